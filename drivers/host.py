@@ -11,7 +11,7 @@ from drivers.control_error import ControlErrorMonitor, SeenVelocity
 from drivers.neighbours import Neighbours
 from drivers.watchdog import Watchdog
 from drivers.watchdog_types import AIRBORNE, Ack, DriverMode, Upstream, VehicleView, WatchdogDecision, WatchdogLimits
-from groundstation.adapters import split_zone
+from groundstation.adapters import ping_to
 from groundstation.bus import clock
 from groundstation.bus.messages import (
     OPERATOR,
@@ -37,6 +37,7 @@ _UNANSWERED_NS, _UNCONFIGURED_NS = 5_000_000_000, 15_000_000_000
 _SILENCE_EVENT_NS = _REFUSAL_PERIOD_NS = 1_000_000_000
 # How long a driver that is to exit goes on for a vehicle it cannot hear.
 _GIVE_UP_NS = 10_000_000_000
+_UNREACHED = "check that it is switched on and that this computer is in its network"
 # Refusals that nothing of ours causes, as the operator reads them.
 _INTRUSIONS = {
     "unsigned": "unsigned frames",
@@ -241,13 +242,12 @@ class VehicleHost:
         limit_ns = _UNANSWERED_NS if decision.mode is DriverMode.CONNECTING else _SILENCE_EVENT_NS
         if not self._silent and now_ns - self._heard_ns >= limit_ns:
             self._silent = True
-            if view.unsound:  # it does answer, and the watchdog's reason says what
+            if view.unsound and decision.mode is not DriverMode.CONNECTING:  # the watchdog's reason says what
                 return
-            host, interface = split_zone(address)
-            ping = f"ping -I {interface} {host}" if interface else f"ping {address}"
-            remedy = f"check that it is switched on and that this computer is in its network: {ping}"
-            self._event(Severity.ERROR, f"{name} does not answer at {address}; trying on", remedy)
-            self._child.degrade(f"{name} does not answer at {address}")
+            told = f"{name}: {view.silence}" if view.unsound else f"{name} does not answer at {address}"
+            remedy = "mend what it says of itself" if view.unsound else f"{_UNREACHED}: {ping_to(address)}"
+            self._event(Severity.ERROR, f"{told}; trying on", remedy)
+            self._child.degrade(told)
 
     def _announce_start(self, now_ns: int, view: VehicleView, decision: WatchdogDecision) -> None:
         """Say READY once the vehicle may take off, or at once when it flies: then it has to be spoken for."""

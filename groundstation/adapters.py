@@ -70,6 +70,12 @@ def with_zone(address: str, interface: str) -> str:
     return f"{address}%{interface}" if interface else address
 
 
+def ping_to(address: str) -> str:
+    """Return what to type to ask whether a vehicle is there, given its address with or without an adapter."""
+    host, interface = split_zone(address)
+    return f"ping -I {interface} {host}" if interface else f"ping {host}"
+
+
 def adapters() -> list[str]:
     """Return the names of this computer's network adapters."""
     return sorted(name for _, name in socket.if_nameindex())

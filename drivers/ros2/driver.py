@@ -12,7 +12,7 @@ from drivers.plausibility.motion import MotionMonitor, MotionSample
 from drivers.rmw_zenoh.wire import vehicle
 from drivers.rmw_zenoh.wire.cdr import WireError
 from drivers.ros2 import names
-from drivers.ros2.flight import FlightWatch, angles_of, levelled
+from drivers.ros2.flight import FlightWatch, angles_of, fault_of_standing, levelled
 from drivers.ros2.link import Ros2Link
 from drivers.ros2.names import Order
 from drivers.ros2.settings import Ros2DriverSettings
@@ -52,6 +52,7 @@ class Ros2Vehicle:
         self._said_ns: dict[Order | None, int] = {}
         self._heard_ns = self._charge_ns = 0
         self._publisher, self._charge, self._rate_hz = b"", 0.0, 0.0
+        self._refused, self._standing, self._height_m, self._was_ordered = "", "", 0.0, False
         self._velocity: Vector3 = (0.0, 0.0, 0.0)
         self._battery_type = names.battery_key(settings.ros2).rpartition("/")[0]
         self._link = Ros2Link(settings.address, settings.ros2, f"skein_{settings.name}", self._hear)
@@ -68,14 +69,18 @@ class Ros2Vehicle:
                 self._rejected["second_publisher"] += 1
             else:
                 self._take(now_ns, vehicle.decode_odometry(payload))
-                self._publisher = publisher
+                self._publisher, self._refused = publisher, ""
         except WireError as error:
             self._rejected[error.reason.replace(" ", "_")] += 1
+            if key.rpartition("/")[0] != self._battery_type:
+                self._refused = error.reason
 
     def _take(self, now_ns: int, message: vehicle.OdometryMessage) -> None:
         roll, pitch, yaw = angles_of(message.quaternion)
         velocity = levelled(message.velocity, roll, pitch)
-        height_m = message.position[2] - self._settings.ros2.standing_z_m
+        standing_z_m = self._settings.ros2.standing_z_m
+        self._height_m = height_m = message.position[2] - standing_z_m
+        self._standing = fault_of_standing(height_m, velocity, roll, pitch, standing_z_m)
         if self._heard_ns:
             self._rate_hz += 0.1 * (NS_PER_S / max(1, now_ns - self._heard_ns) - self._rate_hz)
         self._heard_ns, self._velocity = now_ns, velocity
@@ -105,16 +110,25 @@ class Ros2Vehicle:
         known = self._charge_ns > 0 and now_ns - self._charge_ns < _CHARGE_NS
         trouble = self._link.trouble
         unsound = self._plausibility.report.reason(Health.BAD, LIMITS.essential)
+        if not fresh and self._refused:
+            unsound = self._refusal
         scale, (x, y, z) = self._settings.velocity_scale, self._velocity
         state = self._flight.state(self._asked, math.hypot(x, y, z))
         charge = self._charge if known else None
-        return VehicleView(state, fresh, charge, trouble, not trouble, unsound, (scale * x, scale * y, z))
+        not_ready = trouble or self._standing
+        return VehicleView(state, fresh, charge, not_ready, not trouble, unsound, (scale * x, scale * y, z))
+
+    @property
+    def _refusal(self) -> str:
+        topic = self._settings.ros2.topic(self._settings.ros2.odometry)
+        return f"its odometry (/{topic}) is refused: {self._refused}"
 
     def apply(self, now_ns: int, decision: WatchdogDecision) -> None:
         """Say what the decision means to the vehicle; its climb after a take-off order is its own."""
         if decision.action is not self._asked:
             self._asked = decision.action
             self._said_ns.clear()
+            self._was_ordered |= self._asked is Action.TAKE_OFF
         match decision.action:
             # Where that order is a switch, one more would undo it.
             case Action.CUT if self._flight.airborne or Order.CUT not in self._said_ns:
@@ -162,9 +176,17 @@ class Ros2Vehicle:
         refused = "" if asked is None else self._link.refused.get(asked, "")
         detail = f"it refused to {_WORDS[asked]}: {refused}" if asked and refused else ""
         if self._flight.airborne and not detail:
-            detail = self._link.trouble
+            detail = self._link.trouble or self._unordered
         rate_hz = 0.0 if silent else self._rate_hz
         return LinkHealth(None, rate_hz, dict(self._rejected), detail, self._plausibility.clock.figures)
+
+    @property
+    def _unordered(self) -> str:
+        """Return what to do where a vehicle that was never told to take off is said to be in the air, or ""."""
+        if self._was_ordered:
+            return ""
+        z_m = self._height_m + self._settings.ros2.standing_z_m
+        return f"its odometry says z = {z_m:.2f} m: if it stands, set ros2.standing_z_m to that"
 
     def flush(self) -> None:
         """Publish the raw messages that wait."""

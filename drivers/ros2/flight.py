@@ -9,6 +9,7 @@ from groundstation.bus.messages import FlightState
 
 _AIRBORNE_M, _STILL_M_S, _CLIMB_M_S = 0.2, 0.25, 0.15
 _STANDS_NS = 500_000_000
+_LEANS_RAD, _MOVES_M_S = math.radians(50.0), 1.0
 # Share of the height of its take-off at which that is over.
 _UP = 0.7
 # While a vehicle is told one of these, a low height may be a low flight.
@@ -58,6 +59,24 @@ class FlightWatch:
         if not self.climbed:
             return FlightState.TAKING_OFF
         return FlightState.HOVERING if asked is Action.HOVER and speed_m_s < _STILL_M_S else FlightState.FLYING
+
+
+def fault_of_standing(height_m: float, velocity: Vector3, roll: float, pitch: float, standing_z_m: float) -> str:
+    """Return why what a standing vehicle says of itself cannot be flown by, with the remedy, or "".
+
+    height_m: above standing_z_m; velocity [m/s] and angles [rad] as its odometry has them, levelled.
+    """
+    if height_m < -_AIRBORNE_M:
+        return (
+            f"its odometry says z = {height_m + standing_z_m:.2f} m where it stands: "
+            f"set ros2.standing_z_m, which is {standing_z_m:g}"
+        )
+    if max(abs(roll), abs(pitch)) > _LEANS_RAD:
+        leans = math.degrees(max(abs(roll), abs(pitch)))
+        return f"its odometry says that it stands tilted by {leans:.0f} deg: its axes must be x ahead, y left, z up"
+    if (speed_m_s := math.hypot(*velocity)) > _MOVES_M_S:
+        return f"its odometry says {speed_m_s:.1f} m/s where it stands"
+    return ""
 
 
 def angles_of(quaternion: Quaternion) -> Vector3:

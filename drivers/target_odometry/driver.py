@@ -112,7 +112,8 @@ class OdometryGuard:
         self._publisher, self._heard_ns = publisher, arrival_ns
         if math.hypot(*message.velocity[:2]) > self._fastest_m_s:
             return "too fast"
-        stands_s, late_s = self._clock.update(arrival_ns, message.stamp_ns)
+        # A stamp of 0 is none: some nodes leave it out.
+        stands_s, late_s = self._clock.update(arrival_ns, message.stamp_ns) if message.stamp_ns else (0.0, 0.0)
         if stands_s > _STANDS_S or self._repeats(arrival_ns, message):
             return "hangs"
         return "late" if late_s > _LATE_S else ""

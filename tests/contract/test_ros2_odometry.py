@@ -211,6 +211,11 @@ def test_one_that_hangs_is_refused_whatever_its_stamps_say() -> None:
     assert [says.next(stamp_ns=3 * 10**11) for _ in range(20)][-4:] == ["hangs"] * 4
 
 
+def test_one_whose_node_leaves_stamps_out_is_used() -> None:
+    says = Says()
+    assert {says.next(stamp_ns=0) for _ in range(100)} == {""}
+
+
 def test_one_that_stands_may_repeat_itself() -> None:
     says = Says()
     still: dict[str, Any] = {"position": (0.0, 0.0, 0.0), "velocity": (0.0, 0.0, 0.0), "turn": (0.0, 0.0, 0.0)}

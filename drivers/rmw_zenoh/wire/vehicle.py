@@ -24,6 +24,8 @@ TWIST, TWIST_STAMPED, EMPTY, TRIGGER = HASHES
 NOTHING = CdrWriter().numbers("B", 0).payload
 _COVARIANCE = 36
 _QUATERNION_ERROR = 0.1
+# No vehicle is so high [m], moves or turns so fast [m/s, rad/s]; a larger number, though finite, can become none.
+_ABSURD_M, _ABSURD_PER_S = 1e4, 1e3
 _CHARGE_AT = 6  # voltage, temperature, current, charge, capacity, design capacity stand before it
 
 
@@ -43,15 +45,22 @@ class OdometryMessage:
 
 
 def decode_odometry(payload: bytes) -> OdometryMessage:
-    """Return an Odometry; raises WireError for bytes that are none, values that are no numbers and no rotations."""
+    """Return an Odometry; raises WireError for bytes that are none, and for values that are no motion of a vehicle.
+
+    Those are what is no number or no rotation, absurd heights and velocities, and a twist in the axes of the room,
+    which one frame for both says.
+    """
     reader = CdrReader(payload)
-    stamp_ns, _ = reader.header()
-    reader.text()  # the vehicle's frame
+    stamp_ns, frame = reader.header()
+    if reader.text() == frame != "":
+        raise WireError("twist in the axes of the room")
     x, y, z, qx, qy, qz, qw = reader.numbers("d", 7)
     reader.numbers("d", _COVARIANCE)
     values = reader.numbers("d", 6)
     if not all(map(math.isfinite, (x, y, z, qx, qy, qz, qw, *values))):
         raise WireError("no number")
+    if abs(z) > _ABSURD_M or max(map(abs, values)) > _ABSURD_PER_S:
+        raise WireError("absurd")
     size = math.hypot(qx, qy, qz, qw)
     if abs(size - 1.0) > _QUATERNION_ERROR:
         raise WireError("no rotation")

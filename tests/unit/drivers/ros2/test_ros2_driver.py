@@ -1,0 +1,129 @@
+"""A vehicle behind a ROS 2 node whose messages are wrong: each is refused, with the reason and the remedy."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from drivers.rmw_zenoh.wire import vehicle
+from drivers.ros2 import driver as ros2_driver
+from drivers.ros2.driver import Ros2Vehicle
+from drivers.ros2.settings import Ros2DriverSettings, Ros2Section
+from drivers.watchdog_types import Action, DriverMode, VehicleView, WatchdogDecision
+from groundstation.bus import clock
+from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+from groundstation.bus.messages import FlightState
+from groundstation.bus.topics import ODOMETRY
+
+MS = 1_000_000
+STANDING = vehicle.OdometryMessage(0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+ON_ITS_BACK = (1.0, 0.0, 0.0, 0.0)
+
+
+class FakeLink:
+    """A router whose node takes everything."""
+
+    trouble = ""
+
+    def __init__(self, address: str, section: Ros2Section, node: str, hear: object) -> None:
+        self.refused: dict[str, str] = {}
+
+    def fly(self, velocity: vehicle.Vector3, turn_rad_s: float) -> bytes:
+        return b""
+
+    def order(self, order: object) -> bytes:
+        return b""
+
+    def close(self) -> None: ...
+
+
+class Node:
+    """A node that says what it is told to, and the driver that hears it, 20 times a second."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now_ns = 1_000_000_000
+        monkeypatch.setattr(ros2_driver, "Ros2Link", FakeLink)
+        monkeypatch.setattr(clock, "now_ns", lambda: self.now_ns)
+        exchange = MemoryExchange()
+        self.heard = MemoryBus(exchange, "lab", "tracker").subscribe([ODOMETRY])
+        settings = Ros2DriverSettings(
+            name="drone_1", address="127.0.0.1", pad_m=(0.0, 0.0), ros2=Ros2Section(namespace="drone_1")
+        )
+        self.driver = Ros2Vehicle(settings, MemoryBus(exchange, "lab", "drone_1"))
+
+    def say(
+        self, message: vehicle.OdometryMessage, *, frame: str = "odom", own_frame: str = "base_link"
+    ) -> VehicleView:
+        self.now_ns += 50 * MS
+        payload = vehicle.encode_odometry(message, frame, own_frame)
+        self.driver._hear("0/drone_1/odom/nav_msgs::msg::dds_::Odometry_/RIHS01_x", payload, b"publisher-of-it.")
+        return self.driver.view(self.now_ns)
+
+    @property
+    def rejected(self) -> dict[str, int]:
+        return self.driver.health(self.now_ns).rejected
+
+
+@pytest.fixture
+def node(monkeypatch: pytest.MonkeyPatch) -> Node:
+    return Node(monkeypatch)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "reason"),
+    [
+        (replace(STANDING, velocity=(0.0, 1.7e308, -1.7e308), quaternion=(0.6, 0.0, 0.0, 0.8)), "absurd"),
+        (replace(STANDING, velocity=(1e4, 0.0, 0.0)), "absurd"),
+        (replace(STANDING, position=(0.0, 0.0, 1e308)), "absurd"),
+        (replace(STANDING, turn=(0.0, 0.0, -1e300)), "absurd"),
+        (replace(STANDING, quaternion=(0.0, 0.0, 0.0, 0.0)), "no rotation"),
+        (replace(STANDING, position=(0.0, 0.0, math.inf)), "no number"),
+    ],
+)
+def test_what_is_no_motion_never_reaches_the_watchdog_and_says_why(
+    node: Node, wrong: vehicle.OdometryMessage, reason: str
+) -> None:
+    for _ in range(20):
+        view = node.say(wrong)
+    assert not view.fresh and view.flight_state is FlightState.UNKNOWN
+    assert view.silence.endswith(f"its odometry (/drone_1/odom) is refused: {reason}")
+    assert node.rejected == {reason.replace(" ", "_"): 20} and not node.heard.drain()
+    view = node.say(STANDING)
+    assert view.fresh and not view.unsound and all(map(math.isfinite, view.velocity_m_s or ()))
+
+
+def test_in_flight_what_is_refused_counts_as_silence_with_its_reason(node: Node) -> None:
+    node.say(STANDING)
+    for _ in range(7):
+        view = node.say(replace(STANDING, velocity=(1e9, 0.0, 0.0)))
+    assert not view.fresh and "is refused: absurd" in view.unsound
+
+
+def test_a_twist_in_the_axes_of_the_room_is_no_twist_of_the_vehicle(node: Node) -> None:
+    view = node.say(STANDING, frame="odom", own_frame="odom")
+    assert not view.fresh and "twist in the axes of the room" in view.unsound
+    assert node.say(STANDING, frame="", own_frame="").fresh  # who names none may mean what is usual
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (replace(STANDING, position=(0.0, 0.0, -0.75)), "z = -0.75 m where it stands: set ros2.standing_z_m"),
+        (replace(STANDING, quaternion=ON_ITS_BACK), "stands tilted by 180 deg: its axes must be x ahead"),
+        (replace(STANDING, velocity=(3.0, 0.0, 0.0)), "3.0 m/s where it stands"),
+    ],
+)
+def test_what_cannot_be_true_of_a_standing_vehicle_keeps_it_on_the_floor(
+    node: Node, wrong: vehicle.OdometryMessage, words: str
+) -> None:
+    assert node.say(STANDING).not_ready == ""
+    view = node.say(wrong)
+    assert view.flight_state is FlightState.LANDED and words in view.not_ready and view.configured
+    assert node.say(STANDING).not_ready == ""
+
+
+def test_a_vehicle_that_seems_to_fly_and_was_never_told_to_names_the_setting(node: Node) -> None:
+    node.say(replace(STANDING, position=(4.0, 2.0, 0.42)))
+    assert "z = 0.42 m: if it stands, set ros2.standing_z_m" in node.driver.health(node.now_ns).detail
+    node.driver.apply(node.now_ns, WatchdogDecision(DriverMode.TAKING_OFF, Action.TAKE_OFF))
+    assert node.driver.health(node.now_ns).detail == ""

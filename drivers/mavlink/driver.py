@@ -43,7 +43,7 @@ class Fleet:
         self._news: deque[tuple[str, str]] = deque(maxlen=16)
         shown = {vehicle.system_id: vehicle for vehicle in settings.vehicles}
         self.link: MavlinkLink = open_link(
-            settings.link, self._sniff, lambda transport: with_riders(transport, shown, self._tell_stop)
+            settings.link, self._sniff, lambda transport: with_riders(transport, shown, self._tell)
         )
         self.vehicles = {v.system_id: MavlinkVehicle(settings, v, self.link, child.bus) for v in settings.vehicles}
         self.strangers: Counter[int] = Counter()
@@ -57,8 +57,8 @@ class Fleet:
         if vehicle is not None:
             (vehicle.log.received if received else vehicle.log.sent)(stamp_ns, data)
 
-    def _tell_stop(self, text: str) -> None:
-        self._news.append((text, "RESUME or TRACK takes the drone back"))
+    def _tell(self, text: str, remedy: str) -> None:
+        self._news.append((text, remedy))
 
     def _read(self) -> None:
         while not self._closing.is_set():

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from drivers.mavlink.settings import LinkSettings, MavlinkDriverSettings, VehicleSettings, VisionFeedback
+from drivers.mavlink.settings import Forward, LinkSettings, MavlinkDriverSettings, VehicleSettings, VisionFeedback
 from drivers.vehicle_settings import Address, silence_limits, vehicle_limits
 from groundstation.adapters import with_zone
 from groundstation.errors import SettingsError
@@ -56,7 +56,7 @@ class Mavlink(KindSection):
     parameters: dict[Annotated[str, Field(pattern=r"^[A-Z][A-Z0-9_]{0,15}$")], float] = Field(default={})
     """Parameters of the autopilot that this drone needs otherwise than `groundstation mavlink setup` proposes, or
     besides, by name; the driver warns of the former."""
-    forward: Annotated[str, Field(pattern=r"^(udp:\d{1,3}(\.\d{1,3}){3}:\d{1,5})?$")] = ""
+    forward: Forward = ""
     """A second ground station that sees the vehicle, such as udp:127.0.0.1:14550 for QGroundControl. It may stop the
     vehicle and ask it questions, never fly it. Empty: none."""
     forward_allows: tuple[Literal["parameters", "missions"], ...] = ()
@@ -135,7 +135,7 @@ def _check(orders: Sequence[VehicleOrder]) -> Iterator[tuple[str, Finding]]:
     shared: dict[tuple[int, str], tuple[str, tuple[str, str, str]]] = {}
     for order in orders:
         name, mavlink = order.name, _own(order)
-        for key, text in _way(mavlink):
+        for key, text in _way(order.drone.address, mavlink):
             yield name, (("mavlink", key), text)
         if mavlink.serial and order.drone.interface:
             yield name, (("interface",), "has no meaning on a serial line")
@@ -148,7 +148,16 @@ def _check(orders: Sequence[VehicleOrder]) -> Iterator[tuple[str, Finding]]:
             yield name, (("mavlink", "port"), text)
 
 
-def _way(mavlink: Mavlink) -> Iterator[tuple[str, str]]:
+def _way(address: str, mavlink: Mavlink) -> Iterator[tuple[str, str]]:
+    ours = {
+        f"udp:{host}:{mavlink.port}"
+        for host in (("127.0.0.1", mavlink.local_address) if mavlink.listen else (address,))
+    }
+    if mavlink.forward in ours and not mavlink.serial:
+        yield (
+            "forward",
+            "is the vehicle's own link, which would hear itself: give the second ground station another port",
+        )
     if mavlink.key_file and mavlink.link == "mavsdk":
         yield "link", "must be pymavlink for a signed link: MAVSDK cannot sign"
     elif mavlink.serial and mavlink.listen:

@@ -5,7 +5,7 @@ from enum import Enum
 
 from drivers.mavlink.wire import flight
 from drivers.mavlink.wire.frames import IDS, Message
-from drivers.mavlink.wire.names import CopterMode, Flavour, MavCmd, Px4Auto, Px4Main, px4_mode
+from drivers.mavlink.wire.names import CUSTOM_MODE_ENABLED, CopterMode, Flavour, MavCmd, Px4Auto, Px4Main, px4_mode
 
 
 class Verdict(Enum):
@@ -25,11 +25,21 @@ _STOPPED = {
     Flavour.ARDUPILOT: frozenset((CopterMode.LAND, CopterMode.BRAKE, CopterMode.LOITER, CopterMode.POSHOLD)),
 }
 _QUESTIONS = frozenset((MavCmd.REQUEST_MESSAGE, MavCmd.REQUEST_PROTOCOL_VERSION, MavCmd.REQUEST_AUTOPILOT_CAPABILITIES))
+# WIRE (docs/reference/mavlink.md 5.11.1): values of `current` by which an ArduPilot flies there, or climbs, at once.
+_FLOWN_TO = (2, 3)
 # Kinds of messages by what the field file may allow besides.
 _BY_SETTING = {
     "parameters": frozenset(number for name, number in IDS.items() if name.startswith(("PARAM_REQUEST", "PARAM_SET"))),
     "missions": frozenset(number for name, number in IDS.items() if name.startswith("MISSION_")),
 }
+
+
+_JUDGED = frozenset(IDS[name] for name in ("COMMAND_LONG", "COMMAND_INT", "SET_MODE"))
+
+
+def may_pass(number: int, allowed: Collection[str] = ()) -> bool:
+    """Return whether a frame of this kind can be more than dropped, so that it is worth to be verified."""
+    return number in _JUDGED or any(number in _BY_SETTING[name] for name in allowed)
 
 
 def verdict(
@@ -44,7 +54,10 @@ def verdict(
         case flight.CommandLong() | flight.CommandInt() if message.target_system in (0, system):
             return _of_command(message, flavour)
         case flight.SetMode() if message.target_system == system:
-            return Verdict.STOP if message.custom_mode in _STOPPED[flavour] else Verdict.DROP
+            stops = message.base_mode & CUSTOM_MODE_ENABLED and message.custom_mode in _STOPPED[flavour]
+            return Verdict.STOP if stops else Verdict.DROP
+        case flight.MissionItem() | flight.MissionItemInt() if message.current in _FLOWN_TO:
+            return Verdict.REFUSE
     # WIRE (docs/reference/mavlink.md 5.11): its heartbeat would hide the loss of ours, its clock upset the vehicle's.
     return Verdict.PASS if any(number in _BY_SETTING[name] for name in allowed) else Verdict.DROP
 
@@ -66,8 +79,12 @@ def _of_command(message: flight.CommandLong | flight.CommandInt, flavour: Flavou
 
 def _mode_of(message: flight.CommandLong | flight.CommandInt, flavour: Flavour) -> int:
     """Return the custom mode that a DO_SET_MODE asks for, -1 for a value that is none."""
-    main, sub = message.param2, message.param3
-    if not (0 <= main < 256 and 0 <= sub < 256):
+    base, main, sub = message.param1, message.param2, message.param3
+    if not (0 <= base < 256 and 0 <= main < 256 and 0 <= sub < 256):
+        return -1
+    # WIRE (docs/reference/mavlink.md 5.11.1): without this flag PX4 goes by the others: with that of AUTO it begins a
+    # mission, whatever mode is named.
+    if not int(base) & CUSTOM_MODE_ENABLED:
         return -1
     return px4_mode(int(main), int(sub)) if flavour is Flavour.PX4 else int(main)
 

@@ -3,10 +3,24 @@
 from dataclasses import replace
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
+from pydantic_core import PydanticCustomError
 
-from drivers.vehicle_settings import DriverSection, Name, Positive, SilenceLimits, VehicleLimits
+from drivers.vehicle_settings import DriverSection, Name, Positive, SilenceLimits, VehicleLimits, is_address
 from drivers.watchdog_types import WatchdogLimits
+
+
+def _is_reachable(forward: str) -> str:
+    if forward:
+        _, address, port = forward.split(":")
+        is_address(address)
+        if not 1 <= int(port) <= 65535:
+            raise PydanticCustomError("port", "must end in a port from 1 to 65535")
+    return forward
+
+
+Forward = Annotated[str, Field(pattern=r"^(udp:\d{1,3}(\.\d{1,3}){3}:\d{1,5})?$"), AfterValidator(_is_reachable)]
+"""Where a second ground station listens, such as udp:127.0.0.1:14550; empty: nowhere."""
 
 
 class VisionFeedback(DriverSection):
@@ -85,7 +99,7 @@ class VehicleSettings(DriverSection):
     velocity_std_m_s: Positive = 0.15
     attitude_std_rad: Positive = 0.0053
     parameters: dict[Annotated[str, Field(pattern=r"^[A-Z][A-Z0-9_]{0,15}$")], float] = Field(default={})
-    forward: Annotated[str, Field(pattern=r"^(udp:[0-9.]+:\d+)?$")] = ""
+    forward: Forward = ""
     forward_allows: tuple[Literal["parameters", "missions"], ...] = ()
 
 

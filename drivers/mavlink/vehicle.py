@@ -57,8 +57,8 @@ class MavlinkVehicle:
         self._acks: deque[flight.CommandAckMessage] = deque(maxlen=64)
         self._values: deque[_Value] = deque(maxlen=256)
         rates = streams(self.flavour, vehicle.odometry_hz, vehicle.imu_hz)
-        ours, known, pinned = settings.link.system_id, dict(vehicle.parameters), vehicle.serial_number
-        self._session = MavlinkSession(self.system, self.flavour, rates, ours, settings.origin, known, pinned)
+        self._ours, known, pinned = settings.link.system_id, dict(vehicle.parameters), vehicle.serial_number
+        self._session = MavlinkSession(self.system, self.flavour, rates, self._ours, settings.origin, known, pinned)
         pad = (vehicle.pad_m, vehicle.pad_yaw_rad)
         self.vision = VisionFeed(vehicle.name, clock.clock_id(), settings.vision, *pad)
         self.orders = Orders(vehicle, self.flavour, self._requests)
@@ -146,7 +146,7 @@ class MavlinkVehicle:
                 self._publisher.stated.hear(now_ns, message)
             case telemetry.Statustext():
                 self.texts.append((now_ns, message))
-            case flight.CommandAckMessage():
+            case flight.CommandAckMessage() if message.target_system in (0, self._ours):  # not a second station's
                 self._acks.append(message)
             case service.ParamValue() | telemetry.GpsGlobalOrigin() | telemetry.AutopilotVersion():
                 self._values.append(message)

@@ -10,7 +10,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from drivers.mavlink.links.seam import Address, Heard, Transport
-from drivers.mavlink.riding_along import Verdict, verdict, words_of
+from drivers.mavlink.riding_along import Verdict, may_pass, verdict, words_of
 from drivers.mavlink.settings import VehicleSettings
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.flight import CommandAckMessage, CommandInt, CommandLong
@@ -26,11 +26,14 @@ _FRAMES_PER_S = 50
 _AUTOPILOT = 1
 _log = logging.getLogger(__name__)
 
-Tell = Callable[[str], None]
+_TAKEN_BACK, _MAVLINK_2 = "RESUME or TRACK takes the drone back", "set it to MAVLink 2"
+
+Tell = Callable[[str, str], None]
 
 
 def with_riders(transport: Transport, vehicles: Mapping[int, VehicleSettings], tell: Tell) -> Transport:
-    """Return the link with those who ride along, or as it is where nobody does; tell: stops, for the operator."""
+    """Return the link with those who ride along, or as it is where nobody does; tell: with text and remedy, what
+    the operator must know."""
     riders = {system: Rider(vehicle) for system, vehicle in vehicles.items() if vehicle.forward}
     return ForwardedLink(transport, riders, tell) if riders else transport
 
@@ -82,7 +85,7 @@ class ForwardedLink:
 
     def __init__(self, transport: Transport, riders: Mapping[int, Rider], tell: Tell) -> None:
         self._transport, self._riders, self._tell = transport, riders, tell
-        self._stopped_ns: dict[str, int] = {}
+        self._told_ns: dict[str, int] = {}
         self._closing = threading.Event()
         self._listener = threading.Thread(target=self._listen, name="mavlink-riders", daemon=True)
         self._listener.start()
@@ -153,9 +156,26 @@ class ForwardedLink:
             return
         try:
             for raw in split(data):
-                self._judge(rider, raw, rider.decoder.decode(raw))
+                self._take_frame(rider, raw)
         except WireError as error:
-            self.rejected[f"rider_{error.reason}"] += 1
+            self._reject(rider, error)
+
+    def _take_frame(self, rider: Rider, raw: bytes) -> None:
+        if not may_pass(
+            number_of(raw), rider.allowed
+        ):  # most are: its own position, heartbeats, an echo of what it hears
+            return
+        try:
+            self._judge(rider, raw, rider.decoder.decode(raw))
+        except WireError as error:  # a stop may come behind it
+            self._reject(rider, error)
+
+    def _reject(self, rider: Rider, error: WireError) -> None:
+        self.rejected[f"rider_{error.reason}"] += 1
+        if error.reason == "mavlink_1":
+            self._tell_once(
+                f"{rider.name}: a second ground station speaks MAVLink 1: its stops do not pass", _MAVLINK_2
+            )
 
     def _judge(self, rider: Rider, raw: bytes, frame: ReceivedFrame) -> None:
         message = frame.message
@@ -163,7 +183,7 @@ class ForwardedLink:
             case Verdict.STOP:
                 self._transport.send_raw(rider.system, raw)
                 assert message is not None
-                self._tell_stop(f"{rider.name}: a second ground station stops it ({words_of(message)})")
+                self._tell_once(f"{rider.name}: a second ground station stops it ({words_of(message)})", _TAKEN_BACK)
             case Verdict.PASS if rider.allowance.take(clock.now_ns()):
                 self._transport.send_raw(rider.system, raw)
             case Verdict.PASS:
@@ -175,8 +195,8 @@ class ForwardedLink:
             case Verdict.DROP:
                 pass
 
-    def _tell_stop(self, text: str) -> None:
+    def _tell_once(self, text: str, remedy: str) -> None:
         now_ns = clock.now_ns()
-        last_ns, self._stopped_ns[text] = self._stopped_ns.get(text), now_ns
+        last_ns, self._told_ns[text] = self._told_ns.get(text), now_ns
         if last_ns is None or now_ns - last_ns > NS_PER_S:
-            self._tell(text)
+            self._tell(text, remedy)

@@ -126,6 +126,46 @@ class CommandAckMessage(NamedTuple):
     target_component: int = 0
 
 
+class MissionItem(NamedTuple):
+    """A point of a mission; current: 2 and 3 make an ArduPilot in GUIDED go there, or change its height, at once."""
+
+    target_system: int
+    target_component: int
+    seq: int
+    frame: int
+    command: int
+    current: int
+    autocontinue: int
+    param1: float
+    param2: float
+    param3: float
+    param4: float
+    x: float
+    y: float
+    z: float
+    mission_type: int = 0
+
+
+class MissionItemInt(NamedTuple):
+    """The same with latitude and longitude in 1e-7 degrees."""
+
+    target_system: int
+    target_component: int
+    seq: int
+    frame: int
+    command: int
+    current: int
+    autocontinue: int
+    param1: float
+    param2: float
+    param3: float
+    param4: float
+    x: int
+    y: int
+    z: float
+    mission_type: int = 0
+
+
 class SetMode(NamedTuple):
     """The old way to change the mode (pymavlink, MAVProxy)."""
 

@@ -1,5 +1,9 @@
 """What strangers send to a vehicle's link or in the tracker's name moves nothing, and the operator reads of it."""
 
+from drivers.mavlink.links.seam import Heard
+from drivers.mavlink.wire.flight import CommandAckMessage
+from drivers.mavlink.wire.frames import ReceivedFrame
+from drivers.mavlink.wire.names import MavCmd
 from groundstation.bus.memory_bus import MemoryBus
 from groundstation.bus.messages import Lease, VelocitySetpoint
 from groundstation.bus.topics import LEASE, SETPOINT
@@ -35,3 +39,17 @@ def test_setpoints_and_leases_in_anothers_place_move_nothing_and_are_told(rig_of
     assert abs(rig.body.x - begin[0]) < 0.3 and abs(rig.body.y - begin[1]) < 0.3
     (told,) = (text for text in rig.process.texts if "refused" in text)
     assert "setpoints of another sender" in told and "operator leases of another sender" in told
+
+
+def test_an_answer_to_a_second_ground_station_answers_no_request_of_ours(rig_of):
+    rig = rig_of("px4")
+    rig.connect()
+    requests = rig.vehicle._requests
+    requests.ask(rig.hand.now, "arm", MavCmd.COMPONENT_ARM_DISARM, 1.0)
+    assert requests.due(rig.hand.now)
+    for target, accepted in ((254, set()), (255, {"arm"})):  # 255: us
+        ack = CommandAckMessage(MavCmd.COMPONENT_ARM_DISARM, 0, 0, 0, target, 190)
+        rig.vehicle.hear(Heard(rig.hand.now, ReceivedFrame(11, 1, 0, ack)))
+        while rig.vehicle._acks:
+            requests.answer(rig.hand.now, rig.vehicle._acks.popleft())
+        assert requests.accepted & {"arm"} == accepted

@@ -31,7 +31,7 @@ class Ground:
         address, port = self.vehicle.getsockname()
         self.link = open_link(
             LinkSettings(target=f"udpout:{address}:{port}"),
-            shown=lambda transport: with_riders(transport, {11: ours}, self.told.append),
+            shown=lambda transport: with_riders(transport, {11: ours}, lambda text, _: self.told.append(text)),
         )
         self.vehicle_says, self.station_says = FrameEncoder(11, 1), FrameEncoder(255, 190)
         self.link.send(11, HEARTBEAT)
@@ -139,6 +139,24 @@ def test_set_points_heartbeats_parameters_and_garbage_do_not_pass_and_stops_behi
     refused = {reason: count for reason, count in ground.link.rejected.items() if reason.startswith("rider_")}
     assert sum(refused.values()) == 2, refused
     assert "rider_internal" not in refused
+
+
+def test_a_stop_passes_behind_a_frame_of_no_use_in_one_datagram(ground):
+    stranger = bytearray(ground.station_says.encode(HEARTBEAT))
+    stranger[7:10] = (60_001).to_bytes(3, "little")  # of another dialect
+    damaged = bytearray(ground.station_says.encode(command(MavCmd.NAV_LAND)))
+    damaged[-1] ^= 1
+    ground.send_raw(bytes(stranger + damaged) + ground.station_says.encode(command(MavCmd.NAV_LAND)))
+    assert message_of(ground.vehicle) == command(MavCmd.NAV_LAND)
+    assert ground.link.rejected["rider_checksum"] == 1
+
+
+def test_a_station_with_mavlink_1_is_told_that_its_stops_do_not_pass(ground):
+    for _ in range(3):
+        ground.send_raw(ground.station_says.encode(command(MavCmd.NAV_LAND), old=True))
+    eventually(lambda: ground.told)
+    nothing_comes(ground.vehicle)
+    assert ground.told == ["drone_2: a second ground station speaks MAVLink 1: its stops do not pass"]
 
 
 def test_parameters_pass_where_the_field_allows_them_50_a_second_and_stops_beyond(request):

@@ -2,12 +2,12 @@
 
 import pytest
 
-from drivers.mavlink.riding_along import Verdict, verdict, words_of
+from drivers.mavlink.riding_along import Verdict, may_pass, verdict, words_of
 from drivers.mavlink.wire import flight, service, telemetry
 from drivers.mavlink.wire.frames import CLASSES, IDS, id_of
 from drivers.mavlink.wire.names import FORCE, CopterMode, Flavour, MavCmd, Px4Auto, Px4Main, px4_mode
 
-SYSTEM = 11
+SYSTEM, MAY_PASS = 11, ("PARAM_REQUEST", "PARAM_SET", "MISSION_")
 STOPS = (
     (MavCmd.NAV_LAND,),
     (MavCmd.DO_FLIGHTTERMINATION, 1.0),
@@ -41,7 +41,22 @@ def test_modes_that_stop_pass_and_others_are_refused():
     assert judged(command(MavCmd.DO_SET_MODE, 1, float("nan"))) is Verdict.REFUSE
     landing = flight.SetMode(SYSTEM, 1, px4_mode(Px4Main.AUTO, Px4Auto.LAND))
     assert judged(landing) is Verdict.STOP
+    assert judged(landing._replace(base_mode=4)) is Verdict.DROP
     assert judged(landing._replace(custom_mode=px4_mode(Px4Main.OFFBOARD))) is Verdict.DROP
+
+
+@pytest.mark.parametrize("base", [0, 4, 64, -1, 256, float("nan"), float("inf")])
+def test_a_mode_that_a_px4_would_take_from_the_base_mode_is_no_stop(base):
+    assert judged(command(MavCmd.DO_SET_MODE, base, Px4Main.AUTO, Px4Auto.HOLD)) is Verdict.REFUSE
+
+
+@pytest.mark.parametrize("kind", [flight.MissionItem, flight.MissionItemInt])
+def test_a_point_of_a_mission_passes_unless_the_vehicle_would_fly_there_at_once(kind):
+    point = kind(SYSTEM, 1, 0, 3, 16, 0, 1, 0.0, 0.0, 0.0, 0.0, 1, 1, 2.0)
+    assert judged(point, Flavour.ARDUPILOT) is Verdict.DROP
+    assert judged(point, Flavour.ARDUPILOT, ("missions",)) is Verdict.PASS
+    for flown_to in (2, 3):
+        assert judged(point._replace(current=flown_to), Flavour.ARDUPILOT, ("missions",)) is Verdict.REFUSE
 
 
 @pytest.mark.parametrize("number", [MavCmd.NAV_TAKEOFF, MavCmd.NAV_RETURN_TO_LAUNCH, MavCmd.SET_MESSAGE_INTERVAL, 300])
@@ -61,8 +76,10 @@ def test_no_other_kind_passes_unasked_and_parameters_and_missions_only_where_all
         if number in own:
             continue
         assert verdict(number, None, SYSTEM, Flavour.PX4) is Verdict.DROP
+        assert not may_pass(number) and may_pass(number, ("parameters", "missions")) == name.startswith(MAY_PASS)
         allowed = verdict(number, None, SYSTEM, Flavour.PX4, ("parameters", "missions"))
-        assert (allowed is Verdict.PASS) == name.startswith(("PARAM_REQUEST", "PARAM_SET", "MISSION_"))
+        assert (allowed is Verdict.PASS) == name.startswith(MAY_PASS)
+    assert all(map(may_pass, own))
     assert {"HEARTBEAT", "TIMESYNC", "SET_POSITION_TARGET_LOCAL_NED", "ODOMETRY"} <= CLASSES.keys()
     asked = service.ParamRequestList(SYSTEM, 1)
     assert judged(asked) is Verdict.DROP

@@ -25,7 +25,7 @@ _STOPPED = {
     Flavour.ARDUPILOT: frozenset((CopterMode.LAND, CopterMode.BRAKE, CopterMode.LOITER, CopterMode.POSHOLD)),
 }
 _QUESTIONS = frozenset((MavCmd.REQUEST_MESSAGE, MavCmd.REQUEST_PROTOCOL_VERSION, MavCmd.REQUEST_AUTOPILOT_CAPABILITIES))
-# WIRE (docs/reference/mavlink.md 5.11.1): values of `current` by which an ArduPilot flies there, or climbs, at once.
+# WIRE (docs/reference/mavlink.md 5.11): values of `current` by which an ArduPilot flies there, or climbs, at once.
 _FLOWN_TO = (2, 3)
 # Kinds of messages by what the field file may allow besides.
 _BY_SETTING = {
@@ -82,7 +82,7 @@ def _mode_of(message: flight.CommandLong | flight.CommandInt, flavour: Flavour) 
     base, main, sub = message.param1, message.param2, message.param3
     if not (0 <= base < 256 and 0 <= main < 256 and 0 <= sub < 256):
         return -1
-    # WIRE (docs/reference/mavlink.md 5.11.1): without this flag PX4 goes by the others: with that of AUTO it begins a
+    # WIRE (docs/reference/mavlink.md 5.11): without this flag PX4 goes by the others: with that of AUTO it begins a
     # mission, whatever mode is named.
     if not int(base) & CUSTOM_MODE_ENABLED:
         return -1

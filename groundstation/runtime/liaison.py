@@ -41,21 +41,30 @@ class LiaisonSection(msgspec.Struct, frozen=True):
 
 
 class Liaison:
-    """The talk with one host; times are of the run's clock."""
+    """The talk with one host; times are of the run's clock.
+
+    Of two processes under its name the first is heard until it is silent. doubled: whether a second was heard just now.
+    """
 
     def __init__(self, bus: Bus, section: LiaisonSection) -> None:
         self._bus, self._section = bus, section
         self.reports = bus.subscribe([HOST_REPORT], entity=section.host, source=section.host, capacity=256)
         self._newest: HostReport | None = None
         self._heard_ns = 0
+        self.doubled = False
         self._next_order_ns = 0
 
     def turn(self, now_ns: int, supervision: Supervision) -> None:
         """Answer what came; give the order to a host that does not serve this run yet."""
-        for received in self.reports.drain():
-            if isinstance(received.message, HostReport):
-                self._newest, self._heard_ns = received.message, received.arrived_ns
-                self._answer(received, received.message, supervision)
+        reports = [(one, one.message) for one in self.reports.drain() if isinstance(one.message, HostReport)]
+        if reports:
+            self.doubled = False
+        for received, report in reports:
+            if self._is_second(received, report):
+                self.doubled = True
+                continue
+            self._newest, self._heard_ns = report, received.arrived_ns
+            self._answer(received, report, supervision)
         if supervision is Supervision.WATCHES and not self.serving and now_ns >= self._next_order_ns:
             self._next_order_ns = now_ns + _ORDER_PERIOD_NS
             section = self._section
@@ -63,10 +72,18 @@ class Liaison:
             order = HostOrder(header=header, run=self._bus.run, version=section.version, field=section.field)
             self._bus.publish(HOST_ORDER, order)
 
+    def _is_second(self, received: Received, report: HostReport) -> bool:
+        first = self._newest
+        return first is not None and report.instance != first.instance and not self.silent(received.arrived_ns)
+
     def _answer(self, received: Received, report: HostReport, supervision: Supervision) -> None:
         header = self._bus.header(self._section.host)
         answer = HostAnswer(
-            header=header, supervision=supervision, sent_ns=report.sent_ns, received_ns=received.arrived_ns
+            header=header,
+            supervision=supervision,
+            sent_ns=report.sent_ns,
+            received_ns=received.arrived_ns,
+            instance=report.instance,
         )
         self._bus.publish(HOST_ANSWER, answer)
 
@@ -95,7 +112,7 @@ def run(child: Child) -> int:
     """Speak with the host until the run ends and the devices there have; the process entry."""
     liaison = Liaison(child.bus, msgspec.json.decode(child.section, type=LiaisonSection))
     liaison.reports.on_arrival = child.wake
-    began_ns, ends_ns, was_silent = clock.now_ns(), 0, False
+    began_ns, ends_ns, was_silent, was_doubled = clock.now_ns(), 0, False, False
     while True:
         now_ns = clock.now_ns()
         supervision = _supervision(child)
@@ -105,6 +122,11 @@ def run(child: Child) -> int:
         if silent and not was_silent:
             child.event(Severity.ERROR, "is silent: its devices, or the link to it, are gone", "look at that host")
         was_silent = silent
+        if liaison.doubled and not was_doubled:
+            child.event(
+                Severity.WARNING, "is there twice: the second one gets no devices", "end one `groundstation host`"
+            )
+        was_doubled |= liaison.doubled
         if supervision is Supervision.ENDS:
             ends_ns = ends_ns or now_ns
             if not liaison.serving or silent or now_ns - ends_ns > _LINGER_NS:

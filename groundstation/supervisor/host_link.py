@@ -1,5 +1,6 @@
 """Another host's end of the talk with the run's host: its order, its supervisor's silence, the offset of its clock."""
 
+import os
 from dataclasses import dataclass
 
 from groundstation.bus import clock
@@ -36,6 +37,7 @@ class HostLink:
 
     def __init__(self, bus: Bus, host: str) -> None:
         self._bus, self._host = bus, host
+        self.instance = os.urandom(8).hex()
         self._orders = bus.subscribe([HOST_ORDER], entity=host, newest=True)
         self._answers = bus.subscribe([HOST_ANSWER], entity=host, capacity=256)
         self._offsets = OffsetFilter()
@@ -82,7 +84,7 @@ class HostLink:
 
     def _hear(self, received: Received) -> None:
         answer = received.message
-        if not isinstance(answer, HostAnswer):
+        if not isinstance(answer, HostAnswer) or answer.instance != self.instance:
             return
         if answer.header.clock != self.run_clock:  # the run's host was started anew
             self.run_clock, self._offsets = answer.header.clock, OffsetFilter()
@@ -98,7 +100,14 @@ class HostLink:
 
     def _report(self, own: OwnState) -> None:
         header = self._bus.header(self._host)
-        report = HostReport(header=header, run=own.run, state=own.state, detail=own.detail, sent_ns=clock.own_ns())
+        report = HostReport(
+            header=header,
+            run=own.run,
+            state=own.state,
+            detail=own.detail,
+            sent_ns=clock.own_ns(),
+            instance=self.instance,
+        )
         self._bus.publish(HOST_REPORT, report)
 
     def _publish_offset(self) -> None:

@@ -39,6 +39,8 @@ class HostReport(Message, frozen=True, kw_only=True):
     """What it waits for or lacks, in words."""
     sent_ns: Whole
     """When it was sent, on the host's own boot clock [ns]."""
+    instance: str = ""
+    """Which process it is; two may have been started under one name."""
 
 
 class HostAnswer(Message, frozen=True, kw_only=True):
@@ -50,6 +52,8 @@ class HostAnswer(Message, frozen=True, kw_only=True):
     """Of the report: when it was sent [ns; that host's own boot clock]."""
     received_ns: Whole
     """When the report arrived [ns; header.clock]."""
+    instance: str = ""
+    """Of the report: which process is answered."""
 
 
 class ClockOffset(Message, frozen=True, kw_only=True):

@@ -80,7 +80,7 @@ def test_a_frozen_supervisor_is_silent_and_a_dead_one_ends_the_run(both: Both) -
 def answer(both: Both, name: str, ahead_ns: int) -> HostAnswer:
     header = Header(both.now_ns + ahead_ns, name, HOST, f"liaison_{HOST}", 1)
     stamps = {"sent_ns": both.now_ns - 40 * MS, "received_ns": both.now_ns + ahead_ns - 20 * MS}
-    return HostAnswer(header=header, supervision=Supervision.WATCHES, **stamps)
+    return HostAnswer(header=header, supervision=Supervision.WATCHES, instance=both.link.instance, **stamps)
 
 
 def test_the_offset_of_the_clocks_is_measured_and_published_and_begins_anew_with_another_clock(both: Both) -> None:
@@ -99,3 +99,17 @@ def test_a_report_of_another_name_is_not_heard(both: Both) -> None:
     liar.publish(HOST_REPORT, HostReport(header=liar.header(HOST), run="run-7", sent_ns=0))
     both.turn(None)
     assert not both.liaison.serving
+
+
+def test_of_two_processes_under_one_name_only_the_first_may_serve_until_it_is_silent(both: Both) -> None:
+    both.turn(SERVES, turns=3)
+    second = HostLink(MemoryBus(both.bus._exchange, "lab", HOST), HOST)
+    for _ in range(40):
+        second.turn(both.now_ns, OwnState("", Lifecycle.DEGRADED, "of the second"))
+        both.turn(SERVES)
+    assert both.liaison.doubled and both.liaison.serving and both.link.watches(both.now_ns)
+    assert not second.synchronised and not second.watches(both.now_ns), "or it would start the same drivers"
+    for _ in range(40):
+        second.turn(both.now_ns, OwnState())
+        both.turn(None)
+    assert second.synchronised and second.watches(both.now_ns) and not both.liaison.doubled

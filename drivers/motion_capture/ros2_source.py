@@ -5,6 +5,7 @@ import time
 from collections import Counter, deque
 
 from drivers.motion_capture.captured_frame import CapturedFrame, Pose
+from drivers.motion_capture.pose_guard import PoseGuard
 from drivers.motion_capture.settings import SystemAddress
 from drivers.motion_capture.wire import ros2_pose
 from drivers.rmw_zenoh.session import RouterSession
@@ -24,7 +25,7 @@ class Ros2Source:
         endpoint = f"tcp/{address.host}:{address.port}"
         self.detail = f"no pose from the ROS 2 router {endpoint}"
         self._waiting: deque[tuple[int, str, Pose]] = deque(maxlen=_WAITING)
-        self._came = threading.Event()
+        self._came, self._guard = threading.Event(), PoseGuard()
         self._session = RouterSession(endpoint, [ros2_pose.expression(address.domain, address.path)], self._hear)
 
     def poll(self, wait_s: float) -> list[CapturedFrame]:
@@ -45,12 +46,17 @@ class Ros2Source:
         self._session.close()
 
     def _hear(self, key: str, payload: bytes, publisher: bytes) -> None:
+        now_ns = clock.now_ns()
         try:
             name, dds_type = ros2_pose.body_of(key)
-            pose = ros2_pose.decode_pose(dds_type, payload)
+            said = ros2_pose.decode_pose(dds_type, payload)
         except WireError as error:
             self.rejected[error.reason] += 1
             return
+        if refusal := self._guard.refusal(name, publisher, said.frame, said.stamp_ns, now_ns):
+            self.rejected[refusal] += 1
+            self.detail = f"{refusal} of {name}"
+            return
         self.detail = ""
-        self._waiting.append((clock.now_ns(), name, pose))
+        self._waiting.append((now_ns, name, said.pose))
         self._came.set()

@@ -51,7 +51,7 @@ def dds(kind: str) -> str:
 @pytest.mark.parametrize("frame", ["", "map", "world", "a_frame"])
 def test_a_pose_is_read_as_it_was_written(kind: str, frame: str) -> None:
     payload = written(kind, frame)
-    assert decode_pose(dds(kind), payload) == (PLACE, TURN)
+    assert decode_pose(dds(kind), payload) == (5_000_000_006, frame, (PLACE, TURN))
     for length in range(60):
         with pytest.raises(WireError, match="short"):
             decode_pose(dds(kind), payload[:length])

@@ -3,6 +3,8 @@
 WIRE (docs/reference/ros2.md 1): `<domain>/<topic>/<DDS type>/<type hash>`.
 """
 
+from typing import NamedTuple
+
 from drivers.rmw_zenoh.wire.cdr import CdrReader, CdrWriter, WireError
 
 Vector3 = tuple[float, float, float]
@@ -29,16 +31,24 @@ def body_of(key: str) -> tuple[str, str]:
     return parts[-4], parts[-2]
 
 
-def decode_pose(dds_type: str, payload: bytes) -> tuple[Vector3, Quaternion]:
-    """Return position [m] and quaternion (x, y, z, w); raises WireError for another type and what is cut short."""
+class StampedPose(NamedTuple):
+    """Position [m] and quaternion (x, y, z, w) in a frame, at a time of the publisher's clock [ns], 0 for none."""
+
+    stamp_ns: int
+    frame: str
+    pose: tuple[Vector3, Quaternion]
+
+
+def decode_pose(dds_type: str, payload: bytes) -> StampedPose:
+    """Return what a message says; raises WireError for another type and what is cut short."""
     if dds_type not in _TEXTS:
         raise WireError("type")
     reader = CdrReader(payload)
-    reader.header()
+    stamp_ns, frame = reader.header()
     if _TEXTS[dds_type] == 2:
         reader.text()
     x, y, z, qx, qy, qz, qw = reader.numbers("d", 7)
-    return (x, y, z), (qx, qy, qz, qw)
+    return StampedPose(stamp_ns, frame, ((x, y, z), (qx, qy, qz, qw)))
 
 
 def encode_pose(stamp_ns: int, position: Vector3, quaternion: Quaternion) -> bytes:

@@ -1,0 +1,48 @@
+"""Poses of a ROS 2 topic that are another publisher's, in another frame, or late are not used."""
+
+import pytest
+
+from drivers.motion_capture.pose_guard import PoseGuard
+
+MS, S = 1_000_000, 1_000_000_000
+
+
+class Says:
+    """A guard, and a publisher that speaks 50 times a second; its clock is an hour behind ours."""
+
+    def __init__(self) -> None:
+        self.guard, self.now_ns = PoseGuard(), 10_000 * S
+
+    def next(self, publisher: bytes = b"a", frame: str = "world", age_ms: int = 5, stamp_ns: int | None = None) -> str:
+        self.now_ns += 20 * MS
+        told_ns = self.now_ns - 3600 * S - age_ms * MS if stamp_ns is None else stamp_ns
+        return self.guard.refusal("cf1", publisher, frame, told_ns, self.now_ns)
+
+
+@pytest.mark.parametrize("stamp_ns", [None, 0])
+def test_sound_poses_are_used_with_stamps_or_without(stamp_ns: int | None) -> None:
+    says = Says()
+    assert {says.next(stamp_ns=stamp_ns) for _ in range(100)} == {""}
+
+
+def test_a_second_publisher_waits_until_the_first_is_silent() -> None:
+    says = Says()
+    assert [says.next(), says.next(b"b"), says.next()] == ["", "second publisher", ""]
+    assert [says.next(b"b") for _ in range(60)][-1] == "", "the first was silent for a second"
+
+
+def test_a_frame_that_changes_is_another_place() -> None:
+    says = Says()
+    assert [says.next(), says.next(frame="map"), says.next()] == ["", "another frame", ""]
+
+
+def test_poses_that_waited_somewhere_are_late() -> None:
+    says = Says()
+    assert {says.next() for _ in range(50)} == {""}
+    assert says.next(age_ms=400) == "late"
+    assert says.next() == ""
+
+
+def test_bodies_have_publishers_of_their_own() -> None:
+    guard = PoseGuard()
+    assert guard.refusal("cf1", b"a", "world", 0, S) == guard.refusal("cf2", b"b", "map", 0, S) == ""

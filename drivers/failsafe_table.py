@@ -137,7 +137,7 @@ def _landings(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
                  patience),
         Failsafe(Condition.UNCONVERGED, land, "the tracker does not know where it is", limits.unseen_land_after_s,
                  "safety.unseen_land_after_s", EVENLY, modes=FREE),
-        Failsafe(Condition.NOT_SEEN, land, "no camera has seen it for too long", limits.unseen_land_after_s,
+        Failsafe(Condition.NOT_SEEN, land, "not seen by any camera for too long", limits.unseen_land_after_s,
                  "safety.unseen_land_after_s", modes=FREE),
         Failsafe(Condition.UNLOCATED, land, "no position from the cameras", limits.lost_land_s, modes=FREE),
         Failsafe(Condition.STRAYS, land, "it does not do what it is told: {why}", limits.stray_land_s, modes=FREE),

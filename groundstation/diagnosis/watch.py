@@ -34,7 +34,7 @@ class FigureWatch:
         refuted = [one for one in self._standing if all(verdict.leads.get(s, 0.0) < _REFUTED for s in one)]
         notices = [self._accusation(charges) for key, charges in named.items() if key not in self._standing]
         for key in refuted:
-            text = f"{self._standing.pop(key).text}: what was told is refuted"
+            text = f"{self._standing.pop(key).text}: no longer suspected"
             notices.append(Notice(Severity.INFO, text, entity=key[0][0]))
         if named:  # what explained it before is explained otherwise
             self._standing = {key: self._suspected(key, charges, now_ns) for key, charges in named.items()}
@@ -46,9 +46,9 @@ class FigureWatch:
         return SuspectedFigure(who, text, remedy, known.told_ns if known else now_ns)
 
     def _accusation(self, charges: tuple[Charge, ...]) -> Notice:
-        text = f"{sentence(charges, self._field)}: that explains best why the team's sightings do not meet"
+        text = f"{sentence(charges, self._field)}: that explains best why the team's sightings disagree"
         if len(charges) > 1:
-            text += "; which of them cannot be told yet, the first is likeliest"
+            text += "; which of them it is cannot be told yet, the first is the most likely"
         return Notice(Severity.WARNING, text, remedies(charges, self._field), charges[0].suspect[0])
 
 

@@ -16,7 +16,7 @@ _MOUNTED = {
     "left": ("sits {size} farther to the left", "sits {size} farther to the right"),
     "up": ("sits {size} higher", "sits {size} lower"),
     "z": ("hangs {size} higher", "hangs {size} lower"),
-    "aside": ("hangs {size} aside", "hangs {size} aside"),
+    "aside": ("hangs {size} to the side of", "hangs {size} to the side of"),
     "yaw": ("is turned by {size}", "is turned by {size}"),
     "tilted": ("is tilted by {size}", "is tilted by {size}"),
 }
@@ -60,7 +60,9 @@ def _what(charge: Charge, field: ResolvedField) -> str:
 
 
 def _against(what: str) -> str:
-    return "against the field" if what in ("yaw", "tilted", "aside") else "than the field says"
+    if what == "aside":
+        return "where the field puts it"
+    return "compared with the field" if what in ("yaw", "tilted") else "than the field says"
 
 
 def _remedy(charge: Charge, field: ResolvedField) -> str:

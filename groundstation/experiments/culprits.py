@@ -11,7 +11,7 @@ SIZE_SHARE = 0.25
 # What accuses somebody or something; other warnings tell what follows from it.
 _ACCUSES = ("explains best", "contradicts the belief", "its pictures seem", "was bumped")
 _EXCUSED = "probably not its fault"
-_REFUTED = "what was told is refuted"
+_REFUTED = "no longer suspected"
 
 
 def accusations(flight: Mapping[str, Any]) -> list[tuple[float, str]]:

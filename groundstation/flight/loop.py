@@ -183,7 +183,7 @@ class Flight:
                 operator.take_off(now_ns, anyway=self._plan.anyway or line.strip() == b"anyway")
                 self._prompting = bool(operator.forbidden)
                 if self._prompting:
-                    self._say("mend it and press Enter, or type anyway and press Enter")
+                    self._say("fix it and press Enter, or type anyway and press Enter")
         if not self._prompting:
             self._start.show_screen()
 

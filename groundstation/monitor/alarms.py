@@ -20,14 +20,14 @@ _BEFORE_FLIGHT = {
     Charge.EMPTY: "charge it before it flies again",
     Charge.UNKNOWN: "until it is known it may not take off",
 }
-_AFTER_LANDING = "Nothing to do now: see to its power and cable when all have landed."
-_RESTARTED = "Nothing to do: what hangs is started again."
+_AFTER_LANDING = "Nothing to do now: check its power and cable once all have landed."
+_RESTARTED = "Nothing to do: it is restarted if it hangs."
 _DOWN = {
     FlightState.EMERGENCY: (
         "EMERGENCY",
-        f"{_TO_DO}keep away until its motors stand, then level it on its pad.",
+        f"{_TO_DO}keep away until its motors have stopped, then set it upright on its pad.",
     ),
-    FlightState.LOST: ("its driver hears nothing of it", f"{_TO_DO}see to its battery and its link."),
+    FlightState.LOST: ("its driver no longer hears it", f"{_TO_DO}check its battery and its link."),
 }
 
 
@@ -126,7 +126,7 @@ def _lost(state: MonitorState) -> Iterator[Alarm]:
     for entity in (entity for entity in entities if entity.age_s > state.cast.lost_after_s):
         seen = state.vehicles.get(entity.name)
         if entity.name in state.cast.targets:
-            advice = "Nothing to do: who is in TRACK looks for it."
+            advice = "Nothing to do: the drones in TRACK search for it."
         elif seen and seen.message.flight_state in AIRBORNE and seen.message.lands_in_s is None:
             advice = "Nothing to do: it lands by itself if this lasts."
         else:

@@ -32,7 +32,9 @@ def finding(field: ResolvedField, opinion: Opinion) -> Finding:
         return Finding(level, SUBJECT, told[0][1], told[0][2])
     either = ", or ".join(text for _, text, _ in told)
     checks = "; or ".join(remedy for _, _, remedy in told)
-    return Finding(level, SUBJECT, f"{either}: which of them cannot be told from here, the first is likeliest", checks)
+    return Finding(
+        level, SUBJECT, f"{either}: which of them it is cannot be told from here, the first is the most likely", checks
+    )
 
 
 def _unexplained(opinion: Opinion) -> Finding:

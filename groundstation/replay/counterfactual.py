@@ -54,8 +54,8 @@ def _figures(figures: RunFigures) -> dict[str, float | None]:
     for name, accuracy in accuracies.items():
         rows[f"{name} rmse [m]"] = accuracy.rmse_m
         rows[f"{name} greatest error [m]"] = accuracy.max_error_m
-        rows[f"{name} anees (1 is honest)"] = accuracy.anees
-    rows |= {f"nis {edge} (1 is honest)": value for edge, value in figures.mean_nis.items()}
+        rows[f"{name} anees (1 is ideal)"] = accuracy.anees
+    rows |= {f"nis {edge} (1 is ideal)": value for edge, value in figures.mean_nis.items()}
     rows |= {f"observations {verdict}": float(count) for verdict, count in sorted(figures.verdicts.items())}
     rows |= {
         f"{title(f'topology_seconds.{name}')} [s]": value for name, value in sorted(figures.topology_seconds.items())

@@ -89,7 +89,7 @@ def _details(report: RunReport) -> Text:
     for name, target in figures.targets.items():
         if target.anees is not None:
             label = "target" if len(figures.targets) == 1 else f"{name}: rms error {target.rmse_m:.3f} m"
-            lines.append(f"{label}: covered {target.covered:.0%}, normalised error {target.anees:.2f} (1 = honest)")
+            lines.append(f"{label}: covered {target.covered:.0%}, normalised error {target.anees:.2f} (1 is ideal)")
     return Text("\n".join(f"  {line}" for line in lines))
 
 

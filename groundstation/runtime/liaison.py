@@ -120,7 +120,7 @@ def run(child: Child) -> int:
         _tell(child, liaison, now_ns, now_ns - began_ns < _START_NS)
         silent = liaison.silent(now_ns) and liaison.serving
         if silent and not was_silent:
-            child.event(Severity.ERROR, "is silent: its devices, or the link to it, are gone", "look at that host")
+            child.event(Severity.ERROR, "is silent: it, or the link to it, is down", "look at that host")
         was_silent = silent
         if liaison.doubled and not was_doubled:
             child.event(

@@ -28,7 +28,7 @@ def all_are_held(flight: FakeFlight) -> None:
 def one_is_unseen_and_will_land(flight: FakeFlight) -> None:
     flight.unseen_s["drone_1"] = 4.0
     flight.lands_in_s["drone_1"] = 6.0
-    flight.detail["drone_1"] = "no camera has seen it for too long"
+    flight.detail["drone_1"] = "not seen by any camera for too long"
 
 
 def the_tracker_is_silent(flight: FakeFlight) -> None:

@@ -34,7 +34,7 @@ def ten_alarms(flight: FakeFlight) -> None:
     flight.braked.add("drone_2")
     flight.detail["drone_2"] = "hovers: its sensors cannot be believed: its velocity is stuck at 0.27 m/s"
     flight.lands_in_s["drone_1"] = 12.0
-    flight.detail["drone_1"] = "no camera has seen it for too long"
+    flight.detail["drone_1"] = "not seen by any camera for too long"
 
 
 @pytest.mark.parametrize("size", FLOWN)

@@ -7,7 +7,8 @@ from groundstation.report.trust import Trust
 
 _NOTE = (
     "NIS is the squared difference between what a sensor said and what was expected, by how large it should be: "
-    "1 is honest. Its interval allows for errors that repeat within two seconds."
+    "1 is ideal, more means that the estimate was too sure of itself. "
+    "Its interval allows for errors that repeat within two seconds."
 )
 
 
@@ -16,7 +17,7 @@ def trust_section(trust: Trust) -> str:
     if trust.doubts:
         verdict = "<ul>" + "".join(f"<li>{escape(doubt)}</li>" for doubt in trust.doubts) + "</ul>"
     else:
-        verdict = "<p>Nothing speaks against it.</p>"
+        verdict = "<p>No reason to doubt them.</p>"
     return verdict + _sensors(trust) + _figures(trust) + _links(trust) + f'<p class="dim">{_NOTE}</p>'
 
 

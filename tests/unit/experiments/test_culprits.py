@@ -10,7 +10,7 @@ from groundstation.experiments.culprits import accusations, row_of, table, verdi
 
 FIELD = {"cameras": {"ceiling": {}}, "drones": {"a": {}, "b": {}}, "target": {"name": "rover"}}
 LABS = {lab.name: lab for lab in labs_of(FIELD)}
-EXPLAINS = ": that explains best why the team's sightings do not meet"
+EXPLAINS = ": that explains best why the team's sightings disagree"
 
 
 def flown(*told: tuple[float, str, str], on_pads: tuple[tuple[str, str], ...] = (), remedy: str = "") -> dict[str, Any]:

@@ -55,11 +55,11 @@ def test_what_asks_for_an_act_stands_first_then_what_is_grave(world: World) -> N
 
 
 def test_what_keeps_a_drone_from_its_plan_is_an_alarm_with_what_follows(world: World) -> None:
-    world.vehicle("drone_1", detail="no camera has seen it for too long", lands_in_s=6.2, braked=True)
+    world.vehicle("drone_1", detail="not seen by any camera for too long", lands_in_s=6.2, braked=True)
     world.vehicle("drone_2", detail="hovers: its velocity is stuck", braked=True)
     world.text()
     first, second = alarms_of(world.state, NOW)
-    assert (first.text, first.grave) == ("drone_1 lands in 6 s: no camera has seen it for too long", True)
+    assert (first.text, first.grave) == ("drone_1 lands in 6 s: not seen by any camera for too long", True)
     assert "HOLD does not stop that" in first.advice
     assert (second.text, second.grave) == ("drone_2 hovers: its velocity is stuck", False)
 
@@ -107,8 +107,8 @@ def test_a_drone_that_nobody_sees_is_lost_unless_its_landing_says_so(world: Worl
     world.vehicle("drone_1")
     world.estimate(drone_age_s=4.0)
     assert _alarms(world) == ["drone_1 is lost: not seen for 4 s"]
-    world.vehicle("drone_1", detail="no camera has seen it for too long", lands_in_s=6.0)
-    assert _alarms(world) == ["drone_1 lands in 6 s: no camera has seen it for too long"]
+    world.vehicle("drone_1", detail="not seen by any camera for too long", lands_in_s=6.0)
+    assert _alarms(world) == ["drone_1 lands in 6 s: not seen by any camera for too long"]
 
 
 def test_a_camera_without_pictures_raises_an_alarm(world: World) -> None:

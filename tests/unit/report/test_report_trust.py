@@ -76,7 +76,7 @@ def test_nothing_speaks_against_a_healthy_run() -> None:
     assert ceiling.nis_per_dof == pytest.approx(1.0, abs=0.15)
     assert ceiling.low is not None and ceiling.high is not None and 0.02 < ceiling.high - ceiling.low < 0.5
     assert trust.links[0].seen_percent == pytest.approx(100.0, abs=0.1)
-    assert "Nothing speaks against it." in trust_section(trust)
+    assert "No reason to doubt them." in trust_section(trust)
 
 
 def test_an_empty_run_has_no_doubts() -> None:

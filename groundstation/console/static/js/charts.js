@@ -10,7 +10,7 @@ const HEIGHT = 118;
 const CHARTS = [
   { title: "Target", unit: "m", curves: [["axis_m", "95 % semi-axis", ofTarget], ["error_m", "true error", () => ink().truth]], digits: 2 },
   { title: "Cost", unit: "cm²", curves: [["cost_cm2", "chosen topology", () => ink().text]], digits: 0 },
-  { title: "NIS per degree of freedom", unit: "", curves: [["nis", "1 is honest", () => ink().band]], digits: 2, band: true },
+  { title: "NIS per degree of freedom", unit: "", curves: [["nis", "1 is ideal", () => ink().band]], digits: 2, band: true },
 ];
 let made = [];
 

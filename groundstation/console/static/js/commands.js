@@ -9,7 +9,7 @@ import { forbidden } from "./preflight.js";
 import { ageS, droneNames, now, replaying, runOver, serverNow, store } from "./store.js";
 
 const SHOWN = 5, KEPT_MS = 30000, PRESS_MS = 1000, STOP_LIVES_MS = 5000;
-const OVER = "the run has ended: nothing is left to command";
+const OVER = "the run has ended: no order can be given any more";
 const WORDS = { TAKEOFF: "TAKE OFF", CUT_MOTORS: "CUT MOTORS" };
 const STATES = {
   unsent: "NOT SENT", dropped: "NOT SENT", sent: "NOT CONFIRMED", heard: "acknowledged", confirmed: "✓ confirmed", refused: "REFUSED", not_confirmed: "NOT CONFIRMED",
@@ -25,7 +25,7 @@ export function give(verb, drones = [], run = store.run, anyway = false) {
   const order = { ref: `${me.client}-${++count}`, verb, drones, run, anyway, given: moment(), given_ms: now() };
   own.push(order);
   if (!mayGive(verb)) { put(order, "refused", roleText()); return showOrders(); }
-  put(order, "unsent", `no connection: goes out if it is back within ${STOP_LIVES_MS / 1000} s. Now: ${inShell(verb)}`);
+  put(order, "unsent", `no connection: it is sent if the connection is back within ${STOP_LIVES_MS / 1000} s. Now: ${inShell(verb)}`);
   if (runOver()) put(order, "dropped", OVER);
   else if (run === store.run && transmit(order)) put(order, "sent");
   else if (!STOPS.has(verb)) put(order, "dropped", "no connection");
@@ -53,7 +53,7 @@ function dropUnsent() {
 
 function sendUnsent() {
   dropUnsent();
-  for (const order of own) if (order.state === "unsent" && transmit(order)) put(order, "sent", "sent when the connection was back");
+  for (const order of own) if (order.state === "unsent" && transmit(order)) put(order, "sent", "sent once the connection was back");
   showOrders();
 }
 
@@ -139,7 +139,7 @@ function barred(session) {
   if (!me.trusted) return ["looking only", "this page may only look"];
   if (!mayGive("TAKEOFF")) return [`may ${me.role} only`, roleText()];
   if (session.operator && session.operator !== me.client) return ["another page starts", "another page is the operator: take over first"];
-  return session.lease ? null : ["no lease", "the ground station's main process holds no lease"];
+  return session.lease ? null : ["no lease", "the ground station's main process may not give orders now"];
 }
 
 function showStarts(why) {

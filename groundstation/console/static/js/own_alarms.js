@@ -14,7 +14,7 @@ export function ownAlarms() {
   if (!store.connected) alarms.push({ kind: "link", about: "link", title: "NO CONNECTION TO THE CONSOLE", more: [store.reason && `${store.reason}.`, old].filter(Boolean).join(" "), shell: true });
   else if (consoleSilent()) alarms.push({ kind: "silent", about: "silent", title: `CONSOLE SILENT for ${seconds(silentS())}`, more: old, shell: true });
   const stop = store.connected ? unheardStop() : null;
-  if (stop) alarms.push({ kind: "unheard", about: `unheard ${stop.id}`, title: `${stop.verb} NOT CONFIRMED: no answer from ${stop.names}`, more: "To do: press again. What flies on: groundstation land in a shell, or its own remote control." });
+  if (stop) alarms.push({ kind: "unheard", about: `unheard ${stop.id}`, title: `${stop.verb} NOT CONFIRMED: no answer from ${stop.names}`, more: "To do: press again. If a drone flies on: groundstation land in a shell, or its own remote control." });
   return alarms;
 }
 

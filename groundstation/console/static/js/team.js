@@ -92,7 +92,7 @@ function showVehicle(name, { root, values, mode, detail }) {
 
 // A vehicle that is not heard does nobody knows what: only its landing is certain.
 function showDuty(node, name, silent) {
-  text(node, silent ? "Nothing is heard of it: its own failsafes count." : dutyOf(name));
+  text(node, silent ? "It is not heard: only its own failsafes protect it now." : dutyOf(name));
   node.classList.toggle("low", Boolean(landsIn(name) || silent));
 }
 
@@ -120,7 +120,7 @@ function showBattery(node, status) {
 const UNSEEN_S = 0.6; // a target may then be hidden, or be elsewhere
 
 function beliefWords(body, age, lost) {
-  if (trackerSilent()) return "Where it is now nobody knows: the tracker is silent.";
+  if (trackerSilent()) return "Where it is now is not known: the tracker is silent.";
   if (!body) return "";
   if (lost) return `Lost: nobody has seen it for ${seconds(age)}. ${doing("TRACK").length ? `${joined(doing("TRACK"))} ${doing("TRACK").length > 1 ? "look" : "looks"} for it.` : ""}`.trim();
   if (age > UNSEEN_S) return `Not seen for ${seconds(age)}: it may be hidden near (${body.mean.slice(0, 2).map((value) => value.toFixed(1)).join(", ")}).`;

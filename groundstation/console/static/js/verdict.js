@@ -16,7 +16,7 @@ const DEEDS = {
 const LOOKS = ["looks for the target", "look for the target"];
 const NEXT = {
   "TAKING OFF": "Each is seen from outside before the next one rises.",
-  LANDING: "Who lands stays down until a new TAKE OFF.",
+  LANDING: "A drone that has landed stays down until a new TAKE OFF.",
 };
 
 // Whom a failsafe lands, told together where it is at the same time: [names, [words of one, of several]].
@@ -59,7 +59,7 @@ function takeOff() {
 }
 
 export function verdict() {
-  if (!modes().length) return "Nothing is heard of the drones yet.";
+  if (!modes().length) return "No drone has been heard yet.";
   if (stage() === "over") return store.connected && !store.s.result ? "The run is over: it is being judged." : "The run is over.";
   if (!aloft()) return `Nobody flies. ${takeOff()}`;
   return [deeds(), lost(), NEXT[teamMode()[0]] ?? start()].filter(Boolean).join(" ");

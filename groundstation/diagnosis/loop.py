@@ -51,10 +51,8 @@ class Diagnosis:
             took_ns = now_ns - self._begun_ns
             self._due_ns, self._begun_ns = max(self._begun_ns + _PAUSE_NS, now_ns + _PAUSES * took_ns), None
             self._tell(now_ns)
-        if (
-            self._watch.figures and now_ns >= self._told_ns + _PAUSE_NS
-        ):  # a console that was started again has not heard it
-            self._publish(now_ns)
+        if self._watch.figures and now_ns >= self._told_ns + _PAUSE_NS:
+            self._publish(now_ns)  # a console that was started again has not heard it
         if now_ns >= self._due_ns and (flown := self._window.flown()) is not None:
             self._begun_ns = now_ns
             self._judging.begin(partial(verdict_on, flown, self._field))

@@ -68,27 +68,32 @@ def verdict_on(flown: Flown, field: ResolvedField) -> Verdict | None:
     try:
         batch = TeamBatch(team_record(flown, field), field)
         fit = batch.fit(np.diag(batch.figures.wide**2))
+        count = max(1.0, fit.misfit / _USUAL_MISFIT)
+        verdict = weighed(*fit.if_alike(count), batch.figures.surveyed, tuple(batch.figures.suspicions()))
+        return _tried(verdict, batch, count)
     except (OperatorMistake, np.linalg.LinAlgError):
         return None
-    count = max(1.0, fit.misfit / _USUAL_MISFIT)
-    verdict = weighed(*fit.if_alike(count), batch.figures.surveyed, tuple(batch.figures.suspicions()))
-    return _tried(verdict, batch, count)
 
 
 def _tried(verdict: Verdict, batch: TeamBatch, count: float) -> Verdict:
-    """Return what is left of a verdict once the flight was explained with each charge, and without any."""
+    """Return what is left of a verdict once the flight was explained with each charge, and without any.
+
+    Leads of what was tried are those of the fits: what explains nothing is refuted, however sure the linear model is.
+    """
     known = {(s.who, s.what): s for s in batch.figures.suspicions()}
-    sigma, causes = np.diag(batch.figures.surveyed**2), list[tuple[Charge, ...]]()
+    sigma, causes, leads = np.diag(batch.figures.surveyed**2), list[tuple[Charge, ...]](), dict(verdict.leads)
     for accused in verdict.causes:
         without = batch.fit(sigma).log_evidence(sigma, count)
         tried = [_retried(batch, sigma, known[charge.suspect], without, count) for charge in accused]
+        if not causes:  # later ones lead beside those that were found
+            leads |= {charge.suspect: charge.lead for charge in tried}
         best = max(tried, key=lambda charge: charge.lead)
         charges = [charge for charge in sorted(tried, key=lambda one: -one.lead) if charge.lead > best.lead - RULED_OUT]
         if not _is_told(charges[0]):
             break
         causes.append(tuple(charges))
         sigma = sigma + spread(known[best.suspect])
-    return Verdict(tuple(causes), verdict.leads)
+    return Verdict(tuple(causes), leads)
 
 
 def _retried(batch: TeamBatch, sigma: Array, s: Suspicion, without: float, count: float) -> Charge:

@@ -170,10 +170,7 @@ class Supervisor:
 
     @property
     def unwell(self) -> list[str]:
-        """Names of what was started and does not work (yet): a camera without pictures, a silent drone.
-
-        What nobody waits for is not one of them while it starts for the first time.
-        """
+        """Names of what was started and does not work (yet), but for what begins and is not awaited."""
         started = [p for p in self.processes if p.life and not p.spec.on_terminal and p.state is not SlotState.READY]
         return [p.spec.name for p in started if p.spec.awaited or not p.begins]
 

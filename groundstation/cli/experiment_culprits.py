@@ -89,8 +89,9 @@ def _order(order: dict[str, Any], base: dict[str, Any], lab: "WrongLab") -> str:
     scenario = {**base, "cameras": cameras, "faults": list(lab.faults)}
     from groundstation.experiments.culprit_rows import STAND_S
 
-    wrong = {"errors": lab.errors, "exchanged": lab.exchanged, "stand_s": STAND_S}
-    return json.dumps(order | wrong | {"scenario": scenario}, sort_keys=True)
+    wrong = {"errors": lab.errors, "exchanged": lab.exchanged}
+    times = {"stand_s": STAND_S, "diagnosed_from_s": lab.diagnosed_from_s}
+    return json.dumps(order | wrong | times | {"scenario": scenario}, sort_keys=True)
 
 
 def _chosen(only: str, labs: "tuple[WrongLab, ...]") -> "list[WrongLab]":

@@ -19,6 +19,7 @@ class WrongLab:
     errors, exchanged, faults: what it is; cameras: how bad their pictures are besides. says: what must be told first,
     as a regular expression of `SUBJECT: TEXT` whose group is the size; none: no figure is wrong, none may be blamed.
     size: in the unit of that text; None: it has none. on_pads: it must be found before anybody takes off.
+    diagnosed_from_s: when the diagnosis comes up, in seconds after the start; the order to take off comes at STAND_S.
     """
 
     name: str
@@ -29,6 +30,7 @@ class WrongLab:
     says: str = ""
     size: float | None = None
     on_pads: bool = False
+    diagnosed_from_s: float = 0.0
 
     @property
     def since_s(self) -> float:
@@ -41,6 +43,7 @@ _FIGURE = r"(-?[\d.]+) \+- [\d.]+"
 _LATE_MS, _TURN_DEG, _ASIDE_M, _PRINT, _FOCAL = 50.0, 3.0, 0.2, 0.05, 0.03
 _BUMP_DEG, _BUMPED_AT_S = 5.0, 22.0
 _FAILS_AT_S = 22.0
+_ALL_FLY_S = 18.0
 
 
 def labs_of(field: Mapping[str, Any]) -> tuple[WrongLab, ...]:
@@ -62,6 +65,7 @@ def _healthy() -> Iterable[WrongLab]:
     yield WrongLab("nothing")
     yield WrongLab("30 % of frames lost", cameras={"frame_loss": 0.3})
     yield WrongLab("corner noise x 3", cameras={"corner_noise_px": 0.6})
+    yield WrongLab("diagnosis begun in the air", diagnosed_from_s=_ALL_FLY_S)
 
 
 def _delays(ceiling: str, one: str) -> Iterable[WrongLab]:

@@ -87,13 +87,13 @@ def _as_wanted(lab: WrongLab, ends: Sequence[str]) -> int:
 def table(rows: Iterable[Mapping[str, Any]]) -> list[str]:
     """Return the rows as lines of text, below each what was said otherwise."""
     head = ("wrong", "as wanted", "latest", "size", "rmse")
-    lines = ["{:22s} {:>9s} {:>8s} {:>6s} {:>8s}  ends".format(*head)]
+    lines = ["{:27s} {:>9s} {:>8s} {:>6s} {:>8s}  ends".format(*head)]
     for row in rows:
         latest = "-" if row["latest_s"] is None else f"{row['latest_s']:.1f} s"
         size = "-" if row["size_ok"] is None else f"{row['size_ok']}/{row['sizes']}"
         rmse = "-" if row["rmse_m"] is None else f"{row['rmse_m']:.3f} m"
         ends = ", ".join(f"{end} {count}" for end, count in row["ends"].items())
         wanted = f"{row['as_wanted']}/{row['flights']}"
-        lines.append(f"{row['lab']:22s} {wanted:>9s} {latest:>8s} {size:>6s} {rmse:>8s}  {ends}")
+        lines.append(f"{row['lab']:27s} {wanted:>9s} {latest:>8s} {size:>6s} {rmse:>8s}  {ends}")
         lines += [f"    seed {seed}: {said[:150]}" for seed, said in row["otherwise"].items()]
     return lines

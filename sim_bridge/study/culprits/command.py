@@ -1,7 +1,7 @@
 """`python -m sim_bridge.study culprits < order.json`: fly some seeds with wrong figures.
 
 The order's own: errors as [who, part, true minus told], exchanged as [drone, whose marker it carries], stand_s: seconds
-on the pads.
+on the pads; diagnosed_from_s: when the diagnosis comes up.
 """
 
 from typing import Any
@@ -22,4 +22,5 @@ def _fly(order: FlightOrder, seed: int) -> dict[str, Any]:
     errors = {(who, part): size for who, part, size in order.own["errors"]}
     wrong = WrongFigures(errors, dict(order.own["exchanged"]))
     drawn = as_drawn(order.field, order.scenario, seed)
-    return CulpritFlight(drawn, order.sections, order.seconds, wrong, order.own["stand_s"]).fly()
+    times = order.own["stand_s"], order.own["diagnosed_from_s"]
+    return CulpritFlight(drawn, order.sections, order.seconds, wrong, *times).fly()

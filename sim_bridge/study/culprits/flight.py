@@ -25,15 +25,21 @@ class CulpritFlight(ScenarioFlight):
     """
 
     def __init__(
-        self, drawn: Drawn, sections: Sequence[Section], seconds: float, wrong: WrongFigures, stand_s: float
+        self,
+        drawn: Drawn,
+        sections: Sequence[Section],
+        seconds: float,
+        wrong: WrongFigures,
+        stand_s: float,
+        diagnosed_from_s: float,
     ) -> None:
         super().__init__(drawn, sections, seconds, "ours", wrong)
-        self._stand_s = stand_s
+        self._stand_s, self._diagnosed_from_s = stand_s, diagnosed_from_s
         self.on_pads: list[tuple[str, str]] | None = None
         self.told: list[tuple[float, str, str, str, str]] = []
         self._pads = PadRecord(self._field.world_sensors)
         self._sightings = self._bus("preflight").subscribe([OBSERVATION])
-        self._diagnosis = Diagnosis(self._bus("diagnosis"), self._field, AtOnce())
+        self._diagnosis: Diagnosis | None = None
 
     def may_start(self) -> bool:
         """Judge the pads once the team has stood for a while; then it may."""
@@ -52,6 +58,10 @@ class CulpritFlight(ScenarioFlight):
     def step(self) -> None:
         """Advance by a tick, with the diagnosis."""
         super().step()
+        if self._diagnosis is None:
+            if self.world.time_s >= self._diagnosed_from_s:
+                self._diagnosis = Diagnosis(self._bus("diagnosis"), self._field, AtOnce())
+            return
         self._diagnosis.turn(self.now_ns)
         for notice in self._diagnosis.notices:
             self.note(self.world.time_s, notice)

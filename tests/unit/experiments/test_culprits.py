@@ -80,6 +80,13 @@ def test_a_device_that_fails_makes_no_figure_wrong() -> None:
     assert verdict_on(lab, flown((19.0, "ceiling", blamed)))["end"] == "false alarm"
 
 
+def test_a_diagnosis_that_begins_in_the_air_blames_nobody() -> None:
+    lab = LABS["diagnosis begun in the air"]
+    assert lab.diagnosed_from_s > 15.0 and LABS["nothing"].diagnosed_from_s == 0.0
+    blamed = "drone_2's camera has a focal length 7.6 +- 2.2 % shorter than calibrated" + EXPLAINS
+    assert verdict_on(lab, flown((27.0, "drone_2", blamed)))["end"] == "false alarm"
+
+
 def test_a_row_counts_what_was_wanted_and_names_the_rest() -> None:
     lab = WrongLab("x", says="a: (\\d+) off", size=10.0, on_pads=True)
     ends = ((1, 0.1, "refused"), (2, 0.4, "refused"), (3, 0.0, "right"), (4, None, "wrong"))

@@ -149,15 +149,9 @@ def _check(orders: Sequence[VehicleOrder]) -> Iterator[tuple[str, Finding]]:
 
 
 def _way(address: str, mavlink: Mavlink) -> Iterator[tuple[str, str]]:
-    ours = {
-        f"udp:{host}:{mavlink.port}"
-        for host in (("127.0.0.1", mavlink.local_address) if mavlink.listen else (address,))
-    }
-    if mavlink.forward in ours and not mavlink.serial:
-        yield (
-            "forward",
-            "is the vehicle's own link, which would hear itself: give the second ground station another port",
-        )
+    hosts = ("127.0.0.1", mavlink.local_address) if mavlink.listen else (address,)
+    if not mavlink.serial and mavlink.forward in {f"udp:{host}:{mavlink.port}" for host in hosts}:
+        yield "forward", "is the vehicle's own link, which would hear itself: give the second ground station its own"
     if mavlink.key_file and mavlink.link == "mavsdk":
         yield "link", "must be pymavlink for a signed link: MAVSDK cannot sign"
     elif mavlink.serial and mavlink.listen:

@@ -32,8 +32,7 @@ Tell = Callable[[str, str], None]
 
 
 def with_riders(transport: Transport, vehicles: Mapping[int, VehicleSettings], tell: Tell) -> Transport:
-    """Return the link with those who ride along, or as it is where nobody does; tell: with text and remedy, what
-    the operator must know."""
+    """Return the link with those who ride along, or as it is where nobody does; tell: texts with their remedies."""
     riders = {system: Rider(vehicle) for system, vehicle in vehicles.items() if vehicle.forward}
     return ForwardedLink(transport, riders, tell) if riders else transport
 
@@ -161,10 +160,8 @@ class ForwardedLink:
             self._reject(rider, error)
 
     def _take_frame(self, rider: Rider, raw: bytes) -> None:
-        if not may_pass(
-            number_of(raw), rider.allowed
-        ):  # most are: its own position, heartbeats, an echo of what it hears
-            return
+        if not may_pass(number_of(raw), rider.allowed):
+            return  # as most are: its own position, heartbeats, an echo of what it hears
         try:
             self._judge(rider, raw, rider.decoder.decode(raw))
         except WireError as error:  # a stop may come behind it

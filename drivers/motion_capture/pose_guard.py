@@ -3,20 +3,17 @@
 from dataclasses import dataclass, field
 
 from drivers.plausibility.clock_watch import ClockWatch
-from groundstation.time_units import NS_PER_S
+from drivers.rmw_zenoh.publisher_tie import PublisherTie
 
-# A publisher that is silent for so long may be followed by another one: the node was started anew.
-_HEIR_NS = NS_PER_S
 _LATE_S = 0.3
 
 
 @dataclass(slots=True)
 class _Topic:
-    """Who publishes a body's poses, in which frame, when it was heard last, and its clock against ours."""
+    """In which frame a body's poses come, who publishes them, and that clock against ours."""
 
-    publisher: bytes
     frame: str
-    heard_ns: int
+    tie: PublisherTie = field(default_factory=PublisherTie)
     clock: ClockWatch = field(default_factory=ClockWatch)
 
 
@@ -32,11 +29,11 @@ class PoseGuard:
         How late it is counts against the freshest poses of the last 5 to 10 s: the publisher's clock may differ.
         """
         topic = self._topics.get(body)
-        if topic is None or arrival_ns - topic.heard_ns >= _HEIR_NS:
-            topic = self._topics[body] = _Topic(publisher, frame, arrival_ns)
-        if publisher != topic.publisher:
+        if topic is None or topic.tie.silent(arrival_ns):
+            topic = self._topics[body] = _Topic(frame)
+        if topic.tie.is_second(publisher, arrival_ns):
             return "second publisher"
-        topic.heard_ns = arrival_ns
+        topic.tie.hear(publisher, arrival_ns)
         if frame != topic.frame:
             return "another frame"
         if stamp_ns and topic.clock.update(arrival_ns, stamp_ns)[1] > _LATE_S:

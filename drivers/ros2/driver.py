@@ -9,6 +9,7 @@ from drivers.host import fly_one
 from drivers.plausibility.health import Health
 from drivers.plausibility.limits import PlausibilityLimits
 from drivers.plausibility.motion import MotionMonitor, MotionSample
+from drivers.rmw_zenoh.publisher_tie import PublisherTie
 from drivers.rmw_zenoh.wire import vehicle
 from drivers.rmw_zenoh.wire.cdr import WireError
 from drivers.ros2 import names
@@ -26,8 +27,6 @@ from groundstation.time_units import NS_PER_S
 
 RATE_HZ = 20.0
 _FRESH_NS = 300_000_000
-# A publisher that is silent for so long may be followed by another one: the node was started anew.
-_HEIR_NS = NS_PER_S
 # Charges come seldom; an older one is unknown.
 _CHARGE_NS = 30 * NS_PER_S
 _STANDING_M = 0.08  # the base of a standing vehicle, as its kind says
@@ -51,7 +50,7 @@ class Ros2Vehicle:
         self._asked = Action.WAIT
         self._said_ns: dict[Order | None, int] = {}
         self._heard_ns = self._charge_ns = 0
-        self._publisher, self._charge, self._rate_hz = b"", 0.0, 0.0
+        self._tie, self._charge, self._rate_hz = PublisherTie(), 0.0, 0.0
         self._refused, self._standing, self._height_m, self._was_ordered = "", "", 0.0, False
         self._velocity: Vector3 = (0.0, 0.0, 0.0)
         self._battery_type = names.battery_key(settings.ros2).rpartition("/")[0]
@@ -65,11 +64,12 @@ class Ros2Vehicle:
         try:
             if key.rpartition("/")[0] == self._battery_type:
                 self._charge, self._charge_ns = vehicle.decode_charge(payload), now_ns
-            elif publisher != self._publisher and self._heard_ns and now_ns - self._heard_ns < _HEIR_NS:
+            elif self._tie.is_second(publisher, now_ns):
                 self._rejected["second_publisher"] += 1
             else:
                 self._take(now_ns, vehicle.decode_odometry(payload))
-                self._publisher, self._refused = publisher, ""
+                self._tie.hear(publisher, now_ns)
+                self._refused = ""
         except WireError as error:
             self._rejected[error.reason.replace(" ", "_")] += 1
             if key.rpartition("/")[0] != self._battery_type:

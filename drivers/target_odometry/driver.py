@@ -6,6 +6,7 @@ from collections import Counter, deque
 
 from drivers.base import HostProcess, read_sensor_section
 from drivers.plausibility.clock_watch import ClockWatch
+from drivers.rmw_zenoh.publisher_tie import PublisherTie
 from drivers.rmw_zenoh.session import RouterSession
 from drivers.rmw_zenoh.wire import graph, vehicle
 from drivers.rmw_zenoh.wire.cdr import WireError
@@ -19,8 +20,6 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 _POLL_S, _WAITING = 0.02, 64
 # The tracker is told no more often: neighbouring readings of one wheel err alike.
 _PERIOD_NS = 45_000_000
-# A publisher that is silent for so long may be followed by another one: the node was started anew.
-_HEIR_NS = NS_PER_S
 # What stands for so long hangs, what is so late was true long ago [s].
 _STANDS_S, _LATE_S = 0.3, 0.3
 # More than a base can do is no slip any more.
@@ -99,17 +98,16 @@ class OdometryGuard:
     def __init__(self, fastest_m_s: float) -> None:
         self._fastest_m_s = fastest_m_s
         self._clock = ClockWatch()
-        self._publisher, self._heard_ns = b"", 0
+        self._tie = PublisherTie()
         self._told: tuple[object, ...] = ()
         self._changed_ns = 0
 
     def refusal(self, arrival_ns: int, message: vehicle.OdometryMessage, publisher: bytes) -> str:
         """Return why a message is not used, in words, or ""."""
-        if publisher != self._publisher and self._heard_ns and arrival_ns - self._heard_ns < _HEIR_NS:
+        if self._tie.is_second(publisher, arrival_ns):
             return "second publisher"
-        if publisher != self._publisher:
+        if self._tie.hear(publisher, arrival_ns):
             self._clock.reset()
-        self._publisher, self._heard_ns = publisher, arrival_ns
         if math.hypot(*message.velocity[:2]) > self._fastest_m_s:
             return "too fast"
         # A stamp of 0 is none: some nodes leave it out.

@@ -1,0 +1,27 @@
+"""One publisher of a topic at a time. Pure."""
+
+from groundstation.time_units import NS_PER_S
+
+# A publisher that is silent for so long may be followed by another one: the node was started anew.
+_HEIR_NS = NS_PER_S
+
+
+class PublisherTie:
+    """Ties a topic to the publisher that was heard on it, until that one is silent for a second."""
+
+    def __init__(self) -> None:
+        self._publisher, self._heard_ns = b"", 0
+
+    def silent(self, now_ns: int) -> bool:
+        """Return whether the publisher was not heard for a second, or ever."""
+        return not self._heard_ns or now_ns - self._heard_ns >= _HEIR_NS
+
+    def is_second(self, publisher: bytes, now_ns: int) -> bool:
+        """Return whether this is not the publisher that the topic is tied to."""
+        return publisher != self._publisher and not self.silent(now_ns)
+
+    def hear(self, publisher: bytes, now_ns: int) -> bool:
+        """Tie the topic to a publisher that was heard; returns whether it is another one than before."""
+        changed = publisher != self._publisher
+        self._publisher, self._heard_ns = publisher, now_ns
+        return changed

@@ -32,14 +32,16 @@ _BY_SETTING = {
     "parameters": frozenset(number for name, number in IDS.items() if name.startswith(("PARAM_REQUEST", "PARAM_SET"))),
     "missions": frozenset(number for name, number in IDS.items() if name.startswith("MISSION_")),
 }
-
-
 _JUDGED = frozenset(IDS[name] for name in ("COMMAND_LONG", "COMMAND_INT", "SET_MODE"))
 
 
 def may_pass(number: int, allowed: Collection[str] = ()) -> bool:
     """Return whether a frame of this kind can be more than dropped, so that it is worth to be verified."""
-    return number in _JUDGED or any(number in _BY_SETTING[name] for name in allowed)
+    return number in _JUDGED or _is_allowed(number, allowed)
+
+
+def _is_allowed(number: int, allowed: Collection[str]) -> bool:
+    return any(number in _BY_SETTING[name] for name in allowed)
 
 
 def verdict(
@@ -59,7 +61,7 @@ def verdict(
         case flight.MissionItem() | flight.MissionItemInt() if message.current in _FLOWN_TO:
             return Verdict.REFUSE
     # WIRE (docs/reference/mavlink.md 5.11): its heartbeat would hide the loss of ours, its clock upset the vehicle's.
-    return Verdict.PASS if any(number in _BY_SETTING[name] for name in allowed) else Verdict.DROP
+    return Verdict.PASS if _is_allowed(number, allowed) else Verdict.DROP
 
 
 def _of_command(message: flight.CommandLong | flight.CommandInt, flavour: Flavour) -> Verdict:

@@ -151,15 +151,9 @@ class ConsoleState:
 
 
 def _alarm(alarm: Alarm) -> dict[str, Any]:
-    told = None if alarm.told_ns is None else alarm.told_ns / 1e6
-    return {
-        "about": alarm.about,
-        "text": alarm.text,
-        "grave": alarm.grave,
-        "advice": alarm.advice,
-        "asks": alarm.asks,
-        "told": told,
-    }
+    values = asdict(alarm)
+    told_ns = values.pop("told_ns")
+    return {**values, "asks": alarm.asks, "told": None if told_ns is None else told_ns / 1e6}
 
 
 def _ms(seen: StampedMessage[Any]) -> float:

@@ -82,17 +82,17 @@ def _tried(verdict: Verdict, batch: TeamBatch, count: float) -> Verdict:
     """
     known = {(s.who, s.what): s for s in batch.figures.suspicions()}
     sigma, causes, leads = np.diag(batch.figures.surveyed**2), list[tuple[Charge, ...]](), dict(verdict.leads)
+    without = batch.fit(sigma).log_evidence(sigma, count) if verdict.causes else 0.0
     for accused in verdict.causes:
-        without = batch.fit(sigma).log_evidence(sigma, count)
         tried = [_retried(batch, sigma, known[charge.suspect], without, count) for charge in accused]
         if not causes:  # later ones lead beside those that were found
             leads |= {charge.suspect: charge.lead for charge in tried}
-        best = max(tried, key=lambda charge: charge.lead)
-        charges = [charge for charge in sorted(tried, key=lambda one: -one.lead) if charge.lead > best.lead - RULED_OUT]
-        if not _is_told(charges[0]):
+        tried.sort(key=lambda charge: -charge.lead)
+        best = tried[0]
+        if not _is_told(best):
             break
-        causes.append(tuple(charges))
-        sigma = sigma + spread(known[best.suspect])
+        causes.append(tuple(charge for charge in tried if charge.lead > best.lead - RULED_OUT))
+        sigma, without = sigma + spread(known[best.suspect]), without + best.lead
     return Verdict(tuple(causes), leads)
 
 

@@ -30,14 +30,14 @@ class FigureWatch:
 
     def take(self, verdict: Verdict, now_ns: int) -> list[Notice]:
         """Return what is new of a verdict that was reached at this time."""
-        named = {_suspects(charges): charges for charges in verdict.causes}
+        named = {(key := _suspects(one)): self._suspected(key, one, now_ns) for one in verdict.causes}
         refuted = [one for one in self._standing if all(verdict.leads.get(s, 0.0) < _REFUTED for s in one)]
-        notices = [self._accusation(charges) for key, charges in named.items() if key not in self._standing]
+        notices = [_accusation(figure, len(key)) for key, figure in named.items() if key not in self._standing]
         for key in refuted:
             text = f"{self._standing.pop(key).text}: no longer suspected"
             notices.append(Notice(Severity.INFO, text, entity=key[0][0]))
         if named:  # what explained it before is explained otherwise
-            self._standing = {key: self._suspected(key, charges, now_ns) for key, charges in named.items()}
+            self._standing = named
         return notices
 
     def _suspected(self, key: tuple[Suspect, ...], charges: tuple[Charge, ...], now_ns: int) -> SuspectedFigure:
@@ -45,11 +45,12 @@ class FigureWatch:
         who, text, remedy = charges[0].suspect[0], sentence(charges, self._field), remedies(charges, self._field)
         return SuspectedFigure(who, text, remedy, known.told_ns if known else now_ns)
 
-    def _accusation(self, charges: tuple[Charge, ...]) -> Notice:
-        text = f"{sentence(charges, self._field)}: that explains best why the team's sightings disagree"
-        if len(charges) > 1:
-            text += "; which of them it is cannot be told yet, the first is the most likely"
-        return Notice(Severity.WARNING, text, remedies(charges, self._field), charges[0].suspect[0])
+
+def _accusation(figure: SuspectedFigure, charges: int) -> Notice:
+    text = f"{figure.text}: that explains best why the team's sightings disagree"
+    if charges > 1:
+        text += "; which of them it is cannot be told yet, the first is the most likely"
+    return Notice(Severity.WARNING, text, figure.remedy, figure.entity)
 
 
 def _suspects(charges: tuple[Charge, ...]) -> tuple[Suspect, ...]:

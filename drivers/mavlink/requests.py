@@ -80,10 +80,11 @@ class Requests:
             self.accepted.add(key)
         else:
             self._quiet_until_ns[key] = now_ns + _REFUSED_NS
-            self.failures.append(f"{key}: {_word(ack.result)}")
+            self.failures.append(f"{key}: {word_of(ack.result)}")
 
 
-def _word(result: int) -> str:
+def word_of(result: int) -> str:
+    """Return the result of a command in words."""
     try:
         return MavResult(result).name.lower().replace("_", " ")
     except ValueError:

@@ -1,11 +1,21 @@
 """What a second ground station may say to a vehicle: questions and stops, nothing that flies it. Pure."""
 
+import math
 from collections.abc import Collection
 from enum import Enum
 
 from drivers.mavlink.wire import flight
 from drivers.mavlink.wire.frames import IDS, Message
-from drivers.mavlink.wire.names import CUSTOM_MODE_ENABLED, CopterMode, Flavour, MavCmd, Px4Auto, Px4Main, px4_mode
+from drivers.mavlink.wire.names import (
+    CUSTOM_MODE_ENABLED,
+    FORCE,
+    CopterMode,
+    Flavour,
+    MavCmd,
+    Px4Auto,
+    Px4Main,
+    px4_mode,
+)
 
 
 class Verdict(Enum):
@@ -18,12 +28,17 @@ class Verdict(Enum):
 
 
 # Modes in which a vehicle stops by itself: stands, lands, or is a pilot's to hold.
-_STOPPED = {
-    Flavour.PX4: frozenset(
-        (px4_mode(Px4Main.AUTO, Px4Auto.HOLD), px4_mode(Px4Main.AUTO, Px4Auto.LAND), px4_mode(Px4Main.POSITION))
-    ),
-    Flavour.ARDUPILOT: frozenset((CopterMode.LAND, CopterMode.BRAKE, CopterMode.LOITER, CopterMode.POSHOLD)),
+_STOPPED: dict[Flavour, dict[int, str]] = {
+    Flavour.PX4: {
+        px4_mode(Px4Main.AUTO, Px4Auto.HOLD): "HOLD",
+        px4_mode(Px4Main.AUTO, Px4Auto.LAND): "LAND",
+        px4_mode(Px4Main.POSITION): "POSITION",
+    },
+    Flavour.ARDUPILOT: {
+        mode: mode.name for mode in (CopterMode.LAND, CopterMode.BRAKE, CopterMode.LOITER, CopterMode.POSHOLD)
+    },
 }
+_CHANGE_MODE = 1.0
 _QUESTIONS = frozenset((MavCmd.REQUEST_MESSAGE, MavCmd.REQUEST_PROTOCOL_VERSION, MavCmd.REQUEST_AUTOPILOT_CAPABILITIES))
 # WIRE (docs/reference/mavlink.md 5.11): values of `current` by which an ArduPilot flies there, or climbs, at once.
 _FLOWN_TO = (2, 3)
@@ -74,6 +89,8 @@ def _of_command(message: flight.CommandLong | flight.CommandInt, flavour: Flavou
             return Verdict.STOP if message.param1 == 0.0 else Verdict.REFUSE
         case MavCmd.DO_SET_MODE:
             return Verdict.STOP if _mode_of(message, flavour) in _STOPPED[flavour] else Verdict.REFUSE
+        case MavCmd.DO_REPOSITION:
+            return Verdict.STOP if flavour is Flavour.PX4 and _goes_nowhere(message) else Verdict.REFUSE
         case number if number in _QUESTIONS:
             return Verdict.PASS
     return Verdict.REFUSE
@@ -91,9 +108,38 @@ def _mode_of(message: flight.CommandLong | flight.CommandInt, flavour: Flavour) 
     return px4_mode(int(main), int(sub)) if flavour is Flavour.PX4 else int(main)
 
 
-def words_of(message: Message) -> str:
-    """Return a stop in words for the operator."""
-    if isinstance(message, flight.SetMode):
-        return f"mode {message.custom_mode:#x}"
-    number = message.command if isinstance(message, flight.CommandLong | flight.CommandInt) else -1
-    return MavCmd(number).name.lower().replace("_", " ") if number in set(MavCmd) else f"command {number}"
+def _goes_nowhere(message: flight.CommandLong | flight.CommandInt) -> bool:
+    """Return whether a DO_REPOSITION names no place, height or heading.
+
+    WIRE (docs/reference/mavlink.md 5.11): so QGroundControl's Pause of a PX4, which then holds where it comes to rest.
+    """
+    if not isinstance(message, flight.CommandLong) or message.param2 != _CHANGE_MODE:
+        return False
+    return all(map(math.isnan, (message.param4, message.param5, message.param6, message.param7)))
+
+
+def made_good(message: Message, system: int, flavour: Flavour) -> Message | None:
+    """Return what has to follow a stop so that its vehicle is seen to have stopped, None for nothing.
+
+    WIRE (docs/reference/mavlink.md 5.11): an ArduPilot that is paused stays in GUIDED, deaf to velocities until the
+    mode is entered anew: nothing would tell us, and no RESUME of ours would end it.
+    """
+    pauses = isinstance(message, flight.CommandLong | flight.CommandInt) and message.command == MavCmd.DO_PAUSE_CONTINUE
+    if flavour is not Flavour.ARDUPILOT or not pauses:
+        return None
+    return flight.CommandLong(system, 1, MavCmd.DO_SET_MODE, 0, CUSTOM_MODE_ENABLED, CopterMode.BRAKE)
+
+
+def words_of(stop: Message, flavour: Flavour) -> str:
+    """Return a stop, as `verdict` found it, in words for the operator."""
+    if isinstance(stop, flight.SetMode):
+        return _STOPPED[flavour][stop.custom_mode]
+    assert isinstance(stop, flight.CommandLong | flight.CommandInt)
+    match stop.command:
+        case MavCmd.DO_SET_MODE:
+            return _STOPPED[flavour][_mode_of(stop, flavour)]
+        case MavCmd.DO_REPOSITION | MavCmd.DO_PAUSE_CONTINUE:
+            return "pause"
+        case MavCmd.COMPONENT_ARM_DISARM:
+            return "motors off" if stop.param2 == FORCE else "disarm"
+    return "LAND" if stop.command == MavCmd.NAV_LAND else "flight termination"

@@ -32,6 +32,7 @@ class ArduCopter(AutopilotFirmware):
         self._climb_to_m: float | None = None
         self._take_off_s = 0.0
         self._braked = True
+        self._paused = False
         self._ground_lost = self._aiding_stopped = False
 
     def knows(self, mode: int) -> bool:
@@ -71,16 +72,26 @@ class ArduCopter(AutopilotFirmware):
             self.copter.steer(Steering.HOLD)
 
     def obey(self, velocity_m_s: tuple[float, float, float], turn: float) -> None:
-        """Fly; a velocity ends a take-off, and moves nothing that stands."""
-        if self.copter.airborne:
+        """Fly; a velocity ends a take-off, and moves nothing that stands or is paused."""
+        if self.copter.airborne and not self._paused:
             self._climb_to_m = None
             self._braked = False
             super().obey(velocity_m_s, turn)
+
+    def pause(self, goes_on: bool) -> Answer:
+        """Stand still in GUIDED until the mode is entered anew; WIRE (docs/reference/mavlink.md 5.11)."""
+        if self.mode != Mode.GUIDED:
+            return MavResult.FAILED, "not in GUIDED"
+        self._paused = not goes_on
+        if self._paused and self.copter.airborne:
+            self.copter.steer(Steering.HOLD)
+        return MavResult.ACCEPTED, ""
 
     def enter(self, mode: int) -> None:
         """Change the mode; a take-off belongs to GUIDED."""
         if mode != Mode.GUIDED:
             self._climb_to_m = None
+            self._paused = False
         super().enter(mode)
 
     def step(self, now_s: float, ground_silence_s: float) -> None:

@@ -88,6 +88,14 @@ class AutopilotFirmware:
         """Climb to a height above the floor."""
         raise NotImplementedError
 
+    def reposition(self, parameters: tuple[float, ...]) -> Answer:
+        """Fly to a place, or stop here where none is named; parameters: the seven of the command."""
+        return MavResult.UNSUPPORTED, ""
+
+    def pause(self, goes_on: bool) -> Answer:
+        """Stop what the mode does, or go on with it."""
+        return MavResult.UNSUPPORTED, ""
+
     def fly(self, setpoint: SetPositionTargetLocalNed) -> None:
         """Take a set-point.
 

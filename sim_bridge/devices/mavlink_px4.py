@@ -1,5 +1,7 @@
 """PX4 1.16 as far as a ground station meets it (docs/reference/mavlink.md 2, 5.2)."""
 
+import math
+
 from drivers.mavlink.wire.flight import SetPositionTargetLocalNed
 from drivers.mavlink.wire.names import Flavour, MavResult, Px4Auto, Px4Main, px4_mode
 from sim_bridge.devices.mavlink_firmware import Answer, AutopilotFirmware
@@ -62,6 +64,12 @@ class Px4(AutopilotFirmware):
         self.enter(TAKE_OFF)
         self._climb_to_m = height
         return MavResult.ACCEPTED, ""
+
+    def reposition(self, parameters: tuple[float, ...]) -> Answer:
+        """Hold here where no place is named; WIRE (docs/reference/mavlink.md 5.11): QGroundControl's Pause."""
+        if parameters[1] != 1.0 or not all(map(math.isnan, parameters[3:])):
+            return super().reposition(parameters)
+        return self.set_mode(HOLD)
 
     def enter(self, mode: int) -> None:
         """Change the mode; a take-off belongs to its own, and AUTO.TAKEOFF without a height takes the parameter's."""

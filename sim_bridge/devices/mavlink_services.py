@@ -102,6 +102,10 @@ class Services:
                 return firmware.take_off(p[6] if math.isfinite(p[6]) else 0.0), []
             case MavCmd.NAV_LAND:
                 return firmware.land(), []
+            case MavCmd.DO_REPOSITION:
+                return firmware.reposition(p), []
+            case MavCmd.DO_PAUSE_CONTINUE:
+                return firmware.pause(goes_on=p[0] != 0.0), []
             case MavCmd.SET_MESSAGE_INTERVAL:
                 return self._set_interval(p), []
             case MavCmd.REQUEST_MESSAGE:

@@ -1,8 +1,10 @@
-"""The real driver and a stand-in for the tracker; as a process, `PORT LINK PLACES [RIDER]`, of two vehicles on a port.
+"""The real driver and a stand-in for the tracker; as a process of two vehicles on a port.
+
+`PORT LINK PLACES [RIDER [ALLOWED]]`.
 
 The stand-in tells the driver where the vehicles are (as a process: as the file PLACES says, x, y, z, yaw of each as
 doubles in the order of FLAVOURS), takes off and flies them forward at 0.4 m/s, at 1.2 m. RIDER: the port of a second
-ground station on this host, to which both are forwarded.
+ground station on this host, to which both are forwarded; ALLOWED: what it may do besides to look and to stop.
 """
 
 import itertools
@@ -114,5 +116,6 @@ class Pilot:
 
 
 if __name__ == "__main__":
-    riding = {"forward": f"udp:127.0.0.1:{sys.argv[4]}"} if len(sys.argv) > 4 else {}
+    riding: dict = {"forward": f"udp:127.0.0.1:{sys.argv[4]}"} if len(sys.argv) > 4 else {}
+    riding |= {"forward_allows": sys.argv[5:]}
     Pilot(int(sys.argv[1]), sys.argv[2], places_of(sys.argv[3]), **riding).fly()

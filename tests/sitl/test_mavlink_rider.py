@@ -1,40 +1,25 @@
 """A second ground station that floods a forwarded link: set-points go out as evenly as without it, stops pass."""
 
-import importlib.util
 import itertools
-import math
 import socket
-import subprocess
-import sys
-import threading
 import time
-from pathlib import Path
 
-import numpy as np
 import pytest
-from arrival_times import ANCILLARY, ArrivalTimes
+from ridden_flight import FLAVOURS, described, hangar, is_on_time, port, ridden
 from spare_time import needing_processors
 
-from drivers.mavlink.wire.flight import CommandLong, SetPositionTargetLocalNed
-from drivers.mavlink.wire.frames import MAX_DATAGRAM, FrameEncoder, id_of
+from drivers.mavlink.wire.flight import CommandLong
+from drivers.mavlink.wire.frames import MAX_DATAGRAM, FrameEncoder
 from drivers.mavlink.wire.names import MavCmd
 from drivers.mavlink.wire.service import ParamRequestList
-from drivers.mavlink.wire.verification import number_of
+
+__all__ = ["hangar", "port"]  # fixtures
 
 pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(180)]
-HERE = Path(__file__).parent
-_SPEC = importlib.util.spec_from_file_location(
-    "mavlink_hangar", HERE.parent / "contract" / "mavlink_links" / "conftest.py"
-)
-assert _SPEC is not None and _SPEC.loader is not None
-_hangar = importlib.util.module_from_spec(_SPEC)
-_SPEC.loader.exec_module(_hangar)
-hangar, port = _hangar.hangar, _hangar.port
 
-STOPPED, FLOWN = 11, 12  # the rider floods the way of one; the other shows what that costs the link that both share
+# The rider floods the way of one; the other shows what that costs the link that both share.
+STOPPED, FLOWN = FLAVOURS["px4"], FLAVOURS["ardupilot"]
 SECONDS, A_SECOND = 8.0, 1000
-UNEVEN = 1.5  # what chance adds to the 99th percentile of some 80 gaps
-VEHICLE_WAITS_S = 0.5  # GUID_TIMEOUT: beyond it an ArduPilot brakes
 STOPS = "a second ground station stops it"
 SAY = FrameEncoder(255, 190).encode
 STOP = SAY(CommandLong(STOPPED, 1, MavCmd.NAV_LAND, 0))
@@ -44,36 +29,6 @@ FLOOD = (
     SAY(CommandLong(STOPPED, 1, MavCmd.COMPONENT_ARM_DISARM, 0, 1.0)),
     STOP,
 )
-
-
-class TimedSocket:
-    """An emulator's socket that notes when set-points arrived [s]."""
-
-    def __init__(self, udp):
-        self._udp, self._times, self.setpoints_s = udp, ArrivalTimes(udp), []
-
-    def recvfrom(self, size):
-        data, notes, _, source = self._udp.recvmsg(size, ANCILLARY)
-        if number_of(data) == id_of(SetPositionTargetLocalNed):
-            self.setpoints_s.append(self._times.of(notes))
-        return data, source
-
-    def __getattr__(self, name):
-        return getattr(self._udp, name)
-
-    def gaps_s(self, since, until):
-        return np.diff([at for at in self.setpoints_s if since <= at < until])
-
-
-def described(gaps_s):
-    return f"{len(gaps_s)}, 99 % within {np.percentile(gaps_s, 99) * 1e3:.0f} ms, all {max(gaps_s) * 1e3:.0f} ms"
-
-
-def until(condition, seconds, what):
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline, f"never: {what()}"
-        time.sleep(0.01)
 
 
 @pytest.fixture
@@ -104,41 +59,16 @@ def flood(rider, place):
 
 @needing_processors()
 def test_a_flood_neither_delays_set_points_nor_hides_a_stop(hangar, port, rider, tmp_path):
-    vehicles = {
-        system: hangar.add(flavour, system, calls=("127.0.0.1", port), aided=True)[:2]
-        for flavour, system in (("px4", STOPPED), ("ardupilot", FLOWN))
-    }
-    wire = vehicles[FLOWN][0].socket = TimedSocket(vehicles[FLOWN][0].socket)
-    places = np.memmap(tmp_path / "places", dtype=float, mode="w+", shape=(len(vehicles), 4))
-    log, ended = tmp_path / "pilot.txt", threading.Event()
-
-    def locate():
-        while not ended.wait(0.01):
-            for place, (_, copter) in zip(places, vehicles.values(), strict=True):
-                body = copter.airframe
-                place[:] = body.x, body.y, body.z, body.yaw
-
-    threading.Thread(target=locate, daemon=True).start()
-    order = [str(HERE / "mavlink_pilot.py"), str(port), "pymavlink", str(tmp_path / "places")]
-    with log.open("wb") as sink:
-        pilot = subprocess.Popen([sys.executable, *order, str(rider.getsockname()[1])], stdout=sink, stderr=sink)
-    try:
-        speeds = lambda: [math.hypot(*c.airframe.velocity_stabilized()) for _, c in vehicles.values()]  # noqa: E731
-        until(lambda: min(speeds()) > 0.25, 60, lambda: (speeds(), log.read_text()[-2000:]))
-        place = way_to(rider, STOPPED)
+    with ridden(hangar, port, tmp_path, rider.getsockname()[1]) as flight:
+        place, wire = way_to(rider, STOPPED), flight.wires[FLOWN]
         quiet_s = time.monotonic()
         time.sleep(SECONDS)
         flooded_s = time.monotonic()
         flood(rider, place)
         quiet, flooded = wire.gaps_s(quiet_s, flooded_s), wire.gaps_s(flooded_s, time.monotonic())
-        until(lambda: not vehicles[STOPPED][1].airborne, 20, lambda: log.read_text()[-2000:])
+        flight.until(lambda: not flight.airborne(STOPPED), 20)
         figures = f"gaps without and with the flood: {described(quiet)}; {described(flooded)}"
         print(figures)
-        assert np.percentile(flooded, 99) <= UNEVEN * np.percentile(quiet, 99), figures
-        assert max(flooded) < VEHICLE_WAITS_S, figures
-        until(lambda: STOPS in log.read_text(), 10, lambda: log.read_text()[-2000:])
-        assert log.read_text().count(STOPS) == 1
-    finally:
-        ended.set()
-        pilot.kill()
-        pilot.wait()
+        assert is_on_time(quiet, flooded), figures
+        flight.until(lambda: STOPS in flight.log, 10)
+        assert flight.log.count(STOPS) == 1

@@ -2,31 +2,26 @@
 
 import logging
 import select
-import socket
 import threading
 from collections import Counter
-from collections.abc import Callable, Mapping
-from contextlib import suppress
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
 
+from drivers.mavlink.links.rider import Rider
 from drivers.mavlink.links.seam import Address, Heard, Transport
-from drivers.mavlink.riding_along import Verdict, may_pass, verdict, words_of
+from drivers.mavlink.riding_along import Verdict, may_pass, verdict
 from drivers.mavlink.settings import VehicleSettings
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.flight import CommandAckMessage, CommandInt, CommandLong
-from drivers.mavlink.wire.frames import MAX_DATAGRAM, FrameDecoder, FrameEncoder, Message, ReceivedFrame, split
-from drivers.mavlink.wire.names import Flavour, MavResult
+from drivers.mavlink.wire.frames import MAX_DATAGRAM, Message, ReceivedFrame, split
 from drivers.mavlink.wire.verification import number_of
 from groundstation.bus import clock
 from groundstation.time_units import NS_PER_S
 
-_POLL_S = 0.2
-# What passes besides stops: enough for a table of parameters in half a minute, too little to make set-points late.
-_FRAMES_PER_S = 50
-_AUTOPILOT = 1
+_POLL_NS = NS_PER_S // 5
 _log = logging.getLogger(__name__)
 
 _TAKEN_BACK, _MAVLINK_2 = "RESUME or TRACK takes the drone back", "set it to MAVLink 2"
+_STOP_HERE = "order HOLD or LAND here"
 
 Tell = Callable[[str, str], None]
 
@@ -37,49 +32,12 @@ def with_riders(transport: Transport, vehicles: Mapping[int, VehicleSettings], t
     return ForwardedLink(transport, riders, tell) if riders else transport
 
 
-@dataclass
-class _Allowance:
-    """Frames that may still pass in this second."""
-
-    left: int = _FRAMES_PER_S
-    until_ns: int = 0
-
-    def take(self, now_ns: int) -> bool:
-        if now_ns >= self.until_ns:
-            self.left, self.until_ns = _FRAMES_PER_S, now_ns + NS_PER_S
-        self.left -= 1
-        return self.left >= 0
-
-
-class Rider:
-    """The way to and from the second ground station of one vehicle, on a port of its own."""
-
-    def __init__(self, vehicle: VehicleSettings) -> None:
-        _, host, port = vehicle.forward.split(":")
-        self.name, self.system = vehicle.name, vehicle.system_id
-        self.flavour = Flavour.PX4 if vehicle.flavour == "px4" else Flavour.ARDUPILOT
-        self.allowed, self.target = vehicle.forward_allows, (host, int(port))
-        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.socket.setblocking(False)
-        self.decoder, self.encoder = FrameDecoder(), FrameEncoder(vehicle.system_id, _AUTOPILOT)
-        self.allowance = _Allowance()
-
-    def show(self, data: bytes) -> None:
-        """Send frames to the second ground station; one that is not there costs nothing."""
-        with suppress(OSError):
-            self.socket.sendto(data, self.target)
-
-    def refuse(self, frame: ReceivedFrame, command: int) -> None:
-        """Answer a command as the vehicle would that does not do it."""
-        ack = CommandAckMessage(command, MavResult.DENIED, 0, 0, frame.system, frame.component)
-        self.show(self.encoder.encode(ack))
-
-
 class ForwardedLink:
     """Another transport, shown to riders; a thread of its own listens to them.
 
     A rider's frames are judged by `riding_along.verdict`; what is refused or goes beyond 50 frames a second is counted
-    in `rejected` ("rider_..."). All its stops pass; of one that is repeated within a second only the first is told.
+    in `rejected` ("rider_..."). Every stop passes, if an equal one does not follow it within 20 ms; of one that is
+    repeated within a second only the first is told.
     """
 
     def __init__(self, transport: Transport, riders: Mapping[int, Rider], tell: Tell) -> None:
@@ -114,7 +72,13 @@ class ForwardedLink:
             rider = self._riders.get(heard.frame.system)
             if rider is not None:
                 rider.show(raw)
+                if isinstance(heard.frame.message, CommandAckMessage):
+                    self._note_refusal(rider, heard.stamp_ns, heard.frame.message)
         return found
+
+    def _note_refusal(self, rider: Rider, now_ns: int, answer: CommandAckMessage) -> None:
+        if why := rider.refused_stop(now_ns, answer):
+            self._tell_once(f"{rider.name} refuses the stop of a second ground station ({why})", _STOP_HERE)
 
     def send(self, system: int, message: Message) -> None:
         """Send to one vehicle."""
@@ -136,14 +100,31 @@ class ForwardedLink:
         by_socket = {rider.socket: rider for rider in self._riders.values()}
         while not self._closing.is_set():
             try:
-                ready, _, _ = select.select(list(by_socket), [], [], _POLL_S)
+                ready, _, _ = select.select(list(by_socket), [], [], self._patience_s(by_socket.values()))
                 for one in ready:
                     self._take(by_socket[one])
+                for rider in by_socket.values():
+                    self._pass_stop(rider)
             except Exception:  # noqa: BLE001 - a rider's garbage must not end the way of its stops
                 if self._closing.is_set():
                     return
                 self.rejected["rider_internal"] += 1
                 _log.exception("a frame of a second ground station could not be used")
+
+    @staticmethod
+    def _patience_s(riders: Iterable[Rider]) -> float:
+        now_ns = clock.now_ns()
+        waits = (rider.stops.wait_ns(now_ns) for rider in riders)
+        return min((wait_ns for wait_ns in waits if wait_ns is not None), default=_POLL_NS) / NS_PER_S
+
+    def _pass_stop(self, rider: Rider) -> None:
+        match rider.stops.take(clock.now_ns()):
+            case None:
+                pass
+            case bytes() as raw:
+                self._transport.send_raw(rider.system, raw)
+            case message:
+                self._transport.send(rider.system, message)
 
     def _take(self, rider: Rider) -> None:
         try:
@@ -177,10 +158,10 @@ class ForwardedLink:
     def _judge(self, rider: Rider, raw: bytes, frame: ReceivedFrame) -> None:
         message = frame.message
         match verdict(number_of(raw), message, rider.system, rider.flavour, rider.allowed):
-            case Verdict.STOP:
-                self._transport.send_raw(rider.system, raw)
-                assert message is not None
-                self._tell_once(f"{rider.name}: a second ground station stops it ({words_of(message)})", _TAKEN_BACK)
+            case Verdict.STOP if message is not None:
+                words = rider.stop(clock.now_ns(), message, raw)
+                self._pass_stop(rider)
+                self._tell_once(f"{rider.name}: a second ground station stops it ({words})", _TAKEN_BACK)
             case Verdict.PASS if rider.allowance.take(clock.now_ns()):
                 self._transport.send_raw(rider.system, raw)
             case Verdict.PASS:
@@ -189,8 +170,6 @@ class ForwardedLink:
                 self.rejected["rider_refused"] += 1
                 if isinstance(message, CommandLong | CommandInt):
                     rider.refuse(frame, message.command)
-            case Verdict.DROP:
-                pass
 
     def _tell_once(self, text: str, remedy: str) -> None:
         now_ns = clock.now_ns()

@@ -147,6 +147,26 @@ def test_ardupilot_obeys_setpoints_in_guided_only_and_stops_at_a_bad_frame(bench
     assert abs(bench.copter.airframe.vx) < 0.15
 
 
+def test_a_paused_ardupilot_stands_in_guided_until_the_mode_is_entered_anew(bench_of):
+    bench = bench_of("ardupilot").up()
+    bench.fly(forward=0.6)
+    bench.run(2.0)
+    assert bench.command(193, 0.0) == 0
+    bench.run(3.0)
+    assert bench.firmware.mode == 4 and abs(bench.copter.airframe.vx) < 0.1
+    assert bench.command(176, 1.0, 17.0) == 0 and bench.command(176, 1.0, 4.0) == 0
+    bench.run(2.0)
+    assert abs(bench.copter.airframe.vx) > 0.4
+
+
+def test_a_px4_that_is_sent_nowhere_holds(bench_of):
+    bench, nan = bench_of("px4").up(), float("nan")
+    assert bench.command(192, -1.0, 1.0, 0.0, nan, nan, nan, 1.0) == 3
+    assert bench.firmware.mode == OFFBOARD
+    assert bench.command(192, -1.0, 1.0, 0.0, nan, nan, nan, nan) == 0
+    assert bench.firmware.mode == 4 << 16 | 3 << 24
+
+
 def test_unknown_requests_are_answered_and_those_of_others_are_not(bench_of, flavour):
     bench = bench_of(flavour).run(0.5)
     assert bench.command(31010) == 3

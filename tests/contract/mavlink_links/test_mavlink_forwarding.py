@@ -35,13 +35,13 @@ class Ground:
         )
         self.vehicle_says, self.station_says = FrameEncoder(11, 1), FrameEncoder(255, 190)
         self.link.send(11, HEARTBEAT)
-        _, self._ours = self.vehicle.recvfrom(2048)
+        _, self.ours = self.vehicle.recvfrom(2048)
         self.hear()
         _, self._rider = self.station.recvfrom(2048)
 
     def hear(self):
         """Let the vehicle speak, and us listen."""
-        self.vehicle.sendto(self.vehicle_says.encode(HEARTBEAT), self._ours)
+        self.vehicle.sendto(self.vehicle_says.encode(HEARTBEAT), self.ours)
         return eventually(self.link.receive)
 
     def order(self, *messages):
@@ -105,7 +105,7 @@ def test_its_stop_reaches_the_vehicle_byte_for_byte_and_is_told(ground):
     ground.order(command(MavCmd.NAV_LAND))
     assert message_of(ground.vehicle) == command(MavCmd.NAV_LAND)
     eventually(lambda: ground.told)
-    assert ground.told == ["drone_2: a second ground station stops it (nav land)"]
+    assert ground.told == ["drone_2: a second ground station stops it (LAND)"]
 
 
 def test_of_stops_without_pause_all_pass_and_the_first_is_told(ground):
@@ -116,7 +116,50 @@ def test_of_stops_without_pause_all_pass_and_the_first_is_told(ground):
     assert len(ground.told) == 2
     time.sleep(1.1)
     ground.order(command(MavCmd.NAV_LAND))
-    assert eventually(lambda: ground.told[2:]) == ["drone_2: a second ground station stops it (nav land)"]
+    assert eventually(lambda: ground.told[2:]) == ["drone_2: a second ground station stops it (LAND)"]
+
+
+def test_a_flood_of_stops_passes_50_times_a_second_and_hides_no_other(ground):
+    began = time.monotonic()
+    for number in range(400):
+        ground.order(command(MavCmd.NAV_LAND))
+        if number == 200:
+            ground.order(command(MavCmd.COMPONENT_ARM_DISARM))
+        time.sleep(0.001)
+    took_s = time.monotonic() - began
+    came = []
+    with pytest.raises(TimeoutError):
+        while True:
+            came.append(message_of(ground.vehicle))
+    assert 5 <= len(came) <= 50 * took_s + 4
+    assert command(MavCmd.COMPONENT_ARM_DISARM) in came and came[-1] == command(MavCmd.NAV_LAND)
+
+
+def test_a_stop_that_the_vehicle_refuses_is_told(ground):
+    ground.order(command(MavCmd.DO_SET_MODE, 1.0, 4.0, 3.0))
+    assert message_of(ground.vehicle).command == MavCmd.DO_SET_MODE
+    ground.vehicle.sendto(
+        ground.vehicle_says.encode(
+            CommandAckMessage(MavCmd.DO_SET_MODE, MavResult.TEMPORARILY_REJECTED, 0, 0, 255, 190)
+        ),
+        ground.ours,
+    )
+    eventually(ground.link.receive)
+    assert ground.told == [
+        "drone_2: a second ground station stops it (HOLD)",
+        "drone_2 refuses the stop of a second ground station (HOLD: temporarily rejected)",
+    ]
+
+
+def test_an_accepted_stop_and_a_refusal_of_something_else_are_not_told(ground):
+    ground.order(command(MavCmd.NAV_LAND))
+    message_of(ground.vehicle)
+    eventually(lambda: ground.told)
+    for number, result in ((MavCmd.NAV_LAND, MavResult.ACCEPTED), (MavCmd.SET_MESSAGE_INTERVAL, MavResult.DENIED)):
+        answer = CommandAckMessage(number, result, 0, 0, 255, 190)
+        ground.vehicle.sendto(ground.vehicle_says.encode(answer), ground.ours)
+        eventually(ground.link.receive)
+    assert len(ground.told) == 1
 
 
 def test_it_cannot_arm_and_is_told_so_by_an_answer(ground):

@@ -1,8 +1,10 @@
 """A second ground station may ask and stop; whatever flies, feeds or configures a vehicle does not pass."""
 
+import math
+
 import pytest
 
-from drivers.mavlink.riding_along import Verdict, may_pass, verdict, words_of
+from drivers.mavlink.riding_along import Verdict, made_good, may_pass, verdict, words_of
 from drivers.mavlink.wire import flight, service, telemetry
 from drivers.mavlink.wire.frames import CLASSES, IDS, id_of
 from drivers.mavlink.wire.names import FORCE, CopterMode, Flavour, MavCmd, Px4Auto, Px4Main, px4_mode
@@ -87,7 +89,39 @@ def test_no_other_kind_passes_unasked_and_parameters_and_missions_only_where_all
     assert judged(telemetry.Heartbeat(6, 8, 0, 0, 4), allowed=("parameters",)) is Verdict.DROP
 
 
-def test_a_stop_is_told_in_words():
-    assert words_of(command(MavCmd.NAV_LAND)) == "nav land"
-    assert words_of(command(31000)) == "command 31000"
-    assert words_of(flight.SetMode(1, 1, 9)) == "mode 0x9"
+PAUSE = (-1.0, 1.0, 0.0, math.nan, math.nan, math.nan, math.nan)  # as QGroundControl pauses a PX4
+
+
+def test_qgroundcontrols_pause_of_a_px4_stops_and_no_other_reposition_passes():
+    assert judged(command(MavCmd.DO_REPOSITION, *PAUSE)) is Verdict.STOP
+    assert judged(command(MavCmd.DO_REPOSITION, *PAUSE), Flavour.ARDUPILOT) is Verdict.REFUSE
+    for place in (1, 3, 4, 5, 6):
+        moved = (*PAUSE[:place], 0.0, *PAUSE[place + 1 :])
+        assert judged(command(MavCmd.DO_REPOSITION, *moved)) is Verdict.REFUSE
+    elsewhere = flight.CommandInt(SYSTEM, 1, 0, MavCmd.DO_REPOSITION, 0, 0, -1.0, 1.0, 0.0, math.nan, 0, 0, math.nan)
+    assert judged(elsewhere) is Verdict.REFUSE
+
+
+def test_a_pause_of_an_ardupilot_ends_in_a_mode_that_is_seen_and_other_stops_need_nothing():
+    brake = command(MavCmd.DO_SET_MODE, 1, CopterMode.BRAKE)
+    assert made_good(command(MavCmd.DO_PAUSE_CONTINUE, 0.0), SYSTEM, Flavour.ARDUPILOT) == brake
+    assert made_good(command(MavCmd.DO_PAUSE_CONTINUE, 0.0), SYSTEM, Flavour.PX4) is None
+    assert made_good(command(MavCmd.NAV_LAND), SYSTEM, Flavour.ARDUPILOT) is None
+    assert made_good(flight.SetMode(SYSTEM, 1, CopterMode.LAND), SYSTEM, Flavour.ARDUPILOT) is None
+
+
+@pytest.mark.parametrize(
+    ("stop", "flavour", "words"),
+    [
+        (command(MavCmd.NAV_LAND), Flavour.PX4, "LAND"),
+        (command(MavCmd.DO_SET_MODE, 1, Px4Main.AUTO, Px4Auto.HOLD), Flavour.PX4, "HOLD"),
+        (command(MavCmd.DO_SET_MODE, 1, CopterMode.BRAKE), Flavour.ARDUPILOT, "BRAKE"),
+        (flight.SetMode(1, 1, 9), Flavour.ARDUPILOT, "LAND"),
+        (command(MavCmd.DO_REPOSITION, *PAUSE), Flavour.PX4, "pause"),
+        (command(MavCmd.COMPONENT_ARM_DISARM, 0.0), Flavour.PX4, "disarm"),
+        (command(MavCmd.COMPONENT_ARM_DISARM, 0.0, FORCE), Flavour.PX4, "motors off"),
+        (command(MavCmd.DO_FLIGHTTERMINATION, 1.0), Flavour.PX4, "flight termination"),
+    ],
+)
+def test_a_stop_is_told_in_words(stop, flavour, words):
+    assert words_of(stop, flavour) == words

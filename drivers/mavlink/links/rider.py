@@ -1,0 +1,76 @@
+"""A second ground station of one vehicle: its port, and what it may still say."""
+
+import socket
+from contextlib import suppress
+from dataclasses import dataclass
+
+from drivers.mavlink.requests import word_of
+from drivers.mavlink.riding_along import made_good, words_of
+from drivers.mavlink.settings import VehicleSettings
+from drivers.mavlink.stop_queue import StopQueue
+from drivers.mavlink.wire.flight import CommandAckMessage
+from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder, Message, ReceivedFrame
+from drivers.mavlink.wire.names import Flavour, MavResult
+from groundstation.time_units import NS_PER_S
+
+# What passes besides stops: enough for a table of parameters in half a minute, too little to make set-points late.
+_FRAMES_PER_S = 50
+_AUTOPILOT = 1
+_ANSWERED_NS = 3 * NS_PER_S
+_UNDERWAY = (MavResult.ACCEPTED, MavResult.IN_PROGRESS)
+
+
+@dataclass
+class _Allowance:
+    """Frames that may still pass in this second."""
+
+    left: int = _FRAMES_PER_S
+    until_ns: int = 0
+
+    def take(self, now_ns: int) -> bool:
+        if now_ns >= self.until_ns:
+            self.left, self.until_ns = _FRAMES_PER_S, now_ns + NS_PER_S
+        self.left -= 1
+        return self.left >= 0
+
+
+class Rider:
+    """The way to and from the second ground station of one vehicle, on a port of its own."""
+
+    def __init__(self, vehicle: VehicleSettings) -> None:
+        _, host, port = vehicle.forward.split(":")
+        self.name, self.system = vehicle.name, vehicle.system_id
+        self.flavour = Flavour.PX4 if vehicle.flavour == "px4" else Flavour.ARDUPILOT
+        self.allowed, self.target = vehicle.forward_allows, (host, int(port))
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.setblocking(False)
+        self.decoder, self.encoder = FrameDecoder(), FrameEncoder(vehicle.system_id, _AUTOPILOT)
+        self.allowance, self.stops = _Allowance(), StopQueue()
+        self._asked: dict[int, tuple[int, str]] = {}
+
+    def show(self, data: bytes) -> None:
+        """Send frames to the second ground station; one that is not there costs nothing."""
+        with suppress(OSError):
+            self.socket.sendto(data, self.target)
+
+    def refuse(self, frame: ReceivedFrame, command: int) -> None:
+        """Answer a command as the vehicle would that does not do it."""
+        ack = CommandAckMessage(command, MavResult.DENIED, 0, 0, frame.system, frame.component)
+        self.show(self.encoder.encode(ack))
+
+    def stop(self, now_ns: int, message: Message, raw: bytes) -> str:
+        """Take a stop into the queue, and return it in words."""
+        words, command = words_of(message, self.flavour), getattr(message, "command", None)
+        self.stops.put((type(message), command, words), raw)
+        if command is not None:
+            self._asked[command] = now_ns + _ANSWERED_NS, words
+        if (more := made_good(message, self.system, self.flavour)) is not None:
+            self.stops.put(more, more)
+        return words
+
+    def refused_stop(self, now_ns: int, answer: CommandAckMessage) -> str:
+        """Return which of its stops the vehicle refuses by an answer, with the reason; "" for none."""
+        until_ns, words = self._asked.get(answer.command, (0, ""))
+        if now_ns > until_ns or answer.result in _UNDERWAY:
+            return ""
+        return f"{words}: {word_of(answer.result)}"

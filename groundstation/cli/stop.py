@@ -40,7 +40,10 @@ def choose_run(name: str | None, stops: bool = False) -> RuntimeRecord:
         records = [record for record in records if name in (record.name, record.site, str(record.supervisor.pid))]
     if not records:
         which = f" called {name}" if name else ""
-        raise UnreachableError(f"no ground station{which} is running (start one with: groundstation fly FIELD)")
+        reasons = "".join(f"\n{reason}" for reason in _closed_doors())
+        raise UnreachableError(
+            f"no ground station{which} is running (start one with: groundstation fly FIELD){reasons}"
+        )
     if len(records) > 1 and stops and name is None:
         # In an emergency nobody reads a list of runs.
         records = [record for record in records if not record.simulated] or records
@@ -55,6 +58,12 @@ def _elsewhere() -> list[RuntimeRecord]:
     from groundstation.supervisor import site
 
     return list(site.runs())
+
+
+def _closed_doors() -> list[str]:
+    from groundstation.supervisor import site
+
+    return list(site.closed_doors())
 
 
 def deliver(bus: ZenohBus, book: AwaitedAnswers, patience_s: float, on_news: Callable[[str], None]) -> None:

@@ -4,12 +4,14 @@ What flies there is supervised there, by the run's own supervisor class and a gu
 is heard over the bus, and its silence is passed on to the drivers as that of this process.
 """
 
+import math
 import time
 from pathlib import Path
 
 from pydantic import ValidationError
 
 from groundstation.bus import clock
+from groundstation.bus.door import why_closed
 from groundstation.bus.messages import HostOrder, Lifecycle
 from groundstation.bus.roles import Identity
 from groundstation.bus.zenoh_bus import ZenohBus, open_bus
@@ -28,6 +30,7 @@ from groundstation.supervisor.supervisor import Supervisor
 from groundstation.supervisor.terminal import Terminal
 
 _CONNECT_S, _TURN_S = 1.0, 0.05
+_IDLE_S = 10.0
 _GUARDIAN_S = 10.0
 # Drivers land long before; what is left then is a run that nobody will come back to.
 _LOST_S = 20.0
@@ -46,7 +49,7 @@ class Hosting:
     def wait(self) -> HostOrder:
         """Return the order of the next run, once the offset of the clocks is known."""
         link = self._join()
-        refused = ""
+        refused, idle_s = "", time.monotonic() + _IDLE_S
         while True:
             link.turn(clock.own_ns(), self._own)
             order = link.order
@@ -58,16 +61,30 @@ class Hosting:
                 refused = order.run
             elif order is not None and link.synchronised and link.watches(clock.own_ns()):
                 return order
+            elif order is None and time.monotonic() > idle_s:
+                self._say_idle()
+                idle_s = math.inf
             time.sleep(_TURN_S)
+
+    def _say_idle(self) -> None:
+        host = self._admission.host
+        self._terminal.say(
+            f"{host} is let in, and gets nothing to do: no device of the run has host: {host} in its field file, or "
+            "the run began before this host was admitted (it takes part in the next one)"
+        )
 
     def _join(self) -> HostLink:
         admission = self._admission
         self._terminal.say(f"{admission.host} waits for a run of {admission.site} at {admission.endpoint}")
+        said = ""
         while self._bus is None:
             try:
                 self._bus = open_bus(admission.endpoint, admission.site, admission.host, _CONNECT_S, self._identity)
             except GroundStationError:
-                continue
+                why = why_closed(admission.endpoint, self._identity)
+                if why and why != said:
+                    self._terminal.say(why)
+                said = why
         self._link = HostLink(self._bus, admission.host)
         return self._link
 

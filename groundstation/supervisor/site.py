@@ -13,6 +13,7 @@ from pathlib import Path
 import msgspec
 
 from groundstation.bus.api import Subscription
+from groundstation.bus.door import why_closed
 from groundstation.bus.messages import Lease
 from groundstation.bus.roles import Identity, Member, Role
 from groundstation.bus.topics import LEASE, VEHICLE_STATUS
@@ -160,6 +161,14 @@ def runs() -> Iterator[RuntimeRecord]:
         record = _found(admission, str(path.parent))
         if record is not None:
             yield record
+
+
+def closed_doors() -> Iterator[str]:
+    """Yield why runs that listen there do not let this host in, with the remedy."""
+    for path in sorted(folder("joined", "").glob("*/admission.json")):
+        admission = msgspec.json.decode(path.read_bytes(), type=Admission)
+        if why := why_closed(admission.endpoint, Identity(str(path.parent), certificate_name(admission.host), "")):
+            yield f"{admission.site} at {admission.endpoint}: {why}"
 
 
 def _found(admission: Admission, place: str) -> RuntimeRecord | None:

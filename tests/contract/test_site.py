@@ -1,17 +1,20 @@
 """A site over real TLS: hosts that it admitted order in its runs, others do not, and none of them is more than that."""
 
+import shutil
 import socket
 import stat
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import closing
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 
 from groundstation.bus import topics, zenoh_bus
 from groundstation.bus.access import AccessList
+from groundstation.bus.door import why_closed
 from groundstation.bus.messages import (
     CameraStatus,
     Command,
@@ -24,8 +27,10 @@ from groundstation.bus.messages import (
 )
 from groundstation.bus.roles import Identity, Member, Role
 from groundstation.bus.zenoh_bus import ZenohBus
+from groundstation.cli.exits import UnreachableError
+from groundstation.cli.stop import choose_run
 from groundstation.errors import GroundStationError, OperatorMistake
-from groundstation.supervisor import site
+from groundstation.supervisor import authority, site
 from groundstation.supervisor.authority import make_identities
 from groundstation.supervisor.joining import join
 
@@ -179,6 +184,55 @@ def test_a_host_cannot_pass_for_the_router(home: Path, run: Run, port: int) -> N
     router = zenoh_bus.open_router(endpoint, Identity(str(place), "host-laptop", "r"), AccessList("lab", ()))
     with pytest.raises(GroundStationError, match="no router answers"):
         zenoh_bus.open_bus(endpoint, "lab", "drone_1", 0.0, Identity(str(home / "keys"), "drone_1", "r"))
+    router.close()
+
+
+def identity_of(host: str) -> Identity:
+    return Identity(str(site.folder("joined", "lab")), f"host-{host}", "")
+
+
+def test_who_is_let_in_and_whom_nobody_awaits_has_no_reason(home: Path, run: Run, port: int) -> None:
+    assert why_closed(run.elsewhere, identity_of("laptop")) == ""
+    assert why_closed(f"tls/{ELSEWHERE}:1", identity_of("laptop")) == ""
+    assert list(site.closed_doors()) == []
+
+
+def test_a_run_of_an_authority_made_anew_is_named_with_the_remedy(home: Path, port: int) -> None:
+    admit(home, "laptop", port)
+    shutil.rmtree(site.folder("sites", "lab"))
+    site.found("lab")
+    run = Run(home / "keys", port)
+    try:
+        assert "admit and join this host again" in why_closed(run.elsewhere, identity_of("laptop"))
+        assert [reason.split(": ")[0] for reason in site.closed_doors()] == [f"lab at {run.elsewhere}"]
+        with pytest.raises(UnreachableError, match=r"no ground station is running.*\n.*its authority was made anew"):
+            choose_run(None)
+        # The other way round: a host that believes whatever it meets is not let in either.
+        shutil.copy(home / "keys" / "authority.pem", site.folder("joined", "lab") / "authority.pem")
+        assert "refuses the certificate of this host" in why_closed(run.elsewhere, identity_of("laptop"))
+    finally:
+        run.close()
+
+
+def test_a_run_that_is_certified_for_another_address_is_named(home: Path, run: Run, port: int) -> None:
+    relay = "127.0.0.8"  # an address of the same computer that bus.listen does not name
+    router = zenoh_bus.open_router(
+        f"tls/{relay}:{port}", Identity(str(home / "keys"), "router", "r"), AccessList("lab", ())
+    )
+    assert "certified for other addresses than 127.0.0.8" in why_closed(f"tls/{relay}:{port}", identity_of("laptop"))
+    router.close()
+
+
+def test_a_host_whose_date_is_wrong_is_told_so(home: Path, port: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(authority, "_ENDS", datetime(2001, 1, 1, tzinfo=UTC))
+    shutil.rmtree(site.folder("sites", "lab"))
+    site.found("lab")
+    admit(home, "laptop", port)
+    run_keys = home / "keys"
+    make_identities(run_keys, [ELSEWHERE], ["router"], site.authority_of("lab"))
+    endpoint = f"tls/{ELSEWHERE}:{port}"
+    router = zenoh_bus.open_router(endpoint, Identity(str(run_keys), "router", "r"), AccessList("lab", ()))
+    assert "set its date" in why_closed(endpoint, identity_of("laptop"))
     router.close()
 
 

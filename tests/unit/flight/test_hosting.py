@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import cast
 
 import pytest
 
@@ -13,6 +14,7 @@ from groundstation.bus import clock
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import HostOrder, Lifecycle, Supervision
 from groundstation.bus.roles import Identity
+from groundstation.errors import GroundStationError
 from groundstation.flight import hosting
 from groundstation.runtime.liaison import VERSION, Liaison, LiaisonSection
 from groundstation.settings.load import load_field
@@ -112,3 +114,44 @@ def test_another_version_is_not_served_and_the_run_says_why(
     with pytest.raises(KeyboardInterrupt):
         served.wait()
     assert not run.liaison.serving and Lifecycle.READY not in run.states
+
+
+class NoticeBoard:
+    """A terminal that remembers, and ends the wait once it has been told enough."""
+
+    def __init__(self, enough: int) -> None:
+        self.said: list[str] = []
+        self._enough = enough
+
+    def say(self, text: str) -> None:
+        self.said.append(text)
+        if len(self.said) >= self._enough:
+            raise KeyboardInterrupt
+
+
+def waiting(board: NoticeBoard, tmp_path: Path) -> None:
+    admission = Admission("lab", HOST, "tls/10.77.0.1:4717", "", "", "")
+    with pytest.raises(KeyboardInterrupt):
+        hosting.Hosting(admission, Identity("keys", "host-pc_2", ""), tmp_path, cast(Terminal, board)).wait()
+
+
+def test_why_a_run_lets_it_not_in_is_told_once_for_each_reason(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    reasons = iter(["", "made anew", "made anew", "", "other addresses"])
+
+    def closed(*_: object, **__: object) -> None:
+        raise GroundStationError("no router answers")
+
+    monkeypatch.setattr(hosting, "open_bus", closed)
+    monkeypatch.setattr(hosting, "why_closed", lambda *_: next(reasons))
+    board = NoticeBoard(3)
+    waiting(board, tmp_path)
+    assert board.said == [f"{HOST} waits for a run of lab at tls/10.77.0.1:4717", "made anew", "other addresses"]
+
+
+def test_a_host_that_gets_nothing_to_do_says_so_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    bus = MemoryBus(MemoryExchange(), "lab", HOST, "")
+    monkeypatch.setattr(hosting, "open_bus", lambda *_, **__: bus)
+    monkeypatch.setattr(hosting, "_IDLE_S", 0.0)
+    board = NoticeBoard(2)
+    waiting(board, tmp_path)
+    assert "no device of the run has host: pc_2" in board.said[-1]

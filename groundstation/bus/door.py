@@ -1,0 +1,60 @@
+"""Why a guarded router that is there lets this member not in: a TLS handshake of our own, for the reason.
+
+Zenoh says of every failure alike that it cannot open a session.
+"""
+
+import socket
+import ssl
+from pathlib import Path
+
+from groundstation.bus.roles import Identity
+from groundstation.bus.zenoh_bus import AUTHORITY, CERTIFICATE, KEY
+
+_PATIENCE_S = 1.0
+# OpenSSL's numbers (x509_vfy.h): not yet valid and expired; another name and another address than the certificate's.
+_OUT_OF_DATE, _ELSEWHERE = (9, 10), (62, 64)
+
+
+def why_closed(endpoint: str, identity: Identity) -> str:
+    """Return why the router at an endpoint and this member do not trust each other, with the remedy.
+
+    "": nobody is there, or the door is open.
+    """
+    host, _, port = endpoint.rpartition("/")[2].rpartition(":")
+    try:
+        context = _context(identity)
+        with socket.create_connection((host, int(port)), _PATIENCE_S) as raw:
+            return _knock(context, raw, host)
+    except ssl.SSLError as error:
+        return f"the certificate of this host cannot be used ({error.reason}): admit and join this host anew"
+    except OSError:
+        return ""
+
+
+def _context(identity: Identity) -> ssl.SSLContext:
+    folder = Path(identity.folder)
+    context = ssl.create_default_context(cafile=str(folder / AUTHORITY))
+    context.load_cert_chain(folder / f"{identity.name}{CERTIFICATE}", folder / f"{identity.name}{KEY}")
+    return context
+
+
+def _knock(context: ssl.SSLContext, raw: socket.socket, host: str) -> str:
+    try:
+        with context.wrap_socket(raw, server_hostname=host) as guarded:
+            guarded.recv(1)  # of TLS 1.3 a refusal comes behind the handshake; who is let in hears nothing yet
+    except ssl.SSLCertVerificationError as error:
+        return _mistrust(error, host)
+    except ssl.SSLError as error:
+        return f"the run there refuses the certificate of this host ({error.reason}): admit and join this host anew"
+    return ""
+
+
+def _mistrust(error: ssl.SSLCertVerificationError, host: str) -> str:
+    if error.verify_code in _OUT_OF_DATE:
+        return "the certificates are out of date by the clock of this host: set its date"
+    if error.verify_code in _ELSEWHERE:
+        return f"the run there is certified for other addresses than {host}: set bus.listen to {host}, or admit anew"
+    return (
+        "who listens there is not vouched for by the site that admitted this host: its authority was made anew "
+        "(admit and join this host again), or it is another program"
+    )

@@ -1,8 +1,17 @@
 """A recorded run as a rosbag2 folder (MCAP, profile ros2) that ROS 2 tools open."""
 
 from pathlib import Path
+from typing import Literal
 
-from rosbags.interfaces import Connection
+from rosbags.interfaces import (
+    Connection,
+    Qos,
+    QosDurability,
+    QosHistory,
+    QosLiveliness,
+    QosReliability,
+    QosTime,
+)
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from groundstation.engineering_views.field import field_of
@@ -12,6 +21,23 @@ from groundstation.errors import MessageError
 from groundstation.recording.outputs import errors_named, require_absent
 from groundstation.recording.reader import decode, payload
 from groundstation.recording.run import RecordedRun
+
+# WIRE: Humble reads no QoS of metadata 9 (ros2/rosbag2 issue 2013); all later distributions read 8.
+_VERSION: Literal[8] = 8
+_FOR_EVER = QosTime(9223372036, 854775807)
+_VOLATILE = Qos(
+    QosHistory.KEEP_LAST,
+    10,
+    QosReliability.RELIABLE,
+    QosDurability.VOLATILE,
+    _FOR_EVER,
+    _FOR_EVER,
+    QosLiveliness.AUTOMATIC,
+    _FOR_EVER,
+    avoid_ros_namespace_conventions=False,
+)
+# WIRE: tf2 takes static frames of no other publisher (ros2/rviz issue 916); `ros2 bag play` offers what stands here.
+_OFFERED = {"/tf_static": _VOLATILE._replace(depth=1, durability=QosDurability.TRANSIENT_LOCAL)}
 
 
 def write_bag(run: RecordedRun, folder: Path, distribution: str = "jazzy") -> tuple[int, list[str]]:
@@ -23,7 +49,7 @@ def write_bag(run: RecordedRun, folder: Path, distribution: str = "jazzy") -> tu
     codec = Ros2Codec(distribution)
     scene = Ros2Scene(codec, field_of(run.attachments))
     unread: dict[str, None] = {}
-    with errors_named(folder), Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+    with errors_named(folder), Writer(folder, version=_VERSION, storage_plugin=StoragePlugin.MCAP) as writer:
         bag = _Bag(writer, codec)
         bag.write(run.start_ns, scene.static(run.start_ns))
         for raw in run.records_from(run.start_ns, lambda topic: topic in SHOWN):
@@ -51,7 +77,10 @@ class _Bag:
         connection = self._connections.get(message.topic)
         if connection is None:
             connection = self._connections[message.topic] = self._writer.add_connection(
-                message.topic, message.type, typestore=self._codec.store
+                message.topic,
+                message.type,
+                typestore=self._codec.store,
+                offered_qos_profiles=[_OFFERED.get(message.topic, _VOLATILE)],
             )
         self._writer.write(connection, stamp_ns, message.data)
         self.written += 1

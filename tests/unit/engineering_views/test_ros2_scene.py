@@ -1,6 +1,7 @@
 """Messages of a flight as ROS 2 reads them: values, frames, keys and tokens, a bag that its own reader opens."""
 
 import math
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 pytest.importorskip("rosbags")
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
+from ruamel.yaml import YAML
 
 from drivers.rmw_zenoh.wire import graph
 from groundstation.bus import codec as bus_codec
@@ -173,4 +175,17 @@ def test_a_bag_holds_what_its_own_reader_decodes(tmp_path: Path) -> None:
     field = resolved_field(load_field(find_field("lab")))
     types = {one.channel.topic: one.schema.name for one in read if one.schema}
     assert types.items() <= advertised(field, truth=True).items(), "a live view advertises all that a flight tells"
-    assert (tmp_path / "bag" / "metadata.yaml").is_file()
+    described = YAML(typ="safe").load(tmp_path / "bag" / "metadata.yaml")["rosbag2_bagfile_information"]
+    assert described["version"] == 8, "the newest one that Humble reads"
+    counts = {one["topic_metadata"]["name"]: one["message_count"] for one in described["topics_with_message_count"]}
+    assert counts == Counter(one.channel.topic for one in read)
+    # By the numbers of rmw: 1 is transient local, which tf2 asks of static frames, 2 volatile.
+    offered = {one["topic_metadata"]["name"]: offers(one) for one in described["topics_with_message_count"]}
+    assert {topic: one["durability"] for topic, one in offered.items()} == dict.fromkeys(topics, 2) | {"/tf_static": 1}
+    assert {one["reliability"] for one in offered.values()} == {1}
+
+
+def offers(topic: dict[str, Any]) -> dict[str, Any]:
+    """Return the one QoS of a topic's metadata, which version 8 keeps as a text."""
+    (one,) = YAML(typ="safe").load(topic["topic_metadata"]["offered_qos_profiles"])
+    return dict(one)

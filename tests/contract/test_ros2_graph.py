@@ -65,9 +65,9 @@ def test_a_foreign_client_lists_and_decodes(router: str) -> None:
             time.sleep(0.02)
         tokens = [str(reply.ok.key_expr) for reply in foreign.liveliness().get("@ros2_lv/7/**") if reply.ok]
         assert any("/NN/" in token for token in tokens)
-        assert any("/MP/" in token and "%drone_1%pose" in token for token in tokens)
+        assert any("/MP/" in token and "%skein%drone_1%pose" in token for token in tokens)
         codec, kind = Ros2Codec(), "geometry_msgs/msg/PoseWithCovarianceStamped"
-        key = f"7/drone_1/pose/geometry_msgs::msg::dds_::PoseWithCovarianceStamped_/{codec.hash_of(kind)}"
+        key = f"7/skein/drone_1/pose/geometry_msgs::msg::dds_::PoseWithCovarianceStamped_/{codec.hash_of(kind)}"
         pose: Any = codec.store.deserialize_cdr(heard[key][-1].payload.to_bytes(), kind)
         assert (pose.pose.pose.position.x, pose.pose.pose.position.y) == (1.0, 2.0)
         assert len(heard[key][-1].attachment.to_bytes()) == 33
@@ -81,8 +81,9 @@ def test_what_a_field_will_tell_is_listed_before_its_first_message(router: str) 
     field = resolved_field(load_field(find_field("lab")))
     foreign = opened(mode="client", connect={"endpoints": [router]})
     bridge = Ros2View(router, 7, "jazzy", field, Timeline(clock.clock_id(), clock.unix_offset_ns()))
-    wanted = {"tf", "tf_static", "skein%markers", "rosout", "diagnostics", "turtlebot%odom", "ceiling%camera_info"}
-    wanted |= {f"drone_{n}%{what}" for n in (1, 2) for what in ("pose", "odom", "setpoint", "battery")}
+    wanted = {"tf", "tf_static", "rosout", "diagnostics"}
+    wanted |= {f"skein%{name}" for name in ("markers", "turtlebot%odom", "ceiling%camera_info")}
+    wanted |= {f"skein%drone_{n}%{what}" for n in (1, 2) for what in ("pose", "odom", "setpoint", "battery")}
     try:
         listed, deadline = set[str](), time.monotonic() + 5
         while not wanted <= listed and time.monotonic() < deadline:

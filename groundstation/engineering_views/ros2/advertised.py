@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 from groundstation.engineering_views.ros2.health import BATTERY, DIAGNOSTICS, LOG
 from groundstation.engineering_views.ros2.markers import MARKERS
+from groundstation.engineering_views.ros2.names import own
 from groundstation.engineering_views.ros2.pictures import LENS, PICTURE
 from groundstation.engineering_views.ros2.stencils import FRAMES, ODOMETRY, POSE, SURE_POSE, TWIST
 from groundstation.field.resolved import ResolvedField
@@ -14,17 +15,17 @@ def advertised(field: ResolvedField | None, truth: bool) -> Mapping[str, str]:
     found = {
         "/tf": FRAMES.type,
         "/tf_static": FRAMES.type,
-        "/skein/markers": MARKERS,
+        own("markers"): MARKERS,
         "/diagnostics": DIAGNOSTICS,
         "/rosout": LOG,
     }
     if field is None:
         return found
     for name in (*field.drones, *field.tracked):
-        found |= {f"/{name}/pose": SURE_POSE.type, f"/{name}/odom": ODOMETRY.type}
-        found |= {f"/{name}/truth": POSE.type} if truth else {}
+        found |= {own(f"{name}/pose"): SURE_POSE.type, own(f"{name}/odom"): ODOMETRY.type}
+        found |= {own(f"{name}/truth"): POSE.type} if truth else {}
     for name in field.drones:
-        found |= {f"/{name}/setpoint": TWIST.type, f"/{name}/battery": BATTERY}
+        found |= {own(f"{name}/setpoint"): TWIST.type, own(f"{name}/battery"): BATTERY}
     for name in field.calibrations:
-        found |= {f"/{name}/image/compressed": PICTURE, f"/{name}/camera_info": LENS}
+        found |= {own(f"{name}/image/compressed"): PICTURE, own(f"{name}/camera_info"): LENS}
     return found

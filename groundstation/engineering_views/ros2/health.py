@@ -7,6 +7,7 @@ import numpy as np
 from groundstation.bus import messages as m
 from groundstation.engineering_views.ros2.codec import Ros2Codec, RosMessage
 from groundstation.engineering_views.ros2.geometry import Builder
+from groundstation.engineering_views.ros2.names import own
 
 # WIRE (docs/reference/ros2.md 3): diagnostic_msgs/msg/DiagnosticStatus and rcl_interfaces/msg/Log.
 _OK, _WARN, _ERROR = 0, 1, 2
@@ -68,7 +69,7 @@ class HealthMaker:
             ("voltage", "temperature", "current", "charge", "capacity", "design_capacity"), math.nan
         )
         return self._codec.message(
-            f"/{name}/battery",
+            own(f"{name}/battery"),
             BATTERY,
             header=self._build.header(stamp_ns, name),
             **unmeasured,

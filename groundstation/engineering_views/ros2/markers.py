@@ -9,6 +9,7 @@ from groundstation.appearance.colours import Rgb
 from groundstation.bus import messages as m
 from groundstation.engineering_views.ros2.codec import Ros2Codec, RosMessage
 from groundstation.engineering_views.ros2.geometry import Builder
+from groundstation.engineering_views.ros2.names import own
 from groundstation.engineering_views.scene import LINK_COLOUR, Body, SensingLink, ViewScene
 from groundstation.time_units import NS_PER_S
 
@@ -46,7 +47,7 @@ class MarkerScene:
         self._next_ns = stamp_ns + _PERIOD_NS
         markers = [*self._bodies(stamp_ns, bodies), *self._links(stamp_ns), *self._arrows(stamp_ns)]
         self._plan, self._setpoints = None, {}
-        return [self._codec.message("/skein/markers", MARKERS, markers=markers)]
+        return [self._codec.message(own("markers"), MARKERS, markers=markers)]
 
     def _bodies(self, stamp_ns: int, bodies: Iterable[Body]) -> Iterator[Any]:
         for body in bodies:

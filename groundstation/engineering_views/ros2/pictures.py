@@ -7,6 +7,7 @@ import numpy as np
 
 from groundstation.engineering_views.ros2.codec import Ros2Codec, RosMessage
 from groundstation.engineering_views.ros2.geometry import Builder
+from groundstation.engineering_views.ros2.names import own
 from groundstation.field.room import LensCalibration
 
 PICTURE, LENS = "sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/CameraInfo"
@@ -23,10 +24,11 @@ class PictureMaker:
         """Return a picture, and its lens where that is known."""
         header = self._build.header(stamp_ns, camera)
         data = np.frombuffer(jpeg, np.uint8)
-        found = [self._codec.message(f"/{camera}/image/compressed", PICTURE, header=header, format="jpeg", data=data)]
+        name = own(f"{camera}/image/compressed")
+        found = [self._codec.message(name, PICTURE, header=header, format="jpeg", data=data)]
         lens = self._lenses.get(camera)
         if lens is not None:
-            found.append(self._codec.message(f"/{camera}/camera_info", LENS, header=header, **lens))
+            found.append(self._codec.message(own(f"{camera}/camera_info"), LENS, header=header, **lens))
         return found
 
     def _lens(self, lens: LensCalibration) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from groundstation.engineering_views.ros2.codec import Ros2Codec, RosMessage
 from groundstation.engineering_views.ros2.geometry import Builder, covariance_36, heading_xyzw, velocity_ahead
 from groundstation.engineering_views.ros2.health import HealthMaker
 from groundstation.engineering_views.ros2.markers import MarkerScene
+from groundstation.engineering_views.ros2.names import own
 from groundstation.engineering_views.ros2.pictures import PictureMaker
 from groundstation.engineering_views.ros2.stencils import FRAMES, ODOMETRY, POSE, SURE_POSE, TWIST, Stencils
 from groundstation.engineering_views.scene import ViewScene
@@ -81,17 +82,17 @@ class Ros2Scene:
         sure = (*place, *covariance_36(entity))
         moving = (*velocity_ahead(entity), *_NO_TURN, *_UNSAID)
         return [
-            filled(f"/{name}/pose", SURE_POSE, stamp_ns, {name: sure}),
-            filled(f"/{name}/odom", ODOMETRY, stamp_ns, {name: sure + moving}),
+            filled(own(f"{name}/pose"), SURE_POSE, stamp_ns, {name: sure}),
+            filled(own(f"{name}/odom"), ODOMETRY, stamp_ns, {name: sure + moving}),
         ]
 
     def _setpoint(self, stamp_ns: int, setpoint: m.VelocitySetpoint) -> RosMessage:
         self._markers.take(setpoint)
         name = setpoint.header.entity
         velocity = (*setpoint.velocity_m_s, 0.0, 0.0, setpoint.yaw_rate_rad_s)
-        return self._stencils.filled(f"/{name}/setpoint", TWIST, stamp_ns, {name: velocity})
+        return self._stencils.filled(own(f"{name}/setpoint"), TWIST, stamp_ns, {name: velocity})
 
     def _truth(self, stamp_ns: int, truth: m.TruthState) -> RosMessage:
         name = truth.header.entity
         place = (*truth.position_m, *heading_xyzw(truth.attitude_rad[2]))
-        return self._stencils.filled(f"/{name}/truth", POSE, stamp_ns, {name: place})
+        return self._stencils.filled(own(f"{name}/truth"), POSE, stamp_ns, {name: place})

@@ -14,6 +14,7 @@ from mcap_ros2.decoder import DecoderFactory
 from ruamel.yaml import YAML
 
 from drivers.rmw_zenoh.wire import graph
+from drivers.ros2.settings import Ros2Section
 from groundstation.bus import codec as bus_codec
 from groundstation.bus import keys
 from groundstation.bus import messages as m
@@ -63,17 +64,17 @@ def test_an_estimate_is_a_frame_a_pose_and_odometry() -> None:
     assert (frame.header.stamp.sec, frame.header.stamp.nanosec) == (1_700_000_000, 250_000_000)
     rotation = frame.transform.rotation
     assert (rotation.z, rotation.w) == pytest.approx((math.sqrt(0.5), math.sqrt(0.5)))
-    covariance = found["/drone_1/pose"].pose.covariance.reshape(6, 6)
+    covariance = found["/skein/drone_1/pose"].pose.covariance.reshape(6, 6)
     assert covariance[0, 1] == 0.02 and covariance[5, 5] == 0.25 and covariance[3, 3] == 1e6
     # Odometry's twist is in the body's frame: it flies along y, which is where it heads.
-    assert found["/drone_1/odom"].twist.twist.linear.x == pytest.approx(0.3)
-    assert found["/drone_1/odom"].twist.twist.linear.y == pytest.approx(0.0)
+    assert found["/skein/drone_1/odom"].twist.twist.linear.x == pytest.approx(0.3)
+    assert found["/skein/drone_1/odom"].twist.twist.linear.y == pytest.approx(0.0)
     assert len(found["/skein/markers"].markers) == 2
 
 
 def test_a_planar_target_says_nothing_of_height_and_heading() -> None:
     target = m.EntityEstimate("bot", "target", (1.0, 2.0), (0.01, 0.0, 0.0, 0.02), (0.1, 0.0), True, 0.0)
-    pose = taken(m.Estimate(header=header("team"), entities=(target,), epoch=1))["/bot/pose"]
+    pose = taken(m.Estimate(header=header("team"), entities=(target,), epoch=1))["/skein/bot/pose"]
     covariance = pose.pose.covariance.reshape(6, 6)
     assert covariance[1, 1] == 0.02 and covariance[2, 2] == covariance[5, 5] == 1e6
 
@@ -81,7 +82,7 @@ def test_a_planar_target_says_nothing_of_height_and_heading() -> None:
 def test_an_unknown_battery_is_not_an_empty_one() -> None:
     status = m.VehicleStatus(header=header(), flight_state=m.FlightState.LOST, mode="HOVER", detail="not heard")
     found = taken(status)
-    assert math.isnan(found["/drone_1/battery"].percentage)
+    assert math.isnan(found["/skein/drone_1/battery"].percentage)
     (line,) = found["/diagnostics"].status
     assert line.level == 2 and "not heard" in line.message
 
@@ -163,6 +164,16 @@ def test_keys_tokens_and_attachments_are_those_of_rmw_zenoh() -> None:
     assert graph.attachment(2, 3, b"x" * 16) == b"\2" + bytes(7) + b"\3" + bytes(7) + b"\x10" + b"x" * 16
 
 
+def test_nothing_of_ours_stands_where_the_robots_own_node_speaks() -> None:
+    """Else an estimate passes for a robot's odometry: with its own driver, whose silence it hides, and with others."""
+    shared = {"/tf", "/tf_static", "/diagnostics", "/rosout"}
+    said = advertised(resolved_field(load_field(find_field("lab"))), truth=True)
+    assert {name for name in said if not name.startswith("/skein/")} == shared
+    for robot in ("drone_1", "turtlebot"):
+        section = Ros2Section(namespace=robot)
+        assert not {f"/{section.topic(name)}" for name in (section.odometry, section.battery)} & said.keys()
+
+
 def test_a_bag_holds_what_its_own_reader_decodes(tmp_path: Path) -> None:
     write_run(tmp_path / "run", load_field(find_field("lab"), ()).model_dump_json().encode(), 1.0)
     count, unread = write_bag(open_run(tmp_path / "run"), tmp_path / "bag")
@@ -171,7 +182,7 @@ def test_a_bag_holds_what_its_own_reader_decodes(tmp_path: Path) -> None:
         read = list(make_reader(stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages())
     topics = {one.channel.topic for one in read}
     assert unread == [] and len(read) == count and len(topics) >= 15, topics
-    assert {"/tf", "/tf_static", "/drone_1/odom", "/skein/markers", "/diagnostics"} <= topics
+    assert {"/tf", "/tf_static", "/skein/drone_1/odom", "/skein/markers", "/diagnostics"} <= topics
     field = resolved_field(load_field(find_field("lab")))
     types = {one.channel.topic: one.schema.name for one in read if one.schema}
     assert types.items() <= advertised(field, truth=True).items(), "a live view advertises all that a flight tells"

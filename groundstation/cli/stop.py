@@ -40,10 +40,8 @@ def choose_run(name: str | None, stops: bool = False) -> RuntimeRecord:
         records = [record for record in records if name in (record.name, record.site, str(record.supervisor.pid))]
     if not records:
         which = f" called {name}" if name else ""
-        reasons = "".join(f"\n{reason}" for reason in _closed_doors())
-        raise UnreachableError(
-            f"no ground station{which} is running (start one with: groundstation fly FIELD){reasons}"
-        )
+        nobody = f"no ground station{which} is running (start one with: groundstation fly FIELD)"
+        raise UnreachableError("\n".join(_closed_doors()) or nobody)
     if len(records) > 1 and stops and name is None:
         # In an emergency nobody reads a list of runs.
         records = [record for record in records if not record.simulated] or records

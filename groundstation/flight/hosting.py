@@ -30,7 +30,8 @@ from groundstation.supervisor.supervisor import Supervisor
 from groundstation.supervisor.terminal import Terminal
 
 _CONNECT_S, _TURN_S = 1.0, 0.05
-_IDLE_S = 10.0
+# A run that loads slowly has its order for this host by then.
+_IDLE_S = 30.0
 _GUARDIAN_S = 10.0
 # Drivers land long before; what is left then is a run that nobody will come back to.
 _LOST_S = 20.0
@@ -69,8 +70,8 @@ class Hosting:
     def _say_idle(self) -> None:
         host = self._admission.host
         self._terminal.say(
-            f"{host} is let in, and gets nothing to do: no device of the run has host: {host} in its field file, or "
-            "the run began before this host was admitted (it takes part in the next one)"
+            f"{host} is let in, and gets nothing to do so far: if that stays, no device of the run has host: {host} in "
+            "its field file, or the run began before this host was admitted (it takes part in the next one)"
         )
 
     def _join(self) -> HostLink:

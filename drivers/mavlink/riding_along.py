@@ -4,7 +4,7 @@ import math
 from collections.abc import Collection
 from enum import Enum
 
-from drivers.mavlink.wire import flight
+from drivers.mavlink.wire import flight, service
 from drivers.mavlink.wire.frames import IDS, Message
 from drivers.mavlink.wire.names import (
     CUSTOM_MODE_ENABLED,
@@ -19,7 +19,7 @@ from drivers.mavlink.wire.names import (
 
 
 class Verdict(Enum):
-    """STOP: pass, at once and always; PASS: pass, if there is room; REFUSE: answer with DENIED; DROP: in silence."""
+    """STOP: pass, at once and always; PASS: pass, if there is room; REFUSE: with an answer; DROP: in silence."""
 
     STOP = "stop"
     PASS = "pass"
@@ -47,7 +47,7 @@ _BY_SETTING = {
     "parameters": frozenset(number for name, number in IDS.items() if name.startswith(("PARAM_REQUEST", "PARAM_SET"))),
     "missions": frozenset(number for name, number in IDS.items() if name.startswith("MISSION_")),
 }
-_JUDGED = frozenset(IDS[name] for name in ("COMMAND_LONG", "COMMAND_INT", "SET_MODE"))
+_JUDGED = frozenset(IDS[name] for name in ("COMMAND_LONG", "COMMAND_INT", "SET_MODE", "FILE_TRANSFER_PROTOCOL"))
 
 
 def may_pass(number: int, allowed: Collection[str] = ()) -> bool:
@@ -74,6 +74,8 @@ def verdict(
             stops = message.base_mode & CUSTOM_MODE_ENABLED and message.custom_mode in _STOPPED[flavour]
             return Verdict.STOP if stops else Verdict.DROP
         case flight.MissionItem() | flight.MissionItemInt() if message.current in _FLOWN_TO:
+            return Verdict.REFUSE
+        case service.FileTransferProtocol() if message.target_system == system:
             return Verdict.REFUSE
     # WIRE (docs/reference/mavlink.md 5.11): its heartbeat would hide the loss of ours, its clock upset the vehicle's.
     return Verdict.PASS if _is_allowed(number, allowed) else Verdict.DROP

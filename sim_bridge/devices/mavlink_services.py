@@ -11,6 +11,7 @@ from drivers.mavlink.wire import flight as f
 from drivers.mavlink.wire import service as s
 from drivers.mavlink.wire import telemetry as t
 from drivers.mavlink.wire.errors import WireError
+from drivers.mavlink.wire.file_transfer import refusal
 from drivers.mavlink.wire.frames import CLASSES, Message, ReceivedFrame, id_of
 from drivers.mavlink.wire.names import Flavour, MavCmd, MavResult, px4_mode
 from drivers.mavlink.wire.parameters import carried_from_value, value_from_carried
@@ -30,7 +31,6 @@ _OLD_STREAMS: tuple[type[Message], ...] = (
 )  # fmt: skip
 _UNSUPPORTED: Answer = (MavResult.UNSUPPORTED, "")
 _OK: Answer = (MavResult.ACCEPTED, "")
-_NAK, _FTP_FAIL = 129, 1
 _MISSION_UNSUPPORTED, _NO_SUCH_ITEM = 3, 13
 _FRESH_S = 0.5
 
@@ -177,7 +177,7 @@ class Services:
             case s.MissionCount() | s.MissionClearAll() | s.MissionRequestInt():
                 yield _mission_answer(frame, message)
             case s.FileTransferProtocol():
-                yield self._ftp_refusal(frame, message)
+                yield refusal(message, frame.system, frame.component)
             case s.RequestDataStream() if message.start_stop:
                 self._old_rates(message.req_message_rate)
 
@@ -189,13 +189,6 @@ class Services:
         except WireError:
             return
         parameters.values[message.param_id] = value
-
-    def _ftp_refusal(self, frame: ReceivedFrame, message: s.FileTransferProtocol) -> Message:
-        # WIRE (MAVLink FTP): sequence + 1, opcode NAK, the request's opcode, error FAIL.
-        request = message.payload
-        sequence = (request[0] | request[1] << 8) + 1 & 0xFFFF
-        head = [sequence & 255, sequence >> 8, request[2], _NAK, 1, request[3], 0, 0, 0, 0, 0, 0, _FTP_FAIL]
-        return s.FileTransferProtocol(0, frame.system, frame.component, tuple(head + [0] * (251 - len(head))))
 
     def _old_rates(self, rate_hz: int) -> None:
         ticks = max(4, round(TICK_HZ / max(1, rate_hz)))

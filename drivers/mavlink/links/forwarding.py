@@ -11,7 +11,7 @@ from drivers.mavlink.links.seam import Address, Heard, Transport
 from drivers.mavlink.riding_along import Verdict, may_pass, verdict
 from drivers.mavlink.settings import VehicleSettings
 from drivers.mavlink.wire.errors import WireError
-from drivers.mavlink.wire.flight import CommandAckMessage, CommandInt, CommandLong
+from drivers.mavlink.wire.flight import CommandAckMessage
 from drivers.mavlink.wire.frames import MAX_DATAGRAM, Message, ReceivedFrame, split
 from drivers.mavlink.wire.verification import number_of
 from groundstation.bus import clock
@@ -168,8 +168,7 @@ class ForwardedLink:
                 self.rejected["rider_too_many"] += 1
             case Verdict.REFUSE:
                 self.rejected["rider_refused"] += 1
-                if isinstance(message, CommandLong | CommandInt):
-                    rider.refuse(frame, message.command)
+                rider.refuse(frame)
 
     def _tell_once(self, text: str, remedy: str) -> None:
         now_ns = clock.now_ns()

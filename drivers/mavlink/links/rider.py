@@ -8,9 +8,11 @@ from drivers.mavlink.requests import word_of
 from drivers.mavlink.riding_along import made_good, words_of
 from drivers.mavlink.settings import VehicleSettings
 from drivers.mavlink.stop_queue import StopQueue
-from drivers.mavlink.wire.flight import CommandAckMessage
+from drivers.mavlink.wire.file_transfer import refusal
+from drivers.mavlink.wire.flight import CommandAckMessage, CommandInt, CommandLong
 from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder, Message, ReceivedFrame
 from drivers.mavlink.wire.names import Flavour, MavResult
+from drivers.mavlink.wire.service import FileTransferProtocol
 from groundstation.time_units import NS_PER_S
 
 # What passes besides stops: enough for a table of parameters in half a minute, too little to make set-points late.
@@ -53,10 +55,16 @@ class Rider:
         with suppress(OSError):
             self.socket.sendto(data, self.target)
 
-    def refuse(self, frame: ReceivedFrame, command: int) -> None:
-        """Answer a command as the vehicle would that does not do it."""
-        ack = CommandAckMessage(command, MavResult.DENIED, 0, 0, frame.system, frame.component)
-        self.show(self.encoder.encode(ack))
+    def refuse(self, frame: ReceivedFrame) -> None:
+        """Answer as the vehicle would that does not do what is asked; a point of a mission gets no answer."""
+        match frame.message:
+            case CommandLong(command=command) | CommandInt(command=command):
+                answer: Message = CommandAckMessage(command, MavResult.DENIED, 0, 0, frame.system, frame.component)
+            case FileTransferProtocol() as request:
+                answer = refusal(request, frame.system, frame.component)
+            case _:
+                return
+        self.show(self.encoder.encode(answer))
 
     def stop(self, now_ns: int, message: Message, raw: bytes) -> str:
         """Take a stop into the queue, and return it in words."""

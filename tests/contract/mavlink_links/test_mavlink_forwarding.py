@@ -11,7 +11,7 @@ from drivers.mavlink.settings import LinkSettings, VehicleSettings
 from drivers.mavlink.wire.flight import CommandAckMessage, CommandLong, SetPositionTargetLocalNed
 from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder, split
 from drivers.mavlink.wire.names import MavCmd, MavResult
-from drivers.mavlink.wire.service import ParamRequestList
+from drivers.mavlink.wire.service import FileTransferProtocol, ParamRequestList
 from drivers.mavlink.wire.telemetry import Heartbeat
 
 HEARTBEAT = Heartbeat(2, 12, 81, 0, 4)
@@ -169,6 +169,16 @@ def test_it_cannot_arm_and_is_told_so_by_an_answer(ground):
     assert (answer.command, answer.result) == (MavCmd.COMPONENT_ARM_DISARM, MavResult.DENIED)
     nothing_comes(ground.vehicle)
     assert ground.link.rejected["rider_refused"] == 1
+
+
+def test_a_file_is_refused_aloud_so_that_it_asks_for_parameters_at_once(ground):
+    opens = FileTransferProtocol(0, 11, 1, (7, 0, 3, 4, *(0,) * 247))
+    ground.order(opens._replace(target_system=12), opens)
+    answer = message_of(ground.station)
+    assert isinstance(answer, FileTransferProtocol)
+    assert (answer.target_system, *answer.payload[:6], answer.payload[12]) == (255, 8, 0, 3, 129, 1, 4, 1)
+    nothing_comes(ground.vehicle)
+    nothing_comes(ground.station)
 
 
 def test_set_points_heartbeats_parameters_and_garbage_do_not_pass_and_stops_behind_them_do(ground):

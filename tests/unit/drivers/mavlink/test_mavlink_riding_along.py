@@ -73,7 +73,9 @@ def test_a_command_for_another_vehicle_does_not_pass():
 
 
 def test_no_other_kind_passes_unasked_and_parameters_and_missions_only_where_allowed():
-    own = {id_of(kind) for kind in (flight.CommandLong, flight.CommandInt, flight.SetMode)}
+    own = {
+        id_of(kind) for kind in (flight.CommandLong, flight.CommandInt, flight.SetMode, service.FileTransferProtocol)
+    }
     for name, number in IDS.items():
         if number in own:
             continue

@@ -138,6 +138,7 @@ def test_a_flood_of_stops_passes_50_times_a_second_and_hides_no_other(ground):
 def test_a_stop_that_the_vehicle_refuses_is_told(ground):
     ground.order(command(MavCmd.DO_SET_MODE, 1.0, 4.0, 3.0))
     assert message_of(ground.vehicle).command == MavCmd.DO_SET_MODE
+    eventually(lambda: ground.told)
     ground.vehicle.sendto(
         ground.vehicle_says.encode(
             CommandAckMessage(MavCmd.DO_SET_MODE, MavResult.TEMPORARILY_REJECTED, 0, 0, 255, 190)

@@ -81,6 +81,7 @@ class SensorBits(IntFlag):
     MAGNETOMETER = 0x4
     GPS = 0x20
     VISION_POSITION = 0x80
+    GEOFENCE = 0x100000
     PREARM_CHECK = 0x10000000
 
 

@@ -71,7 +71,7 @@ class Hosting:
         host = self._admission.host
         self._terminal.say(
             f"{host} is let in, and gets nothing to do so far: if that stays, no device of the run has host: {host} in "
-            "its field file, or the run began before this host was admitted (it takes part in the next one)"
+            "its field file, or this host was admitted after the run began (it takes part in the next one), or expelled"
         )
 
     def _join(self) -> HostLink:

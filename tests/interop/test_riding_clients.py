@@ -82,7 +82,8 @@ def test_mavproxy_sees_both_vehicles_is_refused_what_flies_and_stops_them(
         with proxy_on(python, riding, tmp_path) as proxy:
             for system in FLAVOURS.values():
                 proxy.until(f"Detected vehicle {system}:1")
-            proxy.until("Received 23 parameters", 30.0)
+            for system in FLAVOURS.values():
+                proxy.until(f"mav_{system}_1.parm", 30.0)  # where it has saved all parameters
             proxy.order(f"vehicle {ARDUPILOT}")
             for line, command in (("arm throttle", "COMPONENT_ARM_DISARM"), ("takeoff 3", "NAV_TAKEOFF")):
                 proxy.order(line)

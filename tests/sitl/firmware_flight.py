@@ -1,4 +1,6 @@
-"""One flight of a firmware in step with the team, and its figures. As a program: `FLAVOUR SEED SECONDS [FAULT]`.
+"""One flight of firmwares in step with the team, and its figures. As a program: `FLAVOURS SEED SECONDS [FAULT]`.
+
+FLAVOURS: px4, ardupilot, or px4,ardupilot for both in one flight.
 
 The fault ends it: `dark` takes the cameras, `kill` the driver, `guarded` the driver while the guardian speaks for it.
 """
@@ -19,121 +21,153 @@ from sim_bridge.world.ardrone import Quadrotor
 
 sys.path.insert(0, str(Path(__file__).parent))  # what lies here and is no test belongs to these tests
 numba_cache.activate()  # before the kernels are imported: afterwards they would be compiled anew, for a minute
-from firmware_room import NAME, Room  # noqa: E402
+from firmware_room import Room  # noqa: E402
+from firmware_seat import Seat  # noqa: E402
 
 from drivers.mavlink.failsafe import HOVERS_S, hover_and_land  # noqa: E402
 from groundstation.bus.messages import Verb  # noqa: E402
 
+# Of the mixed team; the other drones are emulated.
+NAMES = ("drone_2", "drone_3")
 RISEN_M, SETTLED_S, START_S = 0.5, 3.0, 30.0  # hovering before the team tracks
 GUARDIAN_SPEAKS_S = 0.3
+Figures = dict[str, Any]
 
 
-class Flight(Room):  # type: ignore[misc]
-    """Take-off, tracking, and a bad end."""
+class Course:
+    """What one firmware's flight was like: looked at in each slice, it `rises`, `tracks` and `sinks` in turn."""
 
-    def take_off(self) -> dict[str, float]:
-        """Bring the team into the air; returns height and drift of the real one until it tracks."""
-        self.study.start_ns, self.flying = self._now_ns, True
-        for drone in self.study.world.of(Quadrotor).values():
-            drone.autopilot.take_off()
-        body, (pad_x, pad_y) = self.puppet.airframe, self.drone.pad_m
-        drifts, heights = [0.0], [0.0]
+    def __init__(self, seat: Seat, room: Room) -> None:
+        self._seat, self._room, self._body = seat, room, seat.puppet.airframe
+        self._floor_m, self._hover_since = self._body.z, 0.0
+        self._drifts, self._heights, self._errors = [0.0], [0.0], [0.0]
+        self._left, self._started_at = "", (0.0, 0.0)
+        self._began_s = self._slow_since = 0.0
+        self._farthest_m = 0.0
 
-        def hovers_long() -> bool:
-            drifts.append(math.hypot(body.x - pad_x, body.y - pad_y))
-            heights.append(body.z - self._floor_m)
-            return self._hovered() > SETTLED_S
+    @property
+    def _now_s(self) -> float:
+        return self._room.study.world.time_s
 
-        self._floor_m, self._hover_since = body.z, 0.0
-        up = self.until(hovers_long, START_S, Verb.TAKEOFF, "LANDED")
-        assert up, f"{self.mode}: {self.process.texts[-6:]}"
-        self.study.options = replace(self.study.options, take_off_s=self.study.world.time_s)
-        assert self.until(lambda: self.mode == "TRACK", 5.0, Verb.TRACK, "HOVER"), self.process.texts[-6:]
-        return {"highest_m": max(heights), "height_m": float(np.mean(heights[-100:])), "drift_m": max(drifts)}
+    def rises(self) -> bool:
+        """Return whether it has not hovered long enough yet."""
+        body, (pad_x, pad_y) = self._body, self._seat.drone.pad_m
+        self._drifts.append(math.hypot(body.x - pad_x, body.y - pad_y))
+        self._heights.append(body.z - self._floor_m)
+        if self._seat.mode != "HOVER" or body.z - self._floor_m < RISEN_M:
+            self._hover_since = self._now_s
+        return self._now_s - self._hover_since <= SETTLED_S
 
-    def _hovered(self) -> float:
-        now_s = self.study.world.time_s
-        if self.mode != "HOVER" or self.puppet.airframe.z - self._floor_m < RISEN_M:
-            self._hover_since = now_s
-        return now_s - self._hover_since
+    def tracks(self) -> bool:
+        """Return whether its driver still tracks."""
+        if self._room.study.world.ticks % 20 == 0:
+            believed = (one.mean for one in self._room.study.tracker.estimates() if one.name == self._seat.name)
+            place = next(believed, (math.nan, math.nan))
+            self._errors.append(math.dist(place[:2], (self._body.x, self._body.y)))
+        if self._seat.mode != "TRACK" and not self._left:
+            self._left = f"{self._seat.mode}: {self._seat.host.watchdog.reason}"
+        return not self._left
 
-    def track(self, seconds: float) -> dict[str, Any]:
-        """Track for a while, as long as the driver does."""
-        errors, body = [], self.puppet.airframe
+    def lose(self, fault: str) -> None:
+        """Take its cameras (dark) or its driver."""
+        self._started_at = (self._body.x, self._body.y)
+        self._began_s = self._slow_since = self._now_s
+        if fault == "dark":
+            self._room.study.blind |= {self._seat.name}
+        else:
+            self._seat.killed = True
 
-        def ends() -> bool:
-            if self.study.world.ticks % 20 == 0:
-                errors.append(math.dist(self.belief()[:2], (body.x, body.y)))
-            return self.mode != "TRACK"
+    def sinks(self, fault: str) -> bool:
+        """Return whether it has come neither to the floor nor to rest; a guardian speaks meanwhile (guarded)."""
+        if fault == "guarded":
+            self._guard(self._now_s - self._began_s)
+        body = self._body
+        if math.hypot(body.vx, body.vy, body.vz) > 0.1:
+            self._slow_since = self._now_s
+        if self._is_down:
+            return False
+        self._farthest_m = max(self._farthest_m, math.dist(self._started_at, (body.x, body.y)))
+        self._ended_s = self._now_s
+        return self._now_s - self._slow_since <= 3.0
 
-        began_s = self.study.world.time_s
-        left = self.until(ends, seconds)
-        report = self.study.score.report()
-        return {
-            "tracked_s": round(self.study.world.time_s - began_s, 1),
-            "left": f"{self.mode}: {self.host.watchdog.reason}" if left else "",
-            "target_rmse_m": report["target_rmse_m"], "target_max_m": report["target_max_m"],
-            "belief_mean_m": float(np.mean(errors)), "belief_max_m": float(np.max(errors)),
-            "separation_m": report["min_separation_m"], "anees": report["anees"].get(NAME),
-        }  # fmt: skip
-
-    def belief(self) -> tuple[float, ...]:
-        """Return where the tracker has the real one."""
-        return next((one.mean for one in self.study.tracker.estimates() if one.name == NAME), (math.nan,) * 4)
-
-    def end_badly(self, fault: str, limit_s: float = 30.0) -> dict[str, Any]:
-        """Take its cameras (dark), its driver (kill), or its driver while a guardian speaks (guarded).
-
-        Returns time and distance to rest or floor.
-        """
-        body = self.puppet.airframe
-        start, began_s = (body.x, body.y), self.study.world.time_s
-        self.study.blind, self.killed = fault == "dark", fault != "dark"
-        slow_since, farthest = [began_s], [0.0]
-
-        def rests() -> bool:
-            now_s = self.study.world.time_s
-            if fault == "guarded":
-                self._guard(now_s - began_s)
-            farthest.append(math.dist(start, (body.x, body.y)))
-            if math.hypot(body.vx, body.vy) > 0.1:
-                slow_since[0] = now_s
-            return body.z < self._floor_m + 0.05 or now_s - slow_since[0] > 3.0
-
-        rested = self.until(rests, limit_s)
-        how = "floor" if body.z < self._floor_m + 0.05 else "rest" if rested else "flies on"
-        took_s = (self.study.world.time_s if how == "floor" else slow_since[0]) - began_s
-        return {"ends": how, "took_s": round(took_s, 2), "farthest_m": round(max(farthest), 3)}
+    @property
+    def _is_down(self) -> bool:
+        return bool(self._body.z < self._floor_m + 0.05)
 
     def _guard(self, elapsed_s: float) -> None:
-        if self.study.world.ticks % 20:
+        if self._room.study.world.ticks % 20:
             return
-        hover, land = hover_and_land([self.system])
-        link: Any = self.fleet.link
+        hover, land = hover_and_land([self._seat.system])
+        link: Any = self._seat.fleet.link
         if elapsed_s > GUARDIAN_SPEAKS_S:
-            link.send_raw(self.system, hover if elapsed_s < HOVERS_S else land)
+            link.send_raw(self._seat.system, hover if elapsed_s < HOVERS_S else land)
+
+    def figures(self) -> Figures:
+        """Return those of take-off and tracking."""
+        return {
+            "name": self._seat.name, "flavour": self._seat.flavour, "left": self._left,
+            "highest_m": max(self._heights), "height_m": float(np.mean(self._heights[-100:])),
+            "drift_m": max(self._drifts), "belief_mean_m": float(np.mean(self._errors)),
+            "belief_max_m": float(np.max(self._errors)),
+            "anees": self._room.study.score.report()["anees"].get(self._seat.name),
+        }  # fmt: skip
+
+    def end(self) -> Figures:
+        """Return time and distance to rest or floor."""
+        how = "floor" if self._is_down else "flies on" if self.sinks("") else "rest"
+        took_s = (self._ended_s if how == "floor" else self._slow_since) - self._began_s
+        return {"ends": how, "took_s": round(took_s, 2), "farthest_m": round(self._farthest_m, 3)}
 
 
-def fly(flavour: str, seed: int, seconds: float, folder: Path, fault: str = "", **more: Any) -> dict[str, Any]:
-    """Fly once; returns the figures."""
-    room = Flight(flavour, seed, folder, **more)
+def take_off(room: Room, courses: list[Course]) -> None:
+    """Bring the team into the air, and let it track."""
+    room.study.start_ns, room.flying = room.now_ns(), True
+    for seat in room.seats:
+        seat.flying = True
+    for drone in room.study.world.of(Quadrotor).values():
+        drone.autopilot.take_off()
+    up = room.until(lambda: sum(one.rises() for one in courses) == 0, START_S, Verb.TAKEOFF, "LANDED")
+    assert up, room.said()
+    room.study.options = replace(room.study.options, take_off_s=room.study.world.time_s)
+    assert room.until(lambda: all(seat.mode == "TRACK" for seat in room.seats), 5.0, Verb.TRACK, "HOVER"), room.said()
+
+
+def track(room: Room, courses: list[Course], seconds: float) -> Figures:
+    """Track for a while, as long as all drivers do; returns the figures of the team."""
+    began_s = room.study.world.time_s
+    room.until(lambda: sum(one.tracks() for one in courses) < len(courses), seconds)
+    report, kept = room.study.score.report(), ("target_rmse_m", "target_max_m", "min_separation_m")
+    tracked_s = round(room.study.world.time_s - began_s, 1)
+    return {"tracked_s": tracked_s, **{key: report[key] for key in kept}}
+
+
+def fly(flavours: list[str], seed: int, seconds: float, folder: Path, fault: str = "", **more: Any) -> Figures:
+    """Fly once; returns the figures of the team, those of each firmware under `firmwares`."""
+    room = Room(dict(zip(NAMES, flavours, strict=False)), seed, folder, **more)
     began = time.monotonic()
     try:
         with room.clocked():
             room.get_ready()
-            figures: dict[str, Any] = {"flavour": flavour, "seed": seed, **room.take_off(), **room.track(seconds)}
-            if fault and not figures["left"]:
-                figures |= room.end_badly(fault)
-            figures["speed"] = round(room.study.world.time_s / (time.monotonic() - began), 2)
-            figures["alone_s"] = round(room.alone_s, 3)
-            figures["texts"] = room.process.texts[-12:]
-            return figures
+            courses = [Course(seat, room) for seat in room.seats]
+            take_off(room, courses)
+            figures = {"seed": seed, **track(room, courses, seconds)}
+            firmwares = [one.figures() for one in courses]
+            if fault and not any(one["left"] for one in firmwares):
+                for one in courses:
+                    one.lose(fault)
+                room.until(lambda: sum(one.sinks(fault) for one in courses) == 0, 30.0)
+                firmwares = [known | one.end() for known, one in zip(firmwares, courses, strict=True)]
+            for known, seat in zip(firmwares, room.seats, strict=True):
+                known["texts"] = seat.process.texts[-12:]
+            speed = round(room.study.world.time_s / (time.monotonic() - began), 2)
+            return figures | {"speed": speed, "alone_s": round(room.alone_s, 3), "firmwares": firmwares}
     finally:
         room.close()
         (folder / "trace.jsonl").write_text("".join(json.dumps(row) + "\n" for row in room.trace))
 
 
 if __name__ == "__main__":
-    _flavour, _seed, _seconds, *_fault = sys.argv[1:]
-    _folder = Path(tempfile.mkdtemp(prefix=f"room-{_flavour}-{_seed}-"))
-    print(json.dumps(fly(_flavour, int(_seed), float(_seconds), _folder, *_fault) | {"trace": str(_folder)}, indent=1))
+    _flavours, _seed, _seconds, *_fault = sys.argv[1:]
+    _folder = Path(tempfile.mkdtemp(prefix=f"room-{_seed}-"))
+    _figures = fly(_flavours.split(","), int(_seed), float(_seconds), _folder, *_fault)
+    print(json.dumps(_figures | {"trace": str(_folder)}, indent=1))

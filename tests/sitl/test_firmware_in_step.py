@@ -24,9 +24,19 @@ def test_a_firmware_tracks_with_the_team_and_stops_near_without_cameras_or_drive
 ) -> None:
     if not binary_of(flavour):
         pytest.skip(f"{VARIABLES[flavour]} names no SITL binary: none is in a package registry")
-    figures = fly(flavour, seed, 30.0, tmp_path, fault)
-    assert figures["height_m"] == pytest.approx(TAKE_OFF_M, rel=0.1), figures
-    assert figures["drift_m"] <= 0.25, figures
-    assert figures["left"] == "" and figures["target_rmse_m"] <= 0.05, figures
-    assert figures["belief_max_m"] <= 0.15, figures
-    assert figures["ends"] in ("floor", "rest") and figures["farthest_m"] <= 1.5, figures
+    team = fly([flavour], seed, 30.0, tmp_path, fault)
+    (one,) = team["firmwares"]
+    assert one["height_m"] == pytest.approx(TAKE_OFF_M, rel=0.1), team
+    assert one["drift_m"] <= 0.25, team
+    assert one["left"] == "" and team["target_rmse_m"] <= 0.05, team
+    assert one["belief_max_m"] <= 0.15, team
+    assert one["ends"] in ("floor", "rest") and one["farthest_m"] <= 1.5, team
+
+
+def test_both_firmwares_track_together_with_an_emulated_drone(tmp_path: Path) -> None:
+    for flavour, variable in VARIABLES.items():
+        if not binary_of(flavour):
+            pytest.skip(f"{variable} names no SITL binary: none is in a package registry")
+    team = fly(["px4", "ardupilot"], 3, 30.0, tmp_path)
+    assert team["tracked_s"] >= 30.0 and team["target_rmse_m"] <= 0.05, team
+    assert max(one["belief_max_m"] for one in team["firmwares"]) <= 0.15, team

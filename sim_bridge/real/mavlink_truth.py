@@ -26,6 +26,8 @@ _SYSTEM, _COMPONENT = 254, 191
 _ASK_NS, _INTERVAL_US = 2_000_000_000, 20_000.0
 # Each simulator has a globe of its own [m per degree]: 0.1 % apart.
 _ARDUPILOT_DEGREE_M, _PX4_DEGREE_M = 111_318.845, 111_194.927
+# WIRE (SIM_STATE, HIL_STATE_QUATERNION): latitude and longitude are whole 1e-7 degrees, a centimetre and more.
+_GRAIN_M = 1e-7 * _ARDUPILOT_DEGREE_M
 _DATAGRAMS = 64
 
 
@@ -103,7 +105,8 @@ class AutopilotTruth:
     def _of_ardupilot(self, m: SimState) -> TrueState:
         degrees = (m.lat_int / 1e7, m.lon_int / 1e7) if m.lat_int or m.lon_int else (m.lat, m.lon)
         place = self._local(*degrees, m.alt, _ARDUPILOT_DEGREE_M)
-        return TrueState(place, (m.vn, m.ve, m.vd), (m.roll, m.pitch, m.yaw), (m.xgyro, m.ygyro, m.zgyro))
+        attitude, rates = (m.roll, m.pitch, m.yaw), (m.xgyro, m.ygyro, m.zgyro)
+        return TrueState(place, (m.vn, m.ve, m.vd), attitude, rates, _GRAIN_M)
 
     def _of_px4(self, m: HilStateQuaternion) -> TrueState:
         w, x, y, z = m.attitude_quaternion
@@ -112,7 +115,8 @@ class AutopilotTruth:
         yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
         place = self._local(m.lat / 1e7, m.lon / 1e7, m.alt / 1e3, _PX4_DEGREE_M)
         rates = (m.rollspeed, m.pitchspeed, m.yawspeed)
-        return TrueState(place, (m.vx / 100.0, m.vy / 100.0, m.vz / 100.0), (roll, pitch, yaw), rates)
+        velocity = (m.vx / 100.0, m.vy / 100.0, m.vz / 100.0)
+        return TrueState(place, velocity, (roll, pitch, yaw), rates, _GRAIN_M)
 
     def _local(self, latitude: float, longitude: float, altitude: float, degree_m: float) -> Vector3:
         first = self._origin = self._origin or (latitude, longitude)

@@ -11,12 +11,16 @@ _WANDERS_M = 0.5
 
 @dataclass(frozen=True, slots=True)
 class TrueState:
-    """What a simulator says: position [m], velocity [m/s; north-east-down], roll, pitch, yaw [rad; FRD], rates."""
+    """What a simulator says: position [m], velocity [m/s; north-east-down], roll, pitch, yaw [rad; FRD], rates.
+
+    grain_m: step of its horizontal position.
+    """
 
     position: Vector3
     velocity: Vector3
     attitude: Vector3
     rates: Vector3
+    grain_m: float = 0.0
 
 
 class Placement:
@@ -58,6 +62,7 @@ class Placement:
             (vx, vy, -state.velocity[2]),
             (roll, -pitch, math.remainder(turn - yaw, math.tau)),
             (p, -q, -r),
+            state.grain_m,
         )
 
 

@@ -9,17 +9,22 @@ from sim_bridge.world.downwash import wake_between
 Vector3 = tuple[float, float, float]
 STALE_S = 0.5
 _AIRBORNE_M = 0.05  # above where it stands
+_TINY_M = 1e-9
 _NOWHERE = (math.nan,) * 13
 
 
 @dataclass(frozen=True, slots=True)
 class OutsidePose:
-    """Where a real body is: position [m], velocity [m/s; world], roll, pitch, yaw [rad; FLU] and body rates [rad/s]."""
+    """Where a real body is: position [m], velocity [m/s; world], roll, pitch, yaw [rad; FLU] and body rates [rad/s].
+
+    grain_m: step in which the horizontal position is told; within one it is unknown.
+    """
 
     position: Vector3
     velocity: Vector3
     attitude: Vector3
     rates: Vector3 = (0.0, 0.0, 0.0)
+    grain_m: float = 0.0
 
 
 class Puppet:
@@ -39,13 +44,24 @@ class Puppet:
 
     def follow(self, pose: OutsidePose) -> None:
         """Be where the real body is now."""
-        body = self.airframe
-        body.x, body.y, body.z = pose.position
+        body, z = self.airframe, pose.position[2]
+        body.x, body.y, body.z = (*self._within_grain(pose), z)
         body.vx, body.vy, body.vz = pose.velocity
         body.roll, body.pitch, body.yaw = pose.attitude
         body.on_ground = body.z < STANDING_HEIGHT_M + _AIRBORNE_M
         self._rates, self.age_s, self._waits = pose.rates, 0.0, False
         self.poses += 1
+
+    def _within_grain(self, pose: OutsidePose) -> tuple[float, float]:
+        """Return the horizontal place nearest to where it has got to that the pose does not exclude.
+
+        It moves evenly then, as a real body does, and not by a grain now and then.
+        """
+        (told_x, told_y, _), body = pose.position, self.airframe
+        away_x, away_y = body.x - told_x, body.y - told_y
+        away_m, reach_m = math.hypot(away_x, away_y), pose.grain_m / math.sqrt(2.0)
+        kept = 0.0 if self._waits or self.stale else min(1.0, reach_m / max(away_m, reach_m, _TINY_M))
+        return told_x + kept * away_x, told_y + kept * away_y
 
     def step(self) -> None:
         """Advance by one tick towards the last pose."""

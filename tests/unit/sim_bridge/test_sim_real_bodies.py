@@ -23,7 +23,7 @@ from sim_bridge.launch_spec import LaunchSpec, read_order
 from sim_bridge.real.mavlink_truth import AutopilotTruth
 from sim_bridge.real.placed import Placement
 from sim_bridge.render.scene import compose_scene
-from sim_bridge.world.puppet import STALE_S, OutsidePose, Puppet
+from sim_bridge.world.puppet import STALE_S
 from sim_bridge.world.world import TICK_NS, TICK_S
 
 LENS = {
@@ -269,15 +269,6 @@ def test_faults_of_what_is_real_are_refused(tmp_path: Path) -> None:
         order(tmp_path, {"drone_9": {"source": "estimate"}})
 
 
-def test_a_pose_beyond_the_walls_is_nowhere() -> None:
-    puppet = Puppet((4.0, 3.0, 4.5), TICK_S)
-    puppet.follow(OutsidePose((3.9, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
-    assert not puppet.nowhere
-    for _ in range(25):
-        puppet.step()
-    assert "outside of the room" in puppet.nowhere and math.isnan(puppet.row()[0])
-
-
 def test_a_taken_port_is_named(port: int) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
         udp.bind(("127.0.0.1", port))
@@ -304,6 +295,7 @@ def test_px4_s_true_state_is_read_in_its_units(truth: AutopilotTruth) -> None:
     assert state is not None
     assert state.position == pytest.approx((10.0, 0.0, -489.5), abs=0.01)
     assert state.velocity == pytest.approx((0.5, -0.2, 0.1)) and state.attitude[2] == pytest.approx(math.radians(30))
+    assert state.grain_m == pytest.approx(0.0111, abs=0.0001), "1e-7 degrees"
 
 
 def test_a_local_position_counts_until_something_exact_is_heard(truth: AutopilotTruth) -> None:

@@ -17,8 +17,9 @@ _SMOOTHING_S = 0.12
 _LATELY_S = 0.6
 # Climb rates of the belief are mostly the autopilot's own word, less an error that changes over seconds.
 _CLIMB_SMOOTHING_S, _MOST_CLIMB_M_S = 0.4, 0.3
-# Without the tracker an estimator's error of the velocity lasts for about that long.
-_FORGETS_S = 2.0
+# A measured estimator's error of the velocity is the same for that long; then so much of it is another's each second
+# (docs/reference/mavlink.md 2.1): 0.73 of it is left half a second after it was seen, 0.33 after a second.
+_LASTS_S, _FORGETS_S = 0.35, 0.6
 _FRESH_NS = 300_000_000
 # Sudden ones are no error of an estimator that still works: what is told is not corrected then, and the limits of the
 # control error act. A large one is corrected as far as this, which 7 degrees of tilt explain: a correction that ended
@@ -76,6 +77,7 @@ class DriftFeedback:
         self._lately: Vector2 = (0.0, 0.0)
         self._climb_drift_m_s = 0.0
         self._at_ns: int | None = None
+        self._seen_ns = 0
         self._believed_ns: int | None = None
         self._doubted_until_ns = 0
         self._stood_ns: int | None = None
@@ -98,6 +100,7 @@ class DriftFeedback:
         self._place, self._yaw_rad, self._believed_ns = (x, y, z), yaw, now_ns
         if estimate.age_s > _SEEN_S:
             return  # dead reckoning by the very velocity that is asked about
+        self._seen_ns = now_ns - round(estimate.age_s * NS_PER_S)
         c, s = math.cos(yaw), math.sin(yaw)
         forward, left = reported_m_s[:2]
         vx, vy = estimate.velocity_m_s[:2]
@@ -130,7 +133,7 @@ class DriftFeedback:
         lifts_off = self._stood_ns is not None and now_ns - self._stood_ns <= _LIFT_OFF_NS
         if self._at_ns is None or (doubted and not lifts_off):
             return _STILL
-        fades = math.exp(-max(0.0, (now_ns - self._at_ns) / NS_PER_S - _SEEN_S) / _FORGETS_S)
+        fades = math.exp(-max(0.0, (now_ns - self._seen_ns) / NS_PER_S - _LASTS_S) / _FORGETS_S)
         x, y = drift
         left_over = fades * min(1.0, _MOST_M_S / max(math.hypot(x, y), _MOST_M_S))
         up = max(-_MOST_CLIMB_M_S, min(_MOST_CLIMB_M_S, fades * self._climb_drift_m_s))

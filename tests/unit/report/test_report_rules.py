@@ -73,16 +73,24 @@ def test_kinds_of_topology(text: str, kind: str) -> None:
     assert topology_use.kind_of(text) == kind
 
 
-@pytest.mark.parametrize(("mode", "failed"), [("demo", {"topology_seconds.string"}), ("sitl", set()), ("fly", set())])
-def test_both_topologies_must_occur_in_the_demo_alone(mode: str, failed: set[str]) -> None:
+@pytest.mark.parametrize(
+    ("mode", "tracking_s", "failed"),
+    [
+        ("demo", None, {"topology_seconds.string"}),
+        ("demo", 20.0, {"topology_seconds.string"}),
+        ("demo", 15.0, set()),
+        ("sitl", None, set()),
+        ("fly", None, set()),
+    ],
+)
+def test_both_topologies_must_occur_in_a_demo_that_lasts(mode: str, tracking_s: float | None, failed: set[str]) -> None:
     data = _data(plans=[_plan(0.0, "a,b"), _plan(10.0, "a,b")])
     seconds = topology_use.topology_seconds(data, 0.0, 20.0)
     figures = msgspec.structs.replace(figures_of(data), topology_seconds=seconds, sim_overrun_percent=0.0)
-    judged = {
-        c.name: c for c in criteria_of(figures, data.resolved, RunFacts(mode=mode)) if c.name.startswith("topology")
-    }
-    assert {name for name, criterion in judged.items() if not criterion.ok} == failed
-    assert bool(judged) == (mode == "demo")
+    facts = RunFacts(mode=mode, tracking_s=tracking_s)
+    judged = [c for c in criteria_of(figures, data.resolved, facts) if c.name.startswith("topology")]
+    assert {criterion.name for criterion in judged if not criterion.ok} == failed
+    assert bool(judged) == bool(failed)
 
 
 def test_a_refused_track_starts_nothing() -> None:

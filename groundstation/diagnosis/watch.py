@@ -43,7 +43,8 @@ class FigureWatch:
     def _suspected(self, key: tuple[Suspect, ...], charges: tuple[Charge, ...], now_ns: int) -> SuspectedFigure:
         known = self._standing.get(key)
         who, text, remedy = charges[0].suspect[0], sentence(charges, self._field), remedies(charges, self._field)
-        return SuspectedFigure(who, text, remedy, known.told_ns if known else now_ns)
+        about = ", ".join(" ".join(suspect).strip() for suspect in key)
+        return SuspectedFigure(who, text, remedy, known.told_ns if known else now_ns, about)
 
 
 def _accusation(figure: SuspectedFigure, charges: int) -> Notice:

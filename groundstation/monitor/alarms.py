@@ -168,4 +168,5 @@ def _suspected(state: MonitorState) -> Iterator[Alarm]:
     """Figures of the field that the diagnosis holds wrong, until it withdraws them."""
     for one in state.suspicion.figures if state.suspicion else ():
         advice = f"Nothing to do now. When all have landed: {one.remedy}."
-        yield Alarm(f"suspected {one.entity} {one.told_ns}", f"Suspected: {one.text}", False, advice, one.told_ns)
+        about = f"suspected {one.about} {one.told_ns}"
+        yield Alarm(about, f"Suspected: {one.text}", False, advice, one.told_ns)

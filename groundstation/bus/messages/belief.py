@@ -115,6 +115,8 @@ class SuspectedFigure(msgspec.Struct, frozen=True):
     """What a person can do about it."""
     told_ns: int
     """When it was told first, on the clock of the header."""
+    about: str = ""
+    """Which figure it is: the same from when it is told until it is withdrawn, while its text changes."""
 
 
 class Suspicion(Message, frozen=True, kw_only=True):

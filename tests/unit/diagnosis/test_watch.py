@@ -36,6 +36,14 @@ def test_a_suspicion_is_told_once_and_stands_until_it_is_refuted(lab_field: Reso
     assert watch.cause == "" and watch.figures == ()
 
 
+def test_each_figure_keeps_its_own_name_while_its_size_changes(lab_field: ResolvedField) -> None:
+    watch = FigureWatch(lab_field)
+    watch.take(verdict((charge(PAN, 0.05),), (charge(LENS, 0.03),)), S)
+    before = [figure.about for figure in watch.figures]
+    watch.take(verdict((charge(LENS, 0.04),), (charge(PAN, 0.06),)), 6 * S)
+    assert before == ["drone_1 pan", "drone_1 focal"] and [figure.about for figure in watch.figures] == before[::-1]
+
+
 def test_of_two_that_cannot_be_told_apart_the_likelier_comes_first(lab_field: ResolvedField) -> None:
     watch = FigureWatch(lab_field)
     (told,) = watch.take(verdict((charge(LENS, 0.03), charge(PAN, 0.05, 8.0))), S)

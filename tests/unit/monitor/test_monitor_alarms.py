@@ -141,3 +141,13 @@ def test_a_suspected_figure_stands_until_it_is_withdrawn(world: World) -> None:
     assert safety_of(world.state, [alarm]).level is Level.WATCH
     world.say(t.SUSPICION, m.Suspicion(header=world.header("diagnosis"), cause=""))
     assert _alarms(world) == []
+
+
+def test_two_figures_that_are_suspected_at_once_are_two_alarms(world: World) -> None:
+    figures = tuple(
+        m.SuspectedFigure("drone_1", f"drone_1's {which} is wrong", "calibrate", NOW - 60 * S, f"drone_1 {which}")
+        for which in ("pan", "delay")
+    )
+    world.say(t.SUSPICION, m.Suspicion(header=world.header("diagnosis"), cause="x", figures=figures))
+    world.text()
+    assert len({alarm.about for alarm in alarms_of(world.state, NOW)}) == 2

@@ -17,7 +17,8 @@ _PATIENCE_DEFAULT_NS = 8_000_000_000
 # An order that lay in a page without a connection, or in a frozen server's queue, must not surprise anybody later.
 _START_LIVES_MS = 2000.0
 _STOP_LIVES_MS = 5000.0
-_KEPT = 8
+# How many are followed: newer ones displace those that need no repeating first, the others only in a flood.
+_KEPT, _MOST = 8, 32
 
 
 @dataclass(slots=True)
@@ -30,6 +31,11 @@ class Followed:
     by: str = ""
     ref: str = ""
     closed: bool = False
+
+    @property
+    def is_repeated(self) -> bool:
+        """Whether it was given here, and an answer is still waited for."""
+        return bool(self.by) and not self.closed
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +76,8 @@ class CommandDesk:
         strangers = [name for name in drones if name not in self._drones]
         if strangers:
             return f"there is no drone {', '.join(strangers)}"
+        if given.ref and any(order.ref == given.ref for order in self._orders.values()):
+            return ""  # its page lost the connection before it saw that the command had come, and gave it again
         stop = verb.stops
         if given.age_ms > (_STOP_LIVES_MS if stop else _START_LIVES_MS):
             late = f"{verb} came too late ({given.age_ms / 1e3:.1f} s) and was dropped"
@@ -116,7 +124,7 @@ class CommandDesk:
             patience_ns = _PATIENCE_NS.get(verb, _PATIENCE_DEFAULT_NS)
             order.closed = order.closed or order.book.settled or now_ns - order.given_ns > patience_ns
             due_ns = order.repeated_ns + order.book.repeat_after_s * NS_PER_S
-            if not order.closed and order.by and now_ns > due_ns:
+            if order.is_repeated and now_ns > due_ns:
                 order.repeated_ns = now_ns
                 self._bus.publish(COMMAND, order.book.command)
 
@@ -136,7 +144,13 @@ class CommandDesk:
             if not old.by and same == (new.issuer, new.verb, new.scope):
                 del self._orders[identity]  # said again by somebody who repeats himself with new ids
         self._orders[followed.book.command.id] = followed
-        while len(self._orders) > _KEPT:
+        self._make_room()
+
+    def _make_room(self) -> None:
+        spare = [identity for identity, order in self._orders.items() if not order.is_repeated]
+        for identity in spare[: max(0, len(self._orders) - _KEPT)]:
+            del self._orders[identity]
+        while len(self._orders) > _MOST:
             del self._orders[next(iter(self._orders))]
 
     def _remember_early(self, ack: CommandAck) -> None:

@@ -41,6 +41,10 @@ def test_an_order_that_nobody_answers_is_red_until_it_is(stage: Any) -> None:
     assert "NOT CONFIRMED" in line.inner_text() and "drone_2 no answer" in line.inner_text().replace("\n", " ")
     alarm = page.there("banner-unheard")
     assert "LAND NOT CONFIRMED: no answer from drone_2" in alarm.inner_text()
+    page.there("drone_1-hold").click()  # what drone_1 hears says nothing of drone_2
+    page.wait(lambda s: s["orders"][0]["state"] == "confirmed")
+    page.page.wait_for_timeout(1000)
+    assert "LAND NOT CONFIRMED: no answer from drone_2" in alarm.inner_text()
     page.shot("not_confirmed")
     stage.flight.deaf = set()
     alarm.wait_for(state="detached", timeout=5000)

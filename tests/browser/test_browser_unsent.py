@@ -1,5 +1,6 @@
 """What becomes of a stop that was given while there was no connection: it belongs to one run, and lives for 5 s."""
 
+import signal
 from typing import Any
 
 import pytest
@@ -45,6 +46,20 @@ def test_a_stop_goes_out_to_a_restarted_console_of_the_same_run(stage: Any) -> N
     assert [command.verb for command in stage.flight.commands] == ["LAND"]
 
 
+def test_a_stop_that_was_lost_with_its_console_goes_out_to_the_next_one(stage: Any) -> None:
+    page: Seen = stage.open()
+    stage.console.send_signal(signal.SIGSTOP)  # it takes what the page sends, and does nothing with it
+    page.there("land-all").click()
+    page.page.wait_for_timeout(200)
+    stage.console.kill()
+    stage.console.wait(5)
+    page.there("banner-link").wait_for(timeout=20_000)
+    assert "the connection broke" in page.there("orders").inner_text()
+    stage.start_console()
+    page.wait(lambda s: any(order["state"] == "confirmed" for order in s["orders"]))
+    assert [command.verb for command in stage.flight.commands] == ["LAND"]
+
+
 def test_a_stop_never_goes_to_the_next_run(stage: Any) -> None:
     page = cut_off(stage, run="run-2")
     hold_cut_motors(page)
@@ -84,3 +99,5 @@ def test_a_stop_lives_for_five_seconds(stage: Any, asleep: bool) -> None:
     state = reconnect(page)
     assert stage.flight.commands == [] and state["orders"] == []
     assert "no connection for 5 s" in page.there("orders").inner_text()
+    assert "LAND NOT SENT: not given to drone_1, drone_2" in page.there("banner-unheard").inner_text()
+    assert page.there("safety").inner_text() == "ACT"

@@ -190,6 +190,35 @@ def test_everybody_s_orders_are_followed_even_if_answers_come_first() -> None:
     assert len(room.desk.summary()) == 8
 
 
+def test_a_stop_is_repeated_until_it_is_heard_whatever_is_ordered_after_it() -> None:
+    room = Room()
+    room.desk.give(m.Verb.LAND, ("drone_1",), Given("viewer 1", ref="first"), room.now_ns)
+    (land,) = room.commands()
+    for number in range(20):
+        room.desk.give(m.Verb.HOLD, ("drone_2",), Given("viewer 1", ref=f"{number}"), room.now_ns)
+        (hold,) = room.commands()
+        room.ack(hold, "drone_2", m.AckStage.EFFECTIVE)
+        room.desk.step(room.now_ns)
+    room.desk.step(room.now_ns + NS_PER_S)
+    assert room.commands() == [land] and len(room.desk.summary()) == 8
+
+
+def test_a_flood_of_orders_that_nobody_hears_is_bounded() -> None:
+    room = Room()
+    for number in range(100):
+        room.desk.give(m.Verb.HOLD, (), Given("viewer 1", ref=f"{number}"), room.now_ns)
+    assert len(room.desk.summary()) == 32
+
+
+def test_an_order_that_a_page_gives_again_after_its_connection_broke_is_one_order() -> None:
+    room = Room()
+    page = room.viewer(1)
+    room.sessions.handle(page, order(m.Verb.LAND, ref="page-1"))
+    room.sessions.handle(page, order(m.Verb.LAND, ref="page-1", age_ms=2000.0))
+    room.sessions.handle(page, order(m.Verb.LAND, ref="page-2"))
+    assert len(room.commands()) == 2 and "order" not in room.sessions.refused
+
+
 def test_without_the_token_a_page_only_looks() -> None:
     room = Room()
     room.lease()

@@ -1,63 +1,23 @@
 // Buttons and keys that command, and how far each order came.
 
-import { moment, sinceMs } from "./clock.js";
 import { byId, el, seconds, text } from "./dom.js";
-import { effectOf, holding, isIdle, refusalOf, STOPS } from "./effects.js";
+import { effectOf, holding, isIdle, refusalOf } from "./effects.js";
 import { aloft, modes } from "./glance.js";
-import { me, on, send } from "./link.js";
+import { me, send } from "./link.js";
+import { give, mayGive, OVER, ownOrders, roleText, startOwnOrders } from "./own_orders.js";
 import { forbidden } from "./preflight.js";
-import { ageS, droneNames, now, replaying, runOver, serverNow, store } from "./store.js";
+import { ageS, droneNames, replaying, runOver, store } from "./store.js";
 
-const SHOWN = 5, KEPT_MS = 30000, PRESS_MS = 1000, STOP_LIVES_MS = 5000;
-const OVER = "the run has ended: no order can be given any more";
+const SHOWN = 5, PRESS_MS = 1000;
 const WORDS = { TAKEOFF: "TAKE OFF", CUT_MOTORS: "CUT MOTORS" };
 const STATES = {
-  unsent: "NOT SENT", dropped: "NOT SENT", sent: "NOT CONFIRMED", heard: "acknowledged", confirmed: "✓ confirmed", refused: "REFUSED", not_confirmed: "NOT CONFIRMED",
+  unsent: "NOT SENT", dropped: "NOT SENT", doubtful: "NOT CONFIRMED", lost: "NOT CONFIRMED", sent: "NOT CONFIRMED", heard: "acknowledged",
+  confirmed: "✓ confirmed", refused: "REFUSED", not_confirmed: "NOT CONFIRMED",
 };
 const STAGES = { RECEIVED: "received", ACCEPTED: "accepted", EFFECTIVE: "✓ done" };
-// Orders that the server has not shown yet, so that nothing is silently lost on the way there.
-let own = [], count = 0;
-
-// run: the one that the operator meant, which while a button is held may have given way to the next. anyway: against
-// the checks before a take-off.
-export function give(verb, drones = [], run = store.run, anyway = false) {
-  if (replaying()) return; // the server would refuse it as well
-  const order = { ref: `${me.client}-${++count}`, verb, drones, run, anyway, given: moment(), given_ms: now() };
-  own.push(order);
-  if (!mayGive(verb)) { put(order, "refused", roleText()); return showOrders(); }
-  put(order, "unsent", `no connection: it is sent if the connection is back within ${STOP_LIVES_MS / 1000} s. Now: ${inShell(verb)}`);
-  if (runOver()) put(order, "dropped", OVER);
-  else if (run === store.run && transmit(order)) put(order, "sent");
-  else if (!STOPS.has(verb)) put(order, "dropped", "no connection");
-  showOrders();
-}
-
-// The server refuses the rest as well: a page of another make may ask for more.
-const mayGive = (verb) => me.role === "command" || (me.role === "stop" && STOPS.has(verb));
-const roleText = () => `this device may ${me.role} only`;
-const inShell = (verb) => `groundstation ${verb.toLowerCase().replace("_", "-")} in a shell`;
-const put = (order, state, note = "") => Object.assign(order, { state, note, since: moment() });
-
-function transmit({ verb, drones, run, anyway, ref, given }) {
-  const age_ms = sinceMs(given);
-  return me.greeted && send("order", { verb, drones, run, anyway, ref, age_ms, at_ms: serverNow() - age_ms });
-}
-
-// A stop that did not get out is good for the run that it was given for, and for so long only.
-function dropUnsent() {
-  for (const order of own.filter(({ state }) => state === "unsent")) {
-    if (order.run !== store.run) put(order, "dropped", "it was given for another run");
-    else if (sinceMs(order.given) > STOP_LIVES_MS) put(order, "dropped", `dropped: there was no connection for ${STOP_LIVES_MS / 1000} s. Give it again, or: ${inShell(order.verb)}`);
-  }
-}
-
-function sendUnsent() {
-  dropUnsent();
-  for (const order of own) if (order.state === "unsent" && transmit(order)) put(order, "sent", "sent once the connection was back");
-  showOrders();
-}
 
 export function startOrders() {
+  startOwnOrders(showOrders);
   byId("land").onclick = () => give("LAND");
   byId("hold").onclick = () => give("HOLD");
   byId("takeoff").onclick = () => give("TAKEOFF");
@@ -66,12 +26,6 @@ export function startOrders() {
   byId("takeover").onclick = () => send("takeover");
   holdToPress(byId("cut"), (run) => give("CUT_MOTORS", [], run));
   holdToPress(byId("anyway"), (run) => give("TAKEOFF", [], run, true));
-  on("welcome", sendUnsent);
-  on("notice", ({ ref, text: reason }) => {
-    const order = own.find((candidate) => ref && candidate.ref === ref);
-    if (order) put(order, "refused", reason);
-    showOrders();
-  });
 }
 
 // Fires after one second of pressing, by pointer or by key, for the run that was shown when it began; anything that ends
@@ -163,11 +117,7 @@ function enable(button, reason) {
 }
 
 export function showOrders() {
-  dropUnsent();
-  const listed = store.s.orders ?? [], known = new Set(listed.map((order) => order.ref).filter(Boolean));
-  own = own.filter((order) => !known.has(order.ref) && sinceMs(order.since) < KEPT_MS);
-  const waiting = own.map((order) => ({ ...order, rows: (order.drones.length ? order.drones : droneNames()).map((name) => ({ name })), by: "you", team: !order.drones.length }));
-  const all = [...waiting.reverse(), ...listed].slice(0, SHOWN);
+  const all = [...ownOrders(), ...(store.s.orders ?? [])].sort((a, b) => b.given_ms - a.given_ms).slice(0, SHOWN);
   // Rebuilt only when an order has come further: a screen reader reads what changes.
   const host = byId("orders"), key = JSON.stringify(all.map(({ id, ref, state, rows, note }) => [id, ref, state, rows, note]));
   if (host.dataset.key !== key) {

@@ -1,7 +1,7 @@
 // What a start or a stop would do now.
 
 import { ALOFT, aloft, lostTarget, modeNow, modes } from "./glance.js";
-import { ageS, droneNames, runOver, store, trackerSilent } from "./store.js";
+import { droneNames, store, trackerSilent } from "./store.js";
 
 // Why a start would be refused or do nothing now; "" if it would not. Stops are never withheld while a run goes on.
 export function refusalOf(verb, names = droneNames()) {
@@ -60,11 +60,3 @@ export function isIdle(verb, names = droneNames()) {
 export const holding = (names = droneNames()) => names.filter((name) => ALOFT.has(modeNow(name)) && modeNow(name) !== "LANDING" && (store.s.vehicles[name].lands_in_s ?? null) === null);
 
 export const STOPS = new Set(["HOLD", "LAND", "CUT_MOTORS"]);
-const UNHEARD_S = 0.8, FORGOTTEN_S = 30;
-
-// The newest stop, if a drone has not answered it: an alarm, wherever it was given.
-export function unheardStop() {
-  const order = runOver() ? null : (store.s.orders ?? []).find(({ verb }) => STOPS.has(verb));
-  const silent = (order?.rows ?? []).filter(({ stage }) => !stage).map(({ name }) => name), age = ageS(order?.given_ms);
-  return silent.length && age > UNHEARD_S && age < FORGOTTEN_S ? { id: order.id, verb: order.verb.replace("_", " "), names: silent.join(", ") } : null;
-}

@@ -10,8 +10,9 @@ import { keepEnd, showEnd } from "./ending.js";
 import { drawHeights } from "./heights.js";
 import { connect, me, on, send } from "./link.js";
 import { drawMap, drawn, layers } from "./map.js";
-import { give, showControls, showOrders, startOrders } from "./commands.js";
+import { showControls, showOrders, startOrders } from "./commands.js";
 import { colourOf, fenceColour, ink, startTheme, takeColours } from "./palette.js";
+import { give } from "./own_orders.js";
 import { showPlan, showSwitch, showTimeline } from "./plan.js";
 import { showEvents, showHealth, showProcesses, showTop } from "./status.js";
 import { showPreflight } from "./preflight.js";
@@ -66,7 +67,7 @@ on("delta", (sections, sampled) => {
 });
 
 on("notice", (notice) => { addNotice(notice); showBanners(); });
-on("state", () => { showBanners(); showTop(); showControls(); showOrders(); dirty = true; });
+on("state", () => { showBanners(); showTop(); showControls(); dirty = true; });
 
 function showAll() {
   showBar(); showBanners(); showTop(); showTeam(); showCameras(); showHealth(); showEvents(); showProcesses(); showPlan(); showSwitch(); showControls(); showOrders(); showPlayback(); showPreflight(); showEnd();

@@ -1,10 +1,13 @@
 // Alarms that only a page can raise: that it hears nothing, or that a stop is not answered; and those of them that are over.
 
 import { seconds } from "./dom.js";
-import { unheardStop } from "./effects.js";
-import { consoleSilent, estimateAge, now, replaying, silentS, store } from "./store.js";
+import { STOPS } from "./effects.js";
+import { mayGive, ownOrders } from "./own_orders.js";
+import { ageS, consoleSilent, estimateAge, now, replaying, silentS, store } from "./store.js";
 
 const KEPT = 50, BREAK_MS = 2000; // as groundstation/console/alarm_log.py has it
+const UNHEARD_S = 0.8, FORGOTTEN_S = 30;
+const NOT_GIVEN = { unsent: "NOT SENT", dropped: "NOT SENT", refused: "REFUSED" };
 let episodes = [], keptFor = "";
 
 // [{kind, about, title, more, shell}]: about stays the same while figures change; shell: whether only a shell helps.
@@ -14,8 +17,30 @@ export function ownAlarms() {
   if (!store.connected) alarms.push({ kind: "link", about: "link", title: "NO CONNECTION TO THE CONSOLE", more: [store.reason && `${store.reason}.`, old].filter(Boolean).join(" "), shell: true });
   else if (consoleSilent()) alarms.push({ kind: "silent", about: "silent", title: `CONSOLE SILENT for ${seconds(silentS())}`, more: old, shell: true });
   const stop = store.connected ? unheardStop() : null;
-  if (stop) alarms.push({ kind: "unheard", about: `unheard ${stop.id}`, title: `${stop.verb} NOT CONFIRMED: no answer from ${stop.names}`, more: "To do: press again. If a drone flies on: groundstation land in a shell, or its own remote control." });
+  if (stop) alarms.push({ kind: "unheard", about: `unheard ${stop.id}`, title: stopWords(stop), more: "To do: press again. If a drone flies on: groundstation land in a shell, or its own remote control." });
   return alarms;
+}
+
+// All stops that concern this run, wherever they were given, the newest first.
+function stops() {
+  const own = ownOrders().filter(({ run, verb }) => run === store.run && mayGive(verb));
+  return [...own, ...(store.s.orders ?? [])].filter(({ verb }) => STOPS.has(verb)).sort((a, b) => b.given_ms - a.given_ms);
+}
+
+// The newest stop that somebody has not answered to whom no newer one was given.
+function unheardStop() {
+  const renewed = new Set();
+  for (const { id, ref, verb, state, rows, given_ms } of stops()) {
+    const age = ageS(given_ms), silent = rows.filter(({ name, stage }) => !stage && !renewed.has(name)).map(({ name }) => name);
+    if (silent.length && age > UNHEARD_S && age < FORGOTTEN_S) return { id: ref || id, verb: verb.replace("_", " "), names: silent.join(", "), state };
+    rows.forEach(({ name }) => renewed.add(name));
+  }
+  return null;
+}
+
+function stopWords({ verb, names, state }) {
+  const fault = NOT_GIVEN[state];
+  return fault ? `${verb} ${fault}: not given to ${names}` : `${verb} NOT CONFIRMED: no answer from ${names}`;
 }
 
 const storeKey = () => `skein-own-alarms ${store.run}`;

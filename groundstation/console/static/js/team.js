@@ -3,9 +3,9 @@
 import { batteryWords, lastsWords } from "./batteries.js";
 import { byId, el, joined, seconds, svg, text } from "./dom.js";
 import { ellipse95 } from "./geometry.js";
-import { give } from "./commands.js";
 import { dutyOf, landsIn } from "./duty.js";
 import { aloft, doing, modeOf, modeWord } from "./glance.js";
+import { give } from "./own_orders.js";
 import { colourOf } from "./palette.js";
 import { ageS, entity, estimateAge, runOver, seenBy, store, trackerSilent } from "./store.js";
 

@@ -201,7 +201,7 @@ class FakeFlight(threading.Thread):
                 x, y, z, _ = self.drone_at(name, s)
                 self._observe(camera, camera, name, (x, -y, 4.2 - z), stamp_ns)
             if tick % 12 == 0:
-                x, y, z, _ = self.drone_at("drone_1", s)
+                x, y, z, _ = self.drone_at(self.drones[0], s)
                 self._picture(camera, (1280, 720), 1179.0, (x, -y, 4.2 - z), stamp_ns)
 
     def _observe(self, observer: str, camera: str, subject: str, at: tuple[float, float, float], stamp_ns: int) -> None:

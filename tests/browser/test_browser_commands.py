@@ -29,6 +29,31 @@ def test_keys_stop_too(stage: Any) -> None:
     page.wait(lambda s: verbs(stage) == ["HOLD"])
     page.page.keyboard.press("l")
     page.wait(lambda s: verbs(stage) == ["HOLD", "LAND"])
+    cyrillic = "() => dispatchEvent(new KeyboardEvent('keydown', {key: 'д', code: 'KeyL'}))"
+    page.page.evaluate(cyrillic)
+    page.wait(lambda s: verbs(stage) == ["HOLD", "LAND", "LAND"])
+
+
+def test_a_key_that_is_held_down_on_a_button_presses_it_once(stage: Any) -> None:
+    page = stage.open()
+    page.there("hold").focus()
+    for _ in range(20):  # the first, and what a keyboard repeats
+        page.page.keyboard.down("Enter")
+    page.page.keyboard.up("Enter")
+    page.wait(lambda s: s["orders"] and s["orders"][0]["state"] == "confirmed")
+    assert verbs(stage) == ["HOLD"]
+
+
+def test_stops_stay_in_reach_while_the_help_is_open(stage: Any) -> None:
+    page = stage.open()
+    for size in ((1440, 900), (390, 844)):
+        page.page.set_viewport_size({"width": size[0], "height": size[1]})
+        page.page.keyboard.press("?")
+        assert page.page.locator("#about").is_visible()
+        page.there("land-all").click(timeout=5000)
+        page.page.keyboard.press("Escape")
+        assert page.page.locator("#about").is_hidden()
+    page.wait(lambda s: verbs(stage) == ["LAND", "LAND"])
 
 
 def test_an_order_that_nobody_answers_is_red_until_it_is(stage: Any) -> None:
@@ -62,6 +87,10 @@ def test_cut_motors_wants_a_second_of_pressing(stage: Any) -> None:
     page = stage.open()
     page.there("cut-motors").click()
     page.page.wait_for_timeout(1300)
+    assert verbs(stage) == []
+    page.page.evaluate("() => { const wall = Date.now; setTimeout(() => { Date.now = () => wall() + 3.6e6; }, 300); }")
+    page.there("cut-motors").click(delay=1600)  # the machine slept for an hour in the middle of it
+    page.page.wait_for_timeout(300)
     assert verbs(stage) == []
     box = page.there("cut-motors").bounding_box()
     page.page.mouse.move(box["x"] + 20, box["y"] + 20)

@@ -293,3 +293,23 @@ def test_the_wall_is_read_from_three_metres(stage: Any) -> None:
     assert len(sizes) >= 9 and min(sizes) >= 45
     assert whole(page) == []
     page.shot("wall")
+
+
+# A phone on its side, a desk's page at 300 %, and the narrowest phone.
+@pytest.mark.parametrize("size", [(844, 390), (480, 300), (320, 568)], ids=str)
+def test_a_low_or_narrow_screen_has_the_stops_and_reaches_the_team(stage: Any, size: tuple[int, int]) -> None:
+    SITUATIONS["all_is_well"](stage.flight)
+    page = stage.open()
+    resize(page, size)
+    page.wait(lambda s: page.there("banner-none").is_visible())
+    assert clipped(page.page) == [] and covered(page.page) == []
+    page.there("drone_1-land").click(timeout=5000)  # what lies over it would have the click
+    for stop in ("hold", "land-all"):
+        page.there(stop).click(timeout=5000)
+    page.wait(lambda s: len(s["orders"]) == 3)
+    page.there("card-drone_2").evaluate("(card) => card.scrollIntoView({block: 'center'})")
+    page.page.wait_for_timeout(300)
+    free = "() => [document.querySelector('#shell').getBoundingClientRect().bottom, "
+    free += "document.querySelector('.stops').getBoundingClientRect().top]"
+    below_shell, above_stops = page.page.evaluate(free)
+    assert above_stops - max(0, below_shell) >= 120

@@ -1,5 +1,6 @@
 // Buttons and keys that command, and how far each order came.
 
+import { moment, sinceMs } from "./clock.js";
 import { byId, el, seconds, text } from "./dom.js";
 import { effectOf, holding, isIdle, refusalOf } from "./effects.js";
 import { aloft, modes } from "./glance.js";
@@ -8,7 +9,7 @@ import { give, mayGive, OVER, ownOrders, roleText, startOwnOrders } from "./own_
 import { forbidden } from "./preflight.js";
 import { ageS, droneNames, replaying, runOver, store } from "./store.js";
 
-const SHOWN = 5, PRESS_MS = 1000;
+const SHOWN = 5, PRESS_MS = 1000, ASLEEP_MS = 1000;
 const WORDS = { TAKEOFF: "TAKE OFF", CUT_MOTORS: "CUT MOTORS" };
 const STATES = {
   unsent: "NOT SENT", dropped: "NOT SENT", doubtful: "NOT CONFIRMED", lost: "NOT CONFIRMED", sent: "NOT CONFIRMED", heard: "acknowledged",
@@ -29,15 +30,17 @@ export function startOrders() {
 }
 
 // Fires after one second of pressing, by pointer or by key, for the run that was shown when it began; anything that ends
-// it early ends it.
+// it early ends it, and a page that slept has not seen whether anything did.
 function holdToPress(button, fire) {
   let timer = 0;
   const stop = () => { clearTimeout(timer); timer = 0; button.classList.remove("held"); };
+  const pressed = (run, began) => { stop(); if (sinceMs(began) < PRESS_MS + ASLEEP_MS) fire(run); };
   const start = () => {
     if (timer) return;
     button.classList.add("held");
-    timer = setTimeout((run) => { stop(); fire(run); }, PRESS_MS, store.run);
+    timer = setTimeout(pressed, PRESS_MS, store.run, moment());
   };
+  for (const kind of ["freeze", "visibilitychange"]) document.addEventListener(kind, stop);
   button.addEventListener("pointerdown", (event) => { if (event.button === 0) { button.setPointerCapture(event.pointerId); start(); } });
   for (const kind of ["pointerup", "pointercancel", "lostpointercapture", "blur"]) button.addEventListener(kind, stop);
   button.addEventListener("pointermove", (event) => {

@@ -83,6 +83,7 @@ function describe() {
 }
 
 function frame(at) {
+  requestAnimationFrame(frame); // first: what fails now does not stop what comes
   drawn.gapS = (at - lastFrame) / 1000;
   lastFrame = at;
   if (at - lastSlow > SLOW_MS) {
@@ -100,7 +101,6 @@ function frame(at) {
       undrawnStamp = null;
     }
   }
-  requestAnimationFrame(frame);
 }
 
 function buildLayers() {
@@ -131,11 +131,19 @@ const toggleTheme = startTheme(() => {
 });
 const toggleWall = startBar(() => view.resize()), toggleSound = startSounds(), toggleLog = startStrip();
 byId("theme").onclick = toggleTheme;
-byId("help").onclick = () => byId("about").showModal();
+// Not modal: what stops the team stays in reach.
+const toggleHelp = () => byId("about").open ? byId("about").close() : byId("about").show();
+byId("help").onclick = toggleHelp;
+
+// A keyboard of another script has the letter where its key is.
+const letterOf = ({ key, code }) => (/^[^\x00-\x7f]$/.test(key) ? code.replace("Key", "") : key).toLowerCase();
 
 addEventListener("keydown", (event) => {
-  if (event.ctrlKey || event.altKey || event.metaKey || (event.repeat && !replaying())) return;
-  const key = event.key.toLowerCase();
+  if (event.ctrlKey || event.altKey || event.metaKey) return;
+  // Enter that is held down would press a button thirty times a second.
+  if (event.repeat && event.key === "Enter" && event.target.closest?.("button")) event.preventDefault();
+  if (event.repeat && !replaying()) return;
+  const key = letterOf(event);
   if (replaying() && playbackKey(event)) event.preventDefault();
   else if (key === "l") give("LAND");
   else if (key === "h") give("HOLD");
@@ -144,7 +152,8 @@ addEventListener("keydown", (event) => {
   else if (key === "m") toggleSound();
   else if (key === "a") toggleLog();
   else if (key === "p" && steerable()) for (const { name } of store.scene.targets) send("followpath", { target: name });
-  else if (key === "?") byId("about").open ? byId("about").close() : byId("about").showModal();
+  else if (key === "?") toggleHelp();
+  else if (key === "escape") byId("about").close();
 });
 
 // What tests read; nothing here can be changed to any effect.

@@ -9,7 +9,7 @@ let eventsShown = "";
 
 export function showTop() {
   const link = byId("link"), silent = consoleSilent(), age = estimateAge();
-  const [level, words] = store.s.ended ? ["calm", "run ended"] : !store.connected ? ["bad", "no connection"] : silent ? ["bad", "console silent"] : age === Infinity ? ["wait", "waiting for the tracker"] : trackerSilent() ? ["bad", "tracker silent"] : ["good", replaying() ? "as it was" : "live"];
+  const [level, words] = store.s.ended ? ["calm", "run ended"] : !store.connected ? ["bad", "no connection"] : silent ? ["bad", "console silent"] : age === Infinity ? ["wait", "no estimate yet"] : trackerSilent() ? ["bad", "tracker silent"] : ["good", replaying() ? "as it was" : "live"];
   link.dataset.level = level;
   text(link, words);
   const latencies = [...drawn.latencies].sort((a, b) => a - b), middle = latencies[latencies.length >> 1];

@@ -22,7 +22,7 @@ from groundstation.runtime.acknowledgements import AwaitedAnswers
 from groundstation.runtime.before_take_off import BeforeTakeOff
 from groundstation.runtime.lift_off import Mistake
 from groundstation.runtime.marker_height import FixedCamera
-from groundstation.runtime.requests import Requests
+from groundstation.runtime.requests import Requests, asked_ns, is_request
 from groundstation.runtime.take_off import TakeOff, TakeOffCommand, TakeOffLimits
 from groundstation.runtime.team import TeamPhase, TeamStatus
 from groundstation.time_units import NS_PER_S
@@ -138,7 +138,7 @@ class Operator:
 
     def _give(self, verb: Verb, scope: tuple[str, ...], now_ns: int, request: Command | None = None) -> AwaitedAnswers:
         self._count += 1
-        header = self._bus.header(_TEAM)
+        header = self._bus.header(_TEAM, asked_ns(request))
         expires_ns = 0 if verb.stops else header.stamp_ns + _EXPIRY_NS
         identity = f"{OPERATOR}-{header.stamp_ns}-{self._count}"
         command = Command(
@@ -168,8 +168,9 @@ class Operator:
         self.team.update(now_ns)
         if self._checks is not None:
             self._checks.update(now_ns)
-        for received in self._inbox.drain():
-            match received.message:
+        # Requests last: a stop that waits behind one has overtaken it.
+        for message in sorted((received.message for received in self._inbox.drain()), key=is_request):
+            match message:
                 case CommandAck() as ack:
                     self._hear_ack(ack, now_ns)
                 case Command() as command if command.header.source != self._bus.source:

@@ -13,6 +13,21 @@ from groundstation.time_units import NS_PER_S
 _REMEMBERED = 256
 
 
+def is_request(message: object) -> bool:
+    """Whether this asks the operator for something; other commands are for the drivers."""
+    return isinstance(message, Command) and OPERATOR in message.scope
+
+
+def asked_ns(start: Command | None) -> int | None:
+    """Return when a start was asked for [ns; our boot clock]; None for anything else, and from another clock.
+
+    Drivers that have heard of a later stop must know.
+    """
+    if start is None or start.verb.stops or start.header.clock != clock.clock_id():
+        return None
+    return start.header.stamp_ns
+
+
 class Requests:
     """Remembers the last answer to each request, which stops were heard, and the last one of each drone."""
 

@@ -167,6 +167,24 @@ def test_a_start_that_arrives_after_a_later_stop_is_refused_and_a_new_one_is_not
     assert desk.stages()[-1] == (AckStage.ACCEPTED, "")
 
 
+@pytest.mark.parametrize("start", [Verb.RESUME, Verb.TRACK, Verb.TAKEOFF])
+def test_a_stop_that_waits_behind_a_start_ends_it_before_it_is_passed_on(start):
+    desk = Desk(drone_1=UP, drone_2=DOWN)
+    desk.shell.publish(COMMAND, desk.command(start, OPERATOR, identity="start", age_s=0.03))
+    desk.shell.publish(COMMAND, desk.command(Verb.HOLD, identity="stop", age_s=0.02))
+    desk.turn()
+    assert desk.orders() == []
+    assert desk.stages()[-1] == (AckStage.REFUSED, "HOLD by cli_1 came after it")
+
+
+def test_drivers_are_told_when_a_start_was_asked_for():
+    desk = Desk(drone_1=UP)
+    asked = desk.command(Verb.RESUME, OPERATOR, age_s=0.5)
+    desk.send(asked)
+    (order,) = desk.orders()
+    assert order.header.stamp_ns == asked.header.stamp_ns  # a stop that they heard in between overtakes it
+
+
 def test_a_request_that_lay_somewhere_for_too_long_is_refused():
     desk = Desk(drone_1=UP)
     desk.send(desk.command(Verb.TRACK, OPERATOR, age_s=7, lives_s=5))

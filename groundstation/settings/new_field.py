@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -16,6 +17,7 @@ _WALL_M, _CEILING_M, _CAMERA_BELOW_CEILING_M = 0.3, 1.7, 0.3
 _LOWEST_CEILING_M = 3.0
 _PAD_GAP_M, _PAD_MARGIN_M, _PAD_SEEN_AT_M = 1.0, 0.15, 1.0
 _TARGET_CODE = 5
+_PLAIN = re.compile(r"[a-z0-9][\w.:/@?=&%+-]*[\w/]", re.ASCII)
 # Drones fly in a band below the fence's top, this high at least, and this far above the target's board.
 _TOP_MARGIN_M, _BAND_M, _LEAST_BAND_M, _LOWEST_FLIGHT_M, _ABOVE_BOARD_M = 0.3, 1.4, 0.2, 0.8, 0.4
 
@@ -123,6 +125,11 @@ def field_text(site: str, room: NewRoom, drones: list[NewDrone], target: NewTarg
     return "\n".join([*parts, _target(target), _planner(room, len(drones), target.board_m), _REST])
 
 
+def _text(answer: str) -> str:
+    """Return an answer as YAML, which an address is as it stands, and nothing else for sure."""
+    return answer if _PLAIN.fullmatch(answer) else json.dumps(answer)
+
+
 def _room(site: str, room: NewRoom) -> str:
     x, y = room.length_m / 2 - _WALL_M, room.width_m / 2 - _WALL_M
     return f"""\
@@ -139,7 +146,7 @@ room:
 
 cameras:                         # fixed in the world; they observe drones only
   ceiling:
-    source: {room.source}
+    source: {_text(room.source)}
     calibration: cameras/ceiling.yaml      # measure yours: groundstation calibrate camera
     position_m: [0.0, 0.0, {room.camera_height_m:g}]   # survey it: groundstation calibrate extrinsics
     looking: down                # picture x axis along world x, picture y axis along world -y
@@ -155,8 +162,8 @@ def _drone(number: int, drone: NewDrone, pad: Place) -> str:
     return f"""\
   drone_{number}:
     type: {drone.kind}
-    address: {drone.address}
-{own}    camera: {{source: "{drone.camera}"}}
+    address: {_text(drone.address)}
+{own}    camera: {{source: {json.dumps(drone.camera)}}}
     marker: {{code: {number if number < _TARGET_CODE else number + 1}}}   # print it: groundstation markers print
     pad_m: [{pad[0]:g}, {pad[1]:g}]          # where it stands before take-off, in the ceiling camera's view
     pad_yaw_deg: {heading:.0f}              # towards the middle of the room

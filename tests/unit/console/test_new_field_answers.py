@@ -48,6 +48,8 @@ def test_the_button_writes_a_good_field_once(tmp_path: Path) -> None:
     ("changes", "problem"),
     [
         ({"room": [8, 6, 2, "http://192.168.1.50/"]}, "too low"),
+        ({"room": [8, 6, 4.5, "'\"; {x: y} # \n}"]}, "cameras.ceiling.source: holds a character"),
+        ({"drones": [["ardrone", "192.168.1.11", '"}, {x: "y']]}, "drones.drone_1.camera.source: must be an address"),
         ({"room": [800, 6, 5, "http://192.168.1.50/"]}, "too large"),
         ({"drones": [["ardrone", "192.168.1.11", "ardrone://192.168.1.11"]] * 2}, "192.168.1.11"),
         ({"drones": [["ardrone", "no address: {", "x"]]}, "hall.yaml"),

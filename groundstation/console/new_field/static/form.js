@@ -20,7 +20,7 @@ function labelled(text, control) {
 
 function input(value) {
   const made = document.createElement("input");
-  Object.assign(made, { value, required: true });
+  Object.assign(made, { value, required: true, maxLength: 500 });
   return made;
 }
 
@@ -73,6 +73,7 @@ function send(order) {
 
 function changed() {
   fit();
+  number += 1; // what is still on its way answers a form that is no more
   button.disabled = true;
   clearTimeout(timer);
   if (!form.checkValidity()) say("Fill in what is marked.", true);
@@ -111,5 +112,5 @@ form.addEventListener("input", (event) => {
 form.addEventListener("submit", (event) => { event.preventDefault(); button.disabled = true; send("write"); });
 socket.addEventListener("open", changed);
 socket.addEventListener("message", (event) => show(JSON.parse(event.data)));
-socket.addEventListener("close", () => { if (!over) { button.disabled = true; say("The command in the terminal has ended; nothing was written.", true); } });
+socket.addEventListener("close", () => { if (!over) { button.disabled = true; say("No connection to the command in the terminal: nothing was written by this page. Reload it if the command still runs.", true); } });
 fit();

@@ -61,7 +61,7 @@ _PX4 = (
     Needed("EKF2_EV_DELAY", 0, "poses are sent as predicted to now", REAL32, accepted=(0, 50)),
     Needed("EKF2_EVP_NOISE", 0.03, "lower bound of the error of our positions, 1 to 3 cm", REAL32, (0.01, 0.06)),
     Needed("EKF2_IMU_CTRL", 3, "it must not take its thrust for gravity while no position comes", others=(0, 1, 2)),
-    Needed("EKF2_NOAID_TOUT", 500_000, "without our positions it lands level, not by its velocity", INT32, (5e5, 9e5)),
+    Needed("EKF2_NOAID_TOUT", 900_000, "without our positions it lands level, not by its velocity", INT32, (5e5, 9e5)),
     Needed("SYS_HAS_GPS", 0, "arm without GPS"),
     Needed("COM_OF_LOSS_T", 0.5, "time without set-points before the failsafe", REAL32, accepted=(0.3, 1.0)),
     Needed("COM_OBL_RC_ACT", 4, "that failsafe: land"),

@@ -41,7 +41,7 @@ _PX4_INDOOR: dict[str, float] = {
     "EKF2_RNG_CTRL": 0,
     "EKF2_MAG_TYPE": 5,
     "EKF2_IMU_CTRL": 3,
-    "EKF2_NOAID_TOUT": 500_000,
+    "EKF2_NOAID_TOUT": 900_000,
     "SYS_HAS_GPS": 0,
     "COM_OBL_RC_ACT": 4,
     "EKF2_EVP_NOISE": 0.05,

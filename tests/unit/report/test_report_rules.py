@@ -77,8 +77,8 @@ def test_kinds_of_topology(text: str, kind: str) -> None:
     ("mode", "tracking_s", "failed"),
     [
         ("demo", None, {"topology_seconds.string"}),
-        ("demo", 20.0, {"topology_seconds.string"}),
-        ("demo", 15.0, set()),
+        ("demo", 30.0, {"topology_seconds.string"}),
+        ("demo", 29.0, set()),
         ("sitl", None, set()),
         ("fly", None, set()),
     ],

@@ -105,9 +105,8 @@ class Speaker:
         if (ardupilot or self._firmware.global_position) and not self._firmware.health_fault():
             healthy |= SensorBits.PREARM_CHECK
         present = healthy | SensorBits.VISION_POSITION | SensorBits.PREARM_CHECK
-        if (
-            ardupilot
-        ):  # WIRE (ArduPilot, GCS.cpp): a fence that there is none of is healthy; MAVProxy tells a breach else
+        if ardupilot:
+            # WIRE (ArduPilot, GCS.cpp): a fence that there is none of is healthy; MAVProxy tells a breach else.
             healthy |= SensorBits.GEOFENCE
         return t.SysStatus(present, present, healthy, 300, self._millivolts, 500, self._percent)
 

@@ -1,6 +1,5 @@
 """Two emulated vehicles that the real driver flies in a process of its own, forwarded to a second ground station."""
 
-import importlib.util
 import math
 import subprocess
 import sys
@@ -11,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import mavlink_hangar
 import numpy as np
 from arrival_times import ANCILLARY, ArrivalTimes
 
@@ -19,13 +19,7 @@ from drivers.mavlink.wire.frames import id_of
 from drivers.mavlink.wire.verification import number_of
 
 HERE = Path(__file__).parent
-_SPEC = importlib.util.spec_from_file_location(
-    "mavlink_hangar", HERE.parent / "contract" / "mavlink_links" / "conftest.py"
-)
-assert _SPEC is not None and _SPEC.loader is not None
-_hangar = importlib.util.module_from_spec(_SPEC)
-_SPEC.loader.exec_module(_hangar)
-hangar, port, free_port = _hangar.hangar, _hangar.port, _hangar.free_port
+hangar, port, free_port = mavlink_hangar.hangar, mavlink_hangar.port, mavlink_hangar.free_port
 
 FLAVOURS = {"px4": 11, "ardupilot": 12}
 VEHICLE_WAITS_S = 0.5  # GUID_TIMEOUT: beyond it an ArduPilot brakes

@@ -1,7 +1,6 @@
 """Clients of others fly our emulated vehicles: MAVSDK's own plugins, and MAVProxy from an environment of its own."""
 
 import asyncio
-import importlib.util
 import itertools
 import math
 import os
@@ -11,6 +10,7 @@ import time
 from collections import deque
 from pathlib import Path
 
+import mavlink_hangar
 import pytest
 from mavlink_pilot import Pilot
 from spare_time import needing_processors
@@ -19,13 +19,7 @@ from groundstation.bus.messages import Verb
 
 pytestmark = [pytest.mark.slow, pytest.mark.interop, pytest.mark.timeout(180)]
 _INTEROP = Path(__file__).parents[2] / ".interop"
-_SPEC = importlib.util.spec_from_file_location(
-    "mavlink_hangar", Path(__file__).parents[1] / "contract" / "mavlink_links" / "conftest.py"
-)
-assert _SPEC is not None and _SPEC.loader is not None
-_hangar = importlib.util.module_from_spec(_SPEC)
-_SPEC.loader.exec_module(_hangar)
-hangar, port = _hangar.hangar, _hangar.port
+hangar, port = mavlink_hangar.hangar, mavlink_hangar.port
 
 LOSS_PARAMETER = {"ardupilot": "GUID_TIMEOUT", "px4": "COM_OF_LOSS_T"}
 
@@ -236,7 +230,7 @@ TYPED = {
 def test_mavproxy_rides_along_and_may_only_stop(proxy_at, hangar, port, flavour):
     """Our driver tracks; MAVProxy cannot change what it flies by, holds it until our RESUME, and lands it."""
     emulator, copter, _ = hangar.add(flavour, 5, aided=True, calls=("127.0.0.1", port))
-    firmware, rider, (home, hold, land) = emulator.firmware, _hangar.free_port(), TYPED[flavour]
+    firmware, rider, (home, hold, land) = emulator.firmware, mavlink_hangar.free_port(), TYPED[flavour]
     tracked = Tracked(port, rider, flavour, copter)
     try:
         tracked.track()

@@ -1,6 +1,5 @@
 """A driver process that is killed or frozen in flight, with nobody to speak for it: the vehicles stop by themselves."""
 
-import importlib.util
 import math
 import os
 import signal
@@ -9,18 +8,13 @@ import sys
 import time
 from pathlib import Path
 
+import mavlink_hangar
 import numpy as np
 import pytest
 
 pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(180)]
 HERE = Path(__file__).parent
-_SPEC = importlib.util.spec_from_file_location(
-    "mavlink_hangar", HERE.parent / "contract" / "mavlink_links" / "conftest.py"
-)
-assert _SPEC is not None and _SPEC.loader is not None
-_hangar = importlib.util.module_from_spec(_SPEC)
-_SPEC.loader.exec_module(_hangar)
-hangar, port = _hangar.hangar, _hangar.port
+hangar, port = mavlink_hangar.hangar, mavlink_hangar.port
 
 # PX4: COM_OF_LOSS_T 1.0 s and what it was measured to add, then it lands. ArduPilot: GUID_TIMEOUT 0.5 s, then it
 # brakes; FS_GCS_TIMEOUT 5 s, then it lands. Add the time of braking, and that of one heartbeat.

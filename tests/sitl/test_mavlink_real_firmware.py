@@ -3,7 +3,6 @@
 `make test-firmware`; building the binaries: docs/explanation/mavlink-vehicles.md#tests-with-other-programs.
 """
 
-import importlib.util
 import math
 import socket
 import sys
@@ -24,17 +23,12 @@ from groundstation.bus.messages import Verb
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))  # what lies here and is no test belongs to these tests
+import mavlink_hangar  # noqa: E402
 from firmware import VARIABLES, Firmware, binary_of  # noqa: E402
 from mavlink_pilot import Pilot  # noqa: E402
 
 pytestmark = [pytest.mark.slow, pytest.mark.interop, pytest.mark.timeout(300)]
-_SPEC = importlib.util.spec_from_file_location(
-    "mavlink_hangar", HERE.parent / "contract" / "mavlink_links" / "conftest.py"
-)
-assert _SPEC is not None and _SPEC.loader is not None
-_hangar = importlib.util.module_from_spec(_SPEC)
-_SPEC.loader.exec_module(_hangar)
-hangar, port = _hangar.hangar, _hangar.port
+hangar, port = mavlink_hangar.hangar, mavlink_hangar.port
 
 SYSTEM = 5
 M_PER_DEGREE = 111_319.5

@@ -1,0 +1,12 @@
+"""Emulated MAVLink vehicles and free ports, as the contract tests of the links have them, for flights here."""
+
+import importlib.util
+from pathlib import Path
+
+_SPEC = importlib.util.spec_from_file_location(
+    "mavlink_links_fixtures", Path(__file__).parents[1] / "contract" / "mavlink_links" / "conftest.py"
+)
+assert _SPEC is not None and _SPEC.loader is not None
+_fixtures = importlib.util.module_from_spec(_SPEC)
+_SPEC.loader.exec_module(_fixtures)
+hangar, port, free_port = _fixtures.hangar, _fixtures.port, _fixtures.free_port

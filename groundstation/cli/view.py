@@ -1,6 +1,5 @@
 """`groundstation view`: live engineering views of a run, in Rerun, Foxglove or ROS 2 tools."""
 
-import signal
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +21,8 @@ _RERUN_PAGE_PORT = 9090
 _ROS_ROUTER = "tcp/127.0.0.1:7447"
 _ROS_DISTRIBUTIONS = ("humble", "jazzy", "lyrical")
 _PORT = click.IntRange(1024, 65535)
+# What a viewer takes for its own last words (2 s each, two of them) fits in.
+_GOODBYE_S = 8.0
 
 
 @click.command(
@@ -49,6 +50,7 @@ def view(
     """Show a running ground station to an engineer's viewer, on loopback. It takes no orders and stops nothing."""
     from groundstation.bus.roles import Role
     from groundstation.engineering_views.watch import watch
+    from groundstation.process.leaving import LeavingSignal, leave_within
     from groundstation.supervisor.joining import join
 
     if viewer is None:
@@ -56,24 +58,29 @@ def view(
     if output is not None and viewer != "rerun":
         raise click.UsageError("--output goes with --rerun; a recording opens in Foxglove as it is")
     _require(viewer)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # the viewer's server must not be left behind
+    leaving = LeavingSignal()
+    leaving.install()
     record = choose(name)
     bus = join(record, "view", Role.VIEW, at_most_hz=_thinned(record) if viewer == "ros2" else {})
     shown: LiveView | None = None
     try:
         opened = _open_ros2(record, **ros2) if viewer == "ros2" else None
         shown = opened or _open(viewer, record, port, page_port, output)
-        dropped = watch(bus, shown, lambda: record.alive)
-        click.echo("the run has ended" if shown.alive else "the viewer's server has ended", err=True)
-        if dropped:
-            click.echo(f"{dropped} samples were dropped: this machine is too slow to show all", err=True)
-        return ExitCode.OK if shown.alive else ExitCode.FAULT
-    except KeyboardInterrupt:
-        return ExitCode.OK
+        dropped = watch(bus, shown, lambda: record.alive and not leaving.requested)
+        return _ended(leaving.requested, shown.alive, dropped)
     finally:
+        leave_within(_GOODBYE_S, ExitCode.OK if leaving.requested else ExitCode.FAULT)
         bus.close()
         if shown is not None:
             shown.close()
+
+
+def _ended(left: bool, served: bool, dropped: int) -> ExitCode:
+    if not left:
+        click.echo("the run has ended" if served else "the viewer's server has ended", err=True)
+    if dropped:
+        click.echo(f"{dropped} samples were dropped: this machine is too slow to show all", err=True)
+    return ExitCode.OK if left or served else ExitCode.FAULT
 
 
 def _require(viewer: str) -> None:

@@ -54,6 +54,7 @@ export function showBanners() {
   const own = ownAlarms(), all = banners(own), word = safetyWord(own), badge = byId("safety");
   text(badge, word);
   badge.dataset.level = LEVELS[word];
+  document.body.dataset.safety = word;
   noteOwnAlarms(own);
   const host = byId("banners"), kinds = all.map(({ kind }) => kind).join();
   if (host.dataset.kinds !== kinds) {

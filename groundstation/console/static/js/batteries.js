@@ -6,7 +6,10 @@ const RANKS = ["empty", "unknown", "low", "good"];
 const LEVELS = { empty: "bad", unknown: "warn", low: "warn", good: "good" };
 
 // Until it lands its drone by itself, in the same words in the bar and on the cards; "" where nobody knows.
-export const lastsWords = ({ good_for: time, battery_min: limit }) => time && `${time} until ${(100 * limit).toFixed(0)} %`;
+export function lastsWords({ battery, good_for: time, battery_min: limit }) {
+  const least = `${(100 * limit).toFixed(0)} %`;
+  return time && (battery < limit ? `below ${least}` : `${time} until ${least}`);
+}
 
 const share = ({ battery }) => (battery === null ? "unknown" : `${(100 * battery).toFixed(0)} %`);
 

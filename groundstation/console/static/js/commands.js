@@ -3,7 +3,7 @@
 import { moment, sinceMs } from "./clock.js";
 import { byId, el, seconds, text } from "./dom.js";
 import { effectOf, holding, isIdle, refusalOf } from "./effects.js";
-import { aloft, modes } from "./glance.js";
+import { aloft, doing, modes } from "./glance.js";
 import { me, send } from "./link.js";
 import { give, mayGive, OVER, ownOrders, roleText, startOwnOrders } from "./own_orders.js";
 import { forbidden } from "./preflight.js";
@@ -54,9 +54,9 @@ function holdToPress(button, fire) {
 
 // How many obey: in the air for those that stop, on the floor for the one that starts; nothing where nobody is heard.
 function showCounts(names) {
-  const known = modes(names).length, up = aloft();
+  const known = modes(names).length, up = aloft(), landing = doing("LANDING").length;
   for (const node of document.querySelectorAll(".count")) {
-    const count = node.closest("#takeoff") ? known - up : node.closest("#hold") ? holding(names).length : up;
+    const count = node.closest("#takeoff") ? known - up : node.closest("#hold") ? holding(names).length : node.closest("#land") ? up - landing : up;
     text(node, known && count ? `${count}` : "");
   }
 }

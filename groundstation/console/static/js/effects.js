@@ -42,11 +42,17 @@ export function effectOf(verb, names = droneNames()) {
   if (!up.length) return names.length > 1 ? "nobody flies" : "it stands";
   if (verb === "CUT_MOTORS") return up.length > 1 ? "" : "press 1 s: it falls";
   const idle = isIdle(verb, names), held = holding(names), bound = up.filter((name) => !held.includes(name));
-  if (verb === "LAND") return idle ? "landing already" : down.length ? does(up, "lands", "land where they are") : "";
+  if (verb === "LAND") return idle ? "landing already" : landing(up, down);
   if (bound.length === names.length) return "all land anyway";
   if (held.length === names.length) return idle ? "hovering already" : "";
   const already = idle ? " already" : "";
   return [does(held, `hovers${already}`, `hover${already}`), does(bound, "lands anyway", "land anyway"), does(down, "stands", "stand")].filter(Boolean).join(";\n");
+}
+
+// What LAND would do to who flies, where not all of the team follow it anew; "" where they do.
+function landing(up, down) {
+  const anew = up.filter((name) => modeNow(name) !== "LANDING"), already = up.filter((name) => !anew.includes(name));
+  return down.length || already.length ? [does(anew, "lands", "land where they are"), does(already, "lands already", "land already")].filter(Boolean).join(";\n") : "";
 }
 
 // Whether a stop would change nothing now.

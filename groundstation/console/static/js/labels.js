@@ -5,6 +5,8 @@ import { label } from "./canvas.js";
 
 const LINE = 1.2;
 // NAME: always drawn, if need be over others; SENSOR, FIGURE: left out where there is no room.
+// Names can be read however faint the body is that they name: those who are lost are looked for first.
+const READABLE = 0.85;
 export const NAME = 0, SENSOR = 1, FIGURE = 2;
 let waiting = [], taken = [];
 // The place that a label had in the last picture: it is tried first, so that words do not jump to and fro.
@@ -48,7 +50,7 @@ export function placeLabels(g, { width, height }) {
     held.set(one.key, box.index);
     taken.push(box);
     placed.push({ words: one.words, ...box });
-    g.globalAlpha = one.alpha;
+    g.globalAlpha = one.rank === NAME ? Math.max(READABLE, one.alpha) : one.alpha;
     label(g, one.words, x, y, one.colour, one.size, one.weight, align);
   }
   g.globalAlpha = alpha;

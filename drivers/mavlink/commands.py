@@ -13,7 +13,17 @@ from drivers.mavlink.lift_off import LiftOff
 from drivers.mavlink.requests import Requests
 from drivers.mavlink.settings import VehicleSettings
 from drivers.mavlink.wire.flight import SetPositionTargetLocalNed
-from drivers.mavlink.wire.names import ARMED, FORCE, Flavour, Landed, MavCmd, guided_mode, land_mode, mode_name
+from drivers.mavlink.wire.names import (
+    ARMED,
+    FORCE,
+    Flavour,
+    Landed,
+    MavCmd,
+    MavSeverity,
+    guided_mode,
+    land_mode,
+    mode_name,
+)
 from drivers.watchdog_types import Action, DriverMode, WatchdogDecision
 from groundstation.bus.messages import EntityEstimate, Vector3
 
@@ -24,7 +34,6 @@ _REGAIN_NS = 1_400_000_000
 # A text older than this explains nothing that happens now.
 _EXPLAINS_NS = 4_000_000_000
 _STILL: Vector3 = (0.0, 0.0, 0.0)
-_WARNING = 4
 # The last of a climb is slower, so that it ends at the height asked for.
 _CLIMBED, _CLIMB_GAIN, _LEAST_CLIMB_M_S = 0.95, 1.2, 0.12
 
@@ -164,7 +173,7 @@ class Orders:
     def _yield(self, now_ns: int, why: str) -> None:
         self._taken_over = True
         text = f"{self._vehicle.name} {why}: not ours to fly until RESUME"
-        self.events.append((_WARNING, text + self.last_said(now_ns)))
+        self.events.append((MavSeverity.WARNING, text + self.last_said(now_ns)))
 
     def _watch_start(self, now_ns: int, armed: bool, guided: bool, custom_mode: int) -> None:
         # Nobody but a pilot, a second ground station or the autopilot itself ends what has begun: asked once more, it

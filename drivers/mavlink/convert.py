@@ -11,6 +11,7 @@ from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.flight import OdometryMessage, SetPositionTargetLocalNed, VisionPositionEstimate
 from drivers.mavlink.wire.names import (
     ARMED,
+    AUTOPILOT_COMPONENT,
     ESTIMATOR_VISION,
     VELOCITY_AND_YAW_RATE,
     Flavour,
@@ -156,7 +157,7 @@ def setpoint_from_velocity(
     return SetPositionTargetLocalNed(
         time_boot_ms=now_ns // 1_000_000 % (1 << 32),
         target_system=system,
-        target_component=1,
+        target_component=AUTOPILOT_COMPONENT,
         coordinate_frame=MavFrame.BODY_NED,
         type_mask=VELOCITY_AND_YAW_RATE,
         x=0.0, y=0.0, z=0.0,

@@ -14,6 +14,7 @@ from drivers.mavlink.links.seam import Heard, MavlinkLink
 from drivers.mavlink.settings import MavlinkDriverSettings
 from drivers.mavlink.vehicle import MavlinkVehicle
 from drivers.mavlink.wire import frames
+from drivers.mavlink.wire.names import NO_AUTOPILOT, MavSeverity
 from drivers.mavlink.wire.telemetry import Heartbeat
 from drivers.vehicle_settings import read_section
 from groundstation.bus.messages import Estimate, Severity
@@ -75,7 +76,7 @@ class Fleet:
         vehicle = self.vehicles.get(heard.frame.system)
         if vehicle is not None:
             vehicle.hear(heard)
-        elif isinstance(heard.frame.message, Heartbeat) and heard.frame.message.autopilot != 8:
+        elif isinstance(heard.frame.message, Heartbeat) and heard.frame.message.autopilot != NO_AUTOPILOT:
             self.strangers[heard.frame.system] += 1
             self.link.rejected["unknown_system"] += 1
             if self.strangers[heard.frame.system] == 1:
@@ -100,7 +101,9 @@ class Fleet:
         if last_ns is not None and now_ns - last_ns < _SAME_TEXT_NS:
             return
         self._announced[name, text] = now_ns
-        level = Severity.ERROR if severity <= 3 else Severity.WARNING if severity <= 4 else Severity.INFO
+        level = Severity.INFO
+        if severity <= MavSeverity.WARNING:
+            level = Severity.ERROR if severity <= MavSeverity.ERROR else Severity.WARNING
         self._child.event(level, f"{name}: {text}", "", name)
 
     def close(self) -> None:

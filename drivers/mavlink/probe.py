@@ -7,8 +7,9 @@ from drivers.mavlink.identity import serial_number_of
 from drivers.mavlink.links.seam import MavlinkLink
 from drivers.mavlink.wire.flight import CommandLong
 from drivers.mavlink.wire.frames import id_of
-from drivers.mavlink.wire.names import ARMED, Flavour, MavCmd, mode_name
+from drivers.mavlink.wire.names import ARMED, AUTOPILOT_COMPONENT, NO_AUTOPILOT, Flavour, MavCmd, mode_name
 from drivers.mavlink.wire.telemetry import (
+    OUR_HEARTBEAT,
     AutopilotVersion,
     Heartbeat,
     LocalPositionNed,
@@ -18,7 +19,6 @@ from drivers.mavlink.wire.telemetry import (
 )
 
 _HEARTBEAT_S = 0.5
-_OURS = Heartbeat(6, 8, 0, 0, 4)
 
 
 @dataclass(slots=True)
@@ -54,12 +54,16 @@ def probe(link: MavlinkLink, seconds: float, greet: tuple[int, ...] = (0,)) -> d
         if time.monotonic() >= next_s:
             next_s = time.monotonic() + _HEARTBEAT_S
             for system in {*greet, *found}:
-                link.send(system, _OURS)
+                link.send(system, OUR_HEARTBEAT)
             for vehicle in found.values():
                 _ask(link, vehicle)
         for _, frame in link.receive():
             message = frame.message
-            if isinstance(message, Heartbeat) and frame.component == 1 and message.autopilot != 8:
+            if (
+                isinstance(message, Heartbeat)
+                and frame.component == AUTOPILOT_COMPONENT
+                and message.autopilot != NO_AUTOPILOT
+            ):
                 vehicle = found.setdefault(frame.system, Found(frame.system, message.autopilot))
                 vehicle.autopilot, vehicle.armed = message.autopilot, bool(message.base_mode & ARMED)
                 vehicle.mode = _mode(message)

@@ -164,7 +164,7 @@ class MavlinkSession:
         messages: list[Message] = []
         if now_ns >= self._next_heartbeat_ns:
             self._next_heartbeat_ns = now_ns + _HEARTBEAT_NS
-            messages.append(telemetry.Heartbeat(6, 8, 0, 0, 4))
+            messages.append(telemetry.OUR_HEARTBEAT)
         if silence_ns > _DISCONNECTED_NS:
             if self._connected:
                 self._connected, self._has_origin, self._origin_tries = False, False, 0

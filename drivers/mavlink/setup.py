@@ -7,16 +7,15 @@ from dataclasses import dataclass
 from drivers.mavlink.links.seam import MavlinkLink
 from drivers.mavlink.parameters import Needed, difference, needed
 from drivers.mavlink.wire.errors import WireError
-from drivers.mavlink.wire.names import ARMED, Flavour
+from drivers.mavlink.wire.names import ARMED, AUTOPILOT_COMPONENT, Flavour
 from drivers.mavlink.wire.parameters import carried_from_value, value_from_carried
 from drivers.mavlink.wire.service import ParamRequestRead, ParamSet, ParamValue
-from drivers.mavlink.wire.telemetry import Heartbeat
+from drivers.mavlink.wire.telemetry import OUR_HEARTBEAT, Heartbeat
 from groundstation.errors import DriverError
 
 _TRIES = 5
 _ANSWER_S = 0.6
 _CONNECT_S = 5.0
-_OURS = Heartbeat(6, 8, 0, 0, 4)
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,10 +43,14 @@ class ParameterSetup:
         """Wait for the vehicle; raises DriverError if it does not answer, is another kind, or has its motors on."""
         deadline = time.monotonic() + _CONNECT_S
         while time.monotonic() < deadline:
-            self._link.send(self._system, _OURS)
+            self._link.send(self._system, OUR_HEARTBEAT)
             for _, frame in self._link.receive():
                 message = frame.message
-                if frame.system != self._system or frame.component != 1 or not isinstance(message, Heartbeat):
+                if (
+                    frame.system != self._system
+                    or frame.component != AUTOPILOT_COMPONENT
+                    or not isinstance(message, Heartbeat)
+                ):
                     continue
                 if message.autopilot != self._flavour:
                     raise DriverError(

@@ -2,11 +2,11 @@
 
 from collections import deque
 
+from drivers.mavlink.wire.names import MavSeverity
 from drivers.mavlink.wire.telemetry import Statustext
 from groundstation.time_units import NS_PER_S
 
 _PIECE = 50
-_WARNING = 4
 _JUMP_MS = 1000
 _PIECES = 8
 _RECENT_S = 2
@@ -42,7 +42,7 @@ class Texts:
 
         now_ns: name the age of those that are older than 2 s.
         """
-        newest = {text: at for at, (level, text) in self._heard if at >= since_ns and level <= _WARNING}
+        newest = {text: at for at, (level, text) in self._heard if at >= since_ns and level <= MavSeverity.WARNING}
         return [text + _age(at, now_ns) for text, at in newest.items() if word in text.lower()]
 
 

@@ -19,7 +19,7 @@ from drivers.mavlink.traffic import Traffic
 from drivers.mavlink.vision import VisionFeed
 from drivers.mavlink.wire import flight, service, telemetry
 from drivers.mavlink.wire.errors import WireError
-from drivers.mavlink.wire.names import ARMED, EkfFlag, Flavour, SensorBits
+from drivers.mavlink.wire.names import ARMED, AUTOPILOT_COMPONENT, EkfFlag, Flavour, MavSeverity, SensorBits
 from drivers.plausibility.health import Health
 from drivers.plausibility.motion import MotionMonitor
 from drivers.watchdog_types import VehicleView, WatchdogDecision
@@ -35,7 +35,6 @@ _BATTERY_NS = 10_000_000_000
 _EXPLAIN_NS = 700_000_000
 # ArduPilot repeats what keeps it from arming every 30 s.
 _COMPLAINTS_NS = 35_000_000_000
-_WARNING = 4
 _Value = service.ParamValue | telemetry.GpsGlobalOrigin | telemetry.AutopilotVersion
 _FAULTS = SensorBits.GYRO | SensorBits.ACCELEROMETER
 _FLAVOURS = {"px4": Flavour.PX4, "ardupilot": Flavour.ARDUPILOT}
@@ -80,7 +79,7 @@ class MavlinkVehicle:
     def hear(self, heard: Heard) -> None:
         """Take a frame of this vehicle; unusable frames are counted."""
         self._traffic.count(heard.stamp_ns, heard.frame.component, heard.frame.sequence)
-        if heard.frame.component != 1 or heard.frame.message is None:
+        if heard.frame.component != AUTOPILOT_COMPONENT or heard.frame.message is None:
             return
         try:
             self._take(heard.stamp_ns, heard.frame.message)
@@ -254,7 +253,7 @@ class MavlinkVehicle:
     def _take_texts(self, now_ns: int) -> None:
         events = self.orders.events
         while self._session.notes:
-            events.append((_WARNING, self._session.notes.popleft()))
+            events.append((MavSeverity.WARNING, self._session.notes.popleft()))
         while self.texts:
             said = self._said.hear(*self.texts.popleft())
             if said is not None:
@@ -262,13 +261,18 @@ class MavlinkVehicle:
                 events.append(said)
         while self._jumps:
             jump_s = self._jumps.popleft() / 1000
-            events.append((4, f"its clock jumped by {jump_s:.0f} s: it restarted, or two vehicles share its system id"))
+            events.append(
+                (
+                    MavSeverity.WARNING,
+                    f"its clock jumped by {jump_s:.0f} s: it restarted, or two vehicles share its system id",
+                )
+            )
         while self._requests.failures:
             self._refusals.append((now_ns, self._requests.failures.popleft()))
         while self._refusals and now_ns - self._refusals[0][0] >= _EXPLAIN_NS:
             at_ns, text = self._refusals.popleft()
             reasons = self._said.reasons(at_ns - _EXPLAIN_NS)
-            events.append((4, f"{text} ({'; '.join(reasons)})" if reasons else text))
+            events.append((MavSeverity.WARNING, f"{text} ({'; '.join(reasons)})" if reasons else text))
 
     def _feed(self, now_ns: int, known: LatestTelemetry) -> list[tuple[object, ...]]:
         if now_ns < self._next_vision_ns or (attitude := known.attitude_at(now_ns)) is None:

@@ -27,15 +27,14 @@ _ROBOT_STD_M, _YAW_STD, _TARGET_STD_M, _SPEED_STD_M_S = 0.05, 0.05, 0.1, 0.2
 class TeamStand:
     """Where the team stands: poses (x, y, z, yaw) [m, rad; world], and what it knows there.
 
-    std_m: of the target's place in the floor plan, root of the trace; robot_std_m: likewise of each drone; placed: whom
-    fixed cameras show, directly or through drones that they show.
+    std_m: of the target's place in the floor plan, root of the trace; placed: whom fixed cameras show, directly or
+    through drones that they show.
     """
 
     place: Place
     topology: Topology
     poses: Mapping[str, Array]
     std_m: float
-    robot_std_m: Mapping[str, float]
     placed: frozenset[str]
 
 
@@ -104,8 +103,7 @@ class StandSearch:
         for _ in range(_RESTS):
             scene = self._after(scene, topology, rest)
         stds, poses = np.sqrt(2.0 * np.diag(scene.prior)).tolist(), dict(zip(scene.robots, scene.poses, strict=True))
-        known = dict(zip(scene.robots, stds, strict=False))
-        return TeamStand(place, topology, poses, stds[len(poses)], known, self.views.placed(poses, place))
+        return TeamStand(place, topology, poses, stds[len(poses)], self.views.placed(poses, place))
 
     def _start(self, place: Place, chain: Chain) -> tuple[PlanningScene, Topology]:
         """Return a chain at its stands, all others beside each other between the target and the middle of the fence."""

@@ -45,7 +45,6 @@ class Tape:
     def __init__(self, files: Iterable[Path]) -> None:
         self._files = tuple(files)
         self._held: defaultdict[Name, list[RawRecord]] = defaultdict(list)
-        self._source = ""
         self._former: JournalEntry | None = None
         self.said: defaultdict[Said, list[RawRecord]] = defaultdict(list)
         self.damage: list[str] = []

@@ -47,7 +47,7 @@ class TakeOff:
     def __init__(self, drones: tuple[str, ...], limits: TakeOffLimits, now_ns: int) -> None:
         self._waiting = list(drones)
         self._limits = limits
-        self._began_ns = self._step_ns = now_ns
+        self._step_ns = now_ns
         self._step = _Step.CONNECT
         self._ordered_ns = 0
         self._refusal = ""

@@ -47,7 +47,6 @@ class Services:
         if px4:
             self._send_unasked(_PX4_RATES)
         self.clock = SenderClock(learns=not px4)
-        self.listing: dict[tuple[str, int], list[str]] = {}
         self._by_id = {id_of(kind): kind for kind in CLASSES.values()}
 
     def _send_unasked(self, rates: dict[type[Message], float]) -> None:

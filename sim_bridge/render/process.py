@@ -1,6 +1,5 @@
 """One process per emulated camera: truth in by shared memory, pictures out over the network."""
 
-import logging
 import math
 import os
 import signal
@@ -19,7 +18,6 @@ from sim_bridge.render.outputs import Output, open_output
 from sim_bridge.render.spec import Outage, OutageKind, RenderSpec
 from sim_bridge.truth import TruthBoard
 
-_log = logging.getLogger(__name__)
 _IDLE_S = 0.05
 # TCP: what is lost is sent again when its time-out has passed, at least 200 ms on Linux (RFC 6298 asks for more), and
 # what comes after it waits.

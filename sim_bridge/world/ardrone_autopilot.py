@@ -41,7 +41,6 @@ class Phase(Enum):
     CUT = auto()
 
 
-AIRBORNE = frozenset({Phase.HOVERING, Phase.FLYING, Phase.BRAKING, Phase.LOOPING, Phase.LANDING})
 _STEERED = frozenset({Phase.HOVERING, Phase.FLYING, Phase.BRAKING})
 
 

@@ -27,7 +27,6 @@ class Flaw(StrEnum):
     SMALL = "board too small: go nearer"
     BLURRED = "blurred: hold still, more light"
     SIMILAR = "too similar to one that is kept"
-    RESIDUAL = "corners that fit no lens: bent board, reflection, or blur"
 
 
 @dataclass(frozen=True, slots=True)

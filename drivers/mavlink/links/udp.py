@@ -11,7 +11,7 @@ from drivers.mavlink.links.seam import Address, Heard, Sniffer, ignore_bytes
 from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.frames import MAX_DATAGRAM, FrameDecoder, FrameEncoder, Message, ReceivedFrame, split
-from drivers.mavlink.wire.telemetry import Heartbeat
+from drivers.mavlink.wire.telemetry import OUR_HEARTBEAT
 from drivers.mavlink.wire.verification import Signing, old_sender
 from groundstation.adapters import bind_to_adapter, split_zone
 from groundstation.bus import clock
@@ -125,7 +125,7 @@ class UdpLink:
             return
         self._greeted[source] = now_ns
         with self._lock:
-            greeting = self._encoder.encode(Heartbeat(6, 8, 0, 0, 4))
+            greeting = self._encoder.encode(OUR_HEARTBEAT)
         with suppress(OSError):
             self._socket.sendto(greeting, source)
 

@@ -9,9 +9,17 @@ VELOCITY_ONLY = 0xDC7
 ARMED = 128
 CUSTOM_MODE_ENABLED = 1
 FORCE = 21196.0
-GCS_TYPE, GCS_AUTOPILOT = 6, 8
+GCS_TYPE, NO_AUTOPILOT, ACTIVE = 6, 8, 4  # MAV_TYPE_GCS, MAV_AUTOPILOT_INVALID, MAV_STATE_ACTIVE
+AUTOPILOT_COMPONENT = 1
 QUADROTOR = 2
 ESTIMATOR_VISION = 2
+
+
+class MavSeverity(IntEnum):
+    """MAV_SEVERITY: 0 emergency .. 7 debug; the two that divide what an operator is told."""
+
+    ERROR = 3
+    WARNING = 4
 
 
 class Flavour(IntEnum):

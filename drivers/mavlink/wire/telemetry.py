@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+from drivers.mavlink.wire.names import ACTIVE, GCS_TYPE, NO_AUTOPILOT
+
 Floats = tuple[float, ...]
 
 
@@ -14,6 +16,9 @@ class Heartbeat(NamedTuple):
     custom_mode: int
     system_status: int
     mavlink_version: int = 3
+
+
+OUR_HEARTBEAT = Heartbeat(GCS_TYPE, NO_AUTOPILOT, 0, 0, ACTIVE)
 
 
 class SysStatus(NamedTuple):

@@ -12,19 +12,18 @@ from typing import Any
 
 import click
 
-from groundstation.bus.messages import OPERATOR, AckStage, Command, CommandAck, Verb
+from groundstation.bus.messages import OPERATOR, AckStage, CommandAck, Verb
 from groundstation.bus.roles import Role
 from groundstation.bus.topics import COMMAND, COMMAND_ACK
 from groundstation.bus.zenoh_bus import ZenohBus
 from groundstation.cli.exits import ExitCode, UnreachableError
 from groundstation.errors import GroundStationError, OperatorMistake
 from groundstation.runtime.acknowledgements import NOT_CONFIRMED, AwaitedAnswers
+from groundstation.runtime.asking import command_of, patience_s
 from groundstation.supervisor import runtime_file
 from groundstation.supervisor.joining import join
 from groundstation.supervisor.runtime_file import RuntimeRecord
 
-_PATIENCE_S = {Verb.LAND: 20.0, Verb.TAKEOFF: 60.0, Verb.TRACK: 8.0, Verb.RESUME: 8.0}
-_PATIENCE_DEFAULT_S = 5.0
 # A router that died is back by then; drones hover without one. One that lives may be busy, and a signal is the last
 # resort: drivers that get it land and exit, whatever was asked.
 _CONNECT_S = 2.0
@@ -101,31 +100,13 @@ def order(verb: Verb, drones: tuple[str, ...], run: str | None, as_json: bool, a
     except GroundStationError as error:
         return _without_router(verb, record, as_json, error)
     try:
-        book = _book(bus, verb, drones, record, anyway)
+        asked = (drones or record.drones) if verb.stops else (OPERATOR,)
+        book = AwaitedAnswers(command_of(bus, verb, drones, 1, anyway), asked)
         say: Callable[[str], None] = (lambda _: None) if as_json else click.echo
-        deliver(bus, book, _PATIENCE_S.get(verb, _PATIENCE_DEFAULT_S), say)
+        deliver(bus, book, patience_s(verb), say)
     finally:
         bus.close()
     return _report(book, as_json)
-
-
-def _book(bus: ZenohBus, verb: Verb, drones: tuple[str, ...], record: RuntimeRecord, anyway: bool) -> AwaitedAnswers:
-    header = bus.header("team" if verb.stops else OPERATOR)
-    # A stop goes to the drones at once and never expires; a start is the operator's, who holds the lease.
-    scope = drones if verb.stops else (OPERATOR, *drones)
-    expires_ns = 0 if verb.stops else header.stamp_ns + 5_000_000_000
-    identity = f"{bus.source}-{header.stamp_ns}"
-    command = Command(
-        header=header,
-        id=identity,
-        verb=verb,
-        scope=scope,
-        issuer=bus.source,
-        expires_ns=expires_ns,
-        run=bus.run,
-        anyway=anyway,
-    )
-    return AwaitedAnswers(command, (drones or record.drones) if verb.stops else (OPERATOR,))
 
 
 def _report(book: AwaitedAnswers, as_json: bool) -> int:

@@ -8,12 +8,9 @@ from groundstation.bus.api import Bus
 from groundstation.bus.messages import OPERATOR, AckStage, Command, CommandAck, Lease, Verb
 from groundstation.bus.topics import COMMAND
 from groundstation.runtime.acknowledgements import AwaitedAnswers
+from groundstation.runtime.asking import command_of, patience_s
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
-_TEAM = "team"
-_EXPIRY_NS = 5_000_000_000
-_PATIENCE_NS = {Verb.LAND: 20_000_000_000, Verb.TAKEOFF: 60_000_000_000}
-_PATIENCE_DEFAULT_NS = 8_000_000_000
 # An order that lay in a page without a connection, or in a frozen server's queue, must not surprise anybody later.
 _START_LIVES_MS = 2000.0
 _STOP_LIVES_MS = 5000.0
@@ -85,20 +82,7 @@ class CommandDesk:
         if not stop and not self.lease_holder(now_ns):
             return "nobody holds the operator lease: is the ground station's main process alive?"
         self._count += 1
-        header = self._bus.header(_TEAM if stop else OPERATOR)
-        identity = f"{self._bus.source}-{header.stamp_ns}-{self._count}"
-        scope = drones if stop else (OPERATOR, *drones)
-        expires_ns = 0 if stop else header.stamp_ns + _EXPIRY_NS
-        command = Command(
-            header=header,
-            id=identity,
-            verb=verb,
-            scope=scope,
-            issuer=f"{self._bus.source} ({given.by})" if given.anyway else self._bus.source,
-            expires_ns=expires_ns,
-            run=self._bus.run,
-            anyway=given.anyway,
-        )
+        command = command_of(self._bus, verb, drones, self._count, given.anyway, given.by)
         self._keep(Followed(self._book(command), now_ns, now_ns, given.by, given.ref))
         self._bus.publish(COMMAND, command)
         return ""
@@ -120,8 +104,7 @@ class CommandDesk:
     def step(self, now_ns: int) -> None:
         """Repeat what was not answered; close what is settled or out of time."""
         for order in self._orders.values():
-            verb = order.book.command.verb
-            patience_ns = _PATIENCE_NS.get(verb, _PATIENCE_DEFAULT_NS)
+            patience_ns = patience_s(order.book.command.verb) * NS_PER_S
             order.closed = order.closed or order.book.settled or now_ns - order.given_ns > patience_ns
             due_ns = order.repeated_ns + order.book.repeat_after_s * NS_PER_S
             if order.is_repeated and now_ns > due_ns:

@@ -19,6 +19,7 @@ from groundstation.bus.messages import (
 from groundstation.bus.stop_mark import StopMark
 from groundstation.bus.topics import COMMAND, COMMAND_ACK, EVENT, LEASE
 from groundstation.runtime.acknowledgements import AwaitedAnswers
+from groundstation.runtime.asking import START_LIVES_NS, TEAM
 from groundstation.runtime.before_take_off import BeforeTakeOff
 from groundstation.runtime.lift_off import Mistake
 from groundstation.runtime.marker_height import FixedCamera
@@ -27,10 +28,8 @@ from groundstation.runtime.take_off import TakeOff, TakeOffCommand, TakeOffLimit
 from groundstation.runtime.team import TeamPhase, TeamStatus
 from groundstation.time_units import NS_PER_S
 
-_TEAM = "team"
 _LEASE_PERIOD_NS = 500_000_000
 _LEASE_LIFE_NS = 1_500_000_000
-_EXPIRY_NS = 5_000_000_000
 _CONFIRM_NS = {Verb.LAND: 20_000_000_000, Verb.TAKEOFF: 20_000_000_000}
 _CONFIRM_DEFAULT_NS = 6_000_000_000
 
@@ -138,8 +137,8 @@ class Operator:
 
     def _give(self, verb: Verb, scope: tuple[str, ...], now_ns: int, request: Command | None = None) -> AwaitedAnswers:
         self._count += 1
-        header = self._bus.header(_TEAM, asked_ns(request))
-        expires_ns = 0 if verb.stops else header.stamp_ns + _EXPIRY_NS
+        header = self._bus.header(TEAM, asked_ns(request))
+        expires_ns = 0 if verb.stops else header.stamp_ns + START_LIVES_NS
         identity = f"{OPERATOR}-{header.stamp_ns}-{self._count}"
         command = Command(
             header=header,
@@ -162,7 +161,7 @@ class Operator:
         """Renew the lease, hear everybody, go on with what is under way."""
         if now_ns >= self._next_lease_ns:
             self._next_lease_ns = now_ns + _LEASE_PERIOD_NS
-            header = self._bus.header(_TEAM)
+            header = self._bus.header(TEAM)
             end_ns = header.stamp_ns + _LEASE_LIFE_NS
             self._bus.publish(LEASE, Lease(header=header, holder=OPERATOR, expires_ns=end_ns, run=self._bus.run))
         self.team.update(now_ns)
@@ -221,7 +220,7 @@ class Operator:
     # --- requests of other shells --------------------------------------------------------------------------------
 
     def _serve(self, request: Command, now_ns: int) -> None:
-        if self._requests.repeated(request):
+        if self._requests.answer_again(request):
             return
         self._requests.answer(request, AckStage.RECEIVED)
         names = tuple(name for name in request.scope if name != OPERATOR)

@@ -38,8 +38,8 @@ class Requests:
         self._stops: dict[str, StopMark] = {}
         self._heard: dict[str, None] = {}
 
-    def repeated(self, request: Command) -> bool:
-        """Whether a request was answered before; then it is answered so again."""
+    def answer_again(self, request: Command) -> bool:
+        """Repeat the answer to a request that was answered before; returns whether it was."""
         known = self._answers.get(request.id)
         if known is not None:
             self._publish(request, *known)
@@ -57,7 +57,7 @@ class Requests:
         self._bus.publish(COMMAND_ACK, ack)
 
     def hear_stop(self, now_ns: int, stop: Command) -> bool:
-        """Remember a stop of the drones that it names, or of all; returns whether it is none that is repeated."""
+        """Remember a stop of the drones that it names, or of all; returns whether it is new."""
         if stop.id in self._heard:
             return False
         _make_room(self._heard)

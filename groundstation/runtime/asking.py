@@ -1,0 +1,38 @@
+"""What a page or a shell asks of the team: the command, and how long an answer to it may take."""
+
+from groundstation.bus.api import Bus
+from groundstation.bus.messages import OPERATOR, Command, Verb
+from groundstation.time_units import NS_PER_S
+
+TEAM = "team"
+# A start that was not heard by then is given up: it must not surprise anybody later.
+START_LIVES_NS = 5 * NS_PER_S
+_PATIENCE_S = {Verb.LAND: 20.0, Verb.TAKEOFF: 60.0, Verb.TRACK: 8.0, Verb.RESUME: 8.0}
+_PATIENCE_DEFAULT_S = 5.0
+
+
+def patience_s(verb: Verb) -> float:
+    """Return how long to wait until all have done it [s]; then it is not confirmed."""
+    return _PATIENCE_S.get(verb, _PATIENCE_DEFAULT_S)
+
+
+def command_of(
+    bus: Bus, verb: Verb, drones: tuple[str, ...], number: int, anyway: bool = False, viewer: str = ""
+) -> Command:
+    """Return a command to drones (none: all), stamped now.
+
+    A stop goes to the drones at once and never expires; a start is the operator's, who holds the lease. number: tells
+    commands of one stamp apart; anyway: a take-off although the checks forbid it; viewer: who of a console said so.
+    """
+    stop = verb.stops
+    header = bus.header(TEAM if stop else OPERATOR)
+    return Command(
+        header=header,
+        id=f"{bus.source}-{header.stamp_ns}-{number}",
+        verb=verb,
+        scope=drones if stop else (OPERATOR, *drones),
+        issuer=f"{bus.source} ({viewer})" if anyway and viewer else bus.source,
+        expires_ns=0 if stop else header.stamp_ns + START_LIVES_NS,
+        run=bus.run,
+        anyway=anyway,
+    )

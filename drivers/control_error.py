@@ -4,11 +4,9 @@ Half of it holds for every kind of vehicle: whatever lags without overshoot stay
 """
 
 import math
-from collections import deque
 from dataclasses import dataclass, replace
 
 from drivers.watchdog_types import FREE, UP, Action, VehicleView, WatchdogDecision
-from groundstation.bus.messages import EntityEstimate
 from groundstation.time_units import NS_PER_S
 
 # The slowest vehicle follows a command with this time constant; what is left of a step counts as told.
@@ -126,54 +124,6 @@ class ControlErrorMonitor:
         if not excess.step(deviation, turning_m_s, dt_s):
             return ""
         return f"{math.hypot(*velocity):.1f} m/s {how}, {math.hypot(*wanted):.1f} m/s asked"
-
-
-_WINDOW_NS = 600_000_000
-_LEAST_WINDOW_NS = 450_000_000
-_SEEN_AGE_S = 0.5
-_MOST_VARIANCE_M2 = 0.1**2
-# Faster than this is no flight: the belief was set anew.
-_LEAP_M_S = 4.0
-_FRESH_NS = 300_000_000
-
-
-class SeenVelocity:
-    """Velocity of a vehicle by the positions that cameras correct, over half a second; reports nothing while unseen."""
-
-    def __init__(self) -> None:
-        self._places: deque[tuple[int, float, float]] = deque()
-        self._yaw_rad = 0.0
-        self._epoch: int | None = None
-
-    def hear(self, now_ns: int, epoch: int, entity: EntityEstimate) -> None:
-        """Take the tracker's estimate of the vehicle."""
-        worst = max(entity.covariance[0], entity.covariance[5]) if len(entity.covariance) == 16 else math.inf
-        good = entity.converged and entity.age_s <= _SEEN_AGE_S and worst <= _MOST_VARIANCE_M2
-        if not good or epoch != self._epoch:
-            self._places.clear()
-            self._epoch = epoch
-        if not good:
-            return
-        x, y, _, self._yaw_rad = entity.mean[:4]
-        if self._places:
-            then_ns, then_x, then_y = self._places[-1]
-            if math.hypot(x - then_x, y - then_y) > 0.1 + _LEAP_M_S * (now_ns - then_ns) / NS_PER_S:
-                self._places.clear()
-        self._places.append((now_ns, x, y))
-        while now_ns - self._places[0][0] > _WINDOW_NS:
-            self._places.popleft()
-
-    def velocity(self, now_ns: int) -> tuple[float, float] | None:
-        """Return the velocity forward and left [m/s], or None."""
-        if not self._places or now_ns - self._places[-1][0] > _FRESH_NS:
-            return None
-        (before_ns, x0, y0), (last_ns, x1, y1) = self._places[0], self._places[-1]
-        if last_ns - before_ns < _LEAST_WINDOW_NS:
-            return None
-        elapsed_s = (last_ns - before_ns) / NS_PER_S
-        vx, vy = (x1 - x0) / elapsed_s, (y1 - y0) / elapsed_s
-        c, s = math.cos(self._yaw_rad), math.sin(self._yaw_rad)
-        return c * vx + s * vy, c * vy - s * vx
 
 
 def _clamp(value: float, limit: float) -> float:

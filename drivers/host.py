@@ -7,8 +7,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from drivers.base import HostProcess, Vehicle
-from drivers.control_error import ControlErrorMonitor, SeenVelocity
+from drivers.control_error import ControlErrorMonitor
 from drivers.neighbours import Neighbours
+from drivers.seen_velocity import SeenVelocity
 from drivers.watchdog import Watchdog
 from drivers.watchdog_types import AIRBORNE, Ack, DriverMode, Upstream, VehicleView, WatchdogDecision, WatchdogLimits
 from groundstation.adapters import ping_to
@@ -27,16 +28,15 @@ from groundstation.bus.messages import (
 from groundstation.bus.topics import COMMAND, COMMAND_ACK, ESTIMATE, LEASE, SETPOINT, VEHICLE_STATUS
 from groundstation.process.priority import go_first
 from groundstation.process.refusals import Refusals
-from groundstation.time_units import NS_PER_S
+from groundstation.time_units import NEVER_NS, NS_PER_S
 
 RATE_HZ = 30.0
-_STATUS_PERIOD_NS = 200_000_000
-_FLUSH_PERIOD_NS = 100_000_000
-_FLOOD_NS, _NEVER_NS = 10_000_000, 1 << 62
+_STATUS_PERIOD_NS, _FLUSH_PERIOD_NS, _FLOOD_NS = 200_000_000, 100_000_000, 10_000_000
 _UNANSWERED_NS, _UNCONFIGURED_NS = 5_000_000_000, 15_000_000_000
 _SILENCE_EVENT_NS = _REFUSAL_PERIOD_NS = 1_000_000_000
 # How long a driver that is to exit goes on for a vehicle it cannot hear.
 _GIVE_UP_NS = 10_000_000_000
+_UNSOUND = "restart it; if it says this again, have that sensor repaired"
 _UNREACHED = "check that it is switched on and that this computer is in its network"
 # Refusals that nothing of ours causes, as the operator reads them.
 _INTRUSIONS = {
@@ -86,7 +86,7 @@ class VehicleHost:
 
     def due_ns(self) -> int:
         """Return when a setpoint or command asks for a turn; a flood of commands waits a little."""
-        asked_ns = self._turned_ns + _FLOOD_NS if self._commands.waiting else _NEVER_NS
+        asked_ns = self._turned_ns + _FLOOD_NS if self._commands.waiting else NEVER_NS
         return 0 if self._setpoints.waiting else asked_ns
 
     def turn(self, now_ns: int) -> WatchdogDecision:
@@ -245,7 +245,7 @@ class VehicleHost:
             if view.unsound and decision.mode is not DriverMode.CONNECTING:  # the watchdog's reason says what
                 return
             told = f"{name}: {view.silence}" if view.unsound else f"{name} does not answer at {address}"
-            remedy = "mend what it says of itself" if view.unsound else f"{_UNREACHED}: {ping_to(address)}"
+            remedy = _UNSOUND if view.unsound else f"{_UNREACHED}: {ping_to(address)}"
             self._event(Severity.ERROR, f"{told}; trying on", remedy)
             self._child.degrade(told)
 

@@ -108,7 +108,7 @@ def _lines_with(text: bytes, word: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 def _described(text: str) -> str:
-    """Return a key in the operator's words; a key that is none of ours is not repeated on his terminal."""
+    """Return a key in the operator's words; a key that is none of ours is not repeated on the terminal."""
     try:
         key = keys.parse(text)
     except MessageError:

@@ -17,12 +17,12 @@ from groundstation.field.resolved import ResolvedField
 from groundstation.planning.planner import Planner, PlanRequest
 from groundstation.runtime.announcer import TEAM, Announcer
 from groundstation.runtime.consistency_watch import ConsistencyWatch
-from groundstation.runtime.health import UnseenWatch
 from groundstation.runtime.inbox import Inbox
 from groundstation.runtime.journal import FAULT, Adoption, entry_of
 from groundstation.runtime.latency_watch import PictureAge
 from groundstation.runtime.plan_worker import PlanWorker
 from groundstation.runtime.rejoin_watch import RejoinWatch
+from groundstation.runtime.unseen_watch import UnseenWatch
 from groundstation.tracker import Tracker, tracker_from_field
 
 _BELIEF_HZ = 5

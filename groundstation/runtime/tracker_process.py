@@ -18,7 +18,7 @@ from groundstation.process import numba_cache
 from groundstation.process.child import Child
 from groundstation.process.priority import go_first
 from groundstation.runtime.compile_kernels import compile_kernels
-from groundstation.runtime.health import Deadlines
+from groundstation.runtime.deadlines import Deadlines
 from groundstation.time_units import NS_PER_S
 
 if TYPE_CHECKING:

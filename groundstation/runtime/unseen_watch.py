@@ -1,34 +1,11 @@
-"""What the tracker's process watches in itself and in its robots: missed deadlines, robots that nobody sees."""
+"""Robots that fly although nobody knows where they are."""
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from groundstation.time_units import NS_PER_S
 
-LATE_NS = 10_000_000
 _REPEAT_NS = NS_PER_S
-
-
-@dataclass(slots=True)
-class Deadlines:
-    """A fixed-rate loop: `next_ns` is when the coming tick is due; a tick late by more than 10 ms is an overrun."""
-
-    period_ns: int
-    next_ns: int
-    ticks: int = 0
-    overruns: int = 0
-
-    def start_tick(self, now_ns: int) -> None:
-        """Count a tick that starts now. Ticks that were slept through are counted as overruns and not made up for."""
-        self.ticks += 1
-        late_ns = now_ns - self.next_ns
-        if late_ns > LATE_NS:
-            missed = late_ns // self.period_ns
-            self.overruns += 1 + missed
-            self.ticks += missed
-            self.next_ns += missed * self.period_ns
-        self.next_ns += self.period_ns
 
 
 class UnseenWatch:

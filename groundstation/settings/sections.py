@@ -1,9 +1,11 @@
 """From the field to what each process is handed: its own part, as JSON, and nothing else."""
 
 import json
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
+
+from pydantic import BaseModel
 
 from drivers.camera.settings import parse_source
 from drivers.motion_capture.settings import emulated_source
@@ -21,14 +23,8 @@ from groundstation.settings.schema import Field
 from groundstation.vehicles import VehicleOrder, kind_named
 from groundstation.vehicles.registry import ask
 
-# What a driver process of a camera talks to; that of a vehicle, its kind.
-CAMERA = "camera"
-# And that of a motion capture system.
-MOTION_CAPTURE = "motion_capture"
-# And that of a ranging system.
-RANGING = "ranging"
-# And that of a target's odometry.
-ODOMETRY = "odometry"
+# What a driver process talks to: one of these, or a kind of vehicle.
+CAMERA, MOTION_CAPTURE, RANGING, ODOMETRY = "camera", "motion_capture", "ranging", "odometry"
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,39 +122,40 @@ def driver_sections(field: Field) -> list[DriverSection]:
     """
     count = len(field.cameras) + len(field.drones)
     phases = [index / (count * SEARCH_RATE_HZ) for index in range(count)]
-    fixed = [
-        DriverSection(
-            name, CAMERA, name, world_camera(field, name, camera, phase).model_dump_json(), (name,), camera.host
-        )
+    sensors = [
+        DriverSection(name, CAMERA, name, _text(world_camera(field, name, camera, phase)), (name,), camera.host)
         for (name, camera), phase in zip(field.cameras.items(), phases, strict=False)
     ]
-    carried = [
-        DriverSection(
-            camera_name(name),
-            CAMERA,
-            name,
-            onboard_camera(field, name, drone, phase).model_dump_json(),
-            (name, camera_name(name)),
-            drone.host,
-        )
-        for (name, drone), phase in zip(field.drones.items(), phases[len(fixed) :], strict=True)
-    ]
-    captured = [
-        DriverSection(name, MOTION_CAPTURE, name, capture_section(field, name).model_dump_json(), (name,), system.host)
+    sensors += [
+        DriverSection(name, MOTION_CAPTURE, name, _text(capture_section(field, name)), (name,), system.host)
         for name, system in field.motion_capture.items()
     ]
-    ranged = [
-        DriverSection(name, RANGING, name, ranging_section(field, name).model_dump_json(), (name,), system.host)
+    sensors += [
+        DriverSection(name, RANGING, name, _text(ranging_section(field, name)), (name,), system.host)
         for name, system in field.ranging.items()
     ]
-    reporting = [
-        DriverSection(
-            odometry_name(name), ODOMETRY, name, odometry_section(name, target, target.odometry).model_dump_json(),
-            (name, odometry_name(name)),
-        )
-        for name, target in field.tracked.items() if target.odometry is not None
-    ]  # fmt: skip
-    return _vehicles(field) + fixed + captured + ranged + reporting + carried
+    return _vehicles(field) + sensors + _odometry(field) + _carried(field, phases[len(field.cameras) :])
+
+
+def _odometry(field: Field) -> list[DriverSection]:
+    reporting = [(name, target, target.odometry) for name, target in field.tracked.items() if target.odometry]
+    return [
+        DriverSection(own, ODOMETRY, name, _text(odometry_section(name, target, odometry)), (name, own))
+        for name, target, odometry in reporting
+        for own in (odometry_name(name),)
+    ]
+
+
+def _carried(field: Field, phases: Sequence[float]) -> list[DriverSection]:
+    return [
+        DriverSection(own, CAMERA, name, _text(onboard_camera(field, name, drone, phase)), (name, own), drone.host)
+        for (name, drone), phase in zip(field.drones.items(), phases, strict=True)
+        for own in (camera_name(name),)
+    ]
+
+
+def _text(section: BaseModel) -> str:
+    return section.model_dump_json()
 
 
 def vehicle_order(field: Field, name: str) -> VehicleOrder:

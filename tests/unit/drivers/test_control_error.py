@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from drivers.control_error import ControlErrorMonitor, SeenVelocity
+from drivers.control_error import ControlErrorMonitor
+from drivers.seen_velocity import SeenVelocity
 from drivers.watchdog_types import Action, DriverMode, VehicleView, WatchdogDecision
 from groundstation.bus.messages import EntityEstimate, FlightState
 

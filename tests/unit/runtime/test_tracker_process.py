@@ -44,8 +44,9 @@ from groundstation.replay.difference import first_difference
 from groundstation.replay.rerun import Rerun
 from groundstation.replay.tick_log import Tick
 from groundstation.runtime import tracker_loop
-from groundstation.runtime.health import Deadlines, UnseenWatch
+from groundstation.runtime.deadlines import Deadlines
 from groundstation.runtime.tracker_loop import TrackerSection, Tracking
+from groundstation.runtime.unseen_watch import UnseenWatch
 from groundstation.runtime.warm_up import warm_up
 
 MS = 1_000_000

@@ -36,7 +36,6 @@ from sim_bridge.world.emulation import video_of
 Stream = tuple[str, int]
 _START_LIMIT_S = 45.0
 _STOP_LIMIT_S = 1.5
-# Picture right is world +x, picture down is world -y, the optical axis points at the floor.
 
 
 def render_specs(

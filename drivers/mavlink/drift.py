@@ -31,8 +31,10 @@ _TRUSTED_AGAIN_NS = NS_PER_S
 _LIFT_OFF_NS = 3 * NS_PER_S
 # Up to here it does not matter whose word is wrong.
 _SMALL_M_S = 0.2
-_RESPONSE_S, _JUDGED_S, _EVEN_M_S = 0.6, 0.5, 0.1
-_HOLD_GAIN, _HOLD_UP_GAIN = 0.8, 1.3
+_RESPONSE_S = 0.6  # of a vehicle to a velocity
+_JUDGED_S = 0.5  # over which what it reports and what is seen are compared with what was told
+_EVEN_M_S = 0.1  # so near to each other they are equally good
+_HOLD_GAIN, _HOLD_UP_GAIN = 0.8, 1.3  # [1/s], sideways and upwards
 # Below what the control error tolerates of a vehicle that is told to stand still.
 _HOLD_M_S = 0.2
 _SEEN_S = 0.5

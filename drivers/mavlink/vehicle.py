@@ -26,6 +26,7 @@ from drivers.watchdog_types import VehicleView, WatchdogDecision
 from groundstation.bus import clock
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import Estimate, FlightState, Vector3
+from groundstation.time_units import NEVER_NS
 
 _FRESH_NS = 300_000_000
 _HEARTBEAT_NS = 4_000_000_000
@@ -223,7 +224,7 @@ class MavlinkVehicle:
         """Send the vehicle its commands for the decision, poses for its estimator, and pending requests."""
         known = self.telemetry
         self._take_answers(now_ns)
-        silence_ns = now_ns - known.heard_ns if known.heartbeat_ns else 1 << 62
+        silence_ns = now_ns - known.heard_ns if known.heartbeat_ns else NEVER_NS
         messages = self._session.step(now_ns, silence_ns, self._requests)
         messages += self._feed(now_ns, known)
         up = (known.position_m[2] if known.position_m else 0.0, known.velocity_m_s[2])

@@ -57,7 +57,7 @@ def _onboard(
         return replace(none, reason="it saw too little")
     found = likeliest(lambda later_ms: costs(flown, resolved, {**others_ms, drone: later_ms}))
     if found is None:
-        return replace(none, reason="none within 100 ms of the setting fits best")
+        return replace(none, reason="no delay within 100 ms of the setting fits")
     if not math.isfinite(found.std_ms):
         return replace(none, reason="the recording does not show it")
     doubt = "" if sum(seen[name] for name in resolved.drones) >= LEAST_SEEN else _TARGET_ONLY

@@ -24,7 +24,7 @@ from groundstation.console.commands import CommandDesk, Given
 from groundstation.console.dead_man import DeadMan, Grip
 from groundstation.errors import GroundStationError, OperatorMistake
 from groundstation.supervisor.joining import join
-from groundstation.time_units import NS_PER_MS
+from groundstation.time_units import NEVER_NS, NS_PER_MS
 
 if TYPE_CHECKING:
     from groundstation.bus.api import Bus
@@ -33,7 +33,7 @@ _ME = "deadman"
 _TURN_S = 0.02
 _FAREWELL_NS = 2_000_000_000
 _KEYBOARD_PATIENCE_NS = 900 * NS_PER_MS
-_GAMEPAD_PATIENCE_NS = 1 << 62  # it says itself when it is let go
+_GAMEPAD_PATIENCE_NS = NEVER_NS  # it says itself when it is let go
 # WIRE: linux/joystick.h js_event: time u32, value s16, type u8 (1 = button, 0x80 = initial state), number u8.
 _EVENT = struct.Struct("<IhBB")
 _BUTTON = 1
@@ -101,7 +101,7 @@ def deadman(name: str | None, gamepad: str | None) -> int:
 
 
 def watch(bus: "Bus", drones: tuple[str, ...], handle: Handle, man: DeadMan, go_on: Callable[[], bool]) -> None:
-    """Obey the handle until the user leaves and what he asked for last is settled, or until `go_on` says no."""
+    """Obey the handle until the user leaves and the last wish is settled, or until `go_on` says no."""
     desk, answers = CommandDesk(bus, drones), bus.subscribe([COMMAND_ACK])
     shown, left_ns = "", 0
     while go_on():

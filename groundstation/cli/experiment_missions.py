@@ -27,7 +27,7 @@ _BATCH = 10
     type=FiniteRange(1, 100),
     default=4.0,
     show_default=True,
-    help="So many times too small is the covariance of sightings in every third flight; 1: in none.",
+    help="Factor by which every third flight states the covariance of its sightings too small; 1: none does.",
 )
 @click.option(
     "--duration", "seconds", type=FiniteRange(5, 600), default=30.0, show_default=True, help="Seconds of tracking."

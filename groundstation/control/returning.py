@@ -13,6 +13,7 @@ from groundstation.sensing.models import Rectangle, SensorSuite
 _LOOK_M_S = 0.2  # speed along the spiral on which a robot looks for the view
 _LOOK_RAD_S = 0.7
 _FARTHEST_LOOK_M = 1.2
+_LEAST_LOOK_M, _WIDENS_M = 0.3, 0.3  # its least radius; the square of its radius grows by this times the way flown
 
 
 def is_lost(
@@ -55,6 +56,6 @@ def return_stand(mean: Array, view: Rectangle | None, looks_s: float = 0.0) -> S
     x, y = view.center if view else (x, y)
     if looks_s <= 0.0:
         return Stand(x, y, yaw)
-    radius = min(_FARTHEST_LOOK_M, math.sqrt(_LOOK_M_S * looks_s * 0.3))
-    angle = math.tau * _LOOK_M_S * looks_s / (math.tau * max(radius, 0.3))
+    radius = min(_FARTHEST_LOOK_M, math.sqrt(_WIDENS_M * _LOOK_M_S * looks_s))
+    angle = _LOOK_M_S * looks_s / max(radius, _LEAST_LOOK_M)
     return Stand(x + radius * math.cos(angle), y + radius * math.sin(angle), yaw, _LOOK_RAD_S)

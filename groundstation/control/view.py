@@ -52,7 +52,7 @@ def _velocity_errors(belief: JointBelief, name: str) -> list[int]:
 def is_localised(belief: JointBelief, name: str, unseen_s: float, parameters: SafetyParameters) -> bool:
     """Return whether a robot is known well enough to fly on.
 
-    Whom nobody sees must know its velocity as well: else its place is a guess sooner than its deviation says.
+    An unseen robot must know its velocity as well: else its position is wrong sooner than its deviation shows.
     """
     P = belief.covariance_of(name)
     lies = (

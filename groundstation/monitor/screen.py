@@ -26,6 +26,7 @@ from groundstation.bus.topics import (
 from groundstation.monitor.alarms import alarms_of
 from groundstation.monitor.state import Cast, MonitorState
 from groundstation.monitor.table import render
+from groundstation.time_units import NEVER_NS
 
 DRAW_PERIOD_NS = 250_000_000
 _LINE_PERIOD_NS = 5_000_000_000
@@ -73,7 +74,7 @@ class Screen:
         try:
             self._draw(now_ns)
         except OSError:
-            self._due_ns = 1 << 62  # the terminal is gone; the run is not
+            self._due_ns = NEVER_NS  # the terminal is gone; the run is not
 
     def _draw(self, now_ns: int) -> None:
         if self._live is not None:

@@ -43,7 +43,7 @@ def _readiness(name: str, status: VehicleStatus) -> Iterator[Finding]:
     """Yield why a drone would refuse to take off, which leaves it out and stops nobody else; and its firmware."""
     if status.not_ready:
         found, _, command = status.not_ready.partition(_COMMAND)
-        remedy = f"groundstation {command}" if command else "mend what it says; until then it is left out"
+        remedy = f"groundstation {command}" if command else "do what it asks for; until then it does not take off"
         yield Finding(Level.SHOULD, name, f"it refuses to take off: {found}", remedy)
     if status.firmware:
         yield Finding(Level.OK, name, f"firmware {status.firmware}")

@@ -43,7 +43,7 @@ class Show:
             cast = cast_from_field(field)
             scene = scene_from_field(field, TRUTH.name in self._reel.topics)
         except ValueError as error:
-            raise RecordingError(f"{source.name}: its field is none that this program knows ({error})") from error
+            raise RecordingError(f"{source.name}: this version cannot read its field ({error})") from error
         scene["replay"] = self._about()
         listener = claim_port(port or field.console.port)
         self.server = ConsoleServer(bus, cast, scene, field, listener, "replay", playback)

@@ -99,7 +99,7 @@ def folder() -> Path:
         status = path.lstat()
     except OSError as error:
         raise GroundStationError(f"cannot use {path} for the runtime file: {error.strerror}") from error
-    # /tmp is shared: a folder planted by another user could point our stop commands at his processes.
+    # /tmp is shared: a folder planted by another user could point our stop commands at processes of their own.
     if not stat.S_ISDIR(status.st_mode) or status.st_uid != os.getuid():
         raise GroundStationError(f"{path} is not a folder of yours: remove it, or set XDG_RUNTIME_DIR")
     return path

@@ -133,7 +133,7 @@ def join(file: Path) -> Admission:
     except (OSError, msgspec.DecodeError) as error:
         raise OperatorMistake(f"{file} is no admission (groundstation site admit writes it): {error}") from error
     if not _HOST.fullmatch(admission.host) or not re.fullmatch(r"[a-z][a-z0-9_]{0,47}", admission.site):
-        raise OperatorMistake(f"{file} is no admission: its names are none")
+        raise OperatorMistake(f"{file} is no admission: its site or host has a name that cannot be")
     place, name = folder("joined", admission.site), _member(admission.host).name
     shutil.rmtree(place, ignore_errors=True)
     place.mkdir(parents=True, mode=0o700)

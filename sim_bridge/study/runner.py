@@ -123,7 +123,7 @@ class Study:
             *ranging_of(self.site, scenario.cameras.mounting_errors, options.seed),
         ]
         self._exposures = Exposures(self._eyes)
-        # Apart, so that cameras expose when they do without.
+        # A schedule of its own: reports of the target do not shift when cameras expose.
         self._reports = Exposures(odometry_of(self.site, world, scenario.cameras.mounting_errors, options.seed))
         fence = field.room.fence
         self._fence = np.array([fence.x_m, fence.y_m, fence.z_m])

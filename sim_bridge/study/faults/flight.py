@@ -146,7 +146,7 @@ class FaultFlight:
         self._tick_every = round(1e9 / field.estimator.rate_hz) // TICK_NS
         eyes = [WrongEye(eye, faults) for eye in eyes_of(self.site, scenario.cameras, 0.0, seed)]
         self._exposures, self._eyes = Exposures(eyes), {eye.name: eye for eye in eyes}
-        # Apart, so that cameras expose when they do without.
+        # A schedule of its own: reports of the target do not shift when cameras expose.
         self._reports = Exposures(odometry_of(self.site, world, scenario.cameras.mounting_errors, seed))
         self._schedule = FaultSchedule(scenario.faults, self.world, self.devices)
         limits = {name: drone.limits.max_speed_m_s for name, drone in field.drones.items()}

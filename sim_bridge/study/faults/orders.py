@@ -1,4 +1,4 @@
-"""Who orders a hosted team to take off and to track: the operator's part, without his checks."""
+"""Who orders a hosted team to take off and to track: the operator's part, without the checks."""
 
 from collections.abc import Mapping
 

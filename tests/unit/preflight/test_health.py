@@ -67,7 +67,7 @@ def test_clocks_are_graded_by_how_fast_they_go_and_how_late_they_are_heard(lab_f
             "it refuses to take off: parameter EKF2_EV_CTRL: is 0, should be 15",
             "groundstation mavlink setup --apply",
         ),
-        ("it has no position yet", "it refuses to take off: it has no position yet", "mend what it says"),
+        ("it has no position yet", "it refuses to take off: it has no position yet", "do what it asks for"),
     ],
 )
 def test_a_standing_drone_that_is_not_ready_says_why_with_its_remedy(

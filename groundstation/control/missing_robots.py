@@ -1,7 +1,6 @@
 """Robots that a world-fixed camera should see and does not: their estimate is doubted."""
 
 import math
-from collections import deque
 from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
@@ -9,13 +8,13 @@ import numpy as np
 from groundstation.arrays import Array
 from groundstation.bus.messages import SearchedPicture
 from groundstation.estimation.belief import JointBelief
+from groundstation.estimation.belief_history import BeliefHistory
 from groundstation.sensing.detection import detection
 from groundstation.sensing.models import SensorSuite
 from groundstation.sensing.occlusion import SOFT_M, box_rows, sight
 from groundstation.sensing.visibility import camera_rows
 from groundstation.time_units import NS_PER_S
 
-_HISTORY = 50  # beliefs that pictures may be as old as
 _SEEN_S = 0.6  # seen so recently, one is not missing
 _DOUBT = math.log(0.02)  # chance of so many pictures without a robot that is where it is believed
 _BODY_M = 0.5  # within it of the line of sight, a robot hides what is behind it
@@ -30,7 +29,7 @@ class MissingRobots:
         self._cameras = {name: camera_rows([camera], sensors.softness) for name, camera in sensors.world.items()}
         self._boxes = box_rows(sensors.obstacles)
         self._pictures: list[SearchedPicture] = []
-        self._history: deque[JointBelief] = deque(maxlen=_HISTORY)
+        self._history = BeliefHistory()
         self._evidence: dict[str, float] = {}
         self._since_ns: dict[str, int] = {}
         self.missed_s: dict[str, float] = {}
@@ -61,10 +60,9 @@ class MissingRobots:
         return fresh
 
     def _look(self, picture: SearchedPicture, unseen: Collection[str]) -> None:
-        stamp_ns = picture.header.stamp_ns
-        if not unseen or not self._history[0].stamp_ns <= stamp_ns <= self._history[-1].stamp_ns:
+        belief = self._history.at(picture.header.stamp_ns)
+        if belief is None:
             return
-        belief = min(self._history, key=lambda one: abs(one.stamp_ns - stamp_ns))
         for name in unseen:
             if name in picture.found or name not in belief.layout:
                 continue

@@ -1,7 +1,6 @@
 """What is known of targets that are not seen, and where the team looks for them: maps in place of Gaussians."""
 
 import math
-from collections import deque
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -15,6 +14,7 @@ from groundstation.control.excursion import Excursions
 from groundstation.control.search_parameters import SearchParameters
 from groundstation.control.stand import Stand
 from groundstation.estimation.belief import JointBelief
+from groundstation.estimation.belief_history import BeliefHistory
 from groundstation.estimation.room_map import RoomGrid, RoomMap, lost_at, unknown_place
 from groundstation.sensing.detection import detection_map
 from groundstation.sensing.footprint import footprint_of
@@ -23,7 +23,6 @@ from groundstation.sensing.occlusion import box_rows, sight_map
 from groundstation.sensing.visibility import camera_rows
 from groundstation.time_units import NS_PER_S
 
-_HISTORY = 50  # beliefs that pictures may be as old as: a second at 50 Hz
 _SHOWN_S = 1.5  # pictures are searched all over twice a second
 _STEP_NS = 100_000_000  # of the maps' motion
 _SLOW_SEARCH_S = 999.0
@@ -83,7 +82,7 @@ class Search:
         self._boxes = box_rows(sensors.obstacles)
         self._lattice = lattice_of(self.grid, parameters)
         self._pictures: list[SearchedPicture] = []
-        self._history: deque[JointBelief] = deque(maxlen=_HISTORY)
+        self._history = BeliefHistory()
         self._moved_ns = 0
         self._shown_ns: dict[str, int] = {}
         self._outlook = NO_OUTLOOK
@@ -212,10 +211,8 @@ class Search:
         """Return where a camera's carrier was, and its standard deviation; None if that is not known."""
         if observer in self._sensors.world:
             return np.zeros(4), 0.0
-        if not self._history or not self._history[0].stamp_ns <= stamp_ns <= self._history[-1].stamp_ns:
-            return None, 0.0
-        belief = min(self._history, key=lambda one: abs(one.stamp_ns - stamp_ns))
-        if observer not in belief.layout:
+        belief = self._history.at(stamp_ns)
+        if belief is None or observer not in belief.layout:
             return None, 0.0
         variance = float(np.diag(belief.covariance_of(observer))[:2].max())
         return np.array(belief.mean_of(observer)[:4]), variance**0.5 + _TIPPED_M

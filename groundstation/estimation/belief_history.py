@@ -1,0 +1,24 @@
+"""The beliefs of the last second, for pictures that arrive after the belief of their time."""
+
+from collections import deque
+
+from groundstation.estimation.belief import JointBelief
+
+_KEPT = 50  # a second at 50 Hz: as old as a picture may be
+
+
+class BeliefHistory:
+    """Keeps the newest beliefs, in the order of their stamps."""
+
+    def __init__(self) -> None:
+        self._beliefs: deque[JointBelief] = deque(maxlen=_KEPT)
+
+    def append(self, belief: JointBelief) -> None:
+        """Add the newest belief."""
+        self._beliefs.append(belief)
+
+    def at(self, stamp_ns: int) -> JointBelief | None:
+        """Return the belief nearest to a time within what is kept [ns], or None."""
+        if not self._beliefs or not self._beliefs[0].stamp_ns <= stamp_ns <= self._beliefs[-1].stamp_ns:
+            return None
+        return min(self._beliefs, key=lambda one: abs(one.stamp_ns - stamp_ns))

@@ -3,11 +3,15 @@
 import { store, takeDelta, takeSeed } from "./store.js";
 
 const ACK_EVERY = 4, RETRY_MS = 300, RETRY_MAX_MS = 2000;
+// For how long nothing may come: from a new connection, and from one that has spoken, which it does twenty times a second.
+// The second leaves a stop that went into a dead connection time to be sent again while it is good.
+const NEW_MS = 5000, SPOKEN_MS = 2500, PATIENCE_MAX_MS = 20000, BEAT_MS = 250;
 const handlers = { seed: [], delta: [], notice: [], picture: [], state: [], welcome: [] };
 // greeted: this connection has had its seed and its welcome. role: what this device may do: watch, stop or command.
 export const me = { client: clientId(), name: "", trusted: false, greeted: false, role: "command" };
 
 let socket = null, token = document.querySelector("meta[name=token]").content, retryMs = RETRY_MS, watched = [];
+let newMs = NEW_MS, patienceMs = NEW_MS, quietMs = 0;
 
 export const on = (kind, handler) => handlers[kind].push(handler);
 const tell = (kind, ...content) => handlers[kind].forEach((handler) => handler(...content));
@@ -36,14 +40,32 @@ export function watch(cameras) {
 
 export function connect() {
   socket = new WebSocket(`${location.protocol.replace("http", "ws")}//${location.host}/ws`);
+  [patienceMs, quietMs] = [newMs, 0];
   socket.binaryType = "arraybuffer";
   socket.onopen = () => {
     retryMs = RETRY_MS;
     send("hello", { token, client: me.client });
     if (watched.length) watch(watched);
   };
-  socket.onmessage = ({ data }) => (typeof data === "string" ? take(JSON.parse(data)) : takePicture(data));
+  socket.onmessage = ({ data }) => {
+    [newMs, patienceMs, quietMs] = [NEW_MS, SPOKEN_MS, 0];
+    return typeof data === "string" ? take(JSON.parse(data)) : takePicture(data);
+  };
   socket.onclose = (event) => lost(event.reason);
+}
+
+// A connection that stalls is closed by nobody else. Told by the page's own beats: one that was frozen has no right to judge.
+setInterval(() => {
+  quietMs += BEAT_MS;
+  if (socket && quietMs > patienceMs) abandon();
+}, BEAT_MS);
+
+function abandon() {
+  const stalled = socket;
+  stalled.onopen = stalled.onmessage = stalled.onclose = null; // a dead peer's answer to a close takes a minute
+  stalled.close();
+  newMs = Math.min(PATIENCE_MAX_MS, 2 * newMs);
+  lost("Nothing came through it any more");
 }
 
 async function lost(reason = "") {
@@ -58,7 +80,7 @@ async function lost(reason = "") {
 async function reconnect() {
   try {
     // The process may be another one by now, with another token.
-    const answer = await fetch("/token", { cache: "no-store" });
+    const answer = await fetch("/token", { cache: "no-store", signal: AbortSignal.timeout(newMs) });
     if (answer.ok) token = await answer.text();
   } catch { return lost(); }
   connect();

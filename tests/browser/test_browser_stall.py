@@ -1,0 +1,45 @@
+"""A connection that stalls, a page that stood still, and names that are hard on a page."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from seen_page import eventually
+from stalling_pipe import StallingPipe
+
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
+
+
+@pytest.fixture
+def pipe(stage: Any) -> Iterator[StallingPipe]:
+    eventually(stage.answers, what="the console answers")
+    made = StallingPipe(stage.port)
+    yield made
+    made.close()
+
+
+def test_a_connection_that_stalls_is_opened_again_and_a_stop_given_meanwhile_goes_out(
+    stage: Any, pipe: StallingPipe, open_page: Any
+) -> None:
+    page = open_page(pipe.url)
+    pipe.stalled.set()
+    page.there("banner-silent").wait_for(timeout=20_000)
+    page.there("land-all").click()
+    page.page.wait_for_timeout(500)
+    assert stage.flight.commands == []
+    pipe.stalled.clear()  # the network is back; what stalled stays dead
+    page.wait(lambda s: s["seeds"] == 2 and any(order["state"] == "confirmed" for order in s["orders"]))
+    assert [command.verb for command in stage.flight.commands] == ["LAND"]
+
+
+def test_a_connection_is_tried_for_no_longer_than_some_seconds(pipe: StallingPipe, open_page: Any) -> None:
+    """Neither the token nor the connection is waited for without end."""
+    page = open_page(pipe.url)
+    pipe.stalled.set()
+    page.there("banner-link").wait_for(timeout=20_000)
+    page.page.wait_for_timeout(1500)  # it asks for the token by now, and nobody answers
+    pipe.stalled.clear()
+    page.wait(lambda s: s["seeds"] == 2 and s["trusted"])
+    before = page.state()["frames"]
+    page.page.wait_for_timeout(4000)
+    assert page.state()["seeds"] == 2 and page.state()["frames"] > before  # a good one is left alone

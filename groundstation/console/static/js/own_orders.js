@@ -1,6 +1,6 @@
 // Orders that this page gave and that the server has not shown yet, so that none is silently lost on the way there.
 
-import { moment, sinceMs } from "./clock.js";
+import { moment, pressedAgoMs, sinceMs } from "./clock.js";
 import { STOPS } from "./effects.js";
 import { me, on, send } from "./link.js";
 import { droneNames, now, replaying, runOver, serverNow, store } from "./store.js";
@@ -26,7 +26,8 @@ const meanwhile = (verb) => `if the connection is back within ${STOP_LIVES_MS / 
 // the checks before a take-off.
 export function give(verb, drones = [], run = store.run, anyway = false) {
   if (replaying()) return; // the server would refuse it as well
-  const order = { ref: `${load}-${++count}`, verb, drones, run, anyway, given: moment(), given_ms: now() };
+  const agoMs = pressedAgoMs();
+  const order = { ref: `${load}-${++count}`, verb, drones, run, anyway, given: moment(agoMs), given_ms: now() - agoMs };
   own.push(order);
   begin(order);
   changed();

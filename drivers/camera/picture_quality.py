@@ -13,11 +13,13 @@ _PIXELS = 120_000
 # Between the darkest and the brightest hundredth: with less there is no edge to judge by, only noise.
 _CONTRAST = 60.0
 _EDGE_SHARE = 99.9
+# What is wider is light that fades across the picture, such as on the floor before a standing drone, and no edge.
+_WIDEST_PX = 16.0
 
 
 @dataclass(frozen=True, slots=True)
 class PictureQuality:
-    """brightness: mean grey value, 0 to 1; edge_px: width of the sharpest edges [px], None without contrast."""
+    """brightness: mean grey value, 0 to 1; edge_px: width of the sharpest edges [px], None where there is none."""
 
     brightness: float
     edge_px: float | None
@@ -37,7 +39,8 @@ def quality_of(picture: Image) -> PictureQuality:
     # At most 255, so that a byte holds it.
     steps = cv2.convertScaleAbs(cv2.Sobel(rows, cv2.CV_16S, 1, 0, ksize=1))
     (steepest,) = _percentiles(np.asarray(steps, np.uint8), _EDGE_SHARE)
-    return PictureQuality(brightness, (high - low) / max(steepest / 2.0, 1.0))
+    edge_px = (high - low) / max(steepest / 2.0, 1.0)
+    return PictureQuality(brightness, edge_px if edge_px <= _WIDEST_PX else None)
 
 
 def _percentiles(values: Image, *percents: float) -> list[float]:

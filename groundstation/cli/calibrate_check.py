@@ -1,7 +1,7 @@
 """`groundstation calibrate check`: do calibration and mounting of a camera still hold?"""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -16,9 +16,13 @@ from groundstation.cli.sources import lens_of, require_size, source_of, until_in
 from groundstation.errors import GroundStationError, OperatorMistake
 
 if TYPE_CHECKING:
+    from drivers.camera.calibration.feed import SourcePicture
     from drivers.camera.calibration.static_markers import Steady
     from groundstation.geometry.lens import CameraIntrinsics
+    from groundstation.settings.room import WorldCameraSettings
     from groundstation.settings.schema import Field
+
+    Pictures = Callable[[str, WorldCameraSettings], Iterable[SourcePicture]]
 
 _RESIDUAL_RATIO, _LEAST_LIMIT_PX = 3.0, 0.35
 _PLACE_SIGMAS, _SAME_PLACE_M = 4.0, 0.03
@@ -42,9 +46,11 @@ class CheckFinding:
 @click.command(
     epilog="\b\nExamples:\n  groundstation calibrate check lab.yaml\n"
     "  groundstation calibrate check lab.yaml --marker 1=1.0,1.0 --marker 2=-1.0,1.0\n"
-    "  groundstation calibrate check http://192.168.1.50:8080/video.mjpg --calibration cameras/ceiling.yaml\n\n"
+    "  groundstation calibrate check http://192.168.1.50:8080/video.mjpg --calibration cameras/ceiling.yaml\n"
+    "  groundstation calibrate check runs/20261120T101500Z-lab --marker 8=1.0,1.0\n\n"
     "With a field file its fixed cameras are looked through, which need markers on the floor; a marker that two of "
-    "them see must be in one place for both. --marker says where one lies.\n\n"
+    "them see must be in one place for both. --marker says where one lies. Of a recording (a run's folder, or one with "
+    "pictures) the first pictures of its fixed cameras are looked at, by the field that was flown.\n\n"
     "Exit codes: 0 all holds, 1 something does not, 2 wrong usage, 4 no pictures."
 )
 @click.argument("what")
@@ -55,18 +61,18 @@ class CheckFinding:
 @click.option("--square-mm", type=FiniteRange(5, 200), default=44.0, show_default=True, help="Side of a square.")
 @click.option("--frames", type=click.IntRange(1, 1000), default=10, show_default=True, help="Pictures to look at.")
 def check(what: str, calibration: Path | None, given: tuple[str, ...], square_mm: float, frames: int) -> int:
-    """Look through the cameras of WHAT (a field file, or a source) at markers that lie still, and judge."""
+    """Look through the cameras of WHAT (a field file, a recording, a source) at markers that lie still, and judge."""
     from groundstation.settings.floor_markers import floor_marker_of
 
     known = {marker.code: np.array(marker.position_m) for marker in map(floor_marker_of, given)}
     if calibration is not None:
         context, parameter = click.get_current_context(), click.get_current_context().command.params[0]
-        source = source_of(context, parameter, what)
-        findings = list(
-            _lens_findings(source, *_seen(source, lens_of(calibration), str(calibration), frames), square_mm)
-        )
+        source, lens = source_of(context, parameter, what), lens_of(calibration)
+        seen = _seen(_live(source, lens), lens, str(calibration), frames)
+        findings = list(_lens_findings(source, lens, seen, square_mm))
     else:
-        findings = list(_field_findings(_field_of(what), known, square_mm, frames))
+        field, pictures = _recorded(Path(what)) if _is_recording(Path(what)) else (_field_of(what), _of_camera)
+        findings = list(_field_findings(field, pictures, known, square_mm, frames))
     click.echo("\n".join(finding.text for finding in findings))
     return ExitCode.FAILED if any(finding.holds is False for finding in findings) else ExitCode.OK
 
@@ -80,24 +86,54 @@ def _field_of(name: str) -> "Field":
     return load_field(find_field(name))
 
 
-def _seen(
-    source: str, lens: "CameraIntrinsics", calibration: str, frames: int
-) -> tuple["CameraIntrinsics", dict[int, "Steady"]]:
+def _is_recording(path: Path) -> bool:
+    return any(path.glob("*.mcap")) if path.is_dir() else path.suffix == ".mcap" and path.is_file()
+
+
+def _recorded(path: Path) -> "tuple[Field, Pictures]":
+    """Return the field that was flown, and what gives the pictures of its cameras."""
+    from groundstation.cli.recorded_pictures import recorded_pictures
+    from groundstation.recording.preamble import FIELD_NAME
+    from groundstation.recording.reader import RecordingError
+    from groundstation.recording.run import open_run
+    from groundstation.settings.recorded import recorded_field
+
+    try:
+        run = open_run(path)
+    except RecordingError as error:
+        raise click.UsageError(str(error)) from error
+    return recorded_field(run.attachments.get(FIELD_NAME, b"{}")), lambda name, _: recorded_pictures(run, name)
+
+
+def _of_camera(_name: str, camera: "WorldCameraSettings") -> "Iterable[SourcePicture]":
+    from groundstation.geometry.lens import intrinsics_of
+
+    return _live(camera.source, intrinsics_of(camera.calibration))
+
+
+def _live(source: str, lens: "CameraIntrinsics") -> "Iterable[SourcePicture]":
     from drivers.camera.calibration.feed import shots
+
+    return shots(source, (lens.width_px, lens.height_px))
+
+
+def _seen(
+    pictures: "Iterable[SourcePicture]", lens: "CameraIntrinsics", calibration: str, frames: int
+) -> "Mapping[int, Steady]":
     from drivers.camera.calibration.static_markers import Gathering
 
     gathering = Gathering(lens)
     with until_interrupted():
-        for shot in shots(source, (lens.width_px, lens.height_px)):
-            require_size(shot, lens, calibration)
-            gathering.take(shot.grey)
+        for picture in pictures:
+            require_size(picture, lens, calibration)
+            gathering.take(picture.grey)
             if gathering.pictures >= frames:
                 break
-    return lens, dict(gathering.steady())
+    return gathering.steady()
 
 
 def _lens_findings(
-    name: str, lens: "CameraIntrinsics", seen: "dict[int, Steady]", square_mm: float
+    name: str, lens: "CameraIntrinsics", seen: "Mapping[int, Steady]", square_mm: float
 ) -> Iterator[CheckFinding]:
     from drivers.camera.calibration.static_markers import flat_points
     from drivers.camera.pose import planar_poses
@@ -107,6 +143,9 @@ def _lens_findings(
         return
     limit = max(_LEAST_LIMIT_PX, _RESIDUAL_RATIO * lens.residual_px)
     for code, steady in seen.items():
+        if steady.moved:
+            yield CheckFinding(f"{name}: marker {code} moved", None, "lay it down, and keep still what carries it")
+            continue
         poses = planar_poses(steady.corners, flat_points(square_mm), lens)
         squared = min((pose.squared_error for pose in poses), default=math.inf)
         rms = math.sqrt(squared / (2 * len(steady.corners) - 6))
@@ -116,14 +155,16 @@ def _lens_findings(
         )
 
 
-def _field_findings(field: "Field", known: dict[int, Any], square_mm: float, frames: int) -> Iterator[CheckFinding]:
+def _field_findings(
+    field: "Field", pictures: "Pictures", known: dict[int, Any], square_mm: float, frames: int
+) -> Iterator[CheckFinding]:
     from groundstation.geometry.lens import intrinsics_of
 
     places: dict[int, dict[str, tuple[Any, float]]] = {}
     for name, camera in field.cameras.items():
         lens = intrinsics_of(camera.calibration)
         try:
-            _, seen = _seen(camera.source, lens, f"of {name}", frames)
+            seen = _seen(pictures(name, camera), lens, f"of {name}", frames)
         except OperatorMistake as error:
             yield CheckFinding(f"{name}: {error}", False)
             continue
@@ -132,7 +173,7 @@ def _field_findings(field: "Field", known: dict[int, Any], square_mm: float, fra
             continue
         yield from _lens_findings(name, lens, seen, square_mm)
         for code, steady in seen.items():
-            placed = _placed(camera, lens, steady, square_mm)
+            placed = None if steady.moved else _placed(camera, lens, steady, square_mm)
             if placed is not None:
                 places.setdefault(code, {})[name] = placed
     for code, by_camera in sorted(places.items()):

@@ -10,12 +10,20 @@ from ruamel.yaml import YAML
 
 from drivers.camera.calibration.extrinsics import Mark, place_camera
 from drivers.camera.calibration.static_markers import Steady
+from groundstation.bus import codec, keys
+from groundstation.bus.api import Sample
+from groundstation.bus.messages import Header
+from groundstation.bus.topics import IMAGE
 from groundstation.cli.main import run
 from groundstation.errors import DriverError
 from groundstation.geometry.board import Checkerboard, raster
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
 from groundstation.geometry.rotations import base_from_tilted_optical, rotation_z, world_from_downward_optical
+from groundstation.recording.synthetic import CLOCK, SITE, UNIX_OFFSET_NS, write_turn
+from groundstation.recording.timeline import Timeline
+from groundstation.recording.writing import RunWriter
+from groundstation.settings.load import load_field
 
 CONFIG = Path(__file__).parents[4] / "config"
 LENS = CameraIntrinsics(1280, 720, 1179.0, 1179.0, 639.5, 359.5, residual_px=0.1)
@@ -230,3 +238,49 @@ def test_the_check_says_what_is_missing(tmp_path, capsys):
     assert "is unknown: " in capsys.readouterr().out
     assert run(["calibrate", "check", "http://127.0.0.1:9/video.mjpg"]) == 2
     assert "--calibration FILE" in capsys.readouterr().err
+
+
+def recorded(tmp_path, pictures, turn=TURN_DEG):
+    """Write a run of a lab whose ceiling camera saw these pictures, five a second; returns its folder."""
+    field = load_field(Path(lab_with(tmp_path, {"ceiling": ("/dev/video0", CEILING, turn)})))
+    folder = tmp_path / "run"
+    folder.mkdir()
+    writer = RunWriter(folder, field.model_dump_json().encode(), 1, Timeline(CLOCK, UNIX_OFFSET_NS))
+    key = keys.expression(SITE, IMAGE, "ceiling", "ceiling")
+    for number, picture in enumerate(pictures):
+        stamp_ns = (number + 1) * 200_000_000
+        jpeg = cv2.imencode(".jpg", picture)[1].tobytes()
+        header = codec.encode(Header(stamp_ns, CLOCK, "ceiling", "ceiling", number))
+        write_turn(writer, [Sample(key, jpeg, header)], stamp_ns)
+    writer.close()
+    return folder
+
+
+def test_a_recording_is_checked_by_its_first_pictures(tmp_path, capsys):
+    laid = {code: (*PLACES[code], 0.0, HEADINGS[code]) for code in (1, 3)}
+    files_for(tmp_path, LENS, picture := drawn(CEILING, LENS, laid), 1)
+    empty = np.full_like(picture, 120)
+    run_dir = str(recorded(tmp_path, [picture, picture, empty]))
+    said = ["--frames=2", *markers({code: PLACES[code] for code in (1, 3)})]
+    assert run(["calibrate", "check", run_dir, *said]) == 0
+    out = capsys.readouterr().out
+    assert "holds: ceiling: has marker 3" in out and "DOES NOT" not in out
+    # Its pictures alone say by which field they were seen, and a marker elsewhere is told.
+    (raw,) = Path(run_dir).glob("raw*.mcap")
+    assert run(["calibrate", "check", str(raw), "--frames=2", "--marker=3=-0.7,-0.5"]) == 1
+    assert "DOES NOT HOLD: ceiling: has marker 3 20." in capsys.readouterr().out
+    (state,) = Path(run_dir).glob("state*.mcap")
+    assert run(["calibrate", "check", str(state)]) == 1
+    assert "no picture of it is in the recording" in capsys.readouterr().out
+    (tmp_path / "other.mcap").write_bytes(b"no recording")
+    assert run(["calibrate", "check", str(tmp_path / "other.mcap")]) == 2
+    assert "not an MCAP recording" in capsys.readouterr().err
+
+
+def test_a_marker_that_moves_judges_no_camera(tmp_path, capsys):
+    files_for(tmp_path, LENS, np.full((720, 1280), 120, np.uint8), 1)
+    carried = [drawn(CEILING, LENS, {1: (0.9, 0.6 + 0.1 * step, 0.0, 0.3)}) for step in range(3)]
+    run_dir = str(recorded(tmp_path, carried))
+    assert run(["calibrate", "check", run_dir, "--frames=3", "--marker=1=0.5,0.6"]) == 0
+    out = capsys.readouterr().out
+    assert "is unknown: ceiling: marker 1 moved" in out and "has marker" not in out

@@ -22,7 +22,7 @@ _WANTED = frozenset(
     (topic.plane, topic.name)
     for topic in (
         *(t.BELIEF, t.BODY_POSES, t.COMMAND, t.COMMAND_ACK, t.ESTIMATE, t.EVENT, t.INNOVATION, t.PLAN),
-        *(t.PROCESS_STATUS, t.SEARCH_MAP, t.SIM_STATUS, t.TRUTH, t.VEHICLE_STATUS),
+        *(t.PROCESS_STATUS, t.SEARCH_MAP, t.SIM_STATUS, t.SUSPICION, t.TRUTH, t.VEHICLE_STATUS),
     )
 )
 
@@ -109,6 +109,8 @@ class _Rows:
                 data.innovations.append(TimedMessage(time_s, message))
             case m.VehicleStatus():
                 data.vehicles.setdefault(message.header.entity, []).append(TimedMessage(time_s, message))
+            case m.Suspicion():
+                data.suspicions.append(TimedMessage(time_s, message))
             case m.SearchMap():
                 data.search_maps.setdefault(message.header.entity, []).append(TimedMessage(time_s, message))
             case m.Event():

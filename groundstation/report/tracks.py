@@ -7,7 +7,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.arrays import Array, BoolArray
-from groundstation.bus.messages import Belief, Command, CommandAck, Event, Innovation, Plan, SearchMap, VehicleStatus
+from groundstation.bus.messages import (
+    Belief,
+    Command,
+    CommandAck,
+    Event,
+    Innovation,
+    Plan,
+    SearchMap,
+    Suspicion,
+    VehicleStatus,
+)
 from groundstation.field.behaviour import PlannerValues, SafetyValues
 from groundstation.field.resolved import ResolvedField
 from groundstation.field.room import Fence, Room
@@ -93,7 +103,8 @@ UNKNOWN_FIELD = ResolvedField(
 class RunData:
     """Everything the report looks at. `start_unix_ns` is the time of the first message, `end_s` of the last.
 
-    belief: the last one. rerun: what it repeats, where it is no recorded flight.
+    belief: the last one. suspicions: at least one for each verdict of the diagnosis. rerun: what it repeats, where it
+    is no recorded flight.
     """
 
     resolved: ResolvedField
@@ -112,6 +123,7 @@ class RunData:
     events: list[TimedMessage[Event]] = field(default_factory=list)
     vehicles: dict[str, list[TimedMessage[VehicleStatus]]] = field(default_factory=dict)
     search_maps: dict[str, list[TimedMessage[SearchMap]]] = field(default_factory=dict)
+    suspicions: list[TimedMessage[Suspicion]] = field(default_factory=list)
     damage: list[str] = field(default_factory=list)
     rerun: Rerun | None = None
 

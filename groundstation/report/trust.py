@@ -24,7 +24,9 @@ _PLANNED_S, _SEEN_S, _SEEN_PERCENT = 5.0, 0.5, 50.0
 # A plan lists all that its topology permits; it counts on what would tell a place to 0.1 m [1/m^2].
 _COUNTED_ON = 100.0
 _PLAN_LASTS_S = 1.0
-_TRACKER = "tracker"
+_TRACKER, _DIAGNOSIS = "tracker", "diagnosis"
+# By then the diagnosis has reached a verdict, unless it got no share of the processor.
+_JUDGED_BY_S = 30.0
 
 
 class SensorTrust(msgspec.Struct, frozen=True):
@@ -88,7 +90,13 @@ def trust_of(data: RunData) -> Trust:
     sensors, shifts = _sensors(data), [] if belief is None else list(_shifts(data, belief))
     delays = [] if belief is None else [DelayShift(one.sensor, one.offset_ms, one.std_ms) for one in belief.lateness]
     links = _links(data)
-    doubts = [*_told(data), *_doubts_of_sensors(sensors), *_doubts_of_figures(shifts, delays), *_doubts_of_links(links)]
+    doubts = [
+        *_told(data),
+        *_unjudged(data),
+        *_doubts_of_sensors(sensors),
+        *_doubts_of_figures(shifts, delays),
+        *_doubts_of_links(links),
+    ]
     return Trust(sensors, shifts, delays, links, doubts)
 
 
@@ -168,13 +176,23 @@ def _link(observer: str, subject: str, found: list[tuple[float, bool]]) -> LinkF
 
 
 def _told(data: RunData) -> Iterator[str]:
-    """Yield what the tracker itself warned of in flight and has a remedy for, once each."""
+    """Yield what tracker and diagnosis warned of in flight and have a remedy for, once each."""
     said: dict[str, str] = {}
     for item in data.events:
         event = item.message
-        if event.header.source == _TRACKER and event.severity is Severity.WARNING and event.remedy:
+        if event.header.source in (_TRACKER, _DIAGNOSIS) and event.severity is Severity.WARNING and event.remedy:
             said.setdefault(event.text, f"told in flight, at {item.time_s:.0f} s: {event.text}; {event.remedy}")
     yield from said.values()
+
+
+def _unjudged(data: RunData) -> Iterator[str]:
+    """Yield that nobody looked for a wrong figure of the field, where one would have."""
+    start_s, end_s = tracking_interval(data) or (0.0, 0.0)
+    if _DIAGNOSIS in data.processes and end_s - start_s >= _JUDGED_BY_S and not data.suspicions:
+        yield (
+            "the diagnosis reached no verdict (the machine was too busy, or it failed): that it blamed no figure of "
+            "the field says nothing; groundstation calibrate team looks for a wrong one in the recording"
+        )
 
 
 def _doubts_of_sensors(sensors: Sequence[SensorTrust]) -> Iterator[str]:

@@ -59,8 +59,17 @@ class PictureAge:
 
     def _warning(self, one: Lateness) -> Notice:
         key, now_ms = self._settings[one.sensor]
-        than = "older" if one.offset_s > 0.0 else "newer"
-        text = f"its pictures seem {1e3 * abs(one.offset_s):.0f} +- {1e3 * one.std_s:.0f} ms {than} than configured"
+        than, other = ("older", "newer") if one.offset_s > 0.0 else ("newer", "older")
+        # Turns in pictures are compared with turns in telemetry: which of the two is late does not show here.
+        text = (
+            f"its pictures seem {1e3 * abs(one.offset_s):.0f} +- {1e3 * one.std_s:.0f} ms {than} than configured, "
+            f"or the telemetry that they are compared with is as much {other}"
+        )
         better = max(0.0, now_ms + 1e3 * one.offset_s)
         setting = f"{key}: {better:.0f} (now {now_ms:.0f})"
-        return Notice(Severity.WARNING, text, f"set {setting}, or run groundstation calibrate delay", one.sensor)
+        return Notice(
+            Severity.WARNING,
+            text,
+            f"groundstation calibrate team tells which; of the pictures, set {setting}",
+            one.sensor,
+        )

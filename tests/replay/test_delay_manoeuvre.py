@@ -69,7 +69,9 @@ def test_a_wrong_delay_is_told_in_flight_with_the_setting_that_mends_it(
     assert ceiling.offset_ms == pytest.approx(error_ms, abs=3.0 * ceiling.std_ms + 5.0)
     assert ceiling.std_ms < 8.0
     (warning,) = [text for text in warnings if text.startswith("ceiling")]
-    assert f"ms {than} than configured" in warning and "calibrate delay" in warning
+    assert f"ms {than} than configured" in warning and "calibrate team" in warning
+    other = "newer" if than == "older" else "older"
+    assert f"the telemetry that they are compared with is as much {other}; groundstation" in warning
     setting = float(warning.split("cameras.ceiling.video_delay_ms: ")[1].split(" ")[0])
     assert setting == pytest.approx(proposed, abs=15.0)
 

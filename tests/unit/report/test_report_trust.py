@@ -3,13 +3,14 @@
 import random
 
 import msgspec
+import numpy as np
 import pytest
 
 from groundstation.bus import messages as m
 from groundstation.field.room import LensCalibration, WorldCamera
 from groundstation.report.page.trust_section import trust_section
 from groundstation.report.run_facts import RunFacts
-from groundstation.report.tracks import UNKNOWN_FIELD, RunData, TimedMessage
+from groundstation.report.tracks import UNKNOWN_FIELD, ProcessTrack, RunData, TimedMessage
 from groundstation.report.trust import trust_of
 
 LENS = LensCalibration(
@@ -120,3 +121,35 @@ def test_what_the_tracker_suspected_in_flight_is_told_once() -> None:
         run_with(events=[TimedMessage(7.0, warning), TimedMessage(9.0, warning), TimedMessage(9.5, others)])
     )
     assert trust.doubts == ["told in flight, at 7 s: ceiling was bumped; fix it"]
+
+
+def test_what_the_diagnosis_suspected_is_a_doubt() -> None:
+    warning = m.Event(
+        header=header("diagnosis", "drone_1"), severity=m.Severity.WARNING, text="its lens is 3 % longer", remedy="do"
+    )
+    assert trust_of(run_with(events=[TimedMessage(24.0, warning)])).doubts == [
+        "told in flight, at 24 s: its lens is 3 % longer; do"
+    ]
+
+
+@pytest.mark.parametrize(("tracked_s", "verdicts", "ran", "told"), [
+    (45.0, 0, True, True), (45.0, 1, True, False), (20.0, 0, True, False), (45.0, 0, False, False),
+])  # fmt: skip
+def test_silence_of_a_diagnosis_that_reached_no_verdict_is_a_doubt(
+    tracked_s: float, verdicts: int, ran: bool, told: bool
+) -> None:
+    """On a machine that is too busy it gets no share of the processor, and everything looks healthy."""
+    ack = m.CommandAck(
+        header=header("drone_1", "drone_1"), command_id="1", verb=m.Verb.TRACK, stage=m.AckStage.ACCEPTED
+    )
+    nothing = TimedMessage(9.0, m.Suspicion(header=header("diagnosis"), cause=""))
+    process = ProcessTrack(np.zeros(1), np.zeros(1), np.zeros((1, 4)))
+    doubts = trust_of(
+        run_with(
+            acks=[TimedMessage(1.0, ack)],
+            end_s=1.0 + tracked_s,
+            suspicions=[nothing] * verdicts,
+            processes={"diagnosis": process} if ran else {},
+        )
+    ).doubts
+    assert [doubt.startswith("the diagnosis reached no verdict") for doubt in doubts] == [True] * told

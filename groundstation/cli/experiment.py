@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from groundstation.cli.bench_planner import choices, numbers, use_kernel_cache
+from groundstation.cli.experiment_calibrations import calibrations
 from groundstation.cli.experiment_culprits import culprits
 from groundstation.cli.experiment_faults import faults
 from groundstation.cli.experiment_missions import missions
@@ -60,6 +61,7 @@ def experiment() -> None:
 experiment.add_command(mrclam)
 experiment.add_command(faults)
 experiment.add_command(culprits)
+experiment.add_command(calibrations)
 experiment.add_command(missions)
 experiment.add_command(scenarios)
 

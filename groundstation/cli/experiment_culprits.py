@@ -67,7 +67,7 @@ def _planned(
     only: str, seeds: int, seed: int, seconds: float, field: str, scenario: str, options: tuple[str, ...]
 ) -> "list[tuple[WrongLab, list[FlightBatch]]]":
     """Return the batches of flights of each row that was asked for."""
-    from groundstation.experiments.culprit_rows import labs_of
+    from groundstation.experiments.culprit_rows import chosen, labs_of
     from groundstation.experiments.faults import batches
     from groundstation.settings.files import find_field, find_scenario
     from groundstation.settings.scenario import load_scenario
@@ -79,7 +79,7 @@ def _planned(
         raise SettingsError([f"{path}: culprits needs a fixed camera and two drones"])
     return [
         (lab, batches(_order(order, base, lab), seed, seeds, _BATCH, "culprits"))
-        for lab in _chosen(only, labs_of(order["field"]))
+        for lab in chosen(only, labs_of(order["field"]))
     ]
 
 
@@ -92,11 +92,3 @@ def _order(order: dict[str, Any], base: dict[str, Any], lab: "WrongLab") -> str:
     wrong = {"errors": lab.errors, "exchanged": lab.exchanged}
     times = {"stand_s": STAND_S, "diagnosed_from_s": lab.diagnosed_from_s}
     return json.dumps(order | wrong | times | {"scenario": scenario}, sort_keys=True)
-
-
-def _chosen(only: str, labs: "tuple[WrongLab, ...]") -> "list[WrongLab]":
-    names = [name.strip() for name in only.split(",") if name.strip()]
-    known = {lab.name: lab for lab in labs}
-    if strangers := [name for name in names if name not in known]:
-        raise SettingsError([f"--rows: no row {', '.join(map(repr, strangers))}; there are {', '.join(known)}"])
-    return [known[name] for name in names] or list(labs)

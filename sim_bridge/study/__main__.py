@@ -14,7 +14,7 @@ from sim_bridge.study.summary import summary
 
 _WRONG_SETTINGS = 2
 # Studies that the ground station's experiments start, with an order on standard input.
-_CAMPAIGNS = ("faults", "scenarios", "culprits", "missions")
+_CAMPAIGNS = ("faults", "scenarios", "culprits", "calibrations", "missions")
 _EXAMPLES = """examples:
   python -m sim_bridge.study demo --seed 3 --duration 60
   python -m sim_bridge.study demo --seeds 10 --set planner.hysteresis=0.1 --json

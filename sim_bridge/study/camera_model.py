@@ -9,6 +9,7 @@ import numpy as np
 from groundstation.arrays import Array
 from groundstation.bus.messages import Header, RelativeObservation, SearchedPicture
 from groundstation.geometry.board import Checkerboard
+from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.rotations import rotation_from_euler
 from groundstation.geometry.tag import SquareTag
 from sim_bridge.mounting import as_measured, generator_of_eye, mounted, on_drone, true_lens, turned_about
@@ -96,6 +97,11 @@ class Eye:
         self._last_seen = {b.body: -math.inf for b in self._boards}
         self._seq = 0
         self._searching = False
+
+    @property
+    def truth(self) -> tuple[Array, Array, CameraIntrinsics]:
+        """Return how the camera sits when nothing has bumped it (rotation, place [m]), and its lens."""
+        return self._mounted, self._position, self._lens
 
     def bump(self, angle_deg: float, axis_deg: float) -> None:
         """Turn the camera away from its mounting, which the ground station does not know; 0: back to it."""

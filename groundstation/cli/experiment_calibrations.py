@@ -1,0 +1,134 @@
+"""`groundstation experiment calibrations`: wrong field files, mended by `calibrate team` and flown again."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from groundstation.cli.exits import ExitCode
+from groundstation.cli.experiment_campaign import campaign_options, flown_field, fly_all
+from groundstation.cli.numbers import FiniteRange
+from groundstation.errors import SettingsError
+
+if TYPE_CHECKING:
+    from groundstation.experiments.culprit_rows import WrongFigure, WrongLab
+    from groundstation.experiments.faults import FlightBatch
+
+Flight = dict[str, Any]
+
+
+@click.command(
+    epilog="\b\nExamples:\n  groundstation experiment calibrations                   (every row, 1 seed each)\n"
+    '  groundstation experiment calibrations --rows "pan of both,all markers" --seeds 3\n\n'
+    "Exit codes: 0 all flights meet their bars with the new settings, 1 one does not, 2 wrong settings."
+)
+@click.option("--seeds", type=click.IntRange(1, 1000), default=1, show_default=True, help="Flights of each row.")
+@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the first flight.")
+@click.option("--rows", "only", default="", metavar="NAMES", help="Only these rows, by commas (default: all).")
+@click.option(
+    "--duration", "seconds", type=FiniteRange(20, 600), default=60.0, show_default=True, help="Seconds of tracking."
+)
+@click.option("--field", default="lab", show_default=True, help="Field file, or a shipped one's name.")
+@click.option("--scenario", default="realistic", show_default=True, help="Scenario: sensor errors, the target's path.")
+@campaign_options("calibrations")
+def calibrations(
+    seeds: int,
+    seed: int,
+    only: str,
+    seconds: float,
+    field: str,
+    scenario: str,
+    options: tuple[str, ...],
+    scheduler: str,
+    workers: int,
+    out: Path,
+    as_json: bool,
+) -> int:
+    """Fly labs whose field file is wrong, take over what `calibrate team` proposes, and fly them again.
+
+    The second flight has the same seed, and the settings in the field file's text: the target's error and ANEES, and
+    what is left wrong.
+    """
+    from groundstation.experiments.calibrations import row_of, table, verdict_on
+    from groundstation.experiments.runner import write_atomically
+
+    labs = _chosen(field, options, only)
+    seeds_flown = range(seed, seed + seeds)
+    firsts = [_order(flown_field(_path(field), options), lab.errors, scenario, field, seconds, True) for lab in labs]
+    batches = [_batch(order, one) for order in firsts for one in seeds_flown]
+    before = _flights(fly_all(batches, scheduler, workers, len(batches) == 1, out))
+    again = [
+        _batch(_mended(field, options, lab, flight, out, scenario, seconds), flight["seed"])
+        for lab, flight in zip((lab for lab in labs for _ in seeds_flown), before, strict=True)
+    ]
+    after = _flights(fly_all(again, scheduler, workers, len(again) == 1, out))
+    rows, verdicts = [], []
+    for index, lab in enumerate(labs):
+        own = slice(index * seeds, (index + 1) * seeds)
+        found = [verdict_on(lab, one, two) for one, two in zip(before[own], after[own], strict=True)]
+        rows.append(row_of(lab, found))
+        verdicts += [{"lab": lab.name, **one} for one in found]
+    document = {"experiment": "calibrations", "rows": rows, "flights": verdicts}
+    write_atomically(out / "calibrations.json", json.dumps(document, indent=1) + "\n")
+    click.echo(json.dumps(document, indent=1) if as_json else "\n".join(table(rows)))
+    good = all(one["mended"] and not one["missed"] for one in verdicts)
+    return ExitCode.OK if good else ExitCode.FAILED
+
+
+def _path(field: str) -> Path:
+    from groundstation.settings.files import find_field
+
+    return find_field(field)
+
+
+def _chosen(field: str, options: tuple[str, ...], only: str) -> "list[WrongLab]":
+    from groundstation.experiments.calibrations import calibrated_labs
+    from groundstation.experiments.culprit_rows import chosen, labs_of
+
+    values = flown_field(_path(field), options)["field"]
+    if not values["cameras"] or len(values["drones"]) < 2:
+        raise SettingsError([f"{field}: calibrations needs a fixed camera and two drones"])
+    return chosen(only, calibrated_labs(labs_of(values)))
+
+
+def _order(
+    order: dict[str, Any], errors: "tuple[WrongFigure, ...]", scenario: str, field: str, seconds: float, calibrate: bool
+) -> str:
+    from groundstation.experiments.culprit_rows import STAND_S
+    from groundstation.settings.files import find_scenario
+    from groundstation.settings.scenario import load_scenario
+
+    base = load_scenario(find_scenario(scenario, _path(field)))
+    own = {"errors": errors, "stand_s": STAND_S, "calibrate": calibrate, "scenario": base, "seconds": seconds}
+    return json.dumps(order | own, sort_keys=True)
+
+
+def _batch(order: str, seed: int) -> "FlightBatch":
+    from groundstation.experiments.faults import FlightBatch
+
+    return FlightBatch(order, (seed,), "calibrations")
+
+
+def _flights(rows: list[dict[str, Any]]) -> list[Flight]:
+    from groundstation.experiments.faults import flights_of
+
+    return flights_of(rows)[0]
+
+
+def _mended(
+    field: str, options: tuple[str, ...], lab: "WrongLab", flight: Flight, out: Path, scenario: str, seconds: float
+) -> str:
+    """Return the order of the same flight once the proposed settings stand in the field file's text."""
+    from groundstation.calibration.team_left import errors_left
+    from groundstation.settings.load import load_field
+    from groundstation.settings.patched import write_patched
+    from groundstation.settings.resolved import resolved_field, yaml_of
+
+    told = load_field(_path(field), options)
+    target = out / "fields" / f"{lab.name.replace(' ', '-')}-{flight['seed']}.yaml"
+    target.parent.mkdir(parents=True, exist_ok=True)
+    changes = {tuple(path): value for path, value in flight["settings"]}
+    write_patched(target, yaml_of(told), changes, told.model_dump(mode="json"))
+    left = errors_left(lab.errors, resolved_field(told), resolved_field(load_field(target, options)))
+    return _order(flown_field(target, options), left, scenario, field, seconds, False)

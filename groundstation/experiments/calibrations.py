@@ -1,0 +1,86 @@
+"""Does `calibrate team` mend a wrong field file? What is left wrong once its settings are taken over. Pure."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from groundstation.experiments.culprit_rows import WrongLab
+
+RMSE_M, ANEES = 0.04, (0.5, 2.0)
+BARS = {"turn": 0.3, "place": 0.01, "focal": 0.005, "print": 0.005, "delay": 5.0}
+"""What may be left wrong: deg, m, shares, ms."""
+_UNITS = {"turn": (1.0, "deg"), "place": (100.0, "cm"), "delay": (1.0, "ms")}
+_PERCENT = (100.0, "%")
+_KINDS = dict.fromkeys(("roll", "pitch", "yaw", "pan", "tilt"), "turn") | dict.fromkeys(
+    ("x", "y", "z", "ahead", "left", "up"), "place"
+)
+
+
+def calibrated_labs(labs: Iterable[WrongLab]) -> list[WrongLab]:
+    """Return the rows in which the field file alone is wrong, in figures that are no pad's, and the healthy one."""
+    own = [lab for lab in labs if lab.errors and not lab.exchanged and not lab.faults]
+    kept = [lab for lab in own if not any(part.startswith("pad") for _, part, _ in lab.errors)]
+    return [WrongLab("nothing"), *kept]
+
+
+def verdict_on(lab: WrongLab, before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what became of one flight and its settings.
+
+    left: of each figure that was wrong, by "WHO KIND", what is left; missed: those beyond their bars; mended: whether
+    the same flight with the new settings meets the bars of rmse and ANEES.
+    """
+    wrong = dict.fromkeys((who, _KINDS.get(part, part)) for who, part, _ in lab.errors)
+    left = {f"{who} {kind}": after["left"][who][kind] for who, kind in wrong}
+    missed = [name for name, value in left.items() if abs(value) > BARS[name.rsplit(" ", 1)[1]]]
+    rmse, anees = after.get("rmse_m"), after.get("anees")
+    return {
+        "seed": before["seed"],
+        "settings": before["settings"],
+        "left": left,
+        "missed": missed,
+        "rmse_m": [before.get("rmse_m"), rmse],
+        "anees": [before.get("anees"), anees],
+        "mended": rmse is not None and anees is not None and rmse <= RMSE_M and ANEES[0] <= anees <= ANEES[1],
+    }
+
+
+def row_of(lab: WrongLab, verdicts: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return one row of the table."""
+    return {
+        "lab": lab.name,
+        "flights": len(verdicts),
+        "mended": sum(one["mended"] for one in verdicts),
+        "within_bars": sum(not one["missed"] for one in verdicts),
+        "worst_left": _worst([one["left"] for one in verdicts]),
+        "rmse_m": [_most([one["rmse_m"][i] for one in verdicts]) for i in (0, 1)],
+        "anees": [_most([one["anees"][i] for one in verdicts]) for i in (0, 1)],
+    }
+
+
+def _worst(left: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    return {name: max((one[name] for one in left), key=abs) for name in (left[0] if left else ())}
+
+
+def _most(values: Sequence[float | None]) -> float | None:
+    return max((value for value in values if value is not None), default=None)
+
+
+def table(rows: Iterable[Mapping[str, Any]]) -> list[str]:
+    """Return the rows as lines of text; rmse and ANEES: the worst flight before and after."""
+    lines = ["{:20s} {:>7s} {:>7s} {:>17s} {:>13s}  worst left".format("wrong", "mended", "within", "rmse m", "ANEES")]
+    for row in rows:
+        flights, (rmse, rmse_now), (anees, anees_now) = row["flights"], row["rmse_m"], row["anees"]
+        left = ", ".join(_told(name, value) for name, value in row["worst_left"].items())
+        lines.append(
+            f"{row['lab']:20s} {row['mended']}/{flights:<5d} {row['within_bars']}/{flights:<5d} "
+            f"{_figure(rmse, 3)} -> {_figure(rmse_now, 3)} {_figure(anees, 1)} -> {_figure(anees_now, 1)}  {left}"
+        )
+    return lines
+
+
+def _told(name: str, value: float) -> str:
+    factor, unit = _UNITS.get(name.rsplit(" ", 1)[1], _PERCENT)
+    return f"{name} {factor * value:.2f} {unit}"
+
+
+def _figure(value: float | None, digits: int) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"

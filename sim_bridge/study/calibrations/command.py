@@ -1,0 +1,26 @@
+"""`python -m sim_bridge.study calibrations < order.json`: fly with wrong figures, and calibrate by that.
+
+The order's own: errors as [who, part, true minus told]; stand_s: seconds on the pads; calibrate: whether settings are
+asked for.
+"""
+
+from typing import Any
+
+from sim_bridge.study.faults.flight_order import FlightOrder, fly_seeds
+from sim_bridge.study.wrong_figures import WrongFigures
+
+
+def main() -> int:
+    """Fly the order on standard input."""
+    return fly_seeds(_fly)
+
+
+def _fly(order: FlightOrder, seed: int) -> dict[str, Any]:
+    from sim_bridge.study.calibrations.flight import CalibrationFlight
+    from sim_bridge.study.scenarios.flight import as_drawn
+
+    wrong = WrongFigures({(who, part): size for who, part, size in order.own["errors"]})
+    drawn = as_drawn(order.field, order.scenario, seed)
+    flight = CalibrationFlight(drawn, order.sections, order.seconds, wrong, order.own["stand_s"])
+    report = flight.fly()
+    return report | ({"settings": flight.settings()} if order.own["calibrate"] else {})

@@ -174,6 +174,7 @@ KIND = VehicleKind(
     reader="drivers.ardrone.video:ArDroneReader",
     has_serial_number=True,
     has_interface=True,
+    blink="drivers.ardrone.blink:blink",
     emulator="sim_bridge.devices.ardrone_emulation:EMULATION",
     emulated_faults=frozenset({"propeller_blocked", "uniform_floor", "obstacle_below"}),
     emulated_firmwares=tuple(OPTION_SIZES),

@@ -182,6 +182,7 @@ KIND = VehicleKind(
     required=frozenset({"mavlink"}),
     has_serial_number=True,
     has_interface=True,
+    blink="drivers.mavlink.blink:blink",
     check=_check,
     moved=_moved,
     emulator="sim_bridge.devices.mavlink_emulation:EMULATION",

@@ -2,13 +2,20 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import click
 
+from groundstation.cli.exits import ExitCode
+from groundstation.errors import DriverError, OperatorMistake
 
-@click.group(epilog="\b\nExamples:\n  groundstation vehicle list\n  groundstation vehicle check tello")
+
+@click.group(
+    epilog="\b\nExamples:\n  groundstation vehicle list\n  groundstation vehicle blink lab.yaml\n"
+    "  groundstation vehicle check tello"
+)
 def vehicle() -> None:
-    """Kinds of vehicles: list them, judge one."""
+    """Vehicles of a field, and their kinds: let one blink, list kinds, judge one."""
 
 
 @vehicle.command("list", epilog="\b\nExamples:\n  groundstation vehicle list\n\nExit codes: 0.")
@@ -45,3 +52,41 @@ def check(kind: str, options: tuple[str, ...], only: str, damaged: int, as_json:
     for option in options:
         command += ["--with", option]
     return subprocess.run([*command, *(["--json"] if as_json else [])], check=False).returncode
+
+
+@vehicle.command(
+    epilog="\b\nExamples:\n  groundstation vehicle blink lab.yaml            (one drone after the other)\n"
+    "  groundstation vehicle blink lab.yaml drone_2\n\n"
+    "Which one answers to which name shows whether addresses and system ids are exchanged. Not while a ground station "
+    "runs: it holds their links.\n\n"
+    "Exit codes: 0 all were told, 1 one cannot blink, 2 wrong settings, 4 one does not answer, or flies."
+)
+@click.argument("field", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("drones", nargs=-1)
+def blink(field: Path, drones: tuple[str, ...]) -> int:
+    """Let each drone of FIELD, or the DRONES named, blink or play a tune where it stands, one after the other."""
+    from groundstation.settings.load import load_field
+    from groundstation.settings.sections import driver_sections
+    from groundstation.vehicles import all_kinds
+    from groundstation.vehicles.registry import load
+
+    loaded = load_field(field)
+    if strangers := [name for name in drones if name not in loaded.drones]:
+        raise OperatorMistake(f"{field}: no drone {', '.join(strangers)}; there are {', '.join(loaded.drones)}")
+    worst = ExitCode.OK
+    vehicles = [section for section in driver_sections(loaded) if section.kind in all_kinds()]
+    sections = {name: section for section in vehicles for name in section.entities}
+    for name in drones or tuple(loaded.drones):
+        section = sections[name]
+        reference, address = all_kinds()[section.kind].blink, loaded.drones[name].address
+        if not reference:
+            click.echo(f"{name} ({address}): a {section.kind} cannot blink")
+            worst = max(worst, ExitCode.FAILED)
+            continue
+        click.echo(f"{name} ({address}): look and listen now")
+        try:
+            click.echo(f"{name} ({address}): {load(reference)(section.section, name)}")
+        except DriverError as error:
+            click.echo(f"{name}: {error}", err=True)
+            worst = ExitCode.FAULT
+    return worst

@@ -144,7 +144,9 @@ class VehicleKind:
     scenario that its emulator can have and others cannot; emulated_firmwares: names that a scenario may give its
     firmware; scenario: sections of a scenario file that only its emulator reads, each as "module:class" of a
     sim_bridge.section.Section. true_pose: "module:function" of what hears from the simulator behind a real firmware
-    where the vehicle is (a sim_bridge.real.followers.PoseFeed), "" if none tells. flight_time_s: what a new
+    where the vehicle is (a sim_bridge.real.followers.PoseFeed), "" if none tells. blink: "module:function" that
+    lets a standing vehicle be seen or heard, called with its driver's section and its name, returns what it did and
+    raises DriverError; "" if it cannot. flight_time_s: what a new
     battery of the usual size lasts at most, None where vehicles of one kind differ or nobody tells.
     """
 
@@ -173,4 +175,5 @@ class VehicleKind:
     emulated_firmwares: tuple[str, ...] = ()
     scenario: Mapping[str, str] = field(default_factory=dict)
     true_pose: str = ""
+    blink: str = ""
     flight_time_s: float | None = None

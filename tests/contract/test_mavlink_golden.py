@@ -60,6 +60,7 @@ CASES = [
         telemetry.LocalPositionNed(99, 1.0, -2.0, -0.5, 0.25, 0.5, -1.0),
         frame(32, struct.pack("<I6f", 99, 1, -2, -0.5, 0.25, 0.5, -1), 185),
     ),
+    (service.PlayTune(11, 1, "L8CEG", ""), frame(258, struct.pack("<BB5s", 11, 1, b"L8CEG"), 187)),
     (service.Timesync(0, 2**40 + 5), frame(111, struct.pack("<qq", 0, 2**40 + 5), 34)),
     (
         service.ParamSet(11, 1, "GUID_TIMEOUT", 0.5, 9),

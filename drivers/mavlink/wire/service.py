@@ -144,3 +144,12 @@ class SetupSigning(NamedTuple):
     target_component: int
     secret_key: tuple[int, ...]
     initial_timestamp: int
+
+
+class PlayTune(NamedTuple):
+    """Play a tune, in music macro language."""
+
+    target_system: int
+    target_component: int
+    tune: str
+    tune2: str

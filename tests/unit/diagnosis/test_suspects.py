@@ -58,6 +58,20 @@ def test_two_causes_are_told_apart_and_what_is_too_small_is_not_told() -> None:
     assert small.leads[("a", "print")] > math.log(100.0), "sure, and yet not worth telling"
 
 
+@pytest.mark.parametrize(("part", "sizes"), [("delay", (0.042, 0.06)), ("velocity_delay", (0.06,))])
+def test_a_late_velocity_is_told_on_the_evidence_that_a_calibration_asks_for(
+    part: str, sizes: tuple[float, ...]
+) -> None:
+    """42 ms lead by e^6.6 here, 60 ms by e^15: that of pictures is told, that of velocities not."""
+    H, one = np.diag([1.5e4]), Suspicion("a", part, np.eye(1), np.array([0.06]))
+    told = []
+    for size in (0.042, 0.06):
+        verdict = weighed(H, H @ np.array([size]), np.array([0.006]), (one,))
+        assert size == 0.06 or math.log(100.0) < verdict.leads["a", part] < math.log(1e4)
+        told += [size] if verdict.causes else []
+    assert tuple(told) == sizes
+
+
 def test_what_explains_it_as_well_is_named_beside_it() -> None:
     direction = np.array([1.0, 1.0, 0.0])
     H = 1e6 * np.outer(direction, direction)

@@ -21,7 +21,7 @@ WAITING := $(wildcard tests/contract/test_*.py) tests/contract/ardrone_driver te
 	tests/replay/test_replay_playback.py tests/sitl tests/unit/console tests/unit/supervisor \
 	tests/unit/cli/test_cli_stop.py tests/unit/cli/test_cli_bench_report.py
 
-.PHONY: install demo test test-waiting test-units test-others raise-floors test-slow slow-flights slow-studies test-exhaustive fuzz test-firmware mutants wire-faults soak check format docs hashes sbom audit interop clean
+.PHONY: install demo test test-waiting test-units test-others raise-floors test-slow slow-flights slow-studies test-exhaustive fuzz test-firmware mutants limiter-states wire-faults soak check format docs hashes sbom audit interop clean
 
 install: $(STAMP)
 
@@ -82,6 +82,10 @@ mutants: $(STAMP)-test
 # Every single kill and freeze of a process, and every pair, in flight: 200 flights of some 35 s. PART=K/N flies a part, e.g. PART=1/6.
 wire-faults: $(STAMP)-test
 	$(BIN)/python tests/sitl/wire_campaign.py --part $(or $(PART),1/1) $(WIRE_ARGS)
+
+# The output limiter in random states: ten million take 35 minutes of a core. STATES=N, SEED=N.
+limiter-states: $(STAMP)-test
+	nice $(BIN)/python tests/property/limiter_states.py --states $(or $(STATES),10000000) --seed $(or $(SEED),2)
 
 # Memory of every process over a long flight.
 soak: $(STAMP)-test

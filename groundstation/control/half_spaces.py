@@ -9,11 +9,12 @@ from itertools import combinations
 import numpy as np
 
 from groundstation.arrays import Array
+from groundstation.bus.messages import Vector3
+from groundstation.control.touching import Plane, dot, touching
 
 TOLERANCE_M_S = 1e-7
 _EXCHANGES = 40
 _HALVINGS = 8
-_PARALLEL = 1e-12
 
 
 def project(wanted: Array, normals: Array, most: Array) -> tuple[Array, list[int]]:
@@ -39,34 +40,28 @@ def project(wanted: Array, normals: Array, most: Array) -> tuple[Array, list[int
 
 def _nearest(wanted: Array, normals: Array, most: Array) -> tuple[Array | None, list[int]]:
     """Return the nearest velocity, or None where there is none."""
-    velocity, basis, met = wanted, tuple[int, ...](), list[int]()
+    velocity, basis, met = wanted, tuple[Plane, ...](), list[int]()
+    x, y, z = wanted.tolist()
     for _ in range(_EXCHANGES):
         excess = normals @ velocity - most
-        worst = int(np.argmax(excess))
+        worst = int(excess.argmax())
         if excess[worst] <= TOLERANCE_M_S:
             return velocity, met
         met.append(worst)
-        corner = _corner(wanted, normals, most, basis, worst)
+        a, b, c = normals[worst].tolist()
+        corner = _corner((x, y, z), (*basis, ((a, b, c), float(most[worst]))))
         if corner is None:
             return None, met
-        velocity, basis = corner
+        velocity, basis = np.array(corner[0]), corner[1]
     return None, met
 
 
-def _corner(
-    wanted: Array, normals: Array, most: Array, basis: tuple[int, ...], worst: int
-) -> tuple[Array, tuple[int, ...]] | None:
-    """Return the nearest velocity that the basis and one more half-space allow, and those that it touches."""
-    asked = [*basis, worst]
+def _corner(wanted: Vector3, asked: tuple[Plane, ...]) -> tuple[Vector3, tuple[Plane, ...]] | None:
+    """Return the nearest velocity that some half-spaces allow, the last of which it touches, and those it touches."""
     for size in range(min(3, len(asked))):
-        for others in combinations(basis, size):
-            touched = (*others, worst)
-            N, b = normals[list(touched)], most[list(touched)]
-            gram = N @ N.T
-            if size and float(np.linalg.det(gram)) < _PARALLEL:
-                continue
-            pull = np.linalg.solve(gram, N @ wanted - b)
-            velocity = wanted - N.T @ pull
-            if pull.min() >= 0.0 and (normals[asked] @ velocity - most[asked]).max() <= TOLERANCE_M_S:
+        for others in combinations(asked[:-1], size):
+            touched = (*others, asked[-1])
+            velocity = touching(wanted, touched)
+            if velocity and all(dot(normal, velocity) - most <= TOLERANCE_M_S for normal, most in asked):
                 return velocity, touched
     return None

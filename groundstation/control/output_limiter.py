@@ -15,6 +15,7 @@ from groundstation.bus.messages import Vector3
 from groundstation.control.half_spaces import project
 from groundstation.control.parameters import SafetyParameters
 from groundstation.control.setpoints import Setpoint
+from groundstation.control.touching import dot
 from groundstation.estimation.belief import JointBelief
 from groundstation.geometry.stabilized_frame import stabilized_from_world, world_from_stabilized
 from groundstation.planning.parameters import MotionLimits
@@ -23,6 +24,8 @@ from groundstation.planning.parameters import MotionLimits
 _NO_SIDE_M = 0.1
 # The sides of a polygon within the circle of the fastest horizontal velocities.
 _ROUND = np.array([(math.cos(a), math.sin(a), 0.0) for a in np.arange(16) * (2.0 * math.pi / 16)])
+# By so much a velocity that was clipped to a limit may exceed it.
+_ROUNDING_M_S = 1e-10
 _UP_DOWN = np.array(((0.0, 0.0, 1.0), (0.0, 0.0, -1.0)))
 _AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -70,7 +73,8 @@ def limit_setpoint(
     walls = _fence(robot, belief, parameters, known) + _others(robot, belief, parameters, known)
     drift = None if drifts is None else drifts.get(robot)
     walls = walls if drift is None else [_held_off(wall, drift.tolist(), parameters) for wall in walls]
-    walls += [_turning(wall, rate, parameters.reaction_s) for wall in walls]
+    if rate:
+        walls += [_turning(wall, rate, parameters.reaction_s) for wall in walls]
     velocity, met = _nearest(velocity, walls, parameters.limits_of(robot))
     names += [walls[i].name for i in met]
     vx, vy, vz = stabilized_from_world(velocity, yaw).tolist()
@@ -78,14 +82,9 @@ def limit_setpoint(
     return Limited(limited, tuple(dict.fromkeys(names)), setpoint.velocity_m_s)
 
 
-def _dot(a: Vector3, b: Vector3) -> float:
-    # Of three numbers, plain floats take a tenth of the time that arrays do.
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
 def _held_off(wall: _Wall, drift: Vector3, parameters: SafetyParameters) -> _Wall:
     """Return the wall for a robot that drifts: nearer by the possible drift, never demanding more than that."""
-    allowed = min(parameters.drift_m_s + max(0.0, _dot(drift, wall.normal)), parameters.most_drift_m_s)
+    allowed = min(parameters.drift_m_s + max(0.0, dot(drift, wall.normal)), parameters.most_drift_m_s)
     return _Wall(wall.name, wall.normal, wall.most - allowed)
 
 
@@ -93,7 +92,8 @@ def _nearest(wanted: Array, walls: list[_Wall], limits: MotionLimits) -> tuple[A
     """Return the nearest velocity [world] that walls and limits allow, and which walls were met on the way."""
     normals, most = np.array([wall.normal for wall in walls]), np.array([wall.most for wall in walls])
     velocity, met = project(wanted, normals, most)
-    slow = math.hypot(velocity[0], velocity[1]) <= limits.max_speed_m_s and abs(velocity[2]) <= limits.max_climb_m_s
+    across, climbs = math.hypot(velocity[0], velocity[1]), abs(velocity[2])
+    slow = across <= limits.max_speed_m_s + _ROUNDING_M_S and climbs <= limits.max_climb_m_s + _ROUNDING_M_S
     if not slow:  # two walls that push, at an acute angle, meet far away
         speed = np.full(len(_ROUND), limits.max_speed_m_s * math.cos(math.pi / len(_ROUND)))
         climb = np.full(2, limits.max_climb_m_s)
@@ -240,5 +240,5 @@ def _relative_covariance(robot: str, other: str, belief: JointBelief) -> list[Ve
 
 def _spread(covariance: list[Vector3], normal: Vector3) -> float:
     """Return the standard deviation along a direction [m]."""
-    x, y, z = (_dot(row, normal) for row in covariance)
-    return math.sqrt(max(0.0, _dot((x, y, z), normal)))
+    x, y, z = (dot(row, normal) for row in covariance)
+    return math.sqrt(max(0.0, dot((x, y, z), normal)))

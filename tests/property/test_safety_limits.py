@@ -155,6 +155,13 @@ def test_what_is_unfit_hovers_and_says_why(reason: str, now_s: float, std: float
     assert limited.setpoint.yaw_rate_rad_s == 0.0
 
 
+@pytest.mark.parametrize("bearing", np.linspace(-3.0, 3.0, 13))
+def test_full_speed_is_left_whole_in_every_direction(bearing: float) -> None:
+    far = belief(np.array([[0.0, 0.0, 1.3, 0.7], [2.5, 2.0, 1.3, 0.0]]))
+    told = limit_setpoint("a", setpoint((1.0 * math.cos(bearing), 1.0 * math.sin(bearing), 0.0, 0.0)), far, 0, SAFETY)
+    assert told.setpoint.velocity_m_s[:2] == pytest.approx((0.6 * math.cos(bearing), 0.6 * math.sin(bearing)))
+
+
 def test_a_stranger_hovers() -> None:
     assert limit_setpoint("c", WISH, belief(POSES), 0, SAFETY).limited_by == ("unknown",)
 

@@ -1,0 +1,62 @@
+"""The point nearest to a wanted one where one, two or three planes meet. Pure."""
+
+from groundstation.bus.messages import Vector3
+
+Plane = tuple[Vector3, float]
+"""A unit normal, and how far along it the plane lies from the origin."""
+
+# The square of the area or volume that normals span, below which their planes are parallel to a line.
+_PARALLEL = 1e-12
+
+
+def dot(a: Vector3, b: Vector3) -> float:
+    """Return the scalar product; of three numbers plain floats take a tenth of the time that arrays do."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Vector3, b: Vector3) -> Vector3:
+    """Return the vector product."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def touching(wanted: Vector3, planes: tuple[Plane, ...]) -> Vector3 | None:
+    """Return the point nearest to `wanted` on all of up to three planes.
+
+    None where they do not meet in one plane, line or point, or where one of them would have to be pulled to: it does
+    not hold `wanted` back, so that without it a nearer point is allowed.
+    """
+    if len(planes) == 1:
+        ((normal, most),) = planes
+        pulls: tuple[float, ...] | None = (dot(normal, wanted) - most,)
+    else:
+        pulls = _two(wanted, *planes) if len(planes) == 2 else _three(wanted, *planes)
+    if pulls is None or min(pulls) < 0.0:
+        return None
+    x, y, z = wanted
+    for pull, ((nx, ny, nz), _) in zip(pulls, planes, strict=True):
+        x, y, z = x - pull * nx, y - pull * ny, z - pull * nz
+    return x, y, z
+
+
+def _two(wanted: Vector3, first: Plane, second: Plane) -> tuple[float, ...] | None:
+    """Return how far the way to the line of two planes goes against each normal."""
+    (a, most_a), (b, most_b) = first, second
+    line = cross(a, b)
+    area = dot(line, line)
+    if area < _PARALLEL:
+        return None
+    along, over_a, over_b = dot(a, b), dot(a, wanted) - most_a, dot(b, wanted) - most_b
+    return (over_a - along * over_b) / area, (over_b - along * over_a) / area
+
+
+def _three(wanted: Vector3, first: Plane, second: Plane, third: Plane) -> tuple[float, ...] | None:
+    """Return how far the way to the point of three planes goes against each normal."""
+    (a, most_a), (b, most_b), (c, most_c) = first, second, third
+    bc, ca, ab = cross(b, c), cross(c, a), cross(a, b)
+    volume = dot(a, bc)
+    if volume * volume < _PARALLEL:
+        return None
+    over_a, over_b, over_c = dot(a, wanted) - most_a, dot(b, wanted) - most_b, dot(c, wanted) - most_c
+    x, y, z = ((over_a * bc[i] + over_b * ca[i] + over_c * ab[i]) / volume for i in range(3))
+    way = (x, y, z)
+    return dot(way, bc) / volume, dot(way, ca) / volume, dot(way, ab) / volume

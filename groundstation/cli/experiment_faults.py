@@ -47,7 +47,7 @@ def faults(
     separation below 0.6 m, a broken fence, 0.3 m/s above the drone's limit, more than a second of motion with a belief
     that is 0.5 m off, and after a vehicle's words became useless a hover later than 1 s, or rest later than 3.5 s.
     """
-    from groundstation.experiments.faults import batches, by_kind, flights_of, table, totals
+    from groundstation.experiments.faults import batches, by_kind, ends_told, flights_of, table, totals
     from groundstation.experiments.runner import write_atomically
 
     began = time.monotonic()
@@ -61,7 +61,7 @@ def faults(
     if as_json:
         click.echo(json.dumps(document, indent=1))
     else:
-        _tell(table(by_kinds), summary, out)
+        _tell([*table(by_kinds), *ends_told(summary)], summary, out)
     return ExitCode.FAILED if summary["unsafe"] else ExitCode.OK
 
 
@@ -69,8 +69,6 @@ def _tell(lines: list[str], summary: dict[str, Any], folder: Path) -> None:
     for line in lines:
         click.echo(line)
     shares = ", ".join(f"{name} {share:.0%}" for name, share in summary["time_shares"].items())
-    click.echo(f"{summary['unsafe']} of {summary['flights']} flights ended unsafe; healthy flights stopped: "
-               f"{summary['false_alarms'] or 'none'}; did not take off: {summary['not_flown'] or 'none'}")  # fmt: skip
     click.echo(f"{summary['cpu_s_per_flight']} s of CPU time for a flight ({shares}), {summary['elapsed_s']} s in all")
     click.echo(
         f"written to {folder}/faults.json; one again: groundstation experiment faults --flights 1 --seed N --json"

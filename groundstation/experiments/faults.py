@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import statistics
 import subprocess
 import sys
 from collections.abc import Iterable, Mapping, Sequence
@@ -119,11 +120,41 @@ def totals(flights: Sequence[Mapping[str, Any]], timing: Sequence[Mapping[str, f
     return {
         "flights": len(flown),
         "unsafe": sum(bool(flight["unsafe"]) for flight in flown),
+        "unreached": [f["seed"] for f in flown if f["unsafe"] and set(f["unsafe"]) == set(f["unreached"])],
+        "deaf": _deaf([spell for flight in flown for spell in flight["deaf"]]),
         "not_flown": [flight["seed"] for flight in flights if flight["tracking_since_s"] is None],
         "false_alarms": [f["seed"] for f in flown if not f["kinds"] and set(f["modes"].values()) != {"TRACK"}],
         "cpu_s_per_flight": round(cpu_s / max(1, len(timing)), 2),
         "time_shares": {name: round(value / spent, 2) for name, value in sorted(parts.items(), key=lambda i: -i[1])},
     }
+
+
+def _deaf(spells: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return how often a drone heard nothing in flight, and how far and fast it flew on by itself: median and most."""
+    figures: dict[str, Any] = {"spells": len(spells)}
+    for key in ("flown_m", "fastest_m_s") if spells else ():
+        values = [spell[key] for spell in spells]
+        figures |= {f"{key}_median": round(statistics.median(values), 3), f"{key}_most": max(values)}
+    return figures
+
+
+def ends_told(summary: Mapping[str, Any]) -> list[str]:
+    """Return what the campaign came to as lines of text; summary: of `totals`."""
+    lines = [
+        f"{summary['unsafe']} of {summary['flights']} flights ended unsafe; healthy flights stopped: "
+        f"{summary['false_alarms'] or 'none'}; did not take off: {summary['not_flown'] or 'none'}"
+    ]
+    if unreached := summary["unreached"]:
+        lines.append(
+            f"  in {len(unreached)} of the unsafe ones a drone heard nothing, and nothing else had gone wrong: nobody "
+            f"on the ground could stop it ({' '.join(map(str, unreached))})"
+        )
+    if (deaf := summary["deaf"])["spells"]:
+        lines.append(
+            f"  {deaf['spells']} times a drone heard nothing in flight: it flew on for {deaf['flown_m_median']:.2f} m "
+            f"(median; {deaf['flown_m_most']:.2f} m at most) at up to {deaf['fastest_m_s_most']:.2f} m/s"
+        )
+    return lines
 
 
 def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -233,6 +233,40 @@ def test_zero_stops_and_stays():
     assert min(row[0] for row in rows) > -0.2
 
 
+def deaf(flight, seconds=4.0):
+    """Let no datagram reach the drone any more; returns how fast and how far it flies then, by itself."""
+    body, speeds, places = flight.drone.airframe, [], []
+    for _ in range(round(seconds / TICK_S)):
+        flight.ticks += 1
+        flight.drone.step((0.0, 0.0, 0.0))
+        flight.onboard.step(flight.drone, flight.drone.autopilot.motors_on)
+        flight.control.watch(flight.ticks * TICK_NS)
+        speeds.append(math.hypot(body.vx, body.vy))
+        places.append((body.x, body.y))
+    return max(speeds), max(math.dist(places[0], place) for place in places)
+
+
+@pytest.mark.parametrize(
+    ("before", "then", "after_s", "speed_m_s", "flown_m"),
+    [
+        (0.6, 0.6, 2.0, (0.5, 0.8), (1.0, 1.8)),
+        (0.0, 0.3, 0.3, (0.8, 1.1), (1.2, 1.8)),
+        (0.0, 0.6, 0.3, (1.6, 2.1), (2.6, 3.6)),
+        (0.6, 0.0, 0.3, (1.3, 1.7), (1.6, 2.3)),
+        (0.6, -0.6, 0.4, (2.4, 3.0), (4.2, 5.4)),
+    ],
+    ids=["even flight", "half a step", "a step", "a stop", "turning back"],
+)
+def test_what_a_drone_does_that_hears_nothing_any_more(before, then, after_s, speed_m_s, flown_m):
+    """It keeps its tilt until its own watchdog acts after 2 s; the safety page tells these figures."""
+    flight = Flight(1).take_off()
+    flight.record(3.0, (before, 0.0, 0.0))
+    flight.record(after_s, (then, 0.0, 0.0))
+    fastest, farthest = deaf(flight)
+    assert speed_m_s[0] <= fastest <= speed_m_s[1]
+    assert flown_m[0] <= farthest <= flown_m[1]
+
+
 def test_the_whole_configuration_is_stored():
     flight = Flight(3).take_off()
     limits = flight.drone.autopilot.limits

@@ -249,7 +249,8 @@ class FaultFlight:
         truth = dict(zip(self.world.bodies, self.world.states().copy(), strict=True))
         told = {name: decision.action is Action.FLY for name, decision in self.drivers.decisions.items()}
         believed = {name: self.believed(name) for name in self.world.drones}
-        self.judge.see(now_s, truth, told, believed)
+        deaf = [name for name, device in self.devices.items() if device.deaf]
+        self.judge.see(now_s, truth, told, believed, deaf)
         self.watch()
 
     def heeds(self, message: Message) -> bool:

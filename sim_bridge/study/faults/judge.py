@@ -1,7 +1,7 @@
 """How a flight with faults is judged, by truth alone."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Any
@@ -10,6 +10,7 @@ import numpy as np
 
 from groundstation.arrays import Array
 from sim_bridge.fault_kinds import Fault, FaultKind
+from sim_bridge.study.faults.deafness import DeafSpells
 
 SEPARATION_M = 0.6
 HOVER_S, REST_S = 1.0, 3.5
@@ -55,14 +56,26 @@ class Judge:
         self._lost_s = dict.fromkeys(limits_m_s, 0.0)
         self.separation_m, self.fence_m, self.speed_m_s, self.lost_s = math.inf, 0.0, 0.0, 0.0
         self.first: dict[str, float] = {}
+        self._deafness = DeafSpells()
+        # Bounds that only drones had broken first which heard nothing.
+        self._unreached: set[str] = set()
 
     def see(
-        self, now_s: float, truth: Mapping[str, Array], told: Mapping[str, bool], believed: Mapping[str, Array | None]
+        self,
+        now_s: float,
+        truth: Mapping[str, Array],
+        told: Mapping[str, bool],
+        believed: Mapping[str, Array | None],
+        deaf: Collection[str] = (),
     ) -> None:
-        """Take one moment. truth: rows of the truth board; told: who is told a velocity; believed: x, y of each."""
+        """Take one moment.
+
+        truth: rows of the truth board; told: who is told a velocity; believed: x, y of each; deaf: who hears nothing.
+        """
         aloft = {name: row for name, row in truth.items() if name in self._flown and not row[12]}
-        for a, b in combinations(aloft.values(), 2):
-            self._worst(now_s, "separation", float(np.linalg.norm(a[:3] - b[:3])))
+        self._deafness.see(now_s, aloft, deaf)
+        for a, b in combinations(aloft, 2):
+            self._worst(now_s, "separation", float(np.linalg.norm(aloft[a][:3] - aloft[b][:3])), by=(a, b))
         for name, flown in self._flown.items():
             row = truth[name]
             flown.times.append(now_s)
@@ -74,13 +87,13 @@ class Judge:
 
     def _see_one(self, now_s: float, name: str, row: Array, told: bool, believed: Array | None) -> None:
         outside = np.maximum(self._fence[:, 0] - row[:3], row[:3] - self._fence[:, 1])
-        self._worst(now_s, "fence", float(outside.max()))
-        self._worst(now_s, "speed", math.hypot(row[3], row[4]), self._limits[name] + FASTER_M_S)
+        self._worst(now_s, "fence", float(outside.max()), by=(name,))
+        self._worst(now_s, "speed", math.hypot(row[3], row[4]), self._limits[name] + FASTER_M_S, by=(name,))
         off_m = math.inf if believed is None else float(np.hypot(*(believed - row[:2])))
         self._lost_s[name] = self._lost_s[name] + self._period_s if told and off_m > LOST_M else 0.0
         self._worst(now_s, "unlocalised", self._lost_s[name])
 
-    def _worst(self, now_s: float, what: str, figure: float, limit: float = 0.0) -> None:
+    def _worst(self, now_s: float, what: str, figure: float, limit: float = 0.0, by: tuple[str, ...] = ()) -> None:
         match what:
             case "separation":
                 self.separation_m, bad = min(self.separation_m, figure), figure < SEPARATION_M
@@ -90,11 +103,17 @@ class Judge:
                 self.speed_m_s, bad = max(self.speed_m_s, figure), figure > limit
             case _:
                 self.lost_s, bad = max(self.lost_s, figure), figure > LOST_S
-        if bad:
-            self.first.setdefault(what, round(now_s, 2))
+        if bad and what not in self.first:
+            self.first[what] = round(now_s, 2)
+            if by and all(name in self._deafness.out_of_reach for name in by):
+                self._unreached.add(what)
 
     def verdict(self, faults: tuple[Fault, ...], observable_s: tuple[float | None, ...]) -> dict[str, Any]:
-        """Return the figures; unsafe: what was violated, with the time at which [s]."""
+        """Return the figures; unsafe: what was violated, with the time at which [s].
+
+        unreached: of these, what a drone did that heard nothing, while nothing else had gone wrong yet: nobody on the
+        ground could stop it. Of two drones that came together both must have heard nothing: one could have given way.
+        """
         hover, rest = 0.0, 0.0
         for flown, since_s in self._due(zip(faults, observable_s, strict=True)):
             hover, rest = max(hover, _until_hover(flown, since_s)), max(rest, _until_rest(flown, since_s))
@@ -110,7 +129,12 @@ class Judge:
             "hover_s": round(hover, 2),
             "rest_s": round(rest, 2),
             "unsafe": dict(sorted(self.first.items(), key=lambda item: item[1])),
+            "unreached": sorted(what for what in self._unreached if self._only_deaf(faults, self.first[what])),
+            "deaf": self._deafness.rows(),
         }
+
+    def _only_deaf(self, faults: Iterable[Fault], until_s: float) -> bool:
+        return all(fault.kind is FaultKind.AT_DEAF for fault in faults if fault.start_s <= until_s)
 
     def _due(self, faults: Iterable[tuple[Fault, float | None]]) -> Iterable[tuple[_Flown, float]]:
         """Return who had to stop, and since when [s], of faults that lasted until it was due."""

@@ -10,14 +10,14 @@ import pytest
 from groundstation.cli.exits import ExitCode
 from groundstation.cli.experiment import experiment
 from groundstation.errors import OperatorMistake
-from groundstation.experiments.faults import HEALTHY, FlightBatch, batches, by_kind, fly, table, totals
+from groundstation.experiments.faults import HEALTHY, FlightBatch, batches, by_kind, ends_told, fly, table, totals
 
 
 def flight(seed: int, kinds: list[str], unsafe: dict[str, float], mode: str = "TRACK", **more: Any) -> dict[str, Any]:
     return {
         "seed": seed, "kinds": kinds, "faults": [{}] * len(kinds), "tracking_since_s": 6.0, "modes": {"a": mode},
         "separation_m": 1.0, "fence_m": 0.0, "speed_m_s": 0.5, "unlocalised_s": 0.0, "hover_s": 0.0, "rest_s": 0.0,
-        "unsafe": unsafe,
+        "unsafe": unsafe, "unreached": [], "deaf": [],
     } | more  # fmt: skip
 
 
@@ -50,6 +50,26 @@ def test_totals_name_false_alarms_and_where_time_goes() -> None:
     assert summary["false_alarms"] == [5]
     assert summary["time_shares"] == {"tracker": 0.75, "world": 0.25}
     assert summary["cpu_s_per_flight"] == 4.5
+
+
+def test_what_nobody_could_stop_is_counted_as_unsafe_and_named() -> None:
+    spells = [{"flown_m": flown_m, "fastest_m_s": 0.5 + flown_m / 2} for flown_m in (0.2, 0.6, 1.5)]
+    unsafe = {"fence": 15.0, "speed": 14.0}
+    flights = [
+        flight(1, ["at_deaf"], unsafe, unreached=["speed", "fence"], deaf=spells[:1]),
+        flight(2, ["at_deaf", "wind"], unsafe, unreached=["speed"], deaf=spells[1:]),
+        flight(3, ["wind"], {}),
+    ]
+    summary = totals(flights, [])
+    assert (summary["unsafe"], summary["unreached"]) == (2, [1])
+    assert summary["deaf"] == {
+        "spells": 3, "flown_m_median": 0.6, "flown_m_most": 1.5, "fastest_m_s_median": 0.8, "fastest_m_s_most": 1.25,
+    }  # fmt: skip
+    unsafe_line, *told = ends_told(summary)
+    assert unsafe_line.startswith("2 of 3 flights ended unsafe")
+    assert "in 1 of the unsafe ones a drone heard nothing" in told[0] and told[0].endswith("could stop it (1)")
+    assert "3 times" in told[1] and "0.60 m (median; 1.50 m at most) at up to 1.25 m/s" in told[1]
+    assert len(ends_told(totals(FLIGHTS, []))) == 1
 
 
 def test_batches_cover_all_seeds_once() -> None:

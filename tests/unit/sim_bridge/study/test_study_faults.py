@@ -72,6 +72,7 @@ def judged(
     off_m: float = 0.0,
     faults: tuple[Fault, ...] = (),
     root: str | None = None,
+    deaf: Any = lambda t: (),
 ) -> dict[str, Any]:
     """Return the verdict on 15 s in which drone a flies rows(t) and drone b stands still 3 m away."""
     judge = Judge(FENCE, {"a": 0.6, "b": 0.6}, PERIOD_S, root)
@@ -79,7 +80,7 @@ def judged(
         t = 5.0 + n * PERIOD_S
         truth = {"a": rows(t), "b": row(0.0, -2.0)}
         believed = {name: truth[name][:2] + np.array([off_m, 0.0]) for name in truth}
-        judge.see(t, truth, {"a": told(t), "b": False}, believed)
+        judge.see(t, truth, {"a": told(t), "b": False}, believed, deaf(t))
     return judge.verdict(faults, tuple(fault.start_s for fault in faults))
 
 
@@ -120,6 +121,47 @@ def test_after_useless_words_hover_and_rest_are_due(stops_s: float, rests_s: flo
     verdict = judged(**flown(stops_s, rests_s), faults=(fault("telemetry_frozen"),))
     assert set(verdict["unsafe"]) == broken
     assert verdict["hover_s"] == pytest.approx(min(stops_s, 19.95) - 10.0, abs=0.11)
+
+
+DEAF = fault("at_deaf", end_s=14.0)
+
+
+@pytest.mark.parametrize(
+    ("rows", "faults", "unsafe", "unreached"),
+    [
+        (lambda t: row(0.0, 0.0, vx=1.0 if 11.0 <= t < 14.0 else 0.5), (DEAF,), ["speed"], ["speed"]),
+        (lambda t: row(0.0, 0.0, vx=1.0 if t > 14.02 else 0.5), (DEAF,), ["speed"], []),
+        (lambda t: row(0.0, 0.0, vx=1.0 if t > 9.0 else 0.5), (DEAF,), ["speed"], []),
+        (lambda t: row(0.0, 0.0, vx=1.0 if t > 11.0 else 0.5), (DEAF, fault("wind", entity="b")), ["speed"], []),
+        (lambda t: row(3.8 if t > 11.0 else 3.5, 0.0), (DEAF, fault("wind", start_s=12.0)), ["fence"], ["fence"]),
+        (lambda t: row(0.0, -1.5 if t > 11.0 else 0.0), (DEAF,), ["separation"], []),
+    ],
+    ids=["too fast", "hears again", "was too fast", "something else is wrong", "out", "the other one hears"],
+)
+def test_what_nobody_on_the_ground_could_stop_is_unsafe_and_named(
+    rows: Any, faults: tuple[Fault, ...], unsafe: list[str], unreached: list[str]
+) -> None:
+    verdict = judged(rows, faults=faults, deaf=lambda t: ["a"] * (10.0 <= t < 14.0))
+    assert sorted(verdict["unsafe"]) == unsafe
+    assert verdict["unreached"] == unreached
+
+
+def test_two_that_come_together_are_out_of_reach_where_both_hear_nothing() -> None:
+    both = (DEAF, fault("at_deaf", entity="b"))
+    verdict = judged(lambda t: row(0.0, -1.5 if t > 11.0 else 0.0), faults=both, deaf=lambda t: ["a", "b"] * (t >= 10))
+    assert verdict["unreached"] == ["separation"]
+
+
+def test_how_far_a_deaf_drone_flies_on_is_measured_from_where_it_became_deaf() -> None:
+    def rows(t: float) -> Any:
+        moving = row(0.3 * (min(t, 13.0) - 5.0), 0.0, 0.3 + 0.5 * (11.0 < t < 12.0), ground=t > 18.0)
+        moving[7] = math.radians(4.0)
+        return moving
+
+    (spell,) = judged(rows, deaf=lambda t: ["a"] * (t >= 10.0))["deaf"]
+    assert (spell["drone"], spell["from_s"]) == ("a", pytest.approx(10.0))
+    assert (spell["speed_m_s"], spell["tilt_deg"], spell["fastest_m_s"]) == pytest.approx((0.3, 4.0, 0.8))
+    assert spell["flown_m"] == pytest.approx(0.9, abs=0.02)
 
 
 @pytest.mark.parametrize(("root", "broken"), [("ceiling", {"hover", "rest"}), ("other", set()), (None, set())])

@@ -85,6 +85,11 @@ def with_changes(field: ResolvedField, new: Mapping[Path, Any]) -> ResolvedField
     return field_from_values(values)
 
 
+def value_at(field: ResolvedField, path: Path) -> Any:
+    """Return a setting of a field."""
+    return _at(msgspec.to_builtins(field), path)
+
+
 def _at(values: Any, path: Path) -> Any:
     for name in path:
         values = values[name]

@@ -31,10 +31,8 @@ SLOW_STATES = (
 )
 AERIAL = SLOW_STATES[:6]
 _TURN_SHARE = 0.02  # of each turn is in error
-_BELIEVABLE = 3.0  # deviations that a sound sensor's error reaches; a larger one lasts longer
-_WRONG = 5.0  # deviations beyond which the sensor lies, as far as it looks
-_LIE_S, _UNSEEN_LIE_S = 2.0, 8.0  # how long a lie lasts, while cameras see the robot and while none does
-_UNSEEN_S = 0.5  # from when on no camera sees it
+_BELIEVABLE, _WRONG = 3.0, 5.0  # deviations beyond which an error lasts longer, and beyond which the sensor lies
+_LIE_S, _UNSEEN_LIE_S, _UNSEEN_S = 2.0, 8.0, 0.5  # how long a lie lasts, seen and unseen, and from when on it is unseen
 # The field file's figure is what a vehicle states while it does not doubt itself; the lasting part of it is 0.6.
 _STATED_ROOM = 2.0
 _DOUBT_S = 1.0  # the doubt that surprises raise is forgotten over this

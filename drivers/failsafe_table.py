@@ -92,6 +92,7 @@ class Failsafe:
 # What a vehicle does while it is asked for nothing else.
 _TRACK = frozenset({DriverMode.TRACK})
 _STANDS = frozenset({DriverMode.LANDED, DriverMode.CUT})
+_UNCONVERGED = "the tracker does not know well enough where it is (safety.max_position_std_m)"
 
 
 @cache
@@ -135,7 +136,7 @@ def _landings(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
                  "safety.unseen_land_after_s"),
         Failsafe(Condition.NOT_RESUMED, land, "the tracker paused, and nobody ordered RESUME", limits.land_after_s,
                  patience),
-        Failsafe(Condition.UNCONVERGED, land, "the tracker does not know where it is", limits.unseen_land_after_s,
+        Failsafe(Condition.UNCONVERGED, land, _UNCONVERGED, limits.unseen_land_after_s,
                  "safety.unseen_land_after_s", EVENLY, modes=FREE),
         Failsafe(Condition.NOT_SEEN, land, "not seen by any camera for too long", limits.unseen_land_after_s,
                  "safety.unseen_land_after_s", modes=FREE),
@@ -168,7 +169,7 @@ def _brakes(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
         (Condition.SUPERVISOR_SILENT, "the supervisor does not answer", 0.0),
         (Condition.TELEMETRY_SILENT, "{why}", 0.0),
         (Condition.NO_SETPOINT, "no setpoint from the tracker", 0.0),
-        (Condition.UNCONVERGED, "the tracker does not know where it is", 0.0),
+        (Condition.UNCONVERGED, _UNCONVERGED, 0.0),
         (Condition.UNLOCATED, "no position from the cameras", limits.lost_hover_s),
         (Condition.TOO_FAST, "{why}", limits.fast_brake_s),
     )

@@ -72,7 +72,7 @@ def team(recording: tuple[Path, ...], field: Path | None, output: Path | None, a
     found = calibrate_team(flown, resolved_field(flown_with))
     click.echo(_json(found) if as_json else f"{source.name}: {flown.duration_s:.0f} s, {found.sightings} sightings")
     if not as_json:
-        click.echo("\n".join(_lines(found)))
+        click.echo("\n".join(_lines(found, flown_with.model_dump(mode="json"))))
     if output is not None:
         _write(output, field, flown_with, found)
     return ExitCode.OK
@@ -103,8 +103,8 @@ def _json(found: "TeamCalibration") -> str:
     return json.dumps(values, indent=2)
 
 
-def _lines(found: "TeamCalibration") -> list[str]:
-    lines = [f"{'figure':26} {'error against the field':>26}   if all were in doubt"]
+def _lines(found: "TeamCalibration", flown_with: dict[str, Any]) -> list[str]:
+    lines = [f"{'figure':26} {'error against the field':>26}   if all others were in doubt"]
     lines += [_row(one) for one in found.figures]
     if not found.found:
         return [*lines, "no setting is contradicted: nothing to change"]
@@ -118,12 +118,19 @@ def _lines(found: "TeamCalibration") -> list[str]:
         return [*lines, "no setting of the field mends that: check the clock of the drone and the link to it"]
     from groundstation.settings.patched import fragment
 
-    return [*lines, "change in the field file:", fragment(found.settings).rstrip()]
+    changes = [f"  {'.'.join(path)}: {_at(flown_with, path)} -> {value}" for path, value in found.settings.items()]
+    return [*lines, "change in the field file:", *changes, "in its form:", fragment(found.settings).rstrip()]
+
+
+def _at(values: Any, path: tuple[str, ...]) -> Any:
+    for name in path:
+        values = values[name]
+    return values
 
 
 def _row(one: "Measured") -> str:
     error = f"{one.error:+.2f} +- {one.std:.2f} {one.unit}"
-    shown = f"+- {one.doubtful_std:.2f} {one.unit}" if one.shown else "not shown by this recording"
+    shown = f"+- {one.doubtful_std:.2f} {one.unit}" if one.shown else "not told apart from them"
     return f"{one.who + ' ' + one.part:26} {error:>26}   {shown}"
 
 

@@ -211,8 +211,9 @@ def _doubts_of_figures(shifts: Sequence[SurveyShift], delays: Sequence[DelayShif
         if shift.sigmas > _MOVED_SIGMAS:
             unit, digits = ("m", 3) if shift.what == "position" else ("deg", 1)
             yield (
-                f"{shift.camera} hangs {shift.by:.{digits}f} {unit} from where the field file has it, "
-                f"{shift.sigmas:.0f} standard deviations: survey it anew (groundstation calibrate extrinsics)"
+                f"{shift.camera} seems to hang {shift.by:.{digits}f} {unit} from where the field file has it, "
+                f"{shift.sigmas:.0f} standard deviations: it does, or a marker or a lens is not as the field says; "
+                "groundstation calibrate team tells which"
             )
     for delay in delays:
         if abs(delay.offset_ms) > max(_LATE_MS, _LATE_SIGMAS * delay.std_ms):

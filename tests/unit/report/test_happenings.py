@@ -1,9 +1,13 @@
 """What happened in a run, in the report: its story, what was broken, what reacted; a failsafe ends no good flight."""
 
+import dataclasses
+
 import msgspec
+import pytest
 from rich.console import Console
 
 from groundstation.bus import messages as m
+from groundstation.report.accuracy import Accuracy
 from groundstation.report.criteria import Criterion, criteria_of
 from groundstation.report.findings import findings_of
 from groundstation.report.happenings import UNEXPLAINED, happenings, landings
@@ -82,6 +86,18 @@ def test_the_summary_and_the_page_show_fault_and_reaction(tmp_path):
     for text in (printed.get(), happenings_table(findings_of(LANDED_BY_FAILSAFE))):
         assert text.index("navdata_silent of a begins") < text.rindex("LANDING by failsafe telemetry_silent")
     assert "because telemetry_silent" in criteria_table(report)
+
+
+@pytest.mark.parametrize(("anees", "doubted"), [(1.1, False), (7.55, True)])
+def test_the_summary_doubts_a_target_that_is_not_where_it_was_believed(tmp_path, anees, doubted):
+    report = judge(LANDED_BY_FAILSAFE, tmp_path)
+    target = Accuracy(rmse_m=0.06, max_error_m=0.1, lost_s=0.0, covered=1.0, anees=anees)
+    report = dataclasses.replace(report, figures=msgspec.structs.replace(report.figures, targets={"car": target}))
+    console = Console(width=300)
+    with console.capture() as printed:
+        console.print(summary(report))
+    assert f"normalised error {anees:.2f}" in printed.get()
+    assert ("groundstation calibrate team looks for it" in printed.get()) is doubted
 
 
 def test_a_pause_that_ended_well_is_told_and_fails_nothing():

@@ -1,4 +1,4 @@
-"""What a decision of the watchdog means to PX4 and ArduPilot: modes, arming, take-off, set-points, landing. Pure.
+"""What a decision of the watchdog means to PX4 and ArduPilot: modes, arming, take-off, setpoints, landing. Pure.
 
 Each setpoint of the tracker goes out once, at most setpoint_hz times a second. While hovering it is told to stand
 still: at the place where the hover began, as far as the tracker knows where it is, else by zero velocity. What sends is
@@ -61,7 +61,7 @@ class Orders:
         self._ordered_ns = -1
 
     def are_heeded(self, now_ns: int, custom_mode: int) -> bool:
-        """Return whether the vehicle flies by our set-points, and not for a pilot or by itself."""
+        """Return whether the vehicle flies by our setpoints, and not for a pilot or by itself."""
         return custom_mode == self._guided and not self._taken_over and not self.climbs_by_itself(now_ns)
 
     def climbs_by_itself(self, now_ns: int) -> bool:
@@ -92,7 +92,7 @@ class Orders:
         self, now_ns: int, decision: WatchdogDecision, base_mode: int, custom_mode: int, landed: int, height_m: float,
         climb_m_s: float = 0.0,
     ) -> SetPositionTargetLocalNed | None:  # fmt: skip
-        """Return the set-point to send now, if any; commands are asked through the requests."""
+        """Return the setpoint to send now, if any; commands are asked through the requests."""
         armed, guided = bool(base_mode & ARMED), custom_mode == self._guided
         climbed_m = self._climbed(now_ns, landed, height_m, climb_m_s)
         action = decision.action
@@ -158,7 +158,7 @@ class Orders:
         self._action, self._since_ns = action, now_ns
 
     def _take_back(self, now_ns: int, ordered_ns: int) -> None:
-        """Ask for the mode once more, by an operator's TRACK or RESUME; set-points that come again are no order."""
+        """Ask for the mode once more, by an operator's TRACK or RESUME; setpoints that come again are no order."""
         self._ordered_ns, self._taken_over = ordered_ns, False
         self._guided_ns, self._regain_until_ns = now_ns, now_ns + _REGAIN_NS
 
@@ -189,7 +189,7 @@ class Orders:
         self, now_ns: int, armed: bool, guided: bool, landed: int, climbed_m: float
     ) -> SetPositionTargetLocalNed | None:
         px4 = self._flavour is Flavour.PX4
-        # WIRE (docs/reference/mavlink.md 5.2): PX4 needs a second of set-points before OFFBOARD, and arms in it.
+        # WIRE (docs/reference/mavlink.md 5.2): PX4 needs a second of setpoints before OFFBOARD, and arms in it.
         if px4 and now_ns - self._since_ns < _STREAM_FIRST_NS:
             return self._send(now_ns, _STILL, 0.0)
         if not guided:

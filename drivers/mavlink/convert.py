@@ -145,7 +145,7 @@ def setpoint_from_velocity(
     system: int, now_ns: int, velocity_m_s: Vector3, yaw_rate_rad_s: float, limits: VehicleLimits,
     drift_m_s: Vector3 = (0.0, 0.0, 0.0),
 ) -> SetPositionTargetLocalNed:  # fmt: skip
-    """Return the set-point of a velocity [base_stabilized, FLU], clamped to the limits.
+    """Return the setpoint of a velocity [base_stabilized, FLU], clamped to the limits.
 
     drift_m_s: what the vehicle's own velocity is off by, added beyond the limits: they are of the true velocity.
     """

@@ -17,7 +17,7 @@ _COVARIANCE = (4e-3, 1e-3, 0.0, 0.0, 1e-3, 3e-3, 0.0, 0.0, 0.0, 0.0, 1e-3, 0.0, 
 
 
 class TalkingTeam(threading.Thread):
-    """Publishes until `over`: estimates, set-points and truth at 50 Hz, everything else at its own rate.
+    """Publishes until `over`: estimates, setpoints and truth at 50 Hz, everything else at its own rate.
 
     jpegs: by camera, the pictures that it sends in turn at 5 Hz.
     """

@@ -61,8 +61,8 @@ class FrustumTeam:
         return SensorSuite(world, onboard, {**dict.fromkeys(self.names, 0.08), TARGET: 0.4})
 
     def _heights(self, topology: Topology) -> dict[str, float]:
-        slots = self.planner.parameters.slots(len(topology.levels)) or ()
-        return {name: slots[topology.level_of(name)] for name in topology.robots}
+        heights = self.planner.parameters.level_heights(len(topology.levels)) or ()
+        return {name: heights[topology.level_of(name)] for name in topology.robots}
 
     @property
     def belief(self) -> JointBelief:

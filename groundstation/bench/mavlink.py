@@ -73,7 +73,7 @@ class _TimedBus(MemoryBus):
 
 
 class _TimedLink:
-    """A link that notes when frames were sent, and how old a set-point is when it goes out."""
+    """A link that notes when frames were sent, and how old a setpoint is when it goes out."""
 
     def __init__(self, link: MavlinkLink, bus: _TimedBus) -> None:
         self.link, self.rejected, self._bus = link, link.rejected, bus
@@ -104,7 +104,7 @@ class _TimedLink:
 
 
 class _Tracker(threading.Thread):
-    """Publishes estimates and, when asked to, set-points at 20 Hz, out of step with the driver."""
+    """Publishes estimates and, when asked to, setpoints at 20 Hz, out of step with the driver."""
 
     def __init__(self, exchange: MemoryExchange, names: Sequence[str], link: _TimedLink) -> None:
         super().__init__(daemon=True)

@@ -88,7 +88,7 @@ SETPOINT = Topic("setpoint", m.VelocitySetpoint, 50, Quality.CONTROL, _TRACKER)
 """Tracker to driver: velocity of one drone."""
 COMMAND = Topic("command", m.Command, 0, Quality.CONTROL, _ORDERING)
 """Operator, any shell or tracker to drivers: a discrete request."""
-# Three answers of one turn do not fit the short queue of set-points: the last, EFFECTIVE, would be dropped.
+# Three answers of one turn do not fit the short queue of setpoints: the last, EFFECTIVE, would be dropped.
 COMMAND_ACK = Topic("command_ack", m.CommandAck, 0, Quality.SENSOR, _ANSWERING)
 """Driver: how far a command has come."""
 LEASE = Topic("lease", m.Lease, 2, Quality.CONTROL, _SUPERVISOR)

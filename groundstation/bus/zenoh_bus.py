@@ -26,7 +26,7 @@ from groundstation.errors import GroundStationError
 
 _log = logging.getLogger(__name__)
 
-# Set-points go out at once, each in a batch of its own (express; docs/reference/zenoh.md 3).
+# Setpoints go out at once, each in a batch of its own (express; docs/reference/zenoh.md 3).
 # Sensor samples share a batch with what waits: an idle link sends them as soon, and after a stall of the router a batch
 # takes all of them, where single batches run out at 16 and the recorder lost what the tracker had got.
 _PRIORITY = {
@@ -36,7 +36,7 @@ _PRIORITY = {
     Quality.BULK: ("DATA_LOW", False),
 }
 # Batches that wait for a link before what follows is dropped; 2 by default, 16 is the most there can be. A replay needs
-# every message that the tracker got. Set-points keep the short queue.
+# every message that the tracker got. Setpoints keep the short queue.
 _QUEUED_BATCHES = {"data_high": 16, "data": 16, "data_low": 16}
 
 

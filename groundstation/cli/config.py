@@ -140,7 +140,7 @@ def schema() -> None:
     "-o", "--output", type=click.Path(path_type=Path, dir_okay=False), default=Path("room.png"), help="PNG, SVG or PDF."
 )
 def draw(field: str, options: tuple[str, ...], scenario: str | None, output: Path) -> None:
-    """Draw the room to scale: fence, pads, height slots, and what the fixed cameras see of drones in each slot."""
+    """Draw the room to scale: fence, pads, level heights, and what the fixed cameras see of drones at each of them."""
     from groundstation.settings import drawing
     from groundstation.settings.files import find_field, find_scenario
     from groundstation.settings.load import load_field

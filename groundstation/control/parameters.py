@@ -16,7 +16,7 @@ SEARCH_SPEED_M_S, SEARCH_YAW_RATE_RAD_S = 0.5, 0.8
 class ControlParameters:
     """Settings of the setpoints.
 
-    search_height_m: slot while searching or returning; column_m: horizontal distance within which nobody changes
+    search_height_m: height while searching or returning; column_m: horizontal distance within which nobody changes
     height, and which stands of two robots keep; return_std_m: a robot outside the world-fixed views that is known
     worse than this flies back; so does one whose deviation would reach return_limit_m before it is back in view, or
     that would then have been unseen for return_within_s (odometry may be worse than it says), each with return_margin_s

@@ -1,4 +1,4 @@
-"""Setpoints of all robots from a plan: held velocities, height slots, and the way back or around when needed."""
+"""Setpoints of all robots from a plan: held velocities, level heights, and the way back or around when needed."""
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -260,16 +260,16 @@ def _with_height(
     name: str,
     velocity: tuple[float, float],
     rate: float,
-    slot: float,
+    level_m: float,
     phase: FlightMode,
     belief: JointBelief,
     robots: list[str],
     parameters: ControlParameters,
 ) -> Setpoint:
-    """Return the setpoint with the climb towards its slot; near another robot it side-steps first."""
+    """Return the setpoint with the climb towards its level height; near another robot it side-steps first."""
     mean = belief.mean_of(name)
     climb = parameters.limits_of(name).max_climb_m_s
-    way = slot - float(mean[2])
+    way = level_m - float(mean[2])
     vz = min(max(parameters.height_gain_per_s * way, -climb), climb)
     if abs(way) <= parameters.height_tolerance_m:
         return Setpoint((*velocity, vz), rate, phase)

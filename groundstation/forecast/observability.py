@@ -77,7 +77,7 @@ def topologies_of(team: Team, chosen: Iterable[Topology]) -> list[Topology]:
             queue += [near for near in one.neighbours() if near not in found and not found.setdefault(near)]
     else:
         found = dict.fromkeys((flat, Topology.string(team.robots), *chosen))
-    return [one for one in found if team.planner.slots(len(one.levels))]
+    return [one for one in found if team.planner.level_heights(len(one.levels))]
 
 
 def observe(field: ResolvedField, team: Team, place: Place, topologies: Iterable[Topology]) -> list[Observability]:

@@ -1,4 +1,4 @@
-"""Settings of the planner: horizon, limits, slots, noise it counts on, weights."""
+"""Settings of the planner: horizon, limits, level heights, noise it counts on, weights."""
 
 import math
 from collections.abc import Mapping
@@ -97,7 +97,7 @@ class PlannerParameters:
         all_heights = [height for row in self.level_heights_m for height in row]
         return min(all_heights), max(all_heights)
 
-    def slots(self, levels: int) -> tuple[float, ...] | None:
+    def level_heights(self, levels: int) -> tuple[float, ...] | None:
         """Return the heights to begin with for so many levels [m], or None for more levels than may be flown."""
         return self.level_heights_m[levels - 1] if 0 < levels <= len(self.level_heights_m) else None
 

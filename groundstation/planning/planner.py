@@ -159,8 +159,8 @@ class Planner:
         if not scene.robots or not scene.targets:
             return self._idle(current, belief.stamp_ns)
         search = _Search(should_stop, max_evaluations, self.parameters)
-        first = current if self.parameters.slots(len(current.levels)) else Topology.flat(current.robots)
-        others = [t for t in self.options(current) if self.parameters.slots(len(t.levels)) and t != first]
+        first = current if self.parameters.level_heights(len(current.levels)) else Topology.flat(current.robots)
+        others = [t for t in self.options(current) if self.parameters.level_heights(len(t.levels)) and t != first]
         self._optimise(search, scene, first, others, warm_start)
         return self._result(belief.stamp_ns, scene, current, search, 1 + len(others))
 
@@ -277,7 +277,7 @@ class Planner:
         return self.parameters.hysteresis if dwelt else self.parameters.urgent_gain
 
     def _idle(self, current: Topology, stamp_ns: int) -> PlanResult:
-        slots = self.parameters.slots(len(current.levels)) or ()
-        heights = {name: slots[current.level_of(name)] for name in current.robots} if slots else {}
+        levels = self.parameters.level_heights(len(current.levels)) or ()
+        heights = {name: levels[current.level_of(name)] for name in current.robots} if levels else {}
         report = SolverReport("idle", 0, 0.0, 0, 0)
         return PlanResult(current, 0.0, 0.0, {}, heights, (), (), report, self.parameters.mode, stamp_ns)

@@ -48,10 +48,10 @@ class Starts:
 
     def rest(self, topology: Topology) -> Array:
         """Return controls with which the robots only go to the heights of their levels."""
-        slots = self._parameters.slots(len(topology.levels)) or ()
+        heights = self._parameters.level_heights(len(topology.levels)) or ()
         x = np.zeros((len(self._scene.robots), ROBOT_CONTROLS))
         for name, i in self._index.items():
-            x[i, HEIGHT] = self.height(i, slots[topology.level_of(name)])
+            x[i, HEIGHT] = self.height(i, heights[topology.level_of(name)])
         return x.ravel()
 
     def height(self, i: int, height_m: float) -> float:
@@ -62,14 +62,14 @@ class Starts:
     def _towards(self, topology: Topology, base: Array, robots: Collection[str], keep_root: bool) -> Array:
         """Return controls with which the robots go where each would look at the middle of the level below."""
         p, sensors, scene = self._parameters, self._sensors, self._scene
-        slots, ahead, x = p.slots(len(topology.levels)) or (), p.horizon_s, base.copy()
+        heights, ahead, x = p.level_heights(len(topology.levels)) or (), p.horizon_s, base.copy()
         subjects: list[Point] = [
             (float(m[0] + ahead * m[2]), float(m[1] + ahead * m[3]), sensors.marker_height_m[name])
             for name, m in zip(scene.targets, scene.moving, strict=True)
         ]
         for level in range(len(topology.levels) - 1, -1, -1):
             middle = np.mean(subjects, axis=0).tolist()
-            height, subjects = slots[level], []
+            height, subjects = heights[level], []
             for name in sorted(topology.levels[level]):
                 pose = scene.poses[self._index[name]]
                 px, py = float(pose[0]), float(pose[1])

@@ -279,7 +279,7 @@ def _rates_and_times(parts: Parts) -> Iterator[Finding]:
             f"must be >= {safety.min_separation_m:g} (safety.min_separation_m) (got {planner.separation_m:g})",
         )
     if safety and safety.setpoint_lifetime_ms >= safety.land_after_s * 1000:
-        yield ("safety", "land_after_s"), f"must be > {safety.setpoint_lifetime_ms / 1000:g} (the set-point's lifetime)"
+        yield ("safety", "land_after_s"), f"must be > {safety.setpoint_lifetime_ms / 1000:g} (the setpoint's lifetime)"
 
 
 def _calibrations(parts: Parts) -> Iterator[Finding]:

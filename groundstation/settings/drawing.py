@@ -1,4 +1,4 @@
-"""A field to scale, from above and from the side: what fixed cameras see at each height slot, and how drones look."""
+"""A field to scale, from above and from the side: what fixed cameras see at each level height, and how drones look."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Paths = dict[str, list[tuple[float, float]]]
 
-_SLOT_COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:purple", "tab:brown")
+_LEVEL_COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:purple", "tab:brown")
 _TARGET_COLOUR = "tab:red"
 _OBSTACLE_COLOUR = "dimgrey"
 
@@ -119,8 +119,8 @@ def _points(path: Mapping[str, Any]) -> list[tuple[float, float]]:
     return [(x + length * math.sin(phase), y + width * math.sin(2 * phase)) for phase in phases]
 
 
-def slots(field: Field) -> list[float]:
-    """Return the height slots of the whole team's topologies, highest first [m]."""
+def level_heights(field: Field) -> list[float]:
+    """Return the level heights of the whole team's topologies, highest first [m]."""
     rows = field.planner.level_heights_m[: len(field.drones)]
     return sorted({height for row in rows for height in row}, reverse=True)
 
@@ -135,9 +135,9 @@ def footprint(camera: WorldCameraSettings, height_m: float) -> tuple[float, floa
     )
 
 
-def marker_height(field: Field, slot_m: float) -> float:
-    """Return how high a drone's marker is when the drone flies in a slot [m; world], the highest of the team."""
-    return slot_m + max(drone.marker.position_m[2] for drone in field.drones.values())
+def marker_height(field: Field, level_m: float) -> float:
+    """Return how high a drone's marker is when the drone flies at a height [m; world], the highest of the team."""
+    return level_m + max(drone.marker.position_m[2] for drone in field.drones.values())
 
 
 def _draw_top(axes: "Axes", field: Field, paths: Paths) -> None:
@@ -149,9 +149,9 @@ def _draw_top(axes: "Axes", field: Field, paths: Paths) -> None:
     for name, camera in field.cameras.items():
         x, y, _ = camera.position_m
         axes.plot(x, y, "k^", label=f"camera {name}")
-        for slot, colour in zip(slots(field), _SLOT_COLOURS, strict=False):
-            length, width = footprint(camera, marker_height(field, slot))
-            label = f"a drone at {slot:g} m is seen by {name}"
+        for level, colour in zip(level_heights(field), _LEVEL_COLOURS, strict=False):
+            length, width = footprint(camera, marker_height(field, level))
+            label = f"a drone at {level:g} m is seen by {name}"
             _box(axes, (x - length, x + length), (y - width, y + width), edgecolor=colour, label=label)
     for name, volume in field.volumes.items():
         _box(axes, volume.x_m, volume.y_m, linestyle=":", edgecolor="black", label=f"seen by {name}")
@@ -182,17 +182,17 @@ def _draw_side(axes: "Axes", field: Field, paths: Paths) -> None:
     for name, board in boards.items():
         along = [x for x, _ in paths.get(name, [])] or [0.0]
         axes.plot((min(along), max(along)), (board, board), color=_TARGET_COLOUR, marker="s", markersize=4)
-    for slot, colour in zip(slots(field), _SLOT_COLOURS, strict=False):
-        axes.axhline(slot, color=colour, linewidth=0.8)
-        axes.annotate(f"slot {slot:g} m", (fence.x_m[0], slot), textcoords="offset points", xytext=(3, 3))
+    for level, colour in zip(level_heights(field), _LEVEL_COLOURS, strict=False):
+        axes.axhline(level, color=colour, linewidth=0.8)
+        axes.annotate(f"level {level:g} m", (fence.x_m[0], level), textcoords="offset points", xytext=(3, 3))
     _draw_view(axes, field, max(boards.values()))
 
 
 def _draw_view(axes: "Axes", field: Field, board_m: float) -> None:
-    """Draw the first drone in its lowest slot, looking at the (highest) target: as far behind as its tilt asks for."""
+    """Draw the first drone at its lowest level, looking at the (highest) target: as far behind as its tilt asks."""
     drone = next(iter(field.drones.values()))
-    camera, slot = drone.camera, slots(field)[-1]
-    height = slot + camera.position_m[2] - board_m
+    camera, level = drone.camera, level_heights(field)[-1]
+    height = level + camera.position_m[2] - board_m
     tilt = camera.tilt_down_rad
     if height <= 0 or not 0 < tilt < math.pi / 2:
         return
@@ -200,8 +200,8 @@ def _draw_view(axes: "Axes", field: Field, board_m: float) -> None:
     half = camera.calibration.vertical_view_rad / 2
     edges = [min(max(tilt + side * half, 0.05), math.pi - 0.05) for side in (-1, 1)]
     ends = [x + height / math.tan(edge) for edge in edges]
-    axes.fill([x, *ends], [slot + camera.position_m[2], board_m, board_m], color="tab:cyan", alpha=0.25)
-    axes.plot(x, slot, "ko", markerfacecolor="none")
+    axes.fill([x, *ends], [level + camera.position_m[2], board_m, board_m], color="tab:cyan", alpha=0.25)
+    axes.plot(x, level, "ko", markerfacecolor="none")
     axes.plot(0.0, board_m, color=_TARGET_COLOUR, marker="s")
 
 

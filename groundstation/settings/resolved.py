@@ -9,7 +9,7 @@ from groundstation.settings.schema import Field
 from groundstation.settings.target import OneOfTargets, TrackedBody
 
 # Printed so that nobody has to guess what wins; drivers.watchdog is where it is enforced.
-STOP_PRIORITY = "CUT_MOTORS > LAND > HOLD > set-point > TAKEOFF"
+STOP_PRIORITY = "CUT_MOTORS > LAND > HOLD > setpoint > TAKEOFF"
 
 
 def resolved_field(field: Field) -> ResolvedField:
@@ -85,7 +85,7 @@ def _safety_lines(field: Field) -> list[str]:
     safety = field.safety
     return [
         f"who wins: {STOP_PRIORITY}",
-        f"no fresh set-point for {safety.setpoint_lifetime_ms / 1000:g} s: hover;"
+        f"no fresh setpoint for {safety.setpoint_lifetime_ms / 1000:g} s: hover;"
         f" for {safety.land_after_s:g} s: land (until a new take-off)",
         f"not localised for {safety.unseen_land_after_s:g} s, or unseen for three times as long: land;"
         f" position known worse than {safety.max_position_std_m:g} m: hover",

@@ -27,7 +27,7 @@ ROUTER = ProcessSpec(
     restart_delay_s=0.5,
     # Under a flood it forwards, and beats late; without it drones hover and land by themselves.
     hang_limit_s=2.0,
-    nice=_WAITED_FOR,  # with an ordinary share it let set-points wait for 0.7 s
+    nice=_WAITED_FOR,  # with an ordinary share it let setpoints wait for 0.7 s
     stop_order=StopOrder.CONNECTS,
     on_bus=False,
 )
@@ -77,7 +77,7 @@ DRONE = ProcessSpec(  # name and entry are those of the drone
     name="",
     role="driver",
     required=False,  # the others can fly without it
-    nice=_WAITED_FOR,  # the bus thread that brings its set-points: without them it lands what it flies
+    nice=_WAITED_FOR,  # the bus thread that brings its setpoints: without them it lands what it flies
     stop_order=StopOrder.DRIVES,
     stop_limit_s=12.0,  # it lands before it ends
 )
@@ -102,7 +102,7 @@ LIAISON = ProcessSpec(  # name is that of the other host
     role="liaison",
     entry="groundstation.runtime.liaison:run",
     required=False,  # the devices of this host can do without
-    nice=_WAITED_FOR,  # set-points go through it
+    nice=_WAITED_FOR,  # setpoints go through it
     stop_limit_s=30.0,  # the drones there land before it ends
 )
 CONSOLE = ProcessSpec(

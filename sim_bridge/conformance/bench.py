@@ -208,7 +208,7 @@ class Bench:
             self.wait(lambda: abs(self.now.velocity[2]) < 0.1 and self.now.position[2] > 0.4, 6.0, must=False)
 
     def track(self, name: str = "track") -> None:
-        """Take off and let the set-points move it; they say to stand still."""
+        """Take off and let the setpoints move it; they say to stand still."""
         self.connect()
         self.take_off()
         self.spend("hover", 1.0)

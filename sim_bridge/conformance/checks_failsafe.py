@@ -14,40 +14,40 @@ def _modes(case: Case, mark: str) -> set[str]:
 
 @check("silence")
 def silence_brakes(case: Case) -> None:
-    """Without set-points it hovers: 0.3 s later it brakes, after 0.9 s it has lost half of its speed."""
+    """Without setpoints it hovers: 0.3 s later it brakes, after 0.9 s it has lost half of its speed."""
     brakes(case, "silence", 0.95)
 
 
 @check("silence")
 def silence_ends_in_hover(case: Case) -> None:
-    """1.3 s after the last set-point it stands."""
+    """1.3 s after the last setpoint it stands."""
     still(case, "silence", 1.35)
 
 
 @check("silence")
 def moment_of_silence_is_survived(case: Case) -> None:
-    """A silence of 0.4 s changes no mode, and set-points count again at once."""
+    """A silence of 0.4 s changes no mode, and setpoints count again at once."""
     assert _modes(case, "after a pause") == {"TRACK"}, f"modes {_modes(case, 'after a pause')}"
     assert case.record.motion("after a pause")[-1].speed > 0.15, "it stands"
 
 
 @check("silence")
 def long_silence_needs_resume(case: Case) -> None:
-    """After a longer silence set-points move nothing until RESUME."""
-    still(case, "set-points without RESUME", 0.2)
-    assert _modes(case, "set-points without RESUME") == {"HOVER"}
+    """After a longer silence setpoints move nothing until RESUME."""
+    still(case, "setpoints without RESUME", 0.2)
+    assert _modes(case, "setpoints without RESUME") == {"HOVER"}
 
 
 @check("silence")
 def resume_is_answered(case: Case) -> None:
-    """RESUME is RECEIVED, ACCEPTED, and EFFECTIVE once a set-point is obeyed."""
+    """RESUME is RECEIVED, ACCEPTED, and EFFECTIVE once a setpoint is obeyed."""
     stages = case.record.stages("resume after silence", COMMAND_ACK)
     assert stages == [AckStage.RECEIVED, AckStage.ACCEPTED, AckStage.EFFECTIVE], " ".join(stages)
 
 
 @check("silence")
 def lasting_silence_lands(case: Case) -> None:
-    """3 s after the last set-point it lands."""
+    """3 s after the last setpoint it lands."""
     case.record.span("until it lands")
     after = case.record.facts["landing after"]
     assert 2.7 < after < 3.8, f"after {after:.1f} s"
@@ -55,7 +55,7 @@ def lasting_silence_lands(case: Case) -> None:
 
 @check("silence")
 def landing_is_latched(case: Case) -> None:
-    """Set-points do not stop a landing."""
+    """Setpoints do not stop a landing."""
     lands(case, "landing")
     heights = [one.position[2] for one in case.record.motion("latched")]
     assert max(heights) - heights[0] < 0.15, f"it rose by {max(heights) - heights[0]:.2f} m"
@@ -71,13 +71,13 @@ def landing_refuses_orders(case: Case) -> None:
 
 @check("silence")
 def landed_stays_down(case: Case) -> None:
-    """After a landing by failsafe it stays down while set-points come."""
+    """After a landing by failsafe it stays down while setpoints come."""
     assert not [one for one in case.record.motion("landed", 0.3) if not one.on_ground or one.motors], "it rose"
 
 
 @check("epochs")
 def new_epoch_moves_nothing(case: Case) -> None:
-    """Set-points of a new epoch move nothing before RESUME."""
+    """Setpoints of a new epoch move nothing before RESUME."""
     still(case, "new epoch without RESUME")
 
 
@@ -90,25 +90,25 @@ def new_epoch_needs_resume(case: Case) -> None:
 
 @check("epochs")
 def new_epoch_counts_after_resume(case: Case) -> None:
-    """RESUME lets the new epoch's set-points count."""
+    """RESUME lets the new epoch's setpoints count."""
     assert case.record.motion("new epoch resumed")[-1].speed > 0.2, "it stands"
 
 
 @check("epochs")
 def old_epoch_moves_nothing(case: Case) -> None:
-    """Set-points of an older epoch move nothing."""
+    """Setpoints of an older epoch move nothing."""
     still(case, "old epoch")
 
 
 @check("epochs")
 def old_sequence_moves_nothing(case: Case) -> None:
-    """Set-points with an older sequence number move nothing."""
+    """Setpoints with an older sequence number move nothing."""
     still(case, "old sequence")
 
 
 @check("epochs")
 def other_source_moves_nothing(case: Case) -> None:
-    """Set-points of anybody but the tracker move nothing, and are counted."""
+    """Setpoints of anybody but the tracker move nothing, and are counted."""
     still(case, "other source")
     counted = case.record.heard(VEHICLE_STATUS, "epoch far ahead")[-1].message.rejected
     assert counted.get("setpoint_other_source"), f"refused: {counted}"
@@ -116,14 +116,14 @@ def other_source_moves_nothing(case: Case) -> None:
 
 @check("epochs")
 def epoch_far_ahead_moves_nothing(case: Case) -> None:
-    """A set-point of an epoch far ahead does not make the true ones look old."""
+    """A setpoint of an epoch far ahead does not make the true ones look old."""
     still(case, "epoch far ahead")
     assert _modes(case, "epoch far ahead") == {"TRACK"}, f"{_modes(case, 'epoch far ahead')}"
 
 
 @check("epochs")
 def unconverged_moves_nothing(case: Case) -> None:
-    """Set-points of a tracker that does not know where the vehicle is move nothing."""
+    """Setpoints of a tracker that does not know where the vehicle is move nothing."""
     still(case, "not converged")
 
 
@@ -178,7 +178,7 @@ def frozen_supervisor_brakes(case: Case) -> None:
 
 @check("orphaned")
 def supervisor_is_obeyed_again(case: Case) -> None:
-    """When the supervisor goes on within a second, set-points count again."""
+    """When the supervisor goes on within a second, setpoints count again."""
     assert case.record.motion("supervisor again")[-1].speed > 0.15, "it stands"
 
 

@@ -1,4 +1,4 @@
-"""Checks of a flight by orders and set-points: units, signs, rates, answers."""
+"""Checks of a flight by orders and setpoints: units, signs, rates, answers."""
 
 import math
 
@@ -43,25 +43,25 @@ def _leg(case: Case, mark: str) -> None:
 
 @check("square")
 def forward_is_forward(case: Case) -> None:
-    """A set-point along x flies forward, by metres per second."""
+    """A setpoint along x flies forward, by metres per second."""
     _leg(case, "forward")
 
 
 @check("square")
 def left_is_left(case: Case) -> None:
-    """A set-point along y flies to the left."""
+    """A setpoint along y flies to the left."""
     _leg(case, "left")
 
 
 @check("square")
 def back_is_back(case: Case) -> None:
-    """A set-point against x flies backward."""
+    """A setpoint against x flies backward."""
     _leg(case, "back")
 
 
 @check("square")
 def right_is_right(case: Case) -> None:
-    """A set-point against y flies to the right."""
+    """A setpoint against y flies to the right."""
     _leg(case, "right")
 
 
@@ -81,13 +81,13 @@ def _climb(case: Case, mark: str, wanted: float) -> None:
 
 @check("square")
 def up_is_up(case: Case) -> None:
-    """A set-point along z climbs."""
+    """A setpoint along z climbs."""
     _climb(case, "up", CLIMB_S * CLIMB_M_S)
 
 
 @check("square")
 def down_is_down(case: Case) -> None:
-    """A set-point against z descends."""
+    """A setpoint against z descends."""
     _climb(case, "down", -CLIMB_S * CLIMB_M_S)
 
 
@@ -100,7 +100,7 @@ def turn_is_counter_clockwise(case: Case) -> None:
 
 @check("square")
 def forward_turns_with_it(case: Case) -> None:
-    """After a turn a set-point along x flies along the new heading."""
+    """After a turn a setpoint along x flies along the new heading."""
     forward, left = _way(case, "forward after the turn", 0.4)
     assert forward > _LEAST * SPEED_M_S * LEG_S, f"{forward:.2f} m forward"
     assert abs(left) < _ASIDE * SPEED_M_S * LEG_S, f"{left:.2f} m aside"
@@ -123,7 +123,7 @@ def hovers_still(case: Case) -> None:
 
 @check("square")
 def take_off_ends_in_hover(case: Case) -> None:
-    """After TAKEOFF it is aloft, waits in HOVER, and no set-point moves it."""
+    """After TAKEOFF it is aloft, waits in HOVER, and no setpoint moves it."""
     modes = {one.message.mode for one in case.record.heard(VEHICLE_STATUS, "hover")}
     assert modes == {"HOVER"}, f"modes {modes}"
     assert case.record.motion("hover")[-1].position[2] > 0.3, "it is too low"
@@ -138,7 +138,7 @@ def take_off_is_answered(case: Case) -> None:
 
 @check("square")
 def track_is_answered(case: Case) -> None:
-    """TRACK is RECEIVED, ACCEPTED, and EFFECTIVE once a set-point is obeyed."""
+    """TRACK is RECEIVED, ACCEPTED, and EFFECTIVE once a setpoint is obeyed."""
     stages = case.record.stages("track", COMMAND_ACK)
     assert stages == _DONE, " ".join(stages)
 
@@ -151,8 +151,8 @@ def hold_is_answered(case: Case) -> None:
 
 
 @check("square")
-def hold_goes_before_set_points(case: Case) -> None:
-    """In HOLD set-points move nothing."""
+def hold_goes_before_setpoints(case: Case) -> None:
+    """In HOLD setpoints move nothing."""
     speed = max(one.speed for one in case.record.motion("held", 1.3))
     assert speed < 0.25, f"{speed:.2f} m/s"
 
@@ -173,7 +173,7 @@ def lands(case: Case) -> None:
 
 @check("square")
 def stays_down(case: Case) -> None:
-    """Once landed it stays down while set-points still come."""
+    """Once landed it stays down while setpoints still come."""
     assert not [one for one in case.record.motion("landed", 0.3) if not one.on_ground or one.motors], "it rose again"
 
 

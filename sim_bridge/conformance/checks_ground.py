@@ -107,9 +107,9 @@ def hold_and_land_are_answered_on_the_ground(case: Case) -> None:
 
 
 @check("stand")
-def set_points_lift_nothing(case: Case) -> None:
-    """Set-points to a standing vehicle start no motor."""
-    _stays(case, "set-points on the ground")
+def setpoints_lift_nothing(case: Case) -> None:
+    """Setpoints to a standing vehicle start no motor."""
+    _stays(case, "setpoints on the ground")
 
 
 @check("stand")

@@ -20,7 +20,7 @@ _SETTLES_S = 1.2
 
 @script(limits=NARROW)
 def _limits(bench: Bench) -> None:
-    """Low limits in the field file, and set-points that ask for twice as much."""
+    """Low limits in the field file, and setpoints that ask for twice as much."""
     bench.track()
     for mark, velocity, turn in (
         ("too fast ahead", (2.0 * NARROW.max_speed_m_s, 0.0, 0.0), 0.0),

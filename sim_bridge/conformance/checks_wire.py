@@ -152,7 +152,7 @@ def damage_aloft_makes_nothing_faster(case: Case) -> None:
 
 @check("damaged_aloft")
 def damage_aloft_keeps_the_failsafe(case: Case) -> None:
-    """Without set-points it stands 1.35 s later, and LAND lands it, all under damage."""
+    """Without setpoints it stands 1.35 s later, and LAND lands it, all under damage."""
     speed = max(one.speed for one in case.record.motion("silence under damage", 1.35))
     assert speed < 0.2, f"{speed:.2f} m/s"
     lands(case, "landing under damage")

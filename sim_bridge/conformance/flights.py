@@ -38,7 +38,7 @@ def _stand(bench: Bench) -> None:
         bench.order("take off of another", Verb.TAKEOFF, limit_s=0.6, scope=("somebody",))
         bench.order("hold on the ground", Verb.HOLD)
         bench.order("land on the ground", Verb.LAND)
-        bench.fly("set-points on the ground", (SPEED_M_S, 0.0, 0.0), 0.0, 0.5)
+        bench.fly("setpoints on the ground", (SPEED_M_S, 0.0, 0.0), 0.0, 0.5)
     bench.speak("hover", 1.0)
     bench.speak("land", 0.5)
     bench.room.do(lambda: setattr(bench.room.body, "battery", LOW_BATTERY))
@@ -105,7 +105,7 @@ def _silence(bench: Bench) -> None:
     bench.up.speaks = False
     bench.spend("silence", 1.5)
     bench.up.speaks = True
-    bench.spend("set-points without RESUME", 1.0)
+    bench.spend("setpoints without RESUME", 1.0)
     bench.up.wanted = ((0.0, 0.0, 0.0), 0.0)
     bench.begin_tracking("resume after silence", Verb.RESUME)
     bench.up.speaks = False
@@ -125,7 +125,7 @@ def _silence(bench: Bench) -> None:
 
 @script()
 def _epochs(bench: Bench) -> None:
-    """Set-points that must not count: old, foreign, unconverged, of a tracker that was started again."""
+    """Setpoints that must not count: old, foreign, unconverged, of a tracker that was started again."""
     bench.track()
     odd = ((SPEED_M_S, 0.0, 0.0), 0.0)
     up = bench.up

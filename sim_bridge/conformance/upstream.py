@@ -39,8 +39,8 @@ _STILL = (0.0, 0.0, 0.0)
 class Upstream:
     """Speaks every 20 ms, by a thread. What is set here is what is said next.
 
-    leases, beats, sees, speaks: whether there are leases, beats of the supervisor, estimates, set-points; wanted:
-    velocity [m/s; base_stabilized] and turn [rad/s] of the set-points; converged, epoch: as they say.
+    leases, beats, sees, speaks: whether there are leases, beats of the supervisor, estimates, setpoints; wanted:
+    velocity [m/s; base_stabilized] and turn [rad/s] of the setpoints; converged, epoch: as they say.
     """
 
     def __init__(self, bus: Bus, stranger: Bus, beats: HeartbeatBlock, record: Record) -> None:
@@ -97,7 +97,7 @@ class Upstream:
         return (EntityEstimate(NAME, "robot", mean, _COVARIANCE, now.velocity, True, 0.0),)
 
     def setpoint(self, bus: Bus, **changes: object) -> VelocitySetpoint:
-        """Return the present set-point, with changes of its fields."""
+        """Return the present setpoint, with changes of its fields."""
         velocity, turn = self.wanted
         made = VelocitySetpoint(
             header=bus.header(NAME),
@@ -115,7 +115,7 @@ class Upstream:
             heard.extend(Heard(time.monotonic_ns(), received) for received in subscription.drain())
 
     def say(self, name: str, setpoint: VelocitySetpoint, seq: int | None = None) -> None:
-        """Publish one odd set-point, of the tracker or, by name "stranger", of somebody else."""
+        """Publish one odd setpoint, of the tracker or, by name "stranger", of somebody else."""
         if seq is not None:
             setpoint = msgspec.structs.replace(setpoint, header=msgspec.structs.replace(setpoint.header, seq=seq))
         with self._lock:

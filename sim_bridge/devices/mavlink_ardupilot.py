@@ -115,7 +115,7 @@ class ArduCopter(AutopilotFirmware):
         return Steering.LEVEL if mode in _LEVEL else Steering.HOLD
 
     def watch(self, ground_silence_s: float) -> None:
-        """Brake when set-points stop; land when the ground or the position is lost."""
+        """Brake when setpoints stop; land when the ground or the position is lost."""
         if self.mode == Mode.GUIDED and not self._braked and self.setpoint_age_s > self.parameters["GUID_TIMEOUT"]:
             self._braked = True
             self.copter.fly((0.0, 0.0, 0.0), 0.0)

@@ -1,6 +1,6 @@
 """Shared parts of both emulated autopilots: arming, mode, setpoints, landing, telemetry. No sockets.
 
-Times are seconds of the world. Set-points arrive in MAVLink's frames and are turned into the world's here, by this
+Times are seconds of the world. Setpoints arrive in MAVLink's frames and are turned into the world's here, by this
 file's own signs.
 """
 
@@ -97,7 +97,7 @@ class AutopilotFirmware:
         return MavResult.UNSUPPORTED, ""
 
     def fly(self, setpoint: SetPositionTargetLocalNed) -> None:
-        """Take a set-point.
+        """Take a setpoint.
 
         WIRE (docs/reference/mavlink.md 5.1): frames and masks that are not understood are refused aloud.
         """
@@ -174,12 +174,12 @@ class AutopilotFirmware:
 
     @property
     def setpoint_age_s(self) -> float:
-        """Return the time since the last good set-point."""
+        """Return the time since the last good setpoint."""
         return self.now_s - self._setpoint_s
 
     @property
     def streams(self) -> bool:
-        """Whether set-points have kept coming for a second."""
+        """Whether setpoints have kept coming for a second."""
         return self.setpoint_age_s < 0.5 and self.now_s - self._stream_s >= 1.0
 
     @property

@@ -24,7 +24,7 @@ _LEVEL = (ALTITUDE, px4_mode(Px4Main.STABILIZED), px4_mode(Px4Main.MANUAL))
 
 
 class Px4(AutopilotFirmware):
-    """OFFBOARD needs a stream of set-points to arm and to stay in."""
+    """OFFBOARD needs a stream of setpoints to arm and to stay in."""
 
     flavour = Flavour.PX4
     guided = OFFBOARD
@@ -104,7 +104,7 @@ class Px4(AutopilotFirmware):
         return Steering.LEVEL if mode in _LEVEL else Steering.HOLD
 
     def watch(self, ground_silence_s: float) -> None:
-        """Leave OFFBOARD when set-points stop; level out when the position is lost."""
+        """Leave OFFBOARD when setpoints stop; level out when the position is lost."""
         if self.mode == OFFBOARD and self.setpoint_age_s > self.parameters["COM_OF_LOSS_T"] + _GRANULARITY_S:
             self._fail(_LOSS_MODES.get(int(self.parameters["COM_OBL_RC_ACT"]), POSITION))
         if self.copter.estimate.aided_s > _VISION_LOST_S and self.mode not in (*_LEVEL, LAND):

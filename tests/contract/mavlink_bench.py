@@ -75,7 +75,7 @@ class Bench:
         )
 
     def up(self):
-        """Hover at about 1 m, obeying set-points."""
+        """Hover at about 1 m, obeying setpoints."""
         self.run(1.0)
         if self.firmware.flavour is Flavour.PX4:
             self.fly()

@@ -28,7 +28,7 @@ _FLIES_M_S = 0.25
 
 
 class TimedSocket:
-    """An emulator's socket that notes when set-points arrived [s]."""
+    """An emulator's socket that notes when setpoints arrived [s]."""
 
     def __init__(self, udp: Any) -> None:
         self._udp, self._times, self.setpoints_s = udp, ArrivalTimes(udp), list[float]()
@@ -109,5 +109,5 @@ def described(gaps_s: Any) -> str:
 
 
 def is_on_time(quiet: Any, ridden: Any) -> bool:
-    """Return whether gaps between set-points are as even as they were without a rider."""
+    """Return whether gaps between setpoints are as even as they were without a rider."""
     return bool(np.percentile(ridden, 99) <= UNEVEN * np.percentile(quiet, 99) and max(ridden) < VEHICLE_WAITS_S)

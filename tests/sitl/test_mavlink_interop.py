@@ -206,7 +206,7 @@ class Tracked:
         assert until(asked), self.texts
 
     def track(self):
-        """Take off, and fly by the stand-in's set-points."""
+        """Take off, and fly by the stand-in's setpoints."""
         assert until(lambda: self.watchdog.mode == "LANDED" and not self.watchdog.vehicle.not_ready), self.texts
         self.order(Verb.TAKEOFF, lambda: self.watchdog.mode == "HOVER" and self._copter.airframe.z > 0.6)
         self.order(Verb.TRACK, lambda: self.speed_m_s > 0.25)
@@ -247,7 +247,7 @@ def test_mavproxy_rides_along_and_may_only_stop(proxy_at, hangar, port, flavour)
         assert until(lambda: firmware.mode != firmware.guided), tracked.texts
         held = firmware.mode
         assert until(lambda: tracked.speed_m_s < 0.1), "it brakes"
-        for _ in range(40):  # the tracker's set-points go on, and move nothing
+        for _ in range(40):  # the tracker's setpoints go on, and move nothing
             time.sleep(0.1)
             assert firmware.mode == held and tracked.speed_m_s < 0.2, tracked.texts
         tracked.order(Verb.RESUME, lambda: firmware.mode == firmware.guided and tracked.speed_m_s > 0.25)

@@ -47,7 +47,7 @@ def test_each_flavour_stops_by_its_own_time_out(hangar, port, link, number, tmp_
     place = ("127.0.0.1", port)
     flown = {}
     for flavour, system in (("px4", 11), ("ardupilot", 12)):
-        # Poses go on: it is the silence of the set-points and of the heartbeat that must act, not that of the cameras.
+        # Poses go on: it is the silence of the setpoints and of the heartbeat that must act, not that of the cameras.
         flown[flavour] = hangar.add(flavour, system, calls=place, aided=True)[:2]
     places = np.memmap(tmp_path / "places", dtype=float, mode="w+", shape=(len(flown), 4))
     with (tmp_path / "pilot.txt").open("wb") as sink:

@@ -1,4 +1,4 @@
-"""A second ground station that floods a forwarded link: set-points go out as evenly as without it, stops pass."""
+"""A second ground station that floods a forwarded link: setpoints go out as evenly as without it, stops pass."""
 
 import itertools
 import socket
@@ -58,7 +58,7 @@ def flood(rider, place):
 
 
 @needing_processors()
-def test_a_flood_neither_delays_set_points_nor_hides_a_stop(hangar, port, rider, tmp_path):
+def test_a_flood_neither_delays_setpoints_nor_hides_a_stop(hangar, port, rider, tmp_path):
     with ridden(hangar, port, tmp_path, rider.getsockname()[1]) as flight:
         place, wire = way_to(rider, STOPPED), flight.wires[FLOWN]
         quiet_s = time.monotonic()

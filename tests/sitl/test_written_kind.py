@@ -69,7 +69,7 @@ def test_a_wrong_sign_is_found(puffin, tmp_path):
     assert right in driver.read_text()
     driver.write_text(driver.read_text().replace(right, right.removeprefix("-")))
     result = checked(puffin, "left_is_left")
-    assert result.returncode == 1 and "FAIL  A set-point along y flies to the left" in result.stdout
+    assert result.returncode == 1 and "FAIL  A setpoint along y flies to the left" in result.stdout
 
 
 def test_the_page_s_driver_is_short():

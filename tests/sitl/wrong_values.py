@@ -88,7 +88,7 @@ def _moves(heard: list[tuple[float, bool, bool]], now_s: float) -> bool:
 
 
 def _follows(run: SitlRun, drone: str, now_s: float) -> bool:
-    """Return whether a drone's driver follows set-points: one that brakes a blind drone tells it to move as well."""
+    """Return whether a drone's driver follows setpoints: one that brakes a blind drone tells it to move as well."""
     known = run.history[VEHICLE_STATUS.name, drone]
     _, status = known[max(0, bisect_right(known, now_s, key=lambda entry: entry[0]) - 1)]
     return isinstance(status, VehicleStatus) and status.mode == "TRACK" and not status.braked

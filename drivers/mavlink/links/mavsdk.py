@@ -5,7 +5,7 @@ names as on the other links, and each vehicle has a Mavsdk object of its own. Wi
 name no target (poses, clock answers) would go to every vehicle on the port.
 
 Messages go through `mavlink_direct`, whose JSON is made from tuples with all fields: a missing one would be sent as 0.
-Its offboard plugin, which repeats the last set-point by itself, is not used; nor is its clock synchronisation, because
+Its offboard plugin, which repeats the last setpoint by itself, is not used; nor is its clock synchronisation, because
 the poses that we feed are stamped on our own boot clock. It keeps the ground station's heartbeat alive by itself.
 """
 

@@ -15,7 +15,7 @@ from drivers.mavlink.wire.names import Flavour, MavResult
 from drivers.mavlink.wire.service import FileTransferProtocol
 from groundstation.time_units import NS_PER_S
 
-# What passes besides stops: enough for a table of parameters in half a minute, too little to make set-points late.
+# What passes besides stops: enough for a table of parameters in half a minute, too little to make setpoints late.
 _FRAMES_PER_S = 50
 _AUTOPILOT = 1
 _ANSWERED_NS = 3 * NS_PER_S

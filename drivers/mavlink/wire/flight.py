@@ -6,7 +6,7 @@ Floats = tuple[float, ...]
 
 
 class SetPositionTargetLocalNed(NamedTuple):
-    """A set-point; a bit of type_mask that is set means: ignore this.
+    """A setpoint; a bit of type_mask that is set means: ignore this.
 
     WIRE (docs/reference/mavlink.md 5.1): frame 8 rotates the velocity by the current heading; both accept 1 and 8 only.
     """

@@ -149,7 +149,7 @@ def px4_mode(main: int, sub: int = 0) -> int:
 
 
 def guided_mode(flavour: Flavour) -> int:
-    """Return the custom_mode in which set-points are obeyed."""
+    """Return the custom_mode in which setpoints are obeyed."""
     return px4_mode(Px4Main.OFFBOARD) if flavour is Flavour.PX4 else CopterMode.GUIDED
 
 

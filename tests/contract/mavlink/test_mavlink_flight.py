@@ -230,7 +230,7 @@ def test_pilots_mode_change_is_not_fought(rig):
 
 
 @pytest.mark.parametrize("verb", [Verb.RESUME, Verb.TRACK])
-def test_what_a_pilot_took_is_given_back_by_an_order_and_not_by_set_points_that_come_again(rig, verb):
+def test_what_a_pilot_took_is_given_back_by_an_order_and_not_by_setpoints_that_come_again(rig, verb):
     """The tracker pauses for less than it takes to need a RESUME: that is no order to take the vehicle from a pilot."""
     rig.track_on()
     firmware = rig.emulator.firmware

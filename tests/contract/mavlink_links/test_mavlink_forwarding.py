@@ -182,7 +182,7 @@ def test_a_file_is_refused_aloud_so_that_it_asks_for_parameters_at_once(ground):
     nothing_comes(ground.station)
 
 
-def test_set_points_heartbeats_parameters_and_garbage_do_not_pass_and_stops_behind_them_do(ground):
+def test_setpoints_heartbeats_parameters_and_garbage_do_not_pass_and_stops_behind_them_do(ground):
     setpoint = SetPositionTargetLocalNed(0, 11, 1, 8, 0x5C7, *(0.0,) * 11)
     ground.order(setpoint, HEARTBEAT, ParamRequestList(11, 1))
     ground.send_raw(b"\xfd\x09garbage")

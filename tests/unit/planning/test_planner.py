@@ -212,7 +212,7 @@ def test_an_observer_settles_about_as_far_behind_as_above() -> None:
     assert abs(math.remainder(facing - pose[3], math.tau)) < 0.3
 
 
-def test_three_robots_have_plans_with_three_levels_of_slots() -> None:
+def test_three_robots_have_plans_with_three_levels() -> None:
     sensors = replace(
         SENSORS,
         onboard=dict(SENSORS.onboard) | {"drone_3": SENSORS.onboard["drone_1"]},

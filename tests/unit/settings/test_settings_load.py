@@ -10,7 +10,7 @@ import pytest
 from groundstation.errors import SettingsError
 from groundstation.geometry.board import VALID_CODES
 from groundstation.settings.document import SourceLine, dotted, parse
-from groundstation.settings.drawing import footprint, marker_height, paths_of, slots
+from groundstation.settings.drawing import footprint, level_heights, marker_height, paths_of
 from groundstation.settings.files import SHIPPED, find_field, find_scenario
 from groundstation.settings.json_schema import field_file_schema
 from groundstation.settings.levels import merged
@@ -157,7 +157,7 @@ def test_the_json_schema_knows_every_key_of_the_file() -> None:
 
 def test_the_summary_names_who_wins(field: Field) -> None:
     text = summary_of(field)
-    assert "CUT_MOTORS > LAND > HOLD > set-point > TAKEOFF" in text
+    assert "CUT_MOTORS > LAND > HOLD > setpoint > TAKEOFF" in text
     assert "drone drone_1: ardrone at 192.168.1.11" in text
     assert "lands below 15% battery held 3 s" in text
 
@@ -219,7 +219,7 @@ def test_scenarios_are_judged_by_the_simulator_and_worded_here(tmp_path: Path) -
 
 def test_the_drawing_is_to_scale(field: Field) -> None:
     ceiling = field.cameras["ceiling"]
-    assert slots(field) == [2.2, 1.3]
+    assert level_heights(field) == [2.2, 1.3]
     assert marker_height(field, 2.2) == pytest.approx(2.28)
     assert footprint(ceiling, 2.2) == pytest.approx((2.0 * 640 / 1179, 2.0 * 360 / 1179))
     assert footprint(ceiling, 9.0) == (0, 0)

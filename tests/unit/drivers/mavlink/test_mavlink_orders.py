@@ -14,7 +14,7 @@ TAKE_OFF_M = 0.8
 
 
 class Climb:
-    """A vehicle that follows its set-points at once; `seen`: the tracker knows where it is."""
+    """A vehicle that follows its setpoints at once; `seen`: the tracker knows where it is."""
 
     def __init__(self, flavour, seen):
         vehicle = VehicleSettings(name="v", system_id=1, flavour=flavour.name.lower(), take_off_m=TAKE_OFF_M)

@@ -136,7 +136,7 @@ class VehicleHost:
         return "" if view.flight_state in AIRBORNE else self._neighbours.obstacle(now_ns)
 
     def is_finished(self, now_ns: int) -> bool:
-        """Whether a driver that is to exit may: no motor turns any more, or the vehicle was silent too long."""
+        """Return whether a driver that is to exit may: no motor turns any more, or the vehicle was silent too long."""
         if not self._child.stop_requested and self._child.supervisor_alive:
             return False
         state, mode = self.watchdog.vehicle, self.watchdog.mode

@@ -70,7 +70,7 @@ class SetpointGate:
 
     @property
     def foreign(self) -> bool:
-        """Whether setpoints of a newer epoch than the authorised one arrive."""
+        """Return whether setpoints of a newer epoch than the authorised one arrive."""
         return self.newest is not None and self.epoch is not None and self.newest.epoch != self.epoch
 
     def adopt(self, now_ns: int) -> bool:

@@ -32,7 +32,7 @@ class MotionMean:
 
     @property
     def repeats(self) -> bool:
-        """Whether a horizontal velocity stands still to the last bit: the drone does not see its own motion."""
+        """Return whether a horizontal velocity stands still to the last bit: the drone does not see its own motion."""
         return max(self._standing) >= _REPEATED
 
     def drain(self) -> tuple[tuple[float, float, float], tuple[float, float] | None]:

@@ -67,7 +67,7 @@ class Inquirer(Protocol):
 
     @property
     def listening(self) -> bool:
-        """Whether a dump would be heard."""
+        """Return whether a dump would be heard."""
 
     def ask_version(self) -> None:
         """Begin to read version.txt."""

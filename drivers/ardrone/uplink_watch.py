@@ -28,7 +28,7 @@ class UplinkWatch:
 
     @property
     def cut(self) -> bool:
-        """Whether the operator was told that commands do not arrive, and they still do not."""
+        """Return whether the operator was told that commands do not arrive, and they still do not."""
         return self._told
 
     def step(self, now_ns: int, obeyed: int, flies: bool) -> Notice | None:

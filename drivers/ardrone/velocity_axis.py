@@ -85,7 +85,7 @@ class Axis:
 
     @property
     def contradicted(self) -> bool:
-        """Whether the measured speed is not the one that the requests must have brought."""
+        """Return whether the measured speed is not the one that the requests must have brought."""
         return self._unexplained_m > self._gains.doubt_m
 
     def stand(self, force_m_s2: float, dt_s: float) -> None:

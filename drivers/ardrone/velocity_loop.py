@@ -48,7 +48,7 @@ class VelocityLoop:
 
     @property
     def contradicted(self) -> bool:
-        """Whether the measured velocity contradicts the commanded one."""
+        """Return whether the measured velocity contradicts the commanded one."""
         return self._flying and any(axis.contradicted for axis in self._axes)
 
     def reset(self) -> None:

@@ -76,7 +76,7 @@ class Subscription:
 
     @property
     def waiting(self) -> bool:
-        """Whether something arrived since the last drain."""
+        """Return whether something arrived since the last drain."""
         return self._arrived.is_set()
 
     def drain_samples(self) -> list[Sample]:

@@ -19,5 +19,5 @@ class StopMark:
         return cls(given_ns, f"{stop.verb} by {stop.issuer} came after it")
 
     def overtakes(self, start_ns: int) -> bool:
-        """Whether a start was given before it [ns; boot clock]."""
+        """Return whether a start was given before it [ns; boot clock]."""
         return start_ns < self.given_ns

@@ -48,7 +48,7 @@ class DemoOutcome:
 
     @property
     def passed(self) -> bool:
-        """Whether both the exit code and the report say so."""
+        """Return whether both the exit code and the report say so."""
         return self.exit_code == 0 and self.report is not None and self.report.get("passed") is True
 
     @property

@@ -31,7 +31,7 @@ class Followed:
 
     @property
     def is_repeated(self) -> bool:
-        """Whether it was given here, and an answer is still waited for."""
+        """Return whether it was given here, and an answer is still waited for."""
         return bool(self.by) and not self.closed
 
 

@@ -15,7 +15,7 @@ class OperatorLock:
     _left_ns: int = 0
 
     def may_start(self, client: str) -> bool:
-        """Whether a viewer may give starting orders: as the operator, or where there is none."""
+        """Return whether a viewer may give starting orders: as the operator, or where there is none."""
         return self.client in ("", client)
 
     def take(self, client: str, name: str) -> str:

@@ -142,7 +142,7 @@ class ConsoleServer:
 
     @property
     def ended(self) -> bool:
-        """Whether the run was announced to end."""
+        """Return whether the run was announced to end."""
         return self._end is not None
 
     @property

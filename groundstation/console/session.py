@@ -93,7 +93,7 @@ class Sessions:
             self.operator_lock.left(viewer.client, clock.now_ns())
 
     def is_operators(self, hello: Hello) -> bool:
-        """Whether this is said by a page of the operator."""
+        """Return whether this is said by a page of the operator."""
         return self.operator_lock.client == hello.client and self._has_token(hello)
 
     def summary(self, now_ns: int) -> dict[str, Any]:

@@ -51,7 +51,7 @@ class PageConnection:
 
     @property
     def is_behind(self) -> bool:
-        """Whether the board holds what was not sent yet."""
+        """Return whether the board holds what was not sent yet."""
         return self._turn < self._board.turn
 
     def notice(self) -> None:
@@ -82,7 +82,7 @@ class PageConnection:
         self._wake.set()
 
     def may_speak(self) -> bool:
-        """Whether the page keeps to the rate at which pages may speak."""
+        """Return whether the page keeps to the rate at which pages may speak."""
         now = time.monotonic()
         self._allowance = min(_BURST, self._allowance + (now - self._allowance_at) * _RATE_PER_S)
         self._allowance_at = now

@@ -115,7 +115,7 @@ class Lookout:
 
     @property
     def _obeyed(self) -> bool:
-        """Whether any robot flies where the search wants it: not while all hold or land."""
+        """Return whether any robot flies where the search wants it: not while all hold or land."""
         return _OBEYS in self._modes.values()
 
     def _unseen_s(self, now_ns: int, ages_s: Mapping[str, float]) -> Mapping[str, float]:

@@ -97,7 +97,7 @@ class Flight:
         unwell = self._supervisor.unwell
         return f"NOT WELL YET (see above): {', '.join(unwell)}" if unwell else "all processes are ready"
 
-    # --- look ----------------------------------------------------------------------------------------------------
+    # -- look ----------------------------------------------------------------------------------------------------
 
     def _look(self, operator: Operator, checks: BeforeTakeOff) -> bool:
         """Wait for what the checks before the take-off judge, and say what they find; return whether that is all."""
@@ -110,7 +110,7 @@ class Flight:
                 return self._plan.look_only
         return False
 
-    # --- fly -----------------------------------------------------------------------------------------------------
+    # -- fly -----------------------------------------------------------------------------------------------------
 
     def _fly(self, operator: Operator) -> str:
         """Go on until there is a reason to land; returns the reason if it is a failure."""
@@ -187,7 +187,7 @@ class Flight:
         if not self._prompting:
             self._start.show_screen()
 
-    # --- land ----------------------------------------------------------------------------------------------------
+    # -- land ----------------------------------------------------------------------------------------------------
 
     def _land(self, operator: Operator) -> bool:
         """Land everybody and wait; returns whether all said that they have landed."""

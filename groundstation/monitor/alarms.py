@@ -48,7 +48,7 @@ class Alarm:
 
     @property
     def asks(self) -> bool:
-        """Whether an operator must do something now."""
+        """Return whether an operator must do something now."""
         return self.advice.startswith(_TO_DO)
 
 

@@ -134,19 +134,19 @@ class Child:
 
     @property
     def supervisor_alive(self) -> bool:
-        """Whether the supervisor lives; once False: a driver hovers, lands and exits, others exit."""
+        """Return whether the supervisor lives; once False: a driver hovers, lands and exits, others exit."""
         return self._parent.alive
 
     @property
     def supervisor_fresh(self) -> bool:
-        """Whether the supervisor's own heartbeat is younger than 0.3 s (False while it is frozen)."""
+        """Return whether the supervisor's own heartbeat is younger than 0.3 s (False while it is frozen)."""
         if self._block is None:
             return True
         return self._block.age_ns(SUPERVISOR_SLOT, time.monotonic_ns()) < _SUPERVISOR_STALE_NS
 
     @property
     def run_ends(self) -> bool:
-        """Whether the supervisor stops the processes of the run, so that no order reaches a drone any more."""
+        """Return whether the supervisor stops the processes of the run, so that no order reaches a drone any more."""
         return self._block is not None and self._block.state(SUPERVISOR_SLOT) is SlotState.STOPPING
 
     @property

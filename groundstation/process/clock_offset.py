@@ -58,7 +58,7 @@ class OffsetFilter:
 
     @property
     def known(self) -> bool:
-        """Whether there were round trips enough."""
+        """Return whether there were round trips enough."""
         return self._trips >= _TRIPS_TO_START
 
     @property

@@ -26,7 +26,7 @@ class ParentWatch:
 
     @property
     def alive(self) -> bool:
-        """Whether the parent lives; once False it stays False."""
+        """Return whether the parent lives; once False it stays False."""
         if not self._dead:
             self._dead = bool(self._poll.poll(0)) if self.descriptor >= 0 else os.getppid() != self._pid
         return not self._dead

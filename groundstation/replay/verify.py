@@ -71,7 +71,7 @@ class Comparison:
 
     @property
     def identical(self) -> bool:
-        """Whether every recorded word of the tracker was repeated, and there were any."""
+        """Return whether every recorded word of the tracker was repeated, and there were any."""
         return not (self.differing or self.fragments or self.missing_count) and bool(self.same)
 
     @property

@@ -17,7 +17,7 @@ class Progress:
 
     @property
     def settled(self) -> bool:
-        """Whether the last expected answer has arrived."""
+        """Return whether the last expected answer has arrived."""
         return self.stage in (AckStage.EFFECTIVE, AckStage.REFUSED)
 
     def text(self, final: bool = False) -> str:
@@ -71,10 +71,10 @@ class AwaitedAnswers:
 
     @property
     def settled(self) -> bool:
-        """Whether all answers are final."""
+        """Return whether all answers are final."""
         return all(progress.settled for progress in self.progress.values())
 
     @property
     def confirmed(self) -> bool:
-        """Whether the command took effect on every drone."""
+        """Return whether the command took effect on every drone."""
         return all(progress.stage is AckStage.EFFECTIVE for progress in self.progress.values())

@@ -89,7 +89,7 @@ class Liaison:
 
     @property
     def serving(self) -> bool:
-        """Whether the host said last that it serves this run."""
+        """Return whether the host said last that it serves this run."""
         return self._newest is not None and self._newest.run == self._bus.run
 
     def silent(self, now_ns: int) -> bool:

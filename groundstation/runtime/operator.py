@@ -79,7 +79,7 @@ class Operator:
         self._next_lease_ns = 0
         self._count = 0
 
-    # --- orders --------------------------------------------------------------------------------------------------
+    # -- orders --------------------------------------------------------------------------------------------------
 
     def take_off(self, now_ns: int, drones: tuple[str, ...] = (), anyway: bool = False, given_ns: int = 0) -> None:
         """Take off, all or given drones, then track, unless `forbidden`, as by a stop after given_ns (0: given now)."""
@@ -122,7 +122,7 @@ class Operator:
             self._end_starts(stop, now_ns)
 
     def landed(self, now_ns: int) -> bool:
-        """Whether no drone is in the air, as far as they say."""
+        """Return whether no drone is in the air, as far as they say."""
         return not self.team.airborne(now_ns)
 
     def _end_starts(self, stop: Command, now_ns: int) -> None:
@@ -155,7 +155,7 @@ class Operator:
         self._bus.publish(COMMAND, command)
         return book
 
-    # --- turn ----------------------------------------------------------------------------------------------------
+    # -- turn ----------------------------------------------------------------------------------------------------
 
     def step(self, now_ns: int) -> None:
         """Renew the lease, hear everybody, go on with what is under way."""
@@ -217,7 +217,7 @@ class Operator:
     def _is_partial(self, command: Command) -> bool:
         return bool(command.scope) and not set(command.scope) >= set(self.team.members)
 
-    # --- requests of other shells --------------------------------------------------------------------------------
+    # -- requests of other shells --------------------------------------------------------------------------------
 
     def _serve(self, request: Command, now_ns: int) -> None:
         if self._requests.answer_again(request):
@@ -249,7 +249,7 @@ class Operator:
                 if verb is Verb.RESUME:
                     self.phase = TeamPhase.TRACKING
 
-    # --- what is under way ---------------------------------------------------------------------------------------
+    # -- what is under way ---------------------------------------------------------------------------------------
 
     def _follow(self, now_ns: int) -> None:
         """Repeat orders that were not answered; close those that are settled or out of time."""

@@ -14,7 +14,7 @@ _REMEMBERED = 256
 
 
 def is_request(message: object) -> bool:
-    """Whether this asks the operator for something; other commands are for the drivers."""
+    """Return whether this asks the operator for something; other commands are for the drivers."""
     return isinstance(message, Command) and OPERATOR in message.scope
 
 

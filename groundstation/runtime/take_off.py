@@ -58,7 +58,7 @@ class TakeOff:
 
     @property
     def finished(self) -> bool:
-        """Whether every drone is up or left out."""
+        """Return whether every drone is up or left out."""
         return not self._waiting
 
     @property

@@ -52,31 +52,31 @@ class Member:
     measured_ns: int = 0
 
     def connected(self, now_ns: int) -> bool:
-        """Whether its driver speaks and hears the drone."""
+        """Return whether its driver speaks and hears the drone."""
         return self.fresh(now_ns) and self.state not in (FlightState.UNKNOWN, FlightState.LOST)
 
     def fresh(self, now_ns: int) -> bool:
-        """Whether its driver spoke lately."""
+        """Return whether its driver spoke lately."""
         return self.heard_ns > 0 and now_ns - self.heard_ns < _FRESH_NS
 
     @property
     def up(self) -> bool:
-        """Whether it flies, its take-off finished."""
+        """Return whether it flies, its take-off finished."""
         return self.state in _UP
 
     @property
     def on_ground(self) -> bool:
-        """Whether it says that it stands, motors off."""
+        """Return whether it says that it stands, motors off."""
         return self.state in _ON_GROUND
 
     @property
     def standing(self) -> bool:
-        """Whether it says that it stands, or never said anything."""
+        """Return whether it says that it stands, or never said anything."""
         return self.on_ground or self.state is FlightState.UNKNOWN
 
     @property
     def lifting(self) -> bool:
-        """Whether it takes off or flies."""
+        """Return whether it takes off or flies."""
         return self.up or self.state is FlightState.TAKING_OFF
 
     def reported_m(self, now_ns: int) -> float | None:

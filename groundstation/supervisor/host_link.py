@@ -50,12 +50,12 @@ class HostLink:
 
     @property
     def synchronised(self) -> bool:
-        """Whether the run's clock can be read here."""
+        """Return whether the run's clock can be read here."""
         return self._offsets.known
 
     @property
     def ends(self) -> bool:
-        """Whether the run's supervisor stops the run, or is dead."""
+        """Return whether the run's supervisor stops the run, or is dead."""
         return self._supervision is Supervision.ENDS
 
     def watches(self, now_ns: int) -> bool:

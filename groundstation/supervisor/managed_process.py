@@ -38,7 +38,7 @@ class ManagedProcess:
 
     @property
     def running(self) -> bool:
-        """Whether it was started and its end has not been noticed yet."""
+        """Return whether it was started and its end has not been noticed yet."""
         return self._handle is not None
 
     @property
@@ -48,12 +48,12 @@ class ManagedProcess:
 
     @property
     def is_up(self) -> bool:
-        """Whether its start is finished and it still runs."""
+        """Return whether its start is finished and it still runs."""
         return self.running and self.state in (SlotState.READY, SlotState.DEGRADED)
 
     @property
     def begins(self) -> bool:
-        """Whether it was started once, and is neither up nor dead yet."""
+        """Return whether it was started once, and is neither up nor dead yet."""
         return self.running and self.life == 1 and not self.is_up
 
     def adopt(self, handle: subprocess.Popen[bytes], now_ns: int) -> None:
@@ -138,7 +138,7 @@ class ManagedProcess:
 
     @property
     def storms(self) -> bool:
-        """Whether it has failed so often in a row that trying on is unlikely to help."""
+        """Return whether it has failed so often in a row that trying on is unlikely to help."""
         return self._failures >= STORM_RESTARTS
 
 

@@ -90,7 +90,7 @@ class ProcessSpec:
 
     @property
     def is_router(self) -> bool:
-        """Whether the bus is its own."""
+        """Return whether the bus is its own."""
         return self.stop_order is StopOrder.CONNECTS
 
 

@@ -34,10 +34,10 @@ class Run:
 
     @property
     def guarded(self) -> bool:
-        """Whether its bus belongs to it alone."""
+        """Return whether its bus belongs to it alone."""
         return self.endpoint.startswith("tls/")
 
     @property
     def makes_identities(self) -> bool:
-        """Whether the certificates of its members are made at its start: on its own host."""
+        """Return whether the certificates of its members are made at its start: on its own host."""
         return self.guarded and self.identity is None

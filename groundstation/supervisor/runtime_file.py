@@ -28,7 +28,7 @@ class ProcessRecord(msgspec.Struct, frozen=True):
 
     @property
     def alive(self) -> bool:
-        """Whether this very process (not another that got its pid) still runs."""
+        """Return whether this very process (not another that got its pid) still runs."""
         return self.pid > 0 and start_time(self.pid) == self.start_time
 
 
@@ -58,7 +58,7 @@ class RuntimeRecord(msgspec.Struct, frozen=True):
 
     @property
     def alive(self) -> bool:
-        """Whether any process of it still runs (drivers outlive a killed supervisor until they have landed)."""
+        """Return whether any process of it still runs (drivers outlive a killed supervisor until they have landed)."""
         return any(process.alive for process in (self.supervisor, *self.processes))
 
     def identity(self, role: Role) -> Identity | None:
@@ -68,12 +68,12 @@ class RuntimeRecord(msgspec.Struct, frozen=True):
 
     @property
     def has_truth(self) -> bool:
-        """Whether a simulator runs in it, which tells the true states of what it emulates."""
+        """Return whether a simulator runs in it, which tells the true states of what it emulates."""
         return any(process.role == "sim_bridge" for process in self.processes)
 
     @property
     def simulated(self) -> bool:
-        """Whether all of its drones are emulated."""
+        """Return whether all of its drones are emulated."""
         return self.has_truth and not self.real
 
 

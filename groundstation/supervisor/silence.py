@@ -69,7 +69,7 @@ class DriverSigns:
 
     @property
     def driving(self) -> bool:
-        """Whether it has the drone: it finished its start, and is neither ending nor dead."""
+        """Return whether it has the drone: it finished its start, and is neither ending nor dead."""
         return self.state in (SlotState.READY, SlotState.DEGRADED) and not self.ended and not self.gone
 
     def heard_silent_ns(self, now_ns: int, awake_since_ns: int) -> int:

@@ -69,7 +69,7 @@ class Supervisor:
         self._turn_ns = self._awake_since_ns = time.monotonic_ns()
         self._stopping = False
 
-    # --- start ---------------------------------------------------------------------------------------------------
+    # -- start ---------------------------------------------------------------------------------------------------
 
     def prepare(self) -> None:
         """Listen to the operator's signals and open the log files; raises GroundStationError when it cannot."""
@@ -146,7 +146,7 @@ class Supervisor:
         except OSError as error:  # the run is worth more than its signpost
             _log.error("cannot write the runtime file: %s", error)
 
-    # --- watch ---------------------------------------------------------------------------------------------------
+    # -- watch ---------------------------------------------------------------------------------------------------
 
     def step(self, timeout_s: float = _TURN_S) -> None:
         """Sleep until something happens or the time-out, then look after every process once."""
@@ -263,7 +263,7 @@ class Supervisor:
         self.failure = f"{name} {why}; its log {self._launcher.log_path(name)} ends:\n{self._launcher.log_tail(name)}"
         self.events.event(Severity.ERROR, process, why, "the run ends; see its log")
 
-    # --- stop ----------------------------------------------------------------------------------------------------
+    # -- stop ----------------------------------------------------------------------------------------------------
 
     def stop(self) -> None:
         """Stop all but what shows the end, in order, each with its deadline; a hurrying operator gets all at once."""

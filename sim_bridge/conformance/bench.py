@@ -161,7 +161,7 @@ class Bench:
             time.sleep(seconds)
 
     def mode(self, *modes: str) -> bool:
-        """Whether the driver says that it is in one of these modes."""
+        """Return whether the driver says that it is in one of these modes."""
         status = self.newest(VEHICLE_STATUS)
         return status is not None and status.mode in modes
 
@@ -182,7 +182,7 @@ class Bench:
     # -- common parts of scripts --------------------------------------------------------------------------------------
 
     def newest_after_start(self) -> bool:
-        """Whether this life of the driver has spoken."""
+        """Return whether this life of the driver has spoken."""
         heard = self.record.heard(VEHICLE_STATUS)
         return bool(heard) and heard[-1].at_ns > self.driver.started_ns
 

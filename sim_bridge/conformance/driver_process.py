@@ -44,7 +44,7 @@ class DriverLife:
 
     @property
     def alive(self) -> bool:
-        """Whether the driver runs."""
+        """Return whether the driver runs."""
         try:
             signal.pidfd_send_signal(self._watch, 0)
         except ProcessLookupError:

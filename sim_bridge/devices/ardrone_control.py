@@ -70,7 +70,7 @@ class FlightControl:
 
     @property
     def demo(self) -> bool:
-        """Whether navdata is in demo mode."""
+        """Return whether navdata is in demo mode."""
         return self.configuration.flag("general:navdata_demo")
 
     def _watchdog_ns(self) -> int:

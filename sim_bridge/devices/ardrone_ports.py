@@ -26,7 +26,7 @@ class ControlPort:
 
     @property
     def connected(self) -> bool:
-        """Whether somebody would get a dump."""
+        """Return whether somebody would get a dump."""
         return any(connection.open for connection in self._port.connections)
 
     def dump(self, configuration: Configuration) -> None:

@@ -42,7 +42,7 @@ class Audience:
 
     @property
     def bootstrap(self) -> bool:
-        """Whether no client has got more than status packets yet."""
+        """Return whether no client has got more than status packets yet."""
         return all(listener.bootstrap for listener in self._listeners.values())
 
     def request(self, address: Address, now_ns: int) -> Listener | None:

@@ -179,17 +179,17 @@ class AutopilotFirmware:
 
     @property
     def streams(self) -> bool:
-        """Whether setpoints have kept coming for a second."""
+        """Return whether setpoints have kept coming for a second."""
         return self.setpoint_age_s < 0.5 and self.now_s - self._stream_s >= 1.0
 
     @property
     def located(self) -> bool:
-        """Whether the estimator has a position now."""
+        """Return whether the estimator has a position now."""
         return self.copter.estimate.has_position and self.copter.estimate.aided_s < _AIDED_S
 
     @property
     def global_position(self) -> bool:
-        """Whether it finds its own way, by satellites."""
+        """Return whether it finds its own way, by satellites."""
         return self.satellites is not None and not self.parameters.indoor
 
     def equip(self, satellites: Satellites) -> None:

@@ -118,7 +118,7 @@ class Parameters:
 
     @property
     def indoor(self) -> bool:
-        """Whether the estimator takes its position from outside."""
+        """Return whether the estimator takes its position from outside."""
         if "EKF2_EV_CTRL" in self.values:
             return int(self.values["EKF2_EV_CTRL"]) & 1 == 1 and self.values["EKF2_GPS_CTRL"] == 0
         return self.values["VISO_TYPE"] == 1 and self.values["EK3_SRC1_POSXY"] == 6

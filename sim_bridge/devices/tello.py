@@ -58,7 +58,7 @@ class TelloBody:
 
     @property
     def airborne(self) -> bool:
-        """Whether it has no contact with the floor."""
+        """Return whether it has no contact with the floor."""
         return not self.airframe.on_ground
 
     def step(self, wake: Vector3) -> None:

@@ -49,7 +49,7 @@ class Quadrotor:
 
     @property
     def airborne(self) -> bool:
-        """Whether it has no contact with the floor."""
+        """Return whether it has no contact with the floor."""
         return not self.airframe.on_ground
 
     def step(self, wake: tuple[float, float, float]) -> None:

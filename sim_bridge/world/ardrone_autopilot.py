@@ -92,7 +92,7 @@ class Autopilot:
 
     @property
     def motors_on(self) -> bool:
-        """Whether the propellers turn."""
+        """Return whether the propellers turn."""
         return self.phase not in (Phase.LANDED, Phase.CUT)
 
     @property
@@ -102,7 +102,7 @@ class Autopilot:
 
     @property
     def calibrating(self) -> bool:
-        """Whether it turns to calibrate the magnetometer."""
+        """Return whether it turns to calibrate the magnetometer."""
         return self._calibration_s > 0.0 and self.phase is Phase.HOVERING
 
     def take_off(self) -> None:

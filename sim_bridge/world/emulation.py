@@ -22,7 +22,7 @@ class Motors(Protocol):
 
     @property
     def motors_on(self) -> bool:
-        """Whether they turn."""
+        """Return whether they turn."""
 
 
 class Body(Protocol):
@@ -42,7 +42,7 @@ class Body(Protocol):
 
     @property
     def airborne(self) -> bool:
-        """Whether it has no contact with the floor."""
+        """Return whether it has no contact with the floor."""
 
     def step(self, wake: Vector3) -> None:
         """Advance by one tick under the wake of the others [m/s^2; world]."""

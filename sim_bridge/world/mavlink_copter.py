@@ -94,12 +94,12 @@ class MavlinkCopter:
 
     @property
     def motors_on(self) -> bool:
-        """Whether the propellers turn."""
+        """Return whether the propellers turn."""
         return self.steering is not Steering.OFF
 
     @property
     def airborne(self) -> bool:
-        """Whether it has no contact with the floor."""
+        """Return whether it has no contact with the floor."""
         return not self.airframe.on_ground
 
     def steer(self, steering: Steering) -> None:

@@ -58,7 +58,7 @@ class InertialEstimate:
 
     @property
     def has_position(self) -> bool:
-        """Whether enough poses came to know where it is."""
+        """Return whether enough poses came to know where it is."""
         return self.poses >= _TRUSTED_AFTER
 
     def step(self, body: Airframe, motors_on: bool) -> None:

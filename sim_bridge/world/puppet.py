@@ -74,12 +74,12 @@ class Puppet:
 
     @property
     def stale(self) -> bool:
-        """Whether its last pose is too old to say where it is."""
+        """Return whether its last pose is too old to say where it is."""
         return self.age_s > STALE_S and not self._waits
 
     @property
     def outside(self) -> bool:
-        """Whether its pose lies beyond walls or ceiling."""
+        """Return whether its pose lies beyond walls or ceiling."""
         body, (x, y, z) = self.airframe, self._room_m
         return abs(body.x) > x or abs(body.y) > y or body.z > z
 
@@ -92,7 +92,7 @@ class Puppet:
 
     @property
     def airborne(self) -> bool:
-        """Whether it flies, as far as its poses say."""
+        """Return whether it flies, as far as its poses say."""
         return self.poses > 0 and not self.stale and not self.airframe.on_ground
 
     def row(self) -> tuple[float, ...]:

@@ -78,7 +78,7 @@ class FakeFlight(threading.Thread):
         self._session.close()
         self._router.close()
 
-    # --- where everything is ---
+    # -- where everything is ---
 
     def target_at(self, s: float) -> tuple[float, float, float, float]:
         w = 0.11
@@ -108,7 +108,7 @@ class FakeFlight(threading.Thread):
     def flying(self) -> list[str]:
         return [name for name in self.drones if self.modes[name] not in ("LANDED", "CUT")]
 
-    # --- what is said ---
+    # -- what is said ---
 
     def _turn(self, tick: int, s: float) -> None:
         self._sink()
@@ -268,7 +268,7 @@ class FakeFlight(threading.Thread):
         bus = self.bus("tracker")
         bus.publish(t.EVENT, m.Event(header=bus.header(entity), severity=severity, text=text, remedy=remedy))
 
-    # --- what is obeyed ---
+    # -- what is obeyed ---
 
     def _obey(self, command: m.Command) -> None:
         # As a driver does: what is said again is answered again, since the first answers may have been lost.

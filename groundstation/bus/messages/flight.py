@@ -94,7 +94,7 @@ class Verb(StrEnum):
 
     @property
     def stops(self) -> bool:
-        """Whether everybody may give it, and drivers obey at once."""
+        """Return whether everybody may give it, and drivers obey at once."""
         return self in (Verb.HOLD, Verb.LAND, Verb.CUT_MOTORS)
 
 

@@ -32,11 +32,11 @@ class MotionModel(Protocol):
 
     @property
     def present(self) -> bool:
-        """Whether its prior alone puts it into the state."""
+        """Return whether its prior alone puts it into the state."""
 
     @property
     def admitted(self) -> bool:
-        """Whether it may be in the state before anybody says so (a vehicle that must fly may not)."""
+        """Return whether it may be in the state before anybody says so (a vehicle that must fly may not)."""
 
     @property
     def place_m(self) -> Vector3:
@@ -87,7 +87,7 @@ class ObservationModel(Protocol):
 
     @property
     def observes_targets(self) -> bool:
-        """Whether it may be used for targets."""
+        """Return whether it may be used for targets."""
 
     @property
     def repeats_s(self) -> float:

@@ -32,7 +32,7 @@ class LocalSubscription(Subscription):
 
     @property
     def waiting(self) -> bool:
-        """Whether something came since the last drain."""
+        """Return whether something came since the last drain."""
         return bool(self._kept or self._latest)
 
     def drain(self) -> list[Received]:

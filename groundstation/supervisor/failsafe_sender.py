@@ -23,6 +23,11 @@ class Speaker(IntEnum):
     GUARDIAN = 3
 
 
+def unreachable(name: str, why: str) -> str:
+    """Return that only its own driver reaches a vehicle, in the operator's words."""
+    return f"{name} could not be landed without its driver: {why}"
+
+
 @dataclass(slots=True)
 class _Speech:
     words: FailsafeDatagrams
@@ -61,7 +66,7 @@ class FailsafeSender:
             return False
         why = self.prepare(name, words)
         if why:
-            _log.error("nobody can speak for %s: %s", name, why)
+            _log.error(unreachable(name, why))
         addresses = heard_at() if words.called else ((words.address, words.port),)
         self._speaking[name] = _Speech(words, since_ns, addresses, time.monotonic_ns())
         self._next_ns = 0

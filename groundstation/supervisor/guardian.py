@@ -16,7 +16,7 @@ import msgspec
 from groundstation.process.child import Child
 from groundstation.process.heartbeat import SUPERVISOR_SLOT, HeartbeatBlock, SlotState
 from groundstation.process.priority import go_first
-from groundstation.supervisor.failsafe_sender import FailsafeSender, Speaker
+from groundstation.supervisor.failsafe_sender import FailsafeSender, Speaker, unreachable
 from groundstation.supervisor.guard_order import GuardOrder, Post
 from groundstation.supervisor.silence import DriverSigns, Guard, SupervisorSigns, SupervisorState, Word, signs_of
 from groundstation.time_units import NS_PER_MS
@@ -117,7 +117,7 @@ def run(child: Child) -> int:
     guardian = Guardian(order, block)
     go_first()
     names = ", ".join(post.name for post in order.posts)
-    missing = "; ".join(f"nobody can speak for {name}: {why}" for name, why in guardian.speechless.items())
+    missing = "; ".join(unreachable(name, why) for name, why in guardian.speechless.items())
     if missing:
         child.degrade(missing)
     else:

@@ -19,7 +19,7 @@ from groundstation.process.heartbeat import SUPERVISOR_SLOT, HeartbeatBlock, Slo
 from groundstation.process.priority import go_back, go_first, take_share
 from groundstation.supervisor import runtime_file
 from groundstation.supervisor.events import ProcessEvents
-from groundstation.supervisor.failsafe_sender import FailsafeSender
+from groundstation.supervisor.failsafe_sender import FailsafeSender, unreachable
 from groundstation.supervisor.interrupts import Interrupts
 from groundstation.supervisor.launcher import Launcher
 from groundstation.supervisor.managed_process import ManagedProcess, exit_text
@@ -84,7 +84,7 @@ class Supervisor:
         for process in self.processes:
             words = process.spec.failsafe_datagrams
             if words is not None and (why := self._last_words.prepare(process.spec.name, words)):
-                _log.error("nobody could speak for %s: %s", process.spec.name, why)
+                _log.error(unreachable(process.spec.name, why))
 
     def _make_identities(self) -> None:
         if self._identities is None:

@@ -1,7 +1,8 @@
 """`groundstation new`: a field file from a few questions, in the terminal or on a page."""
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import click
 
@@ -9,6 +10,8 @@ from groundstation.errors import OperatorMistake
 
 if TYPE_CHECKING:
     from groundstation.settings.new_field import NewDrone, NewRoom, NewTarget
+
+_Answer = TypeVar("_Answer")
 
 
 @click.command(
@@ -30,10 +33,30 @@ def new(directory: Path, page: bool) -> None:
 
 
 def _ask(path: Path) -> None:
-    from groundstation.settings.new_field import NewRoom, check_room, field_text
+    from groundstation.settings.new_field import field_text
     from groundstation.settings.shipped_copies import write_field
 
     click.echo("The floor's middle is the origin, x along the long side. Enter takes what stands in brackets.")
+    room = _ask_room()
+    drones = _ask_drones(room)
+    text = field_text(path.stem, room, drones, _until_possible(lambda: _ask_target(room)))
+    if not click.confirm(f"Write {path}?", default=True):
+        raise OperatorMistake("nothing was written")
+    write_field(path, text)
+
+
+def _until_possible(ask: Callable[[], _Answer]) -> _Answer:
+    """Ask again what cannot be, with all answers before it kept."""
+    while True:
+        try:
+            return ask()
+        except OperatorMistake as mistake:
+            click.echo(f"{mistake}. Once more:")
+
+
+def _ask_room() -> "NewRoom":
+    from groundstation.settings.new_field import NewRoom, check_room
+
     length = click.prompt("Length of the room [m]", default=8.0, type=click.FloatRange(3, 60))
     width = click.prompt("Width [m]", default=6.0, type=click.FloatRange(3, length))
     height = click.prompt("Height [m]", default=4.5, type=click.FloatRange(3, 20))
@@ -41,11 +64,7 @@ def _ask(path: Path) -> None:
     room = NewRoom(length, width, height, source)
     check_room(room)
     _draw(room, 0)
-    drones = _ask_drones(room)
-    text = field_text(path.stem, room, drones, _ask_target())
-    if not click.confirm(f"Write {path}?", default=True):
-        raise OperatorMistake("nothing was written")
-    write_field(path, text)
+    return room
 
 
 def _draw(room: "NewRoom", drones: int) -> None:
@@ -56,11 +75,16 @@ def _draw(room: "NewRoom", drones: int) -> None:
     click.echo(f"{pads} what the ceiling camera sees 1 m above the floor.")
 
 
+def _ask_count(room: "NewRoom") -> int:
+    count: int = click.prompt("How many drones", default=2, type=click.IntRange(1, 9))
+    _draw(room, count)
+    return count
+
+
 def _ask_drones(room: "NewRoom") -> "list[NewDrone]":
     from groundstation.settings.new_field import NewDrone, offers
 
-    count = click.prompt("How many drones", default=2, type=click.IntRange(1, 9))
-    _draw(room, count)
+    count = _until_possible(lambda: _ask_count(room))
     known = offers()
     drones: list[NewDrone] = []
     for number in range(1, 1 + count):
@@ -72,12 +96,14 @@ def _ask_drones(room: "NewRoom") -> "list[NewDrone]":
     return drones
 
 
-def _ask_target() -> "NewTarget":
-    from groundstation.settings.new_field import BASES, NewTarget
+def _ask_target(room: "NewRoom") -> "NewTarget":
+    from groundstation.settings.new_field import BASES, NewTarget, check_target
 
     base = click.prompt("Target", default=next(iter(BASES)), type=click.Choice(tuple(BASES)))
     board = click.prompt("  height of the marker board on it [m]", default=BASES[base], type=click.FloatRange(0, 3))
-    return NewTarget(base, board)
+    target = NewTarget(base, board)
+    check_target(room, target)
+    return target
 
 
 def _ask_on_page(path: Path) -> None:

@@ -48,6 +48,7 @@ def test_an_unknown_verb_is_answered_with_the_likely_one(capsys: pytest.CaptureF
     ("word", "meant"),
     [
         ("stop", "'land', 'hold' or 'cut-motors'"),
+        ("hepl", "'help'"),
         ("check", "'config check'"),
         ("compare", "'report RUN --compare"),
         ("probe", "'ardrone probe' or 'mavlink probe'"),

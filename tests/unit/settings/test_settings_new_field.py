@@ -78,6 +78,16 @@ def test_the_target_says_what_it_is(tmp_path: Path) -> None:
     assert (target.base, target.marker.height_m, target.max_speed_m_s) == ("person", BASES["person"], 1.5)
 
 
+def test_what_cannot_be_is_asked_again_and_no_answer_is_lost(tmp_path: Path) -> None:
+    """More pads than the camera sees, and a board that nobody looks down on."""
+    room = ["8", "6", "4.5", "http://10.0.0.5/mjpg"]
+    team = ["9", "1", "", "", "", "turtlebot_2", "3", "turtlebot_2", "0.4", "y", ""]
+    result = CliRunner().invoke(new, [str(tmp_path / "hall")], input="\n".join([*room, *team]))
+    assert result.exit_code == 0, result.output
+    assert result.output.count("Once more:") == 2
+    assert "http://10.0.0.5/mjpg" in (tmp_path / "hall" / "hall.yaml").read_text()
+
+
 def test_a_board_too_high_to_look_down_on_is_refused() -> None:
     with pytest.raises(OperatorMistake, match=r"2 m above the floor .* 4\.5 m high: 1\.9"):
         field_text("lab", NewRoom(8, 6, 4.5, SOURCE), [ARDRONE], NewTarget("person", 2.0))

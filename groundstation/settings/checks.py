@@ -30,6 +30,8 @@ RESERVED = frozenset(
     {"team", "operator", "router", "tracker", "diagnosis", "recorder", "console", "monitor", "supervisor"}
 )
 _ROBOT_HEIGHT_M = 0.3
+# What the bus takes, and what the ground station itself adds to a name: _camera of a drone, _odometry of a target.
+_LONGEST_NAME, _ADDED = 48, {"drones": 7, "target": 9, "targets": 9}
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,6 +240,8 @@ def _names(parts: Parts) -> Iterator[Finding]:
     for path, name in named:
         if name in RESERVED or name.startswith("sim_") or name.endswith(("_camera", "_odometry")):
             yield path, f"the name {name} is taken by the ground station itself"
+        elif len(name) > (most := _LONGEST_NAME - _ADDED.get(str(path[0]), 0)):
+            yield path, f"the name {name} has {len(name)} letters: {most} at most"
     yield from _unique(((path, name, _kind_of(path)) for path, name in named), "the name")
 
 

@@ -4,6 +4,7 @@ import { showLog, showMore } from "./alarm_strip.js";
 import { byId, el, seconds, text } from "./dom.js";
 import { resultWords } from "./ending.js";
 import { drawn } from "./map.js";
+import { withShortNames } from "./names.js";
 import { noteOwnAlarms, ownAlarms } from "./own_alarms.js";
 import { momentWords } from "./playback.js";
 import { estimateAge, replaying, runOver, silentS, store, trackerSilent } from "./store.js";
@@ -65,8 +66,8 @@ export function showBanners() {
   all.forEach(({ level, title, more, rank }, index) => {
     const node = host.children[index];
     node.className = `banner ${COLOURS[rank] ?? level}`;
-    text(node.children[0], index && rank !== "notice" ? `${rank}: ${title}` : title);
-    text(node.children[1], more ?? "");
+    text(node.children[0], withShortNames(index && rank !== "notice" ? `${rank}: ${title}` : title));
+    text(node.children[1], withShortNames(more ?? ""));
   });
   showLog();
   showMore(all.slice(1).map(({ rank }) => rank), !host.firstElementChild || fitted(host.firstElementChild));

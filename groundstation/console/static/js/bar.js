@@ -3,6 +3,7 @@
 import { worstBattery } from "./batteries.js";
 import { byId, el, seconds, text } from "./dom.js";
 import { oldestS, recording, STAGES, stage, stageWord, teamMode } from "./glance.js";
+import { withShortNames } from "./names.js";
 import { ageS, replaying, store } from "./store.js";
 import { verdict } from "./verdict.js";
 
@@ -18,16 +19,16 @@ function show(id, words, level) {
 export function showBar() {
   const [mode, level, who] = teamMode();
   show("team-mode", mode, level);
-  text(byId("team-who"), who || "team");
+  text(byId("team-who"), withShortNames(who || "team"));
   const since = store.s.flight?.airborne_since_ms, airborne = since ? ageS(since) : null;
   show("air-time", airborne === null || replaying() ? "–" : `${Math.floor(airborne / 60)}:${String(Math.floor(airborne % 60)).padStart(2, "0")}`);
   const battery = worstBattery();
-  show("worst-battery", battery ? `${battery.words} ${battery.name}` : "–", battery?.level);
+  show("worst-battery", battery ? withShortNames(`${battery.words} ${battery.name}`) : "–", battery?.level);
   text(byId("battery-lasts"), battery?.lasts ? `worst battery, ${battery.lasts}` : "worst battery");
   const oldest = oldestS();
   show("worst-age", Number.isFinite(oldest) ? seconds(oldest) : "–", Number.isNaN(oldest) ? "calm" : oldest > TOO_OLD_S ? "bad" : oldest > OLD_S ? "warn" : "good");
   show("recording", ...(replaying() ? ["–", ""] : recording()));
-  text(byId("verdict"), replaying() ? store.scene.replay.note : verdict());
+  text(byId("verdict"), replaying() ? store.scene.replay.note : withShortNames(verdict()));
   showStages();
 }
 

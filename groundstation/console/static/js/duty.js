@@ -33,7 +33,7 @@ function tracked(name, plan) {
   const [, who] = store.s.vehicles[name].detail.match(/^tracking for (.+)$/) ?? [];
   const task = sought.length ? `Looks for ${joined(sought)}` : `Tracks ${joined(targets)}${who ? `, ordered by ${who}` : ""}`;
   const does = watched.length ? `${task}: watches ${joined(watched)}` : sought.length ? task : `${task}: moves to where it will see it`;
-  const known = watchers.length ? `Seen by ${joined(watchers)}` : `Nobody sees ${name} now`;
+  const known = watchers.length ? `Seen by ${joined(watchers)}` : "Nobody sees it now";
   return [`${does}.`, `${known}.`, limits && `Slowed by ${limits}.`].filter(Boolean).join(" ");
 }
 

@@ -11,6 +11,7 @@ import { drawHeights } from "./heights.js";
 import { connect, me, on, send } from "./link.js";
 import { drawMap, drawn, layers } from "./map.js";
 import { showControls, showOrders, startOrders } from "./commands.js";
+import { takeNames } from "./names.js";
 import { colourOf, fenceColour, ink, startTheme, takeColours } from "./palette.js";
 import { give } from "./own_orders.js";
 import { showPlan, showSwitch, showTimeline } from "./plan.js";
@@ -43,6 +44,7 @@ on("seed", () => {
 
 function build(scene) {
   takeColours(scene);
+  takeNames(scene);
   document.title = `${scene.replay ? `${scene.replay.what} ${scene.replay.name}` : scene.site} · Skein`;
   document.body.classList.toggle("replay", replaying());
   byId("site").textContent = scene.site;

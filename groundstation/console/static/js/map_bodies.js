@@ -7,6 +7,7 @@ import { seconds } from "./dom.js";
 import { limitsOf } from "./duty.js";
 import { isLost } from "./glance.js";
 import { FIGURE, NAME, around, keepClear, note } from "./labels.js";
+import { withShortNames } from "./names.js";
 import { ageS, entities, entity, estimateAge, isTarget, store } from "./store.js";
 
 const ARROW_S = 1.5, OLD_S = 2;
@@ -83,7 +84,7 @@ export function drawBodies(g, view, stale) {
     const age = estimateAge() + body.age_s;
     const suffix = stale ? `, ${seconds(age)} ago` : isLost(body.name) ? `, lost for ${seconds(age)}` : "";
     keepClear(x, y, bodyRadius(view) / 2);
-    note(g, NAME, body.name, `${body.name}${suffix}`, around(x, y, bodyRadius(view), 14), colourOf(body.name), 14, 700);
+    note(g, NAME, body.name, withShortNames(`${body.name}${suffix}`), around(x, y, bodyRadius(view), 14), colourOf(body.name), 14, 700);
   }
   g.globalAlpha = alpha;
 }
@@ -97,7 +98,7 @@ export function drawStanding(g, view) {
     drawDrone(g, x, y, yaw ?? 0, Math.max(13, 0.27 * view.scale), colourOf(name));
     g.globalAlpha = alpha;
     keepClear(x, y, bodyRadius(view) / 2);
-    note(g, NAME, name, `${name} stands`, around(x, y, bodyRadius(view), 14), colourOf(name), 14, 500);
+    note(g, NAME, name, withShortNames(`${name} stands`), around(x, y, bodyRadius(view), 14), colourOf(name), 14, 500);
   }
 }
 
@@ -174,7 +175,7 @@ export function drawTruth(g, view) {
     g.moveTo(x - r, y + r); g.lineTo(x + r, y - r);
     g.moveTo(x, y); g.lineTo(...view.point(position[0] + 0.32 * Math.cos(yaw), position[1] + 0.32 * Math.sin(yaw)));
     g.stroke();
-    if (!entity(name) && !(store.s.standing ?? []).some((one) => one.name === name)) note(g, NAME, name, `${name} (truth)`, around(x, y, 10, 14), ink().truth, 14, 500);
+    if (!entity(name) && !(store.s.standing ?? []).some((one) => one.name === name)) note(g, NAME, name, withShortNames(`${name} (truth)`), around(x, y, 10, 14), ink().truth, 14, 500);
   }
 }
 

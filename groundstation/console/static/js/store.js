@@ -27,6 +27,13 @@ export const replaying = () => Boolean(store.scene?.replay);
 // Announced by the run itself; while drones may still be in the air, buttons stay for as long as somebody can obey them.
 export const runOver = () => Boolean(store.s.ended) && (store.s.ended.severity === "INFO" || store.s.ended.closed || !store.connected);
 export const steerable = () => Boolean(store.scene?.truth) && !replaying();
+// A drone may be called as something that every object has, "constructor" say: a table by names holds these names only.
+function onlyNames(table) {
+  if (table === null || typeof table !== "object" || Array.isArray(table)) return table;
+  Object.values(table).forEach(onlyNames);
+  return Object.setPrototypeOf(table, null);
+}
+
 // A replay's time stands still, runs and jumps: it is what the newest frame says.
 export const now = () => (replaying() ? store.serverMs : performance.now() + (store.offset ?? 0));
 // The same for what is sent, right also before the first frame after a sleep.
@@ -38,6 +45,7 @@ export function takeSeed(seed) {
   offsets = [];
   lastTrail = lastSample = 0;
   noteClock(seed.now);
+  onlyNames(seed);
   Object.assign(store, { scene: seed.scene, s: seed.s, run: seed.run, seq: seed.seq });
   store.trails = seed.history.trails;
   store.samples = seed.history.samples;
@@ -48,7 +56,7 @@ export function takeDelta(delta) {
   noteClock(delta.now);
   store.seq = delta.seq;
   store.frames += 1;
-  Object.assign(store.s, delta.s);
+  Object.assign(store.s, onlyNames(delta.s));
   if (replaying()) return takePassed(delta.s.passed);
   if (delta.s.estimate) extendTrails(delta.s.estimate);
   if (delta.s.sample && delta.s.sample.t_ms > lastSample) {

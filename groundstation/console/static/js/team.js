@@ -5,6 +5,7 @@ import { byId, el, joined, seconds, svg, text } from "./dom.js";
 import { ellipse95 } from "./geometry.js";
 import { dutyOf, landsIn } from "./duty.js";
 import { aloft, doing, modeOf, modeWord } from "./glance.js";
+import { withShortNames } from "./names.js";
 import { give } from "./own_orders.js";
 import { colourOf } from "./palette.js";
 import { ageS, entity, estimateAge, runOver, seenBy, store, trackerSilent } from "./store.js";
@@ -39,7 +40,7 @@ function card(name, fields, drone) {
   const chip = svg("svg", { viewBox: "0 0 18 18", class: "chip", "aria-hidden": "true" });
   const detail = el("p", { class: "detail", data: { testid: `${name}-duty` } });
   const root = el("article", { class: drone ? "unit" : "unit target", "aria-label": name, data: { testid: `card-${name}` } },
-    el("div", { class: "head" }, chip, el("strong", {}, name), mode), detail,
+    el("div", { class: "head" }, chip, el("strong", { title: name }, withShortNames(name)), mode), detail,
     el("dl", {}, ...fields.map((field) => el("div", { class: [WIDE.has(field) && "wide", field === "by" && "names", CHIEF.has(field) && "chief", FIRST[drone ? "drone" : "target"].has(field) && "first"].filter(Boolean).join(" ") }, el("dt", {}, TITLES[field]), values[field]))), drone ? actions(name) : null);
   cards.set(name, { root, values, mode, chip, detail, drone });
   paint(name);
@@ -92,7 +93,7 @@ function showVehicle(name, { root, values, mode, detail }) {
 
 // A vehicle that is not heard does nobody knows what: only its landing is certain.
 function showDuty(node, name, silent) {
-  text(node, silent ? "It is not heard: only its own failsafes protect it now." : dutyOf(name));
+  text(node, silent ? "It is not heard: only its own failsafes protect it now." : withShortNames(dutyOf(name)));
   node.classList.toggle("low", Boolean(landsIn(name) || silent));
 }
 
@@ -138,12 +139,12 @@ function showBelief(name, { root, values, mode, detail, drone }) {
     const lost = age > store.scene.lost_after_s, [search, words] = trackerSilent() ? [] : store.s.estimate?.searches?.[name] ?? [];
     text(mode, trackerSilent() ? "unknown" : lost && body ? "lost" : search?.toLowerCase() ?? (!body ? "not found yet" : age > UNSEEN_S ? "not seen" : doing("TRACK").length ? "tracked" : "seen"));
     mode.dataset.level = !body || trackerSilent() ? "wait" : lost ? "bad" : search ? "warn" : age > UNSEEN_S ? "warn" : "good";
-    text(detail, words ?? beliefWords(body, age, lost));
+    text(detail, withShortNames(words ?? beliefWords(body, age, lost)));
     root.classList.toggle("stale", estimateAge() > STALE_S || !store.connected);
   }
   text(values.seen, body ? `${seconds(age)} ago` : standsInSight(name) ? "it stands" : "not yet");
   values.seen.className = !body ? "" : age > 3 ? "empty" : age > 1 ? "low" : "";
-  text(values.by, seenBy(name).join(", ") || "nobody");
+  text(values.by, withShortNames(seenBy(name).join(", ") || "nobody"));
   if (!body) { for (const field of ["position", "ellipse", "speed"]) text(values[field], "unknown"); return; }
   const { major, minor } = ellipse95(body.cov);
   text(values.position, body.mean.slice(0, drone ? 3 : 2).map((value) => value.toFixed(2)).join("  "));

@@ -19,7 +19,8 @@ _Settings = TypeVar("_Settings", bound=BaseModel)
 class LinkHealth:
     """State of a driver's link; rejected: datagrams dropped, by reason; clock: None where no time is told.
 
-    firmware: of the vehicle, with its version; "": not known.
+    firmware: of the vehicle, with its version; "": not known. asks_time: whether it asks for our time, None: it
+    need not.
     """
 
     link_quality: float | None = None
@@ -28,6 +29,7 @@ class LinkHealth:
     detail: str = ""
     clock: ClockFigures | None = None
     firmware: str = ""
+    asks_time: bool | None = None
 
 
 class Vehicle(Protocol):

@@ -165,6 +165,7 @@ class VehicleHost:
             lands_in_s=self.watchdog.lands_in_s,
             clock_drift_ppm=None if health.clock is None else health.clock.drift_ppm,
             telemetry_late_ms=None if health.clock is None else health.clock.late_ms,
+            asks_time=health.asks_time,
         )
         self._bus.publish(VEHICLE_STATUS, status)
         if refused := self._intrusions.news(now_ns, status.rejected):

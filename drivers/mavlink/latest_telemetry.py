@@ -9,11 +9,13 @@ from groundstation.bus.messages import Vector3
 
 @dataclass(frozen=True, slots=True)
 class LatestTelemetry:
-    """What was told last; times 0: never. moved_ns, attitude_ns are of the last velocity and attitude."""
+    """What was told last; times 0: never. moved_ns, attitude_ns are of the last velocity and attitude, asked_ns of the
+    last question for our time."""
 
     heard_ns: int = 0
     moved_ns: int = 0
     heartbeat_ns: int = 0
+    asked_ns: int = 0
     base_mode: int = 0
     custom_mode: int = 0
     status: int = 0

@@ -30,6 +30,7 @@ from groundstation.time_units import NEVER_NS
 
 _FRESH_NS = 300_000_000
 _HEARTBEAT_NS = 4_000_000_000
+_ASKS_NS = 3_000_000_000
 # Asked for twice a second; a charge this old is unknown.
 _BATTERY_NS = 10_000_000_000
 # Report a refusal only after its STATUSTEXT: the COMMAND_ACK arrives first.
@@ -153,6 +154,7 @@ class MavlinkVehicle:
             case service.Timesync() if message.tc1 == 0:
                 # WIRE (docs/reference/mavlink.md 5.6): without answers PX4 does not accept the times of our poses.
                 self._link.send(self.system, service.Timesync(clock.now_ns(), message.ts1))
+                return replace(known, asked_ns=now_ns)
         return known
 
     # -- sender loop --------------------------------------------------------------------------------------------------
@@ -292,7 +294,12 @@ class MavlinkVehicle:
         lost = f"no position from the cameras for {lost_s:.1f} s" if lost_s >= limit_s else ""
         detail = lost or self._session.detail(self._requests)
         rejected = dict(self._link.rejected + self._refused)
-        return LinkHealth(quality, rate_hz, rejected, detail, self._plausibility.clock.figures, self._session.firmware)
+        clocks, firmware = self._plausibility.clock.figures, self._session.firmware
+        return LinkHealth(quality, rate_hz, rejected, detail, clocks, firmware, self._asks_time(now_ns))
+
+    def _asks_time(self, now_ns: int) -> bool | None:
+        """Return whether a PX4 asks for our time, ten times a second as it should; ArduPilot need not."""
+        return None if self.flavour is not Flavour.PX4 else now_ns - self.telemetry.asked_ns < _ASKS_NS
 
     def flush(self) -> None:
         """Publish the raw datagrams that wait."""

@@ -57,6 +57,10 @@ def _clock(name: str, status: VehicleStatus) -> Iterator[Finding]:
         bad = abs(drift) > _DRIFT_PPM
         remedy = "start it again; if that stays, its rates are wrong by as much: exchange it" if bad else ""
         yield Finding(Level.SHOULD if bad else Level.OK, name, found, remedy)
+    if status.asks_time is False:
+        found = "it does not ask for our time (TIMESYNC): it cannot tell how old the positions are that it is told"
+        remedy = "send TIMESYNC on this link: set its MAV_n_MODE to Onboard, and restart it"
+        yield Finding(Level.SHOULD, name, found, remedy)
     if late_ms is not None and late_ms > _LATE_MS:
         yield Finding(Level.SHOULD, name, f"its telemetry comes up to {late_ms:.0f} ms late",
                       "a free radio channel, no other traffic on it, or a less busy machine")  # fmt: skip

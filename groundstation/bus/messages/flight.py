@@ -59,6 +59,8 @@ class VehicleStatus(Message, frozen=True, kw_only=True):
     """How much faster the vehicle's clock goes than ours [1e-6]; none: not known (yet)."""
     telemetry_late_ms: float | None = None
     """How late the latest telemetry of the last 30 s came, by the freshest of its half second [ms]; none: unknown."""
+    asks_time: bool | None = None
+    """Whether it asks for our time, without which it does not know how old what we tell it is; none: it need not."""
 
 
 class VelocitySetpoint(Message, frozen=True, kw_only=True):

@@ -283,6 +283,14 @@ def test_a_vehicles_clock_that_jumps_is_named_and_moves_nothing(rig, jump_s):
     rig.until(lambda: rig.mode == "LANDED")
 
 
+def test_a_px4_that_no_longer_asks_for_our_time_is_told(rig):
+    rig.connect()
+    asks = {"px4": True, "ardupilot": None}[rig.vehicle.flavour.name.lower()]
+    assert rig.vehicle.health(rig.hand.now).asks_time is asks
+    later = rig.hand.now + 4_000_000_000
+    assert rig.vehicle.health(later).asks_time is (None if asks is None else False)
+
+
 def test_clock_requests_with_any_time_are_answered_with_ours(rig):
     rig.connect()
     for asked in (0, -1, 2**62, 5):

@@ -245,6 +245,7 @@ class CameraDriverSettings(_Section):
     calibration: CalibrationSettings
     mount: MountSettings = MountSettings()
     video_delay_ms: Annotated[float, Field(ge=0, le=2000)] = 120.0
+    readout_ms: Annotated[float, Field(ge=0, le=100)] = 0.0
     markers: tuple[MarkerSettings, ...] = ()
     observes: tuple[str, ...] = ()
     image_fps: Annotated[float, Field(ge=0, le=5)] = 5.0

@@ -36,6 +36,7 @@ class OnboardCamera(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     attitude_std_deg: float = 0.0
     position_std_m: float = 0.0
     video_delay_ms: float = 120.0
+    readout_ms: float = 0.0
 
 
 class OdometryErrors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -75,6 +75,7 @@ class WorldCamera(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     looking: Literal["down"] = "down"
     rotation_deg: Vector3 = (0.0, 0.0, 0.0)
     video_delay_ms: float = 120.0
+    readout_ms: float = 0.0
     attitude_std_deg: float = 0.2
     position_std_m: float = 0.01
     observes: tuple[Literal["robots", "targets"], ...] = ("robots",)

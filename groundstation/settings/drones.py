@@ -9,7 +9,16 @@ from pydantic_core import PydanticCustomError, PydanticKnownError
 from drivers.camera.settings import behind_adapter, parse_source
 from groundstation.settings.marker import MarkerSettings
 from groundstation.settings.room import CalibrationSettings
-from groundstation.settings.values import Address, HostName, OnVehicle, SettingsSection, Source, Vector2, VideoDelay
+from groundstation.settings.values import (
+    Address,
+    HostName,
+    OnVehicle,
+    Readout,
+    SettingsSection,
+    Source,
+    Vector2,
+    VideoDelay,
+)
 from groundstation.vehicles import KindSection, all_kinds, kind_named, refused_kinds
 
 StdDeviation = Annotated[float, Field(gt=0, le=10)]
@@ -73,6 +82,9 @@ class OnboardCameraSettings(SettingsSection):
     by it."""
     video_delay_ms: VideoDelay = 120.0
     """Median time [ms] from the exposure of an image to its arrival. Measure it: groundstation calibrate delay."""
+    readout_ms: Readout = 0.0
+    """Time [ms] from the exposure of a picture's first row to that of its last (rolling shutter), as its data sheet has
+    it: a marker's time is that of its row; 0: all at once. A picture's own time is that of its middle row."""
 
     @property
     def tilt_down_rad(self) -> float:

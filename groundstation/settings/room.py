@@ -10,6 +10,7 @@ from groundstation.settings.values import (
     HostName,
     Interval,
     Name,
+    Readout,
     SettingsSection,
     Source,
     Vector2,
@@ -143,6 +144,9 @@ class WorldCameraSettings(SettingsSection):
     them."""
     video_delay_ms: VideoDelay = 120.0
     """Median time [ms] from the exposure of an image to its arrival. Measure it: groundstation calibrate delay."""
+    readout_ms: Readout = 0.0
+    """Time [ms] from the exposure of a picture's first row to that of its last (rolling shutter), as its data sheet has
+    it: a marker's time is that of its row; 0: all at once. A picture's own time is that of its middle row."""
     attitude_std_deg: Annotated[float, Field(gt=0, le=10)] = 0.2
     """Standard deviation [deg] of the mounting angles."""
     position_std_m: Annotated[float, Field(gt=0, le=0.5)] = 0.01

@@ -60,6 +60,7 @@ _Offset = Annotated[float, Field(ge=-2, le=2)]
 OnVehicle = Annotated[tuple[_Offset, _Offset, _Offset], of_length(3)]  # a typing error in a place tears the estimate
 Interval = Annotated[Vector2, AfterValidator(_rising)]
 VideoDelay = Annotated[float, Field(ge=0, le=2000)]
+Readout = Annotated[float, Field(ge=0, le=100)]
 SquareSize = Annotated[float, Field(ge=5, le=200)]
 MarkerCode = Annotated[int, Field(ge=0, le=15)]  # geometry.board.VALID_CODES
 # Only the driver gets the password, from the attribute: a field that is written, recorded or shown is a dump.

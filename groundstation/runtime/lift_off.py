@@ -23,7 +23,10 @@ _NOTHING_ROSE_NS = 3 * NS_PER_S
 # A vehicle that reports no height may say that it is in the air as soon as its skids are free: PX4 took 2 s from there
 # to RISEN_M in the simulator, and climbs as slowly as its limits say.
 _NOTHING_ROSE_YET_NS = 5 * NS_PER_S
-_REMEDY = "check address, system id and marker code of {} in the field file against what the drones are and carry"
+_REMEDY = (
+    "check address, system id and marker code of {} in the field file against what the drones are and carry "
+    "(groundstation vehicle blink shows which of them answers to which name)"
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ from drivers.ardrone.wire import at
 from drivers.ardrone.wire.state import StateBit
 from groundstation.errors import DriverError
 
-# WIRE (docs/reference/ardrone.md): animation 3, orange; nothing acknowledges it, and datagrams get lost.
+# WIRE (docs/reference/ardrone.md 2.4): animation 3, orange; nothing acknowledges it, and datagrams get lost.
 _ORANGE, _HZ, _LASTS_S, _TIMES = 3, 4.0, 4, 3
 
 

@@ -12,7 +12,7 @@ from groundstation.errors import DriverError
 
 _CONNECT_S, _LASTS_S = 5.0, 4.0
 _OURS = Heartbeat(6, 8, 0, 0, 4)
-# WIRE (PX4 and ArduPilot play music macro language, 30 characters of it in PLAY_TUNE): up and down three times.
+# WIRE (docs/reference/mavlink.md 5.12): music macro language, 30 characters at most; a rising triad, three times.
 _TUNE = "MFT200L8O3CEGCEGCEGO4C"
 
 

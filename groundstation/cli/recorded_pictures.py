@@ -2,10 +2,7 @@
 
 from collections.abc import Iterator
 
-import cv2
-import numpy as np
-
-from drivers.camera.calibration.feed import SourcePicture
+from drivers.camera.calibration.feed import SourcePicture, decoded
 from groundstation.bus.topics import IMAGE
 from groundstation.errors import GroundStationError, MessageError
 from groundstation.recording.reader import payload
@@ -21,12 +18,10 @@ def recorded_pictures(run: RecordedRun, camera: str) -> Iterator[SourcePicture]:
             continue
         try:
             _, jpeg = payload(record)
-            grey = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_GRAYSCALE) if jpeg else None
-        except (MessageError, cv2.error):
+        except MessageError:
             continue
-        if grey is not None:
-            at_s = (record.log_time_ns - run.start_ns) / NS_PER_S
-            yield SourcePicture(f"{count:05d}", np.asarray(grey, dtype=np.uint8), at_s)
+        if (grey := decoded(jpeg)) is not None:
+            yield SourcePicture(f"{count:05d}", grey, (record.log_time_ns - run.start_ns) / NS_PER_S)
             count += 1
     if not count:
         raise GroundStationError("no picture of it is in the recording (name the run's folder)")

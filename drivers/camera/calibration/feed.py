@@ -88,10 +88,13 @@ def _live(source: FrameSource, name: str, patience_s: float) -> Iterator[SourceP
 
 
 def _grey(packet: Packet) -> Image | None:
-    if packet.picture is not None:
-        return packet.picture.grey()
+    return packet.picture.grey() if packet.picture is not None else decoded(packet.data)
+
+
+def decoded(data: bytes) -> Image | None:
+    """Return the brightness (h, w) of a picture as it is stored or sent, such as a JPEG; None where it is none."""
     try:
-        grey = cv2.imdecode(np.frombuffer(packet.data, np.uint8), cv2.IMREAD_GRAYSCALE) if packet.data else None
+        grey = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE) if data else None
     except cv2.error:  # one that claims to be huge
         return None
     return None if grey is None else np.asarray(grey, dtype=np.uint8)

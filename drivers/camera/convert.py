@@ -15,6 +15,7 @@ from groundstation.geometry.rotations import (
     rotation_from_euler,
     world_from_downward_optical,
 )
+from groundstation.time_units import NS_PER_MS
 
 
 @lru_cache(maxsize=16)
@@ -55,6 +56,11 @@ def observation_from_sighting(
         roll_rad=observer_attitude[0],
         pitch_rad=observer_attitude[1],
     )
+
+
+def row_ns(corners: Array, height_px: int, readout_ms: float) -> int:
+    """Return how much later than its picture's middle row a marker was exposed [ns]; corners (n, 2) [px]."""
+    return round((float(corners[:, 1].mean()) / height_px - 0.5) * readout_ms * NS_PER_MS)
 
 
 def _vector(pose: RelativePose) -> tuple[float, float, float]:

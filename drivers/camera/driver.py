@@ -13,7 +13,6 @@ from drivers.camera.context import Surroundings
 from drivers.camera.picture_quality import quality_of
 from drivers.camera.pipeline import Pipeline
 from drivers.camera.settings import CameraDriverSettings
-from drivers.camera.sighting import Sighting
 from drivers.camera.sources.frames import FrameSource, Packet, Unit
 from drivers.camera.sources.opening import open_source
 from drivers.camera.stream_watch import StreamState, StreamWatch
@@ -157,7 +156,8 @@ class CameraDriver:
             lambda entity: around.drop_m(entity, exposure_ns),
         )
         for sighting in sightings:
-            header = self._child.bus.header(settings.observer, exposure_ns + self._row_ns(sighting))
+            later_ns = convert.row_ns(sighting.corners, self._intrinsics.height_px, settings.readout_ms)
+            header = self._child.bus.header(settings.observer, exposure_ns + later_ns)
             observation = convert.observation_from_sighting(sighting, header, settings.name, attitude)
             self._child.bus.publish(OBSERVATION, observation)
             self._detections += 1
@@ -168,11 +168,6 @@ class CameraDriver:
             self._child.bus.publish(SEARCHED_PICTURE, searched)
         for notice in self._pipeline.take_notices():
             self._child.event(notice.severity, f"camera {settings.name}: {notice.text}", notice.remedy, notice.entity)
-
-    def _row_ns(self, sighting: Sighting) -> int:
-        """Return how much later than the picture's middle row a marker's row was exposed [ns]."""
-        share = float(sighting.corners[:, 1].mean()) / self._intrinsics.height_px - 0.5
-        return round(share * self._settings.readout_ms * NS_PER_MS)
 
     def _publish_image(self, packet: Packet, exposure_ns: int) -> None:
         """Pass a JPEG on, at most `image_fps` times a second: as it came, or made of what was decoded."""

@@ -1,6 +1,7 @@
 """`groundstation experiment calibrations`: wrong field files, mended by `calibrate team` and flown again."""
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,17 +34,7 @@ Flight = dict[str, Any]
 @click.option("--scenario", default="realistic", show_default=True, help="Scenario: sensor errors, the target's path.")
 @campaign_options("calibrations")
 def calibrations(
-    seeds: int,
-    seed: int,
-    only: str,
-    seconds: float,
-    field: str,
-    scenario: str,
-    options: tuple[str, ...],
-    scheduler: str,
-    workers: int,
-    out: Path,
-    as_json: bool,
+    seeds: int, seed: int, only: str, scheduler: str, workers: int, out: Path, as_json: bool, **flown: Any
 ) -> int:
     """Fly labs whose field file is wrong, take over what `calibrate team` proposes, and fly them again.
 
@@ -53,13 +44,12 @@ def calibrations(
     from groundstation.experiments.calibrations import row_of, table, verdict_on
     from groundstation.experiments.runner import write_atomically
 
-    labs = _chosen(field, options, only)
-    seeds_flown = range(seed, seed + seeds)
-    firsts = [_order(flown_field(_path(field), options), lab.errors, scenario, field, seconds, True) for lab in labs]
-    batches = [_batch(order, one) for order in firsts for one in seeds_flown]
+    told = Told(**flown)
+    labs, seeds_flown = _chosen(told, only), range(seed, seed + seeds)
+    batches = [_batch(order, one) for order in (_order(told, lab.errors) for lab in labs) for one in seeds_flown]
     before = _flights(fly_all(batches, scheduler, workers, len(batches) == 1, out))
     again = [
-        _batch(_mended(field, options, lab, flight, out, scenario, seconds), flight["seed"])
+        _batch(_mended(told, lab, flight, out), flight["seed"])
         for lab, flight in zip((lab for lab in labs for _ in seeds_flown), before, strict=True)
     ]
     after = _flights(fly_all(again, scheduler, workers, len(again) == 1, out))
@@ -76,32 +66,42 @@ def calibrations(
     return ExitCode.OK if good else ExitCode.FAILED
 
 
-def _path(field: str) -> Path:
-    from groundstation.settings.files import find_field
+@dataclass(frozen=True, slots=True)
+class Told:
+    """The field as the operator has it, and how it is flown."""
 
-    return find_field(field)
+    field: str
+    options: tuple[str, ...]
+    scenario: str
+    seconds: float
+
+    @property
+    def path(self) -> Path:
+        """Return its file."""
+        from groundstation.settings.files import find_field
+
+        return find_field(self.field)
 
 
-def _chosen(field: str, options: tuple[str, ...], only: str) -> "list[WrongLab]":
+def _chosen(told: Told, only: str) -> "list[WrongLab]":
     from groundstation.experiments.calibrations import calibrated_labs
     from groundstation.experiments.culprit_rows import chosen, labs_of
 
-    values = flown_field(_path(field), options)["field"]
+    values = flown_field(told.path, told.options)["field"]
     if not values["cameras"] or len(values["drones"]) < 2:
-        raise SettingsError([f"{field}: calibrations needs a fixed camera and two drones"])
+        raise SettingsError([f"{told.field}: calibrations needs a fixed camera and two drones"])
     return chosen(only, calibrated_labs(labs_of(values)))
 
 
-def _order(
-    order: dict[str, Any], errors: "tuple[WrongFigure, ...]", scenario: str, field: str, seconds: float, calibrate: bool
-) -> str:
+def _order(told: Told, errors: "tuple[WrongFigure, ...]", mended: Path | None = None) -> str:
+    """Return what the simulator is told besides the seeds; mended: the field's file with the new settings."""
     from groundstation.experiments.culprit_rows import STAND_S
     from groundstation.settings.files import find_scenario
     from groundstation.settings.scenario import load_scenario
 
-    base = load_scenario(find_scenario(scenario, _path(field)))
-    own = {"errors": errors, "stand_s": STAND_S, "calibrate": calibrate, "scenario": base, "seconds": seconds}
-    return json.dumps(order | own, sort_keys=True)
+    base = load_scenario(find_scenario(told.scenario, told.path))
+    own = {"errors": errors, "stand_s": STAND_S, "calibrate": mended is None, "scenario": base, "seconds": told.seconds}
+    return json.dumps(flown_field(mended or told.path, told.options) | own, sort_keys=True)
 
 
 def _batch(order: str, seed: int) -> "FlightBatch":
@@ -116,19 +116,17 @@ def _flights(rows: list[dict[str, Any]]) -> list[Flight]:
     return flights_of(rows)[0]
 
 
-def _mended(
-    field: str, options: tuple[str, ...], lab: "WrongLab", flight: Flight, out: Path, scenario: str, seconds: float
-) -> str:
+def _mended(told: Told, lab: "WrongLab", flight: Flight, out: Path) -> str:
     """Return the order of the same flight once the proposed settings stand in the field file's text."""
     from groundstation.calibration.team_left import errors_left
     from groundstation.settings.load import load_field
     from groundstation.settings.patched import write_patched
     from groundstation.settings.resolved import resolved_field, yaml_of
 
-    told = load_field(_path(field), options)
+    field = load_field(told.path, told.options)
     target = out / "fields" / f"{lab.name.replace(' ', '-')}-{flight['seed']}.yaml"
     target.parent.mkdir(parents=True, exist_ok=True)
     changes = {tuple(path): value for path, value in flight["settings"]}
-    write_patched(target, yaml_of(told), changes, told.model_dump(mode="json"))
-    left = errors_left(lab.errors, resolved_field(told), resolved_field(load_field(target, options)))
-    return _order(flown_field(target, options), left, scenario, field, seconds, False)
+    write_patched(target, yaml_of(field), changes, field.model_dump(mode="json"))
+    left = errors_left(lab.errors, resolved_field(field), resolved_field(load_field(target, told.options)))
+    return _order(told, left, target)

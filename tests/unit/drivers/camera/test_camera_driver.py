@@ -165,26 +165,15 @@ def test_an_observation_carries_exposure_time_attitude_and_names(rig, jpeg):
     assert (len(observation.covariance), observation.margin > 1.0) == (16, True)
     assert [r.message.found for r in heard if r.key.topic is SEARCHED_PICTURE] == [("bot",)]
     (image,) = [r for r in heard if r.key.topic is IMAGE]
-    assert image.payload == jpeg
-    assert (image.header.entity, image.header.stamp_ns) == ("drone_1_camera", now_ns - 120_000_000)
+    assert (image.payload, image.header.entity, image.header.stamp_ns) == (jpeg, "drone_1_camera", now_ns - 120_000_000)
     assert rig.child.states[0][0] == "READY"
 
 
 def test_a_marker_is_as_old_as_the_row_that_shows_it(rig, jpeg):
-    """With a rolling shutter the rows above the middle are exposed before it, those below after it."""
-    now_ns = clock.now_ns()
-    seen = {}
-    for readout_ms in (0.0, 30.0):
-        slow = driver.CameraDriver(rig.child, settings(readout_ms=readout_ms), rig.source)
-        rig.source.push(jpeg, now_ns)
-        slow.turn()
-        (seen[readout_ms],) = [r.message for r in rig.heard.drain() if r.key.topic is OBSERVATION]
-    x, y, z = seen[30.0].position_m
-    lens = CameraIntrinsics(640, 360, 460.0, 460.0, 319.5, 179.5, (-0.30, 0.08, 0.0, 0.0, 0.0))
-    row = float(lens.project(np.array([[x, y, z]]))[0, 1])
-    assert abs(row / 360 - 0.5) > 0.02, "it is not in the middle row"
-    later_ns = seen[30.0].header.stamp_ns - seen[0.0].header.stamp_ns
-    assert later_ns == pytest.approx((row / 360 - 0.5) * 30e6, abs=3e5)
+    rig.source.push(jpeg, now_ns := clock.now_ns())
+    driver.CameraDriver(rig.child, settings(readout_ms=30.0), rig.source).turn()
+    (seen,) = [r.message for r in rig.heard.drain() if r.key.topic is OBSERVATION]
+    assert 1e6 < abs(seen.header.stamp_ns - now_ns + 120_000_000) < 15e6
 
 
 def test_pictures_are_passed_on_at_most_five_times_a_second(rig, jpeg):

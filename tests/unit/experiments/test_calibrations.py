@@ -1,13 +1,17 @@
 """What is left wrong of a field once settings were changed, and how a mended flight is judged."""
 
+import json
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from groundstation.calibration.team_left import errors_left
 from groundstation.calibration.team_settings import with_changes
+from groundstation.cli.main import run
 from groundstation.experiments.calibrations import calibrated_labs, row_of, table, verdict_on
 from groundstation.experiments.culprit_rows import WrongLab, labs_of
+from groundstation.experiments.faults import FlightBatch
 from groundstation.field.resolved import ResolvedField
 from groundstation.settings.files import find_field
 from groundstation.settings.load import load_field
@@ -85,3 +89,31 @@ def test_rows_are_those_whose_field_file_alone_is_wrong() -> None:
     found = [one.name for one in calibrated_labs(labs_of(names))]
     assert found[0] == "nothing" and {"pan of both", "all markers", "a drone's lens", "ceiling aside"} <= set(found)
     assert not {"a wrong pad", "markers exchanged", "ceiling bumped", "a drone's telemetry"} & set(found)
+
+
+def test_what_is_proposed_is_written_into_the_field_and_flown_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    flown: list[dict[str, Any]] = []
+
+    def fly(batches: list[FlightBatch], *_: object) -> list[dict[str, Any]]:
+        rows = []
+        for batch in batches:
+            order = json.loads(batch.order) | {"seeds": batch.seeds}
+            flown.append(order)
+            turn = sum(size for who, part, size in order["errors"] if (who, part) == ("drone_1", "pan"))
+            found = flight(0.09 if turn > 1.0 else 0.02, 1.0, turn=turn) | {"seed": batch.seeds[0]}
+            found["settings"] = [[["drones", "drone_1", "camera", "pan_left_deg"], 2.9]] if order["calibrate"] else None
+            rows.append({"merits": {"flights": [found]}, "timing": {"flights": [{}]}})
+        return rows
+
+    monkeypatch.setattr("groundstation.cli.experiment_calibrations.fly_all", fly)
+    asked = ["experiment", "calibrations", "--rows", "pan of one", "--seeds", "2", "--seed", "7", "-o", str(tmp_path)]
+    assert run(asked) == 0
+    first, second, again, last = flown
+    assert [one["calibrate"] for one in flown] == [True, True, False, False]
+    assert (first["seeds"], second["seeds"]) == (again["seeds"], last["seeds"]) == ((7,), (8,))
+    assert first["errors"] == [["drone_1", "pan", 3.0]]
+    assert again["errors"] == [["drone_1", "pan", pytest.approx(0.1)]]
+    assert again["field"]["drones"]["drone_1"]["camera"]["pan_left_deg"] == 2.9
+    assert "2/2" in capsys.readouterr().out and (tmp_path / "calibrations.json").exists()

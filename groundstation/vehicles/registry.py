@@ -102,7 +102,7 @@ def _require_parts(kind: VehicleKind) -> None:
     for part in ("processes", "stop", "check", "moved"):
         if not callable(getattr(kind, part)):
             raise TypeError(f"{part} is a {type(getattr(kind, part)).__name__}, no function")
-    for part in ("driver", "emulator", "true_pose"):
+    for part in ("driver", "emulator", "true_pose", "blink"):
         place = getattr(kind, part)
         if (place or part == "driver") and ":" not in str(place):
             raise ValueError(f'{part} must be "module:attribute" (got {place!r})')

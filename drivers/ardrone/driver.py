@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from drivers.ardrone import convert, velocity_loop
 from drivers.ardrone.averages import MotionMean
+from drivers.ardrone.blind_descent import BlindDescent
 from drivers.ardrone.commands import orders_from_decision
 from drivers.ardrone.desired_config import ids_of, scale_from_settings, wishes
 from drivers.ardrone.identity import Model, model_from_navdata
@@ -57,7 +58,7 @@ _log = logging.getLogger(__name__)
 class LatestNavdata(NamedTuple):
     """The newest word of the drone; heard_ns 0: never; moved_ns: when it last reported motion; velocity as reported.
 
-    obeyed: sequence number of the last PCMD that it says it obeyed, if it says so.
+    obeyed: sequence number of the last PCMD that it says it obeyed, if it says so; height_m: above the floor, likewise.
     """
 
     heard_ns: int = 0
@@ -69,6 +70,7 @@ class LatestNavdata(NamedTuple):
     model: Model = Model.UNKNOWN
     velocity_m_s: Vector3 = (0.0, 0.0, 0.0)
     obeyed: int | None = None
+    height_m: float | None = None
 
 
 class ArDrone:
@@ -94,6 +96,7 @@ class ArDrone:
         self._scale = scale_from_settings(settings)
         self._loop = VelocityLoop(settings.limits)
         self._motion = MotionMean()
+        self._descent, self._sinks = BlindDescent(), False
         self._plausibility = MotionMonitor(LIMITS)
         self._applied_ns = 0
         self._doubted_ns = -_DOUBTED_NS
@@ -137,6 +140,7 @@ class ArDrone:
             model=model_from_navdata(packet) if heard.model is Model.UNKNOWN else heard.model,
             velocity_m_s=motion.velocity_m_s,
             obeyed=None if references is None else references.sequence,
+            height_m=motion.height_m,
         )
         sample = convert.sample_from_motion(now_ns, packet, motion)
         report = self._plausibility.update(sample, flight_state)
@@ -179,7 +183,7 @@ class ArDrone:
         if self._session.request_due(now_ns, silence_ns):
             self._link.request_navdata()
         attitude = self._attitude(now_ns, decision, heard)
-        action = decision.action
+        action = Action.HOVER if self._sinks else decision.action
         if action is Action.TAKE_OFF and self._session.phase is not SessionPhase.READY:
             action = Action.HOVER  # it was restarted since the order: what flies stays up, what stands stays there
         commands = orders_from_decision(action, attitude, heard.state, heard.flight_state, self._scale)
@@ -216,8 +220,11 @@ class ArDrone:
         fresh = now_ns - heard.moved_ns <= _FRESH_NS
         if decision.action is Action.IDLE and fresh and force is not None:
             self._loop.stand(force, dt_s)
-        if fresh and decision.action is Action.HOVER and self._is_blind():
-            return self._loop.brake(dt_s, force, decision.seen_m_s)
+        blind = fresh and self._is_blind()
+        self._sinks = self._descent.step(now_ns, decision.action is Action.LAND, blind, heard.height_m)
+        if blind and (self._sinks or decision.action is Action.HOVER):
+            climb_m_s = -self._settings.limits.max_climb_m_s if self._sinks else 0.0
+            return self._loop.brake(dt_s, force, decision.seen_m_s, climb_m_s)
         if decision.action is not Action.FLY or not fresh:
             self._loop.reset()
             return velocity_loop.HOVER

@@ -96,11 +96,12 @@ class VelocityLoop:
         dt_s: float,
         force_m_s2: tuple[float, float] | None = None,
         seen_m_s: tuple[float, float] | None = None,
+        climb_m_s: float = 0.0,
     ) -> AttitudeRequest:
         """Return the attitude that stops a drone whose velocity is wrong, from its last correct speed.
 
         Its own hover is no brake then: the firmware stops by the same optical flow. seen_m_s: velocity forward and left
-        that cameras see; without it the error of that last speed stays.
+        that cameras see; without it the error of that last speed stays. climb_m_s: meanwhile, within limits.
         """
         dt_s = min(max(dt_s, 0.0), _LONGEST_STEP_S)
         if self.contradicted:
@@ -110,7 +111,7 @@ class VelocityLoop:
             axis.brake()
         for axis, seen in zip(self._axes, seen_m_s or (), strict=False):
             axis.see(seen, dt_s)
-        return self._request((0.0, 0.0, 0.0), 0.0, None, dt_s, force_m_s2)
+        return self._request((0.0, 0.0, climb_m_s), 0.0, None, dt_s, force_m_s2)
 
     def _request(
         self,

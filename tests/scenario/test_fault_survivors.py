@@ -25,6 +25,9 @@ BLIND = {
     "blind_and_then_deaf": (23, ["at_deaf", "uniform_floor"]),
 }
 
+# Braked to rest, blind and out of all views, and then landed level: the air carried it off at 0.27 m/s.
+CARRIED_OFF = (42032, ["uniform_floor"])
+
 # The ceiling saw the velocity drift off, and lost sight of the drone; the other drone was blind.
 BELIEVED_AGAIN = (50, ["picture_black", "velocity_drifting"])
 
@@ -77,6 +80,12 @@ def safely_flown(order: dict[str, Any], seed: int, kinds: list[str]) -> dict[str
 def test_a_blind_drone_comes_to_rest(order: dict[str, Any], seed: int, kinds: list[str]) -> None:
     flown = safely_flown(order, seed, kinds)
     assert flown["rest_s"] <= 2.5
+
+
+@pytest.mark.slow
+@pytest.mark.study
+def test_a_blind_drone_is_braked_while_it_comes_down() -> None:
+    assert safely_flown(order_of([]), *CARRIED_OFF)["rest_s"] <= 2.5
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""The landing of an AR.Drone that does not see its motion. Pure.
+"""The landing of an AR.Drone whose optical flow sees no floor. Pure.
 
 Its firmware lands level then: it stops by the optical flow that fails, and moving air carries it off. So the driver
 lets it sink and goes on braking it, until it is so low that the firmware may land it.
@@ -21,7 +21,7 @@ class BlindDescent:
     def step(self, now_ns: int, lands: bool, blind: bool, height_m: float | None) -> bool:
         """Return whether it sinks.
 
-        lands: it is to land; blind: it does not see its motion, and all else that it says is sound; height_m: above the
+        lands: it is to land; blind: it sees no floor, and all else that it says is sound; height_m: above the
         floor, None if it does not say.
         """
         if not lands:

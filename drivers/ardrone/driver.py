@@ -1,6 +1,7 @@
 """The AR.Drone driver: reader thread, sender, and the process entry `run`."""
 
 import logging
+import math
 import threading
 from collections import Counter
 from functools import partial
@@ -42,6 +43,8 @@ RATE_HZ = 40.0
 _FRESH_NS = 300_000_000
 # Long enough that the drone waits for RESUME.
 _DOUBTED_NS = 1_300_000_000
+# What a drone reports that sees no floor: not what it flew last, so that its firmware's own braking fails as well.
+_NO_FLOW_M_S = 0.02
 _RATE_PERIOD_NS = 200_000_000
 _FAULTS = int(StateBit.MOTORS | StateBit.SOFTWARE_FAULT | StateBit.VBAT_LOW)
 _NO_AR1_VIDEO = Notice(
@@ -221,7 +224,8 @@ class ArDrone:
         if decision.action is Action.IDLE and fresh and force is not None:
             self._loop.stand(force, dt_s)
         blind = fresh and self._is_blind()
-        self._sinks = self._descent.step(now_ns, decision.action is Action.LAND, blind, heard.height_m)
+        flowless = blind and math.hypot(*heard.velocity_m_s[:2]) < _NO_FLOW_M_S
+        self._sinks = self._descent.step(now_ns, decision.action is Action.LAND, flowless, heard.height_m)
         if blind and (self._sinks or decision.action is Action.HOVER):
             climb_m_s = -self._settings.limits.max_climb_m_s if self._sinks else 0.0
             return self._loop.brake(dt_s, force, decision.seen_m_s, climb_m_s)

@@ -27,6 +27,8 @@ BLIND = {
 
 # Braked to rest, blind and out of all views, and then landed level: the air carried it off at 0.27 m/s.
 CARRIED_OFF = (42032, ["uniform_floor"])
+# A velocity stuck at -0.6 m/s is no floor that is not seen: the firmware brakes better than the driver then.
+STUCK_IN_MOTION = (20223, ["velocity_stuck"])
 
 # The ceiling saw the velocity drift off, and lost sight of the drone; the other drone was blind.
 BELIEVED_AGAIN = (50, ["picture_black", "velocity_drifting"])
@@ -86,6 +88,12 @@ def test_a_blind_drone_comes_to_rest(order: dict[str, Any], seed: int, kinds: li
 @pytest.mark.study
 def test_a_blind_drone_is_braked_while_it_comes_down() -> None:
     assert safely_flown(order_of([]), *CARRIED_OFF)["rest_s"] <= 2.5
+
+
+@pytest.mark.slow
+@pytest.mark.study
+def test_a_drone_whose_velocity_is_stuck_in_motion_is_left_to_its_firmware_as_it_lands() -> None:
+    assert safely_flown(order_of([]), *STUCK_IN_MOTION)["rest_s"] <= 3.0
 
 
 @pytest.mark.slow

@@ -32,7 +32,11 @@ def test_a_sighting_that_joins_nobody_is_not_told() -> None:
     assert Joinings().take(1, [Correction("ceiling", "drone_1", Verdict.ACCEPTED, "", nis=3.0)]) == []
 
 
-SECOND_AND_NOW = [(5.9, 5.9, True), (6.1, 6.1, False), (2.0, 4.9, True), (2.0, 5.1, False)]
+def test_nobody_is_unsettled_before_anything_was_seen() -> None:
+    assert not Joinings().is_unsettled("drone_1")
+
+
+SECOND_AND_NOW = [(5.9, 5.9, True), (6.0, 6.0, False), (2.0, 4.9, True), (2.0, 5.0, False)]
 
 
 @pytest.mark.parametrize(("second_s", "now_s", "unsettled"), SECOND_AND_NOW)

@@ -12,7 +12,7 @@ from drivers.neighbours import Neighbours
 from drivers.seen_velocity import SeenVelocity
 from drivers.watchdog import Watchdog
 from drivers.watchdog_types import AIRBORNE, Ack, DriverMode, Upstream, VehicleView, WatchdogDecision, WatchdogLimits
-from groundstation.adapters import ping_to
+from groundstation.adapters import how_to_reach
 from groundstation.bus import clock
 from groundstation.bus.messages import (
     OPERATOR,
@@ -37,7 +37,6 @@ _SILENCE_EVENT_NS = _REFUSAL_PERIOD_NS = 1_000_000_000
 # How long a driver that is to exit goes on for a vehicle it cannot hear.
 _GIVE_UP_NS = 10_000_000_000
 _UNSOUND = "restart it; if it says this again, have that sensor repaired"
-_UNREACHED = "check that it is switched on and that this computer is in its network"
 # Refusals that nothing of ours causes, as the operator reads them.
 _INTRUSIONS = {
     "unsigned": "unsigned frames",
@@ -246,7 +245,7 @@ class VehicleHost:
             if view.unsound and decision.mode is not DriverMode.CONNECTING:  # the watchdog's reason says what
                 return
             told = f"{name}: {view.silence}" if view.unsound else f"{name} does not answer at {address}"
-            remedy = _UNSOUND if view.unsound else f"{_UNREACHED}: {ping_to(address)}"
+            remedy = _UNSOUND if view.unsound else how_to_reach(address)
             self._event(Severity.ERROR, f"{told}; trying on", remedy)
             self._child.degrade(told)
 

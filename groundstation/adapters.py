@@ -70,10 +70,11 @@ def with_zone(address: str, interface: str) -> str:
     return f"{address}%{interface}" if interface else address
 
 
-def ping_to(address: str) -> str:
-    """Return what to type to ask whether a vehicle is there, given its address with or without an adapter."""
+def how_to_reach(address: str) -> str:
+    """Return what to try with a vehicle that does not answer, given its address with or without an adapter."""
     host, interface = split_zone(address)
-    return f"ping -I {interface} {host}" if interface else f"ping {host}"
+    ping = f"ping -I {interface} {host}" if interface else f"ping {host}"
+    return f"check that it is switched on and that this computer is in its network: {ping}"
 
 
 def adapters() -> list[str]:

@@ -5,13 +5,12 @@ import time
 from drivers.mavlink.links.opening import open_link
 from drivers.mavlink.links.seam import MavlinkLink
 from drivers.mavlink.settings import MavlinkDriverSettings
-from drivers.mavlink.wire.names import ARMED
+from drivers.mavlink.wire.names import ARMED, AUTOPILOT_COMPONENT
 from drivers.mavlink.wire.service import PlayTune
-from drivers.mavlink.wire.telemetry import Heartbeat
+from drivers.mavlink.wire.telemetry import OUR_HEARTBEAT, Heartbeat
 from groundstation.errors import DriverError
 
 _CONNECT_S, _LASTS_S = 5.0, 4.0
-_OURS = Heartbeat(6, 8, 0, 0, 4)
 # WIRE (docs/reference/mavlink.md 5.12): music macro language, 30 characters at most; a rising triad, three times.
 _TUNE = "MFT200L8O3CEGCEGCEGO4C"
 
@@ -26,7 +25,7 @@ def blink(section: str, name: str) -> str:
     link = open_link(settings.link)
     try:
         _wait_for(link, system)
-        link.send(system, PlayTune(system, 1, _TUNE, ""))
+        link.send(system, PlayTune(system, AUTOPILOT_COMPONENT, _TUNE, ""))
         _listen(link, _LASTS_S)
     finally:
         link.close()
@@ -36,9 +35,13 @@ def blink(section: str, name: str) -> str:
 def _wait_for(link: MavlinkLink, system: int) -> None:
     deadline = time.monotonic() + _CONNECT_S
     while time.monotonic() < deadline:
-        link.send(system, _OURS)
+        link.send(system, OUR_HEARTBEAT)
         for _, frame in link.receive():
-            if frame.system != system or frame.component != 1 or not isinstance(frame.message, Heartbeat):
+            if (
+                frame.system != system
+                or frame.component != AUTOPILOT_COMPONENT
+                or not isinstance(frame.message, Heartbeat)
+            ):
                 continue
             if frame.message.base_mode & ARMED:
                 raise DriverError(f"system {system} is armed: land and disarm it first")

@@ -46,7 +46,9 @@ def test_who_cannot_be_flown_stops_in_time(
 ) -> None:
     verdict = fly(sitl, tap, wrong, tmp_path)
     assert verdict["unsafe"] == {}, verdict
-    assert verdict["hover_s"] + verdict["rest_s"] > 0.0, "the fault never showed, or nobody moved"
+    # One that hardly moved when the fault began is stopped before its motion could show it.
+    stopped = verdict["modes"].get(wrong.entity, "TRACK") != "TRACK"
+    assert stopped or verdict["hover_s"] + verdict["rest_s"] > 0.0, "the fault never showed, or nobody moved"
 
 
 @pytest.mark.parametrize("wrong", BORNE.values(), ids=BORNE)

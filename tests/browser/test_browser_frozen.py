@@ -78,7 +78,7 @@ def test_what_was_pressed_on_a_frozen_page_is_not_given_when_it_goes_on(watched:
                 os.kill(pid, signal.SIGCONT)
     orders, banner = page.there("orders"), page.there("banner-unheard")
     page.wait(lambda s: s["connected"] and orders.inner_text().count("came too late") == 2, within_s=5)
-    assert "LAND REFUSED: not given to drone_2" in banner.inner_text()
+    page.wait(lambda s: "LAND REFUSED: not given to drone_2" in banner.inner_text(), within_s=5)
     page.shot("frozen_page_goes_on")
     assert stage.flight.commands == []
     page.wait(

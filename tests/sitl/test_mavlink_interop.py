@@ -225,8 +225,10 @@ TYPED = {
 }
 
 
+# In a whole run MAVProxy and MAVSDK ride along in tests/interop/test_riding_clients.py.
+@pytest.mark.exhaustive
 @needing_processors()
-@pytest.mark.parametrize("flavour", ["ardupilot", pytest.param("px4", marks=pytest.mark.exhaustive)])
+@pytest.mark.parametrize("flavour", ["ardupilot", "px4"])
 def test_mavproxy_rides_along_and_may_only_stop(proxy_at, hangar, port, flavour):
     """Our driver tracks; MAVProxy cannot change what it flies by, holds it until our RESUME, and lands it."""
     emulator, copter, _ = hangar.add(flavour, 5, aided=True, calls=("127.0.0.1", port))

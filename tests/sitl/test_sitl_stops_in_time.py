@@ -21,7 +21,7 @@ LAND_S = 3.0  # safety.land_after_s of the lab
 CASES = [
     ("tracker", signal.SIGKILL),
     ("drone_1", signal.SIGSTOP),
-    ("router", signal.SIGKILL),
+    pytest.param("router", signal.SIGKILL, marks=pytest.mark.exhaustive),
     pytest.param("drone_1", signal.SIGKILL, marks=pytest.mark.exhaustive),
     pytest.param("tracker", signal.SIGSTOP, marks=pytest.mark.exhaustive),
     pytest.param("router", signal.SIGSTOP, marks=pytest.mark.exhaustive),

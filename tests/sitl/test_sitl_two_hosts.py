@@ -82,11 +82,9 @@ class End:
     resumes: bool = False
 
 
-SLOW = [
-    End("host", AT_ONCE_S),
-    End("driver", LAND_S, "SIGSTOP", (DOWN, TRACK), concerned=("drone_1",)),
-]
+SLOW = [End("host", AT_ONCE_S)]
 ON_DEMAND = [
+    End("driver", LAND_S, "SIGSTOP", (DOWN, TRACK), concerned=("drone_1",)),
     End("host", LAND_S + LINK_S, "SIGSTOP"),
     End("driver", LAND_S, modes=(DOWN, TRACK), concerned=("drone_1",)),
     End("supervisor", AT_ONCE_S + LINK_S),

@@ -16,7 +16,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.sitl, pytest.mark.timeout(300)]
     [
         ("tello", [], "stand,kind"),
         ("ardrone", [], "killed"),
-        ("mavlink", [], "epochs"),
+        pytest.param("mavlink", [], "epochs", marks=pytest.mark.exhaustive),
         ("mavlink", ["--with", "mavlink.flavour=ardupilot"], "limits"),
         pytest.param("mavlink", ["--with", "mavlink.flavour=ardupilot"], "orphaned", marks=pytest.mark.exhaustive),
         pytest.param("tello", [], "square,cut,stranger", marks=pytest.mark.exhaustive),

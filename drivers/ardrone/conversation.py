@@ -5,7 +5,8 @@ The caller decides what may be said: `speaking` feeds the drone's watchdog, and 
 
 import socket
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 from drivers.ardrone.dump import parse_dump
@@ -145,3 +146,22 @@ def _open(interface: str) -> socket.socket:
     one = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     bind_to_adapter(one, interface)
     return one
+
+
+@contextmanager
+def with_standing(address: str) -> Iterator[Conversation]:
+    """Give a conversation with a drone that stands, and end it.
+
+    Raises DriverError when it does not answer, cannot be reached, or its motors may turn: whoever flies it numbers its
+    commands.
+    """
+    line = Conversation(address)
+    try:
+        line.wait_for_answer()
+        if line.is_set(StateBit.FLY):
+            raise DriverError(f"{address} flies: land it first")
+        yield line
+    except OSError as error:
+        raise DriverError(f"{address} cannot be reached: {error.strerror or error}") from error
+    finally:
+        line.close()

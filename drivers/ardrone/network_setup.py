@@ -12,10 +12,9 @@ import struct
 from collections.abc import Mapping
 from pathlib import Path
 
-from drivers.ardrone.conversation import CONTROL_PORT, FTP_PORT, Conversation
+from drivers.ardrone.conversation import CONTROL_PORT, FTP_PORT, with_standing
 from drivers.ardrone.queries import TcpInquirer
 from drivers.ardrone.wire import at
-from drivers.ardrone.wire.state import StateBit
 from groundstation.adapters import bind_to_adapter, split_zone
 from groundstation.errors import DriverError
 
@@ -76,18 +75,10 @@ def trim(address: str) -> None:
 
     Raises DriverError when it does not answer, or its motors may turn.
     """
-    line = Conversation(address)
-    try:
-        line.wait_for_answer()
-        if line.is_set(StateBit.FLY):
-            raise DriverError(f"{address} flies: land it first")
+    with with_standing(address) as line:
         for _ in range(_TRIMS):
             line.say(at.ftrim())  # datagrams get lost, and nothing acknowledges it
             line.listen(0.05)
-    except OSError as error:
-        raise DriverError(f"{address} cannot be reached: {error.strerror or error}") from error
-    finally:
-        line.close()
 
 
 def change(address: str, wanted: Mapping[str, str]) -> dict[str, tuple[str, str]]:
@@ -95,12 +86,8 @@ def change(address: str, wanted: Mapping[str, str]) -> dict[str, tuple[str, str]
 
     Raises DriverError when it does not answer, flies, or gives no configuration.
     """
-    inquirer, line = TcpInquirer(address, FTP_PORT, CONTROL_PORT), Conversation(address)
-    try:
-        line.wait_for_answer()
-        if line.is_set(StateBit.FLY):
-            raise DriverError(f"{address} flies: land it first")
-        before = line.read_configuration(inquirer)
+    with with_standing(address) as line:
+        before = line.read_configuration(TcpInquirer(address, FTP_PORT, CONTROL_PORT))
         if not before:
             raise DriverError(f"{address} gives no configuration (TCP {CONTROL_PORT}): nothing was changed")
         for key, value in wanted.items():
@@ -108,7 +95,3 @@ def change(address: str, wanted: Mapping[str, str]) -> dict[str, tuple[str, str]
                 line.configure(key, value)
         after = line.read_configuration(TcpInquirer(address, FTP_PORT, CONTROL_PORT))
         return {key: (before.get(key, ""), after.get(key, "")) for key in wanted}
-    except OSError as error:
-        raise DriverError(f"{address} cannot be reached: {error.strerror or error}") from error
-    finally:
-        line.close()

@@ -4,13 +4,13 @@ import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+from drivers.mavlink.greeting import first_heartbeat
 from drivers.mavlink.links.seam import MavlinkLink
 from drivers.mavlink.parameters import Needed, difference, needed
 from drivers.mavlink.wire.errors import WireError
-from drivers.mavlink.wire.names import ARMED, AUTOPILOT_COMPONENT, Flavour
+from drivers.mavlink.wire.names import ARMED, Flavour
 from drivers.mavlink.wire.parameters import carried_from_value, value_from_carried
 from drivers.mavlink.wire.service import ParamRequestRead, ParamSet, ParamValue
-from drivers.mavlink.wire.telemetry import OUR_HEARTBEAT, Heartbeat
 from groundstation.errors import DriverError
 
 _TRIES = 5
@@ -41,29 +41,18 @@ class ParameterSetup:
 
     def connect(self) -> None:
         """Wait for the vehicle; raises DriverError if it does not answer, is another kind, or has its motors on."""
-        deadline = time.monotonic() + _CONNECT_S
-        while time.monotonic() < deadline:
-            self._link.send(self._system, OUR_HEARTBEAT)
-            for _, frame in self._link.receive():
-                message = frame.message
-                if (
-                    frame.system != self._system
-                    or frame.component != AUTOPILOT_COMPONENT
-                    or not isinstance(message, Heartbeat)
-                ):
-                    continue
-                if message.autopilot != self._flavour:
-                    raise DriverError(
-                        f"system {self._system} is autopilot {message.autopilot}, not {self._flavour.name}"
-                    )
-                if message.base_mode & ARMED:
-                    raise DriverError(f"system {self._system} is armed: parameters are not touched")
-                return
+        heartbeat = first_heartbeat(self._link, self._system, _CONNECT_S)
+        if heartbeat is None:
+            raise DriverError(self._unanswered())
+        if heartbeat.autopilot != self._flavour:
+            raise DriverError(f"system {self._system} is autopilot {heartbeat.autopilot}, not {self._flavour.name}")
+        if heartbeat.base_mode & ARMED:
+            raise DriverError(f"system {self._system} is armed: parameters are not touched")
+
+    def _unanswered(self) -> str:
         heard = ", ".join(f"{reason} {n}" for reason, n in self._link.rejected.items())
         refused = f" (refused: {heard})" if heard else ""
-        raise DriverError(
-            f"system {self._system} does not answer{refused}; `groundstation mavlink probe` tells who is on a link"
-        )
+        return f"system {self._system} does not answer{refused}; `groundstation mavlink probe` tells who is on a link"
 
     def differences(self) -> Iterator[ParameterDifference]:
         """Yield the differences from the needed values."""

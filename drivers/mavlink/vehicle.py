@@ -264,12 +264,8 @@ class MavlinkVehicle:
                 events.append(said)
         while self._jumps:
             jump_s = self._jumps.popleft() / 1000
-            events.append(
-                (
-                    MavSeverity.WARNING,
-                    f"its clock jumped by {jump_s:.0f} s: it restarted, or two vehicles share its system id",
-                )
-            )
+            why = "it restarted, or two vehicles share its system id"
+            events.append((MavSeverity.WARNING, f"its clock jumped by {jump_s:.0f} s: {why}"))
         while self._requests.failures:
             self._refusals.append((now_ns, self._requests.failures.popleft()))
         while self._refusals and now_ns - self._refusals[0][0] >= _EXPLAIN_NS:

@@ -56,7 +56,7 @@ def changes(figures: Figures, theta: Vector, moved: Vector) -> dict[Path, Any]:
     for index in np.flatnonzero(moved):
         key = figures.keys[index]
         for path in paths_of(field, key):
-            before = found.get(path, _at(values, path))
+            before = found.get(path, entry_at(values, path))
             found[path] = _changed(figures, theta, key, before)
     return found
 
@@ -81,16 +81,17 @@ def with_changes(field: ResolvedField, new: Mapping[Path, Any]) -> ResolvedField
     """Return the field with settings changed."""
     values = msgspec.to_builtins(field)
     for path, value in new.items():
-        _at(values, path[:-1])[path[-1]] = value
+        entry_at(values, path[:-1])[path[-1]] = value
     return field_from_values(values)
 
 
 def value_at(field: ResolvedField, path: Path) -> Any:
     """Return a setting of a field."""
-    return _at(msgspec.to_builtins(field), path)
+    return entry_at(msgspec.to_builtins(field), path)
 
 
-def _at(values: Any, path: Path) -> Any:
+def entry_at(values: Any, path: Path) -> Any:
+    """Return what stands at a path of nested mappings."""
     for name in path:
         values = values[name]
     return values

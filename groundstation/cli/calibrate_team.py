@@ -116,16 +116,11 @@ def _lines(found: "TeamCalibration", flown_with: dict[str, Any]) -> list[str]:
         )
     if not found.settings:
         return [*lines, "no setting of the field mends that: check the clock of the drone and the link to it"]
+    from groundstation.calibration.team_settings import entry_at
     from groundstation.settings.patched import fragment
 
-    changes = [f"  {'.'.join(path)}: {_at(flown_with, path)} -> {value}" for path, value in found.settings.items()]
+    changes = [f"  {'.'.join(path)}: {entry_at(flown_with, path)} -> {value}" for path, value in found.settings.items()]
     return [*lines, "change in the field file:", *changes, "in its form:", fragment(found.settings).rstrip()]
-
-
-def _at(values: Any, path: tuple[str, ...]) -> Any:
-    for name in path:
-        values = values[name]
-    return values
 
 
 def _row(one: "Measured") -> str:

@@ -277,7 +277,7 @@ class Planner:
         return self.parameters.hysteresis if dwelt else self.parameters.urgent_gain
 
     def _idle(self, current: Topology, stamp_ns: int) -> PlanResult:
-        levels = self.parameters.level_heights(len(current.levels)) or ()
-        heights = {name: levels[current.level_of(name)] for name in current.robots} if levels else {}
+        by_level = self.parameters.level_heights(len(current.levels)) or ()
+        heights = {name: by_level[current.level_of(name)] for name in current.robots} if by_level else {}
         report = SolverReport("idle", 0, 0.0, 0, 0)
         return PlanResult(current, 0.0, 0.0, {}, heights, (), (), report, self.parameters.mode, stamp_ns)

@@ -14,7 +14,7 @@ from groundstation.report.wording import KIND_WORDS, bound, quantity, title
 
 _HAPPENINGS_SHOWN = 12
 _DOUBTS_SHOWN = 3
-# Healthy flights stay below three, as the target alone decides about some of its turns.
+# Healthy flights come to 0.4 to 2.9.
 _FAR_TOO_SURE = 4.0
 
 
@@ -93,7 +93,7 @@ def _details(report: RunReport) -> Text:
             label = "target" if len(figures.targets) == 1 else f"{name}: rms error {target.rmse_m:.3f} m"
             lines.append(f"{label}: covered {target.covered:.0%}, normalised error {target.anees:.2f} (1 is ideal)")
             if target.anees > _FAR_TOO_SURE:
-                lines.append("  a figure of the field is wrong: groundstation calibrate team looks for it")
+                lines.append("  a figure of the field may be wrong: groundstation calibrate team looks for it")
     return Text("\n".join(f"  {line}" for line in lines))
 
 

@@ -4,9 +4,9 @@
 import { label } from "./canvas.js";
 
 const LINE = 1.2;
-// NAME: always drawn, if need be over others; SENSOR, FIGURE: left out where there is no room.
 // Names can be read however faint the body is that they name: those who are lost are looked for first.
 const READABLE = 0.85;
+// NAME: always drawn, if need be over others; SENSOR, FIGURE: left out where there is no room.
 export const NAME = 0, SENSOR = 1, FIGURE = 2;
 let waiting = [], taken = [];
 // The place that a label had in the last picture: it is tried first, so that words do not jump to and fro.

@@ -23,6 +23,8 @@ _LATCHED = (*STATES, LEASE)
 _TRACED = (ESTIMATE, PLAN, TRUTH, INNOVATION)
 # What the page looks back on: two minutes of curves, and longer than any detection or sighting is shown.
 _LOOK_BACK_NS, _SEEN_NS = 122_000_000_000, 5_000_000_000
+# The first look after a jump, which is shown before two minutes could be read.
+_GLANCE_NS = 5_000_000_000
 # Trails go on at 5 Hz, curves at 2 Hz (console.history).
 _TRACE_NS, _CURVE_NS = 200_000_000, 500_000_000
 _MARKS = 400
@@ -48,6 +50,7 @@ class Show:
         listener = claim_port(port or field.console.port)
         self.server = ConsoleServer(bus, cast, scene, field, listener, "replay", playback)
         self.undecodable = 0
+        self._glanced = False
         self._at_s = time.monotonic()
 
     def _about(self) -> dict[str, Any]:
@@ -82,8 +85,10 @@ class Show:
         """Bring the server's board to where the replay is now; the server's own turn updates the viewers."""
         now_s = time.monotonic()
         elapsed_s, self._at_s = now_s - self._at_s, now_s
-        if self.playback.take_sought():
-            self._refill()
+        sought = self.playback.take_sought()
+        if sought or self._glanced:
+            self._refill(_GLANCE_NS if sought else _LOOK_BACK_NS)
+            self._glanced = sought
             self._at_s = time.monotonic()
             return
         for after_ns, until_ns in self.playback.advance(elapsed_s):
@@ -102,12 +107,12 @@ class Show:
             return
         self._exchange.deliver(Sample(str(record.key), content, codec.encode(header)))
 
-    def _refill(self) -> None:
+    def _refill(self, look_back_ns: int) -> None:
         """Remember what had been seen until now: the newest of everything, what happened, trails and curves."""
         server, reel, at_ns = self.server, self._reel, self.playback.at_ns
         now_ns = self.playback.now_ns()
         server.begin_anew()
-        self._trace(max(reel.start_ns - 1, at_ns - _LOOK_BACK_NS), at_ns)
+        self._trace(max(reel.start_ns - 1, at_ns - look_back_ns), at_ns)
         self._ingest(self._newest(at_ns, _LATCHED), now_ns)
         for came_ns, record in reel.milestones:
             if came_ns > at_ns:

@@ -53,4 +53,4 @@ def test_a_far_seek_is_drawn_within_a_fifth_of_a_second(
     figures = f"median {delays[_JUMPS // 2]:.0f} ms, worst of {_JUMPS} {delays[-1]:.0f} ms"
     record_property("far seek", figures)
     print(figures)
-    assert delays[_JUMPS // 2] <= _LIMIT_MS, figures
+    assert delays[-1] <= _LIMIT_MS, figures

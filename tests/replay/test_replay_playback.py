@@ -12,6 +12,7 @@ from groundstation.console.protocol import decode
 from groundstation.console.snapshot import Snapshot
 from groundstation.console.viewer import PageConnection
 from groundstation.recording.reader import RecordingError
+from groundstation.replay import playback_server
 from groundstation.replay.playback import Playback
 from groundstation.replay.playback_server import Show
 from groundstation.replay.source import open_source
@@ -111,6 +112,16 @@ def test_a_seek_shows_what_was_seen_then(watched: Watched) -> None:
     for name, trail in history["trails"].items():
         assert len(again["trails"][name]) == pytest.approx(len(trail), abs=3)
     assert len(again["samples"]) == pytest.approx(len(history["samples"]), abs=2)
+
+
+def test_a_jump_is_shown_before_all_that_led_to_it_is_read(watched: Watched, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(playback_server, "_GLANCE_NS", 1_000 * MS)
+    watched.ask("seek", at_ms=watched.seed["scene"]["replay"]["end_ms"])
+    estimate, first = watched.sections["estimate"], watched.seed["history"]
+    assert len(first["trails"]["drone_1"]) <= 6, "one second of five points"
+    watched.turn(0.0)
+    assert watched.sections["estimate"] == estimate
+    assert len(watched.seed["history"]["trails"]["drone_1"]) > 6
 
 
 def test_steps_are_ticks_of_the_tracker(watched: Watched) -> None:

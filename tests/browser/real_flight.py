@@ -1,7 +1,6 @@
 """A whole run of emulated drones, and its console: fixtures of the tests that look at one."""
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -41,10 +40,13 @@ def kernels() -> None:
 
 
 @pytest.fixture
-def live(kernels: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[runtime_file.RuntimeRecord]:
+def live(
+    kernels: None, free_port: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[runtime_file.RuntimeRecord]:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     arguments = ["sitl", "lab", "--headless", "--duration", "120", "--output", str(tmp_path)]
-    arguments += ["--set", f"console.listen={NETWORK}", "--scenario", str(FEW_PICTURES)]
+    arguments += ["--set", f"console.port={free_port}", "--set", f"console.listen={NETWORK}"]
+    arguments += ["--scenario", str(FEW_PICTURES)]
     process = subprocess.Popen([sys.executable, "-m", "groundstation", *arguments], stdout=subprocess.DEVNULL)
     try:
         yield eventually(lambda: next(iter(runtime_file.live_records()), None), 60.0, "a run")
@@ -57,13 +59,7 @@ def live(kernels: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iter
 
 
 @pytest.fixture
-def served(live: runtime_file.RuntimeRecord, free_port: int) -> Iterator[str]:
-    command = [sys.executable, "-m", "groundstation", "console", "--port", str(free_port)]
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, env=dict(os.environ))
+def served(live: runtime_file.RuntimeRecord, free_port: int) -> str:
     url = f"http://127.0.0.1:{free_port}/"
-    try:
-        eventually(lambda: answers(url), 30.0, "the console answers")  # a page that is refused says so on its console
-        yield url
-    finally:
-        process.terminate()
-        process.wait(10)
+    eventually(lambda: answers(url), 30.0, "the run's console answers")  # a page that is refused says so on its console
+    return url

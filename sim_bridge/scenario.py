@@ -6,6 +6,7 @@ here. Units are in the key names; a pair of numbers is a range that each drone d
 
 import math
 from collections.abc import Iterable
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, assert_never
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationError, create_model
@@ -13,7 +14,6 @@ from pydantic_core import PydanticCustomError
 
 from groundstation.errors import SettingsError
 from groundstation.vehicles import VehicleKind, all_kinds
-from groundstation.vehicles.registry import load
 from sim_bridge.fault_kinds import Fault
 from sim_bridge.section import Section
 from sim_bridge.surroundings import FloorZone, LinkBursts, Obstacle, ScenarioExpectation
@@ -226,7 +226,7 @@ class CommonScenario(Section):
 def _section_of_kind(kind: VehicleKind, reference: str) -> tuple[Any, Any]:
     """Return type and default of a section; of one that cannot be used, what refuses every scenario that has it."""
     try:
-        model = load(reference)
+        model = resolve_name(reference)
         return model, Field(default=model(), description=str(model.__doc__))
     except Exception as error:  # noqa: BLE001 - a plug-in is anybody's program: its failure is told where it is used
         told = {"kind": kind.name, "why": f"{type(error).__name__}: {error}"}

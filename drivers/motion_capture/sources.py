@@ -6,6 +6,7 @@ import socket
 import threading
 from collections import Counter, deque
 from contextlib import suppress
+from pkgutil import resolve_name
 from typing import Any, Protocol
 
 from drivers.motion_capture.captured_frame import CapturedFrame
@@ -45,8 +46,7 @@ def open_source(address: SystemAddress) -> Source:
     Raises SettingsError where its library is missing, DriverError for a plug-in that cannot be loaded.
     """
     if address.scheme in OURS:
-        module, _, name = OURS[address.scheme].reader.partition(":")
-        ours: Source = getattr(importlib.import_module(module), name)(address)
+        ours: Source = resolve_name(OURS[address.scheme].reader)(address)
         return ours
     try:
         source: Source = plug_ins.made(plug_ins.WORLD_SENSORS, address.scheme, _USED, address)

@@ -1,6 +1,6 @@
 """`groundstation bench`: long measurements, each a sub-command imported only when it is called."""
 
-import importlib
+from pkgutil import resolve_name
 
 import click
 
@@ -32,8 +32,7 @@ class BenchGroup(click.Group):
         row = BENCHES.get(cmd_name)
         if row is None:
             return None
-        module, _, function = row[0].partition(":")
-        command = getattr(importlib.import_module(module), function)
+        command = resolve_name(row[0])
         assert isinstance(command, click.Command)
         return command
 

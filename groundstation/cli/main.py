@@ -1,10 +1,10 @@
 """The command line: each verb imported only when it is called, and one place for errors."""
 
-import importlib
 import sys
 from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
+from pkgutil import resolve_name
 
 import click
 
@@ -26,9 +26,8 @@ def _row(name: str) -> CommandRow | None:
 
 
 def _command(name: str, verb: CommandRow) -> click.Command:
-    module, _, function = verb.target.partition(":")
     try:
-        command = getattr(importlib.import_module(module), function)
+        command = resolve_name(verb.target)
         if not isinstance(command, click.Command):
             raise TypeError(f"{verb.target} is a {type(command).__name__}, no click command")
     except Exception as error:

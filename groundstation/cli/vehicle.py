@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from pathlib import Path
+from pkgutil import resolve_name
 
 import click
 
@@ -68,7 +69,6 @@ def blink(field: Path, drones: tuple[str, ...]) -> int:
     from groundstation.settings.load import load_field
     from groundstation.settings.sections import driver_sections
     from groundstation.vehicles import all_kinds
-    from groundstation.vehicles.registry import load
 
     loaded = load_field(field)
     if strangers := [name for name in drones if name not in loaded.drones]:
@@ -85,7 +85,7 @@ def blink(field: Path, drones: tuple[str, ...]) -> int:
             continue
         click.echo(f"{name} ({address}): look and listen now")
         try:
-            click.echo(f"{name} ({address}): {load(reference)(section.section, name)}")
+            click.echo(f"{name} ({address}): {resolve_name(reference)(section.section, name)}")
         except DriverError as error:
             click.echo(f"{name}: {error}", err=True)
             worst = ExitCode.FAULT

@@ -3,11 +3,11 @@
 The specification comes through a memory file and not through the disk: a restart in flight must work on a full one.
 """
 
-import importlib
 import logging
 import sys
 import time
 from collections.abc import Callable
+from pkgutil import resolve_name
 
 import msgspec
 
@@ -18,20 +18,13 @@ EXIT_FAILED = 1
 _log = logging.getLogger(__name__)
 
 
-def resolve(entry: str) -> Callable[[Child], int]:
-    """Return the function named by "module:function"; imports the module."""
-    module, _, function = entry.partition(":")
-    run: Callable[[Child], int] = getattr(importlib.import_module(module), function)
-    return run
-
-
 def main(arguments: list[str]) -> int:
     """Run one child to its end and return its exit code."""
     spec = msgspec.json.decode(sys.stdin.buffer.read(), type=ChildSpec)
     try:
         with Child(spec) as child:
             began = time.monotonic()
-            run = resolve(arguments[1])
+            run: Callable[[Child], int] = resolve_name(arguments[1])
             _log.info("imported %s in %.2f s", arguments[1], time.monotonic() - began)
             return run(child)
     except GroundStationError as error:

@@ -1,8 +1,8 @@
 """Transports of fail-safe datagrams: plain UDP, or that of the drone's driver package for its links."""
 
-import importlib
 import socket
 from collections.abc import Callable, Sequence
+from pkgutil import resolve_name
 from typing import Protocol
 
 from groundstation.adapters import bind_to_adapter
@@ -44,6 +44,5 @@ def open_voice(words: FailsafeDatagrams, speaker: int) -> Voice:
     if not words.voice:
         return UdpVoice(words.interface)
     # By name, as drivers are started: the supervisor knows no protocol.
-    module, _, name = words.voice.partition(":")
-    make: Callable[[str, int], Voice] = getattr(importlib.import_module(module), name)
+    make: Callable[[str, int], Voice] = resolve_name(words.voice)
     return make(words.way, speaker)

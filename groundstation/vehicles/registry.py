@@ -3,7 +3,6 @@
 import pkgutil
 from collections.abc import Callable, Iterator
 from functools import cache
-from importlib import import_module
 from importlib.util import find_spec
 from typing import Any
 
@@ -32,12 +31,6 @@ def all_kinds() -> dict[str, VehicleKind]:
 def refused_kinds() -> dict[str, str]:
     """Return why plug-ins could not be loaded, by the name of their entry point."""
     return dict(_found()[1])
-
-
-def load(reference: str) -> Any:
-    """Return what "module:attribute" names; raises ImportError or AttributeError."""
-    module, _, attribute = reference.partition(":")
-    return getattr(import_module(module), attribute)
 
 
 @cache
@@ -72,7 +65,7 @@ def _ours() -> Iterator[tuple[str, str, Callable[[], object]]]:
     for package in pkgutil.iter_modules(spec.submodule_search_locations if spec is not None else None):
         module = f"{_OURS}.{package.name}.kind"
         if package.ispkg and find_spec(module) is not None:
-            yield package.name, module, lambda module=module: load(f"{module}:KIND")  # type: ignore[misc]
+            yield package.name, module, lambda module=module: pkgutil.resolve_name(f"{module}:KIND")  # type: ignore[misc]
 
 
 def _of_others() -> Iterator[tuple[str, str, Callable[[], object]]]:

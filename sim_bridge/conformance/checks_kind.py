@@ -8,11 +8,11 @@ import subprocess
 import sys
 from collections.abc import Mapping
 from dataclasses import replace
+from pkgutil import resolve_name
 
 from msgspec.structs import replace as change
 
 from groundstation.vehicles import KindSection, VehicleOrder
-from groundstation.vehicles.registry import load
 from sim_bridge.conformance.check import Case, NotApplicable, check
 from sim_bridge.conformance.subject import LIMITS, NAME, PAD_M, TOP_M
 from sim_bridge.world.emulation import emulation_of
@@ -35,7 +35,7 @@ def kind_has_a_name_and_a_summary(case: Case) -> None:
 @check()
 def driver_can_be_loaded(case: Case) -> None:
     """The driver's entry is a function of one argument."""
-    entry = load(case.subject.kind.driver)
+    entry = resolve_name(case.subject.kind.driver)
     assert len(inspect.signature(entry).parameters) == 1, f"{case.subject.kind.driver} takes other arguments"
 
 

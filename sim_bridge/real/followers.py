@@ -1,13 +1,13 @@
 """Keeps the puppets of a world where the real bodies are, and says when that is not known."""
 
 from collections.abc import Mapping
+from pkgutil import resolve_name
 from typing import Protocol
 
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import Estimate
 from groundstation.bus.topics import ESTIMATE
 from groundstation.vehicles import kind_named
-from groundstation.vehicles.registry import load
 from sim_bridge.launch_spec import PoseSource, RealBody
 from sim_bridge.real.captured import CaptureFeed
 from sim_bridge.site import Site
@@ -93,7 +93,7 @@ class Followers:
 def _feed(name: str, body: RealBody, site: Site, bus: Bus) -> PoseFeed:
     drone = site.drones[name]
     if body.source is PoseSource.AUTOPILOT and body.address is not None:
-        feed: PoseFeed = load(kind_named(drone.kind).true_pose)(name, body.address, drone)
+        feed: PoseFeed = resolve_name(kind_named(drone.kind).true_pose)(name, body.address, drone)
         return feed
     if body.source is PoseSource.CAPTURE:
         return CaptureFeed(name, body.system, bus)

@@ -1,13 +1,13 @@
 """Where the pictures of a camera go: MJPEG over HTTP, or as the vehicle that carries it sends its own."""
 
 from multiprocessing.connection import Connection
+from pkgutil import resolve_name
 from typing import Protocol
 
 import cv2
 
 from groundstation.arrays import Array
 from groundstation.geometry.lens import CameraIntrinsics
-from groundstation.vehicles.registry import load
 from sim_bridge.devices.camera_stream import CameraStream
 from sim_bridge.render.spec import RenderSpec
 from sim_bridge.render.wrong_pictures import WrongPictures
@@ -34,7 +34,7 @@ def open_output(spec: RenderSpec, modes: Connection | None) -> Output:
     """Return the output of a camera; modes: what a vehicle is told of its own video, as it comes."""
     if spec.own is None:
         return MjpegOutput(spec)
-    output: Output = load(spec.own.output)(spec, modes)
+    output: Output = resolve_name(spec.own.output)(spec, modes)
     return output
 
 

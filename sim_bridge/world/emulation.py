@@ -1,13 +1,13 @@
 """What a kind of vehicle brings to the simulator: how it moves, and how it speaks at the wire."""
 
 from collections.abc import Callable
+from pkgutil import resolve_name
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
 from groundstation.errors import SettingsError
 from groundstation.vehicles import kind_named
-from groundstation.vehicles.registry import load
 from sim_bridge.launch_spec import LaunchSpec
 from sim_bridge.own_video import OwnVideo
 from sim_bridge.scenario import Scenario
@@ -97,8 +97,8 @@ def emulation_of(kind: str) -> Emulation:
     if not reference:
         raise SettingsError([f"kind: {kind} has no emulator: it cannot be simulated"])
     try:
-        emulation: Emulation = load(reference)
-    except (ImportError, AttributeError) as error:
+        emulation: Emulation = resolve_name(reference)
+    except (ImportError, AttributeError, ValueError) as error:
         raise SettingsError([f"kind: {kind}: its emulator {reference} cannot be loaded: {error}"]) from error
     return emulation
 

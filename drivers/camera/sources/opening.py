@@ -1,5 +1,7 @@
 """From a source's address to its reader."""
 
+from pkgutil import resolve_name
+
 from drivers.camera.settings import SourceAddress, SourceKind, parse_source
 from drivers.camera.sources.container import device, rtsp
 from drivers.camera.sources.files import FileReader
@@ -10,7 +12,6 @@ from drivers.camera.sources.ros2 import Ros2Reader
 from groundstation import plug_ins
 from groundstation.errors import DriverError, without_password
 from groundstation.vehicles import all_kinds
-from groundstation.vehicles.registry import load
 
 _READER = ("name", "decoder", "rejected", "read", "interrupt")
 
@@ -48,7 +49,7 @@ def _reader(address: SourceAddress, source: str, size: tuple[int, int] | None) -
 def _own_video(address: SourceAddress) -> Reader:
     (reader,) = (kind.reader for kind in all_kinds().values() if kind.camera == address.vehicle)
     try:
-        made: Reader = load(reader)((address.host, address.port), address.interface)
+        made: Reader = resolve_name(reader)((address.host, address.port), address.interface)
     except (ImportError, AttributeError, TypeError) as error:
         raise ValueError(f"{reader} cannot be used: {plug_ins.reason(error)}") from error
     return made

@@ -7,11 +7,11 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import closing
 from pathlib import Path
 
 import msgspec
 import pytest
+from free_port import free_port
 
 from groundstation.bus import topics, zenoh_bus
 from groundstation.bus.access import AccessList
@@ -36,9 +36,7 @@ Join = Callable[..., ZenohBus]
 
 @pytest.fixture(scope="module")
 def endpoint() -> str:
-    with closing(socket.socket()) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tls/127.0.0.1:{probe.getsockname()[1]}"
+    return f"tls/127.0.0.1:{free_port()}"
 
 
 @pytest.fixture(scope="module")
@@ -199,9 +197,7 @@ refusals.close()
 @pytest.fixture
 def told(tmp_path: Path) -> Iterator[tuple[Join, Callable[[], list[str]]]]:
     """A guarded router in a process of its own: how to join it, and what it has refused since it was last asked."""
-    with closing(socket.socket()) as probe:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"tls/127.0.0.1:{probe.getsockname()[1]}"
+    endpoint = f"tls/127.0.0.1:{free_port()}"
     make_identities(tmp_path / "keys", ["127.0.0.1"], NAMES)
     access = msgspec.json.encode(AccessList("lab", MEMBERS)).decode()
     command = [sys.executable, "-c", READER, endpoint, str(tmp_path / "keys"), access]

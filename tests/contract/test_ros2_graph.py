@@ -1,13 +1,12 @@
 """A ROS-like Zenoh router, the bridge, and a foreign client that lists topics and decodes them."""
 
 import json
-import socket
 import time
 from collections.abc import Iterator
-from contextlib import closing
 from typing import Any
 
 import pytest
+from free_port import free_port
 
 pytest.importorskip("rosbags")
 import zenoh
@@ -28,12 +27,6 @@ from groundstation.settings.resolved import resolved_field
 def opened(**settings: Any) -> Any:
     silent = {"scouting": {"multicast": {"enabled": False}}}
     return zenoh.open(zenoh.Config.from_json5(json.dumps(silent | settings)))
-
-
-def free_port() -> int:
-    with closing(socket.socket()) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 @pytest.fixture

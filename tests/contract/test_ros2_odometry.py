@@ -1,16 +1,15 @@
 """A target's nav_msgs/Odometry, written by a foreign encoder and published through a ROS-like router, as reports."""
 
 import json
-import socket
 import time
 from collections.abc import Iterator
-from contextlib import closing
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from free_port import free_port
 
 pytest.importorskip("rosbags")
 import zenoh
@@ -82,9 +81,7 @@ class Rig:
 
 @pytest.fixture
 def port() -> int:
-    with closing(socket.socket()) as probe:
-        probe.bind((HOST, 0))
-        return int(probe.getsockname()[1])
+    return free_port(HOST)
 
 
 @pytest.fixture

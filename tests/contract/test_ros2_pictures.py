@@ -1,16 +1,15 @@
 """Pictures of ROS 2, written by a foreign encoder and published through a ROS-like router, arrive at a reader."""
 
 import json
-import socket
 import time
 from collections.abc import Callable, Iterator
-from contextlib import closing
 from statistics import median
 from typing import Any
 
 import cv2
 import numpy as np
 import pytest
+from free_port import free_port
 
 pytest.importorskip("rosbags")
 import zenoh
@@ -54,9 +53,7 @@ class Node:
     """A router with a node of its own."""
 
     def __init__(self) -> None:
-        with closing(socket.socket()) as probe:
-            probe.bind(("127.0.0.1", 0))
-            self.port = int(probe.getsockname()[1])
+        self.port = free_port()
         self.start()
 
     def start(self) -> None:

@@ -1,13 +1,12 @@
 """Poses of ROS 2, written by a foreign encoder and published through a ROS-like router, arrive as frames."""
 
 import json
-import socket
 import time
 from collections.abc import Iterator
-from contextlib import closing
 from typing import Any
 
 import pytest
+from free_port import free_port
 
 pytest.importorskip("rosbags")
 import zenoh
@@ -75,9 +74,7 @@ def opened(**settings: Any) -> Any:
 
 @pytest.fixture
 def port() -> int:
-    with closing(socket.socket()) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+    return free_port()
 
 
 @pytest.fixture

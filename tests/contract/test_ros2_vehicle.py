@@ -1,12 +1,11 @@
 """The driver of a vehicle behind a ROS 2 node, its fail-safe voice and its emulator, through a router on loopback."""
 
-import socket
 import time
 from collections.abc import Callable, Iterator
-from contextlib import closing
 from typing import Any
 
 import pytest
+from free_port import free_port
 
 from drivers.rmw_zenoh.wire import graph, vehicle
 from drivers.ros2.driver import Ros2Vehicle
@@ -32,17 +31,11 @@ DRONE = SiteDrone.model_validate(
 )
 
 
-def free_port() -> int:
-    with closing(socket.socket()) as probe:
-        probe.bind((ADDRESS, 0))
-        return int(probe.getsockname()[1])
-
-
 class Room:
     """An emulated vehicle whose time passes by calls, and its driver without a loop."""
 
     def __init__(self, **own: Any) -> None:
-        self.section = Ros2Section(port=free_port(), namespace="drone_1", domain=3, **own)
+        self.section = Ros2Section(port=free_port(ADDRESS), namespace="drone_1", domain=3, **own)
         self.settings = Ros2DriverSettings(name="drone_1", address=ADDRESS, pad_m=(0.0, 0.0), ros2=self.section)
         self.body = TelloBody(DRONE, Scenario(), 0.005, generator_of(1, "ros2"))
         self.node = Ros2Emulator("drone_1", ADDRESS, self.section.model_dump(), self.body)
@@ -128,7 +121,9 @@ def test_the_voice_of_a_dead_driver_stops_and_lands_it() -> None:
 
 
 def test_a_voice_without_a_router_says_so() -> None:
-    settings = Ros2DriverSettings(name="drone_1", address=ADDRESS, pad_m=(0.0, 0.0), ros2=Ros2Section(port=free_port()))
+    settings = Ros2DriverSettings(
+        name="drone_1", address=ADDRESS, pad_m=(0.0, 0.0), ros2=Ros2Section(port=free_port(ADDRESS))
+    )
     voice = Ros2Voice(settings.model_dump_json(), 2)
     try:
         for word in (HOVER, LAND):

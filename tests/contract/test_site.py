@@ -1,16 +1,15 @@
 """A site over real TLS: hosts that it admitted order in its runs, others do not, and none of them is more than that."""
 
 import shutil
-import socket
 import stat
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import closing
 from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
+from free_port import free_port
 
 from groundstation.bus import topics, zenoh_bus
 from groundstation.bus.access import AccessList
@@ -54,9 +53,7 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def port() -> int:
-    with closing(socket.socket()) as probe:
-        probe.bind((HERE, 0))
-        return int(probe.getsockname()[1])
+    return free_port(HERE)
 
 
 def admit(home: Path, host: str, port: int) -> None:
@@ -177,10 +174,7 @@ def test_who_was_not_admitted_before_the_run_or_was_expelled_says_nothing(home: 
 def test_a_host_cannot_pass_for_the_router(home: Path, run: Run, port: int) -> None:
     """Its certificate names no address and is good for clients only."""
     place = site.folder("joined", "lab")
-    with closing(socket.socket()) as probe:
-        probe.bind((ELSEWHERE, 0))
-        other = int(probe.getsockname()[1])
-    endpoint = f"tls/{ELSEWHERE}:{other}"
+    endpoint = f"tls/{ELSEWHERE}:{free_port(ELSEWHERE)}"
     router = zenoh_bus.open_router(endpoint, Identity(str(place), "host-laptop", "r"), AccessList("lab", ()))
     with pytest.raises(GroundStationError, match="no router answers"):
         zenoh_bus.open_bus(endpoint, "lab", "drone_1", 0.0, Identity(str(home / "keys"), "drone_1", "r"))

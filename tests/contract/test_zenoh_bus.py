@@ -1,12 +1,12 @@
 """The star over real Zenoh on loopback: delivery, forwarding past a stalled reader, absent and taken endpoints."""
 
-import socket
 import time
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import closing
 
 import pytest
+from free_port import free_port
 
 from groundstation.bus import keys, topics, zenoh_bus
 from groundstation.bus.api import Subscription
@@ -15,9 +15,7 @@ from groundstation.errors import GroundStationError
 
 
 def free_endpoint() -> str:
-    with closing(socket.socket()) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    return f"tcp/127.0.0.1:{free_port()}"
 
 
 @pytest.fixture

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from free_port import free_port
 from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
 from mavsdk.asyncio.plugins.action import ActionAsync
 from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync
@@ -20,18 +21,12 @@ from ground_station import GroundStation
 pytestmark = [pytest.mark.slow, pytest.mark.interop, pytest.mark.timeout(150)]
 
 
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
-        udp.bind(("127.0.0.1", 0))
-        return int(udp.getsockname()[1])
-
-
 def heights(hangar: Any) -> list[float]:
     return [drone["position"][2] for states in hangar.stop() for drone in states.values()]
 
 
 def test_dronekit_flies_an_ardupilot(hangar: Any, programs: Any) -> None:
-    place = f"127.0.0.1:{free_port()}"
+    place = f"127.0.0.1:{free_port(kind=socket.SOCK_DGRAM)}"
     drones = hangar(1, "--call", place, kind="ardupilot")
     seen = programs.result(programs.python("dronekit", "dronekit_flight.py", place))
     assert seen["parameters"] > 20 and seen["fix"] == 3
@@ -86,7 +81,7 @@ async def fly_with_mavsdk(port: int) -> list[Any]:
 
 
 def test_mavsdk_finds_no_mission_and_flies_by_satellites(hangar: Any) -> None:
-    port = free_port()
+    port = free_port(kind=socket.SOCK_DGRAM)
     drones = hangar(1, "--call", f"127.0.0.1:{port}", kind="px4")
     assert asyncio.run(fly_with_mavsdk(port)) == []
     flown = heights(drones)

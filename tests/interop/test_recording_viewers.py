@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from free_port import free_port
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
@@ -99,13 +100,6 @@ def test_the_copy_with_a_scene_holds_everything_else_too(run_dir: Path, tmp_path
     assert b"drone_1" in message.data and b"room" in message.data
 
 
-def _free_port() -> int:
-    with closing(socket.socket()) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
-
-
 @pytest.mark.parametrize("kind", ["--rrd", "--foxglove-scene"])
 def test_an_export_never_touches_what_is_there(kind: str, run_dir: Path, tmp_path: Path) -> None:
     taken = tmp_path / "taken"
@@ -157,7 +151,7 @@ def _viewer(address: str) -> ClientConnection:
 def test_foxglove_is_served_on_loopback_beside_a_viewer_that_never_reads(flight: MemoryBus, field: str) -> None:
     from groundstation.engineering_views.foxglove_live import FoxgloveView
 
-    port, over = _free_port(), threading.Event()
+    port, over = free_port(), threading.Event()
     view = FoxgloveView("lab", field_from_json(field.encode()), _timeline(), port)
     loop = threading.Thread(target=watch, args=(flight, view, lambda: not over.is_set()))
     loop.start()
@@ -199,7 +193,7 @@ def test_a_port_that_is_taken_is_named(field: str) -> None:
 def test_rerun_is_served_on_loopback_only_and_ends_with_us(flight: MemoryBus, field: str) -> None:
     from groundstation.engineering_views.rerun_live import RerunServer, RerunView
 
-    port, page_port = _free_port(), _free_port()
+    port, page_port = free_port(), free_port()
     server = RerunServer(port, page_port)
     view = RerunView("lab", field_from_json(field.encode()), _timeline(), clock.now_ns(), server, None)
     over = time.monotonic() + 4.0

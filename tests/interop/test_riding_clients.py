@@ -1,6 +1,7 @@
 """Second ground stations that others wrote, by their defaults: they look and stop, and fly nobody."""
 
 import asyncio
+import socket
 import subprocess
 import sys
 import time
@@ -15,7 +16,8 @@ from mavsdk.asyncio.plugins.action import ActionAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "sitl"))  # the flight that they ride along with
-from ridden_flight import FLAVOURS, RiddenFlight, described, free_port, hangar, is_on_time, port, ridden
+from free_port import free_port
+from ridden_flight import FLAVOURS, RiddenFlight, described, hangar, is_on_time, port, ridden
 from spare_time import needing_processors
 
 __all__ = ["hangar", "port"]  # fixtures
@@ -74,7 +76,7 @@ def proxy_on(python: Path, port: int, folder: Path) -> Iterator[Proxy]:
 def test_mavproxy_sees_both_vehicles_is_refused_what_flies_and_stops_them(
     hangar: Any, port: int, tmp_path: Path, interpreter: Callable[[str], Path]
 ) -> None:
-    python, riding = interpreter("mavproxy"), free_port()
+    python, riding = interpreter("mavproxy"), free_port(kind=socket.SOCK_DGRAM)
     with ridden(hangar, port, tmp_path, riding, "parameters") as flight:
         began_s = time.monotonic()
         time.sleep(QUIET_S)
@@ -155,7 +157,7 @@ async def answer_of(asked: Any) -> str:
 
 
 def test_mavsdk_sees_both_vehicles_is_refused_a_take_off_and_stops_them(hangar: Any, port: int, tmp_path: Path) -> None:
-    riding = free_port()
+    riding = free_port(kind=socket.SOCK_DGRAM)
     with ridden(hangar, port, tmp_path, riding) as flight:
         answers = asyncio.run(ride_with_mavsdk(riding, flight))
         assert set(answers) == set(FLAVOURS.values())

@@ -1,4 +1,4 @@
-"""Emulated MAVLink vehicles and free ports, as the contract tests of the links have them, for flights here."""
+"""Emulated MAVLink vehicles and a free port, as the contract tests of the links have them, for flights here."""
 
 import importlib.util
 from pathlib import Path
@@ -9,4 +9,4 @@ _SPEC = importlib.util.spec_from_file_location(
 assert _SPEC is not None and _SPEC.loader is not None
 _fixtures = importlib.util.module_from_spec(_SPEC)
 _SPEC.loader.exec_module(_fixtures)
-hangar, port, free_port = _fixtures.hangar, _fixtures.port, _fixtures.free_port
+hangar, port = _fixtures.hangar, _fixtures.port

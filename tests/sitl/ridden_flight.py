@@ -19,7 +19,7 @@ from drivers.mavlink.wire.frames import id_of
 from drivers.mavlink.wire.verification import number_of
 
 HERE = Path(__file__).parent
-hangar, port, free_port = mavlink_hangar.hangar, mavlink_hangar.port, mavlink_hangar.free_port
+hangar, port = mavlink_hangar.hangar, mavlink_hangar.port
 
 FLAVOURS = {"px4": 11, "ardupilot": 12}
 VEHICLE_WAITS_S = 0.5  # GUID_TIMEOUT: beyond it an ArduPilot brakes

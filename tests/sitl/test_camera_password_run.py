@@ -14,6 +14,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from free_port import free_port
 from websockets.asyncio.client import connect
 from websockets.typing import Origin
 
@@ -66,11 +67,6 @@ def cameras() -> Iterator[list[LockedCamera]]:
     yield made
     for camera in made:
         camera.close()
-
-
-def free_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as probe:
-        return int(probe.getsockname()[1])
 
 
 def all_bytes(run_dir: Path) -> Iterator[tuple[str, bytes]]:

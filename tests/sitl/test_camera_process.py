@@ -3,7 +3,6 @@
 import multiprocessing
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -11,6 +10,7 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
+from free_port import free_port
 
 from drivers.camera.sources.opening import open_source
 from groundstation.geometry.lens import CameraIntrinsics
@@ -21,11 +21,6 @@ from sim_bridge.truth import TruthBoard
 
 pytestmark = pytest.mark.sitl
 BODIES = ("drone_1",)
-
-
-def free_port():
-    with socket.create_server(("127.0.0.1", 0)) as listener:
-        return listener.getsockname()[1]
 
 
 def make_spec(truth_name, port, **scenario):
@@ -128,8 +123,7 @@ def test_it_ends_with_its_parent(tmp_path):
     name = f"{os.getpid()}-orphan"
     truth = TruthBoard.create(name, BODIES)
     script = tmp_path / "parent.py"
-    folder = os.path.dirname(os.path.abspath(__file__))  # noqa: PTH100, PTH120 - goes into sys.path as text
-    script.write_text(_PARENT.format(path=[folder], name=name, port=free_port()))
+    script.write_text(_PARENT.format(path=sys.path, name=name, port=free_port()))
     parent = subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, text=True)
     assert parent.stdout is not None
     try:

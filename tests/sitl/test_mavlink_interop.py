@@ -4,6 +4,7 @@ import asyncio
 import itertools
 import math
 import os
+import socket
 import subprocess
 import threading
 import time
@@ -12,6 +13,7 @@ from pathlib import Path
 
 import mavlink_hangar
 import pytest
+from free_port import free_port
 from mavlink_pilot import Pilot
 from spare_time import needing_processors
 
@@ -232,7 +234,7 @@ TYPED = {
 def test_mavproxy_rides_along_and_may_only_stop(proxy_at, hangar, port, flavour):
     """Our driver tracks; MAVProxy cannot change what it flies by, holds it until our RESUME, and lands it."""
     emulator, copter, _ = hangar.add(flavour, 5, aided=True, calls=("127.0.0.1", port))
-    firmware, rider, (home, hold, land) = emulator.firmware, mavlink_hangar.free_port(), TYPED[flavour]
+    firmware, rider, (home, hold, land) = emulator.firmware, free_port(kind=socket.SOCK_DGRAM), TYPED[flavour]
     tracked = Tracked(port, rider, flavour, copter)
     try:
         tracked.track()

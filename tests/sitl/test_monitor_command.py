@@ -2,13 +2,13 @@
 
 import json
 import os
-import socket
 import threading
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
 import pytest
+from free_port import free_port
 
 from groundstation.bus import zenoh_bus
 from groundstation.bus.messages import FlightState, VehicleStatus
@@ -22,9 +22,7 @@ pytestmark = pytest.mark.sitl
 @pytest.fixture
 def record(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[runtime_file.RuntimeRecord]:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    with closing(socket.socket()) as probe:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
     router = zenoh_bus.open_router(endpoint)
     ourselves = runtime_file.ProcessRecord(
         "supervisor", "supervisor", os.getpid(), runtime_file.start_time(os.getpid()) or 0

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from free_port import free_port
 
 from groundstation.bus.messages import Lifecycle, ProcessStatus, SimCommand, SimStatus, TruthState
 from groundstation.bus.topics import PROCESS_STATUS, SIM_COMMAND, SIM_STATUS, TRUTH
@@ -43,9 +44,8 @@ class Site:
 
     def __init__(self, folder: Path) -> None:
         self.net = free_net()
-        with socket.socket() as probe:
-            probe.bind((f"{self.net}.1", 0))
-            self.endpoint = f"tcp/{self.net}.1:{probe.getsockname()[1]}"
+        address = f"{self.net}.1"
+        self.endpoint = f"tcp/{address}:{free_port(address)}"
         self.router = open_router(self.endpoint)
         self.bus: ZenohBus = open_bus(self.endpoint, "lab", "test")
         self.subscription = self.bus.subscribe([TRUTH, SIM_STATUS, PROCESS_STATUS])

@@ -7,7 +7,6 @@ tests/contract/mavlink_links/test_mavlink_takeover.py, pages in tests/browser, p
 import json
 import os
 import pwd
-import socket
 import subprocess
 import sys
 import time
@@ -15,6 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from free_port import free_port
 from sitl_run import SitlRun
 
 from groundstation.bus import clock, topics, zenoh_bus
@@ -41,8 +41,7 @@ class Neighbour:
 
     def __init__(self, folder: Path) -> None:
         self._stop = folder / "stop"
-        with socket.create_server(("127.0.0.1", 0)) as probe:
-            self.port = probe.getsockname()[1]
+        self.port = free_port()
         command = [sys.executable, str(STRANGER), "neighbour", str(self.port), "lab", str(self._stop)]
         self._process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=ENVIRONMENT)
         assert self._process.stdout is not None

@@ -8,6 +8,7 @@ import time
 
 import numpy as np
 import pytest
+from free_port import free_port
 
 from drivers.mavlink.wire.names import Flavour
 from sim_bridge.devices.mavlink import MavlinkEmulator
@@ -25,12 +26,6 @@ def free_address():
     """A loopback address that no other test of this run uses."""
     pid = os.getpid()
     return f"127.{10 + pid % 90}.{pid // 90 % 250}.{next(_numbers)}"
-
-
-def free_port():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
-        udp.bind(("127.0.0.1", 0))
-        return udp.getsockname()[1]
 
 
 class Hangar:
@@ -93,4 +88,4 @@ def hangar():
 
 @pytest.fixture
 def port():
-    return free_port()
+    return free_port(kind=socket.SOCK_DGRAM)

@@ -4,6 +4,7 @@ import socket
 import time
 
 import pytest
+from free_port import free_port
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from drivers.mavlink.links.udp import UdpLink
@@ -40,9 +41,7 @@ def test_a_second_link_to_the_same_vehicle_is_opened_all_the_same(vehicle):
 
 
 def test_who_speaks_mavlink_1_is_greeted_once_a_second_and_not_believed(vehicle):
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    port = free_port(kind=socket.SOCK_DGRAM)
     link = UdpLink(LinkSettings(target=f"udpin:127.0.0.1:{port}"))
     old = dialect.MAVLink(None, 1, 1)
     frame = dialect.MAVLink_heartbeat_message(2, 12, 0, 0, 3, 3).pack(old, force_mavlink1=True)
@@ -63,9 +62,7 @@ def test_who_speaks_mavlink_1_is_greeted_once_a_second_and_not_believed(vehicle)
 
 
 def test_frames_of_mavlink_1_are_recorded_and_those_of_strangers_are_not(vehicle):
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    port = free_port(kind=socket.SOCK_DGRAM)
     noted = []
     sniffer = lambda system, stamp_ns, raw, received: noted.append((system, raw)) if received else None  # noqa: E731
     link = UdpLink(LinkSettings(target=f"udpin:127.0.0.1:{port}"), sniffer=sniffer)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from free_port import free_port
 
 from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder, split
 from drivers.mavlink.wire.simulator import HilStateQuaternion, SimState
@@ -33,12 +34,6 @@ LENS = {
 MARKER = {"code": 1, "square_mm": 44, "position_m": [0.0, 0.0, 0.08]}
 CAMERA = {"calibration": LENS, "position_m": [0.09, 0.0, 0.0], "tilt_down_deg": 45.0}
 SYSTEM = 11
-
-
-def free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
-        udp.bind(("127.0.0.1", 0))
-        return int(udp.getsockname()[1])
 
 
 def order(folder: Path, real: dict[str, Any], **scenario: Any) -> LaunchSpec:
@@ -103,7 +98,7 @@ def turn(harness: Harness, seconds: float) -> None:
 
 @pytest.fixture
 def port() -> int:
-    return free_port()
+    return free_port(kind=socket.SOCK_DGRAM)
 
 
 @pytest.fixture
@@ -220,7 +215,7 @@ def test_what_another_vehicle_says_moves_nobody(firmware: tuple[Harness, Process
 
 def test_emulated_cameras_show_a_followed_body_and_not_one_that_only_the_tracker_knows(tmp_path: Path) -> None:
     for source, shown in (("autopilot", True), ("estimate", False)):
-        address = {"address": ["127.0.0.1", free_port()]} if source == "autopilot" else {}
+        address = {"address": ["127.0.0.1", free_port(kind=socket.SOCK_DGRAM)]} if source == "autopilot" else {}
         read = order(tmp_path, {"drone_1": {"source": source, **address}})
         streams = {"ceiling": ("127.91.3.50", 8080), "drone_1": ("127.91.3.51", 8080)}
         specs = render_specs(read.site, read.scenario, streams, "board", 1, read.unseen)

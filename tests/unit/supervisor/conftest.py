@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from free_port import free_port
 
 from groundstation.flight.composition import router_section
 from groundstation.settings.behaviour import Bus
@@ -18,8 +19,6 @@ from groundstation.supervisor.terminal import Terminal
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))  # what lies here and is no test belongs to these tests
-
-from dummy_table import free_port  # noqa: E402
 
 
 @pytest.fixture

@@ -1,18 +1,11 @@
 """Rows of a process table whose children are dummies, and how to wait for what they do."""
 
-import socket
 import time
 from collections.abc import Callable
 
 from groundstation.supervisor.process_spec import ProcessSpec
 from groundstation.supervisor.start import Start
 from groundstation.supervisor.supervisor import Supervisor
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def spec(name: str, entry: str, **options: object) -> ProcessSpec:

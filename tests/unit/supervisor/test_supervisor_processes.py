@@ -11,7 +11,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from dummy_table import free_port, spec, start, until
+from dummy_table import spec, start, until
+from free_port import free_port
 
 from groundstation.supervisor import runtime_file
 from groundstation.supervisor.process_spec import FailsafeDatagrams, Restart

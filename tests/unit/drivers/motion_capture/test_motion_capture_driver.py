@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from free_port import free_port
 
 from drivers.motion_capture import driver as process
 from drivers.motion_capture.captured_frame import CapturedFrame
@@ -52,9 +53,7 @@ class FakeChild:
 
 
 def a_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind((HOST, 0))
-        return int(probe.getsockname()[1])
+    return free_port(HOST, kind=socket.SOCK_DGRAM)
 
 
 @dataclass

@@ -68,6 +68,17 @@ NOTHING_SEEN = Sight()
 HOVER = Setpoint((0.0, 0.0, 0.0), 0.0, FlightMode.UNKNOWN)
 
 
+@dataclass(frozen=True, slots=True)
+class _Moment:
+    """What all setpoints of a step depend on; robots: those in the air whose place is believed."""
+
+    belief: JointBelief
+    robots: Sequence[str]
+    parameters: ControlParameters
+    sensors: SensorSuite
+    sight: Sight
+
+
 def setpoints_from_plan(
     plan: PlanResult | None,
     belief: JointBelief,
@@ -79,135 +90,115 @@ def setpoints_from_plan(
     """Return a setpoint for every airborne robot; plan: the last valid one, or None."""
     age_s, missing = sight.target_age_s, sight.missing
     fresh = age_s is not None and age_s <= parameters.lost_after_s and bool(belief.layout.targets)
-    robots = [name for name in belief.layout.robots if name in airborne]
+    now = _Moment(belief, [name for name in belief.layout.robots if name in airborne], parameters, sensors, sight)
     phases = {
         name: flight_mode_of(
             Situation(
                 airborne=True,
-                in_belief=name in robots,
-                lost=name in robots and _is_lost(name, belief, parameters, sensors, sight),
+                in_belief=name in now.robots,
+                lost=name in now.robots and _is_lost(name, now),
                 target_fresh=fresh,
                 planned=plan is not None and name in plan.controls,
             )
         )
         for name in airborne
     }
-    tracking = [name for name in robots if phases[name] is FlightMode.TRACK]
-    scout = _scout(belief, tracking, missing) if fresh and missing else None
+    tracking = [name for name in now.robots if phases[name] is FlightMode.TRACK]
+    scout = _scout(tracking, now) if fresh and missing else None
     if scout is not None:
         phases[scout] = FlightMode.SEARCH
-    searching = sight.search([name for name in robots if phases[name] is FlightMode.SEARCH], missing)
-    stands = _stands(phases, belief, robots, parameters, sensors, searching, sight.missed_s)
-    coming = [name for name in robots if phases[name] is FlightMode.RETURN and name not in sight.unsteered]
+    searching = sight.search([name for name in now.robots if phases[name] is FlightMode.SEARCH], missing)
+    stands = _stands(phases, searching, now)
+    coming = [name for name in now.robots if phases[name] is FlightMode.RETURN and name not in sight.unsteered]
     wanted: dict[str, Setpoint] = {}
     for name, phase in phases.items():
         if phase is FlightMode.UNKNOWN:
             wanted[name] = HOVER
         elif phase is FlightMode.TRACK and plan is not None:
-            vx, vy, rate = _regained(name, plan, belief, parameters, sensors, sight)
-            vx, vy = _giving_way(name, (vx, vy), coming, belief, parameters)
-            vx, vy = _recoverable(name, (vx, vy), belief, parameters, sensors, sight)
-            wanted[name] = _with_height(name, (vx, vy), rate, plan.heights[name], phase, belief, robots, parameters)
+            vx, vy, rate = _regained(name, plan, now)
+            velocity = _recoverable(name, _giving_way(name, (vx, vy), coming, now), now)
+            wanted[name] = _with_height(name, velocity, rate, plan.heights[name], phase, now)
         else:
-            drift = sight.drifts_m_s.get(name, _NO_DRIFT) if phase is FlightMode.RETURN else _NO_DRIFT
-            wanted[name] = _towards(name, stands[name], phase, belief, robots, parameters, drift)
+            wanted[name] = _towards(name, stands[name], phase, now)
     return wanted
 
 
-def _regained(
-    name: str, plan: PlanResult, belief: JointBelief, parameters: ControlParameters, sensors: SensorSuite, sight: Sight
-) -> tuple[float, float, float]:
+def _regained(name: str, plan: PlanResult, now: _Moment) -> tuple[float, float, float]:
     """Return what the plan holds for a robot, or, if it should look at a target that is not seen, what brings it back.
 
     PAPER (docs/explanation/method.md 7): plans assume level robots; one that brakes before a target tips it out of its
     picture, and no plan of it mends that.
     """
     vx, vy, rate = (float(value) for value in plan.controls[name])
-    age_s = sight.target_age_s
-    if age_s is None or age_s <= parameters.regain_after_s:
+    belief, age_s = now.belief, now.sight.target_age_s
+    if age_s is None or age_s <= now.parameters.regain_after_s:
         return vx, vy, rate
     place = belief.mean_of(name)[:2]
-    tracked = (one for one in belief.layout.targets if one not in sight.missing)
+    tracked = (one for one in belief.layout.targets if one not in now.sight.missing)
     target = min(tracked, key=lambda one: math.dist(belief.mean_of(one)[:2], place))
-    found = regaining(name, target, belief, sensors)
-    if found is None or name not in who_regains(target, plan.topology, belief, sensors):
+    found = regaining(name, target, belief, now.sensors)
+    if found is None or name not in who_regains(target, plan.topology, belief, now.sensors):
         return vx, vy, rate
     (vx, vy), rate = found[0].tolist(), found[1]
     return vx, vy, rate
 
 
-def _giving_way(
-    name: str, velocity: tuple[float, float], coming: Sequence[str], belief: JointBelief, parameters: ControlParameters
-) -> tuple[float, float]:
+def _giving_way(name: str, velocity: tuple[float, float], coming: Sequence[str], now: _Moment) -> tuple[float, float]:
     """Return the velocity [base_stabilized] of a robot that makes room for those that fly back.
 
     Where they are is doubtful, so the limit of separation holds them off from afar: one that hovers in the middle of
     the view would keep them out of it.
     """
-    mean, wanted = belief.mean_of(name), np.array(velocity)
+    mean, wanted = now.belief.mean_of(name), np.array(velocity)
     for other in coming:
-        away = mean[:2] - belief.mean_of(other)[:2]
+        away = mean[:2] - now.belief.mean_of(other)[:2]
         distance = max(float(np.linalg.norm(away)), 1e-6)
-        lacking_m = parameters.column_m + _ROOM_SIGMAS * spread_m(belief, other) - distance
+        lacking_m = now.parameters.column_m + _ROOM_SIGMAS * spread_m(now.belief, other) - distance
         if lacking_m <= 0.0:
             continue
         off = stabilized_from_world(np.append(away / distance, 0.0), float(mean[3]))[:2]
-        least = min(parameters.search_speed_m_s, _STAND_GAIN * lacking_m)
+        least = min(now.parameters.search_speed_m_s, _STAND_GAIN * lacking_m)
         wanted = wanted + max(0.0, least - float(off @ wanted)) * off
     return float(wanted[0]), float(wanted[1])
 
 
-def _recoverable(
-    name: str,
-    velocity: tuple[float, float],
-    belief: JointBelief,
-    parameters: ControlParameters,
-    sensors: SensorSuite,
-    sight: Sight,
-) -> tuple[float, float]:
+def _recoverable(name: str, velocity: tuple[float, float], now: _Moment) -> tuple[float, float]:
     """Return the part of a velocity [base_stabilized] that keeps a robot where it comes back from, if it gets lost."""
-    yaw, error_m_s = float(belief.mean_of(name)[3]), sight.velocity_errors_m_s.get(name, 0.0)
-    if error_m_s <= parameters.sound_error_m_s:
+    yaw, error_m_s = float(now.belief.mean_of(name)[3]), now.sight.velocity_errors_m_s.get(name, 0.0)
+    if error_m_s <= now.parameters.sound_error_m_s:
         return velocity
     wanted = world_from_stabilized(np.array([*velocity, 0.0]), yaw)
-    drift = sight.drifts_m_s.get(name, _NO_DRIFT)[:2]
-    held = within_reach(wanted[:2], name, belief, parameters, sensors, error_m_s, drift)
+    drift = now.sight.drifts_m_s.get(name, _NO_DRIFT)[:2]
+    held = within_reach(wanted[:2], name, now.belief, now.parameters, now.sensors, error_m_s, drift)
     forward, left, _ = stabilized_from_world(np.append(held, 0.0), yaw).tolist()
     return forward, left
 
 
-def _is_lost(name: str, belief: JointBelief, parameters: ControlParameters, sensors: SensorSuite, sight: Sight) -> bool:
-    unseen_s, error_m_s = sight.unseen_s.get(name, 0.0), sight.velocity_errors_m_s.get(name, 0.0)
-    return name in sight.missed_s or is_lost(name, belief, parameters, sensors, unseen_s, error_m_s)
+def _is_lost(name: str, now: _Moment) -> bool:
+    unseen_s, error_m_s = now.sight.unseen_s.get(name, 0.0), now.sight.velocity_errors_m_s.get(name, 0.0)
+    return name in now.sight.missed_s or is_lost(name, now.belief, now.parameters, now.sensors, unseen_s, error_m_s)
 
 
-def _scout(belief: JointBelief, tracking: Sequence[str], missing: Collection[str]) -> str | None:
+def _scout(tracking: Sequence[str], now: _Moment) -> str | None:
     """Return the robot that can be spared: the farthest from the tracked targets; None if it is the only one."""
-    seen = [belief.mean_of(name)[:2] for name in belief.layout.targets if name not in missing]
+    belief = now.belief
+    seen = [belief.mean_of(name)[:2] for name in belief.layout.targets if name not in now.sight.missing]
     if len(tracking) < 2 or not seen:
         return None
     return max(tracking, key=lambda name: min(math.dist(belief.mean_of(name)[:2], place) for place in seen))
 
 
-def _stands(
-    phases: Mapping[str, FlightMode],
-    belief: JointBelief,
-    robots: Sequence[str],
-    parameters: ControlParameters,
-    sensors: SensorSuite,
-    searching: Mapping[str, Stand],
-    missed_s: Mapping[str, float],
-) -> dict[str, Stand]:
+def _stands(phases: Mapping[str, FlightMode], searching: Mapping[str, Stand], now: _Moment) -> dict[str, Stand]:
     """Return where each robot stands that returns or searches, apart from each other; who returns comes first.
 
     Who searches and has nowhere to go waits in view.
     """
-    robots = [name for name in robots if phases[name] in (FlightMode.RETURN, FlightMode.SEARCH)]
-    means = {name: belief.mean_of(name) for name in robots}
+    robots = [name for name in now.robots if phases[name] in (FlightMode.RETURN, FlightMode.SEARCH)]
+    means = {name: now.belief.mean_of(name) for name in robots}
     places = {name: (float(mean[0]), float(mean[1])) for name, mean in means.items()}
-    views = {name: view_of(*places[name], name, parameters, sensors) for name in robots}
+    views = {name: view_of(*places[name], name, now.parameters, now.sensors) for name in robots}
     back = {
-        name: return_stand(means[name], views[name], missed_s.get(name, 0.0))
+        name: return_stand(means[name], views[name], now.sight.missed_s.get(name, 0.0))
         for name in robots
         if phases[name] is FlightMode.RETURN
     }
@@ -218,31 +209,24 @@ def _stands(
         if phases[name] is FlightMode.SEARCH and name not in searching
     }
     within = {name: None if name in out else view for name, view in views.items()}
-    return apart(back | out | idle, places, within, parameters.column_m)
+    return apart(back | out | idle, places, within, now.parameters.column_m)
 
 
-def _towards(
-    name: str,
-    stand: Stand,
-    phase: FlightMode,
-    belief: JointBelief,
-    robots: list[str],
-    parameters: ControlParameters,
-    drift_m_s: Array,
-) -> Setpoint:
+def _towards(name: str, stand: Stand, phase: FlightMode, now: _Moment) -> Setpoint:
     """Return a setpoint that flies to a stand and turns to its heading, keeping off other robots.
 
-    drift_m_s: motion besides what is told (3) [m/s; world], which is subtracted, as far as such a drift is believed.
+    Of who returns, motion besides what it is told is subtracted, as far as such a drift is believed.
     """
-    mean = belief.mean_of(name)
+    mean, parameters = now.belief.mean_of(name), now.parameters
+    drift_m_s = now.sight.drifts_m_s.get(name, _NO_DRIFT) if phase is FlightMode.RETURN else _NO_DRIFT
     velocity = _STAND_GAIN * np.array([stand.x - mean[0], stand.y - mean[1], 0.0])
     speed = float(np.linalg.norm(velocity))
     most = parameters.return_speed_m_s if phase is FlightMode.RETURN else parameters.search_speed_m_s
     velocity *= min(1.0, most / max(speed, 1e-9))
     size = float(np.hypot(*drift_m_s[:2]))
     velocity[:2] -= drift_m_s[:2] * min(1.0, parameters.return_drift_m_s / max(size, 1e-9))
-    for other in robots:
-        away = mean[:2] - belief.mean_of(other)[:2]
+    for other in now.robots:
+        away = mean[:2] - now.belief.mean_of(other)[:2]
         distance = float(np.linalg.norm(away))
         if other != name and distance < parameters.column_m:
             nearness = 1.0 - distance / parameters.column_m
@@ -251,29 +235,21 @@ def _towards(
     limit = parameters.search_yaw_rate_rad_s
     body = stabilized_from_world(velocity, float(mean[3]))
     rate = min(max(rate, -limit), limit)
-    return _with_height(
-        name, (float(body[0]), float(body[1])), rate, parameters.search_height_m, phase, belief, robots, parameters
-    )
+    return _with_height(name, (float(body[0]), float(body[1])), rate, parameters.search_height_m, phase, now)
 
 
 def _with_height(
-    name: str,
-    velocity: tuple[float, float],
-    rate: float,
-    level_m: float,
-    phase: FlightMode,
-    belief: JointBelief,
-    robots: list[str],
-    parameters: ControlParameters,
+    name: str, velocity: tuple[float, float], rate: float, level_m: float, phase: FlightMode, now: _Moment
 ) -> Setpoint:
     """Return the setpoint with the climb towards its level height; near another robot it side-steps first."""
+    belief, parameters = now.belief, now.parameters
     mean = belief.mean_of(name)
     climb = parameters.limits_of(name).max_climb_m_s
     way = level_m - float(mean[2])
     vz = min(max(parameters.height_gain_per_s * way, -climb), climb)
     if abs(way) <= parameters.height_tolerance_m:
         return Setpoint((*velocity, vz), rate, phase)
-    near = _nearest(name, belief, robots)
+    near = _nearest(name, now)
     if near is None or near[1] >= parameters.column_m:
         return Setpoint((*velocity, vz), rate, phase)
     other, distance = near
@@ -286,10 +262,10 @@ def _with_height(
     return Setpoint((float(held[0]), float(held[1]), 0.0), rate, phase, blocked=other)
 
 
-def _nearest(name: str, belief: JointBelief, robots: list[str]) -> tuple[str, float] | None:
+def _nearest(name: str, now: _Moment) -> tuple[str, float] | None:
     """Return the other robot that is horizontally closest, with its distance."""
-    mean = belief.mean_of(name)
-    distances: Mapping[str, float] = {
-        other: float(np.hypot(*(belief.mean_of(other)[:2] - mean[:2]))) for other in robots if other != name
+    mean = now.belief.mean_of(name)
+    distances = {
+        other: float(np.hypot(*(now.belief.mean_of(other)[:2] - mean[:2]))) for other in now.robots if other != name
     }
     return min(distances.items(), key=lambda entry: entry[1]) if distances else None

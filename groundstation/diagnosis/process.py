@@ -30,15 +30,10 @@ def run(child: Child) -> int:
     section = msgspec.json.decode(child.section, type=DiagnosisSection)
     diagnosis = Diagnosis(child.bus, section.field, OnThread())
     child.ready()
-    ticks = 0
-    while not child.stop_requested and child.supervisor_alive:
-        now_ns = clock.now_ns()
-        diagnosis.turn(now_ns)
+    for ticks in child.turns(_PERIOD_NS):
+        diagnosis.turn(clock.now_ns())
         for notice in diagnosis.notices:
             child.event(notice.severity, notice.text, notice.remedy, notice.entity or None)
         diagnosis.notices.clear()
-        ticks += 1
-        child.beat()
         child.tick_status(ticks=ticks, overflowed=diagnosis.overflowed)
-        child.sleep_until(now_ns + _PERIOD_NS)
     return 0

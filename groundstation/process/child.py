@@ -3,7 +3,7 @@
 import logging
 import os
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from types import TracebackType
@@ -162,6 +162,16 @@ class Child:
     def sleep_until(self, deadline_ns: int) -> bool:
         """Sleep until then or until `wake`; False when a stop, or the supervisor's death, ended it (each once)."""
         return self._stop.sleep_until(deadline_ns)
+
+    def turns(self, period_ns: int) -> Iterator[int]:
+        """Yield the numbers of the turns of a loop, from 1 on, with a heartbeat after each, until it is to end."""
+        count, due_ns = 0, clock.now_ns()
+        while not self.stop_requested and self.supervisor_alive:
+            count += 1
+            yield count
+            self.beat()
+            due_ns = max(due_ns + period_ns, clock.now_ns())
+            self.sleep_until(due_ns)
 
     def beat(self) -> None:
         """Say "my main loop turns"; about a microsecond."""

@@ -30,12 +30,7 @@ def run(child: Child) -> int:
     cast = cast_from_field(section.field)
     with Screen(child.bus, cast, clock.now_ns(), hint="Ctrl-C lands all") as screen:
         child.ready()
-        ticks, due_ns = 0, clock.now_ns()
-        while not child.stop_requested and child.supervisor_alive:
+        for ticks in child.turns(_PERIOD_NS):
             screen.turn(clock.now_ns())
-            ticks += 1
-            child.beat()
             child.tick_status(ticks=ticks)
-            due_ns = max(due_ns + _PERIOD_NS, clock.now_ns())
-            child.sleep_until(due_ns)
     return 0

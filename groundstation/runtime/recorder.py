@@ -154,13 +154,8 @@ def run(child: Child) -> int:
     recorder = Recorder(child, msgspec.json.decode(child.section, type=RecorderSection))
     recorder.turn()
     recorder.announce()
-    ticks, due_ns = 0, clock.now_ns()
-    while not child.stop_requested and child.supervisor_alive:
+    for ticks in child.turns(_PERIOD_NS):
         recorder.turn()
-        ticks += 1
-        child.beat()
         child.tick_status(ticks=ticks, overflowed=recorder.dropped)
-        due_ns = max(due_ns + _PERIOD_NS, clock.now_ns())
-        child.sleep_until(due_ns)
     recorder.close()
     return 0

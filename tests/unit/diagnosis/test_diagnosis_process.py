@@ -20,6 +20,7 @@ class FakeChild:
     """Lets a process turn a few times, and notes what it says."""
 
     supervisor_alive = True
+    turns = Child.turns
 
     def __init__(self, field: ResolvedField) -> None:
         self.bus = MemoryBus(MemoryExchange(), "lab", "diagnosis")

@@ -66,6 +66,17 @@ def test_a_block_that_a_dead_run_left_is_replaced(block: HeartbeatBlock) -> None
     made.close()
 
 
+def test_each_turn_beats_and_the_last_is_the_one_in_which_a_stop_came(block: HeartbeatBlock) -> None:
+    with Child(ChildSpec("one", "recorder", "", "lab", str(block.path), 1)) as child:
+        beats = list[int]()
+        for count in child.turns(5 * MS):
+            beats.append(block.beat_ns(1))
+            if count == 3:
+                os.kill(os.getpid(), signal.SIGTERM)
+    assert len(beats) == 3 and beats == sorted(set(beats)), "a beat between each two turns"
+    assert beats[2] - beats[1] >= 4 * MS
+
+
 @pytest.mark.parametrize(("error", "ended"), [(None, True), (RuntimeError, False)])
 def test_only_an_ordinary_end_is_recorded_as_one(
     block: HeartbeatBlock, error: type[Exception] | None, ended: bool

@@ -1,11 +1,11 @@
-"""What is said under which key of the router, for driver and fail-safe voice alike. Pure."""
+"""What is said under which key of the router, for driver and failsafe voice alike. Pure."""
 
 from enum import StrEnum
 
 from drivers.rmw_zenoh.wire import graph, vehicle
 from drivers.ros2.settings import NO_HASH, Ros2Section
 
-# The words of the fail-safe voice, which makes the messages itself.
+# The words of the failsafe voice, which makes the messages itself.
 HOVER, LAND = b"hover", b"land"
 
 

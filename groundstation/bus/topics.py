@@ -60,9 +60,9 @@ _ANSWERING = frozenset({Role.DRIVER, Role.SUPERVISOR})
 _HOST = frozenset({Role.HOST})
 _LIAISON = frozenset({Role.LIAISON})
 
-IMU = Topic("imu", m.ImuSample, 200, Quality.SENSOR, _DRIVER)
+IMU = Topic("imu", m.ImuSample, 25, Quality.SENSOR, _DRIVER)
 """Driver: body rates and specific force of a vehicle."""
-ODOMETRY = Topic("odometry", m.Odometry, 200, Quality.SENSOR, _DRIVER)
+ODOMETRY = Topic("odometry", m.Odometry, 100, Quality.SENSOR, _DRIVER)
 """Driver to tracker: velocity, attitude and height as the vehicle measured them."""
 OBSERVATION = Topic("observation", m.RelativeObservation, 15, Quality.SENSOR, _CAMERA)
 """Camera or motion capture driver to tracker: one marker that a camera saw, one body that was captured."""

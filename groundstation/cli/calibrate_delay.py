@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 @click.command(
     epilog="\b\nExamples:\n  groundstation calibrate delay runs/20261120T101500Z-lab\n"
     "  groundstation calibrate delay RUN --json\n\n"
-    "The flight should turn the drones in sight of the fixed camera and move them briskly, for a minute or more; "
+    "The flight should turn the drones in sight of the fixed camera and move them briskly, for three minutes; "
     "heights need five take-offs and landings. A delay that the recording does not show to 15 ms is not proposed; the "
     "flight that would show it is named.\n\n"
     "Exit codes: 0 done, 2 wrong usage, or no recording that can be used."

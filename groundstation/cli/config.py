@@ -137,7 +137,12 @@ def schema() -> None:
 @_OPTION
 @click.option("--scenario", metavar="S", help="Draw the target's path of a scenario (a name or a path) as well.")
 @click.option(
-    "-o", "--output", type=click.Path(path_type=Path, dir_okay=False), default=Path("room.png"), help="PNG, SVG or PDF."
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path, dir_okay=False),
+    default=Path("room.png"),
+    show_default=True,
+    help="PNG, SVG or PDF.",
 )
 def draw(field: str, options: tuple[str, ...], scenario: str | None, output: Path) -> None:
     """Draw the room to scale: fence, pads, level heights, and what the fixed cameras see of drones at each of them."""
@@ -168,7 +173,7 @@ def draw(field: str, options: tuple[str, ...], scenario: str | None, output: Pat
     help="lab: two AR.Drones, one ceiling camera; mixed-team: AR.Drone, PX4 and ArduPilot vehicle, two cameras.",
 )
 def init(directory: Path, like: str) -> None:
-    """Write a commented field file, its camera calibrations and a scenario into DIRECTORY, to start from."""
+    """Write a commented field file, its camera calibrations and the shipped scenarios into DIRECTORY, to start from."""
     from groundstation.settings.files import SHIPPED
     from groundstation.settings.shipped_copies import copy, refuse_existing, shipped
 

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     "--invite",
     metavar="ROLE",
     type=click.Choice(("watch", "stop", "command")),
-    help="Let one tablet or phone in, by a code that works once; needs console.listen in the field.",
+    help="Let one tablet or phone in as watch, stop or command, by a code that works once; needs console.listen in the "
+    "field.",
 )
 @click.option("--port", type=click.IntRange(1024, 65535), help="Port to serve on (default: the field's console.port).")
 def console(name: str | None, invite: str | None, port: int | None) -> None:

@@ -86,7 +86,10 @@ class Handle:
 @click.option("--run", "name", metavar="NAME", help="Which ground station, if several run here.")
 @click.option("--gamepad", type=click.Path(exists=True), help="A joystick device; without it the space bar is held.")
 def deadman(name: str | None, gamepad: str | None) -> int:
-    """Hold on, and the flight goes on; let go, and the drones hold at once and land 5 s later. No emergency stop."""
+    """Hold on, and the flight goes on; let go, and the drones hold (space bar: after 0.9 s), and land 5 s later.
+
+    No emergency stop.
+    """
     record = choose_run(name)
     bus = join(record, "deadman", Role.CLI)
     grip = "any button (the second lands)" if gamepad else "the space bar"

@@ -1,4 +1,4 @@
-"""`groundstation experiment`: the paper's planar simulations, seeded, with tables and pictures."""
+"""`groundstation experiment`: seeded studies in the plane, of flights at message level, and of recorded data."""
 
 import json
 from collections.abc import Callable, Sequence
@@ -52,9 +52,10 @@ def _world(command: Callable[..., None]) -> Callable[..., None]:
 
 @click.group(epilog="Example: groundstation experiment figure1 --seeds 5")
 def experiment() -> None:
-    """The paper's planar simulations: robots and target in the plane, seeded and repeatable bit for bit.
+    """Seeded experiments: the paper's planar simulations, flights at message level, and a real data set.
 
-    Each writes results.csv (one row per run), summary.json, timing.json and pictures into its folder.
+    The planar ones write results.csv (one row per run), summary.json, timing.json and pictures into their folder, the
+    others one file of figures.
     """
 
 

@@ -22,7 +22,7 @@ Flight = dict[str, Any]
 @click.command(
     epilog="\b\nExamples:\n  groundstation experiment calibrations                   (every row, 1 seed each)\n"
     '  groundstation experiment calibrations --rows "pan of both,all markers" --seeds 3\n\n'
-    "Exit codes: 0 all flights meet their bars with the new settings, 1 one does not, 2 wrong settings."
+    "Exit codes: 0 all flights keep their limits with the new settings, 1 one does not, 2 wrong settings."
 )
 @click.option("--seeds", type=click.IntRange(1, 1000), default=1, show_default=True, help="Flights of each row.")
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the first flight.")

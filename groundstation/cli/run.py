@@ -75,8 +75,9 @@ def simulated_options(command: Callable[..., Any]) -> Callable[..., Any]:
     "--real",
     multiple=True,
     metavar="PART[=POSE]",
-    help="A drone, camera or target of the field that is not emulated; repeatable. POSE of a drone: autopilot:PORT "
-    "(where the simulator behind its firmware tells its true pose) or estimate (default).",
+    help="A drone, camera, target, motion capture or ranging system of the field that is real; repeatable. POSE of a "
+    "drone: autopilot:PORT (its true pose, from its firmware's simulator), the name of a motion capture system, or "
+    "estimate (default).",
 )
 def sitl(field: str, **arguments: Any) -> int:
     """Fly a field file against emulated drones and cameras. Ctrl-C lands; a second one stops at once.

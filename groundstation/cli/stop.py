@@ -139,7 +139,11 @@ def _without_router(verb: Verb, record: RuntimeRecord, as_json: bool, error: Gro
 
 def _verb(verb: Verb, text: str) -> click.Command:
     @click.argument("drones", nargs=-1)
-    @click.option("--run", metavar="NAME", help="Which ground station, if several run here (a stop: the real drones).")
+    @click.option(
+        "--run",
+        metavar="NAME",
+        help="The run to address. Without it, if several run here, a stop goes to the one with real drones.",
+    )
     @click.option("--json", "as_json", is_flag=True, help="Print one JSON document.")
     def callback(drones: tuple[str, ...], run: str | None, as_json: bool, **more: Any) -> int:
         if verb is Verb.CUT_MOTORS and not more["yes"]:

@@ -47,7 +47,7 @@ VERBS: dict[str, CommandRow] = {
     "replay": CommandRow(
         "Look", "groundstation.cli.replay:replay", "Show a recorded run, or compute it again.", first=True
     ),
-    "view": CommandRow("Look", "groundstation.cli.view:view", "Live engineering view in Rerun or Foxglove."),
+    "view": CommandRow("Look", "groundstation.cli.view:view", "Live engineering view in Rerun, Foxglove or ROS 2."),
     "recording": CommandRow(
         "Look", "groundstation.cli.recording:recording", "Look into, repair, cut and convert recordings."
     ),
@@ -72,12 +72,14 @@ VERBS: dict[str, CommandRow] = {
         "Prepare", "groundstation.cli.camera:camera", "See what a camera sees, and what is found in it."
     ),
     "markers": CommandRow("Prepare", "groundstation.cli.markers:markers", "Print the markers of robots and targets."),
-    "vehicle": CommandRow("Prepare", "groundstation.cli.vehicle:vehicle", "List the kinds of vehicles, and judge one."),
+    "vehicle": CommandRow("Prepare", "groundstation.cli.vehicle:vehicle", "List, judge and identify vehicles."),
     "site": CommandRow("Prepare", "groundstation.cli.site:site", "Let other hosts stop and order."),
     "experiment": CommandRow(
-        "Study", "groundstation.cli.experiment:experiment", "The paper's planar simulations, with tables and pictures."
+        "Study", "groundstation.cli.experiment:experiment", "Seeded experiments: planar, flights, recorded data."
     ),
-    "bench": CommandRow("Develop", "groundstation.cli.bench:bench", "Fly many seeds of the demo and judge each."),
+    "bench": CommandRow(
+        "Develop", "groundstation.cli.bench:bench", "Measure flights, planner, estimator, bus and page."
+    ),
     "version": CommandRow(
         "Develop", "groundstation.cli.version:version", "Versions of this program and its libraries."
     ),

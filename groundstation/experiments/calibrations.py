@@ -25,8 +25,8 @@ def calibrated_labs(labs: Iterable[WrongLab]) -> list[WrongLab]:
 def verdict_on(lab: WrongLab, before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
     """Return what became of one flight and its settings.
 
-    left: of each figure that was wrong, by "WHO KIND", what is left; missed: those beyond their bars; mended: whether
-    the same flight with the new settings meets the bars of rmse and ANEES.
+    left: of each figure that was wrong, by "WHO KIND", what is left; missed: those beyond their limits; mended: whether
+    the same flight with the new settings keeps the limits of rmse and ANEES.
     """
     wrong = dict.fromkeys((who, _KINDS.get(part, part)) for who, part, _ in lab.errors)
     left = {f"{who} {kind}": after["left"][who][kind] for who, kind in wrong}

@@ -54,7 +54,7 @@ class ProcessSpec:
 
     entry: "module:function" run with a Child, or else command: an argument list in which "{spec}" becomes the path of
     a JSON file holding section plus "child". numbered: each start gets a higher "epoch" in its section.
-    silence_limit_s: heartbeat older than this starts its fail-safe datagrams; hang_limit_s: it is killed (both after
+    silence_limit_s: heartbeat older than this starts its failsafe datagrams; hang_limit_s: it is killed (both after
     READY). restart_delay_s: pause before even the first restart. required: the run cannot start without it. awaited: a
     start waits for it, if only for a moment. on_terminal: it writes to the operator's terminal. entities: the vehicles
     or the camera that a device speaks of.

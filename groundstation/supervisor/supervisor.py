@@ -80,7 +80,7 @@ class Supervisor:
         self._block.set_state(SUPERVISOR_SLOT, SlotState.READY)
 
     def _find_words(self) -> None:
-        """Open the transports of fail-safe datagrams; a link whose driver cannot use it either fails its start."""
+        """Open the transports of failsafe datagrams; a link whose driver cannot use it either fails its start."""
         for process in self.processes:
             words = process.spec.failsafe_datagrams
             if words is not None and (why := self._last_words.prepare(process.spec.name, words)):

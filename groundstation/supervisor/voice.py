@@ -1,4 +1,4 @@
-"""Transports of fail-safe datagrams: plain UDP, or that of the drone's driver package for its links."""
+"""Transports of failsafe datagrams: plain UDP, or that of the drone's driver package for its links."""
 
 import socket
 from collections.abc import Callable, Sequence

@@ -135,7 +135,7 @@ class VehicleKind:
     base above the floor before take-off, and its deviation; the default is usual of small vehicles. camera: scheme
     of the vehicle's own video, "" if it has none; camera_port: its usual port; reader: "module:attribute" of what
     is called with address and interface and reads it, as the sources of `drivers.camera` do. has_serial_number: the
-    driver knows the vehicle's own. has_interface: driver and fail-safe datagrams use the drone's network adapter
+    driver knows the vehicle's own. has_interface: driver and failsafe datagrams use the drone's network adapter
     and no other. shares_address: its vehicles may have one address, and `check` tells them apart. moved: changes of
     sections in a simulated network, where this computer has the local address. emulator: "module:attribute" of a
     sim_bridge.world.emulation.Emulation, "" if there is none. example: what a field file may say of one in its

@@ -26,6 +26,7 @@ from groundstation.estimation.fixed_lag import FixedLagFilter
 from groundstation.estimation.ingest import REASONS, Intake
 from groundstation.estimation.layout import EntityKind
 from groundstation.estimation.measurement import Correction
+from groundstation.estimation.models.ranging import RangeSensor
 from groundstation.estimation.mount_watch import MOVED, MountWatch
 from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.stabilized_frame import world_from_stabilized
@@ -92,7 +93,8 @@ class Tracker:
         self._robots = tuple(n for n, m in parameters.estimator.entities.items() if m.kind is EntityKind.ROBOT)
         self._targets = tuple(n for n, m in parameters.estimator.entities.items() if m.kind is EntityKind.TARGET)
         self.lookout = Lookout(parameters.search, parameters.control, parameters.sensors, self._robots, self._targets)
-        self._roots = RootWatch(self._mounts.roots, self._robots + self._targets)
+        links = [one.carrier for one in parameters.estimator.sensors.values() if isinstance(one, RangeSensor)]
+        self._roots = RootWatch(self._mounts.roots, self._robots + self._targets, links)
 
     @property
     def robots(self) -> tuple[str, ...]:

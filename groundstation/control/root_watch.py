@@ -28,11 +28,13 @@ class RootWatch:
     """Use: `hear` each message that counts, `advance` once a tick; ask `age_s` and `is_silent`.
 
     roots: sensors that are fixed in the room; carried: robots and targets, of which one that sees another passes on
-    where it is. Two that see only each other drift together, and nothing in their sightings shows it.
+    where it is. Two that see only each other drift together, and nothing in their sightings shows it. links: what the
+    filter calls the parts of ranging systems, one for each anchor and robot.
     """
 
-    def __init__(self, roots: Collection[str], carried: Iterable[str]) -> None:
+    def __init__(self, roots: Collection[str], carried: Iterable[str], links: Collection[str] = ()) -> None:
         self._roots, self._carried = frozenset(roots), frozenset(carried)
+        self._placing = self._roots | frozenset(links)
         self._rooted_ns: dict[str, int] = {}
         self._heard_ns: dict[str, int] = {}
         self._telling: set[str] = set()
@@ -97,7 +99,7 @@ class RootWatch:
 
     def _tie(self, one: Correction, at_ns: int) -> None:
         """Let both ends of a sighting know what the better rooted one knows."""
-        if one.observer in self._roots:
+        if one.observer in self._placing:
             self._rooted_ns[one.subject] = max(at_ns, self._rooted_ns.get(one.subject, at_ns))
             return
         ends = (one.observer, one.subject)

@@ -5,6 +5,8 @@ from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.fixed_lag import FixedLagFilter
 from groundstation.estimation.layout import EntityKind
 
+_NEVER_S = 1e6  # what is told for never: a message holds finite numbers
+
 
 def entity_estimate(
     joint: FixedLagFilter, belief: JointBelief, name: str, converged: bool, age_s: float, unlocalised_s: float
@@ -25,7 +27,7 @@ def entity_estimate(
         covariance=tuple(covariance[:size, :size].ravel().tolist()),
         velocity_m_s=velocity,
         converged=converged,
-        age_s=age_s,
-        unlocalised_s=unlocalised_s,
+        age_s=min(age_s, _NEVER_S),
+        unlocalised_s=min(unlocalised_s, _NEVER_S),
         contradicted=joint.contradicted(name),
     )

@@ -37,6 +37,12 @@ def test_what_a_root_sees_is_passed_on_along_sightings_in_either_direction() -> 
     assert ages_s(watch) == [0.0, 0.0, 0.0]
 
 
+def test_a_range_roots_a_robot_by_the_name_of_its_link() -> None:
+    watch = RootWatch(["uwb"], CARRIED, ["uwb_a1_drone_1"])
+    watch.advance(TICK_NS, [used("uwb_a1_drone_1", "drone_1")], flying=True)
+    assert ages_s(watch) == [0.0, math.inf, math.inf]
+
+
 def test_two_that_see_only_each_other_grow_older_together() -> None:
     watch = RootWatch(["ceiling"], CARRIED)
     watch.advance(TICK_NS, [used("ceiling", "drone_1")], flying=True)

@@ -6,13 +6,14 @@ import termios
 import threading
 from collections import Counter
 
-from drivers.mavlink.links.seam import Address, Heard, Sniffer, ignore_bytes
+from drivers.mavlink.links.seam import Heard, Sniffer, ignore_bytes
 from drivers.mavlink.links.tty import make_raw
 from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder, Message
 from drivers.mavlink.wire.signature import frame_size
 from drivers.mavlink.wire.verification import Signing
+from groundstation.adapters import Address
 from groundstation.bus import clock
 from groundstation.errors import DriverError
 
@@ -54,7 +55,7 @@ class SerialLink:
         self._own = (settings.system_id, settings.component_id)
         self._decoder = FrameDecoder(signing)
         self._encoder = FrameEncoder(settings.system_id, settings.component_id, signing)
-        self._cutter, self._lock, self._sniffer = StreamCutter(), threading.Lock(), sniffer
+        self._cutter, self._lock, self._sniffer = StreamCutter(), threading.RLock(), sniffer
         try:
             self._fd = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         except OSError as error:
@@ -78,12 +79,14 @@ class SerialLink:
         """Wait up to 0.1 s for bytes; return the frames that are whole by now, each with its bytes."""
         try:
             ready, _, _ = select.select([self._fd], [], [], _POLL_S)
-            data = os.read(self._fd, _CHUNK) if ready else b""
-        except (OSError, ValueError) as error:
+            if not ready:
+                return []
+            data = os.read(self._fd, _CHUNK)
+        except OSError:
+            data = b""
+        if not data:  # an unplugged radio fails, or ends, at once and for ever: do not spin
             self.rejected["receive_failed"] += 1
-            # An unplugged radio fails at once and for ever: do not spin.
             select.select([], [], [], _POLL_S)
-            raise_if_closed(error)
             return []
         now_ns, heard = clock.now_ns(), list[tuple[Heard, bytes]]()
         for raw in self._cutter.feed(data):
@@ -99,9 +102,8 @@ class SerialLink:
 
     def send(self, system: int, message: Message) -> None:
         """Write one frame; a line that is too slow loses it."""
-        with self._lock:
-            data = self._encoder.encode(message)
-        self.send_raw(system, data)
+        with self._lock:  # signed frames must leave in the order of their times
+            self.send_raw(system, self._encoder.encode(message))
 
     def send_raw(self, system: int, data: bytes) -> None:
         """Write whole frames; a line that is too slow loses them."""
@@ -116,9 +118,3 @@ class SerialLink:
     def close(self) -> None:
         """Close the device."""
         os.close(self._fd)
-
-
-def raise_if_closed(error: Exception) -> None:
-    """Raise the error of a line that we closed ourselves (ValueError) again; ignore others."""
-    if isinstance(error, ValueError):
-        raise error

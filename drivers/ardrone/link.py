@@ -1,6 +1,7 @@
 """The two UDP links to one AR.Drone: who may speak to us, in which order, and with which number we speak."""
 
 import logging
+import select
 import socket
 import threading
 from collections import Counter, deque
@@ -80,13 +81,11 @@ class ArDroneLink:
     def receive(self) -> tuple[int, Navdata] | None:
         """Wait up to 0.1 s for a packet; returns (receipt_ns, packet), or None when nothing usable came."""
         try:
-            datagram, source = self._navdata_socket.recvfrom(navdata.MAX_SIZE + 1)
-            return self._judge(datagram, source)
-        except TimeoutError:
-            pass
+            if select.select([self._navdata_socket], [], [], _POLL_S)[0]:
+                return self._judge(*self._navdata_socket.recvfrom(navdata.MAX_SIZE + 1))
         except WireError as error:
             self._reject(error.reason, str(error))
-        except OSError as error:
+        except (OSError, ValueError) as error:  # ValueError: it was closed meanwhile
             self._reject("receive_failed", str(error))
         return None
 
@@ -140,5 +139,5 @@ class ArDroneLink:
 
 def _open(settings: ArDroneDriverSettings, port: int) -> socket.socket:
     channel = open_udp((settings.local_address, port), settings.interface)
-    channel.settimeout(_POLL_S)
+    channel.setblocking(False)
     return channel

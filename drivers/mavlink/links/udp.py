@@ -1,19 +1,20 @@
 """One UDP port with any number of vehicles behind it: who may speak, who is where."""
 
 import logging
+import select
 import socket
 import threading
 import zlib
 from collections import Counter
 from contextlib import suppress
 
-from drivers.mavlink.links.seam import Address, Heard, Sniffer, ignore_bytes
+from drivers.mavlink.links.seam import Heard, Sniffer, ignore_bytes
 from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.frames import MAX_DATAGRAM, FrameDecoder, FrameEncoder, Message, ReceivedFrame, split
 from drivers.mavlink.wire.telemetry import OUR_HEARTBEAT
 from drivers.mavlink.wire.verification import Signing, old_sender
-from groundstation.adapters import bind_to_adapter, split_zone
+from groundstation.adapters import Address, bind_to_adapter, split_zone
 from groundstation.bus import clock
 from groundstation.errors import DriverError
 from groundstation.process.ports import why_refused
@@ -62,7 +63,7 @@ class UdpLink:
             self._socket.close()
             why = why_refused(error, address, int(port), socket.SOCK_DGRAM)
             raise DriverError(f"cannot listen on {settings.target}: {why}") from error
-        self._socket.settimeout(_POLL_S)
+        self._socket.setblocking(False)
 
     @property
     def called_from(self) -> tuple[Address, ...]:
@@ -76,10 +77,10 @@ class UdpLink:
     def receive_raw(self) -> list[tuple[Heard, bytes]]:
         """Wait up to 0.1 s for a datagram; return its frames, each with its bytes."""
         try:
+            if not select.select([self._socket], [], [], _POLL_S)[0]:
+                return []
             data, source = self._socket.recvfrom(MAX_DATAGRAM)
-        except TimeoutError:
-            return []
-        except OSError as error:
+        except (OSError, ValueError) as error:  # ValueError: it was closed meanwhile
             # An ICMP "port unreachable" answers what was sent to a vehicle that is not there yet.
             self._reject("receive_failed", str(error))
             return []

@@ -253,7 +253,7 @@ class ArDrone:
         """Return rates, losses and refusals of the link."""
         rate_hz, quality = self._link.rates(now_ns)
         heights = Counter({"height_jump": self._publisher.heights.refused})
-        rejected = dict(self._link.rejected + self._refused + heights)
+        rejected = dict(self._link.rejected.copy() + self._refused + heights)
         detail = "its commands do not arrive" if self._uplink.cut else self._session.detail
         clock, firmware = self._plausibility.clock.figures, self._session.identity.firmware
         return LinkHealth(quality, rate_hz, rejected, detail, clock, firmware)

@@ -222,7 +222,7 @@ class CameraDriver:
             skipped=self._skipped,
             detections=self._detections,
             detail="" if flowing or self._watch.state is StreamState.WAITING else self._trouble(),
-            rejected=dict(+(self.counts + self._source.rejected)),
+            rejected=dict(self.counts + self._source.rejected.copy()),
             brightness=None if quality is None else round(quality.brightness, 3),
             edge_px=None if quality is None or quality.edge_px is None else round(quality.edge_px, 1),
         )

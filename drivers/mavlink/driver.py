@@ -100,6 +100,7 @@ class Fleet:
         last_ns = self._announced.get((name, text))
         if last_ns is not None and now_ns - last_ns < _SAME_TEXT_NS:
             return
+        self._announced = {said: at for said, at in self._announced.items() if now_ns - at < _SAME_TEXT_NS}
         self._announced[name, text] = now_ns
         level = Severity.INFO
         if severity <= MavSeverity.WARNING:

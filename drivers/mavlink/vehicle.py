@@ -138,7 +138,7 @@ class MavlinkVehicle:
             case telemetry.SysStatus():
                 known = replace(known, healthy=message.onboard_control_sensors_health)
                 return _charged(now_ns, message.battery_remaining, known)
-            case telemetry.BatteryStatus():
+            case telemetry.BatteryStatus(id=0):  # the others feed a payload
                 return _charged(now_ns, message.battery_remaining, known)
             case telemetry.EkfStatusReport():
                 self._publisher.stated.hear(now_ns, message)
@@ -289,7 +289,7 @@ class MavlinkVehicle:
         lost_s, limit_s = self.vision.lost_s(now_ns), self._settings.vision.hover_after_s
         lost = f"no position from the cameras for {lost_s:.1f} s" if lost_s >= limit_s else ""
         detail = lost or self._session.detail(self._requests)
-        rejected = dict(self._link.rejected + self._refused)
+        rejected = dict(self._link.rejected.copy() + self._refused)
         clocks, firmware = self._plausibility.clock.figures, self._session.firmware
         return LinkHealth(quality, rate_hz, rejected, detail, clocks, firmware, self._asks_time(now_ns))
 

@@ -21,6 +21,7 @@ _NOISE_M_S = 0.05
 _FADES_S = 10.0
 _KEPT_NS = 3 * NS_PER_S
 _MOST_M_S, _MOST_RAD = 2.0, math.radians(10.0)
+_FILLED_IN = 1e3  # of 30 m/s: nobody measures that
 _ROLL_VARIANCE, _PITCH_VARIANCE = 15, 18
 _X_VARIANCE, _Y_VARIANCE = 0, 6
 
@@ -77,5 +78,5 @@ class StatedUncertainty:
 
 def _std(*variances: float) -> float:
     # A covariance that is not known is NaN by the standard, and 0 or huge where one fills it in.
-    known = [v for v in variances if 0.0 < v < _MOST_M_S**2]
+    known = [v for v in variances if 0.0 < v < _FILLED_IN]
     return math.sqrt(max(known)) if len(known) == len(variances) else 0.0

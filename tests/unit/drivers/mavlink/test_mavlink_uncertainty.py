@@ -33,6 +33,13 @@ def test_an_unknown_covariance_states_nothing(unknown):
     assert stated.velocity_std_m_s(S) == stated.attitude_std_rad(S) == 0.0
 
 
+def test_a_large_doubt_is_one_and_not_none():
+    stated = StatedUncertainty()
+    stated.hear(S, odometry(9.0, 9.0))
+    assert stated.velocity_std_m_s(S) == pytest.approx(2.0)
+    assert math.degrees(stated.attitude_std_rad(S)) == pytest.approx(10.0)
+
+
 @pytest.mark.parametrize(("ratio", "std"), [(0.3, 0.0), (0.5, 0.0), (0.75, 0.25), (1.0, 0.5), (44.0, 0.5)])
 def test_a_filter_that_refuses_what_it_is_fed_is_doubted(ratio, std):
     px4, ardupilot = StatedUncertainty(), StatedUncertainty()

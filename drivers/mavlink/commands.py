@@ -149,6 +149,7 @@ class Orders:
             self.starting, self._climb_until_ns = True, now_ns + 2 * _CLIMB_LIMIT_NS
             self._started = self._taken_over = False
             self._requests.accepted -= {"arming", "take-off"}  # once per start: a second one begins its spool-up anew
+            self._requests.drop("motor cut", "disarming", "landing")
         elif action is not Action.HOVER or self._action is not Action.TAKE_OFF:
             self.starting, self._climb_until_ns = False, 0
         else:

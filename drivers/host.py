@@ -69,7 +69,7 @@ class VehicleHost:
         self._estimates = self._bus.subscribe([ESTIMATE], newest=True)
         self._seen, self._control_error = SeenVelocity(), ControlErrorMonitor()
         self._told: WatchdogDecision | None = None
-        self._refused_id, self._next_refusal_ns = "", 0
+        self._next_refusal_ns = 0
         self._statuses = self._bus.subscribe([VEHICLE_STATUS], newest=True)
         self._neighbours = Neighbours(vehicle.name, limits.pad_m, limits.min_separation_m)
         self._localised_ns: int | None = None
@@ -184,7 +184,7 @@ class VehicleHost:
         return total
 
     def _command(self, now_ns: int, command: Command) -> None:
-        if command.scope and self.vehicle.name not in command.scope:
+        if OPERATOR in command.scope or (command.scope and self.vehicle.name not in command.scope):
             return
         self._announce_refusal(now_ns, command)
         for ack in self.watchdog.accept_command(now_ns, command):
@@ -193,11 +193,11 @@ class VehicleHost:
     def _announce_refusal(self, now_ns: int, command: Command) -> None:
         """Report a command without the right to give it; once a second, and once for each."""
         reason = "" if self.watchdog.has_answered(command) else self.watchdog.lease.refusal(now_ns, command)
-        if not reason or command.id == self._refused_id or OPERATOR in command.scope:
+        if not reason:
             return
         self._count("command", "unauthorised")
         if now_ns >= self._next_refusal_ns:
-            self._refused_id, self._next_refusal_ns = command.id, now_ns + _REFUSAL_PERIOD_NS
+            self._next_refusal_ns = now_ns + _REFUSAL_PERIOD_NS
             self._event(Severity.WARNING, f"{command.verb} of {command.header.source} refused: {reason}")
 
     def _answer(self, ack: Ack) -> None:

@@ -5,9 +5,8 @@ A start that was given before the last stop never counts: repetitions of it may 
 
 from dataclasses import dataclass
 
-from groundstation.bus.messages import STOP_LIVES_NS, Command, Lease, Verb
-from groundstation.bus.stop_mark import StopMark
-from groundstation.time_units import NS_PER_S
+from groundstation.bus.messages import Command, Lease, Verb
+from groundstation.bus.stop_mark import StopMark, why_another_runs, why_too_old
 
 # Orders that begin or go on with a motion; all others stop, and anyone may stop.
 STARTING_VERBS = frozenset({Verb.TAKEOFF, Verb.TRACK, Verb.RESUME})
@@ -48,10 +47,10 @@ class LeaseBook:
 
     def refusal(self, now_ns: int, command: Command) -> str:
         """Return "" if the command is permitted to its issuer now, else why not; anybody of the run may stop."""
-        if self.run and command.run != self.run:
-            return f"given for another run ({command.run})" if command.run else "given for no run"
+        if why := why_another_runs(command, self.run):
+            return why
         if command.verb not in STARTING_VERBS:
-            return self._staleness(now_ns, command)
+            return why_too_old(command, now_ns, self.clock)
         if command.header.clock != self.clock:
             return "sent from a host whose clock is not known here"
         if now_ns >= command.expires_ns:
@@ -68,9 +67,3 @@ class LeaseBook:
         mark = StopMark.of(stop, now_ns, self.clock)
         if self.last_stop is None or self.last_stop.given_ns < mark.given_ns:
             self.last_stop = mark
-
-    def _staleness(self, now_ns: int, stop: Command) -> str:
-        age_ns = now_ns - stop.header.stamp_ns
-        if stop.header.clock == self.clock and age_ns > STOP_LIVES_NS:
-            return f"given {age_ns / NS_PER_S:.0f} s ago"
-        return ""

@@ -2,7 +2,23 @@
 
 from dataclasses import dataclass
 
-from groundstation.bus.messages import Command
+from groundstation.bus.messages import STOP_LIVES_NS, Command
+from groundstation.time_units import NS_PER_S
+
+
+def why_another_runs(command: Command, run: str) -> str:
+    """Return why a command is none of this run's, or ""; run "": those of all runs count."""
+    if not run or command.run == run:
+        return ""
+    return f"given for another run ({command.run})" if command.run else "given for no run"
+
+
+def why_too_old(stop: Command, now_ns: int, clock: str) -> str:
+    """Return why a stop does not count any more, or ""; the age of one from another clock than ours is not known."""
+    age_ns = now_ns - stop.header.stamp_ns
+    if stop.header.clock == clock and age_ns > STOP_LIVES_NS:
+        return f"given {age_ns / NS_PER_S:.0f} s ago"
+    return ""
 
 
 @dataclass(frozen=True, slots=True)

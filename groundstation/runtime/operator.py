@@ -7,7 +7,6 @@ from groundstation.bus import clock
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import (
     OPERATOR,
-    STOP_LIVES_NS,
     AckStage,
     Command,
     CommandAck,
@@ -16,7 +15,7 @@ from groundstation.bus.messages import (
     Severity,
     Verb,
 )
-from groundstation.bus.stop_mark import StopMark
+from groundstation.bus.stop_mark import StopMark, why_another_runs, why_too_old
 from groundstation.bus.topics import COMMAND, COMMAND_ACK, EVENT, LEASE
 from groundstation.runtime.acknowledgements import AwaitedAnswers
 from groundstation.runtime.asking import START_LIVES_NS, TEAM
@@ -115,7 +114,9 @@ class Operator:
 
     def land(self, now_ns: int) -> None:
         """Land everybody; whatever else was going on ends."""
-        if self.phase is not TeamPhase.LANDING:
+        given = [dialogue.book.command for dialogue in self._dialogues]
+        # Not by the phase: another shell's LAND, which sets it as well, may have been lost on its way.
+        if not any(order.verb is Verb.LAND and not order.scope for order in given):
             self.phase = TeamPhase.LANDING
             stop = self._give(Verb.LAND, (), now_ns).command
             self._requests.hear_stop(now_ns, stop)
@@ -193,7 +194,7 @@ class Operator:
     def _hear_command(self, command: Command, now_ns: int) -> None:
         if OPERATOR in command.scope:
             self._serve(command, now_ns)
-        elif self._is_void(command, now_ns):
+        elif why_another_runs(command, self._bus.run) or why_too_old(command, now_ns, clock.clock_id()):
             return  # no driver obeys it, and it is theirs to say so
         elif command.verb.stops and self._requests.hear_stop(now_ns, command):
             self._hear_stop(command, now_ns)
@@ -209,10 +210,6 @@ class Operator:
             for name in stop.scope:
                 self._sequence.drop(name, f"{stop.verb} by {stop.issuer}", now_ns)
             self._say(f"{stop.verb} {', '.join(stop.scope)} by {stop.issuer}")
-
-    def _is_void(self, stop: Command, now_ns: int) -> bool:
-        old = stop.header.clock == clock.clock_id() and now_ns - stop.header.stamp_ns > STOP_LIVES_NS
-        return old or bool(self._bus.run and stop.run != self._bus.run)
 
     def _is_partial(self, command: Command) -> bool:
         return bool(command.scope) and not set(command.scope) >= set(self.team.members)

@@ -36,16 +36,19 @@ class Inbox:
         self._subscription = bus.subscribe(TOPICS, capacity=CAPACITY)
         self._keys: dict[str, Key] = {}
         self.refused: Counter[str] = Counter()
+        self._skipped = 0
 
     @property
     def overflowed(self) -> int:
         """Return how many messages were dropped because the loop did not drain in time."""
-        return self._subscription.overflowed
+        return self._subscription.overflowed + self._skipped
 
     def pop_ready(self) -> list[tuple[str, Message]]:
         """Return (key, message) of all that has arrived, in order; what cannot be decoded is counted by reason."""
         ready = []
-        for sample in self._subscription.drain_samples()[-_MAX_PER_TICK:]:
+        samples = self._subscription.drain_samples()
+        self._skipped += max(0, len(samples) - _MAX_PER_TICK)
+        for sample in samples[-_MAX_PER_TICK:]:
             try:
                 ready.append((sample.key, codec.decode(self._key(sample.key), sample.payload)))
             except MessageError as error:

@@ -108,10 +108,11 @@ class ParallelCompilation:
         statement = "\n".join(f"import {module}" for module in modules)
         self._process = subprocess.Popen([sys.executable, "-c", statement], stdin=subprocess.DEVNULL)
 
-    def finish(self) -> None:
-        """Wait for it; whatever it did not compile is compiled where it is imported."""
+    def finish(self) -> bool:
+        """Wait for it; returns whether it did all. Whatever it did not compile is compiled where it is imported."""
         try:
-            self._process.wait(_COMPILE_LIMIT_S)
+            return self._process.wait(_COMPILE_LIMIT_S) == 0
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
+            return False

@@ -16,8 +16,8 @@ def compile_kernels(cache: Path) -> None:
         "groundstation.sensing.footprint",
     ):
         importlib.import_module(module)
-    other_half.finish()
-    numba_cache.mark_complete(cache)
+    if other_half.finish():
+        numba_cache.mark_complete(cache)
 
 
 def main() -> None:

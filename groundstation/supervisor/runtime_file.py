@@ -77,6 +77,10 @@ class RuntimeRecord(msgspec.Struct, frozen=True):
         return self.has_truth and not self.real
 
 
+class _AnyRecord(msgspec.Struct, frozen=True):
+    supervisor: ProcessRecord
+
+
 def start_time(pid: int) -> int | None:
     """Return when a process started [clock ticks since boot], or None if there is none or it is a zombie."""
     try:
@@ -106,8 +110,11 @@ def folder() -> Path:
 
 
 def write(record: RuntimeRecord) -> Path:
-    """Write a record in one step, so that no reader sees half of it; returns its path."""
-    path = folder() / f"{record.name}.json"
+    """Write a record in one step, so that no reader sees half of it; returns its path. Raises OSError."""
+    try:
+        path = folder() / f"{record.name}.json"
+    except GroundStationError as error:  # the folder is gone, at a logout e.g.
+        raise OSError(str(error)) from error
     draft = path.with_suffix(".draft")
     draft.write_bytes(msgspec.json.encode(record))
     draft.chmod(0o600)
@@ -116,21 +123,30 @@ def write(record: RuntimeRecord) -> Path:
 
 
 def live_records() -> list[RuntimeRecord]:
-    """Return the runs that still have a process, and remove files of dead ones."""
+    """Return the runs that still have a process, and remove files of dead ones that can be read."""
     records = []
     for path in sorted(folder().glob("*.json")):
         try:
-            record = msgspec.json.decode(path.read_bytes(), type=RuntimeRecord)
-        except FileNotFoundError:
+            content = path.read_bytes()
+            record = msgspec.json.decode(content, type=RuntimeRecord)
+        except OSError:
             continue
-        except (OSError, msgspec.DecodeError):
-            path.unlink(missing_ok=True)
+        except msgspec.DecodeError:
+            if not _is_of_a_live_run(content):
+                path.unlink(missing_ok=True)
             continue
         if record.alive:
             records.append(record)
         else:
             remove(record)
     return records
+
+
+def _is_of_a_live_run(content: bytes) -> bool:
+    """Return whether a record that this version cannot read, as it is another's, has a supervisor that lives."""
+    with suppress(msgspec.DecodeError):
+        return msgspec.json.decode(content, type=_AnyRecord).supervisor.alive
+    return False
 
 
 def identities_of(site: str, pid: int) -> Path:
@@ -140,9 +156,10 @@ def identities_of(site: str, pid: int) -> Path:
 
 def remove(record: RuntimeRecord) -> None:
     """Remove a record, and the certificates and heartbeat block that a killed supervisor could not remove."""
-    (folder() / f"{record.name}.json").unlink(missing_ok=True)
-    if record.identities:
-        shutil.rmtree(folder() / record.name, ignore_errors=True)
+    with suppress(OSError, GroundStationError):  # the folder is gone, at a logout e.g.
+        (folder() / f"{record.name}.json").unlink(missing_ok=True)
+        if record.identities:
+            shutil.rmtree(folder() / record.name, ignore_errors=True)
     block = Path(record.heartbeat)
     if block.name.startswith("skein-"):
         with suppress(OSError):

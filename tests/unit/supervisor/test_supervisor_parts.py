@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from groundstation.errors import GroundStationError
@@ -62,6 +63,33 @@ def test_damaged_runtime_file_is_removed(runtime: Path, content: bytes) -> None:
     path.write_bytes(content)
     assert runtime_file.live_records() == []
     assert not path.exists()
+
+
+def test_the_file_of_another_version_stays_while_its_run_lives(runtime: Path) -> None:
+    path = runtime_file.folder() / "lab-1.json"
+    own = {
+        "name": "supervisor",
+        "role": "supervisor",
+        "pid": os.getpid(),
+        "start_time": runtime_file.start_time(os.getpid()),
+    }
+    path.write_bytes(msgspec.json.encode({"supervisor": own, "field": 3}))
+    assert runtime_file.live_records() == []
+    assert path.exists()
+    path.write_bytes(msgspec.json.encode({"supervisor": own | {"start_time": 1}, "field": 3}))
+    assert runtime_file.live_records() == []
+    assert not path.exists()
+
+
+def test_a_folder_that_is_gone_is_an_os_error_to_who_writes_and_nothing_to_who_removes(
+    runtime: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    one = record(os.getpid(), runtime_file.start_time(os.getpid()) or 0, str(tmp_path / "block"))
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "gone"))
+    monkeypatch.setattr("tempfile.gettempdir", lambda: str(tmp_path / "gone"))
+    with pytest.raises(OSError, match="gone"):
+        runtime_file.write(one)
+    runtime_file.remove(one)
 
 
 def test_zombie_is_not_alive() -> None:

@@ -10,7 +10,8 @@ from contextlib import suppress
 
 from drivers.base import LinkHealth
 from drivers.datagrams import DatagramLog
-from drivers.vehicle_socket import Address, open_udp
+from drivers.vehicle_socket import open_udp
+from groundstation.adapters import Address
 from groundstation.bus import clock
 
 # Takes a datagram with its arrival [ns] and returns whether it was a report of the vehicle. A ValueError refuses it;

@@ -3,11 +3,9 @@
 import os
 import socket
 
-from groundstation.adapters import bind_to_adapter
+from groundstation.adapters import Address, bind_to_adapter
 from groundstation.errors import DriverError
 from groundstation.process.ports import why_refused
-
-Address = tuple[str, int]
 
 
 def open_udp(local: Address, interface: str = "", peer: Address | None = None) -> socket.socket:

@@ -6,6 +6,7 @@ Without that the routes of this computer decide, and of two equal ones only the 
 import errno
 import os
 import socket
+from collections.abc import Sequence
 from pathlib import Path
 
 from groundstation.errors import DriverError
@@ -28,6 +29,18 @@ def bind_to_adapter(one: socket.socket, interface: str) -> None:
     except OSError as error:
         one.close()
         raise DriverError(f"interface {interface}: {_why(error)}") from error
+
+
+def send_to_all(udp: socket.socket, datagram: bytes, addresses: Sequence[Address]) -> None:
+    """Send a datagram to each address; raises the last OSError, once the others have theirs."""
+    failed: OSError | None = None
+    for address in addresses:
+        try:
+            udp.sendto(datagram, address)
+        except OSError as error:
+            failed = error
+    if failed is not None:
+        raise failed
 
 
 def _why(error: OSError) -> str:

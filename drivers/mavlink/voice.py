@@ -13,18 +13,15 @@ from collections.abc import Sequence
 from drivers.mavlink.links.tty import make_raw
 from drivers.mavlink.signing_key import read_key
 from drivers.mavlink.wire.signature import signed_anew, stamp_at
-from groundstation.adapters import bind_to_adapter
+from groundstation.adapters import Address, bind_to_adapter, send_to_all
 from groundstation.errors import DriverError
-
-Address = tuple[str, int]
 
 
 class MavlinkVoice:
     """Says prepared frames; made before anything flies, since the key must be at hand when it is needed.
 
-    way: JSON with `serial` (DEVICE:BAUD, or "" for UDP) `key_file` ("" for unsigned frames) and `interface`
-    (network adapter, "" for any). speaker: a number of
-    its own for each process that may speak, used as the signature's link.
+    way: JSON with `serial` (DEVICE:BAUD, or "" for UDP), `key_file` ("" for unsigned frames) and `interface` (network
+    adapter, "" for any). speaker: a number of its own for each process that may speak, used as the signature's link.
     """
 
     def __init__(self, way: str, speaker: int) -> None:
@@ -47,8 +44,7 @@ class MavlinkVoice:
         if self._socket is None:
             os.write(self._line(), datagram)
             return
-        for address in addresses:
-            self._socket.sendto(datagram, address)
+        send_to_all(self._socket, datagram, addresses)
 
     def _line(self) -> int:
         """Open the device beside the driver that hangs, or after it; a device may be opened twice."""

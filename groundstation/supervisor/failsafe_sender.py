@@ -7,9 +7,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 from enum import IntEnum
 
+from groundstation.adapters import Address
 from groundstation.errors import GroundStationError
 from groundstation.supervisor.process_spec import FailsafeDatagrams
-from groundstation.supervisor.voice import Address, Voice, open_voice
+from groundstation.supervisor.voice import Voice, open_voice
 from groundstation.time_units import NS_PER_S
 
 _PERIOD_NS = 100_000_000

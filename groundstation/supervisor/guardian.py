@@ -9,6 +9,7 @@ import os
 import select
 import signal
 import time
+from contextlib import suppress
 from functools import partial
 
 import msgspec
@@ -55,7 +56,8 @@ class GuardedDriver:
     def kill(self) -> None:
         """End a process that hangs, so that it cannot wake up and contradict."""
         if self._pidfd >= 0:
-            signal.pidfd_send_signal(self._pidfd, signal.SIGKILL)
+            with suppress(ProcessLookupError):  # it has ended meanwhile
+                signal.pidfd_send_signal(self._pidfd, signal.SIGKILL)
 
     def close(self) -> None:
         """Release the descriptor; idempotent."""

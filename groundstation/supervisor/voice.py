@@ -5,10 +5,8 @@ from collections.abc import Callable, Sequence
 from pkgutil import resolve_name
 from typing import Protocol
 
-from groundstation.adapters import bind_to_adapter
+from groundstation.adapters import Address, bind_to_adapter, send_to_all
 from groundstation.supervisor.process_spec import FailsafeDatagrams
-
-Address = tuple[str, int]
 
 
 class Voice(Protocol):
@@ -31,8 +29,7 @@ class UdpVoice:
 
     def say(self, datagram: bytes, addresses: Sequence[Address]) -> None:
         """Send a datagram to each address."""
-        for address in addresses:
-            self._socket.sendto(datagram, address)
+        send_to_all(self._socket, datagram, addresses)
 
     def close(self) -> None:
         """Close the socket; idempotent."""

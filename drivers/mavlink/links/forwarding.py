@@ -7,13 +7,14 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 
 from drivers.mavlink.links.rider import Rider
-from drivers.mavlink.links.seam import Address, Heard, Transport
+from drivers.mavlink.links.seam import Heard, Transport
 from drivers.mavlink.riding_along import Verdict, may_pass, verdict
 from drivers.mavlink.settings import VehicleSettings
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.flight import CommandAckMessage
 from drivers.mavlink.wire.frames import MAX_DATAGRAM, Message, ReceivedFrame, split
 from drivers.mavlink.wire.verification import number_of
+from groundstation.adapters import Address
 from groundstation.bus import clock
 from groundstation.time_units import NS_PER_S
 

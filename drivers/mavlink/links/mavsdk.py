@@ -24,11 +24,12 @@ from mavsdk.logging import log_subscribe
 from mavsdk.plugins.mavlink_direct import MavlinkDirect
 from mavsdk.plugins.mavlink_direct.mavlink_direct import MavlinkMessage
 
-from drivers.mavlink.links.seam import Address, Heard, Transport
+from drivers.mavlink.links.seam import Heard, Transport
 from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.frames import CLASSES, Message, ReceivedFrame, fields_of, name_of
 from drivers.mavlink.wire.telemetry import Heartbeat
+from groundstation.adapters import Address
 from groundstation.errors import DriverError
 
 _POLL_S = 0.1

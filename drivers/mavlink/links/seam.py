@@ -5,8 +5,8 @@ from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
 from drivers.mavlink.wire.frames import Message, ReceivedFrame
+from groundstation.adapters import Address
 
-Address = tuple[str, int]
 Sniffer = Callable[[int, int, bytes, bool], None]  # system, stamp_ns, bytes, received
 
 

@@ -22,7 +22,7 @@ from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.voice import MavlinkVoice
 from drivers.tello.driver import Tello
 from drivers.tello.settings import TelloDriverSettings
-from groundstation.adapters import bind_to_adapter, connected, drops_strangers, split_zone, with_zone
+from groundstation.adapters import bind_to_adapter, connected, drops_strangers, send_to_all, split_zone, with_zone
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.errors import DriverError
 from groundstation.supervisor.failsafe_sender import FailsafeSender
@@ -145,3 +145,12 @@ def test_strict_filters_of_the_kernel_are_known(tmp_path: Path, everywhere: str,
         (tmp_path / name / "rp_filter").write_text(f"{value}\n")
     assert drops_strangers("wlan1", tmp_path) is drops
     assert not drops_strangers("wlan2", tmp_path) or everywhere == "1"
+
+
+def test_one_address_that_fails_does_not_silence_those_after_it() -> None:
+    with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as ear:
+        ear.bind(("127.0.0.1", 0))
+        ear.settimeout(2.0)
+        with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as voice, pytest.raises(OSError):
+            send_to_all(voice, b"land", [("127.0.0.1", 0), ear.getsockname()])
+        assert ear.recv(10) == b"land"

@@ -29,27 +29,17 @@ def delay(recording: tuple[Path, ...], as_json: bool) -> int:
     Sensors are compared with each other: delays are measured against what gyroscopes say, which is taken as immediate.
     The same recording gives the same figures.
     """
-    from groundstation.process import numba_cache
-    from groundstation.recording.reader import RecordingError
-    from groundstation.settings.recorded import recorded_field
+    from groundstation.cli.recorded_flight import recorded_flight
     from groundstation.settings.resolved import resolved_field
 
-    numba_cache.activate()
+    name, flown_with, flown = recorded_flight(recording)
     from groundstation.calibration.delay import delays
-    from groundstation.calibration.recorded_likelihood import flown_of
-    from groundstation.replay.source import open_source
 
-    try:
-        source = open_source(recording)
-        field = resolved_field(recorded_field(source.field))
-        flown = flown_of(source)
-    except RecordingError as error:
-        raise click.UsageError(str(error)) from error
-    found = delays(flown, field)
+    found = delays(flown, resolved_field(flown_with))
     if as_json:
         click.echo(json.dumps([asdict(one) | {"sure": one.sure} for one in found], indent=2))
     else:
-        click.echo(f"{source.name}: {flown.duration_s:.0f} s, {sum(flown.cameras.values())} observations")
+        click.echo(f"{name}: {flown.duration_s:.0f} s, {sum(flown.cameras.values())} observations")
         click.echo("\n".join(_lines(found)))
     return ExitCode.OK
 

@@ -53,24 +53,14 @@ def team(recording: tuple[Path, ...], field: Path | None, output: Path | None, a
 
     One least-squares fit over all sightings, odometry and inertial readings. The same recording gives the same figures.
     """
-    from groundstation.process import numba_cache
-    from groundstation.recording.reader import RecordingError
-    from groundstation.settings.recorded import recorded_field
+    from groundstation.cli.recorded_flight import recorded_flight
     from groundstation.settings.resolved import resolved_field
 
-    numba_cache.activate()
-    from groundstation.calibration.recorded_likelihood import flown_of
+    name, flown_with, flown = recorded_flight(recording)
     from groundstation.calibration.team import calibrate_team
-    from groundstation.replay.source import open_source
 
-    try:
-        source = open_source(recording)
-        flown_with = recorded_field(source.field)
-        flown = flown_of(source)
-    except RecordingError as error:
-        raise click.UsageError(str(error)) from error
     found = calibrate_team(flown, resolved_field(flown_with))
-    click.echo(_json(found) if as_json else f"{source.name}: {flown.duration_s:.0f} s, {found.sightings} sightings")
+    click.echo(_json(found) if as_json else f"{name}: {flown.duration_s:.0f} s, {found.sightings} sightings")
     if not as_json:
         click.echo("\n".join(_lines(found, flown_with.model_dump(mode="json"))))
     if output is not None:

@@ -5,24 +5,20 @@ from collections.abc import Sequence
 from groundstation.calibration.team_settings import paths_of, unit_of
 from groundstation.diagnosis.suspects import Charge
 from groundstation.field.resolved import ResolvedField
+from groundstation.preflight.figure_words import calibrated_lens, fixed_camera, hangs, lens_is, marker_is, measured_by
 
 _MOST_TOLD = 3
 _UNITS = {"tilted": "roll", "aside": "x"}
-# Of a camera's mounting: what is more, and what is less.
+# Of the mounting of a drone's camera: what is more, and what is less.
 _MOUNTED = {
     "pan": ("looks {size} farther to the left", "looks {size} farther to the right"),
     "tilt": ("looks {size} lower", "looks {size} higher"),
     "ahead": ("sits {size} farther ahead", "sits {size} farther behind"),
     "left": ("sits {size} farther to the left", "sits {size} farther to the right"),
     "up": ("sits {size} higher", "sits {size} lower"),
-    "z": ("hangs {size} higher", "hangs {size} lower"),
-    "aside": ("hangs {size} to the side of", "hangs {size} to the side of"),
-    "yaw": ("is turned by {size}", "is turned by {size}"),
-    "tilted": ("is tilted by {size}", "is tilted by {size}"),
 }
 _REPORTED = {"velocity_delay": "velocities", "height_delay": "heights"}
 _STAMPS = "check the clock of {who} and the link to it: all that it tells of itself is stamped wrong"
-_LENS = "calibrate the lens of {who} (groundstation calibrate camera)"
 _SURVEY = "fix the camera {who} where the field has it, or survey it anew (groundstation calibrate extrinsics)"
 
 
@@ -41,14 +37,15 @@ def _what(charge: Charge, field: ResolvedField) -> str:
     factor, unit = unit_of(_UNITS.get(what, what))
     digits = 1 if unit in ("deg", "%") else 0
     size = f"{abs(factor * charge.size):.{digits}f} +- {factor * charge.std:.{digits}f} {unit}"
-    camera = "every drone's camera" if not who else f"the camera {who}" if who in field.cameras else f"{who}'s camera"
+    camera = "every drone's camera" if not who else fixed_camera(who) if who in field.cameras else f"{who}'s camera"
     if what in _MOUNTED:
-        return f"{camera} {_MOUNTED[what][not more].format(size=size)} {_against(what)}"
+        return f"{camera} {_MOUNTED[what][not more].format(size=size)} than the field says"
     if what == "print":
-        marker = f"{who}'s marker is" if who else "all markers are"
-        return f"{marker} {size} {'larger' if more else 'smaller'} than the field says"
+        return marker_is(who, charge.size, charge.std)
     if what == "focal":
-        return f"{camera} has a focal length {size} {'longer' if more else 'shorter'} than calibrated"
+        return lens_is(camera, charge.size, charge.std)
+    if who in field.cameras and not what.endswith("delay"):
+        return hangs(who, what, more, size)
     if what == "scale":
         return f"{who}'s true velocities are {size} {'larger' if more else 'smaller'} than the field says"
     if what == "own_delay":
@@ -59,18 +56,12 @@ def _what(charge: Charge, field: ResolvedField) -> str:
     return f"{late} are {size} {'older' if more else 'newer'} than configured"
 
 
-def _against(what: str) -> str:
-    if what == "aside":
-        return "where the field puts it"
-    return "compared with the field" if what in ("yaw", "tilted") else "than the field says"
-
-
 def _remedy(charge: Charge, field: ResolvedField) -> str:
     who, what = charge.suspect
     if what == "print":
-        return "measure it with a ruler; print it without scaling, or set its size in the field"
+        return measured_by()
     if what == "focal":
-        return _LENS.format(who=who or "each drone")
+        return calibrated_lens(who or "each drone")
     if what == "own_delay":
         return _STAMPS.format(who=who)
     if what.endswith("delay"):

@@ -104,10 +104,10 @@ def _sizes(target: str, one: str, drones: Iterable[str]) -> Iterable[WrongLab]:
 
 
 def _roots(ceiling: str) -> Iterable[WrongLab]:
-    aside = rf".*: {ceiling} hangs {_FIGURE} m aside"
+    aside = rf".*: the camera {ceiling} hangs {_FIGURE} m to the side"
     yield WrongLab("ceiling aside", ((ceiling, "x", _ASIDE_M),), says=aside, size=_ASIDE_M, on_pads=True)
     for part, word in (("yaw", "turned"), ("roll", "tilted")):
-        said = rf".*: {ceiling} is {word} by {_FIGURE} deg"
+        said = rf".*: the camera {ceiling} is {word} by {_FIGURE} deg"
         yield WrongLab(f"ceiling {word}", ((ceiling, part, _TURN_DEG),), says=said, size=_TURN_DEG, on_pads=True)
     bump = {"kind": "camera_bumped", "entity": ceiling, "start_s": _BUMPED_AT_S, "value": _BUMP_DEG}
     said = rf"{ceiling}: was bumped: .* turned by {_FIGURE} deg"

@@ -8,6 +8,7 @@ import numpy as np
 from groundstation.doctor.finding import Finding, Level
 from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.rotations import euler_from_rotation, rotation_from_euler
+from groundstation.preflight.figure_words import calibrated_lens, fixed_camera, hangs, lens_is, marker_is, measured_by
 from groundstation.preflight.suspicions import Opinion, Verdict
 
 SUBJECT = "pads"
@@ -46,31 +47,21 @@ def _unexplained(opinion: Opinion) -> Finding:
     return Finding(Level.MUST if fit.misfit > 10 * fit.rows else Level.SHOULD, SUBJECT, found, remedy)
 
 
-def _longer(value: float, more: str, less: str) -> str:
-    return more if value > 0.0 else less
-
-
 def _prints(field: ResolvedField, v: Verdict) -> _Told:
     value, std = v.figure("print")
-    text = f"all markers are {100 * abs(value):.1f} +- {100 * std:.1f} % {_longer(value, 'larger', 'smaller')}"
     squares = {drone.marker.square_mm for drone in field.drones.values() if drone.marker.size_mm is None}
     told = "".join(f" ({one * (1 + value):.1f} mm for {one:g})" for one in sorted(squares)[:1])
-    remedy = f"measure a printed marker with a ruler{told}: print it without scaling, or set its size in the field"
-    return abs(value) >= _MUST_SHARE, f"{text} than the field says", remedy
+    return abs(value) >= _MUST_SHARE, marker_is("", value, std), measured_by(told=told)
 
 
 def _print(field: ResolvedField, v: Verdict) -> _Told:
-    value, std = v.figure("print")
-    size = f"{100 * abs(value):.1f} +- {100 * std:.1f} % {_longer(value, 'larger', 'smaller')}"
-    remedy = f"measure it: print it without scaling, or set drones.{v.suspicion.who}.marker to its size"
-    return abs(value) >= _MUST_SHARE, f"{v.suspicion.who}'s marker is {size} than the field says", remedy
+    (value, std), who = v.figure("print"), v.suspicion.who
+    return abs(value) >= _MUST_SHARE, marker_is(who, value, std), measured_by(f"drones.{who}.marker to its size")
 
 
 def _focal(field: ResolvedField, v: Verdict) -> _Told:
-    value, std = v.figure("focal")
-    longer = _longer(value, "longer", "shorter")
-    text = f"{v.suspicion.who}'s focal length is {100 * abs(value):.1f} +- {100 * std:.1f} % {longer} than calibrated"
-    return abs(value) >= _MUST_SHARE, text, f"calibrate the lens of {v.suspicion.who} (groundstation calibrate camera)"
+    (value, std), who = v.figure("focal"), v.suspicion.who
+    return abs(value) >= _MUST_SHARE, lens_is(fixed_camera(who), value, std), calibrated_lens(who)
 
 
 def _moved(field: ResolvedField, v: Verdict, text: str, size_m: float) -> _Told:
@@ -84,14 +75,13 @@ def _moved(field: ResolvedField, v: Verdict, text: str, size_m: float) -> _Told:
 def _aside(field: ResolvedField, v: Verdict) -> _Told:
     size, std = v.size("x", "y")
     x, y = v.figure("x")[0], v.figure("y")[0]
-    text = f"{v.suspicion.who} hangs {size:.2f} +- {std:.2f} m aside of its place (x {x:+.2f}, y {y:+.2f})"
-    return _moved(field, v, text, size)
+    text = hangs(v.suspicion.who, "aside", True, f"{size:.2f} +- {std:.2f} m")
+    return _moved(field, v, f"{text} (x {x:+.2f}, y {y:+.2f})", size)
 
 
 def _height(field: ResolvedField, v: Verdict) -> _Told:
     value, std = v.figure("z")
-    higher = _longer(value, "higher", "lower")
-    text = f"{v.suspicion.who} hangs {abs(value):.2f} +- {std:.2f} m {higher} than the field says"
+    text = hangs(v.suspicion.who, "z", value > 0.0, f"{abs(value):.2f} +- {std:.2f} m")
     return _moved(field, v, text, value)
 
 
@@ -108,15 +98,18 @@ def _rotation(field: ResolvedField, v: Verdict, text: str, must: bool) -> _Told:
 
 def _turned(field: ResolvedField, v: Verdict) -> _Told:
     value, std = v.figure("yaw")
-    degrees = f"{math.degrees(value):.1f} +- {math.degrees(std):.1f} deg"
-    text = f"{v.suspicion.who} is turned by {degrees} about the vertical"
+    text = hangs(v.suspicion.who, "yaw", value > 0.0, _degrees(value, std))
     return _rotation(field, v, text, abs(value) >= _MUST_TURN)
 
 
 def _tilted(field: ResolvedField, v: Verdict) -> _Told:
     size, std = v.size("roll", "pitch")
-    text = f"{v.suspicion.who} is tilted by {math.degrees(size):.1f} +- {math.degrees(std):.1f} deg"
+    text = hangs(v.suspicion.who, "tilted", True, _degrees(size, std))
     return _rotation(field, v, text, size >= _MUST_TILT)
+
+
+def _degrees(value: float, std: float) -> str:
+    return f"{abs(math.degrees(value)):.1f} +- {math.degrees(std):.1f} deg"
 
 
 def _placed(field: ResolvedField, v: Verdict) -> _Told:

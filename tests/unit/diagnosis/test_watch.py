@@ -88,7 +88,7 @@ def test_of_two_that_cannot_be_told_apart_the_likelier_comes_first(lab_field: Re
         (
             ("ceiling", "yaw"),
             0.1,
-            "the camera ceiling is turned by 5.7 +- 1.1 deg compared with the field",
+            "the camera ceiling is turned by 5.7 +- 1.1 deg counter-clockwise (seen from above)",
             "extrinsics",
         ),
         (

@@ -28,7 +28,7 @@ def flown(*told: tuple[float, str, str], on_pads: tuple[tuple[str, str], ...] = 
         ("pan of one", "a: a's camera looks 2.8 +- 0.2 deg farther to the left than the field says", 2.8),
         ("tilt of both", ": every drone's camera looks 3.3 +- 0.4 deg lower than the field says", 3.3),
         ("target's marker", "rover: rover's marker is 5.2 +- 0.5 % larger than the field says", 5.2),
-        ("ceiling tilted", "pads: ceiling is tilted by 3.0 +- 0.1 deg", 3.0),
+        ("ceiling tilted", "pads: the camera ceiling is tilted by 3.0 +- 0.1 deg compared with the field", 3.0),
         ("a wrong pad", "pads: a stands 0.51 +- 0.01 m from its pad, turned by 0 deg", 0.51),
     ],
 )

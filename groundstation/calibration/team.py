@@ -2,14 +2,16 @@
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
+from groundstation.arrays import Array
 from groundstation.calibration.flown import Flown
 from groundstation.calibration.team_batch import TeamBatch
 from groundstation.calibration.team_causes import Cause, causes, freed, posterior
-from groundstation.calibration.team_figures import Suspicion
+from groundstation.calibration.team_figures import Key, Suspicion
 from groundstation.calibration.team_gain import Gain, gain
 from groundstation.calibration.team_record import team_record
 from groundstation.calibration.team_settings import Path, changes, unit_of, with_changes
@@ -54,13 +56,15 @@ _WORTH = {
 _WORTH_M, _SIGMAS = 0.02, 3.0
 # What disturbs sightings lasts: so many of them say the same.
 _ALIKE = 4.0
+_HALF = 0.5
 
 
 @dataclass(frozen=True, slots=True)
 class Measured:
     """One figure: its error against the field and one sigma [unit], the same with all figures in doubt.
 
-    shown: whether the recording alone tells it well enough to be used.
+    shown: whether the recording alone tells it well enough to be used; beside: the figure (who, part) that what is
+    doubtful of it is told apart from least, None where no single one stands out.
     """
 
     who: str
@@ -70,6 +74,7 @@ class Measured:
     std: float
     doubtful_std: float
     shown: bool
+    beside: Key | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,18 +108,19 @@ def calibrate_team(flown: Flown, field: ResolvedField) -> TeamCalibration:
     """Return what a recording says of all figures; raises OperatorMistake where it has too little."""
     batch = TeamBatch(team_record(flown, field), field)
     figures = batch.figures
-    free = batch.fit(np.diag(figures.wide**2))
-    told, sigma = causes(*free.if_alike(_ALIKE), figures.surveyed, figures.suspicions())
-    final = batch.fit(sigma)
-    error, covariance = posterior(*final.if_alike(_ALIKE), sigma)
-    _, doubtful = posterior(*free.if_alike(_ALIKE), np.diag(figures.wide**2))
+    explain = partial(batch.fit, alike=_ALIKE)
+    free = explain(np.diag(figures.wide**2))
+    told, sigma = causes(explain, free, figures.surveyed, figures.suspicions())
+    final = explain(sigma)
+    error, covariance = posterior(final.information, final.pull, sigma)
+    _, doubtful = posterior(free.information, free.pull, np.diag(figures.wide**2))
     std, doubtful_std = np.sqrt(np.diag(covariance)), np.sqrt(np.diag(doubtful))
     rows = []
     for index, (who, part) in enumerate(figures.keys):
         factor, unit = unit_of(part)
         shown = bool(doubtful_std[index] <= _NEEDED[part])
         off, one, doubt = (float(factor * value[index]) for value in (error, std, doubtful_std))
-        rows.append(Measured(who, part, unit, off, one, doubt, shown))
+        rows.append(Measured(who, part, unit, off, one, doubt, shown, _beside(index, doubtful, figures.keys)))
     kept = [one for one in told if _worth(one, figures.keys, error, std)]
     settings = changes(figures, error, freed(kept)) if kept else {}
     better = gain(flown, field, with_changes(field, settings), batch.targets) if settings else None
@@ -122,17 +128,26 @@ def calibrate_team(flown: Flown, field: ResolvedField) -> TeamCalibration:
     return TeamCalibration(tuple(rows), found, settings, better, final.used, final.misfit)
 
 
+def _beside(index: int, covariance: Array, keys: tuple[Key, ...]) -> Key | None:
+    """Return the figure that, if it were known, would halve the variance of this one at least: the nearest."""
+    std = np.sqrt(np.diag(covariance))
+    alike = np.abs(covariance[index] / (std * std[index]))
+    alike[index] = 0.0
+    nearest = int(np.argmax(alike))
+    return keys[nearest] if alike[nearest] ** 2 >= _HALF else None
+
+
 def _largest(cause: Cause, error: Any) -> int:
     moved = freed([cause])
     return int(np.argmax(np.where(moved, np.abs(error), -1.0)))
 
 
-def _worth(cause: Cause, keys: tuple[tuple[str, str], ...], error: Any, std: Any) -> bool:
+def _worth(cause: Cause, keys: tuple[Key, ...], error: Any, std: Any) -> bool:
     most = _largest(cause, error)
     return bool(abs(error[most]) > max(_WORTH.get(keys[most][1], _WORTH_M), _SIGMAS * std[most]))
 
 
-def _found(cause: Cause, keys: tuple[tuple[str, str], ...], error: Any, std: Any) -> Found:
+def _found(cause: Cause, keys: tuple[Key, ...], error: Any, std: Any) -> Found:
     most = _largest(cause, error)
     factor, unit = unit_of(keys[most][1])
     return Found(

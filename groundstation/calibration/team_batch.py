@@ -55,19 +55,15 @@ class Fit:
     used: int
     cost: float
 
-    def if_alike(self, count: float) -> tuple[Array, Vector]:
-        """Return information and pull if so many sightings say the same."""
-        return self.information / count, self.pull / count
-
-    def log_evidence(self, sigma: Array, count: float) -> float:
-        """Return the log evidence, but for a constant, of the prior (n, n) that this fit had; as `if_alike`.
+    def log_evidence(self, sigma: Array) -> float:
+        """Return the log evidence, but for a constant, of the prior (n, n) that this fit had.
 
         The cost is that of the paths which fit this prior best, not what the paths of another fit let expect: delays
         bend the paths, and from the best delay it does not follow how well another explains the same flight.
         """
-        spread = np.linalg.slogdet(np.eye(len(self.theta)) + sigma @ self.information / count)[1]
+        spread = np.linalg.slogdet(np.eye(len(self.theta)) + sigma @ self.information)[1]
         prior = float(self.theta @ np.linalg.solve(sigma, self.theta))
-        return -0.5 * (self.cost / count + prior + float(spread))
+        return -0.5 * (self.cost + prior + float(spread))
 
 
 class TeamBatch:
@@ -146,13 +142,16 @@ class TeamBatch:
     def _path(self, name: str) -> RobotPath | TargetPath:
         return self.robots[name] if name in self.robots else self.targets[name]
 
-    def fit(self, sigma: Array) -> Fit:
-        """Return the best explanation where the figures' errors have a prior with this covariance (n, n)."""
+    def fit(self, sigma: Array, alike: float = 1.0) -> Fit:
+        """Return the best explanation where the figures' errors have a prior with this covariance (n, n).
+
+        alike: so many sightings say the same, as what disturbs them lasts; how well a pad is known stays as it is.
+        """
         theta, precision = np.zeros(len(self.figures.keys)), np.linalg.inv(sigma)
         rounds = (*_FORGIVING, *([1.0] * _ROUNDS))
         for forgiving in rounds:
             self._refresh(theta)
-            H, g, knots = self._eliminated(theta, forgiving)
+            H, g, knots = self._eliminated(theta, forgiving, alike)
             step = np.asarray(np.linalg.solve(H + precision, g - precision @ theta))
             if forgiving == 1.0:
                 step = _DAMPED * step
@@ -161,27 +160,32 @@ class TeamBatch:
             if forgiving == 1.0 and float(np.max(np.abs(step) / self.figures.surveyed)) < _SETTLED:
                 break
         self._refresh(theta)
-        H, g, _ = self._eliminated(theta, 1.0)
+        H, g, _ = self._eliminated(theta, 1.0, alike)
         return Fit(theta, H, g + H @ theta, self._misfit, len(self._sightings.times), self._cost)
 
     def _refresh(self, theta: Vector) -> None:
         for name, path in self.robots.items():
             path.refresh(*(float(theta[self.figures.place[name, part]]) for part in OWN))
 
-    def _eliminated(self, theta: Vector, forgiving: float) -> tuple[Array, Vector, "Knots"]:
+    def _eliminated(self, theta: Vector, forgiving: float, alike: float) -> tuple[Array, Vector, "Knots"]:
         rows = Rows()
         for name, path in self.robots.items():
-            drone, columns = self.field.drones[name], self._columns(name)
-            robot_rows(rows, path, drone, columns, {part: self.figures.place[name, part] for part in OWN})
-            if name in self._record.stands:
-                stand_rows(rows, path, columns, self._record.stands[name], *_pad(self.field, name))
+            drone = self.field.drones[name]
+            robot_rows(rows, path, drone, self._columns(name), {part: self.figures.place[name, part] for part in OWN})
         for name, target in self.targets.items():
             target_rows(rows, target, self.field.tracked[name].max_acceleration_m_s2, self._columns(name))
         self._sighting_rows(rows, theta, forgiving)
+        rows.count_as_one_of(alike)
+        self._stand_rows(rows)
         count = self._stride * len(next(iter(self.robots.values())).grid.times)
         r, local, figures = rows.matrices(count, len(theta))
         self._cost = float(r @ r) + rows.beyond
         return eliminated(r, local, figures, 3 * self._stride)
+
+    def _stand_rows(self, rows: Rows) -> None:
+        for name, span in self._record.stands.items():
+            if name in self.robots:
+                stand_rows(rows, self.robots[name], self._columns(name), span, *_pad(self.field, name))
 
     def _columns(self, name: str) -> Columns:
         return Columns(self._first[name], self._stride)

@@ -1,13 +1,14 @@
 """Which figures of a field does a recording show to be wrong? As few causes as explain it. Pure arrays.
 
-All figures are free within their surveys. One cause after another is let loose, the one that raises the evidence of
-the linear Gaussian model most, until none raises it enough.
+All figures are free within their surveys. One cause after another is let loose, the one that raises the evidence most,
+until none raises it enough. A linear Gaussian model says which are worth a trial; what counts is how much better the
+recording is explained with a cause than without it, by a fit each.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import islice
+from typing import Protocol
 
 import numpy as np
 
@@ -15,8 +16,40 @@ from groundstation.arrays import Array, Vector
 from groundstation.calibration.team_figures import Suspicion
 
 # By how much (log) a cause must raise the evidence; causes this much worse than the best are ruled out.
-_SURE, RULED_OUT = math.log(1e4), math.log(20.0)
+_SURE, RULED_OUT = math.log(100.0), math.log(20.0)
+# What a velocity errs by is known least: noise that happens to look late was worth e^8 in a healthy flight.
+_SURE_OF = {"velocity_delay": math.log(1e4)}
+# What the linear model gives so little for is not tried; of what is left, so many at once.
+_WORTH_A_TRIAL, _AT_ONCE = math.log(10.0), 4
 _MOST = 8
+
+
+class Explained(Protocol):
+    """A recording as it is explained under a prior: information (n, n) and pull (n) of the recording alone."""
+
+    @property
+    def information(self) -> Array:
+        """Return the information on the figures."""
+
+    @property
+    def pull(self) -> Vector:
+        """Return the pull on the figures, about zero."""
+
+    def log_evidence(self, sigma: Array) -> float:
+        """Return the log evidence, but for a constant, of that prior (n, n)."""
+
+
+Explain = Callable[[Array], Explained]
+"""Explains a recording where the figures' errors have a prior with this covariance (n, n)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """A suspicion, how a recording is explained with it, and by how much (log) better than without."""
+
+    suspicion: Suspicion
+    explained: Explained
+    lead: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,30 +80,65 @@ class Round:
         return tuple(one for one in self.gains if one[1] > least)
 
 
-def rounds(H: Array, g: Vector, surveyed: Vector, suspicions: Iterable[Suspicion]) -> Iterator[Round]:
-    """Yield one round after another; in each the best is let loose for those that follow.
+def round_of(H: Array, g: Vector, sigma: Array, suspicions: Iterable[Suspicion]) -> Round:
+    """Return by how much more each suspicion would explain beside what has been let loose already.
 
-    H (n, n), g (n): information and pull on figures that were surveyed to one sigma (n).
+    H (n, n), g (n): information and pull on figures whose errors have the prior sigma (n, n).
     """
+    here = evidence(H, g, sigma)
+    return Round(sigma, tuple((s, evidence(H, g, sigma + spread(s)) - here) for s in suspicions))
+
+
+def rounds(H: Array, g: Vector, surveyed: Vector, suspicions: Iterable[Suspicion]) -> Iterator[Round]:
+    """Yield one round after another; in each the best is let loose for those that follow; surveyed (n): one sigma."""
     sigma, left = np.diag(surveyed**2), list(suspicions)
     while left:
-        here = evidence(H, g, sigma)
-        one = Round(sigma, tuple((s, evidence(H, g, sigma + spread(s)) - here) for s in left))
+        one = round_of(H, g, sigma, left)
         yield one
         best, _ = one.best
         left = [s for s in left if s is not best]
         sigma = sigma + spread(best)
 
 
-def causes(H: Array, g: Vector, surveyed: Vector, suspicions: Iterable[Suspicion]) -> tuple[tuple[Cause, ...], Array]:
-    """Return what is wrong, gravest first, and the prior's covariance (n, n) that goes with it."""
-    sigma, found = np.diag(surveyed**2), list[Cause]()
-    for one in islice(rounds(H, g, surveyed, suspicions), _MOST):
-        best, gain = one.best
-        if gain < _SURE:
+def sure_of(what: str) -> float:
+    """Return by how much (log) a cause of this sort must raise the evidence."""
+    return _SURE_OF.get(what, _SURE)
+
+
+def tried(explain: Explain, sigma: Array, suspicions: Iterable[Suspicion], without: float) -> list[Trial]:
+    """Return a fit with each suspicion, best first; without: the log evidence of sigma (n, n), without any."""
+    found = []
+    for s in suspicions:
+        freed_too = sigma + spread(s)
+        explained = explain(freed_too)
+        found.append(Trial(s, explained, explained.log_evidence(freed_too) - without))
+    return sorted(found, key=lambda trial: -trial.lead)
+
+
+def causes(
+    explain: Explain, free: Explained, surveyed: Vector, suspicions: Iterable[Suspicion]
+) -> tuple[tuple[Cause, ...], Array]:
+    """Return what is wrong, gravest first, and the prior's covariance (n, n) that goes with it.
+
+    free: the recording with all figures in doubt, by which the linear model chooses what to try; surveyed (n): one
+    sigma.
+    """
+    sigma, left, found = np.diag(surveyed**2), list(suspicions), list[Cause]()
+    without = math.nan
+    while left and len(found) < _MOST:
+        one = round_of(free.information, free.pull, sigma, left)
+        if one.best[1] < _WORTH_A_TRIAL:
             break
-        found.append(Cause(best, gain, tuple(s for s, _ in one.near if s is not best)))
-        sigma = one.sigma + spread(best)
+        if not found:
+            without = explain(sigma).log_evidence(sigma)
+        likely = [s for s, _ in sorted(one.near, key=lambda pair: -pair[1])[:_AT_ONCE]]
+        best, *others = tried(explain, sigma, likely, without)
+        if best.lead < sure_of(best.suspicion.what):
+            break
+        rivals = tuple(other.suspicion for other in others if other.lead > best.lead - RULED_OUT)
+        found.append(Cause(best.suspicion, best.lead, rivals))
+        left = [s for s in left if s is not best.suspicion]
+        sigma, without = sigma + spread(best.suspicion), without + best.lead
     return tuple(found), sigma
 
 

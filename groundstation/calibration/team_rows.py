@@ -48,6 +48,14 @@ class Rows:
         known = columns >= 0
         self.figures.append((rows[known], columns[known], values[known]))
 
+    def count_as_one_of(self, alike: float) -> None:
+        """Let the rows so far count as one of so many that say the same."""
+        share = alike**-0.5
+        self.residuals = [share * values for values in self.residuals]
+        self.local = [(rows, columns, share * values) for rows, columns, values in self.local]
+        self.figures = [(rows, columns, share * values) for rows, columns, values in self.figures]
+        self.beyond /= alike
+
     def matrices(self, locals_: int, figures: int) -> tuple[Vector, csr_matrix, csr_matrix]:
         """Return residuals (m) and derivatives (m, locals), (m, figures)."""
         return (

@@ -115,7 +115,11 @@ def _lines(found: "TeamCalibration", flown_with: dict[str, Any]) -> list[str]:
 
 def _row(one: "Measured") -> str:
     error = f"{one.error:+.2f} +- {one.std:.2f} {one.unit}"
-    shown = f"+- {one.doubtful_std:.2f} {one.unit}" if one.shown else "not told apart from them"
+    other = "" if one.beside is None else " ".join(one.beside)
+    if one.shown:
+        shown = f"+- {one.doubtful_std:.2f} {one.unit}" + (f", shared with {other}" if other else "")
+    else:
+        shown = f"not told apart from {other}" if other else "this flight tells too little of it"
     return f"{one.who + ' ' + one.part:26} {error:>26}   {shown}"
 
 

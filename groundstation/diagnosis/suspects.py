@@ -7,6 +7,7 @@ operator reads them as suspicions and a flight is short.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 
 import numpy as np
@@ -14,7 +15,7 @@ import numpy as np
 from groundstation.arrays import Array, Vector
 from groundstation.calibration.flown import Flown
 from groundstation.calibration.team_batch import TeamBatch
-from groundstation.calibration.team_causes import RULED_OUT, posterior, rounds, spread
+from groundstation.calibration.team_causes import RULED_OUT, posterior, rounds, spread, sure_of, tried
 from groundstation.calibration.team_figures import Suspicion
 from groundstation.calibration.team_record import team_record
 from groundstation.errors import OperatorMistake
@@ -23,9 +24,6 @@ from groundstation.field.resolved import ResolvedField
 Suspect = tuple[str, str]
 """One thing that may be wrong: whose ("": of all), and what."""
 
-_SURE = math.log(100.0)  # by how much a suspect must raise the evidence to be named
-# What a velocity errs by is known least: noise that happens to look late was worth e^8 in a healthy flight.
-_SURE_OF = {"velocity_delay": math.log(1e4)}
 # Less does not harm, and is not told: [m], [rad], [s], shares.
 _WORTH_TELLING = {
     "print": 0.02,
@@ -69,39 +67,39 @@ def verdict_on(flown: Flown, field: ResolvedField) -> Verdict | None:
     """Return what a stretch of flight shows; None where it has too little, or nothing that fits it was found."""
     try:
         batch = TeamBatch(team_record(flown, field), field)
-        fit = batch.fit(np.diag(batch.figures.wide**2))
-        count = max(1.0, fit.misfit / _USUAL_MISFIT)
-        verdict = weighed(*fit.if_alike(count), batch.figures.surveyed, tuple(batch.figures.suspicions()))
-        return _tried(verdict, batch, count)
+        wide = np.diag(batch.figures.wide**2)
+        fit = batch.fit(wide)
+        alike = max(1.0, fit.misfit / _USUAL_MISFIT)
+        if alike > 1.0:
+            fit = batch.fit(wide, alike)
+        verdict = weighed(fit.information, fit.pull, batch.figures.surveyed, tuple(batch.figures.suspicions()))
+        return _tried(verdict, batch, alike)
     except (OperatorMistake, np.linalg.LinAlgError):
         return None
 
 
-def _tried(verdict: Verdict, batch: TeamBatch, count: float) -> Verdict:
+def _tried(verdict: Verdict, batch: TeamBatch, alike: float) -> Verdict:
     """Return what is left of a verdict once the flight was explained with each charge, and without any.
 
     Leads of what was tried are those of the fits: what explains nothing is refuted, however sure the linear model is.
     """
     known = {(s.who, s.what): s for s in batch.figures.suspicions()}
     sigma, causes, leads = np.diag(batch.figures.surveyed**2), list[tuple[Charge, ...]](), dict(verdict.leads)
-    without = batch.fit(sigma).log_evidence(sigma, count) if verdict.causes else 0.0
+    explain = partial(batch.fit, alike=alike)
+    without = explain(sigma).log_evidence(sigma) if verdict.causes else 0.0
     for accused in verdict.causes:
-        tried = [_retried(batch, sigma, known[charge.suspect], without, count) for charge in accused]
+        trials = tried(explain, sigma, [known[charge.suspect] for charge in accused], without)
+        charges = [
+            _charge(one.explained.information, one.explained.pull, sigma, one.suspicion, one.lead) for one in trials
+        ]
         if not causes:  # later ones lead beside those that were found
-            leads |= {charge.suspect: charge.lead for charge in tried}
-        tried.sort(key=lambda charge: -charge.lead)
-        best = tried[0]
+            leads |= {charge.suspect: charge.lead for charge in charges}
+        best = charges[0]
         if not _is_told(best):
             break
-        causes.append(tuple(charge for charge in tried if charge.lead > best.lead - RULED_OUT))
+        causes.append(tuple(charge for charge in charges if charge.lead > best.lead - RULED_OUT))
         sigma, without = sigma + spread(known[best.suspect]), without + best.lead
     return Verdict(tuple(causes), leads)
-
-
-def _retried(batch: TeamBatch, sigma: Array, s: Suspicion, without: float, count: float) -> Charge:
-    freed = sigma + spread(s)
-    fit = batch.fit(freed)
-    return _charge(*fit.if_alike(count), sigma, s, fit.log_evidence(freed, count) - without)
 
 
 def weighed(H: Array, g: Vector, surveyed: Vector, suspicions: Sequence[Suspicion]) -> Verdict:
@@ -120,8 +118,7 @@ def weighed(H: Array, g: Vector, surveyed: Vector, suspicions: Sequence[Suspicio
 
 def _is_told(charge: Charge) -> bool:
     what = charge.suspect[1]
-    sure, worth = _SURE_OF.get(what, _SURE), _WORTH_TELLING.get(what, _WORTH_TELLING_M)
-    return charge.lead >= sure and abs(charge.size) >= worth
+    return charge.lead >= sure_of(what) and abs(charge.size) >= _WORTH_TELLING.get(what, _WORTH_TELLING_M)
 
 
 def _charge(H: Array, g: Vector, sigma: Array, s: Suspicion, lead: float) -> Charge:

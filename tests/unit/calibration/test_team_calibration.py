@@ -8,7 +8,9 @@ from swinging_lab import CLOCK, Lab
 
 from groundstation.calibration.flown import Flown
 from groundstation.calibration.team import TeamCalibration, calibrate_team
+from groundstation.calibration.team_batch import TeamBatch
 from groundstation.calibration.team_figures import Figures
+from groundstation.calibration.team_record import team_record
 from groundstation.calibration.team_settings import changes, with_changes
 from groundstation.errors import OperatorMistake
 from groundstation.field.resolved import ResolvedField
@@ -59,8 +61,26 @@ def test_late_telemetry_changes_no_setting(lab_field: ResolvedField) -> None:
     assert changes(figures, late, late != 0.0) == {}
 
 
+def test_a_ceiling_camera_that_is_turned_shows_by_the_pads_alone(lab_field: ResolvedField) -> None:
+    """The whole world turns with it: two drones on their pads say so, to 0.65 deg, and no flight tells more."""
+    found = calibrated(lab_field, {("ceiling", "yaw"): 3.0})
+    assert [(one.who, one.what) for one in found.found] == [("ceiling", "yaw")]
+    assert found.found[0].error == pytest.approx(3.0, abs=0.3) and 0.5 < found.found[0].std < 0.8
+    rotation = with_changes(lab_field, found.settings).cameras["ceiling"].rotation_deg
+    assert rotation == pytest.approx((0.0, 0.0, 3.0), abs=0.3)
+
+
+def test_pads_are_known_as_well_however_many_sightings_say_the_same(lab_field: ResolvedField) -> None:
+    batch = TeamBatch(team_record(Lab(lab_field, WrongFigures({})).flown(), lab_field), lab_field)
+    wide = np.diag(batch.figures.wide**2)
+    once, fourth = batch.fit(wide), batch.fit(wide, alike=4.0)
+    for key, least, most in ((("ceiling", "yaw"), 0.8, 1.0), (("drone_1", "focal"), 0.2, 0.35)):
+        place = batch.figures.place[key]
+        assert least < fourth.information[place, place] / once.information[place, place] < most, key
+
+
 @pytest.mark.slow
-def test_a_turned_ceiling_camera_and_its_new_setting(lab_field: ResolvedField) -> None:
+def test_a_tilted_ceiling_camera_and_its_new_setting(lab_field: ResolvedField) -> None:
     found = calibrated(lab_field, {("ceiling", "pitch"): 3.0})
     assert [(one.who, one.what) for one in found.found] == [("ceiling", "tilted")]
     rotation = with_changes(lab_field, found.settings).cameras["ceiling"].rotation_deg
@@ -82,3 +102,12 @@ def test_a_recording_in_which_no_fixed_camera_saw_a_drone_is_refused(lab_field: 
     blind = tuple((now, tuple(p for p in inputs if p[0] != "observation")) for now, inputs in flown.ticks)
     with pytest.raises(OperatorMistake, match="no fixed camera saw any drone"):
         calibrate_team(Flown(blind, CLOCK), lab_field)
+
+
+def test_what_a_flight_hardly_shows_is_named_with_what_it_is_not_told_apart_from(lab_field: ResolvedField) -> None:
+    """A fixed camera that hangs aside sees nearly what one sees that is tilted."""
+    figures = {(one.who, one.part): one for one in calibrated(lab_field, {}).figures}
+    for place, turn in (("x", "pitch"), ("y", "roll")):
+        assert figures["ceiling", place].beside == ("ceiling", turn)
+        assert not figures["ceiling", place].shown
+    assert figures["drone_1", "pan"].shown and figures["drone_1", "pan"].beside is None

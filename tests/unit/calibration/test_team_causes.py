@@ -1,12 +1,36 @@
 """As few causes as explain it: from information and pull to what is wrong."""
 
-import numpy as np
+import math
+from dataclasses import dataclass
 
-from groundstation.calibration.team_causes import causes, freed, posterior
+import numpy as np
+import pytest
+
+from groundstation.arrays import Array, Vector
+from groundstation.calibration.team_causes import Cause, causes, evidence, freed, posterior
 from groundstation.calibration.team_figures import Figures, Suspicion
 from groundstation.field.resolved import ResolvedField
 
 SURVEYED = np.array([0.01, 0.01, 0.01])
+
+
+@dataclass(frozen=True)
+class Linear:
+    """A recording that is as its linear model says; share: how much of the evidence a fit finds of it."""
+
+    information: Array
+    pull: Vector
+    share: float = 1.0
+
+    def log_evidence(self, sigma: Array) -> float:
+        return self.share * evidence(self.information, self.pull, sigma)
+
+
+def found_in(
+    H: Array, errors: list[float], among: list[Suspicion], share: float = 1.0
+) -> tuple[tuple[Cause, ...], Array]:
+    recording = Linear(H, H @ np.array(errors), share)
+    return causes(lambda sigma: recording, recording, SURVEYED, among)
 
 
 def suspicions() -> list[Suspicion]:
@@ -16,7 +40,7 @@ def suspicions() -> list[Suspicion]:
 
 def test_what_is_within_its_survey_has_no_cause() -> None:
     H = np.diag([1e6, 1e6, 1e6])
-    found, sigma = causes(H, H @ np.array([0.01, -0.01, 0.005]), SURVEYED, suspicions())
+    found, sigma = found_in(H, [0.01, -0.01, 0.005], suspicions())
     assert found == () and not freed(found).any()
     assert np.allclose(np.diag(sigma), SURVEYED**2)
 
@@ -24,7 +48,7 @@ def test_what_is_within_its_survey_has_no_cause() -> None:
 def test_one_figure_and_all_alike_are_told_apart() -> None:
     H = np.diag([1e5, 1e5, 1e5])
     for errors, who in (([0.0, 0.2, 0.0], "b"), ([0.2, 0.2, 0.2], "")):
-        found, sigma = causes(H, H @ np.array(errors), SURVEYED, suspicions())
+        found, sigma = found_in(H, list(errors), suspicions())
         assert [one.suspicion.who for one in found] == [who]
         mean, covariance = posterior(H, H @ np.array(errors), sigma)
         assert np.allclose(mean, errors, atol=3.0 * np.sqrt(np.diag(covariance)).max())
@@ -33,10 +57,26 @@ def test_one_figure_and_all_alike_are_told_apart() -> None:
 def test_causes_that_explain_it_as_well_are_rivals() -> None:
     direction = np.array([1.0, 1.0, 0.0])
     H = 1e5 * np.outer(direction, direction)
-    found, _ = causes(H, H @ np.array([0.2, 0.0, 0.0]), SURVEYED, suspicions()[:3])
+    found, _ = found_in(H, [0.2, 0.0, 0.0], suspicions()[:3])
     assert found[0].suspicion.who in "ab" and {one.who for one in found[0].rivals} == {"a", "b"} - {
         found[0].suspicion.who
     }
+
+
+def test_what_explains_nothing_by_a_fit_is_no_cause_however_sure_the_linear_model_is() -> None:
+    H = np.diag([1e5, 1e5, 1e5])
+    assert found_in(H, [0.0, 0.2, 0.0], suspicions())[0] != ()
+    assert found_in(H, [0.0, 0.2, 0.0], suspicions(), share=1e-3)[0] == ()
+
+
+@pytest.mark.parametrize(("what", "told"), [("size", True), ("velocity_delay", False)])
+def test_a_cause_is_told_by_100_to_1_and_a_late_velocity_by_10000_to_1(what: str, told: bool) -> None:
+    H, one = np.diag([1.5e4]), Suspicion("a", what, np.eye(1), np.array([0.06]))
+    recording = Linear(H, H @ np.array([0.042]))
+    narrow = np.array([0.006])
+    lead = recording.log_evidence(np.diag(narrow**2) + 0.06**2) - recording.log_evidence(np.diag(narrow**2))
+    assert math.log(100.0) < lead < math.log(1e4)
+    assert bool(causes(lambda sigma: recording, recording, narrow, [one])[0]) is told
 
 
 def test_every_figure_of_the_lab_has_a_survey_and_a_suspicion(lab_field: ResolvedField) -> None:

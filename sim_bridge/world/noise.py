@@ -45,6 +45,33 @@ class GaussMarkov:
         return self.value
 
 
+class Vibration:
+    """Noise of unit variance that swings about zero, so that its integral does not wander, and a share of white noise.
+
+    half_ticks: how long it stays on one side; white_share: deviation of the white part, which does wander.
+    """
+
+    __slots__ = ("_before", "_draw", "_gain", "_line", "_since", "_white")
+
+    def __init__(self, half_ticks: int, white_share: float, draw: Draw) -> None:
+        self._line = deque([0.0] * (2 * half_ticks), maxlen=2 * half_ticks)
+        self._draw, self._white = draw, white_share
+        self._since = self._before = 0.0
+        # Both parts have the newest draw in common: its coefficient is the sum of theirs.
+        shared = white_share / math.sqrt(2.0 * half_ticks)
+        swinging = math.sqrt(shared**2 + 1.0 - white_share**2) - shared
+        self._gain = swinging / math.sqrt(2.0 * half_ticks)
+
+    def step(self) -> float:
+        """Advance by one tick and return the value."""
+        line, newest = self._line, self._draw()
+        middle = line[len(line) // 2]
+        self._since += newest - middle
+        self._before += middle - line[0]
+        line.append(newest)
+        return self._gain * (self._since - self._before) + self._white * newest
+
+
 class DelayLine(Generic[T]):
     """Returns the value pushed `delay` ago, rounded up to whole ticks; before that, the first one."""
 

@@ -1,0 +1,29 @@
+"""When a camera's age is told: on the evidence that the diagnosis asks for, and until it is refuted."""
+
+import pytest
+
+from groundstation.bus.messages import Severity
+from groundstation.estimation.camera_latency import Lateness
+from groundstation.field.resolved import ResolvedField
+from groundstation.runtime.latency_watch import PictureAge
+
+
+@pytest.mark.parametrize(
+    ("offset_s", "std_s", "told"),
+    [
+        # Three deviations are worth 25 to 1 where so little is known: a drone's late telemetry blamed the ceiling.
+        (-0.071, 0.022, False),
+        (-0.090, 0.022, True),
+        (0.040, 0.006, True),
+        (0.020, 0.006, False),
+        (0.014, 0.002, False),  # sure, and harmless
+    ],
+)
+def test_a_wrong_age_is_told_by_100_to_1(
+    lab_field: ResolvedField, monkeypatch: pytest.MonkeyPatch, offset_s: float, std_s: float, told: bool
+) -> None:
+    age = PictureAge(lab_field, "clock")
+    monkeypatch.setattr(age._watch, "told", lambda: (Lateness("ceiling", offset_s, std_s),))
+    warned = [one for one in age.notices() if one.severity is Severity.WARNING]
+    assert bool(warned) is told
+    assert age.notices() == [], "once"

@@ -1,7 +1,5 @@
 """One flight at message level: world, sensors, delays, tracker and pilots in one thread under a manual clock."""
 
-import heapq
-import itertools
 import time
 from collections import defaultdict
 from collections.abc import Collection
@@ -20,6 +18,7 @@ from sim_bridge.site import parse_site
 from sim_bridge.study.ardrone_pilot import Pilot
 from sim_bridge.study.camera_model import Eye, eyes_of
 from sim_bridge.study.capture_model import CaptureEye, captures_of
+from sim_bridge.study.delay_queue import DelayQueue
 from sim_bridge.study.exposures import Exposures
 from sim_bridge.study.mavlink_copter import CopterLink
 from sim_bridge.study.odometry_model import OdometryEar, odometry_of
@@ -98,8 +97,7 @@ class Study:
         self.spent_s: defaultdict[str, float] = defaultdict(float)
         self._rng = generator_of(options.seed, "study")
         self._scenario = scenario
-        self._queue: list[tuple[int, int, str, Message]] = []
-        self._order = itertools.count()
+        self._arriving = DelayQueue[tuple[str, Message]]()
         self._tick_every = round(1e9 / field.estimator.rate_hz) // TICK_NS
         self._plan_every = round(1e9 / field.planner.rate_hz) // TICK_NS
         world = self.world
@@ -210,13 +208,16 @@ class Study:
             self._send(now_ns + round(sensor.lateness_ms * 1e6), f"told/{sensor.name}", told)
 
     def _send(self, arrival_ns: int, key: str, message: Message) -> None:
-        heapq.heappush(self._queue, (arrival_ns, next(self._order), key, message))
+        self._arriving.send(arrival_ns, (key, message))
+
+    def _arrived(self) -> tuple[tuple[str, Message], ...]:
+        """Return what has reached the tracker since it was last asked."""
+        return tuple(self._arriving.due(self.now_ns))
 
     def _tick(self, tracking: bool) -> None:
         now_ns, tracker = self.now_ns, self.tracker
         mark = time.perf_counter()
-        while self._queue and self._queue[0][0] <= now_ns:
-            _, _, key, message = heapq.heappop(self._queue)
+        for key, message in self._arrived():
             tracker.ingest(key, message, now_ns)
         tracker.advance(now_ns)
         self.spent_s["filter"] += time.perf_counter() - mark

@@ -119,9 +119,7 @@ class FlownStudy(Study):
     def _tick(self, tracking: bool) -> None:
         if tracking and not self._tracked:
             self._begin_tracking()
-        while self._queue and self._queue[0][0] <= self.now_ns:
-            *_, kind, message = self._queue.pop(0)
-            self._queue.sort()
+        for kind, message in self._arrived():
             header = message.header
             key = keys.expression(SITE, _TOPICS[kind], header.entity, header.source)
             self._arrivals.ready.append((key, message))

@@ -26,9 +26,12 @@ class Manoeuvre(Study):
         super().__init__(field, Scenario(), StudyOptions(seed, DURATION_S, plan=False))
         self.ticks: Ticks = []
 
-    def _tick(self, tracking: bool) -> None:
-        due = tuple((entry[2], entry[3]) for entry in sorted(self._queue) if entry[0] <= self.now_ns)
+    def _arrived(self) -> tuple[tuple[str, Message], ...]:
+        due = super()._arrived()
         self.ticks.append((self.now_ns, due))
+        return due
+
+    def _tick(self, tracking: bool) -> None:
         super()._tick(tracking)
         now_s = self.world.time_s
         for index, pilot in enumerate(self._pilots.values() if tracking else ()):

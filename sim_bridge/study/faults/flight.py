@@ -1,7 +1,5 @@
 """One flight of the campaign: world, emulated vehicles, drivers with watchdogs, tracker; one thread, a manual clock."""
 
-import heapq
-import itertools
 import time
 from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
@@ -29,6 +27,7 @@ from sim_bridge.faults import FaultSchedule, described
 from sim_bridge.scenario import Scenario
 from sim_bridge.site import parse_site
 from sim_bridge.study.camera_model import eyes_of
+from sim_bridge.study.delay_queue import DelayQueue
 from sim_bridge.study.exposures import Exposures
 from sim_bridge.study.faults.draw import Drawn
 from sim_bridge.study.faults.judge import Judge
@@ -127,8 +126,7 @@ class FaultFlight:
         self.spent_s: defaultdict[str, float] = defaultdict(float)
         self._rng = generator_of(seed, "study")
         self._exchange, self._network = LocalExchange(), MemoryNetwork()
-        self._queue: list[tuple[int, int, Topic, Message]] = []
-        self._order = itertools.count()
+        self._arriving = DelayQueue[tuple[Topic, Message]]()
         faults = scenario.faults
         self._values = {n: ObservedValues(fault for fault in faults if fault.entity == n) for n in self.world.drones}
         addresses = {name: drone.address for name, drone in field.drones.items()}
@@ -225,11 +223,10 @@ class FaultFlight:
                 self._send(now_ns + round(ear.lateness_ms * 1e6), REPORTED_MOTION, told)
 
     def _send(self, arrival_ns: int, topic: Topic, message: Message) -> None:
-        heapq.heappush(self._queue, (arrival_ns, next(self._order), topic, message))
+        self._arriving.send(arrival_ns, (topic, message))
 
     def _deliver(self, now_ns: int) -> None:
-        while self._queue and self._queue[0][0] <= now_ns:
-            _, _, topic, message = heapq.heappop(self._queue)
+        for topic, message in self._arriving.due(now_ns):
             key = Key(self._field.site, message.header.entity, topic, message.header.source)
             self._exchange.deliver(Received(key, message.header, message, b""))
 

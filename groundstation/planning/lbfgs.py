@@ -1,190 +1,215 @@
-"""Compiled projected L-BFGS on the box of admissible controls."""
+"""Compiled projected L-BFGS in the box [-1, 1]^m, point by point: the caller computes cost and gradient of each.
 
-from typing import NamedTuple
+Both planners minimise with it: that which flies, and that of the plane (`experiments/planar`).
+"""
+
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from groundstation.arrays import BoolVector, Matrix, Vector
-from groundstation.kernel import kernel
-from groundstation.planning.gradient import evaluate
-from groundstation.planning.records import CostProblem
+from groundstation.arrays import Matrix, Vector
+from groundstation.kernel import Record, Rows, kernel
 
 MEMORY = 6
+_ARMIJO = 1e-4
+_SHORTER, _SHORTEST = 0.3, 1e-4  # a step that does not help, and one after which its direction is given up
+_FIRST = 0.5  # of the largest entry of a first step, when nothing is known of the curvature
+_FLAT = 1e-10  # a pair of step and change that curves less tells nothing
+
+
+class Progress(Record):
+    """How far a descent has come.
+
+    cost: at x; size: by which costs and gradients are divided (0: the first cost); expected: by how much the cost of
+    the next point should change, over size; step: length along the direction; stored: rows of history; evaluations:
+    so far; over: 1 once x is a minimum, as far as can be told.
+    """
+
+    cost: float
+    size: float
+    expected: float
+    step: float
+    stored: int
+    evaluations: int
+    over: int
+
+
+_PROGRESS = Progress.dtype
+
+
+class Descent(NamedTuple):
+    """A search that can be continued: the best point x, the next one to look at, `trial`, and their gradients.
+
+    free (m): 0 for entries that their bound holds, else 1; steps, changes (MEMORY, m): history of x and of its
+    gradient, newest first; progress (1).
+    """
+
+    x: Vector
+    gradient: Vector
+    trial: Vector
+    trial_gradient: Vector
+    direction: Vector
+    free: Vector
+    steps: Matrix
+    changes: Matrix
+    progress: Rows[Progress]
 
 
 @kernel()
-def direction(x: Vector, g: Vector, S: Matrix, Y: Matrix, stored: int, free: BoolVector, out: Vector) -> None:
-    """Write the L-BFGS descent direction over the variables that are not held by their bound."""
-    alphas = np.zeros(MEMORY)
-    n = x.shape[0]
-    for j in range(n):
-        free[j] = not ((x[j] <= -1.0 and g[j] > 0.0) or (x[j] >= 1.0 and g[j] < 0.0))
-        out[j] = -g[j] if free[j] else 0.0
-    gamma = 0.0
-    for back in range(stored):
-        s, y = S[back], Y[back]  # newest first
-        sy = sq = yy = 0.0
-        for j in range(n):
-            if free[j]:
-                sy += s[j] * y[j]
-                sq += s[j] * out[j]
-                yy += y[j] * y[j]
-        if sy <= 1e-12 * yy or yy == 0.0:
-            alphas[back] = np.inf
-            continue
-        gamma = sy / yy if gamma == 0.0 else gamma
-        alphas[back] = sq / sy
-        for j in range(n):
-            if free[j]:
-                out[j] -= alphas[back] * y[j]
-    if gamma > 0.0:
-        out *= gamma
-    for back in range(stored - 1, -1, -1):
-        if alphas[back] == np.inf:
-            continue
-        s, y = S[back], Y[back]
-        sy = yq = 0.0
-        for j in range(n):
-            if free[j]:
-                sy += s[j] * y[j]
-                yq += y[j] * out[j]
-        for j in range(n):
-            if free[j]:
-                out[j] += (alphas[back] - yq / sy) * s[j]
+def descent_from(start: Vector, size: float) -> Descent:
+    """Return the search that begins at a start, or where the box is nearest to it; size: see Progress."""
+    m = start.shape[0]
+    x, trial = np.empty(m), np.empty(m)
+    progress: Any = np.zeros(1, _PROGRESS)
+    for k in range(m):
+        x[k] = trial[k] = min(max(start[k], -1.0), 1.0)
+    progress[0].cost, progress[0].size, progress[0].step = np.inf, size, 1.0
+    return Descent(
+        x, np.empty(m), trial, np.empty(m), np.empty(m), np.empty(m), np.zeros((MEMORY, m)), np.zeros((MEMORY, m)),
+        progress,
+    )  # fmt: skip
 
 
 @kernel()
-def projected_gradient(x: Vector, g: Vector) -> float:
-    """Return the largest entry of clip(x - g) - x: zero at a stationary point of the box [-1, 1]."""
+def projected_gradient(x: Vector, gradient: Vector) -> float:
+    """Return the largest entry of |clip(x - g) - x|: zero at a stationary point of the box."""
     worst = 0.0
-    for j in range(x.shape[0]):
-        worst = max(worst, abs(min(max(x[j] - g[j], -1.0), 1.0) - x[j]))
+    for k in range(x.shape[0]):
+        worst = max(worst, abs(min(max(x[k] - gradient[k], -1.0), 1.0) - x[k]))
     return worst
 
 
+@kernel(contract=True, reassociate=True)
+def newton(d: Descent, stored: int) -> float:
+    """Write the quasi-Newton direction over the entries that are free to move; returns its slope (0: nothing is known).
+
+    Two-loop recursion with history projected onto them; a pair whose curvature vanishes there is skipped.
+    """
+    x, g, free, out, m = d.x, d.gradient, d.free, d.direction, d.x.shape[0]
+    alpha, curvature = np.empty(MEMORY), np.empty(MEMORY)
+    for k in range(m):
+        held = (x[k] <= -1.0 and g[k] > 0.0) or (x[k] >= 1.0 and g[k] < 0.0)
+        free[k] = 0.0 if held else 1.0
+        out[k] = -free[k] * g[k]
+    scale = 0.0
+    for row in range(stored):
+        s, y = d.steps[row], d.changes[row]
+        along = square = alpha[row] = 0.0
+        for k in range(m):
+            change = free[k] * y[k]
+            along += s[k] * change
+            square += change * change
+            alpha[row] += s[k] * out[k]
+        curvature[row] = along if along > _FLAT * square else 0.0
+        if curvature[row] == 0.0:
+            continue
+        scale = along / square if scale == 0.0 else scale
+        alpha[row] /= along
+        for k in range(m):
+            out[k] -= alpha[row] * free[k] * y[k]
+    for k in range(m):
+        out[k] *= scale
+    for row in range(stored - 1, -1, -1):
+        if curvature[row] == 0.0:
+            continue
+        s, y = d.steps[row], d.changes[row]
+        beta = 0.0
+        for k in range(m):
+            beta += y[k] * out[k]
+        beta = alpha[row] - beta / curvature[row]
+        for k in range(m):
+            out[k] += free[k] * beta * s[k]
+    slope = 0.0
+    for k in range(m):
+        slope += g[k] * out[k]
+    return slope
+
+
 @kernel()
-def copy_into(to: Vector, source: Vector) -> None:
-    """Copy a vector. (Assigning slices compiles numba's broadcasting errors: 1.5 s for each use.)"""
-    for j in range(to.shape[0]):
-        to[j] = source[j]
+def head(d: Descent, stored: int) -> int:
+    """Write where to go next: by the history, or else a bounded step downhill; returns how much history is of use."""
+    largest = 0.0
+    if newton(d, stored) < 0.0:
+        return stored
+    for k in range(d.x.shape[0]):
+        d.direction[k] = -d.free[k] * d.gradient[k]
+        largest = max(largest, abs(d.direction[k]))
+    for k in range(d.x.shape[0]):
+        d.direction[k] *= _FIRST / max(largest, 1e-12)
+    return 0
 
 
 @kernel()
 def push(history: Matrix, newest: Vector, before: Vector) -> None:
     """Shift a history by one and put newest - before in front."""
     for row in range(history.shape[0] - 1, 0, -1):
-        copy_into(history[row], history[row - 1])
-    for j in range(newest.shape[0]):
-        history[0, j] = newest[j] - before[j]
+        for k in range(newest.shape[0]):
+            history[row, k] = history[row - 1, k]
+    for k in range(newest.shape[0]):
+        history[0, k] = newest[k] - before[k]
 
 
 @kernel()
-def head(x: Vector, g: Vector, S: Matrix, Y: Matrix, stored: int, free: BoolVector, out: Vector) -> int:
-    """Write where to go next: the L-BFGS direction, or a bounded step downhill; returns how much history is of use."""
-    direction(x, g, S, Y, stored, free, out)
-    slope = largest = 0.0
-    for j in range(x.shape[0]):
-        slope += g[j] * out[j]
-    if stored > 0 and slope < 0.0:
-        return stored
-    for j in range(x.shape[0]):
-        out[j] = -g[j] if free[j] else 0.0
-        largest = max(largest, abs(out[j]))
-    for j in range(x.shape[0]):
-        out[j] *= 0.5 / max(largest, 1e-12)
-    return 0
+def move(d: Descent) -> int:
+    """Make the trial the best point; returns how much history there is now.
 
-
-@kernel()
-def advance(x: Vector, g: Vector, out: Vector, step: float, trial: Vector) -> float:
-    """Write the projection of x + step out onto the box; returns the linear prediction g . (trial - x)."""
-    expected = 0.0
-    for j in range(x.shape[0]):
-        trial[j] = min(max(x[j] + step * out[j], -1.0), 1.0)
-        expected += g[j] * (trial[j] - x[j])
-    return expected
-
-
-class SearchState(NamedTuple):
-    """A local search that can be continued: best point x with gradient g, next point `trial`, and its history.
-
-    numbers: cost at x, first cost, expected change, step, rows of history, evaluations, whether it is over.
+    A step along which the cost curves downwards is not remembered: on its own it would make the next one as short as
+    the gradient, which is least where the cost is flat, far from what is to be seen.
     """
-
-    x: Vector
-    g: Vector
-    g_new: Vector
-    out: Vector
-    trial: Vector
-    u: Vector
-    latest: Vector
-    report: Vector
-    free: BoolVector
-    S: Matrix
-    Y: Matrix
-    numbers: Vector
-
-
-def search_state(start: Vector, report_size: int) -> SearchState:
-    """Return the state of a search that begins at a start in [-1, 1]^(4 n)."""
-    x: Vector = np.clip(start, -1.0, 1.0)
-    n = x.size
-    g, g_new, out, u = (np.empty(n) for _ in range(4))
-    numbers = np.array([np.inf, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-    return SearchState(
-        x, g, g_new, out, x.copy(), u, np.empty(report_size), np.empty(report_size),
-        np.empty(n, np.bool_), np.zeros((MEMORY, n)), np.zeros((MEMORY, n)), numbers,
-    )  # fmt: skip
+    stored, along, square = int(d.progress[0].stored), 0.0, 0.0
+    if d.progress[0].evaluations > 1:
+        for k in range(d.x.shape[0]):
+            change = d.trial_gradient[k] - d.gradient[k]
+            along += (d.trial[k] - d.x[k]) * change
+            square += change * change
+    if along > _FLAT * square:
+        push(d.steps, d.trial, d.x)
+        push(d.changes, d.trial_gradient, d.gradient)
+        stored = min(stored + 1, MEMORY)
+    for k in range(d.x.shape[0]):
+        d.x[k], d.gradient[k] = d.trial[k], d.trial_gradient[k]
+    return stored
 
 
 @kernel()
-def solve(state: SearchState, problem: CostProblem, budget: int, limit: int, tolerance: float) -> bool:
-    """Minimise over x in [-1, 1]^(4 n), u = x * scale, for `budget` further evaluations; returns whether it is over.
+def propose(d: Descent) -> None:
+    """Write the next trial: x and a step along the direction, projected onto the box."""
+    progress, expected = d.progress[0], 0.0
+    for k in range(d.x.shape[0]):
+        d.trial[k] = min(max(d.x[k] + progress.step * d.direction[k], -1.0), 1.0)
+        expected += d.gradient[k] * (d.trial[k] - d.x[k])
+    progress.expected = expected
 
-    It is over when the projected gradient of cost / first cost is below the tolerance, when no step improves, or after
-    `limit` evaluations in all; x is always the best point seen. A first cost that is not finite has no direction to go
-    in: x stays, and the cost is infinite. report: see gradient.evaluate.
+
+@kernel()
+def take(d: Descent, cost: float, tolerance: float, least_gain: float) -> bool:
+    """Go on from the cost of the trial, whose gradient the caller has written; returns whether it is the best so far.
+
+    It is over when the projected gradient of cost / size is within the tolerance, when a step gains less than
+    least_gain of size, or when no step helps. A first cost that is not finite has no direction to go in: x stays.
     """
-    x, g, g_new, out, trial, numbers = state.x, state.g, state.g_new, state.out, state.trial, state.numbers
-    n, free, S, Y = x.shape[0], state.free, state.S, state.Y
-    f, size, expected, step, stored, used = numbers[0], numbers[1], numbers[2], numbers[3], int(numbers[4]), 0
-    before, over = int(numbers[5]), bool(numbers[6] > 0.0)
-    while used < budget and not over:
-        for j in range(n):
-            state.u[j] = trial[j] * problem.scale[j]
-        f_new = evaluate(state.u, problem, True, g_new, state.latest)
-        used += 1
-        first = before + used == 1
-        if first:
-            size = max(f_new, 1e-12)
-            if not np.isfinite(f_new):
-                copy_into(state.report, state.latest)
-                over = True
-                break
-        for j in range(n):
-            g_new[j] *= problem.scale[j] / size
-        if f_new < f and (first or f_new <= f + 1e-4 * size * expected):
-            if not first:
-                push(S, trial, x)
-                push(Y, g_new, g)
-                stored = min(stored + 1, MEMORY)
-            gain, f, step = (f - f_new) / size, f_new, 1.0
-            copy_into(x, trial)
-            copy_into(g, g_new)
-            copy_into(state.report, state.latest)
-            if gain < 1e-2 * tolerance or projected_gradient(x, g) <= tolerance:
-                over = True
-                break
-            stored = head(x, g, S, Y, stored, free, out)
-        else:
-            step *= 0.3
-            if step < 1e-4 and stored == 0:
-                over = True
-                break
-            if step < 1e-4:
-                stored, step = head(x, g, S, Y, 0, free, out), 1.0
-        over = bool(before + used >= limit)
-        expected = advance(x, g, out, step, trial)
-    numbers[0], numbers[1], numbers[2], numbers[3], numbers[4] = f, size, expected, step, stored
-    numbers[5], numbers[6] = before + used, 1.0 if over else 0.0
-    return over
+    progress = d.progress[0]
+    progress.evaluations += 1
+    first = progress.evaluations == 1
+    if first and not np.isfinite(cost):
+        progress.over = 1
+        return True
+    if progress.size == 0.0:
+        progress.size = max(cost, 1e-12)
+    size, before = progress.size, progress.cost
+    for k in range(d.x.shape[0]):
+        d.trial_gradient[k] /= size
+    better = cost < before and (first or cost <= before + _ARMIJO * size * progress.expected)
+    if better:
+        progress.stored, progress.cost, progress.step = move(d), cost, 1.0
+        if before - cost < least_gain * size or projected_gradient(d.x, d.gradient) <= tolerance:
+            progress.over = 1
+            return True
+        progress.stored = head(d, progress.stored)
+    else:
+        progress.step *= _SHORTER
+        if progress.step < _SHORTEST:
+            progress.over = 1 if progress.stored == 0 else 0
+            progress.stored, progress.step = head(d, 0), 1.0
+    propose(d)
+    return better

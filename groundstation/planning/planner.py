@@ -10,15 +10,9 @@ from groundstation.arrays import Array
 from groundstation.bus.messages import Alternative, Edge, SolverReport
 from groundstation.errors import EstimatorFault
 from groundstation.estimation.belief import JointBelief
+from groundstation.planning.local_search import LocalSearch, Solution
 from groundstation.planning.parameters import PlannerParameters
-from groundstation.planning.problem import (
-    LocalSearch,
-    PlanningProblem,
-    PlanningScene,
-    ProblemBuilder,
-    Solution,
-    scene_from_belief,
-)
+from groundstation.planning.problem import PlanningProblem, PlanningScene, ProblemBuilder, scene_from_belief
 from groundstation.planning.records import HEIGHT, ROBOT_CONTROLS
 from groundstation.planning.starts import Starts
 from groundstation.sensing.models import SensorSuite

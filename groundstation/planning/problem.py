@@ -11,7 +11,6 @@ from groundstation.estimation.belief import JointBelief
 from groundstation.kernel import Rows
 from groundstation.planning.bound import lower_bound
 from groundstation.planning.gradient import evaluate
-from groundstation.planning.lbfgs import search_state, solve
 from groundstation.planning.parameters import PlannerParameters
 from groundstation.planning.records import HEIGHT, ROBOT_CONTROLS, TARGET_STATES, CostOptions, CostProblem, EdgeRow
 from groundstation.sensing.models import SensorSuite
@@ -92,50 +91,6 @@ class PlanningProblem:
         """Return the cost at x."""
         scratch, report = np.empty(x.size), np.empty(1 + len(self.cost.edges))
         return float(evaluate(x * self.scale, self.cost, False, scratch, report))
-
-
-class LocalSearch:
-    """The search for one topology's local minimum from a start, a few evaluations at a time."""
-
-    def __init__(self, problem: PlanningProblem, start: Array, limit: int, tolerance: float) -> None:
-        self.problem = problem
-        self._state = search_state(start, 1 + len(problem.cost.edges))
-        self._limit, self._tolerance = limit, tolerance
-
-    def advance(self, until: int) -> bool:
-        """Go on as far as may be without asking for the time, or to so many evaluations; returns whether it is over."""
-        budget = min(self.problem.evaluations_at_once, until - self.evaluations)
-        return bool(solve(self._state, self.problem.cost, budget, self._limit, self._tolerance))
-
-    @property
-    def over(self) -> bool:
-        """Return whether it has ended."""
-        return bool(self._state.numbers[6])
-
-    @property
-    def cost(self) -> float:
-        """Return the least cost so far."""
-        return float(self._state.numbers[0])
-
-    @property
-    def evaluations(self) -> int:
-        """Return how many there were."""
-        return int(self._state.numbers[5])
-
-    def solution(self) -> "Solution":
-        """Return the best point so far."""
-        state, problem = self._state, self.problem
-        return Solution(problem.topology, float(state.numbers[0]), state.x * problem.scale, state.report)
-
-
-@dataclass(frozen=True, slots=True)
-class Solution:
-    """Controls u (4 n) with their cost; report (1 + m): the uncertainty alone, each edge's mean information."""
-
-    topology: Topology
-    cost: float
-    controls: Array
-    report: Array
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ import numpy as np
 
 from groundstation.arrays import Array, IntArray
 from groundstation.experiments.planar.candidates import MOST_CUTS, all_topologies, candidate_list
-from groundstation.experiments.planar.lbfgs import FAILED
+from groundstation.experiments.planar.minimise import FAILED
 from groundstation.experiments.planar.parameters import PlanarParameters
 from groundstation.experiments.planar.problem import make_problem, make_workspace
 from groundstation.experiments.planar.records import Candidates, Limits, PlanarProblem

@@ -4,7 +4,7 @@ import numpy as np
 
 from groundstation.arrays import IntVector, Vector
 from groundstation.experiments.planar.bounds import reach_bound, reach_information, tangent_bounds
-from groundstation.experiments.planar.lbfgs import FAILED, OUT_OF_BUDGET, minimise
+from groundstation.experiments.planar.minimise import FAILED, OUT_OF_BUDGET, minimise
 from groundstation.experiments.planar.problem import load_topology
 from groundstation.experiments.planar.records import Candidates, Limits, PlanarProblem, Workspace
 from groundstation.kernel import kernel

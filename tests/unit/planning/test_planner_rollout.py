@@ -11,7 +11,7 @@ from groundstation.arrays import Array
 from groundstation.kernel import Rows
 from groundstation.planning.bound import lower_bound
 from groundstation.planning.gradient import evaluate
-from groundstation.planning.lbfgs import search_state, solve
+from groundstation.planning.local_search import search_state, solve
 from groundstation.planning.records import CostOptions, CostProblem, EdgeRow
 from groundstation.sensing.models import Box, Frustum, OnboardCameraModel, Softness, WorldCameraModel
 from groundstation.sensing.occlusion import BoxRow, box_rows
@@ -200,7 +200,8 @@ def search(one: Case, start: Array, budget: int, tolerance: float) -> tuple[Arra
     """Return the best point, its cost and the number of evaluations."""
     state = search_state(start, 1 + len(one.cost.edges))
     solve(state, one.cost, budget, budget, tolerance)
-    return state.x, float(state.numbers[0]), int(state.numbers[5])
+    progress = state.descent.progress[0]
+    return state.descent.x, float(progress["cost"]), int(progress["evaluations"])
 
 
 def test_a_search_in_parts_is_the_search_in_one() -> None:
@@ -209,8 +210,8 @@ def test_a_search_in_parts_is_the_search_in_one() -> None:
     solve(whole, one.cost, 40, 40, 1e-5)
     while not solve(parts, one.cost, 3, 40, 1e-5):
         pass
-    assert (parts.x == whole.x).all()
-    assert (parts.numbers == whole.numbers).all()
+    assert (parts.descent.x == whole.descent.x).all()
+    assert parts.descent.progress[0] == whole.descent.progress[0]
 
 
 def test_no_controls_get_below_the_bound() -> None:

@@ -127,10 +127,11 @@ class StandSearch:
     def _after(self, scene: PlanningScene, topology: Topology, controls: Array) -> PlanningScene:
         """Return the scene after one horizon of held controls (n, 4); the target stands still."""
         problem = self._judge.build(scene, topology).cost
-        tape = empty_tape(len(scene.robots), problem.options.steps, len(problem.edges), problem.prior.shape[0])
+        d = problem.prior.shape[0]
+        tape = empty_tape(len(scene.robots), problem.options.steps, len(problem.edges), d)
         roll_out(controls.ravel(), problem, tape)
         poses = tape.path[-1][:, [X, Y, Z, YAW]].copy()
-        covariance = tape.covariances[-1]
+        covariance = tape.covariances[-1, :d, :d]
         prior = np.ascontiguousarray(0.5 * (covariance + covariance.T))
         return replace(scene, poses=poses, prior=prior, yaw_variances=tape.yaws_after[-1].copy())
 

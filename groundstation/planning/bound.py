@@ -6,7 +6,7 @@ import numpy as np
 
 from groundstation.arrays import Vector
 from groundstation.kernel import kernel
-from groundstation.planning.covariance import invert, predict
+from groundstation.planning.covariance import invert, predict, room_for
 from groundstation.planning.records import TARGET_STATES, CostProblem, X, Y
 from groundstation.sensing.visibility import SPREAD
 
@@ -58,11 +58,11 @@ def lower_bound(problem: CostProblem, reach: Vector, low: Vector, high: Vector) 
     between which heights it stays [m]. Penalties are at least 0. docs/explanation/planning.md 5.
     """
     n, k, h, m = problem.poses.shape[0], problem.targets.shape[0], problem.options.steps, problem.edges.shape[0]
-    options, P, cameras, cost, discount = problem.options, problem.prior.copy(), problem.cameras, 0.0, 1.0
+    options, P, cameras, cost, discount = problem.options, room_for(problem.prior), problem.cameras, 0.0, 1.0
     turns = problem.yaw_variances.copy()
     sharper = np.empty(n)
     for i in range(h):
-        predict(P, n, options)
+        predict(P, n, n + TARGET_STATES * k, options)
         invert(P)
         for r in range(n):
             turns[r] += options.robot_yaw_noise * options.step_s

@@ -7,6 +7,7 @@ import numpy as np
 from groundstation.arrays import Matrix, Vector
 from groundstation.kernel import kernel
 from groundstation.planning.covariance import between, predict_adjoint
+from groundstation.planning.dense import padded
 from groundstation.planning.records import (
     COS,
     HEIGHT,
@@ -111,7 +112,8 @@ def undo_move(state: Matrix, motion: Matrix, dt: float, gradient: Vector) -> Non
 def go_back(problem: CostProblem, tape: Tape, gradient: Vector) -> None:
     """Add the derivatives of uncertainty and penalties to dc/du, step by step backwards."""
     n, h, d, options = problem.poses.shape[0], problem.options.steps, problem.prior.shape[0], problem.options
-    W, M, product = np.zeros((d, d)), np.empty((d, d)), np.empty((d, d))
+    wide = padded(d)
+    W, M, product = np.zeros((wide, wide)), np.empty((wide, wide)), np.empty((wide, wide))
     state, yaws, work = np.zeros((n, 4)), np.zeros(n), np.empty(n)
     for i in range(h - 1, -1, -1):
         discount = options.discount ** (i + 1)
@@ -127,7 +129,7 @@ def go_back(problem: CostProblem, tape: Tape, gradient: Vector) -> None:
         undo_move(state, tape.motion[i], options.step_s, gradient)
         if i > 0:
             between(tape.informations[i], M, W, product)
-            predict_adjoint(W, n, options.step_s)
+            predict_adjoint(W, n, d, options.step_s)
 
 
 @kernel()

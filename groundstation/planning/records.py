@@ -111,8 +111,8 @@ class Tape(NamedTuple):
 
     path (h + 1, n, 6): x, y, yaw, its cosine and sine, z; motion (h, n, 4): displacement, direction, and the derivative
     of z by the height that is gone to; sightings (h m): by step, then edge; informations (h, d, d) before and
-    covariances (h, d, d) after each correction; yaws_before, yaws_after (h, n): variances; penalties (h, n, 3): their
-    derivatives by x, y.
+    covariances (h, d, d) after each correction, padded to whole vectors; yaws_before, yaws_after (h, n): variances;
+    penalties (h, n, 3): their derivatives by x, y.
     """
 
     path: MatrixStack

@@ -7,7 +7,8 @@ import numpy as np
 
 from groundstation.arrays import Matrix, Vector
 from groundstation.kernel import kernel
-from groundstation.planning.covariance import invert, predict
+from groundstation.planning.covariance import invert, predict, room_for
+from groundstation.planning.dense import padded
 from groundstation.planning.records import (
     COS,
     HEIGHT,
@@ -33,9 +34,11 @@ _EDGE_TAPE = EdgeTape.dtype
 @kernel(inlined=True)
 def empty_tape(n: int, h: int, m: int, d: int) -> Tape:
     """Return a tape for n robots, h steps, m edges and d entries of the state."""
+    wide = padded(d)
     sightings: Any = np.empty(h * m, _EDGE_TAPE)
     return Tape(
-        np.empty((h + 1, n, 6)), np.empty((h, n, 4)), sightings, np.empty((h, d, d)), np.empty((h, d, d)),
+        np.empty((h + 1, n, 6)), np.empty((h, n, 4)), sightings, np.empty((h, wide, wide)),
+        np.empty((h, wide, wide)),
         np.empty((h, n)), np.empty((h, n)), np.empty((h, n, 3)),
     )  # fmt: skip
 
@@ -150,7 +153,7 @@ def fuse(P: Matrix, problem: CostProblem, tape: Tape, i: int) -> None:
 def roll_out(u: Vector, problem: CostProblem, tape: Tape) -> tuple[float, float]:
     """Return (expected uncertainty of the targets, all other costs) of held controls u (4 n) and fill the tape."""
     n, k, h = problem.poses.shape[0], problem.targets.shape[0], problem.options.steps
-    options, P, weights = problem.options, problem.prior.copy(), problem.target_weights
+    options, P, weights = problem.options, room_for(problem.prior), problem.target_weights
     path, motion, penalties = tape.path, tape.motion, tape.penalties
     for r in range(n):
         path[0, r, X], path[0, r, Y] = problem.poses[r, X], problem.poses[r, Y]
@@ -162,7 +165,7 @@ def roll_out(u: Vector, problem: CostProblem, tape: Tape) -> tuple[float, float]
     for i in range(h):
         move(u, path[i], options.step_s, path[i + 1], motion[i])
         climb(u, problem, i, path[i + 1], motion[i])
-        predict(P, n, options)
+        predict(P, n, problem.prior.shape[0], options)
         look_around(problem, tape, i, views, points, found)
         weigh(problem, tape, i)
         fuse(P, problem, tape, i)

@@ -3,12 +3,12 @@
 import numpy as np
 
 from groundstation.arrays import Array, IntVector, Matrix
-from groundstation.experiments.planar.dense import cholesky_upper, padded
 from groundstation.experiments.planar.edges import sort_team
 from groundstation.experiments.planar.parameters import PlanarParameters
 from groundstation.experiments.planar.records import Observers, PlanarProblem, Workspace, X, Y
 from groundstation.experiments.planar.rollout import predicted_information
 from groundstation.kernel import kernel
+from groundstation.planning.dense import cholesky_upper, padded
 
 # The information-form predict loses eps * max(D P) relative accuracy: beyond this the covariance form is used.
 STABLE_ABOVE = 1e6

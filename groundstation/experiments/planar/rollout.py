@@ -7,10 +7,10 @@ D = Q^-1: L_i = Lm_i + Laplacian(w_i), Lm_{i+1} = D - D (L_i + D)^-1 D, cost = s
 import numpy as np
 
 from groundstation.arrays import Matrix, MatrixStack, Vector
-from groundstation.experiments.planar.dense import cholesky_upper, negative_inverse, subtract_products
 from groundstation.experiments.planar.edges import add_laplacian
 from groundstation.experiments.planar.records import PlanarProblem, Workspace
 from groundstation.kernel import kernel
+from groundstation.planning.dense import cholesky_upper, negative_inverse, subtract_products
 
 
 @kernel()

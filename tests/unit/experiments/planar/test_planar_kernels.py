@@ -10,18 +10,18 @@ import pytest
 
 from groundstation.bench.planner_peers import naive, numpy_adjoint
 from groundstation.bench.planner_peers.step import edges_of
-from groundstation.experiments.planar.dense import (
-    cholesky_upper,
-    negative_inverse,
-    padded,
-    subtract_products,
-)
 from groundstation.experiments.planar.edges import exponentials
 from groundstation.experiments.planar.objective import cost_and_gradient
 from groundstation.experiments.planar.parameters import FIGURE_1, PlanarParameters
 from groundstation.experiments.planar.planner import PlanarPlanner, SearchOptions
 from groundstation.experiments.planar.problem import load_topology, make_problem, make_workspace
 from groundstation.experiments.planar.scenarios import bench_belief
+from groundstation.planning.dense import (
+    cholesky_upper,
+    negative_inverse,
+    padded,
+    subtract_products,
+)
 
 
 def evaluate(

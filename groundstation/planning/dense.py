@@ -17,9 +17,10 @@ from groundstation.arrays import Matrix
 from groundstation.kernel import kernel
 
 LANES = 8
-_PIVOTS = 4
+PIVOTS = 4
 
 
+@kernel(inlined=True)
 def padded(size: int) -> int:
     """Return the next multiple of the vector width."""
     return -(-size // LANES) * LANES
@@ -43,7 +44,7 @@ def _rank4_code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.inttoptr(base, vector.as_pointer())
 
     held = [
-        [scalar(address(address(factors, p, factor_stride), r, row_stride)) for r in range(4)] for p in range(_PIVOTS)
+        [scalar(address(address(factors, p, factor_stride), r, row_stride)) for r in range(4)] for p in range(PIVOTS)
     ]
     with cgutils.for_range(builder, blocks) as loop:
         column = builder.mul(loop.index, ir.Constant(pointer, 8 * LANES))
@@ -51,7 +52,7 @@ def _rank4_code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         for r in range(4):
             place = lanes(builder.add(address(target, r, stride), column))
             value = builder.load(place, align=8)
-            for p in range(_PIVOTS):
+            for p in range(PIVOTS):
                 product = builder.fmul(held[p][r], rows[p], flags=["contract"])
                 value = builder.fsub(value, product, flags=["contract"])
             builder.store(value, place, align=8)

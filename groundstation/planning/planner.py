@@ -190,6 +190,7 @@ class Planner:
         search.solve(problem, self._warm(scene, warm_start, starts.rest(first), starts, problem.scale))
         best = search.solutions[first].controls / problem.scale
         ranked: list[_Ranked] = []
+        held = first.level_by_robot()
         for topology in (first, *others):
             if search.must_stop():
                 return
@@ -199,7 +200,7 @@ class Planner:
             if self.parameters.mode == "paper":
                 ranked += [] if topology == first else [_Ranked(0.0, problem, starts.rest(topology))]
                 continue
-            moved = {name for name in scene.robots if topology.level_of(name) != first.level_of(name)}
+            moved = {name for name, level in topology.level_by_robot().items() if held[name] != level}
             own = starts.of(topology, None if topology == first else best, moved)
             ranked += self._ranked(search, problem, own)
         self._race(search, ranked)

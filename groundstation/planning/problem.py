@@ -190,7 +190,7 @@ class ProblemBuilder:
         return _Pairs(rows, observer, subject)
 
     def _levels(self, scene: PlanningScene, topology: Topology) -> IntArray:
-        level = {name: index for index, names in enumerate(topology.levels) for name in names}
+        level = topology.level_by_robot()
         return np.array([level[name] for name in scene.robots], dtype=np.int64)
 
     def _edges(self, scene: PlanningScene, topology: Topology) -> tuple[Rows[EdgeRow], int]:

@@ -26,9 +26,13 @@ class Starts:
     def __init__(
         self, scene: PlanningScene, parameters: PlannerParameters, sensors: SensorSuite, scale: Array, height_m: float
     ) -> None:
-        self._scene, self._parameters, self._sensors, self._scale = scene, parameters, sensors, scale
+        self._scene, self._parameters, self._sensors = scene, parameters, sensors
         self._height_m = height_m
         self._index = {name: i for i, name in enumerate(scene.robots)}
+        # Plain numbers: a large team has thousands of stands in a step, and numpy takes ten times as long for each.
+        self._scale: list[float] = scale.tolist()
+        self._poses: list[list[float]] = scene.poses.tolist()
+        self._views: dict[float, list[Rectangle]] = {}
 
     def of(self, topology: Topology, known: Array | None, moved: Collection[str]) -> list[Array]:
         """Return starts of a topology: the known optimum of another one, which differs by the robots `moved`.
@@ -50,13 +54,13 @@ class Starts:
         """Return controls with which the robots only go to the heights of their levels."""
         heights = self._parameters.level_heights(len(topology.levels)) or ()
         x = np.zeros((len(self._scene.robots), ROBOT_CONTROLS))
-        for name, i in self._index.items():
-            x[i, HEIGHT] = self.height(i, heights[topology.level_of(name)])
+        for name, level in topology.level_by_robot().items():
+            x[self._index[name], HEIGHT] = self.height(self._index[name], heights[level])
         return x.ravel()
 
     def height(self, i: int, height_m: float) -> float:
         """Return a robot's height as a part of a start."""
-        share = (height_m - self._height_m) / float(self._scale[ROBOT_CONTROLS * i + HEIGHT])
+        share = (height_m - self._height_m) / self._scale[ROBOT_CONTROLS * i + HEIGHT]
         return max(-1.0, min(1.0, share))
 
     def _towards(self, topology: Topology, base: Array, robots: Collection[str], keep_root: bool) -> Array:
@@ -68,48 +72,63 @@ class Starts:
             for name, m in zip(scene.targets, scene.moving, strict=True)
         ]
         for level in range(len(topology.levels) - 1, -1, -1):
-            middle = np.mean(subjects, axis=0).tolist()
+            middle = _middle(subjects)
             height, subjects = heights[level], []
             for name in sorted(topology.levels[level]):
-                pose = scene.poses[self._index[name]]
-                px, py = float(pose[0]), float(pose[1])
+                i, above = self._index[name], height + sensors.marker_height_m[name]
+                pose = self._poses[i]
+                px, py = pose[0], pose[1]
                 if name in robots:
                     px, py = _stand(pose, middle, height, name, sensors)
-                    above = height + sensors.marker_height_m[name]
                     if level == 0 and keep_root:
-                        px, py = _in_root_view((px, py), sensors.root_views(above))
-                    self._steer(x, self._index[name], (px, py, math.atan2(middle[1] - py, middle[0] - px)))
-                    x[ROBOT_CONTROLS * self._index[name] + HEIGHT] = self.height(self._index[name], height)
-                subjects.append((px, py, height + sensors.marker_height_m[name]))
+                        px, py = _in_root_view((px, py), self._root_views(above))
+                    self._steer(x, i, (px, py, math.atan2(middle[1] - py, middle[0] - px)))
+                    x[ROBOT_CONTROLS * i + HEIGHT] = self.height(i, height)
+                subjects.append((px, py, above))
         return x
+
+    def _root_views(self, above_m: float) -> list[Rectangle]:
+        """Return what world-fixed cameras see at a height, without its edge."""
+        if above_m not in self._views:
+            self._views[above_m] = [view.shrunk(_INSET_M) for view in self._sensors.root_views(above_m)]
+        return self._views[above_m]
 
     def _steer(self, x: Array, i: int, goal: Point) -> None:
         """Write the controls with which a robot gets to (x, y, yaw) within the horizon, or as near as it can."""
         px, py, yaw = goal
         at = ROBOT_CONTROLS * i
-        pose, scale, horizon_s = self._scene.poses[i], self._scale[at : at + HEIGHT], self._parameters.horizon_s
-        rate = max(-1.0, min(1.0, difference(yaw, float(pose[3])) / horizon_s / scale[2]))
-        middle = float(pose[3]) + 0.5 * rate * scale[2] * horizon_s
-        vx, vy = (px - float(pose[0])) / horizon_s, (py - float(pose[1])) / horizon_s
+        (x_m, y_m, _, yaw_rad), horizon_s = self._poses[i], self._parameters.horizon_s
+        forward, left, turn = self._scale[at : at + HEIGHT]
+        rate = max(-1.0, min(1.0, difference(yaw, yaw_rad) / horizon_s / turn))
+        middle = yaw_rad + 0.5 * rate * turn * horizon_s
+        vx, vy = (px - x_m) / horizon_s, (py - y_m) / horizon_s
         c, s = math.cos(middle), math.sin(middle)
-        body = np.array([c * vx + s * vy, c * vy - s * vx]) / scale[:2]
-        x[at : at + 2] = body / max(1.0, float(np.abs(body).max()))
-        x[at + 2] = rate
+        ahead, aside = (c * vx + s * vy) / forward, (c * vy - s * vx) / left
+        over = max(1.0, abs(ahead), abs(aside))
+        x[at], x[at + 1], x[at + 2] = ahead / over, aside / over, rate
+
+
+def _middle(points: Sequence[Point]) -> Point:
+    """Return the mean of points."""
+    x, y, z = (sum(part) / len(points) for part in zip(*points, strict=True))
+    return x, y, z
 
 
 def _in_root_view(stand: tuple[float, float], views: Sequence[Rectangle]) -> tuple[float, float]:
     """Return the point in a world-fixed view that is nearest to a stand; the stand itself without a view."""
-    points = (view.shrunk(_INSET_M).nearest(*stand) for view in views)
+    points = (view.nearest(*stand) for view in views)
     return min(points, key=lambda point: math.dist(point, stand), default=stand)
 
 
-def _stand(pose: Array, subject: list[float], height: float, name: str, sensors: SensorSuite) -> tuple[float, float]:
+def _stand(
+    pose: Sequence[float], subject: Point, height: float, name: str, sensors: SensorSuite
+) -> tuple[float, float]:
     camera = sensors.onboard.get(name)
     tilt = camera.tilt_down_rad if camera else math.pi / 4
     reach = camera.view.range_m if camera else 1.0
     behind = min(max((height - subject[2]) / max(math.tan(tilt), 0.1), 0.4), 0.8 * reach)
-    dx, dy = float(pose[0]) - subject[0], float(pose[1]) - subject[1]
+    dx, dy = pose[0] - subject[0], pose[1] - subject[1]
     if math.hypot(dx, dy) < 0.1:
-        dx, dy = -math.cos(float(pose[3])), -math.sin(float(pose[3]))
+        dx, dy = -math.cos(pose[3]), -math.sin(pose[3])
     d = math.hypot(dx, dy)
     return subject[0] + behind * dx / d, subject[1] + behind * dy / d

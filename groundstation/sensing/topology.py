@@ -63,6 +63,10 @@ class Topology:
                 return index
         raise KeyError(name)
 
+    def level_by_robot(self) -> dict[str, int]:
+        """Return the level of each robot, 0 on top."""
+        return {name: index for index, level in enumerate(self.levels) for name in level}
+
     def edges(self) -> tuple[tuple[str, str], ...]:
         """Return all permitted (observer, subject) pairs, in a fixed order; `ROOT` and `LEAF` stand for the ends."""
         if not self.levels:

@@ -153,6 +153,7 @@ def fly(team: BenchTeam, duration_ms: int, late_ms: int, heights: bool, seed: in
         "entities": len(team.parameters.entities),
         "delay_ms": late_ms,
         "heights": heights,
+        "waits_ms": round(1e3 * team.parameters.wait_s, 1),
         "error_m": _worst_error(team, path.filter),
     }
 

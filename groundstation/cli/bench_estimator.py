@@ -71,11 +71,12 @@ def _table(result: dict[str, Any]) -> str:
             f"{name:40} {row['predict_us']:10.2f} {row['correct_us']:16.2f} {row['cores']:8.3f} "
             f"{row['times_ours']:11.1f}" + (f"   {differs:.0e}" if differs is not None else "")
         )
-    lines += ["", "path: decode, intake, filter, Innovation     us/observation    observations  times in order"]
+    lines += ["", "path: decode, intake, filter, Innovation        us/observation    observations  times in order"]
     for row in result["path"]:
         name = f"{row['robots']:3} robots {row['blocks']:8} {'heights' if row['heights'] else '-':8} "
         name += f"{row['delay_ms']:3} ms late" if row["delay_ms"] else "in order"
-        lines.append(f"{name:44} {row['us_per_observation']:14.1f} {row['observations']:15} {row['to_in_order']:15.2f}")
+        name += f", waits {row['waits_ms']:.0f} ms" if row["waits_ms"] else ""
+        lines.append(f"{name:47} {row['us_per_observation']:14.1f} {row['observations']:15} {row['to_in_order']:15.2f}")
     lines.append("")
     for name, target in result["targets"].items():
         bound = "at least" if name == "filterpy_to_ours" else "at most"

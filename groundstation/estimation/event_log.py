@@ -2,7 +2,7 @@
 
 import math
 from bisect import bisect_left, insort
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,9 +66,10 @@ class EventLog:
             self._free.extend(row for _, _, row in self._order[:count])
             del self._order[:count]
 
-    def verdict_code(self, row: int) -> int:
-        """Return what became of an event so far; PENDING before it was reached."""
-        return int(self._verdicts[row])
+    def reached(self, rows: Iterable[int]) -> list[int]:
+        """Return those events, of some, whose verdict is known."""
+        verdicts = self._verdicts.tolist()
+        return [row for row in rows if verdicts[row] != r.PENDING]
 
     def correction(self, row: int, observer: str, subject: str, latency_ms: float) -> Correction:
         """Return the outcome of an observation as a value."""

@@ -93,10 +93,11 @@ class Inputs(NamedTuple):
 
 
 class Span(NamedTuple):
-    """The steps that are run, and the time up to which the last one is."""
+    """The steps that are run, the time up to which the last one is, and from which step on observations wait."""
 
     first: int
     last: int
+    waiting: int
     now: float
 
 

@@ -21,7 +21,7 @@ from groundstation.estimation.measurement import Correction, Measurement, Odomet
 from groundstation.estimation.models.protocol import DrivenModel
 from groundstation.estimation.odometry_ring import OdometryRing
 from groundstation.estimation.parameters import EstimatorParameters
-from groundstation.estimation.records import ADMITTED, COMPARED, DISMISSED, OBSERVATION, PENDING, PLACED, REPORTED
+from groundstation.estimation.records import ADMITTED, COMPARED, DISMISSED, OBSERVATION, PLACED, REPORTED
 from groundstation.estimation.replay import replay
 from groundstation.estimation.tables import checkpoints_of, empty_state, tables_from_parameters
 from groundstation.time_units import NS_PER_S
@@ -61,6 +61,8 @@ class FixedLagFilter:
         # Steps after and before now that a measurement may fall into; a command is followed after its stamp.
         self._ahead = (FUTURE_NS + max(0, *(-d for d in delays), 0)) // self._step_ns + 2 + _IDLE_STEPS
         self._behind = (self._lag_ns + max(0, *delays, 0)) // self._step_ns + 3
+        # Steps, the present one included, whose observations wait: the one before them ended as long ago.
+        self._wait_steps = math.ceil(parameters.wait_s / parameters.step_s) + 1 if parameters.wait_s > 0.0 else 0
         self._build_state([model.admitted for model in self._models])
 
     def add_motion(self, robot: str, motion: OdometrySample, now_ns: int) -> Verdict:
@@ -274,15 +276,16 @@ class FixedLagFilter:
         last = self._step_of(now_ns)
         for step in range(self._last + self._ahead + 1, last + self._ahead + 1):
             self._odometry.clear(step)
-        first, log = min(self._dirty, self._last), self._log
+        first, log = self._dirty, self._log
         order = log.rows_from(self._origin_ns + first * self._step_ns)
         inputs = Inputs(self._odometry.rows, log.events, order, log.outcomes)
-        span = Span(first, last, self._seconds(now_ns))
+        waiting = last + 1 - self._wait_steps
+        span = Span(first, last, waiting, self._seconds(now_ns))
         replay(self._event_kernels, self._tables, self._checkpoints, inputs, span, self._state, self._moments)
         self._velocities.clear()
-        self._now_ns, self._last, self._dirty = now_ns, last, last
+        self._now_ns, self._last, self._dirty = now_ns, last, min(waiting, last)
         self._log.forget_before(self._origin_ns + (last - self._behind) * self._step_ns)
 
     def _report(self) -> None:
-        for row in [row for row in self._fresh if self._log.verdict_code(row) != PENDING]:
+        for row in self._log.reached(self._fresh):
             self._corrections.append(self._log.correction(row, *self._fresh.pop(row)))

@@ -1,7 +1,7 @@
 """Settings of the estimator, and how they follow from a resolved field."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -50,6 +50,8 @@ _MANOEUVRING_SHARE = 0.07
 # Deviation of a target's turn rate over its highest, and of each component of its velocity, before it is seen, over its
 # highest speed.
 _TURN_SHARE, _SPEED_SHARE = 0.5 / math.pi, 0.4 / 0.7
+# From so many robots on observations wait for the odometry of their time, and what odometry takes to arrive [s].
+_LARGE_TEAM, _ARRIVES_S = 12, 0.01
 # Of the acceleration of a target that turns, what is left to one that goes straight on.
 _STRAIGHT_SHARE = 0.5
 
@@ -59,6 +61,8 @@ class EstimatorParameters:
     """Entities and sensors by name, and the settings of the filter.
 
     step_s: odometry is condensed and checkpoints are kept at this spacing; max_lateness_s: the rewind's bound;
+    wait_s: how long observations wait for the odometry of their time (0: each counts at once, and is computed again
+    whenever odometry of its time arrives);
     wild_gates: beyond this many gates a measurement is not even used inflated; divergence_count of them in a row over
     at least divergence_s re-initialise the entity. inertial: robots whose attitude is taken from their IMU where they
     publish one (inertial.py), with their velocity scale. joins_early: robots that join as soon as they begin to take
@@ -71,6 +75,7 @@ class EstimatorParameters:
     sensors: Mapping[str, ObservationModel] = field(default_factory=dict)
     step_s: float = 0.01
     max_lateness_s: float = 0.5
+    wait_s: float = 0.0
     gate_probability: float = 0.997
     wild_gates: float = 6.0
     divergence_count: int = 5
@@ -106,6 +111,7 @@ def parameters_from_field(resolved: ResolvedField) -> EstimatorParameters:
         entities,
         cameras,
         max_lateness_s=estimator.max_lateness_s,
+        wait_s=_wait_s(drones.values()),
         gate_probability=estimator.gate_probability,
         inertial={
             n: d.odometry.velocity_scale for n, d in drones.items() if not kind_named(d.kind).habits.tells_attitude
@@ -116,6 +122,14 @@ def parameters_from_field(resolved: ResolvedField) -> EstimatorParameters:
         ranging={name: _ranged(system, drones) for name, system in resolved.ranging.items()},
         reporting=reporting,
     )
+
+
+def _wait_s(drones: Collection[FieldDrone]) -> float:
+    """Return how long observations of a team wait: a small one's are cheap to compute again."""
+    if len(drones) < _LARGE_TEAM:
+        return 0.0
+    delays_ms = [delay for d in drones for delay in (d.odometry.velocity_delay_ms, d.odometry.height_delay_ms)]
+    return max(0.0, *delays_ms) / 1000 + _ARRIVES_S
 
 
 def _robot(drone: FieldDrone) -> OdometryRobot:

@@ -16,7 +16,7 @@ from groundstation.estimation.linear import copy_matrix
 from groundstation.estimation.model_kernels import call_begin, call_handle
 from groundstation.estimation.modes import combine, mix
 from groundstation.estimation.motion import predict
-from groundstation.estimation.records import CondensedOdometry, EntityMemory
+from groundstation.estimation.records import COMPARED, OBSERVATION, REPORTED, CondensedOdometry, EntityMemory, EventRow
 from groundstation.kernel import Rows, copy_rows, kernel
 
 _MEMORY = EntityMemory.dtype
@@ -56,6 +56,12 @@ def checkpoint(ring: Checkpoints, step: int) -> State:
 
 
 @kernel(inlined=True)
+def is_reading(event: EventRow) -> bool:
+    """Return whether an event is what a sensor says, and no change of who is in the state."""
+    return bool(event.kind == OBSERVATION or event.kind == REPORTED or event.kind == COMPARED)
+
+
+@kernel(inlined=True)
 def predict_modes(state: State, tables: Tables, dt: float) -> None:
     """Predict all modes."""
     for m in range(state.weights.shape[0]):
@@ -69,13 +75,14 @@ def replay(
     """Run the steps of a span from the checkpoint of the first, renewing checkpoints; leaves the belief at its end.
 
     Checkpoint k is the state at time k * step_s before anything of step k; rings are indexed modulo their length. No
-    event in `inputs.order` is before the first step; event_kernels: addresses by kind of event.
+    event in `inputs.order` is before the first step; event_kernels: addresses by kind of event. What lies beyond the
+    first step whose observations wait is predicted only, and has no checkpoints.
     """
     step_s, order, events = tables.settings.step_s, inputs.order, inputs.events
     copy_state(checkpoint(ring, span.first), state)
     i = 0
     for k in range(span.first, span.last + 1):
-        if k > span.first:
+        if span.first < k <= span.waiting:
             copy_state(state, checkpoint(ring, k))
         mix(state, tables)
         begin_step(state, tables, inputs.odometry[k % ring.means.shape[0]])
@@ -83,12 +90,14 @@ def replay(
         end = min((k + 1) * step_s, max(span.now, t))
         while i < order.shape[0] and events[order[i]].step == k and events[order[i]].at <= span.now:
             row = order[i]
+            i += 1
+            if k >= span.waiting and is_reading(events[row]):
+                continue
             at = min(max(events[row].at, t), end)
             if at > t:
                 predict_modes(state, tables, at - t)
                 t = at
             call_handle(event_kernels[events[row].kind], (state, tables, events[row], inputs.outcomes[row]))
-            i += 1
         if end > t:
             predict_modes(state, tables, end - t)
     combine(state, tables, out)

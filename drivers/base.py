@@ -93,7 +93,7 @@ class HostProcess(Protocol):
         """Publish the process status when due."""
 
     def sleep_until(self, deadline_ns: int) -> bool:
-        """Sleep until a monotonic time or `wake`; False when a stop is requested."""
+        """Sleep until a time of the bus's clock [ns] or `wake`; False if a stop or the supervisor's death ended it."""
 
     def wake(self) -> None:
         """End a sleep early, the one under way or the next; from any thread."""

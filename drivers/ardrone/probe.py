@@ -68,7 +68,7 @@ def probe(address: str) -> ProbeReport:
 
 
 def _look(line: Conversation, report: ProbeReport) -> None:
-    """Watch without sending; an idle drone on the ground is then asked for both kinds of navdata."""
+    """Watch, sending no command; an idle drone on the ground is then asked for both kinds of navdata."""
     first = line.stream(_LOOK_S)
     if first.mode != "bootstrap" or line.is_set(StateBit.FLY):
         report.streams.append(first)

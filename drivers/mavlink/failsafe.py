@@ -12,14 +12,16 @@ from drivers.vehicle_settings import VehicleLimits
 # Its positions end with its driver: told to stand still it slides off ever faster (docs/reference/mavlink.md 2.1). By
 # itself it would land as soon: COM_OF_LOSS_T.
 HOVERS_S = 0.5
+# Those that ground stations have.
+_SYSTEM, _COMPONENT = 255, 190
 
 
-def hover_and_land(systems: Sequence[int], our_system: int = 255, *, signed: bool = False) -> tuple[bytes, bytes]:
+def hover_and_land(systems: Sequence[int], *, signed: bool = False) -> tuple[bytes, bytes]:
     """Return the datagrams that stop and that land the vehicles of a link; both are obeyed as often as repeated.
 
     signed: with room for signatures, which whoever sends them makes (`wire/signature.py`).
     """
-    encoder = FrameEncoder(our_system, 190, Signing(bytes(32), 0) if signed else None)
+    encoder = FrameEncoder(_SYSTEM, _COMPONENT, Signing(bytes(32), 0) if signed else None)
     stop = [setpoint_from_velocity(system, 0, (0.0, 0.0, 0.0), 0.0, VehicleLimits()) for system in systems]
     land = [CommandLong(system, 1, MavCmd.NAV_LAND, 0) for system in systems]
     return b"".join(map(encoder.encode, stop)), b"".join(map(encoder.encode, land))

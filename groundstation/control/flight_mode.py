@@ -7,8 +7,7 @@ from enum import StrEnum
 class FlightMode(StrEnum):
     """What a robot is flown by."""
 
-    GROUNDED = "GROUNDED"  # not airborne: no setpoint is published
-    UNKNOWN = "UNKNOWN"  # airborne, not in the belief: hover until a camera has seen it
+    UNKNOWN = "UNKNOWN"  # not in the belief: hover until a camera has seen it
     RETURN = "RETURN"  # badly localised or unseen for too long: back to the middle of the world-fixed cameras' view
     SEARCH = "SEARCH"  # localised, but no target: look around
     TRACK = "TRACK"  # obey the plan
@@ -16,9 +15,11 @@ class FlightMode(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Situation:
-    """What the table reads of one robot; target_fresh: seen within lost_after_s; planned: the plan holds controls."""
+    """What the table reads of one airborne robot.
 
-    airborne: bool
+    target_fresh: seen within lost_after_s; planned: the plan holds controls.
+    """
+
     in_belief: bool
     lost: bool = False
     target_fresh: bool = False
@@ -26,9 +27,7 @@ class Situation:
 
 
 def flight_mode_of(situation: Situation) -> FlightMode:
-    """Return the phase; the first row that fits, from the most careful to the boldest."""
-    if not situation.airborne:
-        return FlightMode.GROUNDED
+    """Return the mode; the first row that fits, from the most careful to the boldest."""
     if not situation.in_belief:
         return FlightMode.UNKNOWN
     if situation.lost:

@@ -23,10 +23,9 @@ class SearchParameters:
     count on; observers: robots and world-fixed cameras that may see targets; height_m: of the search; begin_after_s:
     unseen for so long, a map takes the Gaussian's place; given_up_below: probability that the target is where it was
     predicted below which the search begins, though `lost_after_s` is not over; patience_s: what is seen so much later
-    counts 1/e; keep_gain: another stand must promise so much more; drift_m_s: how fast a robot's place becomes
-    uncertain out of sight; starts_ahead_m: how far before the team a target is expected that was never seen;
-    target_speed_m_s, target_straight_s: of a target that drives about; lost_after_s, lost_excluded: after so long a
-    search that excluded so much of the room a person is asked.
+    counts 1/e; keep_gain: another stand must promise so much more; starts_ahead_m: how far before the team a target is
+    expected that was never seen; target_speed_m_s, target_straight_s: of a target that drives about; lost_after_s,
+    lost_excluded: after so long a search that excluded so much of the room a person is asked.
     """
 
     room_m: tuple[float, float]
@@ -45,7 +44,6 @@ class SearchParameters:
     patience_s: float = 10.0
     keep_gain: float = 1.3
     plan_period_s: float = 0.3
-    drift_m_s: float = 0.04
     starts_ahead_m: float = 1.2
     target_speed_m_s: float = 0.3
     target_straight_s: float = 2.0

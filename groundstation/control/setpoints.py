@@ -94,7 +94,6 @@ def setpoints_from_plan(
     phases = {
         name: flight_mode_of(
             Situation(
-                airborne=True,
                 in_belief=name in now.robots,
                 lost=name in now.robots and _is_lost(name, now),
                 target_fresh=fresh,

@@ -11,8 +11,8 @@ from groundstation.bus.messages import PoseHypothesis, Verdict
 from groundstation.estimation import records as r
 from groundstation.estimation.measurement import Correction, Measurement, SensorReading
 
-# Reason of a sighting for which a belief would have been given up, had not others been for the same observer.
 FAR = "far beyond the gate"
+# Reason of a sighting for which a belief would have been given up, had not others been for the same observer.
 HASTY = "far beyond the gate, but its observer lately had others given up"
 _VERDICTS = {
     r.ACCEPTED: (Verdict.ACCEPTED, ""),

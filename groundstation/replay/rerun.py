@@ -111,7 +111,7 @@ class Rerun:
         self._workers: list[JournalWorker] = []
         self._bus = JournalBus(site, first.header.source, first.header.clock)
         feed = TrackerFeed(self._arrivals, self._worker_of, first.header.clock, first.tick)
-        self._tracking = Tracking(self._bus, TrackerSection(field, "", epoch), feed)
+        self._tracking = Tracking(self._bus, TrackerSection(field, epoch), feed)
 
     def _worker_of(self, planner: Planner) -> JournalWorker:
         self._workers.append(JournalWorker(planner))

@@ -20,9 +20,9 @@ from groundstation.bus.topics import BELIEF, ESTIMATE, INNOVATION, JOURNAL, PLAN
 from groundstation.control.output_limiter import Limited
 from groundstation.estimation.measurement import Correction
 from groundstation.planning.planner import PlanResult
+from groundstation.runtime.asking import TEAM
 from groundstation.tracker import Tracker
 
-TEAM = "team"
 _SHADES = 255.0  # of the likeliest cell of a map
 
 

@@ -19,9 +19,10 @@ from groundstation.doctor.finding import Finding, Level
 from groundstation.field.resolved import ResolvedField
 from groundstation.preflight.judge import judge, open_musts
 from groundstation.preflight.pad_record import PadRecord
+from groundstation.runtime.asking import TEAM
 
 _STANDS = frozenset({FlightState.LANDED, FlightState.EMERGENCY})
-_ON_GROUND = _STANDS | {FlightState.UNKNOWN, FlightState.LOST}
+_NOT_SEEN_TO_FLY = _STANDS | {FlightState.UNKNOWN, FlightState.LOST}
 _AGAIN_NS = 3_000_000_000
 _SEVERITIES = {Level.MUST: Severity.ERROR, Level.SHOULD: Severity.WARNING}
 
@@ -56,17 +57,17 @@ class BeforeTakeOff:
             self._tell(self.findings(now_ns), now_ns)
 
     def _anybody_flies(self) -> bool:
-        return any(status.flight_state not in _ON_GROUND for status in self._vehicles.values())
+        return any(status.flight_state not in _NOT_SEEN_TO_FLY for status in self._vehicles.values())
 
     def _hear(self, status: VehicleStatus) -> None:
         name = status.header.entity
         self._vehicles[name] = status
-        if status.flight_state not in _ON_GROUND:
+        if status.flight_state not in _NOT_SEEN_TO_FLY:
             self._flew.add(name)
             self._record.forget(name)
 
     def complete(self, now_ns: int) -> bool:
-        """Return whether every process has spoken and every drone that has not flown was seen often enough."""
+        """Return whether every fixed sensor has spoken and every drone that has not flown was seen often enough."""
         if not set(self._field.world_sensors) <= self._cameras.keys():
             return False
         seen = {sighting.drone for sighting in self._record.medians(now_ns)}
@@ -85,7 +86,7 @@ class BeforeTakeOff:
         self._tell(findings, now_ns)
         for one in findings:
             if one.level in _SEVERITIES:
-                entity = one.subject if one.subject in self._field.drones else "team"
+                entity = one.subject if one.subject in self._field.drones else TEAM
                 text = f"before take-off: {one.subject}: {one.found}"
                 header = self._bus.header(entity)
                 event = Event(header=header, severity=_SEVERITIES[one.level], text=text, remedy=one.remedy)
@@ -94,11 +95,11 @@ class BeforeTakeOff:
     def _tell(self, findings: Collection[Finding], now_ns: int) -> None:
         self._next_ns = now_ns + _AGAIN_NS
         rows = tuple(PreflightFinding(one.level, one.subject, one.found, one.remedy) for one in findings)
-        self._bus.publish(PREFLIGHT, Preflight(header=self._bus.header("team"), findings=rows))
+        self._bus.publish(PREFLIGHT, Preflight(header=self._bus.header(TEAM), findings=rows))
 
     def record_override(self, who: str, findings: Collection[Finding]) -> None:
         """Tell everybody, and the recording, that somebody takes off although it was forbidden."""
         what = "; ".join(f"{one.subject}: {one.found}" for one in findings)
         text = f"{who} takes off although it must not: {what}"
-        event = Event(header=self._bus.header("team"), severity=Severity.WARNING, text=text, remedy="land")
+        event = Event(header=self._bus.header(TEAM), severity=Severity.WARNING, text=text, remedy="land")
         self._bus.publish(EVENT, event)

@@ -17,11 +17,9 @@ _PERIOD_NS = 84 * NS_PER_MS
 
 
 class MonitorSection(msgspec.Struct, frozen=True):
-    """What the supervisor hands to the monitor: the resolved field (and what the recorder needs)."""
+    """What the supervisor hands to the monitor: the resolved field."""
 
     field: ResolvedField
-    run_dir: str = ""
-    epoch: int = 0
 
 
 def run(child: Child) -> int:

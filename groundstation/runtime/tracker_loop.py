@@ -15,7 +15,8 @@ from groundstation.bus.notice import Notice
 from groundstation.bus.topics import SEARCH_MAP
 from groundstation.field.resolved import ResolvedField
 from groundstation.planning.planner import Planner, PlanRequest
-from groundstation.runtime.announcer import TEAM, Announcer
+from groundstation.runtime.announcer import Announcer
+from groundstation.runtime.asking import TEAM
 from groundstation.runtime.consistency_watch import ConsistencyWatch
 from groundstation.runtime.inbox import Inbox
 from groundstation.runtime.journal import FAULT, Adoption, entry_of
@@ -34,10 +35,9 @@ EPOCHS_PER_LIFE = 1000  # the tracker itself begins a new epoch when its belief 
 
 
 class TrackerSection(msgspec.Struct, frozen=True):
-    """What the supervisor hands to the tracker: the resolved field, the run folder, the life's number."""
+    """What the supervisor hands to the tracker: the resolved field, the life's number."""
 
     field: ResolvedField
-    run_dir: str = ""
     epoch: int = 0
 
 

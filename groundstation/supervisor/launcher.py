@@ -16,6 +16,7 @@ from groundstation.supervisor.process_spec import ProcessSpec
 from groundstation.supervisor.run import Run
 
 # 13 processes on 2 cores: a thread pool per process would only fight over them.
+_TAIL_LINES = 8
 _SINGLE_THREADED = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
@@ -98,10 +99,10 @@ class Launcher:
             env=os.environ | dict.fromkeys(_SINGLE_THREADED, "1"),
         )
 
-    def log_tail(self, name: str, lines: int = 8) -> str:
+    def log_tail(self, name: str) -> str:
         """Return the last lines of a process's log, for an error message."""
         with suppress(OSError):
-            return "\n".join(self.log_path(name).read_text(errors="replace").splitlines()[-lines:])
+            return "\n".join(self.log_path(name).read_text(errors="replace").splitlines()[-_TAIL_LINES:])
         return ""
 
     def close(self) -> None:

@@ -83,7 +83,7 @@ class FlownStudy(Study):
         self._odometry_every, self._said_every, self._truth_every = (8, 10, 40) if small else (1, 1, 10)
         self._arrivals = Arrivals()
         self._bus = JournalBus(SITE, "tracker", CLOCK)
-        self._tracking = Tracking(self._bus, TrackerSection(field, "", 1), TrackerFeed(self._arrivals, Worker, CLOCK))
+        self._tracking = Tracking(self._bus, TrackerSection(field, 1), TrackerFeed(self._arrivals, Worker, CLOCK))
         self.tracker = self._tracking.tracker
         timeline = Timeline(CLOCK, UNIX_OFFSET_NS)
         self._capture = Capture(timeline)

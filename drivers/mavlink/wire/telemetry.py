@@ -8,7 +8,7 @@ Floats = tuple[float, ...]
 
 
 class Heartbeat(NamedTuple):
-    """A vehicle's presence and mode; the meaning of custom_mode depends on the autopilot (modes.py)."""
+    """A vehicle's presence and mode; the meaning of custom_mode depends on the autopilot (names.py)."""
 
     type: int
     autopilot: int

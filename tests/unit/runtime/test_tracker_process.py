@@ -64,7 +64,7 @@ class Lab:
         self.listener = MemoryBus(exchange, "lab", "listener")
         self.heard = self.listener.subscribe([ESTIMATE, BELIEF, SETPOINT, PLAN, INNOVATION, JOURNAL, COMMAND])
         self.tape = self.listener.subscribe([ODOMETRY, OBSERVATION, VEHICLE_STATUS])
-        self.tracking = Tracking(MemoryBus(exchange, "lab", "tracker"), TrackerSection(field, "", 2))
+        self.tracking = Tracking(MemoryBus(exchange, "lab", "tracker"), TrackerSection(field, 2))
         self.now = clock.now_ns()
         self.rng = np.random.default_rng(1)
 

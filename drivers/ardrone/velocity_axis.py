@@ -32,7 +32,8 @@ class Gains:
     difference between the measured speed and that one which a wrong scale and gusts explain, and the integral of what
     exceeds it that nothing does; answer_s: by how much the measured one is later. lasting_s: what the measured speed
     teaches in less time may be its drift. seen_ticks, seen_rad_s, first_seen: what cameras see is the mean of so many
-    calls, and draws the observer with this bandwidth where nothing else is measured, at first by this share.
+    calls, and draws the observer with this bandwidth where nothing else is measured, at first by this share. push_s:
+    time constant of the push that goes on where the accelerometers fall silent.
     """
 
     proportional: float = 1.6
@@ -61,6 +62,7 @@ class Gains:
     seen_ticks: int = SEEN_TICKS
     seen_rad_s: float = 2.0
     first_seen: float = 0.9
+    push_s: float = 0.5
 
 
 class Axis:
@@ -78,7 +80,7 @@ class Axis:
         self._reference_rate = self._tilt = self._tilt_rate = 0.0
         self._under_way = deque([0.0] * self._gains.dead_ticks)
         self._lately = deque([self.speed_m_s], self._gains.seen_ticks)
-        self._unseen = 0.0
+        self._unseen = self._push_m_s2 = 0.0
         self.flown_m_s = self.speed_m_s
         self._expected_m_s = self.flown_m_s
         self._unexplained_m = 0.0
@@ -125,12 +127,12 @@ class Axis:
         """Take a measurement; returns how air and bias accelerate the vehicle [m/s^2].
 
         measured_m_s: None where there is none, so that the speed is integrated. force_m_s2: specific force, None unless
-        measured. turn_m_s2: change of the speed by turning of its frame. drift_m_s: known part of the measured speed
-        that is not true.
+        measured: what it last showed besides drag then goes on. turn_m_s2: change of the speed by turning of its frame.
+        drift_m_s: known part of the measured speed that is not true.
         """
         gains = self._gains
         blind = force_m_s2 is None
-        air = -self.drag(self.speed_m_s) if force_m_s2 is None else force_m_s2 / gains.accelerometer_gain
+        air = self._air(force_m_s2, dt_s)
         outside = air + self.bias_m_s2
         self._wind_m_s2 = 0.0 if blind or self.contradicted else self._wind(air)
         acceleration = self._answer(dt_s) + outside + turn_m_s2
@@ -149,6 +151,14 @@ class Axis:
         self._lasting_m_s2 += (self.bias_m_s2 - self._lasting_m_s2) * min(1.0, dt_s / gains.lasting_s)
         self._unseen = gains.first_seen
         return outside
+
+    def _air(self, force_m_s2: float | None, dt_s: float) -> float:
+        drag = self.drag(self.speed_m_s)
+        if force_m_s2 is None:
+            return self._push_m_s2 - drag
+        air = force_m_s2 / self._gains.accelerometer_gain
+        self._push_m_s2 += (air + drag - self._push_m_s2) * min(1.0, dt_s / self._gains.push_s)
+        return air
 
     def _wind(self, air_m_s2: float) -> float:
         """Return the push that the accelerometers show, if more than a wrong drag explains [m/s^2].

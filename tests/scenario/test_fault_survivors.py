@@ -30,6 +30,10 @@ CARRIED_OFF = (42032, ["uniform_floor"])
 # A velocity stuck at -0.6 m/s is no floor that is not seen: the firmware brakes better than the driver then.
 STUCK_IN_MOTION = (20223, ["velocity_stuck"])
 
+# Blind for 0.4 s, then silent: told to hold its place, which it does by the same optical flow, it flew on level. Drawn
+# of these two kinds.
+SILENT_TOO = (48303, ["navdata_silent", "uniform_floor"])
+
 # The ceiling saw the velocity drift off, and lost sight of the drone; the other drone was blind.
 BELIEVED_AGAIN = (50, ["picture_black", "velocity_drifting"])
 
@@ -94,6 +98,14 @@ def test_a_blind_drone_is_braked_while_it_comes_down() -> None:
 @pytest.mark.study
 def test_a_drone_whose_velocity_is_stuck_in_motion_is_left_to_its_firmware_as_it_lands() -> None:
     assert safely_flown(order_of([]), *STUCK_IN_MOTION)["rest_s"] <= 3.0
+
+
+@pytest.mark.slow
+@pytest.mark.study
+def test_a_blind_drone_that_falls_silent_is_braked_on() -> None:
+    seed, kinds = SILENT_TOO
+    flown = safely_flown(order_of([]) | {"kinds": ["uniform_floor", "navdata_silent"]}, seed, kinds)
+    assert flown["rest_s"] <= 1.0
 
 
 @pytest.mark.slow

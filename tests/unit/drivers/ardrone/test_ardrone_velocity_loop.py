@@ -235,21 +235,24 @@ def test_a_healthy_flight_is_never_contradicted(sensed, contradictions):
     assert len(contradictions) > 2000 and not any(contradictions)
 
 
-def stop_blindly(push, seen_s, wrong=0.0, drift=0.0, cameras=False):
+def stop_blindly(push, seen_s, wrong=0.0, drift=0.0, cameras=False, told_s=9.0, offset=0.0):
     """Fly 0.5 m/s, seen until seen_s, then with a speed that is off by `wrong` for 0.7 s, then brake for 4 s.
 
     Return the true speeds of the last second; push: of the air from the brake on [m/s^2]; drift: error of the speed
-    that is seen in flight [m/s]; cameras: whether they see the drone.
+    that is seen in flight [m/s]; cameras: whether they see the drone; told_s: the accelerometers are told for so long
+    after seen_s; offset: of theirs [m/s^2], as the standing drone has shown.
     """
     rng, loop, tilt = random.Random(1), VelocityLoop(ArDroneLimits()), Tilt()
+    for _ in range(400):
+        loop.stand((offset, 0.0), 1 / 40)
     speed, pitch, speeds, air = 0.0, 0.0, list[float](), []
     for i in range(round((seen_s + 4.7) / TICK_S)):
         now_s = i * TICK_S
         outside = -speed * (0.2 + 0.1 * abs(speed)) + (push if now_s > seen_s else 0.0)
         speed += (9.81 * math.tan(tilt.step(pitch)) + outside) * TICK_S
-        air.append(0.92 * outside + rng.gauss(0, 0.045))
+        air.append(0.92 * outside + offset + rng.gauss(0, 0.045))
         if i % 5 == 0:
-            force = (sum(air) / len(air), 0.0)
+            force = (sum(air) / len(air), 0.0) if now_s < seen_s + told_s else None
             air.clear()
             measured = (speed + drift + rng.gauss(0, 0.04), 0.0, 0.0) if now_s < seen_s else None
             measured = (speed + wrong, 0.0, 0.0) if wrong and now_s >= seen_s else measured
@@ -271,6 +274,13 @@ def stop_blindly(push, seen_s, wrong=0.0, drift=0.0, cameras=False):
 def test_a_drone_that_sees_no_floor_is_braked_by_what_it_knows(seen_s, push):
     """Level, as its firmware hovers then, it would still do 0.3 m/s: air alone hardly brakes."""
     assert max(abs(speed) for speed in stop_blindly(push, seen_s)) <= 0.12
+
+
+@pytest.mark.parametrize("push", [0.0, 0.15, -0.15])
+@pytest.mark.parametrize("offset", [0.0, 0.2, -0.2])
+def test_one_that_falls_silent_besides_is_braked_by_what_its_accelerometers_showed_last(push, offset):
+    """From 0.5 m/s: told to hold its place without a floor it came to rest on the floor, 6.5 s later."""
+    assert max(abs(speed) for speed in stop_blindly(push, 4.0, told_s=0.9, offset=offset)) <= 0.15
 
 
 def test_a_speed_that_contradicts_the_requests_is_no_guide_to_braking():

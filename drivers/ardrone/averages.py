@@ -4,6 +4,7 @@ import threading
 from collections import deque
 
 from drivers.ardrone.convert import NavdataMotion
+from groundstation.bus.messages import Vector3
 
 # In flight no measured velocity comes twice: one that has come so often is none.
 _REPEATED = 4
@@ -20,6 +21,8 @@ class MotionMean:
         self._velocity = (0.0, 0.0, 0.0)
         self._newest, self._standing = (0.0, 0.0), (1, 1)
         self._force: tuple[float, float] | None = None
+        self._newest_force: Vector3 | None = None
+        self._forces_standing = 0
 
     def add(self, motion: NavdataMotion) -> None:
         """Take the motion of one packet."""
@@ -29,11 +32,19 @@ class MotionMean:
             (before_x, before_y), (times_x, times_y) = self._newest, self._standing
             self._standing = (times_x + 1 if x == before_x else 1, times_y + 1 if y == before_y else 1)
             self._newest = (x, y)
+            force = motion.specific_force_m_s2
+            self._forces_standing = self._forces_standing + 1 if force == self._newest_force else 1
+            self._newest_force = force
 
     @property
     def repeats(self) -> bool:
         """Return whether a horizontal velocity stands still to the last bit: the drone does not see its own motion."""
         return max(self._standing) >= _REPEATED
+
+    @property
+    def frozen(self) -> bool:
+        """Return whether the accelerometers repeat themselves as well, or tell nothing: what comes is old."""
+        return self._forces_standing >= _REPEATED
 
     def drain(self) -> tuple[tuple[float, float, float], tuple[float, float] | None]:
         """Return (velocity, force forward and left or None) since the last call, or once more the last ones."""

@@ -43,7 +43,7 @@ RATE_HZ = 40.0
 _FRESH_NS = 300_000_000
 # Long enough that the drone waits for RESUME.
 _DOUBTED_NS = 1_300_000_000
-# A blind drone that falls silent is braked on by what its loop knows, until it would land for its silence.
+# A blind drone that falls silent or freezes is braked on by what its loop knows, until it would land for that.
 _BRAKED_ON_NS = 3_000_000_000
 # What a drone reports that sees no floor: not what it flew last, so that its firmware's own braking fails as well.
 _NO_FLOW_M_S = 0.02
@@ -104,6 +104,7 @@ class ArDrone:
         self._descent, self._sinks = BlindDescent(), False
         self._plausibility = MotionMonitor(LIMITS)
         self._applied_ns = 0
+        self._blind_ns = -_BRAKED_ON_NS
         self._doubted_ns = -_DOUBTED_NS
         self._video_refused = False
         self._refused: Counter[str] = Counter()
@@ -222,16 +223,18 @@ class ArDrone:
         dt_s = (now_ns - self._applied_ns) * 1e-9
         self._applied_ns = now_ns
         velocity, force = self._motion.drain()
-        silence_ns = now_ns - heard.moved_ns
-        fresh = silence_ns <= _FRESH_NS
+        fresh = now_ns - heard.moved_ns <= _FRESH_NS
         if decision.action is Action.IDLE and fresh and force is not None:
             self._loop.stand(force, dt_s)
-        blind = silence_ns <= _BRAKED_ON_NS and self._is_blind()
-        flowless = blind and fresh and math.hypot(*heard.velocity_m_s[:2]) < _NO_FLOW_M_S
+        blind = fresh and self._is_blind()
+        flowless = blind and math.hypot(*heard.velocity_m_s[:2]) < _NO_FLOW_M_S
         self._sinks = self._descent.step(now_ns, decision.action is Action.LAND, flowless, heard.height_m)
-        if blind and (self._sinks or decision.action is Action.HOVER):
+        told = fresh and not self._motion.frozen
+        self._blind_ns = now_ns if blind and told else self._blind_ns
+        was_blind = not told and now_ns - self._blind_ns <= _BRAKED_ON_NS
+        if (blind or was_blind) and (self._sinks or decision.action is Action.HOVER):
             climb_m_s = -self._settings.limits.max_climb_m_s if self._sinks else 0.0
-            return self._loop.brake(dt_s, force if fresh else None, decision.seen_m_s, climb_m_s)
+            return self._loop.brake(dt_s, force if told else None, decision.seen_m_s, climb_m_s)
         if decision.action is not Action.FLY or not fresh:
             self._loop.reset()
             return velocity_loop.HOVER

@@ -30,9 +30,12 @@ CARRIED_OFF = (42032, ["uniform_floor"])
 # A velocity stuck at -0.6 m/s is no floor that is not seen: the firmware brakes better than the driver then.
 STUCK_IN_MOTION = (20223, ["velocity_stuck"])
 
-# Blind for 0.4 s, then silent: told to hold its place, which it does by the same optical flow, it flew on level. Drawn
-# of these two kinds.
-SILENT_TOO = (48303, ["navdata_silent", "uniform_floor"])
+# Blind, and half a second later silent or frozen: told to hold its place, which it does by the same optical flow, it
+# flew on level. Drawn of these two kinds.
+SILENT_TOO = {
+    "silent": (48303, ["navdata_silent", "uniform_floor"]),
+    "frozen": (48132, ["telemetry_frozen", "uniform_floor"]),
+}
 
 # The ceiling saw the velocity drift off, and lost sight of the drone; the other drone was blind.
 BELIEVED_AGAIN = (50, ["picture_black", "velocity_drifting"])
@@ -102,10 +105,10 @@ def test_a_drone_whose_velocity_is_stuck_in_motion_is_left_to_its_firmware_as_it
 
 @pytest.mark.slow
 @pytest.mark.study
-def test_a_blind_drone_that_falls_silent_is_braked_on() -> None:
-    seed, kinds = SILENT_TOO
-    flown = safely_flown(order_of([]) | {"kinds": ["uniform_floor", "navdata_silent"]}, seed, kinds)
-    assert flown["rest_s"] <= 1.0
+@pytest.mark.parametrize(("seed", "kinds"), SILENT_TOO.values(), ids=SILENT_TOO)
+def test_a_blind_drone_that_tells_nothing_new_is_braked_on(seed: int, kinds: list[str]) -> None:
+    flown = safely_flown(order_of([]) | {"kinds": ["uniform_floor", kinds[0]]}, seed, kinds)
+    assert flown["rest_s"] <= 2.0
 
 
 @pytest.mark.slow

@@ -1,0 +1,105 @@
+"""For how long a value, a velocity or a vehicle's clock has stood, and how late values are: to the packet."""
+
+import math
+
+import pytest
+
+from drivers.plausibility.clock_watch import ClockWatch
+from drivers.plausibility.health import Finding, Health, HealthReport, Sensor
+from drivers.plausibility.repeats import RepeatWatch, StandstillWatch
+
+MS, S = 1_000_000, 1_000_000_000
+LEAN_RAD = 0.1
+LEAN_M_S2 = 9.80665 * math.tan(LEAN_RAD)
+
+
+def held(watch, values, every_ms=10, begins_ms=1000):
+    """Return for how long each value had stood when it came [s]."""
+    return [watch.update((begins_ms + i * every_ms) * MS, value) for i, value in enumerate(values)]
+
+
+# -- what repeats -----------------------------------------------------------------------------------------------------
+
+
+def test_the_fourth_of_equal_values_stands_since_the_first():
+    assert held(RepeatWatch(), [1.0] * 6) == pytest.approx([0.0, 0.0, 0.0, 0.03, 0.04, 0.05])
+    assert held(RepeatWatch(), [1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 1.0]) == pytest.approx([0.0] * 6 + [0.03, 0.0])
+
+
+def test_a_value_that_did_not_come_for_longer_than_the_gap_stands_anew():
+    assert held(RepeatWatch(), [1.0] * 5, every_ms=300) == pytest.approx([0.0, 0.0, 0.0, 0.9, 1.2])
+    assert held(RepeatWatch(), [1.0] * 5, every_ms=301) == [0.0] * 5
+    assert held(RepeatWatch(gap_s=0.1), [1.0] * 5, every_ms=101) == [0.0] * 5
+
+
+def test_what_was_before_a_reset_does_not_count():
+    watch = RepeatWatch()
+    held(watch, [1.0] * 4)
+    watch.reset()
+    assert held(watch, [1.0] * 4, begins_ms=1040) == pytest.approx([0.0, 0.0, 0.0, 0.03])
+
+
+def stood(watch, velocities, lean_rad=LEAN_RAD, begins_ms=1000):
+    """Return (for how long it had stood, change of speed by the tilt) at each velocity."""
+    return [watch.update((begins_ms + i * 10) * MS, speed, lean_rad) for i, speed in enumerate(velocities)]
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_tilt_tells_by_how_much_a_standing_velocity_should_have_changed(sign):
+    found = stood(StandstillWatch(), [0.3] * 8, sign * LEAN_RAD)
+    assert [at for at, _ in found] == pytest.approx([0.0, 0.0, 0.0, 0.03, 0.04, 0.05, 0.06, 0.07])
+    assert [change for _, change in found] == pytest.approx([0.01 * LEAN_M_S2 * max(0, i - 2) for i in range(8)])
+
+
+def test_the_change_of_speed_is_counted_anew_where_the_velocity_moved_or_the_watch_began_anew():
+    watch = StandstillWatch()
+    *_, moved, _, _, again = stood(watch, [0.3] * 6 + [0.4] * 4)
+    assert moved == (0.0, 0.0) and again == pytest.approx((0.03, 0.01 * LEAN_M_S2))
+    watch.reset()
+    assert stood(watch, [0.4] * 4, begins_ms=1100)[-1] == pytest.approx((0.03, 0.01 * LEAN_M_S2))
+
+
+# -- its clock --------------------------------------------------------------------------------------------------------
+
+
+def test_a_clock_stands_since_it_last_moved():
+    watch = ClockWatch()
+    assert [watch.update((10 + i) * S, min(i, 2) * S)[0] for i in range(5)] == pytest.approx([0.0, 0.0, 0.0, 1.0, 2.0])
+
+
+def test_lateness_is_against_the_freshest_of_five_to_ten_seconds():
+    watch = ClockWatch()
+    late_s = [0.0] + [0.3] * 12 + [0.1, 0.3]
+    told = [watch.update((10 + i) * S, i * S - round(late * S))[1] for i, late in enumerate(late_s)]
+    # Spans of more than 5 s begin with packets 0, 6 and 12: with the third the first is forgotten.
+    assert told == pytest.approx([0.0] + [0.3] * 11 + [0.0, 0.0, 0.2])
+
+
+def test_who_goes_back_by_more_than_three_seconds_was_started_again():
+    watch = ClockWatch()
+    watch.update(100 * S, 50 * S)
+    assert watch.update(101 * S, 47 * S) == pytest.approx((0.0, 4.0))
+    assert watch.update(102 * S, 44 * S - 1) == (0.0, 0.0)
+    assert watch.update(103 * S, 45 * S - 1) == (0.0, 0.0)
+    assert watch.update(104 * S, 45 * S - 1) == pytest.approx((1.0, 1.0)), "judged by what came since"
+
+
+def test_a_clock_that_starts_over_goes_on_each_time_and_may_still_be_late():
+    watch = ClockWatch(wrap_s=10.0)
+    told = [watch.update((100 + i) * S, (i % 10) * S) for i in range(35)]
+    assert told == [(0.0, 0.0)] * 35
+    assert watch.update(135 * S, 4 * S + S // 2) == pytest.approx((0.0, 0.5))
+    assert watch.update(136 * S, 4 * S) == pytest.approx((0.0, 2.0)), "half a second back is no turn"
+
+
+# -- what is told of it -----------------------------------------------------------------------------------------------
+
+
+def test_a_reason_is_told_of_what_is_bad_enough_and_asked_for():
+    stuck = Finding(Sensor.VELOCITY, Health.BAD, "stuck")
+    report = HealthReport((stuck, Finding(Sensor.CLOCK, Health.SUSPECT, "late")))
+    both, clock = frozenset({Sensor.VELOCITY, Sensor.CLOCK}), frozenset({Sensor.CLOCK})
+    assert report.reason(Health.BAD, both) == "stuck" and report.reason(Health.BAD, clock) == ""
+    assert report.reason(Health.SUSPECT, clock) == "late" and report.reason(Health.SUSPECT, both) == "stuck"
+    assert report.of(Sensor.CLOCK) is Health.SUSPECT and report.of(Sensor.IMU) is Health.GOOD
+    assert Health.GOOD < Health.SUSPECT < Health.BAD

@@ -1,5 +1,6 @@
 """A robot that a fixed camera should see and does not is missed; one that may be hidden is not."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -32,14 +33,16 @@ def missed(
     age_s: float = 2.0,
     std_m: float = 0.05,
     obstacles: tuple[Box, ...] = (),
+    observer: str = "ceiling",
+    found: tuple[str, ...] = ("drone_2",),
 ) -> tuple[list[str], MissingRobots]:
-    """Return whom ten pictures without drone_1 let miss."""
+    """Return whom ten pictures without drone_1, or with others found, let miss."""
     said: list[str] = []
     watch = MissingRobots(replace(SENSORS, obstacles=obstacles), NAMES)
     for tick in range(1, 11):
         stamp_ns = tick * 100_000_000
-        header = Header(stamp_ns, "c", "ceiling", "ceiling", tick)
-        watch.take(SearchedPicture(header=header, observer="ceiling", camera="ceiling", found=("drone_2",)))
+        header = Header(stamp_ns, "c", observer, observer, tick)
+        watch.take(SearchedPicture(header=header, observer=observer, camera=observer, found=found))
         said += watch.advance(belief(first, second, stamp_ns, std_m), {"drone_1": age_s, "drone_2": 0.1})
     return said, watch
 
@@ -72,3 +75,58 @@ def test_one_that_may_well_not_be_seen_is_not_missed(
 def test_one_behind_a_pillar_is_not_missed() -> None:
     said, _ = missed((0.9, 0.4, 1.3, 0.0), (-0.8, 0.0, 1.6, 0.0), obstacles=(Box((0.75, 0.3), (0.3, 0.3, 3.0)),))
     assert said == []
+
+
+HERE, THERE = (0.5, 0.2, 1.6, 0.0), (-0.8, 0.0, 1.6, 0.0)
+
+
+@pytest.mark.parametrize(("age_s", "missed_one"), [(0.6, False), (0.61, True), (math.inf, False)])
+def test_who_was_seen_just_now_or_never_is_not_missed(age_s: float, missed_one: bool) -> None:
+    assert bool(missed(HERE, THERE, age_s)[0]) is missed_one
+
+
+@pytest.mark.parametrize(
+    ("observer", "found", "said"),
+    [("ceiling", (), ["drone_1"]), ("ceiling", NAMES, []), ("drone_2", (), [])],
+    ids=["nobody", "both", "by a camera that moves"],
+)
+def test_only_pictures_of_fixed_cameras_without_it_count(
+    observer: str, found: tuple[str, ...], said: list[str]
+) -> None:
+    assert missed(HERE, THERE, observer=observer, found=found)[0] == said
+
+
+EYE = np.array(SENSORS.world["ceiling"].position_m)
+BELOW = np.array([0.4, 0.2, 1.0])
+
+
+def beside_the_line(share: float, aside_m: float) -> tuple[float, ...]:
+    """Return a place on the line from the ceiling camera to BELOW, and so far beside it."""
+    line = BELOW - EYE
+    across = np.cross(line, (0.0, 0.0, 1.0))
+    return (*(EYE + share * line + aside_m * across / np.linalg.norm(across)).tolist(), 0.0)
+
+
+@pytest.mark.parametrize(
+    ("share", "aside_m", "said"),
+    [(0.6, 0.4, []), (0.6, 0.6, ["drone_1"]), (1.3, 0.0, ["drone_1"]), (-0.2, 0.0, ["drone_1"])],
+    ids=["in the line of sight", "beside it", "behind", "above the camera"],
+)
+def test_whoever_may_stand_before_it_hides_it(share: float, aside_m: float, said: list[str]) -> None:
+    assert missed((*BELOW.tolist(), 0.0), beside_the_line(share, aside_m))[0] == said
+
+
+def test_pictures_count_once_and_what_is_forgotten_begins_anew() -> None:
+    _, watch = missed(HERE, THERE)
+    assert watch.advance(belief(HERE, THERE, 1_500_000_000), {"drone_1": 2.0, "drone_2": 0.1}) == (), "told once"
+    assert watch.missed_s["drone_1"] == pytest.approx(1.1, abs=0.11), "since it was first missed"
+    watch.advance(belief(HERE, THERE, 1_600_000_000), {"drone_1": 0.1, "drone_2": 0.1})
+    watch.advance(belief(HERE, THERE, 1_700_000_000), {"drone_1": 2.0, "drone_2": 0.1})
+    assert watch.missed_s == {}, "no picture since"
+
+
+def test_one_who_does_not_fly_is_not_missed() -> None:
+    said, watch = missed(HERE, THERE)
+    assert said == ["drone_1"]
+    watch.advance(belief(HERE, THERE, 2_000_000_000), {"drone_2": 0.1})
+    assert watch.missed_s == {}

@@ -92,6 +92,14 @@ def test_a_clock_that_starts_over_goes_on_each_time_and_may_still_be_late():
     assert watch.update(136 * S, 4 * S) == pytest.approx((0.0, 2.0)), "half a second back is no turn"
 
 
+def test_what_is_late_as_its_clock_starts_over_is_still_late():
+    """Fresh for 4 s, then a second late, while a clock of 4 s starts over twice; the first freshest count for 11 s."""
+    watch = ClockWatch(wrap_s=4.0)
+    told = [watch.update((100 + at_s) * S, (at_s % 4) * S)[1] for at_s in range(4)]
+    told += [watch.update((100 + at_s) * S, ((at_s - 1) % 4) * S)[1] for at_s in range(5, 12)]
+    assert told == pytest.approx([0.0] * 4 + [1.0] * 7)
+
+
 # -- what is told of it -----------------------------------------------------------------------------------------------
 
 

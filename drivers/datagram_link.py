@@ -13,6 +13,7 @@ from drivers.datagrams import DatagramLog
 from drivers.vehicle_socket import open_udp
 from groundstation.adapters import Address
 from groundstation.bus import clock
+from groundstation.time_units import NS_PER_MS
 
 # Takes a datagram with its arrival [ns] and returns whether it was a report of the vehicle. A ValueError refuses it;
 # the error's `reason`, if it has one, is the word that it is counted by.
@@ -20,7 +21,7 @@ Take = Callable[[int, bytes], bool]
 
 _WAIT_S = 0.1
 _LARGEST = 4096
-_SILENT_NS = 300_000_000
+_SILENT_NS = 300 * NS_PER_MS
 _log = logging.getLogger(__name__)
 
 

@@ -28,14 +28,14 @@ from groundstation.bus.messages import (
 from groundstation.bus.topics import COMMAND, COMMAND_ACK, ESTIMATE, LEASE, SETPOINT, VEHICLE_STATUS
 from groundstation.process.priority import go_first
 from groundstation.process.refusals import Refusals
-from groundstation.time_units import NEVER_NS, NS_PER_S
+from groundstation.time_units import NEVER_NS, NS_PER_MS, NS_PER_S
 
 RATE_HZ = 30.0
-_STATUS_PERIOD_NS, _FLUSH_PERIOD_NS, _FLOOD_NS = 200_000_000, 100_000_000, 10_000_000
-_UNANSWERED_NS, _UNCONFIGURED_NS = 5_000_000_000, 15_000_000_000
-_SILENCE_EVENT_NS = _REFUSAL_PERIOD_NS = 1_000_000_000
+_STATUS_PERIOD_NS, _FLUSH_PERIOD_NS, _FLOOD_NS = 200 * NS_PER_MS, 100 * NS_PER_MS, 10 * NS_PER_MS
+_UNANSWERED_NS, _UNCONFIGURED_NS = 5 * NS_PER_S, 15 * NS_PER_S
+_SILENCE_EVENT_NS = _REFUSAL_PERIOD_NS = NS_PER_S
 # How long a driver that is to exit goes on for a vehicle it cannot hear.
-_GIVE_UP_NS = 10_000_000_000
+_GIVE_UP_NS = 10 * NS_PER_S
 _UNSOUND = "restart it; if it says this again, have that sensor repaired"
 # Refusals that nothing of ours causes, as the operator reads them.
 _INTRUSIONS = {

@@ -7,13 +7,14 @@ from dataclasses import dataclass
 
 from groundstation.bus.messages import Command, Lease, Verb
 from groundstation.bus.stop_mark import StopMark, why_another_runs, why_too_old
+from groundstation.time_units import NS_PER_S
 
 # Orders that begin or go on with a motion; all others stop, and anyone may stop.
 STARTING_VERBS = frozenset({Verb.TAKEOFF, Verb.TRACK, Verb.RESUME})
 # A lease may not claim to live longer than this after it was heard.
-_LONGEST_NS = 5_000_000_000
+_LONGEST_NS = 5 * NS_PER_S
 # Both ends read the same clock; only the order of reading may differ.
-_FUTURE_NS = 1_000_000_000
+_FUTURE_NS = NS_PER_S
 
 
 @dataclass(slots=True)

@@ -4,15 +4,15 @@ import math
 from collections import deque
 
 from groundstation.bus.messages import EntityEstimate
-from groundstation.time_units import NS_PER_S
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
-_WINDOW_NS = 600_000_000
-_LEAST_WINDOW_NS = 450_000_000
+_WINDOW_NS = 600 * NS_PER_MS
+_LEAST_WINDOW_NS = 450 * NS_PER_MS
 _SEEN_AGE_S = 0.5
 _MOST_VARIANCE_M2 = 0.1**2
 # Faster than this is no flight: the belief was set anew.
 _LEAP_M_S = 4.0
-_FRESH_NS = 300_000_000
+_FRESH_NS = 300 * NS_PER_MS
 
 
 class SeenVelocity:

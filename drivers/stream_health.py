@@ -9,7 +9,7 @@ from groundstation.bus.messages import CameraStatus, Severity
 from groundstation.bus.topics import CAMERA_STATUS
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
-_STATUS_PERIOD_NS = 500_000_000
+_STATUS_PERIOD_NS = 500 * NS_PER_MS
 
 
 @dataclass(frozen=True, slots=True)

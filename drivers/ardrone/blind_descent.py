@@ -4,10 +4,12 @@ Its firmware lands level then: it stops by the optical flow that fails, and movi
 lets it sink and goes on braking it, until it is so low that the firmware may land it.
 """
 
+from groundstation.time_units import NS_PER_MS, NS_PER_S
+
 LOWEST_M = 0.35
-_LONGEST_NS = 6_000_000_000
+_LONGEST_NS = 6 * NS_PER_S
 # Who is told to sink answers after 0.7 s. Whatever does not sink lands as its firmware does.
-_LOWER_M, _LOWER_WITHIN_NS = 0.1, 1_200_000_000
+_LOWER_M, _LOWER_WITHIN_NS = 0.1, 1_200 * NS_PER_MS
 
 
 class BlindDescent:

@@ -37,17 +37,18 @@ from groundstation.adapters import with_zone
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import FlightState, Severity, Vector3
 from groundstation.bus.notice import Notice
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 # WIRE: at least every 30 ms (guide), 20-25 ms (SDK); on a busy machine a turn comes late.
 RATE_HZ = 40.0
-_FRESH_NS = 300_000_000
+_FRESH_NS = 300 * NS_PER_MS
 # Long enough that the drone waits for RESUME.
-_DOUBTED_NS = 1_300_000_000
+_DOUBTED_NS = 1_300 * NS_PER_MS
 # A blind drone that falls silent or freezes is braked on by what its loop knows, until it would land for that.
-_BRAKED_ON_NS = 3_000_000_000
+_BRAKED_ON_NS = 3 * NS_PER_S
 # What a drone reports that sees no floor: not what it flew last, so that its firmware's own braking fails as well.
 _NO_FLOW_M_S = 0.02
-_RATE_PERIOD_NS = 200_000_000
+_RATE_PERIOD_NS = 200 * NS_PER_MS
 _FAULTS = int(StateBit.MOTORS | StateBit.SOFTWARE_FAULT | StateBit.VBAT_LOW)
 _NO_AR1_VIDEO = Notice(
     Severity.WARNING,

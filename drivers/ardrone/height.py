@@ -1,13 +1,15 @@
 """Heights that the drone cannot have reached: echoes of another drone's ultrasound. Pure."""
 
+from groundstation.time_units import NS_PER_MS, NS_PER_S
+
 # The fastest a drone climbs, and the step that noise and the ultrasound's own jumps explain.
 _RATE_M_S = 2.0
 _STEP_M = 0.15
 _LONGEST_S = 0.1
 # Readings that agree for so long are the truth: a table below, or a bad start.
-_INSIST_NS = 400_000_000
+_INSIST_NS = 400 * NS_PER_MS
 # Nothing is known any more after a pause.
-_FORGET_NS = 1_000_000_000
+_FORGET_NS = NS_PER_S
 
 
 class HeightWatch:

@@ -16,10 +16,11 @@ from drivers.datagrams import DatagramLog
 from drivers.vehicle_socket import open_udp
 from groundstation.bus import clock
 from groundstation.errors import DriverError
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 # After this silence a lower sequence number is a new session of the drone, before it a replay.
-_RESTART_NS = 300_000_000
-_WINDOW_NS = 1_000_000_000
+_RESTART_NS = 300 * NS_PER_MS
+_WINDOW_NS = NS_PER_S
 _POLL_S = 0.1
 _log = logging.getLogger(__name__)
 

@@ -6,9 +6,10 @@ Hz for some 5 s, every couple of minutes; the drone misses commands meanwhile as
 
 from groundstation.bus.messages import Severity
 from groundstation.bus.notice import Notice
+from groundstation.time_units import NS_PER_MS
 
 _SLOW_SHARE, _FINE_SHARE = 0.4, 0.7
-_LONG_ENOUGH_NS = 500_000_000
+_LONG_ENOUGH_NS = 500 * NS_PER_MS
 # A rate below this was never a stream to fall from.
 _LEAST_HZ = 50.0
 _REMEDY = (

@@ -19,19 +19,20 @@ from drivers.ardrone.wire.at import AtCommand
 from drivers.ardrone.wire.state import StateBit
 from groundstation.bus.messages import Severity
 from groundstation.bus.notice import Notice
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
-_REQUEST_PERIOD_NS = 100_000_000
-_REQUEST_AFTER_NS = 1_000_000_000
-_DISCONNECTED_NS = 2_000_000_000
-_STAGE_NS = 1_000_000_000
-_DUMP_PERIOD_NS = 300_000_000
+_REQUEST_PERIOD_NS = 100 * NS_PER_MS
+_REQUEST_AFTER_NS = NS_PER_S
+_DISCONNECTED_NS = 2 * NS_PER_S
+_STAGE_NS = NS_PER_S
+_DUMP_PERIOD_NS = 300 * NS_PER_MS
 # WIRE: a dump raises bit 6 as well. The text may be here before the packet that says so.
-_SETTLE_NS = 300_000_000
+_SETTLE_NS = 300 * NS_PER_MS
 _ROUNDS = 3
-_RETRY_NS = 5_000_000_000
+_RETRY_NS = 5 * NS_PER_S
 _FLAT_TRIMS = 3
 # A drone may say for a while that it is in the mode that it was told to leave.
-_FORGOTTEN_NS = 1_000_000_000
+_FORGOTTEN_NS = NS_PER_S
 
 
 class SessionPhase(StrEnum):

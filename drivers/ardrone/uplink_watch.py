@@ -6,9 +6,10 @@ may come at full rate while the other direction is dead; the drone then flies it
 
 from groundstation.bus.messages import Severity
 from groundstation.bus.notice import Notice
+from groundstation.time_units import NS_PER_MS
 
 # A Wi-Fi link repeats a datagram for tenths of a second; 20 commands in a row are no bad luck.
-_CUT_NS = 500_000_000
+_CUT_NS = 500 * NS_PER_MS
 _REMEDY = (
     "the drone flies its last command on: move this computer or its access point nearer, and look for other senders"
 )

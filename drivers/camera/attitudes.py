@@ -2,8 +2,10 @@
 
 from collections import defaultdict, deque
 
+from groundstation.time_units import NS_PER_MS
+
 _MOST_SAMPLES = 64
-_FARTHEST_NS = 200_000_000
+_FARTHEST_NS = 200 * NS_PER_MS
 
 
 class AttitudeHistory:

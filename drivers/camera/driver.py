@@ -26,7 +26,7 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _log = logging.getLogger(__name__)
 _POLL_S = 0.02
-_STATUS_PERIOD_NS = 500_000_000
+_STATUS_PERIOD_NS = 500 * NS_PER_MS
 _LEVEL = (0.0, 0.0)
 
 

@@ -14,12 +14,13 @@ from groundstation.bus.messages import EntityEstimate, Estimate
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
 from groundstation.geometry.rotations import rotation_from_euler, rotation_z
+from groundstation.time_units import NS_PER_MS
 
 Attitude = tuple[float, float]
 
 # Estimates at 50 Hz; a picture is exposed up to 0.5 s before it is looked at.
 _KEPT = 48
-_FARTHEST_NS = 300_000_000
+_FARTHEST_NS = 300 * NS_PER_MS
 # Roll, pitch and mounting of an observer that measures its attitude, of one whose levelness is assumed, and of a mount.
 _ATTITUDE_STD_RAD, _LEVEL_STD_RAD, _MOUNT_STD_RAD = math.radians(2.0), math.radians(8.0), math.radians(0.5)
 _FLOOR_STD_M = 0.02

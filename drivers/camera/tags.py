@@ -13,10 +13,11 @@ from drivers.camera.settings import DetectorSettings, MarkerSettings
 from drivers.camera.sighting import Sighting
 from groundstation.arrays import Array, Image
 from groundstation.geometry.lens import CameraIntrinsics
+from groundstation.time_units import NS_PER_MS
 
 GravityOf = Callable[[str], pose.Gravity]
 
-_LIFETIME_NS = 450_000_000
+_LIFETIME_NS = 450 * NS_PER_MS
 # A tag's side in a window: smaller ones are enlarged to this, for their bits need three pixels each.
 _WANTED_PX, _MOST_ENLARGEMENT = 48.0, 4.0
 # A tag is read as a whole, with the parity of its dictionary: there are no half-sure readings.

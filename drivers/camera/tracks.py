@@ -8,13 +8,13 @@ from drivers.camera.detect import Find, Window, spacing_px, window_around
 from drivers.camera.markers import BarReading
 from drivers.camera.prediction import Prediction
 from groundstation.arrays import Array
-from groundstation.time_units import NS_PER_S
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _MARGIN_SQUARES = 1.6
 # A window grows with the time since the last detection, for what constant velocity does not foresee.
 _UNREST_PX_S = 120.0
 _MOST_UNREST_PX = 45.0
-_LIFETIME_NS = 450_000_000
+_LIFETIME_NS = 450 * NS_PER_MS
 _MOST_MISSES = 5
 # An identity outlives the last sure reading by this much of unbroken tracking.
 _IDENTITY_NS = 2 * NS_PER_S

@@ -26,13 +26,14 @@ from drivers.mavlink.wire.names import (
 )
 from drivers.watchdog_types import Action, DriverMode, WatchdogDecision
 from groundstation.bus.messages import EntityEstimate, Vector3
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
-_STREAM_FIRST_NS = 1_200_000_000
-_CLIMB_LIMIT_NS = 8_000_000_000
-_TAKEN_OVER_NS = 1_500_000_000
-_REGAIN_NS = 1_400_000_000
+_STREAM_FIRST_NS = 1_200 * NS_PER_MS
+_CLIMB_LIMIT_NS = 8 * NS_PER_S
+_TAKEN_OVER_NS = 1_500 * NS_PER_MS
+_REGAIN_NS = 1_400 * NS_PER_MS
 # A text older than this explains nothing that happens now.
-_EXPLAINS_NS = 4_000_000_000
+_EXPLAINS_NS = 4 * NS_PER_S
 _STILL: Vector3 = (0.0, 0.0, 0.0)
 # The last of a climb is slower, so that it ends at the height asked for.
 _CLIMBED, _CLIMB_GAIN, _LEAST_CLIMB_M_S = 0.95, 1.2, 0.12

@@ -8,7 +8,7 @@ moves a vehicle by itself: without the tracker's word the correction fades, and 
 import math
 
 from groundstation.bus.messages import EntityEstimate, Vector3
-from groundstation.time_units import NS_PER_S
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 # Velocities of the belief are noisy by 0.05 m/s.
 _SMOOTHING_S = 0.12
@@ -20,7 +20,7 @@ _CLIMB_SMOOTHING_S, _MOST_CLIMB_M_S = 0.4, 0.3
 # A measured estimator's error of the velocity is the same for that long; then so much of it is another's each second
 # (docs/reference/mavlink.md 2.1): 0.73 of it is left half a second after it was seen, 0.33 after a second.
 _LASTS_S, _FORGETS_S = 0.35, 0.6
-_FRESH_NS = 300_000_000
+_FRESH_NS = 300 * NS_PER_MS
 # Sudden ones are no error of an estimator that still works: what is told is not corrected then, and the limits of the
 # control error act. A large one is corrected as far as this, which 7 degrees of tilt explain: a correction that ended
 # there would itself be a step of that size.

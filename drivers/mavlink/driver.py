@@ -21,13 +21,14 @@ from groundstation.bus.messages import Estimate, Severity
 from groundstation.bus.topics import ESTIMATE
 from groundstation.errors import DriverError
 from groundstation.process.priority import go_first
+from groundstation.time_units import NS_PER_S
 
 # Of what is due by the clock: poses, questions, status. Orders do not wait for a turn.
 RATE_HZ = 100.0
 # How long one thread may keep the others from the interpreter: Python's own 5 ms is all the time a setpoint has.
 # MAVSDK has its own threads for every message: shorter turns would cost it a third more CPU.
 _SWITCH_S = {"pymavlink": 0.0005, "mavsdk": 0.005}
-_SAME_TEXT_NS = 10_000_000_000
+_SAME_TEXT_NS = 10 * NS_PER_S
 _log = logging.getLogger(__name__)
 
 

@@ -6,9 +6,10 @@ cameras see of its height decides, and its own word where they do not see it.
 
 from drivers.mavlink.wire.names import Landed
 from groundstation.bus.messages import Vector3
+from groundstation.time_units import NS_PER_MS
 
 # An estimator that is told that it stands on its pad shows little of its height, and its climb sooner.
-_RISEN_M, _CLIMBING_M_S, _CLIMBING_NS = 0.1, 0.1, 300_000_000
+_RISEN_M, _CLIMBING_M_S, _CLIMBING_NS = 0.1, 0.1, 300 * NS_PER_MS
 # Three times the error of a height that cameras see.
 _SEEN_RISEN_M = 0.1
 _STANDING = 25  # estimates whose mean is the place where it stands

@@ -5,11 +5,12 @@ from dataclasses import dataclass
 
 from drivers.mavlink.wire.flight import CommandAckMessage, CommandLong
 from drivers.mavlink.wire.names import MavCmd, MavResult
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
-_RETRY_NS = 500_000_000
+_RETRY_NS = 500 * NS_PER_MS
 _TRIES = 4
-_SETTLE_NS = 1_000_000_000
-_REFUSED_NS = 1_000_000_000
+_SETTLE_NS = NS_PER_S
+_REFUSED_NS = NS_PER_S
 
 
 @dataclass(slots=True)

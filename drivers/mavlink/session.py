@@ -16,17 +16,18 @@ from drivers.mavlink.wire.flight import CommandLong, OdometryMessage
 from drivers.mavlink.wire.frames import Message, id_of
 from drivers.mavlink.wire.names import Flavour, MavCmd
 from drivers.mavlink.wire.parameters import value_from_carried
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
-_ORIGIN_PERIOD_NS = 3_000_000_000
-_PARAM_PERIOD_NS = 500_000_000
-_HEARTBEAT_NS = 1_000_000_000
-_DISCONNECTED_NS = 2_000_000_000
+_ORIGIN_PERIOD_NS = 3 * NS_PER_S
+_PARAM_PERIOD_NS = 500 * NS_PER_MS
+_HEARTBEAT_NS = NS_PER_S
+_DISCONNECTED_NS = 2 * NS_PER_S
 _PARAM_BURST = 4
 _PARAM_TRIES = 20
 _ORIGIN_TRIES_PX4 = 5
 _STOPPED = 0.0
 _CHECKED_WITH = "PX4 1.16 or ArduCopter 4.6"
-_VERSION_PERIOD_NS, _VERSION_TRIES = 1_000_000_000, 5
+_VERSION_PERIOD_NS, _VERSION_TRIES = NS_PER_S, 5
 # After so many questions without an answer a parameter is asked for by its other names as well.
 _ALIAS_AFTER = 3
 

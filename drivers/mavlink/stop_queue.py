@@ -3,9 +3,10 @@
 from collections.abc import Hashable
 
 from drivers.mavlink.wire.frames import Message
+from groundstation.time_units import NS_PER_MS
 
 # As many a second as of all else together: a serial link of 57600 baud carries 120 such frames.
-_EVERY_NS = 20_000_000
+_EVERY_NS = 20 * NS_PER_MS
 
 
 Stop = bytes | Message

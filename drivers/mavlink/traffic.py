@@ -3,7 +3,9 @@
 import threading
 from collections import deque
 
-_WINDOW_NS = 1_000_000_000
+from groundstation.time_units import NS_PER_S
+
+_WINDOW_NS = NS_PER_S
 # Half a turn of the counter is no loss that can be told from a restart; a datagram is not overtaken by more than this.
 _HALF_TURN, _OVERTAKEN = 128, 32
 

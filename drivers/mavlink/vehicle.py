@@ -26,17 +26,17 @@ from drivers.watchdog_types import VehicleView, WatchdogDecision
 from groundstation.bus import clock
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import Estimate, FlightState, Vector3
-from groundstation.time_units import NEVER_NS
+from groundstation.time_units import NEVER_NS, NS_PER_MS, NS_PER_S
 
-_FRESH_NS = 300_000_000
-_HEARTBEAT_NS = 4_000_000_000
-_ASKS_NS = 3_000_000_000
+_FRESH_NS = 300 * NS_PER_MS
+_HEARTBEAT_NS = 4 * NS_PER_S
+_ASKS_NS = 3 * NS_PER_S
 # Asked for twice a second; a charge this old is unknown.
-_BATTERY_NS = 10_000_000_000
+_BATTERY_NS = 10 * NS_PER_S
 # Report a refusal only after its STATUSTEXT: the COMMAND_ACK arrives first.
-_EXPLAIN_NS = 700_000_000
+_EXPLAIN_NS = 700 * NS_PER_MS
 # ArduPilot repeats what keeps it from arming every 30 s.
-_COMPLAINTS_NS = 35_000_000_000
+_COMPLAINTS_NS = 35 * NS_PER_S
 _Value = service.ParamValue | telemetry.GpsGlobalOrigin | telemetry.AutopilotVersion
 _FAULTS = SensorBits.GYRO | SensorBits.ACCELEROMETER
 _FLAVOURS = {"px4": Flavour.PX4, "ardupilot": Flavour.ARDUPILOT}

@@ -14,13 +14,13 @@ from drivers.mavlink.convert import VisionPose
 from drivers.mavlink.settings import VisionFeedback
 from groundstation.bus.messages import EntityEstimate, Estimate
 from groundstation.geometry.angles import difference
-from groundstation.time_units import NS_PER_S
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
-_FRESH_NS = 300_000_000
+_FRESH_NS = 300 * NS_PER_MS
 _JUMP_RAD = math.radians(15.0)
 _STANDING_VARIANCES = (0.05**2, 0.05**2, 0.02**2, math.radians(3.0) ** 2)
 # An autopilot that was told nothing for longer has coasted off by its own velocity, and refuses what it is told then.
-_COASTED_NS = 400_000_000
+_COASTED_NS = 400 * NS_PER_MS
 # After lift-off cameras need a while to find it; autopilots coast for 4.8 s or more (docs/reference/mavlink.md 1.1, 2).
 _FIRST_SIGHT_NS = 4 * NS_PER_S
 

@@ -4,8 +4,10 @@ import math
 from collections import deque
 from dataclasses import dataclass
 
-_SPAN_NS, _KEPT, _NEEDED = 500_000_000, 60, 8
-_JUMP_NS = 10_000_000_000
+from groundstation.time_units import NS_PER_MS, NS_PER_S
+
+_SPAN_NS, _KEPT, _NEEDED = 500 * NS_PER_MS, 60, 8
+_JUMP_NS = 10 * NS_PER_S
 _KNOWN_PPM = 100.0  # a drift that is known worse than this is not told
 
 

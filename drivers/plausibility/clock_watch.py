@@ -1,9 +1,11 @@
 """A vehicle's own clock against ours: standing, or late. Pure."""
 
-_BUCKET_NS = 5_000_000_000
+from groundstation.time_units import NS_PER_S
+
+_BUCKET_NS = 5 * NS_PER_S
 # A clock that went back by less tells that what comes is older than what came. By more: it was set, or the vehicle was
 # started again; on no link do values wait for so long.
-_LONGEST_NS = 3_000_000_000
+_LONGEST_NS = 3 * NS_PER_S
 
 
 class ClockWatch:

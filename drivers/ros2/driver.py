@@ -23,10 +23,10 @@ from groundstation.bus import clock
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import Odometry, Vector3
 from groundstation.bus.topics import ODOMETRY
-from groundstation.time_units import NS_PER_S
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 RATE_HZ = 20.0
-_FRESH_NS = 300_000_000
+_FRESH_NS = 300 * NS_PER_MS
 # Charges come seldom; an older one is unknown.
 _CHARGE_NS = 30 * NS_PER_S
 _STANDING_M = 0.08  # the base of a standing vehicle, as its kind says

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from drivers.rmw_zenoh.wire.vehicle import Quaternion, Vector3
 from drivers.watchdog_types import Action
 from groundstation.bus.messages import FlightState
+from groundstation.time_units import NS_PER_MS
 
 _AIRBORNE_M, _STILL_M_S, _CLIMB_M_S = 0.2, 0.25, 0.15
-_STANDS_NS = 500_000_000
+_STANDS_NS = 500 * NS_PER_MS
 _LEANS_RAD, _MOVES_M_S = math.radians(50.0), 1.0
 # Share of the height of its take-off at which that is over.
 _UP = 0.7

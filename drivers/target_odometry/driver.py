@@ -19,7 +19,7 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _POLL_S, _WAITING = 0.02, 64
 # The tracker is told no more often: neighbouring readings of one wheel err alike.
-_PERIOD_NS = 45_000_000
+_PERIOD_NS = 45 * NS_PER_MS
 # What stands for so long hangs, what is so late was true long ago [s].
 _STANDS_S, _LATE_S = 0.3, 0.3
 # More than a base can do is no slip any more.

@@ -18,21 +18,22 @@ from groundstation.adapters import with_zone
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import FlightState, Odometry, Vector3
 from groundstation.bus.topics import ODOMETRY
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 RATE_HZ = 20.0
-_FRESH_NS = 300_000_000
+_FRESH_NS = 300 * NS_PER_MS
 # The motors' time is told in whole seconds.
-_MOTORS_NS = 1_300_000_000
+_MOTORS_NS = 1_300 * NS_PER_MS
 _AIRBORNE_CM = 20
 _STEP_STD_M_S = 0.03  # of a velocity in steps of 0.1 m/s
 _STILL_M_S = 0.25
 # Orders are repeated until they are obeyed; `command` keeps a standing vehicle awake.
 _PAUSE_NS = {
-    text.SDK: 1_000_000_000,
-    text.TAKE_OFF: 4_000_000_000,
-    text.LAND: 500_000_000,
-    text.EMERGENCY: 100_000_000,
-    text.STREAM_ON: 3_000_000_000,
+    text.SDK: NS_PER_S,
+    text.TAKE_OFF: 4 * NS_PER_S,
+    text.LAND: 500 * NS_PER_MS,
+    text.EMERGENCY: 100 * NS_PER_MS,
+    text.STREAM_ON: 3 * NS_PER_S,
 }
 # Whole numbers at 10 Hz: that one of them stands says nothing; the accelerations of all three axes never do.
 LIMITS = PlausibilityLimits(frozen_s=0.6, stuck_s=math.inf, stuck_alone_s=math.inf, jump_m_s=0.8)

@@ -7,11 +7,12 @@ import numpy as np
 
 from groundstation.arrays import Array
 from groundstation.geometry.parabola import Least, least
+from groundstation.time_units import NS_PER_S
 
 # Delays are tried this far apart until one is better than its neighbours, then half as far around it.
 _COARSE_MS, _FARTHEST_MS = 40.0, 120.0
 # Errors that are alike are seldom further apart than this.
-_BLOCK_NS = 3_000_000_000
+_BLOCK_NS = 3 * NS_PER_S
 _LEAST_BLOCKS = 5
 
 Costs = Mapping[tuple[str, str, int], float]

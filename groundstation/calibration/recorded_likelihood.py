@@ -17,11 +17,12 @@ from groundstation.estimation.measurement import Correction
 from groundstation.field.resolved import ResolvedField
 from groundstation.replay.source import Source
 from groundstation.replay.tick_log import Tape
+from groundstation.time_units import NS_PER_S
 from groundstation.tracker import tracker_from_field
 
 # A correction counts like one of Student's distribution with so many degrees of freedom: outliers must not decide.
 _FREEDOM = 8.0
-_SETTLING_NS = 3_000_000_000
+_SETTLING_NS = 3 * NS_PER_S
 
 
 def flown_of(source: Source) -> Flown:

@@ -24,14 +24,14 @@ from groundstation.console.commands import CommandDesk, Given
 from groundstation.console.dead_man import DeadMan, Grip
 from groundstation.errors import GroundStationError, OperatorMistake
 from groundstation.supervisor.joining import join
-from groundstation.time_units import NEVER_NS, NS_PER_MS
+from groundstation.time_units import NEVER_NS, NS_PER_MS, NS_PER_S
 
 if TYPE_CHECKING:
     from groundstation.bus.api import Bus
 
 _ME = "deadman"
 _TURN_S = 0.02
-_FAREWELL_NS = 2_000_000_000
+_FAREWELL_NS = 2 * NS_PER_S
 _KEYBOARD_PATIENCE_NS = 900 * NS_PER_MS
 _GAMEPAD_PATIENCE_NS = NEVER_NS  # it says itself when it is let go
 # WIRE: linux/joystick.h js_event: time u32, value s16, type u8 (1 = button, 0x80 = initial state), number u8.

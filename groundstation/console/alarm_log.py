@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from groundstation.monitor.alarms import Alarm
+from groundstation.time_units import NS_PER_S
 
 _KEPT = 50
 # What comes back within this time was not over: a figure that wavers about its limit is one alarm.
-_BREAK_NS = 2_000_000_000
+_BREAK_NS = 2 * NS_PER_S
 
 
 @dataclass(slots=True)

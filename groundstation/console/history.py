@@ -9,12 +9,13 @@ from groundstation.appearance.cost import cost_cm2
 from groundstation.appearance.topology import topology_words
 from groundstation.bus.messages import Estimate, Plan, TruthState
 from groundstation.geometry.ellipse import semi_axes_95
+from groundstation.time_units import NS_PER_MS
 
 _TRAIL_POINTS = 300
-_TRAIL_NS = 200_000_000
+_TRAIL_NS = 200 * NS_PER_MS
 _SAMPLES = 240
 _PASSED = 1000
-_SAMPLE_NS = 500_000_000
+_SAMPLE_NS = 500 * NS_PER_MS
 
 
 class History:

@@ -2,8 +2,10 @@
 
 from dataclasses import dataclass
 
+from groundstation.time_units import NS_PER_S
+
 # A page that reconnects within this time is still the operator.
-_GRACE_NS = 15_000_000_000
+_GRACE_NS = 15 * NS_PER_S
 
 
 @dataclass(slots=True)

@@ -10,14 +10,15 @@ import numpy as np
 from groundstation.bus.jpeg import stated_size
 from groundstation.bus.messages import Header, RelativeObservation
 from groundstation.geometry.lens import CameraIntrinsics
+from groundstation.time_units import NS_PER_MS
 
 # Half of the board's long side, quiet zone included [m]: the ring that is drawn around a detection.
 _RING_M = 0.16
 _REMEMBERED = 8
 # Pictures come at 5 a second at most; a sender that does not keep to it is held to it here, on the average: what comes
 # is looked at in turns of 50 ms.
-_PERIOD_NS = 200_000_000
-_EARLY_NS = 60_000_000
+_PERIOD_NS = 200 * NS_PER_MS
+_EARLY_NS = 60 * NS_PER_MS
 # A browser decodes what it is sent: 20 megapixels are 80 MB there.
 _MAX_BYTES = 4_000_000
 _MAX_PIXELS = 20_000_000

@@ -19,9 +19,10 @@ from groundstation.monitor.state import cast_from_field
 from groundstation.process.child import Child
 from groundstation.process.ports import holder_of
 from groundstation.process.refusals import Refusals
+from groundstation.time_units import NS_PER_MS
 
 # The signal to stop may overtake the event that the run ends.
-_OVERTAKEN_NS = 500_000_000
+_OVERTAKEN_NS = 500 * NS_PER_MS
 _INTRUSIONS = {
     "other_site": "requests of other web sites",
     "other_user": "requests of other users without the code",

@@ -19,7 +19,7 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 _USED = (Verdict.ACCEPTED, Verdict.INFLATED)
 # Longer than a camera of 2 pictures a second, or one that is started again, is silent; of one that goes on with what
 # is refused, no longer than two of its pictures take.
-_SILENT_NS, _HANGS_NS = 1_500_000_000, 500_000_000
+_SILENT_NS, _HANGS_NS = 1_500 * NS_PER_MS, 500 * NS_PER_MS
 _SILENCE = "no fixed sensor tells anything new of the room: drones hover, and land if none does"
 _REMEDY = "see to the cameras and motion capture (frozen? unplugged?); the team goes on once one sees it"
 

@@ -21,10 +21,10 @@ from groundstation.sensing.footprint import footprint_of
 from groundstation.sensing.models import OnboardCameraModel, SensorSuite
 from groundstation.sensing.occlusion import box_rows, sight_map
 from groundstation.sensing.visibility import camera_rows
-from groundstation.time_units import NS_PER_S
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _SHOWN_S = 1.5  # pictures are searched all over twice a second
-_STEP_NS = 100_000_000  # of the maps' motion
+_STEP_NS = 100 * NS_PER_MS  # of the maps' motion
 _SLOW_SEARCH_S = 999.0
 _TIPPED_M = 0.08  # what a robot's picture is off at the distance of a target, since it is not level as it is believed
 

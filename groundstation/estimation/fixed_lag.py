@@ -24,10 +24,10 @@ from groundstation.estimation.parameters import EstimatorParameters
 from groundstation.estimation.records import ADMITTED, COMPARED, DISMISSED, OBSERVATION, PLACED, REPORTED
 from groundstation.estimation.replay import replay
 from groundstation.estimation.tables import checkpoints_of, empty_state, tables_from_parameters
-from groundstation.time_units import NS_PER_S
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _FORGOTTEN_NS = 60 * NS_PER_S  # after a pause as long (a suspended host) nothing that was believed is worth predicting
-FUTURE_NS = 100_000_000  # a measurement further ahead of now than this is an error of a clock
+FUTURE_NS = 100 * NS_PER_MS  # a measurement further ahead of now than this is an error of a clock
 _IDLE_STEPS = 10  # steps that may pass between two calls of `advance` before `add_*` advances by itself
 
 

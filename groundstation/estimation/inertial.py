@@ -13,13 +13,13 @@ from groundstation.bus.messages import Vector3
 from groundstation.estimation.gyro_bias import GyroBias
 from groundstation.geometry.angles import wrap
 from groundstation.geometry.stabilized_frame import STANDARD_GRAVITY_M_S2
-from groundstation.time_units import NS_PER_S
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _LEVEL_S, _STANDING_S = 4.0, 0.5  # accelerometers draw the tilt back over this: in flight, on the ground
 _SMOOTH_S = 0.3  # velocities are smoothed over this before they are differentiated
 _SILENT_S = 0.3  # after so much silence the acceleration counts as none
 _GAP_S = 0.5  # nothing is integrated across a longer one
-_FRESH_NS = 100_000_000  # how far a sample speaks for a time beside it
+_FRESH_NS = 100 * NS_PER_MS  # how far a sample speaks for a time beside it
 _KEPT = 256  # samples: more than a second
 # Of roll and pitch after a while; at the start, when one sample of a vehicle that may accelerate is all there is.
 _SETTLED_RAD, _FIRST_RAD = math.radians(0.5), math.radians(5.0)

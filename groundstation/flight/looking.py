@@ -5,10 +5,11 @@ from collections.abc import Iterator
 from groundstation.doctor.finding import Finding, Level
 from groundstation.preflight.judge import lines
 from groundstation.runtime.before_take_off import BeforeTakeOff
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 # Two pictures a second, which is the least that was met on a busy machine, make a median in this time.
-_LONGEST_NS = 8_000_000_000
-_AGAIN_NS = 200_000_000
+_LONGEST_NS = 8 * NS_PER_S
+_AGAIN_NS = 200 * NS_PER_MS
 
 
 class Looking:

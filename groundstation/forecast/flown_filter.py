@@ -18,9 +18,9 @@ from groundstation.field.resolved import ResolvedField
 from groundstation.field.room import ranging_link
 from groundstation.forecast.team import Team
 from groundstation.forecast.views import Views
-from groundstation.time_units import NS_PER_S
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
-_ODOMETRY_NS, _BEGIN_NS = 40_000_000, 10 * NS_PER_S
+_ODOMETRY_NS, _BEGIN_NS = 40 * NS_PER_MS, 10 * NS_PER_S
 _CIRCLE_M, _ROUND_S = 0.25, 8.0  # the circle that all go along to show what only motion shows
 
 

@@ -26,10 +26,10 @@ from groundstation.bus.topics import (
 from groundstation.monitor.alarms import alarms_of
 from groundstation.monitor.state import Cast, MonitorState
 from groundstation.monitor.table import render
-from groundstation.time_units import NEVER_NS
+from groundstation.time_units import NEVER_NS, NS_PER_MS, NS_PER_S
 
-DRAW_PERIOD_NS = 250_000_000
-_LINE_PERIOD_NS = 5_000_000_000
+DRAW_PERIOD_NS = 250 * NS_PER_MS
+_LINE_PERIOD_NS = 5 * NS_PER_S
 
 
 class Screen:

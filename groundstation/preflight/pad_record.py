@@ -7,8 +7,9 @@ import numpy as np
 
 from groundstation.bus.messages import RangeObservation, RelativeObservation
 from groundstation.preflight.stand import PadSighting
+from groundstation.time_units import NS_PER_S
 
-_WINDOW_NS = 12_000_000_000
+_WINDOW_NS = 12 * NS_PER_S
 _MOST = 60
 LEAST = 8
 """Sightings of one drone by one camera that make a median worth having."""

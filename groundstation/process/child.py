@@ -20,9 +20,10 @@ from groundstation.process.heartbeat import SUPERVISOR_SLOT, HeartbeatBlock, Slo
 from groundstation.process.parent import ParentWatch
 from groundstation.process.priority import take_share
 from groundstation.process.signals import StopSignal
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
-_STATUS_PERIOD_NS = 1_000_000_000
-_SUPERVISOR_STALE_NS = 300_000_000
+_STATUS_PERIOD_NS = NS_PER_S
+_SUPERVISOR_STALE_NS = 300 * NS_PER_MS
 _log = logging.getLogger(__name__)
 
 

@@ -7,7 +7,7 @@ free of queues. What stays is half of the difference between the two ways: nobod
 from collections import deque
 from dataclasses import dataclass
 
-from groundstation.time_units import NS_PER_S
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 # Clocks of two computers run apart by 50 us in a second at most; the line through half a minute follows that.
 _SECONDS, _LINE_S = 32, 8
@@ -15,7 +15,7 @@ _TRIPS_TO_START = 10
 _STEADIEST_NS = 200_000.0
 _DRIFT_LIMIT = 200e-6
 # Corrections by which a clock that is followed is led to its offset; more than _STEP_NS is a clock that was set.
-_SLEW_PER_S, _STEP_NS = 500e-6, 20_000_000
+_SLEW_PER_S, _STEP_NS = 500e-6, 20 * NS_PER_MS
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,12 +14,13 @@ from enum import IntEnum
 from pathlib import Path
 
 from groundstation.errors import GroundStationError
+from groundstation.time_units import NS_PER_S
 
 SUPERVISOR_SLOT = 0
 _WORDS_PER_SLOT = 16  # whole cache lines, so that two beating processes never share one
 _STAMP, _STATE, _PID, _WORKED, _ENDED, _SILENT_SINCE, _CLOCK_OFFSET = 0, 1, 2, 3, 4, 5, 6
 _ADDRESSES, MOST_ADDRESSES = 8, 8
-_LEFT_BEHIND_NS = 10_000_000_000
+_LEFT_BEHIND_NS = 10 * NS_PER_S
 
 
 class SlotState(IntEnum):

@@ -2,7 +2,9 @@
 
 from collections.abc import Mapping
 
-_PERIOD_NS = 10_000_000_000
+from groundstation.time_units import NS_PER_S
+
+_PERIOD_NS = 10 * NS_PER_S
 
 
 class Refusals:

@@ -18,14 +18,14 @@ from groundstation.bus.topics import Topic
 from groundstation.recording.rotating_file import NO_ROTATION, Rotation
 from groundstation.recording.timeline import Timeline
 from groundstation.recording.writing import RunWriter
-from groundstation.time_units import NS_PER_S
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 SITE = "lab"
 CLOCK = "synthetic"
 UNIX_OFFSET_NS = 1_700_000_000 * NS_PER_S
 DRONES = ("drone_1", "drone_2")
 _TARGET = "turtlebot"
-_TURN_NS = 66_000_000
+_TURN_NS = 66 * NS_PER_MS
 # Different ones, or the compression of a chunk would find them again.
 _JPEGS = [b"\xff\xd8" + Random(number).randbytes(28_000) + b"\xff\xd9" for number in range(16)]
 _DATAGRAMS = [Random(number).randbytes(6000) for number in range(16)]

@@ -16,6 +16,7 @@ from groundstation.recording.chunks import RawRecord
 from groundstation.recording.index import FileIndex
 from groundstation.recording.run import RecordedRun
 from groundstation.replay.source import Source
+from groundstation.time_units import NS_PER_S
 
 Wanted = Callable[[Topic], bool]
 Arrival = tuple[int, RawRecord]
@@ -23,7 +24,7 @@ _MILESTONES = (EVENT, COMMAND, COMMAND_ACK)
 # So many small chunks hold the two minutes that a seek looks back over; those with pictures are large.
 _KEPT_SMALL, _KEPT_LARGE = 1000, 6
 _LARGE_BYTES = 200_000
-_STEP_REACH_NS = 30_000_000_000
+_STEP_REACH_NS = 30 * NS_PER_S
 
 
 def among(topics: Iterable[Topic]) -> Wanted:

@@ -5,9 +5,10 @@ from typing import Any
 
 from groundstation.replay.arrival_order import Reel
 from groundstation.replay.source import Source
+from groundstation.time_units import NS_PER_MS
 
 # Trails are kept at 5 Hz: a fast replay takes so much at a time, and loses no point of them.
-_STRETCH_NS = 200_000_000
+_STRETCH_NS = 200 * NS_PER_MS
 _LONGEST_TURN_S = 0.25
 
 

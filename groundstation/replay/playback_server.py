@@ -18,15 +18,16 @@ from groundstation.recording.chunks import RawRecord
 from groundstation.recording.reader import RecordingError, payload
 from groundstation.replay.arrival_order import among
 from groundstation.replay.playback import Playback
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _LATCHED = (*STATES, LEASE)
 _TRACED = (ESTIMATE, PLAN, TRUTH, INNOVATION)
 # What the page looks back on: two minutes of curves, and longer than any detection or sighting is shown.
-_LOOK_BACK_NS, _SEEN_NS = 122_000_000_000, 5_000_000_000
+_LOOK_BACK_NS, _SEEN_NS = 122 * NS_PER_S, 5 * NS_PER_S
 # The first look after a jump, which is shown before two minutes could be read.
-_GLANCE_NS = 5_000_000_000
+_GLANCE_NS = 5 * NS_PER_S
 # Trails go on at 5 Hz, curves at 2 Hz (console.history).
-_TRACE_NS, _CURVE_NS = 200_000_000, 500_000_000
+_TRACE_NS, _CURVE_NS = 200 * NS_PER_MS, 500 * NS_PER_MS
 _MARKS = 400
 _MS = 1e6
 

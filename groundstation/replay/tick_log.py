@@ -11,11 +11,12 @@ from groundstation.bus.topics import BELIEF, ESTIMATE, INNOVATION, JOURNAL, PLAN
 from groundstation.errors import MessageError
 from groundstation.recording.reader import RawRecord, open_recording
 from groundstation.runtime.inbox import TOPICS as INPUTS
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 OUTPUTS = (ESTIMATE, BELIEF, PLAN, SETPOINT, INNOVATION)
 # Senders reach the recorder in no fixed order; after so much recorded time nothing that belongs to a tick is to come.
-_PATIENCE_NS = 1_500_000_000
-_FORGET_NS = 20_000_000_000
+_PATIENCE_NS = 1_500 * NS_PER_MS
+_FORGET_NS = 20 * NS_PER_S
 _TIDY_EVERY = 500
 
 Name = tuple[str, int]

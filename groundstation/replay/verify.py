@@ -16,10 +16,11 @@ from groundstation.replay.rerun import Rerun, Words
 from groundstation.replay.source import Source
 from groundstation.replay.tick_log import OUTPUTS, Tape, Tick
 from groundstation.runtime.tracker_loop import EPOCHS_PER_LIFE
+from groundstation.time_units import NS_PER_S
 
 _KEPT_DIFFERENCES = 200
 # A plan is stamped when it was begun; one that was begun shortly before the end may never have been adopted.
-_PLANNING_NS = 1_000_000_000
+_PLANNING_NS = NS_PER_S
 _NAMES = frozenset(topic.name for topic in OUTPUTS)
 
 

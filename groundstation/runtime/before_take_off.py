@@ -20,10 +20,11 @@ from groundstation.field.resolved import ResolvedField
 from groundstation.preflight.judge import judge, open_musts
 from groundstation.preflight.pad_record import PadRecord
 from groundstation.runtime.asking import TEAM
+from groundstation.time_units import NS_PER_S
 
 _STANDS = frozenset({FlightState.LANDED, FlightState.EMERGENCY})
 _NOT_SEEN_TO_FLY = _STANDS | {FlightState.UNKNOWN, FlightState.LOST}
-_AGAIN_NS = 3_000_000_000
+_AGAIN_NS = 3 * NS_PER_S
 _SEVERITIES = {Level.MUST: Severity.ERROR, Level.SHOULD: Severity.WARNING}
 
 

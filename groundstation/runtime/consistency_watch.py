@@ -10,14 +10,15 @@ from dataclasses import dataclass
 from groundstation.bus.messages import Message, Odometry, RelativeObservation, Severity, Verdict
 from groundstation.bus.notice import Notice
 from groundstation.estimation.measurement import Correction
+from groundstation.time_units import NS_PER_S
 
 # NIS per degree of freedom is 1 where the belief is right. Up at the first, down again at the second, each for so long.
-_FAR, _NEAR, _LASTING_NS = 4.0, 2.0, 3_000_000_000
+_FAR, _NEAR, _LASTING_NS = 4.0, 2.0, 3 * NS_PER_S
 # One sighting counts no more than this: a wild one alone is none of a lasting contradiction.
 _MOST = 12.0
-_FORGETTING_S, _SILENT_NS = 2.0, 2_000_000_000
+_FORGETTING_S, _SILENT_NS = 2.0, 2 * NS_PER_S
 _LEAST_SIGHTINGS = 10.0
-_FROZEN_NS = 1_000_000_000
+_FROZEN_NS = NS_PER_S
 
 _SENSOR_REMEDY = "check how its camera is mounted, its calibration and its video_delay_ms (groundstation calibrate)"
 _SUBJECT_REMEDY = (

@@ -2,7 +2,9 @@
 
 from dataclasses import dataclass
 
-_LATE_NS = 10_000_000
+from groundstation.time_units import NS_PER_MS
+
+_LATE_NS = 10 * NS_PER_MS
 
 
 @dataclass(slots=True)

@@ -5,10 +5,11 @@ from collections import deque
 from dataclasses import dataclass
 
 from groundstation.bus.messages import Vector3
+from groundstation.time_units import NS_PER_S
 
 # The median of five forgets a wrong sighting or two, and is a fifth of a second late at 15 pictures a second. A machine
 # that is too busy brought two a second.
-_WINDOW_NS = 2_000_000_000
+_WINDOW_NS = 2 * NS_PER_S
 _MOST, _LEAST = 5, 3
 
 

@@ -25,12 +25,12 @@ from groundstation.runtime.marker_height import FixedCamera
 from groundstation.runtime.requests import Requests, asked_ns, is_request
 from groundstation.runtime.take_off import TakeOff, TakeOffCommand, TakeOffLimits
 from groundstation.runtime.team import TeamPhase, TeamStatus
-from groundstation.time_units import NS_PER_S
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
-_LEASE_PERIOD_NS = 500_000_000
-_LEASE_LIFE_NS = 1_500_000_000
-_CONFIRM_NS = {Verb.LAND: 20_000_000_000, Verb.TAKEOFF: 20_000_000_000}
-_CONFIRM_DEFAULT_NS = 6_000_000_000
+_LEASE_PERIOD_NS = 500 * NS_PER_MS
+_LEASE_LIFE_NS = 1_500 * NS_PER_MS
+_CONFIRM_NS = {Verb.LAND: 20 * NS_PER_S, Verb.TAKEOFF: 20 * NS_PER_S}
+_CONFIRM_DEFAULT_NS = 6 * NS_PER_S
 
 
 @dataclass(slots=True)

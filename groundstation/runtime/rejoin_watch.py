@@ -10,8 +10,9 @@ from groundstation.bus.messages import Severity
 from groundstation.bus.notice import Notice
 from groundstation.estimation.event_log import HASTY
 from groundstation.estimation.measurement import Correction
+from groundstation.time_units import NS_PER_S
 
-_AT_ONCE_NS, _AGAIN_NS, _QUIET_NS = 3_000_000_000, 20_000_000_000, 20_000_000_000
+_AT_ONCE_NS, _AGAIN_NS, _QUIET_NS = 3 * NS_PER_S, 20 * NS_PER_S, 20 * NS_PER_S
 _AGAIN = 3
 _CAMERA_REMEDY = "check that it was not moved and that its picture is live; land what depends on it"
 _EITHER_REMEDY = "its odometry or that camera is wrong; hold or land it and look at both"

@@ -12,10 +12,11 @@ from groundstation.bus.zenoh_bus import ZenohBus, open_router
 from groundstation.process.child import Child
 from groundstation.process.priority import go_first
 from groundstation.runtime.router_refusals import RouterRefusals
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
-_TURN_NS = 50_000_000
+_TURN_NS = 50 * NS_PER_MS
 # Longer than sim_bridge and drivers take to land without a supervisor; they still want to be heard meanwhile.
-_LINGER_NS = 25_000_000_000
+_LINGER_NS = 25 * NS_PER_S
 
 
 class RouterSection(msgspec.Struct, frozen=True):

@@ -10,8 +10,9 @@ from contextlib import suppress
 from groundstation.bus import keys
 from groundstation.bus.zenoh_bus import REFUSED_BY
 from groundstation.errors import MessageError
+from groundstation.time_units import NS_PER_S
 
-_PERIOD_NS = 10_000_000_000
+_PERIOD_NS = 10 * NS_PER_S
 _STDOUT = 1
 _KEPT_LINES = 20
 _PIPE_BYTES, _BLOCK_BYTES = 1 << 20, 8192

@@ -15,8 +15,9 @@ from groundstation.bus.messages import (
 )
 from groundstation.bus.topics import OBSERVATION, ODOMETRY, RANGE, VEHICLE_STATUS
 from groundstation.runtime.marker_height import FixedCamera, MarkerHeight
+from groundstation.time_units import NS_PER_MS
 
-_FRESH_NS = 1_500_000_000
+_FRESH_NS = 1_500 * NS_PER_MS
 _ON_GROUND = frozenset({FlightState.LANDED, FlightState.EMERGENCY})
 _UP = frozenset({FlightState.FLYING, FlightState.HOVERING})
 # The marker of a standing drone that no camera saw there.

@@ -2,9 +2,10 @@
 
 from groundstation.bus.messages import FlightState, Header, Odometry, RelativeObservation, VehicleStatus
 from groundstation.field.resolved import ResolvedField
+from groundstation.time_units import NS_PER_S
 from groundstation.tracker import tracker_from_field
 
-_START_NS = 1_000_000_000_000
+_START_NS = 1_000 * NS_PER_S
 _MS = 1_000_000
 _CLOCK = "warm-up"
 

@@ -11,9 +11,9 @@ from groundstation.adapters import Address
 from groundstation.errors import GroundStationError
 from groundstation.supervisor.process_spec import FailsafeDatagrams
 from groundstation.supervisor.voice import Voice, open_voice
-from groundstation.time_units import NS_PER_S
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
-_PERIOD_NS = 100_000_000
+_PERIOD_NS = 100 * NS_PER_MS
 _log = logging.getLogger(__name__)
 
 

@@ -6,8 +6,10 @@ import time
 from contextlib import suppress
 from types import FrameType
 
+from groundstation.time_units import NS_PER_MS
+
 # `timeout` and some shells signal a process twice at once; a person needs longer for the second thought.
-_SAME_WISH_NS = 500_000_000
+_SAME_WISH_NS = 500 * NS_PER_MS
 
 
 class Interrupts:

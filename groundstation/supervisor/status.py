@@ -10,8 +10,9 @@ from groundstation.bus.messages import Lifecycle, ProcessStatus
 from groundstation.bus.topics import PROCESS_STATUS
 from groundstation.process.heartbeat import SlotState
 from groundstation.supervisor.managed_process import ManagedProcess
+from groundstation.time_units import NS_PER_S
 
-_PERIOD_NS = 1_000_000_000
+_PERIOD_NS = NS_PER_S
 _TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 
 

@@ -27,10 +27,10 @@ from groundstation.supervisor.process_spec import ProcessSpec, Restart, StopOrde
 from groundstation.supervisor.run import SOURCE, Run
 from groundstation.supervisor.status import StatusPublisher
 from groundstation.supervisor.terminal import Terminal
-from groundstation.time_units import NS_PER_S
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _TURN_S = 0.05
-_OWN_DELAY_NS = 200_000_000
+_OWN_DELAY_NS = 200 * NS_PER_MS
 _HURRY_S = 1.0
 # A process that is killed and still there hangs in the kernel, on a device or a network disk.
 _KERNEL_S = 3.0

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from groundstation.bus.topics import IMU, ODOMETRY, RAW_TX
+from groundstation.time_units import NS_PER_MS
 from sim_bridge.conformance.check import Case, NotApplicable, check
 from sim_bridge.conformance.flights import LEG_S, SPEED_M_S, TURN_RAD_S
 from sim_bridge.conformance.record import Heard
@@ -15,7 +16,7 @@ from sim_bridge.conformance.record import Heard
 _LEGS = ("forward", "left", "back", "right")
 _STD_M_S = 0.15
 _GRAVITY_M_S2 = 9.81
-_RATE_NS = 20_000_000  # on both sides, over which a true rate is taken
+_RATE_NS = 20 * NS_PER_MS  # on both sides, over which a true rate is taken
 _HARDLY = 0.01  # rad or rad/s
 _FRAMING = struct.Struct("<qI")  # of recorded datagrams: stamp, length
 

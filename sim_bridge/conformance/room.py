@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable
 
 from groundstation.process.priority import go_first
+from groundstation.time_units import NS_PER_MS
 from sim_bridge.conformance.record import Moment, Record
 from sim_bridge.conformance.subject import NAME, stranger_to
 from sim_bridge.conformance.wire import Wire
@@ -14,7 +15,7 @@ from sim_bridge.tick_schedule import Clockwork
 from sim_bridge.world.emulation import Emulator, emulation_of
 from sim_bridge.world.world import World
 
-_STOOD_NS = 60_000_000
+_STOOD_NS = 60 * NS_PER_MS
 
 
 class Room:

@@ -4,6 +4,7 @@ import math
 
 from drivers.ardrone.wire import at
 from drivers.ardrone.wire.errors import WireError
+from groundstation.time_units import NS_PER_S
 from sim_bridge.devices.ardrone_config import Configuration, Ids
 from sim_bridge.devices.ardrone_firmware import DEFAULT, FIRMWARES, ArdroneFirmware
 from sim_bridge.devices.ardrone_session import COM_LOST_NS, LAND_AFTER_LOST_NS, CommandSession
@@ -74,7 +75,7 @@ class FlightControl:
         return self.configuration.flag("general:navdata_demo")
 
     def _watchdog_ns(self) -> int:
-        return self.configuration.integer("general:com_watchdog") * 1_000_000_000
+        return self.configuration.integer("general:com_watchdog") * NS_PER_S
 
     def _obey(self, command: at.AtCommand, now_ns: int) -> None:
         # COMWDG feeds the watchdog like any traffic; MTRIM, PMODE, MISC and the legacy ones change nothing here.

@@ -2,9 +2,11 @@
 
 from enum import Enum, auto
 
-COM_WATCHDOG_NS = 50_000_000
-COM_LOST_NS = 2_000_000_000
-LAND_AFTER_LOST_NS = 500_000_000
+from groundstation.time_units import NS_PER_MS, NS_PER_S
+
+COM_WATCHDOG_NS = 50 * NS_PER_MS
+COM_LOST_NS = 2 * NS_PER_S
+LAND_AFTER_LOST_NS = 500 * NS_PER_MS
 # WIRE: an ack that comes and goes within one packet is missed by real clients: hold bit 6 for two.
 ACK_PACKETS = 2
 

@@ -2,10 +2,11 @@
 
 from collections.abc import Iterator
 
+from groundstation.time_units import NS_PER_S
 from sim_bridge.devices.ardrone_session import COM_LOST_NS
 
 Address = tuple[str, int]
-_PATIENCE_NS = 1_000_000_000
+_PATIENCE_NS = NS_PER_S
 # Programs that restart ask from a new port each time and never say goodbye: the one that asked longest ago leaves.
 _MOST_LISTENERS = 4
 

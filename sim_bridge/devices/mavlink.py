@@ -10,6 +10,7 @@ from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.frames import MAX_DATAGRAM, FrameDecoder, FrameEncoder, Message, ReceivedFrame, id_of, split
 from drivers.mavlink.wire.names import Flavour
 from drivers.mavlink.wire.verification import Signing
+from groundstation.time_units import NS_PER_S
 from sim_bridge.devices.mavlink_ardupilot import ArduCopter
 from sim_bridge.devices.mavlink_firmware import AutopilotFirmware
 from sim_bridge.devices.mavlink_messages import Speaker
@@ -25,7 +26,7 @@ from sim_bridge.wrong_values import WrongValues
 PORT = 14550
 Address = tuple[str, int]
 _DATAGRAMS_PER_TICK = 64
-_FORGET_NS = 10_000_000_000
+_FORGET_NS = 10 * NS_PER_S
 _CLIENTS = 8
 _TIMESYNC_TICKS = 20
 _LIST_PER_TICK = 2

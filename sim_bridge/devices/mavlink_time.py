@@ -1,6 +1,8 @@
 """How an emulated autopilot maps the times of a sender to its own."""
 
-_JUMP_NS = 100_000_000
+from groundstation.time_units import NS_PER_MS, NS_PER_S
+
+_JUMP_NS = 100 * NS_PER_MS
 _STUBBORN = 5
 _SHARE = 0.1
 
@@ -18,7 +20,7 @@ class SenderClock:
 
     def synchronise(self, now_ns: int, remote_ns: int, asked_ns: int) -> None:
         """Take an answer: the sender's time between our asking and now."""
-        if self.learns or not 0 <= now_ns - asked_ns < 1_000_000_000:
+        if self.learns or not 0 <= now_ns - asked_ns < NS_PER_S:
             return
         offset = (asked_ns + now_ns) / 2 - remote_ns
         if self._offset_ns is None:

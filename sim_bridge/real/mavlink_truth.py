@@ -14,6 +14,7 @@ from drivers.mavlink.wire.frames import MAX_DATAGRAM, FrameDecoder, FrameEncoder
 from drivers.mavlink.wire.names import MavCmd
 from drivers.mavlink.wire.simulator import HilStateQuaternion, SimState
 from drivers.mavlink.wire.telemetry import Attitude, LocalPositionNed
+from groundstation.time_units import NS_PER_S
 from sim_bridge.devices.mavlink_identity import identity_of
 from sim_bridge.listening import open_udp
 from sim_bridge.real.placed import Placement, TrueState
@@ -23,7 +24,7 @@ from sim_bridge.world.puppet import OutsidePose, Vector3
 Address = tuple[str, int]
 # Of a system that is neither a vehicle nor a ground station: no failsafe of a vehicle waits for it.
 _SYSTEM, _COMPONENT = 254, 191
-_ASK_NS, _INTERVAL_US = 2_000_000_000, 20_000.0
+_ASK_NS, _INTERVAL_US = 2 * NS_PER_S, 20_000.0
 # Each simulator has a globe of its own [m per degree]: 0.1 % apart.
 _ARDUPILOT_DEGREE_M, _PX4_DEGREE_M = 111_318.845, 111_194.927
 # WIRE (SIM_STATE, HIL_STATE_QUATERNION): latitude and longitude are whole 1e-7 degrees, a centimetre and more.

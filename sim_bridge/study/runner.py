@@ -12,6 +12,7 @@ import numpy as np
 from groundstation import plug_ins
 from groundstation.bus.messages import EntityEstimate, Message, Odometry, VehicleStatus
 from groundstation.field.resolved import ResolvedField
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 from groundstation.tracker import Tracker, tracker_from_field
 from sim_bridge.scenario import Scenario
 from sim_bridge.site import parse_site
@@ -32,8 +33,8 @@ from sim_bridge.world.noise import generator_of
 from sim_bridge.world.world import TICK_NS, World
 
 CLOCK = "study"
-_START_NS = 1_000_000_000_000
-_ODOMETRY_LATENCY_NS = 4_000_000
+_START_NS = 1_000 * NS_PER_S
+_ODOMETRY_LATENCY_NS = 4 * NS_PER_MS
 _PILOT_TICKS = 6
 _STATUS_TICKS = 40
 _SCORE_TICKS = 20

@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from groundstation.time_units import NS_PER_MS
 from sim_bridge.scenario import Scenario
 from sim_bridge.site import Site, SiteDrone
 from sim_bridge.truth import WIDTH
@@ -19,7 +20,7 @@ from sim_bridge.world.puppet import Puppet
 from sim_bridge.world.unicycle import Unicycle
 
 TICK_S = 0.005
-TICK_NS = 5_000_000
+TICK_NS = 5 * NS_PER_MS
 _TARGET_RADIUS_M = 0.18
 _STILL_AIR = (0.0, 0.0, 0.0)
 # How far a drone's ultrasound disturbs another's, and how often that is looked at.

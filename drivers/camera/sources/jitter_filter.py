@@ -8,9 +8,11 @@ from collections import deque
 from collections.abc import Sequence
 from statistics import median
 
+from groundstation.time_units import NS_PER_S
+
 _FRAMES = 151
 # A sender that was started anew, or whose clock is of no use.
-_JUMP_NS = 5_000_000_000
+_JUMP_NS = 5 * NS_PER_S
 
 
 class SenderClock:

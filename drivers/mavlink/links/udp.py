@@ -18,11 +18,12 @@ from groundstation.adapters import Address, bind_to_adapter, split_zone
 from groundstation.bus import clock
 from groundstation.errors import DriverError
 from groundstation.process.ports import why_refused
+from groundstation.time_units import NS_PER_S
 
 _POLL_S = 0.1
-_ADDRESS_HELD_NS = 3_000_000_000
+_ADDRESS_HELD_NS = 3 * NS_PER_S
 _FIRST_OWN_PORT, _OWN_PORTS = 14_300, 200
-_GREETED_NS, _MOST_GREETED = 1_000_000_000, 250
+_GREETED_NS, _MOST_GREETED = NS_PER_S, 250
 _log = logging.getLogger(__name__)
 
 

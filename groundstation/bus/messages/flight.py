@@ -5,6 +5,7 @@ from enum import StrEnum
 import msgspec
 
 from groundstation.bus.messages.base import Message, Vector3
+from groundstation.time_units import NS_PER_S
 
 
 class FlightState(StrEnum):
@@ -100,7 +101,7 @@ class Verb(StrEnum):
         return self in (Verb.HOLD, Verb.LAND, Verb.CUT_MOTORS)
 
 
-STOP_LIVES_NS = 30_000_000_000
+STOP_LIVES_NS = 30 * NS_PER_S
 """Whoever repeats a stop gives up before that: an older one is the ghost of a queue that stood still."""
 
 

@@ -22,6 +22,7 @@ from groundstation.planning.planner import Planner, PlanRequest
 from groundstation.runtime.inbox import TOPICS
 from groundstation.runtime.journal import Adoption
 from groundstation.runtime.tracker_loop import TrackerFeed, TrackerSection, Tracking
+from groundstation.time_units import NS_PER_S
 from sim_bridge.fault_kinds import RULES, Fault, Part
 from sim_bridge.faults import FaultSchedule, described
 from sim_bridge.scenario import Scenario
@@ -43,7 +44,7 @@ from sim_bridge.study.wrong_figures import NOTHING_WRONG, WrongFigures
 from sim_bridge.world.noise import generator_of
 from sim_bridge.world.world import TICK_NS, World
 
-_START_NS = 1_000_000_000_000
+_START_NS = 1_000 * NS_PER_S
 _DETECTOR_MS = (10.0, 50.0)
 _JUDGE_TICKS = 10
 JUDGE_S = _JUDGE_TICKS * TICK_NS / 1e9

@@ -6,10 +6,11 @@ from drivers.host import VehicleHost
 from drivers.watchdog_types import DriverMode
 from groundstation.bus.messages import Command, Lease, Verb
 from groundstation.bus.topics import COMMAND, LEASE
+from groundstation.time_units import NS_PER_MS
 from sim_bridge.study.faults.local_bus import LocalBus
 
 _HOLDER, _TEAM = "operator", "team"
-_PERIOD_NS, _LIFE_NS = 500_000_000, 1_500_000_000
+_PERIOD_NS, _LIFE_NS = 500 * NS_PER_MS, 1_500 * NS_PER_MS
 
 
 class TeamOrders:

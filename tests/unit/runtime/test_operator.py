@@ -243,24 +243,6 @@ def test_a_stop_by_anyone_ends_the_take_off(scene: Scene, verb: Verb) -> None:
     assert two.heard == [verb]
 
 
-def test_landing_is_ordered_although_another_shell_has_ordered_it(scene: Scene) -> None:
-    """That LAND may have been lost on its way to one drone, with the shell that would have repeated it."""
-    one, two = scene.add("drone_1"), scene.add("drone_2")
-    scene.operator.take_off(scene.now_ns)
-    scene.pass_(4.0)
-    other = MemoryBus(scene.exchange, "lab", "cli_1")
-    late = scene.drones.pop("drone_2")
-    other.publish(COMMAND, Command(header=other.header("team"), id="x", verb=Verb.LAND, scope=(), issuer="cli_1"))
-    scene.pass_(0.2)
-    late.commands.drain()
-    scene.drones["drone_2"] = late
-    scene.operator.land(scene.now_ns)
-    scene.operator.land(scene.now_ns)
-    scene.pass_(1.0)
-    assert one.heard.count(Verb.LAND) == 2 and two.heard.count(Verb.LAND) == 1
-    assert scene.operator.landed(scene.now_ns)
-
-
 def test_a_stop_of_one_drone_leaves_the_others_to_go_on(scene: Scene) -> None:
     one, two = scene.add("drone_1", seen=False), scene.add("drone_2")
     scene.operator.take_off(scene.now_ns)

@@ -259,3 +259,13 @@ def test_a_stop_before_the_take_off_leaves_the_team_on_the_ground(verb):
     desk.send(desk.command(verb, identity="y"))
     desk.turn()
     assert desk.operator.phase is (TeamPhase.HELD if verb is Verb.HOLD else TeamPhase.LANDING)
+
+
+def test_landing_is_ordered_although_another_shell_has_ordered_it():
+    """That LAND may have been lost on its way to one drone, with the shell that would have repeated it."""
+    desk = Desk(drone_1=UP, drone_2=UP)
+    desk.send(desk.command(Verb.LAND))
+    assert desk.operator.phase is TeamPhase.LANDING
+    desk.operator.land(desk.now_ns)
+    desk.operator.land(desk.now_ns)
+    assert [order.verb for order in desk.orders()] == [Verb.LAND], "once"

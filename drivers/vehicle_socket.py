@@ -1,6 +1,7 @@
 """The datagram socket of a vehicle's link."""
 
 import os
+import select
 import socket
 
 from groundstation.adapters import Address, bind_to_adapter
@@ -32,3 +33,11 @@ def open_udp(local: Address, interface: str = "", peer: Address | None = None) -
         one.close()
         raise DriverError(f"no way from {place} to {peer}: {os.strerror(error.errno or 0)}") from error
     return one
+
+
+def waits(udp: socket.socket, seconds: float) -> bool:
+    """Wait for a datagram, so long at most, and return whether one is there; by this, sending need not wait either.
+
+    A time limit of the socket's own would count for sending too: 0.1 s for each frame while the buffer is full.
+    """
+    return bool(select.select([udp], [], [], seconds)[0])

@@ -1,19 +1,18 @@
 """The two UDP links to one AR.Drone: who may speak to us, in which order, and with which number we speak."""
 
 import logging
-import select
 import socket
 import threading
 from collections import Counter, deque
 from collections.abc import Sequence
 
+from drivers import vehicle_socket
 from drivers.ardrone.settings import ArDroneDriverSettings
 from drivers.ardrone.wire import at, navdata
 from drivers.ardrone.wire.at import AtCommand
 from drivers.ardrone.wire.errors import WireError
 from drivers.ardrone.wire.navdata import Navdata
 from drivers.datagrams import DatagramLog
-from drivers.vehicle_socket import open_udp
 from groundstation.bus import clock
 from groundstation.errors import DriverError
 from groundstation.time_units import NS_PER_MS, NS_PER_S
@@ -82,7 +81,7 @@ class ArDroneLink:
     def receive(self) -> tuple[int, Navdata] | None:
         """Wait up to 0.1 s for a packet; returns (receipt_ns, packet), or None when nothing usable came."""
         try:
-            if select.select([self._navdata_socket], [], [], _POLL_S)[0]:
+            if vehicle_socket.waits(self._navdata_socket, _POLL_S):
                 return self._judge(*self._navdata_socket.recvfrom(navdata.MAX_SIZE + 1))
         except WireError as error:
             self._reject(error.reason, str(error))
@@ -139,6 +138,6 @@ class ArDroneLink:
 
 
 def _open(settings: ArDroneDriverSettings, port: int) -> socket.socket:
-    channel = open_udp((settings.local_address, port), settings.interface)
+    channel = vehicle_socket.open_udp((settings.local_address, port), settings.interface)
     channel.setblocking(False)
     return channel

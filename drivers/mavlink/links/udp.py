@@ -1,13 +1,13 @@
 """One UDP port with any number of vehicles behind it: who may speak, who is where."""
 
 import logging
-import select
 import socket
 import threading
 import zlib
 from collections import Counter
 from contextlib import suppress
 
+from drivers import vehicle_socket
 from drivers.mavlink.links.seam import Heard, Sniffer, ignore_bytes
 from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.wire.errors import WireError
@@ -78,7 +78,7 @@ class UdpLink:
     def receive_raw(self) -> list[tuple[Heard, bytes]]:
         """Wait up to 0.1 s for a datagram; return its frames, each with its bytes."""
         try:
-            if not select.select([self._socket], [], [], _POLL_S)[0]:
+            if not vehicle_socket.waits(self._socket, _POLL_S):
                 return []
             data, source = self._socket.recvfrom(MAX_DATAGRAM)
         except (OSError, ValueError) as error:  # ValueError: it was closed meanwhile

@@ -66,6 +66,12 @@ class MemorySocket:
         """Return that the system knows nothing of it."""
         return -1
 
+    def waits(self) -> bool:
+        """Return that a datagram is there; raises NothingWaits where there is none, as a reader's thread would wait."""
+        if self.waiting:
+            return True
+        raise NothingWaits
+
     def recvfrom(self, _size: int) -> tuple[bytes, Address]:
         """Return the oldest datagram and where it came from."""
         if self.waiting:

@@ -156,7 +156,7 @@ def _chosen(left: Array, lattice: Lattice, searchers: Mapping[str, _Searcher], p
         stand, way = divmod(int(np.argmax(value)), len(_DIRECTIONS))
         sweep = sweeps[name] = Sweep(stand, _DIRECTIONS[way])
         x, y = lattice.places[stand].tolist()
-        stands[name] = Stand(x, y, searcher.yaw_rad + sweep.direction * _LEAD_RAD)
+        stands[name] = Stand(x, y, searcher.yaw_rad + sweep.direction * _LEAD_RAD, turn_rad_s=parameters.yaw_rate_rad_s)
         missed *= 1.0 - min(1.0, float(views[stand, way].sum()))
         total += float(value[stand, way])
         for view, heading in zip(searcher.at[stand], searcher.headings(sweep.direction), strict=True):

@@ -1,5 +1,6 @@
 """Settings of the search for targets that are not seen."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -15,6 +16,10 @@ SEARCH_PX = 8.8
 """So large a square is found in 86 % of the pictures that are searched all over (docs/reference/vision.md 2)."""
 
 
+NEAR_YAW_RATE_RAD_S = 1.04
+"""For a target that was tracked when it got out of sight: near, and large in a picture that is not quite sharp."""
+
+
 @dataclass(frozen=True, slots=True)
 class SearchParameters:
     """How a target that is not seen is searched for.
@@ -23,9 +28,10 @@ class SearchParameters:
     count on; observers: robots and world-fixed cameras that may see targets; height_m: of the search; begin_after_s:
     unseen for so long, a map takes the Gaussian's place; given_up_below: probability that the target is where it was
     predicted below which the search begins, though `lost_after_s` is not over; patience_s: what is seen so much later
-    counts 1/e; keep_gain: another stand must promise so much more; starts_ahead_m: how far before the team a target is
-    expected that was never seen; target_speed_m_s, target_straight_s: of a target that drives about; lost_after_s,
-    lost_excluded: after so long a search that excluded so much of the room a person is asked.
+    counts 1/e; near_yaw_rate_rad_s: while all that are searched for were tracked before; keep_gain: another stand must
+    promise so much more; starts_ahead_m: how far before the team a target is expected that was never seen;
+    target_speed_m_s, target_straight_s: of a target that drives about; lost_after_s, lost_excluded: after so long a
+    search that excluded so much of the room a person is asked.
     """
 
     room_m: tuple[float, float]
@@ -40,6 +46,7 @@ class SearchParameters:
     given_up_below: float = 0.3
     speed_m_s: float = SEARCH_SPEED_M_S
     yaw_rate_rad_s: float = SEARCH_YAW_RATE_RAD_S
+    near_yaw_rate_rad_s: float = NEAR_YAW_RATE_RAD_S
     look_s: float = 0.4
     patience_s: float = 10.0
     keep_gain: float = 1.3
@@ -54,6 +61,7 @@ class SearchParameters:
 def search_from_field(resolved: ResolvedField) -> SearchParameters:
     """Return the settings of a resolved field."""
     room, planner = resolved.room, resolved.planner
+    turn_rad_s = math.radians(min(drone.limits.max_yaw_rate_deg_s for drone in resolved.drones.values()))
     fixed: dict[str, WorldCamera | MotionCapture] = {**resolved.cameras, **resolved.sensing_capture}
     cameras = tuple(name for name, sensor in fixed.items() if "targets" in sensor.observes)
     return SearchParameters(
@@ -61,6 +69,8 @@ def search_from_field(resolved: ResolvedField) -> SearchParameters:
         fence_x_m=room.fence.x_m,
         fence_y_m=room.fence.y_m,
         height_m=planner.level_heights_m[0][0],
+        yaw_rate_rad_s=min(SEARCH_YAW_RATE_RAD_S, turn_rad_s),
+        near_yaw_rate_rad_s=min(NEAR_YAW_RATE_RAD_S, turn_rad_s),
         observers=(*resolved.drones, *cameras),
         ranges_m={name: _range_m(drone, resolved) for name, drone in resolved.drones.items()},
         apart_m=max(1.0, planner.separation_m),

@@ -231,7 +231,7 @@ def _towards(name: str, stand: Stand, phase: FlightMode, now: _Moment) -> Setpoi
             nearness = 1.0 - distance / parameters.column_m
             velocity[:2] += parameters.search_speed_m_s * 2 * nearness * away / max(distance, 0.05)
     rate = _TURN_GAIN * difference(stand.yaw, float(mean[3])) + stand.yaw_rate
-    limit = parameters.search_yaw_rate_rad_s
+    limit = stand.turn_rad_s or parameters.search_yaw_rate_rad_s
     body = stabilized_from_world(velocity, float(mean[3]))
     rate = min(max(rate, -limit), limit)
     return _with_height(name, (float(body[0]), float(body[1])), rate, parameters.search_height_m, phase, now)

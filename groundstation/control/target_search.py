@@ -42,7 +42,7 @@ class SearchState:
     """How the search for one target stands.
 
     since_ns: since when the mode holds; place: where it most likely is [m; world]; excluded: share of the floor where
-    it is not; expected_s: about how long finding it takes.
+    it is not; expected_s: about how long finding it takes; near: it was tracked when it got out of sight.
     """
 
     mode: SearchMode
@@ -52,6 +52,7 @@ class SearchState:
     excluded: float = 0.0
     expected_s: float | None = None
     given_up: bool = False
+    near: bool = False
 
 
 class Search:
@@ -144,8 +145,10 @@ class Search:
         order = robots_in_order(robots, chances, poses, self.grid)
         footprints = {name: self._footprints[name] for name in order}
         allowed_s = {name: self._excursions.allowed_s(name, belief, self._lattice.places) for name in robots}
-        held = self._outlook.sweeps
-        return choose_stands(chances, self._lattice, footprints, poses, allowed_s, held, self.parameters)
+        held, parameters = self._outlook.sweeps, self.parameters
+        if all(self.targets[name].near for name in targets):
+            parameters = replace(parameters, yaw_rate_rad_s=parameters.near_yaw_rate_rad_s)
+        return choose_stands(chances, self._lattice, footprints, poses, allowed_s, held, parameters)
 
     def _begun(self, name: str, state: SearchState, belief: JointBelief, age_s: float) -> SearchState:
         p, now_ns = self.parameters, belief.stamp_ns
@@ -163,7 +166,7 @@ class Search:
             return SearchState(SearchMode.SEARCH, now_ns, self._anywhere(belief), given_up=True)
         mean, covariance = belief.mean_of(name)[:2], belief.covariance_of(name)[:2, :2]
         room = state.room or lost_at(self.grid, mean, covariance)
-        state = replace(state, room=room)
+        state = replace(state, room=room, near=True)
         if state.given_up:
             return state
         if room.mass_near(mean, covariance, 2.0, 0.5) < p.given_up_below:

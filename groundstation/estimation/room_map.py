@@ -13,7 +13,7 @@ import numpy as np
 from groundstation.arrays import Array
 
 MOST_CELLS = 2400
-STANDS_SHARE = 0.6
+STANDS_SHARE = 0.3
 """Prior of a target that is not seen: it stands."""
 
 HIDDEN_S = 2.0

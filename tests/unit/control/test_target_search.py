@@ -107,6 +107,17 @@ def test_a_searcher_turns_all_the_time_towards_what_it_has_not_seen() -> None:
     assert again.sweeps == outlook.sweeps
 
 
+@pytest.mark.parametrize("known", [None, (1.0, 0.0)])
+def test_who_looks_for_a_target_that_was_tracked_turns_faster(known: tuple[float, float] | None) -> None:
+    search, ages_s = new_search(), (0.0, 2.0) if known else (math.inf, math.inf)
+    poses = {"drone_1": np.array([-0.5, 0.5, 1.6, 0.0]), "drone_2": np.array([-0.5, -0.5, 1.6, 0.0])}
+    for stamp_s, age_s in zip((1.0, 3.0), ages_s, strict=True):
+        now = belief(poses, stamp_s, known)
+        search.advance(now, {"turtlebot": age_s})
+    rates = {stand.turn_rad_s for stand in search.stands(NAMES, ("turtlebot",), now).values()}
+    assert rates == {SEARCH.near_yaw_rate_rad_s if known else SEARCH.yaw_rate_rad_s}
+
+
 def test_pictures_are_searched_as_far_as_a_full_search_finds_markers() -> None:
     assert SEARCH.ranges_m["drone_1"] == pytest.approx(460 * 0.044 / 8.8)
     far = resolved_field(load_field(CONFIG / "lab.yaml", ("planner.planned_range_m=3.0",)))

@@ -26,46 +26,47 @@ def padded(size: int) -> int:
     return -(-size // LANES) * LANES
 
 
-def _rank4_code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-    """Emit: for each block of 8 columns, for 4 rows r: target[r] -= sum_p factor[p, r] * panel[p]."""
-    target, panel, stride, factors, factor_stride, row_stride, blocks = args
-    vector, pointer = ir.VectorType(ir.DoubleType(), LANES), ir.IntType(64)
-    whole = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
-
-    def address(base: Any, index: int, stride: Any) -> Any:
-        return builder.add(base, builder.mul(stride, ir.Constant(pointer, index)))
-
-    def scalar(base: Any) -> Any:
-        value = builder.load(builder.inttoptr(base, ir.DoubleType().as_pointer()))
-        first = builder.insert_element(ir.Constant(vector, ir.Undefined), value, ir.Constant(ir.IntType(32), 0))
-        return builder.shuffle_vector(first, ir.Constant(vector, ir.Undefined), whole)
-
-    def lanes(base: Any) -> Any:
-        return builder.inttoptr(base, vector.as_pointer())
-
-    held = [
-        [scalar(address(address(factors, p, factor_stride), r, row_stride)) for r in range(4)] for p in range(PIVOTS)
-    ]
-    with cgutils.for_range(builder, blocks) as loop:
-        column = builder.mul(loop.index, ir.Constant(pointer, 8 * LANES))
-        rows = [builder.load(lanes(builder.add(address(panel, p, stride), column)), align=8) for p in range(4)]
-        for r in range(4):
-            place = lanes(builder.add(address(target, r, stride), column))
-            value = builder.load(place, align=8)
-            for p in range(PIVOTS):
-                product = builder.fmul(held[p][r], rows[p], flags=["contract"])
-                value = builder.fsub(value, product, flags=["contract"])
-            builder.store(value, place, align=8)
-    return context.get_dummy_value()
-
-
+@intrinsic
 def _typed_rank4(
     _typing: Any, target: Any, panel: Any, stride: Any, factors: Any, factor_stride: Any, row_stride: Any, blocks: Any
 ) -> Any:
-    return types.void(*[types.intp] * 7), _rank4_code
+    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        """Emit: for each block of 8 columns, for 4 rows r: target[r] -= sum_p factor[p, r] * panel[p]."""
+        target, panel, stride, factors, factor_stride, row_stride, blocks = args
+        vector, pointer = ir.VectorType(ir.DoubleType(), LANES), ir.IntType(64)
+        whole = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
+
+        def address(base: Any, index: int, stride: Any) -> Any:
+            return builder.add(base, builder.mul(stride, ir.Constant(pointer, index)))
+
+        def scalar(base: Any) -> Any:
+            value = builder.load(builder.inttoptr(base, ir.DoubleType().as_pointer()))
+            first = builder.insert_element(ir.Constant(vector, ir.Undefined), value, ir.Constant(ir.IntType(32), 0))
+            return builder.shuffle_vector(first, ir.Constant(vector, ir.Undefined), whole)
+
+        def lanes(base: Any) -> Any:
+            return builder.inttoptr(base, vector.as_pointer())
+
+        held = [
+            [scalar(address(address(factors, p, factor_stride), r, row_stride)) for r in range(4)]
+            for p in range(PIVOTS)
+        ]
+        with cgutils.for_range(builder, blocks) as loop:
+            column = builder.mul(loop.index, ir.Constant(pointer, 8 * LANES))
+            rows = [builder.load(lanes(builder.add(address(panel, p, stride), column)), align=8) for p in range(4)]
+            for r in range(4):
+                place = lanes(builder.add(address(target, r, stride), column))
+                value = builder.load(place, align=8)
+                for p in range(PIVOTS):
+                    product = builder.fmul(held[p][r], rows[p], flags=["contract"])
+                    value = builder.fsub(value, product, flags=["contract"])
+                builder.store(value, place, align=8)
+        return context.get_dummy_value()
+
+    return types.void(*[types.intp] * 7), code
 
 
-_rank4 = cast(Callable[[int, int, int, int, int, int, int], None], intrinsic(_typed_rank4))
+_rank4 = cast(Callable[[int, int, int, int, int, int, int], None], _typed_rank4)
 
 
 @kernel()

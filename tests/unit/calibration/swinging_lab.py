@@ -25,7 +25,8 @@ STANDING_M = 0.1
 class Lab:
     """Two drones that stand, rise and swing about a target that drives; cameras and odometry with a little noise."""
 
-    def __init__(self, field: ResolvedField, wrong: WrongFigures, seed: int = 1) -> None:
+    def __init__(self, field: ResolvedField, wrong: WrongFigures, seed: int = 1, seconds: float = SECONDS) -> None:
+        self.seconds = seconds
         self.field, self.true, self.wrong = field, wrong.world(field), wrong
         self.rng, self.seq = np.random.default_rng(seed), 0
 
@@ -114,7 +115,7 @@ class Lab:
 
     def flown(self) -> Flown:
         ticks = []
-        for tick in range(round(SECONDS * 50)):
+        for tick in range(round(self.seconds * 50)):
             t = 100.0 + tick / 50.0
             ticks.append((round(t * 1e9) + 1, tuple(self._later(self.messages(tick / 50.0, tick)))))
         return Flown(tuple(ticks), CLOCK)

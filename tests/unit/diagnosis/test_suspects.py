@@ -31,7 +31,7 @@ def suspicions() -> tuple[Suspicion, ...]:
         ({}, None, 0.0),
         ({("ceiling", "delay"): 50.0}, ("ceiling", "delay"), 0.05),
         ({("drone_1", "delay"): -50.0}, ("drone_1", "delay"), -0.05),
-        ({("drone_1", "own_delay"): 100.0}, ("drone_1", "own_delay"), 0.1),
+        ({("drone_1", "own_delay"): 80.0}, ("drone_1", "own_delay"), 0.08),
         ({("drone_1", "pan"): 3.0, ("drone_2", "pan"): 3.0}, ("", "pan"), math.radians(3.0)),
         ({("ceiling", "pitch"): 3.0}, ("ceiling", "tilted"), math.radians(3.0)),
         ({("turtlebot", "print"): 0.05}, ("turtlebot", "print"), 0.05),
@@ -41,7 +41,7 @@ def suspicions() -> tuple[Suspicion, ...]:
 def test_a_wrong_figure_is_likeliest_with_its_size(
     lab_field: ResolvedField, errors: dict[tuple[str, str], float], suspect: tuple[str, str] | None, size: float
 ) -> None:
-    verdict = verdict_on(Lab(lab_field, WrongFigures(errors)).flown(), lab_field)
+    verdict = verdict_on(Lab(lab_field, WrongFigures(errors), seconds=16.0).flown(), lab_field)
     assert verdict is not None
     assert [charges[0].suspect for charges in verdict.causes] == ([] if suspect is None else [suspect])
     for charges in verdict.causes:

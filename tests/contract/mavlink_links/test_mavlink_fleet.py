@@ -9,7 +9,11 @@ from pathlib import Path
 import pytest
 
 from drivers.mavlink.driver import RATE_HZ, Fleet, hosts_of
+from drivers.mavlink.links.seam import Heard
 from drivers.mavlink.settings import MavlinkDriverSettings
+from drivers.mavlink.wire.frames import ReceivedFrame
+from drivers.mavlink.wire.names import AUTOPILOT_COMPONENT
+from drivers.mavlink.wire.telemetry import BatteryStatus
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import Command, Lease, Verb
 from groundstation.bus.topics import COMMAND, IMU, LEASE, ODOMETRY, VEHICLE_STATUS
@@ -184,5 +188,21 @@ def test_parameters_and_health_forbid_a_take_off_on_every_link(hangar, kind):
         assert flying.turn(10.0, lambda: ready(flying)), reason()
         copter.battery = 0.05
         assert flying.turn(3.0, lambda: "does not want to arm" in reason()), reason()
+    finally:
+        flying.close()
+
+
+def test_the_charge_is_that_of_the_first_battery_whatever_a_payloads_says(hangar):
+    _, copter, (address, port) = hangar.add("px4", 9)
+    flying = Flying(f"udpout:{address}:{port}", {9: "px4"})
+    vehicle = flying.fleet.vehicles[9]
+    try:
+        copter.battery = 0.4
+        charge = lambda: vehicle.view(time.monotonic_ns()).battery  # noqa: E731
+        assert flying.turn(5.0, lambda: charge() == pytest.approx(0.4, abs=0.011)), charge()
+        for percent in (90, 5):
+            second = BatteryStatus(1, 0, 0, 0, (0,) * 10, 0, 0, 0, percent)
+            vehicle.hear(Heard(time.monotonic_ns(), ReceivedFrame(9, AUTOPILOT_COMPONENT, 0, second)))
+            assert charge() == pytest.approx(0.4, abs=0.011)
     finally:
         flying.close()

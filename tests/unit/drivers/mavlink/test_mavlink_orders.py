@@ -5,7 +5,7 @@ import pytest
 from drivers.mavlink.commands import Orders
 from drivers.mavlink.requests import Requests
 from drivers.mavlink.settings import VehicleSettings
-from drivers.mavlink.wire.names import ARMED, Flavour, Landed, guided_mode
+from drivers.mavlink.wire.names import ARMED, Flavour, Landed, MavCmd, guided_mode
 from drivers.watchdog_types import Action, DriverMode, WatchdogDecision
 from groundstation.bus.messages import EntityEstimate
 
@@ -116,3 +116,20 @@ def test_what_was_not_asked_to_take_off_is_not_corrected_on_the_floor():
     orders = px4()
     stands(orders, 1.0, Action.IDLE, DriverMode.LANDED)
     assert orders.drift.drift(2 * 10**9) == (0.0, 0.0, 0.0)
+
+
+def test_a_disarm_that_nobody_acknowledged_is_not_repeated_into_the_take_off_after_it():
+    vehicle = VehicleSettings(name="v", system_id=1, flavour="ardupilot", take_off_m=TAKE_OFF_M)
+    requests = Requests(1)
+    orders = Orders(vehicle, Flavour.ARDUPILOT, requests)
+
+    def asked(now_s, mode, action):
+        now_ns = round(now_s * 1e9)
+        guided = guided_mode(Flavour.ARDUPILOT)
+        orders.step(now_ns, WatchdogDecision(mode, action), ARMED, guided, Landed.ON_GROUND, 0.0)
+        return [(one.command, one.param1) for one in requests.due(now_ns)]
+
+    disarm = (MavCmd.COMPONENT_ARM_DISARM, 0.0)
+    assert disarm in asked(1.0, DriverMode.CUT, Action.CUT)
+    for tenth in range(1, 30):
+        assert disarm not in asked(1.0 + 0.1 * tenth, DriverMode.TAKING_OFF, Action.TAKE_OFF)

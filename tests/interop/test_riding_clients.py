@@ -27,6 +27,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.interop, pytest.mark.timeout(150)]
 PX4, ARDUPILOT = FLAVOURS["px4"], FLAVOURS["ardupilot"]
 QUIET_S, RIDDEN_S = 6.0, 12.0
 STANDS_M_S = 0.15
+_ANSWERED_S = 2.0
 # DO_REPOSITION to nowhere, as QGroundControl pauses a PX4.
 PAUSE = "long DO_REPOSITION -1 1 0 nan nan nan nan"
 DENIED = "Got COMMAND_ACK: {}: DENIED"
@@ -141,6 +142,8 @@ async def ride_with_mavsdk(port: int, flight: RiddenFlight) -> dict[int, str]:
                 assert time.monotonic() < deadline, "it is not seen to fly"
                 await asyncio.sleep(0.1)
             answers[number] = await answer_of(action.takeoff())
+            # It repeats a command after half a second, and takes a second refusal of a mode for that of the next one.
+            await asyncio.sleep(_ANSWERED_S)
             await action.hold()
             await asyncio.to_thread(flight.until, lambda n=number: flight.speed(n) < STANDS_M_S, 10)
             await action.land()

@@ -137,7 +137,22 @@ def test_positions_seen_become_a_velocity_in_the_vehicles_frame():
     assert seen_velocity(moving, yaw=math.pi / 2)[-1] == pytest.approx((0.0, -0.5), abs=1e-9)
 
 
-@pytest.mark.parametrize("fields", [{"converged": False}, {"age_s": 2.0}, {"covariance": (0.1,) * 16}])
+def test_a_velocity_seen_while_turning_is_the_mean_one_of_the_vehicles_frame():
+    places, yaws = [(0.5 * i / 50, 0.0) for i in range(50)], [1.0 * i / 50 for i in range(50)]
+    seen, velocity = SeenVelocity(), None
+    for turn, ((x, y), yaw) in enumerate(zip(places, yaws, strict=True)):
+        entity = EntityEstimate(
+            name="v", kind="robot", mean=(x, y, 0.8, yaw), velocity_m_s=(0.0, 0.0, 0.0), converged=True, age_s=0.1,
+            covariance=(1e-4,) * 16,
+        )  # fmt: skip
+        seen.hear(turn * S // 50, 1, entity)
+        velocity = seen.velocity(turn * S // 50)
+    window = yaws[-31:]  # 0.6 s
+    mean = [0.5 * sum(map(f, window)) / len(window) for f in (math.cos, lambda yaw: -math.sin(yaw))]
+    assert velocity == pytest.approx(mean, abs=0.01)
+
+
+@pytest.mark.parametrize("fields", [{"converged": False}, {"age_s": 2.0}, {"covariance": (0.06**2,) * 16}])
 def test_nothing_is_made_of_positions_that_nobody_sees_well(fields):
     assert seen_velocity([(0.5 * i / 50, 0.0) for i in range(100)], **fields)[-1] is None
 

@@ -229,7 +229,8 @@ def _exit_code(
     outcome: "FlightOutcome", plan: "FlightPlan", passed: bool | None, *, judged_by_landing: bool
 ) -> ExitCode:
     if plan.look_only:
-        return ExitCode.FAILED if outcome.forbidden else ExitCode.OK
+        unsaid = ExitCode.INTERRUPTED if outcome.interrupted else ExitCode.OK
+        return ExitCode.FAILED if outcome.forbidden else unsaid
     if passed is not None and outcome.interrupted and plan.duration_s is not None:
         return ExitCode.INTERRUPTED
     if passed is None or judged_by_landing or plan.duration_s is None:

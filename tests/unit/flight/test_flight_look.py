@@ -1,0 +1,101 @@
+"""A look before a take-off that is broken off: nobody takes off after Ctrl-C, a dead process, or in a mere look."""
+
+import time
+from types import SimpleNamespace
+from typing import cast
+
+import pytest
+
+from groundstation.bus import messages as m
+from groundstation.bus import topics as t
+from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+from groundstation.cli.exits import ExitCode
+from groundstation.cli.run import _exit_code
+from groundstation.field.resolved import ResolvedField
+from groundstation.flight import loop
+from groundstation.flight.flight_plan import FlightPlan
+from groundstation.runtime.take_off import TakeOffLimits
+from groundstation.supervisor.start import Start
+from groundstation.supervisor.supervisor import Supervisor
+from groundstation.supervisor.terminal import Terminal
+
+
+class Unfinished:
+    """Checks that go on for ever and have found nothing so far."""
+
+    def __init__(self, _bus: object, _field: object) -> None:
+        pass
+
+    def update(self, now_ns: int) -> None:
+        pass
+
+    def complete(self, _now_ns: int) -> bool:
+        return False
+
+    def forbids(self, _now_ns: int, _drones: object) -> list[object]:
+        return []
+
+
+class Broken:
+    """A run whose drone stands ready, and that ends in the third turn of the look."""
+
+    def __init__(self, failure: str) -> None:
+        exchange = MemoryExchange()
+        self.bus, self._drone = MemoryBus(exchange, "lab", "supervisor"), MemoryBus(exchange, "lab", "drone_1")
+        self._orders = self._drone.subscribe([t.COMMAND])
+        self.run = SimpleNamespace(drones=("drone_1",))
+        self.interrupts = SimpleNamespace(stop_requested=False, hurry=False)
+        self.failure, self.unwell, self._why = "", list[str](), failure
+        self._turns = 0
+
+    def step(self) -> None:
+        self._turns += 1
+        status = m.VehicleStatus(header=self._drone.header("drone_1"), flight_state=m.FlightState.LANDED, mode="LANDED")
+        self._drone.publish(t.VEHICLE_STATUS, status)
+        if self._turns == 3:
+            self.failure, self.interrupts.stop_requested = self._why, not self._why
+        time.sleep(0.002)
+
+    def end_run(self) -> None:
+        pass
+
+    def heard(self) -> list[m.Verb]:
+        return [r.message.verb for r in self._orders.drain() if isinstance(r.message, m.Command)]
+
+
+def plan_of(field: ResolvedField, *, look_only: bool) -> FlightPlan:
+    return FlightPlan(
+        None,
+        asks=False,
+        cameras={},
+        limits=TakeOffLimits(),
+        landing_limit_s=0.1,
+        field=field,
+        look_only=look_only,
+    )
+
+
+@pytest.mark.parametrize("look_only", [False, True])
+@pytest.mark.parametrize("failure", ["", "the router died"])
+def test_a_look_that_is_broken_off_is_followed_by_no_take_off(
+    failure: str, look_only: bool, lab_field: ResolvedField, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(loop, "BeforeTakeOff", Unfinished)
+    run = Broken(failure)
+    terminal = cast(Terminal, SimpleNamespace(say=lambda _: None, unmute=lambda: None))
+    flight = loop.Flight(cast(Supervisor, run), plan_of(lab_field, look_only=look_only), terminal)
+    flight._start = cast(Start, SimpleNamespace(run=lambda: None, show_screen=lambda: None))
+    outcome = flight.run()
+    assert m.Verb.TAKEOFF not in run.heard()
+    assert (outcome.failure, outcome.interrupted, outcome.landed) == (failure, not failure, True)
+
+
+@pytest.mark.parametrize(
+    ("forbidden", "interrupted", "code"),
+    [(False, False, ExitCode.OK), (True, False, ExitCode.FAILED), (False, True, ExitCode.INTERRUPTED)],
+)
+def test_a_look_that_was_broken_off_does_not_say_that_all_is_well(
+    forbidden: bool, interrupted: bool, code: ExitCode, lab_field: ResolvedField
+) -> None:
+    outcome = loop.FlightOutcome("", interrupted, landed=True, forbidden=forbidden)
+    assert _exit_code(outcome, plan_of(lab_field, look_only=True), None, judged_by_landing=False) is code

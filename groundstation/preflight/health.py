@@ -32,7 +32,8 @@ def drone_findings(field: ResolvedField, statuses: Mapping[str, VehicleStatus]) 
             yield Finding(Level.SHOULD, name, "its motors are cut off", "set it upright and start it again")
         yield from _readiness(name, status)
         yield _battery(name, status, drone.limits.battery_min)
-        if status.rate_hz < _TELEMETRY_HZ or (status.link_quality or 1.0) < _LINK_SHARE:
+        share = 1.0 if status.link_quality is None else status.link_quality
+        if status.rate_hz < _TELEMETRY_HZ or share < _LINK_SHARE:
             heard = "" if status.link_quality is None else f", {status.link_quality:.0%} of it arrives"
             found = f"telemetry {status.rate_hz:.0f} Hz{heard}"
             yield Finding(Level.SHOULD, name, found, "bring it nearer, or choose another radio channel")

@@ -49,6 +49,18 @@ def clock_findings(field: ResolvedField, drift_ppm: float | None, late_ms: float
     return [one for one in found if one.subject == "drone_1" and "battery" not in one.found]
 
 
+@pytest.mark.parametrize(("share", "told"), [(None, 0), (0.0, 1), (0.4, 1), (0.95, 0)])
+def test_a_link_over_which_nothing_or_little_arrives_is_told(
+    lab_field: ResolvedField, share: float | None, told: int
+) -> None:
+    status = VehicleStatus(
+        header=Header(0, "here", "drone_1", "drone_1", 0), flight_state=FlightState.LANDED, mode="LANDED", battery=0.9,
+        rate_hz=50.0, link_quality=share,
+    )  # fmt: skip
+    found = [one for one in drone_findings(lab_field, {"drone_1": status}) if "of it arrives" in one.found]
+    assert len(found) == told and all(one.level is Level.SHOULD and one.remedy for one in found)
+
+
 @pytest.mark.parametrize(("asks", "told"), [(None, 0), (True, 0), (False, 1)])
 def test_a_vehicle_that_does_not_ask_for_our_time_is_told(
     lab_field: ResolvedField, asks: bool | None, told: int

@@ -1,6 +1,7 @@
 """Collects what the preflight checks judge, from the bus, and answers whether a take-off is open."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
+from typing import TypeVar
 
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import (
@@ -25,7 +26,11 @@ from groundstation.time_units import NS_PER_S
 _STANDS = frozenset({FlightState.LANDED, FlightState.EMERGENCY})
 _NOT_SEEN_TO_FLY = _STANDS | {FlightState.UNKNOWN, FlightState.LOST}
 _AGAIN_NS = 3 * NS_PER_S
+# Drivers speak twice a second at least: what was said longer ago is not how it is now.
+_SPOKEN_NS = 3 * NS_PER_S
 _SEVERITIES = {Level.MUST: Severity.ERROR, Level.SHOULD: Severity.WARNING}
+
+Status = TypeVar("Status", VehicleStatus, CameraStatus)
 
 
 class BeforeTakeOff:
@@ -38,8 +43,8 @@ class BeforeTakeOff:
     def __init__(self, bus: Bus, field: ResolvedField) -> None:
         self._bus, self._field = bus, field
         self._inbox = bus.subscribe([OBSERVATION, RANGE, VEHICLE_STATUS, CAMERA_STATUS])
-        self._vehicles: dict[str, VehicleStatus] = {}
-        self._cameras: dict[str, CameraStatus] = {}
+        self._vehicles: dict[str, tuple[int, VehicleStatus]] = {}
+        self._cameras: dict[str, tuple[int, CameraStatus]] = {}
         self._flew: set[str] = set()
         self._record = PadRecord(field.world_sensors)
         self._next_ns: int | None = None
@@ -51,18 +56,18 @@ class BeforeTakeOff:
                 case RelativeObservation() | RangeObservation() as sighting if sighting.subject not in self._flew:
                     self._record.see(sighting, now_ns)
                 case CameraStatus() as status:
-                    self._cameras[status.header.entity] = status
+                    self._cameras[status.header.entity] = now_ns, status
                 case VehicleStatus() as status:
-                    self._hear(status)
+                    self._hear(status, now_ns)
         if self._next_ns is not None and now_ns >= self._next_ns and not self._anybody_flies():
             self._tell(self.findings(now_ns), now_ns)
 
     def _anybody_flies(self) -> bool:
-        return any(status.flight_state not in _NOT_SEEN_TO_FLY for status in self._vehicles.values())
+        return any(status.flight_state not in _NOT_SEEN_TO_FLY for _, status in self._vehicles.values())
 
-    def _hear(self, status: VehicleStatus) -> None:
+    def _hear(self, status: VehicleStatus, now_ns: int) -> None:
         name = status.header.entity
-        self._vehicles[name] = status
+        self._vehicles[name] = now_ns, status
         if status.flight_state not in _NOT_SEEN_TO_FLY:
             self._flew.add(name)
             self._record.forget(name)
@@ -76,7 +81,8 @@ class BeforeTakeOff:
 
     def findings(self, now_ns: int) -> list[Finding]:
         """Return everything that is to be said now, the grave first."""
-        return judge(self._field, self._vehicles, self._cameras, self._record.medians(now_ns), self._flew)
+        vehicles, cameras = _spoken(self._vehicles, now_ns), _spoken(self._cameras, now_ns)
+        return judge(self._field, vehicles, cameras, self._record.medians(now_ns), self._flew)
 
     def forbids(self, now_ns: int, drones: Collection[str]) -> list[Finding]:
         """Return what forbids a take-off of the given drones (none: all)."""
@@ -104,3 +110,8 @@ class BeforeTakeOff:
         text = f"{who} takes off although it must not: {what}"
         event = Event(header=self._bus.header(TEAM), severity=Severity.WARNING, text=text, remedy="land")
         self._bus.publish(EVENT, event)
+
+
+def _spoken(heard: Mapping[str, tuple[int, Status]], now_ns: int) -> dict[str, Status]:
+    """Return what was said lately: a driver that is dead says nothing, and not what it said last."""
+    return {name: status for name, (at_ns, status) in heard.items() if now_ns - at_ns < _SPOKEN_NS}

@@ -193,3 +193,14 @@ def test_a_battery_is_judged_by_where_it_lands(lab_field: ResolvedField, battery
     lab.checks.update(lab.now_ns)
     found: list[Finding] = [one for one in lab.checks.findings(lab.now_ns) if one.level is not Level.OK]
     assert [one.level for one in found] == ([] if level is None else [level])
+
+
+def test_what_a_silent_driver_said_last_is_not_how_it_is_now(lab_field: ResolvedField) -> None:
+    lab = Lab(lab_field)
+    lab.turn()
+    assert all(one.level is Level.OK for one in lab.checks.findings(lab.now_ns))
+    lab.now_ns += 4000 * MS
+    lab.checks.update(lab.now_ns)
+    found = {one.subject: one for one in lab.checks.findings(lab.now_ns) if one.level is not Level.OK}
+    assert found["cameras"].level is Level.MUST
+    assert found["drone_1"].found == "nothing is heard of it" and found["drone_1"].remedy

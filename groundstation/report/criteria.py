@@ -48,6 +48,8 @@ def criteria_of(figures: RunFigures, field: ResolvedField, facts: RunFacts) -> l
         criteria.append(_below("mean_cpu_cores", figures.mean_cpu_cores, MAX_CPU_CORES))
         if figures.sim_overrun_percent is not None or not field.truth:
             criteria.append(_below("sim_overrun_percent", figures.sim_overrun_percent, MAX_SIM_OVERRUN_PERCENT))
+    elif figures.landed is not None:
+        criteria.append(_landed(figures))
     return criteria
 
 
@@ -62,7 +64,11 @@ def _against_truth(figures: RunFigures, field: ResolvedField) -> Iterator[Criter
     yield _below("max_fence_violation_m", figures.max_fence_violation_m, 0.0)
     if len(field.drones) > 1:
         yield _above("min_separation_m", figures.min_separation_m, field.safety.min_separation_m)
-    yield Criterion("landed", figures.landed, "==", True, figures.landed is True)
+    yield _landed(figures)
+
+
+def _landed(figures: RunFigures) -> Criterion:
+    return Criterion("landed", figures.landed, "==", True, figures.landed is True)
 
 
 def _of_the_demo(figures: RunFigures, facts: RunFacts) -> Iterator[Criterion]:

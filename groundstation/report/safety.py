@@ -1,14 +1,18 @@
-"""What the drones really did: fence, separation, landing, time to get airborne. From the truth only."""
+"""What the drones really did: fence, separation, landing, time to get airborne. From the truth, where there is one."""
 
 from itertools import combinations
 
 import numpy as np
 
+from groundstation.bus.messages import FlightState
 from groundstation.field.room import Fence
 from groundstation.report.tracks import RunData, TruthTrack
 
 # Contact with the floor lets a body sink by fractions of this; it is no breach of a fence.
 _TOUCH_M = 1e-3
+_DOWN = frozenset({FlightState.LANDED, FlightState.EMERGENCY})
+# A drone that is not heard, or not yet, says nothing of where it is.
+_SAYS_NOTHING = frozenset({FlightState.LOST, FlightState.UNKNOWN})
 
 
 def fence_violation_m(track: TruthTrack, fence: Fence) -> float:
@@ -45,9 +49,23 @@ def _closest(first: TruthTrack, second: TruthTrack) -> float | None:
 
 
 def landed(data: RunData) -> bool | None:
-    """Return whether every drone stood on the ground at the end; None without truth."""
+    """Return whether every drone stood on the ground at the end.
+
+    Without truth: by what those said last that flew; None where nobody did.
+    """
     ends = [bool(data.truth[name].on_ground[-1]) for name in data.drones if name in data.truth]
-    return all(ends) and len(ends) == len(data.drones) if ends else None
+    if ends:
+        return all(ends) and len(ends) == len(data.drones)
+    said = [_said_down(data, name) for name in data.vehicles]
+    flew = [down for down in said if down is not None]
+    return all(flew) if flew else None
+
+
+def _said_down(data: RunData, name: str) -> bool | None:
+    """Return whether the last that a drone said of its flight was that it stands; None where it never flew."""
+    reported = sorted(data.vehicles[name], key=lambda item: item.time_s)
+    states = [item.message.flight_state for item in reported if item.message.flight_state not in _SAYS_NOTHING]
+    return None if _DOWN.issuperset(states) else states[-1] in _DOWN
 
 
 def all_airborne_s(data: RunData) -> float | None:

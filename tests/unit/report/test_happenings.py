@@ -176,3 +176,31 @@ def test_criteria_are_told_in_words_with_units():
     assert (quantity("landed", False), quantity("target_rmse_m", None)) == ("no", "not measured")
     assert bound(Criterion("landed", True, "==", True, True)) == "yes"
     assert quantity("anything_else", 1.0) == "1"
+
+
+LOST = m.FlightState.LOST
+
+
+@pytest.mark.parametrize(
+    ("last", "landed"),
+    [
+        ([(9, DOWN, "LANDED", "")], True),
+        ([(9, DOWN, "LANDED", ""), (12, LOST, "CONNECTING", "")], True),
+        ([(9, m.FlightState.EMERGENCY, "CUT", "")], True),
+        ([(9, SINKS, "LANDING", "")], False),
+        ([(9, LOST, "TRACK", "")], False),
+        ([], False),
+    ],
+)
+def test_a_flight_without_truth_fails_where_a_drone_never_said_that_it_landed(last, landed):
+    flown = data((1, DOWN, "LANDED", ""), (2, UP, "TRACK", ""), *last, commands=[(8.0, m.Verb.LAND, ())])
+    figures = figures_of(flown)
+    assert figures.landed is landed
+    (criterion,) = [one for one in criteria_of(figures, UNKNOWN_FIELD, RunFacts()) if one.name == "landed"]
+    assert criterion.ok is landed
+
+
+def test_who_never_flew_has_no_landing_to_be_judged():
+    figures = figures_of(data((1, DOWN, "LANDED", ""), (2, LOST, "CONNECTING", "")))
+    assert figures.landed is None
+    assert "landed" not in {one.name for one in criteria_of(figures, UNKNOWN_FIELD, RunFacts())}

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeVar
 
 from groundstation.appearance.cost import cost_cm2, cost_text
 from groundstation.appearance.topology import topology_words
@@ -26,6 +26,9 @@ _EVENTS = 40
 _ALTERNATIVES = 8
 # Sections that change slowly are looked at every so many turns.
 _OFTEN, _SELDOM = 2, 5
+# What trails and curves go on with is no older: a line that runs on would look as if it were measured.
+_CURRENT_S = 1.0
+T = TypeVar("T")
 NO_CAMERAS: Mapping[str, WorldCamera] = MappingProxyType({})
 
 
@@ -76,9 +79,8 @@ class ConsoleState:
         if not self.history.due(now_ns):
             return
         truth = {name: seen.message for name, seen in self.truth.items()}
-        plan = self.monitor.plan.message if self.monitor.plan else None
-        estimate = self.monitor.estimate.message if self.monitor.estimate else None
-        nis = self.health.nis() if self.history.sample_due(now_ns) else None
+        estimate, plan = _current(self.monitor.estimate, now_ns), _current(self.monitor.plan, now_ns)
+        nis = self.health.nis() if estimate is not None and self.history.sample_due(now_ns) else None
         self._sample = self.history.step(now_ns, estimate, plan, nis, truth) or self._sample
 
     def put(self, board: Snapshot, now_ns: int) -> None:
@@ -154,6 +156,10 @@ def _alarm(alarm: Alarm) -> dict[str, Any]:
     values = asdict(alarm)
     told_ns = values.pop("told_ns")
     return {**values, "asks": alarm.asks, "told": None if told_ns is None else told_ns / 1e6}
+
+
+def _current(seen: StampedMessage[T] | None, now_ns: int) -> T | None:
+    return seen.message if seen is not None and seen.age_s(now_ns) < _CURRENT_S else None
 
 
 def _ms(seen: StampedMessage[Any]) -> float:

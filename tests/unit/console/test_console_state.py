@@ -156,6 +156,26 @@ def plan(at_s: float, topology: str, cost: float, stay: dict[str, float]) -> Rec
     return received(t.PLAN, made)
 
 
+def test_curves_of_a_tracker_that_is_silent_end() -> None:
+    state, board = ConsoleState(Cast("lab", {}, ("turtlebot",)), 0), Snapshot()
+    innovation = m.Innovation(
+        header=header("ceiling"), observer="ceiling", subject="drone_1", verdict=m.Verdict.ACCEPTED,
+        residual=(0.1, 0.1), nis=2.0,
+    )  # fmt: skip
+    state.ingest([received(t.ESTIMATE, estimate()), plan(1.0, "drone_1", 0.04, {})])
+    state.ingest([received(t.INNOVATION, innovation)] * 10)
+    samples = []
+    for seconds in (0.1, 3.0):
+        state.note(NS_PER_S + round(seconds * NS_PER_S))
+        board.begin()
+        state.put(board, NS_PER_S)
+        samples.append(json.loads(board.since(-1))["sample"])
+    figures = ("axis_m", "cost_cm2", "nis")
+    assert all(samples[0][name] is not None for name in figures)
+    assert [samples[1][name] for name in figures] == [None, None, None] and samples[1]["topology"] == ""
+    assert len(state.history.as_json()["trails"]["turtlebot"]) == 1
+
+
 def test_the_last_switch_of_topology_stays_with_its_reason() -> None:
     state, board = ConsoleState(Cast(), 0), Snapshot()
     state.ingest([plan(1.0, "a,b", 0.2, {}), plan(2.0, "a/b", 0.1, {"a,b": 0.2})])

@@ -1,7 +1,9 @@
 """Reads recordings, whole or cut anywhere: what was flushed before a crash is there, the rest is named as damage."""
 
+import re
 import zlib
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
@@ -21,7 +23,7 @@ from groundstation.bus.topics import Topic
 from groundstation.errors import MessageError
 from groundstation.recording.chunks import UNREADABLE, RawRecord, chunk_data, chunk_records, frames
 from groundstation.recording.compatibility import RecordingError, require_ours, require_readable
-from groundstation.recording.file_topics import STATE, is_picture
+from groundstation.recording.file_topics import RAW, STATE, is_picture
 from groundstation.recording.part_names import numbered_parts
 from groundstation.recording.preamble import FIELD_NAME
 from groundstation.recording.viewers import picture_parts
@@ -37,6 +39,7 @@ __all__ = [
     "open_recording",
     "parts",
     "payload",
+    "recorded_offset_ns",
 ]
 
 
@@ -155,6 +158,17 @@ def attached_field(run_dir: Path) -> bytes:
     except RecordingError:
         return b"{}"
     return next((part.attachments[FIELD_NAME] for part in opened if FIELD_NAME in part.attachments), b"{}")
+
+
+def recorded_offset_ns(run_dir: Path, clock: str) -> int | None:
+    """Return UNIX time minus a boot clock [ns] as a run is recorded with it; None where no part of it says so (yet)."""
+    for path in (*parts(run_dir, STATE), *parts(run_dir, RAW)):
+        with suppress(RecordingError):  # killed before its first byte
+            noted = open_recording(path).metadata.get("run", {})
+            written = noted.get("unix_offset_ns", "")
+            if noted.get("clock") == clock and re.fullmatch("-?[0-9]{1,19}", written):  # metadata has no checksum
+                return int(written)
+    return None
 
 
 def _read_preamble(stream: IO[bytes], recording: Recording) -> None:

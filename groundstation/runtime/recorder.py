@@ -69,12 +69,15 @@ class Recorder:
         self._blurs = settings.pictures == "blurred"
         self._datagram_queue = child.bus.subscribe(DATAGRAM_TOPICS if settings.raw_datagrams else (), capacity=4096)
         # Only here: formats and compression take half a second, which a recorder that was killed does not have.
+        from groundstation.recording.reader import recorded_offset_ns
         from groundstation.recording.writing import RunWriter
 
         self._child = child
         self._folder = Path(section.run_dir)
         self._folder.mkdir(parents=True, exist_ok=True)
-        timeline = Timeline(clock.clock_id(), clock.unix_offset_ns())
+        # One that was killed and started again goes on with the first one's: the system's clock may be another by now.
+        kept_ns = recorded_offset_ns(self._folder, clock.clock_id())
+        timeline = Timeline(clock.clock_id(), clock.unix_offset_ns() if kept_ns is None else kept_ns)
         self._space = Space.AMPLE
         self._space_ns = 0
         self._writer = RunWriter(

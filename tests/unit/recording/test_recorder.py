@@ -70,6 +70,23 @@ def _say(bus: MemoryBus, text: str) -> None:
     bus.publish(EVENT, Event(header=bus.header("drone_1"), severity=Severity.INFO, text=text))
 
 
+def test_a_recorder_that_is_started_again_goes_on_with_the_first_ones_time(
+    sender: tuple[MemoryBus, FakeChild], now: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bus, child = sender
+    offset_ns = 1_700_000_000 * 10**9
+    for set_by_s in (0, 3600):
+        monkeypatch.setattr(clock, "unix_offset_ns", lambda: offset_ns + set_by_s * 10**9)  # noqa: B023
+        recorder = _recorder(child, tmp_path)
+        _say(bus, "here")
+        recorder.turn()
+        recorder.close()
+    opened = [open_recording(path) for path in parts(tmp_path, "state")]
+    assert [part.metadata["run"]["unix_offset_ns"] for part in opened] == [str(offset_ns)] * 2
+    told = [record.log_time_ns for part in opened for record in part.records()]
+    assert told == [offset_ns + now[0]] * 2
+
+
 def test_write_error_degrades_once_and_recovers(
     sender: tuple[MemoryBus, FakeChild], now: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -13,10 +13,10 @@ export function lastsWords({ battery, good_for: time, battery_min: limit }) {
 
 const share = ({ battery }) => (battery === null ? "unknown" : `${(100 * battery).toFixed(0)} %`);
 
-// The battery that is nearest to its end: {name, words, level, lasts}; null where a drone was not heard yet.
+// The battery that is nearest to its end, of the drones that were heard: {name, words, level, lasts}; null where none was.
 export function worstBattery() {
-  const all = droneNames().map((name) => [name, store.s.vehicles?.[name]]);
-  if (!all.length || all.some(([, status]) => !status)) return null;
+  const all = droneNames().map((name) => [name, store.s.vehicles?.[name]]).filter(([, status]) => status);
+  if (!all.length) return null;
   const [[name, status]] = all.sort(([, a], [, b]) => RANKS.indexOf(a.charge) - RANKS.indexOf(b.charge)
     || (a.minutes ?? Infinity) - (b.minutes ?? Infinity) || a.battery - b.battery);
   return { name, words: share(status), level: LEVELS[status.charge], lasts: lastsWords(status) };

@@ -1,6 +1,5 @@
 // What is worth hearing and feeling: stops, alarms, a battery that runs low, a lost target. Muting silences all but stops.
 
-import { worstBattery } from "./batteries.js";
 import { byId } from "./dom.js";
 import { targetAgeS } from "./glance.js";
 import { now, replaying, store } from "./store.js";
@@ -15,8 +14,9 @@ const CUES = {
   lost: { hertz: 440, shakes: [150, 100, 150, 100, 150] },
   found: { hertz: 660, shakes: [] },
 };
+const SCARCE = new Set(["low", "empty"]); // charges that are heard: of one that is unknown the page tells
 const heard = new Set();
-let muted = false, before = { battery: "good", lost: false, alarm: "" }, context = null;
+let muted = false, before = { charges: {}, lost: false, alarm: "" }, context = null;
 
 export function startSounds() {
   const button = byId("sound");
@@ -39,13 +39,13 @@ export function listen() {
     heard.add(order.id);
     if (now() - order.given_ms < NEW_MS) say("stop", STOPS[order.verb]);
   }
-  const battery = worstBattery(), age = targetAgeS();
+  const age = targetAgeS();
   const after = {
-    battery: battery?.level ?? "good",
+    charges: Object.fromEntries(Object.entries(store.s.vehicles ?? {}).map(([name, { charge }]) => [name, charge])),
     lost: Number.isFinite(age) && age > store.scene.lost_after_s,
     alarm: (store.s.alarms ?? []).find(({ grave }) => grave)?.text ?? "",
   };
-  if (after.battery !== before.battery && after.battery !== "good") say("battery", `battery ${battery.name} ${after.battery === "bad" ? "empty" : "low"}`);
+  for (const [name, charge] of Object.entries(after.charges)) if (SCARCE.has(charge) && charge !== before.charges[name]) say("battery", `battery ${name} ${charge}`);
   if (after.lost !== before.lost) say(after.lost ? "lost" : "found", after.lost ? "target lost" : "target found");
   if (after.alarm && after.alarm !== before.alarm) say("alarm", after.alarm);
   before = after;

@@ -42,6 +42,10 @@ class _Track:
     headings: Array
 
 
+# Of a field without a fixed camera: motion capture and ranges date nothing yet.
+_UNSEEN = _Track(np.empty(0), np.empty((0, 3)), np.empty(0))
+
+
 @dataclass(frozen=True, slots=True)
 class _Own:
     """A robot as it reported itself: times [s], velocities (n, 2) [base_stabilized], heading, roll, pitch, height."""
@@ -68,8 +72,8 @@ def delays(flown: Flown, resolved: ResolvedField) -> list[Delay]:
         exposure_s[name] = (one.now_ms - (one.measured_ms or one.now_ms)) / 1e3 if one.sure else 0.0
     for drone, settings in resolved.drones.items():
         seen = [(name, _track(flown, name, camera, drone)) for name, camera in resolved.cameras.items()]
-        name, track = max(seen, key=lambda pair: len(pair[1].times))
-        moved = _Track(track.times + exposure_s[name], track.positions, track.headings)
+        name, track = max(seen, key=lambda pair: len(pair[1].times), default=("", _UNSEEN))
+        moved = _Track(track.times + exposure_s.get(name, 0.0), track.positions, track.headings)
         found += _odometry(drone, settings, habits[drone], moved, own[drone])
     fixed = {one.sensor: one for one in found if one.sensor in resolved.cameras}
     return found + onboard_cameras(flown, resolved, fixed)

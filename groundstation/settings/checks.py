@@ -134,12 +134,14 @@ def _captured(parts: Parts) -> Iterator[Finding]:
         for entity in system.bodies:
             if entity not in known:
                 yield ("motion_capture", name, "bodies", entity), f"{entity} is no drone or target of the field"
-        called = [(("motion_capture", name, "bodies", n), body.name or n, n) for n, body in system.bodies.items()]
+        as_they_are = {*parts.flying, *(target for target, _ in parts.tracked.values())} - system.bodies.keys()
+        called: list[tuple[KeyPath, object, str]] = [(("motion_capture", name, "bodies"), n, n) for n in as_they_are]
+        called += [(("motion_capture", name, "bodies", n), body.name or n, n) for n, body in system.bodies.items()]
         yield from _unique(called, "the body's name")
 
 
 def _ranged(parts: Parts) -> Iterator[Finding]:
-    yield from findings_of_ranging(parts.ranging, parts.drones, parts.room)
+    yield from findings_of_ranging(parts.ranging, parts.drones, parts.flying, parts.room)
 
 
 def _pads(parts: Parts) -> Iterator[Finding]:

@@ -1,6 +1,6 @@
 """What must hold of ranging systems beside the team and the room."""
 
-from collections.abc import Container, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 
 from groundstation.settings.document import KeyPath
 from groundstation.settings.ranging import RangingSettings
@@ -8,11 +8,11 @@ from groundstation.settings.room import RoomSettings
 
 
 def findings_of_ranging(
-    systems: Mapping[str, RangingSettings], drones: Container[str], room: RoomSettings | None
+    systems: Mapping[str, RangingSettings], drones: Container[str], flying: Iterable[str], room: RoomSettings | None
 ) -> Iterator[tuple[KeyPath, str]]:
     """Return transponders that nobody carries or two do, and anchors outside of the room."""
     for name, system in systems.items():
-        holders: dict[str, str] = {}
+        holders = {drone: drone for drone in flying if drone not in system.transponders}  # called as they are
         for drone, one in system.transponders.items():
             path, called = ("ranging", name, "transponders", drone), one.name or drone
             if drone not in drones:

@@ -39,12 +39,25 @@ def section(path: Path, options: tuple[str, ...] = ()) -> MotionCaptureSection:
         (("motion_capture.mocap.source=vrpn://1.2.3.4:3884",), "must have no port: vrpn:// is heard at port 3883 only"),
         (("motion_capture.mocap.bodies.ghost={}",), "ghost is no drone or target of the field"),
         (("motion_capture.mocap.bodies={drone_1: {name: a}, drone_2: {name: a}}",), "the body's name a is already"),
+        (("motion_capture.mocap.bodies={drone_1: {name: drone_2}}",), "name drone_2 is already that of drone_2"),
+        (("motion_capture.mocap.bodies={drone_1: {name: turtlebot}}",), "name turtlebot is already that of turtlebot"),
     ],
 )
 def test_a_wrong_system_is_refused_with_its_place(options: tuple[str, ...], told: str) -> None:
     with pytest.raises(SettingsError) as refused:
         load_field(ROOTED, options)
     assert told in str(refused.value)
+
+
+def test_a_body_of_a_drone_that_does_not_fly_is_free_for_another() -> None:
+    assert load_field(
+        ROOTED, ("drones.drone_2.enabled=false", "motion_capture.mocap.bodies={drone_1: {name: drone_2}}")
+    )
+
+
+def test_bodies_may_have_each_other_s_names() -> None:
+    own = section(ROOTED, ("motion_capture.mocap.bodies={drone_1: {name: drone_2}, drone_2: {name: drone_1}}",))
+    assert [body.name for body in own.bodies] == ["drone_2", "drone_1", "turtlebot"]
 
 
 def test_the_driver_observes_robots_and_knows_all_bodies_by_name() -> None:

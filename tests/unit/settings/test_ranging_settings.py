@@ -32,6 +32,7 @@ FIELD = Path(__file__).parents[3] / "config" / "uwb-lab.yaml"
         ("ranging.uwb.anchors.a1=[9.0, 0.0, 1.0]", "ranging.uwb.anchors.a1: must be inside the room"),
         ("ranging.uwb.transponders.ghost={}", "ghost is no drone of the field"),
         ("ranging.uwb.transponders={drone_1: {name: a}, drone_2: {name: a}}", "the transponder's name a is already"),
+        ("ranging.uwb.transponders={drone_1: {name: drone_2}}", "name drone_2 is already that of drone_2"),
         ("truth.from=uwb", "truth.from: must name a motion capture system of the field"),
         ("target.name=uwb_a1_drone_1", "the name uwb_a1_drone_1 is already"),
         ("ranging.uwb.host=uwb", "must not be called as a device of the field"),
@@ -41,6 +42,10 @@ def test_a_wrong_system_is_refused_with_its_place(option: str, told: str) -> Non
     with pytest.raises(SettingsError) as refused:
         load_field(FIELD, (option,))
     assert told in str(refused.value)
+
+
+def test_a_transponder_of_a_drone_that_does_not_fly_is_free_for_another() -> None:
+    assert load_field(FIELD, ("drones.drone_2.enabled=false", "ranging.uwb.transponders={drone_1: {name: drone_2}}"))
 
 
 def test_a_field_may_be_rooted_in_it_and_its_driver_gets_its_part(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from rich.text import Text
 
 from groundstation.appearance.cost import cost_text
 from groundstation.appearance.topology import topology_words
-from groundstation.bus.messages import AckStage, EntityEstimate, Event, Lifecycle, Severity
+from groundstation.bus.messages import OPERATOR, AckStage, EntityEstimate, Event, Lifecycle, Severity
 from groundstation.control.unseen_targets import TELL_AFTER_S, unseen_words
 from groundstation.geometry.ellipse import semi_axes_95
 from groundstation.monitor.alarms import alarms_of
@@ -229,7 +229,7 @@ def _command(state: MonitorState) -> Text:
     text.append(str(state.command.message.verb), style="bold")
     answers = state.answers.get(state.command.message.id, {})
     names = state.command.message.scope or tuple(state.cast.drones)
-    for name in names:
+    for name in (OPERATOR,) if OPERATOR in names else names:  # of a request, the drones answer nothing
         answer = answers.get(name)
         if answer is None:
             text.append(f"  {name} NOT CONFIRMED", style="bold red")

@@ -118,6 +118,20 @@ def test_a_command_is_not_confirmed_until_each_drone_has_answered(world: World) 
     assert "drone_2 NOT CONFIRMED" in text
 
 
+def test_what_is_asked_of_the_operator_waits_for_no_drone(world: World) -> None:
+    asked = m.Command(
+        header=world.header("operator"), id="8", verb=m.Verb.TAKEOFF, scope=(m.OPERATOR, "drone_1"), issuer="me"
+    )
+    world.say(t.COMMAND, asked)
+    assert "operator NOT CONFIRMED" in world.text()
+    answer = m.CommandAck(
+        header=world.header(m.OPERATOR), command_id="8", verb=m.Verb.TAKEOFF, stage=m.AckStage.ACCEPTED
+    )
+    world.say(t.COMMAND_ACK, answer)
+    text = world.text()
+    assert "operator accepted" in text and "NOT CONFIRMED" not in text
+
+
 def test_processes_and_events_are_listed(world: World) -> None:
     world.status("tracker")
     event = m.Event(header=world.header("drone_2", 3.0), severity=m.Severity.WARNING, text="wind", remedy="land")

@@ -49,6 +49,9 @@ def make_room(parent: Path, limit_gb: float, now_s: float | None = None) -> list
 def _runs(parent: Path) -> Iterator[RecordedRun]:
     for folder in parent.iterdir() if parent.is_dir() else ():
         if _NAME.fullmatch(folder.name) and folder.is_dir() and not folder.is_symlink():
-            status = [path.lstat() for path in folder.rglob("*")]
-            files = sum(one.st_size for one in status)
-            yield RecordedRun(folder, files, max((one.st_mtime for one in status), default=folder.stat().st_mtime))
+            try:
+                status = [path.lstat() for path in (folder, *folder.rglob("*"))]
+            except OSError:  # another flight removes it
+                continue
+            newest_s = max(one.st_mtime for one in status[1:] or status)
+            yield RecordedRun(folder, sum(one.st_size for one in status[1:]), newest_s)

@@ -1,7 +1,10 @@
 """Old runs make room for new ones, and nothing else in the folder does."""
 
 import os
+import shutil
 from pathlib import Path
+
+import pytest
 
 from groundstation.flight.retention import KEEP, make_room
 
@@ -38,6 +41,21 @@ def test_kept_unsettled_and_foreign_folders_stay(tmp_path: Path) -> None:
     (tmp_path / "20261120T090000Z-link").symlink_to(run(tmp_path.parent / "elsewhere", "20261120T080000Z-lab", 10))
     assert make_room(tmp_path, 0.001, NOW_S) == []
     assert len(names(tmp_path)) == 4
+
+
+def test_a_run_that_another_flight_removes_meanwhile_is_passed_over(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    vanishing, oldest = run(tmp_path, "20261120T110000Z-lab", 10), run(tmp_path, "20261120T100000Z-lab", 10)
+    lstat = Path.lstat
+
+    def removed_before(path: Path) -> os.stat_result:
+        if path == vanishing / "state.mcap":
+            shutil.rmtree(vanishing)
+        return lstat(path)
+
+    monkeypatch.setattr(Path, "lstat", removed_before)
+    assert [one.folder for one in make_room(tmp_path, 0.001, NOW_S)] == [oldest]
 
 
 def test_without_a_limit_or_a_folder_nothing_happens(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from groundstation.console.standing import StandingDrones
 from groundstation.field.room import WorldCamera
 from groundstation.monitor.alarms import Alarm, alarms_of
 from groundstation.monitor.batteries import Battery, battery_of
-from groundstation.monitor.endurance import AIRBORNE
+from groundstation.monitor.endurance import flies
 from groundstation.monitor.safety import safety_of
 from groundstation.monitor.state import Cast, MonitorState, StampedMessage
 from groundstation.sensing.switches import Switch, switch_between
@@ -109,8 +109,8 @@ class ConsoleState:
 
     def _flight(self) -> dict[str, Any]:
         """Return since when somebody is in the air, and whether anybody ever was."""
-        seen = self.monitor.vehicles.values()
-        airborne = [status.stamp_ns for status in seen if status.message.flight_state in AIRBORNE]
+        seen, take_offs = self.monitor.vehicles.items(), self.monitor.take_offs
+        airborne = [status.stamp_ns for name, status in seen if flies(status.message, take_offs.get(name))]
         self._flown |= bool(airborne)
         self._airborne_since_ns = (self._airborne_since_ns or min(airborne)) if airborne else None
         since_ns = self._airborne_since_ns

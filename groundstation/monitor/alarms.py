@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from groundstation.bus.messages import FlightState, Lifecycle, Severity, VehicleStatus
 from groundstation.monitor.batteries import Battery, Charge, battery_of
-from groundstation.monitor.endurance import AIRBORNE
+from groundstation.monitor.endurance import AIRBORNE, flies
 from groundstation.monitor.state import MonitorState
 
 VEHICLE_SILENT_S = 1.0
@@ -76,7 +76,8 @@ def _vehicles(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
         if down := _DOWN.get(seen.message.flight_state):
             words, advice = down
             yield Alarm(f"{name} {seen.message.flight_state}", f"{name}: {words}", advice=advice)
-        yield from _battery(name, seen.message.flight_state, battery_of(state, name))
+        up = flies(seen.message, state.take_offs.get(name))
+        yield from _battery(name, seen.message.flight_state, up, battery_of(state, name))
         yield from _link(name, seen.message.link_quality)
 
 
@@ -90,13 +91,13 @@ def _failsafe(name: str, status: VehicleStatus) -> Iterator[Alarm]:
         yield Alarm(f"{name} braked", f"{name} {status.detail}", False, advice)
 
 
-def _battery(name: str, flight: FlightState, battery: Battery) -> Iterator[Alarm]:
+def _battery(name: str, flight: FlightState, up: bool, battery: Battery) -> Iterator[Alarm]:
     if battery.charge is Charge.GOOD or (battery.level is None and flight is FlightState.UNKNOWN):
         return
     about, held, lands = f"{name} battery", f"{name}: {battery.words}", f"it lands by itself at {battery.limit:.0%}"
     if flight is FlightState.LANDING:
         yield Alarm(about, f"{held}, it lands", False, "Nothing to do.")
-    elif flight not in AIRBORNE:
+    elif not up:
         yield Alarm(about, held, False, f"Nothing to do now: {_BEFORE_FLIGHT[battery.charge]}.")
     elif battery.charge is Charge.EMPTY:
         below = battery.level is not None and battery.level < battery.limit

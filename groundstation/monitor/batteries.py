@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from groundstation.bus.messages import FlightState
-from groundstation.monitor.endurance import AIRBORNE, Endurance, endurance
+from groundstation.monitor.endurance import Endurance, endurance, flies
 from groundstation.monitor.state import MonitorState
 
 LIMIT = 0.15  # of a drone whose own is not known
@@ -48,8 +48,9 @@ def battery_of(state: MonitorState, name: str) -> Battery:
     if status.battery is None:
         return Battery(None, limit, None, Charge.UNKNOWN)
     usual_s = state.cast.flight_times_s.get(name)
-    left = endurance(seen.stamp_ns, status.battery, limit, state.take_offs.get(name), usual_s)
-    spends = status.flight_state in AIRBORNE and status.flight_state is not FlightState.LANDING
+    take_off = state.take_offs.get(name)
+    left = endurance(seen.stamp_ns, status.battery, limit, take_off, usual_s)
+    spends = flies(status, take_off) and status.flight_state is not FlightState.LANDING
     minutes = left.minutes if left is not None and spends else float("inf")
     return Battery(status.battery, limit, left, _charge(status.battery - limit, minutes))
 

@@ -33,8 +33,15 @@ class Endurance:
         return f"{'' if self.measured else '~'}{int(self.minutes)} min"
 
 
+def flies(status: VehicleStatus, take_off: TakeOff | None) -> bool:
+    """Return whether it is in the air, or was when it was last heard."""
+    return status.flight_state in AIRBORNE or (status.flight_state is FlightState.LOST and take_off is not None)
+
+
 def take_off_of(known: TakeOff | None, stamp_ns: int, status: VehicleStatus) -> TakeOff | None:
     """Return the take-off that this status belongs to: none on the floor; anew with a fuller battery or in the past."""
+    if status.flight_state is FlightState.LOST:
+        return known if known is not None and stamp_ns >= known.stamp_ns else None
     if status.battery is None or status.flight_state not in AIRBORNE:
         return None
     if known is None or stamp_ns < known.stamp_ns or status.battery > known.battery:

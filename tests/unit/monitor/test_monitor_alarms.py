@@ -103,6 +103,15 @@ def test_a_drone_that_stands_with_a_low_battery_asks_for_nothing_now(world: Worl
     assert (alarm.text, alarm.asks) == ("drone_1: battery 10%", False)
 
 
+def test_the_battery_of_a_drone_that_is_not_heard_in_flight_is_that_of_one_that_flies(world: World) -> None:
+    world.vehicle("drone_1", battery=0.18, age_s=0.5)
+    world.text()
+    world.vehicle("drone_1", battery=0.18, flight_state=m.FlightState.LOST)
+    world.text()
+    alarms = {alarm.about: alarm for alarm in alarms_of(world.state, NOW)}
+    assert alarms["drone_1 battery"].asks and "LAND it" in alarms["drone_1 battery"].advice
+
+
 def test_a_drone_that_nobody_sees_is_lost_unless_its_landing_says_so(world: World) -> None:
     world.vehicle("drone_1")
     world.estimate(drone_age_s=4.0)

@@ -3,7 +3,7 @@
 import pytest
 
 from groundstation.bus.messages import FlightState, Header, VehicleStatus
-from groundstation.monitor.endurance import Endurance, TakeOff, endurance, take_off_of
+from groundstation.monitor.endurance import Endurance, TakeOff, endurance, flies, take_off_of
 
 MIN = 60_000_000_000
 
@@ -48,6 +48,13 @@ def test_a_take_off_lasts_until_the_drone_stands() -> None:
     assert take_off_of(first, 2 * MIN, status(0.7)) == first
     assert take_off_of(first, 2 * MIN, status(0.7, FlightState.LANDED)) is None
     assert take_off_of(first, 2 * MIN, status(None)) is None
+
+
+def test_a_drone_that_is_not_heard_for_a_moment_has_not_landed() -> None:
+    first, lost = TakeOff(1 * MIN, 0.8), status(0.7, FlightState.LOST)
+    assert take_off_of(first, 2 * MIN, lost) == first and flies(lost, first)
+    assert take_off_of(None, 2 * MIN, lost) is None and not flies(lost, None)
+    assert take_off_of(first, 0, lost) is None
 
 
 def test_a_fuller_battery_or_a_jump_back_in_a_replay_begins_anew() -> None:

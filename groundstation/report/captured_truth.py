@@ -7,6 +7,7 @@ import numpy as np
 
 from groundstation.arrays import Array
 from groundstation.bus.messages import BodyPoses, FlightState, VehicleStatus
+from groundstation.report.safety import SAYS_NOTHING
 from groundstation.report.tracks import TimedMessage, TruthTrack
 
 _ALOFT = frozenset({FlightState.FLYING, FlightState.HOVERING, FlightState.TAKING_OFF, FlightState.LANDING})
@@ -17,7 +18,8 @@ def captured_tracks(
 ) -> dict[str, TruthTrack]:
     """Return the track of each body: where the system had it, but for poses that cannot be true.
 
-    A drone is on the ground as long as it says so; a body without a driver always is.
+    A drone is on the ground as long as it says so, and one that is not heard is as it was; a body without a driver
+    always is on the ground.
     """
     rows: dict[str, list[tuple[float, ...]]] = {}
     for item in poses:
@@ -32,7 +34,8 @@ def _yaw(w: float, x: float, y: float, z: float) -> float:
 
 
 def _track(table: Array, statuses: Sequence[TimedMessage[VehicleStatus]]) -> TruthTrack:
-    said = sorted((item.time_s, item.message.flight_state in _ALOFT) for item in statuses)
+    states = [(item.time_s, item.message.flight_state) for item in statuses]
+    said = sorted((time_s, state in _ALOFT) for time_s, state in states if state not in SAYS_NOTHING)
     times = np.array([time_s for time_s, _ in said])
     aloft = np.array([False, *(flies for _, flies in said)])
     return TruthTrack(

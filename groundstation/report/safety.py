@@ -12,7 +12,7 @@ from groundstation.report.tracks import RunData, TruthTrack
 _TOUCH_M = 1e-3
 _DOWN = frozenset({FlightState.LANDED, FlightState.EMERGENCY})
 # A drone that is not heard, or not yet, says nothing of where it is.
-_SAYS_NOTHING = frozenset({FlightState.LOST, FlightState.UNKNOWN})
+SAYS_NOTHING = frozenset({FlightState.LOST, FlightState.UNKNOWN})
 
 
 def fence_violation_m(track: TruthTrack, fence: Fence) -> float:
@@ -64,7 +64,7 @@ def landed(data: RunData) -> bool | None:
 def _said_down(data: RunData, name: str) -> bool | None:
     """Return whether the last that a drone said of its flight was that it stands; None where it never flew."""
     reported = sorted(data.vehicles[name], key=lambda item: item.time_s)
-    states = [item.message.flight_state for item in reported if item.message.flight_state not in _SAYS_NOTHING]
+    states = [item.message.flight_state for item in reported if item.message.flight_state not in SAYS_NOTHING]
     return None if _DOWN.issuperset(states) else states[-1] in _DOWN
 
 

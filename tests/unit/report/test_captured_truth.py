@@ -29,3 +29,9 @@ def test_tracks_hold_what_can_be_true_and_who_flew() -> None:
     assert np.allclose(tracks["drone_1"].yaw_rad, 0.5)
     assert tracks["drone_1"].on_ground.tolist() == [True, False, True]
     assert tracks["turtlebot"].on_ground.all() and len(tracks["turtlebot"].time_s) == 4
+
+
+def test_a_drone_that_is_not_heard_any_more_flies_on() -> None:
+    said = {"drone_1": [status(0.5, FlightState.HOVERING), status(1.5, FlightState.LOST)]}
+    track = captured_tracks([poses(time_s, 0.0) for time_s in (0.0, 1.0, 2.0, 3.0)], said)["drone_1"]
+    assert track.on_ground.tolist() == [True, False, False, False]

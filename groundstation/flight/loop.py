@@ -115,8 +115,9 @@ class Flight:
     def _fly(self, operator: Operator) -> str:
         """Go on until there is a reason to land; returns the reason if it is a failure."""
         now_ns = self._turn(operator)
-        if self._plan.look_only or self._supervisor.failure or self._supervisor.interrupts.stop_requested:
-            return self._supervisor.failure  # what broke the look off must not be answered by a take-off
+        failure, stopped = self._supervisor.failure, self._supervisor.interrupts.stop_requested
+        if self._plan.look_only or failure or stopped:
+            return failure  # what broke the look off must not be answered by a take-off
         if self._plan.asks:
             self._prompting = True
             insist = "type anyway and press Enter" if self._forbidden else "press Enter"

@@ -104,14 +104,14 @@ def vehicle_limits(limits: DroneLimits) -> VehicleLimits:
 class VehicleDriverSettings(DriverSection):
     """What the driver of one vehicle of any kind is told; a kind adds its own.
 
-    interface: network adapter that the vehicle is behind ("": any); pad_m: where it takes off [x, y; world];
-    raw_datagrams: whether they are recorded.
+    interface: network adapter that the vehicle is behind ("": any); pad_m: where it takes off [x, y; world], None:
+    unknown; velocity_scale: true velocity / reported velocity; raw_datagrams: whether they are recorded.
     """
 
     name: Name
     address: str
     interface: str = ""
-    pad_m: tuple[float, float]
+    pad_m: tuple[float, float] | None = None
     limits: VehicleLimits = VehicleLimits()
     safety: SilenceLimits = SilenceLimits()
     velocity_scale: Positive = 1.0

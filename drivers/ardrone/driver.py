@@ -171,7 +171,7 @@ class ArDrone:
         )
 
     def _true(self, velocity_m_s: Vector3) -> Vector3:
-        scale = self._settings.odometry.velocity_scale
+        scale = self._settings.velocity_scale
         return velocity_m_s[0] * scale, velocity_m_s[1] * scale, velocity_m_s[2]
 
     def _not_ready(self, heard: LatestNavdata) -> str:

@@ -5,18 +5,11 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from drivers.ardrone.settings import (
-    ArDroneDriverSettings,
-    ArDroneLimits,
-    FlightConfiguration,
-    VelocityScale,
-    Video,
-)
+from drivers.ardrone.settings import ArDroneDriverSettings, ArDroneLimits, FlightConfiguration, Video
 from drivers.ardrone.wire import at
 from drivers.ardrone.wire.tags import OPTION_SIZES
-from drivers.vehicle_settings import silence_limits, vehicle_limits
+from drivers.vehicle_settings import Port, a_process_each, values_of, vehicle_limits
 from groundstation.vehicles import (
-    DriverProcess,
     ErrorHabits,
     Finding,
     KindCommands,
@@ -41,7 +34,6 @@ class ArDroneVideo(KindSection):
     """Constant bit rate [kbit/s]; none: the drone chooses."""
 
 
-_Port = Annotated[int, Field(ge=1, le=65535)]
 # WIRE (docs/reference/ardrone.md 5.4): values of pic:ultrasound_freq.
 _ULTRASOUND: dict[int, Literal[7, 8]] = {22: 7, 25: 8}
 
@@ -60,13 +52,13 @@ class ArDroneOwn(KindSection):
     """Rate of its ultrasound [Hz]; none: 22 and 25 in turn, in the order of the drones, so that neighbours differ."""
     strict_checksum: bool = True
     """Whether navdata with a wrong checksum is refused; false for firmwares and bridges that send none."""
-    navdata_port: _Port = 5554
+    navdata_port: Port = 5554
     """UDP port of its navdata."""
-    at_port: _Port = 5556
+    at_port: Port = 5556
     """UDP port that it takes commands at."""
-    control_port: _Port = 5559
+    control_port: Port = 5559
     """TCP port of its configuration."""
-    ftp_port: _Port = 5551
+    ftp_port: Port = 5551
     """TCP port of its version."""
 
 
@@ -78,25 +70,14 @@ def _own(order: VehicleOrder) -> ArDroneOwn:
     return own if isinstance(own, ArDroneOwn) else ArDroneOwn()
 
 
-def _processes(orders: Sequence[VehicleOrder]) -> list[DriverProcess]:
-    return [DriverProcess((order.name,), _settings(order).model_dump_json()) for order in orders]
-
-
 def _settings(order: VehicleOrder) -> ArDroneDriverSettings:
     drone, own = order.drone, _own(order)
     # WIRE: neighbours must not hear each other's ultrasound: 22.22 Hz (7) and 25 Hz (8) in turn.
     rate_hz = own.ultrasound_hz or (25 if order.index % 2 else 22)
+    limits = ArDroneLimits(**vehicle_limits(drone.limits).model_dump(), max_tilt_deg=drone.limits.max_tilt_deg)
     return ArDroneDriverSettings(
-        name=order.name,
-        address=drone.address,
-        interface=drone.interface,
+        **values_of(order) | {"limits": limits},
         serial_number=drone.serial_number,
-        limits=ArDroneLimits(**vehicle_limits(drone.limits).model_dump(), max_tilt_deg=drone.limits.max_tilt_deg),
-        odometry=VelocityScale(
-            velocity_scale=drone.odometry.velocity_scale, velocity_std_m_s=drone.odometry.velocity_std_m_s
-        ),
-        safety=silence_limits(order.safety),
-        pad_m=drone.pad_m,
         flight=FlightConfiguration(
             altitude_max_m=max(0.5, order.top_m),
             outdoor=own.outdoor,
@@ -105,7 +86,6 @@ def _settings(order: VehicleOrder) -> ArDroneDriverSettings:
             flat_trim=own.flat_trim == "at_connect",
         ),
         video=_video(order),
-        raw_datagrams=order.raw_datagrams,
         strict_checksum=own.strict_checksum,
         **{name: getattr(own, name) for name in _PORTS},
     )
@@ -162,7 +142,7 @@ KIND = VehicleKind(
     summary="Parrot AR.Drone 1.0 and 2.0",
     driver="drivers.ardrone.driver:run",
     habits=ErrorHabits(0.4, 5.0, 0.7, 0.0, 0.2, reports_climb=False, tells_attitude=False),
-    processes=_processes,
+    processes=a_process_each(_settings),
     stop=_stop,
     sections={"video": ArDroneVideo, "ardrone": ArDroneOwn},
     moved=_moved,

@@ -64,7 +64,7 @@ class NavdataPublisher:
         self._imu, self._inertial = Decimator(settings.imu_hz), _InertialMean()
         self._covariances = {
             (suspect, sound): (std**2, 0.0, 0.0, 0.0, std**2, 0.0, 0.0, 0.0, climb_std**2)
-            for suspect, std in ((False, settings.odometry.velocity_std_m_s), (True, _SUSPECT_STD_M_S))
+            for suspect, std in ((False, settings.velocity_std_m_s), (True, _SUSPECT_STD_M_S))
             for sound, climb_std in ((True, _CLIMB_STD_M_S), (False, _VOID_CLIMB_STD_M_S))
         }
 

@@ -5,8 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from drivers.vehicle_settings import DriverSection, Name, Port, Positive, SilenceLimits, VehicleLimits
-from drivers.watchdog_types import WatchdogLimits
+from drivers.vehicle_settings import DriverSection, Port, VehicleDriverSettings, VehicleLimits
 
 VideoCodec = Literal["h264_360p", "h264_720p"]
 
@@ -20,13 +19,6 @@ class ArDroneLimits(VehicleLimits):
     def max_tilt_rad(self) -> float:
         """Return the largest tilt [rad]."""
         return math.radians(self.max_tilt_deg)
-
-
-class VelocityScale(DriverSection):
-    """True velocity = scale x reported velocity; one sigma of it. Delays and the rest concern the estimator alone."""
-
-    velocity_scale: Annotated[float, Field(ge=0.2, le=5)] = 1.0
-    velocity_std_m_s: Positive = 0.05
 
 
 class FlightConfiguration(DriverSection):
@@ -47,18 +39,14 @@ class Video(DriverSection):
     bitrate: Annotated[int, Field(ge=250, le=4000)] | None = None
 
 
-class ArDroneDriverSettings(DriverSection):
+class ArDroneDriverSettings(VehicleDriverSettings):
     """One AR.Drone: address, limits, published data.
 
-    interface: network adapter that it is behind ("": any).
     local_address: address to bind (empty: any); local_navdata_port, local_at_port: ports to bind there, 0: any free
-    one, so that many drones fit on one host. video None: the drone's own setting is left alone. pad_m: where it takes
-    off [x, y; world], None: unknown. serial_number: the only drone that may take off ("": any).
+    one, so that many drones fit on one host. video None: the drone's own setting is left alone. serial_number: the only
+    drone that may take off ("": any).
     """
 
-    name: Name
-    address: str
-    interface: str = ""
     serial_number: str = ""
     navdata_port: Port = 5554
     at_port: Port = 5556
@@ -68,17 +56,8 @@ class ArDroneDriverSettings(DriverSection):
     local_at_port: Annotated[int, Field(ge=0, le=65535)] = 0
     local_address: str = ""
     limits: ArDroneLimits = ArDroneLimits()
-    odometry: VelocityScale = VelocityScale()
-    safety: SilenceLimits = SilenceLimits()
-    pad_m: tuple[float, float] | None = None
     flight: FlightConfiguration = FlightConfiguration()
     video: Video | None = None
     odometry_hz: Annotated[float, Field(gt=0, le=200)] = 100.0
     imu_hz: Annotated[float, Field(ge=0, le=200)] = 25.0
-    raw_datagrams: bool = True
     strict_checksum: bool = True
-
-    @property
-    def authority(self) -> WatchdogLimits:
-        """Return the limits of the shared watchdog."""
-        return self.safety.authority(self.limits, self.pad_m)

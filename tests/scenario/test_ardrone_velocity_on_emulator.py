@@ -12,7 +12,7 @@ from drivers.ardrone.convert import flight_state_from_navdata, motion_from_navda
 from drivers.ardrone.desired_config import ids_of, scale_from_settings, wishes
 from drivers.ardrone.driver import LIMITS, RATE_HZ
 from drivers.ardrone.session import ArdroneSession
-from drivers.ardrone.settings import ArDroneDriverSettings, VelocityScale
+from drivers.ardrone.settings import ArDroneDriverSettings
 from drivers.ardrone.velocity_loop import HOVER, VelocityLoop
 from drivers.ardrone.wire import at, navdata
 from drivers.ardrone.wire.options import DEMO
@@ -48,9 +48,7 @@ class Flight:
     """One emulated drone and the pure parts of its driver, joined by their datagrams."""
 
     def __init__(self, seed: int, **changes: float) -> None:
-        self.settings = ArDroneDriverSettings(
-            name="drone_1", address="127.0.0.1", odometry=VelocityScale(velocity_scale=1.18)
-        )
+        self.settings = ArDroneDriverSettings(name="drone_1", address="127.0.0.1", velocity_scale=1.18)
         scenario = DroneScenario().model_copy(update=changes)
         self.drone = Quadrotor((0.0, 0.0), 0.4, scenario, TICK_S, generator_of(seed, "drone"))
         self.onboard = Onboard(scenario, TICK_S, self.drone.airframe, generator_of(seed, "onboard"))
@@ -102,7 +100,7 @@ class Flight:
         attitude, dt_s = HOVER, SENDER_TICKS * TICK_S
         (vx, vy, vz), force = self.motion.drain()
         if action is Action.FLY:
-            k = self.settings.odometry.velocity_scale
+            k = self.settings.velocity_scale
             attitude = self.loop.step(wanted, yaw_rate, (k * vx, k * vy, vz), dt_s, force)
         else:
             self.loop.reset()

@@ -54,8 +54,8 @@ def test_a_drone_s_driver_gets_its_limits_and_times(field: Field) -> None:
     assert settings.address == "192.168.1.11"
     assert settings.limits.model_dump() == field.drones["drone_1"].limits.model_dump()
     odometry = field.drones["drone_1"].odometry
-    assert settings.odometry.velocity_scale == odometry.velocity_scale
-    assert settings.odometry.velocity_std_m_s == odometry.velocity_std_m_s
+    assert settings.velocity_scale == odometry.velocity_scale
+    assert settings.velocity_std_m_s == odometry.velocity_std_m_s
     assert settings.safety.land_after_s == field.safety.land_after_s
     assert settings.flight.altitude_max_m == field.room.fence.z_m[1]
 

@@ -105,10 +105,10 @@ class HostProcess(Protocol):
         """Publish something that happened."""
 
 
-def read_sensor_section(model: type[_Settings], text: str, sensor: str) -> _Settings:
-    """Return the settings of a sensor's driver from JSON; raises SettingsError with a line for each mistake."""
+def read_section(model: type[_Settings], text: str, driver: str) -> _Settings:
+    """Return the settings of a driver of that name from JSON; raises SettingsError with a line for each mistake."""
     try:
         return model.model_validate_json(text)
     except ValidationError as error:
-        problems = [f"{sensor}: {'.'.join(map(str, p['loc']))}: {p['msg']}" for p in error.errors()]
+        problems = [f"{driver}: {'.'.join(map(str, p['loc']))}: {p['msg']}" for p in error.errors()]
         raise SettingsError(problems) from None

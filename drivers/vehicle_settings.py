@@ -3,13 +3,12 @@
 import ipaddress
 import math
 from collections.abc import Callable, Sequence
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from pydantic_core import PydanticCustomError
 
 from drivers.watchdog_types import WatchdogLimits
-from groundstation.errors import SettingsError
 from groundstation.field.behaviour import SafetyValues
 from groundstation.field.drones import DroneLimits
 from groundstation.vehicles import DriverProcess, VehicleOrder
@@ -145,14 +144,3 @@ def a_process_each(
 ) -> Callable[[Sequence[VehicleOrder]], list[DriverProcess]]:
     """Return what gives each vehicle a driver process of its own; settings_of: what that is told."""
     return lambda orders: [DriverProcess((order.name,), settings_of(order).model_dump_json()) for order in orders]
-
-
-_Section = TypeVar("_Section", bound=DriverSection)
-
-
-def read_section(model: type[_Section], text: str) -> _Section:
-    """Return a driver's settings from JSON; raises SettingsError."""
-    try:
-        return model.model_validate_json(text)
-    except ValidationError as error:
-        raise SettingsError([str(error)]) from error

@@ -25,13 +25,12 @@ from drivers.ardrone.wire.errors import WireError
 from drivers.ardrone.wire.navdata import Navdata
 from drivers.ardrone.wire.options import DEMO, SPEED_REFERENCES
 from drivers.ardrone.wire.state import StateBit, bit_names
-from drivers.base import HostProcess, LinkHealth
+from drivers.base import HostProcess, LinkHealth, read_section
 from drivers.datagrams import DatagramLog
 from drivers.host import fly_one
 from drivers.plausibility.health import Health, Sensor
 from drivers.plausibility.limits import PlausibilityLimits
 from drivers.plausibility.motion import MotionMonitor
-from drivers.vehicle_settings import read_section
 from drivers.watchdog_types import UP, Action, VehicleView, WatchdogDecision
 from groundstation.adapters import with_zone
 from groundstation.bus.api import Bus
@@ -279,7 +278,7 @@ class ArDrone:
 
 def run(child: HostProcess) -> int:
     """Fly one AR.Drone until a stop is requested; the process entry."""
-    settings = read_section(ArDroneDriverSettings, child.section)
+    settings = read_section(ArDroneDriverSettings, child.section, "AR.Drone")
     drone = ArDrone(settings, child.bus)
 
     def tell(_now_ns: int) -> None:

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.base import HostProcess, read_sensor_section
+from drivers.base import HostProcess, read_section
 from drivers.camera import convert
 from drivers.camera.context import Surroundings
 from drivers.camera.picture_quality import quality_of
@@ -32,7 +32,7 @@ _LEVEL = (0.0, 0.0)
 
 def run(child: HostProcess) -> int:
     """Serve one camera until a stop is requested; returns the exit code."""
-    settings = read_sensor_section(CameraDriverSettings, child.section, "camera")
+    settings = read_section(CameraDriverSettings, child.section, "camera")
     cv2.setNumThreads(1)
     lens = settings.calibration
     source = open_source(settings.source, (lens.width_px, lens.height_px))

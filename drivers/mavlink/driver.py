@@ -6,7 +6,7 @@ import threading
 from collections import Counter, deque
 from collections.abc import Sequence
 
-from drivers.base import HostProcess
+from drivers.base import HostProcess, read_section
 from drivers.host import VehicleHost, run_hosts
 from drivers.mavlink.links.forwarding import with_riders
 from drivers.mavlink.links.opening import open_link
@@ -16,7 +16,6 @@ from drivers.mavlink.vehicle import MavlinkVehicle
 from drivers.mavlink.wire import frames
 from drivers.mavlink.wire.names import NO_AUTOPILOT, MavSeverity
 from drivers.mavlink.wire.telemetry import Heartbeat
-from drivers.vehicle_settings import read_section
 from groundstation.bus.messages import Estimate, Severity
 from groundstation.bus.topics import ESTIMATE
 from groundstation.errors import DriverError
@@ -132,7 +131,7 @@ def hosts_of(child: HostProcess, fleet: Fleet, settings: MavlinkDriverSettings) 
 
 def run(child: HostProcess) -> int:
     """Fly the vehicles of one link until asked to stop; the process entry."""
-    settings = read_section(MavlinkDriverSettings, child.section)
+    settings = read_section(MavlinkDriverSettings, child.section, "MAVLink")
     share_interpreter(settings)
     fleet = Fleet(child, settings)
     try:

@@ -2,7 +2,7 @@
 
 from collections import Counter
 
-from drivers.base import HostProcess, read_sensor_section
+from drivers.base import HostProcess, read_section
 from drivers.motion_capture.body_watch import BodyWatch
 from drivers.motion_capture.captured_frame import CapturedFrame
 from drivers.motion_capture.convert import EntityPose, Placement, body_pose
@@ -19,7 +19,7 @@ _CHECK = "check the system's definition of its markers, what hides them, and its
 
 def run(child: HostProcess) -> int:
     """Serve one system until a stop is requested; returns the exit code."""
-    settings = read_sensor_section(MotionCaptureSection, child.section, "motion capture")
+    settings = read_section(MotionCaptureSection, child.section, "motion capture")
     source = open_source(parse_source(settings.source))
     try:
         driver = MotionCaptureDriver(child, settings, source)

@@ -3,7 +3,7 @@
 import math
 from collections import Counter
 
-from drivers.base import HostProcess, read_sensor_section
+from drivers.base import HostProcess, read_section
 from drivers.ranging.gateway import Gateway
 from drivers.ranging.settings import RangingSection, parse_source
 from drivers.ranging.wire.ranges import Round
@@ -20,7 +20,7 @@ _MOST_REPEATS = 3
 
 def run(child: HostProcess) -> int:
     """Serve one system until a stop is requested; returns the exit code."""
-    settings = read_sensor_section(RangingSection, child.section, "ranging")
+    settings = read_section(RangingSection, child.section, "ranging")
     gateway = Gateway(*parse_source(settings.source))
     try:
         driver = RangingDriver(child, settings, gateway)

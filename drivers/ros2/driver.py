@@ -3,7 +3,7 @@
 import math
 from collections import Counter
 
-from drivers.base import HostProcess, LinkHealth
+from drivers.base import HostProcess, LinkHealth, read_section
 from drivers.datagrams import DatagramLog
 from drivers.host import fly_one
 from drivers.plausibility.health import Health
@@ -17,7 +17,6 @@ from drivers.ros2.flight import FlightWatch, angles_of, fault_of_standing, level
 from drivers.ros2.link import Ros2Link
 from drivers.ros2.names import Order
 from drivers.ros2.settings import Ros2DriverSettings
-from drivers.vehicle_settings import read_section
 from drivers.watchdog_types import Action, VehicleView, WatchdogDecision
 from groundstation.bus import clock
 from groundstation.bus.api import Bus
@@ -205,5 +204,5 @@ def recorded(name: str, payload: bytes) -> bytes:
 
 def run(child: HostProcess) -> int:
     """Fly one vehicle until a stop is requested; the process entry."""
-    settings = read_section(Ros2DriverSettings, child.section)
+    settings = read_section(Ros2DriverSettings, child.section, "ROS 2")
     return fly_one(child, Ros2Vehicle(settings, child.bus), settings.authority, RATE_HZ)

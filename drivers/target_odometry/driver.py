@@ -4,7 +4,7 @@ import math
 import threading
 from collections import Counter, deque
 
-from drivers.base import HostProcess, read_sensor_section
+from drivers.base import HostProcess, read_section
 from drivers.plausibility.clock_watch import ClockWatch
 from drivers.rmw_zenoh.publisher_tie import PublisherTie
 from drivers.rmw_zenoh.session import RouterSession
@@ -28,7 +28,7 @@ _MARGIN = 1.5
 
 def run(child: HostProcess) -> int:
     """Hear one target until a stop is requested; returns the exit code."""
-    driver = OdometryDriver(child, read_sensor_section(OdometrySection, child.section, "odometry"))
+    driver = OdometryDriver(child, read_section(OdometrySection, child.section, "odometry"))
     try:
         while not child.stop_requested and child.supervisor_alive:
             driver.turn()

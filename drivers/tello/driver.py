@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from drivers.base import HostProcess
+from drivers.base import HostProcess, read_section
 from drivers.datagram_link import DatagramLink, DatagramVehicle
 from drivers.datagrams import DatagramLog
 from drivers.host import fly_one
@@ -12,7 +12,6 @@ from drivers.plausibility.limits import PlausibilityLimits
 from drivers.plausibility.motion import MotionMonitor, MotionSample
 from drivers.tello.settings import TelloDriverSettings
 from drivers.tello.wire import text
-from drivers.vehicle_settings import read_section
 from drivers.watchdog_types import Action, VehicleView, WatchdogDecision
 from groundstation.adapters import with_zone
 from groundstation.bus.api import Bus
@@ -175,5 +174,5 @@ class Tello(DatagramVehicle):
 
 def run(child: HostProcess) -> int:
     """Fly one Tello until a stop is requested; the process entry."""
-    settings = read_section(TelloDriverSettings, child.section)
+    settings = read_section(TelloDriverSettings, child.section, "Tello")
     return fly_one(child, Tello(settings, child.bus), settings.authority, RATE_HZ)

@@ -24,7 +24,7 @@ from drivers.plausibility.limits import PlausibilityLimits
 from drivers.plausibility.motion import MotionSample
 from drivers.vehicle_settings import VehicleLimits
 from groundstation.bus.messages import FlightState, Quaternion, Vector3
-from groundstation.geometry.angles import quaternion_from_euler, wrap
+from groundstation.geometry.angles import euler_from_quaternion, quaternion_from_euler, wrap
 from groundstation.geometry.stabilized_frame import STANDARD_GRAVITY_M_S2
 
 _M_S2_FROM_MG = STANDARD_GRAVITY_M_S2 / 1000
@@ -72,9 +72,8 @@ def attitude_from_quaternion(message: AttitudeQuaternion) -> BaseAttitude:
         raise WireError("implausible" if math.isfinite(norm2) else "not_finite", "quaternion")
     rates = (message.rollspeed, message.pitchspeed, message.yawspeed)
     _sane("body rates", _MOST_RAD_S, *rates)
-    roll = math.atan2(2 * (w * x + y * z), norm2 - 2 * (x * x + y * y))
-    pitch = math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x) / norm2)))
-    yaw = math.atan2(2 * (w * z + x * y), norm2 - 2 * (y * y + z * z))
+    norm = math.sqrt(norm2)
+    roll, pitch, yaw = euler_from_quaternion((w / norm, x / norm, y / norm, z / norm))
     return BaseAttitude(roll, -pitch, wrap(-yaw), (rates[0], -rates[1], -rates[2]))
 
 

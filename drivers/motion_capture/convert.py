@@ -8,6 +8,7 @@ import numpy as np
 from drivers.motion_capture.settings import BodySection, MotionCaptureSection
 from groundstation.arrays import Array
 from groundstation.bus.messages import BodyPose, Header, RelativeObservation
+from groundstation.geometry.angles import quaternion_from_euler
 from groundstation.geometry.rotations import euler_from_rotation, rotation_z
 
 Vector3 = tuple[float, float, float]
@@ -88,10 +89,5 @@ def _rotation_of(quaternion: Quaternion, length: float) -> Array:
 
 def _quaternion_of(rotation: Array) -> Quaternion:
     """Return (w, x, y, z) of a rotation (3, 3), w not negative."""
-    roll, pitch, yaw = (angle / 2 for angle in euler_from_rotation(rotation))
-    cr, sr, cp, sp, cy, sy = (
-        math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch), math.cos(yaw), math.sin(yaw),
-    )  # fmt: skip
-    w, x = cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy
-    y, z = cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy
+    w, x, y, z = quaternion_from_euler(*euler_from_rotation(rotation))
     return (w, x, y, z) if w >= 0 else (-w, -x, -y, -z)

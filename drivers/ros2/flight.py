@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from drivers.rmw_zenoh.wire.vehicle import Quaternion, Vector3
 from drivers.watchdog_types import Action
 from groundstation.bus.messages import FlightState
+from groundstation.geometry.angles import euler_from_quaternion
 from groundstation.time_units import NS_PER_MS
 
 _AIRBORNE_M, _STILL_M_S, _CLIMB_M_S = 0.2, 0.25, 0.15
@@ -80,12 +81,10 @@ def fault_of_standing(height_m: float, velocity: Vector3, roll: float, pitch: fl
     return ""
 
 
-def angles_of(quaternion: Quaternion) -> Vector3:
+def angles_of(xyzw: Quaternion) -> Vector3:
     """Return roll, pitch and yaw [rad; FLU: right side down, nose down, counter-clockwise positive]."""
-    x, y, z, w = quaternion
-    roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
-    pitch = math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x))))
-    return roll, pitch, math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    x, y, z, w = xyzw
+    return euler_from_quaternion((w, x, y, z))
 
 
 def levelled(velocity: Vector3, roll: float, pitch: float) -> Vector3:

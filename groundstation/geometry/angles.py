@@ -25,3 +25,11 @@ def quaternion_from_euler(roll_rad: float, pitch_rad: float, yaw_rad: float) -> 
         cr * sp * cy + sr * cp * sy,
         cr * cp * sy - sr * sp * cy,
     )
+
+
+def euler_from_quaternion(wxyz: tuple[float, float, float, float]) -> tuple[float, float, float]:
+    """Return the intrinsic z-y-x angles roll, pitch, yaw [rad] of parent_from_body, a unit quaternion."""
+    w, x, y, z = wxyz
+    roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    pitch = math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x))))
+    return roll, pitch, math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))

@@ -11,6 +11,7 @@ from drivers.mavlink.wire.flight import OdometryMessage
 from drivers.mavlink.wire.frames import Message
 from drivers.mavlink.wire.names import QUADROTOR, EkfFlag, Flavour, SensorBits
 from drivers.mavlink.wire.positioning import GlobalPositionInt, GpsRawInt
+from groundstation.geometry.angles import quaternion_from_euler
 from sim_bridge.devices.mavlink_ardupilot import ArduCopter
 from sim_bridge.devices.mavlink_firmware import AutopilotFirmware
 from sim_bridge.world.airframe import STANDING_HEIGHT_M
@@ -139,16 +140,8 @@ class Speaker:
         return t.Attitude(self.boot_ms, e.roll, -e.pitch, -e.yaw, *self._rates())
 
     def _quaternion(self) -> tuple[float, float, float, float]:
-        # Yaw about down, then pitch about right, then roll about forward.
         e = self._estimate
-        halves = (e.roll / 2, -e.pitch / 2, -e.yaw / 2)
-        (cr, cp, cy), (sr, sp, sy) = map(math.cos, halves), map(math.sin, halves)
-        return (
-            cy * cp * cr + sy * sp * sr,
-            cy * cp * sr - sy * sp * cr,
-            cy * sp * cr + sy * cp * sr,
-            sy * cp * cr - cy * sp * sr,
-        )
+        return quaternion_from_euler(e.roll, -e.pitch, -e.yaw)
 
     def quaternion(self) -> Message:
         """Return its attitude as a quaternion."""

@@ -1,12 +1,12 @@
 """The true state of an emulated vehicle over MAVLink, as the simulators behind real firmwares send it."""
 
-import math
 import socket
 from contextlib import suppress
 
 from drivers.mavlink.wire.frames import FrameEncoder, Message
 from drivers.mavlink.wire.names import Flavour
 from drivers.mavlink.wire.simulator import HilStateQuaternion, SimState
+from groundstation.geometry.angles import quaternion_from_euler
 from sim_bridge.devices.mavlink_satellites import Satellites
 from sim_bridge.world.airframe import Airframe
 
@@ -37,27 +37,19 @@ class TruthTeller:
         b, (lat, lon) = self._body, self._globe.degrees(self._body.x, self._body.y)
         attitude, rates = (b.roll, -b.pitch, -b.yaw), self._rates()
         altitude = self._globe.altitude_mm(b.z) / 1000.0
-        motion = (*self._quaternion(), *attitude, b.ax, -b.ay, -b.az, *rates)
+        motion = (*quaternion_from_euler(b.roll, -b.pitch, -b.yaw), *attitude, b.ax, -b.ay, -b.az, *rates)
         place = (lat / 1e7, lon / 1e7, altitude, 0.0, 0.0, b.vx, -b.vy, -b.vz)
         return SimState(*motion, *place, lat_int=lat, lon_int=lon)
 
     def _of_px4(self) -> Message:
         b, place = self._body, (*self._globe.degrees(self._body.x, self._body.y), self._globe.altitude_mm(self._body.z))
         velocity = (round(100 * b.vx), round(-100 * b.vy), round(-100 * b.vz))
-        return HilStateQuaternion(self._ticks * 5000, self._quaternion(), *self._rates(), *place, *velocity, *(0,) * 5)
+        attitude = quaternion_from_euler(b.roll, -b.pitch, -b.yaw)
+        return HilStateQuaternion(self._ticks * 5000, attitude, *self._rates(), *place, *velocity, *(0,) * 5)
 
     def _rates(self) -> tuple[float, float, float]:
         wx, wy, wz = self._body.body_rates()
         return wx, -wy, -wz
-
-    def _quaternion(self) -> tuple[float, float, float, float]:
-        # Yaw about down, then pitch about right, then roll about forward.
-        halves = (self._body.roll / 2, -self._body.pitch / 2, -self._body.yaw / 2)
-        (cr, cp, cy), (sr, sp, sy) = map(math.cos, halves), map(math.sin, halves)
-        return (
-            cy * cp * cr + sy * sp * sr, cy * cp * sr - sy * sp * cr,
-            cy * sp * cr + sy * cp * sr, sy * cp * cr - cy * sp * sr,
-        )  # fmt: skip
 
     def close(self) -> None:
         """Close the socket."""

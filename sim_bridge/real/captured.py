@@ -3,10 +3,11 @@
 import math
 
 from groundstation.bus.api import Bus
-from groundstation.bus.messages import BodyPose, BodyPoses, Quaternion
+from groundstation.bus.messages import BodyPose, BodyPoses
 from groundstation.bus.topics import BODY_POSES
+from groundstation.geometry.angles import euler_from_quaternion
 from groundstation.time_units import NS_PER_S
-from sim_bridge.world.puppet import OutsidePose, Vector3
+from sim_bridge.world.puppet import OutsidePose
 
 # A velocity is that between two frames at most so far apart [s]; a frame is carried on by it, for no longer than this.
 _APART_S, _CARRIED_S = 0.2, 0.1
@@ -44,20 +45,12 @@ class CaptureFeed:
 
 def _pose(before: _Stamped | None, newest: _Stamped, now_ns: int) -> OutsidePose:
     stamp_ns, body = newest
-    roll, pitch, yaw = _euler(body.attitude)
+    roll, pitch, yaw = euler_from_quaternion(body.attitude)
     velocity, yaw_rate = (0.0, 0.0, 0.0), 0.0
     if before is not None and 0.0 < (apart_s := (stamp_ns - before[0]) / NS_PER_S) <= _APART_S:
         x, y, z = ((b - a) / apart_s for a, b in zip(before[1].position_m, body.position_m, strict=True))
         velocity = (x, y, z)
-        yaw_rate = math.remainder(yaw - _euler(before[1].attitude)[2], math.tau) / apart_s
+        yaw_rate = math.remainder(yaw - euler_from_quaternion(before[1].attitude)[2], math.tau) / apart_s
     ahead_s = min(max(0.0, (now_ns - stamp_ns) / NS_PER_S), _CARRIED_S)
     px, py, pz = (p + ahead_s * v for p, v in zip(body.position_m, velocity, strict=True))
     return OutsidePose((px, py, pz), velocity, (roll, pitch, yaw + ahead_s * yaw_rate), (0.0, 0.0, yaw_rate))
-
-
-def _euler(attitude: Quaternion) -> Vector3:
-    """Return roll, pitch, yaw [rad] of a quaternion (w, x, y, z)."""
-    w, x, y, z = attitude
-    roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
-    pitch = math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x))))
-    return roll, pitch, math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))

@@ -14,6 +14,7 @@ from drivers.mavlink.wire.frames import MAX_DATAGRAM, FrameDecoder, FrameEncoder
 from drivers.mavlink.wire.names import MavCmd
 from drivers.mavlink.wire.simulator import HilStateQuaternion, SimState
 from drivers.mavlink.wire.telemetry import Attitude, LocalPositionNed
+from groundstation.geometry.angles import euler_from_quaternion
 from groundstation.time_units import NS_PER_S
 from sim_bridge.devices.mavlink_identity import identity_of
 from sim_bridge.listening import open_udp
@@ -111,13 +112,10 @@ class AutopilotTruth:
 
     def _of_px4(self, m: HilStateQuaternion) -> TrueState:
         w, x, y, z = m.attitude_quaternion
-        roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
-        pitch = math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x))))
-        yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
         place = self._local(m.lat / 1e7, m.lon / 1e7, m.alt / 1e3, _PX4_DEGREE_M)
         rates = (m.rollspeed, m.pitchspeed, m.yawspeed)
         velocity = (m.vx / 100.0, m.vy / 100.0, m.vz / 100.0)
-        return TrueState(place, velocity, (roll, pitch, yaw), rates, _GRAIN_M)
+        return TrueState(place, velocity, euler_from_quaternion((w, x, y, z)), rates, _GRAIN_M)
 
     def _local(self, latitude: float, longitude: float, altitude: float, degree_m: float) -> Vector3:
         first = self._origin = self._origin or (latitude, longitude)

@@ -40,6 +40,9 @@ def test_euler_angles_agree_with_scipy_and_return(roll: float, pitch: float, yaw
     rotation = rotations.rotation_from_euler(roll, pitch, yaw)
     np.testing.assert_allclose(rotation, Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_matrix(), atol=1e-12)
     np.testing.assert_allclose(rotations.euler_from_rotation(rotation), (roll, pitch, yaw), atol=1e-7)
+    quaternion = angles.quaternion_from_euler(roll, pitch, yaw)
+    np.testing.assert_allclose(Rotation.from_quat(quaternion, scalar_first=True).as_matrix(), rotation, atol=1e-12)
+    np.testing.assert_allclose(angles.euler_from_quaternion(quaternion), (roll, pitch, yaw), atol=1e-7)
 
 
 def test_nose_down_is_positive_pitch_and_right_side_down_positive_roll() -> None:

@@ -3,7 +3,7 @@
 import logging
 import socket
 import threading
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Sequence
 
 from drivers import vehicle_socket
@@ -12,14 +12,14 @@ from drivers.ardrone.wire import at, navdata
 from drivers.ardrone.wire.at import AtCommand
 from drivers.ardrone.wire.errors import WireError
 from drivers.ardrone.wire.navdata import Navdata
+from drivers.arrivals import Arrivals
 from drivers.datagrams import DatagramLog
 from groundstation.bus import clock
 from groundstation.errors import DriverError
-from groundstation.time_units import NS_PER_MS, NS_PER_S
+from groundstation.time_units import NS_PER_MS
 
 # After this silence a lower sequence number is a new session of the drone, before it a replay.
 _RESTART_NS = 300 * NS_PER_MS
-_WINDOW_NS = NS_PER_S
 _POLL_S = 0.1
 _log = logging.getLogger(__name__)
 
@@ -34,7 +34,7 @@ class SequenceFilter:
     def __init__(self) -> None:
         self._last = -1
         self._accepted_ns = 0
-        self._window: deque[tuple[int, int]] = deque()
+        self.arrivals = Arrivals()
 
     def accept(self, now_ns: int, sequence: int) -> bool:
         """Return whether a packet with this number is new enough to use."""
@@ -43,19 +43,8 @@ class SequenceFilter:
             return False
         step = 1 if restarted else sequence - self._last
         self._last, self._accepted_ns = sequence, now_ns
-        self._window.append((now_ns, step))
-        self._trim(now_ns)
+        self.arrivals.add(now_ns, step)
         return True
-
-    def rates(self, now_ns: int) -> tuple[float, float | None]:
-        """Return (packets per second, share of the numbers of the last second that arrived, or None)."""
-        self._trim(now_ns)
-        expected = sum(step for _, step in self._window)
-        return len(self._window) * 1e9 / _WINDOW_NS, len(self._window) / expected if expected else None
-
-    def _trim(self, now_ns: int) -> None:
-        while self._window and self._window[0][0] < now_ns - _WINDOW_NS:
-            self._window.popleft()
 
 
 class ArDroneLink:
@@ -129,7 +118,7 @@ class ArDroneLink:
     def rates(self, now_ns: int) -> tuple[float, float | None]:
         """Return the navdata rate [Hz] and the share of its datagrams that arrived."""
         with self._lock:
-            return self._filter.rates(now_ns)
+            return self._filter.arrivals.rates(now_ns)
 
     def close(self) -> None:
         """Close both sockets."""

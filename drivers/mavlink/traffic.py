@@ -1,11 +1,9 @@
 """Share of a vehicle's frames that arrive, from their sequence numbers."""
 
 import threading
-from collections import deque
 
-from groundstation.time_units import NS_PER_S
+from drivers.arrivals import Arrivals
 
-_WINDOW_NS = NS_PER_S
 # Half a turn of the counter is no loss that can be told from a restart; a datagram is not overtaken by more than this.
 _HALF_TURN, _OVERTAKEN = 128, 32
 
@@ -15,7 +13,7 @@ class Traffic:
 
     def __init__(self) -> None:
         self._newest: dict[int, int] = {}
-        self._window: deque[tuple[int, int]] = deque()
+        self._arrivals = Arrivals()
         self._lock = threading.Lock()
 
     def count(self, now_ns: int, component: int, sequence: int) -> None:
@@ -28,17 +26,9 @@ class Traffic:
         if step:
             self._newest[component] = sequence
         with self._lock:
-            self._window.append((now_ns, step))
-            self._trim(now_ns)
+            self._arrivals.add(now_ns, step)
 
     def rates(self, now_ns: int) -> tuple[float, float | None]:
         """Return (frames per second, share that arrived, or None when nothing did)."""
         with self._lock:
-            self._trim(now_ns)
-            expected = sum(step for _, step in self._window)
-            share = min(1.0, len(self._window) / expected) if expected else None
-            return len(self._window) * 1e9 / _WINDOW_NS, share
-
-    def _trim(self, now_ns: int) -> None:
-        while self._window and self._window[0][0] < now_ns - _WINDOW_NS:
-            self._window.popleft()
+            return self._arrivals.rates(now_ns)

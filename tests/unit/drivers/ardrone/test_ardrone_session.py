@@ -259,7 +259,7 @@ def test_navdata_numbers_must_rise():
     assert [numbers.accept(now + i * MS, n) for i, n in enumerate((5, 6, 6, 5, 9, 1))] == [
         True, True, False, False, True, False,
     ]  # fmt: skip
-    rate, quality = numbers.rates(now + 6 * MS)
+    rate, quality = numbers.arrivals.rates(now + 6 * MS)
     assert rate == 3 and quality == pytest.approx(3 / 5)
 
 
@@ -269,4 +269,4 @@ def test_a_lower_number_after_a_pause_is_a_new_session():
     assert not numbers.accept(10 * S + 200 * MS, 1)
     assert numbers.accept(10 * S + 301 * MS, 1)
     assert numbers.accept(10 * S + 306 * MS, 2)
-    assert numbers.rates(20 * S) == (0, None)
+    assert numbers.arrivals.rates(20 * S) == (0, None)

@@ -1,0 +1,27 @@
+"""How many of the numbered packets of a link arrive. Pure."""
+
+from collections import deque
+
+from groundstation.time_units import NS_PER_S
+
+
+class Arrivals:
+    """Packets of the last second, each with its step: how far its number is above that of the one before."""
+
+    def __init__(self) -> None:
+        self._window: deque[tuple[int, int]] = deque()
+
+    def add(self, now_ns: int, step: int) -> None:
+        """Take a packet."""
+        self._window.append((now_ns, step))
+        self._trim(now_ns)
+
+    def rates(self, now_ns: int) -> tuple[float, float | None]:
+        """Return (packets per second, share of all that were sent, or None when nothing arrived)."""
+        self._trim(now_ns)
+        arrived, sent = len(self._window), sum(step for _, step in self._window)
+        return float(arrived), min(1.0, arrived / sent) if sent else None
+
+    def _trim(self, now_ns: int) -> None:
+        while self._window and self._window[0][0] < now_ns - NS_PER_S:
+            self._window.popleft()

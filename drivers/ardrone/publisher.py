@@ -4,6 +4,7 @@ from drivers.ardrone.convert import HeadingWatch, NavdataMotion
 from drivers.ardrone.height import HeightWatch
 from drivers.ardrone.settings import ArDroneDriverSettings
 from drivers.plausibility.health import ALL_GOOD, Health, HealthReport, Sensor
+from drivers.thinning import Decimator
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import ImuSample, Odometry, Vector3
 from groundstation.bus.topics import IMU, ODOMETRY
@@ -15,22 +16,6 @@ _CLIMB_STD_M_S = 0.15
 _VOID_CLIMB_STD_M_S = 2.0
 # What a doubtful velocity is worth.
 _SUSPECT_STD_M_S = 0.5
-
-
-class Decimator:
-    """Lets events through at a nominal rate, evenly on average."""
-
-    def __init__(self, rate_hz: float) -> None:
-        self._period_ns = round(1e9 / rate_hz) if rate_hz > 0 else None
-        self._due_ns = 0
-
-    def is_due(self, now_ns: int) -> bool:
-        """Return whether this event goes through."""
-        # A quarter of a period early is on time: the source jitters, and half its rate must come out as half.
-        if self._period_ns is None or now_ns + self._period_ns // 4 < self._due_ns:
-            return False
-        self._due_ns = max(self._due_ns + self._period_ns, now_ns)
-        return True
 
 
 class _InertialMean:

@@ -16,6 +16,7 @@ from drivers.camera.settings import CameraDriverSettings
 from drivers.camera.sources.frames import FrameSource, Packet, Unit
 from drivers.camera.sources.opening import open_source
 from drivers.camera.stream_watch import StreamState, StreamWatch
+from drivers.thinning import Grid
 from groundstation.arrays import Image
 from groundstation.bus import clock
 from groundstation.bus.jpeg import whole_size
@@ -69,7 +70,7 @@ class CameraDriver:
         self._exposure_ns = 0
         self._newest: Image | None = None
         self._silence_s = settings.start_within_s
-        self._next_image_ns = 0
+        self._images = Grid(settings.image_fps)
         self._status_ns = clock.now_ns()
         self.counts: Counter[str] = Counter()
 
@@ -171,12 +172,8 @@ class CameraDriver:
 
     def _publish_image(self, packet: Packet, exposure_ns: int) -> None:
         """Pass a JPEG on, at most `image_fps` times a second: as it came, or made of what was decoded."""
-        if self._settings.image_fps <= 0.0 or exposure_ns < self._next_image_ns:
+        if not self._images.is_due(exposure_ns):
             return
-        period_ns = round(NS_PER_S / self._settings.image_fps)
-        # On the grid of the rate, so that 15 fps thin out to 5 and not to every fourth; anew after a pause.
-        on_grid = exposure_ns - self._next_image_ns < period_ns
-        self._next_image_ns = (self._next_image_ns if on_grid else exposure_ns) + period_ns
         data = packet.data or (packet.picture.jpeg() if packet.picture is not None else b"")
         self._child.bus.publish_bytes(IMAGE, self._child.bus.header(self._settings.name, exposure_ns), data)
 

@@ -24,6 +24,7 @@ from drivers.mavlink.wire.names import (
     land_mode,
     mode_name,
 )
+from drivers.thinning import Decimator
 from drivers.watchdog_types import Action, DriverMode, WatchdogDecision
 from groundstation.bus.messages import EntityEstimate, Vector3
 from groundstation.time_units import NS_PER_MS, NS_PER_S
@@ -50,12 +51,11 @@ class Orders:
         self.drift = DriftFeedback()
         self._vehicle, self._flavour, self._requests = vehicle, flavour, requests
         self._guided, self._landing = guided_mode(flavour), land_mode(flavour)
-        self._period_ns = round(1e9 / vehicle.setpoint_hz)
+        self._pace = Decimator(vehicle.setpoint_hz)
         self._action = Action.WAIT
         self._since_ns = 0
         self._climb_until_ns = 0
         self._rises_to_take_off = False
-        self._due_ns = 0
         self._told_ns = -1
         self._guided_ns = self._regain_until_ns = 0
         self._started = self._taken_over = False
@@ -249,10 +249,8 @@ class Orders:
         self._requests.ask(now_ns, key, command, *params)
 
     def _send(self, now_ns: int, velocity_m_s: Vector3, yaw_rate: float) -> SetPositionTargetLocalNed | None:
-        # A quarter of a period early is on time: the tracker's 50 Hz must come out as an even 20.
-        if now_ns + self._period_ns // 4 < self._due_ns:
+        if not self._pace.is_due(now_ns):  # the tracker's 50 Hz must come out as an even 20
             return None
-        self._due_ns = max(self._due_ns + self._period_ns, now_ns)
         vehicle = self._vehicle
         drift = self.drift.correction(now_ns)
         message = setpoint_from_velocity(vehicle.system_id, now_ns, velocity_m_s, yaw_rate, vehicle.limits, drift)

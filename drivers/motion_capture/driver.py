@@ -9,9 +9,10 @@ from drivers.motion_capture.convert import EntityPose, Placement, body_pose
 from drivers.motion_capture.settings import MotionCaptureSection, parse_source
 from drivers.motion_capture.sources import Source, open_source
 from drivers.stream_health import StreamHealth, StreamNames
+from drivers.thinning import Grid
 from groundstation.bus.messages import BodyPoses, Severity
 from groundstation.bus.topics import BODY_POSES, OBSERVATION
-from groundstation.time_units import NS_PER_MS, NS_PER_S
+from groundstation.time_units import NS_PER_MS
 
 _POLL_S = 0.02
 _CHECK = "check the system's definition of its markers, what hides them, and its names of the bodies"
@@ -39,7 +40,7 @@ class MotionCaptureDriver:
         self._bodies = {body.name: body for body in settings.bodies}
         self._watch = BodyWatch(settings.max_speed_m_s)
         self._faults: dict[str, str] = {}
-        self._exposure_ns = self._next_ns = 0
+        self._exposure_ns, self._grid = 0, Grid(settings.rate_hz)
         remedy = f"check the system, whether it streams, and its address {settings.source}"
         names = StreamNames("motion capture", settings.name, "frame", settings.source, remedy)
         self._health = StreamHealth(child, names, settings.start_within_s, settings.silent_after_s)
@@ -64,10 +65,7 @@ class MotionCaptureDriver:
         poses = self._entity_poses(frame)
         faults = self._watch.look(exposure_ns, {name: pose.position for name, pose in poses.items()})
         self._tell(faults)
-        if exposure_ns >= self._next_ns:
-            period_ns = round(NS_PER_S / self._settings.rate_hz)
-            on_grid = exposure_ns - self._next_ns < period_ns
-            self._next_ns = (self._next_ns if on_grid else exposure_ns) + period_ns
+        if self._grid.is_due(exposure_ns):
             self._publish(exposure_ns, poses, faults)
 
     def _entity_poses(self, frame: CapturedFrame) -> dict[str, EntityPose]:

@@ -223,9 +223,8 @@ def test_a_picture_that_comes_before_its_usual_time_was_not_exposed_in_the_futur
 
 
 def test_nothing_is_passed_on_where_no_pictures_are_wanted(rig, jpeg):
-    rig.camera._settings = settings(image_fps=0)
     rig.source.push_decoded(np.zeros((360, 640), np.uint8), Unit(b"x", clock.now_ns(), clock.now_ns()))
-    rig.camera.turn()
+    driver.CameraDriver(rig.child, settings(image_fps=0), rig.source).turn()
     assert not [r for r in rig.heard.drain() if r.key.topic in (IMAGE, VIDEO)]
 
 

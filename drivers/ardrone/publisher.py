@@ -3,7 +3,7 @@
 from drivers.ardrone.convert import HeadingWatch, NavdataMotion
 from drivers.ardrone.height import HeightWatch
 from drivers.ardrone.settings import ArDroneDriverSettings
-from drivers.plausibility.health import ALL_GOOD, Health, HealthReport, Sensor
+from drivers.plausibility.health import ALL_GOOD, SUSPECT_VELOCITY_STD_M_S, Health, HealthReport, Sensor
 from drivers.thinning import Decimator
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import ImuSample, Odometry, Vector3
@@ -14,8 +14,6 @@ from groundstation.geometry.angles import quaternion_from_euler
 _CLIMB_STD_M_S = 0.15
 # It says nothing while the ultrasound hears another drone.
 _VOID_CLIMB_STD_M_S = 2.0
-# What a doubtful velocity is worth.
-_SUSPECT_STD_M_S = 0.5
 
 
 class _InertialMean:
@@ -49,7 +47,7 @@ class NavdataPublisher:
         self._imu, self._inertial = Decimator(settings.imu_hz), _InertialMean()
         self._covariances = {
             (suspect, sound): (std**2, 0.0, 0.0, 0.0, std**2, 0.0, 0.0, 0.0, climb_std**2)
-            for suspect, std in ((False, settings.velocity_std_m_s), (True, _SUSPECT_STD_M_S))
+            for suspect, std in ((False, settings.velocity_std_m_s), (True, SUSPECT_VELOCITY_STD_M_S))
             for sound, climb_std in ((True, _CLIMB_STD_M_S), (False, _VOID_CLIMB_STD_M_S))
         }
 

@@ -9,7 +9,7 @@ from drivers.mavlink.convert import BaseAttitude, attitude_quaternion
 from drivers.mavlink.settings import VehicleSettings
 from drivers.mavlink.turning import heading_rate_rad_s, lasting_s
 from drivers.mavlink.uncertainty import StatedUncertainty
-from drivers.plausibility.health import ALL_GOOD, Health, HealthReport, Sensor
+from drivers.plausibility.health import ALL_GOOD, SUSPECT_VELOCITY_STD_M_S, Health, HealthReport, Sensor
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import ImuSample, Odometry, Vector3
 from groundstation.bus.topics import IMU, ODOMETRY
@@ -17,8 +17,6 @@ from groundstation.geometry.angles import wrap
 
 _GAP_S = 0.5
 _CLIMB_SHARE = 1.5
-# What a doubtful velocity is worth.
-_SUSPECT_STD_M_S = 0.5
 
 
 class GyroHeading:
@@ -70,7 +68,7 @@ class TelemetryPublisher:
             return
         std_m_s = max(self._velocity_std_m_s, self.stated.velocity_std_m_s(stamp_ns))
         if believed is Health.SUSPECT:
-            std_m_s = max(std_m_s, _SUSPECT_STD_M_S)
+            std_m_s = max(std_m_s, SUSPECT_VELOCITY_STD_M_S)
         message = Odometry(
             header=self._bus.header(self._name, stamp_ns),
             velocity_m_s=velocity_m_s,

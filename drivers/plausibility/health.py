@@ -3,6 +3,9 @@
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 
+# What a SUSPECT velocity is worth.
+SUSPECT_VELOCITY_STD_M_S = 0.5
+
 
 class Health(IntEnum):
     """How far a sensor can be trusted; a BAD one counts as silent."""

@@ -11,6 +11,7 @@ from pydantic_core import PydanticCustomError
 from drivers.watchdog_types import WatchdogLimits
 from groundstation.field.behaviour import SafetyValues
 from groundstation.field.drones import DroneLimits
+from groundstation.field.room import Vector3
 from groundstation.vehicles import DriverProcess, VehicleOrder
 
 _SAFETY = SafetyValues()
@@ -52,6 +53,14 @@ class VehicleLimits(DriverSection):
     def max_yaw_rate_rad_s(self) -> float:
         """Return the largest turn rate [rad/s]."""
         return math.radians(self.max_yaw_rate_deg_s)
+
+    def within(self, velocity_m_s: Vector3, yaw_rate_rad_s: float) -> tuple[Vector3, float]:
+        """Return a velocity [base_stabilized] and a turn rate within the limits; one too fast keeps its direction."""
+        forward, left, up = velocity_m_s
+        share = min(1.0, self.max_speed_m_s / max(math.hypot(forward, left), 1e-9))
+        rise = max(-self.max_climb_m_s, min(self.max_climb_m_s, up))
+        fastest = self.max_yaw_rate_rad_s
+        return (share * forward, share * left, rise), max(-fastest, min(fastest, yaw_rate_rad_s))
 
 
 class SilenceLimits(DriverSection):

@@ -148,11 +148,7 @@ def setpoint_from_velocity(
 
     drift_m_s: what the vehicle's own velocity is off by, added beyond the limits: they are of the true velocity.
     """
-    forward, left, up = velocity_m_s
-    size = math.hypot(forward, left)
-    shrink = min(1.0, limits.max_speed_m_s / size) if size > 0.0 else 1.0
-    up = max(-limits.max_climb_m_s, min(limits.max_climb_m_s, up))
-    turn = max(-limits.max_yaw_rate_rad_s, min(limits.max_yaw_rate_rad_s, yaw_rate_rad_s))
+    (forward, left, up), turn = limits.within(velocity_m_s, yaw_rate_rad_s)
     return SetPositionTargetLocalNed(
         time_boot_ms=now_ns // 1_000_000 % (1 << 32),
         target_system=system,
@@ -160,7 +156,7 @@ def setpoint_from_velocity(
         coordinate_frame=MavFrame.BODY_NED,
         type_mask=VELOCITY_AND_YAW_RATE,
         x=0.0, y=0.0, z=0.0,
-        vx=forward * shrink + drift_m_s[0], vy=-(left * shrink + drift_m_s[1]), vz=-(up + drift_m_s[2]),
+        vx=forward + drift_m_s[0], vy=-(left + drift_m_s[1]), vz=-(up + drift_m_s[2]),
         afx=0.0, afy=0.0, afz=0.0,
         yaw=0.0, yaw_rate=-turn,
     )  # fmt: skip

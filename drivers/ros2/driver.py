@@ -137,19 +137,11 @@ class Ros2Vehicle:
             case Action.TAKE_OFF if not self._flight.airborne:
                 self._order(now_ns, Order.TAKE_OFF)
             case Action.FLY:
-                self._fly(now_ns, *self._limited(decision))
+                self._fly(now_ns, *self._settings.limits.within(decision.velocity_m_s, decision.yaw_rate_rad_s))
             case Action.HOVER:
                 self._fly(now_ns, (0.0, 0.0, 0.0), 0.0)
             case Action.IDLE | Action.CLEAR if self._is_due(now_ns, None):
                 self._fly(now_ns, (0.0, 0.0, 0.0), 0.0)
-
-    def _limited(self, decision: WatchdogDecision) -> tuple[Vector3, float]:
-        limits, (forward, left, up) = self._settings.limits, decision.velocity_m_s
-        # A velocity beyond its limit keeps its direction.
-        share = min(1.0, limits.max_speed_m_s / max(math.hypot(forward, left), 1e-9))
-        rise = max(-limits.max_climb_m_s, min(limits.max_climb_m_s, up))
-        fastest = limits.max_yaw_rate_rad_s
-        return (share * forward, share * left, rise), max(-fastest, min(fastest, decision.yaw_rate_rad_s))
 
     def _fly(self, now_ns: int, velocity: Vector3, turn_rad_s: float) -> None:
         self._note(now_ns, self._settings.ros2.velocity, self._link.fly(velocity, turn_rad_s))

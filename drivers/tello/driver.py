@@ -158,13 +158,11 @@ class Tello(DatagramVehicle):
             self._repeat(now_ns, text.STREAM_ON)
 
     def _sticks(self, decision: WatchdogDecision) -> bytes:
-        own, limits, (forward, left, up) = self._settings.tello, self._settings.limits, decision.velocity_m_s
-        # A velocity beyond its limit keeps its direction.
-        shorter = min(1.0, limits.max_speed_m_s / max(math.hypot(forward, left), 1e-9)) / own.full_speed_m_s
-        rise = max(-limits.max_climb_m_s, min(limits.max_climb_m_s, up)) / own.full_climb_m_s
-        fastest = limits.max_yaw_rate_deg_s
-        turn = max(-fastest, min(fastest, math.degrees(decision.yaw_rate_rad_s))) / own.full_yaw_rate_deg_s
-        return text.rc(*(round(100 * share) for share in (-left * shorter, forward * shorter, rise, -turn)))
+        own = self._settings.tello
+        (forward, left, up), turn = self._settings.limits.within(decision.velocity_m_s, decision.yaw_rate_rad_s)
+        right, ahead = -left / own.full_speed_m_s, forward / own.full_speed_m_s
+        shares = (right, ahead, up / own.full_climb_m_s, -math.degrees(turn) / own.full_yaw_rate_deg_s)
+        return text.rc(*(round(100 * share) for share in shares))
 
     def _repeat(self, now_ns: int, word: bytes) -> None:
         if now_ns - self._sent_ns.get(word, -_PAUSE_NS[word]) >= _PAUSE_NS[word]:

@@ -64,6 +64,11 @@ def shell(role: Role) -> str:
     return f"{role}-shell"  # no process can be called so: its name has no hyphen
 
 
+def certificate_name(host: str) -> str:
+    """Return the name in the certificate of an admitted host."""
+    return f"host-{host}"
+
+
 SHELLS = (
     Member(shell(Role.CLI), Role.CLI, ("cli_$*", "deadman_$*")),
     Member(shell(Role.CONSOLE), Role.CONSOLE, ("console_$*",)),

@@ -11,7 +11,7 @@ import msgspec
 
 from drivers.camera.settings import parse_source
 from groundstation.bus.access import AccessList
-from groundstation.bus.roles import SHELLS, Member, Role
+from groundstation.bus.roles import SHELLS, Member, Role, certificate_name
 from groundstation.console.section import enough_hz
 from groundstation.errors import OperatorMistake
 from groundstation.field.targets import odometry_name
@@ -37,7 +37,7 @@ from groundstation.supervisor.guard_order import guarded
 from groundstation.supervisor.network import Network
 from groundstation.supervisor.process_spec import ProcessSpec
 from groundstation.supervisor.run import SOURCE
-from groundstation.supervisor.site import certificate_name, hosts
+from groundstation.supervisor.site import hosts
 from groundstation.vehicles import kind_named
 
 _SENSOR_DRIVERS = {

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import msgspec
 
-from groundstation.bus.roles import Identity, Role, shell
+from groundstation.bus.roles import Identity, Role, certificate_name, shell
 from groundstation.errors import GroundStationError
 
 
@@ -63,7 +63,7 @@ class RuntimeRecord(msgspec.Struct, frozen=True):
 
     def identity(self, role: Role) -> Identity | None:
         """Return the identity with which a program of another shell joins the bus."""
-        name = f"host-{self.host}" if self.host else shell(role)
+        name = certificate_name(self.host) if self.host else shell(role)
         return Identity(self.identities, name, Path(self.run_dir).name) if self.identities else None
 
     @property

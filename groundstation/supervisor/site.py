@@ -15,7 +15,7 @@ import msgspec
 from groundstation.bus.api import Subscription
 from groundstation.bus.door import why_closed
 from groundstation.bus.messages import Lease
-from groundstation.bus.roles import Identity, Member, Role
+from groundstation.bus.roles import Identity, Member, Role, certificate_name
 from groundstation.bus.topics import LEASE, VEHICLE_STATUS
 from groundstation.bus.zenoh_bus import AUTHORITY, CERTIFICATE, KEY, open_bus
 from groundstation.errors import GroundStationError, OperatorMistake
@@ -84,11 +84,6 @@ def _names(site: str) -> list[str]:
 def hosts(site: str) -> tuple[Member, ...]:
     """Return the hosts that a site has admitted: each may order as the operator's shells may, under its own name."""
     return tuple(_member(host) for host in _names(site))
-
-
-def certificate_name(host: str) -> str:
-    """Return the name in the certificate of an admitted host."""
-    return f"host-{host}"
 
 
 def _member(host: str) -> Member:

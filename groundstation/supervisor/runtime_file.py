@@ -16,6 +16,7 @@ import msgspec
 
 from groundstation.bus.roles import Identity, Role, certificate_name, shell
 from groundstation.errors import GroundStationError
+from groundstation.process.stat_file import stat_of
 
 
 class ProcessRecord(msgspec.Struct, frozen=True):
@@ -83,12 +84,8 @@ class _AnyRecord(msgspec.Struct, frozen=True):
 
 def start_time(pid: int) -> int | None:
     """Return when a process started [clock ticks since boot], or None if there is none or it is a zombie."""
-    try:
-        content = Path(f"/proc/{pid}/stat").read_text()
-    except OSError:
-        return None
-    fields = content.rpartition(")")[2].split()  # the name in parentheses may hold spaces
-    return None if fields[0] in "ZX" else int(fields[19])
+    fields = stat_of(pid)
+    return None if fields is None or fields[0] in "ZX" else int(fields[19])
 
 
 def folder() -> Path:

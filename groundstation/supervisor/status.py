@@ -3,12 +3,12 @@
 import os
 import time
 from collections.abc import Iterable
-from pathlib import Path
 
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import Lifecycle, ProcessStatus
 from groundstation.bus.topics import PROCESS_STATUS
 from groundstation.process.heartbeat import SlotState
+from groundstation.process.stat_file import stat_of
 from groundstation.supervisor.managed_process import ManagedProcess
 from groundstation.time_units import NS_PER_S
 
@@ -46,9 +46,8 @@ class StatusPublisher:
         return self._share_since(0, now_ns, time.process_time())
 
     def _share(self, pid: int, now_ns: int) -> float:
-        try:
-            fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-        except OSError:
+        fields = stat_of(pid)
+        if fields is None:
             return 0.0
         return self._share_since(pid, now_ns, (int(fields[11]) + int(fields[12])) / _TICKS_PER_S)
 

@@ -11,6 +11,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from groundstation.process.child import ChildSpec
+from groundstation.process.stat_file import stat_of
 from groundstation.vehicles import DriverProcess
 
 # Between kit and driver stands a parent of its own, so that the driver can lose it.
@@ -49,12 +50,8 @@ class DriverLife:
             signal.pidfd_send_signal(self._watch, 0)
         except ProcessLookupError:
             return False
-        return not self._is_zombie()
-
-    def _is_zombie(self) -> bool:
-        with suppress(OSError):
-            return Path(f"/proc/{self.pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
-        return True
+        fields = stat_of(self.pid)
+        return fields is not None and fields[0] != "Z"
 
     def send(self, number: signal.Signals) -> None:
         """Send the driver a signal; nothing happens to one that has ended."""

@@ -15,6 +15,7 @@ from free_port import free_port
 from drivers.camera.sources.opening import open_source
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
+from groundstation.supervisor.runtime_file import start_time
 from sim_bridge.render.process import run
 from sim_bridge.render.spec import BoardSpec, Mount, Outage, OutageKind, PictureQuality, RenderSpec
 from sim_bridge.truth import TruthBoard
@@ -132,7 +133,7 @@ def test_it_ends_with_its_parent(tmp_path):
         os.kill(parent.pid, signal.SIGKILL)
         parent.wait(5.0)
         deadline = time.monotonic() + 15.0
-        while _runs(child):
+        while start_time(child) is not None:
             assert time.monotonic() < deadline, "the render process outlived its parent"
             time.sleep(0.05)
     finally:
@@ -140,11 +141,3 @@ def test_it_ends_with_its_parent(tmp_path):
         parent.stdout.close()
         parent.wait(5.0)
         truth.close()
-
-
-def _runs(pid):
-    try:
-        with open(f"/proc/{pid}/stat") as stat:  # noqa: PTH123
-            return stat.read().rsplit(")", 1)[1].split()[0] != "Z"
-    except FileNotFoundError:
-        return False

@@ -19,6 +19,7 @@ from free_port import free_port
 from groundstation.bus.messages import Lifecycle, ProcessStatus, SimCommand, SimStatus, TruthState
 from groundstation.bus.topics import PROCESS_STATUS, SIM_COMMAND, SIM_STATUS, TRUTH
 from groundstation.bus.zenoh_bus import ZenohBus, open_bus, open_router
+from groundstation.supervisor.runtime_file import start_time
 
 pytestmark = pytest.mark.sitl
 
@@ -210,7 +211,4 @@ def children(pid: int) -> list[int]:
 
 
 def alive(pid: int) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
-    except OSError:
-        return False
+    return start_time(pid) is not None

@@ -10,6 +10,7 @@ from dummy_table import spec, start
 
 from groundstation.errors import GroundStationError
 from groundstation.supervisor import kernels
+from groundstation.supervisor.runtime_file import start_time
 from groundstation.supervisor.start import Interrupted
 from groundstation.supervisor.supervisor import Supervisor
 
@@ -54,7 +55,7 @@ def test_what_is_late_or_unwanted_ends_with_its_children(tmp_path: Path, late: b
 
 def _gone(pid: int) -> None:
     deadline = time.monotonic() + 5.0
-    while Path(f"/proc/{pid}/stat").exists() and Path(f"/proc/{pid}/stat").read_text().split()[2] != "Z":
+    while start_time(pid) is not None:
         assert time.monotonic() < deadline, f"{pid} still runs"
         time.sleep(0.05)
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from drivers.mavlink.convert import setpoint_from_velocity
-from drivers.mavlink.wire.flight import CommandLong
+from drivers.mavlink.wire.flight import command_to
 from drivers.mavlink.wire.frames import FrameEncoder
 from drivers.mavlink.wire.names import MavCmd
 from drivers.mavlink.wire.verification import Signing
@@ -23,5 +23,5 @@ def hover_and_land(systems: Sequence[int], *, signed: bool = False) -> tuple[byt
     """
     encoder = FrameEncoder(_SYSTEM, _COMPONENT, Signing(bytes(32), 0) if signed else None)
     stop = [setpoint_from_velocity(system, 0, (0.0, 0.0, 0.0), 0.0, VehicleLimits()) for system in systems]
-    land = [CommandLong(system, 1, MavCmd.NAV_LAND, 0) for system in systems]
+    land = [command_to(system, MavCmd.NAV_LAND) for system in systems]
     return b"".join(map(encoder.encode, stop)), b"".join(map(encoder.encode, land))

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from drivers.mavlink.identity import serial_number_of
 from drivers.mavlink.links.seam import MavlinkLink
-from drivers.mavlink.wire.flight import CommandLong
+from drivers.mavlink.wire.flight import command_to
 from drivers.mavlink.wire.frames import id_of
 from drivers.mavlink.wire.names import ARMED, AUTOPILOT_COMPONENT, NO_AUTOPILOT, Flavour, MavCmd, mode_name
 from drivers.mavlink.wire.telemetry import (
@@ -40,7 +40,8 @@ class Found:
     @property
     def flavour(self) -> str:
         """Return its autopilot in words."""
-        return {3: "ardupilot", 12: "px4"}.get(self.autopilot, f"autopilot {self.autopilot}")
+        words = {flavour.value: flavour.name.lower() for flavour in Flavour}
+        return words.get(self.autopilot, f"autopilot {self.autopilot}")
 
 
 def probe(link: MavlinkLink, seconds: float, greet: tuple[int, ...] = (0,)) -> dict[int, Found]:
@@ -76,10 +77,10 @@ def probe(link: MavlinkLink, seconds: float, greet: tuple[int, ...] = (0,)) -> d
 def _ask(link: MavlinkLink, vehicle: Found) -> None:
     for kind, known in ((AutopilotVersion, vehicle.version), (VideoStreamInformation, vehicle.video)):
         if not known:
-            link.send(vehicle.system, CommandLong(vehicle.system, 1, MavCmd.REQUEST_MESSAGE, 0, float(id_of(kind))))
+            link.send(vehicle.system, command_to(vehicle.system, MavCmd.REQUEST_MESSAGE, float(id_of(kind))))
     if not vehicle.battery:
         interval = (float(id_of(SysStatus)), 500_000.0)
-        link.send(vehicle.system, CommandLong(vehicle.system, 1, MavCmd.SET_MESSAGE_INTERVAL, 0, *interval))
+        link.send(vehicle.system, command_to(vehicle.system, MavCmd.SET_MESSAGE_INTERVAL, *interval))
 
 
 def _mode(message: Heartbeat) -> str:

@@ -3,7 +3,7 @@
 from collections import deque
 from dataclasses import dataclass
 
-from drivers.mavlink.wire.flight import CommandAckMessage, CommandLong
+from drivers.mavlink.wire.flight import CommandAckMessage, CommandLong, command_to
 from drivers.mavlink.wire.names import MavCmd, MavResult
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
@@ -37,8 +37,7 @@ class Requests:
         """Wish for a command; nothing happens while it is under way, or was answered within the last second."""
         if key in self._open or now_ns < self._quiet_until_ns.get(key, 0):
             return
-        padded = (*params, *(0.0,) * (7 - len(params)))
-        self._open[key] = _Open(CommandLong(self._system, 1, command, 0, *padded), now_ns)
+        self._open[key] = _Open(command_to(self._system, command, *params), now_ns)
 
     def drop(self, *keys: str) -> None:
         """Give up wishes: a landing must not be followed by a late order to climb."""

@@ -129,7 +129,7 @@ def made_good(message: Message, system: int, flavour: Flavour) -> Message | None
     pauses = isinstance(message, flight.CommandLong | flight.CommandInt) and message.command == MavCmd.DO_PAUSE_CONTINUE
     if flavour is not Flavour.ARDUPILOT or not pauses:
         return None
-    return flight.CommandLong(system, 1, MavCmd.DO_SET_MODE, 0, CUSTOM_MODE_ENABLED, CopterMode.BRAKE)
+    return flight.command_to(system, MavCmd.DO_SET_MODE, CUSTOM_MODE_ENABLED, CopterMode.BRAKE)
 
 
 def words_of(stop: Message, flavour: Flavour) -> str:

@@ -12,9 +12,9 @@ from drivers.mavlink import parameters
 from drivers.mavlink.requests import Requests
 from drivers.mavlink.settings import GlobalOrigin
 from drivers.mavlink.wire import service, telemetry
-from drivers.mavlink.wire.flight import CommandLong, OdometryMessage
+from drivers.mavlink.wire.flight import OdometryMessage, command_to
 from drivers.mavlink.wire.frames import Message, id_of
-from drivers.mavlink.wire.names import Flavour, MavCmd
+from drivers.mavlink.wire.names import AUTOPILOT_COMPONENT, Flavour, MavCmd
 from drivers.mavlink.wire.parameters import value_from_carried
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
@@ -197,7 +197,9 @@ class MavlinkSession:
             self._next_param_ns = now_ns + _PARAM_PERIOD_NS
             # A burst at a time, so that a slow radio is not flooded; answers bring the next one forward.
             burst = sorted(unread, key=self._param_tries.__getitem__)[:_PARAM_BURST]
-            messages += [service.ParamRequestRead(self._system, 1, self._asked_as(name), -1) for name in burst]
+            messages += [
+                service.ParamRequestRead(self._system, AUTOPILOT_COMPONENT, self._asked_as(name), -1) for name in burst
+            ]
             self._param_tries.update(burst)
             if left_out := [name for name in burst if name in self.unchecked]:
                 self.notes.append(f"not checked, because its firmware does not know them: {', '.join(left_out)}")
@@ -215,7 +217,7 @@ class MavlinkSession:
         self._version_tries += 1
         self._next_version_ns = now_ns + _VERSION_PERIOD_NS
         asked = float(id_of(telemetry.AutopilotVersion))
-        return [CommandLong(self._system, 1, MavCmd.REQUEST_MESSAGE, 0, asked)]
+        return [command_to(self._system, MavCmd.REQUEST_MESSAGE, asked)]
 
     def _origin_requests(self) -> list[Message]:
         o = self._origin
@@ -224,7 +226,7 @@ class MavlinkSession:
         # Not through the requests: "denied" here means "none yet", which is no news for the operator.
         return [
             service.SetGpsGlobalOrigin(self._system, *place),
-            CommandLong(self._system, 1, MavCmd.REQUEST_MESSAGE, 0, asked),
+            command_to(self._system, MavCmd.REQUEST_MESSAGE, asked),
         ]
 
     @staticmethod

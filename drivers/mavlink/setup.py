@@ -8,7 +8,7 @@ from drivers.mavlink.greeting import first_heartbeat
 from drivers.mavlink.links.seam import MavlinkLink
 from drivers.mavlink.parameters import Needed, difference, needed
 from drivers.mavlink.wire.errors import WireError
-from drivers.mavlink.wire.names import ARMED, Flavour
+from drivers.mavlink.wire.names import ARMED, AUTOPILOT_COMPONENT, Flavour
 from drivers.mavlink.wire.parameters import carried_from_value, value_from_carried
 from drivers.mavlink.wire.service import ParamRequestRead, ParamSet, ParamValue
 from groundstation.errors import DriverError
@@ -67,13 +67,13 @@ class ParameterSetup:
         known = self._answers.get(wanted.name)
         name, kind = (wanted.name, wanted.kind) if known is None else (known.param_id, known.param_type)
         carried = carried_from_value(self._flavour, wanted.value, kind)
-        value = self._exchange(wanted, ParamSet(self._system, 1, name, carried, kind), _TRIES)
+        value = self._exchange(wanted, ParamSet(self._system, AUTOPILOT_COMPONENT, name, carried, kind), _TRIES)
         return value is not None and not difference(wanted, {wanted.name: value})
 
     def _read(self, wanted: Needed) -> float | None:
         for tries in (1, _TRIES - 1):
             for name in wanted.names:
-                value = self._exchange(wanted, ParamRequestRead(self._system, 1, name, -1), tries)
+                value = self._exchange(wanted, ParamRequestRead(self._system, AUTOPILOT_COMPONENT, name, -1), tries)
                 if value is not None:
                     return value
         return None

@@ -39,7 +39,6 @@ _EXPLAIN_NS = 700 * NS_PER_MS
 _COMPLAINTS_NS = 35 * NS_PER_S
 _Value = service.ParamValue | telemetry.GpsGlobalOrigin | telemetry.AutopilotVersion
 _FAULTS = SensorBits.GYRO | SensorBits.ACCELEROMETER
-_FLAVOURS = {"px4": Flavour.PX4, "ardupilot": Flavour.ARDUPILOT}
 
 
 class MavlinkVehicle:
@@ -49,7 +48,7 @@ class MavlinkVehicle:
         self.name, self.address = vehicle.name, settings.link.target
         self.system = vehicle.system_id
         self.telemetry = LatestTelemetry()
-        self.flavour = _FLAVOURS[vehicle.flavour]
+        self.flavour = Flavour[vehicle.flavour.upper()]
         self.texts: deque[tuple[int, telemetry.Statustext]] = deque(maxlen=64)
         self.log = DatagramLog(bus, vehicle.name, settings.raw_datagrams)
         self._settings, self._link = settings, link

@@ -14,7 +14,7 @@ from contextlib import suppress
 from drivers.mavlink.parameters import needed
 from drivers.mavlink.wire import flight, service, telemetry
 from drivers.mavlink.wire.frames import MAX_DATAGRAM, FrameDecoder, FrameEncoder, Message, split
-from drivers.mavlink.wire.names import Flavour, MavCmd
+from drivers.mavlink.wire.names import AUTOPILOT_COMPONENT, Flavour, MavCmd
 from drivers.mavlink.wire.parameters import carried_from_value
 
 FIRST_SYSTEM = 11
@@ -29,7 +29,7 @@ class TalkingVehicle:
     """A PX4 that rises by 1 m once it is armed, then flies ahead at AHEAD_M_S, whatever else it is told."""
 
     def __init__(self, system: int, port: int) -> None:
-        self._encoder, self._decoder = FrameEncoder(system, 1), FrameDecoder()
+        self._encoder, self._decoder = FrameEncoder(system, AUTOPILOT_COMPONENT), FrameDecoder()
         self._host = ("127.0.0.1", port)
         self._mode, self._armed_s = 3 << 16, 0.0
         self._parameters = {n.name: n for n in needed(Flavour.PX4, 255)}

@@ -8,7 +8,7 @@ from drivers.mavlink.wire import service as s
 from drivers.mavlink.wire import telemetry as t
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.frames import MAX_DATAGRAM, FrameDecoder, FrameEncoder, Message, ReceivedFrame, id_of, split
-from drivers.mavlink.wire.names import Flavour
+from drivers.mavlink.wire.names import AUTOPILOT_COMPONENT, Flavour
 from drivers.mavlink.wire.verification import Signing
 from groundstation.time_units import NS_PER_S
 from sim_bridge.devices.mavlink_ardupilot import ArduCopter
@@ -63,7 +63,7 @@ class MavlinkEmulator:
         self.firmware: AutopilotFirmware = (Px4 if px4 else ArduCopter)(copter, parameters)
         self.speaker = Speaker(self.firmware)
         self.services = Services(system, self.firmware, self.speaker, video)
-        self._encoder, self._decoder = FrameEncoder(system, 1, signing), FrameDecoder(signing)
+        self._encoder, self._decoder = FrameEncoder(system, AUTOPILOT_COMPONENT, signing), FrameDecoder(signing)
         self._calls = calls
         self._clients: dict[Address, int] = {}
         self._ground_ns: int | None = None

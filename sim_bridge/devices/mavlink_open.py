@@ -50,7 +50,7 @@ def open_at(
     identity, section = identity_of(drone), scenario.of_kind("mavlink", CopterScenario)
     if calls is None and identity.listen:
         calls = identity.local_address, identity.port
-    flavour = Flavour.PX4 if identity.flavour == "px4" else Flavour.ARDUPILOT
+    flavour = Flavour[identity.flavour.upper()]
     parameters = Parameters(flavour, identity.system_id, section.configured)
     vehicle = MavlinkEmulator(name, (address, identity.port), parameters, copter, calls=calls, video=video, wrong=wrong)
     vehicle.habits = LinkHabits(section.one_partner, section.mavlink_1_until_greeted)

@@ -13,7 +13,7 @@ from drivers.mavlink.wire import telemetry as t
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.file_transfer import refusal
 from drivers.mavlink.wire.frames import CLASSES, Message, ReceivedFrame, id_of
-from drivers.mavlink.wire.names import Flavour, MavCmd, MavResult, px4_mode
+from drivers.mavlink.wire.names import AUTOPILOT_COMPONENT, Flavour, MavCmd, MavResult, px4_mode
 from drivers.mavlink.wire.parameters import carried_from_value, value_from_carried
 from drivers.mavlink.wire.positioning import GlobalPositionInt, GpsRawInt
 from sim_bridge.devices.mavlink_firmware import Answer, AutopilotFirmware
@@ -63,7 +63,7 @@ class Services:
         target = getattr(message, "target_system", 0)
         if message is None or target not in (0, self._system):
             return []
-        if getattr(message, "target_component", 0) not in (0, 1):
+        if getattr(message, "target_component", 0) not in (0, AUTOPILOT_COMPONENT):
             return []
         match message:
             case f.CommandLong():

@@ -4,7 +4,7 @@ import socket
 from contextlib import suppress
 
 from drivers.mavlink.wire.frames import FrameEncoder, Message
-from drivers.mavlink.wire.names import Flavour
+from drivers.mavlink.wire.names import AUTOPILOT_COMPONENT, Flavour
 from drivers.mavlink.wire.simulator import HilStateQuaternion, SimState
 from groundstation.geometry.angles import quaternion_from_euler
 from sim_bridge.devices.mavlink_satellites import Satellites
@@ -20,7 +20,7 @@ class TruthTeller:
     def __init__(self, flavour: Flavour, system: int, body: Airframe, to: Address) -> None:
         self._flavour, self._body, self._to = flavour, body, to
         self._globe = Satellites(system)
-        self._encoder = FrameEncoder(system, 1)
+        self._encoder = FrameEncoder(system, AUTOPILOT_COMPONENT)
         self._ticks = 0
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)

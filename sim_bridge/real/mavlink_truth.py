@@ -9,7 +9,7 @@ import math
 from contextlib import suppress
 
 from drivers.mavlink.wire.errors import WireError
-from drivers.mavlink.wire.flight import CommandLong
+from drivers.mavlink.wire.flight import command_to
 from drivers.mavlink.wire.frames import MAX_DATAGRAM, FrameDecoder, FrameEncoder, Message, id_of, split
 from drivers.mavlink.wire.names import MavCmd
 from drivers.mavlink.wire.simulator import HilStateQuaternion, SimState
@@ -100,7 +100,7 @@ class AutopilotTruth:
         for kind in kinds:
             number = float(id_of(kind))
             more = (number, _INTERVAL_US, 0.0, 0.0, 0.0, 0.0, 0.0)
-            command = CommandLong(self._system, 1, MavCmd.SET_MESSAGE_INTERVAL, 0, *more)
+            command = command_to(self._system, MavCmd.SET_MESSAGE_INTERVAL, *more)
             with suppress(OSError):
                 self._socket.sendto(self._encoder.encode(command), source)
 

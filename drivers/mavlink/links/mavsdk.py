@@ -28,6 +28,7 @@ from drivers.mavlink.links.seam import Heard, Transport
 from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.frames import CLASSES, Message, ReceivedFrame, fields_of, name_of
+from drivers.mavlink.wire.names import AUTOPILOT_COMPONENT
 from drivers.mavlink.wire.telemetry import Heartbeat
 from groundstation.adapters import Address
 from groundstation.errors import DriverError
@@ -127,7 +128,7 @@ class _System:
         """Send a message; heartbeats are the library's own business."""
         if self._direct is None or isinstance(message, Heartbeat):
             return
-        carrier = MavlinkMessage(name_of(message), 0, 0, self.number, 1, json_from_message(message))
+        carrier = MavlinkMessage(name_of(message), 0, 0, self.number, AUTOPILOT_COMPONENT, json_from_message(message))
         try:
             self._direct.send_message(carrier)
         except MavsdkError as error:

@@ -11,13 +11,12 @@ from drivers.mavlink.stop_queue import StopQueue
 from drivers.mavlink.wire.file_transfer import refusal
 from drivers.mavlink.wire.flight import CommandAckMessage, CommandInt, CommandLong
 from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder, Message, ReceivedFrame
-from drivers.mavlink.wire.names import Flavour, MavResult
+from drivers.mavlink.wire.names import AUTOPILOT_COMPONENT, Flavour, MavResult
 from drivers.mavlink.wire.service import FileTransferProtocol
 from groundstation.time_units import NS_PER_S
 
 # What passes besides stops: enough for a table of parameters in half a minute, too little to make setpoints late.
 _FRAMES_PER_S = 50
-_AUTOPILOT = 1
 _ANSWERED_NS = 3 * NS_PER_S
 _UNDERWAY = (MavResult.ACCEPTED, MavResult.IN_PROGRESS)
 
@@ -42,11 +41,11 @@ class Rider:
     def __init__(self, vehicle: VehicleSettings) -> None:
         _, host, port = vehicle.forward.split(":")
         self.name, self.system = vehicle.name, vehicle.system_id
-        self.flavour = Flavour.PX4 if vehicle.flavour == "px4" else Flavour.ARDUPILOT
+        self.flavour = Flavour[vehicle.flavour.upper()]
         self.allowed, self.target = vehicle.forward_allows, (host, int(port))
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.setblocking(False)
-        self.decoder, self.encoder = FrameDecoder(), FrameEncoder(vehicle.system_id, _AUTOPILOT)
+        self.decoder, self.encoder = FrameDecoder(), FrameEncoder(vehicle.system_id, AUTOPILOT_COMPONENT)
         self.allowance, self.stops = _Allowance(), StopQueue()
         self._asked: dict[int, tuple[int, str]] = {}
 

@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+from drivers.mavlink.wire.names import AUTOPILOT_COMPONENT, MavCmd
+
 Floats = tuple[float, ...]
 
 
@@ -95,6 +97,11 @@ class CommandLong(NamedTuple):
     param5: float = 0.0
     param6: float = 0.0
     param7: float = 0.0
+
+
+def command_to(system: int, command: MavCmd, *params: float) -> CommandLong:
+    """Return a request to a system's autopilot, sent for the first time."""
+    return CommandLong(system, AUTOPILOT_COMPONENT, command, 0, *params)
 
 
 class CommandInt(NamedTuple):

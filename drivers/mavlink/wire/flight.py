@@ -45,17 +45,6 @@ class VisionPositionEstimate(NamedTuple):
     reset_counter: int
 
 
-class VisionSpeedEstimate(NamedTuple):
-    """A velocity measured from outside: NED [m/s], covariance (3, 3) row-major."""
-
-    usec: int
-    x: float
-    y: float
-    z: float
-    covariance: Floats
-    reset_counter: int
-
-
 class OdometryMessage(NamedTuple):
     """Pose in frame_id, velocity and rates in child_frame_id; q is frame from child, w x y z.
 

@@ -33,11 +33,8 @@ class MavFrame(IntEnum):
     """MAV_FRAME."""
 
     LOCAL_NED = 1
-    LOCAL_OFFSET_NED = 7
     BODY_NED = 8
-    BODY_OFFSET_NED = 9
     BODY_FRD = 12
-    LOCAL_FRD = 20
 
 
 class MavCmd(IntEnum):
@@ -51,7 +48,6 @@ class MavCmd(IntEnum):
     DO_FLIGHTTERMINATION = 185
     DO_REPOSITION = 192
     DO_PAUSE_CONTINUE = 193
-    PREFLIGHT_REBOOT = 246
     COMPONENT_ARM_DISARM = 400
     GET_HOME_POSITION = 410
     SET_MESSAGE_INTERVAL = 511

@@ -137,15 +137,6 @@ class FileTransferProtocol(NamedTuple):
     payload: tuple[int, ...]
 
 
-class SetupSigning(NamedTuple):
-    """Hand over a signing key; WIRE (docs/reference/mavlink.md 5.9): in clear, so over a wire only."""
-
-    target_system: int
-    target_component: int
-    secret_key: tuple[int, ...]
-    initial_timestamp: int
-
-
 class PlayTune(NamedTuple):
     """Play a tune, in music macro language."""
 

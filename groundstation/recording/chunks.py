@@ -4,7 +4,7 @@ import os
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from io import BytesIO
 from typing import IO
@@ -41,6 +41,12 @@ Wanted = Callable[[Topic], bool]
 def every_topic(_topic: Topic) -> bool:
     """Want everything."""
     return True
+
+
+def among(topics: Iterable[Topic]) -> Wanted:
+    """Return a question for topics; by identity, since there is one of each and it is asked of every message."""
+    known = frozenset(map(id, topics))
+    return lambda topic: id(topic) in known
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 
 import re
 import zlib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 from io import BytesIO
@@ -21,7 +21,7 @@ from groundstation.bus.keys import Key
 from groundstation.bus.messages import Header, Message
 from groundstation.bus.topics import Topic
 from groundstation.errors import MessageError
-from groundstation.recording.chunks import UNREADABLE, RawRecord, chunk_data, chunk_records, frames
+from groundstation.recording.chunks import UNREADABLE, RawRecord, Wanted, chunk_data, chunk_records, every_topic, frames
 from groundstation.recording.compatibility import RecordingError, require_ours, require_readable
 from groundstation.recording.file_topics import RAW, STATE, is_picture
 from groundstation.recording.part_names import numbered_parts
@@ -67,7 +67,7 @@ class Recording:
     damage: list[str] = field(default_factory=list)
     preamble_damage: list[str] = field(default_factory=list)
 
-    def raw_records(self, wanted: Callable[[Topic], bool] = lambda _topic: True) -> Iterator[RawRecord]:
+    def raw_records(self, wanted: Wanted = every_topic) -> Iterator[RawRecord]:
         """Yield the messages of the wanted topics in file order; foreign channels are passed over."""
         self.damage[:] = self.preamble_damage
         channels: dict[int, Key | None] = {}
@@ -77,7 +77,7 @@ class Recording:
                     data = chunk_data(body, self.damage)
                     yield from chunk_records(data, channels, wanted, self.damage)
 
-    def records(self, wanted: Callable[[Topic], bool] = lambda _topic: True) -> Iterator[Record]:
+    def records(self, wanted: Wanted = every_topic) -> Iterator[Record]:
         """Yield decoded messages of the wanted typed topics; what does not decode is named in `damage`."""
         for raw in self.raw_records(lambda topic: topic.type is not None and wanted(topic)):
             try:

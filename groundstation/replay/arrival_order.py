@@ -7,30 +7,23 @@ before it in the file had come before it, so it came at the latest time that any
 import heapq
 from bisect import bisect_left
 from collections import OrderedDict
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 from itertools import accumulate
 
-from groundstation.bus.topics import COMMAND, COMMAND_ACK, ESTIMATE, EVENT, Topic
+from groundstation.bus.topics import COMMAND, COMMAND_ACK, ESTIMATE, EVENT
 from groundstation.console.server import TOPICS
-from groundstation.recording.chunks import RawRecord
+from groundstation.recording.chunks import RawRecord, Wanted, among
 from groundstation.recording.index import FileIndex
 from groundstation.recording.run import RecordedRun
 from groundstation.replay.source import Source
 from groundstation.time_units import NS_PER_S
 
-Wanted = Callable[[Topic], bool]
 Arrival = tuple[int, RawRecord]
 _MILESTONES = (EVENT, COMMAND, COMMAND_ACK)
 # So many small chunks hold the two minutes that a seek looks back over; those with pictures are large.
 _KEPT_SMALL, _KEPT_LARGE = 1000, 6
 _LARGE_BYTES = 200_000
 _STEP_REACH_NS = 30 * NS_PER_S
-
-
-def among(topics: Iterable[Topic]) -> Wanted:
-    """Return a question for topics; by identity, since there is one of each and it is asked of every message."""
-    known = frozenset(map(id, topics))
-    return lambda topic: id(topic) in known
 
 
 is_shown = among(TOPICS)  # the console shows something of it

@@ -14,9 +14,8 @@ from groundstation.console.room import scene_from_field
 from groundstation.console.server import STATES, ConsoleServer, claim_port
 from groundstation.errors import MessageError
 from groundstation.monitor.state import cast_from_field
-from groundstation.recording.chunks import RawRecord
+from groundstation.recording.chunks import RawRecord, among
 from groundstation.recording.reader import RecordingError, payload
-from groundstation.replay.arrival_order import among
 from groundstation.replay.playback import Playback
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 

@@ -7,8 +7,9 @@ from pathlib import Path
 
 from groundstation.bus import codec
 from groundstation.bus.messages import JournalEntry, Message
-from groundstation.bus.topics import BELIEF, ESTIMATE, INNOVATION, JOURNAL, PLAN, SETPOINT, Topic
+from groundstation.bus.topics import BELIEF, ESTIMATE, INNOVATION, JOURNAL, PLAN, SETPOINT
 from groundstation.errors import MessageError
+from groundstation.recording.chunks import among
 from groundstation.recording.reader import RawRecord, open_recording
 from groundstation.runtime.inbox import TOPICS as INPUTS
 from groundstation.time_units import NS_PER_MS, NS_PER_S
@@ -72,14 +73,10 @@ class Tape:
         yield from map(self._filled, waiting)
 
     def _records(self) -> Iterator[RawRecord]:
-        wanted = frozenset((topic.plane, topic.name) for topic in (*INPUTS, *OUTPUTS, JOURNAL))
-
-        def is_wanted(topic: Topic) -> bool:
-            return (topic.plane, topic.name) in wanted
-
+        wanted = among((*INPUTS, *OUTPUTS, JOURNAL))
         for path in self._files:
             recording = open_recording(path)
-            yield from recording.raw_records(is_wanted)
+            yield from recording.raw_records(wanted)
             self.damage += [f"{path.name}: {damage}" for damage in recording.damage]
 
     def _tick(self, record: RawRecord) -> list[Tick]:

@@ -10,6 +10,7 @@ import numpy as np
 from groundstation.bus import messages as m
 from groundstation.bus import topics as t
 from groundstation.field.resolved import ResolvedField, field_from_json
+from groundstation.recording.chunks import among
 from groundstation.recording.file_topics import STATE
 from groundstation.recording.preamble import FIELD_NAME
 from groundstation.recording.reader import Record, RecordingError, open_parts, parts
@@ -18,12 +19,9 @@ from groundstation.report import run_facts
 from groundstation.report.captured_truth import captured_tracks
 from groundstation.report.tracks import UNKNOWN_FIELD, EstimateTrack, ProcessTrack, RunData, TimedMessage, TruthTrack
 
-_WANTED = frozenset(
-    (topic.plane, topic.name)
-    for topic in (
-        *(t.BELIEF, t.BODY_POSES, t.COMMAND, t.COMMAND_ACK, t.ESTIMATE, t.EVENT, t.INNOVATION, t.PLAN),
-        *(t.PROCESS_STATUS, t.SEARCH_MAP, t.SIM_STATUS, t.SUSPICION, t.TRUTH, t.VEHICLE_STATUS),
-    )
+_WANTED = (
+    *(t.BELIEF, t.BODY_POSES, t.COMMAND, t.COMMAND_ACK, t.ESTIMATE, t.EVENT, t.INNOVATION, t.PLAN),
+    *(t.PROCESS_STATUS, t.SEARCH_MAP, t.SIM_STATUS, t.SUSPICION, t.TRUTH, t.VEHICLE_STATUS),
 )
 
 
@@ -40,14 +38,10 @@ def gather(run_dir: Path) -> RunData:
         if FIELD_NAME in recording.attachments and not data.resolved.drones:
             data.resolved = _field(recording.attachments[FIELD_NAME], data.damage)
         data.rerun = data.rerun or rerun_of(recording.metadata)
-        rows.take(recording.records(_is_wanted))
+        rows.take(recording.records(among(_WANTED)))
         data.damage.extend(f"{recording.path.name}: {damage}" for damage in recording.damage)
     rows.finish()
     return data
-
-
-def _is_wanted(topic: t.Topic) -> bool:
-    return (topic.plane, topic.name) in _WANTED
 
 
 def _field(attachment: bytes, damage: list[str]) -> ResolvedField:

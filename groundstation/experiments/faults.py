@@ -11,6 +11,7 @@ from typing import Any
 
 from groundstation.errors import OperatorMistake
 from groundstation.experiments.program_digest import program_digest
+from groundstation.experiments.summary import worst
 
 BATCH = 20
 # Exit code of the simulator's study for an order that it does not understand.
@@ -98,17 +99,12 @@ def by_kind(flights: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
                 "alone": sum(len(f["faults"]) == 1 for f in flown),
                 "unsafe_alone": sum(len(f["faults"]) == 1 for f in unsafe),
                 "stopped": sum(any(mode != "TRACK" for mode in f["modes"].values()) for f in flown),
-                **{key: _worst(flown, key, pick) for key, pick in _WORST},
+                **{key: worst(flown, key, pick) for key, pick in _WORST},
                 "why": dict(sorted(why.items(), key=lambda item: -item[1])),
                 "seeds": [f["seed"] for f in unsafe],
             }
         )
     return rows
-
-
-def _worst(flights: Iterable[Mapping[str, Any]], key: str, pick: Any) -> float | None:
-    found = [flight[key] for flight in flights if flight[key] is not None]
-    return pick(found) if found else None
 
 
 def totals(flights: Sequence[Mapping[str, Any]], timing: Sequence[Mapping[str, float]]) -> dict[str, Any]:

@@ -3,6 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from groundstation.experiments.summary import worst
+
 _WORST = (("separation_m", min), ("fence_m", max), ("unlocalised_s", max))
 _SHOWN_SEEDS = 8
 
@@ -22,7 +24,7 @@ def rows_of(flights: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
                 "covariance_share": share,
                 "flights": len(flown),
                 "not_flown": [flight["seed"] for flight in mine if not flight["flown"]],
-                **{key: _worst(flown, key, pick) for key, pick in _WORST},
+                **{key: worst(flown, key, pick) for key, pick in _WORST},
                 "violations": {flight["seed"]: broken for flight in flown if (broken := _broken(flight))},
                 "landed_before": [flight["seed"] for flight in flown if flight["landed_before"]],
                 "not_landed": [flight["seed"] for flight in flown if not flight["landed"]],
@@ -33,11 +35,6 @@ def rows_of(flights: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 def _broken(flight: Mapping[str, Any]) -> dict[str, float]:
     return {what: at_s for what, at_s in flight["unsafe"].items() if what in ("fence", "separation")}
-
-
-def _worst(flights: Sequence[Mapping[str, Any]], key: str, pick: Any) -> float | None:
-    found = [flight[key] for flight in flights if flight[key] is not None]
-    return pick(found) if found else None
 
 
 def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:

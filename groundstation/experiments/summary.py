@@ -1,6 +1,6 @@
 """Figures of merit over seeds: medians, shares and ratios to the paper's heuristic, as the JSON summary holds them."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -65,3 +65,9 @@ def timings(rows: Sequence[dict[str, Any]], by: Sequence[str] = GROUP) -> list[d
         }
         for key, members in groups.items()
     ]
+
+
+def worst(flights: Iterable[Mapping[str, Any]], key: str, pick: Any) -> float | None:
+    """Return the least or largest (pick: min or max) of what flights have under a key, None where none has any."""
+    found = [flight[key] for flight in flights if flight[key] is not None]
+    return pick(found) if found else None

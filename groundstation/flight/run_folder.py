@@ -12,6 +12,7 @@ import msgspec
 
 from groundstation.errors import GroundStationError, OperatorMistake, without_passwords
 from groundstation.process.log import DiscreetFormatter
+from groundstation.recording.disk_space import free_bytes
 from groundstation.report import run_facts
 from groundstation.supervisor import kernels
 from groundstation.supervisor.runtime_file import start_time
@@ -34,18 +35,13 @@ def make_run_dir(parent: Path, field_name: str) -> Path:
         probe = path / ".probe"
         probe.write_bytes(b"x" * 4096)
         probe.unlink()
-        free = _free_bytes(path)
+        free = free_bytes(path)
     except OSError as error:
         raise OperatorMistake(f"cannot write to {path}: {error.strerror} (--set recording.directory=...)") from error
     if free < _MIN_FREE_BYTES:
         path.rmdir()
         raise GroundStationError(f"only {free / 1e6:.0f} MB are free for {parent}: make room before take-off")
     return path
-
-
-def _free_bytes(path: Path) -> int:
-    status = os.statvfs(path)
-    return status.f_bavail * status.f_frsize
 
 
 def write_facts(run_dir: Path, facts: run_facts.RunFacts) -> None:

@@ -2,13 +2,13 @@
 
 import json
 import os
-import sys
 from typing import Any
 
 import click
 
 from groundstation.cli.bench_planner import numbers, use_kernel_cache
 from groundstation.cli.exits import ExitCode
+from groundstation.cli.terminal import write_over
 
 
 @click.command(
@@ -46,14 +46,8 @@ def estimator(robots: str, rounds: int, flight_ms: int, field_name: str, seed: i
     use_kernel_cache()
     from groundstation.bench.estimator import SAME_BELIEF, run_bench
 
-    terminal = sys.stderr.isatty()
-
-    def tell(text: str) -> None:
-        if terminal:
-            click.echo(f"\r\033[K{text}", err=True, nl=False)
-
-    result = run_bench(sizes, resolved, rounds, flight_ms, seed, tell)
-    tell("")
+    result = run_bench(sizes, resolved, rounds, flight_ms, seed, write_over)
+    write_over("")
     click.echo(json.dumps(result, indent=1) if as_json else _table(result))
     agree = all(
         d <= SAME_BELIEF for row in result["same_belief"].values() for n, d in row.items() if n != "numpy-batch"

@@ -2,12 +2,12 @@
 
 import json
 import os
-import sys
 from typing import Any
 
 import click
 
 from groundstation.cli.numbers import FiniteRange
+from groundstation.cli.terminal import write_over
 from groundstation.process import numba_cache
 
 _LAYOUTS = ("two-level", "random", "string", "flat")
@@ -77,22 +77,16 @@ def planner(
     use_kernel_cache()
     from groundstation.bench.planner import run_bench
 
-    terminal = sys.stderr.isatty()
-
-    def tell(text: str) -> None:
-        if terminal:
-            click.echo(f"\r\033[K{text}", err=True, nl=False)
-
     if model == "frustum":
         from groundstation.bench.frustum import run_frustum_bench
 
         chosen = [one for one in layouts if one != "random"]
-        timed = run_frustum_bench(sizes, chosen, repeats, seed, tell=tell)
-        tell("")
+        timed = run_frustum_bench(sizes, chosen, repeats, seed, tell=write_over)
+        write_over("")
         click.echo(json.dumps(timed, indent=1) if as_json else _frustum_table(timed))
         return
-    result = run_bench(sizes, layouts, peers, repeats, seed, limit_s, tell)
-    tell("")
+    result = run_bench(sizes, layouts, peers, repeats, seed, limit_s, write_over)
+    write_over("")
     click.echo(json.dumps(result, indent=1) if as_json else _table(result))
 
 

@@ -21,6 +21,11 @@ def show(picture: "RenderableType") -> None:
 
 def progress(done: int, total: int) -> None:
     """Draw a bar of the work done, if standard error is a terminal."""
+    bar = "#" * (40 * done // max(total, 1))
+    write_over(f"[{bar:40}] {done}/{total}{chr(10) if done == total else ''}")
+
+
+def write_over(text: str) -> None:
+    """Write over the last line, if standard error is a terminal; nothing leaves it empty."""
     if sys.stderr.isatty():
-        bar = "#" * (40 * done // max(total, 1))
-        click.echo(f"\r\033[K[{bar:40}] {done}/{total}{chr(10) if done == total else ''}", err=True, nl=False)
+        click.echo(f"\r\033[K{text}", err=True, nl=False)

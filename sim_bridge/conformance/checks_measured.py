@@ -190,21 +190,24 @@ def _agrees(told: Sequence[float], true: Sequence[float]) -> float:
     return float(np.corrcoef(told, true)[0, 1])
 
 
+def _rate(case: Case, axis: int, marks: Sequence[str]) -> float:
+    """Return the correlation of the told rate of roll (0) or pitch (1) with the true one over spans."""
+    heard = [one for mark in marks for one in _imu(case, mark)]
+    true = [_true_rate(case, one.message.header.stamp_ns, axis) for one in heard]
+    return _agrees([one.message.angular_velocity_rad_s[axis] for one in heard], true)
+
+
 @check("square")
 def gyroscopes_roll_the_right_way(case: Case) -> None:
     """The body rate about x, where it is told, is positive as the right side goes down."""
-    heard = [one for mark in ("left", "right") for one in _imu(case, mark)]
-    true = [_true_rate(case, one.message.header.stamp_ns, 0) for one in heard]
-    correlation = _agrees([one.message.angular_velocity_rad_s[0] for one in heard], true)
+    correlation = _rate(case, 0, ("left", "right"))
     assert correlation > 0.3, f"correlation with the true rate {correlation:.2f}"
 
 
 @check("square")
 def gyroscopes_pitch_the_right_way(case: Case) -> None:
     """The body rate about y, where it is told, is positive as the nose goes down."""
-    heard = [one for mark in ("forward", "back") for one in _imu(case, mark)]
-    true = [_true_rate(case, one.message.header.stamp_ns, 1) for one in heard]
-    correlation = _agrees([one.message.angular_velocity_rad_s[1] for one in heard], true)
+    correlation = _rate(case, 1, ("forward", "back"))
     assert correlation > 0.3, f"correlation with the true rate {correlation:.2f}"
 
 

@@ -15,19 +15,17 @@ from drivers.camera.pipeline import Pipeline
 from drivers.camera.settings import CameraDriverSettings
 from drivers.camera.sources.frames import FrameSource, Packet, Unit
 from drivers.camera.sources.opening import open_source
-from drivers.camera.stream_watch import StreamState, StreamWatch
+from drivers.stream_health import StreamHealth, StreamNames
 from drivers.thinning import Grid
 from groundstation.arrays import Image
-from groundstation.bus import clock
 from groundstation.bus.jpeg import whole_size
-from groundstation.bus.messages import CameraStatus, SearchedPicture, Severity
-from groundstation.bus.topics import CAMERA_STATUS, IMAGE, OBSERVATION, SEARCHED_PICTURE, VIDEO
+from groundstation.bus.messages import SearchedPicture
+from groundstation.bus.topics import IMAGE, OBSERVATION, SEARCHED_PICTURE, VIDEO
 from groundstation.errors import without_password
-from groundstation.time_units import NS_PER_MS, NS_PER_S
+from groundstation.time_units import NS_PER_MS
 
 _log = logging.getLogger(__name__)
 _POLL_S = 0.02
-_STATUS_PERIOD_NS = 500 * NS_PER_MS
 _LEVEL = (0.0, 0.0)
 
 
@@ -65,18 +63,18 @@ class CameraDriver:
             settings.search_phase_s,
         )
         self._surroundings = Surroundings(child.bus, settings)
-        self._watch = StreamWatch(settings.start_within_s, settings.stall_after_s, clock.now_ns())
-        self._processed = self._detections = self._processed_then = 0
-        self._exposure_ns = 0
         self._newest: Image | None = None
-        self._silence_s = settings.start_within_s
         self._images = Grid(settings.image_fps)
-        self._status_ns = clock.now_ns()
+        address = without_password(settings.source)
+        remedy = f"check the camera and its address {address}"
+        size = "set the camera to the calibrated size, or calibrate it at this one"
+        names = StreamNames("camera", settings.name, "picture", address, remedy, size)
+        self._health = StreamHealth(child, names, settings.start_within_s, settings.stall_after_s)
         self.counts: Counter[str] = Counter()
 
     def tell_counts(self) -> None:
         """Log what became of all pictures and boards."""
-        counts = {"pictures": self._processed, "skipped": self._skipped, **self.counts, **self._pipeline.counts}
+        counts = {"pictures": self._health.pieces, "skipped": self._skipped, **self.counts, **self._pipeline.counts}
         _log.info("%s", ", ".join(f"{name} {count}" for name, count in counts.items()))
 
     def turn(self) -> None:
@@ -86,28 +84,22 @@ class CameraDriver:
         self._surroundings.read()
         if packet is not None:
             self._handle(packet)
-        now_ns = clock.now_ns()
-        patience_s = self._watch.patience_s
-        if self._watch.look(now_ns):
-            self._silence_s = patience_s
-            self._announce()
-        if now_ns - self._status_ns >= _STATUS_PERIOD_NS:
-            self._publish_status(now_ns)
-        self._child.beat()
-        self._child.tick_status(ticks=self._processed, overruns=self._skipped)
+        self._health.skipped = self._skipped
+        why = "connected, but nothing comes" if self._source.connected else self._source.detail
+        self._health.end_turn(why, "", self.counts + self._source.rejected.copy(), self._quality)
 
     @property
     def _skipped(self) -> int:
-        return max(0, self._source.received - self._processed - sum(self.counts.values()))
+        return max(0, self._source.received - self._health.pieces - sum(self.counts.values()))
 
     def _handle(self, packet: Packet) -> None:
         exposure_ns = self._exposed(packet)
         picture = self._decoded(packet)
         if picture is None:
             return
-        if self._watch.usable(packet.arrival_ns):
-            self._announce()
-        self._exposure_ns, self._newest = exposure_ns, picture
+        self._health.flows(packet.arrival_ns)
+        self._health.used(exposure_ns)
+        self._newest = picture
         self._publish_image(packet, exposure_ns)
         try:
             self._observe(picture, exposure_ns)
@@ -115,7 +107,7 @@ class CameraDriver:
             self.counts["detector"] += 1
             _log.warning("picture %d cannot be measured: %s", packet.number, error)
             return
-        self._processed += 1
+        self._health.pieces += 1
 
     def _exposed(self, taken: Packet | Unit) -> int:
         """Return when a picture was exposed: the calibrated delay before it came, or would have come usually [ns]."""
@@ -142,8 +134,7 @@ class CameraDriver:
             return True
         self.counts["size"] += 1
         reason = f"its pictures are {width}x{height}, its calibration is for {wanted.width_px}x{wanted.height_px}"
-        if self._watch.refused(reason, packet.arrival_ns):
-            self._announce()
+        self._health.refuse(reason, packet.arrival_ns)
         return False
 
     def _observe(self, picture: NDArray[np.uint8], exposure_ns: int) -> None:
@@ -161,7 +152,7 @@ class CameraDriver:
             header = self._child.bus.header(settings.observer, exposure_ns + later_ns)
             observation = convert.observation_from_sighting(sighting, header, settings.name, attitude)
             self._child.bus.publish(OBSERVATION, observation)
-            self._detections += 1
+            self._health.reported += 1
         if self._pipeline.searched:
             header = self._child.bus.header(settings.observer, exposure_ns)
             found = tuple(sighting.entity for sighting in sightings)
@@ -184,44 +175,9 @@ class CameraDriver:
                 header = self._child.bus.header(self._settings.name, self._exposed(unit))
                 self._child.bus.publish_bytes(VIDEO, header, unit.data)
 
-    def _announce(self) -> None:
-        """Report the state of the stream to lifecycle and operator."""
-        name = self._settings.name
-        if self._watch.state is StreamState.FLOWING:
-            self._child.ready(f"pictures from {without_password(self._settings.source)}")
-            self._child.event(Severity.INFO, f"camera {name}: pictures arrive", entity=name)
-            return
-        detail = self._trouble()
-        self._child.degrade(detail)
-        self._child.event(Severity.WARNING, f"camera {name}: {detail}", self._remedy(), entity=name)
-
-    def _trouble(self) -> str:
-        if self._watch.state is StreamState.REFUSED:
-            return self._watch.reason
-        why = "connected, but nothing comes" if self._source.connected else self._source.detail
-        return f"no picture for {self._silence_s:g} s ({why})"
-
-    def _remedy(self) -> str:
-        if self._watch.state is StreamState.REFUSED:
-            return "set the camera to the calibrated size, or calibrate it at this one"
-        return f"check the camera and its address {without_password(self._settings.source)}"
-
-    def _publish_status(self, now_ns: int) -> None:
-        elapsed_s = (now_ns - self._status_ns) / NS_PER_S
-        flowing = self._watch.state is StreamState.FLOWING
-        quality = quality_of(self._newest) if flowing and self._newest is not None else None
-        status = CameraStatus(
-            header=self._child.bus.header(self._settings.name),
-            connected=flowing,
-            fps=(self._processed - self._processed_then) / elapsed_s,
-            age_ms=(now_ns - (self._exposure_ns or self._watch.since_ns)) / NS_PER_MS,
-            frames=self._processed,
-            skipped=self._skipped,
-            detections=self._detections,
-            detail="" if flowing or self._watch.state is StreamState.WAITING else self._trouble(),
-            rejected=dict(self.counts + self._source.rejected.copy()),
-            brightness=None if quality is None else round(quality.brightness, 3),
-            edge_px=None if quality is None or quality.edge_px is None else round(quality.edge_px, 1),
-        )
-        self._child.bus.publish(CAMERA_STATUS, status)
-        self._status_ns, self._processed_then = now_ns, self._processed
+    def _quality(self) -> tuple[float | None, float | None]:
+        """Return brightness and width of edges [px] of the newest picture."""
+        if self._newest is None:
+            return None, None
+        quality = quality_of(self._newest)
+        return round(quality.brightness, 3), None if quality.edge_px is None else round(quality.edge_px, 1)

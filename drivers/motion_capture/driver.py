@@ -51,7 +51,7 @@ class MotionCaptureDriver:
         for frame in self._source.poll(_POLL_S):
             self._handle(frame)
         wrong = "; ".join(f"{entity} {why}" for entity, why in self._faults.items() if why)
-        self._health.watch(self._source.detail, wrong, self.counts + self._source.rejected.copy())
+        self._health.end_turn(self._source.detail, wrong, self.counts + self._source.rejected.copy())
 
     def _handle(self, frame: CapturedFrame) -> None:
         self._health.came(frame.arrival_ns)

@@ -51,7 +51,7 @@ class RangingDriver:
             self._handle(arrival_ns, told)
         stuck = sorted(robot for robot, (_, repeats) in self._last.items() if repeats > _MOST_REPEATS)
         why = f"the ranges of {', '.join(stuck)} repeat themselves: restart the gateway" if stuck else ""
-        self._health.watch(why, why, self.counts + self._gateway.rejected)
+        self._health.end_turn(why, why, self.counts + self._gateway.rejected)
 
     def _handle(self, arrival_ns: int, told: Round) -> None:
         robot = self._robots.get(told.transponder)

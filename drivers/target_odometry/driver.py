@@ -61,7 +61,7 @@ class OdometryDriver:
         while self._waiting:
             self._handle(*self._waiting.popleft())
         why = self._refused if self._session.reaches_router else "no ROS 2 Zenoh router answers"
-        self._health.watch(why, self._refused, self.counts)
+        self._health.end_turn(why, self._refused, self.counts)
 
     def close(self) -> None:
         """Leave the router."""

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from drivers.camera.settings import SourceAddress, SourceKind, parse_source
-from drivers.camera.stream_watch import StreamState, StreamWatch
+from drivers.stream_watch import StreamState, StreamWatch
 from groundstation.bus.jpeg import whole_size
 
 

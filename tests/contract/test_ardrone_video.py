@@ -13,6 +13,7 @@ import av
 import cv2
 import numpy as np
 import pytest
+from patience import wait_for
 
 from drivers.ardrone.video import Assembly
 from drivers.ardrone.wire.configuration import CONFIGURATION
@@ -23,13 +24,6 @@ from groundstation.errors import DriverError
 from sim_bridge.devices.ardrone_video import ArDroneVideoServer, VideoEncoder, VideoMode, parameter_sizes
 
 MODE_720P = VideoMode(codec=0x83)
-
-
-def wait_for(condition, seconds=10.0):
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline, "did not happen in time"
-        time.sleep(0.002)
 
 
 def picture(number, size=(640, 360)):

@@ -10,17 +10,11 @@ from fractions import Fraction
 
 import av
 import numpy as np
+from patience import wait_for
 
 from drivers.camera.sources.frames import Packet
 from drivers.camera.sources.nal_units import has_parameters
 from drivers.camera.sources.opening import open_source
-
-
-def wait_for(condition, seconds=15.0):
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline, "did not happen in time"
-        time.sleep(0.005)
 
 
 def units_of(data):

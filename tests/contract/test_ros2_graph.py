@@ -1,15 +1,14 @@
 """A ROS-like Zenoh router, the bridge, and a foreign client that lists topics and decodes them."""
 
-import json
 import time
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
 from free_port import free_port
+from zenoh_peer import opened
 
 pytest.importorskip("rosbags")
-import zenoh
 
 from groundstation.bus import clock
 from groundstation.bus import messages as m
@@ -22,11 +21,6 @@ from groundstation.recording.timeline import Timeline
 from groundstation.settings.files import find_field
 from groundstation.settings.load import load_field
 from groundstation.settings.resolved import resolved_field
-
-
-def opened(**settings: Any) -> Any:
-    silent = {"scouting": {"multicast": {"enabled": False}}}
-    return zenoh.open(zenoh.Config.from_json5(json.dumps(silent | settings)))
 
 
 @pytest.fixture

@@ -1,6 +1,5 @@
 """A target's nav_msgs/Odometry, written by a foreign encoder and published through a ROS-like router, as reports."""
 
-import json
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -10,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 from free_port import free_port
+from zenoh_peer import opened
 
 pytest.importorskip("rosbags")
-import zenoh
 
 from drivers.rmw_zenoh.wire import graph, vehicle
 from drivers.target_odometry.driver import OdometryDriver, OdometryGuard
@@ -89,11 +88,6 @@ def rig(port: int) -> Iterator[Rig]:
     rig = Rig(port)
     yield rig
     rig.driver.close()
-
-
-def opened(**settings: Any) -> Any:
-    silent = {"scouting": {"multicast": {"enabled": False}}}
-    return zenoh.open(zenoh.Config.from_json5(json.dumps(silent | settings)))
 
 
 def written(codec: Ros2Codec, stamp_ns: int, forward: float, left: float, x: float) -> bytes:

@@ -1,15 +1,14 @@
 """Poses of ROS 2, written by a foreign encoder and published through a ROS-like router, arrive as frames."""
 
-import json
 import time
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
 from free_port import free_port
+from zenoh_peer import opened
 
 pytest.importorskip("rosbags")
-import zenoh
 
 from drivers.motion_capture.captured_frame import CapturedFrame
 from drivers.motion_capture.ros2_source import Ros2Source
@@ -65,11 +64,6 @@ def test_other_types_and_keys_are_refused() -> None:
         decode_pose(dds("std_msgs/msg/String"), written(KINDS[0], "map"))
     with pytest.raises(WireError, match="key"):
         body_of("0/cf1/odom/x/y")
-
-
-def opened(**settings: Any) -> Any:
-    silent = {"scouting": {"multicast": {"enabled": False}}}
-    return zenoh.open(zenoh.Config.from_json5(json.dumps(silent | settings)))
 
 
 @pytest.fixture

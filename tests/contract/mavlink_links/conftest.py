@@ -80,6 +80,15 @@ class Hangar:
 
 
 @pytest.fixture
+def vehicle():
+    """A socket that stands for a vehicle."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
+        udp.bind(("127.0.0.1", 0))
+        udp.settimeout(2.0)
+        yield udp
+
+
+@pytest.fixture
 def hangar():
     hangar = Hangar()
     yield hangar

@@ -12,14 +12,6 @@ from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.wire.telemetry import Heartbeat
 
 
-@pytest.fixture
-def vehicle():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
-        sock.bind(("127.0.0.1", 0))
-        sock.settimeout(1.0)
-        yield sock
-
-
 def test_a_link_that_is_opened_again_speaks_from_the_same_port(vehicle):
     sources = []
     for _ in range(2):

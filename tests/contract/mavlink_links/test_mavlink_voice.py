@@ -3,7 +3,6 @@
 import dataclasses
 import os
 import pty
-import socket
 import subprocess
 import sys
 import time
@@ -39,14 +38,6 @@ def words_of(tmp_path, **mavlink):
     table = process_table(field, "tcp/127.0.0.1:1", tmp_path, simulation=None, monitor=False)
     spoken = [s.failsafe_datagrams for s in table if s.failsafe_datagrams and s.failsafe_datagrams.hover[0] == 0xFD]
     return spoken, [d.model_dump()["mavlink"]["system_id"] for d in field.drones.values() if d.kind == "mavlink"]
-
-
-@pytest.fixture
-def vehicle():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
-        udp.bind(("127.0.0.1", 0))
-        udp.settimeout(2.0)
-        yield udp
 
 
 @pytest.fixture

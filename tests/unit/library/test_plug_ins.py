@@ -6,6 +6,7 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
+from installation import install
 
 from drivers.camera.settings import SourceKind, parse_source
 from drivers.camera.sources.opening import open_source
@@ -96,18 +97,11 @@ REASONS = {
 }
 
 
-def _install(folder, package, entries):
-    info = folder / f"{package.replace('-', '_')}-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(entries)
-
-
 @pytest.fixture(autouse=True)
 def _installed(tmp_path, monkeypatch):
     (tmp_path / "lab_plug_ins.py").write_text(CODE)
     (tmp_path / "lab_ending.py").write_text("import sys\n\nsys.exit('no display')\n")
-    _install(tmp_path, "lab-plug-ins", ENTRIES)
+    install(tmp_path, "lab-plug-ins", ENTRIES)
     monkeypatch.syspath_prepend(tmp_path)
     yield
     sys.modules.pop("lab_plug_ins", None)
@@ -157,7 +151,7 @@ def test_each_fault_of_a_plug_in_is_named_where_it_is_used(name):
 
 
 def test_two_packages_of_one_name_are_both_named_and_none_is_used(tmp_path):
-    _install(tmp_path, "lab-twin", "[skein.cameras]\nstatic = lab_plug_ins:Static\n")
+    install(tmp_path, "lab-twin", "[skein.cameras]\nstatic = lab_plug_ins:Static\n")
     with pytest.raises(DriverError, match=r"static .*lab-plug-ins .* and lab-twin .* have the same name"):
         open_source("static://north")
 

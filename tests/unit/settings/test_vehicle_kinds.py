@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from installation import install
 from pydantic import ValidationError
 
 from groundstation.cli import main as cli
@@ -86,13 +87,6 @@ def unknown(field: Field) -> Field:
     """The field with a drone of a kind that nobody knows, as if its plug-in were gone since it was read."""
     name, drone = next((n, d) for n, d in field.drones.items() if d.kind == "mavlink")
     return field.model_copy(update={"drones": field.drones | {name: drone.model_copy(update={"kind": "zeppelin"})}})
-
-
-def install(folder: Path, package: str, entries: str) -> None:
-    info = folder / f"{package.replace('-', '_')}-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(entries)
 
 
 @pytest.fixture

@@ -7,18 +7,12 @@ import av
 import cv2
 import numpy as np
 import pytest
+from patience import wait_for
 
 from drivers.camera.sources.container import device
 from drivers.camera.sources.frames import Packet
 from drivers.camera.sources.opening import open_source
 from drivers.camera.sources.reader_thread import Drain
-
-
-def wait_for(condition, seconds=10.0):
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline, "did not happen in time"
-        time.sleep(0.005)
 
 
 @contextmanager

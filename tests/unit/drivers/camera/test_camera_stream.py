@@ -7,19 +7,13 @@ from base64 import b64encode
 from contextlib import contextmanager
 
 import pytest
+from patience import wait_for
 
 from drivers.camera.sources.opening import open_source
 from groundstation.errors import DriverError
 from sim_bridge.devices.camera_stream import CameraStream
 
 JPEG = b"\xff\xd8 picture %d \xff\xd9"
-
-
-def wait_for(condition, seconds=5.0):
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline, "did not happen in time"
-        time.sleep(0.005)
 
 
 @contextmanager

@@ -1,0 +1,13 @@
+"""Waiting for what happens in another thread or process."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+
+def wait_for(condition: Callable[..., Any], seconds: float = 10.0) -> None:
+    """Return once a condition holds; fails when it does not in time."""
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, "did not happen in time"
+        time.sleep(0.005)

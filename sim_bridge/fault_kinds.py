@@ -120,7 +120,7 @@ class Fault(Section):
 
     kind: FaultKind
     """navdata_silent: a vehicle sends nothing; at_deaf: it hears nothing; camera_cut: a camera's connection is closed
-    and refused; camera_stall: it stays open, without images; battery_drop: the charge falls to value;
+    and refused; camera_stall: it stays open, without pictures; battery_drop: the charge falls to value;
     propeller_blocked: an AR.Drone's cut-out stops its motors, an emergency until it is free; telemetry_frozen: what a
     vehicle sends comes, and repeats its contents; telemetry_delayed: it is value old [s]; velocity_stuck,
     velocity_scaled, velocity_drifting, velocity_jumping: the reported horizontal velocity is value [m/s], value times
@@ -130,7 +130,7 @@ class Fault(Section):
     obstacle_below: something value high [m] stands under its ultrasound; wind: air pushes by value [m/s^2], and an
     AR.Drone's reported tilt does not say how far it leans against it; ids_swapped: two vehicles have each other's
     address or id, from the start; camera_bumped: a camera is turned by value [deg]; picture_frozen, picture_black: its
-    images come, and repeat the last one, are black; wrong_board: the entity carries the board of the other;
+    pictures come, and repeat the last one, are black; wrong_board: the entity carries the board of the other;
     capture_silent, capture_frozen: a motion capture system sends nothing, repeats its last frame; body_jumped: all
     systems have the entity's body value [m] aside; bodies_swapped: they name two bodies for each other; ranges_silent,
     ranges_frozen: a ranging system sends nothing, repeats each drone's last round; ranges_long: those of a drone are

@@ -152,10 +152,10 @@ class DroneScenario(Section):
 
 
 class CameraScenario(Section):
-    """Every emulated camera: its stream and the errors of its images."""
+    """Every emulated camera: its stream and the errors of its pictures."""
 
     fps: Annotated[float, Field(ge=0.1, le=60)] = 15.0
-    """Images per second."""
+    """Pictures per second."""
     video_delay_ms: Annotated[float, Field(ge=0, le=1000)] = 120.0
     """Mean time from exposure to arrival [ms]."""
     video_jitter_ms: Annotated[float, Field(ge=0, le=500)] = 20.0
@@ -164,7 +164,7 @@ class CameraScenario(Section):
     """Whether cameras, in the room and on drones, are off by what the field says of their mounting (attitude_std_deg,
     position_std_m) and lens (the calibration's std), drawn from the seed; false: each is exactly as the field says."""
     frame_loss: Annotated[float, Field(ge=0, le=1)] = 0.05
-    """Share of images that are lost; over TCP, that come 200 ms late."""
+    """Share of pictures that are lost; over TCP, that come 200 ms late."""
     corner_noise_px: Annotated[float, Field(ge=0, le=5)] = 0.2
     """Displacement of a corner's image, one sigma per axis [px]."""
     pixel_noise: Annotated[float, Field(ge=0, le=100)] = 2.0

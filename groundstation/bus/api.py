@@ -125,7 +125,7 @@ class Bus(Protocol):
         """Send a message under its header's entity; never blocks, never raises for a lost link."""
 
     def publish_bytes(self, topic: Topic, header: Header, payload: bytes) -> None:
-        """Send raw bytes (images, datagrams) with their header as attachment."""
+        """Send raw bytes (pictures, datagrams) with their header as attachment."""
 
     def subscribe(
         self, topics: Iterable[Topic], entity: str = "*", source: str = "*", capacity: int = 4096, newest: bool = False

@@ -17,7 +17,7 @@ class Quality(StrEnum):
     STATE = "state"
     """What the tracker and the processes report."""
     BULK = "bulk"
-    """Images, datagrams, journal: last in every queue."""
+    """Pictures, datagrams, journal: last in every queue."""
 
 
 class Plane(StrEnum):
@@ -77,7 +77,7 @@ BODY_POSES = Topic("body_poses", m.BodyPoses, 30, Quality.SENSOR, _CAMERA)
 VEHICLE_STATUS = Topic("vehicle_status", m.VehicleStatus, 5, Quality.STATE, _DRIVER)
 """Driver: flight state, battery, link."""
 CAMERA_STATUS = Topic("camera_status", m.CameraStatus, 2, Quality.STATE, _CAMERA | _TARGET)
-"""Driver of a camera or another sensor: whether images (frames, ranges, reports) arrive, and how many were used."""
+"""Driver of a camera or another sensor: whether pictures (frames, ranges, reports) arrive, and how many were used."""
 ESTIMATE = Topic("estimate", m.Estimate, 50, Quality.STATE, _TRACKER)
 """Tracker: mean and covariance of each robot and target, predicted to now."""
 BELIEF = Topic("belief", m.Belief, 5, Quality.STATE, _TRACKER)
@@ -116,7 +116,7 @@ HOST_ANSWER = Topic("host_answer", m.HostAnswer, 20, Quality.SENSOR, _LIAISON)
 JOURNAL = Topic("journal", m.JournalEntry, 50, Quality.BULK, _TRACKER)
 """Tracker: inputs and adopted plan of each tick."""
 IMAGE = Topic("image", None, 5, Quality.BULK, _CAMERA, encoding="image/jpeg")
-"""Camera driver: single images for the console."""
+"""Camera driver: single pictures for the console."""
 VIDEO = Topic("video", None, 30, Quality.BULK, _CAMERA, encoding="video/h264")
 """Camera driver: every access unit of an H.264 camera, as received."""
 RAW_RX = Topic("raw_rx", None, 200, Quality.BULK, _DRIVER, encoding="application/octet-stream")

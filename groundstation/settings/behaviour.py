@@ -120,8 +120,8 @@ class RecordingSettings(SettingsSection):
     directory: Annotated[str, Field(min_length=1)] = "runs"
     """Folder for the runs, relative to the working directory; each run makes a folder in it."""
     image_fps: Annotated[float, Field(ge=0, le=5)] = 5.0
-    """Images per second and camera that are shown in the console and recorded; 0: none. The H.264 video of a camera is
-    recorded in full besides, unless this is 0."""
+    """Pictures per second and camera that are shown in the console and recorded; 0: none. The H.264 video of a camera
+    is recorded in full besides, unless this is 0."""
     pictures: Literal["none", "blurred", "full"] = "full"
     """Which pictures are recorded. blurred: an eighth of the detail, so that nobody can be recognised, and no video.
     The console shows them as they are."""

@@ -64,8 +64,8 @@ class OnboardCameraSettings(SettingsSection):
     """The camera that a drone carries: source, lens, mounting."""
 
     source: Source
-    """Where the images come from: http://, rtsp://, ros2:// or ardrone:// address, /dev/videoN, video file or folder
-    of images."""
+    """Where the pictures come from: http://, rtsp://, ros2:// or ardrone:// address, /dev/videoN, video file or folder
+    of pictures."""
     calibration: CalibrationSettings
     """Lens calibration: the name of a file beside the field file, or its content."""
     position_m: OnVehicle = (0.0, 0.0, 0.0)
@@ -81,7 +81,7 @@ class OnboardCameraSettings(SettingsSection):
     """Standard deviation [m] of the camera's position on the drone; 0: it is exactly as said. Simulated cameras are off
     by it."""
     video_delay_ms: VideoDelay = 120.0
-    """Median time [ms] from the exposure of an image to its arrival. Measure it: groundstation calibrate delay."""
+    """Median time [ms] from the exposure of a picture to its arrival. Measure it: groundstation calibrate delay."""
     readout_ms: Readout = 0.0
     """Time [ms] from the exposure of a picture's first row to that of its last (rolling shutter), as its data sheet has
     it: a marker's time is that of its row; 0: all at once. A picture's own time is that of its middle row."""
@@ -104,7 +104,7 @@ class OdometryCalibration(SettingsSection):
     """True velocity divided by reported velocity."""
     velocity_std_m_s: StdDeviation = 0.05
     """Standard deviation [m/s] of the velocity after scaling, per axis. The filter takes 60 % of it for an error that
-    lasts longer than the interval between images."""
+    lasts longer than the interval between pictures."""
     velocity_delay_ms: Delay = 30.0
     """Age [ms] of a velocity when it arrives."""
     height_std_m: StdDeviation = 0.04

@@ -93,9 +93,9 @@ class CalibrationSettings(SettingsSection):
     model: Literal["plumb_bob"]
     """Lens model: pinhole with radial and tangential distortion."""
     width_px: Annotated[int, Field(ge=16, le=8192)]
-    """Width [px] of the images that the calibration belongs to."""
+    """Width [px] of the pictures that the calibration belongs to."""
     height_px: Annotated[int, Field(ge=16, le=8192)]
-    """Height [px] of the images that the calibration belongs to."""
+    """Height [px] of the pictures that the calibration belongs to."""
     fx_px: Annotated[float, Field(gt=0, le=100_000)]
     """Focal length along the image's x axis [px]."""
     fy_px: Annotated[float, Field(gt=0, le=100_000)]
@@ -111,7 +111,7 @@ class CalibrationSettings(SettingsSection):
     date: datetime.date | None = None
     """Day of the measurement (YYYY-MM-DD)."""
     views: Annotated[int, Field(gt=0)] | None = None
-    """Number of images that the calibration was made from."""
+    """Number of pictures that the calibration was made from."""
     std: CalibrationStd | None = None
     """Standard deviations of the figures, from the least-squares fit."""
 
@@ -130,7 +130,7 @@ class WorldCameraSettings(SettingsSection):
     """A camera fixed in the world."""
 
     source: Source
-    """Where the images come from: http://, rtsp:// or ros2:// address, /dev/videoN, video file or folder of images."""
+    """Where pictures come from: http://, rtsp:// or ros2:// address, /dev/videoN, video file or folder of pictures."""
     host: HostName = ""
     """Name of the host that the camera's driver runs on, as the site admitted it. Empty: the host of the run."""
     calibration: CalibrationSettings
@@ -143,7 +143,7 @@ class WorldCameraSettings(SettingsSection):
     """Roll, pitch, yaw [deg] about the world's axes from that orientation. groundstation calibrate extrinsics measures
     them."""
     video_delay_ms: VideoDelay = 120.0
-    """Median time [ms] from the exposure of an image to its arrival. Measure it: groundstation calibrate delay."""
+    """Median time [ms] from the exposure of a picture to its arrival. Measure it: groundstation calibrate delay."""
     readout_ms: Readout = 0.0
     """Time [ms] from the exposure of a picture's first row to that of its last (rolling shutter), as its data sheet has
     it: a marker's time is that of its row; 0: all at once. A picture's own time is that of its middle row."""

@@ -149,15 +149,15 @@ class CameraStatus(Message, frozen=True, kw_only=True):
     """Health of one camera process (2 Hz)."""
 
     connected: bool
-    """Whether images arrive."""
+    """Whether pictures arrive."""
     fps: float
-    """Images processed per second."""
+    """Pictures processed per second."""
     age_ms: float
-    """Age of the newest image [ms]."""
+    """Age of the newest picture [ms]."""
     frames: int
-    """Images processed so far."""
+    """Pictures processed so far."""
     skipped: int
-    """Images that were overtaken by newer ones."""
+    """Pictures that were overtaken by newer ones."""
     detections: int
     """Observations so far."""
     detail: str = ""
@@ -165,6 +165,6 @@ class CameraStatus(Message, frozen=True, kw_only=True):
     rejected: dict[str, int] = msgspec.field(default_factory=dict)
     """What was refused since the start, by reason."""
     brightness: float | None = None
-    """Mean grey value of the newest image, 0 to 1; none: there is no image."""
+    """Mean grey value of the newest picture, 0 to 1; none: there is no picture."""
     edge_px: float | None = None
     """Width of its sharpest edges [px]; none: nothing in it has contrast."""

@@ -37,8 +37,8 @@ class SimStatus(Message, frozen=True, kw_only=True):
     overruns: int
     """Ticks that began more than 10 ms late."""
     pictures: int = 0
-    """Images of all emulated cameras."""
+    """Pictures of all emulated cameras."""
     late_pictures: int = 0
-    """Images that were not ready when they should have arrived."""
+    """Pictures that were not ready when they should have arrived."""
     airborne: tuple[str, ...] = ()
     """Drones in the air."""

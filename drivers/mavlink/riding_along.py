@@ -18,7 +18,7 @@ from drivers.mavlink.wire.names import (
 )
 
 
-class Verdict(Enum):
+class Passage(Enum):
     """STOP: pass, at once and always; PASS: pass, if there is room; REFUSE: with an answer; DROP: in silence."""
 
     STOP = "stop"
@@ -59,9 +59,9 @@ def _is_allowed(number: int, allowed: Collection[str]) -> bool:
     return any(number in _BY_SETTING[name] for name in allowed)
 
 
-def verdict(
+def passage_of(
     number: int, message: Message | None, system: int, flavour: Flavour, allowed: Collection[str] = ()
-) -> Verdict:
+) -> Passage:
     """Return what becomes of a verified frame of a second ground station.
 
     number: of its kind; message: None where its content is not known; system: the vehicle; allowed: "parameters",
@@ -72,30 +72,30 @@ def verdict(
             return _of_command(message, flavour)
         case flight.SetMode() if message.target_system == system:
             stops = message.base_mode & CUSTOM_MODE_ENABLED and message.custom_mode in _STOPPED[flavour]
-            return Verdict.STOP if stops else Verdict.DROP
+            return Passage.STOP if stops else Passage.DROP
         case flight.MissionItem() | flight.MissionItemInt() if message.current in _FLOWN_TO:
-            return Verdict.REFUSE
+            return Passage.REFUSE
         case service.FileTransferProtocol() if message.target_system == system:
-            return Verdict.REFUSE
+            return Passage.REFUSE
     # WIRE (docs/reference/mavlink.md 5.11): its heartbeat would hide the loss of ours, its clock upset the vehicle's.
-    return Verdict.PASS if _is_allowed(number, allowed) else Verdict.DROP
+    return Passage.PASS if _is_allowed(number, allowed) else Passage.DROP
 
 
-def _of_command(message: flight.CommandLong | flight.CommandInt, flavour: Flavour) -> Verdict:
+def _of_command(message: flight.CommandLong | flight.CommandInt, flavour: Flavour) -> Passage:
     match message.command:
         case MavCmd.NAV_LAND | MavCmd.DO_FLIGHTTERMINATION:
-            return Verdict.STOP
+            return Passage.STOP
         case MavCmd.COMPONENT_ARM_DISARM:
-            return Verdict.STOP if message.param1 == 0.0 else Verdict.REFUSE
+            return Passage.STOP if message.param1 == 0.0 else Passage.REFUSE
         case MavCmd.DO_PAUSE_CONTINUE:
-            return Verdict.STOP if message.param1 == 0.0 else Verdict.REFUSE
+            return Passage.STOP if message.param1 == 0.0 else Passage.REFUSE
         case MavCmd.DO_SET_MODE:
-            return Verdict.STOP if _mode_of(message, flavour) in _STOPPED[flavour] else Verdict.REFUSE
+            return Passage.STOP if _mode_of(message, flavour) in _STOPPED[flavour] else Passage.REFUSE
         case MavCmd.DO_REPOSITION:
-            return Verdict.STOP if flavour is Flavour.PX4 and _goes_nowhere(message) else Verdict.REFUSE
+            return Passage.STOP if flavour is Flavour.PX4 and _goes_nowhere(message) else Passage.REFUSE
         case number if number in _QUESTIONS:
-            return Verdict.PASS
-    return Verdict.REFUSE
+            return Passage.PASS
+    return Passage.REFUSE
 
 
 def _mode_of(message: flight.CommandLong | flight.CommandInt, flavour: Flavour) -> int:
@@ -133,7 +133,7 @@ def made_good(message: Message, system: int, flavour: Flavour) -> Message | None
 
 
 def words_of(stop: Message, flavour: Flavour) -> str:
-    """Return a stop, as `verdict` found it, in words for the operator."""
+    """Return a stop, as `passage_of` found it, in words for the operator."""
     if isinstance(stop, flight.SetMode):
         return _STOPPED[flavour][stop.custom_mode]
     assert isinstance(stop, flight.CommandLong | flight.CommandInt)

@@ -36,7 +36,7 @@ class Suspicion:
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class Explanation:
     """A suspicion that explains the sightings, and the figures that it needs."""
 
     suspicion: Suspicion
@@ -56,10 +56,10 @@ class Verdict:
 
 @dataclass(frozen=True, slots=True)
 class Opinion:
-    """all_well: nothing has to be wrong; verdicts: what may be, likeliest first; empty: no one thing explains it."""
+    """all_well: nothing has to be wrong; explanations: what may be, likeliest first; empty: no one thing does."""
 
     all_well: bool
-    verdicts: tuple[Verdict, ...]
+    explanations: tuple[Explanation, ...]
     nothing_wrong: Fit
 
 
@@ -72,7 +72,7 @@ def opinion(stand: Stand, sightings: Sequence[PadSighting]) -> Opinion:
         if promised - plain.promise({}) < _TELLING:
             return Opinion(True, (), nothing)
     ranked = sorted(_suspicions(plain), key=lambda s: -_promise(plain, s))[:_REFINED]
-    tried = [Verdict(s, _explained(plain, s)) for s in ranked]
+    tried = [Explanation(s, _explained(plain, s)) for s in ranked]
     good = [v for v in tried if _good(v.fit, len(v.suspicion.loose))]
     best = max((v.fit.evidence for v in good), default=-math.inf)
     left = sorted((v for v in good if v.fit.evidence > best - _RULED_OUT), key=lambda v: -v.fit.evidence)

@@ -1,4 +1,4 @@
-"""A verdict in words: what is wrong, by how much, how sure, and what to do about it. Pure."""
+"""An explanation in words: what is wrong, by how much, how sure, and what to do about it. Pure."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -9,7 +9,7 @@ from groundstation.doctor.finding import Finding, Level
 from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.rotations import euler_from_rotation, rotation_from_euler
 from groundstation.preflight.figure_words import calibrated_lens, fixed_camera, hangs, lens_is, marker_is, measured_by
-from groundstation.preflight.suspicions import Opinion, Verdict
+from groundstation.preflight.suspicions import Explanation, Opinion
 
 SUBJECT = "pads"
 # From here on a flight is not worth its risk (docs/explanation/preflight.md#checks-of-standing-drones).
@@ -25,9 +25,9 @@ def finding(field: ResolvedField, opinion: Opinion) -> Finding:
     if opinion.all_well:
         chance = f"chi-square {opinion.nothing_wrong.misfit:.0f} of {opinion.nothing_wrong.rows} rows"
         return Finding(Level.OK, SUBJECT, f"every drone that is seen stands where the field says ({chance})")
-    if not opinion.verdicts:
+    if not opinion.explanations:
         return _unexplained(opinion)
-    told = [_WORDS[v.suspicion.what](field, v) for v in opinion.verdicts[:_MOST_TOLD]]
+    told = [_WORDS[e.suspicion.what](field, e) for e in opinion.explanations[:_MOST_TOLD]]
     level = Level.MUST if any(must for must, _, _ in told) else Level.SHOULD
     if len(told) == 1:
         return Finding(level, SUBJECT, told[0][1], told[0][2])
@@ -47,47 +47,47 @@ def _unexplained(opinion: Opinion) -> Finding:
     return Finding(Level.MUST if fit.misfit > 10 * fit.rows else Level.SHOULD, SUBJECT, found, remedy)
 
 
-def _prints(field: ResolvedField, v: Verdict) -> _Told:
-    value, std = v.figure("print")
+def _prints(field: ResolvedField, e: Explanation) -> _Told:
+    value, std = e.figure("print")
     squares = {drone.marker.square_mm for drone in field.drones.values() if drone.marker.size_mm is None}
     told = "".join(f" ({one * (1 + value):.1f} mm for {one:g})" for one in sorted(squares)[:1])
     return abs(value) >= _MUST_SHARE, marker_is("", value, std), measured_by(told=told)
 
 
-def _print(field: ResolvedField, v: Verdict) -> _Told:
-    (value, std), who = v.figure("print"), v.suspicion.who
+def _print(field: ResolvedField, e: Explanation) -> _Told:
+    (value, std), who = e.figure("print"), e.suspicion.who
     return abs(value) >= _MUST_SHARE, marker_is(who, value, std), measured_by(f"drones.{who}.marker to its size")
 
 
-def _focal(field: ResolvedField, v: Verdict) -> _Told:
-    (value, std), who = v.figure("focal"), v.suspicion.who
+def _focal(field: ResolvedField, e: Explanation) -> _Told:
+    (value, std), who = e.figure("focal"), e.suspicion.who
     return abs(value) >= _MUST_SHARE, lens_is(fixed_camera(who), value, std), calibrated_lens(who)
 
 
-def _moved(field: ResolvedField, v: Verdict, text: str, size_m: float) -> _Told:
-    who = v.suspicion.who
-    place = (p + v.fit.value[who, axis] for p, axis in zip(field.cameras[who].position_m, "xyz", strict=True))
-    x, y, z = place if v.suspicion.what == "aside" else (*field.cameras[who].position_m[:2], tuple(place)[2])
+def _moved(field: ResolvedField, e: Explanation, text: str, size_m: float) -> _Told:
+    who = e.suspicion.who
+    place = (p + e.fit.value[who, axis] for p, axis in zip(field.cameras[who].position_m, "xyz", strict=True))
+    x, y, z = place if e.suspicion.what == "aside" else (*field.cameras[who].position_m[:2], tuple(place)[2])
     remedy = f"set cameras.{who}.position_m: [{x:.2f}, {y:.2f}, {z:.2f}], or groundstation calibrate extrinsics"
     return abs(size_m) >= _MUST_M, text, remedy
 
 
-def _aside(field: ResolvedField, v: Verdict) -> _Told:
-    size, std = v.size("x", "y")
-    x, y = v.figure("x")[0], v.figure("y")[0]
-    text = hangs(v.suspicion.who, "aside", True, f"{size:.2f} +- {std:.2f} m")
-    return _moved(field, v, f"{text} (x {x:+.2f}, y {y:+.2f})", size)
+def _aside(field: ResolvedField, e: Explanation) -> _Told:
+    size, std = e.size("x", "y")
+    x, y = e.figure("x")[0], e.figure("y")[0]
+    text = hangs(e.suspicion.who, "aside", True, f"{size:.2f} +- {std:.2f} m")
+    return _moved(field, e, f"{text} (x {x:+.2f}, y {y:+.2f})", size)
 
 
-def _height(field: ResolvedField, v: Verdict) -> _Told:
-    value, std = v.figure("z")
-    text = hangs(v.suspicion.who, "z", value > 0.0, f"{abs(value):.2f} +- {std:.2f} m")
-    return _moved(field, v, text, value)
+def _height(field: ResolvedField, e: Explanation) -> _Told:
+    value, std = e.figure("z")
+    text = hangs(e.suspicion.who, "z", value > 0.0, f"{abs(value):.2f} +- {std:.2f} m")
+    return _moved(field, e, text, value)
 
 
-def _rotation(field: ResolvedField, v: Verdict, text: str, must: bool) -> _Told:
-    who = v.suspicion.who
-    error = rotation_from_euler(*(v.fit.value[who, part] for part in ("roll", "pitch", "yaw")))
+def _rotation(field: ResolvedField, e: Explanation, text: str, must: bool) -> _Told:
+    who = e.suspicion.who
+    error = rotation_from_euler(*(e.fit.value[who, part] for part in ("roll", "pitch", "yaw")))
     known = rotation_from_euler(*np.radians(field.cameras[who].rotation_deg).tolist())
     roll, pitch, yaw = np.degrees(euler_from_rotation(error @ known)).tolist()
     remedy = (
@@ -96,32 +96,32 @@ def _rotation(field: ResolvedField, v: Verdict, text: str, must: bool) -> _Told:
     return must, text, remedy
 
 
-def _turned(field: ResolvedField, v: Verdict) -> _Told:
-    value, std = v.figure("yaw")
-    text = hangs(v.suspicion.who, "yaw", value > 0.0, _degrees(value, std))
-    return _rotation(field, v, text, abs(value) >= _MUST_TURN)
+def _turned(field: ResolvedField, e: Explanation) -> _Told:
+    value, std = e.figure("yaw")
+    text = hangs(e.suspicion.who, "yaw", value > 0.0, _degrees(value, std))
+    return _rotation(field, e, text, abs(value) >= _MUST_TURN)
 
 
-def _tilted(field: ResolvedField, v: Verdict) -> _Told:
-    size, std = v.size("roll", "pitch")
-    text = hangs(v.suspicion.who, "tilted", True, _degrees(size, std))
-    return _rotation(field, v, text, size >= _MUST_TILT)
+def _tilted(field: ResolvedField, e: Explanation) -> _Told:
+    size, std = e.size("roll", "pitch")
+    text = hangs(e.suspicion.who, "tilted", True, _degrees(size, std))
+    return _rotation(field, e, text, size >= _MUST_TILT)
 
 
 def _degrees(value: float, std: float) -> str:
     return f"{abs(math.degrees(value)):.1f} +- {math.degrees(std):.1f} deg"
 
 
-def _placed(field: ResolvedField, v: Verdict) -> _Told:
-    who, (size, std), (turn, _) = v.suspicion.who, v.size("aside_x", "aside_y"), v.figure("turned")
-    x, y = (p + v.figure(part)[0] for p, part in zip(field.drones[who].pad_m, ("aside_x", "aside_y"), strict=True))
+def _placed(field: ResolvedField, e: Explanation) -> _Told:
+    who, (size, std), (turn, _) = e.suspicion.who, e.size("aside_x", "aside_y"), e.figure("turned")
+    x, y = (p + e.figure(part)[0] for p, part in zip(field.drones[who].pad_m, ("aside_x", "aside_y"), strict=True))
     text = f"{who} stands {size:.2f} +- {std:.2f} m from its pad, turned by {math.degrees(turn):.0f} deg"
     remedy = f"put it on its pad, or set drones.{who}.pad_m: [{x:.2f}, {y:.2f}]"
     return size >= _MUST_PLACED_M or abs(turn) >= _MUST_HEADING, text, remedy
 
 
-def _heading(field: ResolvedField, v: Verdict) -> _Told:
-    who, (value, std) = v.suspicion.who, v.figure("turned")
+def _heading(field: ResolvedField, e: Explanation) -> _Told:
+    who, (value, std) = e.suspicion.who, e.figure("turned")
     text = (
         f"{who}'s marker is turned by {math.degrees(value):.0f} +- {math.degrees(std):.0f} deg from its pad's heading"
     )
@@ -129,14 +129,14 @@ def _heading(field: ResolvedField, v: Verdict) -> _Told:
     return abs(value) >= _MUST_HEADING, text, remedy
 
 
-def _exchanged(field: ResolvedField, v: Verdict) -> _Told:
-    pairs = [f"{one} stands on the pad of {other}" for one, other in v.suspicion.exchanged.items()]
-    names = " and ".join(dict.fromkeys((*v.suspicion.exchanged, *v.suspicion.exchanged.values())))
+def _exchanged(field: ResolvedField, e: Explanation) -> _Told:
+    pairs = [f"{one} stands on the pad of {other}" for one, other in e.suspicion.exchanged.items()]
+    names = " and ".join(dict.fromkeys((*e.suspicion.exchanged, *e.suspicion.exchanged.values())))
     remedy = f"exchange the drones; if they stand right, the marker codes (or pads) of {names} in the field file do not"
     return True, ", and ".join(pairs), remedy
 
 
-_WORDS: Mapping[str, Callable[[ResolvedField, Verdict], _Told]] = {
+_WORDS: Mapping[str, Callable[[ResolvedField, Explanation], _Told]] = {
     "prints": _prints,
     "print": _print,
     "focal": _focal,

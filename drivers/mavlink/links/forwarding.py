@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 
 from drivers.mavlink.links.rider import Rider
 from drivers.mavlink.links.seam import Heard, Transport
-from drivers.mavlink.riding_along import Verdict, may_pass, verdict
+from drivers.mavlink.riding_along import Passage, may_pass, passage_of
 from drivers.mavlink.settings import VehicleSettings
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.flight import CommandAckMessage
@@ -36,9 +36,9 @@ def with_riders(transport: Transport, vehicles: Mapping[int, VehicleSettings], t
 class ForwardedLink:
     """Another transport, shown to riders; a thread of its own listens to them.
 
-    A rider's frames are judged by `riding_along.verdict`; what is refused or goes beyond 50 frames a second is counted
-    in `rejected` ("rider_..."). Every stop passes, if an equal one does not follow it within 20 ms; of one that is
-    repeated within a second only the first is told.
+    A rider's frames are judged by `riding_along.passage_of`; what is refused or goes beyond 50 frames a second is
+    counted in `rejected` ("rider_..."). Every stop passes, if an equal one does not follow it within 20 ms; of one that
+    is repeated within a second only the first is told.
     """
 
     def __init__(self, transport: Transport, riders: Mapping[int, Rider], tell: Tell) -> None:
@@ -158,16 +158,16 @@ class ForwardedLink:
 
     def _judge(self, rider: Rider, raw: bytes, frame: ReceivedFrame) -> None:
         message = frame.message
-        match verdict(number_of(raw), message, rider.system, rider.flavour, rider.allowed):
-            case Verdict.STOP if message is not None:
+        match passage_of(number_of(raw), message, rider.system, rider.flavour, rider.allowed):
+            case Passage.STOP if message is not None:
                 words = rider.stop(clock.now_ns(), message, raw)
                 self._pass_stop(rider)
                 self._tell_once(f"{rider.name}: a second ground station stops it ({words})", _TAKEN_BACK)
-            case Verdict.PASS if rider.allowance.take(clock.now_ns()):
+            case Passage.PASS if rider.allowance.take(clock.now_ns()):
                 self._transport.send_raw(rider.system, raw)
-            case Verdict.PASS:
+            case Passage.PASS:
                 self.rejected["rider_too_many"] += 1
-            case Verdict.REFUSE:
+            case Passage.REFUSE:
                 self.rejected["rider_refused"] += 1
                 rider.refuse(frame)
 

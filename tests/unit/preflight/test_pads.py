@@ -99,8 +99,8 @@ def test_a_size_is_within_its_deviation(
 ) -> None:
     for seed in range(2):
         said = opinion(stand_of(lab_field), seen(lab_field, truth, seed))
-        (verdict,) = [v for v in said.verdicts if v.suspicion.what == what]
-        found, std = verdict.figure(part)
+        (explanation,) = [v for v in said.explanations if v.suspicion.what == what]
+        found, std = explanation.figure(part)
         assert abs(found - value) < 3.0 * std and std < 0.3 * value
 
 

@@ -131,11 +131,12 @@ def _root(parts: Parts) -> Iterator[Finding]:
 def _captured(parts: Parts) -> Iterator[Finding]:
     known = {*parts.drones, *(name for name, _ in parts.tracked.values())}
     for name, system in parts.motion_capture.items():
-        for entity in system.bodies.keys() - known:
-            yield ("motion_capture", name, "bodies", entity), f"{entity} is no drone or target of the field"
+        bodies: KeyPath = ("motion_capture", name, "bodies")
+        for entity in sorted(system.bodies.keys() - known):
+            yield (*bodies, entity), f"{entity} is no drone or target of the field"
         as_they_are = {*parts.flying, *(target for target, _ in parts.tracked.values())} - system.bodies.keys()
-        called: list[tuple[KeyPath, object, str]] = [(("motion_capture", name, "bodies"), n, n) for n in as_they_are]
-        called += [(("motion_capture", name, "bodies", n), body.name or n, n) for n, body in system.bodies.items()]
+        called: list[tuple[KeyPath, object, str]] = [(bodies, n, n) for n in sorted(as_they_are)]
+        called += [((*bodies, n), body.name or n, n) for n, body in system.bodies.items()]
         yield from _unique(called, "the body's name")
 
 

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from realism import weaker_than_reality
 from ruamel.yaml import YAML
 
 from groundstation.errors import SettingsError
-from sim_bridge.realism import weaker_than_reality
 from sim_bridge.scenario import Scenario, parse_scenario
 
 SCENARIOS = Path(__file__).parents[3] / "config" / "scenarios"

@@ -66,8 +66,7 @@ _PORTS = ("navdata_port", "at_port", "control_port", "ftp_port")
 
 
 def _own(order: VehicleOrder) -> ArDroneOwn:
-    own = order.sections.get("ardrone")
-    return own if isinstance(own, ArDroneOwn) else ArDroneOwn()
+    return order.section("ardrone", ArDroneOwn())
 
 
 def _settings(order: VehicleOrder) -> ArDroneDriverSettings:
@@ -111,8 +110,7 @@ def _check(orders: Sequence[VehicleOrder]) -> Iterator[tuple[str, Finding]]:
     for order in orders:
         if not order.drone.camera.source.startswith("ardrone://"):
             continue
-        video = order.sections.get("video")
-        codec = video.codec if isinstance(video, ArDroneVideo) else "h264_360p"
+        codec = order.section("video", ArDroneVideo()).codec
         wanted, found = _VIDEO_WIDTHS[codec], order.drone.camera.calibration.width_px
         if found != wanted:
             text = f"must be for pictures {wanted} wide, as video codec {codec} sends them (got {found})"

@@ -9,8 +9,7 @@ from groundstation.vehicles import ErrorHabits, Finding, Offer, StopDatagrams, V
 
 
 def _own(order: VehicleOrder) -> Ros2Section:
-    own = order.sections.get("ros2")
-    return own if isinstance(own, Ros2Section) else Ros2Section()
+    return order.section("ros2", Ros2Section())
 
 
 def _settings(order: VehicleOrder) -> Ros2DriverSettings:

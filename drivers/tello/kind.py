@@ -9,8 +9,7 @@ from groundstation.vehicles import ErrorHabits, KindSection, StopDatagrams, Vehi
 
 
 def _settings(order: VehicleOrder) -> TelloDriverSettings:
-    own = order.sections.get("tello")
-    return TelloDriverSettings(**values_of(order), tello=own if isinstance(own, TelloSection) else TelloSection())
+    return TelloDriverSettings(**values_of(order), tello=order.section("tello", TelloSection()))
 
 
 def _moved(local_address: str, sections: Mapping[str, KindSection]) -> dict[str, dict[str, object]]:

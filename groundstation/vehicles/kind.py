@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import TypeVar
 
 from pydantic import BaseModel, ConfigDict
 
@@ -25,6 +26,7 @@ class KindSection(BaseModel):
     )
 
 
+_Section = TypeVar("_Section", bound=KindSection)
 _NONE: Mapping[str, KindSection] = MappingProxyType({})
 
 
@@ -63,6 +65,11 @@ class VehicleOrder:
     top_m: float
     raw_datagrams: bool
     sections: Mapping[str, KindSection] = field(default_factory=lambda: _NONE)
+
+    def section(self, key: str, default: _Section) -> _Section:
+        """Return a section of the kind's own, or what holds where the field file has none."""
+        own = self.sections.get(key)
+        return own if isinstance(own, type(default)) else default
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from installation import install
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT.joinpath("docs", "how-to", "write-a-kind-of-vehicle.md")
@@ -21,10 +22,7 @@ def puffin(tmp_path):
     for name, text in FILE.findall(PAGE.read_text()):
         (tmp_path / name).write_text(text)
     entry = re.findall(r'\[project\.entry-points\."(skein\.vehicles)"\]\n(.*?)```', PAGE.read_text(), re.DOTALL)[0]
-    info = tmp_path / "puffin_for_skein-0.1.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: puffin-for-skein\nVersion: 0.1\n")
-    (info / "entry_points.txt").write_text(f"[{entry[0]}]\n{entry[1].replace(chr(34), '')}")
+    install(tmp_path, "puffin-for-skein", f"[{entry[0]}]\n{entry[1].replace(chr(34), '')}")
     return os.environ | {"PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"}
 
 

@@ -1,7 +1,7 @@
 """What was answered to which command, and when an accepted one has become effective. Pure."""
 
-from drivers.watchdog_types import ALOFT, FREE, UP, Ack, DriverMode, VehicleView
-from groundstation.bus.messages import AckStage, Command, FlightState, Verb
+from drivers.watchdog_types import ALOFT, FREE, Ack, DriverMode, VehicleView
+from groundstation.bus.messages import UP, AckStage, Command, FlightState, Verb
 
 _REMEMBERED_COMMANDS = 256
 

@@ -6,7 +6,8 @@ Half of it holds for every kind of vehicle: whatever lags without overshoot stay
 import math
 from dataclasses import dataclass, replace
 
-from drivers.watchdog_types import FREE, UP, Action, VehicleView, WatchdogDecision
+from drivers.watchdog_types import FREE, Action, VehicleView, WatchdogDecision
+from groundstation.bus.messages import UP
 from groundstation.time_units import NS_PER_S
 
 # The slowest vehicle follows a command with this time constant; what is left of a step counts as told.

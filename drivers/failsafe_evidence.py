@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 from drivers.failsafe_table import Condition, Failsafe, Reaction
 from drivers.setpoints import SetpointGate
-from drivers.watchdog_types import AIRBORNE, STANDING, DriverMode, Upstream, VehicleView, WatchdogLimits
-from groundstation.bus.messages import FlightState
+from drivers.watchdog_types import DriverMode, Upstream, VehicleView, WatchdogLimits
+from groundstation.bus.messages import AIRBORNE, STANDING, FlightState
 from groundstation.time_units import NS_PER_S
 
 # A setpoint older than this is not the stream that it should be.

@@ -11,10 +11,11 @@ from drivers.control_error import ControlErrorMonitor
 from drivers.neighbours import Neighbours
 from drivers.seen_velocity import SeenVelocity
 from drivers.watchdog import Watchdog
-from drivers.watchdog_types import AIRBORNE, Ack, DriverMode, Upstream, VehicleView, WatchdogDecision, WatchdogLimits
+from drivers.watchdog_types import Ack, DriverMode, Upstream, VehicleView, WatchdogDecision, WatchdogLimits
 from groundstation.adapters import how_to_reach
 from groundstation.bus import clock
 from groundstation.bus.messages import (
+    AIRBORNE,
     OPERATOR,
     Command,
     CommandAck,
@@ -288,8 +289,7 @@ def run_hosts(
 
     before: what the vehicles of one link share, done ahead of each turn.
     """
-    period_ns = round(1e9 / rate_hz)
-    overruns = 0
+    period_ns, overruns = round(1e9 / rate_hz), 0
     for host in hosts:
         host.call_on_commands(child.wake)
     deadline_ns = clock.now_ns()

@@ -3,8 +3,7 @@
 import math
 from collections.abc import Iterable
 
-from drivers.watchdog_types import AIRBORNE
-from groundstation.bus.messages import EntityEstimate, FlightState, VehicleStatus
+from groundstation.bus.messages import AIRBORNE, EntityEstimate, FlightState, VehicleStatus
 from groundstation.time_units import NS_PER_S
 
 _STALE_NS = NS_PER_S

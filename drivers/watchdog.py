@@ -11,11 +11,8 @@ from drivers.failsafe_table import Condition, Failsafe, Latch, Reaction, failsaf
 from drivers.lease import LeaseBook
 from drivers.setpoints import SetpointGate
 from drivers.watchdog_types import (
-    AIRBORNE,
     ALOFT,
     FREE,
-    STANDING,
-    UP,
     Ack,
     Action,
     DriverMode,
@@ -24,7 +21,17 @@ from drivers.watchdog_types import (
     WatchdogDecision,
     WatchdogLimits,
 )
-from groundstation.bus.messages import AckStage, Command, FlightState, Lease, VelocitySetpoint, Verb
+from groundstation.bus.messages import (
+    AIRBORNE,
+    STANDING,
+    UP,
+    AckStage,
+    Command,
+    FlightState,
+    Lease,
+    VelocitySetpoint,
+    Verb,
+)
 from groundstation.time_units import NS_PER_S
 
 _PAUSES = frozenset({Condition.TRACKER_PAUSED, Condition.SETPOINTS_PATCHY})

@@ -39,9 +39,6 @@ class Action(StrEnum):
     CUT = "CUT"
 
 
-UP = frozenset({FlightState.FLYING, FlightState.HOVERING})
-AIRBORNE = UP | {FlightState.TAKING_OFF, FlightState.LANDING}
-STANDING = frozenset({FlightState.LANDED, FlightState.EMERGENCY})
 FREE = frozenset({DriverMode.HOVER, DriverMode.TRACK, DriverMode.HOLD})
 ALOFT = FREE | {DriverMode.TAKING_OFF}
 

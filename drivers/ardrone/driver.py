@@ -31,10 +31,10 @@ from drivers.host import fly_one
 from drivers.plausibility.health import Health, Sensor
 from drivers.plausibility.limits import PlausibilityLimits
 from drivers.plausibility.motion import MotionMonitor
-from drivers.watchdog_types import UP, Action, VehicleView, WatchdogDecision
+from drivers.watchdog_types import Action, VehicleView, WatchdogDecision
 from groundstation.adapters import with_zone
 from groundstation.bus.api import Bus
-from groundstation.bus.messages import FlightState, Severity, Vector3
+from groundstation.bus.messages import UP, FlightState, Severity, Vector3
 from groundstation.bus.notice import Notice
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 

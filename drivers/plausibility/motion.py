@@ -13,8 +13,7 @@ from drivers.plausibility.clock_watch import ClockWatch
 from drivers.plausibility.health import ALL_GOOD, Finding, Health, HealthReport, Sensor
 from drivers.plausibility.limits import PlausibilityLimits
 from drivers.plausibility.repeats import RepeatWatch, StandstillWatch
-from drivers.watchdog_types import AIRBORNE, UP
-from groundstation.bus.messages import FlightState
+from groundstation.bus.messages import AIRBORNE, UP, FlightState
 
 _Judged = tuple[Sensor, Health, str]
 # After a pause no step between two values means anything.

@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from groundstation.bus.messages import FlightState, Lifecycle, Severity, VehicleStatus
+from groundstation.bus.messages import AIRBORNE, FlightState, Lifecycle, Severity, VehicleStatus
 from groundstation.monitor.batteries import Battery, Charge, battery_of
-from groundstation.monitor.endurance import AIRBORNE, flies
+from groundstation.monitor.endurance import flies
 from groundstation.monitor.state import MonitorState
 
 VEHICLE_SILENT_S = 1.0

@@ -2,9 +2,8 @@
 
 from dataclasses import dataclass
 
-from groundstation.bus.messages import FlightState, VehicleStatus
+from groundstation.bus.messages import AIRBORNE, FlightState, VehicleStatus
 
-AIRBORNE = frozenset({FlightState.TAKING_OFF, FlightState.FLYING, FlightState.HOVERING, FlightState.LANDING})
 # What has to be spent before a drain is believed, and for how long.
 _LEAST_DRAIN, _LEAST_MIN = 0.02, 0.5
 _NS_PER_MIN = 60e9

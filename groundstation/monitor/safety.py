@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
+from groundstation.bus.messages import AIRBORNE
 from groundstation.monitor.alarms import Alarm
 from groundstation.monitor.batteries import battery_of
-from groundstation.monitor.endurance import AIRBORNE
 from groundstation.monitor.state import MonitorState
 
 

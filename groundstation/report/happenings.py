@@ -4,12 +4,10 @@ from collections.abc import Iterator
 
 import msgspec
 
-from groundstation.bus.messages import FlightState, Verb
+from groundstation.bus.messages import STANDING, UP, Verb
 from groundstation.report.tracks import RunData
 
 _ENDING = frozenset({"LANDING", "CUT"})
-_UP = frozenset({FlightState.FLYING, FlightState.HOVERING})
-_DOWN = frozenset({FlightState.LANDED, FlightState.EMERGENCY})
 _STOPS = frozenset({Verb.LAND, Verb.CUT_MOTORS})
 UNEXPLAINED = "unordered"
 
@@ -76,9 +74,9 @@ def _reactions(data: RunData, drone: str) -> Iterator[Happening]:
             text = f"{status.mode} by failsafe {status.failsafe}: {status.detail}"
             yield Happening(item.time_s, drone, status.failsafe, text, ends)
         before = now
-        if status.flight_state in _UP and up_since_s is None:
+        if status.flight_state in UP and up_since_s is None:
             up_since_s, explained = item.time_s, False
-        elif status.flight_state in _DOWN and up_since_s is not None:
+        elif status.flight_state in STANDING and up_since_s is not None:
             if not explained and not _ordered(data, drone, up_since_s, item.time_s):
                 text = "came down without an order and without its driver"
                 yield Happening(item.time_s, drone, UNEXPLAINED, text, True)

@@ -5,13 +5,12 @@ from collections.abc import Iterator
 import msgspec
 
 from groundstation.appearance.topology import topology_words
-from groundstation.bus.messages import FlightState, Severity
+from groundstation.bus.messages import UP, FlightState, Severity
 from groundstation.report.decisions import switches
 from groundstation.report.happenings import happenings
 from groundstation.report.interval import tracking_interval
 from groundstation.report.tracks import RunData
 
-_UP = frozenset({FlightState.FLYING, FlightState.HOVERING})
 _LOUD = frozenset({Severity.WARNING, Severity.ERROR})
 _MARKS = {Severity.WARNING: "warning", Severity.ERROR: "error"}
 
@@ -45,7 +44,7 @@ def _flights(data: RunData) -> Iterator[Moment]:
         up = False
         for item in sorted(statuses, key=lambda status: status.time_s):
             state = item.message.flight_state
-            if not up and state in _UP:
+            if not up and state in UP:
                 up = True
                 yield Moment(item.time_s, "flight", f"{drone} is in the air")
             elif up and state is FlightState.LANDED:

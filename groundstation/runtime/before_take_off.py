@@ -5,6 +5,7 @@ from typing import TypeVar
 
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import (
+    STANDING,
     CameraStatus,
     Event,
     FlightState,
@@ -23,8 +24,7 @@ from groundstation.preflight.pad_record import PadRecord
 from groundstation.runtime.asking import TEAM
 from groundstation.time_units import NS_PER_S
 
-_STANDS = frozenset({FlightState.LANDED, FlightState.EMERGENCY})
-_NOT_SEEN_TO_FLY = _STANDS | {FlightState.UNKNOWN, FlightState.LOST}
+_NOT_SEEN_TO_FLY = STANDING | {FlightState.UNKNOWN, FlightState.LOST}
 _AGAIN_NS = 3 * NS_PER_S
 # Drivers speak twice a second at least: what was said longer ago is not how it is now.
 _SPOKEN_NS = 3 * NS_PER_S

@@ -6,6 +6,8 @@ from enum import StrEnum
 
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import (
+    STANDING,
+    UP,
     FlightState,
     Odometry,
     RangeObservation,
@@ -18,8 +20,6 @@ from groundstation.runtime.marker_height import FixedCamera, MarkerHeight
 from groundstation.time_units import NS_PER_MS
 
 _FRESH_NS = 1_500 * NS_PER_MS
-_ON_GROUND = frozenset({FlightState.LANDED, FlightState.EMERGENCY})
-_UP = frozenset({FlightState.FLYING, FlightState.HOVERING})
 # The marker of a standing drone that no camera saw there.
 _STANDING_M = 0.1
 
@@ -63,12 +63,12 @@ class Member:
     @property
     def up(self) -> bool:
         """Return whether it flies, its take-off finished."""
-        return self.state in _UP
+        return self.state in UP
 
     @property
     def on_ground(self) -> bool:
         """Return whether it says that it stands, motors off."""
-        return self.state in _ON_GROUND
+        return self.state in STANDING
 
     @property
     def standing(self) -> bool:
@@ -121,7 +121,7 @@ class TeamStatus:
     def _hear(self, status: VehicleStatus, now_ns: int) -> None:
         member = self.members.get(status.header.entity)
         if member is not None:
-            if not member.standing and status.flight_state in _ON_GROUND:
+            if not member.standing and status.flight_state in STANDING:
                 member.marker.forget()  # it was seen in the air until now
             member.state, member.mode, member.detail = status.flight_state, status.mode, status.detail
             member.heard_ns = now_ns

@@ -18,8 +18,11 @@ from groundstation.bus.messages.belief import (
     Verdict,
 )
 from groundstation.bus.messages.flight import (
+    AIRBORNE,
     OPERATOR,
+    STANDING,
     STOP_LIVES_NS,
+    UP,
     AckStage,
     Command,
     CommandAck,
@@ -48,6 +51,9 @@ from groundstation.bus.messages.sensing import (
 from groundstation.bus.messages.simulation import SimCommand, SimStatus, TruthState
 
 __all__ = [
+    "AIRBORNE",
+    "STANDING",
+    "UP",
     "RUN",
     "OPERATOR",
     "STOP_LIVES_NS",

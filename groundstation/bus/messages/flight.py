@@ -29,6 +29,11 @@ class FlightState(StrEnum):
     """Nothing is heard of the vehicle any more."""
 
 
+UP = frozenset({FlightState.FLYING, FlightState.HOVERING})
+AIRBORNE = UP | {FlightState.TAKING_OFF, FlightState.LANDING}
+STANDING = frozenset({FlightState.LANDED, FlightState.EMERGENCY})
+
+
 class VehicleStatus(Message, frozen=True, kw_only=True):
     """Health of one vehicle and of the link to it (5 Hz)."""
 

@@ -5,8 +5,8 @@ import itertools
 
 import pytest
 
-from drivers.watchdog_types import AIRBORNE, DriverMode
-from groundstation.bus.messages import AckStage, FlightState, Verb
+from drivers.watchdog_types import DriverMode
+from groundstation.bus.messages import AIRBORNE, AckStage, FlightState, Verb
 
 MS = 1_000_000
 S = 1_000_000_000

@@ -7,8 +7,8 @@ import pytest
 
 from drivers.failsafe_table import Condition
 from drivers.watchdog import Watchdog
-from drivers.watchdog_types import AIRBORNE, FREE, Ack, Action, DriverMode, Upstream, VehicleView, WatchdogLimits
-from groundstation.bus.messages import AckStage, Command, FlightState, Header, Lease, VelocitySetpoint, Verb
+from drivers.watchdog_types import FREE, Ack, Action, DriverMode, Upstream, VehicleView, WatchdogLimits
+from groundstation.bus.messages import AIRBORNE, AckStage, Command, FlightState, Header, Lease, VelocitySetpoint, Verb
 
 LASTING = (
     Condition.SUPERVISOR_DEAD, Condition.SUPERVISOR_SILENT, Condition.TELEMETRY_SILENT, Condition.BATTERY_LOW,

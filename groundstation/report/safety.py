@@ -4,13 +4,12 @@ from itertools import combinations
 
 import numpy as np
 
-from groundstation.bus.messages import FlightState
+from groundstation.bus.messages import STANDING, FlightState
 from groundstation.field.room import Fence
 from groundstation.report.tracks import RunData, TruthTrack
 
 # Contact with the floor lets a body sink by fractions of this; it is no breach of a fence.
 _TOUCH_M = 1e-3
-_DOWN = frozenset({FlightState.LANDED, FlightState.EMERGENCY})
 # A drone that is not heard, or not yet, says nothing of where it is.
 SAYS_NOTHING = frozenset({FlightState.LOST, FlightState.UNKNOWN})
 
@@ -65,7 +64,7 @@ def _said_down(data: RunData, name: str) -> bool | None:
     """Return whether the last that a drone said of its flight was that it stands; None where it never flew."""
     reported = sorted(data.vehicles[name], key=lambda item: item.time_s)
     states = [item.message.flight_state for item in reported if item.message.flight_state not in SAYS_NOTHING]
-    return None if _DOWN.issuperset(states) else states[-1] in _DOWN
+    return None if STANDING.issuperset(states) else states[-1] in STANDING
 
 
 def all_airborne_s(data: RunData) -> float | None:

@@ -132,8 +132,7 @@ def _captured(parts: Parts) -> Iterator[Finding]:
     known = {*parts.drones, *(name for name, _ in parts.tracked.values())}
     for name, system in parts.motion_capture.items():
         bodies: KeyPath = ("motion_capture", name, "bodies")
-        for entity in sorted(system.bodies.keys() - known):
-            yield (*bodies, entity), f"{entity} is no drone or target of the field"
+        yield from (((*bodies, n), f"{n} is no drone or target of the field") for n in sorted({*system.bodies} - known))
         as_they_are = {*parts.flying, *(target for target, _ in parts.tracked.values())} - system.bodies.keys()
         called: list[tuple[KeyPath, object, str]] = [(bodies, n, n) for n in sorted(as_they_are)]
         called += [((*bodies, n), body.name or n, n) for n, body in system.bodies.items()]

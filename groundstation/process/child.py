@@ -4,7 +4,7 @@ import logging
 import os
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext, suppress
+from contextlib import suppress
 from dataclasses import dataclass, field
 from types import TracebackType
 from typing import Self
@@ -18,7 +18,7 @@ from groundstation.errors import GroundStationError, without_passwords
 from groundstation.process import log
 from groundstation.process.heartbeat import SUPERVISOR_SLOT, HeartbeatBlock, SlotState
 from groundstation.process.parent import ParentWatch
-from groundstation.process.priority import LARGEST, take_share, threads_go_first
+from groundstation.process.priority import take_share
 from groundstation.process.signals import StopSignal
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
@@ -122,12 +122,7 @@ class Child:
         spec = self.spec
         if spec.at_most_hz:
             speak_on_one_thread()
-        with self.bus_threads():
-            return open_bus(spec.endpoint, spec.site, self.name, identity=spec.identity, at_most_hz=spec.at_most_hz)
-
-    def bus_threads(self) -> AbstractContextManager[None]:
-        """Return the block to open the bus in: its threads go first where others wait for this process."""
-        return threads_go_first() if self.spec.nice <= LARGEST else nullcontext()
+        return open_bus(spec.endpoint, spec.site, self.name, identity=spec.identity, at_most_hz=spec.at_most_hz)
 
     @property
     def _has_bus(self) -> bool:

@@ -2,8 +2,7 @@
 
 import os
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from enum import IntEnum
 from pathlib import Path
 
@@ -34,21 +33,6 @@ def go_first(rank: Rank = Rank.TICK, *, heirs: bool = False) -> bool:
         os.sched_setscheduler(0, policy, os.sched_param(rank))
         return True
     return False
-
-
-@contextmanager
-def threads_go_first(rank: Rank = Rank.PLAN) -> Iterator[None]:
-    """Put all threads that begin within the block, and all that these start, ahead of ordinary ones, where that may be.
-
-    For the threads of a bus connection that a loop with deadlines waits for (docs/decisions/0193).
-    """
-    policy, param = os.sched_getscheduler(0), os.sched_getparam(0)
-    allowed = go_first(rank, heirs=True)
-    try:
-        yield
-    finally:
-        if allowed:
-            os.sched_setscheduler(0, policy, param)
 
 
 def take_share(nice: int = LARGEST) -> bool:

@@ -35,13 +35,12 @@ def run(child: Child) -> int:
     """Route until told to stop. When the supervisor dies, stay until the landing has had its time."""
     section = msgspec.json.decode(child.section, type=RouterSection)
     refusals = RouterRefusals()
-    with child.bus_threads():
-        session = open_router(
-            section.endpoint, child.spec.identity, section.access, section.also, trace=section.name_refusals
-        )
+    session = open_router(
+        section.endpoint, child.spec.identity, section.access, section.also, trace=section.name_refusals
+    )
     bus = ZenohBus(session, child.spec.site, child.name)
     child.ready()
-    go_first()  # it beats: where nothing is left of the processor, a living router counted as hung
+    go_first()  # only this loop, which beats: where nothing is left of the processor, a living router counted as hung
     orphaned_ns = 0
     while not child.stop_requested:
         now_ns = time.monotonic_ns()

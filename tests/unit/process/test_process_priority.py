@@ -4,12 +4,11 @@ import os
 import subprocess
 import sys
 import threading
-from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
 import pytest
 
-from groundstation.process.priority import LARGEST, Rank, go_first, take_share, threads_go_first
+from groundstation.process.priority import LARGEST, go_first, take_share
 
 
 def inherited() -> int:
@@ -41,34 +40,12 @@ def test_only_the_thread_that_asks_goes_first_unless_it_asks_for_its_heirs(heirs
     assert started == (own if heirs else os.SCHED_OTHER)
 
 
-def started_in(block: AbstractContextManager[None]) -> tuple[int, int, int]:
-    """The policy and rank of a thread that begins in a block, and the policy of this one after it."""
-    found: list[int] = []
-
-    def look() -> None:
-        found.extend((os.sched_getscheduler(0), os.sched_getparam(0).sched_priority))
-
-    with block:
-        thread = threading.Thread(target=look)
-        thread.start()
-        thread.join()
-    return found[0], found[1], os.sched_getscheduler(0)
-
-
-def test_threads_that_begin_in_the_block_go_first_and_who_began_it_does_not() -> None:
-    assert started_in(nullcontext()) == (os.SCHED_OTHER, 0, os.SCHED_OTHER)
-    allowed, *_ = policies(heirs=True)[:1]
-    first = (os.SCHED_RR, Rank.PLAN) if allowed else (os.SCHED_OTHER, 0)
-    assert started_in(threads_go_first()) == (*first, os.SCHED_OTHER)
-
-
 def test_where_it_may_not_it_goes_on(monkeypatch) -> None:
     def refuse(*_: object) -> None:
         raise PermissionError(1, "Operation not permitted")
 
     monkeypatch.setattr(os, "sched_setscheduler", refuse)
     assert go_first() is False
-    assert started_in(threads_go_first()) == (os.SCHED_OTHER, 0, os.SCHED_OTHER)
 
 
 def nice_of(nice: int = LARGEST, *, own_session: bool, refused: bool = False) -> tuple[str, str, str]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from drivers.failsafe_table import Condition, Failsafe, Reaction
 from drivers.setpoints import SetpointGate
 from drivers.watchdog_types import DriverMode, Upstream, VehicleView, WatchdogLimits
-from groundstation.bus.messages import AIRBORNE, STANDING, FlightState
+from groundstation.bus.messages import AIRBORNE, STANDING, UNHEARD, FlightState
 from groundstation.time_units import NS_PER_S
 
 # A setpoint older than this is not the stream that it should be.
@@ -15,7 +15,6 @@ _STREAM_S = 0.15
 _FIRST_S = 0.05
 # What is told of a reaction to come: its condition has lasted for so long, and it is so near.
 _LASTING_S, _NEAR_S = 0.3, 3.0
-NAMELESS = frozenset({FlightState.UNKNOWN, FlightState.LOST})
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +71,7 @@ def observed(at: Situation, limits: WatchdogLimits) -> dict[Condition, str]:
 def _observe_state(at: Situation, holding: dict[Condition, str]) -> None:
     """Note the vehicle's report, and its actions against its commands."""
     vehicle, state = at.vehicle, at.vehicle.flight_state
-    if state in NAMELESS:
+    if state in UNHEARD:
         holding[Condition.STATE_UNKNOWN] = ""
     if state not in STANDING:
         holding[Condition.NOT_STANDING] = str(state)

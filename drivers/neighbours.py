@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable
 
-from groundstation.bus.messages import AIRBORNE, EntityEstimate, FlightState, VehicleStatus
+from groundstation.bus.messages import AIRBORNE, UNHEARD, EntityEstimate, VehicleStatus
 from groundstation.time_units import NS_PER_S
 
 _STALE_NS = NS_PER_S
@@ -23,7 +23,7 @@ class Neighbours:
         name, state = status.header.entity, status.flight_state
         if state in AIRBORNE:
             self._aloft.add(name)
-        elif state is not FlightState.LOST and state is not FlightState.UNKNOWN:
+        elif state not in UNHEARD:
             self._aloft.discard(name)
 
     def see(self, now_ns: int, entities: Iterable[EntityEstimate]) -> None:

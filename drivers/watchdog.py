@@ -6,7 +6,7 @@ Tables: docs/explanation/authority.md#the-watchdog.
 """
 
 from drivers.acknowledgements import AckBook
-from drivers.failsafe_evidence import NAMELESS, Evidence, Situation, observed
+from drivers.failsafe_evidence import Evidence, Situation, observed
 from drivers.failsafe_table import Condition, Failsafe, Latch, Reaction, failsafes
 from drivers.lease import LeaseBook
 from drivers.setpoints import SetpointGate
@@ -24,6 +24,7 @@ from drivers.watchdog_types import (
 from groundstation.bus.messages import (
     AIRBORNE,
     STANDING,
+    UNHEARD,
     UP,
     AckStage,
     Command,
@@ -158,7 +159,7 @@ class Watchdog:
         silent = self._refusal(now_ns, Condition.TELEMETRY_SILENT)
         if silent:
             return silent
-        if self.vehicle.flight_state in STANDING | NAMELESS | {FlightState.LANDING}:
+        if self.vehicle.flight_state in STANDING | UNHEARD | {FlightState.LANDING}:
             return f"the vehicle says {self.vehicle.flight_state}"
         above = (Condition.STOP_REQUESTED, Condition.SUPERVISOR_DEAD, Condition.SUPERVISOR_SILENT)
         refusal = self._refusal(now_ns, *above)
@@ -241,7 +242,7 @@ class Watchdog:
         """Enter the modes that the vehicle itself reaches."""
         state = self.vehicle.flight_state
         self._clearing = self._clearing and state is FlightState.EMERGENCY
-        if not self.vehicle.fresh or state in NAMELESS:
+        if not self.vehicle.fresh or state in UNHEARD:
             return
         if self.mode is DriverMode.CONNECTING and state not in AIRBORNE:
             self._enter(now_ns, DriverMode.LANDED, "connected")

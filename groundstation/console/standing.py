@@ -6,14 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.arrays import Array
-from groundstation.bus.messages import FlightState, RelativeObservation
+from groundstation.bus.messages import AIRBORNE, FlightState, RelativeObservation
 from groundstation.field.room import WorldCamera
 from groundstation.geometry.rotations import world_from_downward_optical
 from groundstation.time_units import NS_PER_S
 
 _SEEN_NS = 3 * NS_PER_S
-# A drone that is not connected yet may stand there as well.
-_STANDS = frozenset({FlightState.LANDED, FlightState.EMERGENCY, FlightState.UNKNOWN, FlightState.LOST})
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,5 +53,5 @@ class StandingDrones:
             for name, seen in self._seen.items()
             if name not in known
             and now_ns - seen.at_ns < _SEEN_NS
-            and flight_states.get(name, FlightState.UNKNOWN) in _STANDS
+            and flight_states.get(name) not in AIRBORNE  # one that is not connected yet may stand there as well
         )

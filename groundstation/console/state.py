@@ -28,7 +28,7 @@ _ALTERNATIVES = 8
 _OFTEN, _SELDOM = 2, 5
 # What trails and curves go on with is no older: a line that runs on would look as if it were measured.
 _CURRENT_S = 1.0
-T = TypeVar("T")
+_T = TypeVar("_T")
 NO_CAMERAS: Mapping[str, WorldCamera] = MappingProxyType({})
 
 
@@ -158,7 +158,7 @@ def _alarm(alarm: Alarm) -> dict[str, Any]:
     return {**values, "asks": alarm.asks, "told": None if told_ns is None else told_ns / 1e6}
 
 
-def _current(seen: StampedMessage[T] | None, now_ns: int) -> T | None:
+def _current(seen: StampedMessage[_T] | None, now_ns: int) -> _T | None:
     return seen.message if seen is not None and seen.age_s(now_ns) < _CURRENT_S else None
 
 

@@ -93,6 +93,10 @@ class Flight:
         operator.step(now_ns)
         return now_ns
 
+    def _breaks_off(self) -> bool:
+        """Return whether a failure, or Ctrl-C, ends what is under way."""
+        return bool(self._supervisor.failure) or self._supervisor.interrupts.stop_requested
+
     def _state(self) -> str:
         unwell = self._supervisor.unwell
         return f"NOT WELL YET (see above): {', '.join(unwell)}" if unwell else "all processes are ready"
@@ -101,8 +105,8 @@ class Flight:
 
     def _look(self, operator: Operator, checks: BeforeTakeOff) -> bool:
         """Wait for what the checks before the take-off judge, and say what they find; return whether that is all."""
-        supervisor, looking = self._supervisor, Looking(checks, self._turn(operator))
-        while not supervisor.failure and not supervisor.interrupts.stop_requested:
+        looking = Looking(checks, self._turn(operator))
+        while not self._breaks_off():
             if looking.finished(self._turn(operator)):
                 for line in looking.tell(whole=self._plan.look_only):
                     self._say(line)
@@ -115,9 +119,8 @@ class Flight:
     def _fly(self, operator: Operator) -> str:
         """Go on until there is a reason to land; returns the reason if it is a failure."""
         now_ns = self._turn(operator)
-        failure, stopped = self._supervisor.failure, self._supervisor.interrupts.stop_requested
-        if self._plan.look_only or failure or stopped:
-            return failure  # what broke the look off must not be answered by a take-off
+        if self._plan.look_only or self._breaks_off():
+            return self._supervisor.failure  # what broke the look off must not be answered by a take-off
         if self._plan.asks:
             self._prompting = True
             insist = "type anyway and press Enter" if self._forbidden else "press Enter"
@@ -134,10 +137,8 @@ class Flight:
             if self._prompting:
                 self._prompt(operator, now_ns)
             self._tell_grounded(operator, now_ns)
-            if self._supervisor.failure:
+            if self._breaks_off():
                 return self._supervisor.failure
-            if self._supervisor.interrupts.stop_requested:
-                return ""
             if self._plan.asks and operator.phase is TeamPhase.GROUND:
                 began_ns = now_ns
             ended, failure = self._is_over(operator, now_ns, began_ns)

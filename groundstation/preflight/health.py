@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
 
-from groundstation.bus.messages import CameraStatus, FlightState, VehicleStatus
+from groundstation.bus.messages import UNHEARD, CameraStatus, FlightState, VehicleStatus
 from groundstation.doctor.finding import Finding, Level
 from groundstation.field.drones import camera_name
 from groundstation.field.resolved import ResolvedField
@@ -24,7 +24,7 @@ def drone_findings(field: ResolvedField, statuses: Mapping[str, VehicleStatus]) 
     """Yield what is told of each drone; one that is not connected is left out by the take-off, and stops nobody."""
     for name, drone in field.drones.items():
         status = statuses.get(name)
-        if status is None or status.flight_state in (FlightState.UNKNOWN, FlightState.LOST):
+        if status is None or status.flight_state in UNHEARD:
             why = status.detail if status is not None and status.detail else "nothing is heard of it"
             yield Finding(Level.SHOULD, name, why, f"check its power, its network and {drone.address}")
             continue

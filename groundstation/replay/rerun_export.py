@@ -8,6 +8,7 @@ from groundstation.bus.api import Sample
 from groundstation.bus.messages import Message
 from groundstation.bus.topics import JOURNAL, Topic
 from groundstation.recording.capture import Capture
+from groundstation.recording.chunks import among
 from groundstation.recording.mcap_file import McapFile
 from groundstation.recording.preamble import FIELD_NAME, Preamble
 from groundstation.recording.reader import RawRecord, RecordingError, open_recording
@@ -19,7 +20,7 @@ from groundstation.replay.tick_log import OUTPUTS
 from groundstation.replay.verify import Lived, Repetition
 
 _FACTS = "run.json"
-_REPLACED = frozenset((topic.plane, topic.name) for topic in (*OUTPUTS, JOURNAL))
+_is_replaced = among((*OUTPUTS, JOURNAL))
 
 
 def require_new(folder: Path) -> None:
@@ -67,7 +68,7 @@ def _write(source: Source, repetition: Repetition, file: McapFile) -> None:
 
 def _copied(source: Source) -> Iterator[RawRecord]:
     def is_kept(topic: Topic) -> bool:
-        return topic.type is not None and (topic.plane, topic.name) not in _REPLACED
+        return topic.type is not None and not _is_replaced(topic)
 
     for path in source.state:
         yield from open_recording(path).raw_records(is_kept)

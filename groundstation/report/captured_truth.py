@@ -6,8 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from groundstation.arrays import Array
-from groundstation.bus.messages import AIRBORNE, BodyPoses, VehicleStatus
-from groundstation.report.safety import SAYS_NOTHING
+from groundstation.bus.messages import AIRBORNE, UNHEARD, BodyPoses, VehicleStatus
 from groundstation.report.tracks import TimedMessage, TruthTrack
 
 
@@ -33,7 +32,7 @@ def _yaw(w: float, x: float, y: float, z: float) -> float:
 
 def _track(table: Array, statuses: Sequence[TimedMessage[VehicleStatus]]) -> TruthTrack:
     states = [(item.time_s, item.message.flight_state) for item in statuses]
-    said = sorted((time_s, state in AIRBORNE) for time_s, state in states if state not in SAYS_NOTHING)
+    said = sorted((time_s, state in AIRBORNE) for time_s, state in states if state not in UNHEARD)
     times = np.array([time_s for time_s, _ in said])
     aloft = np.array([False, *(flies for _, flies in said)])
     return TruthTrack(

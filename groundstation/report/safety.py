@@ -4,14 +4,12 @@ from itertools import combinations
 
 import numpy as np
 
-from groundstation.bus.messages import STANDING, FlightState
+from groundstation.bus.messages import STANDING, UNHEARD
 from groundstation.field.room import Fence
 from groundstation.report.tracks import RunData, TruthTrack
 
 # Contact with the floor lets a body sink by fractions of this; it is no breach of a fence.
 _TOUCH_M = 1e-3
-# A drone that is not heard, or not yet, says nothing of where it is.
-SAYS_NOTHING = frozenset({FlightState.LOST, FlightState.UNKNOWN})
 
 
 def fence_violation_m(track: TruthTrack, fence: Fence) -> float:
@@ -63,7 +61,7 @@ def landed(data: RunData) -> bool | None:
 def _said_down(data: RunData, name: str) -> bool | None:
     """Return whether the last that a drone said of its flight was that it stands; None where it never flew."""
     reported = sorted(data.vehicles[name], key=lambda item: item.time_s)
-    states = [item.message.flight_state for item in reported if item.message.flight_state not in SAYS_NOTHING]
+    states = [item.message.flight_state for item in reported if item.message.flight_state not in UNHEARD]
     return None if STANDING.issuperset(states) else states[-1] in STANDING
 
 

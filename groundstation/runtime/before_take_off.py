@@ -5,10 +5,9 @@ from typing import TypeVar
 
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import (
-    STANDING,
+    AIRBORNE,
     CameraStatus,
     Event,
-    FlightState,
     Preflight,
     PreflightFinding,
     RangeObservation,
@@ -24,13 +23,12 @@ from groundstation.preflight.pad_record import PadRecord
 from groundstation.runtime.asking import TEAM
 from groundstation.time_units import NS_PER_S
 
-_NOT_SEEN_TO_FLY = STANDING | {FlightState.UNKNOWN, FlightState.LOST}
 _AGAIN_NS = 3 * NS_PER_S
 # Drivers speak twice a second at least: what was said longer ago is not how it is now.
 _SPOKEN_NS = 3 * NS_PER_S
 _SEVERITIES = {Level.MUST: Severity.ERROR, Level.SHOULD: Severity.WARNING}
 
-Status = TypeVar("Status", VehicleStatus, CameraStatus)
+_Status = TypeVar("_Status", VehicleStatus, CameraStatus)
 
 
 class BeforeTakeOff:
@@ -63,12 +61,12 @@ class BeforeTakeOff:
             self._tell(self.findings(now_ns), now_ns)
 
     def _anybody_flies(self) -> bool:
-        return any(status.flight_state not in _NOT_SEEN_TO_FLY for _, status in self._vehicles.values())
+        return any(status.flight_state in AIRBORNE for _, status in self._vehicles.values())
 
     def _hear(self, status: VehicleStatus, now_ns: int) -> None:
         name = status.header.entity
         self._vehicles[name] = now_ns, status
-        if status.flight_state not in _NOT_SEEN_TO_FLY:
+        if status.flight_state in AIRBORNE:
             self._flew.add(name)
             self._record.forget(name)
 
@@ -112,6 +110,6 @@ class BeforeTakeOff:
         self._bus.publish(EVENT, event)
 
 
-def _spoken(heard: Mapping[str, tuple[int, Status]], now_ns: int) -> dict[str, Status]:
+def _spoken(heard: Mapping[str, tuple[int, _Status]], now_ns: int) -> dict[str, _Status]:
     """Return what was said lately: a driver that is dead says nothing, and not what it said last."""
     return {name: status for name, (at_ns, status) in heard.items() if now_ns - at_ns < _SPOKEN_NS}

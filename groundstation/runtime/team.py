@@ -7,6 +7,7 @@ from enum import StrEnum
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import (
     STANDING,
+    UNHEARD,
     UP,
     FlightState,
     Odometry,
@@ -54,7 +55,7 @@ class Member:
 
     def connected(self, now_ns: int) -> bool:
         """Return whether its driver speaks and hears the drone."""
-        return self.fresh(now_ns) and self.state not in (FlightState.UNKNOWN, FlightState.LOST)
+        return self.fresh(now_ns) and self.state not in UNHEARD
 
     def fresh(self, now_ns: int) -> bool:
         """Return whether its driver spoke lately."""

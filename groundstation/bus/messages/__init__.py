@@ -22,6 +22,7 @@ from groundstation.bus.messages.flight import (
     OPERATOR,
     STANDING,
     STOP_LIVES_NS,
+    UNHEARD,
     UP,
     AckStage,
     Command,
@@ -53,6 +54,7 @@ from groundstation.bus.messages.simulation import SimCommand, SimStatus, TruthSt
 __all__ = [
     "AIRBORNE",
     "STANDING",
+    "UNHEARD",
     "UP",
     "RUN",
     "OPERATOR",

@@ -32,6 +32,7 @@ class FlightState(StrEnum):
 UP = frozenset({FlightState.FLYING, FlightState.HOVERING})
 AIRBORNE = UP | {FlightState.TAKING_OFF, FlightState.LANDING}
 STANDING = frozenset({FlightState.LANDED, FlightState.EMERGENCY})
+UNHEARD = frozenset({FlightState.UNKNOWN, FlightState.LOST})
 
 
 class VehicleStatus(Message, frozen=True, kw_only=True):

@@ -121,11 +121,14 @@ def test_the_speed_is_the_faster_of_what_is_reported_and_seen():
     assert ControlErrorMonitor().judge(S, view(0.3, 0.4), told(0.5), None).speed_m_s == pytest.approx(0.5)
 
 
-def seen_velocity(positions, yaw=0.0, **fields):
+def seen_velocity(positions, yaw=0.0, yaw_rate=0.0, **fields):
     seen, velocities = SeenVelocity(), []
     for turn, (x, y) in enumerate(positions):
+        heading = yaw + yaw_rate * turn / 50
         values: dict[str, Any] = {"converged": True, "age_s": 0.1, "covariance": (1e-4,) * 16} | fields
-        entity = EntityEstimate(name="v", kind="robot", mean=(x, y, 0.8, yaw), velocity_m_s=(0.0, 0.0, 0.0), **values)
+        entity = EntityEstimate(
+            name="v", kind="robot", mean=(x, y, 0.8, heading), velocity_m_s=(0.0, 0.0, 0.0), **values
+        )
         seen.hear(turn * S // 50, 1, entity)
         velocities.append(seen.velocity(turn * S // 50))
     return velocities
@@ -138,16 +141,8 @@ def test_positions_seen_become_a_velocity_in_the_vehicles_frame():
 
 
 def test_a_velocity_seen_while_turning_is_the_mean_one_of_the_vehicles_frame():
-    places, yaws = [(0.5 * i / 50, 0.0) for i in range(50)], [1.0 * i / 50 for i in range(50)]
-    seen, velocity = SeenVelocity(), None
-    for turn, ((x, y), yaw) in enumerate(zip(places, yaws, strict=True)):
-        entity = EntityEstimate(
-            name="v", kind="robot", mean=(x, y, 0.8, yaw), velocity_m_s=(0.0, 0.0, 0.0), converged=True, age_s=0.1,
-            covariance=(1e-4,) * 16,
-        )  # fmt: skip
-        seen.hear(turn * S // 50, 1, entity)
-        velocity = seen.velocity(turn * S // 50)
-    window = yaws[-31:]  # 0.6 s
+    velocity = seen_velocity([(0.5 * i / 50, 0.0) for i in range(50)], yaw_rate=1.0)[-1]
+    window = [i / 50 for i in range(19, 50)]  # headings of the last 0.6 s
     mean = [0.5 * sum(map(f, window)) / len(window) for f in (math.cos, lambda yaw: -math.sin(yaw))]
     assert velocity == pytest.approx(mean, abs=0.01)
 

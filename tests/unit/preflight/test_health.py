@@ -1,5 +1,7 @@
 """What pre-flight says of each camera's pictures."""
 
+from typing import Any
+
 import pytest
 
 from groundstation.bus.messages import CameraStatus, FlightState, Header, VehicleStatus
@@ -39,13 +41,17 @@ def test_a_bad_picture_is_named_with_its_remedy(
     assert worse.level is Level.SHOULD and words in worse.found and worse.remedy
 
 
-def clock_findings(field: ResolvedField, drift_ppm: float | None, late_ms: float | None) -> list[Finding]:
-    header = Header(0, "c", "drone_1", "drone_1", 1)
+def findings_of(field: ResolvedField, rate_hz: float, **told: Any) -> list[Finding]:
+    """What is found of a drone that stands, well but for what is told besides."""
+    header = Header(0, "here", "drone_1", "drone_1", 1)
     status = VehicleStatus(
-        header=header, flight_state=FlightState.LANDED, mode="LANDED", battery=0.9, rate_hz=200.0,
-        clock_drift_ppm=drift_ppm, telemetry_late_ms=late_ms,
-    )  # fmt: skip
-    found = drone_findings(field, {"drone_1": status})
+        header=header, flight_state=FlightState.LANDED, mode="LANDED", battery=0.9, rate_hz=rate_hz, **told
+    )
+    return list(drone_findings(field, {"drone_1": status}))
+
+
+def clock_findings(field: ResolvedField, drift_ppm: float | None, late_ms: float | None) -> list[Finding]:
+    found = findings_of(field, 200.0, clock_drift_ppm=drift_ppm, telemetry_late_ms=late_ms)
     return [one for one in found if one.subject == "drone_1" and "battery" not in one.found]
 
 
@@ -53,11 +59,7 @@ def clock_findings(field: ResolvedField, drift_ppm: float | None, late_ms: float
 def test_a_link_over_which_nothing_or_little_arrives_is_told(
     lab_field: ResolvedField, share: float | None, told: int
 ) -> None:
-    status = VehicleStatus(
-        header=Header(0, "here", "drone_1", "drone_1", 0), flight_state=FlightState.LANDED, mode="LANDED", battery=0.9,
-        rate_hz=50.0, link_quality=share,
-    )  # fmt: skip
-    found = [one for one in drone_findings(lab_field, {"drone_1": status}) if "of it arrives" in one.found]
+    found = [one for one in findings_of(lab_field, 50.0, link_quality=share) if "of it arrives" in one.found]
     assert len(found) == told and all(one.level is Level.SHOULD and one.remedy for one in found)
 
 
@@ -65,11 +67,7 @@ def test_a_link_over_which_nothing_or_little_arrives_is_told(
 def test_a_vehicle_that_does_not_ask_for_our_time_is_told(
     lab_field: ResolvedField, asks: bool | None, told: int
 ) -> None:
-    status = VehicleStatus(
-        header=Header(0, "here", "drone_1", "drone_1", 0), flight_state=FlightState.LANDED, mode="LANDED", battery=0.9,
-        rate_hz=50.0, asks_time=asks,
-    )  # fmt: skip
-    found = [one for one in drone_findings(lab_field, {"drone_1": status}) if "TIMESYNC" in one.found]
+    found = [one for one in findings_of(lab_field, 50.0, asks_time=asks) if "TIMESYNC" in one.found]
     assert len(found) == told and all(one.level is Level.SHOULD and one.remedy for one in found)
 
 

@@ -7,8 +7,8 @@ import { ageS, store } from "./store.js";
 
 const LINE_PX = 22; // of words in a picture
 const STALE_S = 1.5;
-const feeds = new Map(), visible = new Set();
-let observer = null;
+const feeds = new Map(), visible = new Set(), waiting = new Map();
+let observer = null, decoder = null;
 
 export const pictures = { frames: 0, marks: 0 };
 
@@ -32,16 +32,16 @@ function feed(name) {
   const canvas = el("canvas", { width: 320, height: 180, role: "img", "aria-label": `Picture of ${name}` });
   const age = el("span", { class: "num" }), veil = el("span", { class: "pill veil", data: { level: "wait" } }, "no picture yet");
   const root = el("figure", { class: "camera", data: { camera: name, testid: `camera-${name}` } }, el("figcaption", {}, el("span", {}, name), age), el("div", { class: "picture" }, canvas, veil));
-  feeds.set(name, { root, canvas, age, veil, bitmap: null, stamp: null, newest: null, decoding: false });
+  feeds.set(name, { root, canvas, age, veil, bitmap: null, stamp: null, marked: null, newest: null, decoding: false });
   return root;
 }
 
 export function startCameras() {
   document.addEventListener("visibilitychange", choose);
-  on("picture", (head, blob) => {
+  on("picture", (head, jpeg) => {
     const target = feeds.get(head.camera);
     if (!target) return;
-    target.newest = [head, blob];
+    target.newest = [head, jpeg];
     if (!target.decoding) decode(head.camera, target);
   });
 }
@@ -51,12 +51,12 @@ async function decode(name, target) {
   target.decoding = true;
   try {
     while (target.newest) {
-      const [head, blob] = target.newest;
+      const [head, jpeg] = target.newest;
       target.newest = null;
-      const bitmap = await createImageBitmap(blob).catch(() => null);
+      const bitmap = await decoded(name, jpeg);
       if (!bitmap) continue;
       target.bitmap?.close();
-      Object.assign(target, { bitmap, stamp: head.stamp_ms });
+      Object.assign(target, { bitmap, stamp: head.stamp_ms, marked: null });
       pictures.frames += 1;
       draw(name, target);
     }
@@ -65,19 +65,40 @@ async function decode(name, target) {
   }
 }
 
-// Detections of a picture may come after it.
-export function showDetections() {
-  for (const [name, target] of feeds) if (target.bitmap) draw(name, target);
+// Beside the page: where a browser is busy, what decodes waits 15 ms for another of its processes.
+function decoded(name, jpeg) {
+  decoder ??= startDecoder();
+  return new Promise((resolve) => {
+    waiting.set(name, resolve);
+    decoder.postMessage({ name, jpeg });
+  });
 }
 
-function draw(name, { canvas, bitmap, stamp }) {
+function startDecoder() {
+  const worker = new Worker(new URL("./picture_decoder.js", import.meta.url));
+  worker.onmessage = ({ data: { name, bitmap } }) => waiting.get(name)(bitmap);
+  return worker;
+}
+
+// Detections of a picture may come after it.
+export function showDetections() {
+  for (const [name, target] of feeds) if (target.bitmap && target.marked !== target.stamp && foundIn(name, target)) draw(name, target);
+}
+
+function foundIn(name, { stamp }) {
+  const found = store.s.detections?.[name];
+  return found && Math.abs(found.stamp_ms - stamp) <= 0.01 ? found : null;
+}
+
+function draw(name, target) {
+  const { canvas, bitmap } = target, found = foundIn(name, target);
   const shown = Math.round((canvas.clientWidth || 320) * Math.min(2, devicePixelRatio || 1));
-  const width = Math.max(120, Math.min(bitmap.width, shown)), scale = width / bitmap.width, height = Math.round(bitmap.height * scale);
+  const width = Math.max(120, Math.min(bitmap.width, shown)), height = Math.round((bitmap.height * width) / bitmap.width);
   if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
   const g = canvas.getContext("2d");
   g.drawImage(bitmap, 0, 0, width, height);
-  const found = store.s.detections?.[name];
-  if (!found || Math.abs(found.stamp_ms - stamp) > 0.01) return;
+  if (!found) return;
+  target.marked = target.stamp;
   // Marks are in pixels of the calibration, which need not be those of the picture.
   const zoom = width / found.width, written = [];
   for (const mark of found.marks) {

@@ -111,5 +111,5 @@ function take(message) {
 function takePicture(data) {
   const size = new DataView(data).getUint16(0);
   const head = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 2, size)));
-  tell("picture", head, new Blob([new Uint8Array(data, 2 + size)], { type: "image/jpeg" }));
+  tell("picture", head, new Uint8Array(data, 2 + size));
 }

@@ -1,4 +1,4 @@
-// Puts the page together: what comes in marks what is to be drawn; drawing happens once per picture of the screen.
+// Puts the page together: what moves is drawn with the next picture of the screen, everything else at a slow beat.
 
 import { startStrip } from "./alarm_strip.js";
 import { addNotice, showBanners } from "./banners.js";
@@ -24,11 +24,11 @@ import { entities, estimateAge, now, replaying, steerable, store, targetHeight }
 import { buildTeam, paint, showTeam, startTeam } from "./team.js";
 import { View } from "./view.js";
 
-const SLOW_MS = 200;
+const BEAT_MS = 200;
 const NAMES = { footprints: "Footprints", graph: "Sensing graph", trails: "Trails", velocities: "Velocities", truth: "Truth" };
-let dirty = true, undrawnStamp = null, lastSlow = 0, lastFrame = 0, builtFor = "";
+let asked = false, undrawnStamp = null, lastBeat = 0, builtFor = "";
 
-const view = new View(byId("map"), () => { dirty = true; });
+const view = new View(byId("map"), redraw);
 
 on("seed", () => {
   const { scene } = store, built = JSON.stringify(scene);
@@ -39,7 +39,7 @@ on("seed", () => {
   keepEnd();
   undrawnStamp = null;
   showAll();
-  dirty = true;
+  redraw();
 });
 
 function build(scene) {
@@ -62,14 +62,13 @@ on("delta", (sections, sampled) => {
   if (sections.orders || sections.session) { showOrders(); showControls(); }
   if (sections.playback) showPlayback();
   if (sections.result) keepEnd();
-  if (sections.plan) showPlan();
   if (sections.detections) showDetections();
   if (sampled) { showSamples(); showTimeline(); }
-  dirty = true;
+  redraw();
 });
 
 on("notice", (notice) => { addNotice(notice); showBanners(); });
-on("state", () => { showBanners(); showTop(); showControls(); dirty = true; });
+on("state", () => { showBanners(); showTop(); showControls(); redraw(); });
 
 function showAll() {
   showBar(); showBanners(); showTop(); showTeam(); showCameras(); showHealth(); showEvents(); showProcesses(); showPlan(); showSwitch(); showControls(); showOrders(); showPlayback(); showPreflight(); showEnd();
@@ -84,31 +83,36 @@ function describe() {
   byId("map").setAttribute("aria-label", `Map of the room. ${words || "Nobody is localised yet."}`);
 }
 
-function frame(at) {
-  requestAnimationFrame(frame); // first: what fails now does not stop what comes
-  drawn.gapS = (at - lastFrame) / 1000;
-  lastFrame = at;
-  if (at - lastSlow > SLOW_MS) {
-    lastSlow = at;
-    showAll();
-    dirty = true;
-  }
-  if (dirty) {
-    dirty = false;
-    drawMap(view, ghostPoint());
-    drawHeights(byId("heights"), view.ratio ?? 1);
-    if (undrawnStamp !== null) {
-      drawn.latencies.push(now() - undrawnStamp);
-      if (drawn.latencies.length > 200) drawn.latencies.shift();
-      undrawnStamp = null;
-    }
-  }
+// Only when there is something new: a page that asks for every picture of the screen costs a third of a core.
+function redraw() {
+  if (asked) return;
+  asked = true;
+  requestAnimationFrame(draw);
+}
+
+function draw() {
+  asked = false; // first: what fails now does not stop what comes
+  drawMap(view, ghostPoint());
+  if (undrawnStamp === null) return;
+  drawn.latencies.push(now() - undrawnStamp);
+  if (drawn.latencies.length > 200) drawn.latencies.shift();
+  undrawnStamp = null;
+}
+
+// By a timer, so that alarms sound in a page that is hidden.
+function beat() {
+  const at = performance.now();
+  drawn.gapS = (at - lastBeat) / 1000;
+  lastBeat = at;
+  showAll();
+  drawHeights(byId("heights"), view.ratio ?? 1);
+  redraw();
 }
 
 function buildLayers() {
   byId("layers").replaceChildren(...Object.keys(layers).filter((name) => name !== "truth" || store.scene.truth).map((name) => {
     const button = el("button", { "aria-pressed": `${layers[name]}`, data: { testid: `layer-${name}` } }, NAMES[name]);
-    button.onclick = () => { layers[name] = !layers[name]; button.setAttribute("aria-pressed", `${layers[name]}`); showSwitch(); dirty = true; };
+    button.onclick = () => { layers[name] = !layers[name]; button.setAttribute("aria-pressed", `${layers[name]}`); showSwitch(); redraw(); };
     return button;
   }));
 }
@@ -129,7 +133,7 @@ function buildLegend() {
 const toggleTheme = startTheme(() => {
   if (!store.scene) return;
   paint(); buildLegend(); buildCharts(); showPlan();
-  dirty = true;
+  redraw();
 });
 const toggleWall = startBar(() => view.resize()), toggleSound = startSounds(), toggleLog = startStrip();
 byId("theme").onclick = toggleTheme;
@@ -176,4 +180,4 @@ startTeam();
 startCameras();
 startSteering(byId("map"), view);
 connect();
-requestAnimationFrame(frame);
+setInterval(beat, BEAT_MS);

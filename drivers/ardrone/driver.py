@@ -235,6 +235,8 @@ class ArDrone:
         if (blind or was_blind) and (self._sinks or decision.action is Action.HOVER):
             climb_m_s = -self._settings.limits.max_climb_m_s if self._sinks else 0.0
             return self._loop.brake(dt_s, force if told else None, decision.seen_m_s, climb_m_s)
+        if decision.action is Action.HOVER and fresh:
+            return self._loop.hold(self._true(velocity), dt_s)
         if decision.action is not Action.FLY or not fresh:
             self._loop.reset()
             return velocity_loop.HOVER

@@ -61,7 +61,7 @@ class Gains:
     lasting_s: float = 10.0
     seen_ticks: int = SEEN_TICKS
     seen_rad_s: float = 2.0
-    first_seen: float = 0.9
+    first_seen: float = 0.5
     push_s: float = 0.5
 
 
@@ -74,9 +74,8 @@ class Axis:
         self.start(0.0)
 
     def start(self, speed_m_s: float) -> None:
-        """Begin from hovering at a measured speed."""
-        # Half of what is measured then is noise: the drone holds its place.
-        self.speed_m_s = self.reference_m_s = 0.5 * speed_m_s
+        """Begin from hovering at a speed."""
+        self.speed_m_s = self.reference_m_s = speed_m_s
         self._reference_rate = self._tilt = self._tilt_rate = 0.0
         self._under_way = deque([0.0] * self._gains.dead_ticks)
         self._lately = deque([self.speed_m_s], self._gains.seen_ticks)
@@ -107,7 +106,7 @@ class Axis:
         self.bias_m_s2 = self._lasting_m_s2
 
     def see(self, seen_m_s: float, dt_s: float) -> None:
-        """Draw the speed to the mean one that cameras saw over the last calls, at first by most of the difference."""
+        """Draw the speed to the mean one that cameras saw over the last calls, at first by half of the difference."""
         error = seen_m_s - sum(self._lately) / len(self._lately)
         self._shift(min(1.0, max(self._unseen, self._gains.seen_rad_s * dt_s)) * error)
         self._unseen = 0.0

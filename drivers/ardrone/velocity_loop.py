@@ -14,6 +14,8 @@ from groundstation.bus.messages import Vector3
 from groundstation.geometry.stabilized_frame import STANDARD_GRAVITY_M_S2
 
 _LONGEST_STEP_S = 0.1
+# Time constant with which the speed of a drone that holds its place by itself is followed: its noise, and its braking.
+_HELD_S = 0.15
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,8 +57,18 @@ class VelocityLoop:
         """Forget the motion, not the learned figures of the vehicle; for times without this loop."""
         self._flying = False
         self._still_s = 0.0
+        self._held_m_s: tuple[float, float] | None = None
         for drift in self._drifts:
             drift.reset()
+
+    def hold(self, measured_m_s: Vector3, dt_s: float) -> AttitudeRequest:
+        """Let the drone hold its place, and note its true (scaled) speed, from which it is braked if it goes blind."""
+        x, y, _ = measured_m_s
+        before_x, before_y = self._held_m_s or (x, y)
+        share = min(1.0, max(dt_s, 0.0) / _HELD_S)
+        self.reset()
+        self._held_m_s = before_x + share * (x - before_x), before_y + share * (y - before_y)
+        return HOVER
 
     def stand(self, force_m_s2: tuple[float, float], dt_s: float) -> None:
         """Learn the accelerometer readings (forward, left) of a standing drone."""
@@ -140,7 +152,9 @@ class VelocityLoop:
         axes = self._axes
         if not self._flying:
             self._flying = True
-            for axis, speed in zip(axes, measured_m_s or (0.0, 0.0), strict=False):
+            # Half of what is measured then is noise: the drone holds its place.
+            first = self._held_m_s or (0.0, 0.0) if measured_m_s is None else tuple(0.5 * v for v in measured_m_s)
+            for axis, speed in zip(axes, first, strict=False):
                 axis.start(speed)
         wanted = _shortened(wanted_m_s[0], wanted_m_s[1], self._limits.max_speed_m_s)
         # Seen from a frame that turns left a steady velocity turns right, and holding one takes a pull to the left.

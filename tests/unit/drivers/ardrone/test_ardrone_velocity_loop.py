@@ -124,6 +124,16 @@ def test_a_standing_drone_teaches_what_its_accelerometers_show_when_level():
     assert abs(out.pitch_rad) < 0.001 and abs(out.roll_rad) < 0.001
 
 
+def test_one_that_goes_blind_as_it_stops_is_braked_from_the_speed_it_told_last():
+    """Its own hover ends with its flow; begun from zero, as before, it glided on at 0.17 m/s until it had landed."""
+    loop = VelocityLoop(ArDroneLimits())
+    for speed in (0.4, 0.38, 0.35, 0.32, 0.3):
+        assert loop.hold((speed, -speed, 0.0), 1 / 40).hover
+    out = [loop.brake(1 / 40, (0.0, 0.0)) for _ in range(20)]
+    assert min(request.pitch_rad for request in out) < -0.03, "nose up: it flies forward"
+    assert min(request.roll_rad for request in out) < -0.03, "to the left: it flies to the right"
+
+
 def test_turning_while_flying_pulls_inwards():
     loop = VelocityLoop(ArDroneLimits())
     for _ in range(80):

@@ -55,16 +55,18 @@ class Tape:
     def ticks(self) -> Iterator[Tick]:
         """Yield the ticks of all lives of the tracker, in order."""
         waiting: list[Tick] = []
-        done = 0
+        done = newest_ns = 0
         for record in self._records():
             if record.key.topic == JOURNAL:
                 waiting += self._tick(record)
+                newest_ns = record.publish_time_ns
             elif record.key.topic in INPUTS:
                 self.inputs += 1
                 self._held[str(record.key), record.sequence].append(record)
             else:
                 self.said[record.key.topic.name, record.key.entity, record.publish_time_ns].append(record)
-            while waiting and record.log_time_ns > waiting[0].at_ns + _PATIENCE_NS:
+            # By the tracker's own time: an input may be stamped seconds ahead.
+            while waiting and newest_ns > waiting[0].at_ns + _PATIENCE_NS:
                 tick = waiting.pop(0)
                 done += 1
                 if done % _TIDY_EVERY == 0:

@@ -24,11 +24,25 @@ from groundstation.estimation.update import linearise
 from groundstation.kernel import kernel
 
 _INNOVATION = Innovation.dtype
+# What is seen farther than this from where another is believed is not that one: a belief that is wide fits all [m].
+_SAME_M = 0.5
+# Contradictions that are so far apart are not in a row.
+_IN_A_ROW_S = 5.0
 # For one observer: between two robots whose beliefs are given up, and how many at most, one more every so often.
 _BETWEEN_S, _AT_MOST, _FORGOTTEN_S = 3.0, 3.0, 10.0
 # A sighting stands for so much time at most.
 _SEEN_S, _LIE_FORGOTTEN_S = 0.2, 1.0
 _FIRST_DOUBT_M_S, _DOUBT_GROWS, _MOST_DOUBT_M_S = 0.2, 2.0, 1.0
+
+
+@kernel(inlined=True)
+def apart_m(sensor: SensorRow, innovation: Innovation) -> float:
+    """Return how far what was seen is from where it was expected [m]; angles left out."""
+    square = 0.0
+    for i in range(innovation.prediction.size):
+        if sensor.is_angle[i] == 0:
+            square += innovation.y[i] * innovation.y[i]
+    return math.sqrt(square)
 
 
 @kernel()
@@ -49,7 +63,8 @@ def fits_another(
         event.subject = other
         copy_matrix(hypothesis.innovations[0].R, work[0].R)
         linearise(belief, sensor, event, shared, hypothesis.z, work[0], HP)
-        found = found or 0.0 <= work[0].nis <= settings.wild_gates * settings.gates[shared]
+        fits = 0.0 <= work[0].nis <= settings.wild_gates * settings.gates[shared]
+        found = found or (fits and apart_m(sensor, work[0]) <= _SAME_M)
     event.subject = subject
     return found
 
@@ -78,6 +93,8 @@ def has_diverged(memory: EntityMemory, settings: Settings, at: float) -> bool:
     """
     if memory.unconfirmed != 0:
         return True
+    if at - memory.wild_at > _IN_A_ROW_S:
+        memory.wild.count = 0
     memory.wild_at = at
     return insists(memory.wild, settings, at)
 

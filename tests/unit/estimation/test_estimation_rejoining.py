@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pytest
 
 from groundstation.bus.messages import Verdict
 from groundstation.estimation.fixed_lag import FixedLagFilter
@@ -19,7 +20,10 @@ PLACES = {"a": (-1.0, 0.0), "b": (1.0, 0.3)}
 
 
 class Team:
-    """Two drones that hover below a ceiling camera, which sees both at 10 Hz, each displaced as it is said."""
+    """Two drones that hover below a ceiling camera, which sees both at 10 Hz, each displaced as it is said.
+
+    Of one that is silent nothing is seen or heard; unseen: neither is seen.
+    """
 
     def __init__(self) -> None:
         entities: dict[str, MotionModel] = {n: OdometryRobot(marker_position_m=(0.0, 0.0, 0.0)) for n in PLACES}
@@ -35,12 +39,14 @@ class Team:
         self.watch(2.0)
         assert self.given_up == []
 
-    def watch(self, seconds: float, **displaced: tuple[float, float]) -> "Team":
+    def watch(self, seconds: float, silent: str = "", unseen: bool = False, **displaced: tuple[float, float]) -> "Team":
         for tick in range(round(seconds * 100)):
             self.now += 10 * MS
             for name, (x, y) in PLACES.items():
+                if name == silent:
+                    continue
                 self.filter.add_motion(name, OdometrySample(self.now, (0.0, 0.0, 0.0), 0.0, FLIGHT_M), self.now)
-                if tick % 10 == 0:
+                if tick % 10 == 0 and not unseen:
                     dx, dy = displaced.get(name, (0.0, 0.0))
                     seen = (x + dx, -y - dy, 4.2 - FLIGHT_M)
                     assert (
@@ -83,6 +89,24 @@ def test_a_robot_that_was_carried_off_is_found_at_once() -> None:
     assert [name for _, name in team.given_up] == ["a"]
     assert math.dist(team.place("a"), (-0.2, 0.0)) < 0.05
     assert math.dist(team.place("b"), PLACES["b"]) < 0.05
+
+
+def test_sightings_long_ago_are_not_held_against_a_robot() -> None:
+    team = Team().watch(0.4, a=(-1.2, 0.0)).watch(8.0, unseen=True).watch(0.1, a=(-1.2, 0.0))
+    assert len(team.refused) == 5 and team.given_up == [], "the fifth, but one in a row"
+
+
+@pytest.mark.parametrize("silent_s", [3.0, 10.0])
+def test_one_that_was_carried_off_is_found_though_another_might_be_anywhere(silent_s: float) -> None:
+    team = Team().watch(silent_s, silent="b").watch(1.5, silent="b", a=(-1.2, 0.0))
+    assert [name for _, name in team.given_up] == ["a"]
+    assert math.dist(team.place("a"), (-2.2, 0.0)) < 0.05
+
+
+def test_a_marker_that_is_read_as_anothers_moves_nobody() -> None:
+    team = Team().watch(3.0, a=(2.0, 0.3))
+    assert team.given_up == [] and math.dist(team.place("a"), PLACES["a"]) < 0.1
+    assert all("fits another entity" in c.reason for c in team.refused)
 
 
 def test_a_camera_that_displaces_all_at_once_has_them_given_up_one_by_one() -> None:

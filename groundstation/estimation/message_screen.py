@@ -62,7 +62,7 @@ class MessageScreen:
             case RelativeObservation():
                 return self._observation(message, stamp_ns)
             case RangeObservation():
-                return self._range(message, stamp_ns)
+                return self._range(message, stamp_ns, now_ns)
             case ReportedMotion():
                 return _fault_of_report(message)
             case VehicleStatus():
@@ -101,9 +101,13 @@ class MessageScreen:
         values = (message.position_m, message.yaw_rad)
         return self._stale((message.observer, message.camera, message.subject), values, stamp_ns)
 
-    def _range(self, message: RangeObservation, stamp_ns: int) -> Verdict | None:
+    def _range(self, message: RangeObservation, stamp_ns: int, now_ns: int) -> Verdict | None:
+        # A round places a robot by itself, before the filter asks how old it is.
+        if stamp_ns < now_ns - self._lag_ns:
+            return Verdict.LATE
         values = (*message.ranges_m.values(), *(message.position_m or ()), message.std_m)
-        if not _plausible(*values, *message.covariance) or not message.std_m > 0.0:
+        usable = _plausible(*values, *message.covariance) and message.std_m > 0.0
+        if not usable or stamp_ns > now_ns + FUTURE_NS:
             return Verdict.IMPLAUSIBLE
         if message.position_m is not None and (
             len(message.position_m) != 3 or not _is_covariance(message.covariance, 3)

@@ -154,6 +154,23 @@ def test_one_who_is_elsewhere_round_after_round_is_placed_anew(desk: Desk) -> No
     assert [one.text for one in desk.intake.ranges.take_notices()] == ["drone re-initialised by uwb"]
 
 
+@pytest.mark.parametrize(("age_ms", "verdict"), [(3000, Verdict.LATE), (-3000, Verdict.IMPLAUSIBLE)])
+def test_rounds_of_another_time_place_nobody(desk: Desk, age_ms: int, verdict: Verdict) -> None:
+    desk.take_off()
+    told = desk.round()
+    header = msgspec.structs.replace(told.header, stamp_ns=desk.now - age_ms * MS)
+    assert desk.take(msgspec.structs.replace(told, header=header)) is verdict
+    desk.filter.advance(desk.now)
+    assert "drone" not in desk.filter.belief().layout
+    desk.fly(10)
+    rounds = [desk.round(at=(POSE[0] - 1.5, POSE[1], POSE[2])) for _ in range(10)]
+    for k, told in enumerate(rounds):  # a link that stood still brings all of them at once
+        header = msgspec.structs.replace(told.header, stamp_ns=desk.now - age_ms * MS + 100 * k * MS)
+        assert desk.take(msgspec.structs.replace(told, header=header)) is verdict
+    desk.filter.advance(desk.now)
+    assert pose(desk)[0] > POSE[0] - 0.1
+
+
 def test_a_reflection_moves_nobody(desk: Desk) -> None:
     desk.take_off()
     desk.fly(20)

@@ -122,10 +122,10 @@ class Tracker:
         Never raises for what a message holds. Refused observations are also among `take_corrections`.
         """
         moved = self._mounts.distrusts(message.header.entity)
-        if not moved:
-            self.lookout.take(message, message.header.clock == self._clock)
         refused = moved and isinstance(message, RelativeObservation)
         verdict = Verdict.IMPLAUSIBLE if refused else self._intake.take(key, message, now_ns)
+        if not moved and verdict is not Verdict.IMPLAUSIBLE:
+            self.lookout.take(message, message.header.clock == self._clock)
         if verdict is Verdict.ACCEPTED:
             if not moved:
                 self._roots.hear(message, now_ns)

@@ -93,7 +93,8 @@ class Search:
         """Take a picture that was searched; it counts with the next `advance`."""
         if picture.observer in self._cameras:
             self._pictures.append(picture)
-            self._shown_ns.update(dict.fromkeys(picture.found, picture.header.stamp_ns))
+            for name in picture.found:
+                self._shown_ns[name] = max(picture.header.stamp_ns, self._shown_ns.get(name, 0))
 
     def is_missing(self, name: str) -> bool:
         """Return whether a target is searched for."""

@@ -1,6 +1,6 @@
 """From bus messages to the filter: clocks, and a verdict for each refusal."""
 
-from collections.abc import Container
+from collections.abc import Mapping
 
 from groundstation.bus.messages import (
     ClockOffset,
@@ -11,13 +11,15 @@ from groundstation.bus.messages import (
     RangeObservation,
     RelativeObservation,
     ReportedMotion,
+    SearchedPicture,
     VehicleStatus,
     Verdict,
 )
 from groundstation.estimation.attitude_intake import AttitudeIntake
-from groundstation.estimation.fixed_lag import FixedLagFilter
+from groundstation.estimation.fixed_lag import FUTURE_NS, FixedLagFilter
 from groundstation.estimation.measurement import Measurement
 from groundstation.estimation.message_screen import MessageScreen
+from groundstation.estimation.models.protocol import ObservationModel
 from groundstation.estimation.range_intake import RangeIntake
 from groundstation.estimation.report_intake import ReportIntake
 
@@ -44,7 +46,7 @@ REASONS = {
 class Intake:
     """Feeds a filter with messages; `clock` is the id of the boot clock that `now_ns` is read from."""
 
-    def __init__(self, joint: FixedLagFilter, cameras: Container[str], clock: str) -> None:
+    def __init__(self, joint: FixedLagFilter, cameras: Mapping[str, ObservationModel], clock: str) -> None:
         self._filter = joint
         self._cameras = cameras
         self._clock = clock
@@ -63,9 +65,11 @@ class Intake:
             if message.header.clock == self._clock:
                 self._offsets[message.of] = message.offset_ns
             return Verdict.ACCEPTED
+        stamp_ns = self._local_stamp(message)
+        if isinstance(message, SearchedPicture) and stamp_ns is not None and stamp_ns > now_ns + FUTURE_NS:
+            return Verdict.IMPLAUSIBLE
         if not isinstance(message, _HEARD):
             return Verdict.ACCEPTED
-        stamp_ns = self._local_stamp(message)
         if stamp_ns is None:
             return Verdict.UNSYNCED
         if refusal := self._screen.refusal(key, message, stamp_ns, now_ns):
@@ -101,7 +105,7 @@ class Intake:
         roll_rad, pitch_rad = self._tilt(message, stamp_ns)
         measurement = Measurement(
             stamp_ns,
-            message.camera if message.camera in self._cameras else message.observer,
+            self._camera_of(message),
             message.subject,
             message.position_m,
             message.yaw_rad,
@@ -112,6 +116,11 @@ class Intake:
         )
         tie = f"{key}#{message.subject}#{message.header.seq}"
         return self._filter.add_observation(measurement, tie, now_ns) or Verdict.ACCEPTED
+
+    def _camera_of(self, message: RelativeObservation) -> str:
+        """Return the camera by which an observer saw: never one that another carries, whatever the message calls it."""
+        named = self._cameras.get(message.camera)
+        return message.camera if named is not None and named.carrier == message.observer else message.observer
 
     def _tilt(self, message: RelativeObservation, stamp_ns: int) -> tuple[float, float]:
         return self._attitudes.tilt(message.observer, stamp_ns, (message.roll_rad, message.pitch_rad))

@@ -185,7 +185,7 @@ def test_a_standing_vehicle_may_repeat_itself() -> None:
 def test_a_vehicle_that_tells_coarse_steps_may_repeat_itself_in_flight(steps: bool) -> None:
     desk = Desk()
     joint = FixedLagFilter(replace(desk.filter.parameters, tells_steps=frozenset(["drone"] if steps else [])))
-    intake = Intake(joint, {"ceiling"}, "here")
+    intake = Intake(joint, joint.parameters.sensors, "here")
     still = [
         intake.take("o", desk.odometry((500 - 10 * k) * MS, yaw_rad=0.5), NOW - (500 - 10 * k) * MS) for k in range(60)
     ]
@@ -210,7 +210,7 @@ def test_a_sensor_that_repeats_itself_is_frozen_and_thaws() -> None:
 def test_only_who_has_to_be_known_before_its_lift_off_joins_while_it_takes_off(early: bool) -> None:
     desk = Desk()
     joint = FixedLagFilter(replace(desk.filter.parameters, joins_early=frozenset(["drone"] if early else [])))
-    intake = Intake(joint, {"ceiling"}, "here")
+    intake = Intake(joint, joint.parameters.sensors, "here")
     status = VehicleStatus(
         header=desk.header("drone", 100 * MS), flight_state=FlightState.TAKING_OFF, mode="TAKING_OFF"
     )

@@ -267,7 +267,7 @@ def test_a_vehicles_own_position_is_never_fused() -> None:
     beliefs = []
     for position in ((0.0, 0.0, 1.3), (40.0, -30.0, 9.0), None):
         room = Room()
-        intake = Intake(room.filter, ("east", "west", "a", "b"), "clock")
+        intake = Intake(room.filter, room.filter.parameters.sensors, "clock")
         room.below("west", "a", (0.0, 0.0, 1.5))
         for k in range(50):
             room.now += 10 * MS

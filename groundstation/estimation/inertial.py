@@ -151,7 +151,7 @@ class InertialAttitude:
         """Integrate body rates."""
         roll_rate, pitch_rate, yaw_rate = self._rates_of_angles(wx, wy, wz)
         self._yaw = wrap(self._yaw + elapsed_s * yaw_rate)
-        self._roll += elapsed_s * roll_rate
+        self._roll = wrap(self._roll + elapsed_s * roll_rate)
         self._pitch += elapsed_s * pitch_rate
 
     def _rates_of_angles(self, wx: float, wy: float, wz: float) -> Vector3:
@@ -169,7 +169,7 @@ class InertialAttitude:
             roll -= self._acceleration[1] / STANDARD_GRAVITY_M_S2
             pitch += self._acceleration[0] / STANDARD_GRAVITY_M_S2
         share = elapsed_s / (within_s + elapsed_s)
-        self._roll += share * (roll - self._roll)
+        self._roll = wrap(self._roll + share * wrap(roll - self._roll))
         self._pitch += share * (pitch - self._pitch)
         settled = _SETTLED_RAD**2 + (within_s * self._bias.tilt_std_rad_s) ** 2
         self._variance += 2.0 * share * (settled - self._variance)

@@ -193,6 +193,17 @@ def test_between_samples_and_just_after_the_newest_it_turns_as_the_gyroscopes_sa
             assert now - was == pytest.approx(rate * turned_s, abs=math.radians(0.02))
 
 
+def test_who_was_turned_over_once_is_level_as_before(flying: Vehicle) -> None:
+    for _ in range(50):
+        flying.now += STEP_NS
+        flying.roll += math.tau / 50
+        flying._publish(np.array([math.tau / 0.5, 0.0, 0.0]), (0.0, 0.0), False)
+    flying.roll = 0.0
+    assert flying.tilt_error_deg < 10.0
+    flying.run(6.0)
+    assert flying.tilt_error_deg < 2.0
+
+
 def test_a_blow_is_no_gravity(flying: Vehicle) -> None:
     for _ in range(20):
         flying.now += STEP_NS

@@ -14,6 +14,7 @@ from groundstation.estimation.measurement import Correction, Measurement, Sensor
 FAR = "far beyond the gate"
 # Reason of a sighting for which a belief would have been given up, had not others been for the same observer.
 HASTY = "far beyond the gate, but its observer lately had others given up"
+OTHER_POSE = "the other pose hypothesis is more likely"
 _VERDICTS = {
     r.ACCEPTED: (Verdict.ACCEPTED, ""),
     r.INFLATED: (Verdict.INFLATED, "beyond the gate"),
@@ -80,7 +81,7 @@ class EventLog:
         if joined:
             reason = "joined" if size == 0 else "re-initialised: the belief contradicted several observations in a row"
         elif alternative_chosen:
-            reason = (reason + "; " if reason else "") + "the other pose hypothesis is more likely"
+            reason = (reason + "; " if reason else "") + OTHER_POSE
         if size == 0:
             return Correction(observer, subject, verdict, reason, latency_ms=latency_ms, joined=bool(joined))
         if not 0.0 <= nis < math.inf:

@@ -15,7 +15,7 @@ import numpy as np
 
 from groundstation.arrays import Vector
 from groundstation.bus.messages import Verdict
-from groundstation.estimation.event_log import FAR, HASTY
+from groundstation.estimation.event_log import FAR, HASTY, OTHER_POSE
 from groundstation.estimation.measurement import Correction
 from groundstation.estimation.sight_jumps import ALONE_M_S
 from groundstation.geometry.camera_turn import CameraTurn, Displacement, camera_turn
@@ -25,6 +25,8 @@ _COUNTS_S, _LEAST, _LASTS_S, _STEADY = 1.5, 4, 0.3, 0.3
 _TIED_S = 1.0
 _LEAST_M = 0.15
 _MOMENT_S = 0.4
+# Whichever of two poses was nearer to the belief: both have the marker in nearly one place.
+_CONTRADICTS = frozenset(f"{why}{also}" for why in (FAR, HASTY) for also in ("", f"; {OTHER_POSE}"))
 
 Pair = tuple[str, str]
 
@@ -68,7 +70,7 @@ class TiedContradictions:
             if c.verdict is Verdict.ACCEPTED and not c.joined:
                 self._agreed_s[pair] = now_s
                 self._far.pop(pair, None)
-            elif c.observer in self._cameras and c.subject in self._robots and c.reason in (FAR, HASTY):
+            elif c.observer in self._cameras and c.subject in self._robots and c.reason in _CONTRADICTS:
                 if pair not in self._far:
                     self._far[pair] = _Contradiction(now_s, now_s - self._agreed(pair))
                 self._far[pair].rows.append((now_s, np.array(c.residual[:3])))

@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from groundstation.bus.messages import Header, RelativeObservation, Severity, Verdict
 from groundstation.bus.notice import Notice
-from groundstation.estimation.event_log import FAR
+from groundstation.estimation.event_log import FAR, OTHER_POSE
 from groundstation.estimation.measurement import Correction
 from groundstation.estimation.mount_watch import MountWatch
 from groundstation.estimation.parameters import parameters_from_field
@@ -158,10 +159,14 @@ def agreed(observer: str, subject: str) -> Correction:
         ((agreed("drone_1", "turtlebot"),), []),
         ((agreed("drone_1", "drone_2"), agreed("ceiling", "drone_1")), []),
         ((far("drone_1"),), ["ceiling"]),
+        ((replace(far("drone_1"), reason=f"{FAR}; {OTHER_POSE}"),), ["ceiling"]),
         ((far("drone_1", (0.5, 0.5, 0.4)),), []),
     ],
-    ids=["one alone", "seen by the other", "one target", "a target of one", "the other agrees", "both", "both apart"],
-)
+    ids=[
+        "one alone", "seen by the other", "one target", "a target of one", "the other agrees", "both",
+        "both, one by its other pose", "both apart",
+    ],
+)  # fmt: skip
 def test_who_agree_among_each_other_are_not_both_lost(
     lab_field: ResolvedField, beside: tuple[Correction, ...], culprits: list[str]
 ) -> None:

@@ -3,19 +3,22 @@
 from collections import deque
 
 from groundstation.estimation.belief import JointBelief
+from groundstation.time_units import NS_PER_S
 
-_KEPT = 50  # a second at 50 Hz: as old as a picture may be
+_KEPT_NS = NS_PER_S  # as old as a picture may be, at whatever rate beliefs come
 
 
 class BeliefHistory:
     """Keeps the newest beliefs, in the order of their stamps."""
 
     def __init__(self) -> None:
-        self._beliefs: deque[JointBelief] = deque(maxlen=_KEPT)
+        self._beliefs: deque[JointBelief] = deque()
 
     def append(self, belief: JointBelief) -> None:
         """Add the newest belief."""
         self._beliefs.append(belief)
+        while belief.stamp_ns - self._beliefs[0].stamp_ns >= _KEPT_NS:
+            self._beliefs.popleft()
 
     def at(self, stamp_ns: int) -> JointBelief | None:
         """Return the belief nearest to a time within what is kept [ns], or None."""

@@ -225,6 +225,13 @@ def test_an_unseen_robot_is_told_once_a_second_until_it_has_landed() -> None:
     assert watch.step(24_200 * MS, {"a": 4.3}) == []
 
 
+def test_a_robot_whose_belief_was_given_up_in_flight_has_time_to_be_seen_again() -> None:
+    watch = UnseenWatch(10.0)
+    assert not any(watch.step(t * MS, {"a": 0.0}) for t in range(0, 60_000, 100))
+    assert not any(watch.step(t * MS, {"a": math.inf}) for t in range(60_000, 69_000, 100)), "it is seen again by then"
+    assert watch.step(71_000 * MS, {"a": math.inf}) == ["a"]
+
+
 def test_late_ticks_are_counted_and_not_made_up_for() -> None:
     deadlines = Deadlines(20 * MS, 0)
     deadlines.start_tick(5 * MS)

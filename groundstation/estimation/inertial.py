@@ -19,6 +19,7 @@ _LEVEL_S, _STANDING_S = 4.0, 0.5  # accelerometers draw the tilt back over this:
 _SMOOTH_S = 0.3  # velocities are smoothed over this before they are differentiated
 _SILENT_S = 0.3  # after so much silence the acceleration counts as none
 _GAP_S = 0.5  # nothing is integrated across a longer one
+_RESTARTED_S = 5.0  # silent for longer, a vehicle may have a new battery, and gyroscopes with another bias
 _FRESH_NS = 100 * NS_PER_MS  # how far a sample speaks for a time beside it
 _KEPT = 256  # samples: more than a second
 # Of roll and pitch after a while; at the start, when one sample of a vehicle that may accelerate is all there is.
@@ -64,6 +65,8 @@ class InertialAttitude:
         elapsed_s = math.inf if self._stamp_ns is None else (stamp_ns - self._stamp_ns) / NS_PER_S
         if elapsed_s <= 0.0:
             return
+        if elapsed_s > _RESTARTED_S:
+            self._bias = GyroBias()
         if standing:
             self._bias.take_standing(stamp_ns, rates_rad_s)
         else:

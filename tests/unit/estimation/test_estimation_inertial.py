@@ -23,7 +23,7 @@ class Vehicle:
     def __init__(self) -> None:
         self.attitude = InertialAttitude(velocity_scale=1.25)
         self.now, self.roll, self.pitch, self.yaw = START, 0.0, 0.0, 0.0
-        self.velocity = np.zeros(2)
+        self.velocity, self.bias = np.zeros(2), np.array(BIAS)
         self._rng = np.random.default_rng(7)
 
     def run(
@@ -49,7 +49,7 @@ class Vehicle:
     def _publish(self, rates: np.ndarray, acceleration: tuple[float, float], standing: bool) -> None:
         force = rotation_from_euler(self.roll, self.pitch, 0.0).T @ np.array([*acceleration, STANDARD_GRAVITY_M_S2])
         noisy = GAIN * force + 0.05 * self._rng.standard_normal(3)
-        rates = rates + np.array(BIAS) + 0.003 * self._rng.standard_normal(3)
+        rates = rates + self.bias + 0.003 * self._rng.standard_normal(3)
         self.attitude.take_velocity(self.now, (*(self.velocity / 1.25).tolist(), 0.0))
         self.attitude.take_imu(self.now, _three(rates), _three(noisy), standing)
 
@@ -191,6 +191,18 @@ def test_between_samples_and_just_after_the_newest_it_turns_as_the_gyroscopes_sa
             (newest.yaw_rad, found.yaw_rad, rates[2]),
         ):
             assert now - was == pytest.approx(rate * turned_s, abs=math.radians(0.02))
+
+
+def test_a_vehicle_with_a_new_battery_teaches_its_new_bias(flying: Vehicle) -> None:
+    flying.run(5.0)
+    flying.now += 30 * 1_000_000_000
+    flying.bias = flying.bias + np.array([0.003, 0.004, 0.005])
+    flying.run(3.0, standing=True)
+    found = flying.attitude.at(flying.now)
+    assert found is not None
+    flying.yaw, since = 0.0, found.yaw_rad
+    flying.run(20.0)
+    assert abs(flying.yaw_error_deg(since)) < 1.5 and flying.tilt_error_deg < 0.7
 
 
 def test_who_was_turned_over_once_is_level_as_before(flying: Vehicle) -> None:

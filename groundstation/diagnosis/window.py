@@ -2,7 +2,7 @@
 
 from collections import deque
 
-from groundstation.bus.messages import FlightState, Message, VehicleStatus
+from groundstation.bus.messages import STANDING, FlightState, Message, VehicleStatus
 from groundstation.bus.topics import IMU, OBSERVATION, ODOMETRY, VEHICLE_STATUS
 from groundstation.calibration.flown import Flown
 from groundstation.estimation.message_screen import MessageScreen
@@ -14,7 +14,7 @@ TOPICS = (ODOMETRY, IMU, OBSERVATION, VEHICLE_STATUS)
 _LASTS_NS = 40 * NS_PER_S
 # So much flight is judged; more where it began in the air and no pad tells from where, so that figures bend paths.
 _LEAST_NS, _LEAST_ALOFT_NS = 8 * NS_PER_S, 20 * NS_PER_S
-_DOWN = frozenset({FlightState.LANDED, FlightState.UNKNOWN})
+_DOWN = STANDING | {FlightState.UNKNOWN}
 
 
 class Window:

@@ -35,14 +35,15 @@ def status(at_s: float, state: FlightState, clock_id: str = "c") -> Message:
     return VehicleStatus(header=Header(round(at_s * S), clock_id, "drone_1", "d", 1), flight_state=state, mode="TRACK")
 
 
-def test_only_a_flight_of_some_seconds_is_judged_and_its_last_forty(lab_field: ResolvedField) -> None:
+@pytest.mark.parametrize("end", [FlightState.LANDED, FlightState.EMERGENCY])
+def test_only_a_flight_of_some_seconds_is_judged_and_its_last_forty(lab_field: ResolvedField, end: FlightState) -> None:
     window = Window(lab_field, "c")
     assert window.flown() is None
     window.take("k", status(0, FlightState.LANDED), 0)
     assert first_flown(window, 1) == 8
     flown = window.flown()
     assert flown is not None and flown.duration_s == 40.0
-    window.take("k", status(100, FlightState.LANDED), 100 * S)
+    window.take("k", status(100, end), 100 * S)
     assert window.flown() is None, "nobody flies"
 
 

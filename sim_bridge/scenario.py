@@ -96,7 +96,11 @@ Firmware = Annotated[str, AfterValidator(_known_firmware)]
 
 
 class DroneScenario(Section):
-    """Every emulated AR.Drone: firmware, errors of its navdata, battery, disturbances."""
+    """Every emulated AR.Drone: firmware, errors of its navdata, battery, disturbances.
+
+    Tellos and vehicles behind ROS 2, which nobody measured, err by the same figures: velocity (its gain about 1),
+    height, tilt, heading, rates; and have their battery and the unrest of the air from here.
+    """
 
     firmware: Firmware = "ar2-2.3"
     """Firmware that the drones emulate: version, size of the navdata packets, options and settings that exist."""
@@ -198,7 +202,7 @@ class CommonScenario(Section):
     targets: dict[str, TargetScenario] = Field(default={})
     """What single targets do, by name."""
     drones: DroneScenario = DroneScenario()
-    """Every emulated AR.Drone."""
+    """Every emulated AR.Drone; what all vehicles have that fly by optical flow, of Tellos and ROS 2's as well."""
     cameras: CameraScenario = CameraScenario()
     """Every emulated camera."""
     faults: tuple[Fault, ...] = ()

@@ -9,6 +9,7 @@ import os
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -49,8 +50,6 @@ class Ros2Emulator:
         self._bell = os.eventfd(0, os.EFD_NONBLOCK)
         self._order, self._ticks = "", 0
         self._heard_tick = -_HELD_TICKS
-        frame = body.airframe
-        self._start = (frame.x, frame.y, frame.yaw)
         endpoint = f"tcp/{address}:{self._section['port']}"
         try:
             self._router = Ros2Router(name, endpoint)
@@ -149,15 +148,9 @@ class Ros2Emulator:
             body.wanted = (_STILL, 0.0)
 
     def _readings(self) -> Readings:
-        body, (ahead, aside) = self._body.airframe, self._body.flow
-        x, y, yaw = self._start
-        c, s = math.cos(yaw), math.sin(yaw)
-        east, north = body.x - x, body.y - y
-        up = body.z - STANDING_HEIGHT_M + self._section["standing_z_m"]
-        told = Readings(
-            self._ticks, (ahead, aside, body.vz), body.roll, body.pitch, body.yaw - yaw, body.body_rates(),
-            body.specific_force(), self._body.battery, up, position=(c * east + s * north, c * north - s * east, up),
-        )  # fmt: skip
+        told = self._body.senses.readings(self._ticks, self._body.battery)
+        up = told.height - STANDING_HEIGHT_M + self._section["standing_z_m"]
+        told = replace(told, height=up, position=(*told.position[:2], up))
         return self._wrong.report(self._ticks * _TICK_S, told) if self._wrong else told
 
     def _told(self) -> bytes:

@@ -18,8 +18,8 @@ from sim_bridge.scenario import Scenario
 from sim_bridge.site import SiteDrone
 from sim_bridge.world.airframe import GRAVITY_M_S2, STANDING_HEIGHT_M, Airframe
 from sim_bridge.world.downwash import wake_between
+from sim_bridge.world.flow_sensors import FlowSensors
 from sim_bridge.world.noise import GaussMarkov, standard_normals
-from sim_bridge.world.readings import Readings
 from sim_bridge.wrong_values import WrongValues, wrong_values_of
 
 Vector3 = tuple[float, float, float]
@@ -28,6 +28,8 @@ _TICK_S = 0.005
 _QUIET_S = 15.0
 _TAKE_OFF_M, _DESCENT_M_S = 0.8, 0.4
 _RESPONSE_S, _CLIMB_S, _TURN_S, _TILT_S, _MOST_M_S2 = 0.35, 0.25, 0.15, 0.12, 2.5
+# What lasts (wind, a tilt that it takes for level) is trimmed away in a second or so.
+_TRIM_PER_S2, _MOST_TRIM_M_S2 = 2.0, 2.0
 _DATAGRAMS_PER_TICK = 64
 _STILL: Vector3 = (0.0, 0.0, 0.0)
 _FULL_M_S, _FULL_TURN_RAD_S = 1.0, math.radians(100.0)
@@ -37,7 +39,7 @@ _WORDS = (TAKE_OFF, LAND, EMERGENCY, STOP, STREAM_ON, STREAM_OFF)
 
 
 class TelloBody:
-    """A quadrotor that holds the velocity it is told, by its own optical flow."""
+    """A quadrotor that holds the velocity it is told by its own, wrong, optical flow and tilt."""
 
     def __init__(self, drone: SiteDrone, scenario: Scenario, tick_s: float, rng: np.random.Generator) -> None:
         draw = standard_normals(rng)
@@ -47,9 +49,9 @@ class TelloBody:
         self.motors_on = False
         self.wanted: tuple[Vector3, float] = (_STILL, 0.0)
         self._tick_s = tick_s
-        self._flow_error = tuple(GaussMarkov(0.03, 0.5, tick_s, draw) for _ in range(2))
         self._unrest = tuple(GaussMarkov(scenario.drones.air_unrest_m_s2, 0.8, tick_s, draw) for _ in range(2))
-        self.flow = (0.0, 0.0)
+        self._expected, self._trim = [0.0, 0.0], [0.0, 0.0]
+        self.senses = FlowSensors(scenario.drones, tick_s, self.airframe, rng)
 
     @property
     def autopilot(self) -> "TelloBody":
@@ -81,13 +83,15 @@ class TelloBody:
         body.on_ground = False
         if body.z <= STANDING_HEIGHT_M:
             body.stand()
+            self._expected, self._trim = [0.0, 0.0], [0.0, 0.0]
 
     def _pursue(self, wake: Vector3) -> Vector3:
         body, (forward, left, up) = self.airframe, self.wanted[0]
-        ahead, aside = self.flow
-        pull = [max(-_MOST_M_S2, min(_MOST_M_S2, e / _RESPONSE_S)) for e in (forward - ahead, left - aside)]
+        senses = self.senses
+        ahead, aside, _ = senses.velocity
+        pull = [self._pull(0, forward, ahead), self._pull(1, left, aside)]
         for name, tilt in (("pitch", math.atan(pull[0] / GRAVITY_M_S2)), ("roll", math.atan(-pull[1] / GRAVITY_M_S2))):
-            rate = (tilt - getattr(body, name)) / _TILT_S
+            rate = (tilt - getattr(senses, name)) / _TILT_S
             setattr(body, f"{name}_rate", rate)
             setattr(body, name, getattr(body, name) + rate * self._tick_s)
         a, b = GRAVITY_M_S2 * math.tan(body.pitch), -GRAVITY_M_S2 * math.tan(body.roll)
@@ -95,10 +99,18 @@ class TelloBody:
         push = [self._unrest[i].step() + wake[i] + self.wind[i] for i in range(2)]
         return c * a - s * b + push[0], s * a + c * b + push[1], (up - body.vz) / _CLIMB_S + wake[2]
 
+    def _pull(self, axis: int, wanted_m_s: float, felt_m_s: float) -> float:
+        """Return the acceleration towards a velocity, with what was trimmed against the one expected by now."""
+        expected, trim = self._expected, self._trim
+        expected[axis] += (wanted_m_s - expected[axis]) * self._tick_s / _RESPONSE_S
+        trim[axis] += _TRIM_PER_S2 * (expected[axis] - felt_m_s) * self._tick_s
+        trim[axis] = max(-_MOST_TRIM_M_S2, min(_MOST_TRIM_M_S2, trim[axis]))
+        pull = (wanted_m_s - felt_m_s) / _RESPONSE_S + trim[axis]
+        return max(-_MOST_M_S2, min(_MOST_M_S2, pull))
+
     def sense(self) -> None:
-        """Let the optical flow see the motion of this tick."""
-        ahead, aside = self.airframe.velocity_stabilized()
-        self.flow = (ahead + self._flow_error[0].step(), aside + self._flow_error[1].step())
+        """Let its sensors see the motion of this tick."""
+        self.senses.step(self.airframe, self.motors_on)
 
     def wake_on(self, other: Airframe) -> Vector3 | None:
         """Return how its downwash accelerates another one below it, None when out of its reach."""
@@ -116,7 +128,6 @@ class TelloEmulator:
         self._streams = False
         self._order = b""
         self._ticks = self._quiet_ticks = self._motor_ticks = 0
-        self._start_yaw = body.airframe.yaw
 
     @property
     def video_settings(self) -> tuple[str, ...]:
@@ -204,12 +215,7 @@ class TelloEmulator:
                 self._socket.sendto(words, source)
 
     def _state(self) -> State:
-        body, flow = self._body.airframe, self._body.flow
-        yaw = body.yaw - self._start_yaw
-        told = Readings(
-            self._ticks, (flow[0], flow[1], body.vz), body.roll, body.pitch, yaw, body.body_rates(),
-            body.specific_force(), self._body.battery, body.z,
-        )  # fmt: skip
+        told = self._body.senses.readings(self._ticks, self._body.battery)
         if self._wrong:
             told = self._wrong.report(self._ticks * _TICK_S, told)
         c, s = math.cos(told.yaw), math.sin(told.yaw)

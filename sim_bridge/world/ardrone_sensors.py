@@ -11,27 +11,19 @@ import numpy as np
 
 from sim_bridge.scenario import DroneScenario
 from sim_bridge.world.airframe import GRAVITY_M_S2, STANDING_HEIGHT_M, Airframe
-from sim_bridge.world.noise import DelayLine, GaussMarkov, Vibration, standard_normals
+from sim_bridge.world.inertia import Inertia
+from sim_bridge.world.noise import DelayLine, GaussMarkov, standard_normals
 
 LIFT_OFF_SEEN_M = 0.25  # the ultrasound reads nothing below
 _MAGNETOMETER_SEEN_M = 0.22  # switched in a moment before
 GROUND_ECHO_M = 0.243  # what it still says on the floor
-_HEIGHT_TICKS = 3  # a new height about every 15 ms
+HEIGHT_TICKS = 3  # a new height about every 15 ms
 # Echoes of a neighbour's ultrasound: how often they come, and how far from the height one may be to be believed.
 _FOREIGN_ECHOES, _BELIEVED_M = 0.25, 0.15
-_HEIGHT_CORRELATION_S = 2.0
-_HEIGHT_WHITE_M = 0.005
-_VELOCITY_CORRELATION_S = 0.4
-_ACCELEROMETER_GAIN = 0.92
-# Recorded noise of the gyros [rad/s] and accelerometers [m/s^2], x y z: motors off, idling on the floor, in flight.
-_STILL = ((7.5e-4, 7.5e-4, 7.5e-4), (0.031, 0.001, 0.017))
-_IDLING = ((0.016, 0.016, 0.048), (0.13, 0.10, 0.07))
-_FLYING = ((0.031, 0.032, 0.044), (0.045, 0.045, 0.045))
-# In flight it is vibration: means over 40 ms are about as sure as those of white noise, over 200 ms twice as sure, and
-# the heading that gyros tell wanders by the white share only: 0.2 deg after 10 s (docs/explanation/estimation.md 9.2).
-_VIBRATION_TICKS, _WHITE_SHARE = 4, 0.28
-_Noise = tuple[float, float, float]
-_YAW_DRIFT_RAD_S = math.radians(0.0185)
+HEIGHT_CORRELATION_S = 2.0
+HEIGHT_WHITE_M = 0.005
+VELOCITY_CORRELATION_S = 0.4
+YAW_DRIFT_RAD_S = math.radians(0.0185)
 
 
 class Senses(Protocol):
@@ -79,17 +71,17 @@ class Onboard:
         self._lifted = self._jumped = False
         # Half of the variance is slow: noise that is white at 200 Hz would average out within a camera frame.
         self._white = scenario.velocity_noise_m_s * math.sqrt(0.5)
-        self._slow = tuple(GaussMarkov(self._white, _VELOCITY_CORRELATION_S, tick_s, draw) for _ in range(2))
+        self._slow = tuple(GaussMarkov(self._white, VELOCITY_CORRELATION_S, tick_s, draw) for _ in range(2))
         self._velocity: DelayLine[tuple[float, float]] = DelayLine(self.velocity_delay_s, tick_s, (0.0, 0.0))
         self._vertical: DelayLine[tuple[float, float]] = DelayLine(
             scenario.height_delay_ms / 1000, tick_s, (start.z, 0.0)
         )
-        slow_height = math.sqrt(max(0.0, scenario.height_noise_m**2 - _HEIGHT_WHITE_M**2))
-        self._height_error = GaussMarkov(slow_height, _HEIGHT_CORRELATION_S, _HEIGHT_TICKS * tick_s, draw)
+        slow_height = math.sqrt(max(0.0, scenario.height_noise_m**2 - HEIGHT_WHITE_M**2))
+        self._height_error = GaussMarkov(slow_height, HEIGHT_CORRELATION_S, HEIGHT_TICKS * tick_s, draw)
         tilt = math.radians(scenario.attitude_noise_deg)
         self._tilt_error = tuple(GaussMarkov(tilt, scenario.attitude_correlation_s, tick_s, draw) for _ in range(2))
         wander = math.radians(scenario.yaw_wander_deg)
-        self._shaken = tuple(Vibration(_VIBRATION_TICKS, _WHITE_SHARE, draw) for _ in range(3))
+        self._inertia = Inertia(draw)
         self._wander = GaussMarkov(wander, scenario.yaw_wander_correlation_s, tick_s, draw)
         self._yaw_offset -= self._wander.value
 
@@ -126,19 +118,16 @@ class Onboard:
             self.pitch += math.atan((c * air[0] + s * air[1]) / GRAVITY_M_S2)
             self.roll -= math.atan((c * air[1] - s * air[0]) / GRAVITY_M_S2)
         self._measure_yaw(body)
-        if motors_on and not body.on_ground:
-            self._measure_inertia(body, _FLYING, tuple(one.step() for one in self._shaken))
-        else:
-            self._measure_inertia(body, _IDLING if motors_on else _STILL, (draw(), draw(), draw()))
+        self.gyros, self.accelerometers = self._inertia.measure(body, motors_on)
         self.battery = drone.battery
         self._ticks += 1
 
     def _measure_height(self, body: Airframe, crosstalk: bool) -> None:
         height, climb = self._vertical.push((body.z - self.below_m, body.vz))
         self._lifted = self._lifted or height > _MAGNETOMETER_SEEN_M
-        if self._ticks % _HEIGHT_TICKS:
+        if self._ticks % HEIGHT_TICKS:
             return
-        error = self._height_error.step() + _HEIGHT_WHITE_M * self._draw()
+        error = self._height_error.step() + HEIGHT_WHITE_M * self._draw()
         if height <= STANDING_HEIGHT_M + 1e-6:
             self.height = self.vz = 0.0
             self.echo, self.rejected = GROUND_ECHO_M, 0
@@ -151,7 +140,7 @@ class Onboard:
             self.echo = GROUND_ECHO_M + (2.0 * height) * self._chance()
             if abs(self.echo - believed) > _BELIEVED_M and self.height > 0.0:
                 self.rejected += 1
-                self.height += self.vz * self._tick_s * _HEIGHT_TICKS
+                self.height += self.vz * self._tick_s * HEIGHT_TICKS
                 return
             believed = self.echo
         self.rejected = 0
@@ -161,14 +150,5 @@ class Onboard:
         if self._lifted and not self._jumped:
             self._jumped = True
             self._yaw_offset += self.yaw_jump_rad if self._magnetometer else 0.0
-        self._yaw_offset += _YAW_DRIFT_RAD_S * self._tick_s
+        self._yaw_offset += YAW_DRIFT_RAD_S * self._tick_s
         self.yaw = math.remainder(body.yaw + self._yaw_offset + self._wander.step(), math.tau)
-
-    def _measure_inertia(self, body: Airframe, noise: tuple[_Noise, _Noise], turned: tuple[float, ...]) -> None:
-        """Measure rates and specific force; turned: noise of the gyros of unit variance."""
-        draw, (rates, (sx, sy, sz)) = self._draw, noise
-        gx, gy, gz = (w + std * one for w, std, one in zip(body.body_rates(), rates, turned, strict=True))
-        self.gyros = (gx, gy, gz)
-        fx, fy, fz = (0.0, 0.0, GRAVITY_M_S2) if body.on_ground else body.specific_force()
-        gain = _ACCELEROMETER_GAIN
-        self.accelerometers = (gain * fx + sx * draw(), gain * fy + sy * draw(), gain * fz + sz * draw())

@@ -12,6 +12,7 @@ from drivers.mavlink.links.seam import Heard, Sniffer, ignore_bytes
 from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.frames import MAX_DATAGRAM, FrameDecoder, FrameEncoder, Message, ReceivedFrame, split
+from drivers.mavlink.wire.names import AUTOPILOT_COMPONENT
 from drivers.mavlink.wire.telemetry import OUR_HEARTBEAT
 from drivers.mavlink.wire.verification import Signing, old_sender
 from groundstation.adapters import Address, bind_to_adapter, split_zone
@@ -38,7 +39,8 @@ def _bind_as_ever(sock: socket.socket, target: str) -> None:
 class UdpLink:
     """Datagrams. `udpout` sends to one address; `udpin` waits for vehicles and keeps the address of each.
 
-    WIRE (docs/reference/mavlink.md 5.6): one socket for many vehicles needs an address per system id.
+    WIRE (docs/reference/mavlink.md 5.6): one socket for many vehicles needs an address per system id: that of its
+    autopilot.
     """
 
     def __init__(self, settings: LinkSettings, signing: Signing | None = None, sniffer: Sniffer = ignore_bytes) -> None:
@@ -97,7 +99,7 @@ class UdpLink:
                 frame = self._decode(raw)
                 if frame is None or (frame.system, frame.component) == self._own:
                     continue
-                if self._is_at(now_ns, frame.system, source):
+                if self._is_at(now_ns, frame, source):
                     self._sniffer(frame.system, now_ns, raw, True)
                     heard.append((Heard(now_ns, frame), raw))
         except WireError as error:
@@ -138,8 +140,14 @@ class UdpLink:
             self._reject(error.reason, str(error))
             return None
 
-    def _is_at(self, now_ns: int, system: int, source: tuple[str, int]) -> bool:
-        known = self._addresses.get(system)
+    def _is_at(self, now_ns: int, frame: ReceivedFrame, source: tuple[str, int]) -> bool:
+        system, known = frame.system, self._addresses.get(frame.system)
+        if frame.component != AUTOPILOT_COMPONENT:
+            # A camera or a computer on board may call from elsewhere: what flies is not there.
+            if known is not None and known[0] != source:
+                self._reject("other_component", f"{system}.{frame.component} at {source[0]}:{source[1]}")
+                return False
+            return True
         if known is not None and known[0] != source and now_ns - known[1] < _ADDRESS_HELD_NS:
             self._reject("duplicate_system", f"system {system} at {source[0]}:{source[1]} and {known[0]}")
             return False

@@ -149,6 +149,24 @@ def test_a_key_that_others_can_read_is_none(tmp_path, mode):
         signing_of(LinkSettings(target="udpout:127.0.0.1:1", key_file=str(key)))
 
 
+def test_a_companion_that_calls_from_elsewhere_does_not_take_the_address_of_its_autopilot():
+    """A camera or a computer on board has the system id of the vehicle: orders and failsafe words are not for it."""
+    link = UdpLink(LinkSettings(target="udpin:127.0.0.1:0"))
+    companion = FrameEncoder(11, 191).encode(telemetry.Heartbeat(18, 8, 0, 0, 4))
+    autopilot = FrameEncoder(11, 1).encode(telemetry.Heartbeat(2, 12, 1, 0, 3))
+    now = time.monotonic_ns()
+    link._judge(now, companion, ("127.0.0.3", 1))
+    assert link.called_from == ()
+    assert len(link._judge(now + 1, autopilot, ("127.0.0.2", 1))) == 1
+    assert link._judge(now + 2, companion, ("127.0.0.3", 1)) == []
+    assert link.called_from == (("127.0.0.2", 1),)
+    assert len(link._judge(now + 3, companion, ("127.0.0.2", 1))) == 1, "that of a vehicle's own router is heard"
+    link._judge(now + 4_000_000_000, companion, ("127.0.0.3", 1))
+    assert link.called_from == (("127.0.0.2", 1),), "not even while the autopilot is silent"
+    assert link.rejected == {"other_component": 2}
+    link.close()
+
+
 def test_duplicates_strangers_and_rubbish_are_refused_by_name():
     link = UdpLink(LinkSettings(target="udpin:127.0.0.1:0"))
     beat = FrameEncoder(11, 1).encode(telemetry.Heartbeat(2, 12, 1, 0, 3))

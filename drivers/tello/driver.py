@@ -49,8 +49,14 @@ class Heard:
 
     def airborne(self, now_ns: int) -> bool:
         """Return whether it flies, by its distance from the floor and its motors."""
-        high = self.state is not None and max(self.state.tof, self.state.height) >= _AIRBORNE_CM
-        return high or (self.motors_ns > 0 and now_ns - self.motors_ns < _MOTORS_NS)
+        return self._is_high or (self.motors_ns > 0 and now_ns - self.motors_ns < _MOTORS_NS)
+
+    @property
+    def _is_high(self) -> bool:
+        state = self.state
+        if state is None:
+            return False
+        return state.height >= _AIRBORNE_CM or _AIRBORNE_CM <= state.tof < text.NO_ECHO_CM
 
 
 def velocity_from_state(state: text.State) -> Vector3:

@@ -9,7 +9,18 @@ from contextlib import suppress
 
 import numpy as np
 
-from drivers.tello.wire.text import COMMAND_PORT, EMERGENCY, LAND, OK, SDK, STATE_PORT, STREAM_ON, TAKE_OFF, State
+from drivers.tello.wire.text import (
+    COMMAND_PORT,
+    EMERGENCY,
+    LAND,
+    NO_ECHO_CM,
+    OK,
+    SDK,
+    STATE_PORT,
+    STREAM_ON,
+    TAKE_OFF,
+    State,
+)
 from sim_bridge.devices.tello_text import STOP, STREAM_OFF, parse_rc, state_text
 from sim_bridge.launch_spec import LaunchSpec
 from sim_bridge.listening import open_udp
@@ -227,7 +238,7 @@ class TelloEmulator:
             roll=round(math.degrees(told.roll)),
             yaw=round(-math.degrees(math.remainder(told.yaw, math.tau))),
             velocity=(round(10 * north), round(-10 * west), round(-10 * told.vz)),
-            tof=max(10, round(100 * told.height)),
+            tof=max(10, round(100 * told.height)) if self._motor_ticks else NO_ECHO_CM,
             height=height,
             battery=round(100 * told.battery),
             time=round(self._motor_ticks * _TICK_S),

@@ -12,6 +12,8 @@ VIDEO_PORT = 11111
 SDK, TAKE_OFF, LAND, EMERGENCY = b"command", b"takeoff", b"land", b"emergency"
 STREAM_ON = b"streamon"
 OK = b"ok"
+# WIRE (docs/reference/tello.md 3): `tof` where nothing echoes, as over the floor that it stands on.
+NO_ECHO_CM = 6553
 _LARGEST = 1024
 
 
@@ -28,7 +30,8 @@ class State:
     """What the vehicle reports, in its own units.
 
     pitch, roll, yaw: degrees, yaw clockwise; velocity: dm/s along north-east-down axes in which yaw is 0; tof: distance
-    to the floor [cm]; height: above the take-off [cm]; battery [%]; time: of the motors [s]; acceleration [mg].
+    to the floor [cm], or NO_ECHO_CM; height: above the take-off [cm]; battery [%]; time: of the motors [s];
+    acceleration [mg].
     """
 
     pitch: int

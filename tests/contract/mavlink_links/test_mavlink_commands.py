@@ -156,13 +156,13 @@ def test_a_companion_that_calls_from_elsewhere_does_not_take_the_address_of_its_
     autopilot = FrameEncoder(11, 1).encode(telemetry.Heartbeat(2, 12, 1, 0, 3))
     now = time.monotonic_ns()
     link._judge(now, companion, ("127.0.0.3", 1))
-    assert link.called_from == ()
+    assert not link.called_from
     assert len(link._judge(now + 1, autopilot, ("127.0.0.2", 1))) == 1
     assert link._judge(now + 2, companion, ("127.0.0.3", 1)) == []
-    assert link.called_from == (("127.0.0.2", 1),)
+    assert list(link.called_from) == [("127.0.0.2", 1)]
     assert len(link._judge(now + 3, companion, ("127.0.0.2", 1))) == 1, "that of a vehicle's own router is heard"
     link._judge(now + 4_000_000_000, companion, ("127.0.0.3", 1))
-    assert link.called_from == (("127.0.0.2", 1),), "not even while the autopilot is silent"
+    assert list(link.called_from) == [("127.0.0.2", 1)], "not even while the autopilot is silent"
     assert link.rejected == {"other_component": 2}
     link.close()
 

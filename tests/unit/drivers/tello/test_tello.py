@@ -206,6 +206,16 @@ def test_the_fail_safe_lands_one_that_flies_away(rig):
     assert not rig.body.motors_on
 
 
+def test_one_that_stands_and_gets_no_echo_from_the_floor_does_not_count_as_airborne():
+    """As logs of several real vehicles have it before the first flight."""
+    said = (
+        b"mid:-1;x:0;y:0;z:0;mpry:0,0,0;pitch:0;roll:0;yaw:0;vgx:0;vgy:0;vgz:0;templ:59;temph:63;tof:6553;h:0;"
+        b"bat:91;baro:60.84;time:0;agx:-3.00;agy:14.00;agz:-1008.00;\r\n"
+    )
+    assert not Heard(1, 0, parse_state(said)).airborne(2_000_000_000)
+    assert Heard(1, 0, parse_state(said.replace(b"h:0", b"h:90"))).airborne(2_000_000_000)
+
+
 def test_a_vehicle_whose_motors_run_on_the_floor_counts_as_airborne():
     low = State(0, 0, 0, (0, 0, 0), 10, 0, 80, 3, (0.0, 0.0, -1000.0))
     assert Heard(1, 1_000_000_000, low).airborne(2_000_000_000)

@@ -16,12 +16,14 @@ from drivers.mavlink.wire.flight import OdometryMessage, command_to
 from drivers.mavlink.wire.frames import Message, id_of
 from drivers.mavlink.wire.names import AUTOPILOT_COMPONENT, Flavour, MavCmd
 from drivers.mavlink.wire.parameters import value_from_carried
-from groundstation.time_units import NS_PER_MS, NS_PER_S
+from groundstation.time_units import NEVER_NS, NS_PER_MS, NS_PER_S
 
 _ORIGIN_PERIOD_NS = 3 * NS_PER_S
 _PARAM_PERIOD_NS = 500 * NS_PER_MS
 _HEARTBEAT_NS = NS_PER_S
 _DISCONNECTED_NS = 2 * NS_PER_S
+# How long a stream may stay away, at least, before it is asked for anew; in periods of its own.
+_STREAM_NS, _PERIODS = 3 * NS_PER_S, 5
 _PARAM_BURST = 4
 _PARAM_TRIES = 20
 _ORIGIN_TRIES_PX4 = 5
@@ -54,7 +56,7 @@ def streams(flavour: Flavour, odometry_hz: float, imu_hz: float) -> dict[type[Me
 
 
 class MavlinkSession:
-    """What one vehicle still has to be asked; starts over when it was silent for 2 s.
+    """What one vehicle still has to be asked; starts over when it was silent for 2 s, or its clock began anew.
 
     problems: parameters that forbid a take-off. detail: what is waited for, or "". notes: for the operator; drained by
     the driver. overrides: parameters as the field file has them. pinned: the serial number of the only vehicle that
@@ -80,6 +82,7 @@ class MavlinkSession:
         self._comparison: tuple[list[str], list[str]] | None = None
         self._asked: set[str] = set()
         self._param_tries: Counter[str] = Counter()
+        self._stream_ns: dict[type[Message], int] = {}  # when it came last, or was asked for
         self._has_origin = False
         self._origin_tries = 0
         self._next_origin_ns = self._next_param_ns = self._next_heartbeat_ns = 0
@@ -133,6 +136,23 @@ class MavlinkSession:
             return f"reading parameter {name}"
         return f"it does not know parameter {name}: is its firmware {_CHECKED_WITH}?"
 
+    def hear(self, now_ns: int, kind: type[Message]) -> None:
+        """Note that a message of a kind came; from the reader's thread."""
+        if kind in self._rates:
+            self._stream_ns[kind] = now_ns
+
+    def start_over(self, requests: Requests) -> None:
+        """Forget what was asked and told: the vehicle was silent, or was restarted."""
+        if not self._connected:
+            return
+        self._connected, self._has_origin, self._origin_tries = False, False, 0
+        self._found.clear()
+        self._comparison = None
+        self._param_tries.clear()
+        self._stream_ns.clear()
+        self._version, self._version_tries, self._serial_number = None, 0, ""
+        requests.forget()
+
     def hear_parameter(self, message: service.ParamValue) -> None:
         """Take a parameter's value; raises WireError."""
         if message.param_id in self._by_name:
@@ -167,22 +187,24 @@ class MavlinkSession:
             self._next_heartbeat_ns = now_ns + _HEARTBEAT_NS
             messages.append(telemetry.OUR_HEARTBEAT)
         if silence_ns > _DISCONNECTED_NS:
-            if self._connected:
-                self._connected, self._has_origin, self._origin_tries = False, False, 0
-                self._found.clear()
-                self._comparison = None
-                self._param_tries.clear()
-                self._version, self._version_tries, self._serial_number = None, 0, ""
-                requests.forget()
+            self.start_over(requests)
             return messages
         self._connected = True
-        for kind, rate_hz in self._rates.items():
-            if (key := self._key(kind)) not in requests.accepted:
-                # WIRE (SET_MESSAGE_INTERVAL): microseconds; -1 stops the stream.
-                interval_us = 1e6 / rate_hz if rate_hz > 0.0 else -1.0
-                requests.ask(now_ns, key, MavCmd.SET_MESSAGE_INTERVAL, float(id_of(kind)), interval_us)
-                break
+        kind = next((one for one in self._rates if self._key(one) not in requests.accepted), None)
+        if (kind := kind or self._ended(now_ns)) is not None:
+            # WIRE (SET_MESSAGE_INTERVAL): microseconds; -1 stops the stream.
+            interval_us = 1e6 / rate_hz if (rate_hz := self._rates[kind]) > 0.0 else -1.0
+            requests.ask(now_ns, self._key(kind), MavCmd.SET_MESSAGE_INTERVAL, float(id_of(kind)), interval_us)
+            self._stream_ns[kind] = now_ns
         return messages + self._service(now_ns)
+
+    def _ended(self, now_ns: int) -> type[Message] | None:
+        """Return a stream that was granted and does not come: it may have been meant by nobody, or taken back."""
+        for kind, rate_hz in self._rates.items():
+            patience_ns = max(_STREAM_NS, round(_PERIODS * NS_PER_S / rate_hz)) if rate_hz > 0.0 else NEVER_NS
+            if now_ns - self._stream_ns.get(kind, now_ns) > patience_ns:
+                return kind
+        return None
 
     def _service(self, now_ns: int) -> list[Message]:
         messages: list[Message] = []

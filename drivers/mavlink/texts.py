@@ -54,10 +54,12 @@ def _age(at_ns: int, now_ns: int | None) -> str:
 class BootClock:
     """Compares a vehicle's time since power-on with our own clock.
 
-    Its stamps are used for nothing else: what is measured is stamped when it arrives.
+    Its stamps are used for nothing else: what is measured is stamped when it arrives. restarted: its clock began anew
+    since somebody last set this to False.
     """
 
     def __init__(self) -> None:
+        self.restarted = False
         self._last: tuple[int, int] | None = None
 
     def hear(self, now_ns: int, boot_ms: int) -> int:
@@ -65,5 +67,6 @@ class BootClock:
         before, self._last = self._last, (now_ns, boot_ms)
         if before is None:
             return 0
+        self.restarted = self.restarted or boot_ms < before[1] - _JUMP_MS
         jump = boot_ms - before[1] - (now_ns - before[0]) // 1_000_000
         return jump if abs(jump) > _JUMP_MS else 0

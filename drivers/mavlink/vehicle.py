@@ -89,6 +89,7 @@ class MavlinkVehicle:
 
     def _take(self, now_ns: int, message: tuple[object, ...]) -> None:
         known = replace(self.telemetry, heard_ns=now_ns)
+        self._session.hear(now_ns, type(message))
         match message:
             case telemetry.LocalPositionNed():
                 known = self._moved(now_ns, message, known)
@@ -226,6 +227,9 @@ class MavlinkVehicle:
         known = self.telemetry
         self._take_answers(now_ns)
         silence_ns = now_ns - known.heard_ns if known.heartbeat_ns else NEVER_NS
+        if self._boot_clock.restarted and not known.base_mode & ARMED:
+            self._boot_clock.restarted = False
+            self._session.start_over(self._requests)  # origin and parameters went, though it was hardly silent
         messages = self._session.step(now_ns, silence_ns, self._requests)
         messages += self._feed(now_ns, known)
         up = (known.position_m[2] if known.position_m else 0.0, known.velocity_m_s[2])

@@ -9,8 +9,8 @@ from drivers.host import VehicleHost, sleep_serving
 from drivers.mavlink.vehicle import MavlinkVehicle
 from drivers.mavlink.wire.flight import CommandLong, OdometryMessage, SetPositionTargetLocalNed
 from drivers.mavlink.wire.names import CopterMode, Flavour, Px4Auto, Px4Main, px4_mode
-from drivers.mavlink.wire.service import SetGpsGlobalOrigin, Timesync
-from drivers.mavlink.wire.telemetry import Attitude, GpsGlobalOrigin, LocalPositionNed
+from drivers.mavlink.wire.service import ParamRequestRead, SetGpsGlobalOrigin, Timesync
+from drivers.mavlink.wire.telemetry import Attitude, GpsGlobalOrigin, Heartbeat, LocalPositionNed
 from groundstation.bus.messages import Verb
 from groundstation.bus.topics import COMMAND_ACK, IMU, ODOMETRY, VEHICLE_STATUS
 
@@ -281,6 +281,21 @@ def test_a_vehicles_clock_that_jumps_is_named_and_moves_nothing(rig, jump_s):
     assert any(f"its clock jumped by {jump_s} s" in text for text in rig.texts)
     rig.order(Verb.LAND)
     rig.until(lambda: rig.mode == "LANDED")
+
+
+def test_a_standing_vehicle_that_restarts_within_a_moment_is_asked_for_everything_anew(rig):
+    """Its heartbeats hardly pause: streams, origin and parameters went all the same."""
+    rig.connect()
+    rig.run(8.0)
+    before = len(rig.sent(ParamRequestRead))
+    speaker, tell, began = rig.emulator.speaker, rig.emulator.speaker.local_position, rig.hand.now
+    rig.emulator.services.intervals = {Heartbeat: 200}
+    speaker.builders[LocalPositionNed] = lambda: (
+        (m := tell()) and m._replace(time_boot_ms=(rig.hand.now - began) // 1_000_000)
+    )
+    rig.run(1.0)
+    assert not rig.vehicle.view(rig.hand.now).fresh or rig.vehicle.view(rig.hand.now).not_ready
+    rig.until(lambda: len(rig.sent(ParamRequestRead)) > before and not rig.vehicle.view(rig.hand.now).not_ready, 20.0)
 
 
 def test_a_px4_that_no_longer_asks_for_our_time_is_told(rig):

@@ -5,10 +5,12 @@ from drivers.mavlink.parameters import needed
 from drivers.mavlink.requests import Requests
 from drivers.mavlink.session import MavlinkSession
 from drivers.mavlink.settings import GlobalOrigin
+from drivers.mavlink.wire.flight import CommandAckMessage
+from drivers.mavlink.wire.frames import id_of
 from drivers.mavlink.wire.names import Flavour
 from drivers.mavlink.wire.parameters import REAL32
 from drivers.mavlink.wire.service import ParamRequestRead, ParamValue
-from drivers.mavlink.wire.telemetry import AutopilotVersion
+from drivers.mavlink.wire.telemetry import Attitude, AutopilotVersion, BatteryStatus, ExtendedSysState
 
 MS = 1_000_000
 
@@ -91,3 +93,52 @@ def test_no_version_told_at_all_is_another_version() -> None:
     session = read_all({"FS_EKF_ACTION"}, 20.0)
     session.hear_origin()
     assert session.detail(Requests(1)) == ""
+
+
+class Streamer:
+    """A vehicle that grants each stream, and sends those that it is not told to keep back."""
+
+    def __init__(self) -> None:
+        rates: dict[type, float] = {ExtendedSysState: 5.0, BatteryStatus: 1.0, Attitude: 0.0}
+        self.session, self.requests = MavlinkSession(1, Flavour.PX4, rates, 255, GlobalOrigin()), Requests(1)
+        self.asked: list[int] = []
+        self.kept_back: set[type] = set()
+        self._turn = 0
+
+    def live(self, seconds: float) -> list[int]:
+        """Return the numbers of the messages whose rate was asked for meanwhile."""
+        before = len(self.asked)
+        for _ in range(round(seconds * 50)):
+            self._turn += 1
+            now_ns = 10_000 * MS + self._turn * 20 * MS
+            for kind in {ExtendedSysState, BatteryStatus} - self.kept_back:
+                if self._turn % 10 == 0:
+                    self.session.hear(now_ns, kind)
+            self.session.step(now_ns, 0, self.requests)
+            for command in self.requests.due(now_ns):
+                self.asked.append(int(command.param1))
+                self.requests.answer(now_ns, CommandAckMessage(command.command, 0))
+        return self.asked[before:]
+
+
+def test_a_stream_that_does_not_come_or_has_ended_is_asked_for_again() -> None:
+    """A restart of less than 2 s, another station's rates, or an answer that was another request's: no silence."""
+    vehicle = Streamer()
+    vehicle.kept_back = {ExtendedSysState}  # granted, as far as the answer tells
+    assert sorted(vehicle.live(2.0)) == sorted(map(id_of, (ExtendedSysState, BatteryStatus, Attitude)))
+    assert vehicle.live(10.0).count(id_of(ExtendedSysState)) >= 2
+    vehicle.kept_back.clear()
+    vehicle.live(1.0)
+    assert vehicle.live(20.0) == [], "what comes is not asked for"
+    vehicle.kept_back = {BatteryStatus}
+    assert set(vehicle.live(8.0)) == {id_of(BatteryStatus)}
+    assert "asking for" not in vehicle.session.detail(vehicle.requests), "it stays as ready as it was"
+
+
+def test_after_a_restart_everything_is_asked_for_anew() -> None:
+    vehicle = Streamer()
+    vehicle.live(3.0)
+    vehicle.session.hear_origin()
+    vehicle.session.start_over(vehicle.requests)
+    assert vehicle.session.detail(vehicle.requests) == "waiting for its heartbeat"
+    assert sorted(vehicle.live(4.0)) == sorted(map(id_of, (ExtendedSysState, BatteryStatus, Attitude)))

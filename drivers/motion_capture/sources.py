@@ -67,7 +67,8 @@ class NatnetSource:
         self._frames: socket.socket | None = None
         self._server: natnet.Server | None = None
         self._names: dict[int, str] = {}
-        self._asked_ns = self._alive_ns = 0
+        self._asks = True  # names are missing, or may be other bodies' by now
+        self._asked_ns = self._alive_ns = self._framed_ns = 0
 
     def poll(self, wait_s: float) -> list[CapturedFrame]:
         """Return the frames that came, the oldest first; asks for whatever is missing once a second."""
@@ -83,7 +84,9 @@ class NatnetSource:
             self._frames.close()
 
     def _ask(self, now_ns: int) -> None:
-        if now_ns - self._asked_ns >= _ASK_AGAIN_NS and not self._names:
+        # A system that was started anew knows no client: it streams to none that does not ask.
+        asks = self._asks or now_ns - self._framed_ns >= _ASK_AGAIN_NS
+        if asks and now_ns - self._asked_ns >= _ASK_AGAIN_NS:
             self._asked_ns = now_ns
             self._send(natnet.connect_request())
             self._send(natnet.encode(natnet.REQUEST_DESCRIPTIONS))
@@ -120,6 +123,7 @@ class NatnetSource:
             self._greet(natnet.decode_server(payload))
         elif kind == natnet.DESCRIPTIONS and self._server is not None:
             self._names = natnet.decode_descriptions(payload, self._server.version)
+            self._asks = not self._names
         elif kind == natnet.FRAME and self._server is not None:
             return self._captured(natnet.decode_frame(payload, self._server.version), self._server)
         return None
@@ -143,6 +147,8 @@ class NatnetSource:
         return frames
 
     def _captured(self, frame: natnet.Frame, server: natnet.Server) -> CapturedFrame:
+        self._framed_ns = clock.now_ns()
+        self._asks = self._asks or frame.changed or any(body.id not in self._names for body in frame.bodies)
         ticks = frame.sent - frame.exposed
         processing_ns = ticks * NS_PER_S // server.ticks_per_s if frame.exposed and server.ticks_per_s else 0
         named = {self._names.get(body.id, str(body.id)): body for body in frame.bodies}

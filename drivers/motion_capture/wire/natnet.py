@@ -18,6 +18,7 @@ _SERVER = struct.Struct("<256s4B4BQH?4B")
 _TAIL = {False: struct.Struct("<dQQQhi"), True: struct.Struct("<dQQQIIhi")}
 _NAME_BYTES, _POINT_BYTES, _LABEL_BYTES = 256, 12, 4
 _MARKER_SET, _RIGID_BODY = 0, 1
+_CHANGED = 2  # of a frame's flags
 _MOST = 10_000
 
 
@@ -55,12 +56,16 @@ class Body:
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """All rigid bodies of one exposure; exposed, sent: the server's ticks at the middle of the exposure, at sending."""
+    """All rigid bodies of one exposure; exposed, sent: the server's ticks at the middle of the exposure, at sending.
+
+    changed: other bodies are described since the frame before.
+    """
 
     number: int
     bodies: tuple[Body, ...]
     exposed: int = 0
     sent: int = 0
+    changed: bool = False
 
 
 def message_of(datagram: bytes) -> tuple[int, bytes]:
@@ -168,7 +173,7 @@ def decode_frame(payload: bytes, version: Version) -> Frame:
     *_, end = values = tail.unpack_from(payload, len(payload) - tail.size)
     if end != 0:
         raise WireError("end")
-    return Frame(number, bodies, values[1], values[3])
+    return Frame(number, bodies, values[1], values[3], bool(values[-2] & _CHANGED))
 
 
 def _body(reader: _Reader) -> Body:
@@ -189,7 +194,8 @@ def encode_frame(frame: Frame, version: Version) -> bytes:
     )
     timecode = struct.pack("<II", 0, 0)
     precision = (0, 0) if sized else ()
-    tail = _TAIL[sized].pack(frame.number / 100, frame.exposed, frame.exposed, frame.sent, *precision, 0, 0)
+    flags = _CHANGED if frame.changed else 0
+    tail = _TAIL[sized].pack(frame.number / 100, frame.exposed, frame.exposed, frame.sent, *precision, flags, 0)
     return encode(FRAME, _COUNT.pack(frame.number) + sections + timecode + tail)
 
 

@@ -3,7 +3,7 @@
 import socket
 import sys
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -179,6 +179,30 @@ def test_strangers_and_noise_are_counted(rig) -> None:
     rig.system._socket.sendto(b"\x07", (HOST, port))
     rig.run(5)
     assert rig.driver._source.rejected == {"stranger": 1, "short": 1}
+
+
+def test_a_system_that_was_started_anew_is_asked_again(rig) -> None:
+    rig.run(60)
+    rig.system._heard.clear()
+    assert told(rig.run(30), BodyPoses) == [], "it streams to nobody who did not ask"
+    rig.run(120)
+    assert told(rig.run(30), BodyPoses)
+
+
+def test_names_that_the_system_changes_are_asked_for_anew(rig) -> None:
+    """As in Motive, where the operator ticks another set of bodies: two exchange their ids, one is new."""
+    rig.run(60)
+    rig.system._ids = {"drone_1": 2, "drone_2": 1}
+    frame_of = rig.system._frame
+    rig.system._frame = lambda now_s: replace(frame_of(now_s), changed=True)
+    rig.run(1)
+    rig.system._frame = frame_of
+    rig.run(120)
+    seen = [one for one in told(rig.run(30), RelativeObservation) if one.subject == "drone_1"]
+    assert seen and np.allclose(np.mean([one.position_m for one in seen], axis=0), (0.5, 0.2, 1.58), atol=0.01)
+    rig.system._ids = {"drone_1": 7, "drone_2": 1}
+    rig.run(150)
+    assert {body.name for body in told(rig.run(10), BodyPoses)[-1].bodies} == set(PLACES)
 
 
 def test_a_system_that_never_answers_is_told_with_its_address(monkeypatch) -> None:

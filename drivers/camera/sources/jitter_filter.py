@@ -13,6 +13,8 @@ from groundstation.time_units import NS_PER_S
 _FRAMES = 151
 # A sender that was started anew, or whose clock is of no use.
 _JUMP_NS = 5 * NS_PER_S
+# No picture comes so much sooner than is usual: the sender's clock was put forward.
+_EARLY_NS = NS_PER_S
 
 
 class SenderClock:
@@ -32,7 +34,8 @@ class SenderClock:
         newest = sent_ns[-1]
         offset = arrival_ns - newest
         stands = self._last_sent_ns is not None and newest <= self._last_sent_ns
-        if stands or (self._offsets and abs(offset - self._usual_ns) > _JUMP_NS):
+        late_ns = offset - self._usual_ns
+        if stands or (self._offsets and not -_EARLY_NS <= late_ns <= _JUMP_NS):
             self._offsets.clear()
         self._last_sent_ns = newest
         self._offsets.append(offset)

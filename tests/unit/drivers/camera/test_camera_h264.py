@@ -162,6 +162,16 @@ def test_frames_that_waited_together_say_nothing_of_the_delay_but_the_last():
     assert settled == [760 * MS, 826 * MS, 892 * MS]
 
 
+def test_a_clock_that_is_put_forward_a_little_is_learnt_anew_at_once():
+    """By two seconds, as by a camera that gets the time from the network: its pictures were dated by their arrival."""
+    clock = SenderClock()
+    for index in range(100):
+        clock.settle([index * 66 * MS], (index * 66 + 100) * MS)
+    late = [clock.settle([(index * 66 + 2000) * MS], (index * 66 + 100 + extra) * MS)[0] - index * 66 * MS
+            for index, extra in zip(range(100, 106), (0, 0, 60, 0, 0, 60), strict=True)]  # fmt: skip
+    assert late == [100 * MS] * 6, "free of the network's jitter again"
+
+
 def test_a_clock_that_jumps_or_stands_still_is_not_believed():
     clock = SenderClock()
     clock.settle([5000 * MS], 100_000 * MS)

@@ -6,11 +6,10 @@ No pymavlink here: the guardian is small. Reason for all of it: docs/decisions/0
 import json
 import os
 import socket
-import termios
 import time
 from collections.abc import Sequence
 
-from drivers.mavlink.links.tty import make_raw
+from drivers.mavlink.links.tty import open_raw
 from drivers.mavlink.signing_key import read_key
 from drivers.mavlink.wire.signature import signed_anew, stamp_at
 from groundstation.adapters import Address, bind_to_adapter, send_to_all
@@ -42,22 +41,26 @@ class MavlinkVoice:
             self._stamp = max(self._stamp, stamp_at(time.time()))
             datagram, self._stamp = signed_anew(datagram, self._key, self._speaker, self._stamp)
         if self._socket is None:
-            os.write(self._line(), datagram)
+            self._write(datagram)
             return
         send_to_all(self._socket, datagram, addresses)
 
-    def _line(self) -> int:
-        """Open the device beside the driver that hangs, or after it; a device may be opened twice."""
+    def _write(self, datagram: bytes) -> None:
+        """Write into the device, opened beside the driver that hangs, or after it; one that fails is opened anew."""
         if self._fd < 0:
             device, _, baud = self._serial.partition(":")
-            fd = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
             try:
-                make_raw(fd, int(baud))
-            except (termios.error, DriverError) as error:
-                os.close(fd)
-                raise OSError(f"cannot use {device}: {error}") from error
-            self._fd = fd
-        return self._fd
+                self._fd = open_raw(device, int(baud))
+            except DriverError as error:
+                raise OSError(str(error)) from error
+        try:
+            os.write(self._fd, datagram)
+        except BlockingIOError:
+            raise  # full, and whole
+        except OSError:
+            os.close(self._fd)
+            self._fd = -1
+            raise
 
     def close(self) -> None:
         """Release the socket or device; idempotent."""

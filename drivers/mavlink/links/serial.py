@@ -2,12 +2,12 @@
 
 import os
 import select
-import termios
 import threading
 from collections import Counter
+from contextlib import suppress
 
 from drivers.mavlink.links.seam import Heard, Sniffer, ignore_bytes
-from drivers.mavlink.links.tty import make_raw
+from drivers.mavlink.links.tty import open_raw
 from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder, Message
@@ -47,7 +47,7 @@ class StreamCutter:
 
 
 class SerialLink:
-    """A terminal device, raw, 8N1."""
+    """A terminal device, raw, 8N1; one that fails is opened anew, ten times a second."""
 
     def __init__(self, settings: LinkSettings, signing: Signing | None = None, sniffer: Sniffer = ignore_bytes) -> None:
         _, device, baud = settings.target.split(":")
@@ -56,15 +56,9 @@ class SerialLink:
         self._decoder = FrameDecoder(signing)
         self._encoder = FrameEncoder(settings.system_id, settings.component_id, signing)
         self._cutter, self._lock, self._sniffer = StreamCutter(), threading.RLock(), sniffer
-        try:
-            self._fd = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-        except OSError as error:
-            raise DriverError(f"cannot open {device}: {error.strerror}") from error
-        try:
-            make_raw(self._fd, int(baud))
-        except (termios.error, DriverError) as error:
-            os.close(self._fd)
-            raise DriverError(f"cannot use {device} at {baud} baud: {error}") from error
+        self._closed = False
+        self._device, self._baud = device, int(baud)
+        self._fd = open_raw(self._device, self._baud)
 
     @property
     def called_from(self) -> tuple[Address, ...]:
@@ -82,11 +76,12 @@ class SerialLink:
             if not ready:
                 return []
             data = os.read(self._fd, _CHUNK)
-        except OSError:
+        except (OSError, ValueError):  # ValueError: it was unplugged, and is not back yet
             data = b""
         if not data:  # an unplugged radio fails, or ends, at once and for ever: do not spin
             self.rejected["receive_failed"] += 1
             select.select([], [], [], _POLL_S)
+            self._open_anew()
             return []
         now_ns, heard = clock.now_ns(), list[tuple[Heard, bytes]]()
         for raw in self._cutter.feed(data):
@@ -99,6 +94,21 @@ class SerialLink:
                 self._sniffer(frame.system, now_ns, raw, True)
                 heard.append((Heard(now_ns, frame), raw))
         return heard
+
+    def _open_anew(self) -> None:
+        """Open the device once more: a radio that was plugged in again, or whose supply broke down, is another one."""
+        with self._lock:
+            if self._closed:
+                return
+            self._release()
+            with suppress(DriverError):
+                self._fd = open_raw(self._device, self._baud)
+        self._cutter = StreamCutter()
+
+    def _release(self) -> None:
+        if self._fd >= 0:
+            os.close(self._fd)
+        self._fd = -1
 
     def send(self, system: int, message: Message) -> None:
         """Write one frame; a line that is too slow loses it."""
@@ -117,4 +127,6 @@ class SerialLink:
 
     def close(self) -> None:
         """Close the device."""
-        os.close(self._fd)
+        with self._lock:
+            self._closed = True
+            self._release()

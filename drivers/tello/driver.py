@@ -21,6 +21,8 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 RATE_HZ = 20.0
 _FRESH_NS = 300 * NS_PER_MS
+# A take-off that is called off may begin for so long after it was ordered.
+_BEGINS_NS = 5 * NS_PER_S
 # The motors' time is told in whole seconds.
 _MOTORS_NS = 1_300 * NS_PER_MS
 _AIRBORNE_CM = 20
@@ -156,6 +158,8 @@ class Tello(DatagramVehicle):
                 self._link.send(now_ns, self._sticks(decision))
             case Action.HOVER | Action.TAKE_OFF if flies:
                 self._link.send(now_ns, text.rc(0, 0, 0, 0))
+            case Action.IDLE if now_ns - self._sent_ns.get(text.TAKE_OFF, -_BEGINS_NS) < _BEGINS_NS:
+                self._repeat(now_ns, text.LAND)
             case _:
                 self._repeat(now_ns, text.SDK)
         if not self._ready:

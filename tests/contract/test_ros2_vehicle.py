@@ -95,6 +95,18 @@ def test_it_flies_by_topics_and_by_services(room: Room) -> None:
     assert topics == {ODOMETRY, RAW_RX, RAW_TX}
 
 
+def test_a_take_off_that_is_called_off_is_followed_by_land() -> None:
+    room = Room()
+    try:
+        room.until(room.ready)
+        room.until(lambda: room.body.motors_on, Action.TAKE_OFF)
+        assert room.state is FlightState.LANDED, "it has not risen yet"
+        room.until(lambda: not room.body.motors_on, Action.IDLE)
+        assert room.body.airframe.z < 0.3
+    finally:
+        room.close()
+
+
 def test_the_voice_of_a_dead_driver_stops_and_lands_it() -> None:
     room = Room()
     voice = Ros2Voice(room.settings.model_dump_json(), 3)

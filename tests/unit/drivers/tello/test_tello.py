@@ -154,6 +154,21 @@ def test_it_says_when_it_hovers(flight):
     assert flight.told(Action.CUT, state=still)[0] == b"emergency"
 
 
+def test_a_take_off_that_is_called_off_is_followed_by_land(flight):
+    """It stands still when it is told, and would rise all the same."""
+    standing = dataclasses.replace(STATE, tof=10, height=0, time=0)
+    flight.tello.heard = Heard(1, 0, standing)
+
+    def told(action: Action) -> bytes:
+        flight.tello.apply(time.monotonic_ns(), WatchdogDecision(DriverMode.LANDED, action))
+        return next(word for word in iter(lambda: flight.heard.recv(64), b"") if word != b"streamon")
+
+    flight.tello._ready = True
+    assert told(Action.IDLE) == b"command"
+    assert told(Action.TAKE_OFF) == b"takeoff"
+    assert told(Action.IDLE) == b"land"
+
+
 def test_it_flies_only_after_it_was_greeted(rig):
     rig.say(b"takeoff", 1.0)
     assert not rig.body.motors_on

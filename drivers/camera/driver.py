@@ -13,7 +13,7 @@ from drivers.camera.context import Surroundings
 from drivers.camera.picture_quality import quality_of
 from drivers.camera.pipeline import Pipeline
 from drivers.camera.settings import CameraDriverSettings
-from drivers.camera.sources.frames import FrameSource, Packet, Unit
+from drivers.camera.sources.frames import GREY_AS_EXPOSED, FrameSource, Packet, Unit
 from drivers.camera.sources.opening import open_source
 from drivers.stream_health import StreamHealth, StreamNames
 from drivers.thinning import Grid
@@ -121,7 +121,7 @@ class CameraDriver:
         size = whole_size(packet.data)
         if size is not None and not self._has_size(*size, packet):
             return None
-        decoded = cv2.imdecode(np.frombuffer(packet.data, np.uint8), cv2.IMREAD_GRAYSCALE) if size else None
+        decoded = cv2.imdecode(np.frombuffer(packet.data, np.uint8), GREY_AS_EXPOSED) if size else None
         if decoded is None:
             self.counts["jpeg"] += 1
             return None

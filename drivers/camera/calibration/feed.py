@@ -8,7 +8,7 @@ import numpy as np
 
 from drivers.camera.settings import SourceKind, parse_source
 from drivers.camera.sources.files import FileReader
-from drivers.camera.sources.frames import FrameSource, Packet
+from drivers.camera.sources.frames import GREY_AS_EXPOSED, FrameSource, Packet
 from drivers.camera.sources.opening import open_source
 from groundstation.arrays import Image
 from groundstation.bus import clock
@@ -94,7 +94,7 @@ def _grey(packet: Packet) -> Image | None:
 def decoded(data: bytes) -> Image | None:
     """Return the brightness (h, w) of a picture as it is stored or sent, such as a JPEG; None where it is none."""
     try:
-        grey = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE) if data else None
+        grey = cv2.imdecode(np.frombuffer(data, np.uint8), GREY_AS_EXPOSED) if data else None
     except cv2.error:  # one that claims to be huge
         return None
     return None if grey is None else np.asarray(grey, dtype=np.uint8)

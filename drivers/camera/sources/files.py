@@ -57,7 +57,7 @@ class FileReader:
         shown = 0
         for path in paths:
             try:
-                pixels = cv2.imread(str(path), cv2.IMREAD_COLOR)
+                pixels = cv2.imread(str(path), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
             except cv2.error:  # one that claims to be huge
                 pixels = None
             if pixels is None:

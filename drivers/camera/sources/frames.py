@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from groundstation.arrays import Image
 
+# A lens is calibrated for the rows and columns of its sensor, however a picture asks to be turned for the eye (EXIF).
+GREY_AS_EXPOSED = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION
 _JPEG_QUALITY = (cv2.IMWRITE_JPEG_QUALITY, 80)
 
 

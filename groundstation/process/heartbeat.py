@@ -17,9 +17,9 @@ from groundstation.errors import GroundStationError
 from groundstation.time_units import NS_PER_S
 
 SUPERVISOR_SLOT = 0
-_WORDS_PER_SLOT = 16  # whole cache lines, so that two beating processes never share one
+_WORDS_PER_SLOT = 64  # whole cache lines, so that two beating processes never share one
 _STAMP, _STATE, _PID, _WORKED, _ENDED, _SILENT_SINCE, _CLOCK_OFFSET = 0, 1, 2, 3, 4, 5, 6
-_ADDRESSES, MOST_ADDRESSES = 8, 8
+_ADDRESSES, MOST_ADDRESSES = 8, 56  # more than a team has
 _LEFT_BEHIND_NS = 10 * NS_PER_S
 
 
@@ -92,7 +92,7 @@ class HeartbeatBlock:
         self._words[slot * _WORDS_PER_SLOT + _SILENT_SINCE] = since_ns
 
     def set_addresses(self, slot: int, addresses: Sequence[tuple[str, int]]) -> None:
-        """Record where the vehicles of a slot's holder were heard last (IPv4, port): the first eight of them."""
+        """Record where vehicles of a slot's holder were heard last (IPv4, port): the first MOST_ADDRESSES of them."""
         base = slot * _WORDS_PER_SLOT + _ADDRESSES
         for index in range(MOST_ADDRESSES):
             address = addresses[index] if index < len(addresses) else ("0.0.0.0", 0)

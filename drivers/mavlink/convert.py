@@ -32,6 +32,7 @@ _RAD_S_FROM_MRAD_S = 0.001
 # Beyond these nothing is a measurement of an indoor vehicle.
 _MOST_M_S, _MOST_RAD_S, _MOST_M_S2, _MOST_M = 30.0, 60.0, 400.0, 10_000.0
 _STILL_M_S = 0.15
+_IN_EMERGENCY, _POWEROFF = 6, 7  # MAV_STATE; 8 is FLIGHT_TERMINATION
 # An estimator may be reset once by the first position that it is fed; time_boot_ms wraps after 49 days.
 LIMITS = PlausibilityLimits(speed_m_s=8.0, tilt_rad=math.radians(50.0), jump_m_s=0.6)
 
@@ -123,9 +124,11 @@ def flight_state_from(flavour: Flavour, base_mode: int, custom_mode: int, status
     """
     if not base_mode & ARMED:
         return FlightState.LANDED
-    if status >= 6:  # EMERGENCY, POWEROFF, FLIGHT_TERMINATION
+    if status >= _POWEROFF:
         return FlightState.EMERGENCY
-    if landed == Landed.LANDING or (landed == Landed.IN_AIR and custom_mode == land_mode(flavour)):
+    # WIRE (docs/reference/mavlink.md 5.2): one in an emergency lands by itself: it must not fall for that.
+    lands = custom_mode == land_mode(flavour) or status == _IN_EMERGENCY
+    if landed == Landed.LANDING or (landed == Landed.IN_AIR and lands):
         return FlightState.LANDING
     if landed == Landed.IN_AIR:
         return FlightState.FLYING

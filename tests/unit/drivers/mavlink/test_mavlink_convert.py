@@ -89,6 +89,8 @@ def test_nonsense_is_refused(value):
         (129, 4 << 16 | 6 << 24, 4, 4, "LANDING"),
         (129, 4 << 16 | 6 << 24, 4, 1, "LANDING"),
         (129, 6 << 16, 8, 2, "EMERGENCY"),
+        (129, 4 << 16 | 8 << 24, 6, 2, "LANDING"),  # of itself, without a position: motors cut now would drop it
+        (129, 4 << 16 | 8 << 24, 6, 1, "LANDED"),
     ],
 )
 def test_flight_state_of_px4(base, mode, status, landed, state):

@@ -72,7 +72,8 @@ class Requests:
             return
         key, request = sent[0], self._open[sent[0]]
         if ack.result == MavResult.IN_PROGRESS:
-            request.due_ns = now_ns + _RETRY_NS
+            # It was heard: none of its tries was in vain. It is said again all the same, for it may be a stop.
+            request.due_ns, request.tries = now_ns + _RETRY_NS, 1
             return
         del self._open[key]
         self._quiet_until_ns[key] = now_ns + _SETTLE_NS

@@ -6,11 +6,13 @@ without Content-Length, any number of blank lines between parts.
 
 import re
 
+from groundstation.bus.jpeg import has_ended
+
 MAX_FRAME_BYTES = 8 << 20
 _MAX_HEAD_BYTES = 4096
 _LENGTH = re.compile(rb"^content-length:[ \t]*(\d{1,9})[ \t]*$", re.IGNORECASE | re.MULTILINE)
 _BOUNDARY = re.compile(rb"multipart/[a-z-]+[^\r\n]*boundary=\"?([^\r\n\";]+)", re.IGNORECASE)
-_JPEG_START = b"\xff\xd8"
+_JPEG_START, _JPEG_END = b"\xff\xd8", b"\xff\xd9"
 
 
 def boundary_from_head(head: bytes) -> bytes | None:
@@ -64,6 +66,7 @@ class MultipartParser:
         if length is None:
             end = self._buffer.find(self._mark, body)
             if end < 0:
+                self._take_ended(body, frames)
                 return False
             self._emit(bytes(self._buffer[body:end]).rstrip(b"\r\n-"), end, frames)
             return True
@@ -76,6 +79,11 @@ class MultipartParser:
             return False
         self._emit(bytes(self._buffer[body:end]), end, frames)
         return True
+
+    def _take_ended(self, body: int, frames: list[bytes]) -> None:
+        """Take a picture whose end is here, though not the boundary behind it: that may come with the next picture."""
+        if self._buffer[-4:].rstrip(b"\r\n").endswith(_JPEG_END) and has_ended(data := bytes(self._buffer[body:])):
+            self._emit(data.rstrip(b"\r\n"), len(self._buffer), frames)
 
     def _emit(self, body: bytes, end: int, frames: list[bytes]) -> None:
         if body.startswith(_JPEG_START):

@@ -1,5 +1,8 @@
 """The multipart reader on hand-made bytes of several kinds of cameras, and on what no camera should send."""
 
+import cv2
+import numpy as np
+
 from drivers.camera.multipart import MAX_FRAME_BYTES, MultipartParser, boundary_from_head
 
 JPEG = b"\xff\xd8 first picture \xff\xd9"
@@ -17,6 +20,22 @@ def test_parts_with_content_length():
 def test_parts_without_content_length():
     stream = b"--frame\r\nContent-Type: image/jpeg\r\n\r\n" + JPEG + b"\r\n--frame\r\nContent-Type: image/jpeg\r\n\r\n"
     assert MultipartParser(b"frame").feed(stream) == [JPEG]
+
+
+def test_a_picture_without_a_length_does_not_wait_for_the_next_one():
+    """As a few lines of Python on a small computer send it: each boundary comes with the picture behind it."""
+    _, coded = cv2.imencode(".jpg", np.arange(64 * 64, dtype=np.uint8).reshape(64, 64))
+    thumbnail = b"Exif\0\0" + JPEG
+    jpeg = coded.tobytes()
+    jpeg = jpeg[:2] + b"\xff\xe1" + (len(thumbnail) + 2).to_bytes(2) + thumbnail + jpeg[2:]
+    for step in (1, 7, 4096):
+        parser, found = MultipartParser(b"frame"), []
+        for number in range(3):
+            part = b"--frame\r\nContent-Type: image/jpeg\r\n\r\n" + jpeg + b"\r\n"
+            for at in range(0, len(part), step):
+                found += parser.feed(part[at : at + step])
+            assert found == [jpeg] * (number + 1), "and its thumbnail is no picture"
+        assert not parser.rejected
 
 
 def test_byte_by_byte():

@@ -13,17 +13,19 @@ from sim_bridge.scenario import DroneScenario
 from sim_bridge.world.airframe import GRAVITY_M_S2, STANDING_HEIGHT_M, Airframe
 from sim_bridge.world.inertia import Inertia
 from sim_bridge.world.noise import DelayLine, GaussMarkov, standard_normals
+from sim_bridge.world.recorded_errors import (
+    HEIGHT_CORRELATION_S,
+    HEIGHT_TICKS,
+    HEIGHT_WHITE_M,
+    VELOCITY_CORRELATION_S,
+    YAW_DRIFT_RAD_S,
+)
 
 LIFT_OFF_SEEN_M = 0.25  # the ultrasound reads nothing below
 _MAGNETOMETER_SEEN_M = 0.22  # switched in a moment before
 GROUND_ECHO_M = 0.243  # what it still says on the floor
-HEIGHT_TICKS = 3  # a new height about every 15 ms
 # Echoes of a neighbour's ultrasound: how often they come, and how far from the height one may be to be believed.
 _FOREIGN_ECHOES, _BELIEVED_M = 0.25, 0.15
-HEIGHT_CORRELATION_S = 2.0
-HEIGHT_WHITE_M = 0.005
-VELOCITY_CORRELATION_S = 0.4
-YAW_DRIFT_RAD_S = math.radians(0.0185)
 
 
 class Senses(Protocol):

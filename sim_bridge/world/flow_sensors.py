@@ -10,16 +10,16 @@ import numpy as np
 
 from sim_bridge.scenario import DroneScenario
 from sim_bridge.world.airframe import Airframe
-from sim_bridge.world.ardrone_sensors import (
+from sim_bridge.world.inertia import Inertia
+from sim_bridge.world.noise import DelayLine, GaussMarkov, standard_normals
+from sim_bridge.world.readings import Readings
+from sim_bridge.world.recorded_errors import (
     HEIGHT_CORRELATION_S,
     HEIGHT_TICKS,
     HEIGHT_WHITE_M,
     VELOCITY_CORRELATION_S,
     YAW_DRIFT_RAD_S,
 )
-from sim_bridge.world.inertia import Inertia
-from sim_bridge.world.noise import DelayLine, GaussMarkov, standard_normals
-from sim_bridge.world.readings import Readings
 
 Vector3 = tuple[float, float, float]
 _CLIMB_WHITE_M_S = 0.05

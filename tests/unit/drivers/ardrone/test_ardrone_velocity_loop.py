@@ -6,8 +6,6 @@ from collections import deque
 
 import pytest
 
-from drivers.ardrone.averages import MotionMean
-from drivers.ardrone.convert import NavdataMotion
 from drivers.ardrone.settings import ArDroneLimits
 from drivers.ardrone.velocity_loop import VelocityLoop
 
@@ -302,23 +300,3 @@ def test_cameras_tell_a_drone_that_sees_no_floor_its_speed(wrong):
     """Its speed had drifted by 0.3 m/s before: it would still do that."""
     assert max(abs(speed) for speed in stop_blindly(0.0, 4.0, wrong, drift=0.3)) >= 0.15
     assert max(abs(speed) for speed in stop_blindly(0.0, 4.0, wrong, drift=0.3, cameras=True)) <= 0.08
-
-
-@pytest.mark.parametrize(("values", "repeats"), [((0.1, 0.2, 0.3, 0.4), False), ((0.1, 0.0, 0.0, 0.0, 0.0), True)])
-def test_a_velocity_that_stands_still_is_no_measurement(values, repeats):
-    mean = MotionMean()
-    for left in values:
-        mean.add(NavdataMotion((left + 1.0, left, 0.0), 0.0, 0.0, 0.0, None, None, None))
-    assert mean.repeats is repeats
-
-
-@pytest.mark.parametrize(
-    ("forces", "frozen"),
-    [([0.1, 0.2, 0.2, 0.2], False), ([0.1, 0.2, 0.2, 0.2, 0.2], True), ([0.2] * 4 + [0.1], False), ([None] * 4, True)],
-)
-def test_accelerometers_that_stand_still_or_tell_nothing_are_old(forces, frozen):
-    mean = MotionMean()
-    for force in forces:
-        told = None if force is None else (0.0, force, 9.8)
-        mean.add(NavdataMotion((0.0, 0.0, 0.0), 0.0, 0.0, 0.0, None, None, told))
-    assert mean.frozen is frozen

@@ -2,19 +2,15 @@
 
 import json
 import math
-import struct
-from collections import Counter, deque
 from dataclasses import dataclass
-from typing import Any
 
 import cv2
 import numpy as np
 import pytest
+from fake_camera import SECTION, FakeChild, FakeSource, settings
 
 from drivers.camera import driver
-from drivers.camera.calibration import feed as calibration_feed
-from drivers.camera.settings import CameraDriverSettings
-from drivers.camera.sources.frames import Matrix, Packet, Unit
+from drivers.camera.sources.frames import Unit
 from groundstation.bus import clock
 from groundstation.bus.api import Subscription
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
@@ -26,81 +22,6 @@ from groundstation.geometry.pose import Pose
 from groundstation.geometry.rotations import base_from_tilted_optical
 from sim_bridge.render.renderer import Renderer
 from sim_bridge.render.spec import BoardSpec, BodyShape, Mount, PictureQuality, RenderSpec
-
-LENS: dict[str, Any] = {"width_px": 640, "height_px": 360, "fx_px": 460, "fy_px": 460, "cx_px": 319.5, "cy_px": 179.5}
-LENS |= {"distortion": [-0.30, 0.08, 0, 0, 0]}
-SECTION: dict[str, Any] = {
-    "name": "drone_1_camera",
-    "source": "http://127.0.0.1:9/video.mjpg",
-    "calibration": LENS,
-    "mount": {"parent": "drone_1", "position_m": [0.09, 0, 0], "tilt_down_deg": 45},
-    "video_delay_ms": 120,
-    "markers": [
-        {"entity": "drone_1", "code": 1, "square_mm": 44, "position_m": [0, 0, 0.08]},
-        {"entity": "bot", "code": 5, "square_mm": 44, "position_m": [0, 0, 0.4], "kind": "target"},
-    ],
-    "start_within_s": 0.05,
-    "stall_after_s": 0.05,
-}
-
-
-def settings(**changes):
-    return CameraDriverSettings.model_validate_json(json.dumps({**SECTION, **changes}))
-
-
-class FakeSource:
-    def __init__(self):
-        self.packets, self.received, self.connected, self.detail = deque[Packet](), 0, True, ""
-        self.units, self.rejected = list[Unit](), Counter[str]()
-
-    def push(self, data, arrival_ns=None):
-        self.received += 1
-        arrival_ns = arrival_ns or clock.now_ns()
-        self.packets.append(Packet(data, arrival_ns, arrival_ns, self.received))
-
-    def take_newest(self, timeout_s):
-        return self.packets.popleft() if self.packets else None
-
-    def push_decoded(self, pixels, unit):
-        self.received += 1
-        self.packets.append(Packet(b"", unit.arrival_ns, unit.settled_ns, self.received, Matrix(pixels)))
-        self.units.append(unit)
-
-    def take_video(self):
-        units, self.units = self.units, []
-        return units
-
-    def close(self):
-        pass
-
-
-class FakeChild:
-    stop_requested, supervisor_alive, supervisor_fresh, spoken_for_ns = False, True, True, 0
-
-    def __init__(self, bus, section="{}"):
-        self.bus, self.name, self.section = bus, "drone_1_camera", section
-        self.states, self.events, self.beats = [], [], 0
-
-    def ready(self, detail=""):
-        self.states.append(("READY", detail))
-
-    def degrade(self, detail):
-        self.states.append(("DEGRADED", detail))
-
-    def event(self, severity, text, remedy="", entity=None):
-        self.events.append((str(severity), text, remedy))
-
-    def beat(self):
-        self.beats += 1
-
-    def note_addresses(self, addresses): ...
-    def tick_status(self, ticks=0, overruns=0, overflowed=0): ...
-
-    def sleep_until(self, deadline_ns):
-        return True
-
-    def wake(self):
-        pass
 
 
 @dataclass
@@ -319,17 +240,3 @@ def test_whom_a_camera_reports():
     both = settings(**ceiling, observes=["bot", "drone_1"])
     assert [m.entity for m in both.expected_markers] == ["drone_1", "bot"]
     assert (settings().observer, both.observer) == ("drone_1", "ceiling")
-
-
-def test_a_picture_that_asks_to_be_turned_is_measured_as_it_was_exposed() -> None:
-    """As phones send theirs: EXIF tag 0x112 with 6, a quarter of a turn; the lens is that of the sensor."""
-    grey = np.zeros((360, 640), np.uint8)
-    grey[:90, :160] = 255
-    whole, jpeg = cv2.imencode(".jpg", grey)
-    exif = b"Exif\0\0MM\0*" + struct.pack(">IHHHIHHI", 8, 1, 0x112, 3, 1, 6, 0, 0)
-    turned = jpeg.tobytes()[:2] + struct.pack(">HH", 0xFFE1, 2 + len(exif)) + exif + jpeg.tobytes()[2:]
-    source, child = FakeSource(), FakeChild(MemoryBus(MemoryExchange(), "lab", "drone_1_camera"))
-    served = driver.CameraDriver(child, settings(), source)
-    picture = served._decoded(Packet(turned, 0, 0, 1))
-    for seen in (picture, calibration_feed.decoded(turned)):
-        assert whole and seen is not None and seen.shape == (360, 640) and seen[45, 80] > 200 > 50 > seen[300, 80]

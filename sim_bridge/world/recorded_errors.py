@@ -1,0 +1,13 @@
+"""How slowly the errors of small drones' sensors change, as recorded (docs/explanation/estimation.md 9.2).
+
+How large they are stands in the scenario.
+"""
+
+import math
+
+HEIGHT_TICKS = 3
+"""A new height about every 15 ms."""
+HEIGHT_CORRELATION_S = 2.0
+HEIGHT_WHITE_M = 0.005
+VELOCITY_CORRELATION_S = 0.4
+YAW_DRIFT_RAD_S = math.radians(0.0185)

@@ -152,8 +152,10 @@ class VelocityLoop:
         axes = self._axes
         if not self._flying:
             self._flying = True
-            # Half of what is measured then is noise: the drone holds its place.
-            first = self._held_m_s or (0.0, 0.0) if measured_m_s is None else tuple(0.5 * v for v in measured_m_s)
+            first: tuple[float, ...] = self._held_m_s or (0.0, 0.0)
+            if measured_m_s is not None:  # half of it is noise: the drone holds its place
+                first = tuple(0.5 * v for v in measured_m_s)
+            self._held_m_s = None
             for axis, speed in zip(axes, first, strict=False):
                 axis.start(speed)
         wanted = _shortened(wanted_m_s[0], wanted_m_s[1], self._limits.max_speed_m_s)

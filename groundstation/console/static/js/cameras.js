@@ -70,7 +70,7 @@ function decoded(name, jpeg) {
   decoder ??= startDecoder();
   return new Promise((resolve) => {
     waiting.set(name, resolve);
-    decoder.postMessage({ name, jpeg });
+    decoder.postMessage({ name, jpeg }, [jpeg.buffer]);
   });
 }
 

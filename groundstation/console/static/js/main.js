@@ -83,7 +83,7 @@ function describe() {
   byId("map").setAttribute("aria-label", `Map of the room. ${words || "Nobody is localised yet."}`);
 }
 
-// Only when there is something new: a page that asks for every picture of the screen costs a third of a core.
+// Only when there is something new: on a busy machine clicks wait behind every picture of the screen that is asked for.
 function redraw() {
   if (asked) return;
   asked = true;

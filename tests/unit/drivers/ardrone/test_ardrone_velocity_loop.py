@@ -132,6 +132,14 @@ def test_one_that_goes_blind_as_it_stops_is_braked_from_the_speed_it_told_last()
     assert min(request.roll_rad for request in out) < -0.03, "to the left: it flies to the right"
 
 
+def test_the_speed_before_a_flight_is_no_guide_to_braking_after_it():
+    loop = VelocityLoop(ArDroneLimits())
+    loop.hold((0.5, 0.5, 0.0), 1 / 40)
+    settled = [loop.step((0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0), 1 / 40).hover for _ in range(80)]
+    out = [loop.brake(1 / 40, (0.0, 0.0)) for _ in range(20)]
+    assert settled[-1] and max(abs(request.pitch_rad) + abs(request.roll_rad) for request in out) < 0.02
+
+
 def test_turning_while_flying_pulls_inwards():
     loop = VelocityLoop(ArDroneLimits())
     for _ in range(80):

@@ -1,7 +1,7 @@
 """JPEG frames out of a multipart/x-mixed-replace byte stream; pure bytes, bounded, never trusting the sender.
 
 WIRE: RFC 2046 section 5.1 and what IP cameras make of it: boundaries with and without leading dashes, parts with and
-without Content-Length, any number of blank lines between parts.
+without Content-Length, lines that end in LF alone, any number of blank lines between parts.
 """
 
 import re
@@ -11,6 +11,7 @@ from groundstation.bus.jpeg import has_ended
 MAX_FRAME_BYTES = 8 << 20
 _MAX_HEAD_BYTES = 4096
 _LENGTH = re.compile(rb"^content-length:[ \t]*(\d{1,9})[ \t]*$", re.IGNORECASE | re.MULTILINE)
+_HEAD_END = re.compile(rb"\r?\n\r?\n")
 _BOUNDARY = re.compile(rb"multipart/[a-z-]+[^\r\n]*boundary=\"?([^\r\n\";]+)", re.IGNORECASE)
 _JPEG_START, _JPEG_END = b"\xff\xd8", b"\xff\xd9"
 
@@ -52,17 +53,17 @@ class MultipartParser:
             del self._buffer[: max(0, len(self._buffer) - len(self._mark) + 1)]
             return False
         head_start = start + len(self._mark)
-        head_end = self._buffer.find(b"\r\n\r\n", head_start, head_start + _MAX_HEAD_BYTES)
-        if head_end < 0:
+        head = _HEAD_END.search(self._buffer, head_start, head_start + _MAX_HEAD_BYTES)
+        if head is None:
             if len(self._buffer) - head_start > _MAX_HEAD_BYTES:
                 self._reject(head_start)
                 return True
             return False
-        return self._take_body(head_start, head_end, frames)
+        return self._take_body(head_start, head, frames)
 
-    def _take_body(self, head_start: int, head_end: int, frames: list[bytes]) -> bool:
-        length = _LENGTH.search(bytes(self._buffer[head_start:head_end]).replace(b"\r\n", b"\n"))
-        body = head_end + 4
+    def _take_body(self, head_start: int, head: re.Match[bytes], frames: list[bytes]) -> bool:
+        length = _LENGTH.search(bytes(self._buffer[head_start : head.start()]).replace(b"\r\n", b"\n"))
+        body = head.end()
         if length is None:
             end = self._buffer.find(self._mark, body)
             if end < 0:

@@ -5,7 +5,7 @@ import select
 import socket
 import threading
 from collections import Counter, deque
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pkgutil import resolve_name
 from typing import Any, Protocol
 
@@ -18,6 +18,7 @@ from groundstation.errors import DriverError, SettingsError
 from groundstation.time_units import NS_PER_S
 
 _ASK_AGAIN_NS = NS_PER_S
+_AGAIN_S = 1.0
 _KEEP_ALIVE_NS = NS_PER_S
 _LARGEST = 65535
 _DATAGRAMS = 64
@@ -131,19 +132,24 @@ class NatnetSource:
     def _greet(self, server: natnet.Server) -> None:
         self._server, self.detail = server, ""
         if server.group and self._frames is None:
-            self._frames = self._join(server.group, server.data_port)
+            try:
+                self._frames = self._join(server.group, server.data_port)
+            except OSError as error:  # a port that another program has, an address that is none: asked again
+                place = f"{server.group}:{server.data_port}"
+                self.detail = f"its frames cannot be taken at {place}: {error.strerror or error}"
 
     def _join(self, group: str, port: int) -> socket.socket:
-        frames = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        frames.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        frames.setblocking(False)
-        frames.bind(("", port))
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as route:
-            route.connect(self._place)  # the interface that leads to the system
-            local = route.getsockname()[0]
-        frames.setsockopt(
-            socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, socket.inet_aton(group) + socket.inet_aton(local)
-        )
+        with ExitStack() as unless_joined:
+            frames = unless_joined.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
+            frames.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            frames.setblocking(False)
+            frames.bind(("", port))
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as route:
+                route.connect(self._place)  # the interface that leads to the system
+                local = route.getsockname()[0]
+            membership = socket.inet_aton(group) + socket.inet_aton(local)
+            frames.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
+            unless_joined.pop_all()
         return frames
 
     def _captured(self, frame: natnet.Frame, server: natnet.Server) -> CapturedFrame:
@@ -173,8 +179,7 @@ class LibrarySource:
             raise SettingsError([f"{address.scheme}://: the library motioncapture is missing; {remedy}"]) from None
         self._library, self._address = library, address
         self._frames: deque[CapturedFrame] = deque(maxlen=_WAITING_FRAMES)
-        self._came = threading.Event()
-        self._closing = False
+        self._came, self._closing = threading.Event(), threading.Event()
         threading.Thread(target=self._follow, name="motion capture", daemon=True).start()
 
     def poll(self, wait_s: float) -> list[CapturedFrame]:
@@ -188,18 +193,23 @@ class LibrarySource:
 
     def close(self) -> None:
         """Let the thread end after its next frame; the process ends without it."""
-        self._closing = True
+        self._closing.set()
 
     def _follow(self) -> None:
-        try:
-            system = self._library.connect(self._address.scheme, _place(self._address))
+        while not self._closing.is_set():
+            try:
+                self._read_frames()
+            except Exception as error:  # noqa: BLE001 - what a foreign library raises is shown, and tried again
+                self.detail = f"{type(error).__name__}: {error}"
+                self._closing.wait(_AGAIN_S)
+
+    def _read_frames(self) -> None:
+        system = self._library.connect(self._address.scheme, _place(self._address))
+        while not self._closing.is_set():
+            system.waitForNextFrame()
+            self._frames.append(_frame_of(system.rigidBodies))
             self.detail = ""
-            while not self._closing:
-                system.waitForNextFrame()
-                self._frames.append(_frame_of(system.rigidBodies))
-                self._came.set()
-        except Exception as error:  # noqa: BLE001 - what a foreign library raises is shown, and ends this thread only
-            self.detail = f"{type(error).__name__}: {error}"
+            self._came.set()
 
 
 def _place(address: SystemAddress) -> dict[str, str]:

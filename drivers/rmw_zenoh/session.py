@@ -9,6 +9,7 @@ import os
 import threading
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Any
 
 import zenoh
@@ -23,7 +24,7 @@ Hear = Callable[[str, bytes, bytes], None]
 class RouterSession:
     """One client; expressions: what `hear` is called with, on a thread of the network.
 
-    joined: called once, on another thread, when the router is there; declares what else is needed.
+    joined: called on another thread when the router is there, again where that failed; declares what else is needed.
     """
 
     def __init__(
@@ -71,13 +72,11 @@ class RouterSession:
         """Leave the router; idempotent."""
         self._closing.set()
         self._joining.join(_PATIENCE_S)
-        if self._session is not None:
-            self.is_open = False
-            for one in self._declared:
+        self.is_open = False
+        for one in self._declared:
+            with suppress(zenoh.ZError):  # the router went before us
                 one.undeclare()
-            self._declared.clear()
-            self._session.close()
-            self._session = None
+        self._leave()
 
     def _join(self) -> None:
         settings = {
@@ -88,15 +87,26 @@ class RouterSession:
         while not self._closing.is_set():
             try:
                 self._session = zenoh.open(zenoh.Config.from_json5(json.dumps(settings)))
-            except zenoh.ZError:
+                self._declare_all()
+            except zenoh.ZError:  # no router yet, or one that went while this was declared
+                self._leave()
                 self._closing.wait(_AGAIN_S)
-                continue
-            self.zid = str(self._session.zid())
-            self._joined(self)
-            for expression in self._expressions:
-                self._declared.append(self._session.declare_subscriber(expression, self._take))
-            self.is_open = True
-            return
+            else:
+                self.is_open = True
+                return
+
+    def _declare_all(self) -> None:
+        self.zid = str(self._session.zid())
+        self._joined(self)
+        for expression in self._expressions:
+            self._declared.append(self._session.declare_subscriber(expression, self._take))
+
+    def _leave(self) -> None:
+        self._declared.clear()
+        if self._session is not None:
+            with suppress(zenoh.ZError):
+                self._session.close()
+            self._session = None
 
     def _take(self, sample: Any) -> None:
         attached = b"" if sample.attachment is None else sample.attachment.to_bytes()

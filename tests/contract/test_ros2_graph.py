@@ -5,11 +5,13 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
+import zenoh
 from free_port import free_port
 from zenoh_peer import opened
 
 pytest.importorskip("rosbags")
 
+from drivers.rmw_zenoh.session import RouterSession
 from groundstation.bus import clock
 from groundstation.bus import messages as m
 from groundstation.bus import topics as t
@@ -98,6 +100,23 @@ def test_true_states_come_where_they_are_asked_for(router: str, truth: bool) -> 
         assert sum(len(queue.drain_samples()) for queue in queues) == truth
     finally:
         bridge.close()
+
+
+def test_a_router_that_goes_while_it_is_joined_is_joined_again(router: str) -> None:
+    failures = [zenoh.ZError("the transport is closed")]
+
+    def joined(_session: RouterSession) -> None:
+        if failures:
+            raise failures.pop()
+
+    session = RouterSession(router, [], lambda _key, _payload, _publisher: None, joined)
+    try:
+        deadline = time.monotonic() + 10
+        while not session.is_open and time.monotonic() < deadline:
+            time.sleep(0.02)
+        assert session.reaches_router and not failures
+    finally:
+        session.close()
 
 
 def test_a_missing_router_is_named_with_the_remedy() -> None:

@@ -22,6 +22,11 @@ def test_parts_without_content_length():
     assert MultipartParser(b"frame").feed(stream) == [JPEG]
 
 
+def test_heads_with_bare_line_feeds():
+    stream = (sized(JPEG) + sized(OTHER)).replace(b"\r\n\r\n", b"\n\n").replace(b"jpeg\r\n", b"jpeg\n")
+    assert MultipartParser(b"frame").feed(stream) == [JPEG, OTHER]
+
+
 def test_a_picture_without_a_length_does_not_wait_for_the_next_one():
     """As a few lines of Python on a small computer send it: each boundary comes with the picture behind it."""
     _, coded = cv2.imencode(".jpg", np.arange(64 * 64, dtype=np.uint8).reshape(64, 64))

@@ -212,10 +212,26 @@ def test_a_system_that_never_answers_is_told_with_its_address(monkeypatch) -> No
     source.close()
 
 
+def test_frames_for_a_group_that_cannot_be_joined_are_told_and_tried_again() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as system:
+        system.bind((HOST, 0))
+        system.settimeout(5.0)
+        source = NatnetSource(parse_source(f"natnet://{HOST}:{system.getsockname()[1]}"))
+        source.poll(0.0)
+        _, client = system.recvfrom(2048)
+        server = natnet.Server("Motive", (4, 1), 10**6, a_port(), "10.0.0.1")  # no multicast address
+        system.sendto(natnet.encode_server(server), client)
+        assert source.poll(1.0) == [] and "cannot be taken at 10.0.0.1" in source.detail
+        system.sendto(natnet.encode_server(replace(server, group="239.255.42.99")), client)
+        assert source.poll(1.0) == [] and source.detail == ""
+        source.close()
+
+
 def test_other_systems_come_through_the_library(monkeypatch) -> None:
     turn = SimpleNamespace(x=0.0, y=0.0, z=0.0, w=1.0)
     body = SimpleNamespace(position=np.array([1.0, 2.0, 3.0], dtype=np.float32), rotation=turn)
-    calls = []
+    calls, breaks = [], ["link lost"]
+    monkeypatch.setattr("drivers.motion_capture.sources._AGAIN_S", 0.05)
 
     class System:
         def __init__(self) -> None:
@@ -223,8 +239,9 @@ def test_other_systems_come_through_the_library(monkeypatch) -> None:
 
         def waitForNextFrame(self) -> None:  # noqa: N802 - as the library calls it
             calls.append(1)
-            if len(calls) > 3:
-                raise RuntimeError("link lost")
+            time.sleep(0.001)
+            if breaks and len(calls) > 3:
+                raise RuntimeError(breaks[0])
 
     asked = []
 
@@ -245,6 +262,11 @@ def test_other_systems_come_through_the_library(monkeypatch) -> None:
     while "link lost" not in source.detail and time.monotonic() < deadline:
         time.sleep(0.01)
     assert source.detail == "RuntimeError: link lost"
+    breaks.clear()
+    while not source.poll(0.05) and time.monotonic() < deadline:
+        pass
+    assert source.detail == "" and len(asked) > 1  # connected anew
+    source.close()
 
 
 def test_a_missing_library_is_named_with_the_remedy(monkeypatch) -> None:

@@ -1,9 +1,9 @@
 """The Tello driver: what the vehicle says, what a decision means to it, and the process entry `run`."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from drivers.base import HostProcess, read_section
+from drivers.base import HostProcess, LinkHealth, read_section
 from drivers.datagram_link import DatagramLink, DatagramVehicle
 from drivers.datagrams import DatagramLog
 from drivers.host import fly_one
@@ -36,6 +36,7 @@ _PAUSE_NS = {
     text.EMERGENCY: 100 * NS_PER_MS,
     text.STREAM_ON: 3 * NS_PER_S,
 }
+_WORDS = {Action.TAKE_OFF: "take off", Action.LAND: "land", Action.CUT: "stop its motors"}
 # Whole numbers at 10 Hz: that one of them stands says nothing; the accelerations of all three axes never do.
 LIMITS = PlausibilityLimits(frozen_s=0.6, stuck_s=math.inf, stuck_alone_s=math.inf, jump_m_s=0.8)
 
@@ -76,7 +77,7 @@ class Tello(DatagramVehicle):
         self.heard = Heard()
         self._settings, self._bus = settings, bus
         self._ready = False
-        self._asked = Action.WAIT
+        self._asked, self._refused = Action.WAIT, ""
         self._sent_ns: dict[bytes, int] = {}
         self._plausibility = MotionMonitor(LIMITS)
         here = settings.tello.local_address
@@ -90,7 +91,10 @@ class Tello(DatagramVehicle):
     # -- reader thread ------------------------------------------------------------------------------------------------
 
     def _hear_answer(self, now_ns: int, data: bytes) -> bool:
-        self._ready = self._ready or data.strip().lower() == text.OK
+        answer = data.strip().lower()
+        self._ready = self._ready or answer == text.OK
+        if answer.startswith(text.ERROR) and self._asked in _WORDS:
+            self._refused = answer.decode("ascii", "replace")
         return False
 
     def _hear_state(self, now_ns: int, data: bytes) -> bool:
@@ -145,7 +149,8 @@ class Tello(DatagramVehicle):
 
     def apply(self, now_ns: int, decision: WatchdogDecision) -> None:
         """Send what the decision means to a Tello; sticks count only while it flies."""
-        self._asked = decision.action
+        if decision.action is not self._asked:
+            self._asked, self._refused = decision.action, ""
         flies = self.heard.airborne(now_ns)
         match decision.action:
             case Action.CUT:
@@ -166,6 +171,12 @@ class Tello(DatagramVehicle):
             self._repeat(now_ns, text.SDK)
         elif self._settings.tello.video and not flies:
             self._repeat(now_ns, text.STREAM_ON)
+
+    def health(self, now_ns: int) -> LinkHealth:
+        """Return the state of the link, and what the vehicle answered to an order that it refused."""
+        word = _WORDS.get(self._asked)
+        detail = f"it answers {self._refused!r} when told to {word}" if self._refused and word else ""
+        return replace(super().health(now_ns), detail=detail)
 
     def _sticks(self, decision: WatchdogDecision) -> bytes:
         own = self._settings.tello

@@ -169,6 +169,14 @@ def test_a_take_off_that_is_called_off_is_followed_by_land(flight):
     assert told(Action.IDLE) == b"land"
 
 
+def test_what_it_answers_to_an_order_that_it_refuses_is_told(flight):
+    flight.told(Action.TAKE_OFF, state=dataclasses.replace(STATE, height=0, tof=0, time=0))
+    flight.tello._hear_answer(time.monotonic_ns(), b"error Motor stop\r\n")
+    assert flight.tello.health(time.monotonic_ns()).detail == "it answers 'error motor stop' when told to take off"
+    flight.told(Action.HOVER)
+    assert flight.tello.health(time.monotonic_ns()).detail == ""
+
+
 def test_it_flies_only_after_it_was_greeted(rig):
     rig.say(b"takeoff", 1.0)
     assert not rig.body.motors_on

@@ -13,7 +13,6 @@ REPEAT ?=
 PYTEST = $(BIN)/python -m pytest $(REPEAT)
 
 INTEROP := .interop
-STUDIES := .pytest_cache/studies
 PARTS := waiting units others
 COVERAGE := $(PARTS:%=.pytest_cache/coverage-%.json)
 # Fast tests that wait for sockets, processes or time; all others compute. Each file has loopback addresses of its own.
@@ -21,7 +20,7 @@ WAITING := $(wildcard tests/contract/test_*.py) tests/contract/ardrone_driver te
 	tests/replay/test_replay_playback.py tests/sitl tests/unit/console tests/unit/supervisor \
 	tests/unit/cli/test_cli_stop.py tests/unit/cli/test_cli_bench_report.py
 
-.PHONY: install demo test test-waiting test-units test-others raise-floors test-slow slow-flights slow-studies test-exhaustive fuzz test-firmware mutants limiter-states wire-faults soak check format docs hashes sbom audit interop clean
+.PHONY: install demo test test-waiting test-units test-others raise-floors test-slow slow-flights slow-pages slow-studies slow-largest test-exhaustive fuzz test-firmware mutants limiter-states wire-faults soak check format docs hashes sbom audit interop clean
 
 install: $(STAMP)
 
@@ -49,18 +48,25 @@ test-units test-others: test-%: $(STAMP)-test
 raise-floors: $(STAMP)-test
 	$(BIN)/python tests/coverage/floors.py $(COVERAGE) --raise
 
-# Flights are judged by the clock; what only computes runs beside them, where they leave time, and is printed at the end.
+# Flights are judged by the clock; pages, and what only computes, run beside them, where they leave time, and are printed
+# at their ends. The largest flights fill two slow cores and have them to themselves.
 test-slow: $(STAMP)-test-slow
-	$(MAKE) --jobs 2 --keep-going --output-sync=none slow-flights slow-studies
+	code=0; $(MAKE) --jobs 3 --keep-going --output-sync=none slow-flights slow-pages slow-studies || code=$$?; \
+	$(MAKE) slow-largest && exit $$code
 
 slow-flights: $(STAMP)-test-slow
-	$(PYTEST) -m "slow and not study and not firmware and not exhaustive" --timeout 900 tests
+	$(PYTEST) -m "slow and not page and not study and not largest and not firmware and not exhaustive" --timeout 900 tests
 
-slow-studies: $(STAMP)-test-slow
-	@mkdir -p $(STUDIES) && code=0; \
-	.ci/background $(PYTEST) -m "study and not exhaustive" --timeout 1800 -o cache_dir=$(STUDIES) tests \
-		>$(STUDIES)/log 2>&1 || code=$$?; \
-	cat $(STUDIES)/log; exit $$code
+slow-largest: $(STAMP)-test-slow
+	$(PYTEST) -m "largest and not exhaustive" --timeout 900 -o cache_dir=.pytest_cache/largest tests
+
+slow-pages: SLOW = page and not exhaustive
+slow-pages: export NICE = 5
+slow-studies: SLOW = study and not exhaustive
+slow-pages slow-studies: slow-%: $(STAMP)-test-slow
+	@mkdir -p .pytest_cache/$* && code=0; \
+	.ci/background $(PYTEST) -m "$(SLOW)" --timeout 1800 -o cache_dir=.pytest_cache/$* tests >.pytest_cache/$*/log 2>&1 || code=$$?; \
+	cat .pytest_cache/$*/log; exit $$code
 
 # More cases of what test-slow shows, e.g. every flight of each kind of vehicle, and the long recordings: an hour.
 test-exhaustive: $(STAMP)-test-slow

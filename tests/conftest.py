@@ -18,15 +18,15 @@ numba_cache.activate(numba_cache.EVERYTHING)
 
 ROOT = Path(__file__).parents[1]
 CONFIG = ROOT / "config"
-STUDIES = {"property", "replay", "statistics"}
+BESIDE_FLIGHTS = {"browser": "page", "property": "study", "replay": "study", "statistics": "study"}
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the slow tests of folders that only compute; put those last that need the machine to themselves."""
+    """Mark the slow tests of folders that fly nothing in real time."""
     for item in items:
-        if item.get_closest_marker("slow") and STUDIES & set(item.path.relative_to(ROOT).parts):
-            item.add_marker("study")
-    items.sort(key=lambda item: item.get_closest_marker("last") is not None)
+        for folder in set(item.path.relative_to(ROOT).parts) & set(BESIDE_FLIGHTS):
+            if item.get_closest_marker("slow"):
+                item.add_marker(BESIDE_FLIGHTS[folder])
 
 
 def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:

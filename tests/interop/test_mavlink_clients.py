@@ -42,7 +42,7 @@ def test_node_mavlink_flies_a_px4(hangar: Any, programs: Any) -> None:
     assert max(flown) == pytest.approx(2.5, abs=0.3) and flown[-1] < 0.1
 
 
-@pytest.mark.parametrize("kind", ["px4", "ardupilot"])
+@pytest.mark.parametrize("kind", ["px4", pytest.param("ardupilot", marks=pytest.mark.exhaustive)])
 def test_traffic_like_qgroundcontrols_is_answered_and_flies(hangar: Any, kind: str) -> None:
     drones = hangar(1, kind=kind)
     station = GroundStation(drones.addresses[0], 14550)

@@ -159,6 +159,7 @@ async def answer_of(asked: Any) -> str:
     return "accepted"
 
 
+@pytest.mark.exhaustive
 def test_mavsdk_sees_both_vehicles_is_refused_a_take_off_and_stops_them(hangar: Any, port: int, tmp_path: Path) -> None:
     riding = free_port(kind=socket.SOCK_DGRAM)
     with ridden(hangar, port, tmp_path, riding) as flight:

@@ -10,7 +10,7 @@ import pytest
 from pymavlink import mavutil
 from spare_time import ENOUGH, SpareTime
 
-pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.last, pytest.mark.timeout(420)]
+pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.largest, pytest.mark.timeout(420)]
 FIELD = Path(__file__).parents[2] / "config" / "mixed-team.yaml"
 FLOWN_S = 45
 

@@ -39,7 +39,7 @@ def told_to_hover(run: Any, drone: str, since: float) -> bool:
 @pytest.mark.parametrize(
     ("field", "limit_m", "source"),
     [
-        ("mocap-lab", 0.03, ()),
+        pytest.param("mocap-lab", 0.03, (), marks=pytest.mark.exhaustive),
         pytest.param("mocap-lab", 0.03, POSE_TOPICS, marks=pytest.mark.exhaustive),
         pytest.param("mocap-truth", 0.03, (), marks=pytest.mark.exhaustive),
         pytest.param("uwb-lab", 0.12, (), marks=pytest.mark.exhaustive),

@@ -37,6 +37,10 @@ def becomes(page: Any, testid: str, attribute: str, value: str) -> str:
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
+HIDDEN = """() => [...document.querySelectorAll(".crew, #commands")]
+  .filter((one) => one.scrollHeight > one.clientHeight + 1)
+  .map((one) => `${one.getAttribute("aria-label")}: ${one.scrollHeight} of ${one.clientHeight} px`)"""
+
 
 def test_first_frame_comes_soon_and_nothing_leaves_loopback(stage: Any) -> None:
     page = stage.open()
@@ -224,6 +228,7 @@ def test_a_mixed_team_below_two_cameras(mixed_stage: Any) -> None:
     assert page.there("land-all").inner_text().startswith("LAND ALL 3")
     assert page.there("drone_3-battery").inner_text() == "unknown"
     page.shot("mixed_team")
+    assert page.page.evaluate(HIDDEN) == [], "a low desk shows three drones, the target and the orders whole"
     page.there("drone_3-land").click()
     page.wait(lambda s: s["orders"] and s["orders"][0]["state"] == "confirmed")
     assert mixed_stage.flight.commands[0].scope == ("drone_3",)

@@ -13,12 +13,17 @@ import { ageS, entity, estimateAge, runOver, seenBy, store, trackerSilent } from
 const STALE_S = 1;
 const LONGEST_CAPTION = 9; // letters of a name that the column of its buttons has room for
 const LEVELS = { TRACK: "good", HOVER: "good", HOLD: "warn", TAKING_OFF: "warn", LANDING: "warn", CUT: "bad", LANDED: "calm", CONNECTING: "calm" };
+const NARROW = matchMedia("(max-width: 1180px)"), LOW = matchMedia("(max-height: 990px)");
 const cards = new Map();
 
 export function startTeam() {
   const button = byId("figures");
   button.onclick = () => button.setAttribute("aria-pressed", `${byId("team").classList.toggle("all")}`);
+  for (const screen of [NARROW, LOW]) screen.onchange = fit;
 }
+
+// A low screen has room for three cards with all their lines.
+const fit = () => byId("team").classList.toggle("close", NARROW.matches || (LOW.matches && cards.size > 3));
 
 export function buildTeam() {
   cards.clear();
@@ -26,6 +31,7 @@ export function buildTeam() {
   const nodes = drones.map((drone) => card(drone.name, ["battery", "link", "heard", "seen", "rate", "speed", "position", "ellipse", "by"], true));
   for (const target of targets) nodes.push(card(target.name, ["seen", "speed", "position", "ellipse", "by"], false));
   byId("team").replaceChildren(...nodes);
+  fit();
 }
 
 const TITLES = { battery: "battery", rate: "telemetry", link: "link", heard: "last heard", seen: "last seen", position: "position [m]", ellipse: "95 % sure within [m]", speed: "speed", by: "seen by" };

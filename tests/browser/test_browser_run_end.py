@@ -50,6 +50,7 @@ def test_a_normal_end_is_calm_and_leaves_nothing_to_stop(stage: Any) -> None:
     page.page.wait_for_timeout(3000)  # nobody beats any more, and nobody needs to
     assert page.there("recording").inner_text() == "ended"
     assert page.there("worst-age").inner_text() == "–"
+    assert page.there("turtlebot-duty").inner_text() == "The run is over."
     assert {pill.get_attribute("data-level") for pill in page.page.locator("#processes .pill:not(.plain)").all()} == {
         "wait"
     }

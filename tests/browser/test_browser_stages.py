@@ -71,6 +71,7 @@ def test_a_must_keeps_take_off_shut_until_it_is_mended_or_somebody_insists(floor
     assert "TAKE OFF waits: drone_1: battery 16 %" in page.there("verdict").inner_text()
     assert page.there("drone_1-takeoff").is_disabled() and page.there("drone_2-takeoff").is_enabled()
     page.page.screenshot(path=str(page.shots() / "preflight.png"))
+    assert page.there("drone_2-duty").inner_text() == "Stands with its motors off."  # its driver gives no reason
 
     anyway = page.there("anyway")
     anyway.click()  # one click is no second of pressing

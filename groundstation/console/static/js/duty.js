@@ -51,7 +51,7 @@ function reasonOf({ mode, detail }) {
 // Why it landed stands in brackets in its driver's words.
 function standing(detail) {
   const [, why] = detail.match(/^landed \((.+)\)$/) ?? [], [, , who] = why?.match(ORDERS) ?? [];
-  return why ? `stands, motors off. It landed: ${who ? `ordered by ${who}` : why}` : `stands with its motors off: ${detail}`;
+  return why ? `stands, motors off. It landed: ${who ? `ordered by ${who}` : why}` : `stands with its motors off${detail && `: ${detail}`}`;
 }
 
 // In TRACK what the plan has it do, unless its driver knows better; else the driver's own reason.

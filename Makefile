@@ -58,14 +58,14 @@ slow-flights: $(STAMP)-test-slow
 	$(PYTEST) -m "slow and not page and not study and not largest and not firmware and not exhaustive" --timeout 900 tests
 
 slow-largest: $(STAMP)-test-slow
-	$(PYTEST) -m "largest and not exhaustive" --timeout 900 -o cache_dir=.pytest_cache/largest tests
+	$(PYTEST) -m "largest and not exhaustive" --timeout 900 -o cache_dir=.pytest_cache/largest tests/sitl
 
-slow-pages: SLOW = page and not exhaustive
 slow-pages: export NICE = 5
-slow-studies: SLOW = study and not exhaustive
+slow-pages: SLOW = "page and not exhaustive" tests/browser
+slow-studies: SLOW = "study and not exhaustive" tests
 slow-pages slow-studies: slow-%: $(STAMP)-test-slow
 	@mkdir -p .pytest_cache/$* && code=0; \
-	.ci/background $(PYTEST) -m "$(SLOW)" --timeout 1800 -o cache_dir=.pytest_cache/$* tests >.pytest_cache/$*/log 2>&1 || code=$$?; \
+	.ci/background $(PYTEST) --timeout 1800 -o cache_dir=.pytest_cache/$* -m $(SLOW) >.pytest_cache/$*/log 2>&1 || code=$$?; \
 	cat .pytest_cache/$*/log; exit $$code
 
 # More cases of what test-slow shows, e.g. every flight of each kind of vehicle, and the long recordings: an hour.

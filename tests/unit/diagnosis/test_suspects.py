@@ -25,17 +25,20 @@ def suspicions() -> tuple[Suspicion, ...]:
     return (*single, both, Suspicion("c", "delay", columns[:, [2]], np.array([0.08])))
 
 
+SLOW = (pytest.mark.slow, pytest.mark.study)
+
+
 @pytest.mark.parametrize(
     ("errors", "suspect", "size"),
     [
         ({}, None, 0.0),
-        ({("ceiling", "delay"): 50.0}, ("ceiling", "delay"), 0.05),
+        pytest.param({("ceiling", "delay"): 50.0}, ("ceiling", "delay"), 0.05, marks=SLOW),
         ({("drone_1", "delay"): -50.0}, ("drone_1", "delay"), -0.05),
-        ({("drone_1", "own_delay"): 80.0}, ("drone_1", "own_delay"), 0.08),
+        pytest.param({("drone_1", "own_delay"): 80.0}, ("drone_1", "own_delay"), 0.08, marks=SLOW),
         ({("drone_1", "pan"): 3.0, ("drone_2", "pan"): 3.0}, ("", "pan"), math.radians(3.0)),
         ({("ceiling", "pitch"): 3.0}, ("ceiling", "tilted"), math.radians(3.0)),
-        ({("turtlebot", "print"): 0.05}, ("turtlebot", "print"), 0.05),
-        ({("drone_1", "focal"): 0.04}, ("drone_1", "focal"), 0.04),
+        pytest.param({("turtlebot", "print"): 0.05}, ("turtlebot", "print"), 0.05, marks=SLOW),
+        pytest.param({("drone_1", "focal"): 0.04}, ("drone_1", "focal"), 0.04, marks=SLOW),
     ],
 )
 def test_a_wrong_figure_is_likeliest_with_its_size(
@@ -79,6 +82,8 @@ def test_what_explains_it_as_well_is_named_beside_it() -> None:
     assert {one.suspect for one in charges} == {("a", "print"), ("b", "print"), ("", "print")}
 
 
+@pytest.mark.slow
+@pytest.mark.study
 def test_a_charge_stands_only_where_the_paths_that_fit_without_it_explain_the_flight_worse(
     lab_field: ResolvedField, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -31,6 +31,17 @@ def rotation_from_euler(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Ar
     return rotation_z(yaw_rad) @ rotation_y(pitch_rad) @ rotation_x(roll_rad)
 
 
+def rotations_from_euler(roll_rad: Array, pitch_rad: Array, yaw_rad: Array) -> Array:
+    """Return the same for angles (...) as rotations (..., 3, 3)."""
+    (cr, cp, cy), (sr, sp, sy) = (tuple(f(a) for a in (roll_rad, pitch_rad, yaw_rad)) for f in (np.cos, np.sin))
+    rows = (
+        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
+        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
+        (-sp, cp * sr, cp * cr),
+    )
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
 def euler_from_rotation(parent_from_body: Array) -> tuple[float, float, float]:
     """Return (roll, pitch, yaw) of a rotation matrix; pitch in [-pi/2, pi/2]."""
     r = parent_from_body

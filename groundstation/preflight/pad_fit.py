@@ -11,8 +11,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.arrays import Array, Vector
-from groundstation.geometry.rotations import euler_from_rotation, rotation_from_euler, rotation_z
-from groundstation.preflight.stand import LENS_STD, PLACED_M, PLACED_RAD, PRINT_STD, PadSighting, Stand
+from groundstation.geometry.rotations import rotations_from_euler
+from groundstation.preflight.stand import (
+    LENS_STD,
+    PLACED_M,
+    PLACED_RAD,
+    PRINT_STD,
+    PadSighting,
+    Stand,
+    marker_centres,
+)
 
 PER_CAMERA = ("x", "y", "z", "roll", "pitch", "yaw", "focal")
 PER_DRONE = ("aside_x", "aside_y", "turned", "higher", "print")
@@ -48,6 +56,12 @@ class PadFit:
             *((d, part) for d in drones for part in PER_DRONE),
         )
         self._place = {key: index for index, key in enumerate(self.keys)}
+        whose = {part: [s.camera for s in self.sightings] for part in PER_CAMERA}
+        whose |= {part: [s.drone for s in self.sightings] for part in PER_DRONE}
+        self._columns = {part: [self._place[name, part] for name in names] for part, names in whose.items()}
+        seen_by = [stand.cameras[s.camera] for s in self.sightings]
+        self._rotations = np.array([camera.rotation for camera in seen_by])
+        self._positions = np.array([camera.position_m for camera in seen_by])
         self._tight = np.array([self._prior(key) for key in self.keys])
         self._at_rest: tuple[Vector, Array] | None = None
         self._seen = np.concatenate([[*s.position_m, s.yaw_rad] for s in self.sightings])
@@ -116,39 +130,39 @@ class PadFit:
 
     def _linearised(self, theta: Vector) -> tuple[Vector, Array]:
         """Return the residuals (n) and the derivatives of what is predicted (n, figures), both in deviations."""
-        predicted = self._predicted(theta)
-        J = np.empty((len(predicted), len(theta)))
-        for column in range(len(theta)):
-            moved = theta.copy()
-            moved[column] += _DIFFERENCE
-            J[:, column] = _wrapped(self._predicted(moved) - predicted) / _DIFFERENCE
+        moved = theta + np.vstack((np.zeros(len(theta)), _DIFFERENCE * np.eye(len(theta))))
+        predicted, *others = self._predicted(moved)
+        J = _wrapped(np.array(others) - predicted).T / _DIFFERENCE
         r = _wrapped(np.where(self._used, self._seen, 0.0) - predicted)
         return r[self._used] / self._weights, J[self._used] / self._weights[:, None]
 
-    def _predicted(self, theta: Vector) -> Vector:
-        """Return (x, y, z [camera_optical], heading) of every sighting under errors of the field."""
-        of = dict(zip(self.keys, theta.tolist(), strict=True))
-        rows = np.empty((len(self.sightings), 4))
-        for row, s in zip(rows, self.sightings, strict=True):
-            pad, camera = self.stand.pads[s.drone], self.stand.cameras[s.camera]
-            turned = of[s.drone, "turned"]
-            aside = np.array([of[s.drone, "aside_x"], of[s.drone, "aside_y"]])
-            centre = pad.centre(aside, turned, of[s.drone, "higher"])
-            x, y, z, roll, pitch, yaw, focal = (of[s.camera, part] for part in PER_CAMERA)
-            error = rotation_from_euler(roll, pitch, yaw)
-            optical = (error @ camera.rotation).T @ (centre - camera.position_m - np.array([x, y, z]))
-            # A larger print looks nearer in all directions, a longer lens along the axis only.
-            optical = optical / ((1.0 + of[TEAM_PRINT]) * (1.0 + of[s.drone, "print"]))
-            optical[2] /= 1.0 + focal
-            heading = euler_from_rotation(error.T @ rotation_z(pad.yaw_rad + turned))[2]
-            row[:3], row[3] = optical, heading
-        return rows.reshape(-1)
+    def _predicted(self, thetas: Array) -> Array:
+        """Return (x, y, z [camera_optical], heading) of all sightings under sets of errors of the field.
+
+        thetas: (n, figures), the result (n, 4 sightings). All sets at once: the supervisor waits for the answer.
+        """
+        of = {part: thetas[:, columns] for part, columns in self._columns.items()}
+        aside = np.stack((of["aside_x"], of["aside_y"]), axis=-1)
+        pads = [self.stand.pads[s.drone] for s in self.sightings]
+        centres = marker_centres(pads, aside, of["turned"], of["higher"])
+        moved = np.stack((of["x"], of["y"], of["z"]), axis=-1)
+        error = rotations_from_euler(of["roll"], of["pitch"], of["yaw"])
+        away = (centres - self._positions - moved)[..., None, :]
+        optical = (away @ error @ self._rotations)[..., 0, :]
+        # A larger print looks nearer in all directions, a longer lens along the axis only.
+        optical /= ((1.0 + thetas[:, [self._place[TEAM_PRINT]]]) * (1.0 + of["print"]))[..., None]
+        optical[..., 2] /= 1.0 + of["focal"]
+        yaw = np.array([pad.yaw_rad for pad in pads]) + of["turned"]
+        ahead = np.stack((np.cos(yaw), np.sin(yaw), np.zeros_like(yaw)), axis=-1)[..., None, :]
+        facing = (ahead @ error)[..., 0, :]
+        heading = np.arctan2(facing[..., 1], facing[..., 0])
+        return np.concatenate((optical, heading[..., None]), axis=-1).reshape(len(thetas), -1)
 
 
-def _wrapped(rows: Vector) -> Vector:
-    """Return rows (x, y, z, heading, ...) with headings in [-pi, pi]."""
+def _wrapped(rows: Array) -> Array:
+    """Return rows (..., 4 sightings) of x, y, z, heading, ... with headings in [-pi, pi]."""
     rows = rows.copy()
-    rows[3::4] = np.remainder(rows[3::4] + math.pi, math.tau) - math.pi
+    rows[..., 3::4] = np.remainder(rows[..., 3::4] + math.pi, math.tau) - math.pi
     return rows
 
 

@@ -1,7 +1,7 @@
 """Where each drone stands on its pad, and what fixed cameras see of it there. Pure values."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,7 +9,7 @@ import numpy as np
 from groundstation.arrays import Array
 from groundstation.field.drones import FieldDrone
 from groundstation.field.resolved import ResolvedField
-from groundstation.geometry.rotations import rotation_z, world_from_downward_optical
+from groundstation.geometry.rotations import world_from_downward_optical
 from groundstation.vehicles import kind_named
 
 # How well a person sets a drone on a cross and a line on the floor.
@@ -45,15 +45,23 @@ class Pad:
     height_std_m: float
     marker_m: tuple[float, float, float]
 
-    def centre(self, aside_m: Array, turned_rad: float, higher_m: float) -> Array:
-        """Return the centre of the marker [m; world] of a drone that stands a little off its pad."""
-        x, y = self.place_m
-        base = np.array([x + aside_m[0], y + aside_m[1], self.height_m + higher_m])
-        return np.asarray(base + rotation_z(self.yaw_rad + turned_rad) @ np.array(self.marker_m))
-
     def of(self, other: "Pad") -> "Pad":
         """Return this drone on the pad of another one."""
         return replace(self, place_m=other.place_m, yaw_rad=other.yaw_rad)
+
+
+def marker_centres(pads: Sequence[Pad], aside_m: Array, turned_rad: Array, higher_m: Array) -> Array:
+    """Return the centres (..., n, 3) of the markers [m; world] of n drones that stand a little off their pads.
+
+    aside_m: (..., n, 2); turned_rad, higher_m: (..., n).
+    """
+    yaw_rad, height_m = np.array([(pad.yaw_rad, pad.height_m) for pad in pads]).T
+    east_m, north_m = np.array([pad.place_m for pad in pads]).T
+    ahead_m, left_m, above_m = np.array([pad.marker_m for pad in pads]).T
+    c, s = np.cos(yaw_rad + turned_rad), np.sin(yaw_rad + turned_rad)
+    x = east_m + aside_m[..., 0] + c * ahead_m - s * left_m
+    y = north_m + aside_m[..., 1] + s * ahead_m + c * left_m
+    return np.stack((x, y, height_m + higher_m + above_m), axis=-1)
 
 
 @dataclass(frozen=True, slots=True)

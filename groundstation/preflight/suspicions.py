@@ -103,15 +103,21 @@ def _suspicions(plain: PadFit) -> Iterator[Suspicion]:
 
 def _promise(plain: PadFit, suspicion: Suspicion) -> float:
     """Return how far a suspicion is worth a fit: those with large angles have no use for derivatives at zero."""
-    if suspicion.exchanged or any(part in _ANGLES and std >= _TURNED_RAD for (_, part), std in suspicion.loose.items()):
+    if suspicion.exchanged:
+        return _exchanged(plain, suspicion).promise({})
+    if any(part in _ANGLES and std >= _TURNED_RAD for (_, part), std in suspicion.loose.items()):
         return _explained(plain, suspicion).evidence
     return plain.promise(suspicion.loose)
 
 
 def _explained(plain: PadFit, suspicion: Suspicion) -> Fit:
     if suspicion.exchanged:
-        return PadFit(plain.stand.exchanged(suspicion.exchanged), plain.sightings).explain({})
+        return _exchanged(plain, suspicion).explain({})
     return plain.explain(suspicion.loose, _start(plain, suspicion))
+
+
+def _exchanged(plain: PadFit, suspicion: Suspicion) -> PadFit:
+    return PadFit(plain.stand.exchanged(suspicion.exchanged), plain.sightings)
 
 
 def _start(plain: PadFit, suspicion: Suspicion) -> dict[Key, float]:

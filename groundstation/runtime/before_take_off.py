@@ -32,7 +32,7 @@ _Status = TypeVar("_Status", VehicleStatus, CameraStatus)
 
 
 class BeforeTakeOff:
-    """Call `update` often; `findings` takes up to a tenth of a second with a team of two.
+    """Call `update` often; `findings` takes up to a tenth of a second with a team of eight.
 
     Once `publish` has told the list, `update` tells it again every 3 s while nobody flies. A drone that flew once in
     this run may stand anywhere: its pad says nothing of it any more.

@@ -1,17 +1,19 @@
 """What fixed cameras see of standing drones tells which one figure of the field is wrong, or that none is."""
 
 import math
+import time
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from groundstation.doctor.finding import Finding, Level
 from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.rotations import euler_from_rotation, rotation_from_euler, rotation_z
 from groundstation.preflight.judge import open_musts, pad_findings
-from groundstation.preflight.stand import PadSighting, stand_of
+from groundstation.preflight.stand import PadSighting, marker_centres, stand_of
 from groundstation.preflight.suspicions import opinion
 
 SPREAD = np.array([0.0025, 0.0025, 0.022, 0.0045])  # of one sighting from 4 m, as rendered pictures have it
@@ -41,7 +43,8 @@ def seen(site: ResolvedField, truth: Truth, seed: int) -> list[PadSighting]:
         pad = own.of(stand.pads[truth.on_pad_of.get(name, name)])
         x, y, turned_deg = truth.moved.get(name, (0.0, 0.0, 0.0))
         turn = math.radians(turned_deg + 0.7 * rng.standard_normal())
-        centre = pad.centre(np.array([x, y]) + 0.005 * rng.standard_normal(2), turn, 0.005 * rng.standard_normal())
+        aside = np.array([x, y]) + 0.005 * rng.standard_normal(2)
+        centre = marker_centres([pad], aside[None], np.array([turn]), 0.005 * rng.standard_normal(1))[0]
         optical = (error @ camera.rotation).T @ (centre - place)
         optical /= 1.0 + truth.prints.get(name, truth.prints.get("", 0.0))
         optical[2] /= 1.0 + truth.focal
@@ -102,6 +105,17 @@ def test_a_size_is_within_its_deviation(
         (explanation,) = [v for v in said.explanations if v.suspicion.what == what]
         found, std = explanation.figure(part)
         assert abs(found - value) < 3.0 * std and std < 0.3 * value
+
+
+def test_the_supervisor_does_not_wait_for_an_opinion_of_a_large_team(lab_field: ResolvedField) -> None:
+    drone = lab_field.drones["drone_1"]
+    drones = {f"drone_{n}": replace(drone, pad_m=(0.8 * (n % 4) - 1.2, 0.8 * (n // 4) - 0.4)) for n in range(8)}
+    team = replace(lab_field, drones=drones)
+    sightings = seen(team, Truth(moved={"drone_3": (0.4, 0.0, 0.0)}), 1)
+    began_s = time.process_time()
+    (explanation,) = opinion(stand_of(team), sightings).explanations
+    assert (explanation.suspicion.what, explanation.suspicion.who) == ("placed", "drone_3")
+    assert time.process_time() - began_s < 1.0
 
 
 def test_what_cannot_be_told_apart_is_told_together(lab_field: ResolvedField) -> None:

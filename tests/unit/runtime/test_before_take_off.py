@@ -21,7 +21,7 @@ from groundstation.bus.topics import CAMERA_STATUS, COMMAND, COMMAND_ACK, EVENT,
 from groundstation.doctor.finding import Finding, Level
 from groundstation.field.resolved import ResolvedField
 from groundstation.flight.looking import Looking
-from groundstation.preflight.stand import stand_of
+from groundstation.preflight.stand import marker_centres, stand_of
 from groundstation.runtime.before_take_off import BeforeTakeOff
 from groundstation.runtime.operator import Operator
 from groundstation.runtime.take_off import TakeOffLimits
@@ -60,7 +60,7 @@ class Lab:
             status = VehicleStatus(header=header, flight_state=state, mode="LANDED", battery=0.9, rate_hz=200.0)
             self.devices.publish(VEHICLE_STATUS, status)
             pad = stand.pads[name]
-            centre = pad.centre(np.zeros(2), 0.0, 0.0) - camera.position_m
+            centre = marker_centres([pad], np.zeros((1, 2)), np.zeros(1), np.zeros(1))[0] - camera.position_m
             x, y, z = (camera.rotation.T @ centre).tolist()
             observation = RelativeObservation(
                 header=self.devices.header("ceiling"),

@@ -106,8 +106,9 @@ class MonitorState:
     def _take(self, entity: str, stamp_ns: int, message: m.Message) -> None:
         match message:
             case m.VehicleStatus():
-                self.vehicles[entity] = StampedMessage(stamp_ns, message)
-                self.take_offs[entity] = take_off_of(self.take_offs.get(entity), stamp_ns, message)
+                status = self._known(entity, message)
+                self.vehicles[entity] = StampedMessage(stamp_ns, status)
+                self.take_offs[entity] = take_off_of(self.take_offs.get(entity), stamp_ns, status)
             case m.CameraStatus():
                 self.cameras[entity] = StampedMessage(stamp_ns, message)
             case m.ProcessStatus():
@@ -133,3 +134,10 @@ class MonitorState:
                 self.answers.setdefault(message.command_id, {})[entity] = message
                 while len(self.answers) > _COMMANDS:
                     del self.answers[next(iter(self.answers))]
+
+    def _known(self, name: str, said: m.VehicleStatus) -> m.VehicleStatus:
+        before = self.vehicles.get(name)
+        if before is None:
+            return said
+        state = m.known_state(before.message.flight_state, said.flight_state)
+        return said if state is said.flight_state else msgspec.structs.replace(said, flight_state=state)

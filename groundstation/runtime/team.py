@@ -15,6 +15,7 @@ from groundstation.bus.messages import (
     RelativeObservation,
     Vector3,
     VehicleStatus,
+    known_state,
 )
 from groundstation.bus.topics import OBSERVATION, ODOMETRY, RANGE, VEHICLE_STATUS
 from groundstation.runtime.marker_height import FixedCamera, MarkerHeight
@@ -124,7 +125,8 @@ class TeamStatus:
         if member is not None:
             if not member.standing and status.flight_state in STANDING:
                 member.marker.forget()  # it was seen in the air until now
-            member.state, member.mode, member.detail = status.flight_state, status.mode, status.detail
+            member.state = known_state(member.state, status.flight_state)
+            member.mode, member.detail = status.mode, status.detail
             member.heard_ns = now_ns
 
     def _see(self, observer: str, subject: str, position_m: Vector3, now_ns: int) -> None:

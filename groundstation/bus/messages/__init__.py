@@ -32,6 +32,7 @@ from groundstation.bus.messages.flight import (
     VehicleStatus,
     VelocitySetpoint,
     Verb,
+    known_state,
 )
 from groundstation.bus.messages.hosts import ClockOffset, HostAnswer, HostOrder, HostReport, Supervision
 from groundstation.bus.messages.plan import Alternative, Control, Edge, Plan, SolverReport
@@ -111,4 +112,5 @@ __all__ = [
     "VelocitySetpoint",
     "Verb",
     "Verdict",
+    "known_state",
 ]

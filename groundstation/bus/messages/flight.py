@@ -35,6 +35,14 @@ STANDING = frozenset({FlightState.LANDED, FlightState.EMERGENCY})
 UNHEARD = frozenset({FlightState.UNKNOWN, FlightState.LOST})
 
 
+def known_state(before: FlightState, said: FlightState) -> FlightState:
+    """Return what is known of a drone whose driver says a state, by what was known before.
+
+    A driver that is started anew in flight says UNKNOWN until it hears the drone, which flies on all the same.
+    """
+    return FlightState.LOST if said is FlightState.UNKNOWN and before in AIRBORNE | {FlightState.LOST} else said
+
+
 class VehicleStatus(Message, frozen=True, kw_only=True):
     """Health of one vehicle and of the link to it (5 Hz)."""
 

@@ -70,3 +70,14 @@ def test_what_asks_for_an_act_decides_beside_what_is_graver(world: World) -> Non
     world.vehicle("drone_2", age_s=4.0)
     said = judged(world)
     assert said.level is Level.ACT and "weak link" in said.reason
+
+
+def test_a_drone_in_the_air_whose_driver_starts_anew_and_does_not_hear_it_is_lost(world: World) -> None:
+    both(world)
+    judged(world)
+    world.vehicle("drone_1", "CONNECTING", battery=None, flight_state=m.FlightState.UNKNOWN)
+    said = judged(world)
+    assert said.level is Level.ACT and "drone_1: its driver no longer hears it" in said.reason
+    world.vehicle("drone_1", "LANDED", flight_state=m.FlightState.LANDED)
+    world.vehicle("drone_2", "LANDED", flight_state=m.FlightState.LANDED)
+    assert judged(world).level is Level.SAFE

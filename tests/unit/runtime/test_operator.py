@@ -314,3 +314,19 @@ def test_landed_means_all_say_so(scene: Scene) -> None:
     two.state = FlightState.LOST
     scene.pass_(0.2)
     assert not scene.operator.landed(scene.now_ns), "a lost drone is not known to stand"
+
+
+def test_a_driver_that_starts_anew_and_hears_nothing_lands_no_drone(scene: Scene) -> None:
+    flying = scene.add("drone_1")
+    flying.state = FlightState.FLYING
+    list(scene.run(0.1))
+    flying.state = FlightState.UNKNOWN  # as its driver says that was started anew
+    list(scene.run(0.5))
+    assert not scene.operator.landed(scene.now_ns)
+    assert scene.operator.team.airborne(scene.now_ns) == ("drone_1",)
+    flying.state = FlightState.LANDED
+    list(scene.run(0.1))
+    assert scene.operator.landed(scene.now_ns)
+    flying.state = FlightState.UNKNOWN
+    list(scene.run(0.1))
+    assert scene.operator.landed(scene.now_ns), "it stood when it was heard last"

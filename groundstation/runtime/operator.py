@@ -31,6 +31,8 @@ _LEASE_PERIOD_NS = 500 * NS_PER_MS
 _LEASE_LIFE_NS = 1_500 * NS_PER_MS
 _CONFIRM_NS = {Verb.LAND: 20 * NS_PER_S, Verb.TAKEOFF: 20 * NS_PER_S}
 _CONFIRM_DEFAULT_NS = 6 * NS_PER_S
+_OBEYED = (AckStage.ACCEPTED, AckStage.EFFECTIVE)
+_IN_THE_AIR = (TeamPhase.UP, TeamPhase.TRACKING, TeamPhase.HELD)
 
 
 @dataclass(slots=True)
@@ -64,7 +66,7 @@ class Operator:
         self._checks = checks
         self.forbidden = ""
         self.team = TeamStatus(bus, drones, cameras)
-        self.phase = TeamPhase.GROUND
+        self.phase = self._phase_before = TeamPhase.GROUND
         self.mistake: Mistake | None = None
         self.tracking_since_ns = 0
         self._inbox = bus.subscribe([COMMAND, COMMAND_ACK])
@@ -104,13 +106,12 @@ class Operator:
         self._sequence = TakeOff(drones or tuple(self.team.members), self._limits, now_ns)
         self._then_track = then_track
         self.mistake = None
-        self.phase = TeamPhase.TAKING_OFF
+        self._phase_before, self.phase = self.phase, TeamPhase.TAKING_OFF
 
     def track(self, now_ns: int, drones: tuple[str, ...] = (), request: Command | None = None) -> None:
         """Let the tracker move the given drones (none given: all that are up)."""
         up = tuple(name for name, member in self.team.members.items() if member.up)
         self._give(Verb.TRACK, drones or up, now_ns, request)
-        self.phase = TeamPhase.TRACKING
 
     def land(self, now_ns: int) -> None:
         """Land everybody; whatever else was going on ends."""
@@ -184,8 +185,8 @@ class Operator:
             if not dialogue.book.note(ack):
                 continue
             progress = dialogue.book.progress[ack.header.entity]
-            if ack.verb is Verb.TRACK and ack.stage in (AckStage.ACCEPTED, AckStage.EFFECTIVE):
-                self.tracking_since_ns = self.tracking_since_ns or now_ns
+            if not ack.verb.stops and ack.verb is not Verb.TAKEOFF and ack.stage in _OBEYED:
+                self.phase, self.tracking_since_ns = TeamPhase.TRACKING, self.tracking_since_ns or now_ns
             line = f"{ack.header.entity}: {ack.verb} {progress.text()}"
             if progress.settled and line != self._said.get(ack.header.entity):
                 self._said[ack.header.entity] = line  # a refusal is asked again several times a second
@@ -243,8 +244,6 @@ class Operator:
                 self.track(now_ns, names, request)
             case verb:
                 self._give(verb, names, now_ns, request)
-                if verb is Verb.RESUME:
-                    self.phase = TeamPhase.TRACKING
 
     # -- what is under way ---------------------------------------------------------------------------------------
 
@@ -307,7 +306,10 @@ class Operator:
 
     def _finish(self, sequence: TakeOff, now_ns: int) -> None:
         request, self._sequence, self._sequence_request = self._sequence_request, None, None
-        self.phase = TeamPhase.UP if sequence.up else TeamPhase.GROUND
+        if self._phase_before in _IN_THE_AIR and not self.landed(now_ns):
+            self.phase = self._phase_before  # others have flown all the while
+        else:
+            self.phase = TeamPhase.UP if sequence.up else TeamPhase.GROUND
         self.mistake = sequence.mistake
         if request is not None:
             missing = "; ".join(f"{name}: {reason}" for name, reason in sequence.left_out.items())

@@ -22,9 +22,9 @@ _LONGEST_S = 5.0
 
 
 class Waiting:
-    """A run whose drone stands; a page presses a stop at the first turn, the keyboard Enter at the fifth."""
+    """A run whose drone stands; a page presses a button at the first turn, the keyboard Enter at the fifth."""
 
-    def __init__(self, keyboard: int, stop: m.Verb) -> None:
+    def __init__(self, keyboard: int, pressed: m.Verb) -> None:
         exchange = MemoryExchange()
         self.bus, self._drone = MemoryBus(exchange, "lab", "supervisor"), MemoryBus(exchange, "lab", "drone_1")
         self._page = MemoryBus(exchange, "lab", "console")
@@ -34,7 +34,7 @@ class Waiting:
         self.failure, self.unwell = "", list[str]()
         self.said: list[str] = []
         self.heard: list[m.Verb] = []
-        self._stop = stop
+        self._pressed = pressed
         self._keyboard, self._turns, self._began = keyboard, 0, time.monotonic()
 
     def step(self) -> None:
@@ -44,8 +44,9 @@ class Waiting:
         self.heard += [r.message.verb for r in self._orders.drain() if isinstance(r.message, m.Command)]
         if self._turns == 1:
             header = self._page.header("team")
-            stop = m.Command(header=header, id="page-1", verb=self._stop, scope=(), issuer="console")
-            self._page.publish(t.COMMAND, stop)
+            scope = () if self._pressed.stops else (m.OPERATOR,)
+            order = m.Command(header=header, id="page-1", verb=self._pressed, scope=scope, issuer="console")
+            self._page.publish(t.COMMAND, order)
         if self._turns == 5:
             os.write(self._keyboard, b"\n")
         late = time.monotonic() - self._began > _LONGEST_S
@@ -87,3 +88,11 @@ def test_a_run_that_asks_nobody_does_not_take_off_after_a_stop(keyboard: int, st
     outcome = flown(waiting, asks=False)
     assert outcome.failure == f"nobody took off: {stop} by console came after it"
     assert m.Verb.TAKEOFF not in waiting.heard
+
+
+@pytest.mark.parametrize("start", [m.Verb.TRACK, m.Verb.RESUME])
+def test_a_start_that_nobody_can_obey_before_the_take_off_does_not_end_the_prompt(keyboard: int, start: m.Verb) -> None:
+    waiting = Waiting(keyboard, start)
+    flown(waiting, asks=True)
+    assert m.Verb.TAKEOFF in waiting.heard, "Enter takes off after it as before it"
+    assert not any("landed by themselves" in line for line in waiting.said)

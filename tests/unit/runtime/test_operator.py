@@ -330,3 +330,20 @@ def test_a_driver_that_starts_anew_and_hears_nothing_lands_no_drone(scene: Scene
     flying.state = FlightState.UNKNOWN
     list(scene.run(0.1))
     assert scene.operator.landed(scene.now_ns), "it stood when it was heard last"
+
+
+@pytest.mark.parametrize("refusal", ["", "battery empty"])
+def test_a_later_take_off_of_one_leaves_the_others_tracking_whatever_comes_of_it(scene: Scene, refusal: str) -> None:
+    scene.add("drone_1")
+    scene.pass_(0.2)
+    scene.operator.take_off(scene.now_ns, ("drone_1",))
+    scene.pass_(4.0)
+    late = scene.add("drone_2", refusal=refusal)
+    scene.pass_(0.2)
+    other = MemoryBus(scene.exchange, "lab", "cli_1")
+    header = other.header("operator")
+    scope = ("operator", "drone_2")
+    other.publish(COMMAND, Command(header=header, id="r1", verb=Verb.TAKEOFF, scope=scope, issuer="cli_1"))
+    scene.pass_(8.0)
+    assert late.state is (FlightState.LANDED if refusal else FlightState.HOVERING)
+    assert scene.operator.phase is TeamPhase.TRACKING

@@ -84,7 +84,25 @@ def test_a_request_goes_to_the_drones_that_it_names_alone_and_is_answered(verb):
 def test_only_what_moves_drones_again_is_tracking(verb, phase):
     desk = Desk(drone_1=UP)
     desk.ask(verb, OPERATOR, "drone_1")
+    desk.confirm(*DONE)
     assert desk.operator.phase is phase
+
+
+@pytest.mark.parametrize("verb", [Verb.TRACK, Verb.RESUME])
+def test_what_every_drone_refuses_leaves_the_team_on_the_ground(verb):
+    desk = Desk(drone_1=DOWN)
+    desk.ask(verb, OPERATOR)
+    desk.confirm(refused=("drone_1",))
+    assert desk.operator.phase is TeamPhase.GROUND and not desk.operator.tracking_since_ns
+
+
+def test_a_team_that_is_held_during_its_take_off_tracks_from_its_resume_on():
+    desk = Desk(drone_1=UP)
+    desk.send(desk.command(Verb.HOLD, identity="h"))
+    desk.ask(Verb.RESUME, OPERATOR)
+    assert not desk.operator.tracking_since_ns
+    desk.confirm(*DONE)
+    assert desk.operator.phase is TeamPhase.TRACKING and desk.operator.tracking_since_ns == desk.now_ns
 
 
 def test_stops_never_expire_and_starts_do():
@@ -151,9 +169,9 @@ def test_a_stop_that_is_repeated_ends_no_start_that_came_after_it(clock_id):
     desk.send(stop)
     desk.send(desk.command(Verb.TRACK, OPERATOR, identity="start", age_s=-0.2 if clock_id else 1))
     desk.send(stop)
-    assert desk.operator.phase is TeamPhase.TRACKING
     assert sum("HOLD by" in line for line in desk.said) == 1
     desk.confirm(*DONE)
+    assert desk.operator.phase is TeamPhase.TRACKING
     assert desk.stages()[-1] == (AckStage.EFFECTIVE, "")
 
 
@@ -212,6 +230,7 @@ def test_an_order_that_nobody_answers_is_given_up_after_its_time_and_not_before(
 def test_a_stop_of_all_drones_by_name_is_one_of_the_team_and_a_stop_of_some_is_not():
     desk = Desk(drone_1=UP, drone_2=UP)
     desk.operator.track(desk.now_ns)
+    desk.confirm(*DONE)
     desk.ask(Verb.LAND, "drone_1", identity="a")
     phases = [desk.operator.phase]
     for verb, scope, identity in ((Verb.HOLD, ("drone_1", "drone_2"), "b"), (Verb.LAND, (), "c"), (Verb.HOLD, (), "d")):

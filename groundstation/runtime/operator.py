@@ -103,15 +103,14 @@ class Operator:
         return "; ".join(f"{one.subject}: {one.found} -> {one.remedy}" for one in musts)
 
     def _begin(self, now_ns: int, drones: tuple[str, ...], then_track: bool) -> None:
-        self._sequence = TakeOff(drones or tuple(self.team.members), self._limits, now_ns)
+        self._sequence = TakeOff(drones or tuple(self.team.members), self._limits, now_ns, self.team.up)
         self._then_track = then_track
         self.mistake = None
         self._phase_before, self.phase = self.phase, TeamPhase.TAKING_OFF
 
     def track(self, now_ns: int, drones: tuple[str, ...] = (), request: Command | None = None) -> None:
         """Let the tracker move the given drones (none given: all that are up)."""
-        up = tuple(name for name, member in self.team.members.items() if member.up)
-        self._give(Verb.TRACK, drones or up, now_ns, request)
+        self._give(Verb.TRACK, drones or self.team.up, now_ns, request)
 
     def land(self, now_ns: int) -> None:
         """Land everybody; whatever else was going on ends."""

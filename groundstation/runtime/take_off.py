@@ -3,6 +3,7 @@
 A state machine without clock or bus: `step` gets the time and returns what to order.
 """
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from enum import Enum, auto
 
@@ -39,20 +40,23 @@ class _Step(Enum):
 
 
 class TakeOff:
-    """One sequence over the given drones; finished when nobody is left waiting.
+    """One sequence over the given drones but for those that fly already; finished when nobody is left waiting.
 
-    up: who was seen in flight; left_out: who was not, and why; mistake: what ended the sequence before its time.
+    up: who flew already or was seen in flight; left_out: who was not, and why; mistake: what ended the sequence before
+    its time.
     """
 
-    def __init__(self, drones: tuple[str, ...], limits: TakeOffLimits, now_ns: int) -> None:
-        self._waiting = list(drones)
+    def __init__(
+        self, drones: tuple[str, ...], limits: TakeOffLimits, now_ns: int, flying: Collection[str] = ()
+    ) -> None:
+        self._waiting = [name for name in drones if name not in flying]
         self._limits = limits
         self._step_ns = now_ns
         self._step = _Step.CONNECT
         self._ordered_ns = 0
         self._refusal = ""
         self._watch = LiftOffWatch()
-        self.up: list[str] = []
+        self.up = [name for name in drones if name in flying]
         self.left_out: dict[str, str] = {}
         self.mistake: Mistake | None = None
 

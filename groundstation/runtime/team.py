@@ -145,6 +145,11 @@ class TeamStatus:
         for member in self.members.values():
             member.note_floor(now_ns)
 
+    @property
+    def up(self) -> tuple[str, ...]:
+        """Return who flies, its take-off finished."""
+        return tuple(name for name, member in self.members.items() if member.up)
+
     def airborne(self, now_ns: int) -> tuple[str, ...]:
         """Return who is not known to stand: a drone that was heard once and then lost counts as flying."""
         return tuple(name for name, member in self.members.items() if member.heard_ns and not _at_rest(member, now_ns))

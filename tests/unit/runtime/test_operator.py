@@ -347,3 +347,19 @@ def test_a_later_take_off_of_one_leaves_the_others_tracking_whatever_comes_of_it
     scene.pass_(8.0)
     assert late.state is (FlightState.LANDED if refusal else FlightState.HOVERING)
     assert scene.operator.phase is TeamPhase.TRACKING
+
+
+def test_who_flies_already_is_none_of_a_later_take_off_of_all_seen_or_not(scene: Scene) -> None:
+    flying = scene.add("drone_1")
+    scene.pass_(0.2)
+    scene.operator.take_off(scene.now_ns, ("drone_1",))
+    scene.pass_(4.0)
+    flying.seen = False  # below another one, or at the edge of the room
+    late = scene.add("drone_2")
+    scene.pass_(3.0)
+    other = MemoryBus(scene.exchange, "lab", "cli_1")
+    request = Command(header=other.header("operator"), id="r1", verb=Verb.TAKEOFF, scope=("operator",), issuer="cli_1")
+    other.publish(COMMAND, request)
+    scene.pass_(14.0)
+    assert flying.heard == [Verb.TAKEOFF, Verb.TRACK] and flying.state is FlightState.HOVERING
+    assert late.heard == [Verb.TAKEOFF] and late.state is FlightState.HOVERING

@@ -148,7 +148,7 @@ def test_nothing_else_is_begun_during_a_take_off_and_its_request_is_not_begun_tw
 @pytest.mark.parametrize("stop", [Verb.HOLD, Verb.LAND])
 @pytest.mark.parametrize("start", [Verb.TAKEOFF, Verb.TRACK, Verb.RESUME])
 def test_a_start_that_is_repeated_after_a_stop_is_not_begun_again(start, stop, scope):
-    desk = Desk(drone_1=UP, drone_2=UP)
+    desk = Desk(**dict.fromkeys(("drone_1", "drone_2"), DOWN if start is Verb.TAKEOFF else UP))
     request = desk.command(start, OPERATOR, identity="start", age_s=3)
     desk.send(request)
     desk.send(desk.command(stop, *scope, identity="stop", age_s=2))

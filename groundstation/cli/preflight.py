@@ -7,8 +7,8 @@ from groundstation.cli.run import SETTINGS, Rehearsal, run_real, run_simulated
 
 @click.command(
     epilog="\b\nExamples:\n  groundstation preflight lab.yaml\n  groundstation preflight lab --scenario realistic\n\n"
-    "Exit codes: 0 nothing must be mended, 1 something must, 2 wrong settings, 4 a process failed, "
-    "130 it was broken off."
+    "Exit codes: 0 nothing must be mended, 1 something must or nobody would take off, 2 wrong settings, "
+    "4 a process failed, 130 it was broken off."
 )
 @click.argument("field")
 @click.option("--scenario", metavar="S", help="Look at emulated devices under a scenario, not at the real ones.")

@@ -1,6 +1,6 @@
 """The checks before a take-off, from the first picture to what the operator reads."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 from groundstation.doctor.finding import Finding, Level
 from groundstation.preflight.judge import lines
@@ -13,13 +13,17 @@ _AGAIN_NS = 200 * NS_PER_MS
 
 
 class Looking:
-    """One look before a take-off. forbidden: whether something must be mended."""
+    """One look before a take-off. forbidden: whether something must be mended; nobody: whether it would leave all out.
 
-    def __init__(self, checks: BeforeTakeOff, now_ns: int) -> None:
-        self._checks, self._began_ns, self._next_ns = checks, now_ns, now_ns
+    drones: the names of the team.
+    """
+
+    def __init__(self, checks: BeforeTakeOff, drones: Collection[str], now_ns: int) -> None:
+        self._checks, self._drones, self._began_ns, self._next_ns = checks, drones, now_ns, now_ns
+        self._left_out: tuple[str, ...] = ()
         self._findings: list[Finding] = []
         self._found_ns = now_ns
-        self.forbidden = False
+        self.forbidden = self.nobody = False
 
     def finished(self, now_ns: int) -> bool:
         """Return whether everything that can be judged has been seen, or it was waited for long enough."""
@@ -29,6 +33,8 @@ class Looking:
         if not self._checks.complete(now_ns) and now_ns - self._began_ns < _LONGEST_NS:
             return False
         self._found_ns, self._findings = now_ns, self._checks.findings(now_ns)
+        self._left_out = self._checks.left_out(now_ns)
+        self.nobody = set(self._left_out) >= set(self._drones)
         self.forbidden = any(one.level is Level.MUST for one in self._findings)
         return True
 
@@ -37,4 +43,5 @@ class Looking:
         self._checks.publish(self._findings, self._found_ns)
         yield from lines(one for one in self._findings if whole or one.level is not Level.OK)
         musts = sum(one.level is Level.MUST for one in self._findings)
-        yield f"before take-off: {musts or 'nothing'} must be mended"
+        who = "nobody would take off" if self.nobody else f"{' and '.join(self._left_out)} would be left out"
+        yield f"before take-off: {musts or 'nothing'} must be mended{f'; {who}' if self._left_out else ''}"

@@ -105,12 +105,12 @@ class Flight:
 
     def _look(self, operator: Operator, checks: BeforeTakeOff) -> bool:
         """Wait for what the checks before the take-off judge, and say what they find; return whether that is all."""
-        looking = Looking(checks, self._turn(operator))
+        looking = Looking(checks, self._supervisor.run.drones, self._turn(operator))
         while not self._breaks_off():
             if looking.finished(self._turn(operator)):
                 for line in looking.tell(whole=self._plan.look_only):
                     self._say(line)
-                self._forbidden = looking.forbidden
+                self._forbidden = looking.forbidden or (self._plan.look_only and looking.nobody)
                 return self._plan.look_only
         return False
 

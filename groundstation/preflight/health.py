@@ -40,6 +40,12 @@ def drone_findings(field: ResolvedField, statuses: Mapping[str, VehicleStatus]) 
         yield from _clock(name, status)
 
 
+def left_out(field: ResolvedField, statuses: Mapping[str, VehicleStatus]) -> tuple[str, ...]:
+    """Return whom a take-off would leave out: drones that are not heard, or would refuse it."""
+    known = {name: statuses.get(name) for name in field.drones}
+    return tuple(n for n, told in known.items() if told is None or told.flight_state in UNHEARD or told.not_ready)
+
+
 def _readiness(name: str, status: VehicleStatus) -> Iterator[Finding]:
     """Yield why a drone would refuse to take off, which leaves it out and stops nobody else; and its firmware."""
     if status.not_ready:

@@ -18,6 +18,7 @@ from groundstation.bus.messages import (
 from groundstation.bus.topics import CAMERA_STATUS, EVENT, OBSERVATION, PREFLIGHT, RANGE, VEHICLE_STATUS
 from groundstation.doctor.finding import Finding, Level
 from groundstation.field.resolved import ResolvedField
+from groundstation.preflight.health import left_out
 from groundstation.preflight.judge import judge, open_musts
 from groundstation.preflight.pad_record import PadRecord
 from groundstation.runtime.asking import TEAM
@@ -81,6 +82,10 @@ class BeforeTakeOff:
         """Return everything that is to be said now, the grave first."""
         vehicles, cameras = _spoken(self._vehicles, now_ns), _spoken(self._cameras, now_ns)
         return judge(self._field, vehicles, cameras, self._record.medians(now_ns), self._flew)
+
+    def left_out(self, now_ns: int) -> tuple[str, ...]:
+        """Return whom a take-off of all would leave on the ground now."""
+        return left_out(self._field, _spoken(self._vehicles, now_ns))
 
     def forbids(self, now_ns: int, drones: Collection[str]) -> list[Finding]:
         """Return what forbids a take-off of the given drones (none: all)."""

@@ -36,6 +36,22 @@ class Unfinished:
         return []
 
 
+class Silent(Unfinished):
+    """Checks that see everything and hear no drone."""
+
+    def complete(self, _now_ns: int) -> bool:
+        return True
+
+    def findings(self, _now_ns: int) -> list[object]:
+        return []
+
+    def left_out(self, _now_ns: int) -> tuple[str, ...]:
+        return ("drone_1",)
+
+    def publish(self, _findings: object, _now_ns: int) -> None:
+        pass
+
+
 class Broken:
     """A run whose drone stands ready, and that ends in the third turn of the look."""
 
@@ -99,3 +115,14 @@ def test_a_look_that_was_broken_off_does_not_say_that_all_is_well(
 ) -> None:
     outcome = loop.FlightOutcome("", interrupted, landed=True, forbidden=forbidden)
     assert _exit_code(outcome, plan_of(lab_field, look_only=True), None, judged_by_landing=False) is code
+
+
+def test_a_mere_look_by_which_nobody_would_take_off_is_not_well(
+    lab_field: ResolvedField, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(loop, "BeforeTakeOff", Silent)
+    said: list[str] = []
+    terminal = cast(Terminal, SimpleNamespace(say=said.append, unmute=lambda: None))
+    flight = loop.Flight(cast(Supervisor, Broken("it took too long")), plan_of(lab_field, look_only=True), terminal)
+    flight._start = cast(Start, SimpleNamespace(run=lambda: None, show_screen=lambda: None))
+    assert flight.run().forbidden and said[-1].endswith("nothing must be mended; nobody would take off")

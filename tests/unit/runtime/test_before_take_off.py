@@ -161,7 +161,7 @@ def test_who_flew_in_this_run_may_stand_anywhere(lab_field: ResolvedField) -> No
 
 def test_a_look_tells_operator_and_bus_what_must_be_mended(lab_field: ResolvedField) -> None:
     lab = Lab(lab_field, higher_m=0.3)
-    looking = Looking(lab.checks, lab.now_ns)
+    looking = Looking(lab.checks, lab.field.drones, lab.now_ns)
     assert not looking.finished(lab.now_ns), "nothing was seen yet"
     lab.turn()
     assert looking.finished(lab.now_ns) and looking.forbidden
@@ -174,11 +174,24 @@ def test_a_look_tells_operator_and_bus_what_must_be_mended(lab_field: ResolvedFi
 
 def test_a_look_ends_where_nothing_arrives(lab_field: ResolvedField) -> None:
     checks = BeforeTakeOff(MemoryBus(MemoryExchange(), "lab", "supervisor"), lab_field)
-    looking = Looking(checks, 0)
+    looking = Looking(checks, lab_field.drones, 0)
     assert not looking.finished(1000 * MS)
     assert looking.finished(9000 * MS)
     told = "\n".join(looking.tell(whole=True))
     assert "no sensor that is fixed in the world sends anything" in told and "nothing is heard of it" in told
+    assert looking.nobody and told.endswith("before take-off: 2 must be mended; nobody would take off")
+
+
+@pytest.mark.parametrize("silent", [("drone_2",), ("drone_1", "drone_2")])
+def test_a_look_tells_who_would_be_left_out(lab_field: ResolvedField, silent: tuple[str, ...]) -> None:
+    lab = Lab(lab_field)
+    lab.states |= dict.fromkeys(silent, FlightState.UNKNOWN)
+    looking = Looking(lab.checks, lab_field.drones, lab.now_ns)
+    lab.turn()
+    assert looking.finished(lab.now_ns) and not looking.forbidden
+    who = "drone_2 would be left out" if len(silent) == 1 else "nobody would take off"
+    assert list(looking.tell(whole=False))[-1] == f"before take-off: nothing must be mended; {who}"
+    assert looking.nobody is (len(silent) == 2)
 
 
 @pytest.mark.parametrize(("battery", "level"), [(0.9, None), (0.3, Level.SHOULD), (0.17, Level.MUST)])

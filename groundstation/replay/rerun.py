@@ -1,5 +1,6 @@
 """Today's tracker in the loop that flies, fed by a journal: same inputs, same ticks, plans where they were adopted."""
 
+import logging
 from collections import Counter
 from collections.abc import Iterable
 
@@ -13,6 +14,8 @@ from groundstation.planning.planner import Planner, PlanRequest
 from groundstation.replay.tick_log import Tick
 from groundstation.runtime.journal import STOPPED, Adoption
 from groundstation.runtime.tracker_loop import TrackerFeed, TrackerSection, Tracking
+
+_log = logging.getLogger(__name__)
 
 Words = list[tuple[Topic, Message]]
 
@@ -96,6 +99,9 @@ class JournalWorker:
         try:
             plan = self._planner.plan(request.belief, request.topology, request.warm_start, lambda: False, budget)
         except EstimatorFault:
+            return Adoption(tick, None)
+        except Exception:  # noqa: BLE001 - as in flight (PlanWorker): what was flown through can be replayed
+            _log.exception("planning crashed")
             return Adoption(tick, None)
         return Adoption(tick, plan)
 

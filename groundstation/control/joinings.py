@@ -22,19 +22,22 @@ class Joinings:
         self._unsettled_ns: dict[str, int] = {}
         self._now_ns = 0
 
-    def take(self, now_ns: int, corrections: Iterable[Correction]) -> list[Notice]:
-        """Return what is to be told."""
+    def take(
+        self, now_ns: int, corrections: Iterable[Correction], ranged: Iterable[tuple[str, str, bool]] = ()
+    ) -> list[Notice]:
+        """Return what is to be told. ranged: by whose ranges who joined, and whether again."""
         self._now_ns = now_ns
-        return [self._note(one) for one in corrections if one.joined]
+        seen = ((one.observer, one.subject, one.nis is not None) for one in corrections if one.joined)
+        return [self._note(*one) for one in (*seen, *ranged)]
 
     def is_unsettled(self, name: str) -> bool:
         """Return whether an entity was re-initialised twice within 5 s, and the last time within 3 s."""
         return self._now_ns - self._unsettled_ns.get(name, -math.inf) < _SETTLED_NS
 
-    def _note(self, one: Correction) -> Notice:
-        if one.nis is None:
-            return Notice(Severity.INFO, f"{one.subject} localised by {one.observer}", entity=one.subject)
-        if self._now_ns - self._last_ns.get(one.subject, -math.inf) < _AGAIN_NS:
-            self._unsettled_ns[one.subject] = self._now_ns
-        self._last_ns[one.subject] = self._now_ns
-        return Notice(Severity.WARNING, f"{one.subject} re-initialised by {one.observer}", entity=one.subject)
+    def _note(self, observer: str, subject: str, again: bool) -> Notice:
+        if not again:
+            return Notice(Severity.INFO, f"{subject} localised by {observer}", entity=subject)
+        if self._now_ns - self._last_ns.get(subject, -math.inf) < _AGAIN_NS:
+            self._unsettled_ns[subject] = self._now_ns
+        self._last_ns[subject] = self._now_ns
+        return Notice(Severity.WARNING, f"{subject} re-initialised by {observer}", entity=subject)

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.arrays import Array
-from groundstation.bus.messages import Odometry, RangeObservation, Severity, Verdict
-from groundstation.bus.notice import Notice
+from groundstation.bus.messages import Odometry, RangeObservation, Verdict
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.fixed_lag import FixedLagFilter
 from groundstation.estimation.measurement import SensorReading
@@ -51,12 +50,12 @@ class RangeIntake:
         ranged = {name: one for own in robots.values() for name, one in own.items()}
         self._ranged, self._headings = ranged, {name: _Heading() for name in ranged}
         self._contradictions: dict[str, tuple[int, int]] = {}
-        self._notices: list[Notice] = []
+        self._joined: list[tuple[str, str, bool]] = []
 
-    def take_notices(self) -> list[Notice]:
-        """Return and forget what the operator should know."""
-        notices, self._notices = self._notices, []
-        return notices
+    def take_joined(self) -> list[tuple[str, str, bool]]:
+        """Return and forget by which system who was placed, and whether it was believed elsewhere before."""
+        joined, self._joined = self._joined, []
+        return joined
 
     def hear(self, message: Odometry, stamp_ns: int) -> None:
         """Take a vehicle's own heading."""
@@ -109,9 +108,7 @@ class RangeIntake:
         variances = [*(_LESS_SURE * np.diag(_square(message.covariance))).tolist(), heading.variance + drifted]
         self._filter.place(name, [*place.tolist(), yaw], variances, stamp_ns, now_ns)
         self._contradictions.pop(name, None)
-        how = "re-initialised" if known else "localised"
-        severity = Severity.WARNING if known else Severity.INFO
-        self._notices.append(Notice(severity, f"{name} {how} by {message.observer}", entity=name))
+        self._joined.append((message.observer, name, known))
         return True
 
     def _remember(self, name: str, belief: JointBelief) -> None:

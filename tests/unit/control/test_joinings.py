@@ -32,6 +32,16 @@ def test_a_sighting_that_joins_nobody_is_not_told() -> None:
     assert Joinings().take(1, [Correction("ceiling", "drone_1", Verdict.ACCEPTED, "", nis=3.0)]) == []
 
 
+def test_who_is_placed_by_ranges_is_told_of_and_unsettled_alike() -> None:
+    watch = Joinings()
+    first, second = watch.take(1, [], [("uwb", "drone_1", False), ("uwb", "drone_1", True)])
+    assert (first.severity, first.text) == (Severity.INFO, "drone_1 localised by uwb")
+    assert (second.severity, second.text) == (Severity.WARNING, "drone_1 re-initialised by uwb")
+    assert not watch.is_unsettled("drone_1")
+    watch.take(2 * NS_PER_S, [joining(again=True)])
+    assert watch.is_unsettled("drone_1"), "a camera and ranges contradict each other"
+
+
 def test_nobody_is_unsettled_before_anything_was_seen() -> None:
     assert not Joinings().is_unsettled("drone_1")
 

@@ -103,7 +103,7 @@ def test_a_drone_joins_where_ranges_put_it_with_the_heading_of_its_pad(desk: Des
     desk.fly(1)
     assert np.allclose(pose(desk), [*POSE, PAD_YAW], atol=0.02)
     assert desk.filter.belief().covariance_of("drone")[3, 3] == pytest.approx(math.radians(10) ** 2, rel=0.1)
-    assert [notice.text for notice in desk.intake.ranges.take_notices()] == ["drone localised by uwb"]
+    assert desk.intake.ranges.take_joined() == [("uwb", "drone", False)]
     before = desk.filter.belief().covariance_of("drone")[0, 0]
     desk.fly(20)
     assert desk.filter.belief().covariance_of("drone")[0, 0] < 0.5 * before
@@ -145,13 +145,13 @@ def test_ranges_without_a_place_let_nobody_join(desk: Desk) -> None:
 def test_one_who_is_elsewhere_round_after_round_is_placed_anew(desk: Desk) -> None:
     desk.take_off()
     desk.fly(10)
-    desk.intake.ranges.take_notices()
+    desk.intake.ranges.take_joined()
     away = (POSE[0] - 1.5, POSE[1], POSE[2])
     desk.fly(4, at=away)
     assert pose(desk)[0] > POSE[0] - 0.75
     desk.fly(6, at=away)
     assert np.allclose(pose(desk)[:3], away, atol=0.1)
-    assert [one.text for one in desk.intake.ranges.take_notices()] == ["drone re-initialised by uwb"]
+    assert desk.intake.ranges.take_joined() == [("uwb", "drone", True)]
 
 
 @pytest.mark.parametrize(("age_ms", "verdict"), [(3000, Verdict.LATE), (-3000, Verdict.IMPLAUSIBLE)])

@@ -102,8 +102,11 @@ class ConsistencyWatch:
         found = []
         for name, alarm in self._alarms.items():
             own = [mean for pair, mean in live.items() if name in pair]
-            wanted = name in blamed if not alarm.raised else bool(own) and max(own) > _NEAR
-            if not own or not alarm.changes(wanted, _LASTING_NS, now_ns):
+            if not own:
+                alarm.since_ns = None  # what is not seen says nothing, for or against
+                continue
+            wanted = name in blamed if not alarm.raised else max(own) > _NEAR
+            if not alarm.changes(wanted, _LASTING_NS, now_ns):
                 continue
             if not alarm.raised:
                 found.append(Notice(Severity.INFO, "sightings agree with the belief again", entity=name))

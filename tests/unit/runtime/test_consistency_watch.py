@@ -67,6 +67,15 @@ def test_between_near_and_far_what_was_told_stays_told() -> None:
     assert flight.fly(20.0, {}) == [], "and nobody seen proves nothing"
 
 
+def test_seconds_without_a_sighting_are_none_of_a_contradiction() -> None:
+    flight = Flight()
+    pair = ("ceiling", "drone_1")
+    assert flight.fly(2.0, {pair: FAR}) == []
+    flight.fly(30.0, {})
+    assert flight.fly(2.0, {pair: FAR}) == [], "what lasts 3 s is told, not what comes again after 30"
+    assert len(flight.fly(3.0, {pair: FAR})) == 1
+
+
 def test_joining_says_nothing_of_the_belief_before_it_and_strangers_are_not_kept() -> None:
     flight = Flight()
     assert flight.fly(10.0, {("ceiling", "drone_1"): FAR}, joined=True) == []

@@ -73,6 +73,9 @@ def test_an_end_without_a_landing_is_grave(stage: Any) -> None:
     strip = page.there("banner-ended")
     strip.wait_for(timeout=20_000)
     assert "grave" in strip.get_attribute("class")
+    stage.flight.event(Severity.ERROR, "drone_1 LANDING: nothing heard of the supervisor", "drone_1")
+    alarms = page.page.locator("[data-testid=banner-alarm]")  # what stops are given by
+    eventually(lambda: any("drone_1 LANDING" in text for text in alarms.all_text_contents()), what="the alarm stays")
     assert all(stop.is_enabled() for stop in stops(page))  # for as long as there is somebody to take them
     stage.console.terminate()
     stage.console.wait(10)

@@ -22,10 +22,10 @@ export function addNotice({ text: words, grave }) {
 // only a shell helps.
 function banners(own) {
   const { ended } = store.s;
-  const all = ended ? [ending(ended)] : own.map((alarm) => ({ ...alarm, level: "grave", rank: "ACT" }));
-  if (!ended && !own.some(({ shell }) => shell) && trackerSilent()) all.push(silentTracker());
+  const all = [...(ended ? [ending(ended)] : []), ...own.map((alarm) => ({ ...alarm, level: "grave", rank: "ACT" }))];
+  if (!runOver() && !own.some(({ shell }) => shell) && trackerSilent()) all.push(silentTracker());
   for (const { words, grave } of notices.filter(({ at }) => performance.now() - at < NOTICE_MS)) all.push({ kind: "notice", level: grave ? "grave" : "mild", title: words, rank: "notice" });
-  for (const alarm of store.connected && !ended ? (store.s.alarms ?? []).slice(0, SHOWN) : []) {
+  for (const alarm of store.connected && !runOver() ? (store.s.alarms ?? []).slice(0, SHOWN) : []) {
     if (alarm.about !== "tracker silent") all.push({ kind: "alarm", level: alarm.grave ? "grave" : "mild", title: alarm.told === null ? alarm.text : `${alarm.text} (told at ${momentWords(alarm.told)})`, more: alarm.advice, rank: alarm.asks ? "ACT" : "WATCH" });
   }
   if (!all.length && !replaying()) all.push({ kind: "none", level: "calm", title: store.s.safety?.reason ?? "No alarms yet." });
@@ -35,7 +35,7 @@ function banners(own) {
 
 function ending({ severity, text: words }) {
   const landed = severity === "INFO", title = [words[0].toUpperCase() + words.slice(1), resultWords()].filter(Boolean).join(". ");
-  return { kind: "ended", level: landed ? "calm" : "grave", title, more: runOver() ? "This run takes no more orders: the stop buttons are off." : "", shell: !landed };
+  return { kind: "ended", level: landed ? "calm" : "grave", title, more: runOver() ? "This run takes no more orders: the stop buttons are off." : "", shell: !landed, rank: landed ? undefined : "ACT" };
 }
 
 function silentTracker() {

@@ -3,7 +3,7 @@
 import { seconds } from "./dom.js";
 import { STOPS } from "./effects.js";
 import { mayGive, ownOrders } from "./own_orders.js";
-import { ageS, consoleSilent, estimateAge, now, replaying, silentS, store } from "./store.js";
+import { ageS, consoleSilent, estimateAge, now, replaying, runOver, silentS, store } from "./store.js";
 
 const KEPT = 50, BREAK_MS = 2000; // as groundstation/console/alarm_log.py has it
 const UNHEARD_S = 0.8, FORGOTTEN_S = 30;
@@ -12,7 +12,7 @@ let episodes = [], keptFor = "";
 
 // [{kind, about, title, more, shell}]: about stays the same while figures change; shell: whether only a shell helps.
 export function ownAlarms() {
-  if (store.s.ended) return [];
+  if (runOver()) return [];
   const alarms = [], age = estimateAge(), old = Number.isFinite(age) ? `What you see is ${seconds(age)} old.` : "";
   if (!store.connected) alarms.push({ kind: "link", about: "link", title: "NO CONNECTION TO THE CONSOLE", more: [store.reason && `${store.reason}.`, old].filter(Boolean).join(" "), shell: true });
   else if (consoleSilent()) alarms.push({ kind: "silent", about: "silent", title: `CONSOLE SILENT for ${seconds(silentS())}`, more: old, shell: true });

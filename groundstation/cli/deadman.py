@@ -2,6 +2,7 @@
 
 import os
 import select
+import signal
 import stat
 import struct
 import sys
@@ -9,7 +10,7 @@ import termios
 import time
 import tty
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -42,13 +43,22 @@ _LAND_BUTTON = 1
 
 @dataclass(slots=True)
 class Handle:
-    """Where the grip is felt: a terminal (any repeating space) or a gamepad (any button but the second)."""
+    """Where the grip is felt: a terminal (any repeating space) or a gamepad (any button but the second).
+
+    gone: nobody will hold it again, the drones land; left: its user leaves, the drones hold.
+    """
 
     descriptor: int
     gamepad: bool
+    gone: bool = False
+    left: bool = False
 
     def feel(self, man: DeadMan, now_ns: int) -> tuple[Verb | None, bool]:
-        """Read what there is; returns the stop that it asks for, and whether the user wants to leave."""
+        """Read what there is; returns the stop that it asks for, and whether nothing more is to come of it."""
+        if self.gone or self.left:
+            time.sleep(_TURN_S)
+            asked = man.release(now_ns)
+            return asked, self.left or man.grip is not Grip.LOOSE
         if not select.select([self.descriptor], [], [], _TURN_S)[0]:
             return None, False
         try:
@@ -56,7 +66,8 @@ class Handle:
         except OSError:
             data = b""
         if not data:
-            return man.release(now_ns), True  # unplugged, or the terminal is gone
+            self.gone = True  # unplugged, or the terminal is gone
+            return None, False
         return self._buttons(man, data, now_ns) if self.gamepad else self._keys(man, data, now_ns)
 
     def _keys(self, man: DeadMan, data: bytes, now_ns: int) -> tuple[Verb | None, bool]:
@@ -88,7 +99,7 @@ class Handle:
 def deadman(name: str | None, gamepad: str | None) -> int:
     """Hold on, and the flight goes on; let go, and the drones hold (space bar: after 0.9 s), and land 5 s later.
 
-    No emergency stop.
+    A gamepad that is pulled out, or a closed terminal, lets go; Ctrl-C holds and leaves, as q. No emergency stop.
     """
     record = choose_run(name)
     bus = join(record, "deadman", Role.CLI)
@@ -97,10 +108,25 @@ def deadman(name: str | None, gamepad: str | None) -> int:
     try:
         with _opened(gamepad) as handle:
             patience_ns = _GAMEPAD_PATIENCE_NS if handle.gamepad else _KEYBOARD_PATIENCE_NS
+            heed_signals(handle)
             watch(bus, record.drones, handle, DeadMan(patience_ns), lambda: record.supervisor.alive)
     finally:
         bus.close()
     return ExitCode.OK
+
+
+def heed_signals(handle: Handle) -> None:
+    """Let Ctrl-C leave as `q` does, and a closed terminal or the end of this process let go; main thread only."""
+
+    def leave(_number: int, _frame: object) -> None:
+        handle.left = True
+
+    def lose(_number: int, _frame: object) -> None:
+        handle.gone = True
+
+    signal.signal(signal.SIGINT, leave)
+    signal.signal(signal.SIGTERM, lose)
+    signal.signal(signal.SIGHUP, lose)
 
 
 def watch(bus: "Bus", drones: tuple[str, ...], handle: Handle, man: DeadMan, go_on: Callable[[], bool]) -> None:
@@ -126,8 +152,13 @@ def watch(bus: "Bus", drones: tuple[str, ...], handle: Handle, man: DeadMan, go_
         line = _line(desk, man)
         if line != shown:
             shown = line
-            click.echo(f"\r{line:<78}", nl=False)
-    click.echo("")
+            _show(f"\r{line:<78}")
+    _show("\n")
+
+
+def _show(text: str) -> None:
+    with suppress(OSError):  # the terminal is gone; what is due is ordered all the same
+        click.echo(text, nl=False)
 
 
 def _settled(desk: CommandDesk) -> bool:
@@ -171,4 +202,5 @@ def _opened(gamepad: str | None) -> Iterator[Handle]:
         tty.setcbreak(descriptor)
         yield Handle(descriptor, gamepad=False)
     finally:
-        termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
+        with suppress(termios.error):  # the terminal is gone
+            termios.tcsetattr(descriptor, termios.TCSADRAIN, before)

@@ -2,18 +2,21 @@
 
 import contextlib
 import os
+import signal
 import struct
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import click
 import pytest
 
 from groundstation.bus import topics as t
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import Command, Verb
 from groundstation.cli import deadman
-from groundstation.cli.deadman import Handle, watch
+from groundstation.cli.deadman import Handle, heed_signals, watch
+from groundstation.console import dead_man
 from groundstation.console.dead_man import DeadMan, Grip
 from groundstation.errors import GroundStationError
 from groundstation.time_units import NS_PER_S
@@ -84,8 +87,9 @@ def test_gamepad(pipe: tuple[int, int]) -> None:
     assert feel(button(5, 0))[0] is Verb.HOLD
     assert feel(button(5, 1), button(1, 1))[0] is Verb.LAND
     man.press(5)
-    os.close(pipe[1])
-    assert handle.feel(man, 6) == (Verb.HOLD, True)  # pulled out
+    os.close(pipe[1])  # pulled out
+    assert [handle.feel(man, 6) for _ in range(3)] == [(None, False), (Verb.HOLD, False), (None, False)]
+    assert man.step(6 * NS_PER_S) is Verb.LAND and handle.feel(man, 6 * NS_PER_S) == (None, True)
 
 
 def test_it_goes_out_to_everybody_and_is_repeated(pipe: tuple[int, int]) -> None:
@@ -102,6 +106,42 @@ def test_it_goes_out_to_everybody_and_is_repeated(pipe: tuple[int, int]) -> None
     assert all(isinstance(c, Command) and c.verb is Verb.HOLD and c.scope == () for c in sent)
 
 
+@pytest.mark.parametrize(
+    ("number", "orders"),
+    [
+        (signal.SIGINT, [Verb.HOLD]),
+        (signal.SIGTERM, [Verb.HOLD, Verb.LAND]),
+        (signal.SIGHUP, [Verb.HOLD, Verb.LAND]),
+    ],
+)
+def test_no_signal_takes_the_handle_away_without_a_stop(
+    pipe: tuple[int, int], monkeypatch: pytest.MonkeyPatch, number: signal.Signals, orders: list[Verb]
+) -> None:
+    monkeypatch.setattr(dead_man, "_LAND_AFTER_NS", NS_PER_S // 5)
+    monkeypatch.setattr(deadman, "_FAREWELL_NS", NS_PER_S // 5)
+    monkeypatch.setattr(click, "echo", broken)
+    exchange = MemoryExchange()
+    bus, drone = MemoryBus(exchange, "lab", "deadman_1"), MemoryBus(exchange, "lab", "drone_1")
+    commands = drone.subscribe([t.COMMAND])
+    before = {each: signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    handle, man, began = Handle(pipe[0], gamepad=True), DeadMan(1 << 62), time.monotonic()
+    man.press(time.monotonic_ns())
+    try:
+        heed_signals(handle)
+        os.kill(os.getpid(), number)
+        watch(bus, ("drone_1",), handle, man, lambda: time.monotonic() - began < 5.0)
+    finally:
+        for each, action in before.items():
+            signal.signal(each, action)
+    assert time.monotonic() - began < 4.0, "it left by itself"
+    verbs = [one.message.verb for one in commands.drain() if isinstance(one.message, Command)]
+    assert list(dict.fromkeys(verbs)) == orders
+
+
+def broken(*_: object, **__: object) -> None:
+    raise OSError("the terminal is gone")
+
+
 def test_what_is_no_gamepad_is_refused(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("no joystick")
     for path, words in (
@@ -115,4 +155,4 @@ def test_what_is_no_gamepad_is_refused(tmp_path: Path) -> None:
         assert handle.gamepad
         man = DeadMan(1)
         man.press(0)
-        assert handle.feel(man, 1) == (Verb.HOLD, True)  # it has nothing more to say: as good as unplugged
+        assert [handle.feel(man, 1)[0] for _ in range(2)] == [None, Verb.HOLD]  # as good as unplugged

@@ -112,14 +112,21 @@ class Hosting:
         self._terminal.say(f"run {order.run}: {', '.join(row.name for row in table)}; logs in {run_dir / 'log'}")
         supervisor = Supervisor(run, table, self._terminal, self._is_watched)
         try:
-            self._start(supervisor)
-            why = self._watch(supervisor, order.run)
+            why = self._why_over(supervisor, order.run)
             self._terminal.say(f"run {order.run}: {why}; drones of this host land")
             return supervisor.interrupts.stop_requested
         finally:
             self._own = OwnState(order.run, Lifecycle.STOPPING)
             supervisor.close()
             self._leave()
+
+    def _why_over(self, supervisor: Supervisor, run: str) -> str:
+        """Run the devices, and return why no longer; a run that ended meanwhile is no reason not to serve the next."""
+        try:
+            self._start(supervisor)
+            return self._watch(supervisor, run)
+        except GroundStationError as error:
+            return str(error)
 
     def _is_watched(self, block: HeartbeatBlock) -> bool:
         now_ns, link = clock.own_ns(), self._link

@@ -100,6 +100,22 @@ def test_a_host_serves_the_run_that_it_is_told_of_until_that_ends(
     assert (tmp_path / "run-7" / "log" / "supervisor.log").exists()
 
 
+def test_a_run_that_is_gone_before_its_devices_start_ends_the_run_and_not_the_waiting_for_the_next(
+    make: Callable[[str], tuple[hosting.Hosting, RunElsewhere]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    served, _ = make(VERSION)
+    order = served.wait()
+
+    def gone(*_: object, **__: object) -> None:
+        raise GroundStationError("no router answers at tls/10.77.0.1:4717")
+
+    monkeypatch.setattr(supervisor, "open_bus", gone)
+    said: list[str] = []
+    monkeypatch.setattr(served._terminal, "say", said.append)
+    assert served.serve(order) is False, "nobody interrupted it here"
+    assert said[-1] == "run run-7: no router answers at tls/10.77.0.1:4717; drones of this host land"
+
+
 def test_another_version_is_not_served_and_the_run_says_why(
     make: Callable[[str], tuple[hosting.Hosting, RunElsewhere]], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -25,6 +25,7 @@ from groundstation.bus.topics import (
     PLAN,
     PREFLIGHT,
     PROCESS_STATUS,
+    SEARCH_MAP,
     SETPOINT,
     SIM_STATUS,
     SUSPICION,
@@ -60,7 +61,17 @@ _KEEPING_S = 3.0
 _SEND_BUFFER_BYTES = 64 * 1024
 _NEWEST = (ESTIMATE,)
 # Looked at in every other turn: arrows and crosses at 10 Hz are enough, and decoding is most of what this process does.
-_LESS_OFTEN = (PLAN, VEHICLE_STATUS, CAMERA_STATUS, PROCESS_STATUS, SETPOINT, SIM_STATUS, PREFLIGHT, SUSPICION)
+_LESS_OFTEN = (
+    PLAN,
+    VEHICLE_STATUS,
+    CAMERA_STATUS,
+    PROCESS_STATUS,
+    SETPOINT,
+    SIM_STATUS,
+    PREFLIGHT,
+    SUSPICION,
+    SEARCH_MAP,
+)
 _EACH = (EVENT, COMMAND, COMMAND_ACK, LEASE, OBSERVATION, INNOVATION)
 # Of these only the newest message counts.
 STATES = (*_NEWEST, *_LESS_OFTEN, TRUTH)

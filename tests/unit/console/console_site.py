@@ -31,7 +31,7 @@ def land(**other: Any) -> str:
 
 class Site:
     def __init__(self, network: Network | None = None) -> None:
-        exchange = MemoryExchange()
+        self.exchange = exchange = MemoryExchange()
         self.bus = MemoryBus(exchange, "lab", "console")
         self.drone = MemoryBus(exchange, "lab", "drone_1")
         self.commands = self.drone.subscribe([t.COMMAND])

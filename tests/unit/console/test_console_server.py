@@ -9,8 +9,10 @@ import pytest
 from console_site import RUN, Site, land, run, until
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
+from groundstation.bus import clock
 from groundstation.bus import messages as m
 from groundstation.bus import topics as t
+from groundstation.bus.memory_bus import MemoryBus
 from groundstation.console import server
 from groundstation.console.access import refusal
 from groundstation.console.pages import load_pages
@@ -97,6 +99,19 @@ def test_a_viewer_gets_a_seed_and_then_what_changes() -> None:
             assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
 
     run(test)
+
+
+def test_where_a_target_may_be_that_is_searched_for_reaches_the_page() -> None:
+    site = Site()
+    tracker, now_ns = MemoryBus(site.exchange, "lab", "tracker"), clock.now_ns()
+    cells = m.SearchMap(header=tracker.header("turtlebot"), first_m=(0.0, 0.0), cell_m=0.2, columns=2, chances=(0, 255))
+    search = m.TargetSearch("turtlebot", "SEARCH", 2.0, (0.4, 0.0), 0.1, None, "searched for 2 s")
+    tracker.publish(t.SEARCH_MAP, cells)
+    tracker.publish(t.ESTIMATE, m.Estimate(header=tracker.header("team"), entities=(), epoch=1, searches=(search,)))
+    for turn in range(10):
+        site.server.turn(now_ns + turn * 50_000_000)
+    site.server._listener.close()
+    assert json.loads(site.server.board.since(-1))["search_maps"]["turtlebot"]["chances"] == [0, 255]
 
 
 def test_viewers_hear_how_the_run_ended_before_they_are_cut_off() -> None:

@@ -129,9 +129,11 @@ class Recorder:
         return sum(series.written for series in self._series)
 
     def close(self) -> None:
-        """Write what is left and finish the files."""
+        """Write what is left and finish the files; says what does not succeed."""
         self.turn()
         self._writer.close()
+        for series in self._series:
+            self._report(series)
 
     def _has_room(self) -> bool:
         return assess(free_bytes(self._folder)) < Space.FULL

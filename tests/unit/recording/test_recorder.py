@@ -122,6 +122,23 @@ def test_write_error_degrades_once_and_recovers(
     assert b"before" in read[0][0] and b"after" in read[1][0]
 
 
+def test_a_disk_that_is_full_at_the_end_is_told_of(
+    sender: tuple[MemoryBus, FakeChild], now: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bus, child = sender
+    recorder = _recorder(child, tmp_path)
+    _say(bus, "landed")
+    recorder.turn()
+
+    def fail(_file: McapFile) -> None:
+        raise OSError(28, os.strerror(28))
+
+    monkeypatch.setattr(McapFile, "close", fail)
+    recorder.close()
+    assert ("ERROR", "cannot write the state recording: No space left on device") in child.events
+    assert recorder.dropped == 1
+
+
 def test_low_disk_warns_then_drops_pictures_only(
     sender: tuple[MemoryBus, FakeChild], now: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

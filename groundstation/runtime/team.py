@@ -22,6 +22,8 @@ from groundstation.runtime.marker_height import FixedCamera, MarkerHeight
 from groundstation.time_units import NS_PER_MS
 
 _FRESH_NS = 1_500 * NS_PER_MS
+# Of a driver, whatever it hears now: its vehicle stood when it was heard last, and nothing was ordered since.
+_STOOD = "LANDED"
 # The marker of a standing drone that no camera saw there.
 _STANDING_M = 0.1
 
@@ -151,10 +153,14 @@ class TeamStatus:
         return tuple(name for name, member in self.members.items() if member.up)
 
     def airborne(self, now_ns: int) -> tuple[str, ...]:
-        """Return who is not known to stand: a drone that was heard once and then lost counts as flying."""
+        """Return who is not known to stand: a drone that was heard once and then lost counts as flying.
+
+        But for one whose driver had it on the floor, without an order to take off: its battery is out.
+        """
         return tuple(name for name, member in self.members.items() if member.heard_ns and not _at_rest(member, now_ns))
 
 
 def _at_rest(member: Member, now_ns: int) -> bool:
     never_met = member.state is FlightState.UNKNOWN
-    return never_met or (member.on_ground and member.fresh(now_ns))
+    stood = member.state is FlightState.LOST and member.mode == _STOOD
+    return never_met or ((member.on_ground or stood) and member.fresh(now_ns))

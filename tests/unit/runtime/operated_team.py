@@ -44,7 +44,7 @@ class Drone:
         self.camera = MemoryBus(exchange, "lab", "ceiling")
         self.name, self.seen, self.refusal = name, seen, refusal
         self.marker, self.reports = marker or name, reports
-        self.state = FlightState.LANDED
+        self.state, self.mode = FlightState.LANDED, "HOVER"
         self.commands = self.bus.subscribe([COMMAND])
         self.heard: list[Verb] = []
         self.change: tuple[int, FlightState, Command] | None = None
@@ -62,7 +62,7 @@ class Drone:
             self.answer(self.change[2], AckStage.EFFECTIVE)
             self.change = None
         header = self.bus.header(self.name)
-        self.bus.publish(VEHICLE_STATUS, VehicleStatus(header=header, flight_state=self.state, mode="HOVER"))
+        self.bus.publish(VEHICLE_STATUS, VehicleStatus(header=header, flight_state=self.state, mode=self.mode))
         height_m = 0.0 if self.state is FlightState.LANDED else FLIGHT_M
         self.measure(height_m if self.reports and height_m else None)
         if self.seen:

@@ -180,3 +180,6 @@ def test_landed_means_all_say_so(scene: Scene) -> None:
     two.state = FlightState.LOST
     scene.pass_(0.2)
     assert not scene.operator.landed(scene.now_ns), "a lost drone is not known to stand"
+    two.mode = "LANDED"
+    scene.pass_(0.2)
+    assert scene.operator.landed(scene.now_ns), "but one whose battery is taken out after its landing is"

@@ -75,6 +75,11 @@ class Member:
         return self.state in STANDING
 
     @property
+    def stood(self) -> bool:
+        """Return whether it is not heard any more, and stood until then."""
+        return self.state is FlightState.LOST and self.mode == _STOOD
+
+    @property
     def standing(self) -> bool:
         """Return whether it says that it stands, or never said anything."""
         return self.on_ground or self.state is FlightState.UNKNOWN
@@ -127,7 +132,8 @@ class TeamStatus:
         if member is not None:
             if not member.standing and status.flight_state in STANDING:
                 member.marker.forget()  # it was seen in the air until now
-            member.state = known_state(member.state, status.flight_state)
+            before = FlightState.LANDED if member.stood else member.state
+            member.state = known_state(before, status.flight_state)
             member.mode, member.detail = status.mode, status.detail
             member.heard_ns = now_ns
 
@@ -162,5 +168,4 @@ class TeamStatus:
 
 def _at_rest(member: Member, now_ns: int) -> bool:
     never_met = member.state is FlightState.UNKNOWN
-    stood = member.state is FlightState.LOST and member.mode == _STOOD
-    return never_met or ((member.on_ground or stood) and member.fresh(now_ns))
+    return never_met or ((member.on_ground or member.stood) and member.fresh(now_ns))

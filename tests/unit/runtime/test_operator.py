@@ -183,3 +183,6 @@ def test_landed_means_all_say_so(scene: Scene) -> None:
     two.mode = "LANDED"
     scene.pass_(0.2)
     assert scene.operator.landed(scene.now_ns), "but one whose battery is taken out after its landing is"
+    two.state, two.mode = FlightState.UNKNOWN, "CONNECTING"
+    scene.pass_(0.2)
+    assert scene.operator.landed(scene.now_ns), "also where its driver is started anew"

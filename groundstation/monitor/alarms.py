@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from groundstation.bus.messages import AIRBORNE, FlightState, Lifecycle, Severity, VehicleStatus
+from groundstation.bus.messages import AIRBORNE, FlightState, Lifecycle, Severity, VehicleStatus, stood_last
 from groundstation.monitor.batteries import Battery, Charge, battery_of
 from groundstation.monitor.endurance import flies
 from groundstation.monitor.state import MonitorState
@@ -21,6 +21,7 @@ _BEFORE_FLIGHT = {
     Charge.UNKNOWN: "until it is known it may not take off",
 }
 _AFTER_LANDING = "Nothing to do now: check its power and cable once all have landed."
+_SWITCHED_OFF = "Nothing to do now: switch it on before it flies again."
 _RESTARTED = "Nothing to do: it is restarted if it hangs."
 _DOWN = {
     FlightState.EMERGENCY: (
@@ -73,7 +74,9 @@ def _vehicles(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
             yield Alarm(f"{name} silent", silence, advice="Nothing to do: it hovers, then lands. Stops are sent to it.")
         else:
             yield from _failsafe(name, seen.message)
-        if down := _DOWN.get(seen.message.flight_state):
+        if stood_last(seen.message.flight_state, seen.message.mode):
+            yield Alarm(f"{name} LOST", f"{name}: not heard any more, it stood until then", False, _SWITCHED_OFF)
+        elif down := _DOWN.get(seen.message.flight_state):
             words, advice = down
             yield Alarm(f"{name} {seen.message.flight_state}", f"{name}: {words}", advice=advice)
         up = flies(seen.message, state.take_offs.get(name))

@@ -16,14 +16,13 @@ from groundstation.bus.messages import (
     Vector3,
     VehicleStatus,
     known_state,
+    stood_last,
 )
 from groundstation.bus.topics import OBSERVATION, ODOMETRY, RANGE, VEHICLE_STATUS
 from groundstation.runtime.marker_height import FixedCamera, MarkerHeight
 from groundstation.time_units import NS_PER_MS
 
 _FRESH_NS = 1_500 * NS_PER_MS
-# Of a driver, whatever it hears now: its vehicle stood when it was heard last, and nothing was ordered since.
-_STOOD = "LANDED"
 # The marker of a standing drone that no camera saw there.
 _STANDING_M = 0.1
 
@@ -77,7 +76,7 @@ class Member:
     @property
     def stood(self) -> bool:
         """Return whether it is not heard any more, and stood until then."""
-        return self.state is FlightState.LOST and self.mode == _STOOD
+        return stood_last(self.state, self.mode)
 
     @property
     def standing(self) -> bool:

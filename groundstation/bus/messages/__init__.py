@@ -33,6 +33,7 @@ from groundstation.bus.messages.flight import (
     VelocitySetpoint,
     Verb,
     known_state,
+    stood_last,
 )
 from groundstation.bus.messages.hosts import ClockOffset, HostAnswer, HostOrder, HostReport, Supervision
 from groundstation.bus.messages.plan import Alternative, Control, Edge, Plan, SolverReport
@@ -113,4 +114,5 @@ __all__ = [
     "Verb",
     "Verdict",
     "known_state",
+    "stood_last",
 ]

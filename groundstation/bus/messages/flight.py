@@ -43,6 +43,14 @@ def known_state(before: FlightState, said: FlightState) -> FlightState:
     return FlightState.LOST if said is FlightState.UNKNOWN and before in AIRBORNE | {FlightState.LOST} else said
 
 
+def stood_last(state: FlightState, mode: str) -> bool:
+    """Return whether a drone that is not heard any more stood until then, by state and mode of its VehicleStatus.
+
+    Its driver has it on the floor still: no take-off was ordered since. Its battery is out, most often.
+    """
+    return state is FlightState.LOST and mode == "LANDED"
+
+
 class VehicleStatus(Message, frozen=True, kw_only=True):
     """Health of one vehicle and of the link to it (5 Hz)."""
 

@@ -81,3 +81,12 @@ def test_a_drone_in_the_air_whose_driver_starts_anew_and_does_not_hear_it_is_los
     world.vehicle("drone_1", "LANDED", flight_state=m.FlightState.LANDED)
     world.vehicle("drone_2", "LANDED", flight_state=m.FlightState.LANDED)
     assert judged(world).level is Level.SAFE
+
+
+def test_a_drone_that_is_switched_off_after_its_landing_asks_for_nothing(world: World) -> None:
+    both(world)
+    world.vehicle("drone_1", "LANDED", battery=None, flight_state=m.FlightState.LOST)
+    assert judged(world) == Safety(
+        Level.WATCH,
+        "drone_1: not heard any more, it stood until then. Nothing to do now: switch it on before it flies again.",
+    )

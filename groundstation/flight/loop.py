@@ -146,14 +146,14 @@ class Flight:
                 return failure
 
     def _tell_grounded(self, operator: Operator, now_ns: int) -> None:
-        """Say what a run waits for whose drones landed though nobody ordered it (their watchdogs did)."""
+        """Say what a run waits for whose drones landed though nobody ordered all to: watchdogs, or one order each."""
         if operator.phase not in (TeamPhase.UP, TeamPhase.TRACKING, TeamPhase.HELD):
             self._grounded = False
         elif operator.landed(now_ns) and not self._grounded:
             self._grounded = True  # until the next take-off: a drone that is not heard for a while counts as in the air
             self._say(
-                "all drones have landed by themselves (why: see the events). Ctrl-C ends the run; to fly again: "
-                "groundstation takeoff, then groundstation track"
+                "all drones have landed without an order to all (why: see the events). Ctrl-C ends the run; to fly "
+                "again: groundstation takeoff, then groundstation track"
             )
 
     def _is_over(self, operator: Operator, now_ns: int, began_ns: int) -> tuple[bool, str]:

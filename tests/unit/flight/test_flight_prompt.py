@@ -13,7 +13,9 @@ from groundstation.bus import topics as t
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.flight import loop
 from groundstation.flight.flight_plan import FlightPlan
+from groundstation.runtime.operator import Operator
 from groundstation.runtime.take_off import TakeOffLimits
+from groundstation.runtime.team import TeamPhase
 from groundstation.supervisor.start import Start
 from groundstation.supervisor.supervisor import Supervisor
 from groundstation.supervisor.terminal import Terminal
@@ -79,7 +81,7 @@ def test_hold_before_the_take_off_ends_neither_the_prompt_nor_a_flight_that_was_
     flown(waiting, asks=True)
     assert m.Verb.TAKEOFF in waiting.heard, "Enter takes off after HOLD as before it"
     assert any("HOLD by console" in line for line in waiting.said)
-    assert not any("landed by themselves" in line for line in waiting.said)
+    assert not any("without an order to all" in line for line in waiting.said)
 
 
 @pytest.mark.parametrize("stop", [m.Verb.HOLD, m.Verb.LAND, m.Verb.CUT_MOTORS])
@@ -95,4 +97,15 @@ def test_a_start_that_nobody_can_obey_before_the_take_off_does_not_end_the_promp
     waiting = Waiting(keyboard, start)
     flown(waiting, asks=True)
     assert m.Verb.TAKEOFF in waiting.heard, "Enter takes off after it as before it"
-    assert not any("landed by themselves" in line for line in waiting.said)
+    assert not any("without an order to all" in line for line in waiting.said)
+
+
+def test_who_was_landed_one_by_one_is_not_said_to_have_landed_by_itself() -> None:
+    said: list[str] = []
+    terminal = cast(Terminal, SimpleNamespace(say=said.append))
+    flight = loop.Flight(cast(Supervisor, SimpleNamespace()), cast(FlightPlan, None), terminal)
+    operator = cast(Operator, SimpleNamespace(phase=TeamPhase.TRACKING, landed=lambda _now_ns: True))
+    for now_ns in (1, 2):
+        flight._tell_grounded(operator, now_ns)
+    (line,) = said
+    assert "all drones have landed without an order to all" in line and "groundstation takeoff" in line

@@ -2,6 +2,8 @@
 
 import json
 import time
+from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -99,13 +101,20 @@ def _planned(
     from groundstation.experiments.faults import batches
 
     planned = []
-    for name in names or _shipped():
+    for name, label in _labelled(names or _shipped()).items():
         order = _order(name, seconds, field, options)
         for strategy in strategies:
             text = json.dumps(order | {"strategy": strategy}, sort_keys=True)
             flights = batches(text, seed, seeds, _BATCH, "scenarios")
-            planned += [(Path(name).name.removesuffix(".yaml"), flight) for flight in flights]
+            planned += [(label, flight) for flight in flights]
     return planned
+
+
+def _labelled(names: Sequence[str]) -> dict[str, str]:
+    """Return what each scenario is called in the table: its file's name, or as it was given where two share that."""
+    short = {name: Path(name).name.removesuffix(".yaml") for name in names}
+    shared = Counter(short.values())
+    return {name: one if shared[one] == 1 else name for name, one in short.items()}
 
 
 def _shipped() -> list[str]:

@@ -5,14 +5,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from scipy.special import stdtrit
 
 STRATEGIES = (
     "ours", "string", "reversed", "flat", "two-level", "no-topology", "relay", "chase", "sampling", "lattice",
     "first-program",
 )  # fmt: skip
 FIXED = ("string", "reversed", "flat", "two-level")
-# Student's factor at 95 % by its expansion in 1 / degrees of freedom.
-_NORMAL_95 = 1.96
+_UPPER = 0.975  # of a two-sided 95 % interval
 _SUMS = ("landings", "switches")
 
 
@@ -59,8 +59,7 @@ def paired(own: Iterable[Mapping[str, Any]], other: Iterable[Mapping[str, Any]])
     freedom = len(gaps) - 1
     if freedom < 1:
         return None
-    factor = _NORMAL_95 + 2.37 / freedom + 2.82 / freedom**2
-    return float(np.mean(gaps)), float(factor * np.std(gaps, ddof=1) / math.sqrt(len(gaps)))
+    return float(np.mean(gaps)), float(stdtrit(freedom, _UPPER) * np.std(gaps, ddof=1) / math.sqrt(len(gaps)))
 
 
 def against_best_fixed(flights: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:

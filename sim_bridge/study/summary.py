@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.special import stdtrit
 
 from groundstation.field.resolved import ResolvedField
 
-_NORMAL_95 = 1.96
+_UPPER = 0.975  # of a two-sided 95 % interval
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,13 +26,13 @@ class Interval:
 
 
 def interval(values: Iterable[float]) -> Interval:
-    """Return the mean of one value per flight; Student's factor by its expansion in 1 / degrees of freedom."""
+    """Return the mean of one value per flight, with Student's factor for so many flights."""
     found = np.array([value for value in values if math.isfinite(value)])
     freedom = len(found) - 1
     if freedom < 1:
         return Interval(float(found.mean()) if len(found) else math.nan, math.nan, len(found))
-    factor = _NORMAL_95 + 2.37 / freedom + 2.82 / freedom**2
-    return Interval(float(found.mean()), float(factor * found.std(ddof=1) / math.sqrt(len(found))), len(found))
+    half = float(stdtrit(freedom, _UPPER) * found.std(ddof=1) / math.sqrt(len(found)))
+    return Interval(float(found.mean()), half, len(found))
 
 
 def anees(report: Mapping[str, Any], names: Iterable[str], suffix: str = "") -> float:

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from groundstation.cli.experiment_scenarios import _labelled
 from groundstation.experiments.scenarios import STRATEGIES, against_best_fixed, comparison, paired, rows_of, table
 from groundstation.settings.files import SHIPPED
 from sim_bridge.study.scenarios.figures import TrackingErrors, shortfalls
@@ -56,6 +57,9 @@ def test_strategies_are_compared_seed_by_seed() -> None:
     relay = [flight(seed, value, "relay") for seed, value in ((1, 0.03), (2, 0.05), (4, 9.0))]
     assert paired(relay, ours) == pytest.approx((0.01, 0.0), abs=1e-12)
     assert paired(relay[:1], ours) is None
+    apart = [one | {"rmse_m": one["rmse_m"] + rank} for rank, one in enumerate(relay[:2])]
+    gap = paired(apart, ours)
+    assert gap is not None and gap[1] == pytest.approx(12.706 / 2.0, abs=1e-3), "Student's factor of two flights"
     first, second = rows_of([*ours, *relay])
     assert first["against"] is None
     assert second["rmse_m"] == pytest.approx([(0.03 + 0.05 + 9.0) / 3, 0.05, 9.0])
@@ -103,3 +107,8 @@ def test_each_scenario_says_what_it_expects_in_its_header() -> None:
     assert len(told) >= 15
     for path in told:
         assert "# Expected: " in path.read_text(encoding="utf-8"), path.name
+
+
+def test_scenarios_of_one_name_are_rows_of_their_own_and_one_named_twice_is_flown_once() -> None:
+    named = ("a/hard.yaml", "b/hard.yaml", "corner", "corner")
+    assert _labelled(named) == {"a/hard.yaml": "a/hard.yaml", "b/hard.yaml": "b/hard.yaml", "corner": "corner"}

@@ -38,6 +38,12 @@ def test_an_interval_holds_the_mean_as_often_as_it_says() -> None:
     assert math.isnan(interval([0.5]).half)
 
 
+def test_an_interval_of_few_flights_is_as_wide_as_students() -> None:
+    """Two values, one apart: Student's factor of one degree of freedom is 12.706, of two 4.303."""
+    assert interval([1.0, 2.0]).half == pytest.approx(12.706 / 2.0, abs=1e-3)
+    assert interval([1.0, 2.0, 3.0]).half == pytest.approx(4.303 / math.sqrt(3.0), abs=1e-3)
+
+
 def test_a_flight_is_one_sample_whatever_it_saw(lab_field: ResolvedField) -> None:
     assert anees(report(1.0, None), ("a", "b")) == pytest.approx(1.5)
     assert math.isnan(anees(report(1.0, None), ("t",)))

@@ -11,6 +11,7 @@ from groundstation.process import numba_cache
 from sim_bridge.scenario import Scenario
 from sim_bridge.settings_files import named_scenario, resolved_field
 from sim_bridge.study.summary import summary
+from sim_bridge.surroundings import LinkBursts
 
 _WRONG_SETTINGS = 2
 # Studies that the ground station's experiments start, with an order on standard input.
@@ -58,6 +59,10 @@ def main() -> int:
     if arguments.start_phase is not None:
         path = scenario.target.path.model_copy(update={"start_phase": arguments.start_phase})
         scenario = scenario.model_copy(update={"target": scenario.target.model_copy(update={"path": path})})
+    if scenario.faults or scenario.link_bursts != LinkBursts():
+        print(
+            "faults and link bursts are left out here: groundstation experiment scenarios flies them", file=sys.stderr
+        )
     numba_cache.activate()
     from sim_bridge.study.runner import Study, StudyOptions
 

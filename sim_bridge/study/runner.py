@@ -26,7 +26,7 @@ from sim_bridge.study.odometry_model import OdometryEar, odometry_of
 from sim_bridge.study.ranging_model import RangingEye, ranging_of
 from sim_bridge.study.score import FlightScore
 from sim_bridge.study.telemetry import TelemetryPublisher
-from sim_bridge.study.wrong_figures import NOTHING_WRONG, WrongFigures
+from sim_bridge.study.wrong_figures import WrongFigures, misdated
 from sim_bridge.world.ardrone import Quadrotor
 from sim_bridge.world.mavlink_copter import MavlinkCopter
 from sim_bridge.world.noise import generator_of
@@ -76,7 +76,7 @@ class Study:
     """A run in progress; `run` flies it to its end and returns the figures.
 
     real: drones whose bodies are moved from outside (`world.puppets`); `attach` gives each a driver. wrong: what the
-    field is told wrongly.
+    field is told wrongly; none: only delays of videos, where the scenario has others.
     """
 
     def __init__(
@@ -85,9 +85,9 @@ class Study:
         scenario: Scenario,
         options: StudyOptions,
         real: Collection[str] = (),
-        wrong: WrongFigures = NOTHING_WRONG,
+        wrong: WrongFigures | None = None,
     ) -> None:
-        self.options, self._wrong = options, wrong
+        self.options, self._wrong = options, wrong or misdated(field, scenario.cameras.video_delay_ms)
         self.site = parse_site(msgspec.to_builtins(self._wrong.world(field)))
         self.world = World(self.site, scenario, options.seed, real, real)
         self.tracker: Tracker = tracker_from_field(field, CLOCK, epoch=1)

@@ -70,7 +70,11 @@ class WrongFigures:
         return self.errors.get((who, part), 0.0)
 
 
-NOTHING_WRONG = WrongFigures({})
+def misdated(told: ResolvedField, video_delay_ms: float) -> WrongFigures:
+    """Return what is wrong of a field whose cameras' videos are not as late as it says, as at the wire."""
+    delays = {name: camera.video_delay_ms for name, camera in told.cameras.items()}
+    delays |= {name: drone.camera.video_delay_ms for name, drone in told.drones.items()}
+    return WrongFigures({(n, "delay"): video_delay_ms - ms for n, ms in delays.items() if ms != video_delay_ms})
 
 
 def _with(struct: Any, name: str, value: Any) -> Any:

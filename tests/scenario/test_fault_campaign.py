@@ -13,6 +13,7 @@ from sim_bridge.fault_kinds import Fault, FaultKind
 from sim_bridge.scenario import Scenario
 from sim_bridge.study.faults.draw import Drawn
 from sim_bridge.study.faults.flight import FaultFlight
+from sim_bridge.study.scenarios.flight import ScenarioFlight
 
 SECONDS = 10.0
 
@@ -63,3 +64,14 @@ def test_vehicles_of_all_kinds_are_flown_by_their_drivers() -> None:
     assert flown["tracking_since_s"] is not None
     assert flown["modes"]["drone_1"] == flown["modes"]["drone_3"] == "TRACK"
     assert flown["modes"]["drone_2"] != "TRACK"
+
+
+@pytest.mark.parametrize("name", ["uwb-lab", "mocap-lab"])
+def test_a_team_without_a_ceiling_camera_is_placed_by_what_its_field_has(name: str) -> None:
+    field = load_field(find_field(name), ("recording.raw_datagrams=false",))
+    sections = [(s.kind, s.section) for s in driver_sections(field) if s.kind != CAMERA]
+    values = msgspec.to_builtins(resolved_field(field))
+    flight = ScenarioFlight(Drawn(values, Scenario(), 3), sections, 6.0, "ours")
+    told = flight.fly()
+    assert told["found_s"] is not None and told["rmse_m"] < 0.3, told
+    assert flight.judge.lost_s < 1.0

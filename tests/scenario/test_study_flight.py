@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from groundstation.bus.messages import Message, RelativeObservation
 from groundstation.field.resolved import ResolvedField
 from groundstation.settings.load import load_field
 from groundstation.settings.resolved import resolved_field
@@ -73,3 +74,27 @@ def test_a_wrong_field_is_reported_as_the_command_line_does() -> None:
     result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60, check=False)
     assert result.returncode == 2
     assert "horizn_steps" in result.stderr
+
+
+class Dated(Study):
+    """Notes how much later than its stamp each sighting arrives [ms]."""
+
+    late_ms: list[float]
+
+    def _send(self, arrival_ns: int, key: str, message: Message) -> None:
+        if isinstance(message, RelativeObservation):
+            self.late_ms.append((arrival_ns - message.header.stamp_ns) / 1e6)
+        super()._send(arrival_ns, key, message)
+
+
+@pytest.mark.parametrize("late_ms", [120.0, 200.0])
+def test_a_video_that_is_later_than_its_setting_is_dated_by_the_setting(
+    lab_field: ResolvedField, late_ms: float
+) -> None:
+    """As a camera's driver does: it knows when a picture arrived, and how late it should be."""
+    cameras = Scenario().cameras.model_copy(update={"video_delay_ms": late_ms})
+    study = Dated(lab_field, Scenario().model_copy(update={"cameras": cameras}), StudyOptions(seed=1, duration_s=0.5))
+    study.late_ms = []
+    study.run()
+    told_ms = lab_field.cameras["ceiling"].video_delay_ms
+    assert study.late_ms and all(told_ms + 9.9 <= late <= told_ms + 50.1 for late in study.late_ms)

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from typing import Any
 
-from groundstation.bus.messages import RelativeObservation
+from groundstation.bus.messages import RangeObservation, RelativeObservation
 from groundstation.bus.notice import Notice
-from groundstation.bus.topics import OBSERVATION
+from groundstation.bus.topics import OBSERVATION, RANGE
 from groundstation.diagnosis.judging import AtOnce
 from groundstation.diagnosis.loop import Diagnosis
 from groundstation.doctor.finding import Level
@@ -38,7 +38,7 @@ class CulpritFlight(ScenarioFlight):
         self.on_pads: list[tuple[str, str]] | None = None
         self.told: list[tuple[float, str, str, str, str]] = []
         self._pads = PadRecord(self._field.world_sensors)
-        self._sightings = self._bus("preflight").subscribe([OBSERVATION])
+        self._sightings = self._bus("preflight").subscribe([OBSERVATION, RANGE])
         self._diagnosis: Diagnosis | None = None
 
     def may_start(self) -> bool:
@@ -46,7 +46,7 @@ class CulpritFlight(ScenarioFlight):
         if self.on_pads is not None:
             return True
         for received in self._sightings.drain():
-            if isinstance(received.message, RelativeObservation):
+            if isinstance(received.message, RelativeObservation | RangeObservation):
                 self._pads.see(received.message, self.now_ns)
         if self.world.time_s >= self._stand_s:
             findings = pad_findings(self._field, self._pads.medians(self.now_ns))

@@ -15,7 +15,7 @@ from groundstation.bus.api import Received
 from groundstation.bus.keys import Key
 from groundstation.bus.messages import Message
 from groundstation.bus.notice import Notice
-from groundstation.bus.topics import OBSERVATION, REPORTED_MOTION, SEARCHED_PICTURE, Topic
+from groundstation.bus.topics import OBSERVATION, SEARCHED_PICTURE, Topic
 from groundstation.errors import EstimatorFault
 from groundstation.field.resolved import field_from_json
 from groundstation.planning.planner import Planner, PlanRequest
@@ -31,6 +31,7 @@ from sim_bridge.study.camera_model import eyes_of
 from sim_bridge.study.delay_queue import DelayQueue
 from sim_bridge.study.exposures import Exposures
 from sim_bridge.study.faults.draw import Drawn
+from sim_bridge.study.faults.fixed_systems import FixedSystems
 from sim_bridge.study.faults.judge import Judge
 from sim_bridge.study.faults.local_bus import LocalBus, LocalExchange
 from sim_bridge.study.faults.memory_network import MemoryNetwork
@@ -39,8 +40,7 @@ from sim_bridge.study.faults.orders import TeamOrders
 from sim_bridge.study.faults.stand_ins import in_memory, manual_clock, read_all
 from sim_bridge.study.faults.vehicles import Drivers, Section, devices_of
 from sim_bridge.study.faults.wrong_cameras import WrongEye
-from sim_bridge.study.odometry_model import odometry_of
-from sim_bridge.study.wrong_figures import NOTHING_WRONG, WrongFigures
+from sim_bridge.study.wrong_figures import WrongFigures, misdated
 from sim_bridge.world.noise import generator_of
 from sim_bridge.world.world import TICK_NS, World
 
@@ -107,7 +107,10 @@ class InlineWorker:
 
 
 class FaultFlight:
-    """A flight in progress. `run` flies it to its end and returns the verdict, with the time spent on each part."""
+    """A flight in progress. `run` flies it to its end and returns the verdict, with the time spent on each part.
+
+    wrong: what the field is told wrongly; none: only delays of videos, where the scenario has others.
+    """
 
     def __init__(
         self,
@@ -115,11 +118,12 @@ class FaultFlight:
         sections: Sequence[Section],
         seconds: float,
         planner_of: Callable[[Planner], Planner] = lambda planner: planner,
-        wrong: WrongFigures = NOTHING_WRONG,
+        wrong: WrongFigures | None = None,
     ) -> None:
         field = field_from_json(msgspec.json.encode(drawn.field))
-        self._drawn, self._seconds, self._field, self._wrong = drawn, seconds, field, wrong
         scenario, seed = drawn.scenario, drawn.seed
+        wrong = wrong or misdated(field, scenario.cameras.video_delay_ms)
+        self._drawn, self._seconds, self._field, self._wrong = drawn, seconds, field, wrong
         self.site = parse_site(msgspec.to_builtins(wrong.world(field)))
         self.world = World(self.site, scenario, seed)
         self.said: list[tuple[str, str]] = []
@@ -145,8 +149,7 @@ class FaultFlight:
         self._tick_every = round(1e9 / field.estimator.rate_hz) // TICK_NS
         eyes = [WrongEye(eye, faults) for eye in eyes_of(self.site, scenario.cameras, 0.0, seed)]
         self._exposures, self._eyes = Exposures(eyes), {eye.name: eye for eye in eyes}
-        # A schedule of its own: reports of the target do not shift when cameras expose.
-        self._reports = Exposures(odometry_of(self.site, world, scenario.cameras.mounting_errors, seed))
+        self._systems = FixedSystems(self.site, world, scenario, seed)
         self._schedule = FaultSchedule(scenario.faults, self.world, self.devices)
         limits = {name: drone.limits.max_speed_m_s for name, drone in field.drones.items()}
         self.judge = Judge(drawn.field["room"]["fence"], limits, JUDGE_S, root=self._only_root())
@@ -217,11 +220,9 @@ class FaultFlight:
                 self._send(searched.header.stamp_ns + round(delay_ms * 1e6), SEARCHED_PICTURE, searched)
 
     def _hear(self) -> None:
-        """Send on what targets say of their own motion."""
-        now_ns = self.now_ns
-        for ear in self._reports.due(self.world.time_s):
-            for told in ear.look(self.world, now_ns, clock.clock_id()):
-                self._send(now_ns + round(ear.lateness_ms * 1e6), REPORTED_MOTION, told)
+        """Send on what is measured without a camera."""
+        for arrival_ns, topic, told in self._systems.due(self.now_ns, clock.clock_id()):
+            self._send(arrival_ns, topic, told)
 
     def _send(self, arrival_ns: int, topic: Topic, message: Message) -> None:
         self._arriving.send(arrival_ns, (topic, message))

@@ -33,7 +33,7 @@ class FlightOrder:
 
 
 def fly_seeds(fly: Callable[[FlightOrder, int], dict[str, Any]]) -> int:
-    """Fly each seed of the order; WRONG_ORDER for a kind of vehicle that is not hosted, and where `fly` says so."""
+    """Fly each seed of the order; WRONG_ORDER for what cannot be flown here, and where `fly` says so."""
     numba_cache.activate()
     try:
         order = order_of(json.load(sys.stdin))

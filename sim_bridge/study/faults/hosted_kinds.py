@@ -1,13 +1,18 @@
-"""Kinds of vehicles whose drivers can be hosted in one thread, with sockets in memory (`vehicles.py`)."""
+"""What can be flown in one thread, with sockets in memory: kinds of vehicles (`vehicles.py`), and kinds of faults."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
+
+from sim_bridge.fault_kinds import RULES, Fault, FaultKind, Part
 
 UP_AFTER_S: Mapping[str, float] = {"ardrone": 8.0, "mavlink": 14.0}
 """By when they are in the air [s]."""
 
 WRONG_ORDER = 2
 """Exit code of a study that cannot be flown as ordered."""
+
+_BROKEN_HERE = frozenset({Part.VEHICLE, Part.ABLE_VEHICLE, Part.CAMERA}), frozenset({FaultKind.IDS_SWAPPED})
+_AT_THE_WIRE = "at the wire: groundstation sitl --scenario FILE"
 
 
 def unhosted(drones: Mapping[str, Mapping[str, Any]]) -> str:
@@ -17,5 +22,20 @@ def unhosted(drones: Mapping[str, Mapping[str, Any]]) -> str:
         return ""
     return (
         f"{', '.join(others)}: flights at message level are of {', '.join(UP_AFTER_S)} only; "
-        "fly the field at the wire: groundstation sitl --scenario FILE"
+        f"fly the field {_AT_THE_WIRE}"
     )
+
+
+def unbroken(faults: Iterable[Fault], entities: Iterable[str]) -> str:
+    """Return which faults would be announced here and break nothing; "" if all do what they say.
+
+    entities: names of the drones and cameras of the field.
+    """
+    parts, others = _BROKEN_HERE
+    idle = [fault for fault in faults if RULES[fault.kind].part not in parts or fault.kind in others]
+    if idle:
+        named = ", ".join(f"{fault.kind} of {fault.entity}" for fault in idle)
+        return f"{named}: nothing breaks so at message level; fly it {_AT_THE_WIRE}"
+    known = (*entities,)
+    strangers = [f"{fault.kind} of {fault.entity}" for fault in faults if fault.entity not in known]
+    return f"{', '.join(strangers)}: the field has {', '.join(known)}" if strangers else ""

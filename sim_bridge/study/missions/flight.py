@@ -1,12 +1,16 @@
 """One mission: take-off, tracking, and the order to land; judged by truth until all drones stand."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
+import msgspec
+
+from groundstation.field.resolved import field_from_json
 from sim_bridge.study.faults.draw import Drawn
 from sim_bridge.study.faults.flight import FaultFlight
 from sim_bridge.study.faults.vehicles import Section
-from sim_bridge.study.wrong_figures import WrongFigures
+from sim_bridge.study.wrong_figures import misdated
 
 _DOWN_BY_S = 15.0
 _STANDS, _LANDS = "LANDED", "LANDING"
@@ -16,7 +20,9 @@ class MissionFlight(FaultFlight):
     """A flight that ends with LAND. covariance_share: what sightings state of their true covariance."""
 
     def __init__(self, drawn: Drawn, sections: Sequence[Section], seconds: float, covariance_share: float) -> None:
-        super().__init__(drawn, sections, seconds, wrong=WrongFigures({}, covariance_share=covariance_share))
+        told = field_from_json(msgspec.json.encode(drawn.field))
+        wrong = replace(misdated(told, drawn.scenario.cameras.video_delay_ms), covariance_share=covariance_share)
+        super().__init__(drawn, sections, seconds, wrong=wrong)
         self._share = covariance_share
         self._landing_since_s: float | None = None
         self._landed_before: list[str] = []

@@ -8,19 +8,23 @@ from sim_bridge.link_bursts import with_bursts
 from sim_bridge.scenario import Scenario
 from sim_bridge.study.faults.draw import Drawn
 from sim_bridge.study.faults.flight import JUDGE_S, FaultFlight
+from sim_bridge.study.faults.flight_order import WrongOrder
+from sim_bridge.study.faults.hosted_kinds import unbroken
 from sim_bridge.study.faults.vehicles import Section
 from sim_bridge.study.scenarios.figures import SEPARATION_M, TrackingErrors, shortfalls
 from sim_bridge.study.scenarios.first_program import along_an_edge
 from sim_bridge.study.scenarios.strategies import STRATEGIES
-from sim_bridge.study.wrong_figures import NOTHING_WRONG, WrongFigures
+from sim_bridge.study.wrong_figures import WrongFigures
 from sim_bridge.surroundings import ScenarioExpectation
 
 _DOWN = ("LANDING", "LANDED")
 
 
 def as_drawn(field: dict[str, Any], scenario: Scenario, seed: int) -> Drawn:
-    """Return the flight of a seed."""
+    """Return the flight of a seed; raises WrongOrder for faults that would break nothing here."""
     drones = field["drones"]
+    if refusal := unbroken(scenario.faults, (*drones, *field["cameras"])):
+        raise WrongOrder(refusal)
     return Drawn(field, with_bursts(scenario, drones, drones, seed), seed)
 
 
@@ -33,7 +37,7 @@ class ScenarioFlight(FaultFlight):
         sections: Sequence[Section],
         seconds: float,
         strategy: str,
-        wrong: WrongFigures = NOTHING_WRONG,
+        wrong: WrongFigures | None = None,
     ) -> None:
         chosen = STRATEGIES[strategy]
         super().__init__(drawn, sections, seconds, chosen.planner_of, wrong)

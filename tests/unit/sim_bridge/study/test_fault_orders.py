@@ -3,11 +3,15 @@
 import io
 import json
 import sys
+from typing import Any
 
 import pytest
 
+from sim_bridge.scenario import parse_scenario
 from sim_bridge.study.faults.command import main
+from sim_bridge.study.faults.flight_order import WrongOrder
 from sim_bridge.study.faults.hosted_kinds import WRONG_ORDER
+from sim_bridge.study.scenarios.flight import as_drawn
 
 
 @pytest.mark.parametrize(
@@ -25,3 +29,20 @@ def test_kinds_that_mean_nothing_are_refused_in_one_line(
     assert main() == WRONG_ORDER
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 1 and lines[0].startswith(said)
+
+
+@pytest.mark.parametrize(
+    ("broken", "said"),
+    [
+        ({"kind": "ranges_silent", "entity": "uwb", "start_s": 5.0}, "ranges_silent of uwb: nothing breaks so"),
+        (
+            {"kind": "wrong_board", "entity": "a", "other": "b", "start_s": 5.0},
+            "wrong_board of a: nothing breaks so at message level; fly it at the wire",
+        ),
+        ({"kind": "wind", "entity": "drone_9", "start_s": 5.0}, "wind of drone_9: the field has a, ceiling"),
+    ],
+)
+def test_a_fault_that_would_break_nothing_is_refused(broken: dict[str, Any], said: str) -> None:
+    field = {"drones": {"a": {"kind": "ardrone"}}, "cameras": {"ceiling": {}}}
+    with pytest.raises(WrongOrder, match=f"^{said}"):
+        as_drawn(field, parse_scenario(json.dumps({"faults": [broken]})), 1)

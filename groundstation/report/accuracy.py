@@ -16,7 +16,8 @@ class Accuracy(msgspec.Struct, frozen=True):
     """Of one entity over an interval.
 
     rmse_m, max_error_m, lost_s (error > 0.5 m) count a missing or stale estimate as 1 m; covered: share of time with
-    an estimate; anees: mean normalised squared error over its dimension (1 = honest covariance, > 1 = overconfident).
+    an estimate; anees: mean normalised squared error over its dimension (1 = honest covariance, > 1 = overconfident);
+    judged: share of the interval for which the truth is known, the part that all else is about.
     """
 
     rmse_m: float
@@ -25,6 +26,7 @@ class Accuracy(msgspec.Struct, frozen=True):
     covered: float
     anees: float | None = None
     yaw_rmse_rad: float | None = None
+    judged: float = 1.0
 
 
 def time_grid(start_s: float, end_s: float) -> Array:
@@ -33,7 +35,7 @@ def time_grid(start_s: float, end_s: float) -> Array:
 
 
 def errors_at(time_s: Array, truth: TruthTrack, estimate: EstimateTrack | None, dim: int) -> Array:
-    """Return position errors (m, dim) [m; world]; NaN where the estimate is missing or older than 0.5 s."""
+    """Return position errors (m, dim) [m; world]; NaN without a truth or an estimate younger than 0.5 s."""
     errors = np.full((len(time_s), dim), np.nan)
     if estimate is None or len(estimate.time_s) == 0:
         return errors
@@ -43,8 +45,14 @@ def errors_at(time_s: Array, truth: TruthTrack, estimate: EstimateTrack | None, 
     return errors
 
 
-def accuracy(time_s: Array, truth: TruthTrack, estimate: EstimateTrack | None, dim: int) -> Accuracy:
-    """Return the figures over the given times; dim is 2 for targets on the floor, 3 for robots."""
+def accuracy(time_s: Array, truth: TruthTrack, estimate: EstimateTrack | None, dim: int) -> Accuracy | None:
+    """Return the figures over the given times; dim is 2 for targets on the floor, 3 for robots.
+
+    None where the truth is known at none of them.
+    """
+    asked, time_s = len(time_s), time_s[truth.known_at(time_s)]
+    if not len(time_s):
+        return None
     errors = errors_at(time_s, truth, estimate, dim)
     distances = np.linalg.norm(errors, axis=1)
     known = np.isfinite(distances)
@@ -56,6 +64,7 @@ def accuracy(time_s: Array, truth: TruthTrack, estimate: EstimateTrack | None, d
         covered=float(np.mean(known)),
         anees=_anees(time_s[known], errors[known], estimate, dim),
         yaw_rmse_rad=_yaw_rmse(time_s[known], truth, estimate) if dim == 3 else None,
+        judged=len(time_s) / asked,
     )
 
 

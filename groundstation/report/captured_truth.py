@@ -9,11 +9,16 @@ from groundstation.arrays import Array
 from groundstation.bus.messages import AIRBORNE, UNHEARD, BodyPoses, VehicleStatus
 from groundstation.report.tracks import TimedMessage, TruthTrack
 
+# Without a pose for so long, or for some of its periods, nobody knows where a body was.
+_MAX_GAP_S, _PERIODS = 0.5, 4.0
+
 
 def captured_tracks(
-    poses: Iterable[TimedMessage[BodyPoses]], vehicles: Mapping[str, Sequence[TimedMessage[VehicleStatus]]]
+    poses: Iterable[TimedMessage[BodyPoses]],
+    vehicles: Mapping[str, Sequence[TimedMessage[VehicleStatus]]],
+    rate_hz: float = 30.0,
 ) -> dict[str, TruthTrack]:
-    """Return the track of each body: where the system had it, but for poses that cannot be true.
+    """Return the track of each body: where the system had it, but for poses that cannot be true; rate_hz: the system's.
 
     A drone is on the ground as long as it says so, and one that is not heard is as it was; a body without a driver
     always is on the ground.
@@ -23,18 +28,18 @@ def captured_tracks(
         for body in item.message.bodies:
             if body.name not in item.message.refused:
                 rows.setdefault(body.name, []).append((item.time_s, *body.position_m, _yaw(*body.attitude)))
-    return {name: _track(np.array(sorted(found)), vehicles.get(name, ())) for name, found in rows.items()}
+    max_gap_s = max(_MAX_GAP_S, _PERIODS / rate_hz)
+    return {name: _track(np.array(sorted(found)), vehicles.get(name, ()), max_gap_s) for name, found in rows.items()}
 
 
 def _yaw(w: float, x: float, y: float, z: float) -> float:
     return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
-def _track(table: Array, statuses: Sequence[TimedMessage[VehicleStatus]]) -> TruthTrack:
+def _track(table: Array, statuses: Sequence[TimedMessage[VehicleStatus]], max_gap_s: float) -> TruthTrack:
     states = [(item.time_s, item.message.flight_state) for item in statuses]
     said = sorted((time_s, state in AIRBORNE) for time_s, state in states if state not in UNHEARD)
     times = np.array([time_s for time_s, _ in said])
     aloft = np.array([False, *(flies for _, flies in said)])
-    return TruthTrack(
-        table[:, 0], table[:, 1:4], table[:, 4], ~aloft[np.searchsorted(times, table[:, 0], side="right")]
-    )
+    on_ground = ~aloft[np.searchsorted(times, table[:, 0], side="right")]
+    return TruthTrack(table[:, 0], table[:, 1:4], table[:, 4], on_ground, max_gap_s)

@@ -10,6 +10,7 @@ from groundstation.report.run_facts import RunFacts
 
 MAX_TARGET_RMSE_M = 0.20
 MAX_TARGET_LOST_S = 2.0
+MIN_JUDGED = 0.5
 MAX_CPU_CORES = 1.6
 MAX_PLANNER_P99_MS = 50.0
 MAX_MISSED_PERCENT = 1.0
@@ -61,6 +62,9 @@ def is_valid(figures: RunFigures) -> bool:
 def _against_truth(figures: RunFigures, field: ResolvedField) -> Iterator[Criterion]:
     yield _below("target_rmse_m", figures.target_rmse_m, MAX_TARGET_RMSE_M)
     yield _below("target_lost_s", figures.target_lost_s, MAX_TARGET_LOST_S)
+    judged = min((one.judged for one in figures.targets.values()), default=None)
+    if judged is not None and judged < 1.0:
+        yield _above("target_judged", judged, MIN_JUDGED)
     yield _below("max_fence_violation_m", figures.max_fence_violation_m, 0.0)
     if len(field.drones) > 1:
         yield _above("min_separation_m", figures.min_separation_m, field.safety.min_separation_m)

@@ -117,7 +117,8 @@ class _Rows:
             table = np.array(sorted(rows))
             data.truth[name] = TruthTrack(table[:, 0], table[:, 1:4], table[:, 4], table[:, 5] > 0.5)
         if self._captured:
-            data.truth = captured_tracks(self._captured, data.vehicles)
+            system = data.resolved.motion_capture.get(data.resolved.truth["from"])
+            data.truth = captured_tracks(self._captured, data.vehicles, system.rate_hz if system else 30.0)
         for name, entries in self._estimates.items():
             data.estimates[name] = _estimate_track(entries)
         for name, rows in self._processes.items():

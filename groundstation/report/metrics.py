@@ -100,17 +100,17 @@ def _accuracies(data: RunData, interval: tuple[float, float] | None) -> tuple[di
     if interval is None:
         return {}, {}
     grid = time_grid(*interval)
-    targets = {
-        name: accuracy(grid, data.truth[name], data.estimates.get(name), 2)
-        for name in data.tracked
-        if name in data.truth
-    }
-    robots = {}
-    for robot in data.drones:
-        truth = data.truth.get(robot)
+    targets: dict[str, Accuracy] = {}
+    robots: dict[str, Accuracy] = {}
+    for name in data.tracked:
+        truth = data.truth.get(name)
+        if truth is not None and (found := accuracy(grid, truth, data.estimates.get(name), 2)) is not None:
+            targets[name] = found
+    for name in data.drones:
+        truth = data.truth.get(name)
         flying = grid[truth.airborne_at(grid)] if truth is not None else grid[:0]
-        if truth is not None and len(flying):
-            robots[robot] = accuracy(flying, truth, data.estimates.get(robot), 3)
+        if truth is not None and (found := accuracy(flying, truth, data.estimates.get(name), 3)) is not None:
+            robots[name] = found
     return targets, robots
 
 

@@ -60,7 +60,7 @@ def _draw_errors(axes: Axes, data: RunData) -> None:
             distance[~truth.airborne_at(grid)] = np.nan
         axes.plot(grid, distance, color=color_of(name, data).light, lw=1.8 if is_target else 0.9, zorder=3, label=name)
         if is_target:
-            _mark_missing(axes, grid, ~np.isfinite(distance))
+            _mark_missing(axes, grid, ~np.isfinite(distance) & truth.known_at(grid))
         if np.isfinite(distance).any():
             top = max(top, min(1.5, 1.1 * float(np.nanmax(distance))))
     for limit, text in ((MAX_TARGET_RMSE_M, "rms limit"), (LOST_ERROR_M, "lost")):

@@ -48,11 +48,12 @@ def _closest(first: TruthTrack, second: TruthTrack) -> float | None:
 def landed(data: RunData) -> bool | None:
     """Return whether every drone stood on the ground at the end.
 
-    Without truth: by what those said last that flew; None where nobody did.
+    Without a simulator: by what those said last that flew, as motion capture may have lost sight of one long before;
+    None where nobody did.
     """
-    ends = [bool(data.truth[name].on_ground[-1]) for name in data.drones if name in data.truth]
-    if ends:
-        return all(ends) and len(ends) == len(data.drones)
+    tracks = [data.truth[name] for name in data.drones if name in data.truth]
+    if any(track.is_simulated for track in tracks):
+        return all(bool(track.on_ground[-1]) for track in tracks) and len(tracks) == len(data.drones)
     said = [_said_down(data, name) for name in data.vehicles]
     flew = [down for down in said if down is not None]
     return all(flew) if flew else None

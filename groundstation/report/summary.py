@@ -92,6 +92,8 @@ def _details(report: RunReport) -> Text:
         if target.anees is not None:
             label = "target" if len(figures.targets) == 1 else f"{name}: rms error {target.rmse_m:.3f} m"
             lines.append(f"{label}: covered {target.covered:.0%}, normalised error {target.anees:.2f} (1 is ideal)")
+            if target.judged < 1.0:
+                lines.append(f"  judged for {target.judged:.0%} of the time: the truth is not known for the rest")
             if target.anees > _FAR_TOO_SURE:
                 lines.append("  a figure of the field may be wrong: groundstation calibrate team looks for it")
     return Text("\n".join(f"  {line}" for line in lines))

@@ -1,5 +1,6 @@
 """Time series of a run as arrays; times in seconds since the first message."""
 
+import math
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
@@ -30,27 +31,50 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class TruthTrack:
-    """Where a body really was: time (n), position (n, 3), yaw (n), on_ground (n)."""
+    """Where a body really was: time (n), position (n, 3), yaw (n), on_ground (n).
+
+    max_gap_s: nobody knows where it was between two samples that are farther apart, nor before the first and after the
+    last; inf: of a simulator, which always knows. on_ground of any other truth is what the drone itself said.
+    """
 
     time_s: Array
     position_m: Array
     yaw_rad: Array
     on_ground: BoolArray
+    max_gap_s: float = math.inf
+
+    @property
+    def is_simulated(self) -> bool:
+        """Return whether a simulator tells it, which knows all of it."""
+        return math.isinf(self.max_gap_s)
+
+    def known_at(self, time_s: Array) -> BoolArray:
+        """Return at which times it is known (m)."""
+        if self.is_simulated:
+            return np.ones(len(time_s), dtype=bool)
+        after = np.searchsorted(self.time_s, time_s, side="left")
+        before = np.searchsorted(self.time_s, time_s, side="right") - 1
+        inside = (before >= 0) & (after < len(self.time_s))
+        last = len(self.time_s) - 1
+        gap_s = self.time_s[np.clip(after, 0, last)] - self.time_s[np.clip(before, 0, last)]
+        known: BoolArray = inside & (gap_s <= self.max_gap_s)
+        return known
 
     def position_at(self, time_s: Array) -> Array:
-        """Return interpolated positions (m, 3); held at both ends."""
-        return np.column_stack([np.interp(time_s, self.time_s, self.position_m[:, axis]) for axis in range(3)])
+        """Return interpolated positions (m, 3); NaN where it is not known, a simulator's are held at both ends."""
+        columns = [np.interp(time_s, self.time_s, self.position_m[:, axis]) for axis in range(3)]
+        return np.where(self.known_at(time_s)[:, None], np.column_stack(columns), np.nan)
 
     def yaw_at(self, time_s: Array) -> Array:
-        """Return interpolated yaw (m), unwrapped."""
-        return np.interp(time_s, self.time_s, np.unwrap(self.yaw_rad))
+        """Return interpolated yaw (m), unwrapped; NaN where it is not known."""
+        return np.where(self.known_at(time_s), np.interp(time_s, self.time_s, np.unwrap(self.yaw_rad)), np.nan)
 
     def airborne_at(self, time_s: Array) -> BoolArray:
-        """Return whether the body flew (m); False outside the track."""
+        """Return whether the body flew (m); False outside the track, and where it is not known."""
         index = np.searchsorted(self.time_s, time_s, side="right") - 1
         inside = (index >= 0) & (time_s <= self.time_s[-1] + 0.5)
         flying: BoolArray = inside & ~self.on_ground[np.clip(index, 0, len(self.time_s) - 1)]
-        return flying
+        return flying & self.known_at(time_s)
 
 
 @dataclass(frozen=True, slots=True)

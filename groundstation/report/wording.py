@@ -9,6 +9,7 @@ _BOUNDS = {"<=": "at most", "<": "below", ">=": "at least", ">": "more than"}
 _TITLES = {
     "target_rmse_m": ("target error (rms)", "m"),
     "target_lost_s": ("target lost", "s"),
+    "target_judged": ("share of the time with a truth of the target", ""),
     "max_fence_violation_m": ("beyond the fence", "m"),
     "min_separation_m": ("least separation", "m"),
     "landed": ("everybody landed", ""),

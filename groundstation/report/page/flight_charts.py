@@ -46,7 +46,7 @@ def _errors(data: RunData, grid: Array) -> Chart:
             if size == 3:
                 distance[~truth.airborne_at(grid)] = np.nan
             curves.append(Curve(name, color_of(name, data), points(distance)))
-    note = "distance between estimate and truth; a gap means that there was no estimate younger than 0.5 s"
+    note = "distance between estimate and truth; a gap: no estimate younger than 0.5 s, or no truth"
     return Chart("Position error", "m", note, times(grid), curves, _spans(data, grid))
 
 

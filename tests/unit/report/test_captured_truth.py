@@ -4,9 +4,26 @@ import math
 
 import numpy as np
 
-from groundstation.bus.messages import BodyPose, BodyPoses, FlightState, Header, VehicleStatus
+from groundstation.arrays import Array
+from groundstation.bus.messages import (
+    AckStage,
+    BodyPose,
+    BodyPoses,
+    Command,
+    CommandAck,
+    FlightState,
+    Header,
+    VehicleStatus,
+    Verb,
+)
+from groundstation.field.resolved import ResolvedField
+from groundstation.report.accuracy import accuracy
 from groundstation.report.captured_truth import captured_tracks
-from groundstation.report.tracks import TimedMessage
+from groundstation.report.criteria import criteria_of
+from groundstation.report.metrics import figures_of
+from groundstation.report.run_facts import RunFacts
+from groundstation.report.safety import landed, min_separation_m
+from groundstation.report.tracks import EstimateTrack, RunData, TimedMessage, TruthTrack
 
 
 def poses(time_s: float, x: float, refused: dict[str, str] | None = None) -> TimedMessage[BodyPoses]:
@@ -35,3 +52,75 @@ def test_a_drone_that_is_not_heard_any_more_flies_on() -> None:
     said = {"drone_1": [status(0.5, FlightState.HOVERING), status(1.5, FlightState.LOST)]}
     track = captured_tracks([poses(time_s, 0.0) for time_s in (0.0, 1.0, 2.0, 3.0)], said)["drone_1"]
     assert track.on_ground.tolist() == [True, False, False, False]
+
+
+def track(*times_s: float, x: float = 0.0, on_ground: bool = False) -> TruthTrack:
+    heard = [poses(time_s, x) for time_s in times_s]
+    said = {} if on_ground else {"drone_1": [status(-1.0, FlightState.HOVERING)]}
+    return captured_tracks(heard, said)["drone_1"]
+
+
+def still(times_s: Array, x: float) -> EstimateTrack:
+    return EstimateTrack(
+        "target", times_s, np.tile([x, 1.0], (len(times_s), 1)), np.tile(np.eye(2), (len(times_s), 1, 1))
+    )
+
+
+def test_nobody_knows_where_a_body_was_that_was_not_seen() -> None:
+    """It went 4 m aside in a gap of two seconds: a line between its ends is no truth, nor is where it was last."""
+    heard = [*(poses(t / 10, 0.0) for t in range(11)), *(poses(3.0 + t / 10, 4.0) for t in range(11))]
+    seen = captured_tracks(heard, {})["drone_1"]
+    times = np.array([-0.2, 0.55, 1.0, 2.0, 3.0, 3.5, 4.2])
+    assert seen.known_at(times).tolist() == [False, True, True, False, True, True, False]
+    assert np.isnan(seen.position_at(times[[3, 6]])).all() and np.isnan(seen.yaw_at(times[[3, 6]])).all()
+    assert not seen.airborne_at(times[[3, 6]]).any()
+    grid = np.arange(0.0, 6.0, 0.1)
+    judged = accuracy(grid, seen, still(grid, 0.0), 2)
+    assert judged is not None and abs(judged.judged - 21 / 60) <= 1 / 60
+    assert judged.covered == 1.0, "what is not judged is no estimate that is missing"
+    assert accuracy(np.array([9.0]), seen, still(grid, 0.0), 2) is None
+    slow = captured_tracks([poses(0.0, 0.0), poses(1.0, 0.0)], {}, rate_hz=2.0)["drone_1"]
+    assert slow.known_at(np.array([0.5])).all(), "a system of two frames a second is known between them"
+
+
+def test_drones_come_near_each_other_only_where_both_were_seen(lab_field: ResolvedField) -> None:
+    along = track(*(t / 10 for t in range(41)), x=2.0)
+    crossing = captured_tracks([poses(0.0, 0.0), poses(0.1, 0.0), poses(3.9, 4.0), poses(4.0, 4.0)],
+                               {"drone_1": [status(-1.0, FlightState.HOVERING)]})["drone_1"]  # fmt: skip
+    data = RunData(lab_field, RunFacts(), truth={"drone_1": along, "drone_2": crossing})
+    assert min_separation_m(data) == 2.0
+
+
+def test_a_drone_that_was_seen_on_its_pad_only_is_not_called_landed(lab_field: ResolvedField) -> None:
+    """The system ended before the take-off; what the drone said last is that it flies."""
+    ended = track(0.0, 0.1, 0.2, on_ground=True)
+    said = {name: [status(0.0, FlightState.LANDED)] for name in lab_field.drones}
+    data = RunData(lab_field, RunFacts(), truth=dict.fromkeys(lab_field.drones, ended), vehicles=said)
+    data.vehicles["drone_1"].append(status(5.0, FlightState.HOVERING))
+    assert landed(data) is False
+    data.vehicles["drone_1"].append(status(9.0, FlightState.LANDED))
+    assert landed(data) is True
+
+
+def test_a_flight_that_was_judged_for_less_than_half_of_its_time_does_not_pass(lab_field: ResolvedField) -> None:
+    header = Header(0, "c", "drone_1", "drone_1", 1)
+    began = CommandAck(header=header, command_id="1", verb=Verb.TRACK, stage=AckStage.EFFECTIVE)
+    ended = Command(header=header, id="2", verb=Verb.LAND, scope=(), issuer="me")
+    grid = np.arange(0.0, 20.0, 0.05)
+    for seen_s, good in ((4.0, False), (16.0, True)):
+        heard = [poses(t / 10, 0.0) for t in range(int(10 * seen_s))]
+        data = RunData(
+            lab_field,
+            RunFacts(),
+            truth={"turtlebot": captured_tracks(heard, {})["turtlebot"]},
+            estimates={
+                "turtlebot": EstimateTrack(
+                    "target", grid, np.tile([2.0, 0.0], (len(grid), 1)), np.tile(np.eye(2), (len(grid), 1, 1))
+                )
+            },
+            acks=[TimedMessage(0.0, began)],
+            commands=[TimedMessage(20.0, ended)],
+        )
+        found = {one.name: one for one in criteria_of(figures_of(data), lab_field, RunFacts())}
+        assert found["target_rmse_m"].ok
+        assert found["target_judged"].ok is good

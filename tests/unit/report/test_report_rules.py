@@ -156,6 +156,7 @@ def test_honest_covariance_gives_one() -> None:
     truth = TruthTrack(times, np.zeros((len(times), 3)), np.zeros(len(times)), np.ones(len(times), dtype=bool))
     estimate = EstimateTrack("target", times, noise, np.tile(covariance, (len(times), 1, 1)))
     figures = accuracy(times, truth, estimate, 2)
+    assert figures is not None
     assert figures.anees == pytest.approx(1.0, abs=0.06)
     assert figures.rmse_m == pytest.approx(np.sqrt(0.06), rel=0.05)
     assert figures.covered == 1.0
@@ -165,7 +166,8 @@ def test_a_singular_covariance_gives_no_ratio_and_no_crash() -> None:
     times = np.arange(10) / 10
     truth = TruthTrack(times, np.zeros((10, 3)), np.zeros(10), np.ones(10, dtype=bool))
     estimate = EstimateTrack("target", times, np.zeros((10, 2)), np.zeros((10, 2, 2)))
-    assert accuracy(times, truth, estimate, 2).anees is None
+    figures = accuracy(times, truth, estimate, 2)
+    assert figures is not None and figures.anees is None
 
 
 def test_ellipse_holds_95_percent() -> None:

@@ -54,8 +54,11 @@ def team(recording: tuple[Path, ...], field: Path | None, output: Path | None, a
     One least-squares fit over all sightings, odometry and inertial readings. The same recording gives the same figures.
     """
     from groundstation.cli.recorded_flight import recorded_flight
+    from groundstation.settings.load import load_field
     from groundstation.settings.resolved import resolved_field
 
+    if field is not None:
+        load_field(field)  # a minute of computing later is late to say that it cannot be read
     name, flown_with, flown = recorded_flight(recording)
     from groundstation.calibration.team import calibrate_team
 
@@ -74,7 +77,7 @@ def _write(output: Path, field: Path | None, flown_with: "Field", found: "TeamCa
 
     if not found.settings:
         raise OperatorMistake(f"{output}: is not written, as there is nothing to change")
-    text = field.read_text(encoding="utf-8") if field is not None else yaml_of(flown_with)
+    text = field.read_text(encoding="utf-8-sig") if field is not None else yaml_of(flown_with)
     write_patched(output, text, found.settings, flown_with.model_dump(mode="json"))
     click.echo(f"wrote {output}", err=True)
 

@@ -1,7 +1,10 @@
 """A field file with some settings changed and all else, comments included, as it was written."""
 
+import copy
 import io
+import os
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -34,16 +37,21 @@ def patched(text: str, changes: Changes, resolved: Mapping[str, Any]) -> str:
 
 
 def write_patched(target: Path, text: str, changes: Changes, resolved: Mapping[str, Any]) -> None:
-    """Write a patched field file and read it back; raises OperatorMistake where it cannot be written or read."""
+    """Write a patched field file; raises OperatorMistake, and leaves what stands there, where it could not be read."""
+    tried = target.with_name(f".{target.name}.{os.getpid()}")
     try:
-        target.write_text(patched(text, changes, resolved), encoding="utf-8")
+        tried.write_text(patched(text, changes, resolved), encoding="utf-8")
+        load_field(tried)
+        tried.replace(target)
     except OSError as error:
         raise OperatorMistake(f"{target}: cannot be written ({error.strerror})") from None
-    try:
-        load_field(target)
     except SettingsError as error:
+        problem = error.problems[0].replace(str(tried), str(target))
         remedy = "write it beside the field file, whose calibrations it names"
-        raise OperatorMistake(f"{target}: is written, but cannot be used ({error.problems[0]}): {remedy}") from None
+        raise OperatorMistake(f"{target}: is not written, it could not be used ({problem}): {remedy}") from None
+    finally:
+        with suppress(OSError):
+            tried.unlink()
 
 
 def _placed(tree: Any, path: tuple[str, ...], value: Any, resolved: Any) -> None:
@@ -52,8 +60,15 @@ def _placed(tree: Any, path: tuple[str, ...], value: Any, resolved: Any) -> None
         resolved = resolved.get(name, {}) if isinstance(resolved, Mapping) else {}
         if not isinstance(tree.get(name), dict):
             tree[name] = dict(resolved) if isinstance(tree.get(name), str) else {}
+        elif _has_anchor(tree[name]):
+            tree[name] = copy.deepcopy(tree[name])  # an alias of it elsewhere in the file keeps what it says
         tree = tree[name]
     tree[last] = value
+
+
+def _has_anchor(node: Any) -> bool:
+    anchor = getattr(node, "yaml_anchor", None)  # what the file did not hold has none
+    return anchor is not None and anchor() is not None
 
 
 def _written(tree: Any) -> str:

@@ -9,6 +9,7 @@ from click.testing import CliRunner
 from rewritten import rewritten, without
 
 from groundstation.cli.main import groundstation
+from groundstation.errors import SettingsError
 from groundstation.field.resolved import ResolvedField
 from groundstation.recording.chunks import RawRecord
 
@@ -76,3 +77,15 @@ def test_a_short_flight_is_told_to_be_too_short(flown: Path) -> None:
     result = CliRunner().invoke(groundstation, ["calibrate", "delay", str(flown)], standalone_mode=False)
     assert result.exception is None, result.exception
     assert "it saw too little" in result.output or "too unsure" in result.output
+
+
+@pytest.mark.parametrize("text", ["- 1\n", "a: {", "", "schema_version: 1\nschema_version: 1\n"])
+def test_a_field_file_that_cannot_be_changed_is_named_before_anything_is_computed(
+    flown: Path, tmp_path: Path, text: str
+) -> None:
+    wrong = tmp_path / "lab.yaml"
+    wrong.write_text(text, encoding="utf-8")
+    arguments = ["calibrate", "team", str(flown), "--field", str(wrong), "-o", str(tmp_path / "new.yaml")]
+    result = CliRunner().invoke(groundstation, arguments, standalone_mode=False)
+    assert isinstance(result.exception, SettingsError) and "lab.yaml" in str(result.exception)
+    assert "sightings" not in result.output

@@ -1,17 +1,36 @@
 """`groundstation new`: a field file from a few questions, in the terminal or on a page."""
 
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from groundstation.errors import OperatorMistake
+from groundstation.cli.numbers import FiniteRange
+from groundstation.errors import OperatorMistake, SettingsError
 
 if TYPE_CHECKING:
     from groundstation.settings.new_field import NewDrone, NewRoom, NewTarget
 
 _Answer = TypeVar("_Answer")
+
+
+class _Checked(click.ParamType):
+    """Text that a function must take, which raises ValueError with the reason where it does not."""
+
+    name = "text"
+
+    def __init__(self, check: Callable[[str], object]) -> None:
+        self._check = check
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Return the text, or fail with the reason, so that the question is asked again."""
+        try:
+            self._check(str(value))
+        except ValueError as error:
+            self.fail(f"{error} (got {value!r})", param, ctx)
+        return str(value)
 
 
 @click.command(
@@ -40,9 +59,23 @@ def _ask(path: Path) -> None:
     room = _ask_room()
     drones = _ask_drones(room)
     text = field_text(path.stem, room, drones, _until_possible(lambda: _ask_target(room)))
+    _require_good(text, path.name)
     if not click.confirm(f"Write {path}?", default=True):
         raise OperatorMistake("nothing was written")
     write_field(path, text)
+
+
+def _require_good(text: str, name: str) -> None:
+    """Raise SettingsError with what is wrong between the answers, such as one address for two drones."""
+    from groundstation.settings.load import load_field
+    from groundstation.settings.shipped_copies import write_field
+
+    with tempfile.TemporaryDirectory() as folder:
+        write_field(Path(folder) / name, text)
+        try:
+            load_field(Path(folder) / name)
+        except SettingsError as error:
+            raise SettingsError([problem.replace(f"{folder}/", "") for problem in error.problems]) from None
 
 
 def _until_possible(ask: Callable[[], _Answer]) -> _Answer:
@@ -55,12 +88,14 @@ def _until_possible(ask: Callable[[], _Answer]) -> _Answer:
 
 
 def _ask_room() -> "NewRoom":
+    from drivers.camera.settings import parse_source
     from groundstation.settings.new_field import NewRoom, check_room
 
-    length = click.prompt("Length of the room [m]", default=8.0, type=click.FloatRange(3, 60))
-    width = click.prompt("Width [m]", default=6.0, type=click.FloatRange(3, length))
-    height = click.prompt("Height [m]", default=4.5, type=click.FloatRange(3, 20))
-    source = click.prompt("Pictures of the ceiling camera", default="http://192.168.1.50:8080/video.mjpg")
+    length = click.prompt("Length of the room [m]", default=8.0, type=FiniteRange(3, 60))
+    width = click.prompt("Width [m]", default=6.0, type=FiniteRange(3, length))
+    height = click.prompt("Height [m]", default=4.5, type=FiniteRange(3, 20))
+    pictures = "http://192.168.1.50:8080/video.mjpg"
+    source = click.prompt("Pictures of the ceiling camera", default=pictures, type=_Checked(parse_source))
     room = NewRoom(length, width, height, source)
     check_room(room)
     _draw(room, 0)
@@ -82,6 +117,8 @@ def _ask_count(room: "NewRoom") -> int:
 
 
 def _ask_drones(room: "NewRoom") -> "list[NewDrone]":
+    from drivers.camera.settings import parse_source
+    from drivers.vehicle_settings import is_address
     from groundstation.settings.new_field import NewDrone, offers
 
     count = _until_possible(lambda: _ask_count(room))
@@ -90,9 +127,10 @@ def _ask_drones(room: "NewRoom") -> "list[NewDrone]":
     for number in range(1, 1 + count):
         before = drones[-1].kind if drones else next(iter(known))
         kind = click.prompt(f"Kind of drone_{number}", default=before, type=click.Choice(tuple(known)))
-        address = click.prompt("  its address", default=f"192.168.1.{10 + number}")
+        address = click.prompt("  its address", default=f"192.168.1.{10 + number}", type=_Checked(is_address))
         own = known[kind][1].pictures.replace("{address}", address)
-        drones.append(NewDrone(kind, address, click.prompt("  pictures of its camera", default=own)))
+        pictures = click.prompt("  pictures of its camera", default=own, type=_Checked(parse_source))
+        drones.append(NewDrone(kind, address, pictures))
     return drones
 
 
@@ -100,7 +138,7 @@ def _ask_target(room: "NewRoom") -> "NewTarget":
     from groundstation.settings.new_field import BASES, NewTarget, check_target
 
     base = click.prompt("Target", default=next(iter(BASES)), type=click.Choice(tuple(BASES)))
-    board = click.prompt("  height of the marker board on it [m]", default=BASES[base], type=click.FloatRange(0, 3))
+    board = click.prompt("  height of the marker board on it [m]", default=BASES[base], type=FiniteRange(0, 3))
     target = NewTarget(base, board)
     check_target(room, target)
     return target

@@ -3,6 +3,7 @@
 import json
 import math
 import re
+import unicodedata
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -17,6 +18,7 @@ _WALL_M, _CEILING_M, _CAMERA_BELOW_CEILING_M = 0.3, 1.7, 0.3
 _LOWEST_CEILING_M = 3.0
 _PAD_GAP_M, _PAD_MARGIN_M, _PAD_SEEN_AT_M = 1.0, 0.15, 1.0
 _TARGET_CODE = 5
+_LONGEST_SITE = 40
 _PLAIN = re.compile(r"[a-z0-9][\w.:/@?=&%+-]*[\w/]", re.ASCII)
 # Drones fly in a band below the fence's top, this high at least, and this far above the target's board.
 _TOP_MARGIN_M, _BAND_M, _LEAST_BAND_M, _LOWEST_FLIGHT_M, _ABOVE_BOARD_M = 0.3, 1.4, 0.2, 0.8, 0.4
@@ -64,6 +66,13 @@ class NewRoom(NamedTuple):
         return below * _HALF_VIEW[0], below * _HALF_VIEW[1]
 
 
+def site_of(folder: str) -> str:
+    """Return a site's name that is like that of a folder: of small letters, digits and _, a letter first."""
+    plain = unicodedata.normalize("NFKD", folder).encode("ascii", "ignore").decode().lower()
+    name = re.sub(r"[^a-z0-9]+", "_", plain).strip("_")[:_LONGEST_SITE].rstrip("_")
+    return name if name[:1].isalpha() else f"lab_{name}".rstrip("_")
+
+
 def check_target(room: NewRoom, target: NewTarget) -> None:
     """Raise OperatorMistake for a board that no drone can look down on."""
     most = round(room.fence_top_m - _TOP_MARGIN_M - _LEAST_BAND_M - _ABOVE_BOARD_M, 2)
@@ -76,6 +85,8 @@ def check_target(room: NewRoom, target: NewTarget) -> None:
 
 def check_room(room: NewRoom) -> None:
     """Raise OperatorMistake for a room in which no team can fly."""
+    if not all(map(math.isfinite, room[:3])):
+        raise OperatorMistake("a room's length, width and height must be numbers")
     if room.height_m < _LOWEST_CEILING_M:
         raise OperatorMistake(f"a room {room.height_m:g} m high is too low: two drones need {_LOWEST_CEILING_M:g} m")
     if min(room.length_m, room.width_m) < 3.0:
@@ -135,7 +146,7 @@ def _room(site: str, room: NewRoom) -> str:
     return f"""\
 # Frame: origin on the floor in the middle of the room, x along the long side, z up. Units are in the key names.
 schema_version: 1
-site: {site}
+site: {site_of(site)}
 
 room:
   size_m: [{room.length_m:g}, {room.width_m:g}, {room.height_m:g}]

@@ -6,7 +6,7 @@ import pytest
 from click.testing import CliRunner
 
 from groundstation.cli.new import new
-from groundstation.errors import OperatorMistake
+from groundstation.errors import OperatorMistake, SettingsError
 from groundstation.settings.load import load_field
 from groundstation.settings.new_field import BASES, NewDrone, NewRoom, NewTarget, check_room, field_text, pads
 from groundstation.settings.room_text import room_text
@@ -91,3 +91,39 @@ def test_what_cannot_be_is_asked_again_and_no_answer_is_lost(tmp_path: Path) -> 
 def test_a_board_too_high_to_look_down_on_is_refused() -> None:
     with pytest.raises(OperatorMistake, match=r"2 m above the floor .* 4\.5 m high: 1\.9"):
         field_text("lab", NewRoom(8, 6, 4.5, SOURCE), [ARDRONE], NewTarget("person", 2.0))
+
+
+@pytest.mark.parametrize(
+    ("folder", "site"),
+    [("My Lab", "my_lab"), ("9lab", "lab_9lab"), ("été", "ete"), ("日本", "lab"), ("a-b", "a_b"), ("x" * 60, "x" * 40)],
+)
+def test_a_folder_of_any_name_makes_a_site(tmp_path: Path, folder: str, site: str) -> None:
+    result = CliRunner().invoke(new, [str(tmp_path / folder)], input="\n" * 14)
+    assert result.exit_code == 0, result.output
+    assert load_field(tmp_path / folder / f"{folder}.yaml").site == site
+
+
+def test_an_answer_that_cannot_be_is_asked_again(tmp_path: Path) -> None:
+    room = ["nan", "8", "inf", "6", "4.5", "webcam", ""]
+    drone = ["", "drone.local", "192.168.1.300", "192.168.1.11", "pictures", ""]
+    result = CliRunner().invoke(
+        new, [str(tmp_path / "hall")], input="\n".join([*room, "1", *drone, "", "nan", "0.4", "y", ""])
+    )
+    assert result.exit_code == 0, result.output
+    assert load_field(tmp_path / "hall" / "hall.yaml").drones["drone_1"].address == "192.168.1.11"
+    assert "must be an IPv4 address such as 192.168.1.11 (got 'drone.local')" in result.output
+
+
+def test_answers_that_contradict_each_other_are_not_written(tmp_path: Path) -> None:
+    one = ["", "192.168.1.11", ""]
+    result = CliRunner().invoke(
+        new, [str(tmp_path / "hall")], input="\n".join(["", "", "", "", "2", *one, *one, "", "", "y", ""])
+    )
+    assert isinstance(result.exception, SettingsError)
+    assert "address 192.168.1.11 is already that of drone_1" in str(result.exception)
+    assert str(result.exception).startswith("hall.yaml:") and not (tmp_path / "hall").exists()
+
+
+def test_a_room_that_is_no_number_is_refused() -> None:
+    with pytest.raises(OperatorMistake, match="must be numbers"):
+        check_room(NewRoom(float("nan"), 6, 4.5, SOURCE))

@@ -64,7 +64,12 @@ def check(what: str, calibration: Path | None, given: tuple[str, ...], square_mm
     """Look through the cameras of WHAT (a field file, a recording, a source) at markers that lie still, and judge."""
     from groundstation.settings.floor_markers import floor_marker_of
 
-    known = {marker.code: np.array(marker.position_m) for marker in map(floor_marker_of, given)}
+    said = [floor_marker_of(text) for text in given]
+    known = {marker.code: np.array(marker.position_m) for marker in said}
+    if len(known) < len(said):
+        raise click.UsageError("--marker: one marker is given twice")
+    if known and calibration is not None:
+        raise click.UsageError("--marker: where a camera hangs is in a field file; a source has a --calibration alone")
     if calibration is not None:
         context, parameter = click.get_current_context(), click.get_current_context().command.params[0]
         source, lens = source_of(context, parameter, what), lens_of(calibration)
@@ -178,6 +183,12 @@ def _field_findings(
                 places.setdefault(code, {})[name] = placed
     for code, by_camera in sorted(places.items()):
         yield from _place_findings(code, by_camera, known.get(code))
+    if not field.cameras:
+        yield CheckFinding("the field has no fixed camera", None, "name a source, and its --calibration")
+    for code in sorted(known.keys() - places.keys()):
+        yield CheckFinding(
+            f"marker {code}: no camera has it in view, lying still", None, "see that it lies where you said"
+        )
 
 
 def _placed(camera: Any, lens: "CameraIntrinsics", steady: "Steady", square_mm: float) -> tuple[Any, float] | None:

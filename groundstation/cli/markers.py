@@ -52,7 +52,8 @@ def print_markers(
     if output.suffix.lower() != ".pdf":
         raise click.UsageError(f"--output {output}: must end in .pdf")
     sheet = paper_size(paper)
-    size = (square_mm or _SQUARE_MM) if dictionary is None else (size_mm or _TAG_MM)
+    given, usual = (square_mm, _SQUARE_MM) if dictionary is None else (size_mm, _TAG_MM)
+    size = usual if given is None else given
     items = [_item(number, dictionary, size) for number in dict.fromkeys(ids)]
     pages = []
     for number, item in zip(dict.fromkeys(ids), items, strict=True):

@@ -3,7 +3,7 @@
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import click
 
@@ -16,21 +16,17 @@ if TYPE_CHECKING:
 _Answer = TypeVar("_Answer")
 
 
-class _Checked(click.ParamType):
-    """Text that a function must take, which raises ValueError with the reason where it does not."""
+def _checked(check: Callable[[str], object]) -> Callable[[str], str]:
+    """Return what takes an answer; one for which `check` raises ValueError with the reason is asked for again."""
 
-    name = "text"
-
-    def __init__(self, check: Callable[[str], object]) -> None:
-        self._check = check
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        """Return the text, or fail with the reason, so that the question is asked again."""
+    def answer(text: str) -> str:
         try:
-            self._check(str(value))
+            check(text)
         except ValueError as error:
-            self.fail(f"{error} (got {value!r})", param, ctx)
-        return str(value)
+            raise click.UsageError(f"{error} (got {text!r})") from None
+        return text
+
+    return answer
 
 
 @click.command(
@@ -95,7 +91,7 @@ def _ask_room() -> "NewRoom":
     width = click.prompt("Width [m]", default=6.0, type=FiniteRange(3, length))
     height = click.prompt("Height [m]", default=4.5, type=FiniteRange(3, 20))
     pictures = "http://192.168.1.50:8080/video.mjpg"
-    source = click.prompt("Pictures of the ceiling camera", default=pictures, type=_Checked(parse_source))
+    source = click.prompt("Pictures of the ceiling camera", default=pictures, value_proc=_checked(parse_source))
     room = NewRoom(length, width, height, source)
     check_room(room)
     _draw(room, 0)
@@ -127,9 +123,9 @@ def _ask_drones(room: "NewRoom") -> "list[NewDrone]":
     for number in range(1, 1 + count):
         before = drones[-1].kind if drones else next(iter(known))
         kind = click.prompt(f"Kind of drone_{number}", default=before, type=click.Choice(tuple(known)))
-        address = click.prompt("  its address", default=f"192.168.1.{10 + number}", type=_Checked(is_address))
+        address = click.prompt("  its address", default=f"192.168.1.{10 + number}", value_proc=_checked(is_address))
         own = known[kind][1].pictures.replace("{address}", address)
-        pictures = click.prompt("  pictures of its camera", default=own, type=_Checked(parse_source))
+        pictures = click.prompt("  pictures of its camera", default=own, value_proc=_checked(parse_source))
         drones.append(NewDrone(kind, address, pictures))
     return drones
 

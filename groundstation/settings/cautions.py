@@ -17,6 +17,7 @@ from groundstation.settings.checks import Finding
 from groundstation.settings.document import KeyPath
 from groundstation.settings.room import CalibrationSettings, WorldCameraSettings
 from groundstation.settings.schema import Field
+from groundstation.settings.unlikely_figures import unlikely
 
 _STANDING_MARKER_M = 0.14
 _FENCE_MARGIN_M, _FENCE_LEAST_M = 0.3, 1.0
@@ -174,4 +175,5 @@ _CHECKS: tuple[Callable[[Field], Iterator[Finding]], ...] = (
     _adapters,
     _lenses,
     _places,
+    unlikely,
 )

@@ -70,6 +70,7 @@ def test_several_markers_are_several_pages_after_the_notes(tmp_path):
         (("--id", "3", "--size", "B9"), "WIDTHxHEIGHT"),
         (("--id", "3", "--square-mm", "-4"), "1..2000"),
         (("--id", "3", "--square-mm", "nan"), "1..2000"),
+        (("--id", "3", "--square-mm", "0"), "1..2000"),
         (("--id", "3", "--size-mm", "100"), "belongs to tags"),
         (("--id", "3", "--dictionary", "DICT_X"), "dictionary must be one of"),
         (("--id", "600", "--dictionary", "DICT_APRILTAG_36H11"), "0..586"),

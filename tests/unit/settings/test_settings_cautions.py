@@ -11,7 +11,7 @@ from groundstation.settings.wording import told
 LAB = Path(__file__).parents[2] / "fixtures" / "field" / "lab.yaml"
 
 
-@pytest.mark.parametrize("name", ["lab", "mixed-team"])
+@pytest.mark.parametrize("name", ["lab", "mixed-team", "mocap-lab", "mocap-truth", "two-targets", "uwb-lab"])
 def test_shipped_fields_are_no_cause_for_caution(name: str) -> None:
     assert cautions_of(SHIPPED / f"{name}.yaml") == []
 
@@ -28,6 +28,18 @@ FOOLISH = [
     ("drones.drone_1.address=192.168.1.255", "drones.drone_1.address", "no address of one vehicle"),
     ("drones.drone_1.address=224.0.0.1", "drones.drone_1.address", "no address of one vehicle"),
     ("recording.directory=/dev/null/runs", "recording.directory", "cannot be written"),
+    ("recording.directory=~/runs", "recording.directory", "not your home"),
+    ("cameras.ceiling.video_delay_ms=0.12", "cameras.ceiling.video_delay_ms", "(got 0.12): is this in seconds"),
+    ("drones.drone_2.camera.video_delay_ms=0.12", "drones.drone_2.camera.video_delay_ms", "in seconds"),
+    ("drones.drone_1.odometry.height_delay_ms=0.085", "drones.drone_1.odometry.height_delay_ms", "in seconds"),
+    ("drones.drone_1.odometry.height_std_m=10", "drones.drone_1.odometry.height_std_m", "counts for nothing"),
+    ("drones.drone_1.odometry.attitude_std_deg=0.017", "drones.drone_1.odometry.attitude_std_deg", "in radians"),
+    ("drones.drone_1.limits.max_yaw_rate_deg_s=1.05", "drones.drone_1.limits.max_yaw_rate_deg_s", "in radians"),
+    ("drones.drone_1.limits.max_speed_m_s=0.0006", "drones.drone_1.limits.max_speed_m_s", "hardly move"),
+    ("cameras.ceiling.attitude_std_deg=0.0035", "cameras.ceiling.attitude_std_deg", "in radians"),
+    ("estimator.max_lateness_s=1e-3", "estimator.max_lateness_s", "would be refused"),
+    ("planner.planned_range_m=0.019", "planner.planned_range_m", "no sighting at all"),
+    ("planner.step_s=2e-4", "planner.step_s", "0.002 s ahead"),
     ("cameras.ceiling.source=/dev/video97", "cameras.ceiling.source", "not there on this machine"),
 ]
 

@@ -236,6 +236,14 @@ def test_the_check_says_what_is_missing(tmp_path, capsys):
     folder, calibration = files_for(tmp_path, LENS, np.full((720, 1280), 120, np.uint8), 1)
     assert run(["calibrate", "check", folder, "--calibration", calibration, "--frames=1"]) == 0
     assert "is unknown: " in capsys.readouterr().out
+    assert run(["calibrate", "check", folder, "--calibration", calibration, "--marker=1=0,0"]) == 2
+    assert "where a camera hangs is in a field file" in capsys.readouterr().err
+    field = lab_with(tmp_path, {"ceiling": (folder, CEILING, TURN_DEG)})
+    assert run(["calibrate", "check", field, "--frames=1", "--marker=8=1,1"]) == 0
+    assert "is unknown: marker 8: no camera has it in view" in capsys.readouterr().out
+    assert run(["calibrate", "check", field, "--marker=8=1,1", "--marker=8=2,1"]) == 2
+    assert run(["calibrate", "check", "uwb-lab", "--frames=1"]) == 0
+    assert "is unknown: the field has no fixed camera" in capsys.readouterr().out
     assert run(["calibrate", "check", "http://127.0.0.1:9/video.mjpg"]) == 2
     assert "--calibration FILE" in capsys.readouterr().err
 

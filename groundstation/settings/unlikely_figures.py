@@ -1,0 +1,73 @@
+"""Figures that are legal and hardly meant: of another unit, or so small or large that nothing comes of a flight."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from pydantic import BaseModel
+
+from groundstation.settings.checks import Finding
+from groundstation.settings.document import KeyPath
+from groundstation.settings.schema import Field
+
+
+@dataclass(frozen=True, slots=True)
+class Likely:
+    """What a setting is likely to lie in, and what is meant or follows where it does not; 0 is always meant."""
+
+    least: float
+    most: float
+    below: str = ""
+    above: str = ""
+
+
+_SECONDS, _RADIANS = "is this in seconds, not in ms?", "is this in radians, not in degrees?"
+_DELAY = Likely(1.0, 5000.0, _SECONDS)
+_NOTHING = "with such a deviation what is measured counts for nothing"
+_CAMERA = {"video_delay_ms": _DELAY, "attitude_std_deg": Likely(0.01, 90.0, _RADIANS)}
+_SYSTEM = {"delay_ms": Likely(0.2, 5000.0, _SECONDS)}
+_LIMITS = {
+    "max_speed_m_s": Likely(0.05, 10.0, "drones would hardly move"),
+    "max_climb_m_s": Likely(0.05, 10.0, "drones would hardly climb"),
+    "max_yaw_rate_deg_s": Likely(5.0, 720.0, _RADIANS),
+}
+_ODOMETRY = {
+    "velocity_delay_ms": _DELAY,
+    "height_delay_ms": _DELAY,
+    "velocity_std_m_s": Likely(0.001, 1.0, "no vehicle knows it so well", _NOTHING),
+    "height_std_m": Likely(0.001, 1.0, "no vehicle knows it so well", _NOTHING),
+    "attitude_std_deg": Likely(0.05, 9.0, _RADIANS),
+}
+_ESTIMATOR = {
+    "max_lateness_s": Likely(0.05, 60.0, "pictures come later than that now and then, and would be refused"),
+    "lost_after_s": Likely(0.3, 60.0, "the team would search for a target that one picture does not show"),
+}
+_PLANNER = {"planned_range_m": Likely(0.3, 100.0, "plans would count on no sighting at all")}
+_LEAST_HORIZON_S = 0.3
+
+
+def unlikely(field: Field) -> Iterator[Finding]:
+    """Yield each setting with such a figure, and what is likely to be wrong with it."""
+    for name, camera in field.cameras.items():
+        yield from _outside(("cameras", name), camera, _CAMERA)
+    for name, drone in field.drones.items():
+        path: KeyPath = ("drones", name)
+        yield from _outside((*path, "limits"), drone.limits, _LIMITS)
+        yield from _outside((*path, "camera"), drone.camera, _CAMERA)
+        yield from _outside((*path, "odometry"), drone.odometry, _ODOMETRY)
+    for section, systems in (("motion_capture", field.motion_capture), ("ranging", field.ranging)):
+        for name, system in systems.items():
+            yield from _outside((section, name), system, _SYSTEM)
+    yield from _outside(("estimator",), field.estimator, _ESTIMATOR)
+    yield from _outside(("planner",), field.planner, _PLANNER)
+    if (ahead_s := field.planner.horizon_steps * field.planner.step_s) < _LEAST_HORIZON_S:
+        yield ("planner", "step_s"), f"lets plans look {ahead_s:g} s ahead: too short for any motion to pay"
+    if field.recording.directory.startswith("~"):
+        yield ("recording", "directory"), "is a folder of that very name: ~ is not your home in a field file"
+
+
+def _outside(path: KeyPath, section: BaseModel, figures: dict[str, Likely]) -> Iterator[Finding]:
+    for key, likely in figures.items():
+        value = float(getattr(section, key))
+        text = likely.below if 0.0 < value < likely.least else likely.above if value > likely.most else ""
+        if text:
+            yield (*path, key), f"is unlikely (got {value:g}): {text}"

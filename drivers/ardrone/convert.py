@@ -96,6 +96,11 @@ def _require_sane(demo: Demo) -> None:
     raise WireError("implausible" if finite else "not_finite", f"DEMO {angles} {speeds} {altitude_mm}")
 
 
+def charge_from_demo(demo: Demo) -> float | None:
+    """Return the battery's charge, 0 to 1; None where the number is none."""
+    return demo.battery_percent / 100 if demo.battery_percent <= 100 else None
+
+
 def _height(state: int, demo: Demo) -> float | None:
     # WIRE: DEMO's altitude is 0 on the ground and until shortly after lift-off.
     return demo.altitude_mm / 1000 if state & _FLY and demo.altitude_mm > 0 else None

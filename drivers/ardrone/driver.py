@@ -142,7 +142,7 @@ class ArDrone:
             state=packet.state,
             control_state=control_state,
             flight_state=flight_state,
-            battery=min(demo.battery_percent, 100) / 100,
+            battery=convert.charge_from_demo(demo),
             model=model_from_navdata(packet) if heard.model is Model.UNKNOWN else heard.model,
             velocity_m_s=motion.velocity_m_s,
             obeyed=None if references is None else references.sequence,

@@ -8,6 +8,7 @@ no AT command at all: not even its watchdog is fed for whoever ought to fly it.
 from dataclasses import dataclass, field
 
 from drivers.ardrone.conversation import CONTROL_PORT, FTP_PORT, Conversation, NavdataStretch
+from drivers.ardrone.convert import charge_from_demo
 from drivers.ardrone.desired_config import FULL_NAVDATA
 from drivers.ardrone.dump import category
 from drivers.ardrone.identity import Identity, Model, identity_from_dump, identity_from_version, model_from_navdata
@@ -93,7 +94,7 @@ def _conclude(line: Conversation, version: str, report: ProbeReport) -> None:
     if line.demo_packet is not None:
         demo = line.demo_packet.read(DEMO)
         assert demo is not None
-        report.battery = min(demo.battery_percent, 100) / 100
+        report.battery = charge_from_demo(demo)
         report.phase = split_control_state(demo.control_state)[0].name
     values = {key: value for key, (value, _) in report.config.items()}
     told = [identity_from_version(version), identity_from_dump(values)]

@@ -134,7 +134,8 @@ def lost_at(grid: RoomGrid, mean: Sequence[float] | Array, covariance: Array) ->
     wide = np.asarray(covariance) + (0.5 * grid.cell_m) ** 2 * np.eye(2)
     square = _squared_distance(dx, dy, wide)
     there = np.exp(-0.5 * (square - square.min()))
-    near = np.exp(-np.hypot(dx, dy) / _NEAR_M)
+    away = np.hypot(dx, dy)
+    near = np.exp(-(away - away.min()) / _NEAR_M)  # of a place far beyond the walls, the nearest cells
     there *= _THERE / there.sum()
     chances = (1.0 - _HIDDEN) * there + _NEAR * near / near.sum() + _ANYWHERE / there.size
     return _shared(grid, chances, _HIDDEN * there)

@@ -56,6 +56,7 @@ class TelloBody:
         draw = standard_normals(rng)
         self.airframe = Airframe(*drone.pad_m, drone.pad_yaw_rad)
         self.battery = float(rng.uniform(*scenario.drones.battery))
+        self._drain_per_s = scenario.drones.battery_drain_per_min / 60.0
         self.wind = (0.0, 0.0)
         self.motors_on = False
         self.wanted: tuple[Vector3, float] = (_STILL, 0.0)
@@ -84,7 +85,7 @@ class TelloBody:
         else:
             if body.on_ground and self.wanted[0][2] <= 0.0:
                 return
-            self.battery = max(0.0, self.battery - 0.05 / 60.0 * dt)
+            self.battery = max(0.0, self.battery - self._drain_per_s * dt)
             acceleration = self._pursue(wake)
         body.ax, body.ay, body.az = acceleration
         body.vx, body.vy, body.vz = (v + a * dt for v, a in zip((body.vx, body.vy, body.vz), acceleration, strict=True))

@@ -98,3 +98,13 @@ def test_who_comes_out_from_behind_something_stands_or_drives() -> None:
     assert later.hidden.sum() == pytest.approx(room.hidden.sum() / np.e)
     assert later.chances == pytest.approx(room.chances)
     assert later.stands.sum() / later.drives.sum() == pytest.approx(room.stands.sum() / room.drives.sum())
+
+
+@pytest.mark.parametrize("place", [(900.0, 0.0), (-1e5, 3e4), (4.5, -3.5)])
+def test_a_target_that_was_predicted_beyond_the_walls_is_looked_for_in_the_room(place: tuple[float, float]) -> None:
+    """An estimate that ran off, or a decoy: no chance may become none of all."""
+    room = lost_at(GRID, place, 0.04 * np.eye(2))
+    assert np.isfinite(room.chances).all() and room.chances.sum() == pytest.approx(1.0)
+    row, column = np.unravel_index(int(room.chances.argmax()), GRID.shape)
+    near = np.argmin(np.hypot(GRID.xs[None, :] - place[0], GRID.ys[:, None] - place[1]))
+    assert (row, column) == np.unravel_index(int(near), GRID.shape)

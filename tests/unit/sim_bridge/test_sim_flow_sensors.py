@@ -103,3 +103,16 @@ def test_one_that_leans_as_it_thinks_slides_until_its_flow_has_trimmed_it() -> N
             speeds.append(math.hypot(body.airframe.vx, body.airframe.vy))
         slid.append((max(speeds), speeds[-1]))
     assert slid[0][0] < 0.01 and 0.03 < slid[1][0] < 0.3 and slid[1][1] < 0.03
+
+
+def test_a_battery_drains_as_the_scenario_says() -> None:
+    figures = DroneScenario(battery=(0.5, 0.5), battery_drain_per_min=1.2)
+    drone = SiteDrone.model_validate(
+        {"kind": "tello", "pad_m": (0.0, 0.0), "marker": {"code": 1, "position_m": (0.0, 0.0, 0.08)}}
+    )
+    body = TelloBody(drone, Scenario(drones=figures), TICK_S, generator_of(3, "tello"))
+    body.motors_on, body.wanted = True, ((0.0, 0.0, 0.3), 0.0)
+    for _ in range(round(10.0 / TICK_S)):
+        body.sense()
+        body.step((0.0, 0.0, 0.0))
+    assert body.battery == pytest.approx(0.5 - 1.2 * 10.0 / 60.0, abs=0.002)

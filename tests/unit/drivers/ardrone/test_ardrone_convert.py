@@ -8,6 +8,7 @@ from drivers.ardrone.commands import motion_from_attitude, orders_from_decision
 from drivers.ardrone.convert import (
     HeadingWatch,
     NavdataMotion,
+    charge_from_demo,
     flight_state_from_navdata,
     motion_from_navdata,
 )
@@ -240,3 +241,9 @@ def test_waiting_says_nothing_about_flying():
     assert list(orders(Action.WAIT)) == ["COMWDG", "PCMD"]
     assert list(orders(Action.IDLE)) == ["REF", "PCMD"]
     assert list(orders(Action.IDLE, state=int(StateBit.COM_WATCHDOG))) == ["COMWDG", "REF", "PCMD"]
+
+
+@pytest.mark.parametrize(("percent", "charge"), [(0, 0.0), (73, 0.73), (100, 1.0), (101, None), (4_000_000_000, None)])
+def test_a_charge_that_is_no_share_is_not_known(percent: int, charge: float | None) -> None:
+    """Garbage counted as a full battery; one whose charge is not known does not take off."""
+    assert charge_from_demo(options.Demo(battery_percent=percent)) == charge

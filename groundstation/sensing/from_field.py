@@ -1,6 +1,7 @@
 """The sensor suite that follows from a resolved field."""
 
 import math
+from collections.abc import Sequence
 
 from groundstation.field.drones import FieldDrone
 from groundstation.field.resolved import ResolvedField
@@ -46,14 +47,14 @@ def sensors_from_field(field: ResolvedField) -> SensorSuite:
     """Return the suite for a resolved field."""
     drones, targets = field.drones, field.tracked
     heights = {name: drone.marker.position_m[2] for name, drone in drones.items()}
-    square = min((square_m(drone.marker) for drone in drones.values()), default=0.044)
-    smallest = min(square, *(square_m(target.marker) for target in targets.values()))
+    carried = [square_m(drone.marker) for drone in drones.values()] or [0.044]
+    tracked = [square_m(target.marker) for target in targets.values()]
     reach = field.planner.planned_range_m
     return SensorSuite(
-        world={name: _world(camera, square) for name, camera in field.cameras.items()}
+        world={name: _world(camera, carried, tracked) for name, camera in field.cameras.items()}
         | {name: _captured(system) for name, system in field.sensing_capture.items()}
         | {name: _ranged(system) for name, system in field.ranging.items()},
-        onboard={name: _onboard(drone, smallest, reach) for name, drone in drones.items()},
+        onboard={name: _onboard(drone, max(*carried, *tracked), reach) for name, drone in drones.items()},
         marker_height_m=heights | {name: target.marker.height_m for name, target in targets.items()},
         obstacles=tuple(Box(one.centre_m, one.size_m) for one in field.room.obstacles.values()),
     )
@@ -68,12 +69,18 @@ def _frustum(lens: LensCalibration, range_m: float, square_m: float) -> Frustum:
     return Frustum.of_picture(lens.width_px, lens.height_px, lens.fx_px, lens.fy_px, range_m, BORDER_SQUARES * square_m)
 
 
-def _world(camera: WorldCamera, square_m: float) -> WorldCameraModel:
+def _world(camera: WorldCamera, carried: Sequence[float], tracked: Sequence[float]) -> WorldCameraModel:
+    """Return the view of a camera; carried, tracked: squares of the markers on drones and targets [m].
+
+    It sees as far as the smallest of drones can be read, and a place counts where the largest is wholly in the picture.
+    """
     noise = Noise(math.hypot(0.015, camera.position_std_m), math.radians(camera.attitude_std_deg), 0.0, 0.035)
-    reach = camera.calibration.fx_px * square_m / DETECTION_PX
+    reach = camera.calibration.fx_px * min(carried) / DETECTION_PX
+    observes_targets = "targets" in camera.observes
+    largest = max(*carried, *(tracked if observes_targets else ()), 0.0)
     rotation = world_from_downward_optical(camera.rotation_deg)
-    view = _frustum(camera.calibration, reach, square_m)
-    return WorldCameraModel(camera.position_m, view, noise, rotation.T, "targets" in camera.observes)
+    view = _frustum(camera.calibration, reach, largest)
+    return WorldCameraModel(camera.position_m, view, noise, rotation.T, observes_targets)
 
 
 def _captured(system: MotionCapture) -> WorldCameraModel:

@@ -61,3 +61,21 @@ def test_a_footprint_turns_with_the_heading_and_agrees_with_the_map() -> None:
         row, column = (int(v) for v in np.argwhere(there == there.max())[0])
         assert math.hypot(xs[column], xs[row]) > 0.5
         assert math.cos(math.atan2(xs[row], xs[column]) - pose[3]) > 0.8
+
+
+def test_the_largest_marker_must_be_in_the_picture_and_the_smallest_be_read() -> None:
+    """Half the diagonal of a board, 3.5 squares, is what a place must be within the picture."""
+    options = ["defaults.marker.square_mm=30", "target.marker.square_mm=80"]
+    suite = sensors_from_field(resolved_field(load_field(Path(__file__).parents[3] / "config/lab.yaml", options)))
+    assert suite.onboard["drone_1"].view.border_m == pytest.approx(3.5 * 0.080)
+    ceiling = suite.world["ceiling"].view
+    assert ceiling.border_m == pytest.approx(3.5 * 0.030), "it observes drones only"
+    assert ceiling.range_m == pytest.approx(1179.0 * 0.030 / 10.0, rel=0.01)
+    both = sensors_from_field(
+        resolved_field(
+            load_field(
+                Path(__file__).parents[3] / "config/lab.yaml", [*options, "cameras.ceiling.observes=[robots, targets]"]
+            )
+        )
+    )
+    assert both.world["ceiling"].view.border_m == pytest.approx(3.5 * 0.080)

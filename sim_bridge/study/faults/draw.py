@@ -8,6 +8,7 @@ import numpy as np
 
 from sim_bridge.fault_kinds import Fault, FaultKind
 from sim_bridge.scenario import Scenario
+from sim_bridge.study.faults.flight_order import WrongOrder
 from sim_bridge.target_paths import FigureEight
 from sim_bridge.world.noise import generator_of
 
@@ -15,6 +16,8 @@ _HEALTHY_SHARE = 0.1
 # Pads lie where the ceiling camera of the shipped fields sees a drone at the height to which it takes off.
 _PADS_X_M, _PADS_Y_M = 1.4, 0.75
 _LEAST_PADS_M, _TARGET_M = 1.1, 0.6
+# Two pads may leave no room for a third: then all are drawn anew. As long as they fit, a seed's are what they were.
+_MISSES, _BEGINNINGS = 20_000, 60
 
 # How each kind is drawn: least and greatest figure, None: it has none. Both signs where a sign makes sense.
 _FIGURES: dict[FaultKind, tuple[float, float] | None] = {
@@ -80,12 +83,24 @@ def random_pads(field: dict[str, Any], rng: np.random.Generator) -> dict[str, An
 
 
 def _pads(field: dict[str, Any], rng: np.random.Generator) -> list[tuple[float, float]]:
-    """Return places before the ceiling camera, none near another or the target's start."""
+    """Return places before the ceiling camera, none near another or the target's start; WrongOrder for too many."""
+    wanted = len(field["drones"])
+    for _ in range(_BEGINNINGS):
+        pads = _some_pads(wanted, rng)
+        if len(pads) == wanted:
+            return pads
+    raise WrongOrder(f"{wanted} drones: pads that are {_LEAST_PADS_M:g} m apart were not found for so many")
+
+
+def _some_pads(wanted: int, rng: np.random.Generator) -> list[tuple[float, float]]:
+    """Return so many places, or those after which no room was found for another one."""
     pads: list[tuple[float, float]] = []
-    while len(pads) < len(field["drones"]):
+    missed = 0
+    while len(pads) < wanted and missed < _MISSES:
         place = (float(rng.uniform(-_PADS_X_M, _PADS_X_M)), float(rng.uniform(-_PADS_Y_M, _PADS_Y_M)))
-        if math.hypot(*place) >= _TARGET_M and all(math.dist(place, other) >= _LEAST_PADS_M for other in pads):
-            pads.append(place)
+        fits = math.hypot(*place) >= _TARGET_M and all(math.dist(place, other) >= _LEAST_PADS_M for other in pads)
+        missed = 0 if fits else missed + 1
+        pads += [place] if fits else []
     return pads
 
 

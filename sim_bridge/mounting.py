@@ -27,13 +27,17 @@ def mounted(camera: SiteCamera, errors: bool, rng: np.random.Generator) -> tuple
 
 def on_drone(camera: EmulatedCamera, errors: bool, rng: np.random.Generator) -> tuple[Array, Array]:
     """Return base_from_optical (3, 3) and position [m; base] of a drone's camera, off by its deviations if said."""
-    tilt, pan = math.radians(camera.tilt_down_deg), math.radians(camera.pan_left_deg)
-    known, place = base_from_tilted_optical(tilt, pan), np.array(camera.position_m, dtype=np.float64)
+    known, place = told_on_drone(camera), np.array(camera.position_m, dtype=np.float64)
     turn, shift = math.radians(camera.attitude_std_deg), camera.position_std_m
     if not errors or (turn == 0.0 and shift == 0.0):
         return known, place
     error, off = turn * rng.standard_normal(3), shift * rng.standard_normal(3)
     return rotation_from_euler(*error) @ known, place + off
+
+
+def told_on_drone(camera: EmulatedCamera) -> Array:
+    """Return base_from_optical (3, 3) of a drone's camera as the field says."""
+    return base_from_tilted_optical(math.radians(camera.tilt_down_deg), math.radians(camera.pan_left_deg))
 
 
 def true_lens(told: Lens, errors: bool, rng: np.random.Generator) -> CameraIntrinsics:

@@ -10,9 +10,17 @@ from groundstation.arrays import Array
 from groundstation.bus.messages import Header, RelativeObservation, SearchedPicture
 from groundstation.geometry.board import Checkerboard
 from groundstation.geometry.lens import CameraIntrinsics
-from groundstation.geometry.rotations import rotation_from_euler
+from groundstation.geometry.rotations import euler_from_rotation, rotation_from_euler, world_from_downward_optical
 from groundstation.geometry.tag import SquareTag
-from sim_bridge.mounting import as_measured, generator_of_eye, mounted, on_drone, true_lens, turned_about
+from sim_bridge.mounting import (
+    as_measured,
+    generator_of_eye,
+    mounted,
+    on_drone,
+    told_on_drone,
+    true_lens,
+    turned_about,
+)
 from sim_bridge.scenario import CameraScenario
 from sim_bridge.site import Lens, Site, SiteCamera, SiteDrone
 from sim_bridge.world.mavlink_copter import MavlinkCopter
@@ -87,8 +95,10 @@ class Eye:
         if isinstance(mount, SiteDrone):
             assert mount.camera is not None
             self._rotation, self._position = on_drone(mount.camera, cameras.mounting_errors, rng)
+            self._told = told_on_drone(mount.camera)
         else:
             self._rotation, self._position = mounted(mount, cameras.mounting_errors, rng)
+            self._told = world_from_downward_optical(mount.rotation_deg)
         self._mounted = self._rotation
         self._told_lens, self._lens = lens.intrinsics, true_lens(lens, cameras.mounting_errors, rng)
         self._boards = tuple(b for b in boards_of(site) if b.body != self._carrier)
@@ -114,7 +124,7 @@ class Eye:
             return []
         self._searching = bool(self._rng.random() < 3.0 * _SEARCH_SHARE)
         states = dict(zip(world.bodies, world.states(), strict=True))
-        rotation, position, reported = self._rotation, self._position, (0.0, 0.0)
+        rotation, position, reported, told = self._rotation, self._position, (0.0, 0.0), self._told
         if self._carrier is not None:
             own = states[self._carrier]
             base = rotation_from_euler(own[6], own[7], own[8])
@@ -122,6 +132,7 @@ class Eye:
             carrier = world.drones.get(self._carrier)
             onboard = carrier.estimate if isinstance(carrier, MavlinkCopter) else world.onboard[self._carrier]
             reported = (onboard.roll, onboard.pitch)
+            told = rotation_from_euler(*reported, 0.0) @ told
         jitter = self._rng.uniform(-1.0, 1.0) * self._scenario.video_jitter_ms
         seen = []
         for carried in self._boards:
@@ -131,10 +142,11 @@ class Eye:
                 continue
             sighting = self._sight(carried, states[carried.body], rotation, position, world.time_s)
             if sighting is not None:
-                yaw_o = states[self._carrier][8] if self._carrier is not None else 0.0
-                yaw = math.remainder(states[carried.body][8] - yaw_o, math.tau)
+                place, unit, facing = sighting
+                # As a detector finds it, which knows the mounting as it was told, and the attitude as it is reported.
+                yaw = euler_from_rotation(told @ facing)[2]
                 stamp = stamp_ns + round(jitter * 1e6)
-                seen.append(self._message(carried.body, sighting, yaw, stamp, clock, reported))
+                seen.append(self._message(carried.body, (place, unit), yaw, stamp, clock, reported))
         return seen
 
     def searched(self, seen: Sequence[RelativeObservation], stamp_ns: int, clock: str) -> SearchedPicture | None:
@@ -149,8 +161,11 @@ class Eye:
 
     def _sight(
         self, carried: Carried, state: Array, rotation: Array, position: Array, now_s: float
-    ) -> tuple[Array, Array] | None:
-        """Return the board's centre [optical] and the covariance of (centre, heading) at one pixel, if it is seen."""
+    ) -> tuple[Array, Array, Array] | None:
+        """Return the board's centre [optical], the covariance of (centre, heading) at one pixel, and its rotation.
+
+        The last: optical_from_subject (3, 3). None if it is not seen.
+        """
         base = rotation_from_euler(state[6], state[7], state[8])
         centre = rotation.T @ (state[:3] + base @ carried.position - position)
         if centre[2] < 0.2:
@@ -170,7 +185,7 @@ class Eye:
             return None
         self._last_seen[carried.body] = now_s
         place = as_measured(centre, self._lens, self._told_lens)
-        return place, self._covariance(carried.corners @ facing.T, centre, rotation.T[:, 2])
+        return place, self._covariance(carried.corners @ facing.T, centre, rotation.T[:, 2]), facing
 
     def _is_framed(self, points: Array) -> bool:
         """Return whether all points (n, 3) [optical] are in the picture, the border aside."""

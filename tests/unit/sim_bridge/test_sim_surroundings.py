@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from groundstation.field.resolved import ResolvedField
+from groundstation.geometry.rotations import euler_from_rotation, world_from_downward_optical
 from sim_bridge.cameras import render_specs
 from sim_bridge.fault_kinds import FaultKind
 from sim_bridge.link_bursts import with_bursts
@@ -66,6 +67,24 @@ def test_an_obstacle_under_the_ceiling_camera_hides_the_drone(
     found = {one.subject for _ in range(60) for one in eye.look(world, 0, "clock")}
     assert (name in found) is seen
     assert drone.kind == "ardrone"
+
+
+def test_a_camera_tells_headings_by_the_mounting_that_the_field_has(lab_field: ResolvedField) -> None:
+    """A detector knows no other: what the camera is turned by stands in each heading, as it does in each place."""
+    values = msgspec.to_builtins(lab_field)
+    values["cameras"]["ceiling"]["attitude_std_deg"] = 5.0
+    values["drones"]["drone_2"]["camera"]["attitude_std_deg"] = 5.0
+    site, told = parse_site(values), scenario(cameras={"corner_noise_px": 0.0})
+    world = World(site, told, 1)
+    world.drones["drone_1"].airframe.x, world.drones["drone_1"].airframe.y = 0.0, 0.0
+    mount = site.cameras["ceiling"]
+    eye = Eye("ceiling", mount.calibration, mount, site, told.cameras, 0.0, generator_of_eye(1, "ceiling"))
+    (seen, *_) = [one for _ in range(60) for one in eye.look(world, 0, "c") if one.subject == "drone_1"]
+    turned = euler_from_rotation(eye.truth[0] @ world_from_downward_optical(mount.rotation_deg).T)[2]
+    assert abs(turned) > math.radians(1.0) and seen.yaw_rad is not None
+    assert math.remainder(world.drones["drone_1"].airframe.yaw - turned - seen.yaw_rad, math.tau) == pytest.approx(
+        0.0, abs=math.radians(0.5)
+    )
 
 
 def test_the_room_of_the_simulation_has_the_obstacles_of_the_field(lab_field: ResolvedField) -> None:

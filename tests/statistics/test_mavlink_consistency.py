@@ -35,9 +35,12 @@ def fly(field: ResolvedField, seeds: range, duration_s: float) -> list[dict[str,
     return [Study(field, Scenario(), StudyOptions(seed, duration_s)).run() for seed in seeds]
 
 
-def test_one_short_flight_is_near_consistent(field: ResolvedField) -> None:
-    """A coarse alarm: double counting would show as an error many times the believed one."""
-    found = summary(fly(field, range(1, 2), 4.0), field)
+def test_short_flights_are_near_consistent(field: ResolvedField) -> None:
+    """A coarse alarm: double counting would show as an error many times the believed one.
+
+    Three flights: in one all headings are off by the turn of one camera (seed 1: 0.5 deg, where 0.2 are believed).
+    """
+    found = summary(fly(field, range(1, 4), 4.0), field)
     assert 0.2 <= found["anees robots"].mean <= 1.8
     assert found["target_rmse_m"].mean <= 0.15
 

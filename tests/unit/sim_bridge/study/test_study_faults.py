@@ -1,7 +1,6 @@
 """The fault campaign: what is drawn, how truth judges, what stands in for threads and sockets, and its table."""
 
 import math
-from itertools import combinations
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,7 +13,6 @@ from groundstation.bus.topics import ODOMETRY, VEHICLE_STATUS
 from sim_bridge.fault_kinds import Fault, FaultKind
 from sim_bridge.scenario import Scenario
 from sim_bridge.study.faults.draw import KINDS, draw
-from sim_bridge.study.faults.flight_order import WrongOrder
 from sim_bridge.study.faults.judge import Judge
 from sim_bridge.study.faults.local_bus import LocalBus, LocalExchange
 from sim_bridge.study.faults.memory_network import MemoryNetwork, NothingWaits
@@ -53,23 +51,6 @@ def test_all_kinds_come_one_or_two_at_once_within_the_window_and_some_flights_ar
     assert all(11.0 <= fault.start_s <= 20.0 for faults in flights for fault in faults)
     of_ardrones = {f.entity for faults in flights for f in faults if f.kind is FaultKind.UNIFORM_FLOOR}
     assert of_ardrones == {"drone_1"}
-
-
-@pytest.mark.timeout(60)
-@pytest.mark.parametrize(("drones", "seed"), [(3, 683), (4, 39)])
-def test_pads_that_leave_no_room_for_another_are_drawn_anew(drones: int, seed: int) -> None:
-    """Two that lie well cover the whole floor before the camera: the campaign looked for a third for ever."""
-    team = {f"drone_{number}": {"kind": "ardrone"} for number in range(drones)}
-    flown = draw({**FIELD, "drones": team}, Scenario(), seed, (11.0, 20.0))
-    pads = [drone["pad_m"] for drone in flown.field["drones"].values()]
-    assert len(pads) == drones and min(math.dist(a, b) for a, b in combinations(pads, 2)) >= 1.1
-
-
-@pytest.mark.timeout(60)
-def test_a_team_that_has_no_room_before_the_camera_is_refused() -> None:
-    team = {f"drone_{number}": {"kind": "ardrone"} for number in range(20)}
-    with pytest.raises(WrongOrder, match="20 drones: pads"):
-        draw({**FIELD, "drones": team}, Scenario(), 1, (11.0, 20.0))
 
 
 def test_pads_are_apart() -> None:

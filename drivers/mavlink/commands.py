@@ -38,6 +38,8 @@ _EXPLAINS_NS = 4 * NS_PER_S
 _STILL: Vector3 = (0.0, 0.0, 0.0)
 # The last of a climb is slower, so that it ends at the height asked for.
 _CLIMBED, _CLIMB_GAIN, _LEAST_CLIMB_M_S = 0.95, 1.2, 0.12
+# Slower than this a climb that HOLD ended is over; one that has just begun grows until the vehicle obeys.
+_STOPPED_M_S, _OBEYS_NS = 0.1, 500 * NS_PER_MS
 
 
 class Orders:
@@ -55,7 +57,7 @@ class Orders:
         self._action = Action.WAIT
         self._since_ns = 0
         self._climb_until_ns = 0
-        self._rises_to_take_off = False
+        self._rises_to_take_off = self._stops_climbing = False
         self._told_ns = -1
         self._guided_ns = self._regain_until_ns = 0
         self._started = self._taken_over = False
@@ -109,7 +111,8 @@ class Orders:
             case Action.FLY:
                 return self._fly(now_ns, decision, guided)
             case Action.HOVER:
-                return self._hover(now_ns, decision.mode, guided, climbed_m)
+                self._end_climb(now_ns, decision.mode, climb_m_s)
+                return self._hover(now_ns, guided, climbed_m)
             case Action.LAND:
                 if armed and custom_mode != self._landing:
                     self._ask(now_ns, "landing", MavCmd.NAV_LAND)
@@ -145,7 +148,7 @@ class Orders:
         self.drift.let_go()
         # The first hover after a take-off goes on to the height that was asked for.
         starts = action is Action.TAKE_OFF or (self._rises_to_take_off and action is Action.HOVER)
-        self._rises_to_take_off = starts
+        self._rises_to_take_off, self._stops_climbing = starts, False
         if action is Action.TAKE_OFF:
             self.starting, self._climb_until_ns = True, now_ns + 2 * _CLIMB_LIMIT_NS
             self._started = self._taken_over = False
@@ -216,11 +219,16 @@ class Orders:
     def _stand(self, now_ns: int, height_m: float | None = None) -> SetPositionTargetLocalNed | None:
         return self._send(now_ns, self.drift.hold(now_ns, height_m), 0.0)
 
-    def _hover(self, now_ns: int, mode: DriverMode, guided: bool, climbed_m: float) -> SetPositionTargetLocalNed | None:
-        if mode is not DriverMode.HOVER and self._rises_to_take_off:  # HOLD: not one step higher
-            self._rises_to_take_off = False
+    def _end_climb(self, now_ns: int, mode: DriverMode, climb_m_s: float) -> None:
+        """Have a climb end at HOLD: no higher than its momentum takes it, and not back to the floor either."""
+        if mode is not DriverMode.HOVER and self._rises_to_take_off:
+            self._rises_to_take_off, self._stops_climbing = False, True
             self._requests.drop("arming", "guided mode", "take-off")
+        if self._stops_climbing:
             self.drift.let_go()
+            self._stops_climbing = climb_m_s > _STOPPED_M_S or now_ns - self._since_ns < _OBEYS_NS
+
+    def _hover(self, now_ns: int, guided: bool, climbed_m: float) -> SetPositionTargetLocalNed | None:
         if not self._rises_to_take_off or climbed_m >= _CLIMBED * self._vehicle.take_off_m:
             self._climb_until_ns = 0
         if self.climbs_by_itself(now_ns):

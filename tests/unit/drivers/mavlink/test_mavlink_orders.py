@@ -14,13 +14,14 @@ TAKE_OFF_M = 0.8
 
 
 class Climb:
-    """A vehicle that follows its setpoints at once; `seen`: the tracker knows where it is."""
+    """A vehicle that follows its setpoints; seen: the tracker knows where it is; sluggish: by 1 m/s^2, not at once."""
 
-    def __init__(self, flavour, seen):
+    def __init__(self, flavour, seen, sluggish=False):
         vehicle = VehicleSettings(name="v", system_id=1, flavour=flavour.name.lower(), take_off_m=TAKE_OFF_M)
         self.flavour, self.seen = flavour, seen
         self.orders = Orders(vehicle, flavour, Requests(1))
         self.now_ns, self.height_m, self.climb_m_s = 10**9, 0.0, 0.0
+        self._most_m_s = 0.05 if sluggish else 10.0
 
     def turn(self, mode, action):
         self.now_ns += 50_000_000
@@ -34,10 +35,13 @@ class Climb:
             self.climb_m_s,
         )  # fmt: skip
         if told is not None:
-            self.climb_m_s = -told.vz
+            self._go(-told.vz)
         elif self.flavour is Flavour.ARDUPILOT and action is Action.TAKE_OFF:
-            self.climb_m_s = 0.4  # by its own take-off
+            self._go(0.4)  # by its own take-off
         self.height_m = max(0.0, self.height_m + 0.05 * self.climb_m_s)
+
+    def _go(self, climb_m_s):
+        self.climb_m_s += max(-self._most_m_s, min(self._most_m_s, climb_m_s - self.climb_m_s))
 
     def rise_to(self, height_m):
         for _ in range(200):
@@ -55,6 +59,21 @@ def test_hold_in_a_climb_stops_it_where_it_is(flavour, seen):
     for _ in range(60):
         climb.turn(DriverMode.HOLD, Action.HOVER)
     assert 0.2 <= climb.height_m <= 0.45
+    assert abs(climb.climb_m_s) < 0.02
+
+
+@pytest.mark.parametrize("lifted_m", [0.04, 0.15])
+@pytest.mark.parametrize("flavour", [Flavour.PX4, Flavour.ARDUPILOT])
+def test_hold_in_a_climb_with_momentum_does_not_take_it_back_to_the_floor(flavour, lifted_m):
+    """A real ArduCopter rose from 0.13 to 0.72 m, and sank to 0.10 m again."""
+    climb = Climb(flavour, True, sluggish=True)
+    climb.rise_to(lifted_m)
+    heights = []
+    for _ in range(120):
+        climb.turn(DriverMode.HOLD, Action.HOVER)
+        heights.append(climb.height_m)
+    assert max(heights) > lifted_m + 0.02, "it has momentum"
+    assert climb.height_m > max(heights) - 0.04
     assert abs(climb.climb_m_s) < 0.02
 
 

@@ -20,7 +20,7 @@ WAITING := $(wildcard tests/contract/test_*.py) tests/contract/ardrone_driver te
 	tests/replay/test_replay_playback.py tests/sitl tests/unit/console tests/unit/supervisor \
 	tests/unit/cli/test_cli_stop.py tests/unit/cli/test_cli_bench_report.py
 
-.PHONY: install demo test test-waiting test-units test-others raise-floors test-slow slow-flights slow-pages slow-studies slow-largest test-exhaustive fuzz test-firmware mutants limiter-states wire-faults soak check format docs hashes sbom audit interop clean
+.PHONY: install demo test test-waiting test-units test-others raise-floors test-slow slow-flights slow-pages slow-scenarios slow-studies slow-largest test-exhaustive fuzz test-firmware mutants limiter-states wire-faults soak check format docs hashes sbom audit interop clean
 
 install: $(STAMP)
 
@@ -51,7 +51,7 @@ raise-floors: $(STAMP)-test
 # Flights are judged by the clock; pages, and what only computes, run beside them, where they leave time, and are printed
 # at their ends. The largest flights fill two slow cores and have them to themselves.
 test-slow: $(STAMP)-test-slow
-	code=0; $(MAKE) --jobs 3 --keep-going --output-sync=none slow-flights slow-pages slow-studies || code=$$?; \
+	code=0; $(MAKE) --jobs 4 --keep-going --output-sync=none slow-flights slow-pages slow-scenarios slow-studies || code=$$?; \
 	$(MAKE) slow-largest && exit $$code
 
 slow-flights: $(STAMP)-test-slow
@@ -62,8 +62,9 @@ slow-largest: $(STAMP)-test-slow
 
 slow-pages: export NICE = 5
 slow-pages: SLOW = "page and not exhaustive" tests/browser
-slow-studies: SLOW = "study and not exhaustive" tests
-slow-pages slow-studies: slow-%: $(STAMP)-test-slow
+slow-scenarios: SLOW = "study and not exhaustive" tests/scenario
+slow-studies: SLOW = "study and not exhaustive" --ignore=tests/scenario --ignore=tests/browser --ignore=tests/sitl tests
+slow-pages slow-scenarios slow-studies: slow-%: $(STAMP)-test-slow
 	@mkdir -p .pytest_cache/$* && code=0; \
 	.ci/background $(PYTEST) --timeout 1800 -o cache_dir=.pytest_cache/$* -m $(SLOW) >.pytest_cache/$*/log 2>&1 || code=$$?; \
 	cat .pytest_cache/$*/log; exit $$code

@@ -38,7 +38,7 @@ SLOW = (pytest.mark.slow, pytest.mark.study)
         ({("drone_1", "pan"): 3.0, ("drone_2", "pan"): 3.0}, ("", "pan"), math.radians(3.0)),
         ({("ceiling", "pitch"): 3.0}, ("ceiling", "tilted"), math.radians(3.0)),
         pytest.param({("turtlebot", "print"): 0.05}, ("turtlebot", "print"), 0.05, marks=SLOW),
-        pytest.param({("drone_1", "focal"): 0.04}, ("drone_1", "focal"), 0.04, marks=SLOW),
+        pytest.param({("drone_1", "focal"): 0.04}, ("drone_1", "focal"), 0.04, marks=(*SLOW, pytest.mark.exhaustive)),
     ],
 )
 def test_a_wrong_figure_is_likeliest_with_its_size(

@@ -1,4 +1,4 @@
-"""Any three of AR.Drone, PX4, ArduPilot and Tello in one field file track the target together, at the wire."""
+"""Any three of AR.Drone, PX4, ArduPilot, Tello and ROS 2 in one field file track the target together, at the wire."""
 
 import itertools
 import json
@@ -12,7 +12,7 @@ from ruamel.yaml import YAML
 
 pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.exhaustive, pytest.mark.timeout(280)]
 CONFIG = Path(__file__).parents[2] / "config"
-TYPES = ("ardrone_2", "px4", "ardupilot", "tello")
+TYPES = ("ardrone_2", "px4", "ardupilot", "tello", "ros2")
 OWN_VIDEO = {"ardrone_2": "ardrone", "tello": "tello"}
 LIMIT_M = 0.05
 Start = Callable[..., Any]
@@ -22,7 +22,7 @@ def field_of(folder: Path, team: tuple[str, ...]) -> Path:
     """Write mixed-team.yaml with another team."""
     shutil.copytree(CONFIG / "cameras", folder / "cameras")
     field = YAML(typ="safe").load(CONFIG / "mixed-team.yaml")
-    field["types"]["tello"] = {"kind": "tello", "tello": {}}
+    field["types"] |= {"tello": {"kind": "tello", "tello": {}}, "ros2": {"kind": "ros2", "ros2": {}}}
     for (drone, values), kind in zip(field["drones"].items(), team, strict=True):
         values["type"] = kind
         pictures = f"http://192.168.1.6{drone[-1]}:8080/video.mjpg"

@@ -41,6 +41,8 @@ class Action(StrEnum):
 
 FREE = frozenset({DriverMode.HOVER, DriverMode.TRACK, DriverMode.HOLD})
 ALOFT = FREE | {DriverMode.TAKING_OFF}
+# What a vehicle may refuse, in the operator's words.
+REFUSABLE = {Action.TAKE_OFF: "take off", Action.LAND: "land", Action.CUT: "stop its motors"}
 
 
 @dataclass(frozen=True, slots=True)

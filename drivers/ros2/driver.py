@@ -17,7 +17,7 @@ from drivers.ros2.flight import FlightWatch, angles_of, fault_of_standing, level
 from drivers.ros2.link import Ros2Link
 from drivers.ros2.names import Order
 from drivers.ros2.settings import Ros2DriverSettings
-from drivers.watchdog_types import Action, VehicleView, WatchdogDecision
+from drivers.watchdog_types import REFUSABLE, Action, VehicleView, WatchdogDecision
 from groundstation.bus import clock
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import Odometry, Vector3
@@ -34,7 +34,6 @@ _PAUSE_NS = {Order.TAKE_OFF: 2 * NS_PER_S, Order.LAND: NS_PER_S // 2, Order.CUT:
 # A take-off that is called off may begin for so long after it was ordered.
 _BEGINS_NS = 5 * NS_PER_S
 _ORDERS = {Action.TAKE_OFF: Order.TAKE_OFF, Action.LAND: Order.LAND, Action.CUT: Order.CUT}
-_WORDS = {Order.TAKE_OFF: "take off", Order.LAND: "land", Order.CUT: "stop its motors"}
 LIMITS = PlausibilityLimits(speed_m_s=8.0, tilt_rad=math.radians(50.0), jump_m_s=0.6)
 
 
@@ -171,7 +170,7 @@ class Ros2Vehicle:
         silent = now_ns - self._heard_ns > _FRESH_NS
         asked = _ORDERS.get(self._asked)
         refused = "" if asked is None else self._link.refused.get(asked, "")
-        detail = f"it refused to {_WORDS[asked]}: {refused}" if asked and refused else ""
+        detail = f"it refused to {REFUSABLE[self._asked]}: {refused}" if refused else ""
         if self._flight.airborne and not detail:
             detail = self._link.trouble or self._unordered
         rate_hz = 0.0 if silent else self._rate_hz

@@ -12,7 +12,7 @@ from drivers.plausibility.limits import PlausibilityLimits
 from drivers.plausibility.motion import MotionMonitor, MotionSample
 from drivers.tello.settings import TelloDriverSettings
 from drivers.tello.wire import text
-from drivers.watchdog_types import Action, VehicleView, WatchdogDecision
+from drivers.watchdog_types import REFUSABLE, Action, VehicleView, WatchdogDecision
 from groundstation.adapters import with_zone
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import FlightState, Odometry, Vector3
@@ -36,7 +36,6 @@ _PAUSE_NS = {
     text.EMERGENCY: 100 * NS_PER_MS,
     text.STREAM_ON: 3 * NS_PER_S,
 }
-_WORDS = {Action.TAKE_OFF: "take off", Action.LAND: "land", Action.CUT: "stop its motors"}
 # Whole numbers at 10 Hz: that one of them stands says nothing; the accelerations of all three axes never do.
 LIMITS = PlausibilityLimits(frozen_s=0.6, stuck_s=math.inf, stuck_alone_s=math.inf, jump_m_s=0.8)
 
@@ -93,7 +92,7 @@ class Tello(DatagramVehicle):
     def _hear_answer(self, now_ns: int, data: bytes) -> bool:
         answer = data.strip().lower()
         self._ready = self._ready or answer == text.OK
-        if answer.startswith(text.ERROR) and self._asked in _WORDS:
+        if answer.startswith(text.ERROR) and self._asked in REFUSABLE:
             self._refused = answer.decode("ascii", "replace")
         return False
 
@@ -174,7 +173,7 @@ class Tello(DatagramVehicle):
 
     def health(self, now_ns: int) -> LinkHealth:
         """Return the state of the link, and what the vehicle answered to an order that it refused."""
-        word = _WORDS.get(self._asked)
+        word = REFUSABLE.get(self._asked)
         detail = f"it answers {self._refused!r} when told to {word}" if self._refused and word else ""
         return replace(super().health(now_ns), detail=detail)
 

@@ -4,13 +4,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-import msgspec
-
-from groundstation.field.resolved import field_from_json
 from sim_bridge.study.faults.draw import Drawn
 from sim_bridge.study.faults.flight import FaultFlight
 from sim_bridge.study.faults.vehicles import Section
-from sim_bridge.study.wrong_figures import misdated
 
 _DOWN_BY_S = 15.0
 _STANDS, _LANDS = "LANDED", "LANDING"
@@ -20,10 +16,8 @@ class MissionFlight(FaultFlight):
     """A flight that ends with LAND. covariance_share: what sightings state of their true covariance."""
 
     def __init__(self, drawn: Drawn, sections: Sequence[Section], seconds: float, covariance_share: float) -> None:
-        told = field_from_json(msgspec.json.encode(drawn.field))
-        wrong = replace(misdated(told, drawn.scenario.cameras.video_delay_ms), covariance_share=covariance_share)
-        super().__init__(drawn, sections, seconds, wrong=wrong)
-        self._share = covariance_share
+        super().__init__(drawn, sections, seconds)
+        self._wrong = replace(self._wrong, covariance_share=covariance_share)
         self._landing_since_s: float | None = None
         self._landed_before: list[str] = []
 
@@ -46,7 +40,7 @@ class MissionFlight(FaultFlight):
         return {
             "seed": report["seed"],
             "path": self.scenario.target.path.shape,
-            "covariance_share": self._share,
+            "covariance_share": self._wrong.covariance_share,
             "flown": report["tracking_since_s"] is not None,
             **{name: report[name] for name in judged if name in report},
             "landing_since_s": self._landing_since_s,

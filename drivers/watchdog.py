@@ -35,6 +35,8 @@ from groundstation.bus.messages import (
 )
 from groundstation.time_units import NS_PER_S
 
+# To land is told for so long at least, even to a vehicle that says that it stands: its word may be wrong.
+_TELLS_NS = NS_PER_S
 _PAUSES = frozenset({Condition.TRACKER_PAUSED, Condition.SETPOINTS_PATCHY})
 
 
@@ -64,6 +66,7 @@ class Watchdog:
         self._last_step_ns: int | None = None
         self._take_off_ended_ns = 0
         self._brake_until_ns = 0
+        self._land_until_ns = 0
         self._clearing = False
         self._paused_ns: int | None = None
         self._braked_by: Failsafe | None = None
@@ -113,10 +116,9 @@ class Watchdog:
     def _obey_land(self, now_ns: int, command: Command) -> str:
         if self.mode in ALOFT:
             return self._enter(now_ns, DriverMode.LANDING, f"landing for {command.issuer}")
-        return "motors are cut" if self.mode is DriverMode.CUT else self._end_braking()
-
-    def _end_braking(self) -> str:
-        self._brake_until_ns = 0
+        if self.mode is DriverMode.CUT:
+            return "motors are cut"
+        self._brake_until_ns, self._land_until_ns = 0, now_ns + _TELLS_NS
         return ""
 
     def _obey_hold(self, now_ns: int, command: Command) -> str:
@@ -176,6 +178,8 @@ class Watchdog:
     def _enter(self, now_ns: int, mode: DriverMode, reason: str, brake: bool = False, failsafe: str = "") -> str:
         if self.mode is DriverMode.TAKING_OFF:
             self._take_off_ended_ns = now_ns
+        if mode is DriverMode.LANDING or (mode is DriverMode.LANDED and self.mode in FREE):
+            self._land_until_ns = now_ns + _TELLS_NS
         self._entered_ns = now_ns
         self.mode, self.reason, self.failsafe = mode, reason, failsafe
         self._paused_ns = None
@@ -284,8 +288,9 @@ class Watchdog:
             case DriverMode.CONNECTING:
                 return Action.WAIT
             case DriverMode.LANDED:
-                clears = self.vehicle.clears and self._clears_in_time(now_ns)
-                return Action.CLEAR if clears else Action.IDLE
+                if self.vehicle.clears and self._clears_in_time(now_ns):
+                    return Action.CLEAR
+                return Action.LAND if now_ns < self._land_until_ns else Action.IDLE
             case DriverMode.TAKING_OFF:
                 return Action.TAKE_OFF
             case DriverMode.LANDING:

@@ -20,6 +20,7 @@ class LatestTelemetry:
     custom_mode: int = 0
     status: int = 0
     landed: int = 0
+    landed_ns: int = 0
     healthy: int = 0
     ekf: int = 0
     battery: float | None = None

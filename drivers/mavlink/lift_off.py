@@ -1,4 +1,4 @@
-"""Whether a vehicle that says that it flies has left the floor yet, and where it stood. Pure.
+"""Whether a vehicle that says that it flies has left the floor yet, where it stood, and what its word is worth. Pure.
 
 WIRE (docs/reference/mavlink.md 2.1): PX4 says that it is in the air up to 3.5 s before it leaves the floor. What
 cameras see of its height decides, and its own word where they do not see it.
@@ -6,13 +6,26 @@ cameras see of its height decides, and its own word where they do not see it.
 
 from drivers.mavlink.wire.names import Landed
 from groundstation.bus.messages import Vector3
-from groundstation.time_units import NS_PER_MS
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 # An estimator that is told that it stands on its pad shows little of its height, and its climb sooner.
 _RISEN_M, _CLIMBING_M_S, _CLIMBING_NS = 0.1, 0.1, 300 * NS_PER_MS
 # Three times the error of a height that cameras see.
 _SEEN_RISEN_M = 0.1
 _STANDING = 25  # estimates whose mean is the place where it stands
+# It is asked for five times a second, and anew after 3 s without it (`session.py`).
+_OLD_NS = 6 * NS_PER_S
+
+
+def credible(landed: int, age_ns: int, motors_flew: bool) -> int:
+    """Return what a vehicle's word about the floor (MAV_LANDED_STATE) is worth at its age.
+
+    motors_flew: it has lifted off, and its motors turn. ON_GROUND then says that it lands, which ends as it disarms:
+    its detector may err, and a vehicle in the air must not be taken for one that stands.
+    """
+    if age_ns > _OLD_NS:
+        return Landed.UNDEFINED
+    return Landed.LANDING if motors_flew and landed == Landed.ON_GROUND else landed
 
 
 class LiftOff:

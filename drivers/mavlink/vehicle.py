@@ -9,6 +9,7 @@ from drivers.mavlink import convert, identity
 from drivers.mavlink.commands import Orders
 from drivers.mavlink.convert import LIMITS
 from drivers.mavlink.latest_telemetry import LatestTelemetry
+from drivers.mavlink.lift_off import credible
 from drivers.mavlink.links.seam import Heard, MavlinkLink
 from drivers.mavlink.publisher import TelemetryPublisher
 from drivers.mavlink.requests import Requests
@@ -19,7 +20,7 @@ from drivers.mavlink.traffic import Traffic
 from drivers.mavlink.vision import VisionFeed
 from drivers.mavlink.wire import flight, service, telemetry
 from drivers.mavlink.wire.errors import WireError
-from drivers.mavlink.wire.names import ARMED, AUTOPILOT_COMPONENT, EkfFlag, Flavour, MavSeverity, SensorBits
+from drivers.mavlink.wire.names import ARMED, AUTOPILOT_COMPONENT, EkfFlag, Flavour, Landed, MavSeverity, SensorBits
 from drivers.plausibility.health import Health
 from drivers.plausibility.motion import MotionMonitor
 from drivers.watchdog_types import VehicleView, WatchdogDecision
@@ -123,7 +124,7 @@ class MavlinkVehicle:
         position = convert.position_from_local(message)
         # As it came: what is turned on by its age no longer shows that it is stuck.
         sample = convert.sample_from_local(now_ns, message, known.attitude, known.inertial)
-        report = self._plausibility.update(sample, self._state(known))
+        report = self._plausibility.update(sample, self._state(now_ns, known))
         self._publisher.velocity(now_ns, velocity, attitude, report)
         return replace(known, moved_ns=now_ns, velocity_m_s=velocity, position_m=position)
 
@@ -134,7 +135,7 @@ class MavlinkVehicle:
     def _take_rare(self, now_ns: int, message: tuple[object, ...], known: LatestTelemetry) -> LatestTelemetry:
         match message:
             case telemetry.ExtendedSysState():
-                return replace(known, landed=message.landed_state)
+                return replace(known, landed=message.landed_state, landed_ns=now_ns)
             case telemetry.SysStatus():
                 known = replace(known, healthy=message.onboard_control_sensors_health)
                 return _charged(now_ns, message.battery_remaining, known)
@@ -172,9 +173,9 @@ class MavlinkVehicle:
         """Return the vehicle's last reported state."""
         known = self.telemetry
         fresh = self._is_heard(now_ns, known)
-        state = self._state(known)
+        state = self._state(now_ns, known)
         unsound = self._plausibility.report.reason(Health.BAD, LIMITS.essential)
-        if not known.heartbeat_ns or not known.landed:
+        if not known.heartbeat_ns or not self._landed(now_ns, known):
             state = FlightState.UNKNOWN
         elif state is FlightState.FLYING and self.orders.starting and not self.orders.lift.lifted:
             state = FlightState.TAKING_OFF
@@ -193,12 +194,17 @@ class MavlinkVehicle:
         (x, y, z), (drift_x, drift_y, drift_z) = known.velocity_m_s, self.orders.drift.drift(now_ns)
         return x - drift_x, y - drift_y, z - drift_z
 
-    def _state(self, known: LatestTelemetry) -> FlightState:
-        return convert.flight_state_from(self.flavour, known.base_mode, known.custom_mode, known.status, known.landed)
+    def _landed(self, now_ns: int, known: LatestTelemetry) -> int:
+        flew = self.orders.lift.lifted and not self.orders.starting and bool(known.base_mode & ARMED)
+        return credible(known.landed, now_ns - known.landed_ns, flew)
+
+    def _state(self, now_ns: int, known: LatestTelemetry) -> FlightState:
+        landed = self._landed(now_ns, known)
+        return convert.flight_state_from(self.flavour, known.base_mode, known.custom_mode, known.status, landed)
 
     def _is_heard(self, now_ns: int, known: LatestTelemetry) -> bool:
         # Velocities are what silence is judged by in the air; on the ground there may be none before the first pose.
-        newest = known.moved_ns if known.landed != 1 else known.heard_ns
+        newest = known.heard_ns if self._landed(now_ns, known) == Landed.ON_GROUND else known.moved_ns
         return known.heartbeat_ns > 0 and now_ns - newest < _FRESH_NS and now_ns - known.heartbeat_ns < _HEARTBEAT_NS
 
     def _not_ready(self, now_ns: int, known: LatestTelemetry) -> str:
@@ -233,7 +239,8 @@ class MavlinkVehicle:
         messages = self._session.step(now_ns, silence_ns, self._requests)
         messages += self._feed(now_ns, known)
         up = (known.position_m[2] if known.position_m else 0.0, known.velocity_m_s[2])
-        setpoint = self.orders.step(now_ns, decision, known.base_mode, known.custom_mode, known.landed, *up)
+        landed = self._landed(now_ns, known)
+        setpoint = self.orders.step(now_ns, decision, known.base_mode, known.custom_mode, landed, *up)
         messages += self._requests.due(now_ns)
         if setpoint is not None:
             messages.append(setpoint)

@@ -154,7 +154,7 @@ class Tello(DatagramVehicle):
         match decision.action:
             case Action.CUT:
                 self._repeat(now_ns, text.EMERGENCY)
-            case Action.LAND if flies:
+            case Action.LAND:  # whether it flies or not: its word may be wrong
                 self._repeat(now_ns, text.LAND)
             case Action.TAKE_OFF if not flies:
                 self._repeat(now_ns, text.TAKE_OFF if self._ready else text.SDK)

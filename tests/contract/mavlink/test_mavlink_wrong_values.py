@@ -5,9 +5,11 @@ from typing import Any
 
 import pytest
 
+from drivers.mavlink.wire.names import Landed
 from drivers.mavlink.wire.telemetry import (
     AttitudeQuaternion,
     BatteryStatus,
+    ExtendedSysState,
     HighresImu,
     LocalPositionNed,
     RawImu,
@@ -111,6 +113,26 @@ def test_a_battery_that_is_told_no_more_is_unknown_and_lands_it(rig_of):
     assert rig.mode == "TRACK"
     rig.until(lambda: rig.mode == "LANDING", 6.0)
     assert rig.host.watchdog.reason == "its battery is unknown"
+
+
+def test_a_vehicle_that_says_in_flight_that_it_stands_is_landed(rig):
+    """Its land detector errs, or repeats itself: it must not be left hovering as one that has landed."""
+    rig.track_on()
+    Liar(rig.link).set(ExtendedSysState, landed_state=Landed.ON_GROUND)
+    rig.until(lambda: rig.mode == "LANDING", 1.0)
+    assert rig.host.watchdog.reason == "the vehicle lands by itself"
+    rig.until(lambda: rig.body.on_ground and not rig.copter.motors_on, 10.0)
+    assert rig.until(lambda: rig.mode == "LANDED", 1.0)
+
+
+def test_one_that_says_no_more_whether_it_flies_is_landed(rig):
+    rig.track_on()
+    Liar(rig.link).change = lambda frame: None if isinstance(frame.message, ExtendedSysState) else frame
+    rig.run(5.0)
+    assert rig.mode == "TRACK"
+    rig.until(lambda: rig.mode == "LANDING", 4.5)
+    assert rig.host.watchdog.reason == "the vehicle does not say what it does"
+    rig.until(lambda: rig.body.on_ground, 10.0)
 
 
 def test_what_is_bad_is_not_published(rig):

@@ -154,6 +154,11 @@ def test_it_says_when_it_hovers(flight):
     assert flight.told(Action.CUT, state=still)[0] == b"emergency"
 
 
+def test_one_that_says_that_it_stands_is_told_to_land_all_the_same(flight):
+    """Its word may be wrong."""
+    assert flight.told(Action.LAND, state=dataclasses.replace(STATE, tof=10, height=0))[0] == b"land"
+
+
 def test_a_take_off_that_is_called_off_is_followed_by_land(flight):
     """It stands still when it is told, and would rise all the same."""
     standing = dataclasses.replace(STATE, tof=10, height=0, time=0)

@@ -31,8 +31,21 @@ def test_take_off_track_and_land(new_bench):
     assert bench.step().action is Action.LAND
     bench.state = FlightState.LANDED
     decision = bench.step()
-    assert (decision.mode, decision.action, decision.acks[0].command_id) == (DriverMode.LANDED, Action.IDLE, "down")
+    assert (decision.mode, decision.acks[0].command_id) == (DriverMode.LANDED, "down")
+    assert set(bench.run(1)) == {Action.LAND, Action.IDLE}, "told for a second, though it says that it stands"
     assert set(bench.run(5)) == {Action.IDLE}, "setpoints go on and move nothing"
+
+
+def test_a_vehicle_that_says_in_flight_that_it_has_landed_is_told_to_land(new_bench):
+    """Its word may be wrong, and nobody else would end its flight."""
+    bench = new_bench().fly()
+    bench.state = FlightState.LANDED
+    decision = bench.step()
+    assert (decision.mode, decision.action) == (DriverMode.LANDED, Action.LAND)
+    assert bench.run(2)[-1] is Action.IDLE
+    assert bench.order(Verb.LAND, issuer="anyone").stage is AckStage.ACCEPTED
+    assert bench.step().action is Action.LAND, "an order to land is told once more"
+    assert bench.run(2)[-1] is Action.IDLE
 
 
 @pytest.mark.parametrize(

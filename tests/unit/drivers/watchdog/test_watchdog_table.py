@@ -88,11 +88,11 @@ LANDED      LANDED     LANDED     LANDING    LANDING    LANDING    LANDING    LA
 TAKING_OFF  TAKING_OFF TAKING_OFF TAKING_OFF HOVER      HOVER      LANDING    CUT        TAKING_OFF
             takeoff    takeoff    takeoff    hover      hover      land       cut        takeoff
 HOVER       HOVER      LANDED     HOVER      HOVER      HOVER      LANDING    CUT        HOVER
-            hover      idle       hover      hover      hover      land       cut        hover
+            hover      land       hover      hover      hover      land       cut        hover
 TRACK       TRACK      LANDED     TRACK      TRACK      TRACK      LANDING    CUT        TRACK
-            fly        idle       fly        fly        fly        land       cut        fly
+            fly        land       fly        fly        fly        land       cut        fly
 HOLD        HOLD       LANDED     HOLD       HOLD       HOLD       LANDING    CUT        HOLD
-            hover      idle       hover      hover      hover      land       cut        hover
+            hover      land       hover      hover      hover      land       cut        hover
 LANDING     LANDING    LANDED     LANDING    LANDING    LANDING    LANDING    CUT        LANDING
             land       idle       land       land       land       land       cut        land
 CUT         CUT        CUT        CUT        CUT        CUT        CUT        CUT        CUT

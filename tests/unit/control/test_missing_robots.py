@@ -11,8 +11,10 @@ from groundstation.bus.messages import Header, SearchedPicture
 from groundstation.control.missing_robots import MissingRobots
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.layout import ROBOT_CORE, EntityKind, StateLayout
+from groundstation.sensing.detection import detection
 from groundstation.sensing.from_field import sensors_from_field
 from groundstation.sensing.models import Box
+from groundstation.sensing.visibility import camera_rows
 from groundstation.settings.load import load_field
 from groundstation.settings.resolved import resolved_field
 
@@ -123,6 +125,25 @@ def test_pictures_count_once_and_what_is_forgotten_begins_anew() -> None:
     watch.advance(belief(HERE, THERE, 1_600_000_000), {"drone_1": 0.1, "drone_2": 0.1})
     watch.advance(belief(HERE, THERE, 1_700_000_000), {"drone_1": 2.0, "drone_2": 0.1})
     assert watch.missed_s == {}, "no picture since"
+
+
+EDGE = (1.15, 0.3, 1.3, 0.0)
+
+
+@pytest.mark.parametrize("variances", [(0.0025, 0.01, 4.0, 9.0), (0.01, 0.0025, 4.0, 9.0)], ids=["y", "x"])
+def test_pictures_weigh_by_the_chance_to_see_it_at_two_deviations_of_its_place(variances: tuple[float, ...]) -> None:
+    marker = SENSORS.marker("drone_1", np.array(EDGE), is_robot=True)
+    camera = camera_rows([SENSORS.world["ceiling"]], SENSORS.softness)[0]
+    chance = detection(camera, np.zeros(4), 2.0 * 0.1, *marker.tolist())
+    needed = math.ceil(math.log(0.02) / math.log(1.0 - chance))
+    assert 10 < needed < 100, "so many that one more or less matters"
+    watch = MissingRobots(SENSORS, NAMES)
+    for tick in range(1, needed + 1):
+        stamp_ns = tick * 100_000_000
+        header = Header(stamp_ns, "c", "ceiling", "ceiling", tick)
+        watch.take(SearchedPicture(header=header, observer="ceiling", camera="ceiling", found=("drone_2",)))
+        now = replace(belief(EDGE, THERE, stamp_ns), covariance=np.diag(variances * 2))
+        assert watch.advance(now, {"drone_1": 2.0}) == (("drone_1",) if tick == needed else ())
 
 
 def test_one_who_does_not_fly_is_not_missed() -> None:

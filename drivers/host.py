@@ -1,4 +1,4 @@
-"""What every vehicle driver shares: orders in, acknowledgements, status and events out, and the sender loop."""
+"""What every vehicle driver shares: orders in, acknowledgements and status out, and the sender loop."""
 
 import itertools
 import math
@@ -6,13 +6,13 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+from drivers.announcements import Announcements
 from drivers.base import HostProcess, Vehicle
 from drivers.control_error import ControlErrorMonitor
 from drivers.neighbours import Neighbours
 from drivers.seen_velocity import SeenVelocity
 from drivers.watchdog import Watchdog
-from drivers.watchdog_types import Ack, DriverMode, Upstream, VehicleView, WatchdogDecision, WatchdogLimits
-from groundstation.adapters import how_to_reach
+from drivers.watchdog_types import Ack, Action, DriverMode, Upstream, VehicleView, WatchdogDecision, WatchdogLimits
 from groundstation.bus import clock
 from groundstation.bus.messages import (
     AIRBORNE,
@@ -22,32 +22,17 @@ from groundstation.bus.messages import (
     Estimate,
     FlightState,
     Lease,
-    Severity,
     VehicleStatus,
     VelocitySetpoint,
 )
 from groundstation.bus.topics import COMMAND, COMMAND_ACK, ESTIMATE, LEASE, SETPOINT, VEHICLE_STATUS
 from groundstation.process.priority import go_first
-from groundstation.process.refusals import Refusals
 from groundstation.time_units import NEVER_NS, NS_PER_MS, NS_PER_S
 
 RATE_HZ = 30.0
 _STATUS_PERIOD_NS, _FLUSH_PERIOD_NS, _FLOOD_NS = 200 * NS_PER_MS, 100 * NS_PER_MS, 10 * NS_PER_MS
-_UNANSWERED_NS, _UNCONFIGURED_NS = 5 * NS_PER_S, 15 * NS_PER_S
-_SILENCE_EVENT_NS = _REFUSAL_PERIOD_NS = NS_PER_S
 # How long a driver that is to exit goes on for a vehicle it cannot hear.
 _GIVE_UP_NS = 10 * NS_PER_S
-_UNSOUND = "restart it; if it says this again, have that sensor repaired"
-# Refusals that nothing of ours causes, as the operator reads them.
-_INTRUSIONS = {
-    "unsigned": "unsigned frames",
-    "signature": "frames signed with another key",
-    "duplicate_system": "frames of a second vehicle with its number",
-    "foreign_address": "datagrams from another address",
-    "setpoint_other_source": "setpoints of another sender",
-    "setpoint_epoch_leap": "setpoints of an epoch far ahead",
-    "lease_held": "operator leases of another sender",
-}
 
 
 class VehicleHost:
@@ -62,19 +47,14 @@ class VehicleHost:
         self._commands = self._bus.subscribe([COMMAND], capacity=256)
         self._leases = self._bus.subscribe([LEASE], capacity=64)
         self._ignored: Counter[str] = Counter()
-        self._started_ns = clock.now_ns()
         self._next_status_ns = self._next_flush_ns = self._turned_ns = 0
-        self._heard_ns = self._unconfigured_ns = self._started_ns
-        self._announced = (self.watchdog.mode, self.watchdog.reason)
-        self._silent = False
+        self._announcements = Announcements(child, vehicle, self.watchdog.mode, self.watchdog.reason)
         self._estimates = self._bus.subscribe([ESTIMATE], newest=True)
         self._seen, self._control_error = SeenVelocity(), ControlErrorMonitor()
         self._told: WatchdogDecision | None = None
-        self._next_refusal_ns = 0
         self._statuses = self._bus.subscribe([VEHICLE_STATUS], newest=True)
         self._neighbours = Neighbours(vehicle.name, limits.pad_m, limits.min_separation_m)
         self._localised_ns: int | None = None
-        self._intrusions = Refusals(_INTRUSIONS)
 
     def call_on_commands(self, wake: Callable[[], None]) -> None:
         """Have a function called, on the network's thread, whenever a command arrives."""
@@ -141,9 +121,9 @@ class VehicleHost:
             return False
         state, mode = self.watchdog.vehicle, self.watchdog.mode
         if mode in (DriverMode.CONNECTING, DriverMode.LANDED):
-            return True
+            return self._told is None or self._told.action is not Action.LAND
         still = state.fresh and state.flight_state in (FlightState.EMERGENCY, FlightState.LANDED)
-        return (mode is DriverMode.CUT and still) or now_ns - self._heard_ns > _GIVE_UP_NS
+        return (mode is DriverMode.CUT and still) or now_ns - self._announcements.heard_ns > _GIVE_UP_NS
 
     def publish_status(self, now_ns: int) -> None:
         """Publish the VehicleStatus now, and report refused messages from outside of the run."""
@@ -168,8 +148,7 @@ class VehicleHost:
             asks_time=health.asks_time,
         )
         self._bus.publish(VEHICLE_STATUS, status)
-        if refused := self._intrusions.news(now_ns, status.rejected):
-            self._event(Severity.WARNING, f"{self.vehicle.name} refused {refused}")
+        self._announcements.tell_intrusions(now_ns, status.rejected)
 
     def _upstream(self) -> Upstream:
         return Upstream(self._child.supervisor_alive, self._child.supervisor_fresh, self._child.stop_requested)
@@ -187,19 +166,16 @@ class VehicleHost:
     def _command(self, now_ns: int, command: Command) -> None:
         if OPERATOR in command.scope or (command.scope and self.vehicle.name not in command.scope):
             return
-        self._announce_refusal(now_ns, command)
+        self._refuse_strangers(now_ns, command)
         for ack in self.watchdog.accept_command(now_ns, command):
             self._answer(ack)
 
-    def _announce_refusal(self, now_ns: int, command: Command) -> None:
-        """Report a command without the right to give it; once a second, and once for each."""
+    def _refuse_strangers(self, now_ns: int, command: Command) -> None:
+        """Count and tell a command without the right to give it; a repetition counts once."""
         reason = "" if self.watchdog.has_answered(command) else self.watchdog.lease.refusal(now_ns, command)
-        if not reason:
-            return
-        self._count("command", "unauthorised")
-        if now_ns >= self._next_refusal_ns:
-            self._next_refusal_ns = now_ns + _REFUSAL_PERIOD_NS
-            self._event(Severity.WARNING, f"{command.verb} of {command.header.source} refused: {reason}")
+        if reason:
+            self._count("command", "unauthorised")
+            self._announcements.tell_refusal(now_ns, command, reason)
 
     def _answer(self, ack: Ack) -> None:
         header = self._bus.header(self.vehicle.name)
@@ -211,57 +187,16 @@ class VehicleHost:
     def _report(self, now_ns: int, view: VehicleView, decision: WatchdogDecision) -> None:
         for ack in decision.acks:
             self._answer(ack)
-        self._announce_mode(decision)
-        self._announce_silence(now_ns, view, decision)
+        if self._announcements.tell_mode(decision, self.watchdog.failsafe):
+            # The status of a changed mode must not wait: the tracker learns from it who is airborne.
+            self._next_status_ns = 0
+        self._announcements.tell_silence(now_ns, view, decision.mode)
         if now_ns >= self._next_flush_ns:
             self._next_flush_ns = now_ns + _FLUSH_PERIOD_NS
             self.vehicle.flush()
         if now_ns >= self._next_status_ns:
             self._next_status_ns = now_ns + _STATUS_PERIOD_NS
             self.publish_status(now_ns)
-
-    def _announce_mode(self, decision: WatchdogDecision) -> None:
-        if (decision.mode, decision.reason) == self._announced:
-            return
-        if decision.mode is not self._announced[0]:
-            # The status of a changed mode must not wait: the tracker learns from it who is airborne.
-            self._next_status_ns = 0
-        self._announced = (decision.mode, decision.reason)
-        cut, sinks = decision.mode is DriverMode.CUT, decision.mode is DriverMode.LANDING and self.watchdog.failsafe
-        severity = Severity.ERROR if cut else Severity.WARNING if sinks else Severity.INFO
-        self._event(severity, f"{self.vehicle.name} {decision.mode}: {decision.reason}")
-
-    def _announce_silence(self, now_ns: int, view: VehicleView, decision: WatchdogDecision) -> None:
-        name, address = self.vehicle.name, self.vehicle.address
-        if view.fresh:
-            self._heard_ns = now_ns
-            self._announce_start(now_ns, view, decision)
-            if self._silent:
-                self._event(Severity.INFO, f"{name} answers")
-            self._silent = False
-            return
-        limit_ns = _UNANSWERED_NS if decision.mode is DriverMode.CONNECTING else _SILENCE_EVENT_NS
-        if not self._silent and now_ns - self._heard_ns >= limit_ns:
-            self._silent = True
-            if view.unsound and decision.mode is not DriverMode.CONNECTING:  # the watchdog's reason says what
-                return
-            told = f"{name}: {view.silence}" if view.unsound else f"{name} does not answer at {address}"
-            remedy = _UNSOUND if view.unsound else how_to_reach(address)
-            self._event(Severity.ERROR, f"{told}; trying on", remedy)
-            self._child.degrade(told)
-
-    def _announce_start(self, now_ns: int, view: VehicleView, decision: WatchdogDecision) -> None:
-        """Say READY once the vehicle may take off, or at once when it flies: then it has to be spoken for."""
-        name, address = self.vehicle.name, self.vehicle.address
-        if view.configured or view.flight_state in AIRBORNE:
-            self._unconfigured_ns = now_ns
-            if self._silent or decision.mode is not DriverMode.CONNECTING:
-                self._child.ready(f"{name} at {address}")
-        elif now_ns - self._unconfigured_ns > _UNCONFIGURED_NS:
-            self._child.degrade(f"{name} at {address}: {view.not_ready}")
-
-    def _event(self, severity: Severity, text: str, remedy: str = "") -> None:
-        self._child.event(severity, text, remedy, self.vehicle.name)
 
 
 def fly_one(

@@ -125,6 +125,17 @@ def test_a_vehicle_that_says_in_flight_that_it_stands_is_landed(rig):
     assert rig.until(lambda: rig.mode == "LANDED", 1.0)
 
 
+def test_a_driver_that_is_to_exit_has_told_to_land_first(rig):
+    """Also one that says that it stands, a moment after it was told."""
+    rig.connect()
+    rig.order(Verb.LAND)
+    rig.process.stop_requested = True
+    rig.tick()
+    assert rig.mode == "LANDED" and not rig.host.is_finished(rig.hand.now)
+    rig.run(1.1)
+    assert rig.host.is_finished(rig.hand.now)
+
+
 def test_one_that_says_no_more_whether_it_flies_is_landed(rig):
     rig.track_on()
     Liar(rig.link).change = lambda frame: None if isinstance(frame.message, ExtendedSysState) else frame

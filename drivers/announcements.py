@@ -1,0 +1,90 @@
+"""What the operator is told of a vehicle: its modes, its silence, and what was refused; each once, as it changes."""
+
+from collections.abc import Mapping
+
+from drivers.base import HostProcess, Vehicle
+from drivers.watchdog_types import DriverMode, VehicleView, WatchdogDecision
+from groundstation.adapters import how_to_reach
+from groundstation.bus import clock
+from groundstation.bus.messages import AIRBORNE, Command, Severity
+from groundstation.process.refusals import Refusals
+from groundstation.time_units import NS_PER_S
+
+_UNANSWERED_NS, _UNCONFIGURED_NS = 5 * NS_PER_S, 15 * NS_PER_S
+_SILENCE_EVENT_NS = _REFUSAL_PERIOD_NS = NS_PER_S
+_UNSOUND = "restart it; if it says this again, have that sensor repaired"
+# Refusals that nothing of ours causes, as the operator reads them.
+_INTRUSIONS = {
+    "unsigned": "unsigned frames",
+    "signature": "frames signed with another key",
+    "duplicate_system": "frames of a second vehicle with its number",
+    "foreign_address": "datagrams from another address",
+    "setpoint_other_source": "setpoints of another sender",
+    "setpoint_epoch_leap": "setpoints of an epoch far ahead",
+    "lease_held": "operator leases of another sender",
+}
+
+
+class Announcements:
+    """Events of one vehicle. heard_ns: when it was last heard, at first when its driver started."""
+
+    def __init__(self, child: HostProcess, vehicle: Vehicle, mode: DriverMode, reason: str) -> None:
+        self._child, self._vehicle = child, vehicle
+        self._told = (mode, reason)
+        self._silent = False
+        self._intrusions = Refusals(_INTRUSIONS)
+        self._next_refusal_ns = 0
+        self.heard_ns = self._unconfigured_ns = clock.now_ns()
+
+    def tell_mode(self, decision: WatchdogDecision, failsafe: str) -> bool:
+        """Tell a new mode or reason; returns whether the mode has changed. failsafe: the row that it comes from."""
+        before, self._told = self._told, (decision.mode, decision.reason)
+        if before != self._told:
+            cut, sinks = decision.mode is DriverMode.CUT, decision.mode is DriverMode.LANDING and failsafe
+            severity = Severity.ERROR if cut else Severity.WARNING if sinks else Severity.INFO
+            self._event(severity, f"{self._vehicle.name} {decision.mode}: {decision.reason}")
+        return before[0] is not decision.mode
+
+    def tell_refusal(self, now_ns: int, command: Command, reason: str) -> None:
+        """Tell of a command without the right to give it, once a second."""
+        if now_ns >= self._next_refusal_ns:
+            self._next_refusal_ns = now_ns + _REFUSAL_PERIOD_NS
+            self._event(Severity.WARNING, f"{command.verb} of {command.header.source} refused: {reason}")
+
+    def tell_intrusions(self, now_ns: int, rejected: Mapping[str, int]) -> None:
+        """Tell of refused messages from outside of the run; rejected: how many so far, by reason."""
+        if refused := self._intrusions.news(now_ns, rejected):
+            self._event(Severity.WARNING, f"{self._vehicle.name} refused {refused}")
+
+    def tell_silence(self, now_ns: int, view: VehicleView, mode: DriverMode) -> None:
+        """Tell that the vehicle is silent, or answers again, and whether the driver is ready."""
+        name, address = self._vehicle.name, self._vehicle.address
+        if view.fresh:
+            self.heard_ns = now_ns
+            self._tell_start(now_ns, view, mode)
+            if self._silent:
+                self._event(Severity.INFO, f"{name} answers")
+            self._silent = False
+            return
+        limit_ns = _UNANSWERED_NS if mode is DriverMode.CONNECTING else _SILENCE_EVENT_NS
+        if not self._silent and now_ns - self.heard_ns >= limit_ns:
+            self._silent = True
+            if view.unsound and mode is not DriverMode.CONNECTING:  # the watchdog's reason says what
+                return
+            told = f"{name}: {view.silence}" if view.unsound else f"{name} does not answer at {address}"
+            remedy = _UNSOUND if view.unsound else how_to_reach(address)
+            self._event(Severity.ERROR, f"{told}; trying on", remedy)
+            self._child.degrade(told)
+
+    def _tell_start(self, now_ns: int, view: VehicleView, mode: DriverMode) -> None:
+        """Say READY once the vehicle may take off, or at once when it flies: then it has to be spoken for."""
+        name, address = self._vehicle.name, self._vehicle.address
+        if view.configured or view.flight_state in AIRBORNE:
+            self._unconfigured_ns = now_ns
+            if self._silent or mode is not DriverMode.CONNECTING:
+                self._child.ready(f"{name} at {address}")
+        elif now_ns - self._unconfigured_ns > _UNCONFIGURED_NS:
+            self._child.degrade(f"{name} at {address}: {view.not_ready}")
+
+    def _event(self, severity: Severity, text: str, remedy: str = "") -> None:
+        self._child.event(severity, text, remedy, self._vehicle.name)

@@ -13,8 +13,8 @@ from drivers.camera.settings import SourceKind, parse_source
 from groundstation.adapters import adapters, drops_strangers
 from groundstation.arrays import Array
 from groundstation.geometry.rotations import world_from_downward_optical
-from groundstation.settings.checks import Finding
 from groundstation.settings.document import KeyPath
+from groundstation.settings.parts import Finding
 from groundstation.settings.room import CalibrationSettings, WorldCameraSettings
 from groundstation.settings.schema import Field
 from groundstation.settings.unlikely_figures import unlikely

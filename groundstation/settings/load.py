@@ -9,10 +9,11 @@ from pydantic import TypeAdapter, ValidationError
 
 from groundstation.errors import SettingsError
 from groundstation.settings.cautions import cautions
-from groundstation.settings.checks import Parts, findings
+from groundstation.settings.checks import findings
 from groundstation.settings.document import KeyPath, Node, SourceLine, read
 from groundstation.settings.drones import Drone
 from groundstation.settings.levels import FIXED, NAMED, Calibrations, Levels, with_option
+from groundstation.settings.parts import Parts
 from groundstation.settings.schema import SCHEMA_VERSION, Field
 from groundstation.settings.wording import ordered, problem, problem_of_error
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 from pydantic import BaseModel
 
-from groundstation.settings.checks import Finding
 from groundstation.settings.document import KeyPath
+from groundstation.settings.parts import Finding
 from groundstation.settings.schema import Field
 
 

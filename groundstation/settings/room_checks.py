@@ -1,0 +1,90 @@
+"""What must hold of places and heights: fence, obstacles, cameras, pads and levels."""
+
+import math
+from collections.abc import Iterator
+from itertools import combinations
+
+from groundstation.settings.parts import Finding, Parts
+
+_ROBOT_HEIGHT_M = 0.3
+
+
+def findings_in_room(parts: Parts) -> Iterator[Finding]:
+    """Return what does not lie where it must."""
+    for check in (_fence_in_room, _obstacles, _cameras_above_fence, _pads, _heights):
+        yield from check(parts)
+
+
+def _fence_in_room(parts: Parts) -> Iterator[Finding]:
+    if parts.room is None:
+        return
+    size, fence = parts.room.size_m, parts.room.fence
+    walls = {"x_m": (-size[0] / 2, size[0] / 2), "y_m": (-size[1] / 2, size[1] / 2), "z_m": (0.0, size[2])}
+    for name, (low, high) in walls.items():
+        least, most = getattr(fence, name)
+        if least < low or most > high:
+            yield ("room", "fence", name), f"must lie inside the room, {low:g} to {high:g} (got {least:g} to {most:g})"
+
+
+def _obstacles(parts: Parts) -> Iterator[Finding]:
+    if parts.room is None:
+        return
+    size = parts.room.size_m
+    for name, one in parts.room.obstacles.items():
+        path = ("room", "obstacles", name)
+        (x, y), half = one.centre_m, (one.size_m[0] / 2, one.size_m[1] / 2)
+        if abs(x) + half[0] > size[0] / 2 or abs(y) + half[1] > size[1] / 2 or one.size_m[2] > size[2]:
+            yield path, "must stand inside the room"
+        for drone, own in parts.flying.items():
+            if abs(own.pad_m[0] - x) < half[0] and abs(own.pad_m[1] - y) < half[1]:
+                yield ("drones", drone, "pad_m"), f"lies in room.obstacles.{name}"
+
+
+def _cameras_above_fence(parts: Parts) -> Iterator[Finding]:
+    if parts.room is None:
+        return
+    size, top = parts.room.size_m, parts.room.fence.z_m[1]
+    for name, camera in parts.cameras.items():
+        x, y, z = camera.position_m
+        path = ("cameras", name, "position_m")
+        if abs(x) > size[0] / 2 or abs(y) > size[1] / 2 or z > size[2]:
+            yield path, "must lie inside the room"
+        elif z <= top:
+            yield path, f"must hang above the fence: height > {top:g} (got {z:g})"
+
+
+def _pads(parts: Parts) -> Iterator[Finding]:
+    if parts.room is not None:
+        for name, drone in parts.flying.items():
+            if not parts.room.fence.contains(*drone.pad_m):
+                yield ("drones", name, "pad_m"), f"must lie inside the fence (got {list(drone.pad_m)})"
+    if parts.safety is None:
+        return
+    least = parts.safety.min_separation_m
+    for (first, one), (second, other) in combinations(parts.flying.items(), 2):
+        distance = math.dist(one.pad_m, other.pad_m)
+        if distance < least:
+            yield (
+                ("drones", second, "pad_m"),
+                f"is {distance:.2f} m from the pad of {first}: must be >= {least:g} (safety.min_separation_m)",
+            )
+
+
+def _heights(parts: Parts) -> Iterator[Finding]:
+    if parts.planner is None:
+        return
+    rows = parts.planner.level_heights_m
+    if parts.flying and len(rows) < len(parts.flying):
+        yield (
+            ("planner", "level_heights_m"),
+            f"must hold a row for each number of levels, 1 to {len(parts.flying)} drones (got {len(rows)})",
+        )
+    low = max((one.marker.height_m + _ROBOT_HEIGHT_M for _, one in parts.tracked.values()), default=0.0)
+    high = math.inf
+    if parts.room is not None:
+        low, high = max(low, parts.room.fence.z_m[0]), parts.room.fence.z_m[1]
+    for index, row in enumerate(rows):
+        for slot, height in enumerate(row):
+            if not low <= height <= high:
+                path = ("planner", "level_heights_m", index, slot)
+                yield path, f"must be between {low:g} (over the target) and {high:g} (the fence) (got {height:g})"

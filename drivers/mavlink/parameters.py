@@ -21,8 +21,9 @@ _CHECKED: dict[Flavour, tuple[Version, Version]] = {
 class Needed:
     """One parameter: the value that `setup` writes, its type on the wire, and its purpose.
 
-    accepted: lowest and highest value that will do as well; others: single values that will do; aliases: its names in
-    other releases.
+    accepted: lowest and highest value that will do as well; others: single values that will do; flown: a wider range,
+    which `setup` changes and the operator is told of, but with which it may take off; aliases: its names in other
+    releases.
     """
 
     name: str
@@ -31,6 +32,7 @@ class Needed:
     kind: int = INT32
     accepted: tuple[float, float] | None = None
     others: tuple[float, ...] = ()
+    flown: tuple[float, float] | None = None
     aliases: tuple[str, ...] = ()
 
     @property
@@ -40,9 +42,12 @@ class Needed:
 
     def takes(self, value: float) -> bool:
         """Return whether a value will do."""
-        low, high = self.accepted or (self.value, self.value)
-        tolerance = 1e-4 * max(1.0, abs(value))
-        return low - tolerance <= value <= high + tolerance or any(abs(value - o) <= tolerance for o in self.others)
+        in_range = _lies_in(self.accepted or (self.value, self.value), value)
+        return in_range or any(_lies_in((other, other), value) for other in self.others)
+
+    def forbids(self, value: float) -> bool:
+        """Return whether a value forbids a take-off."""
+        return not (self.takes(value) or (self.flown is not None and _lies_in(self.flown, value)))
 
     @property
     def wish(self) -> str:
@@ -50,6 +55,11 @@ class Needed:
         if self.accepted is not None:
             return f"{self.accepted[0]:.7g} to {self.accepted[1]:.7g}"
         return " or ".join(f"{value:.7g}" for value in (self.value, *self.others))
+
+
+def _lies_in(span: tuple[float, float], value: float) -> bool:
+    tolerance = 1e-4 * max(1.0, abs(value))
+    return span[0] - tolerance <= value <= span[1] + tolerance
 
 
 _PX4 = (
@@ -108,7 +118,8 @@ def _overridden(wanted: Iterable[Needed], overrides: Mapping[str, float]) -> tup
     for need in wanted:
         name = next((n for n in need.names if n in left), None)
         if name is not None:
-            need = replace(need, value=left.pop(name), reason="as the field file says", accepted=None, others=())
+            value, reason = left.pop(name), "as the field file says"
+            need = replace(need, value=value, reason=reason, accepted=None, others=(), flown=None)
         found.append(need)
     for name, value in left.items():
         kind = INT32 if value == round(value) else REAL32
@@ -137,8 +148,14 @@ def is_checked(flavour: Flavour, version: Version | None) -> bool:
 
 
 def difference(wanted: Needed, found: Mapping[str, float]) -> str:
-    """Return the fault of one parameter, or ""; found: by name or alias."""
+    """Return what one parameter differs by, or ""; found: by name or alias."""
     name = next((n for n in wanted.names if n in found), None)
     if name is None:
         return f"{wanted.name} is missing, needs {wanted.wish} ({wanted.reason})"
     return "" if wanted.takes(found[name]) else f"{name} is {found[name]:.7g}, needs {wanted.wish} ({wanted.reason})"
+
+
+def fault(wanted: Needed, found: Mapping[str, float]) -> str:
+    """Return the difference of a parameter that was found, if it forbids a take-off, or ""."""
+    value = next(found[name] for name in wanted.names if name in found)
+    return difference(wanted, found) if wanted.forbids(value) else ""

@@ -81,6 +81,7 @@ class MavlinkSession:
         self._found: dict[str, float] = {}
         self._comparison: tuple[list[str], list[str]] | None = None
         self._asked: set[str] = set()
+        self._doubted: set[str] = set()
         self._param_tries: Counter[str] = Counter()
         self._stream_ns: dict[type[Message], int] = {}  # when it came last, or was asked for
         self._has_origin = False
@@ -101,7 +102,7 @@ class MavlinkSession:
         if self._comparison is None:  # asked at each turn, changed by a value only
             found = self._found
             read = [n for n in self._needed if not found.keys().isdisjoint(n.names)]
-            faults = [text for n in read if (text := parameters.difference(n, found))]
+            faults = [text for n in read if (text := parameters.fault(n, found))]
             self._comparison = faults, [n.name for n in self._needed if found.keys().isdisjoint(n.names)]
         return self._comparison
 
@@ -158,6 +159,14 @@ class MavlinkSession:
         if message.param_id in self._by_name:
             value = value_from_carried(self._flavour, message.param_value, message.param_type)
             self._found[message.param_id], self._comparison = value, None
+            self._note_doubtful(self._by_name[message.param_id], {message.param_id: value})
+
+    def _note_doubtful(self, wanted: parameters.Needed, found: dict[str, float]) -> None:
+        """Tell once of a value with which it flies, though not as well as it could."""
+        text = parameters.difference(wanted, found)
+        if text and not parameters.fault(wanted, found) and wanted.name not in self._doubted:
+            self._doubted.add(wanted.name)
+            self.notes.append(f"parameter {text}: groundstation mavlink setup --apply")
 
     def hear_version(self, flight_sw_version: int, serial_number: str = "") -> None:
         """Take its number and the version of its firmware; a new one of which nothing is known is noted."""

@@ -2,7 +2,7 @@
 
 import pytest
 
-from drivers.mavlink.parameters import difference, is_checked, needed, overridden, version_of
+from drivers.mavlink.parameters import Needed, difference, fault, is_checked, needed, overridden, version_of
 from drivers.mavlink.wire.names import Flavour
 
 
@@ -61,3 +61,12 @@ def test_only_releases_that_were_compared_count_as_checked():
     assert is_checked(Flavour.PX4, version_of(0x011001FF))
     assert not is_checked(Flavour.PX4, version_of(0x01110000))
     assert not is_checked(Flavour.ARDUPILOT, None)
+
+
+@pytest.mark.parametrize(
+    ("value", "differs", "forbids"), [(2, False, False), (3, False, False), (5, True, False), (1, True, True)]
+)
+def test_a_value_may_do_for_a_take_off_that_setup_changes_all_the_same(value, differs, forbids):
+    wanted = Needed("FS_GCS_TIMEOUT", 2, "time", accepted=(2, 3), flown=(2, 10))
+    assert bool(difference(wanted, {"FS_GCS_TIMEOUT": value})) is differs
+    assert bool(fault(wanted, {"FS_GCS_TIMEOUT": value})) is forbids

@@ -94,7 +94,8 @@ def tables_of(topic: Topic) -> tuple[Table, ...]:
     assert topic.type is not None
     name = f"{topic.plane.removeprefix('@')}_{topic.name}" if topic.plane else topic.name
     if topic is ESTIMATE:
-        return (Table(name, _ESTIMATE_COLUMNS, _estimate_rows),)
+        searches = _inner_table(f"{name}_searches", m.TargetSearch, _field("searches"))
+        return (Table(name, _ESTIMATE_COLUMNS, _estimate_rows), searches)
     main: list[tuple[Column, Getter]] = []
     inner: list[Table] = []
     for field, kind in get_type_hints(topic.type).items():
@@ -157,7 +158,7 @@ def _columns(name: str, kind: Any, get: Getter) -> Iterator[tuple[Column, Getter
 def _axes_of(name: str, size: int) -> Sequence[str]:
     if size == 4:
         return "wxyz"
-    return ("roll", "pitch", "yaw") if name.startswith("attitude") else _XYZ
+    return ("roll", "pitch", "yaw") if name.startswith("attitude") else _XYZ[:size]
 
 
 def _chain(get: Getter, then: Getter) -> Getter:

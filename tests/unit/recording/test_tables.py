@@ -1,0 +1,55 @@
+"""Messages as rows: every topic, lists of any length, and vectors in the plane."""
+
+import types
+from enum import Enum
+from typing import Any, Union, get_args, get_origin, get_type_hints
+
+import msgspec
+import pytest
+
+from groundstation.bus import messages as m
+from groundstation.bus import topics as t
+from groundstation.bus.topics import TOPICS, Topic
+from groundstation.recording.tables import Table, tables_of
+
+HEADER = m.Header(1, "clock", "turtlebot", "tracker", 1)
+
+
+def _example(kind: Any) -> Any:
+    """Return a value of a type, with one element in each list; structs as plain objects, which no rule refuses."""
+    if get_origin(kind) in (Union, types.UnionType):
+        return _example(next(one for one in get_args(kind) if one is not type(None)))
+    if get_origin(kind) is tuple:
+        return tuple(_example(one) for one in get_args(kind) if one is not Ellipsis)
+    if get_origin(kind) is dict:
+        return {}
+    if issubclass(kind, Enum):
+        return next(iter(kind))
+    if issubclass(kind, msgspec.Struct):
+        return types.SimpleNamespace(**{name: _example(one) for name, one in get_type_hints(kind).items()})
+    return kind(1)
+
+
+def _row(table: Table, message: Any) -> dict[str, Any]:
+    (row,) = table.rows(message)
+    return {column.name: cell for column, cell in zip(table.columns, row, strict=True)}
+
+
+@pytest.mark.parametrize("topic", [topic for topic in TOPICS.values() if topic.type is not None], ids=lambda t: t.name)
+def test_every_typed_topic_has_a_cell_for_each_column(topic: Topic) -> None:
+    for table in tables_of(topic):
+        _row(table, _example(topic.type))
+
+
+def test_a_vector_in_the_plane_has_no_z() -> None:
+    (table,) = tables_of(t.SEARCH_MAP)
+    row = _row(table, m.SearchMap(header=HEADER, first_m=(-1.0, 2.0), cell_m=0.5, columns=2, chances=(255, 0)))
+    assert (row["first_x_m"], row["first_y_m"]) == (-1.0, 2.0) and "first_z_m" not in row
+
+
+def test_searches_of_an_estimate_have_a_table() -> None:
+    search = m.TargetSearch("turtlebot", "SEARCH", 3.0, (1.0, 2.0), 0.25, None, "searched for")
+    _, searches = tables_of(t.ESTIMATE)
+    row = _row(searches, m.Estimate(header=HEADER, entities=(), epoch=1, searches=(search,)))
+    assert searches.name == "estimate_searches"
+    assert (row["target"], row["place_x_m"], row["expected_s"]) == ("turtlebot", 1.0, None)

@@ -74,10 +74,12 @@ def recover(recording: Path, output: Path | None) -> int:
     from groundstation.recording.copies import recover as make_valid
     from groundstation.recording.run import open_run
 
-    damaged = [index for index in open_run(recording).indexes if index.damage]
-    if not damaged:
+    run = open_run(recording)
+    damaged = [index for index in run.indexes if index.checked_damage()]
+    for path, why in run.unread.items():
+        click.echo(f"{path}: nothing can be recovered: {why}", err=True)
+    if not damaged and not run.unread:
         click.echo(f"{recording}: nothing is damaged, nothing was written")
-        return ExitCode.OK
     if output is not None and len(damaged) > 1:
         names = ", ".join(index.path.name for index in damaged)
         raise click.UsageError(f"several files are damaged ({names}): name one of them, or leave out --output.")
@@ -85,7 +87,7 @@ def recover(recording: Path, output: Path | None) -> int:
         target = output or index.path.with_name(f"{index.path.stem}-recovered.mcap")
         count, damage = make_valid(index.path, target)
         click.echo(f"{target}: {count} messages of {index.path.name} ({'; '.join(damage)})")
-    return ExitCode.OK
+    return ExitCode.SETTINGS if run.unread else ExitCode.OK
 
 
 @recording.command()
@@ -98,9 +100,13 @@ def recover(recording: Path, output: Path | None) -> int:
 def cut(recording: Path, from_s: float, to_s: float | None, output: Path | None) -> int:
     """Write a stretch of a recording to a new one, with all attachments and with what was known when it begins."""
     from groundstation.recording.cut import cut_run
+    from groundstation.recording.run import open_run
 
-    for path, count in cut_run(recording, from_s, to_s, output).items():
+    run = open_run(recording)
+    for path, count in cut_run(run, recording, from_s, to_s, output).items():
         click.echo(f"{path}: {count} messages")
+    for line in run.damage:
+        click.echo(f"damaged, read as far as it is sound: {line}", err=True)
     return ExitCode.OK
 
 

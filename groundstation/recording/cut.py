@@ -6,19 +6,19 @@ from pathlib import Path
 from groundstation.recording.compatibility import RecordingError
 from groundstation.recording.copies import cut
 from groundstation.recording.outputs import new_folder, require_absent
-from groundstation.recording.run import RecordedRun, open_run
+from groundstation.recording.run import RecordedRun
 from groundstation.time_units import NS_PER_S
 
 # What reports and replays look for beside the files of a run.
 _COMPANIONS = ("run.json", "resolved.yaml")
 
 
-def cut_run(path: Path, from_s: float, to_s: float | None, output: Path | None) -> dict[Path, int]:
-    """Write what happened between two times [s since the start]; returns the new files with their messages.
+def cut_run(run: RecordedRun, path: Path, from_s: float, to_s: float | None, output: Path | None) -> dict[Path, int]:
+    """Write what happened in a run between two times [s since the start]; returns the new files with their messages.
 
+    path: where the run was opened. Afterwards `run.damage` says what could not be read of it.
     Raises RecordingError when nothing lies between them or the output exists; leaves nothing half done behind.
     """
-    run = open_run(path)
     end_s = run.duration_s if to_s is None else to_s
     if not from_s < end_s:
         raise RecordingError(f"--from {from_s:g} is not before --to {end_s:g}")
@@ -26,8 +26,9 @@ def cut_run(path: Path, from_s: float, to_s: float | None, output: Path | None) 
         raise RecordingError(f"{path}: lasts {run.duration_s:.1f} s, nothing begins at {from_s:g} s")
     from_ns = run.start_ns + round(from_s * NS_PER_S)
     until_ns = run.end_ns + 1 if to_s is None else run.start_ns + round(to_s * NS_PER_S)
-    name = f"{path.name.removesuffix('.mcap')}-{from_s:g}s-{end_s:.6g}s"
-    target = output or path.absolute().with_name(f"{name}.mcap" if path.is_file() else name)
+    place = path.resolve() if path.name in ("", "..") else path.absolute()
+    name = f"{place.name.removesuffix('.mcap')}-{from_s:g}s-{end_s:.6g}s"
+    target = output or place.with_name(f"{name}.mcap" if path.is_file() else name)
     require_absent(target)
     if path.is_file():
         return {target: cut(run, run.indexes[0].stem, from_ns, until_ns, target)}

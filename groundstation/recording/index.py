@@ -126,6 +126,12 @@ class FileIndex:
             self._note(f"{text} at byte {chunk.offset}")
         return data
 
+    def checked_damage(self) -> list[str]:
+        """Return the damage after every chunk's checksum was compared."""
+        for chunk in self.chunks:
+            self.data(chunk)
+        return self.damage
+
     def read(self, chunk: Chunk, wanted: Wanted = every_topic) -> list[RawRecord]:
         """Return the messages of the wanted topics in one chunk, in file order; damage is noted and costs the chunk."""
         channels = {id_: key for id_, key in self.channels.items() if key is None or wanted(key.topic)}

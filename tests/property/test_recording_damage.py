@@ -56,7 +56,7 @@ def _read_everything(path: Path) -> int:
         recover(path, folder / "recovered.mcap")
         with (folder / "recovered.mcap").open("rb") as stream:
             assert sum(1 for _ in make_reader(stream).iter_messages()) >= len(read)
-        cut_run(path, 0.0, None, folder / "cut.mcap")
+        cut_run(open_run(path), path, 0.0, None, folder / "cut.mcap")
     except OperatorMistake as error:
         assert str(path) in str(error) or "not before" in str(error)
     assert sum(part.messages for part in found.parts) >= len(read)

@@ -113,11 +113,42 @@ def test_recover_leaves_whole_recordings_alone(whole: Path) -> None:
     assert sorted(path.name for path in whole.iterdir()) == files
 
 
+def test_recover_finds_a_damaged_chunk_in_a_file_that_ends_well(whole: Path, tmp_path: Path) -> None:
+    index = open_run(whole / "state.mcap").indexes[0]
+    data = bytearray((whole / "state.mcap").read_bytes())
+    chunk = index.chunks[len(index.chunks) // 2]
+    data[chunk.offset + chunk.length - 100] ^= 0xFF
+    (tmp_path / "state.mcap").write_bytes(data)
+    result = _run("recover", tmp_path)
+    recovered = tmp_path / "state-recovered.mcap"
+    assert f"{recovered}: " in result.output and "damaged chunk" in result.output
+    assert json.loads(_run("info", recovered, "--json").output)["whole"]
+
+
+def test_recover_names_a_part_of_which_nothing_is_left(whole: Path, tmp_path: Path) -> None:
+    (tmp_path / "raw.mcap").write_bytes((whole / "raw.mcap").read_bytes())
+    (tmp_path / "state.mcap").touch()
+    result = _run("recover", tmp_path)
+    assert "nothing is damaged" not in result.output
+    assert "state.mcap: nothing can be recovered" in result.stderr and result.return_value == ExitCode.SETTINGS
+
+
 def test_cut_takes_a_stretch_of_a_cut_off_run(run_dir: Path) -> None:
     result = _run("cut", run_dir, "--from", 0.5, "--to", 1.0)
     folder = run_dir.parent / "run-0.5s-1s"
     assert f"{folder / 'state.mcap'}" in result.output
     assert open_run(folder).duration_s == pytest.approx(0.5, abs=0.05)
+    assert "cut off at byte" in result.stderr
+
+
+@pytest.mark.parametrize("here", [".", "log/.."])
+def test_a_stretch_of_the_folder_one_stands_in_lies_beside_it(
+    run_dir: Path, here: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (run_dir / "log").mkdir()
+    monkeypatch.chdir(run_dir)
+    assert _run("cut", here, "--from", 0.5, "--to", 1.0).exit_code == 0
+    assert open_run(run_dir.parent / "run-0.5s-1s").duration_s == pytest.approx(0.5, abs=0.05)
 
 
 def test_csv_tables_say_what_the_messages_said(whole: Path, tmp_path: Path) -> None:

@@ -125,7 +125,7 @@ def test_a_rare_message_is_found_long_after_it_was_said(run_dir: Path) -> None:
 
 
 def test_a_stretch_is_a_run_of_its_own_with_what_was_known_when_it_begins(run_dir: Path, tmp_path: Path) -> None:
-    written = cut_run(run_dir, 1.5, 3.5, tmp_path / "stretch")
+    written = cut_run(open_run(run_dir), run_dir, 1.5, 3.5, tmp_path / "stretch")
     assert [path.name for path in written] == ["state.mcap", "raw.mcap"]
     whole, stretch = open_run(run_dir), open_run(tmp_path / "stretch")
     assert stretch.damage == [] and stretch.duration_s == pytest.approx(2.0, abs=0.05)
@@ -149,7 +149,7 @@ def test_a_stretch_of_nothing_is_refused(
     run_dir: Path, tmp_path: Path, begin_s: float, end_s: float | None, reason: str
 ) -> None:
     with pytest.raises(RecordingError, match=reason):
-        cut_run(run_dir, begin_s, end_s, tmp_path / "nothing")
+        cut_run(open_run(run_dir), run_dir, begin_s, end_s, tmp_path / "nothing")
     assert not (tmp_path / "nothing").exists()
 
 

@@ -4,17 +4,15 @@ from pathlib import Path
 
 from mcap.records import Channel, Schema
 
-from groundstation.bus.topics import ESTIMATE, PLAN, SETPOINT
 from groundstation.engineering_views.extras import require_foxglove
 from groundstation.engineering_views.field import field_of
+from groundstation.engineering_views.scene import DRAWN
 from groundstation.errors import MessageError
 from groundstation.recording.copies import Copied, CopyWriter, messages_of, new_copy, preamble_copy
 from groundstation.recording.reader import decode, open_recording
 from groundstation.recording.rerun import rerun_of
 from groundstation.recording.run import RecordedRun
 from groundstation.recording.viewers import SCENE_CHANNEL
-
-_DRAWN = (ESTIMATE, PLAN, SETPOINT)
 
 
 def write_with_scene(run: RecordedRun, path: Path) -> tuple[int, list[str]]:
@@ -43,7 +41,7 @@ def _add_scenes(run: RecordedRun, writer: CopyWriter, unread: dict[str, None]) -
     channel = Channel(1, SCENE_CHANNEL, "protobuf", {"derived": "for viewers"}, 1)
     rerun = rerun_of(run.metadata)
     scene = FoxgloveScene(field_of(run.attachments), rerun.mark if rerun else "")
-    for raw in run.records_from(run.start_ns, _DRAWN.__contains__):
+    for raw in run.records_from(run.start_ns, DRAWN.__contains__):
         try:
             update = scene.take(raw.log_time_ns, decode(raw).message)
         except MessageError as error:

@@ -4,8 +4,8 @@ import foxglove
 
 from groundstation.bus import codec, keys
 from groundstation.bus.api import Bus, Sample, Subscription
-from groundstation.bus.topics import ESTIMATE, PLAN, SETPOINT
 from groundstation.engineering_views.foxglove_scene import FoxgloveScene, scene_schema
+from groundstation.engineering_views.scene import DRAWN
 from groundstation.engineering_views.watch import USUAL_PERIOD_S, everything
 from groundstation.errors import MessageError, OperatorMistake
 from groundstation.field.resolved import ResolvedField
@@ -17,7 +17,7 @@ from groundstation.recording.viewers import SCENE_CHANNEL
 HOST = "127.0.0.1"
 # Messages that wait for one slow viewer before the oldest are dropped for it alone.
 _BACKLOG = 512
-_DRAWN = frozenset(topic.name for topic in (ESTIMATE, PLAN, SETPOINT))
+_DRAWN = frozenset(topic.name for topic in DRAWN)
 
 
 class FoxgloveView:

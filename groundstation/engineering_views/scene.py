@@ -8,6 +8,7 @@ import numpy as np
 from groundstation.appearance.colours import FENCE_COLOUR, NEUTRAL_COLOUR, Rgb, colours_of, rgb
 from groundstation.arrays import Array
 from groundstation.bus import messages as m
+from groundstation.bus.topics import ESTIMATE, PLAN, SEARCH_MAP, SETPOINT
 from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.ellipse import semi_axes_95
 from groundstation.recording.derived import camera_frames
@@ -23,6 +24,8 @@ VOLUME_COLOUR: Rgb = (140, 150, 110)
 FENCE: Rgb = rgb(FENCE_COLOUR.dark)
 _LIKELY_AT_ALL = 0.03
 _USUAL_HEIGHT_M = 4.0
+# All that bodies, links, arrows and cells are made of.
+DRAWN = (ESTIMATE, PLAN, SEARCH_MAP, SETPOINT)
 # An arrow is as long as the way in this time.
 ARROW_S = 2.0
 

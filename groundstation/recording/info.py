@@ -2,7 +2,8 @@
 
 import json
 from array import array
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 from mcap.opcode import Opcode
 
 from groundstation.bus import keys
-from groundstation.bus.topics import INNOVATION, OBSERVATION
+from groundstation.bus.topics import INNOVATION, OBSERVATION, PREFLIGHT, PROCESS_STATUS, SEARCH_MAP, SEARCHED_PICTURE
 from groundstation.errors import MessageError
 from groundstation.recording.chunks import inner_records, message_of
 from groundstation.recording.index import FileIndex
@@ -23,6 +24,8 @@ from groundstation.time_units import NS_PER_S
 _HOLE_S = 1.0
 _HOLE_PERIODS = 5.0
 _MAX_HOLES = 20
+# Told while somebody is seen, searched for, or on the ground.
+_NOW_AND_THEN = (OBSERVATION, INNOVATION, SEARCHED_PICTURE, SEARCH_MAP, PREFLIGHT)
 _LATEST_NS = (1 << 63) - 1
 
 
@@ -88,7 +91,8 @@ def info_of(run: RecordedRun) -> RecordingInfo:
     """Return what is in a run; every chunk is read and its checksum compared."""
     channels: dict[str, _Times] = {}
     counts = [_gather(index, channels) for index in run.indexes]
-    listed = [_channel(name, held, run) for name, held in sorted(channels.items())]
+    regular = _regular(channels)
+    listed = [_channel(name, held, run, name in regular) for name, held in sorted(channels.items())]
     return RecordingInfo(
         parts=(*_unread(run), *map(_part, run.indexes, counts)),
         start_unix_ns=run.start_ns,
@@ -129,7 +133,7 @@ def _gather(index: FileIndex, channels: dict[str, _Times]) -> int:
     return total
 
 
-def _channel(name: str, held: _Times, run: RecordedRun) -> tuple[ChannelInfo, list[Hole]]:
+def _channel(name: str, held: _Times, run: RecordedRun, is_regular: bool) -> tuple[ChannelInfo, list[Hole]]:
     times_s = (np.sort(np.frombuffer(held.times, dtype=np.int64)) - run.start_ns) / NS_PER_S
     if len(times_s) < 2:
         first_s = float(times_s[0]) if len(times_s) else 0.0
@@ -139,17 +143,28 @@ def _channel(name: str, held: _Times, run: RecordedRun) -> tuple[ChannelInfo, li
     rate_hz = (len(times_s) - 1) / max(last_s - first_s, 1e-9)
     found = ChannelInfo(name, held.schema, len(times_s), rate_hz, first_s, last_s, float(gaps_s.max()))
     limit_s = max(_HOLE_S, _HOLE_PERIODS * float(np.median(gaps_s)))
-    after = np.flatnonzero(gaps_s > limit_s)[: _MAX_HOLES if _is_regular(name) else 0]
+    after = np.flatnonzero(gaps_s > limit_s)[: _MAX_HOLES if is_regular else 0]
     return found, [Hole(name, float(times_s[n]), float(times_s[n + 1])) for n in after]
 
 
-def _is_regular(channel: str) -> bool:
-    """Return whether silence is a hole: what nobody sees is not observed, and that is no fault of a recording."""
-    try:
-        topic = keys.parse(channel).topic
-        return topic.rate_hz > 0 and topic not in (OBSERVATION, INNOVATION)
-    except MessageError:
-        return False
+def _regular(channels: Iterable[str]) -> set[str]:
+    """Return the channels whose silence is a hole.
+
+    What nobody sees is not observed, and that is no fault of a recording; nor is the silence of somebody who tells a
+    process' state where that process speaks for itself.
+    """
+    parsed = {}
+    for name in channels:
+        with suppress(MessageError):
+            parsed[name] = keys.parse(name)
+    speaking = {key.entity for key in parsed.values() if key.topic is PROCESS_STATUS and key.entity == key.source}
+    return {
+        name
+        for name, key in parsed.items()
+        if key.topic.rate_hz > 0
+        and key.topic not in _NOW_AND_THEN
+        and not (key.topic is PROCESS_STATUS and key.entity != key.source and key.entity in speaking)
+    }
 
 
 def _missing(run: RecordedRun) -> list[str]:

@@ -41,11 +41,25 @@ def new_folder(path: Path) -> Iterator[None]:
     require_absent(path)
     with errors_named(path):
         path.mkdir(parents=True)
-        try:
+        with _removed_if_unfinished(path):
             yield
-        except BaseException:
-            shutil.rmtree(path, ignore_errors=True)
-            raise
+
+
+@contextmanager
+def unmade_folder(path: Path) -> Iterator[None]:
+    """Do the same for a folder that somebody else's library makes, and refuses where it exists."""
+    require_absent(path)
+    with errors_named(path), _removed_if_unfinished(path):
+        yield
+
+
+@contextmanager
+def _removed_if_unfinished(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except BaseException:
+        shutil.rmtree(path, ignore_errors=True)
+        raise
 
 
 @contextmanager

@@ -18,7 +18,7 @@ from groundstation.engineering_views.field import field_of
 from groundstation.engineering_views.ros2.codec import Ros2Codec, RosMessage
 from groundstation.engineering_views.ros2.scene import SHOWN, Ros2Scene
 from groundstation.errors import MessageError
-from groundstation.recording.outputs import errors_named, require_absent
+from groundstation.recording.outputs import unmade_folder
 from groundstation.recording.reader import decode, payload
 from groundstation.recording.run import RecordedRun
 
@@ -45,11 +45,10 @@ def write_bag(run: RecordedRun, folder: Path, distribution: str = "jazzy") -> tu
 
     Raises RecordingError when the folder exists, OutputError when it cannot be written.
     """
-    require_absent(folder)
     codec = Ros2Codec(distribution)
     scene = Ros2Scene(codec, field_of(run.attachments))
     unread: dict[str, None] = {}
-    with errors_named(folder), Writer(folder, version=_VERSION, storage_plugin=StoragePlugin.MCAP) as writer:
+    with unmade_folder(folder), Writer(folder, version=_VERSION, storage_plugin=StoragePlugin.MCAP) as writer:
         bag = _Bag(writer, codec)
         bag.write(run.start_ns, scene.static(run.start_ns))
         for raw in run.records_from(run.start_ns, lambda topic: topic in SHOWN):

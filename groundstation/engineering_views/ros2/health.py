@@ -47,7 +47,7 @@ class HealthMaker:
         """Return the diagnostics of a process."""
         level = _WARN if status.state is m.Lifecycle.DEGRADED else _OK
         facts = {"cpu": f"{status.cpu:.2f}", "overruns": f"{status.overruns} of {status.ticks}"}
-        name = f"process {status.header.source}"
+        name = f"process {status.header.entity}"  # the supervisor speaks for those that do not yet, or no longer
         return self._diagnostics(stamp_ns, name, level, f"{status.state} {status.detail}".strip(), facts)
 
     def event(self, stamp_ns: int, event: m.Event) -> RosMessage:

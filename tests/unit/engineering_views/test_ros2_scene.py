@@ -87,6 +87,13 @@ def test_an_unknown_battery_is_not_an_empty_one() -> None:
     assert line.level == 2 and "not heard" in line.message
 
 
+def test_a_process_that_the_supervisor_speaks_for_is_named_as_when_it_speaks() -> None:
+    said = m.Header(1, "clock", "drone_1", "supervisor", 1)
+    found = taken(m.ProcessStatus(header=said, state=m.Lifecycle.STOPPING, pid=1, cpu=0.0, ticks=0))
+    (line,) = found["/diagnostics"].status
+    assert line.name == "skein: process drone_1"
+
+
 def flight() -> list[m.Message]:
     """A message of each topic of a made-up run."""
     seen: dict[Topic, m.Message] = {}
@@ -194,6 +201,18 @@ def test_a_bag_holds_what_its_own_reader_decodes(tmp_path: Path) -> None:
     offered = {one["topic_metadata"]["name"]: offers(one) for one in described["topics_with_message_count"]}
     assert {topic: one["durability"] for topic, one in offered.items()} == dict.fromkeys(topics, 2) | {"/tf_static": 1}
     assert {one["reliability"] for one in offered.values()} == {1}
+
+
+def test_nothing_is_left_of_a_bag_that_could_not_be_finished(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_run(tmp_path / "run", load_field(find_field("lab"), ()).model_dump_json().encode(), 1.0)
+
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Ros2Scene, "_truth", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        write_bag(open_run(tmp_path / "run"), tmp_path / "bag")
+    assert not (tmp_path / "bag").exists()
 
 
 def offers(topic: dict[str, Any]) -> dict[str, Any]:

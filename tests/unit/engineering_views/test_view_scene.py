@@ -5,8 +5,16 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from groundstation.bus import codec, keys
 from groundstation.bus import messages as m
+from groundstation.bus.api import Sample
+from groundstation.bus.topics import ESTIMATE, SEARCH_MAP, Topic
 from groundstation.engineering_views.scene import ViewScene
+from groundstation.recording.copies import messages_of
+from groundstation.recording.run import open_run
+from groundstation.recording.timeline import Timeline
+from groundstation.recording.viewers import SCENE_CHANNEL
+from groundstation.recording.writing import RunWriter
 from groundstation.settings.load import load_field
 from groundstation.settings.resolved import resolved_field
 from groundstation.time_units import NS_PER_S
@@ -66,6 +74,28 @@ def test_foxglove_shows_where_a_target_is_searched_while_it_is() -> None:
     )
     assert during is not None and after is not None
     assert len(during) > len(after) + 2 * 40  # two cubes
+
+
+def test_a_copy_for_foxglove_shows_where_a_target_was_searched(tmp_path: Path) -> None:
+    pytest.importorskip("foxglove")
+    from groundstation.engineering_views.foxglove_file import write_with_scene
+
+    def sample(topic: Topic, message: m.Message) -> Sample:
+        head = message.header
+        return Sample(keys.expression("lab", topic, head.entity, head.source), codec.encode(message))
+
+    header = m.Header(NS_PER_S, "c", "team", "tracker", 1)
+    search = m.TargetSearch("turtlebot", "SEARCH", 2.0, (0.4, 0.0), 0.1, None, "searched for 2 s")
+    estimate = sample(ESTIMATE, m.Estimate(header=header, entities=(), epoch=0, searches=(search,)))
+    scene_bytes = []
+    for name, samples in (("mapped", [sample(SEARCH_MAP, search_map()), estimate]), ("bare", [estimate])):
+        writer = RunWriter(tmp_path / name, msgspec.json.encode(FIELD), 1, Timeline("c", 0))
+        writer.write(samples, writer.state, NS_PER_S)
+        writer.close()
+        write_with_scene(open_run(tmp_path / name), tmp_path / f"{name}.mcap")
+        index = open_run(tmp_path / f"{name}.mcap").indexes[0]
+        scene_bytes += [len(one.data) for one in messages_of(index) if one.channel.topic == SCENE_CHANNEL]
+    assert scene_bytes[0] > scene_bytes[1] + 2 * 40  # two cubes
 
 
 def test_rerun_shows_where_a_target_is_searched_while_it_is() -> None:

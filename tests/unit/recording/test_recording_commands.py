@@ -14,7 +14,10 @@ from click.testing import CliRunner, Result
 from mcap.reader import make_reader
 from mcap.writer import Writer
 
-from groundstation.bus.topics import ESTIMATE
+from groundstation.bus import codec, keys
+from groundstation.bus import messages as m
+from groundstation.bus.api import Sample
+from groundstation.bus.topics import ESTIMATE, PROCESS_STATUS
 from groundstation.cli.exits import ExitCode, exit_code_of
 from groundstation.cli.main import groundstation
 from groundstation.cli.verbs import VERBS
@@ -26,6 +29,8 @@ from groundstation.recording.reader import decode, open_recording
 from groundstation.recording.run import open_run
 from groundstation.recording.schemas import description_of
 from groundstation.recording.synthetic import write_run
+from groundstation.recording.timeline import Timeline
+from groundstation.recording.writing import RunWriter
 from groundstation.settings.files import find_field
 from groundstation.settings.load import load_field
 
@@ -88,6 +93,21 @@ def test_info_names_holes_and_missing_parts(whole: Path, tmp_path: Path) -> None
     assert (odometry["from_s"], odometry["to_s"]) == pytest.approx((0.8, 2.2), abs=0.05)
     (first / "state-2.mcap").rename(first / "state-3.mcap")
     assert json.loads(_run("info", first, "--json").output)["missing_parts"] == ["state-2.mcap"]
+
+
+def test_info_calls_it_no_hole_that_the_supervisor_speaks_for_a_process_now_and_then(tmp_path: Path) -> None:
+    rare, often = [0.0, 0.5, 1.0, 40.0, 40.5, 41.0], [float(second) for second in (*range(20), *range(30, 41))]
+    field = load_field(find_field("lab"), ()).model_dump_json().encode()
+    writer = RunWriter(tmp_path, field, 1, Timeline("c", 0))
+    for source, times in (("supervisor", rare), ("tracker", often)):
+        for number, time_s in enumerate(times):
+            header = m.Header(round(time_s * 1e9) + 1, "c", "tracker", source, number)
+            status = m.ProcessStatus(header=header, state=m.Lifecycle.READY, pid=1, cpu=0.0, ticks=0)
+            key = keys.expression("lab", PROCESS_STATUS, "tracker", source)
+            writer.write([Sample(key, codec.encode(status))], writer.state, header.stamp_ns)
+    writer.close()
+    (hole,) = json.loads(_run("info", tmp_path, "--json").output)["holes"]
+    assert hole["channel"].endswith("/tracker") and (hole["from_s"], hole["to_s"]) == (19.0, 30.0)
 
 
 def test_recover_makes_a_file_for_other_programs_and_keeps_the_original(run_dir: Path) -> None:

@@ -9,11 +9,12 @@ import numpy as np
 
 from groundstation.bus import messages as m
 from groundstation.bus import topics as t
+from groundstation.errors import MessageError
 from groundstation.field.resolved import ResolvedField, field_from_json
 from groundstation.recording.chunks import among
 from groundstation.recording.file_topics import STATE
 from groundstation.recording.preamble import FIELD_NAME
-from groundstation.recording.reader import Record, RecordingError, open_parts, parts
+from groundstation.recording.reader import RawRecord, RecordingError, decode, open_parts, parts
 from groundstation.recording.rerun import rerun_of
 from groundstation.report import run_facts
 from groundstation.report.captured_truth import captured_tracks
@@ -38,7 +39,7 @@ def gather(run_dir: Path) -> RunData:
         if FIELD_NAME in recording.attachments and not data.resolved.drones:
             data.resolved = _field(recording.attachments[FIELD_NAME], data.damage)
         data.rerun = data.rerun or rerun_of(recording.metadata)
-        rows.take(recording.records(among(_WANTED)))
+        rows.take(recording.raw_records(among((*_WANTED, t.ODOMETRY))))
         data.damage.extend(f"{recording.path.name}: {damage}" for damage in recording.damage)
     rows.finish()
     return data
@@ -59,14 +60,25 @@ class _Rows:
         self._data = data
         self._truth: defaultdict[str, list[tuple[float, ...]]] = defaultdict(list)
         self._estimates: defaultdict[str, list[tuple[float, m.EntityEstimate]]] = defaultdict(list)
-        self._processes: defaultdict[str, list[tuple[float, ...]]] = defaultdict(list)
+        # By who says it: the supervisor speaks for a process that is not there, or never speaks.
+        self._processes: defaultdict[str, defaultdict[str, list[tuple[float, ...]]]]
+        self._processes = defaultdict(lambda: defaultdict(list))
+        self._heard: defaultdict[str, list[int]] = defaultdict(list)
         self._sim: list[tuple[float, ...]] = []
         self._captured: list[TimedMessage[m.BodyPoses]] = []
 
-    def take(self, records: Iterable[Record]) -> None:
-        """Sort records into rows."""
+    def take(self, records: Iterable[RawRecord]) -> None:
+        """Sort records into rows. Of telemetry it counts when it was measured, which needs no decoding."""
         data = self._data
-        for record in records:
+        for raw in records:
+            if raw.key.topic is t.ODOMETRY:
+                self._heard[raw.key.entity].append(raw.log_time_ns)
+                continue
+            try:
+                record = decode(raw)
+            except MessageError as error:
+                data.damage.append(str(error))
+                continue
             if data.start_unix_ns == 0:
                 data.start_unix_ns = record.log_time_ns
             time_s = (record.log_time_ns - data.start_unix_ns) / 1e9
@@ -87,7 +99,8 @@ class _Rows:
                     self._estimates[entity.name].append((time_s, entity))
             case m.ProcessStatus():
                 counters = (message.pid, message.ticks, message.overruns, message.overflowed)
-                self._processes[message.header.entity].append((time_s, message.cpu, *map(float, counters)))
+                said = self._processes[message.header.entity][message.header.source]
+                said.append((time_s, message.cpu, *map(float, counters)))
             case m.SimStatus():
                 counts = (message.ticks, message.overruns, message.pictures, message.late_pictures)
                 self._sim.append((time_s, *map(float, counts)))
@@ -121,9 +134,12 @@ class _Rows:
             data.truth = captured_tracks(self._captured, data.vehicles, system.rate_hz if system else 30.0)
         for name, entries in self._estimates.items():
             data.estimates[name] = _estimate_track(entries)
-        for name, rows in self._processes.items():
-            table = np.array(sorted(rows))
+        for name, said in self._processes.items():
+            # Never both: what the supervisor says of an absent one (no pid yet, no ticks, no CPU) is no figure of it.
+            table = np.array(sorted(said.get(name) or (row for rows in said.values() for row in rows)))
             data.processes[name] = ProcessTrack(table[:, 0], table[:, 1], table[:, 2:])
+        for name, times_ns in self._heard.items():
+            data.heard_s[name] = (np.sort(np.array(times_ns, dtype=np.int64)) - data.start_unix_ns) / 1e9
         if self._sim:
             data.sim_counters = np.array(sorted(self._sim))[:, 1:]
         for timed in (data.commands, data.acks, data.plans, data.innovations, data.events):

@@ -1,7 +1,5 @@
 """How the links held: per vehicle, rates of telemetry, its longest gap, link quality, battery, refused datagrams."""
 
-from itertools import pairwise
-
 import msgspec
 import numpy as np
 
@@ -9,12 +7,15 @@ from groundstation.report.tracks import RunData
 
 
 class VehicleLink(msgspec.Struct, frozen=True):
-    """Of one vehicle over the whole run; None where it never said so. battery: first and last value, 0..1."""
+    """Of one vehicle over the whole run; None where it never said so. battery: first and last value, 0..1.
+
+    longest_silence_s: the longest time between two measurements that it sent (its driver speaks all the while).
+    """
 
     vehicle: str
     rate_hz_p50: float
     rate_hz_min: float
-    longest_silence_s: float
+    longest_silence_s: float | None
     link_quality_min: float | None
     battery: tuple[float, float] | None
     rejected: dict[str, int]
@@ -27,7 +28,7 @@ def links(data: RunData) -> list[VehicleLink]:
 
 def _link(data: RunData, name: str) -> VehicleLink:
     reported = sorted(data.vehicles[name], key=lambda item: item.time_s)
-    statuses, times = [item.message for item in reported], [item.time_s for item in reported]
+    statuses, heard_s = [item.message for item in reported], data.heard_s.get(name, ())
     rates = [status.rate_hz for status in statuses]
     quality = [status.link_quality for status in statuses if status.link_quality is not None]
     battery = [status.battery for status in statuses if status.battery is not None]
@@ -39,7 +40,7 @@ def _link(data: RunData, name: str) -> VehicleLink:
         vehicle=name,
         rate_hz_p50=float(np.median(rates)),
         rate_hz_min=min(rates),
-        longest_silence_s=max((now - before for before, now in pairwise(times)), default=0.0),
+        longest_silence_s=float(np.diff(heard_s).max()) if len(heard_s) > 1 else None,
         link_quality_min=min(quality, default=None),
         battery=(battery[0], battery[-1]) if battery else None,
         rejected=rejected,

@@ -128,7 +128,7 @@ class RunData:
     """Everything the report looks at. `start_unix_ns` is the time of the first message, `end_s` of the last.
 
     belief: the last one. suspicions: at least one for each verdict of the diagnosis. rerun: what it repeats, where it
-    is no recorded flight.
+    is no recorded flight. heard_s: when the telemetry of each vehicle was measured, by vehicle.
     """
 
     resolved: ResolvedField
@@ -146,6 +146,7 @@ class RunData:
     belief: Belief | None = None
     events: list[TimedMessage[Event]] = field(default_factory=list)
     vehicles: dict[str, list[TimedMessage[VehicleStatus]]] = field(default_factory=dict)
+    heard_s: dict[str, Array] = field(default_factory=dict)
     search_maps: dict[str, list[TimedMessage[SearchMap]]] = field(default_factory=dict)
     suspicions: list[TimedMessage[Suspicion]] = field(default_factory=list)
     damage: list[str] = field(default_factory=list)

@@ -114,8 +114,10 @@ def test_links_name_the_longest_silence_and_the_worst_quality() -> None:
             (0.0, 0.9, 1.0, 200.0, 0), (0.2, 0.9, 0.4, 150.0, 3), (2.2, 0.8, 0.9, 200.0, 1),
         )
     ]  # fmt: skip
-    (found,) = links(run_with(vehicles={"drone_1": statuses}))
-    assert found.longest_silence_s == pytest.approx(2.0)
+    heard_s = {"drone_1": np.array([0.0, 0.01, 1.51, 1.52])}  # silent for 1.5 s while its driver goes on telling
+    (found,) = links(run_with(vehicles={"drone_1": statuses}, heard_s=heard_s))
+    assert found.longest_silence_s == pytest.approx(1.5)
+    assert links(run_with(vehicles={"drone_1": statuses}))[0].longest_silence_s is None
     assert (found.link_quality_min, found.battery, found.rejected) == (0.4, (0.9, 0.8), {"checksum": 3})
 
 

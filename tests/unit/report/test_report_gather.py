@@ -1,0 +1,64 @@
+"""From the files of a run to figures of its processes and links."""
+
+from pathlib import Path
+
+import pytest
+
+from groundstation.bus import codec, keys
+from groundstation.bus import messages as m
+from groundstation.bus.api import Sample
+from groundstation.bus.topics import ODOMETRY, PROCESS_STATUS, Topic
+from groundstation.recording.timeline import Timeline
+from groundstation.recording.writing import RunWriter
+from groundstation.report.gather import gather
+from groundstation.report.load import process_loads
+from groundstation.settings.files import find_field
+from groundstation.settings.load import load_field
+from groundstation.time_units import NS_PER_S
+
+
+class _Writer:
+    def __init__(self, folder: Path) -> None:
+        field = load_field(find_field("lab"), ()).model_dump_json().encode()
+        self._run = RunWriter(folder, field, 1, Timeline("c", 0))
+
+    def status(self, time_s: int, name: str, source: str, **said: float) -> None:
+        header = m.Header((time_s + 1) * NS_PER_S, "c", name, source, time_s)
+        told = {"pid": 7, "cpu": 0.0, "ticks": 0} | said
+        self.write(PROCESS_STATUS, m.ProcessStatus(header=header, state=m.Lifecycle.READY, **told))  # type: ignore[arg-type]
+
+    def write(self, topic: Topic, message: m.Message) -> None:
+        head = message.header
+        key = keys.expression("lab", topic, head.entity, head.source)
+        self._run.write([Sample(key, codec.encode(message))], self._run.state, head.stamp_ns)
+
+    def close(self) -> None:
+        self._run.close()
+
+
+def test_what_the_supervisor_says_of_an_absent_process_is_no_life_of_it(tmp_path: Path) -> None:
+    writer = _Writer(tmp_path)
+    for second in range(3):
+        writer.status(second, "tracker", "supervisor", pid=0)
+        writer.status(second, "router", "supervisor", pid=5, cpu=0.1)
+    for second in range(3, 11):
+        writer.status(second, "tracker", "tracker", cpu=0.5, ticks=50 * second)
+        writer.status(second, "router", "supervisor", pid=5, cpu=0.1)
+    writer.status(7, "tracker", "supervisor")
+    writer.close()
+    tracker, router = process_loads(gather(tmp_path))
+    assert (tracker.name, tracker.restarts, tracker.ticks) == ("tracker", 0, 500)
+    assert (router.restarts, router.cores) == (0, pytest.approx(0.1))
+
+
+def test_the_silence_of_a_vehicle_is_that_of_its_telemetry(tmp_path: Path) -> None:
+    writer = _Writer(tmp_path)
+    for second in (1, 2, 6, 7):
+        header = m.Header(second * NS_PER_S, "c", "drone_1", "drone_1", second)
+        still = (0.0, 0.0, 0.0)
+        writer.write(ODOMETRY, m.Odometry(header=header, velocity_m_s=still, velocity_covariance=(0.01,) * 9,
+                                          yaw_rad=0.0, roll_rad=0.0, pitch_rad=0.0, height_m=1.0))  # fmt: skip
+    writer.status(0, "tracker", "tracker")
+    writer.close()
+    heard_s = gather(tmp_path).heard_s["drone_1"]
+    assert heard_s.tolist() == [0.0, 1.0, 5.0, 6.0]

@@ -21,8 +21,10 @@ def use_kernel_cache() -> None:
 
 
 def choices(value: str, allowed: tuple[str, ...], option: str) -> list[str]:
-    """Return a comma-separated option as a list; raises UsageError for what is not allowed."""
-    chosen = [part.strip() for part in value.split(",") if part.strip()]
+    """Return a comma-separated option as a list, each choice once; raises UsageError for none, or one not allowed."""
+    chosen = list(dict.fromkeys(part.strip() for part in value.split(",") if part.strip()))
+    if not chosen:
+        raise click.UsageError(f"{option}: name at least one of {', '.join(allowed)}")
     for part in chosen:
         if part not in allowed:
             raise click.UsageError(f"{option}: {part!r} is none of {', '.join(allowed)}")
@@ -30,9 +32,9 @@ def choices(value: str, allowed: tuple[str, ...], option: str) -> list[str]:
 
 
 def numbers(value: str, option: str, low: int, high: int) -> list[int]:
-    """Return a comma-separated option as integers within a range; raises UsageError."""
+    """Return a comma-separated option as integers within a range, each once; raises UsageError."""
     try:
-        found = [int(part) for part in value.split(",") if part.strip()]
+        found = list(dict.fromkeys(int(part) for part in value.split(",") if part.strip()))
     except ValueError:
         raise click.UsageError(f"{option}: {value!r} is not a list of whole numbers") from None
     if not found or min(found) < low or max(found) > high:
@@ -71,7 +73,7 @@ def planner(
     (without random), --repeats and --seed count.
     """
     sizes, layouts = numbers(robots, "--robots", 1, 500), choices(layout, _LAYOUTS, "--layout")
-    peers = choices(peer, _PEERS, "--peer")
+    peers = choices(peer, _PEERS, "--peer") if peer else []
     for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
     use_kernel_cache()

@@ -175,6 +175,7 @@ def _tasks(
     world: dict[str, Any],
 ) -> "list[Task]":
     """Return all runs of a grid; only `certified` and `global` depart from the paper."""
+    use_kernel_cache()  # the next import compiles
     from groundstation.experiments.tasks import DEPARTURES, Task
 
     if "global" in strategies and max(robots) > 6:
@@ -194,7 +195,6 @@ def _tasks(
 
 def _finish(name: str, tasks: "list[Task]", world: dict[str, Any], scheduler: str = "", workers: int = 0) -> None:
     """Run the tasks, write the tables and pictures, and print the result."""
-    use_kernel_cache()
     from groundstation.experiments.runner import SweepError, run_tasks, write_atomically
     from groundstation.experiments.summary import add_ratios, summarise, timings
     from groundstation.experiments.tasks import csv_text

@@ -6,7 +6,6 @@ Measurements name barcodes; `Barcodes.dat` says whose they are. "Odometry" is th
 
 import lzma
 from dataclasses import dataclass
-from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -80,10 +79,13 @@ def _table(folder: Path, name: str, columns: int) -> Array:
         )
     try:
         data = path.read_bytes() if path == plain else lzma.decompress(path.read_bytes())
-        table = np.loadtxt(StringIO(data.decode("ascii")), comments="#", ndmin=2, dtype=np.float64)
+        lines = data.decode("ascii").splitlines()
+        said = [line for line in lines if line.partition("#")[0].strip()]
+        table = np.loadtxt(said, comments="#", ndmin=2, dtype=np.float64) if said else np.empty((0, 0))
     except (OSError, ValueError, lzma.LZMAError) as error:
         raise DatasetError(f"{path}: not readable as a table of numbers ({error})") from error
     if table.size == 0 or table.shape[1] != columns or not np.isfinite(table).all():
-        raise DatasetError(f"{path}: expected lines of {columns} numbers (found {table.shape[1]} columns)")
+        found = f"{table.shape[1]} columns" if table.shape[1] != columns else "infinity, or what is no number"
+        raise DatasetError(f"{path}: expected lines of {columns} numbers (found {found if table.size else 'none'})")
     table = table[np.argsort(table[:, 0], kind="stable")] if name.startswith("Robot") else table
     return np.asarray(table)

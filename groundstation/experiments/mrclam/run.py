@@ -13,7 +13,7 @@ from groundstation.estimation.fixed_lag import FixedLagFilter
 from groundstation.estimation.measurement import Measurement, OdometrySample, SensorReading
 from groundstation.estimation.models import CommandedRobot, FixedMount, Landmark, MountedCamera, RangeBearingSensor
 from groundstation.estimation.parameters import WORLD_FROM_DOWN, EstimatorParameters
-from groundstation.experiments.mrclam.dataset import Dataset
+from groundstation.experiments.mrclam.dataset import Dataset, DatasetError
 from groundstation.experiments.mrclam.scenarios import CAMERA_STD_M, CAMERA_STD_RAD, SensingScenario, camera_sightings
 from groundstation.time_units import NS_PER_S
 
@@ -190,7 +190,9 @@ class ScenarioScore:
         self._errors.append(errors)
 
     def result(self, scenario: str, robot_readings: bool) -> ScenarioErrors:
-        """Return the figures."""
+        """Return the figures; raises DatasetError where nothing was compared."""
+        if not self._errors:
+            raise DatasetError(f"nothing can be judged in less than {_JUDGED_S:g} s of the set: take a longer --span")
         errors = np.array(self._errors)
         squares = np.sum(errors[:, :, :2] ** 2, axis=2)
         total = max(self.verdicts.total(), 1)

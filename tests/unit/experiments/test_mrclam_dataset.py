@@ -77,6 +77,8 @@ def test_dark_spells_and_the_room_s_other_half_show_nothing(folder: Path) -> Non
         (lambda f: (f / "Robot4_Odometry.dat").write_text("# nothing\nhello world\n"), "not readable as a table"),
         (lambda f: (f / "Landmark_Groundtruth.dat").write_text("1 2 3\n"), "expected lines of 5 numbers"),
         (lambda f: (f / "Barcodes.dat.xz").write_bytes(b"no archive"), "Barcodes.dat.xz"),
+        (lambda f: (f / "Barcodes.dat").write_text("# subject, barcode\n"), "expected lines of 2 numbers .found none"),
+        (lambda f: write(f, "Robot1_Odometry", [(5.0, math.nan, 0.0)]), "what is no number"),
         (lambda f: write(f, "Robot1_Odometry", [(5.0, 0.1, 0.0)]), "do not overlap in time"),
     ],
 )
@@ -84,6 +86,11 @@ def test_what_is_wrong_with_a_folder_is_named(folder: Path, break_it, said: str)
     break_it(folder)
     with pytest.raises(GroundStationError, match=said):
         read_dataset(folder)
+
+
+def test_a_span_too_short_to_judge_is_named(folder: Path) -> None:
+    with pytest.raises(GroundStationError, match="longer --span"):
+        run_scenario(read_dataset(folder), SCENARIOS[0], robot_readings=True, span=(0.5, 0.501))
 
 
 def test_the_verb_writes_json_and_refuses_bad_spans(folder: Path) -> None:

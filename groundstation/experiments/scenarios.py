@@ -1,18 +1,17 @@
 """Scenarios flown under strategies: their figures over seeds, and paired differences between strategies."""
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.special import stdtrit
+
+from groundstation.estimation.mean_interval import half_width
 
 STRATEGIES = (
     "ours", "string", "reversed", "flat", "two-level", "no-topology", "relay", "chase", "sampling", "lattice",
     "first-program",
 )  # fmt: skip
 FIXED = ("string", "reversed", "flat", "two-level")
-_UPPER = 0.975  # of a two-sided 95 % interval
 _SUMS = ("landings", "switches")
 
 
@@ -56,10 +55,7 @@ def paired(own: Iterable[Mapping[str, Any]], other: Iterable[Mapping[str, Any]])
     """Return mean and half width of the 95 % interval of own rmse minus the other's over the seeds that both found."""
     known = {one["seed"]: one["rmse_m"] for one in other if one.get("rmse_m") is not None}
     gaps = [one["rmse_m"] - known[one["seed"]] for one in own if one["seed"] in known and one.get("rmse_m") is not None]
-    freedom = len(gaps) - 1
-    if freedom < 1:
-        return None
-    return float(np.mean(gaps)), float(stdtrit(freedom, _UPPER) * np.std(gaps, ddof=1) / math.sqrt(len(gaps)))
+    return (float(np.mean(gaps)), half_width(gaps)) if len(gaps) > 1 else None
 
 
 def against_best_fixed(flights: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:

@@ -6,13 +6,12 @@ from collections.abc import Iterator, Sequence
 
 import msgspec
 import numpy as np
-from scipy.stats import t as student
 
 from groundstation.bus.messages import Belief, Innovation, Severity, Verdict
+from groundstation.estimation.mean_interval import half_width
 from groundstation.report.interval import tracking_interval
 from groundstation.report.tracks import RunData, TimedMessage
 
-CONFIDENCE = 0.95
 # Errors of a sensor repeat from picture to picture: what is two seconds apart counts as independent.
 _BLOCK_S, _LEAST_BLOCKS = 2.0, 4
 _TOO_SURE, _TOO_CAUTIOUS = 2.0, 0.4
@@ -116,15 +115,10 @@ def _sensor(observer: str, items: list[TimedMessage[Innovation]]) -> SensorTrust
     refused = 100.0 * sum(i.message.verdict is Verdict.IMPLAUSIBLE for i in items) / len(items)
     if len(means) < _LEAST_BLOCKS:
         return SensorTrust(observer, len(items), None, None, None, refused, "too few observations to say")
-    mean, half = float(np.mean(means)), _half_width(means)
+    mean, half = float(np.mean(means)), half_width(means)
     low, high = max(0.0, mean - half), mean + half
     verdict = "too sure" if low > _TOO_SURE else "too cautious" if high < _TOO_CAUTIOUS else "consistent"
     return SensorTrust(observer, len(items), mean, low, high, refused, verdict)
-
-
-def _half_width(values: Sequence[float]) -> float:
-    quantile = float(student.ppf((1 + CONFIDENCE) / 2, len(values) - 1))
-    return quantile * float(np.std(values, ddof=1)) / math.sqrt(len(values))
 
 
 def _shifts(data: RunData, belief: Belief) -> Iterator[SurveyShift]:

@@ -6,11 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.special import stdtrit
 
+from groundstation.estimation.mean_interval import half_width
 from groundstation.field.resolved import ResolvedField
-
-_UPPER = 0.975  # of a two-sided 95 % interval
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,12 +25,8 @@ class Interval:
 
 def interval(values: Iterable[float]) -> Interval:
     """Return the mean of one value per flight, with Student's factor for so many flights."""
-    found = np.array([value for value in values if math.isfinite(value)])
-    freedom = len(found) - 1
-    if freedom < 1:
-        return Interval(float(found.mean()) if len(found) else math.nan, math.nan, len(found))
-    half = float(stdtrit(freedom, _UPPER) * found.std(ddof=1) / math.sqrt(len(found)))
-    return Interval(float(found.mean()), half, len(found))
+    found = [value for value in values if math.isfinite(value)]
+    return Interval(float(np.mean(found)) if found else math.nan, half_width(found), len(found))
 
 
 def anees(report: Mapping[str, Any], names: Iterable[str], suffix: str = "") -> float:

@@ -51,7 +51,7 @@ class CheckFinding:
     "With a field file its fixed cameras are looked through, which need markers on the floor; a marker that two of "
     "them see must be in one place for both. --marker says where one lies. Of a recording (a run's folder, or one with "
     "pictures) the first pictures of its fixed cameras are looked at, by the field that was flown.\n\n"
-    "Exit codes: 0 all holds, 1 something does not, 2 wrong usage, 4 no pictures."
+    "Exit codes: 0 all that is known holds, 1 something does not or nothing is known, 2 wrong usage, 4 no pictures."
 )
 @click.argument("what")
 @click.option(
@@ -79,7 +79,8 @@ def check(what: str, calibration: Path | None, given: tuple[str, ...], square_mm
         field, pictures = _recorded(Path(what)) if _is_recording(Path(what)) else (_field_of(what), _of_camera)
         findings = list(_field_findings(field, pictures, known, square_mm, frames))
     click.echo("\n".join(finding.text for finding in findings))
-    return ExitCode.FAILED if any(finding.holds is False for finding in findings) else ExitCode.OK
+    held = {finding.holds for finding in findings}
+    return ExitCode.OK if True in held and False not in held else ExitCode.FAILED
 
 
 def _field_of(name: str) -> "Field":

@@ -5,12 +5,17 @@ import numpy as np
 
 _QUALITY = 60
 _LEAST_PX = 8
+# Of an eighth of the size: no camera takes 64 million pixels, and a recorder that draws more ends for want of memory.
+_MOST_PX = 1 << 20
 
 
 def blurred(jpeg: bytes) -> bytes | None:
-    """Return a JPEG of the same size with an eighth of the detail; None for what is no picture that large."""
-    coarse = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_REDUCED_COLOR_8) if jpeg else None
-    if coarse is None or min(coarse.shape[:2]) < _LEAST_PX:
+    """Return a JPEG of the same size with an eighth of the detail; None for what is no picture, or no size of one."""
+    try:
+        coarse = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_REDUCED_COLOR_8) if jpeg else None
+    except cv2.error:  # one that claims to be huge
+        return None
+    if coarse is None or min(coarse.shape[:2]) < _LEAST_PX or coarse.shape[0] * coarse.shape[1] > _MOST_PX:
         return None
     soft = cv2.GaussianBlur(coarse, (3, 3), 0)
     large = cv2.resize(soft, None, fx=8, fy=8, interpolation=cv2.INTER_LINEAR)

@@ -87,8 +87,8 @@ def _draw_heights(axes: Axes, data: RunData) -> None:
         truth, estimate = data.truth.get(name), data.estimates.get(name)
         color = color_of(name, data).light
         if truth is not None:
-            inside = (truth.time_s >= start) & (truth.time_s <= end)
-            axes.plot(truth.time_s[inside], truth.position_m[inside, 2], color=color, lw=1.4)
+            for part in truth.stretches(start, end):
+                axes.plot(truth.time_s[part], truth.position_m[part, 2], color=color, lw=1.4)
         if estimate is not None and estimate.mean.shape[1] > 2:
             inside = (estimate.time_s >= start) & (estimate.time_s <= end)
             axes.plot(estimate.time_s[inside], estimate.mean[inside, 2], color=color, lw=0.8, alpha=0.45)

@@ -76,12 +76,12 @@ def _draw_entity(axes: Axes, data: RunData, name: str, start: float, end: float)
     color = color_of(name, data).light
     truth, estimate = data.truth.get(name), data.estimates.get(name)
     if truth is not None:
-        inside = (truth.time_s >= start) & (truth.time_s <= end)
-        path = truth.position_m[inside, :2]
-        axes.plot(path[:, 0], path[:, 1], color=color, lw=1.8, zorder=4, solid_capstyle="round")
-        if len(path):
-            axes.plot(*path[0], "o", ms=7, mfc="white", mec=color, mew=1.8, zorder=6)
-            axes.plot(*path[-1], "s", ms=7, mfc=color, mec="white", mew=1.0, zorder=6)
+        stretches = [truth.position_m[part, :2] for part in truth.stretches(start, end) if len(part)]
+        for path in stretches:  # where it was in between nobody knows
+            axes.plot(path[:, 0], path[:, 1], color=color, lw=1.8, zorder=4, solid_capstyle="round")
+        if stretches:
+            axes.plot(*stretches[0][0], "o", ms=7, mfc="white", mec=color, mew=1.8, zorder=6)
+            axes.plot(*stretches[-1][-1], "s", ms=7, mfc=color, mec="white", mew=1.0, zorder=6)
     if estimate is not None and len(estimate.time_s):
         _draw_estimate(axes, estimate, color, start, end)
 

@@ -60,6 +60,11 @@ class TruthTrack:
         known: BoolArray = inside & (gap_s <= self.max_gap_s)
         return known
 
+    def stretches(self, start_s: float, end_s: float) -> list[NDArray[np.int64]]:
+        """Return the indices of the samples between two times, by stretches without a gap."""
+        inside = np.flatnonzero((self.time_s >= start_s) & (self.time_s <= end_s))
+        return np.split(inside, np.flatnonzero(np.diff(self.time_s[inside]) > self.max_gap_s) + 1)
+
     def position_at(self, time_s: Array) -> Array:
         """Return interpolated positions (m, 3); NaN where it is not known, a simulator's are held at both ends."""
         columns = [np.interp(time_s, self.time_s, self.position_m[:, axis]) for axis in range(3)]

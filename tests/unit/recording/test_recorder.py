@@ -223,5 +223,18 @@ def test_pictures_are_recorded_as_far_as_the_field_allows(
         assert _detail(seen) < 0.2 * _detail(fine)
 
 
+def test_a_huge_picture_is_left_out_and_recording_goes_on(
+    sender: tuple[MemoryBus, FakeChild], now: list[int], tmp_path: Path
+) -> None:
+    huge, usual = (cv2.imencode(".jpg", np.zeros((side, side), np.uint8))[1].tobytes() for side in (9000, 240))
+    bus, child = sender
+    recorder = _recorder(child, tmp_path, pictures="blurred")
+    for picture in (huge, usual):
+        bus.publish_bytes(IMAGE, bus.header("ceiling"), picture)
+    recorder.turn()
+    recorder.close()
+    assert len(list(open_recording(tmp_path / "raw.mcap").raw_records())) == 1
+
+
 def _detail(picture: Any) -> float:
     return float(np.abs(np.diff(picture.astype(float), axis=1)).mean())

@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from groundstation.arrays import Array
 from groundstation.bus.messages import (
@@ -21,6 +22,7 @@ from groundstation.report.accuracy import accuracy
 from groundstation.report.captured_truth import captured_tracks
 from groundstation.report.criteria import criteria_of
 from groundstation.report.metrics import figures_of
+from groundstation.report.plot_map import draw_map
 from groundstation.report.run_facts import RunFacts
 from groundstation.report.safety import landed, min_separation_m
 from groundstation.report.tracks import EstimateTrack, RunData, TimedMessage, TruthTrack
@@ -81,6 +83,15 @@ def test_nobody_knows_where_a_body_was_that_was_not_seen() -> None:
     assert accuracy(np.array([9.0]), seen, still(grid, 0.0), 2) is None
     slow = captured_tracks([poses(0.0, 0.0), poses(1.0, 0.0)], {}, rate_hz=2.0)["drone_1"]
     assert slow.known_at(np.array([0.5])).all(), "a system of two frames a second is known between them"
+
+
+def test_no_line_is_drawn_where_a_body_was_not_seen(lab_field: ResolvedField) -> None:
+    heard = [*(poses(t / 10, 0.0) for t in range(11)), *(poses(3.0 + t / 10, 4.0) for t in range(11))]
+    data = RunData(lab_field, RunFacts(), end_s=4.0, truth={"drone_1": captured_tracks(heard, {})["drone_1"]})
+    axes = Figure().subplots()
+    draw_map(axes, data)
+    paths = [line.get_xdata() for line in axes.lines if len(np.asarray(line.get_xdata())) > 1]
+    assert sorted(float(np.ptp(np.asarray(path))) for path in paths) == [0.0, 0.0]
 
 
 def test_drones_come_near_each_other_only_where_both_were_seen(lab_field: ResolvedField) -> None:

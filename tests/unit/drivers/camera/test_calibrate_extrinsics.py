@@ -234,15 +234,15 @@ def test_the_check_compares_what_two_cameras_have_in_view(tmp_path, capsys):
 
 def test_the_check_says_what_is_missing(tmp_path, capsys):
     folder, calibration = files_for(tmp_path, LENS, np.full((720, 1280), 120, np.uint8), 1)
-    assert run(["calibrate", "check", folder, "--calibration", calibration, "--frames=1"]) == 0
+    assert run(["calibrate", "check", folder, "--calibration", calibration, "--frames=1"]) == 1
     assert "is unknown: " in capsys.readouterr().out
     assert run(["calibrate", "check", folder, "--calibration", calibration, "--marker=1=0,0"]) == 2
     assert "where a camera hangs is in a field file" in capsys.readouterr().err
     field = lab_with(tmp_path, {"ceiling": (folder, CEILING, TURN_DEG)})
-    assert run(["calibrate", "check", field, "--frames=1", "--marker=8=1,1"]) == 0
+    assert run(["calibrate", "check", field, "--frames=1", "--marker=8=1,1"]) == 1
     assert "is unknown: marker 8: no camera has it in view" in capsys.readouterr().out
     assert run(["calibrate", "check", field, "--marker=8=1,1", "--marker=8=2,1"]) == 2
-    assert run(["calibrate", "check", "uwb-lab", "--frames=1"]) == 0
+    assert run(["calibrate", "check", "uwb-lab", "--frames=1"]) == 1
     assert "is unknown: the field has no fixed camera" in capsys.readouterr().out
     assert run(["calibrate", "check", "http://127.0.0.1:9/video.mjpg"]) == 2
     assert "--calibration FILE" in capsys.readouterr().err
@@ -289,6 +289,6 @@ def test_a_marker_that_moves_judges_no_camera(tmp_path, capsys):
     files_for(tmp_path, LENS, np.full((720, 1280), 120, np.uint8), 1)
     carried = [drawn(CEILING, LENS, {1: (0.9, 0.6 + 0.1 * step, 0.0, 0.3)}) for step in range(3)]
     run_dir = str(recorded(tmp_path, carried))
-    assert run(["calibrate", "check", run_dir, "--frames=3", "--marker=1=0.5,0.6"]) == 0
+    assert run(["calibrate", "check", run_dir, "--frames=3", "--marker=1=0.5,0.6"]) == 1
     out = capsys.readouterr().out
     assert "is unknown: ceiling: marker 1 moved" in out and "has marker" not in out

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from groundstation.cli.exits import ExitCode
-from groundstation.cli.experiment_campaign import campaign_options, flown_field, fly_all
+from groundstation.cli.experiment_campaign import campaign_options, flown_field, flown_scenario, fly_all
 from groundstation.cli.numbers import FiniteRange
 from groundstation.errors import SettingsError
 
@@ -96,10 +96,8 @@ def _chosen(told: Told, only: str) -> "list[WrongLab]":
 def _order(told: Told, errors: "tuple[WrongFigure, ...]", mended: Path | None = None) -> str:
     """Return what the simulator is told besides the seeds; mended: the field's file with the new settings."""
     from groundstation.experiments.culprit_rows import STAND_S
-    from groundstation.settings.files import find_scenario
-    from groundstation.settings.scenario import load_scenario
 
-    base = load_scenario(find_scenario(told.scenario, told.path))
+    base = flown_scenario(told.scenario, told.path)
     own = {"errors": errors, "stand_s": STAND_S, "calibrate": mended is None, "scenario": base, "seconds": told.seconds}
     return json.dumps(flown_field(mended or told.path, told.options) | own, sort_keys=True)
 

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable, Sequence
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -64,13 +65,44 @@ def flown_field(path: Path, options: Sequence[str]) -> dict[str, Any]:
     return {"field": msgspec.to_builtins(resolved_field(field)), "sections": sections}
 
 
-def order_of(name: str, scenario: str, options: Sequence[str], seconds: float, **own: Any) -> str:
-    """Return the simulator's order besides the seeds, by names of field and scenario; own: what one study asks for."""
-    from groundstation.settings.files import find_field, find_scenario
+PICTURES_ONLY = (
+    "pixel_noise",
+    "blur_px",
+    "exposure_ms",
+    "rolling_shutter_ms",
+    "light",
+    "shot_noise",
+    "jpeg_quality",
+    "floor",
+)
+"""What a scenario says of cameras that only pictures show, which nobody draws at message level."""
+
+
+@cache
+def flown_scenario(name: str, field: Path) -> dict[str, Any]:
+    """Return a scenario for flights at message level; says what of it changes nothing there.
+
+    field: the field file beside which it is looked for.
+    """
+    from groundstation.settings.document import read
+    from groundstation.settings.files import SHIPPED, find_scenario
     from groundstation.settings.scenario import load_scenario
 
+    scenario = load_scenario(find_scenario(name, field))
+    usual = read(SHIPPED / "scenarios" / "realistic.yaml").plain()["cameras"]
+    told = scenario.get("cameras") or {}
+    if idle := [key for key in PICTURES_ONLY if told.get(key, usual[key]) != usual[key]]:
+        listed = ", ".join(f"cameras.{key}" for key in idle)
+        click.echo(f"{name}: {listed}: nothing of it at message level, where no pictures are drawn: fly it", err=True)
+    return scenario
+
+
+def order_of(name: str, scenario: str, options: Sequence[str], seconds: float, **own: Any) -> str:
+    """Return the simulator's order besides the seeds, by names of field and scenario; own: what one study asks for."""
+    from groundstation.settings.files import find_field
+
     path = find_field(name)
-    order = {"scenario": load_scenario(find_scenario(scenario, path)), "seconds": seconds}
+    order = {"scenario": flown_scenario(scenario, path), "seconds": seconds}
     return json.dumps(flown_field(path, options) | order | own, sort_keys=True)
 
 

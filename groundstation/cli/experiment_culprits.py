@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from groundstation.cli.exits import ExitCode
-from groundstation.cli.experiment_campaign import campaign_options, flown_field, fly_all
+from groundstation.cli.experiment_campaign import campaign_options, flown_field, flown_scenario, fly_all
 from groundstation.cli.numbers import FiniteRange
 from groundstation.errors import SettingsError
 
@@ -69,12 +69,11 @@ def _planned(
     """Return the batches of flights of each row that was asked for."""
     from groundstation.experiments.culprit_rows import chosen, labs_of
     from groundstation.experiments.faults import batches
-    from groundstation.settings.files import find_field, find_scenario
-    from groundstation.settings.scenario import load_scenario
+    from groundstation.settings.files import find_field
 
     path = find_field(field)
     order = flown_field(path, options) | {"seconds": seconds}
-    base = load_scenario(find_scenario(scenario, path))
+    base = flown_scenario(scenario, path)
     if not order["field"]["cameras"] or len(order["field"]["drones"]) < 2:
         raise SettingsError([f"{path}: culprits needs a fixed camera and two drones"])
     return [

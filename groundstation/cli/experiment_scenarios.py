@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from groundstation.cli.exits import ExitCode
-from groundstation.cli.experiment_campaign import campaign_options, flown_field, fly_all
+from groundstation.cli.experiment_campaign import campaign_options, flown_field, flown_scenario, fly_all
 from groundstation.cli.numbers import FiniteRange
 from groundstation.errors import SettingsError
 
@@ -128,10 +128,9 @@ def _shipped() -> list[str]:
 
 def _order(name: str, seconds: float | None, field: str | None, options: tuple[str, ...]) -> dict[str, Any]:
     """Return what the simulator is told besides strategy and seeds."""
-    from groundstation.settings.files import find_field, find_scenario
-    from groundstation.settings.scenario import load_scenario
+    from groundstation.settings.files import find_field
 
-    scenario = load_scenario(find_scenario(name, find_field(field or "lab")))
+    scenario = flown_scenario(name, find_field(field or "lab"))
     expected = scenario.get("expected") or {}
     path = find_field(field or expected.get("field", "lab"))
     return flown_field(path, (*expected.get("set", ()), *options)) | {

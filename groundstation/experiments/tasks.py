@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from groundstation.experiments.closed_loop import SimulatedStep, SimulationSettings, run
 from groundstation.experiments.paths import Path, figure_eight, receding
 from groundstation.experiments.planar.parameters import FIGURE_1, PlanarParameters
+from groundstation.experiments.program_digest import program_digest
 from groundstation.experiments.strategies import Strategy
 
 LOST_M = 0.5
@@ -56,8 +57,8 @@ class Task:
 
     @property
     def key(self) -> str:
-        """Return a name that is the same for equal tasks only."""
-        text = json.dumps(asdict(self), sort_keys=True)
+        """Return a name that is the same for equal tasks of the same program only."""
+        text = json.dumps(asdict(self), sort_keys=True) + program_digest()
         digest = hashlib.sha256(text.encode()).hexdigest()[:12]
         return f"{self.experiment}-{self.robots:03d}-{self.strategy}-{self.seed:04d}-{digest}"
 

@@ -124,10 +124,12 @@ def test_wrong_names_are_told() -> None:
         Strategy("best", 3, FIGURE_1, np.random.default_rng(0))
 
 
-def test_equal_tasks_have_equal_keys_only() -> None:
+def test_equal_tasks_have_equal_keys_only(monkeypatch: pytest.MonkeyPatch) -> None:
     task = Task("teams", 3, "paper", 1)
-    assert task.key == Task("teams", 3, "paper", 1).key
+    assert task.key == (key := Task("teams", 3, "paper", 1).key)
     assert len({task.key, Task("teams", 3, "paper", 2).key, Task("teams", 3, "paper", 1, dropout=0.1).key}) == 3
+    monkeypatch.setattr("groundstation.experiments.tasks.program_digest", lambda: "of another program")
+    assert task.key != key, "a sweep goes on in a folder of results only with the program that made them"
 
 
 @pytest.mark.parametrize("sensor", SENSORS, ids=lambda sensor: sensor.name)

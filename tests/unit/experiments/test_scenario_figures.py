@@ -1,13 +1,16 @@
 """Figures of flown scenarios: what counts as found, lost and as expected, and how strategies are compared."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from groundstation.cli.experiment_campaign import PICTURES_ONLY, flown_scenario
 from groundstation.cli.experiment_scenarios import _labelled
 from groundstation.experiments.scenarios import STRATEGIES, against_best_fixed, comparison, paired, rows_of, table
-from groundstation.settings.files import SHIPPED
+from groundstation.settings.files import SHIPPED, find_field
+from sim_bridge.scenario import CameraScenario
 from sim_bridge.study.scenarios.figures import TrackingErrors, shortfalls
 from sim_bridge.surroundings import ScenarioExpectation
 
@@ -112,3 +115,15 @@ def test_each_scenario_says_what_it_expects_in_its_header() -> None:
 def test_scenarios_of_one_name_are_rows_of_their_own_and_one_named_twice_is_flown_once() -> None:
     named = ("a/hard.yaml", "b/hard.yaml", "corner", "corner")
     assert _labelled(named) == {"a/hard.yaml": "a/hard.yaml", "b/hard.yaml": "b/hard.yaml", "corner": "corner"}
+
+
+def test_what_only_pictures_show_is_told_to_change_nothing_at_message_level(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    dark = tmp_path / "dark.yaml"
+    dark.write_text("schema_version: 1\ncameras: {light: 0.2, rolling_shutter_ms: 20, fps: 12, exposure_ms: 4.0}\n")
+    assert flown_scenario(str(dark), find_field("lab"))["cameras"]["light"] == 0.2
+    assert "cameras.rolling_shutter_ms, cameras.light: " in capsys.readouterr().err
+    flown_scenario("realistic", find_field("lab"))
+    assert not capsys.readouterr().err
+    assert set(PICTURES_ONLY) < set(CameraScenario.model_fields)

@@ -41,7 +41,7 @@ def new_folder(path: Path) -> Iterator[None]:
     require_absent(path)
     with errors_named(path):
         path.mkdir(parents=True)
-        with _removed_if_unfinished(path):
+        with removed_if_unfinished(path):
             yield
 
 
@@ -49,12 +49,13 @@ def new_folder(path: Path) -> Iterator[None]:
 def unmade_folder(path: Path) -> Iterator[None]:
     """Do the same for a folder that somebody else's library makes, and refuses where it exists."""
     require_absent(path)
-    with errors_named(path), _removed_if_unfinished(path):
+    with errors_named(path), removed_if_unfinished(path):
         yield
 
 
 @contextmanager
-def _removed_if_unfinished(path: Path) -> Iterator[None]:
+def removed_if_unfinished(path: Path) -> Iterator[None]:
+    """Remove a folder, where there is one by then, when what fills it fails or is interrupted."""
     try:
         yield
     except BaseException:

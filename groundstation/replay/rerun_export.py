@@ -1,6 +1,7 @@
 """A re-run as a run folder of its own: what was recorded, with what the tracker says now in place of what it said."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 from groundstation.bus import codec, keys
@@ -9,8 +10,10 @@ from groundstation.bus.messages import Message
 from groundstation.bus.topics import JOURNAL, Topic
 from groundstation.recording.capture import Capture
 from groundstation.recording.chunks import among
+from groundstation.recording.copies import preamble_copy
 from groundstation.recording.mcap_file import McapFile
-from groundstation.recording.preamble import FIELD_NAME, Preamble
+from groundstation.recording.outputs import errors_named
+from groundstation.recording.preamble import FIELD_NAME
 from groundstation.recording.reader import RawRecord, RecordingError, open_recording
 from groundstation.recording.rerun import Rerun
 from groundstation.recording.timeline import Timeline
@@ -35,19 +38,19 @@ def live_again(source: Source, repetition: Repetition, folder: Path, field: byte
     field: the resolved field (JSON) that it runs with; changes: what is not as it was recorded, in words.
     """
     require_new(folder)
-    folder.mkdir(parents=True, exist_ok=True)
     opened = open_recording(source.state[0])
-    attachments = {name: (opened.media_types.get(name, ""), data) for name, data in opened.attachments.items()}
-    attachments[FIELD_NAME] = ("application/json", field)
     note = {**Rerun(source.name, changes).as_metadata(), "versions": {**source.versions, **versions.current()}}
-    created = int(source.run.get("created_unix_ns", "0"))
-    if _FACTS in opened.attachments:
-        (folder / _FACTS).write_bytes(opened.attachments[_FACTS])
-    file = McapFile(folder / "state.mcap", Preamble({**opened.metadata, **note}, attachments, created))
-    try:
-        _write(source, repetition, file)
-    finally:
-        file.close()
+    preamble = preamble_copy(opened, note)
+    attachments = {**preamble.attachments, FIELD_NAME: ("application/json", field)}
+    with errors_named(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        if _FACTS in opened.attachments:
+            (folder / _FACTS).write_bytes(opened.attachments[_FACTS])
+        file = McapFile(folder / "state.mcap", replace(preamble, attachments=attachments))
+        try:
+            _write(source, repetition, file)
+        finally:
+            file.close()
 
 
 def _write(source: Source, repetition: Repetition, file: McapFile) -> None:

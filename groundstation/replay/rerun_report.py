@@ -3,6 +3,7 @@
 import hashlib
 import tempfile
 from collections.abc import Iterator, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import msgspec
 
 from groundstation.appearance.topology import topology_words
 from groundstation.field.resolved import ResolvedField
+from groundstation.recording.outputs import removed_if_unfinished
 from groundstation.recording.reader import RecordingError
 from groundstation.replay import counterfactual, versions
 from groundstation.replay.rerun_export import live_again, require_new
@@ -48,8 +50,13 @@ class Again:
     def run(self) -> Comparison:
         """Live all ticks again as recorded, then with the changes; returns how the first went.
 
-        Raises RecordingError when the recording holds nothing to do it with.
+        Raises RecordingError when the recording holds nothing to do it with. An output that was not finished is
+        removed: half of it would look like a whole flight.
         """
+        with removed_if_unfinished(self._output) if self._output else nullcontext():
+            return self._run()
+
+    def _run(self) -> Comparison:
         plain = Repetition(self._source, self._field, self._plain_digest.update)
         if not self._changes:
             self._live(plain, self._output)

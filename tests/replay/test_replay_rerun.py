@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import click
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -194,3 +195,18 @@ def test_recordings_made_earlier_are_understood() -> None:
                 assert again[label] == pytest.approx(value, abs=0.15), label
     assert compared > 100 and later < 20, (compared, later)
     assert np.isfinite([value for belief in now.values() for value in belief.mean]).all()
+
+
+def test_nothing_is_left_of_a_rerun_that_was_interrupted(
+    flown: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*_: object) -> None:
+        assert (tmp_path / "again" / "state.mcap").exists()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("groundstation.replay.rerun_export._write_lived", interrupted)
+    result = CliRunner().invoke(
+        groundstation, ["replay", str(flown), "--recompute", "-o", str(tmp_path / "again")], standalone_mode=False
+    )
+    assert isinstance(result.exception, click.Abort | KeyboardInterrupt)
+    assert not (tmp_path / "again").exists(), "half of it would be taken for a flight"

@@ -218,7 +218,10 @@ def _finish(name: str, tasks: "list[Task]", world: dict[str, Any], scheduler: st
 
 
 def _folder(name: str, world: dict[str, Any]) -> Path:
-    return Path(world["out"] or Path("runs") / f"experiment-{name}")
+    """Return the folder of the results, and make it: one that cannot be made must not end hours of computing."""
+    folder = Path(world["out"] or Path("runs") / f"experiment-{name}")
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
 
 
 def _show(summary: dict[str, Any], entries: Sequence[dict[str, Any]], folder: Path, world: dict[str, Any]) -> None:

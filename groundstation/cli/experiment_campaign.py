@@ -116,6 +116,7 @@ def fly_all(
     from groundstation.experiments.faults import fly
     from groundstation.experiments.runner import SweepError, dask_is_there, run_tasks
 
+    (out / "flights").mkdir(parents=True, exist_ok=True)  # before hours were flown for nothing
     serial = scheduler == "none" or (scheduler == "local" and (single or not dask_is_there()))
     try:
         return run_tasks(batches, out / "flights", "" if serial else scheduler, workers, progress, fly)

@@ -32,6 +32,8 @@ _UNITS = {
     "_deg": "deg",
     "_hz": "Hz",
     "_bytes": "B",
+    "_ppm": "ppm",
+    "_px": "px",
     "_ms": "ms",
     "_ns": "ns",
     "_m": "m",

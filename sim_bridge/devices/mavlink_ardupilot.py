@@ -39,11 +39,6 @@ class ArduCopter(AutopilotFirmware):
         """Return whether a mode exists."""
         return mode in list(Mode)
 
-    def prearm_fault(self) -> str:
-        """Return the reason against arming in any mode, or ""."""
-        fault = self.health_fault()
-        return f"PreArm: {fault.capitalize()}" if fault else ""
-
     def arming_fault(self) -> str:
         """Return why it does not arm now, or ""."""
         fault = self.health_fault()

@@ -151,3 +151,13 @@ def test_without_dask_a_sweep_runs_one_by_one(
     assert "needs dask" in capsys.readouterr().err
     with pytest.raises(SweepError):
         run_tasks(TASKS, None, "local")
+
+
+def test_a_place_for_results_that_cannot_be_is_told_before_anything_is_computed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setattr("groundstation.experiments.runner.run_tasks", lambda *_: pytest.fail("computed"))
+    for wrong in (["figure1"], ["scenarios", "random-walk", "--scheduler", "none"]):
+        assert run(["experiment", *wrong, "--output", str(tmp_path / "file")]) == 2
+        assert str(tmp_path / "file") in capsys.readouterr().err

@@ -53,3 +53,13 @@ def test_searches_of_an_estimate_have_a_table() -> None:
     row = _row(searches, m.Estimate(header=HEADER, entities=(), epoch=1, searches=(search,)))
     assert searches.name == "estimate_searches"
     assert (row["target"], row["place_x_m"], row["expected_s"]) == ("turtlebot", 1.0, None)
+
+
+def test_columns_have_the_units_that_their_names_say() -> None:
+    units = {one.name: one.unit for topic in (t.CAMERA_STATUS, t.VEHICLE_STATUS) for one in tables_of(topic)[0].columns}
+    assert (units["edge_px"], units["clock_drift_ppm"], units["age_ms"], units["lands_in_s"]) == (
+        "px",
+        "ppm",
+        "ms",
+        "s",
+    )

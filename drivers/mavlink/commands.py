@@ -131,11 +131,12 @@ class Orders:
     def _climbed(self, now_ns: int, landed: int, reported_m: float, climb_m_s: float) -> float:
         """Return the height above the floor [m]: from the tracker, else the vehicle's own since lift-off."""
         risen_m = self.lift.hear(now_ns, self.starting, landed, reported_m, climb_m_s)
-        if not self.lift.lifted:
-            if self.starting:
-                self.drift.stand(now_ns)
-            else:
-                self.drift.reset()
+        if self.lift.lifted:
+            self.drift.lift()
+        elif self.starting:
+            self.drift.stand(now_ns)
+        else:
+            self.drift.reset()
         believed = self.drift.place(now_ns)
         return risen_m if believed is None else believed[2] - self._floor_m
 

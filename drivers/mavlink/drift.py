@@ -15,8 +15,10 @@ _SMOOTHING_S = 0.12
 # The belief learns of an error half a second late (sightings are late, and it takes some); one that grows with a tilt
 # has changed by then as much as it did lately.
 _LATELY_S = 0.6
-# Climb rates of the belief are mostly the autopilot's own word, less an error that changes over seconds.
-_CLIMB_SMOOTHING_S, _MOST_CLIMB_M_S = 0.4, 0.3
+# An error of the climb rate sways within a second or two (docs/reference/mavlink.md 2.1). Heights show it sooner than
+# the belief's own climb rate, which is mostly the autopilot's; sought faster than this, it would be their noise.
+_CLIMB_PER_S, _MOST_CLIMB_M_S = 6.0, 0.3
+_GAP_S, _HEIGHT_JUMP_M, _STEP_S = 0.3, 0.3, 0.1
 # A measured estimator's error of the velocity is the same for that long; then so much of it is another's each second
 # (docs/reference/mavlink.md 2.1): 0.73 of it is left half a second after it was seen, 0.33 after a second.
 _LASTS_S, _FORGETS_S = 0.35, 0.6
@@ -67,6 +69,26 @@ class Obedience:
         return self._reported_off <= self._seen_off + _EVEN_M_S
 
 
+class ClimbError:
+    """error_m_s: reported less true climb rate, by how the believed height leaves the sum of the reported rate."""
+
+    def __init__(self) -> None:
+        self.error_m_s = 0.0
+        self._height_m, self._at_ns = 0.0, 0
+
+    def hear(self, now_ns: int, height_m: float, reported_m_s: float) -> None:
+        """Take a height [world] that cameras keep right, and the climb rate reported meanwhile."""
+        elapsed_s, self._at_ns = (now_ns - self._at_ns) / NS_PER_S, now_ns
+        expected_m = self._height_m + elapsed_s * (reported_m_s - self.error_m_s)
+        off_m = height_m - expected_m
+        if elapsed_s > _GAP_S or abs(off_m) > _HEIGHT_JUMP_M:
+            self._height_m = height_m
+            return
+        step_s = min(elapsed_s, _STEP_S)
+        self._height_m = expected_m + 1.4 * _CLIMB_PER_S * step_s * off_m
+        self.error_m_s -= _CLIMB_PER_S**2 * step_s * off_m
+
+
 class DriftFeedback:
     """Belief of one flying vehicle [world, FLU] beside the velocity that its autopilot reports."""
 
@@ -77,7 +99,8 @@ class DriftFeedback:
         """Forget everything: the vehicle is on the floor."""
         self._drift: Vector2 = (0.0, 0.0)
         self._lately: Vector2 = (0.0, 0.0)
-        self._climb_drift_m_s = 0.0
+        self._climb = ClimbError()
+        self._stands = False
         self._at_ns: int | None = None
         self._seen_ns = 0
         self._believed_ns: int | None = None
@@ -89,8 +112,12 @@ class DriftFeedback:
         self._held: Vector3 | None = None
 
     def stand(self, now_ns: int) -> None:
-        """Note that it has not lifted off yet; the error of its climb rate, which sways on the floor, is forgotten."""
-        self._climb_drift_m_s, self._stood_ns = 0.0, now_ns
+        """Note that it has not lifted off yet: the error of its climb rate, which sways there, does not count."""
+        self._stands, self._stood_ns = True, now_ns
+
+    def lift(self) -> None:
+        """Note that it has left the floor."""
+        self._stands = False
 
     def tell(self, now_ns: int, velocity_m_s: Vector3) -> None:
         """Note the velocity [base_stabilized] that goes out, correction included."""
@@ -107,8 +134,7 @@ class DriftFeedback:
         forward, left = reported_m_s[:2]
         vx, vy = estimate.velocity_m_s[:2]
         self._obeys = self._obedience.hear(now_ns, (forward, left), (c * vx + s * vy, c * vy - s * vx))
-        share = _share(now_ns - (self._at_ns or now_ns), _CLIMB_SMOOTHING_S)
-        self._climb_drift_m_s += share * (reported_m_s[2] - estimate.velocity_m_s[2] - self._climb_drift_m_s)
+        self._climb.hear(now_ns, z, reported_m_s[2])
         self._correct(now_ns, (c * forward - s * left - vx, s * forward + c * left - vy))
 
     def _correct(self, now_ns: int, error: Vector2) -> None:
@@ -138,8 +164,8 @@ class DriftFeedback:
         fades = math.exp(-max(0.0, (now_ns - self._seen_ns) / NS_PER_S - _LASTS_S) / _FORGETS_S)
         x, y = drift
         left_over = fades * min(1.0, _MOST_M_S / max(math.hypot(x, y), _MOST_M_S))
-        up = max(-_MOST_CLIMB_M_S, min(_MOST_CLIMB_M_S, fades * self._climb_drift_m_s))
-        return self._in_heading(left_over * x, left_over * y, up)
+        up = 0.0 if self._stands else fades * self._climb.error_m_s
+        return self._in_heading(left_over * x, left_over * y, max(-_MOST_CLIMB_M_S, min(_MOST_CLIMB_M_S, up)))
 
     @property
     def size_m_s(self) -> float:

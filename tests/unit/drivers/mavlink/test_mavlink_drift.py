@@ -2,6 +2,8 @@
 
 import itertools
 import math
+import random
+import statistics
 
 import pytest
 
@@ -118,6 +120,61 @@ def test_an_error_that_changes_evenly_is_corrected_by_what_it_is_by_now():
     assert feedback.drift(S + 199 * STEP_NS)[0] < now - 0.09, "what it was seen to be"
 
 
+class Climber:
+    """Rises at 0.1 m/s, its own word off by an error; cameras tell its height, the belief's rate is its word."""
+
+    def __init__(self):
+        self.feedback, self.now_ns, self.height_m = DriftFeedback(), S, 0.8
+
+    def rise(self, *errors_m_s):
+        for error in errors_m_s:
+            self.now_ns += STEP_NS
+            self.height_m += 0.02 * 0.1
+            place = (0.0, 0.0, self.height_m, 0.0)
+            entity = EntityEstimate("v", "robot", place, (1e-4,) * 16, (0.0, 0.0, 0.1 + error), True, 0.1)
+            self.feedback.hear(self.now_ns, entity, (0.0, 0.0, 0.1 + error))
+
+    @property
+    def corrected(self):
+        return self.feedback.correction(self.now_ns)[2]
+
+
+def test_an_error_of_a_climb_rate_is_found_by_heights_within_half_a_second():
+    """A real PX4's sways from -0.2 to +0.2 m/s within two seconds: a correction that is late adds to it."""
+    climber = Climber()
+    climber.rise(*[-0.2] * 150)
+    assert climber.corrected == pytest.approx(-0.2, abs=0.02)
+    climber.rise(*[0.2] * 25)
+    assert climber.corrected == pytest.approx(0.2, abs=0.05)
+
+
+def test_heights_that_are_noisy_by_a_centimetre_hardly_move_the_correction_of_a_climb():
+    climber, noise, corrected = Climber(), random.Random(1), []
+    for _ in range(500):
+        climber.height_m += (offset := noise.gauss(0.0, 0.01))
+        climber.rise(0.0)
+        climber.height_m -= offset
+        corrected.append(climber.corrected)
+    assert statistics.pstdev(corrected[100:]) < 0.04
+
+
+def test_a_step_of_the_believed_height_is_no_climb():
+    climber = Climber()
+    climber.rise(*[0.1] * 100)
+    climber.height_m += 0.5
+    climber.rise(*[0.1] * 10)
+    assert climber.corrected == pytest.approx(0.1, abs=0.02)
+
+
+def test_an_error_of_a_climb_rate_counts_from_lift_off_on():
+    climber = Climber()
+    climber.feedback.stand(climber.now_ns)
+    climber.rise(*[0.1] * 100)
+    assert climber.corrected == 0.0
+    climber.feedback.lift()
+    assert climber.corrected == pytest.approx(0.1, abs=0.01)
+
+
 def test_an_error_beyond_what_is_corrected_is_corrected_as_far():
     """Nothing is as far off as the whole error: a correction that ends at a limit is a step of that size."""
     vehicle = Vehicle()
@@ -156,12 +213,10 @@ def test_on_the_floor_nothing_is_known():
 
 
 def test_the_error_of_a_climb_rate_is_corrected_up_to_a_limit():
-    feedback = DriftFeedback()
     for error, corrected in ((0.2, 0.2), (0.9, 0.3)):
-        for turn in range(150):
-            entity = EntityEstimate("v", "robot", (0.0, 0.0, 0.8, 0.0), (1e-4,) * 16, (0.0, 0.0, 0.1), True, 0.1)
-            feedback.hear(S + turn * STEP_NS, entity, (0.0, 0.0, 0.1 + error))
-        assert feedback.drift(S + 150 * STEP_NS)[2] == pytest.approx(corrected, abs=0.01)
+        climber = Climber()
+        climber.rise(*[error] * 150)
+        assert climber.feedback.drift(climber.now_ns)[2] == pytest.approx(corrected, abs=0.01)
 
 
 def test_a_place_that_is_given_is_held_instead_of_the_one_where_the_hover_began():

@@ -90,6 +90,15 @@ def test_a_hover_after_the_take_off_goes_on_to_its_height_and_a_later_hold_keeps
     assert climb.height_m == pytest.approx(reached_m, abs=0.05)
 
 
+@pytest.mark.parametrize("flavour", [Flavour.PX4, Flavour.ARDUPILOT])
+def test_a_track_in_the_climb_ends_it_since_heights_are_the_trackers_from_then_on(flavour):
+    climb = Climb(flavour, seen=True)
+    climb.rise_to(0.3)
+    for _ in range(40):
+        climb.turn(DriverMode.TRACK, Action.FLY)  # told to stay where it is
+    assert climb.height_m == pytest.approx(0.3, abs=0.05)
+
+
 def test_an_ardupilot_that_ends_its_take_off_is_told_nothing_and_so_not_judged_by_it():
     climb = Climb(Flavour.ARDUPILOT, seen=True)
     climb.rise_to(0.3)

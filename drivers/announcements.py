@@ -17,7 +17,7 @@ _UNSOUND = "restart it; if it says this again, have that sensor repaired"
 _INTRUSIONS = {
     "unsigned": "unsigned frames",
     "signature": "frames signed with another key",
-    "duplicate_system": "frames of a second vehicle with its number",
+    "duplicate_system": "frames with its number from a second address (another vehicle, or it was restarted there)",
     "foreign_address": "datagrams from another address",
     "setpoint_other_source": "setpoints of another sender",
     "setpoint_epoch_leap": "setpoints of an epoch far ahead",

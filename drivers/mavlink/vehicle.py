@@ -15,6 +15,7 @@ from drivers.mavlink.publisher import TelemetryPublisher
 from drivers.mavlink.requests import Requests
 from drivers.mavlink.session import MavlinkSession, streams
 from drivers.mavlink.settings import MavlinkDriverSettings, VehicleSettings
+from drivers.mavlink.settling import Settling
 from drivers.mavlink.texts import BootClock, Texts
 from drivers.mavlink.traffic import Traffic
 from drivers.mavlink.vision import VisionFeed
@@ -68,7 +69,7 @@ class MavlinkVehicle:
         self._traffic = Traffic()
         self._plausibility = MotionMonitor(LIMITS)
         self._refused: Counter[str] = Counter()
-        self._said, self._boot_clock = Texts(), BootClock()
+        self._said, self._boot_clock, self._settling = Texts(), BootClock(), Settling()
         self._jumps: deque[int] = deque(maxlen=8)
         self._refusals: deque[tuple[int, str]] = deque(maxlen=16)
 
@@ -218,7 +219,7 @@ class MavlinkVehicle:
         if self.flavour is Flavour.PX4:
             # WIRE (docs/reference/mavlink.md 2): without GPS PX4's PREARM_CHECK never becomes healthy, yet OFFBOARD
             # arming works.
-            return ""
+            return "" if self._settling.is_over(now_ns, known.status) else "its own checks have not passed yet"
         if not known.ekf & EkfFlag.POS_HORIZ_REL:
             return "its estimator has no position yet"
         return "" if known.healthy & SensorBits.PREARM_CHECK else self._arming_reason()

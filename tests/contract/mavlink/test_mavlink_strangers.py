@@ -20,6 +20,16 @@ def test_frames_that_nothing_vouches_for_are_told(rig_of):
     assert sum("refused" in text for text in rig.process.texts) == 1, "a flood is told once in 10 s"
 
 
+def test_a_second_address_may_be_that_of_a_vehicle_that_was_restarted(rig_of):
+    """A real ArduCopter called from another port then, and was told to be a second vehicle for 3 s."""
+    rig = rig_of("ardupilot")
+    rig.connect()
+    rig.link.rejected.update(duplicate_system=60)
+    rig.run(1.0)
+    word = "v refused 60 frames with its number from a second address (another vehicle, or it was restarted there)"
+    assert word in rig.process.texts
+
+
 def test_setpoints_and_leases_in_anothers_place_move_nothing_and_are_told(rig_of):
     rig = rig_of("px4")
     rig.track_on()

@@ -10,6 +10,7 @@ from drivers.mavlink.wire.telemetry import (
     AttitudeQuaternion,
     BatteryStatus,
     ExtendedSysState,
+    Heartbeat,
     HighresImu,
     LocalPositionNed,
     RawImu,
@@ -104,6 +105,20 @@ def test_a_velocity_that_is_alive_and_wrong_stops_it_too(rig_of, lie, word):
     rig.until(lambda: rig.mode != "TRACK", 1.5)
     assert word in rig.host.watchdog.reason
     rig.until(lambda: rig.mode == "LANDING" or math.hypot(*rig.velocity()) < 0.1, 2.5)
+
+
+def test_a_px4_that_says_that_it_is_not_ready_is_given_four_seconds_from_its_first_positions_on(rig_of):
+    """It refuses to arm for 3 s then; without a remote control it may say so for ever."""
+    rig = rig_of("px4")
+    Liar(rig.link).set(Heartbeat, system_status=0)
+    rig.until(lambda: rig.host.watchdog.vehicle.not_ready == "its own checks have not passed yet")
+    rig.run(3.0)
+    assert rig.host.watchdog.vehicle.not_ready == "its own checks have not passed yet"
+    rig.run(1.5)
+    assert not rig.host.watchdog.vehicle.not_ready
+    ready = rig_of("px4").connect()
+    ready.order(Verb.TAKEOFF)
+    ready.until(lambda: ready.mode == "TAKING_OFF", 0.2)
 
 
 def test_a_battery_that_is_told_no_more_is_unknown_and_lands_it(rig_of):

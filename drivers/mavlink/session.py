@@ -20,7 +20,8 @@ from groundstation.time_units import NEVER_NS, NS_PER_MS, NS_PER_S
 
 _ORIGIN_PERIOD_NS = 3 * NS_PER_S
 _PARAM_PERIOD_NS = 500 * NS_PER_MS
-_HEARTBEAT_NS = NS_PER_S
+# Eight of them in the 2 s after which an ArduPilot lands without: on a link that loses every fifth some always arrive.
+_HEARTBEAT_NS = 250 * NS_PER_MS
 _DISCONNECTED_NS = 2 * NS_PER_S
 # How long a stream may stay away, at least, before it is asked for anew; in periods of its own.
 _STREAM_NS, _PERIODS = 3 * NS_PER_S, 5

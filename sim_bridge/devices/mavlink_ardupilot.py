@@ -13,6 +13,8 @@ _REACHED_M = 0.08
 # Measured after the last pose.
 _EKF_FAILSAFE_S = 8.0
 _STOPPED_AIDING_S = 15.0
+# Source (mode_land.cpp): a landing by a failsafe holds its place before it descends.
+_LANDS_AFTER_S = 4.0
 _LEVEL = (Mode.STABILIZE, Mode.ALT_HOLD)
 _GCS_ACTIONS = frozenset({1, 3, 5, 7})
 
@@ -34,6 +36,7 @@ class ArduCopter(AutopilotFirmware):
         self._braked = True
         self._paused = False
         self._ground_lost = self._aiding_stopped = False
+        self._descends_s: float | None = None
 
     def knows(self, mode: int) -> bool:
         """Return whether a mode exists."""
@@ -87,7 +90,14 @@ class ArduCopter(AutopilotFirmware):
         if mode != Mode.GUIDED:
             self._climb_to_m = None
             self._paused = False
+        self._descends_s = None
         super().enter(mode)
+
+    def _fail_safe(self) -> None:
+        if self.mode != Mode.LAND:
+            self.enter(Mode.LAND)
+            self._descends_s = self.now_s + _LANDS_AFTER_S
+            self.copter.steer(Steering.HOLD)
 
     def step(self, now_s: float, ground_silence_s: float) -> None:
         """Climb when asked to, then watch over time-outs."""
@@ -118,11 +128,14 @@ class ArduCopter(AutopilotFirmware):
             if not self._ground_lost:
                 self._ground_lost = True
                 self.say(4, "GCS Failsafe")
-                self.enter(Mode.LAND)
+                self._fail_safe()
         elif self._ground_lost:
             self._ground_lost = False
             self.say(4, "GCS Failsafe Cleared")
         self._watch_position(self.copter.estimate.aided_s)
+        if self._descends_s is not None and self.now_s >= self._descends_s:
+            self._descends_s = None
+            self.copter.steer(Steering.LAND)
 
     def _watch_position(self, aided_s: float) -> None:
         if aided_s < _EKF_FAILSAFE_S:
@@ -131,7 +144,7 @@ class ArduCopter(AutopilotFirmware):
             self._failed = True
             self.say(2, "EKF variance")
             self.say(2, "EKF Failsafe: changed to LAND Mode")
-            self.enter(Mode.LAND)
+            self._fail_safe()
         elif aided_s > _STOPPED_AIDING_S and not self._aiding_stopped:
             self._aiding_stopped = True
             self.say(4, "EKF3 IMU0 stopped aiding")

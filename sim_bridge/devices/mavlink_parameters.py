@@ -63,6 +63,7 @@ _COPTER_FACTORY: dict[str, float] = {
     "COMPASS_USE3": 1,
     "ARMING_CHECK": 1,
     "FS_GCS_ENABLE": 0,
+    "LAND_SPEED": 50,
     "FS_EKF_ACTION": 1,
     "FS_THR_ENABLE": 1,
     "FS_OPTIONS": 16,
@@ -89,6 +90,8 @@ _COPTER_INDOOR: dict[str, float] = {
     "ARMING_CHECK": 1048574,
     "GUID_TIMEOUT": 0.5,
     "FS_GCS_ENABLE": 5,
+    "FS_GCS_TIMEOUT": 2.0,
+    "LAND_SPEED": 70,
     "FS_OPTIONS": 0,
     "FS_THR_ENABLE": 0,
 }

@@ -17,9 +17,9 @@ HERE = Path(__file__).parent
 hangar, port = mavlink_hangar.hangar, mavlink_hangar.port
 
 # PX4: COM_OF_LOSS_T 1.0 s and what it was measured to add, then it lands. ArduPilot: GUID_TIMEOUT 0.5 s, then it
-# brakes; FS_GCS_TIMEOUT 5 s, then it lands. Add the time of braking, and that of one heartbeat.
+# brakes; FS_GCS_TIMEOUT 2 s, then it lands. Add the time of braking, and that of one heartbeat.
 STOPPED_S = {"px4": 2.5, "ardupilot": 2.2}
-LANDS_S = {"px4": 3.5, "ardupilot": 7.0}
+LANDS_S = {"px4": 3.5, "ardupilot": 4.0}
 
 
 def until(condition, seconds, what):

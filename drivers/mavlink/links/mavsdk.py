@@ -6,7 +6,7 @@ name no target (poses, clock answers) would go to every vehicle on the port.
 
 Messages go through `mavlink_direct`, whose JSON is made from tuples with all fields: a missing one would be sent as 0.
 Its offboard plugin, which repeats the last setpoint by itself, is not used; nor is its clock synchronisation, because
-the poses that we feed are stamped on our own boot clock. It keeps the ground station's heartbeat alive by itself.
+the poses that we feed are stamped on our own boot clock. It sends a heartbeat each second, besides ours.
 """
 
 import json
@@ -125,8 +125,8 @@ class _System:
         return None
 
     def send(self, message: Message) -> None:
-        """Send a message; heartbeats are the library's own business."""
-        if self._direct is None or isinstance(message, Heartbeat):
+        """Send a message; the library adds heartbeats of its own, one a second, which alone would be too few."""
+        if self._direct is None:
             return
         carrier = MavlinkMessage(name_of(message), 0, 0, self.number, AUTOPILOT_COMPONENT, json_from_message(message))
         try:

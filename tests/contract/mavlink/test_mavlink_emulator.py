@@ -109,13 +109,24 @@ def test_ardupilot_brakes_after_guid_timeout(bench_of, timeout_s, late_s):
 def test_ardupilot_lands_when_the_ground_is_lost_though_setpoints_flow(bench_of):
     bench = bench_of("ardupilot").up()
     bench.beating = False
-    bench.run(4.5)
+    bench.run(0.9)  # the last heartbeat is up to a second old
     assert bench.firmware.mode == 4
-    bench.run(1.7)
+    bench.run(2.0)
     assert bench.firmware.mode == 9 and "GCS Failsafe" in bench.texts()
     bench.beating = True
     bench.run(1.2)
     assert "GCS Failsafe Cleared" in bench.texts() and bench.firmware.mode == 9
+
+
+def test_a_landing_of_an_ardupilot_by_a_failsafe_begins_four_seconds_later(bench_of):
+    bench = bench_of("ardupilot").up()
+    height_m = bench.copter.airframe.z
+    bench.setpoint, bench.beating = None, False
+    bench.run(6.0)
+    assert bench.firmware.mode == 9
+    assert bench.copter.airframe.z == pytest.approx(height_m, abs=0.1)
+    bench.run(3.0)
+    assert bench.copter.airframe.z < height_m - 0.5
 
 
 def test_ardupilot_lands_without_vision_after_eight_seconds(bench_of):

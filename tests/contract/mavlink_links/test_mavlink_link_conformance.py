@@ -113,6 +113,18 @@ def test_values_arrive_to_the_bit(hangar, opened):
     assert of(heard, service.ParamValue)[0][:2] == ("COM_OF_LOSS_T", 1.0)
 
 
+def test_every_heartbeat_is_sent_since_an_ardupilot_lands_two_seconds_after_the_last(hangar, opened):
+    emulator, _, (address, port) = hangar.add("ardupilot", 9)
+    link = opened(f"udpout:{address}:{port}")
+    beat = heartbeat(link, 9)
+    collect(link, lambda h: of(h, telemetry.Heartbeat, 9), 3.0, beat)
+    messages: list[Any] = []
+    emulator.services.take = noting(emulator.services.take, messages)
+    for _ in range(8):
+        beat()
+    collect(link, lambda _: sum(isinstance(m, telemetry.Heartbeat) for m in messages) >= 8, 2.0)
+
+
 def test_two_vehicles_call_one_port_and_each_gets_its_own(hangar, opened, port):
     place = ("127.0.0.1", port)
     link = opened(f"udpin:127.0.0.1:{port}")

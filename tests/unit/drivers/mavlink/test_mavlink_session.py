@@ -10,7 +10,13 @@ from drivers.mavlink.wire.frames import id_of
 from drivers.mavlink.wire.names import Flavour
 from drivers.mavlink.wire.parameters import REAL32
 from drivers.mavlink.wire.service import ParamRequestRead, ParamValue
-from drivers.mavlink.wire.telemetry import Attitude, AutopilotVersion, BatteryStatus, ExtendedSysState
+from drivers.mavlink.wire.telemetry import (
+    OUR_HEARTBEAT,
+    Attitude,
+    AutopilotVersion,
+    BatteryStatus,
+    ExtendedSysState,
+)
 
 MS = 1_000_000
 
@@ -24,6 +30,13 @@ def read_all(strange: set[str], seconds: float) -> MavlinkSession:
             if isinstance(message, ParamRequestRead) and message.param_id in values.keys() - strange:
                 session.hear_parameter(ParamValue(message.param_id, values[message.param_id], REAL32, 1, 0))
     return session
+
+
+def test_eight_heartbeats_go_out_in_the_time_after_which_an_ardupilot_lands_without() -> None:
+    session, requests = MavlinkSession(1, Flavour.ARDUPILOT, {}, 255, GlobalOrigin()), Requests(1)
+    (lands_s,) = (n.value for n in needed(Flavour.ARDUPILOT, 255) if n.name == "FS_GCS_TIMEOUT")
+    sent = [m for turn in range(round(lands_s * 100)) for m in session.step(10_000 * MS + turn * 10 * MS, 0, requests)]
+    assert lands_s == 2.0 and sent.count(OUR_HEARTBEAT) == 8
 
 
 def test_unknown_parameters_do_not_hide_the_others() -> None:

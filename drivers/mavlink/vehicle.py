@@ -12,16 +12,16 @@ from drivers.mavlink.latest_telemetry import LatestTelemetry
 from drivers.mavlink.lift_off import credible
 from drivers.mavlink.links.seam import Heard, MavlinkLink
 from drivers.mavlink.publisher import TelemetryPublisher
+from drivers.mavlink.readiness import Readiness
 from drivers.mavlink.requests import Requests
 from drivers.mavlink.session import MavlinkSession, streams
 from drivers.mavlink.settings import MavlinkDriverSettings, VehicleSettings
-from drivers.mavlink.settling import Settling
 from drivers.mavlink.texts import BootClock, Texts
 from drivers.mavlink.traffic import Traffic
 from drivers.mavlink.vision import VisionFeed
 from drivers.mavlink.wire import flight, service, telemetry
 from drivers.mavlink.wire.errors import WireError
-from drivers.mavlink.wire.names import ARMED, AUTOPILOT_COMPONENT, EkfFlag, Flavour, Landed, MavSeverity, SensorBits
+from drivers.mavlink.wire.names import ARMED, AUTOPILOT_COMPONENT, Flavour, Landed, MavSeverity
 from drivers.plausibility.health import Health
 from drivers.plausibility.motion import MotionMonitor
 from drivers.watchdog_types import VehicleView, WatchdogDecision
@@ -37,10 +37,7 @@ _ASKS_NS = 3 * NS_PER_S
 _BATTERY_NS = 10 * NS_PER_S
 # Report a refusal only after its STATUSTEXT: the COMMAND_ACK arrives first.
 _EXPLAIN_NS = 700 * NS_PER_MS
-# ArduPilot repeats what keeps it from arming every 30 s.
-_COMPLAINTS_NS = 35 * NS_PER_S
 _Value = service.ParamValue | telemetry.GpsGlobalOrigin | telemetry.AutopilotVersion
-_FAULTS = SensorBits.GYRO | SensorBits.ACCELEROMETER
 
 
 class MavlinkVehicle:
@@ -69,7 +66,8 @@ class MavlinkVehicle:
         self._traffic = Traffic()
         self._plausibility = MotionMonitor(LIMITS)
         self._refused: Counter[str] = Counter()
-        self._said, self._boot_clock, self._settling = Texts(), BootClock(), Settling()
+        self._said, self._boot_clock = Texts(), BootClock()
+        self._readiness = Readiness(self.flavour, self._session, self._requests, self._said)
         self._jumps: deque[int] = deque(maxlen=8)
         self._refusals: deque[tuple[int, str]] = deque(maxlen=16)
 
@@ -185,7 +183,7 @@ class MavlinkVehicle:
         elif state is FlightState.LANDED and self.orders.starting:
             state = FlightState.TAKING_OFF if known.base_mode & ARMED else FlightState.LANDED
         velocity = self._true_velocity(now_ns, known) if self.orders.are_heeded(now_ns, known.custom_mode) else None
-        not_ready = self._not_ready(now_ns, known)
+        not_ready = self._readiness.why_not(now_ns, known)
         battery = known.battery if now_ns - known.battery_ns < _BATTERY_NS else None
         lost_s = self.vision.lost_s(now_ns)
         return VehicleView(state, fresh, battery, not_ready, unsound=unsound, velocity_m_s=velocity, lost_s=lost_s)
@@ -207,27 +205,6 @@ class MavlinkVehicle:
         # Velocities are what silence is judged by in the air; on the ground there may be none before the first pose.
         newest = known.heard_ns if self._landed(now_ns, known) == Landed.ON_GROUND else known.moved_ns
         return known.heartbeat_ns > 0 and now_ns - newest < _FRESH_NS and now_ns - known.heartbeat_ns < _HEARTBEAT_NS
-
-    def _not_ready(self, now_ns: int, known: LatestTelemetry) -> str:
-        detail = self._session.detail(self._requests)
-        if detail:
-            return detail
-        if now_ns - known.moved_ns > _FRESH_NS:
-            return "it has no position yet"
-        if known.healthy & _FAULTS != _FAULTS:
-            return "its gyros or accelerometers are not healthy"
-        if self.flavour is Flavour.PX4:
-            # WIRE (docs/reference/mavlink.md 2): without GPS PX4's PREARM_CHECK never becomes healthy, yet OFFBOARD
-            # arming works.
-            return "" if self._settling.is_over(now_ns, known.status) else "its own checks have not passed yet"
-        if not known.ekf & EkfFlag.POS_HORIZ_REL:
-            return "its estimator has no position yet"
-        return "" if known.healthy & SensorBits.PREARM_CHECK else self._arming_reason()
-
-    def _arming_reason(self) -> str:
-        now_ns = clock.now_ns()
-        said = self._said.reasons(now_ns - _COMPLAINTS_NS, "arm", now_ns)
-        return f"it does not want to arm{': ' + '; '.join(said) if said else ''}"
 
     def apply(self, now_ns: int, decision: WatchdogDecision) -> None:
         """Send the vehicle its commands for the decision, poses for its estimator, and pending requests."""

@@ -1,0 +1,43 @@
+"""Why a vehicle may not take off yet, by what it has told."""
+
+from drivers.mavlink.latest_telemetry import LatestTelemetry
+from drivers.mavlink.requests import Requests
+from drivers.mavlink.session import MavlinkSession
+from drivers.mavlink.settling import Settling
+from drivers.mavlink.texts import Texts
+from drivers.mavlink.wire.names import EkfFlag, Flavour, SensorBits
+from groundstation.time_units import NS_PER_MS, NS_PER_S
+
+_POSITION_NS = 300 * NS_PER_MS
+# ArduPilot repeats what keeps it from arming every 30 s.
+_COMPLAINTS_NS = 35 * NS_PER_S
+_FAULTS = SensorBits.GYRO | SensorBits.ACCELEROMETER
+
+
+class Readiness:
+    """Of one vehicle, with its session, pending requests, and texts."""
+
+    def __init__(self, flavour: Flavour, session: MavlinkSession, requests: Requests, said: Texts) -> None:
+        self._flavour, self._session, self._requests, self._said = flavour, session, requests, said
+        self._settling = Settling()
+
+    def why_not(self, now_ns: int, known: LatestTelemetry) -> str:
+        """Return what keeps it from taking off, in words, or ""."""
+        detail = self._session.detail(self._requests)
+        if detail:
+            return detail
+        if now_ns - known.moved_ns > _POSITION_NS:
+            return "it has no position yet"
+        if known.healthy & _FAULTS != _FAULTS:
+            return "its gyros or accelerometers are not healthy"
+        if self._flavour is Flavour.PX4:
+            # WIRE (docs/reference/mavlink.md 2): without GPS PX4's PREARM_CHECK never becomes healthy, yet OFFBOARD
+            # arming works.
+            return "" if self._settling.is_over(now_ns, known.status) else "its own checks have not passed yet"
+        if not known.ekf & EkfFlag.POS_HORIZ_REL:
+            return "its estimator has no position yet"
+        return "" if known.healthy & SensorBits.PREARM_CHECK else self._arming_reason(now_ns)
+
+    def _arming_reason(self, now_ns: int) -> str:
+        said = self._said.reasons(now_ns - _COMPLAINTS_NS, "arm", now_ns)
+        return f"it does not want to arm{': ' + '; '.join(said) if said else ''}"

@@ -94,8 +94,8 @@ _ARDUPILOT = (
     Needed("ARMING_CHECK", 1048574, "every check by its own bit; without a GPS those of the GPS check nothing"),
     Needed("GUID_TIMEOUT", 0.5, "time without setpoints before it stops", REAL32, accepted=(0.1, 0.5)),
     Needed("FS_GCS_ENABLE", 5, "ground station lost: land"),
-    Needed("FS_GCS_TIMEOUT", 2.0, "time without our heartbeat before that", REAL32, accepted=(2.0, 3.0)),
-    Needed("LAND_SPEED", 70, "down in time where it lands without a position", INT32, accepted=(60, 100)),
+    Needed("FS_GCS_TIMEOUT", 2.0, "time without our heartbeat before that", REAL32, (2.0, 3.0), flown=(2.0, 5.0)),
+    Needed("LAND_SPEED", 70, "down in time where it lands without a position", INT32, (60, 100), flown=(30, 100)),
     Needed("FS_EKF_ACTION", 1, "position lost: land"),
     Needed("FS_THR_ENABLE", 0, "a throttle failsafe of a transmitter that is off would forbid arming", others=(1, 3)),
 )

@@ -85,6 +85,18 @@ def test_an_older_or_newer_name_counts_as_well() -> None:
     assert not session.unread and not session.problems
 
 
+def test_a_value_that_setup_would_change_is_told_once_and_flown() -> None:
+    session, requests = MavlinkSession(1, Flavour.ARDUPILOT, {}, 255, GlobalOrigin()), Requests(1)
+    session.hear_origin()
+    values = {n.name: n.value for n in needed(Flavour.ARDUPILOT, 255)} | {"LAND_SPEED": 50.0}
+    for name, value in [*values.items(), *values.items()]:
+        session.hear_parameter(ParamValue(name, value, REAL32, 1, 0))
+    session.step(10_000 * MS, 0, requests)
+    assert session.detail(requests) == "" and not session.problems
+    (told,) = session.notes
+    assert told.startswith("parameter LAND_SPEED is 50, needs 60 to 100 (") and told.endswith("setup --apply")
+
+
 def test_another_version_is_flown_and_what_was_not_checked_is_said() -> None:
     session, requests = MavlinkSession(1, Flavour.ARDUPILOT, {}, 255, GlobalOrigin()), Requests(1)
     session.hear_origin()

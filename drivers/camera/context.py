@@ -1,6 +1,7 @@
 """Context for a camera from the bus: attitudes and heights of vehicles, and the belief."""
 
 import math
+from collections.abc import Collection
 
 from drivers.camera import convert
 from drivers.camera.attitudes import AttitudeHistory
@@ -63,6 +64,10 @@ class Surroundings:
     def predictions(self, exposure_ns: int) -> Predictions:
         """Return where the belief expects the markers."""
         return self._foresight.at(exposure_ns, self.attitude(exposure_ns))
+
+    def sought(self, exposure_ns: int, predictions: Predictions) -> Collection[str]:
+        """Return what whole pictures are searched for often; nothing where nothing is heard of the tracker."""
+        return self._foresight.sought(exposure_ns, predictions)
 
     def drop_m(self, entity: str, exposure_ns: int) -> float | None:
         """Return how far a marker is below the camera by height sensors alone; None when one of them says nothing."""

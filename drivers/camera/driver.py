@@ -140,12 +140,14 @@ class CameraDriver:
     def _observe(self, picture: NDArray[np.uint8], exposure_ns: int) -> None:
         settings, around = self._settings, self._surroundings
         attitude = around.attitude(exposure_ns) or _LEVEL
+        predictions = around.predictions(exposure_ns)
         sightings = self._pipeline.process(
             picture,
             exposure_ns,
             lambda entity: around.gravity(entity, exposure_ns),
-            around.predictions(exposure_ns),
+            predictions,
             lambda entity: around.drop_m(entity, exposure_ns),
+            around.sought(exposure_ns, predictions),
         )
         for sighting in sightings:
             later_ns = convert.row_ns(sighting.corners, self._intrinsics.height_px, settings.readout_ms)

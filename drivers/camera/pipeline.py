@@ -1,23 +1,24 @@
 """One camera's eyes without its wires: picture, attitudes and belief in, sightings out; keeps tracks in between."""
 
+import time
 from collections import Counter, defaultdict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from types import MappingProxyType
 
 import numpy as np
 
 from drivers.camera import detect, markers, pose
 from drivers.camera.faults import MarkerFaults
-from drivers.camera.prediction import Prediction
+from drivers.camera.prediction import Prediction, is_looked_for
 from drivers.camera.search import find_in, search
 from drivers.camera.settings import DetectorSettings, MarkerSettings
 from drivers.camera.sighting import Sighting
 from drivers.camera.tags import TagFinder
 from drivers.camera.tracks import Track
+from drivers.camera.whole_searches import SearchRates, WholeSearches
 from groundstation.arrays import Array, Image
 from groundstation.bus.notice import Notice
 from groundstation.geometry.lens import CameraIntrinsics
-from groundstation.time_units import NS_PER_S
 
 Followed = list[tuple[Track, detect.Find]]
 GravityOf = Callable[[str], pose.Gravity]
@@ -25,8 +26,6 @@ DropOf = Callable[[str], float | None]
 
 # Corners beside a tracked board, its bar's among them, are no new board.
 _TAKEN_SQUARES = 2.2
-# Where the belief expects a marker that does not show, it is looked for in so many pictures, then in every third.
-_EAGER_LOOKS, _PATIENT_STRIDE = 4, 3
 _NOTHING_EXPECTED: Mapping[str, Prediction | None] = MappingProxyType({})
 
 
@@ -38,7 +37,7 @@ class Pipeline:
     """Finds, follows, identifies and measures the expected markers of one camera.
 
     `counts` says what was found, missed and refused since the start, by name; `searched`: whether the last picture was
-    searched all over.
+    searched all over. cpu_s: tells how much CPU this thread has used [s].
     """
 
     def __init__(
@@ -48,6 +47,7 @@ class Pipeline:
         settings: DetectorSettings,
         search_rate_hz: float,
         search_phase_s: float = 0.0,
+        cpu_s: Callable[[], float] = time.thread_time,
     ) -> None:
         self._intrinsics = intrinsics
         self._settings = settings
@@ -55,10 +55,8 @@ class Pipeline:
         self._points = {marker.entity: marker.printed.corners() for marker in self._expected.values()}
         self._markers = {marker.entity: marker for marker in expected}
         self._tags = TagFinder(intrinsics, expected, settings)
-        self._search_rate_hz = search_rate_hz
-        self._search_phase_ns = round(search_phase_s * NS_PER_S)
-        self._next_search_ns: int | None = None
-        self._searched_ns = 0
+        self._searches = WholeSearches(SearchRates.of(settings, search_rate_hz), search_phase_s)
+        self._cpu_s = cpu_s
         self._tracks: list[Track] = []
         self.searched = False
         self._blind: Counter[str] = Counter()
@@ -87,19 +85,22 @@ class Pipeline:
         gravity_of: GravityOf,
         predictions: Mapping[str, Prediction | None] = _NOTHING_EXPECTED,
         drop_of: DropOf = _unknown_drop,
+        sought: Collection[str] = (),
     ) -> list[Sighting]:
         """Return the sightings in a picture exposed at `stamp_ns`.
 
-        gravity_of, drop_of: what is known for a subject; predictions: where the belief expects which marker.
+        gravity_of, drop_of: what is known for a subject; predictions: where the belief expects which marker; sought:
+        entities that whole pictures are searched for often.
         """
         finds = self._follow(picture, stamp_ns, predictions)
         self._look_where_expected(picture, stamp_ns, predictions, finds)
-        searching = self.searched = self._is_search_due(stamp_ns)
+        searching = self.searched = self._is_search_due(stamp_ns, sought)
+        begun_s = self._cpu_s()
         if searching:
             finds += self._search(picture, stamp_ns) if self._expected else []
         sightings = self._tags.look(picture, stamp_ns, gravity_of, predictions, searching)
         if searching:
-            self._schedule_search(stamp_ns, predictions)
+            self._schedule_search(stamp_ns, predictions, self._cpu_s() - begun_s)
         for track, find in finds:
             rays = self._intrinsics.normalised_from_pixels(find.corners)
             self._identify(picture, track, find, rays, stamp_ns)
@@ -142,8 +143,7 @@ class Pipeline:
                 self._blind[entity] = 0
                 continue
             self._blind[entity] += 1
-            patient = self._blind[entity] > _EAGER_LOOKS and self._blind[entity] % _PATIENT_STRIDE != 0
-            window = None if patient else prediction.window(picture.shape)
+            window = prediction.window(picture.shape) if is_looked_for(self._blind[entity]) else None
             if window is None:
                 continue
             find = find_in(picture, window, prediction.spacing_px, [other.corners for _, other in finds])
@@ -179,32 +179,24 @@ class Pipeline:
         self.counts["found"] += len(fresh)
         return fresh
 
-    def _is_search_due(self, stamp_ns: int) -> bool:
-        if self._next_search_ns is None:
-            self._next_search_ns = stamp_ns + self._search_phase_ns
-        return bool(self._markers) and stamp_ns >= self._next_search_ns
-
-    def _schedule_search(self, stamp_ns: int, predictions: Mapping[str, Prediction | None]) -> None:
-        """Search at the full rate while nothing is in view, at half of it while something is missing, else seldom.
-
-        What the belief has outside of the picture is not missing.
-        """
+    def _is_search_due(self, stamp_ns: int, sought: Collection[str]) -> bool:
+        if not self._markers:
+            return False
         seen = set(self.tracked)
-        missing = {entity for entity in self._markers if predictions.get(entity, ...) is not None} - seen
-        rate_hz = self._search_rate_hz if not seen else self._search_rate_hz / 2
-        if not missing:
-            rate_hz = self._settings.tracked_search_rate_hz
-        self._searched_ns = stamp_ns
-        self._next_search_ns = stamp_ns + round(NS_PER_S / rate_hz)
+        return self._searches.is_due(stamp_ns, bool(seen), bool(set(sought) & set(self._markers) - seen))
+
+    def _schedule_search(self, stamp_ns: int, predictions: Mapping[str, Prediction | None], cost_s: float) -> None:
+        """Plan the next search by what is missing; what the belief has elsewhere is not."""
+        missing = {entity for entity in self._markers if predictions.get(entity, ...) is not None} - set(self.tracked)
+        self._searches.done(stamp_ns, bool(missing), cost_s)
 
     def _forget(self, stamp_ns: int, predictions: Mapping[str, Prediction | None]) -> None:
         """Drop tracks that are over; when a marker was lost that should still be in view, search soon."""
         over = [track for track in self._tracks if self._is_over(track, stamp_ns)]
         self._tracks = [track for track in self._tracks if not self._is_over(track, stamp_ns)]
         lost = [entity for track in over if (entity := self._entity_of(track)) is not None]
-        if any(predictions.get(entity, ...) is not None for entity in lost) and self._next_search_ns is not None:
-            soonest = self._searched_ns + round(NS_PER_S / (2.0 * self._search_rate_hz))
-            self._next_search_ns = min(self._next_search_ns, max(stamp_ns, soonest))
+        if any(predictions.get(entity, ...) is not None for entity in lost):
+            self._searches.lost(stamp_ns)
 
     def _is_over(self, track: Track, stamp_ns: int) -> bool:
         foreign = track.code is not None and track.code not in self._expected

@@ -21,6 +21,8 @@ Attitude = tuple[float, float]
 # Estimates at 50 Hz; a picture is exposed up to 0.5 s before it is looked at.
 _KEPT = 48
 _FARTHEST_NS = 300 * NS_PER_MS
+# A target that no camera has seen for so long is sought by all; after so long the tracker says whether it is.
+_SOUGHT_AFTER_S, _SOUGHT_FOR_S = 0.5, 10.0
 # Roll, pitch and mounting of an observer that measures its attitude, of one whose levelness is assumed, and of a mount.
 _ATTITUDE_STD_RAD, _LEVEL_STD_RAD, _MOUNT_STD_RAD = math.radians(2.0), math.radians(8.0), math.radians(0.5)
 _FLOOR_STD_M = 0.02
@@ -33,6 +35,8 @@ _WIDEST_SHARE = 0.2
 # From the centre of a checkerboard to its outer corners.
 _RADIUS_SQUARES = 1.803
 _MARGIN_SQUARES = 1.6
+# Where the belief expects a marker that does not show, it is looked for in so many pictures, then in every third.
+_EAGER_LOOKS, _PATIENT_STRIDE = 4, 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,10 +48,19 @@ class Prediction:
     spacing_px: float
     std_px: float
 
+    @property
+    def reach_px(self) -> float:
+        """Return how far from its centre to look, wide enough for the uncertainty."""
+        return self.radius_px + _MARGIN_SQUARES * self.spacing_px + _SIGMAS * self.std_px + _SLACK_PX
+
     def window(self, shape: tuple[int, ...]) -> Window | None:
-        """Return where to look, wide enough for the uncertainty; None when that is outside of the picture."""
-        reach = self.radius_px + _MARGIN_SQUARES * self.spacing_px + _SIGMAS * self.std_px + _SLACK_PX
-        return window_around(self.centre[None], reach, shape)
+        """Return where to look; None when that is outside of the picture."""
+        return window_around(self.centre[None], self.reach_px, shape)
+
+
+def is_looked_for(missing: int) -> bool:
+    """Return whether a marker is looked for where the belief has it: in how many pictures it has not been found."""
+    return missing <= _EAGER_LOOKS or missing % _PATIENT_STRIDE == 0
 
 
 # None: certainly not in the picture. Entities of which nothing useful is known are missing.
@@ -71,8 +84,8 @@ class Foresight:
 
     def at(self, stamp_ns: int, attitude: Attitude | None) -> Predictions:
         """Return where each marker should be in a picture exposed then; `attitude` is the observer's, if measured."""
-        estimate = min(self._estimates, key=lambda e: abs(e.header.stamp_ns - stamp_ns), default=None)
-        if estimate is None or abs(estimate.header.stamp_ns - stamp_ns) > _FARTHEST_NS:
+        estimate = self._nearest(stamp_ns)
+        if estimate is None:
             return {}
         seconds = (stamp_ns - estimate.header.stamp_ns) / 1e9
         entities = {entity.name: entity for entity in estimate.entities}
@@ -88,6 +101,28 @@ class Foresight:
                 if known:
                     found[marker.entity] = prediction
         return found
+
+    def sought(self, stamp_ns: int, predictions: Predictions) -> frozenset[str]:
+        """Return the entities that whole pictures are searched for often, unless they are in view.
+
+        Those are targets that no camera saw at an exposure: the tracker searches for them, or lost them just now. For a
+        camera fixed in the world they are also the robots that `predictions` have in its picture: how often it misses
+        one is how the tracker learns that it is not where it is believed.
+        """
+        estimate = self._nearest(stamp_ns)
+        if estimate is None:
+            return frozenset()
+        targets = {marker.entity for marker, _ in self._markers if marker.kind is MarkerKind.TARGET}
+        unseen = {one.name for one in estimate.entities if _SOUGHT_AFTER_S < one.age_s <= _SOUGHT_FOR_S}
+        missed = {name for name, prediction in predictions.items() if prediction is not None}
+        wanted = targets & (unseen | {search.target for search in estimate.searches})
+        return frozenset(wanted | (missed - targets if self._mount.in_world else set()))
+
+    def _nearest(self, stamp_ns: int) -> Estimate | None:
+        """Return the estimate nearest to an exposure, unless that is long before or after."""
+        estimate = min(self._estimates, key=lambda e: abs(e.header.stamp_ns - stamp_ns), default=None)
+        near = estimate is not None and abs(estimate.header.stamp_ns - stamp_ns) <= _FARTHEST_NS
+        return estimate if near else None
 
     def _camera(self, carrier: EntityEstimate | None, seconds: float, attitude: Attitude | None) -> "_Camera | None":
         position = np.array(self._mount.position_m)

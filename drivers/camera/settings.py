@@ -20,6 +20,10 @@ _Positive = Annotated[float, Field(gt=0)]
 _Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,47}$")]
 
 
+SEARCH_RATE_HZ = 2.0
+"""How often whole pictures are searched in which nothing is in view."""
+
+
 class SourceKind(StrEnum):
     """What pictures can come from."""
 
@@ -221,12 +225,16 @@ class DetectorSettings(_Section):
     """Figures of the detector; the defaults are measured (reference: vision).
 
     corner_floor_px: least standard deviation believed of a corner; tracked_search_rate_hz: full searches while every
-    expected marker is tracked; ambiguity_cost: cost difference (chi-square units) below which both poses are reported.
+    expected marker is tracked; sought_search_rate_hz: while something is not in view that is sought (a target that no
+    camera sees, a robot that a fixed one should); search_share: what share of a processor's time those may take;
+    ambiguity_cost: cost difference (chi-square units) below which both poses are reported.
     """
 
     corner_floor_px: Annotated[float, Field(ge=0.01, le=5)] = 0.02
     identity_margin: Annotated[float, Field(ge=1, le=4)] = 1.0
     tracked_search_rate_hz: Annotated[float, Field(gt=0, le=2)] = 0.5
+    sought_search_rate_hz: Annotated[float, Field(gt=0, le=30)] = 8.0
+    search_share: Annotated[float, Field(gt=0, le=1)] = 0.15
     max_residual_px: _Positive = 1.5
     ambiguity_cost: _Positive = 6.0
 
@@ -249,7 +257,7 @@ class CameraDriverSettings(_Section):
     markers: tuple[MarkerSettings, ...] = ()
     observes: tuple[str, ...] = ()
     image_fps: Annotated[float, Field(ge=0, le=5)] = 5.0
-    search_rate_hz: Annotated[float, Field(gt=0, le=2)] = 2.0
+    search_rate_hz: Annotated[float, Field(gt=0, le=2)] = SEARCH_RATE_HZ
     search_phase_s: Annotated[float, Field(ge=0)] = 0.0
     start_within_s: _Positive = 5.0
     stall_after_s: _Positive = 1.0

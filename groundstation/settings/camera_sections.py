@@ -1,6 +1,7 @@
 """From the field to what each camera driver is handed."""
 
 from drivers.camera.settings import (
+    SEARCH_RATE_HZ,
     CalibrationSettings,
     CameraDriverSettings,
     MarkerKind,
@@ -15,8 +16,6 @@ from groundstation.settings import room
 from groundstation.settings.drones import Drone
 from groundstation.settings.schema import Field
 from groundstation.settings.values import Vector3
-
-SEARCH_RATE_HZ = 2.0
 
 
 def world_camera(field: Field, name: str, camera: room.WorldCameraSettings, phase_s: float) -> CameraDriverSettings:

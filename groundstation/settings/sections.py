@@ -7,12 +7,12 @@ from types import MappingProxyType
 
 from pydantic import BaseModel
 
-from drivers.camera.settings import parse_source
+from drivers.camera.settings import SEARCH_RATE_HZ, parse_source
 from drivers.motion_capture.settings import emulated_source
 from drivers.ranging.settings import emulated_source as emulated_gateway
 from groundstation.field.drones import camera_name
 from groundstation.field.targets import odometry_name
-from groundstation.settings.camera_sections import SEARCH_RATE_HZ, onboard_camera, world_camera
+from groundstation.settings.camera_sections import onboard_camera, world_camera
 from groundstation.settings.capture_sections import capture_section
 from groundstation.settings.drones import Drone
 from groundstation.settings.motion_capture import MotionCaptureSettings

@@ -14,8 +14,8 @@ from drivers.camera.sources.frames import Unit
 from groundstation.bus import clock
 from groundstation.bus.api import Subscription
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
-from groundstation.bus.messages import Odometry
-from groundstation.bus.topics import CAMERA_STATUS, IMAGE, OBSERVATION, ODOMETRY, SEARCHED_PICTURE, VIDEO
+from groundstation.bus.messages import EntityEstimate, Estimate, Odometry
+from groundstation.bus.topics import CAMERA_STATUS, ESTIMATE, IMAGE, OBSERVATION, ODOMETRY, SEARCHED_PICTURE, VIDEO
 from groundstation.errors import SettingsError
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
@@ -90,6 +90,21 @@ def test_an_observation_carries_exposure_time_attitude_and_names(rig, jpeg):
     (image,) = [r for r in heard if r.key.topic is IMAGE]
     assert (image.payload, image.header.entity, image.header.stamp_ns) == (jpeg, "drone_1_camera", now_ns - 120_000_000)
     assert rig.child.states[0][0] == "READY"
+
+
+@pytest.mark.parametrize(("told", "searches"), [(None, 4), (0.1, 4), (0.8, 15)])
+def test_a_driver_that_hears_of_a_target_that_nobody_sees_searches_often(rig, told, searches):
+    """Every second picture; without the news twice a second, for there is nothing in view."""
+    grey, start_ns = encoded(np.full((360, 640), 128, np.uint8)), clock.now_ns()
+    for k in range(30):
+        came_ns = start_ns + k * 66_666_667
+        if told is not None:
+            bot = EntityEstimate("bot", "target", (-3.0, 0.0), (0.01, 0.0, 0.0, 0.01), (0.0, 0.0), True, told)
+            header = rig.bus.header("team", came_ns - 120_000_000)
+            rig.bus.publish(ESTIMATE, Estimate(header=header, entities=(bot,), epoch=1))
+        rig.source.push(grey, came_ns)
+        rig.camera.turn()
+    assert sum(r.key.topic is SEARCHED_PICTURE for r in rig.heard.drain()) == pytest.approx(searches, abs=1)
 
 
 def test_a_marker_is_as_old_as_the_row_that_shows_it(rig, jpeg):

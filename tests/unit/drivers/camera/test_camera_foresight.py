@@ -10,7 +10,7 @@ from drivers.camera.convert import stabilized_from_optical
 from drivers.camera.pipeline import Pipeline
 from drivers.camera.prediction import Foresight
 from drivers.camera.settings import DetectorSettings, MarkerKind, MarkerSettings, MountSettings
-from groundstation.bus.messages import EntityEstimate, Estimate, Header
+from groundstation.bus.messages import EntityEstimate, Estimate, Header, TargetSearch
 from groundstation.geometry.board import Checkerboard
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
@@ -177,6 +177,70 @@ def test_the_belief_follows_a_camera_that_turns_fast():
         out = pipeline.process(picture, k * FRAME_NS, gravity_of(states), eyes.at(k * FRAME_NS, (0.0, 0.0)))
         seen += any(sighting.entity == "bot" for sighting in out)
     assert seen >= 27
+
+
+def unseen(stamp_ns, age_s, search="", mode="SEARCH"):
+    """Return an estimate whose target no camera has seen for so long, or that is searched for."""
+    bot = EntityEstimate("bot", "target", (9.0, 9.0), (0.01, 0.0, 0.0, 0.01), (0.0, 0.0), True, age_s)
+    away = EntityEstimate(
+        "drone_2", "robot", (9.0, 9.0, 1.0, 0.0), tuple((0.01 * np.eye(4)).ravel()), (0.0,) * 3, True, 5
+    )
+    searches = (TargetSearch(search, mode, 1.0, (0.0, 0.0), 0.1, None, ""),) if search else ()
+    entities = (robot("drone_1", SCENE[0]), away, *(() if search else (bot,)))
+    return Estimate(
+        header=Header(stamp_ns, "c", "tracker", "tracker", 1), entities=entities, epoch=1, searches=searches
+    )
+
+
+@pytest.mark.parametrize(
+    ("told", "sought"),
+    [
+        (unseen(0, 0.3), ()),
+        (unseen(0, 0.8), ("bot",)),
+        (unseen(0, 60.0), ()),  # nobody flies who could search, or the tracker would say so
+        (unseen(0, 0.0, "bot"), ("bot",)),
+        (unseen(0, 0.0, "bot", "LOST"), ("bot",)),
+        (unseen(0, 0.0, "somebody"), ()),
+        (unseen(-400_000_000, 0.8), ()),  # too old to say anything
+    ],
+)
+def test_targets_that_no_camera_sees_are_sought(told, sought):
+    eyes = foresight()
+    assert eyes.sought(0, {}) == frozenset()
+    eyes.add(told)
+    assert eyes.sought(0, eyes.at(0, (0.0, 0.0))) == frozenset(sought)
+
+
+@pytest.mark.parametrize(("fixed", "sought"), [(True, {"drone_2"}), (False, set())])
+def test_robots_that_a_fixed_camera_should_see_are_sought(fixed, sought):
+    """How often it misses one tells the tracker that it is not where it is believed; drones miss each other all day."""
+    mount = MountSettings(position_m=(0.0, 0.0, 4.2), looking="down") if fixed else MOUNT
+    eyes = Foresight(mount, "ceiling" if fixed else "drone_1", MARKERS, FRONT)
+    place = state(0.0, 0.0, 1.3) if fixed else state(1.5, 0.0, 0.5)
+    seen = EntityEstimate("bot", "target", (0.5, 0.5), (0.01, 0.0, 0.0, 0.01), (0.0, 0.0), True, 0.1)
+    eyes.add(estimate(0, robot("drone_1", SCENE[0]), robot("drone_2", place), seen))
+    predictions = eyes.at(0, (0.0, 0.0))
+    assert predictions["drone_2"] is not None
+    assert eyes.sought(0, predictions) == sought
+
+
+def test_a_target_that_no_camera_sees_is_found_though_the_belief_has_it_elsewhere():
+    """It was carried before this camera, which would look at whole pictures twice a second."""
+    renderer = renderer_of()
+    found: dict[tuple[str, ...], int] = {}
+    for sought in ((), ("bot",)):
+        eyes, pipeline = foresight(), Pipeline(FRONT, MARKERS, DetectorSettings(), search_rate_hz=2.0)
+        for k in range(12):
+            stamp_ns = k * FRAME_NS
+            states = np.array([SCENE[0], state(9, 9, 1), SCENE[2] if k >= 2 else state(9, 9, 0)])
+            eyes.add(unseen(stamp_ns, 0.1))
+            expected = eyes.at(stamp_ns, (0.05, -0.08))
+            seen = pipeline.process(renderer.render(states), stamp_ns, gravity_of(SCENE), expected, sought=sought)
+            if any(sighting.entity == "bot" for sighting in seen):
+                found.setdefault(sought, k)
+        assert expected == {"drone_2": None, "bot": None}
+    assert found[("bot",)] <= 4
+    assert found[()] >= 7
 
 
 def test_an_identity_is_read_and_never_taken_from_the_belief():

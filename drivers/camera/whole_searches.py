@@ -1,0 +1,74 @@
+"""When a whole picture is searched: seldom while all is tracked, as often as it may cost for what should be found."""
+
+from dataclasses import dataclass
+
+from drivers.camera.settings import DetectorSettings
+from groundstation.time_units import NS_PER_S
+
+
+@dataclass(frozen=True, slots=True)
+class SearchRates:
+    """How often a camera searches whole pictures [Hz], and what that may cost.
+
+    idle_hz: while nothing is in view, so that a camera that sees nobody is not taken for a dead one; half of it while
+    something is in view and something else missing; tracked_hz: while nothing is missing; sought_hz: while something is
+    not in view that is sought; share: of a processor's time then, unless `idle_hz` costs more.
+    """
+
+    tracked_hz: float
+    idle_hz: float
+    sought_hz: float
+    share: float
+
+    @classmethod
+    def of(cls, detector: DetectorSettings, idle_hz: float) -> "SearchRates":
+        """Return what the settings of a camera's driver say."""
+        return cls(detector.tracked_search_rate_hz, idle_hz, detector.sought_search_rate_hz, detector.search_share)
+
+
+class WholeSearches:
+    """Schedule of one camera's whole searches, by times of exposure [ns].
+
+    Use: ask `is_due` for each picture, say `done` after each search, and `lost` when a marker is not tracked any more.
+    """
+
+    def __init__(self, rates: SearchRates, phase_s: float) -> None:
+        self._rates, self._phase_ns = rates, round(phase_s * NS_PER_S)
+        self._next_ns: int | None = None
+        self._done_ns: int | None = None
+        self._cost_s = 0.0
+
+    def is_due(self, stamp_ns: int, sees: bool, sought: bool) -> bool:
+        """Return whether a picture is searched all over.
+
+        sees: any expected marker is in view; sought: one is not that should be found soon.
+        """
+        if self._next_ns is None:
+            self._next_ns = stamp_ns + self._phase_ns
+        if self._done_ns is None:
+            return sought or stamp_ns >= self._next_ns
+        waited_ns = stamp_ns - self._done_ns
+        blind = not sees and waited_ns >= round(NS_PER_S / self._rates.idle_hz)
+        return blind or (sought and waited_ns >= self._eager_ns) or stamp_ns >= self._next_ns
+
+    def done(self, stamp_ns: int, misses: bool, cost_s: float) -> None:
+        """Take in that a picture was searched, and what that cost [s of CPU].
+
+        misses: an expected marker is not in view, and the belief does not have it elsewhere.
+        """
+        rate_hz = 0.5 * self._rates.idle_hz if misses else self._rates.tracked_hz
+        self._cost_s, self._done_ns = cost_s, stamp_ns
+        self._next_ns = stamp_ns + round(NS_PER_S / rate_hz)
+
+    def lost(self, stamp_ns: int) -> None:
+        """Search soon: a marker is not tracked any more that should be in view."""
+        if self._next_ns is not None:
+            soonest = (self._done_ns or 0) + round(NS_PER_S / (2.0 * self._rates.idle_hz))
+            self._next_ns = min(self._next_ns, max(stamp_ns, soonest))
+
+    @property
+    def _eager_ns(self) -> int:
+        """Return the least time between two searches for what is sought [ns]."""
+        rates = self._rates
+        within_cost_s = max(1.0 / rates.sought_hz, self._cost_s / rates.share)
+        return round(NS_PER_S * min(1.0 / rates.idle_hz, within_cost_s))

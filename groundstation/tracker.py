@@ -131,6 +131,7 @@ class Tracker:
                 self._roots.hear(message, now_ns)
             if isinstance(message, RelativeObservation) and message.header.clock == self._clock:
                 self._mounts.see(message)
+                self.lookout.see(message)
             return None
         self.rejected[f"{type(message).__name__} {verdict}"] += 1
         if verdict is Verdict.FROZEN:

@@ -2,7 +2,14 @@
 
 from collections.abc import Collection, Mapping, Sequence
 
-from groundstation.bus.messages import Message, SearchedPicture, Severity, TargetSearch, VehicleStatus
+from groundstation.bus.messages import (
+    Message,
+    RelativeObservation,
+    SearchedPicture,
+    Severity,
+    TargetSearch,
+    VehicleStatus,
+)
 from groundstation.bus.notice import Notice
 from groundstation.control.excursion import Excursions
 from groundstation.control.missing_robots import MissingRobots
@@ -23,7 +30,10 @@ _ROBOT_REMEDY = "check its marker and that camera; land it if it strays"
 
 
 class Lookout:
-    """Use: `take` messages, `advance` with each belief; read `targets`, `missing`, `missed_s`, `take_notices`."""
+    """Use: `take` messages, `see` sightings, `advance` with each belief.
+
+    Read `targets`, `missing`, `missed_s`, `take_notices`.
+    """
 
     def __init__(
         self, search: SearchParameters, control: ControlParameters, sensors: SensorSuite,
@@ -72,6 +82,10 @@ class Lookout:
             case SearchedPicture() if in_our_time:
                 self._search.take(message)
                 self._robots.take(message)
+
+    def see(self, sighting: RelativeObservation) -> None:
+        """Take in a sighting in our time that the filter is given."""
+        self._search.see(sighting)
 
     def advance(
         self, belief: JointBelief, ages_s: Mapping[str, float], rooted_s: Mapping[str, float]

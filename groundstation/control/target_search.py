@@ -8,7 +8,7 @@ from enum import StrEnum
 import numpy as np
 
 from groundstation.arrays import Array
-from groundstation.bus.messages import SearchedPicture
+from groundstation.bus.messages import RelativeObservation, SearchedPicture
 from groundstation.control.coverage import NO_OUTLOOK, Outlook, choose_stands, lattice_of, robots_in_order
 from groundstation.control.excursion import Excursions
 from groundstation.control.search_parameters import SearchParameters
@@ -23,7 +23,6 @@ from groundstation.sensing.occlusion import box_rows, sight_map
 from groundstation.sensing.visibility import camera_rows
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
-_SHOWN_S = 1.5  # pictures are searched all over twice a second
 _STEP_NS = 100 * NS_PER_MS  # of the maps' motion
 _SLOW_SEARCH_S = 999.0
 _TIPPED_M = 0.08  # what a robot's picture is off at the distance of a target, since it is not level as it is believed
@@ -58,7 +57,7 @@ class SearchState:
 class Search:
     """Maps of the targets that are not seen, updated by pictures without them, and the stands of those that search.
 
-    Use: `take` the pictures, `advance` with each belief, read `targets`, ask for `stands`.
+    Use: `see` sightings, `take` searched pictures, `advance` with each belief, read `targets`, ask for `stands`.
     """
 
     def __init__(
@@ -93,15 +92,19 @@ class Search:
         """Take a picture that was searched; it counts with the next `advance`."""
         if picture.observer in self._cameras:
             self._pictures.append(picture)
-            for name in picture.found:
-                self._shown_ns[name] = max(picture.header.stamp_ns, self._shown_ns.get(name, 0))
+
+    def see(self, sighting: RelativeObservation) -> None:
+        """Take a sighting, which the filter may still refuse: the target is where a camera sees it all the same."""
+        name = sighting.subject
+        if sighting.observer in self._cameras and name in self.targets:
+            self._shown_ns[name] = max(sighting.header.stamp_ns, self._shown_ns.get(name, 0))
 
     def is_missing(self, name: str) -> bool:
         """Return whether a target is searched for."""
         return self.targets[name].mode is not SearchMode.TRACK
 
     def shown_s(self, name: str, now_ns: int) -> float:
-        """Return since when no picture that was searched all over has shown a target; infinite: none ever did."""
+        """Return since when no picture has shown a target; infinite: none ever did."""
         stamp_ns = self._shown_ns.get(name)
         return math.inf if stamp_ns is None else (now_ns - stamp_ns) / NS_PER_S
 
@@ -154,7 +157,7 @@ class Search:
     def _begun(self, name: str, state: SearchState, belief: JointBelief, age_s: float) -> SearchState:
         p, now_ns = self.parameters, belief.stamp_ns
         # A picture that shows it elsewhere than it was predicted is the filter's business, not a reason to search.
-        shown = self.shown_s(name, now_ns) < _SHOWN_S and name in belief.layout
+        shown = self.shown_s(name, now_ns) <= p.begin_after_s and name in belief.layout
         if age_s <= p.begin_after_s or shown:
             return (
                 state

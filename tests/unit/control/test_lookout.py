@@ -6,10 +6,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from groundstation.bus.messages import FlightState, Header, SearchedPicture, Severity, VehicleStatus
+from groundstation.bus.messages import (
+    FlightState,
+    Header,
+    RelativeObservation,
+    SearchedPicture,
+    Severity,
+    VehicleStatus,
+)
 from groundstation.control.lookout import Lookout
 from groundstation.control.parameters import control_from_field
 from groundstation.control.search_parameters import search_from_field
+from groundstation.control.target_search import SearchMode
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, StateLayout
 from groundstation.sensing.from_field import sensors_from_field
@@ -28,6 +36,15 @@ def belief(stamp_s: float) -> JointBelief:
 
 def driver_in(mode: str) -> VehicleStatus:
     return VehicleStatus(header=Header(0, "c", "drone_1", "driver", 1), flight_state=FlightState.FLYING, mode=mode)
+
+
+def sighting(observer: str, stamp_s: float) -> RelativeObservation:
+    header = Header(round(stamp_s * 1e9), "c", observer, f"{observer}_camera", 1)
+    covariance = tuple((0.01 * np.eye(4)).ravel().tolist())
+    return RelativeObservation(
+        header=header, observer=observer, subject="turtlebot", camera=f"{observer}_camera", position_m=(0.0, 0.0, 1.5),
+        yaw_rad=0.0, covariance=covariance, margin=2.0, roll_rad=0.0, pitch_rad=0.0,
+    )  # fmt: skip
 
 
 def lookout_of_the_lab() -> Lookout:
@@ -91,10 +108,32 @@ def test_a_picture_that_shows_a_target_elsewhere_hides_it_from_nobody() -> None:
     lookout.take(driver_in("TRACK"))
     lookout.advance(belief(0.02), {"drone_1": 0.1, "turtlebot": 0.1}, {"drone_1": 0.1})
     lookout.take_notices()
+    for stamp_s, seen_s in ((0.9, 0.5), (2.9, 2.5), (4.9, 4.5)):
+        lookout.see(sighting("drone_1", seen_s))
+        lookout.advance(belief(stamp_s), {"drone_1": 0.1, "turtlebot": stamp_s}, {"drone_1": 0.1})
+        assert lookout.take_notices() == []
+        assert lookout.targets["turtlebot"].mode is SearchMode.TRACK
+
+
+def test_a_search_begins_as_late_as_the_last_sighting_and_not_as_the_last_searched_picture() -> None:
+    """Which may be a second older, or just have come: a target that was carried off then was looked for later."""
+    lookout = lookout_of_the_lab()
+    lookout.take(driver_in("TRACK"))
+    lookout.see(sighting("drone_1", 0.5))
     header = Header(round(0.5e9), "c", "drone_1", "drone_1_camera", 1)
     lookout.take(SearchedPicture(header=header, observer="drone_1", camera="drone_1_camera", found=("turtlebot",)))
+    for stamp_s, doubted in ((1.05, False), (1.15, True)):
+        lookout.advance(belief(stamp_s), {"drone_1": 0.1, "turtlebot": stamp_s - 0.5}, {"drone_1": 0.1})
+        assert (lookout.targets["turtlebot"].room is not None) is doubted
+
+
+def test_who_must_not_observe_targets_shows_none() -> None:
+    lookout = lookout_of_the_lab()
+    lookout.take(driver_in("TRACK"))
+    lookout.advance(belief(0.02), {"drone_1": 0.1, "turtlebot": 0.1}, {"drone_1": 0.1})
+    lookout.see(sighting("ceiling", 0.8))
     lookout.advance(belief(0.9), {"drone_1": 0.1, "turtlebot": 0.8}, {"drone_1": 0.1})
-    assert lookout.take_notices() == []
+    assert lookout.targets["turtlebot"].room is not None
 
 
 def test_nobody_is_said_to_search_who_lands_or_holds() -> None:

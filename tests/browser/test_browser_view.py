@@ -56,10 +56,9 @@ def test_first_frame_comes_soon_and_nothing_leaves_loopback(stage: Any) -> None:
 
 def test_words_of_a_crowded_map_give_way_to_each_other(mixed_stage: Any) -> None:
     mixed_stage.flight.distance_m = 0.3
-    page = mixed_stage.open()
+    page, names = mixed_stage.open(), {*mixed_stage.flight.drones, "turtlebot"}
     for _ in range(5):
-        labels = page.wait(lambda s: len(s["labels"]) > 3)["labels"]
-        assert {label["words"].split()[0] for label in labels} >= {*mixed_stage.flight.drones, "turtlebot"}
+        labels = page.wait(lambda s: {label["words"].split()[0] for label in s["labels"]} >= names)["labels"]
         for one, other in itertools.combinations(labels, 2):
             beside = one["right"] <= other["left"] or other["right"] <= one["left"]
             assert beside or one["bottom"] <= other["top"] or other["bottom"] <= one["top"], (one, other)

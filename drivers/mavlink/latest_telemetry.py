@@ -5,6 +5,9 @@ from dataclasses import dataclass
 from drivers.mavlink.convert import BaseAttitude
 from drivers.mavlink.turning import turned_on
 from groundstation.bus.messages import Vector3
+from groundstation.time_units import NS_PER_MS
+
+FRESH_NS = 300 * NS_PER_MS
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +33,10 @@ class LatestTelemetry:
     inertial: tuple[float, ...] = ()
     velocity_m_s: Vector3 = (0.0, 0.0, 0.0)
     position_m: Vector3 | None = None
+
+    def tells_motion(self, now_ns: int) -> bool:
+        """Return whether its velocity is younger than 0.3 s."""
+        return now_ns - self.moved_ns < FRESH_NS
 
     def attitude_at(self, now_ns: int) -> BaseAttitude | None:
         """Return the attitude as it is by now; None: never told."""

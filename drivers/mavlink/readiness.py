@@ -6,9 +6,8 @@ from drivers.mavlink.session import MavlinkSession
 from drivers.mavlink.settling import Settling
 from drivers.mavlink.texts import Texts
 from drivers.mavlink.wire.names import EkfFlag, Flavour, SensorBits
-from groundstation.time_units import NS_PER_MS, NS_PER_S
+from groundstation.time_units import NS_PER_S
 
-_POSITION_NS = 300 * NS_PER_MS
 # ArduPilot repeats what keeps it from arming every 30 s.
 _COMPLAINTS_NS = 35 * NS_PER_S
 _FAULTS = SensorBits.GYRO | SensorBits.ACCELEROMETER
@@ -26,7 +25,7 @@ class Readiness:
         detail = self._session.detail(self._requests)
         if detail:
             return detail
-        if now_ns - known.moved_ns > _POSITION_NS:
+        if not known.tells_motion(now_ns):
             return "it has no position yet"
         if known.healthy & _FAULTS != _FAULTS:
             return "its gyros or accelerometers are not healthy"

@@ -8,7 +8,7 @@ from drivers.datagrams import DatagramLog
 from drivers.mavlink import convert, identity
 from drivers.mavlink.commands import Orders
 from drivers.mavlink.convert import LIMITS
-from drivers.mavlink.latest_telemetry import LatestTelemetry
+from drivers.mavlink.latest_telemetry import FRESH_NS, LatestTelemetry
 from drivers.mavlink.lift_off import credible
 from drivers.mavlink.links.seam import Heard, MavlinkLink
 from drivers.mavlink.publisher import TelemetryPublisher
@@ -30,7 +30,6 @@ from groundstation.bus.api import Bus
 from groundstation.bus.messages import Estimate, FlightState, Vector3
 from groundstation.time_units import NEVER_NS, NS_PER_MS, NS_PER_S
 
-_FRESH_NS = 300 * NS_PER_MS
 _HEARTBEAT_NS = 4 * NS_PER_S
 _ASKS_NS = 3 * NS_PER_S
 # Asked for twice a second; a charge this old is unknown.
@@ -164,7 +163,7 @@ class MavlinkVehicle:
         good, known = self.vision.hear(now_ns, estimate), self.telemetry
         if self.orders.starting and not self.orders.lift.lifted and known.base_mode & ARMED:
             self._publisher.stated.leave_floor(now_ns)
-        reported = known.velocity_m_s if now_ns - known.moved_ns < _FRESH_NS else None
+        reported = known.velocity_m_s if known.tells_motion(now_ns) else None
         if good is not None and self.orders.see(now_ns, good, reported):
             self._publisher.stated.see_drift(now_ns, self.orders.drift.size_m_s)
 
@@ -204,7 +203,7 @@ class MavlinkVehicle:
     def _is_heard(self, now_ns: int, known: LatestTelemetry) -> bool:
         # Velocities are what silence is judged by in the air; on the ground there may be none before the first pose.
         newest = known.heard_ns if self._landed(now_ns, known) == Landed.ON_GROUND else known.moved_ns
-        return known.heartbeat_ns > 0 and now_ns - newest < _FRESH_NS and now_ns - known.heartbeat_ns < _HEARTBEAT_NS
+        return known.heartbeat_ns > 0 and now_ns - newest < FRESH_NS and now_ns - known.heartbeat_ns < _HEARTBEAT_NS
 
     def apply(self, now_ns: int, decision: WatchdogDecision) -> None:
         """Send the vehicle its commands for the decision, poses for its estimator, and pending requests."""

@@ -80,10 +80,16 @@ class Recording:
     def records(self, wanted: Wanted = every_topic) -> Iterator[Record]:
         """Yield decoded messages of the wanted typed topics; what does not decode is named in `damage`."""
         for raw in self.raw_records(lambda topic: topic.type is not None and wanted(topic)):
-            try:
-                yield decode(raw)
-            except MessageError as error:
-                self.damage.append(str(error))
+            if (record := self.decoded(raw)) is not None:
+                yield record
+
+    def decoded(self, raw: RawRecord) -> Record | None:
+        """Return the message of a typed topic; None where its bytes do not fit, which is named in `damage`."""
+        try:
+            return decode(raw)
+        except MessageError as error:
+            self.damage.append(str(error))
+            return None
 
 
 def decode(raw: RawRecord) -> Record:

@@ -1,7 +1,6 @@
 """From the files of a run to arrays, in one pass over the topics that matter."""
 
 from collections import defaultdict
-from collections.abc import Iterable
 from pathlib import Path
 
 import msgspec
@@ -9,12 +8,11 @@ import numpy as np
 
 from groundstation.bus import messages as m
 from groundstation.bus import topics as t
-from groundstation.errors import MessageError
 from groundstation.field.resolved import ResolvedField, field_from_json
 from groundstation.recording.chunks import among
 from groundstation.recording.file_topics import STATE
 from groundstation.recording.preamble import FIELD_NAME
-from groundstation.recording.reader import RawRecord, RecordingError, decode, open_parts, parts
+from groundstation.recording.reader import Recording, RecordingError, open_parts, parts
 from groundstation.recording.rerun import rerun_of
 from groundstation.report import run_facts
 from groundstation.report.captured_truth import captured_tracks
@@ -39,7 +37,7 @@ def gather(run_dir: Path) -> RunData:
         if FIELD_NAME in recording.attachments and not data.resolved.drones:
             data.resolved = _field(recording.attachments[FIELD_NAME], data.damage)
         data.rerun = data.rerun or rerun_of(recording.metadata)
-        rows.take(recording.raw_records(among((*_WANTED, t.ODOMETRY))))
+        rows.take(recording)
         data.damage.extend(f"{recording.path.name}: {damage}" for damage in recording.damage)
     rows.finish()
     return data
@@ -67,17 +65,14 @@ class _Rows:
         self._sim: list[tuple[float, ...]] = []
         self._captured: list[TimedMessage[m.BodyPoses]] = []
 
-    def take(self, records: Iterable[RawRecord]) -> None:
-        """Sort records into rows. Of telemetry it counts when it was measured, which needs no decoding."""
+    def take(self, recording: Recording) -> None:
+        """Sort a recording's records into rows. Of telemetry it counts when it was measured: that needs no decoding."""
         data = self._data
-        for raw in records:
+        for raw in recording.raw_records(among((*_WANTED, t.ODOMETRY))):
             if raw.key.topic is t.ODOMETRY:
                 self._heard[raw.key.entity].append(raw.log_time_ns)
                 continue
-            try:
-                record = decode(raw)
-            except MessageError as error:
-                data.damage.append(str(error))
+            if (record := recording.decoded(raw)) is None:
                 continue
             if data.start_unix_ns == 0:
                 data.start_unix_ns = record.log_time_ns

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from groundstation.control.search_height import search_height_m
 from groundstation.field.resolved import ResolvedField
 from groundstation.planning.parameters import MotionLimits, limits_from_field
 
@@ -89,7 +90,7 @@ def control_from_field(field: ResolvedField) -> ControlParameters:
     """Return the setpoints' settings of a resolved field."""
     planner, safety = field.planner, field.safety
     return ControlParameters(
-        search_height_m=planner.level_heights_m[0][0],
+        search_height_m=search_height_m(field),
         limits=limits_from_field(field),
         lost_after_s=field.estimator.lost_after_s,
         return_std_m=0.6 * safety.max_position_std_m,

@@ -5,16 +5,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from groundstation.control.parameters import SEARCH_SPEED_M_S, SEARCH_YAW_RATE_RAD_S
-from groundstation.field.drones import FieldDrone
+from groundstation.control.search_height import search_height_m
+from groundstation.control.search_ranges import search_ranges_m
 from groundstation.field.resolved import ResolvedField
 from groundstation.field.room import MotionCapture, WorldCamera
-from groundstation.sensing.from_field import square_m
 
 Interval = tuple[float, float]
-
-SEARCH_PX = 8.8
-"""So large a square is found in 86 % of the pictures that are searched all over (docs/reference/vision.md 2)."""
-
 
 NEAR_YAW_RATE_RAD_S = 1.04
 """For a target that was tracked when it got out of sight: near, and large in a picture that is not quite sharp."""
@@ -68,17 +64,10 @@ def search_from_field(resolved: ResolvedField) -> SearchParameters:
         room_m=(room.size_m[0], room.size_m[1]),
         fence_x_m=room.fence.x_m,
         fence_y_m=room.fence.y_m,
-        height_m=planner.level_heights_m[0][0],
+        height_m=search_height_m(resolved),
         yaw_rate_rad_s=min(SEARCH_YAW_RATE_RAD_S, turn_rad_s),
         near_yaw_rate_rad_s=min(NEAR_YAW_RATE_RAD_S, turn_rad_s),
         observers=(*resolved.drones, *cameras),
-        ranges_m={name: _range_m(drone, resolved) for name, drone in resolved.drones.items()},
+        ranges_m=search_ranges_m(resolved),
         apart_m=max(1.0, planner.separation_m),
     )
-
-
-def _range_m(drone: FieldDrone, resolved: ResolvedField) -> float:
-    """Return how far a full search of a drone's pictures finds all targets, at least as far as plans go."""
-    smallest_m = min(square_m(target.marker) for target in resolved.tracked.values())
-    found_m = drone.camera.calibration.fx_px * smallest_m / SEARCH_PX
-    return max(resolved.planner.planned_range_m, found_m)

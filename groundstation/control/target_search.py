@@ -12,13 +12,14 @@ from groundstation.bus.messages import RelativeObservation, SearchedPicture
 from groundstation.control.coverage import NO_OUTLOOK, Outlook, choose_stands, lattice_of, robots_in_order
 from groundstation.control.excursion import Excursions
 from groundstation.control.search_parameters import SearchParameters
+from groundstation.control.search_ranges import searching_cameras
 from groundstation.control.stand import Stand
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.belief_history import BeliefHistory
 from groundstation.estimation.room_map import RoomGrid, RoomMap, lost_at, unknown_place
 from groundstation.sensing.detection import detection_map
 from groundstation.sensing.footprint import footprint_of
-from groundstation.sensing.models import OnboardCameraModel, SensorSuite
+from groundstation.sensing.models import SensorSuite
 from groundstation.sensing.occlusion import box_rows, sight_map
 from groundstation.sensing.visibility import camera_rows
 from groundstation.time_units import NS_PER_MS, NS_PER_S
@@ -69,7 +70,7 @@ class Search:
         self.targets: dict[str, SearchState] = {name: SearchState(SearchMode.SEARCH, 0) for name in targets}
         self._lost_after_s, self._sensors, self._excursions = lost_after_s, sensors, excursions
         observers = [name for name in parameters.observers if name in sensors.onboard or name in sensors.world]
-        onboard = {name: _searching(camera, parameters.ranges_m.get(name)) for name, camera in sensors.onboard.items()}
+        onboard = searching_cameras(sensors.onboard, parameters.ranges_m)
         self._cameras = {
             name: camera_rows([onboard.get(name) or sensors.world[name]], sensors.softness) for name in observers
         }
@@ -241,8 +242,3 @@ class Search:
                 excluded=excluded,
                 expected_s=expected_s,
             )
-
-
-def _searching(camera: OnboardCameraModel, range_m: float | None) -> OnboardCameraModel:
-    """Return a camera with the range within which its pictures are searched."""
-    return camera if range_m is None else replace(camera, view=replace(camera.view, range_m=range_m))

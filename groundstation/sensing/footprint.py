@@ -52,6 +52,14 @@ def footprint_of(
     return Footprint(all_rows, all_columns, np.concatenate(chances), np.array(first, dtype=np.int64), fresh)
 
 
+def turn_view(footprint: Footprint) -> float:
+    """Return how many cells a full turn shows, each by its chance at the best heading."""
+    half = int(max(np.abs(footprint.rows).max(initial=0), np.abs(footprint.columns).max(initial=0)))
+    best = np.zeros((2 * half + 1, 2 * half + 1))
+    np.maximum.at(best, (footprint.rows + half, footprint.columns + half), footprint.chances)
+    return float(best.sum())
+
+
 @kernel()
 def seen_from(
     chances: Matrix, at_row: IntVector, at_column: IntVector,

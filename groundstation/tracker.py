@@ -278,7 +278,7 @@ class Tracker:
         sight = Sight(
             min(seen_s, default=None), unseen_s, lookout.missed_s, lookout.missing,
             lambda robots, targets: lookout.stands(robots, targets, belief), lookout.velocity_errors_m_s, drifts,
-            lookout.unsteered)  # fmt: skip
+            lookout.unsteered, {n: self._tied_age_s(n) for n in belief.layout.robots}, velocities)  # fmt: skip
         wanted = setpoints_from_plan(self.current, belief, airborne, p.control, p.sensors, sight)
         limited = {
             name: limit_setpoint(name, setpoint, belief, now_ns, p.safety, velocities, drifts)

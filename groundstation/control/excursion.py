@@ -51,18 +51,19 @@ class Excursions:
 
 def within_reach(
     velocity: Array, name: str, belief: JointBelief, parameters: ControlParameters, sensors: SensorSuite,
-    error_m_s: float, drift_m_s: Array,
+    error_m_s: float, drift_m_s: Array, near_m: tuple[float, float] | None = None,
 ) -> Array:  # fmt: skip
     """Return the part of a velocity (2) [m/s; world] with which a robot stays where it could come back from unseen.
 
-    It could from now on, into the nearest world-fixed view at its height; another one that it reaches from there in
-    time counts as the same. error_m_s: rms error of its odometry that is to be expected; drift_m_s: motion besides what
-    it is told (2) [m/s; world], which counts towards the borders.
+    It could from now on, into the world-fixed view at its height that is nearest to near_m [x, y], or to itself;
+    another one that it reaches from there in time counts as the same. error_m_s: rms error of its odometry that is to
+    be expected, above 0 (infinite: it has no time at all); drift_m_s: motion besides what it is told (2) [m/s; world],
+    which counts towards the borders.
     """
     mean, p = belief.mean_of(name), parameters
     left_s = time_left_s(spread_m(belief, name), 0.0, p, error_m_s)
     views = sensors.root_views(float(mean[2]) + sensors.marker_height_m[name])
-    view = _connected(mean[:2], views, p.return_speed_m_s * max(0.0, left_s))
+    view = _connected(mean[:2] if near_m is None else np.array(near_m), views, p.return_speed_m_s * max(0.0, left_s))
     if view is None:
         return velocity
     reach_m = p.return_speed_m_s * max(0.0, left_s - p.return_margin_s)

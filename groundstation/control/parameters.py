@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from groundstation.control.search_height import search_height_m
 from groundstation.field.resolved import ResolvedField
 from groundstation.planning.parameters import MotionLimits, limits_from_field
+from groundstation.vehicles import kind_named
 
 Interval = tuple[float, float]
 _USUAL_LIMITS = MotionLimits()
@@ -26,7 +27,8 @@ class ControlParameters:
     uncertain out of sight at least, seen_std_m: from where; sound_error_m_s: a larger error of the odometry is not that
     of a sound one; regain_after_s: nobody has seen a target for so long, those that track it turn to it and back off;
     hint_std_m: no plan goes by a target that is known worse; max_plan_age_s: held controls of an older plan are not
-    flown any more.
+    flown any more; fed: robots that fly on our estimate; untied_after_s: of nothing that tells where they are, after
+    which they turn back; the next sighting takes 0.3 s at most, where there is one.
     """
 
     search_height_m: float
@@ -51,6 +53,8 @@ class ControlParameters:
     search_yaw_rate_rad_s: float = SEARCH_YAW_RATE_RAD_S
     hint_std_m: float = 1.5
     max_plan_age_s: float = 1.0
+    fed: frozenset[str] = frozenset()
+    untied_after_s: float = 0.4
 
     def limits_of(self, robot: str) -> MotionLimits:
         """Return a robot's motion limits."""
@@ -97,6 +101,7 @@ def control_from_field(field: ResolvedField) -> ControlParameters:
         return_limit_m=0.8 * safety.max_position_std_m,
         return_within_s=1.5 * safety.unseen_land_after_s,
         max_plan_age_s=max(1.0, 3.0 / planner.rate_hz),
+        fed=frozenset(n for n, drone in field.drones.items() if kind_named(drone.kind).habits.flies_on_estimate),
     )
 
 

@@ -22,8 +22,10 @@ from groundstation.geometry.stabilized_frame import stabilized_from_world, world
 from groundstation.planning.planner import PlanResult
 from groundstation.sensing.models import SensorSuite
 
-_NO_DRIFT = np.zeros(3)
+_STILL = np.zeros(3)
 _STAND_GAIN, _TURN_GAIN = 1.0, 1.5  # of the way and the turn to a stand [1/s]
+# Between two views a robot goes on to the one that it flies to: the nearest one changes with each estimate.
+_AHEAD_S = 1.0
 # Deviations of a robot's place by which others make room for it: two keep it away from them, one is to spare.
 _ROOM_SIGMAS = 3.0
 
@@ -51,7 +53,8 @@ class Sight:
     saw each robot; missed_s: since when a camera should see a robot and does not; missing: targets that are to be
     searched for: while others are tracked, one robot does; velocity_errors_m_s: of each robot's odometry, rms;
     drifts_m_s: motion of each robot besides what it is told (3) [m/s; world]; unsteered: robots that follow no
-    setpoints: they wait or land.
+    setpoints: they wait or land; untied_s: since something fixed in the room last told where each robot is, or somebody
+    saw it; velocities_m_s: of each robot (3) [m/s; world].
     """
 
     target_age_s: float | None = None
@@ -62,6 +65,8 @@ class Sight:
     velocity_errors_m_s: Mapping[str, float] = field(default_factory=dict)
     drifts_m_s: Mapping[str, Array] = field(default_factory=dict)
     unsteered: Collection[str] = ()
+    untied_s: Mapping[str, float] = field(default_factory=dict)
+    velocities_m_s: Mapping[str, Array] = field(default_factory=dict)
 
 
 NOTHING_SEEN = Sight()
@@ -162,15 +167,28 @@ def _giving_way(name: str, velocity: tuple[float, float], coming: Sequence[str],
 
 
 def _recoverable(name: str, velocity: tuple[float, float], now: _Moment) -> tuple[float, float]:
-    """Return the part of a velocity [base_stabilized] that keeps a robot where it comes back from, if it gets lost."""
+    """Return the part of a velocity [base_stabilized] that keeps a robot where it comes back from, if it gets lost.
+
+    One that flies on our estimate comes back as soon as nothing tells where it is: it lands before its place is lost.
+    """
     yaw, error_m_s = float(now.belief.mean_of(name)[3]), now.sight.velocity_errors_m_s.get(name, 0.0)
+    untied = now.sight.untied_s.get(name, 0.0) > now.parameters.untied_after_s
+    if untied and name in now.parameters.fed:
+        error_m_s = math.inf
     if error_m_s <= now.parameters.sound_error_m_s:
         return velocity
     wanted = world_from_stabilized(np.array([*velocity, 0.0]), yaw)
-    drift = now.sight.drifts_m_s.get(name, _NO_DRIFT)[:2]
-    held = within_reach(wanted[:2], name, now.belief, now.parameters, now.sensors, error_m_s, drift)
+    drift = now.sight.drifts_m_s.get(name, _STILL)[:2]
+    near = _soon(name, now)
+    held = within_reach(wanted[:2], name, now.belief, now.parameters, now.sensors, error_m_s, drift, near)
     forward, left, _ = stabilized_from_world(np.append(held, 0.0), yaw).tolist()
     return forward, left
+
+
+def _soon(name: str, now: _Moment) -> tuple[float, float]:
+    """Return where a robot will be in a second [x, y; world]."""
+    x, y = now.belief.mean_of(name)[:2] + _AHEAD_S * now.sight.velocities_m_s.get(name, _STILL)[:2]
+    return float(x), float(y)
 
 
 def _is_lost(name: str, now: _Moment) -> bool:
@@ -195,7 +213,7 @@ def _stands(phases: Mapping[str, FlightMode], searching: Mapping[str, Stand], no
     robots = [name for name in now.robots if phases[name] in (FlightMode.RETURN, FlightMode.SEARCH)]
     means = {name: now.belief.mean_of(name) for name in robots}
     places = {name: (float(mean[0]), float(mean[1])) for name, mean in means.items()}
-    views = {name: view_of(*places[name], name, now.parameters, now.sensors) for name in robots}
+    views = {name: view_of(*_soon(name, now), name, now.parameters, now.sensors) for name in robots}
     back = {
         name: return_stand(means[name], views[name], now.sight.missed_s.get(name, 0.0))
         for name in robots
@@ -217,7 +235,7 @@ def _towards(name: str, stand: Stand, phase: FlightMode, now: _Moment) -> Setpoi
     Of who returns, motion besides what it is told is subtracted, as far as such a drift is believed.
     """
     mean, parameters = now.belief.mean_of(name), now.parameters
-    drift_m_s = now.sight.drifts_m_s.get(name, _NO_DRIFT) if phase is FlightMode.RETURN else _NO_DRIFT
+    drift_m_s = now.sight.drifts_m_s.get(name, _STILL) if phase is FlightMode.RETURN else _STILL
     velocity = _STAND_GAIN * np.array([stand.x - mean[0], stand.y - mean[1], 0.0])
     speed = float(np.linalg.norm(velocity))
     most = parameters.return_speed_m_s if phase is FlightMode.RETURN else parameters.search_speed_m_s

@@ -1,0 +1,127 @@
+"""Who flies on our estimate turns back as soon as nothing tells where it is: it lands before its place is lost."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from groundstation.bus.messages import SolverReport
+from groundstation.control.flight_mode import FlightMode
+from groundstation.control.parameters import control_from_field
+from groundstation.control.setpoints import Setpoint, Sight, setpoints_from_plan
+from groundstation.estimation.belief import JointBelief
+from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, StateLayout
+from groundstation.geometry.stabilized_frame import stabilized_from_world, world_from_stabilized
+from groundstation.planning.planner import PlanResult
+from groundstation.sensing.from_field import sensors_from_field
+from groundstation.sensing.topology import Topology
+from groundstation.settings.load import load_field
+from groundstation.settings.resolved import resolved_field
+
+FIELD = resolved_field(load_field(Path(__file__).parents[3] / "config/mixed-team.yaml"))
+SENSORS, CONTROL = sensors_from_field(FIELD), control_from_field(FIELD)
+TICK_S, LAG_S, DELAY_S = 0.02, 0.5, 0.2
+# As a real PX4 (SIH) was believed out of sight, and as its driver stops and lands it.
+SEEN_STD_M, GROWTH_M_S, NEEDED_STD_M, HOVERS_S, LANDS_S = 0.02, 0.08, 0.07, 0.3, 0.7
+TARGET = (1.0, 0.45, 0.2, 0.05)
+
+
+def belief(pose: np.ndarray, std_m: float, name: str = "drone_2") -> JointBelief:
+    layout = StateLayout().with_entity(name, EntityKind.ROBOT, ROBOT_CORE)
+    layout = layout.with_entity("turtlebot", EntityKind.TARGET, TARGET_CORE)
+    return JointBelief(np.array([*pose, *TARGET]), std_m**2 * np.eye(8), layout, 0)
+
+
+def plan(velocity: np.ndarray, pose: np.ndarray, name: str = "drone_2") -> PlanResult:
+    body = stabilized_from_world(np.append(velocity, 0.0), float(pose[3]))
+    return PlanResult(
+        topology=Topology.parse(name), cost=0.1, uncertainty=0.1, controls={name: np.array([body[0], body[1], 0.0])},
+        heights={name: float(pose[2])}, edges=(), alternatives=(), solver=SolverReport("complete", 1, 0.0, 1, 1),
+        mode="multistart", stamp_ns=0,
+    )  # fmt: skip
+
+
+def told(pose: np.ndarray, velocity: np.ndarray, sight: Sight, std_m: float, name: str = "drone_2") -> Setpoint:
+    found = setpoints_from_plan(plan(velocity, pose, name), belief(pose, std_m, name), (name,), CONTROL, SENSORS, sight)
+    assert found[name].phase is FlightMode.TRACK
+    return found[name]
+
+
+def seen(pose: np.ndarray) -> bool:
+    marker = SENSORS.marker("drone_2", pose, is_robot=True)
+    return any(SENSORS.world_in_view(camera, marker) for camera in SENSORS.world)
+
+
+class Flight:
+    """A vehicle that follows velocities with a lag, its belief, and what its driver makes of that."""
+
+    def __init__(self, place: tuple[float, ...], velocity: tuple[float, float]) -> None:
+        self.pose, self.velocity = np.array([*place, 0.7]), np.array(velocity)
+        self.tied_s = self.lost_s = 0.0
+
+    def step(self, planned: tuple[float, float]) -> bool:
+        """Return whether it goes on; its driver lands it before its place is known too badly."""
+        unseen_s = self.tied_s + DELAY_S
+        sight = Sight(
+            0.1, {"drone_2": unseen_s}, untied_s={"drone_2": unseen_s},
+            velocities_m_s={"drone_2": np.append(self.velocity, 0.0)},
+        )  # fmt: skip
+        std_m = SEEN_STD_M + GROWTH_M_S * self.tied_s
+        out = told(self.pose, np.array(planned), sight, std_m).velocity_m_s
+        wanted = world_from_stabilized(np.array(out), float(self.pose[3]))[:2]
+        self.lost_s = self.lost_s + TICK_S if std_m > NEEDED_STD_M else 0.0
+        self.velocity += TICK_S / LAG_S * ((wanted if self.lost_s < HOVERS_S else np.zeros(2)) - self.velocity)
+        self.pose[:2] += TICK_S * self.velocity
+        self.tied_s += TICK_S
+        return self.lost_s < LANDS_S
+
+
+@pytest.mark.parametrize(
+    ("place", "velocity", "planned"),
+    [
+        ((-0.29, -0.52, 1.31), (0.12, -0.38), (0.16, -0.10)),
+        ((-0.14, -0.59, 1.17), (0.14, -0.03), (0.00, 0.17)),
+    ],
+    ids=["it left the view and saw nothing itself", "the one that saw the same target left the view too"],
+)
+def test_who_left_every_view_is_back_in_one_before_it_lands(
+    place: tuple[float, ...], velocity: tuple[float, float], planned: tuple[float, float]
+) -> None:
+    """Places, velocities and plans of two flights of a PX4 in step with the room that ended in a landing."""
+    flight = Flight(place, velocity)
+    while not seen(flight.pose):
+        assert flight.step(planned), f"landed {flight.tied_s:.1f} s after it was last seen, at {flight.pose[:2]}"
+    assert flight.tied_s > 0.4
+
+
+def test_who_is_told_where_it_is_by_what_it_sees_flies_its_plan() -> None:
+    pose = np.array([-0.1, -0.55, 1.3, 0.7])
+    sight = Sight(0.1, {"drone_2": 3.0}, untied_s={"drone_2": 0.3})
+    out = told(pose, np.array([0.3, 0.1]), sight, SEEN_STD_M).velocity_m_s
+    assert world_from_stabilized(np.array(out), 0.7)[:2] == pytest.approx([0.3, 0.1])
+
+
+def test_who_holds_its_place_by_itself_flies_on_unseen() -> None:
+    pose = np.array([-0.1, 0.55, 1.3, 0.7])
+    sight = Sight(0.1, {"drone_1": 1.0}, untied_s={"drone_1": 1.0})
+    out = told(pose, np.array([0.3, 0.1]), sight, SEEN_STD_M, "drone_1").velocity_m_s
+    assert world_from_stabilized(np.array(out), 0.7)[:2] == pytest.approx([0.3, 0.1])
+
+
+@pytest.mark.parametrize("x", [-0.02, 0.02])
+def test_between_two_views_it_goes_on_to_the_one_that_it_flies_to(x: float) -> None:
+    """The nearest one changes with each estimate, and it would stay between them until it lands."""
+    sight = Sight(
+        0.1, {"drone_2": 1.0}, untied_s={"drone_2": 1.0}, velocities_m_s={"drone_2": np.array([0.2, 0.0, 0.0])}
+    )
+    out = told(np.array([x, -0.3, 1.3, 0.7]), np.array([-0.2, 0.0]), sight, SEEN_STD_M).velocity_m_s
+    assert world_from_stabilized(np.array(out), 0.7)[0] == pytest.approx(CONTROL.return_speed_m_s)
+
+
+@pytest.mark.parametrize("x", [-0.02, 0.02])
+def test_on_the_way_back_it_goes_on_to_the_view_that_it_flies_to(x: float) -> None:
+    pose = np.array([x, -0.3, 1.5, 0.0])
+    sight = Sight(0.1, {"drone_2": 20.0}, velocities_m_s={"drone_2": np.array([0.2, 0.0, 0.0])})
+    out = setpoints_from_plan(None, belief(pose, 0.05), ("drone_2",), CONTROL, SENSORS, sight)["drone_2"]
+    assert out.phase is FlightMode.RETURN
+    assert out.velocity_m_s[0] > 0.3

@@ -85,7 +85,7 @@ class Orders:
         """
         lifted = self.lift.lifted
         if not lifted:
-            self.lift.see((good.mean[0], good.mean[1], good.mean[2]))
+            self.lift.see(now_ns, (good.mean[0], good.mean[1], good.mean[2]), good.age_s)
         if reported_m_s is None or not (lifted or self.starting):
             return False
         self.drift.hear(now_ns, good, reported_m_s)

@@ -12,6 +12,8 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 _RISEN_M, _CLIMBING_M_S, _CLIMBING_NS = 0.1, 0.1, 300 * NS_PER_MS
 # Three times the error of a height that cameras see.
 _SEEN_RISEN_M = 0.1
+# While they do, its own word alone counts from a height on by which it is never wrong on the floor.
+_SEEN_NS, _SURELY_RISEN_M = 500 * NS_PER_MS, 0.4
 _STANDING = 25  # estimates whose mean is the place where it stands
 # It is asked for five times a second, and anew after 3 s without it (`session.py`).
 _OLD_NS = 6 * NS_PER_S
@@ -38,11 +40,14 @@ class LiftOff:
         self.lifted = False
         self.stood: Vector3 | None = None
         self._places = 0
+        self._seen_ns: int | None = None
         self._floor_m: float | None = None
         self._climbing_since_ns: int | None = None
 
-    def see(self, place: Vector3) -> None:
-        """Take where the tracker has it [world], while it has not lifted."""
+    def see(self, now_ns: int, place: Vector3, age_s: float) -> None:
+        """Take where the tracker has it [world], while it has not lifted; age_s: of what cameras saw of it last."""
+        if age_s * NS_PER_S < _SEEN_NS:
+            self._seen_ns = now_ns
         stood = self.stood or place
         if self._places < _STANDING:
             self._places += 1
@@ -66,5 +71,10 @@ class LiftOff:
         elif self._climbing_since_ns is None:
             self._climbing_since_ns = now_ns
         climbs = self._climbing_since_ns is not None and now_ns - self._climbing_since_ns >= _CLIMBING_NS
-        self.lifted = self.lifted or not starting or climbs or risen_m >= _RISEN_M
+        stood = self._places == _STANDING  # else they have only seen it rise
+        if stood and self._seen_ns is not None and now_ns - self._seen_ns < _SEEN_NS:
+            says = risen_m >= _SURELY_RISEN_M  # its climb rate errs by 0.15 m/s for seconds where it stands
+        else:
+            says = climbs or risen_m >= _RISEN_M
+        self.lifted = self.lifted or not starting or says
         return risen_m

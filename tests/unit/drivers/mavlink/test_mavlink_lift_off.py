@@ -59,7 +59,7 @@ def stands(lift, height_m, starting=True):
     """The tracker has it on the floor for half a second, with errors of 3 cm."""
     for turn in range(25):
         lift.hear(turn * 20 * MS, starting, Landed.ON_GROUND, 0.0, 0.0)
-        lift.see((1.0, 2.0, height_m + (0.03 if turn % 2 else -0.03)))
+        lift.see(turn * 20 * MS, (1.0, 2.0, height_m + (0.03 if turn % 2 else -0.03)), 0.2)
 
 
 def test_what_cameras_see_of_its_height_counts_before_its_own_word():
@@ -67,10 +67,41 @@ def test_what_cameras_see_of_its_height_counts_before_its_own_word():
     stands(lift, 0.06)
     assert lift.stood == pytest.approx((1.0, 2.0, 0.06), abs=0.002)
     lift.hear(1_000 * MS, True, Landed.IN_AIR, 0.0, 0.0)
-    lift.see((1.0, 2.0, 0.14))
+    lift.see(1_000 * MS, (1.0, 2.0, 0.14), 0.2)
     assert not lift.lifted, "sightings err by 3 cm"
-    lift.see((1.1, 2.0, 0.17))
+    lift.see(1_000 * MS, (1.1, 2.0, 0.17), 0.2)
     assert lift.lifted and lift.stood == pytest.approx((1.0, 2.0, 0.06), abs=0.002)
+
+
+def climbs_by_its_own_word(lift, age_s, height_m=0.12):
+    """For a second it says 0.13 m/s, and is seen where it stands; returns whether it has lifted."""
+    for turn in range(26, 76):
+        lift.hear(turn * 20 * MS, True, Landed.IN_AIR, height_m, 0.13)
+        lift.see(turn * 20 * MS, (1.0, 2.0, 0.06), age_s)
+    return lift.lifted
+
+
+def test_its_own_climb_rate_does_not_lift_it_where_cameras_see_it_stand():
+    """A real PX4 (SIH) said 0.13 m/s on the floor, and was called airborne 1.9 s before it was."""
+    lift = LiftOff()
+    stands(lift, 0.06)
+    assert not climbs_by_its_own_word(lift, age_s=0.2)
+    assert climbs_by_its_own_word(lift, age_s=0.2, height_m=0.45), "its word alone counts at last"
+
+
+def test_what_cameras_saw_a_while_ago_does_not_hold_it_on_the_floor():
+    lift = LiftOff()
+    stands(lift, 0.06)
+    assert climbs_by_its_own_word(lift, age_s=0.8)
+
+
+def test_whom_cameras_see_in_the_air_first_has_its_own_word():
+    lift = LiftOff()
+    hear(lift, 1.0, Landed.ON_GROUND)
+    for turn in range(20):
+        lift.hear((1_000 + turn * 20) * MS, True, Landed.IN_AIR, 0.0, 0.13)
+        lift.see((1_000 + turn * 20) * MS, (1.0, 2.0, 0.3), 0.1)
+    assert lift.lifted
 
 
 def test_where_it_stood_is_that_of_this_take_off():

@@ -285,8 +285,8 @@ class Watchdog:
 
     def _action(self, now_ns: int) -> Action:
         match self.mode:
-            case DriverMode.CONNECTING:
-                return Action.WAIT
+            case DriverMode.CONNECTING:  # a vehicle that is not heard may hear
+                return Action.LAND if now_ns < self._land_until_ns else Action.WAIT
             case DriverMode.LANDED:
                 if self.vehicle.clears and self._clears_in_time(now_ns):
                     return Action.CLEAR

@@ -114,10 +114,11 @@ class Orders:
                 self._end_climb(now_ns, decision.mode, climb_m_s)
                 return self._hover(now_ns, guided, climbed_m)
             case Action.LAND:
-                if armed and custom_mode != self._landing:
+                # Its word may be wrong, that it lands already or has disarmed: it is told until it has once accepted.
+                if "landing" not in self._requests.accepted or (armed and custom_mode != self._landing):
                     self._ask(now_ns, "landing", MavCmd.NAV_LAND)
-                    # Until it obeys it must not fly on with the last velocity.
-                    return self._stand(now_ns) if guided else None
+                # Until it obeys it must not fly on with the last velocity.
+                return self._stand(now_ns) if armed and guided else None
             case Action.CUT:
                 if armed:
                     self._ask(now_ns, "motor cut", MavCmd.COMPONENT_ARM_DISARM, 0.0, FORCE)
@@ -161,6 +162,8 @@ class Orders:
             self.starting, self._climb_until_ns = False, now_ns + _CLIMB_LIMIT_NS
         if action in (Action.LAND, Action.CUT, Action.IDLE):
             self._requests.drop("arming", "guided mode", "take-off")
+        if action is Action.LAND:
+            self._requests.accepted.discard("landing")
         self._action, self._since_ns = action, now_ns
 
     def _take_back(self, now_ns: int, ordered_ns: int) -> None:

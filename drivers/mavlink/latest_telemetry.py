@@ -4,22 +4,26 @@ from dataclasses import dataclass
 
 from drivers.mavlink.convert import BaseAttitude
 from drivers.mavlink.turning import turned_on
+from drivers.mavlink.wire.names import ARMED, Landed
 from groundstation.bus.messages import Vector3
-from groundstation.time_units import NS_PER_MS
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
+# Longer than the time in which a vehicle whose motors stand is on the floor, and says so.
+_FALLS_NS = 5 * NS_PER_S
 FRESH_NS = 300 * NS_PER_MS
 
 
 @dataclass(frozen=True, slots=True)
 class LatestTelemetry:
     """What was told last; times 0: never. moved_ns, attitude_ns are of the last velocity and attitude, asked_ns of the
-    last question for our time."""
+    last question for our time; disarmed_ns: since when heartbeats say again that its motors stand."""
 
     heard_ns: int = 0
     moved_ns: int = 0
     heartbeat_ns: int = 0
     asked_ns: int = 0
     base_mode: int = 0
+    disarmed_ns: int = 0
     custom_mode: int = 0
     status: int = 0
     landed: int = 0
@@ -37,6 +41,15 @@ class LatestTelemetry:
     def tells_motion(self, now_ns: int) -> bool:
         """Return whether its velocity is younger than 0.3 s."""
         return now_ns - self.moved_ns < FRESH_NS
+
+    def disarmed_aloft(self, now_ns: int, landed: int) -> bool:
+        """Return whether it says since a moment ago that its motors stand, and that it flies (MAV_LANDED_STATE).
+
+        Both cannot be true for longer: its heartbeat may be another's, or old.
+        """
+        if self.base_mode & ARMED or landed in (Landed.UNDEFINED, Landed.ON_GROUND):
+            return False
+        return self.disarmed_ns > 0 and now_ns - self.disarmed_ns < _FALLS_NS
 
     def attitude_at(self, now_ns: int) -> BaseAttitude | None:
         """Return the attitude as it is by now; None: never told."""

@@ -102,7 +102,9 @@ class MavlinkVehicle:
                 known = self._felt(now_ns, *convert.imu_from_raw(message), known)
             case telemetry.Heartbeat():
                 mode = (message.base_mode, message.custom_mode, message.system_status)
+                disarmed_ns = now_ns if known.base_mode & ARMED and not mode[0] & ARMED else known.disarmed_ns
                 known = replace(known, heartbeat_ns=now_ns, base_mode=mode[0], custom_mode=mode[1], status=mode[2])
+                known = replace(known, disarmed_ns=disarmed_ns)
                 if message.autopilot != self.flavour:
                     raise WireError(
                         "wrong_flavour", f"autopilot {message.autopilot}, the field says {self.flavour.name}"
@@ -198,6 +200,8 @@ class MavlinkVehicle:
 
     def _state(self, now_ns: int, known: LatestTelemetry) -> FlightState:
         landed = self._landed(now_ns, known)
+        if known.disarmed_aloft(now_ns, landed):
+            return FlightState.LANDING
         return convert.flight_state_from(self.flavour, known.base_mode, known.custom_mode, known.status, landed)
 
     def _is_heard(self, now_ns: int, known: LatestTelemetry) -> bool:

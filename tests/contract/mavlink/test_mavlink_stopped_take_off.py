@@ -1,7 +1,7 @@
 """Somebody else stops a vehicle while it takes off: its driver does not ask for what they ended."""
 
 from drivers.mavlink.wire.flight import CommandLong
-from drivers.mavlink.wire.names import CopterMode, Flavour, MavCmd, Px4Auto, Px4Main, px4_mode
+from drivers.mavlink.wire.names import FORCE, CopterMode, Flavour, MavCmd, Px4Auto, Px4Main, px4_mode
 from groundstation.bus.messages import Verb
 
 _RESTARTS = {MavCmd.DO_SET_MODE, MavCmd.NAV_TAKEOFF}
@@ -53,11 +53,10 @@ def test_a_landing_ends_on_the_floor(rig):
 
 def test_motors_that_were_switched_off_stay_off_until_the_next_order(rig):
     firmware = begin(rig)
-    firmware.armed = False
+    firmware.disarm(FORCE)
     rig.run(4.0)
     assert not asked_again(rig) and not firmware.armed
-    # PX4 says from its arming on that it flies: to its driver it has landed. ArduPilot still takes off.
-    assert rig.mode == "LANDED" if rig.flavour == Flavour.PX4 else is_given_up(rig)
+    assert is_given_up(rig)
     rig.order(Verb.LAND)
     rig.until(lambda: rig.mode == "LANDED", 10.0)
     rig.order(Verb.TAKEOFF)

@@ -5,7 +5,8 @@ from typing import Any
 
 import pytest
 
-from drivers.mavlink.wire.names import Landed
+from drivers.mavlink.wire.flight import CommandLong
+from drivers.mavlink.wire.names import Landed, MavCmd, land_mode
 from drivers.mavlink.wire.telemetry import (
     AttitudeQuaternion,
     BatteryStatus,
@@ -138,6 +139,42 @@ def test_a_vehicle_that_says_in_flight_that_it_stands_is_landed(rig):
     assert rig.host.watchdog.reason == "the vehicle lands by itself"
     rig.until(lambda: rig.body.on_ground and not rig.copter.motors_on, 10.0)
     assert rig.until(lambda: rig.mode == "LANDED", 1.0)
+
+
+@pytest.mark.parametrize("custom_mode", [0, None], ids=["in another mode", "landing already"])
+def test_a_vehicle_whose_heartbeat_says_in_flight_that_it_is_disarmed_is_landed(rig, custom_mode):
+    """It may be another's heartbeat with its ids: what flies is in the air by its own word, and is told to land."""
+    rig.track_on()
+    mode = land_mode(rig.flavour) if custom_mode is None else custom_mode
+    Liar(rig.link).set(Heartbeat, base_mode=0, custom_mode=mode)
+    rig.until(lambda: rig.mode == "LANDING", 1.5)
+    rig.until(lambda: MavCmd.NAV_LAND in [message.command for _, message in rig.sent(CommandLong)], 0.1)
+    rig.until(lambda: rig.body.on_ground, 10.0)
+    rig.until(lambda: rig.mode == "LANDED", 1.0)
+
+
+def test_an_order_to_land_is_sent_whatever_the_vehicle_says(rig):
+    """Also to one that says by all its words that it stands, and to one that nobody has heard."""
+    rig.connect()
+    rig.order(Verb.LAND)
+    rig.run(1.0)
+    assert [m.command for _, m in rig.sent(CommandLong)].count(MavCmd.NAV_LAND) == 1
+    rig.order(Verb.TAKEOFF)
+    rig.until(lambda: rig.mode == "HOVER")
+
+
+def test_an_order_to_land_is_sent_to_a_vehicle_that_nobody_hears(rig):
+    Liar(rig.link).change = lambda _frame: None
+    rig.run(1.0)
+    rig.order(Verb.LAND)
+    rig.run(0.1)
+    assert rig.mode == "CONNECTING"
+    assert MavCmd.NAV_LAND in [message.command for _, message in rig.sent(CommandLong)]
+    rig.run(2.5)
+    told = len(rig.sent(CommandLong))
+    rig.run(2.0)
+    lands = [m for _, m in rig.sent(CommandLong)[told:] if m.command == MavCmd.NAV_LAND]
+    assert not lands
 
 
 def test_a_driver_that_is_to_exit_has_told_to_land_first(rig):

@@ -7,6 +7,7 @@ import errno
 import os
 import socket
 from collections.abc import Sequence
+from itertools import product
 from pathlib import Path
 
 from groundstation.errors import DriverError
@@ -31,10 +32,10 @@ def bind_to_adapter(one: socket.socket, interface: str) -> None:
         raise DriverError(f"interface {interface}: {_why(error)}") from error
 
 
-def send_to_all(udp: socket.socket, datagram: bytes, addresses: Sequence[Address]) -> None:
-    """Send a datagram to each address; raises the last OSError, once the others have theirs."""
+def send_to_all(udp: socket.socket, datagrams: Sequence[bytes], addresses: Sequence[Address]) -> None:
+    """Send datagrams to each address; raises the last OSError, once the others have theirs."""
     failed: OSError | None = None
-    for address in addresses:
+    for datagram, address in product(datagrams, addresses):
         try:
             udp.sendto(datagram, address)
         except OSError as error:

@@ -7,13 +7,16 @@ import json
 import os
 import socket
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from drivers.mavlink.links.tty import open_raw
 from drivers.mavlink.signing_key import read_key
-from drivers.mavlink.wire.signature import signed_anew, stamp_at
+from drivers.mavlink.wire.signature import frame_size, signed_anew, stamp_at
 from groundstation.adapters import Address, bind_to_adapter, send_to_all
 from groundstation.errors import DriverError
+
+# What is larger goes in fragments over a usual network: one that is lost takes the words to all vehicles with it.
+_MOST_BYTES = 1200
 
 
 class MavlinkVoice:
@@ -43,7 +46,7 @@ class MavlinkVoice:
         if self._socket is None:
             self._write(datagram)
             return
-        send_to_all(self._socket, datagram, addresses)
+        send_to_all(self._socket, tuple(_in_parts(datagram)), addresses)
 
     def _write(self, datagram: bytes) -> None:
         """Write into the device, opened beside the driver that hangs, or after it; one that fails is opened anew."""
@@ -69,3 +72,16 @@ class MavlinkVoice:
         if self._fd >= 0:
             os.close(self._fd)
             self._fd = -1
+
+
+def _in_parts(frames: bytes) -> Iterator[bytes]:
+    """Yield whole frames, as many together as go in one datagram unfragmented."""
+    begin = end = 0
+    while end < len(frames):
+        size = frame_size(frames, end)
+        if end + size - begin > _MOST_BYTES and end > begin:
+            yield frames[begin:end]
+            begin = end
+        end += size
+    if frames:
+        yield frames[begin:]

@@ -29,7 +29,7 @@ class UdpVoice:
 
     def say(self, datagram: bytes, addresses: Sequence[Address]) -> None:
         """Send a datagram to each address."""
-        send_to_all(self._socket, datagram, addresses)
+        send_to_all(self._socket, (datagram,), addresses)
 
     def close(self) -> None:
         """Close the socket; idempotent."""

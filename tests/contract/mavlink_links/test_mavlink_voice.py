@@ -1,6 +1,7 @@
 """Who speaks for a dead driver is heard on every kind of link: signed, called by the vehicle, by a serial line."""
 
 import dataclasses
+import json
 import os
 import pty
 import subprocess
@@ -11,8 +12,10 @@ from typing import Any
 
 import pytest
 
+from drivers.mavlink.failsafe import hover_and_land
 from drivers.mavlink.links.opening import open_link
 from drivers.mavlink.settings import LinkSettings
+from drivers.mavlink.voice import MavlinkVoice
 from drivers.mavlink.wire.flight import CommandLong, SetPositionTargetLocalNed
 from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder, split
 from drivers.mavlink.wire.telemetry import Heartbeat
@@ -55,6 +58,23 @@ def target_of(frame):
 
 def at(words, udp, **changes):
     return dataclasses.replace(words, address="127.0.0.1", port=udp.getsockname()[1], **changes)
+
+
+@pytest.mark.parametrize("signed", [False, True])
+def test_words_to_many_vehicles_fit_a_usual_network_unfragmented(vehicle, key_file, signed):
+    """A fragment that is lost takes the whole datagram with it: nobody would be stopped."""
+    systems = list(range(1, 61))
+    way = json.dumps({"serial": "", "key_file": key_file if signed else "", "interface": ""})
+    voice = MavlinkVoice(way, 2)
+    for words in hover_and_land(systems, signed=signed):
+        voice.say(words, [vehicle.getsockname()])
+        told: list[int] = []
+        while len(told) < len(systems):
+            datagram = vehicle.recv(65536)
+            assert len(datagram) <= 1400
+            told += [target_of(frame) for frame in split(datagram)]
+        assert told == systems
+    voice.close()
 
 
 def test_a_signed_vehicle_obeys_driver_supervisor_and_guardian_in_any_order(vehicle, key_file, tmp_path):

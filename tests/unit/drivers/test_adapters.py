@@ -152,5 +152,5 @@ def test_one_address_that_fails_does_not_silence_those_after_it() -> None:
         ear.bind(("127.0.0.1", 0))
         ear.settimeout(2.0)
         with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as voice, pytest.raises(OSError):
-            send_to_all(voice, b"land", [("127.0.0.1", 0), ear.getsockname()])
+            send_to_all(voice, [b"land"], [("127.0.0.1", 0), ear.getsockname()])
         assert ear.recv(10) == b"land"

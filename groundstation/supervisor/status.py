@@ -32,6 +32,8 @@ class StatusPublisher:
         self._publish(self._bus.source, Lifecycle.READY, os.getpid(), self._own_share(now_ns), "")
         for process in processes:
             name, pid = process.spec.name, process.pid
+            if process.life == 0:
+                continue  # its turn to be started has not come: nothing ended
             if not process.running:
                 text = "restarting" if process.restart_due_ns is not None else "ended"
                 self._publish(name, Lifecycle.STOPPING, pid, 0.0, text)

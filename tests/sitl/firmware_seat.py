@@ -1,7 +1,6 @@
 """One firmware of its own in the room: its process, its driver, and what the study sees of both."""
 
 import math
-import os
 import signal
 import sys
 import time
@@ -129,12 +128,12 @@ class Seat:
     # -- time ---------------------------------------------------------------------------------------------------------
 
     def run(self) -> None:
-        """Let its process go on."""
-        os.kill(self.firmware.process.pid, signal.SIGCONT)
+        """Let its process go on; one that ended by itself stays so."""
+        self.firmware.process.send_signal(signal.SIGCONT)
 
     def stop(self) -> None:
         """Have its process stand still."""
-        os.kill(self.firmware.process.pid, signal.SIGSTOP)
+        self.firmware.process.send_signal(signal.SIGSTOP)
 
     def ahead_ns(self, now_ns: int) -> int:
         """Return for how long it flew on after a time of the room."""

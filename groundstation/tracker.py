@@ -178,7 +178,8 @@ class Tracker:
     def converged(self, name: str) -> bool:
         """Return whether an entity is known well enough to fly on; without a camera to root the team nobody is."""
         unrooted = name not in self._belief.layout or self._mounts.is_rootless or self._roots.is_silent
-        if unrooted or self._joinings.is_unsettled(name):
+        swings = self._joinings.is_unsettled(name) and name not in self.parameters.control.fed
+        if unrooted or swings:
             return False
         return self._localisation.holds(self._belief, name, self._tied_age_s(name))
 

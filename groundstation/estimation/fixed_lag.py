@@ -189,9 +189,11 @@ class FixedLagFilter:
 
     def contradicted(self, name: str) -> bool:
         """Return whether sightings far from an entity's place are being weighed against it, for twice the time that
-        this takes: whatever then was not believed is not heeded any longer."""
+        this takes: whatever then was not believed is not heeded any longer. One that moved the belief ends it."""
         memory, within_s = self._state.memory[self._index[name]], self.parameters.divergence_s
         now, wild = self._seconds(self._now_ns), memory["wild"]
+        if memory["corrected_at"] > memory["wild_at"]:
+            return False
         lately = now - float(memory["wild_at"]) <= within_s and now - float(wild["since"]) <= 2.0 * within_s
         return bool(wild["count"] >= 2 and lately)
 

@@ -79,6 +79,16 @@ def test_a_robot_is_contradicted_until_it_is_believed_elsewhere() -> None:
     assert told.count(True) <= 7 and [name for _, name in team.given_up] == ["a"]
 
 
+def test_a_robot_is_contradicted_no_longer_than_until_a_sighting_moves_it() -> None:
+    """What is beyond the gate, but not far beyond, is used: the belief follows the sightings from then on."""
+    team = Team().watch(0.3, a=(0.8, 0.0))
+    refused, (x, _) = len(team.refused), team.place("a")
+    assert team.filter.contradicted("a")
+    team.watch(0.1, a=(0.08, 0.0))
+    assert len(team.refused) == refused and team.place("a")[0] > x + 0.01
+    assert not team.filter.contradicted("a")
+
+
 def test_a_camera_that_is_not_heeded_contradicts_for_a_moment_only() -> None:
     team = Team().watch(1.5, a=(0.8, 0.0), b=(0.8, 0.0))
     assert len(team.given_up) <= 1 and not any(team.filter.contradicted(name) for name in PLACES)

@@ -160,6 +160,19 @@ def test_whom_nobody_sees_must_know_its_velocity(flight: Flight, limit: dict[str
     assert not tracker.converged("drone_1")
 
 
+@pytest.mark.parametrize("fed", [False, True])
+def test_who_is_re_initialised_twice_hovers_unless_it_flies_on_our_estimate(flight: Flight, fed: bool) -> None:
+    """One that does would be told its place no more: it flies off, and lands."""
+    flight.run(2.0)
+    tracker = flight.tracker
+    control = replace(tracker.parameters.control, fed=frozenset(["drone_1"] if fed else []))
+    tracker.parameters = replace(tracker.parameters, control=control)
+    again = Correction("ceiling", "drone_1", Verdict.ACCEPTED, "", nis=900.0, joined=True)
+    for _ in range(2):
+        tracker._joinings.take(flight.now, [again])
+    assert tracker.converged("drone_1") is fed
+
+
 def test_who_sees_what_the_room_knows_of_is_localised_by_it(flight: Flight) -> None:
     """drone_1, which nobody sees, sees a target that something else knows of, which the ceiling sees."""
     tracker = flight.tracker

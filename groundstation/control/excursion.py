@@ -12,7 +12,8 @@ from groundstation.control.view import VIEW_INSET_M, spread_m, view_of, way_back
 from groundstation.estimation.belief import JointBelief
 from groundstation.sensing.models import Rectangle, SensorSuite
 
-_HOLD_GAIN = 1.0  # of the way that is left to the border of where a robot may be [1/s]
+# Of the way that is left to the border of where a robot may be [1/s]; and of the way back of one that has no time.
+_HOLD_GAIN, _BACK_GAIN = 1.0, 3.0
 
 
 @dataclass
@@ -69,8 +70,9 @@ def within_reach(
     reach_m = p.return_speed_m_s * max(0.0, left_s - p.return_margin_s)
     low, high = np.transpose((view.x_m, view.y_m))
     most, drift = p.return_speed_m_s, np.clip(drift_m_s, -p.return_drift_m_s, p.return_drift_m_s)
-    slowest = np.clip(_HOLD_GAIN * (low - reach_m - mean[:2]), -most, most) - drift
-    fastest = np.clip(_HOLD_GAIN * (high + reach_m - mean[:2]), -most, most) - drift
+    gain = _HOLD_GAIN if math.isfinite(error_m_s) else _BACK_GAIN
+    slowest = np.clip(gain * (low - reach_m - mean[:2]), -most, most) - drift
+    fastest = np.clip(gain * (high + reach_m - mean[:2]), -most, most) - drift
     return np.asarray(np.clip(velocity, slowest, fastest))
 
 

@@ -172,13 +172,13 @@ def _recoverable(name: str, velocity: tuple[float, float], now: _Moment) -> tupl
     One that flies on our estimate comes back as soon as nothing tells where it is: it lands before its place is lost.
     """
     yaw, error_m_s = float(now.belief.mean_of(name)[3]), now.sight.velocity_errors_m_s.get(name, 0.0)
+    drift = now.sight.drifts_m_s.get(name, _STILL)[:2]
     untied = now.sight.untied_s.get(name, 0.0) > now.parameters.untied_after_s
     if untied and name in now.parameters.fed:
-        error_m_s = math.inf
+        error_m_s, drift = math.inf, _STILL[:2]  # a drift was measured by what is no longer known
     if error_m_s <= now.parameters.sound_error_m_s:
         return velocity
     wanted = world_from_stabilized(np.array([*velocity, 0.0]), yaw)
-    drift = now.sight.drifts_m_s.get(name, _STILL)[:2]
     near = _soon(name, now)
     held = within_reach(wanted[:2], name, now.belief, now.parameters, now.sensors, error_m_s, drift, near)
     forward, left, _ = stabilized_from_world(np.append(held, 0.0), yaw).tolist()

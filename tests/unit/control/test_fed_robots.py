@@ -94,6 +94,13 @@ def test_who_left_every_view_is_back_in_one_before_it_lands(
     assert flight.tied_s > 0.4
 
 
+def test_it_turns_back_at_full_speed_whatever_drift_was_measured_of_it() -> None:
+    """A copter that crept back at 0.05 m/s, since it had drifted that way before, landed at the border of the view."""
+    sight = Sight(0.1, {"drone_2": 0.6}, untied_s={"drone_2": 0.6}, drifts_m_s={"drone_2": np.array([-0.2, 0.0, 0.0])})
+    out = told(np.array([-0.31, -0.4, 1.25, 0.7]), np.array([0.1, 0.1]), sight, SEEN_STD_M).velocity_m_s
+    assert world_from_stabilized(np.array(out), 0.7)[0] == pytest.approx(-CONTROL.return_speed_m_s)
+
+
 def test_who_is_told_where_it_is_by_what_it_sees_flies_its_plan() -> None:
     pose = np.array([-0.1, -0.55, 1.3, 0.7])
     sight = Sight(0.1, {"drone_2": 3.0}, untied_s={"drone_2": 0.3})

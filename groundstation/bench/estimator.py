@@ -1,7 +1,7 @@
 """Times the joint filter, filterpy and dense numpy on the same team, and the product's path from bytes to bytes.
 
-CPU time; every round restores the state, so that all rounds do the same; the least of all rounds counts, because other
-programs on a machine only ever add to it.
+CPU time; every round restores the state, so that all rounds do the same, and times every filter once; the least of all
+rounds counts, because other programs on a machine only ever add to it.
 """
 
 import os
@@ -118,9 +118,9 @@ def _kernel_rows(team: BenchTeam, with_peers: bool, rounds: int, seed: int) -> l
     rng = np.random.default_rng(seed)
     start, events = joined_state(team, rng), frame_of(team, rng)
     timed = {_OURS: LeastTime()} | ({name: LeastTime() for name in contestants(team, start)} if with_peers else {})
-    for turn in range(rounds):
+    for _ in range(rounds):
         state = joined_state(team, np.random.default_rng(seed))
-        filters = contestants(team, state) if with_peers and turn < max(2, rounds // 10) else {}
+        filters = contestants(team, state) if with_peers else {}
         for name, filter_ in filters.items():
             timed[name].add(filter_, events, 2)
         ours = Ours(team, state)

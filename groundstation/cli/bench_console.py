@@ -8,7 +8,7 @@ import click
 from groundstation.cli.bench_limits import judge
 from groundstation.cli.numbers import FiniteRange
 
-_CHROMIUM = "/usr/bin/chromium"
+_CHROMIUM = ("chromium", "chromium-browser", "google-chrome")
 _LIMITS = {
     "cpu_percent_of_core": 5.0,
     "estimate_to_socket_ms": 60.0,
@@ -30,7 +30,7 @@ def console(seconds: float, drones: int, no_browser: bool, as_json: bool) -> int
     """
     from groundstation.bench.console import load_average, measure
 
-    browser = "" if no_browser else shutil.which(_CHROMIUM) or ""
+    browser = "" if no_browser else next(filter(None, map(shutil.which, _CHROMIUM)), "")
     figures: dict[str, Any] = {"drones": drones, "seconds": seconds, **measure(seconds, drones, _pictures(), browser)}
     figures["ratio_to_peer"] = round(figures["cpu_percent_of_core"] / figures["peer"]["cpu_percent_of_core"], 2)
     figures["load_average"] = load_average()

@@ -12,7 +12,7 @@ from groundstation.cli.exits import ExitCode
 def judge(figures: Mapping[str, Any], limits: Mapping[str, float], measure: str, as_json: bool) -> ExitCode:
     """Print the figures and which limits they miss; a figure that is a mapping is judged by its entry `measure`.
 
-    A limit without its figure is passed over: what it needs is not on this machine.
+    A limit without its figure is not judged, and named: what it needs is not on this machine.
     """
 
     def value(name: str) -> float:
@@ -20,11 +20,13 @@ def judge(figures: Mapping[str, Any], limits: Mapping[str, float], measure: str,
         return float(figure[measure] if isinstance(figure, dict) else figure)
 
     missed = [name for name, limit in limits.items() if name in figures and not value(name) <= limit]
+    unknown = [name for name in limits if name not in figures]
     everything = {**figures, "limits": dict(limits)}
     if as_json:
-        click.echo(json.dumps(everything | {"passed": not missed}, indent=2))
+        click.echo(json.dumps(everything | {"not_measured": unknown, "passed": not missed}, indent=2))
     else:
         for name, figure in everything.items():
             click.echo(f"{name.replace('_', ' '):24} {figure}")
-        click.echo(f"missed: {', '.join(missed)}" if missed else "all limits are kept")
+        verdict = f"missed: {', '.join(missed)}" if missed else "all limits are kept"
+        click.echo(verdict + (f"; not measured: {', '.join(unknown)}" if unknown else ""))
     return ExitCode.FAILED if missed else ExitCode.OK

@@ -74,6 +74,8 @@ def planner(
     """
     sizes, layouts = numbers(robots, "--robots", 1, 500), choices(layout, _LAYOUTS, "--layout")
     peers = choices(peer, _PEERS, "--peer") if peer else []
+    if model == "frustum":
+        layouts = _of_the_planner_that_flies(layouts, peers)
     for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
     use_kernel_cache()
@@ -82,14 +84,23 @@ def planner(
     if model == "frustum":
         from groundstation.bench.frustum import run_frustum_bench
 
-        chosen = [one for one in layouts if one != "random"]
-        timed = run_frustum_bench(sizes, chosen, repeats, seed, tell=write_over)
+        timed = run_frustum_bench(sizes, layouts, repeats, seed, tell=write_over)
         write_over("")
         click.echo(json.dumps(timed, indent=1) if as_json else _frustum_table(timed))
         return
     result = run_bench(sizes, layouts, peers, repeats, seed, limit_s, write_over)
     write_over("")
     click.echo(json.dumps(result, indent=1) if as_json else _table(result))
+
+
+def _of_the_planner_that_flies(layouts: list[str], peers: list[str]) -> list[str]:
+    """Return the layouts that it is timed in; raises UsageError where none is left, or where peers are named."""
+    if peers:
+        raise click.UsageError("--peer: the planner that flies (--model frustum) has no peers")
+    chosen = [one for one in layouts if one != "random"]
+    if not chosen:
+        raise click.UsageError("--layout: the planner that flies (--model frustum) has no teams of random levels")
+    return chosen
 
 
 def _frustum_table(result: dict[str, Any]) -> str:

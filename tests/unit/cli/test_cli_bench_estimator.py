@@ -73,6 +73,16 @@ def test_the_command_reports_rows_and_agreement():
     assert found["targets"] == {}, "only 30 robots are judged"
 
 
+def test_every_filter_is_timed_equally_often(monkeypatch):
+    """The least of many times is less than the least of a few: a peer that was timed less often would seem slower."""
+    timed: list[int] = []
+    monkeypatch.setattr(estimator_bench.LeastTime, "add", lambda row, *_: timed.append(id(row)))
+    with np.errstate(invalid="ignore"):
+        estimator_bench._kernel_rows(team_of(minimal_parameters(3)), True, rounds=30, seed=1)
+    assert {timed.count(row) for row in set(timed)} == {30}
+    assert len(set(timed)) == 4
+
+
 def test_the_path_of_blocks_as_flown_is_judged_on_its_own():
     kernels = [{"robots": 30, "blocks": "minimal", "method": "ours", "predict_us": 1.0, "correct_us": 1.0}]
     about: Row = {"robots": 30, "heights": False, "to_in_order": 1.0, "delay_ms": 0, "us_per_observation": 59.0}

@@ -7,10 +7,13 @@ from typing import Any
 import pytest
 
 from groundstation.bench.planner import exponents
-from groundstation.bench.planner_peer_process import PeerProcess
+from groundstation.bench.planner_peer_process import PeerProcess, _measure, naive_calls
+from groundstation.bench.planner_peers import naive, numpy_adjoint
+from groundstation.bench.planner_peers.step import PeerStep
 from groundstation.cli.main import run
 from groundstation.experiments import runner
 from groundstation.experiments.planar.parameters import PlanarParameters
+from groundstation.experiments.planar.scenarios import bench_belief
 from groundstation.experiments.runner import SweepError, read_result, result_file, run_tasks, write_atomically
 from groundstation.experiments.tasks import Task, execute
 
@@ -46,6 +49,12 @@ def test_bench_of_the_planner_that_flies(capsys: pytest.CaptureFixture[str]) -> 
     assert len(json.loads(capsys.readouterr().out)["rows"]) == 2
 
 
+def test_bench_of_the_planner_that_flies_refuses_what_it_would_leave_out(capsys: pytest.CaptureFixture[str]) -> None:
+    for left_out, named in ((["--layout", "random"], "--layout"), (["--peer", "numpy"], "--peer")):
+        assert run(["bench", "planner", "--model", "frustum", "--robots", "1", "--repeats", "1", *left_out]) == 2
+        assert named in capsys.readouterr().err
+
+
 def test_exponent_uses_measured_rows_from_ten_robots_on() -> None:
     rows = [
         {"layout": "flat", "method": "m", "robots": n, "cpu_ms_median": float(n) ** 2, "extrapolated": n > 40}
@@ -62,6 +71,27 @@ def test_peer_in_its_own_process() -> None:
         assert peer.measure(3, "no such layout", 3, PlanarParameters()) is None
         assert "unknown layout" in peer.failure
         assert peer.measure(2, "flat", 3, PlanarParameters()) is not None
+
+
+def test_a_peer_is_timed_warm_as_ours_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = []
+
+    def solve(mean: Any, covariance: Any, levels: Any, parameters: Any, should_stop: Any) -> PeerStep:
+        calls.append(should_stop())
+        return PeerStep(levels, 1.0, 8, 4, 4)
+
+    monkeypatch.setattr(numpy_adjoint, "solve", solve)
+    measured = _measure("numpy", 2, "flat", 3, PlanarParameters(), 20.0)
+    assert calls == [True, False]  # one topology untimed, then all of them
+    assert measured.evaluations == 8
+
+
+def test_the_work_of_the_naive_peer_is_guessed_as_it_is_counted() -> None:
+    mean, covariance, level = bench_belief(2, "two-level", 3, PlanarParameters())
+    levels = tuple(int(k) for k in level)
+    exact = numpy_adjoint.solve(mean, covariance, levels, PlanarParameters(), lambda: True)
+    counted = naive.solve(mean, covariance, levels, PlanarParameters(), lambda: True)
+    assert naive_calls(2, exact.evaluations) == pytest.approx(counted.evaluations, rel=0.02)
 
 
 def test_figure1_repeats_bit_for_bit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,7 +1,21 @@
 """Errors that cross package borders; an operator's mistake is always one of these, never a bare traceback."""
 
+import errno
 import re
 
+# A place that was named on the command line, and in which nothing can be read or written.
+_WRONG_PLACE = frozenset(
+    (
+        errno.EACCES,
+        errno.EEXIST,
+        errno.EISDIR,
+        errno.ENAMETOOLONG,
+        errno.ENOENT,
+        errno.ENOTDIR,
+        errno.EPERM,
+        errno.EROFS,
+    )
+)
 _WORD_WITH_AT = re.compile(r"""[^\s"'<>]*@[^\s"'<>]*""")
 _PLACE = re.compile(r"(\[[^\]@]*\]|[^@:]*)(:\d{0,5})?")
 
@@ -37,6 +51,11 @@ class GroundStationError(Exception):
 
 class OperatorMistake(GroundStationError):
     """Asked for what cannot be done as asked: a wrong file, a place that is taken, an extra that is missing."""
+
+
+def is_wrong_place(error: OSError) -> bool:
+    """Return whether an error of the disk is one of the place that was named; a full or broken disk is none."""
+    return error.errno in _WRONG_PLACE
 
 
 class SettingsError(GroundStationError):

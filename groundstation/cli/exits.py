@@ -1,11 +1,10 @@
 """Exit codes of the `groundstation` command, for scripts."""
 
-import errno
 from enum import IntEnum
 
 import click
 
-from groundstation.errors import GroundStationError, OperatorMistake, SettingsError
+from groundstation.errors import GroundStationError, OperatorMistake, SettingsError, is_wrong_place
 
 
 class ExitCode(IntEnum):
@@ -36,21 +35,6 @@ _MEANING = {
 }
 
 
-# A path that was named on the command line and cannot be read or written there.
-_WRONG_PLACE = frozenset(
-    (
-        errno.EACCES,
-        errno.EEXIST,
-        errno.EISDIR,
-        errno.ENAMETOOLONG,
-        errno.ENOENT,
-        errno.ENOTDIR,
-        errno.EPERM,
-        errno.EROFS,
-    )
-)
-
-
 class UnreachableError(GroundStationError):
     """No running ground station answers."""
 
@@ -60,7 +44,7 @@ def exit_code_of(error: BaseException) -> ExitCode:
     match error:
         case SettingsError() | OperatorMistake() | click.UsageError():
             return ExitCode.SETTINGS
-        case OSError(filename=place, errno=number) if place is not None and number in _WRONG_PLACE:
+        case OSError(filename=place) if place is not None and is_wrong_place(error):
             return ExitCode.SETTINGS
         case UnreachableError():
             return ExitCode.UNREACHABLE

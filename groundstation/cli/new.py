@@ -1,5 +1,7 @@
 """`groundstation new`: a field file from a few questions, in the terminal or on a page."""
 
+import os
+import shlex
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -42,9 +44,17 @@ def new(directory: Path, page: bool) -> None:
     path = directory.resolve()
     path = path / f"{path.name}.yaml"
     refuse_existing([path])
+    _require_place(path.parent)
     (_ask_on_page if page else _ask)(path)
-    shown = directory / path.name
-    click.echo(f"wrote {shown}\nnext: groundstation config check {shown}, then groundstation sitl {shown}")
+    shown, typed = directory / path.name, shlex.quote(str(directory / path.name))
+    click.echo(f"wrote {shown}\nnext: groundstation config check {typed}, then groundstation sitl {typed}")
+
+
+def _require_place(folder: Path) -> None:
+    """Raise OperatorMistake where nothing can be written, before anything is asked; the folder is not made yet."""
+    nearest = next(place for place in (folder, *folder.parents) if place.exists())
+    if not (nearest.is_dir() and os.access(nearest, os.W_OK)):
+        raise OperatorMistake(f"{folder}: cannot be written: {nearest} is not a folder of yours")
 
 
 def _ask(path: Path) -> None:

@@ -125,8 +125,9 @@ def _print(found: "RecordingInfo") -> None:
     width = max((len(channel.channel) for channel in found.channels), default=7)
     click.echo(f"{'channel':{width}}  {'messages':>8}  {'Hz':>7}  {'longest gap':>11}  schema")
     for channel in found.channels:
+        rate = f"{channel.rate_hz:.2f}" if channel.rate_hz else "-"
         click.echo(
-            f"{channel.channel:{width}}  {channel.messages:8d}  {channel.rate_hz:7.2f}  "
+            f"{channel.channel:{width}}  {channel.messages:8d}  {rate:>7}  "
             f"{channel.longest_gap_s:9.2f} s  {channel.schema}"
         )
     _print_troubles(found)

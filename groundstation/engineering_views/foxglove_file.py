@@ -18,8 +18,8 @@ from groundstation.recording.viewers import SCENE_CHANNEL
 def write_with_scene(run: RecordedRun, path: Path) -> tuple[int, list[str]]:
     """Write all parts of a run into one new file, with a scene ten times a second; returns how many scenes.
 
-    The second value says what could not be decoded. Raises OperatorMistake when the extra is missing or the file
-    exists, OutputError when it cannot be written.
+    The second value says what could not be decoded. Raises OperatorMistake when the extra is missing or the place
+    is wrong or taken, OutputError when the disk refuses.
     """
     require_foxglove()
     opened = open_recording(run.paths[0])

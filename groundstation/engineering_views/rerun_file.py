@@ -17,7 +17,8 @@ APPLICATION = "skein"
 def write_rrd(run: RecordedRun, path: Path) -> tuple[int, list[str]]:
     """Write a new .rrd file; returns how many messages it was made of, and what could not be decoded.
 
-    Raises OperatorMistake when the extra is not installed or the file exists, OutputError when it cannot be written.
+    Raises OperatorMistake when the extra is not installed or the place is wrong or taken, OutputError when the disk
+    refuses.
     """
     require_rerun()
     with new_file(path) as partial:

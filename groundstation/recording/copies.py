@@ -89,7 +89,7 @@ class CopyWriter:
 def new_copy(path: Path, preamble: Preamble) -> Iterator[CopyWriter]:
     """Yield a writer whose file appears at the path only when it is complete.
 
-    Raises RecordingError when something is there already, OutputError when the disk refuses.
+    Raises OperatorMistake when something is there already or nothing can be, OutputError when the disk refuses.
     """
     with new_file(path) as partial, partial.open("wb") as stream:
         writer = CopyWriter(stream, preamble)

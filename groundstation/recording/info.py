@@ -20,6 +20,7 @@ from groundstation.recording.run import RecordedRun
 from groundstation.recording.schemas import description_of
 from groundstation.time_units import NS_PER_S
 
+_RATED_S = 1.0  # messages that span less have no rate
 # A topic that comes regularly has a hole where it is silent for this long and for this many of its periods.
 _HOLE_S = 1.0
 _HOLE_PERIODS = 5.0
@@ -40,7 +41,10 @@ class Hole:
 
 @dataclass(frozen=True, slots=True)
 class ChannelInfo:
-    """One channel over all parts: schema, messages, mean rate [Hz], first and last message [s since the start]."""
+    """One channel over all parts: schema, messages, mean rate [Hz], first and last message [s since the start].
+
+    The rate is 0 where the messages span less than a second: two that came together have none.
+    """
 
     channel: str
     schema: str
@@ -140,7 +144,7 @@ def _channel(name: str, held: _Times, run: RecordedRun, is_regular: bool) -> tup
         return ChannelInfo(name, held.schema, len(times_s), 0.0, first_s, first_s, 0.0), []
     gaps_s = np.diff(times_s)
     first_s, last_s = float(times_s[0]), float(times_s[-1])
-    rate_hz = (len(times_s) - 1) / max(last_s - first_s, 1e-9)
+    rate_hz = (len(times_s) - 1) / (last_s - first_s) if last_s - first_s >= _RATED_S else 0.0
     found = ChannelInfo(name, held.schema, len(times_s), rate_hz, first_s, last_s, float(gaps_s.max()))
     limit_s = max(_HOLE_S, _HOLE_PERIODS * float(np.median(gaps_s)))
     after = np.flatnonzero(gaps_s > limit_s)[: _MAX_HOLES if is_regular else 0]

@@ -6,14 +6,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from groundstation.errors import GroundStationError
+from groundstation.errors import GroundStationError, OperatorMistake, is_wrong_place
 from groundstation.recording.compatibility import RecordingError
 
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 class OutputError(GroundStationError):
-    """The output cannot be written."""
+    """The disk is full, or failed."""
 
 
 def require_absent(path: Path) -> None:
@@ -24,10 +24,12 @@ def require_absent(path: Path) -> None:
 
 @contextmanager
 def errors_named(path: Path) -> Iterator[None]:
-    """Turn errors of the disk into an OutputError that names the place, and the remedy when it is full."""
+    """Name place and remedy of an error of the disk: an OperatorMistake for a wrong place, else an OutputError."""
     try:
         yield
     except OSError as error:
+        if is_wrong_place(error):
+            raise OperatorMistake(f"{path}: {error.strerror}; name another place with --output") from error
         remedy = ": make room, or name another place with --output" if error.errno in _NO_ROOM else ""
         raise OutputError(f"{path}: {error.strerror or error}{remedy}") from error
 
@@ -36,7 +38,7 @@ def errors_named(path: Path) -> Iterator[None]:
 def new_folder(path: Path) -> Iterator[None]:
     """Make a folder to be filled; what was written is removed again when that fails.
 
-    Raises RecordingError when there is something already, OutputError when the disk refuses.
+    Raises OperatorMistake when there is something already or nothing can be, OutputError when the disk refuses.
     """
     require_absent(path)
     with errors_named(path):
@@ -67,7 +69,7 @@ def removed_if_unfinished(path: Path) -> Iterator[None]:
 def new_file(path: Path) -> Iterator[Path]:
     """Yield the path to write to; it becomes `path` when all went well, and is removed when not.
 
-    Raises RecordingError when there is something already, OutputError when the disk refuses.
+    Raises OperatorMistake when there is something already or nothing can be, OutputError when the disk refuses.
     """
     require_absent(path)
     partial = path.with_name(f".{path.name}.partial")

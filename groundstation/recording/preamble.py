@@ -17,9 +17,10 @@ from groundstation.recording.timeline import Timeline
 
 FIELD_NAME = "field.json"
 CALIBRATIONS_NAME = "calibrations.json"
+COMMAND_NAME = "run.json"  # how the run was started, and when
 _LIBRARIES = ("skein-groundstation", "mcap", "msgspec", "numpy", "numba", "scipy", "opencv-python-headless")
 # Written into the run folder before the recorder starts, where there is one.
-_FILES = {"resolved.yaml": "application/yaml", "run.json": "application/json"}
+_FILES = {"resolved.yaml": "application/yaml", COMMAND_NAME: "application/json"}
 _CONVENTIONS = {
     "world": "z up, origin on the floor in the middle of the room, metres",
     "base": "FLU; yaw counter-clockwise, radians",
@@ -73,7 +74,7 @@ def processor() -> str:
 
 def _seeds(attachments: Mapping[str, tuple[str, bytes]]) -> dict[str, str]:
     """Return what the noise of a simulated run came from; empty for a real flight."""
-    _, text = attachments.get("run.json", ("", b"{}"))
+    _, text = attachments.get(COMMAND_NAME, ("", b"{}"))
     try:
         facts = json.loads(text)
     except ValueError:

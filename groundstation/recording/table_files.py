@@ -140,7 +140,8 @@ def write_tables(
 ) -> tuple[dict[str, int], list[str]]:
     """Write all topics of a run into a new folder; returns rows by table, and what could not be decoded.
 
-    Raises RecordingError when the folder exists, OutputError when there is no room; nothing is left behind then.
+    Raises OperatorMistake when the folder exists or cannot be there, OutputError when the disk is full.
+    Nothing is left behind then.
     """
     unread: dict[str, None] = {}
     with new_folder(folder), ExitStack() as stack:

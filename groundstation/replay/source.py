@@ -9,7 +9,7 @@ import msgspec
 
 from groundstation.field.resolved import ResolvedField, field_from_json
 from groundstation.recording.file_topics import RAW, STATE
-from groundstation.recording.preamble import FIELD_NAME
+from groundstation.recording.preamble import COMMAND_NAME, FIELD_NAME
 from groundstation.recording.reader import Recording, RecordingError, open_parts, open_recording, parts
 from groundstation.recording.rerun import Rerun, rerun_of
 
@@ -72,8 +72,7 @@ def _source(name: str, state: Sequence[Path], raw: Sequence[Path]) -> Source:
     first = opened[0]
     if FIELD_NAME not in first.attachments or "run" not in first.metadata:
         raise RecordingError(f"{first.path}: no recording of a ground station (neither field nor run are in it)")
-    sites = {recording.metadata.get("run", {}).get("clock", "") for recording in opened}
-    if len(sites) > 1:
+    if not _are_of_one_run(opened):
         raise RecordingError(f"{', '.join(map(str, state))}: these are not parts of one recording")
     run = first.metadata["run"]
     try:
@@ -87,6 +86,13 @@ def _source(name: str, state: Sequence[Path], raw: Sequence[Path]) -> Source:
     damage = tuple(f"{path.name}: {why}" for path, why in unread.items())
     rerun, field = rerun_of(first.metadata), first.attachments[FIELD_NAME]
     return Source(name, files, tuple(raw), field, run, versions, began_ns, offset_ns, damage, rerun)
+
+
+def _are_of_one_run(opened: Sequence[Recording]) -> bool:
+    """Return whether files may be parts of one run: of one boot, and begun by one command; damage may hide either."""
+    boots = {recording.metadata.get("run", {}).get("clock", "") for recording in opened}
+    commands = {recording.attachments.get(COMMAND_NAME, b"") for recording in opened}
+    return len(boots - {""}) <= 1 and len(commands - {b""}) <= 1
 
 
 def _created_ns(recording: Recording) -> int:

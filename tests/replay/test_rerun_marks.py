@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from mcap.reader import make_reader
 from groundstation.engineering_views.foxglove_file import write_with_scene
 from groundstation.engineering_views.rerun_file import write_rrd
 from groundstation.recording.copies import messages_of, new_copy, preamble_copy
-from groundstation.recording.reader import open_recording
+from groundstation.recording.reader import RecordingError, open_recording
 from groundstation.recording.rerun import Rerun
 from groundstation.recording.run import open_run
 from groundstation.recording.synthetic import write_run
@@ -86,3 +87,19 @@ def test_the_scene_for_foxglove(kind: str, folder: Path, tmp_path: Path) -> None
         records = {record.name: record.metadata for record in reader.iter_metadata()}
     assert scenes and all((mark(kind) in scene) == (kind != "flight") for scene in scenes)
     assert ("replay" in records) == (kind != "flight"), "the copy keeps what it repeats"
+
+
+def test_two_runs_of_one_boot_are_not_one_recording(flight: Path, tmp_path: Path) -> None:
+    """A replay of both would be a flight that never was; parts of one run go together, a damaged one too."""
+    opened = open_recording(flight / "state.mcap")
+    for name, command in (("a", b'{"seed":1}'), ("b", b'{"seed":2}'), ("c", b'{"seed":1}'), ("damaged", b"")):
+        told = preamble_copy(opened, {})
+        attached = {**told.attachments, "run.json": ("application/json", command)} if command else told.attachments
+        with new_copy(tmp_path / f"state-{name}.mcap", replace(told, attachments=attached)) as writer:
+            for index in open_run(flight / "state.mcap").indexes:
+                for message in messages_of(index):
+                    writer.write(message)
+    a, b, c, damaged = (tmp_path / f"state-{name}.mcap" for name in ("a", "b", "c", "damaged"))
+    assert open_source([a, c, damaged]).state
+    with pytest.raises(RecordingError, match="not parts of one recording"):
+        open_source([a, b])

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.arrays import Array, Image
-from groundstation.errors import DriverError
 from groundstation.geometry.lens import CameraIntrinsics
 
 Colour = tuple[int, int, int]
@@ -67,12 +66,9 @@ def jpeg_of(picture: Image) -> bytes:
 
 
 def save(folder: Path, name: str, picture: Image) -> Path:
-    """Write a picture as JPEG below a folder; raises DriverError where it cannot be written."""
+    """Write a picture as JPEG below a folder; raises OSError, which names the file, where it cannot be written."""
     path = folder / f"{Path(name).stem.replace(' ', '_')}.jpg"
-    try:
-        path.write_bytes(jpeg_of(picture))
-    except OSError as error:
-        raise DriverError(f"{path}: cannot be written ({error.strerror})") from None
+    path.write_bytes(jpeg_of(picture))
     return path
 
 

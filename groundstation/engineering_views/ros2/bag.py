@@ -43,7 +43,7 @@ _OFFERED = {"/tf_static": _VOLATILE._replace(depth=1, durability=QosDurability.T
 def write_bag(run: RecordedRun, folder: Path, distribution: str = "jazzy") -> tuple[int, list[str]]:
     """Write a new folder; returns how many ROS 2 messages it holds, and what could not be decoded.
 
-    Raises RecordingError when the folder exists, OutputError when it cannot be written.
+    Raises OperatorMistake when the folder exists or cannot be there, OutputError when the disk refuses.
     """
     codec = Ros2Codec(distribution)
     scene = Ros2Scene(codec, field_of(run.attachments))

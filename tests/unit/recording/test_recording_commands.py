@@ -304,3 +304,32 @@ def test_a_missing_extra_names_its_command(whole: Path, monkeypatch: pytest.Monk
         result = CliRunner().invoke(groundstation, [str(one) for one in arguments], standalone_mode=False)
         assert f'pip install "skein-groundstation[{extra}]"' in str(result.exception)
         assert exit_code_of(result.exception) is ExitCode.SETTINGS  # type: ignore[arg-type]
+
+
+def test_messages_that_came_together_have_no_rate(tmp_path: Path) -> None:
+    write_run(tmp_path, load_field(find_field("lab"), ()).model_dump_json().encode(), 0.5)
+    channels = json.loads(_run("info", tmp_path, "--json").output)["channels"]
+    assert max(channel["messages"] for channel in channels) > 20
+    assert {channel["rate_hz"] for channel in channels} == {0.0}
+    rows = [line.split() for line in _run("info", tmp_path).output.splitlines() if "/estimate/" in line]
+    assert rows and all(row[2] == "-" for row in rows)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("export", "--csv"),
+        ("export", "--parquet"),
+        ("export", "--rrd"),
+        ("export", "--foxglove-scene"),
+        ("export", "--rosbag2"),
+        ("cut", "--from", "0", "--to", "1"),
+        ("recover",),
+    ],
+    ids=" ".join,
+)
+def test_a_place_that_cannot_be_is_wrong_usage(run_dir: Path, tmp_path: Path, command: tuple[str, ...]) -> None:
+    """A full disk is a fault; a place below a file was named wrongly, and ends each command with the same code."""
+    (tmp_path / "taken").write_text("")
+    code, text = _refusal(*command, run_dir / "state.mcap", "-o", tmp_path / "taken" / "out")
+    assert code is ExitCode.SETTINGS and "taken/out" in text and "--output" in text

@@ -127,3 +127,15 @@ def test_answers_that_contradict_each_other_are_not_written(tmp_path: Path) -> N
 def test_a_room_that_is_no_number_is_refused() -> None:
     with pytest.raises(OperatorMistake, match="must be numbers"):
         check_room(NewRoom(float("nan"), 6, 4.5, SOURCE))
+
+
+def test_a_place_that_cannot_be_is_told_before_the_first_question(tmp_path: Path) -> None:
+    (tmp_path / "taken").write_text("")
+    result = CliRunner().invoke(new, [str(tmp_path / "taken" / "hall")], standalone_mode=False)
+    assert isinstance(result.exception, OperatorMistake) and "taken is not a folder of yours" in str(result.exception)
+    assert "Length" not in result.output
+
+
+def test_the_next_command_can_be_copied_into_a_shell(tmp_path: Path) -> None:
+    result = CliRunner().invoke(new, [str(tmp_path / "My Lab")], input="\n" * 40)
+    assert f"groundstation config check '{tmp_path}/My Lab/My Lab.yaml'," in result.output

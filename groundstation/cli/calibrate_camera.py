@@ -219,6 +219,7 @@ class ProgressLine:
 
 def _write(output: Path, source: str, session: CalibrationSession, fit: "LensFit") -> None:
     from groundstation.errors import without_password
+    from groundstation.recording.outputs import replaced_file
     from groundstation.settings.calibration_file import calibration_text
 
     missing = session.missing
@@ -226,5 +227,7 @@ def _write(output: Path, source: str, session: CalibrationSession, fit: "LensFit
     if missing:
         remark += f"; not covered: {', '.join(missing)}"
     today = datetime.datetime.now().astimezone().date()
-    output.write_text(calibration_text(fit.lens, fit.std, len(fit.by_view_px), today, remark), encoding="utf-8")
+    text = calibration_text(fit.lens, fit.std, len(fit.by_view_px), today, remark)
+    with replaced_file(output) as partial:
+        partial.write_text(text, encoding="utf-8")
     click.echo(f"wrote {output}")

@@ -146,6 +146,7 @@ def schema() -> None:
 )
 def draw(field: str, options: tuple[str, ...], scenario: str | None, output: Path) -> None:
     """Draw the room to scale: fence, pads, level heights, and what the fixed cameras see of drones at each of them."""
+    from groundstation.recording.outputs import replaced_file
     from groundstation.settings import drawing
     from groundstation.settings.files import find_field, find_scenario
     from groundstation.settings.load import load_field
@@ -156,7 +157,8 @@ def draw(field: str, options: tuple[str, ...], scenario: str | None, output: Pat
     path = find_field(field)
     settings = load_field(path, options)
     plain = load_scenario(find_scenario(scenario, path)) if scenario else {}
-    drawing.draw(settings, output, drawing.paths_of(plain, settings.tracked))
+    with replaced_file(output) as partial:
+        drawing.draw(settings, partial, drawing.paths_of(plain, settings.tracked))
     click.echo(f"wrote {output}")
 
 
@@ -174,6 +176,7 @@ def draw(field: str, options: tuple[str, ...], scenario: str | None, output: Pat
 )
 def init(directory: Path, like: str) -> None:
     """Write a commented field file, its camera calibrations and the shipped scenarios into DIRECTORY, to start from."""
+    from groundstation.recording.outputs import errors_named
     from groundstation.settings.files import SHIPPED
     from groundstation.settings.shipped_copies import copy, refuse_existing, shipped
 
@@ -181,7 +184,8 @@ def init(directory: Path, like: str) -> None:
     targets = [directory / source.relative_to(SHIPPED) for source in sources]
     refuse_existing(targets)
     for source, target in zip(sources, targets, strict=True):
-        copy(source, target)
+        with errors_named(target):
+            copy(source, target)
         click.echo(f"wrote {target}")
     click.echo(
         f"next: groundstation sitl {targets[0]}; for your own lab: room, cameras, addresses and pads in it, then"

@@ -139,6 +139,7 @@ def _tell(found: "Forecast") -> None:
 
 
 def _write(found: "Forecast", settings: "Field", paths: "Paths", output: Path) -> None:
+    from groundstation.recording.outputs import replaced_file
     from groundstation.settings.drawing import Shade, draw, svg_of
 
     floor = found.floor
@@ -148,7 +149,10 @@ def _write(found: "Forecast", settings: "Field", paths: "Paths", output: Path) -
         from groundstation.forecast.wording import sections_of
 
         title = f"Forecast of {settings.site}"
-        output.write_text(page(title, sections_of(found), svg_of(settings, paths, shade)), encoding="utf-8")
+        text = page(title, sections_of(found), svg_of(settings, paths, shade))
+        with replaced_file(output) as partial:
+            partial.write_text(text, encoding="utf-8")
     else:
-        draw(settings, output, paths, shade)
+        with replaced_file(output) as partial:
+            draw(settings, partial, paths, shade)
     click.echo(f"wrote {output}", err=True)

@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Sequence
 from importlib.util import find_spec
+from io import TextIOWrapper
 from pathlib import Path
 from pkgutil import resolve_name
 
@@ -152,6 +153,9 @@ def _tell(error: BaseException) -> None:
 
 def main() -> None:
     """Carry out the command of this process, and end it."""
+    if isinstance(sys.stdout, TextIOWrapper) and sys.stdout.errors == "strict":
+        # A name or a sign that the terminal cannot show is written as Python writes it on stderr, not a fault.
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
         code = run()
     except Exception:  # noqa: BLE001  the outermost loop: a bug must not look like a failed run (exit code 1)

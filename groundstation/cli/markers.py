@@ -7,6 +7,7 @@ import click
 
 from groundstation.geometry.tag import SquareTag
 from groundstation.printing import pdf, sheets
+from groundstation.recording.outputs import replaced_file
 
 _SQUARE_MM, _TAG_MM = 44.0, 168.0
 
@@ -65,7 +66,8 @@ def print_markers(
             hint = f"at most {name} {fitting:g} fits; or take a larger --size" if fitting else "take a larger --size"
             raise click.UsageError(f"marker {number} with {size:g} mm {error}: {hint}") from None
     title = f"Skein markers {', '.join(str(number) for number in dict.fromkeys(ids))}"
-    output.write_bytes(pdf.encode([sheets.notes(items, sheet), *pages], title))
+    with replaced_file(output) as partial:
+        partial.write_bytes(pdf.encode([sheets.notes(items, sheet), *pages], title))
     click.echo(f"{output}: {len(pages)} marker(s) and a page of notes; print at 100 % and check the scale", err=True)
 
 

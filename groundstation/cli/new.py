@@ -58,6 +58,7 @@ def _require_place(folder: Path) -> None:
 
 
 def _ask(path: Path) -> None:
+    from groundstation.recording.outputs import errors_named
     from groundstation.settings.new_field import field_text
     from groundstation.settings.shipped_copies import write_field
 
@@ -68,7 +69,8 @@ def _ask(path: Path) -> None:
     _require_good(text, path.name)
     if not click.confirm(f"Write {path}?", default=True):
         raise OperatorMistake("nothing was written")
-    write_field(path, text)
+    with errors_named(path):
+        write_field(path, text)
 
 
 def _require_good(text: str, name: str) -> None:

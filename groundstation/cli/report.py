@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from groundstation.cli.exits import ExitCode
-from groundstation.errors import GroundStationError, OperatorMistake
+from groundstation.errors import GroundStationError, OperatorMistake, is_wrong_place
 
 if TYPE_CHECKING:
     from groundstation.report.judge import RunReport
@@ -49,8 +49,10 @@ def _writing(build: Callable[[], "RunReport"]) -> "RunReport":
     try:
         return build()
     except OSError as error:
-        where = error.filename or "the run folder"
-        raise GroundStationError(f"{where}: {error.strerror}; nothing of the recording is lost") from error
+        told = f"{error.filename or 'the run folder'}: {error.strerror}; nothing of the recording is lost"
+        if is_wrong_place(error):
+            raise OperatorMistake(f"{told}: copy the run to a folder of yours") from error
+        raise GroundStationError(told) from error
 
 
 def _show(built: "RunReport", as_json: bool) -> None:
@@ -100,7 +102,8 @@ def _trend(folder: Path, as_json: bool) -> None:
     try:
         write_trend(runs, damage, folder / NAME)
     except OSError as error:
-        raise GroundStationError(f"{folder / NAME}: {error.strerror}") from error
+        kind = OperatorMistake if is_wrong_place(error) else GroundStationError
+        raise kind(f"{folder / NAME}: {error.strerror}") from error
     for line in damage:
         click.echo(f"cannot be read: {line}", err=True)
     passed = sum(run.verdict == "passed" for run in runs)

@@ -7,6 +7,7 @@ from typing import Any
 import msgspec
 
 from groundstation.console.pages import StaticFile
+from groundstation.recording.part_names import shown
 from groundstation.report import run_facts
 from groundstation.report.file_names import HTML_NAME, JSON_NAME
 
@@ -37,8 +38,8 @@ class RunEnd:
             "verdict": self.verdict,
             "reasons": self.reasons,
             "command": self.command,
-            "folder": str(self.folder),
-            "name": self.folder.name,
+            "folder": shown(self.folder),
+            "name": shown(self.folder.name),
             "report": REPORT_PATH if self.report is not None else "",
         }
 

@@ -4,9 +4,10 @@ from pathlib import Path
 
 from groundstation.engineering_views.extras import require_rerun
 from groundstation.engineering_views.field import field_of
-from groundstation.errors import MessageError
+from groundstation.errors import MessageError, OperatorMistake
 from groundstation.recording.file_topics import is_picture
 from groundstation.recording.outputs import OutputError, new_file
+from groundstation.recording.part_names import shown
 from groundstation.recording.reader import decode, payload
 from groundstation.recording.rerun import rerun_of
 from groundstation.recording.run import RecordedRun
@@ -21,6 +22,8 @@ def write_rrd(run: RecordedRun, path: Path) -> tuple[int, list[str]]:
     refuses.
     """
     require_rerun()
+    if shown(path) != str(path):
+        raise OperatorMistake(f"{shown(path)}: is no UTF-8 text, as Rerun asks of a file's name; name another place")
     with new_file(path) as partial:
         partial.touch()  # the library itself would only log that it cannot write
         return _write(run, partial)
@@ -34,9 +37,9 @@ def _write(run: RecordedRun, path: Path) -> tuple[int, list[str]]:
     field = field_of(run.attachments)
     unread: dict[str, None] = {}
     count = 0
-    stream = rr.RecordingStream(APPLICATION, recording_id=f"{run.paths[0].parent.name}-{run.start_ns}")
+    name, rerun = shown(run.paths[0].parent.name), rerun_of(run.metadata)
+    stream = rr.RecordingStream(APPLICATION, recording_id=f"{name}-{run.start_ns}")
     stream.save(path, default_blueprint=blueprint(field))
-    name, rerun = run.paths[0].parent.name, rerun_of(run.metadata)
     stream.send_recording_name(f"{name}: {rerun.mark}" if rerun else name)
     scene = RerunScene(stream, field, run.start_ns, rerun.mark if rerun else "")
     for raw in run.records_from(run.start_ns, lambda topic: topic.type is not None or is_picture(topic)):

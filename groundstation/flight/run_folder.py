@@ -10,9 +10,10 @@ from pathlib import Path
 
 import msgspec
 
-from groundstation.errors import GroundStationError, OperatorMistake, without_passwords
+from groundstation.errors import GroundStationError, OperatorMistake, is_wrong_place, without_passwords
 from groundstation.process.log import DiscreetFormatter
 from groundstation.recording.disk_space import free_bytes
+from groundstation.recording.part_names import shown
 from groundstation.report import run_facts
 from groundstation.supervisor import kernels
 from groundstation.supervisor.runtime_file import start_time
@@ -25,6 +26,8 @@ def make_run_dir(parent: Path, field_name: str) -> Path:
     """Return a new run folder that can be written; raises GroundStationError before anything has started."""
     stamp = datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
     path = parent / f"{stamp}-{field_name}"
+    if (named := shown(path.absolute())) != str(path.absolute()):
+        raise OperatorMistake(f"{named}: is no UTF-8 text: rename that folder, or fly from another one")
     try:
         for number in range(2, 100):
             if not path.exists():
@@ -37,7 +40,8 @@ def make_run_dir(parent: Path, field_name: str) -> Path:
         probe.unlink()
         free = free_bytes(path)
     except OSError as error:
-        raise OperatorMistake(f"cannot write to {path}: {error.strerror} (--set recording.directory=...)") from error
+        kind = OperatorMistake if is_wrong_place(error) else GroundStationError
+        raise kind(f"cannot write to {path}: {error.strerror} (--set recording.directory=...)") from error
     if free < _MIN_FREE_BYTES:
         path.rmdir()
         raise GroundStationError(f"only {free / 1e6:.0f} MB are free for {parent}: make room before take-off")

@@ -29,9 +29,21 @@ def errors_named(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         if is_wrong_place(error):
-            raise OperatorMistake(f"{path}: {error.strerror}; name another place with --output") from error
-        remedy = ": make room, or name another place with --output" if error.errno in _NO_ROOM else ""
+            raise OperatorMistake(f"{path}: {error.strerror}; name another place") from error
+        remedy = ": make room, or name another place" if error.errno in _NO_ROOM else ""
         raise OutputError(f"{path}: {error.strerror or error}{remedy}") from error
+
+
+@contextmanager
+def replaced_file(path: Path) -> Iterator[Path]:
+    """Yield the path to write to; it takes the place of `path`, and of what was there, when all went well."""
+    partial = path.with_name(f".partial-{path.name}")  # many a library goes by the ending
+    with errors_named(path):
+        try:
+            yield partial
+            partial.replace(path)
+        finally:
+            partial.unlink(missing_ok=True)
 
 
 @contextmanager
@@ -72,11 +84,6 @@ def new_file(path: Path) -> Iterator[Path]:
     Raises OperatorMistake when there is something already or nothing can be, OutputError when the disk refuses.
     """
     require_absent(path)
-    partial = path.with_name(f".{path.name}.partial")
-    with errors_named(path):
-        try:
-            yield partial
-            require_absent(path)
-            partial.rename(path)
-        finally:
-            partial.unlink(missing_ok=True)
+    with replaced_file(path) as partial:
+        yield partial
+        require_absent(path)

@@ -1,5 +1,6 @@
-"""Names of the parts of a recording: `state.mcap`, `state-2.mcap`, ..., in the order they were begun."""
+"""Names of the parts of a recording: `state.mcap`, `state-2.mcap`, ..., in the order they were begun; of its folder."""
 
+import os
 import re
 from pathlib import Path
 
@@ -7,6 +8,11 @@ from pathlib import Path
 def part_path(folder: Path, stem: str, number: int) -> Path:
     """Return the path of a part, counted from 1."""
     return folder / (f"{stem}.mcap" if number == 1 else f"{stem}-{number}.mcap")
+
+
+def shown(place: Path | str) -> str:
+    """Return a path as text for files and pages, with a sign for what is no UTF-8 in it."""
+    return os.fsencode(place).decode(errors="replace")
 
 
 def numbered_parts(folder: Path, stem: str) -> list[tuple[int, Path]]:

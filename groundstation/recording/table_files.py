@@ -76,7 +76,8 @@ class ParquetFile:
         )
         self._batch_of: Any = pa.RecordBatch.from_arrays
         self._array: Any = pa.array
-        self._writer = pq.ParquetWriter(path, self._schema, compression="zstd")
+        self._stream = path.open("wb")  # the library takes no name that is not UTF-8
+        self._writer = pq.ParquetWriter(self._stream, self._schema, compression="zstd")
         self._rows: list[Row] = []
 
     def add(self, row: Row) -> None:
@@ -94,8 +95,11 @@ class ParquetFile:
 
     def close(self) -> None:
         """Write what is left and the footer."""
-        self._flush()
-        self._writer.close()
+        try:
+            self._flush()
+            self._writer.close()
+        finally:
+            self._stream.close()
 
 
 # What raw topics leave in a table: when, and how much.

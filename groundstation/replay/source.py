@@ -9,6 +9,7 @@ import msgspec
 
 from groundstation.field.resolved import ResolvedField, field_from_json
 from groundstation.recording.file_topics import RAW, STATE
+from groundstation.recording.part_names import shown
 from groundstation.recording.preamble import COMMAND_NAME, FIELD_NAME
 from groundstation.recording.reader import Recording, RecordingError, open_parts, open_recording, parts
 from groundstation.recording.rerun import Rerun, rerun_of
@@ -50,7 +51,7 @@ def open_source(paths: Sequence[Path]) -> Source:
         state, raw = parts(folder, STATE), parts(folder, RAW)
         if not state:
             raise RecordingError(f"{folder}: there is no recording in this folder ({_TYPICAL}){_nearby(folder)}")
-        return _source(folder.resolve().name, state, raw)
+        return _source(shown(folder.resolve().name), state, raw)
     folders = [path for path in paths if path.is_dir()]
     if folders:
         raise RecordingError(f"{folders[0]}: name one run folder, or the parts of one recording, not both")

@@ -16,14 +16,15 @@ def build_report(run_dir: Path, *, plot: bool = True) -> RunReport:
         from groundstation.report.page.document import write_page  # matplotlib takes half a second to import
         from groundstation.report.plot import draw
 
-        draw(data, _title(report), run_dir / PLOT_NAME)
+        draw(data, title(report), run_dir / PLOT_NAME)
         write_page(data, report, run_dir / HTML_NAME)
     return report
 
 
-def _title(report: RunReport) -> str:
+def title(report: RunReport) -> str:
+    """Return what stands above the picture of the paths."""
     figures = report.figures
     error = "no tracking" if figures.target_rmse_m is None else f"target error {figures.target_rmse_m:.3f} m rms"
     verdict = "passed" if report.passed else report.verdict.upper()
     of = f" of {report.rerun.of}" if report.rerun else ""
-    return f"{report.run_dir.name}: {error} over {figures.tracked_s:.0f} s, {verdict}{of}"
+    return f"{report.name}: {error} over {figures.tracked_s:.0f} s, {verdict}{of}"

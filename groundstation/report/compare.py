@@ -5,6 +5,7 @@ from typing import Any
 
 import msgspec
 
+from groundstation.recording.part_names import shown
 from groundstation.report.judge import RunReport
 
 _FIGURES = (
@@ -48,7 +49,7 @@ def as_json(first: RunReport, second: RunReport) -> bytes:
     runs = {"first": first, "second": second}
     content = {
         "schema_version": 1,
-        **{name: str(report.run_dir) for name, report in runs.items()},
+        **{name: shown(report.run_dir) for name, report in runs.items()},
         "reruns": {name: report.rerun for name, report in runs.items()},
         "figures": rows,
     }

@@ -6,6 +6,7 @@ from typing import Any
 
 import msgspec
 
+from groundstation.recording.part_names import shown
 from groundstation.recording.rerun import Rerun
 from groundstation.report.criteria import Criterion, criteria_of, is_valid
 from groundstation.report.findings import Findings, findings_of
@@ -30,6 +31,11 @@ class RunReport:
     valid: bool
     damage: tuple[str, ...]
     rerun: Rerun | None = None
+
+    @property
+    def name(self) -> str:
+        """Return what the run is called: the name of its folder."""
+        return shown(self.run_dir.resolve().name)
 
     @property
     def passed(self) -> bool | None:

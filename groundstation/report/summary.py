@@ -5,6 +5,7 @@ from rich.table import Table
 from rich.text import Text
 
 from groundstation.appearance.topology import topology_words
+from groundstation.recording.part_names import shown
 from groundstation.report.compare import differences, labels
 from groundstation.report.criteria import Criterion
 from groundstation.report.file_names import HTML_NAME, JSON_NAME, PLOT_NAME
@@ -30,7 +31,7 @@ def summary(report: RunReport) -> RenderableType:
         parts.append(Text(f"  {line}", style="yellow"))
     for line in report.damage[:3]:
         parts.append(Text(f"  recording: {line}", style="dim"))
-    parts.append(Text(f"  {report.run_dir}: {HTML_NAME}, {JSON_NAME}, {PLOT_NAME}", style="dim"))
+    parts.append(Text(f"  {shown(report.run_dir)}: {HTML_NAME}, {JSON_NAME}, {PLOT_NAME}", style="dim"))
     return Group(*parts)
 
 
@@ -45,7 +46,7 @@ def comparison(first: RunReport, second: RunReport) -> RenderableType:
             title(row.figure),
             *("–" if value is None else quantity(row.figure, value) for value in (row.first, row.second, row.change)),
         )
-    names = f" first: {first.run_dir.name}, second: {second.run_dir.name}"
+    names = f" first: {first.name}, second: {second.name}"
     notes = [
         Text(f" {label}: {report.rerun.sentence}", style="bold yellow")
         for label, report in (("first", first), ("second", second))

@@ -5,6 +5,7 @@ from typing import Any
 
 import msgspec
 
+from groundstation.recording.part_names import shown
 from groundstation.report.criteria import Criterion
 from groundstation.report.file_names import JSON_NAME
 from groundstation.report.run_facts import RunFacts
@@ -51,10 +52,10 @@ def judged_runs(folder: Path) -> tuple[list[JudgedRun], list[str]]:
             data = path.read_bytes()
             report, figures = msgspec.json.decode(data, type=_Report), msgspec.json.decode(data)
         except (OSError, msgspec.DecodeError) as error:
-            damage.append(f"{path}: {error}")
+            damage.append(f"{shown(path)}: {error}")
             continue
         if report.rerun is None:
-            runs.append(_run(path.parent.name, report, figures))
+            runs.append(_run(shown(path.parent.name), report, figures))
     return runs, damage
 
 

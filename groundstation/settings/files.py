@@ -20,6 +20,7 @@ def find_scenario(name: str, field_file: Path) -> Path:
 def _find(name: str, what: str, folders: tuple[Path, ...]) -> Path:
     if "/" in name or name.endswith((".yaml", ".yml", ".json")):
         path = Path(name)
+        _require_text(name)
         _refuse_folder(path, what)
         return path  # read() names a missing file and what was probably meant
     known: list[str] = []
@@ -34,6 +35,14 @@ def _find(name: str, what: str, folders: tuple[Path, ...]) -> Path:
     near = get_close_matches(name, known, 1, 0.5)
     meant = f"did you mean {near[0]}?" if near else f"there are: {', '.join(dict.fromkeys(known)) or 'none'}"
     raise SettingsError([f"there is no {what} {name!r}, {meant} (or give the path of a YAML file)"])
+
+
+def _require_text(name: str) -> None:
+    """Raise SettingsError for a path that no recording can name."""
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        raise SettingsError([f"{name!a}: this path is no UTF-8 text: rename what is not"]) from None
 
 
 def _refuse_folder(path: Path, what: str) -> None:

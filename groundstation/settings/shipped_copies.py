@@ -22,9 +22,13 @@ def shipped() -> list[Path]:
 
 
 def copy(source: Path, target: Path) -> None:
-    """Copy one shipped file, with the folders that it needs."""
+    """Copy one shipped file, with the folders that it needs; no half of it stays where there is no room."""
     target.parent.mkdir(parents=True, exist_ok=True)
-    shutil.copyfile(source, target)
+    try:
+        shutil.copyfile(source, target)
+    except OSError:
+        target.unlink(missing_ok=True)
+        raise
 
 
 def refuse_existing(paths: list[Path]) -> None:

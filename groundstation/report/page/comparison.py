@@ -28,7 +28,7 @@ def write_comparison(runs: tuple[tuple[RunData, RunReport], tuple[RunData, RunRe
     first, second = runs[0][1], runs[1][1]
     called = labels(first, second)
     charts = [chart for chart in (_errors(runs, called), _beliefs(runs, called), _costs(runs, called)) if chart.curves]
-    names = [escape(report.run_dir.name) for report in (first, second)]
+    names = [escape(report.name) for report in (first, second)]
     rows = [
         (title(row.figure), number(row.first), number(row.second), number(row.change))
         for row in differences(first, second)
@@ -39,7 +39,7 @@ def write_comparison(runs: tuple[tuple[RunData, RunReport], tuple[RunData, RunRe
     ]
     lead = f"<p>first: <b>{names[0]}</b> ({first.verdict}), second: <b>{names[1]}</b> ({second.verdict})</p>"
     lead += "".join(rerun_note(report) for report in (first, second))
-    path.write_text(page(f"{first.run_dir.name} and {second.run_dir.name}", lead, sections, charts), encoding="utf-8")
+    path.write_text(page(f"{first.name} and {second.name}", lead, sections, charts), encoding="utf-8")
 
 
 def _grids(runs: tuple[tuple[RunData, RunReport], ...]) -> tuple[Array, list[float]]:

@@ -51,7 +51,7 @@ def write_page(data: RunData, report: RunReport, path: Path) -> None:
             * bool(report.damage)
         ),
     ]
-    path.write_text(page(report.run_dir.name, _lead(report), sections, [*flight, *health]), encoding="utf-8")
+    path.write_text(page(report.name, _lead(report), sections, [*flight, *health]), encoding="utf-8")
 
 
 def page(title: str, lead: str, sections: list[tuple[str, str]], charts: list[Chart]) -> str:
@@ -118,7 +118,7 @@ def rerun_note(report: RunReport) -> str:
     """Return what marks a re-run as such, "" for a flight."""
     if report.rerun is None:
         return ""
-    return f'<p class="rerun"><b>{escape(report.run_dir.name)}</b> is a {escape(report.rerun.sentence)}.</p>'
+    return f'<p class="rerun"><b>{escape(report.name)}</b> is a {escape(report.rerun.sentence)}.</p>'
 
 
 def _room(data: RunData) -> str:

@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -279,3 +280,14 @@ def test_the_first_page_names_a_dozen_commands(capsys: pytest.CaptureFixture[str
     first = capsys.readouterr().out
     named = {name for name in all_verbs() if re.search(rf"^  {name} ", first, re.MULTILINE)}
     assert 0 < len(named) <= 12 and {"demo", "fly", "land"} <= named
+
+
+@pytest.mark.parametrize("encoding", ["utf-8:strict", "latin-1"])
+def test_what_a_terminal_cannot_show_is_no_fault(tmp_path: Path, encoding: str) -> None:
+    """Where a locale is set, python is strict on stdout: a path that was typed as bytes ended in a traceback."""
+    typed = os.fsencode(tmp_path) + b"/\xff"
+    command = [os.fsencode(sys.executable), b"-m", b"groundstation", b"config", b"init", typed]
+    told = {**os.environ, "PYTHONIOENCODING": encoding}
+    done = subprocess.run(command, capture_output=True, timeout=60, check=False, env=told)
+    assert done.returncode == 0, done.stderr
+    assert rb"\udcff/lab.yaml" in done.stdout and not done.stderr

@@ -11,7 +11,7 @@ import pytest
 from groundstation.bus import messages as m
 from groundstation.bus import topics as t
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
-from groundstation.errors import GroundStationError
+from groundstation.errors import GroundStationError, OperatorMistake
 from groundstation.flight.flight_plan import FlightPlan
 from groundstation.flight.loop import Flight
 from groundstation.flight.run_folder import make_run_dir
@@ -81,3 +81,10 @@ def test_a_run_says_how_it_ended(stage: dict[str, Any], severity: str, words: st
 def test_the_folder_of_a_run_is_its_owners(tmp_path: Path) -> None:
     folder = make_run_dir(tmp_path / "runs", "lab")
     assert stat.S_IMODE(folder.stat().st_mode) == 0o700
+
+
+def test_nobody_flies_from_a_place_that_no_recording_can_name(tmp_path: Path) -> None:
+    """Facts and messages travel as JSON; the start ended in a traceback there."""
+    with pytest.raises(OperatorMistake, match="is no UTF-8 text: rename"):
+        make_run_dir(tmp_path / "\udcff" / "runs", "lab")
+    assert not list(tmp_path.iterdir())

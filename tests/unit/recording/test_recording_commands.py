@@ -313,23 +313,3 @@ def test_messages_that_came_together_have_no_rate(tmp_path: Path) -> None:
     assert {channel["rate_hz"] for channel in channels} == {0.0}
     rows = [line.split() for line in _run("info", tmp_path).output.splitlines() if "/estimate/" in line]
     assert rows and all(row[2] == "-" for row in rows)
-
-
-@pytest.mark.parametrize(
-    "command",
-    [
-        ("export", "--csv"),
-        ("export", "--parquet"),
-        ("export", "--rrd"),
-        ("export", "--foxglove-scene"),
-        ("export", "--rosbag2"),
-        ("cut", "--from", "0", "--to", "1"),
-        ("recover",),
-    ],
-    ids=" ".join,
-)
-def test_a_place_that_cannot_be_is_wrong_usage(run_dir: Path, tmp_path: Path, command: tuple[str, ...]) -> None:
-    """A full disk is a fault; a place below a file was named wrongly, and ends each command with the same code."""
-    (tmp_path / "taken").write_text("")
-    code, text = _refusal(*command, run_dir / "state.mcap", "-o", tmp_path / "taken" / "out")
-    assert code is ExitCode.SETTINGS and "taken/out" in text and "--output" in text

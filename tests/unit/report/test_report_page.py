@@ -11,6 +11,7 @@ from click.testing import CliRunner
 
 from groundstation.bus import messages as m
 from groundstation.cli.report import report as report_command
+from groundstation.report.build import title
 from groundstation.report.consistency import bounds, edges, nees_per_dof, windowed_nis
 from groundstation.report.decisions import interventions, switches
 from groundstation.report.findings import findings_of
@@ -19,6 +20,7 @@ from groundstation.report.links import links
 from groundstation.report.page.chart import held, thin
 from groundstation.report.page.comparison import write_comparison
 from groundstation.report.page.document import write_page
+from groundstation.report.plot import draw
 from groundstation.report.run_facts import RunFacts
 from groundstation.report.tracks import UNKNOWN_FIELD, EstimateTrack, RunData, TimedMessage, TruthTrack
 
@@ -161,6 +163,17 @@ def test_comparison_lists_every_figure_with_its_change(tmp_path: Path) -> None:
     write_comparison((runs[0], runs[1]), tmp_path / "comparison.html")
     page = (tmp_path / "comparison.html").read_text("utf-8")
     assert "nis ceiling → drone_1" in page and "Plan cost" in page
+
+
+def test_a_run_of_any_name_has_its_pages(tmp_path: Path) -> None:
+    """A name that is no UTF-8 cannot stand in a page, and is replaced there."""
+    data, folder = sample_run(tmp_path, "run\udcff")
+    report = judge(data, folder)
+    write_page(data, report, tmp_path / "report.html")
+    write_comparison(((data, report), (data, report)), tmp_path / "comparison.html")
+    for page in ("report.html", "comparison.html"):
+        assert "run\N{REPLACEMENT CHARACTER}" in (tmp_path / page).read_text()
+    draw(data, title(report), tmp_path / "trajectories.png")
 
 
 def test_findings_of_an_empty_run_are_empty() -> None:

@@ -59,3 +59,12 @@ def test_a_damaged_report_is_named_and_the_others_count(folder: Path) -> None:
 def test_a_folder_without_reports_is_refused(tmp_path: Path) -> None:
     found = CliRunner().invoke(report_command, [str(tmp_path), "--trend"], standalone_mode=False)
     assert isinstance(found.exception, OperatorMistake)
+
+
+def test_a_run_of_any_name_is_shown(folder: Path) -> None:
+    for name in ("20261120T140000Z-\udcff", "20261120T150000Z-\udcff"):
+        write(folder, name)
+    (folder / name / "report.json").write_text("{")
+    found = CliRunner().invoke(report_command, [str(folder), "--trend"], standalone_mode=False)
+    assert found.exception is None and "4 runs, 3 passed" in found.output
+    assert "20261120T140000Z-\N{REPLACEMENT CHARACTER}" in (folder / NAME).read_text()

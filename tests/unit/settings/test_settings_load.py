@@ -172,6 +172,11 @@ def test_names_of_shipped_files() -> None:
         find_field("hall")
 
 
+def test_a_path_that_no_recording_can_name_is_refused() -> None:
+    with pytest.raises(SettingsError, match="is no UTF-8 text"):
+        find_field("lab\udcff/lab.yaml")
+
+
 def test_scenarios_are_read_with_options() -> None:
     path = find_scenario("realistic", FIXTURE)
     assert load_scenario(path)["schema_version"] == 1

@@ -28,8 +28,8 @@ _RUNS = Path("runs")
 def report(recording: Path | None, as_json: bool, no_plot: bool, other: Path | None, trend: bool) -> int:
     """Rebuild report.html, report.json and trajectories.png of a run folder (default: the newest in ./runs).
 
-    Exit code 0 when the run passed, 1 when it did not. A comparison, and the report of a re-run (`replay --output`),
-    judge nothing: 0 when they could be made.
+    Exit code 0 when the run passed, 1 when it did not. A comparison, and the report of a re-run (`replay --output`)
+    or of a cut, judge nothing: 0 when they could be made.
     """
     from groundstation.report.build import build_report
 
@@ -107,7 +107,7 @@ def _trend(folder: Path, as_json: bool) -> None:
     for line in damage:
         click.echo(f"cannot be read: {line}", err=True)
     passed = sum(run.verdict == "passed" for run in runs)
-    click.echo(f"{folder / NAME}: {len(runs)} runs, {passed} passed")
+    click.echo(f"{folder / NAME}: {len(runs)} run{'s' * (len(runs) != 1)}, {passed} passed")
 
 
 def _run_dir(path: Path) -> Path:
@@ -118,8 +118,11 @@ def _run_dir(path: Path) -> Path:
 
 
 def newest_run(folder: Path) -> Path:
-    """Return the run folder with the newest recording; raises OperatorMistake when there is none."""
-    recordings = sorted(folder.glob("*/state*.mcap"), key=lambda path: path.stat().st_mtime)
-    if not recordings:
+    """Return the folder with the newest recording that was not cut from another; raises OperatorMistake for none."""
+    from groundstation.recording.stretch import is_stretch
+
+    recordings = sorted(folder.glob("*/state*.mcap"), key=lambda path: path.stat().st_mtime, reverse=True)
+    newest = next((path for path in recordings if not is_stretch(path)), None)
+    if newest is None:
         raise OperatorMistake(f"no recorded run in {folder.absolute()}: name a run folder")
-    return recordings[-1].parent
+    return newest.parent

@@ -20,6 +20,7 @@ from groundstation.recording.outputs import new_file
 from groundstation.recording.preamble import Preamble
 from groundstation.recording.reader import Recording, open_recording
 from groundstation.recording.run import RecordedRun
+from groundstation.recording.stretch import Stretch
 
 _FOR_EVER = 1 << 63
 
@@ -121,8 +122,7 @@ def cut(run: RecordedRun, stem: str, from_ns: int, until_ns: int, target: Path) 
     indexes = [index for index in run.indexes if index.stem == stem]
     latched = run.latest_before(from_ns, LATCHED_TOPICS.__contains__)
     opened = open_recording(indexes[0].path)
-    note = {"cut": {"from_unix_ns": str(from_ns), "until_unix_ns": str(until_ns)}}
-    with new_copy(target, preamble_copy(opened, note)) as writer:
+    with new_copy(target, preamble_copy(opened, Stretch(from_ns, until_ns).as_metadata())) as writer:
         for message in _latched_copies(indexes, latched.values(), from_ns):
             writer.write(message)
         for index in indexes:

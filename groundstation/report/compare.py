@@ -35,8 +35,8 @@ def differences(first: RunReport, second: RunReport) -> list[FigureDifference]:
 
 
 def labels(first: RunReport, second: RunReport) -> tuple[str, str]:
-    """Return what the two are called in a comparison: a re-run says that it is one."""
-    marks = [f" ({report.verdict})" if report.rerun else "" for report in (first, second)]
+    """Return what the two are called in a comparison: what is no flight says so."""
+    marks = [f" ({report.verdict})" if report.no_flight else "" for report in (first, second)]
     return f"first{marks[0]}", f"second{marks[1]}"
 
 

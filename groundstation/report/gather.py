@@ -14,6 +14,7 @@ from groundstation.recording.file_topics import STATE
 from groundstation.recording.preamble import FIELD_NAME
 from groundstation.recording.reader import Recording, RecordingError, open_parts, parts
 from groundstation.recording.rerun import rerun_of
+from groundstation.recording.stretch import stretch_of
 from groundstation.report import run_facts
 from groundstation.report.captured_truth import captured_tracks
 from groundstation.report.tracks import UNKNOWN_FIELD, EstimateTrack, ProcessTrack, RunData, TimedMessage, TruthTrack
@@ -37,6 +38,7 @@ def gather(run_dir: Path) -> RunData:
         if FIELD_NAME in recording.attachments and not data.resolved.drones:
             data.resolved = _field(recording.attachments[FIELD_NAME], data.damage)
         data.rerun = data.rerun or rerun_of(recording.metadata)
+        data.stretch = data.stretch or stretch_of(recording.metadata)
         rows.take(recording)
         data.damage.extend(f"{recording.path.name}: {damage}" for damage in recording.damage)
     rows.finish()

@@ -8,6 +8,7 @@ import msgspec
 
 from groundstation.recording.part_names import shown
 from groundstation.recording.rerun import Rerun
+from groundstation.recording.stretch import Stretch
 from groundstation.report.criteria import Criterion, criteria_of, is_valid
 from groundstation.report.findings import Findings, findings_of
 from groundstation.report.metrics import RunFigures, figures_of
@@ -21,7 +22,7 @@ _DAMAGE_LINES = 20
 
 @dataclass(frozen=True, slots=True)
 class RunReport:
-    """A judged run. `valid`: the simulator kept real time; `rerun`: what it repeats, where it is no flight."""
+    """A judged run. `valid`: the simulator kept real time; rerun, stretch: what it repeats or is a part of."""
 
     run_dir: Path
     facts: RunFacts
@@ -31,6 +32,12 @@ class RunReport:
     valid: bool
     damage: tuple[str, ...]
     rerun: Rerun | None = None
+    stretch: Stretch | None = None
+
+    @property
+    def no_flight(self) -> Rerun | Stretch | None:
+        """Return what it is where it is no whole flight, so that there is nothing to judge."""
+        return self.rerun or self.stretch
 
     @property
     def name(self) -> str:
@@ -39,8 +46,8 @@ class RunReport:
 
     @property
     def passed(self) -> bool | None:
-        """Whether the run was what it should be: valid, and all criteria met; None for a re-run, which is no flight."""
-        if self.rerun is not None:
+        """Whether the run was what it should be: valid, and all criteria met; None for what is no flight."""
+        if self.no_flight is not None:
             return None
         return self.valid and all(criterion.ok for criterion in self.criteria)
 
@@ -55,9 +62,9 @@ class RunReport:
 
     @property
     def verdict(self) -> str:
-        """Return passed, failed or invalid; re-run or what-if where there is nothing to judge."""
-        if self.rerun is not None:
-            return self.rerun.kind
+        """Return passed, failed or invalid; re-run, what-if or cut where there is nothing to judge."""
+        if self.no_flight is not None:
+            return self.no_flight.kind
         return "passed" if self.passed else "failed" if self.valid else "invalid"
 
     def as_json(self) -> bytes:
@@ -69,6 +76,7 @@ class RunReport:
             "reasons": self.reasons,
             "valid": self.valid,
             "rerun": self.rerun,
+            "cut": self.stretch,
             "criteria": self.criteria,
             "run": self.facts,
             **msgspec.to_builtins(self.figures),
@@ -81,6 +89,16 @@ class RunReport:
 def judge(data: RunData, run_dir: Path) -> RunReport:
     """Return the report of a run's data; writes nothing."""
     figures = figures_of(data)
-    criteria = () if data.rerun else tuple(criteria_of(figures, data.resolved, data.facts))
-    damage = tuple(data.damage[:_DAMAGE_LINES])
-    return RunReport(run_dir, data.facts, figures, criteria, findings_of(data), is_valid(figures), damage, data.rerun)
+    is_flight = data.rerun is None and data.stretch is None
+    criteria = tuple(criteria_of(figures, data.resolved, data.facts)) if is_flight else ()
+    return RunReport(
+        run_dir=run_dir,
+        facts=data.facts,
+        figures=figures,
+        criteria=criteria,
+        findings=findings_of(data),
+        valid=is_valid(figures),
+        damage=tuple(data.damage[:_DAMAGE_LINES]),
+        rerun=data.rerun,
+        stretch=data.stretch,
+    )

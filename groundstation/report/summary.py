@@ -48,17 +48,17 @@ def comparison(first: RunReport, second: RunReport) -> RenderableType:
         )
     names = f" first: {first.name}, second: {second.name}"
     notes = [
-        Text(f" {label}: {report.rerun.sentence}", style="bold yellow")
+        Text(f" {label}: {report.no_flight.sentence}", style="bold yellow")
         for label, report in (("first", first), ("second", second))
-        if report.rerun
+        if report.no_flight
     ]
     return Group(Text(names, style="dim"), *notes, table)
 
 
 def _verdict(report: RunReport) -> Text:
-    if report.rerun is not None:
+    if report.no_flight is not None:
         return Text(
-            f"{report.verdict.upper()}{report.rerun.sentence.removeprefix(report.verdict)}", style="bold yellow"
+            f"{report.verdict.upper()}{report.no_flight.sentence.removeprefix(report.verdict)}", style="bold yellow"
         )
     if report.passed:
         return Text("PASSED", style="bold green")

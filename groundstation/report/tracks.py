@@ -24,6 +24,7 @@ from groundstation.field.resolved import ResolvedField
 from groundstation.field.room import Fence, Room
 from groundstation.field.targets import SingleTarget, TargetMarker
 from groundstation.recording.rerun import Rerun
+from groundstation.recording.stretch import Stretch
 from groundstation.report.run_facts import RunFacts
 
 T = TypeVar("T")
@@ -132,8 +133,8 @@ UNKNOWN_FIELD = ResolvedField(
 class RunData:
     """Everything the report looks at. `start_unix_ns` is the time of the first message, `end_s` of the last.
 
-    belief: the last one. suspicions: at least one for each verdict of the diagnosis. rerun: what it repeats, where it
-    is no recorded flight. heard_s: when the telemetry of each vehicle was measured, by vehicle.
+    belief: the last one. suspicions: at least one for each verdict of the diagnosis. rerun, stretch: what
+    it repeats or is a part of, where it is no whole flight. heard_s: when the telemetry of each vehicle was measured.
     """
 
     resolved: ResolvedField
@@ -156,6 +157,7 @@ class RunData:
     suspicions: list[TimedMessage[Suspicion]] = field(default_factory=list)
     damage: list[str] = field(default_factory=list)
     rerun: Rerun | None = None
+    stretch: Stretch | None = None
 
     @property
     def drones(self) -> tuple[str, ...]:

@@ -37,6 +37,7 @@ class _Report(msgspec.Struct):
     passed: bool | None
     valid: bool
     rerun: Any = None
+    cut: Any = None
     criteria: tuple[Criterion, ...] = ()
     run: RunFacts = RunFacts()
 
@@ -44,7 +45,7 @@ class _Report(msgspec.Struct):
 def judged_runs(folder: Path) -> tuple[list[JudgedRun], list[str]]:
     """Return the runs of a folder in order of their names, which begin with their times, and what cannot be read.
 
-    Re-runs are left out: they are no flights.
+    Re-runs and cuts are left out: they are no flights.
     """
     runs, damage = [], []
     for path in sorted(folder.glob(f"*/{JSON_NAME}")):
@@ -54,7 +55,7 @@ def judged_runs(folder: Path) -> tuple[list[JudgedRun], list[str]]:
         except (OSError, msgspec.DecodeError) as error:
             damage.append(f"{shown(path)}: {error}")
             continue
-        if report.rerun is None:
+        if report.rerun is None and report.cut is None:
             runs.append(_run(shown(path.parent.name), report, figures))
     return runs, damage
 

@@ -12,7 +12,7 @@ from groundstation.report.compare import differences, labels
 from groundstation.report.interval import tracking_interval
 from groundstation.report.judge import RunReport
 from groundstation.report.page.chart import Chart, Curve, held, points, thin, times
-from groundstation.report.page.document import holders, page, rerun_note
+from groundstation.report.page.document import holders, no_flight_note, page
 from groundstation.report.page.flight_charts import semi_axis_m
 from groundstation.report.page.tables import number, table
 from groundstation.report.plot_style import SERIES_COLORS
@@ -38,7 +38,7 @@ def write_comparison(runs: tuple[tuple[RunData, RunReport], tuple[RunData, RunRe
         ("Over time", holders(charts, 0)),
     ]
     lead = f"<p>first: <b>{names[0]}</b> ({first.verdict}), second: <b>{names[1]}</b> ({second.verdict})</p>"
-    lead += "".join(rerun_note(report) for report in (first, second))
+    lead += "".join(no_flight_note(report) for report in (first, second))
     path.write_text(page(f"{first.name} and {second.name}", lead, sections, charts), encoding="utf-8")
 
 

@@ -90,15 +90,15 @@ def _lead(report: RunReport) -> str:
     }  # fmt: skip
     words = " · ".join(f"{name} {escape(value)}" for name, value in known.items() if value)
     why = "" if report.valid else " The simulator did not keep real time: the figures mean nothing."
-    if report.rerun:
+    if report.no_flight:
         words = f"recorded flight: {words}"
     badge = f'<p><span class="verdict {verdict}">{verdict.upper()}</span> <span class="dim">{words}.{why}</span></p>'
-    return badge + _reasons(report) + rerun_note(report)
+    return badge + _reasons(report) + no_flight_note(report)
 
 
 def _reasons(report: RunReport) -> str:
     """Return why a run failed, in words, "" where it did not."""
-    if report.rerun or report.passed:
+    if report.no_flight or report.passed:
         return ""
     return "".join(f"<p>{escape(missed(one))}.</p>" for one in report.criteria if not one.ok)
 
@@ -114,11 +114,11 @@ def _pictures(pictures: list[MomentPicture]) -> str:
     return f'<div class="moments">{figures}</div>' if figures else ""
 
 
-def rerun_note(report: RunReport) -> str:
-    """Return what marks a re-run as such, "" for a flight."""
-    if report.rerun is None:
+def no_flight_note(report: RunReport) -> str:
+    """Return what marks a re-run or a cut as such, "" for a flight."""
+    if report.no_flight is None:
         return ""
-    return f'<p class="rerun"><b>{escape(report.name)}</b> is a {escape(report.rerun.sentence)}.</p>'
+    return f'<p class="rerun"><b>{escape(report.name)}</b> is a {escape(report.no_flight.sentence)}.</p>'
 
 
 def _room(data: RunData) -> str:

@@ -44,7 +44,8 @@ def criteria_table(report: RunReport) -> str:
         ("met" if item.ok else "MISSED", title(item.name), quantity(item.name, item.value), bound(item), item.why)
         for item in report.criteria
     ]  # fmt: skip
-    empty = "A re-run is no flight: no criterion applies." if report.rerun else "No criterion applies."
+    kind = report.no_flight.kind if report.no_flight else ""
+    empty = f"A {kind} is no flight: no criterion applies." if kind else "No criterion applies."
     return table(("verdict", "criterion", "value", "asked for", "why"), rows, empty)
 
 

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
+from groundstation.recording.part_names import shown
 from groundstation.report.page.chart import Chart, Curve
 from groundstation.report.page.document import holders, page
 from groundstation.report.page.tables import table
@@ -18,9 +19,11 @@ def write_trend(runs: Sequence[JudgedRun], damage: Sequence[str], path: Path) ->
     """Write the page of many runs; `damage` names reports that could not be read."""
     charts = [_chart(figure, runs) for figure in FIGURES if any(run.figures[figure] is not None for run in runs)]
     passed = sum(run.verdict == "passed" for run in runs)
-    lead = f"<p>{len(runs)} runs, {passed} passed.</p>" + "".join(f"<p>{escape(line)}</p>" for line in damage)
+    lead = f"<p>{len(runs)} run{'s' * (len(runs) != 1)}, {passed} passed.</p>" + "".join(
+        f"<p>{escape(line)}</p>" for line in damage
+    )
     sections = [("Run by run", holders(charts, 0)), ("Runs", _table(runs))]
-    path.write_text(page(f"Runs of {path.parent.absolute().name}", lead, sections, charts), encoding="utf-8")
+    path.write_text(page(f"Runs of {shown(path.parent.absolute().name)}", lead, sections, charts), encoding="utf-8")
 
 
 def _chart(figure: str, runs: Sequence[JudgedRun]) -> Chart:

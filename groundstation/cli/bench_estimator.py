@@ -6,8 +6,9 @@ from typing import Any
 
 import click
 
-from groundstation.cli.bench_planner import numbers, use_kernel_cache
+from groundstation.cli.bench_planner import numbers
 from groundstation.cli.exits import ExitCode
+from groundstation.cli.kernels import use_all_kernels
 from groundstation.cli.terminal import write_over
 
 
@@ -43,7 +44,7 @@ def estimator(robots: str, rounds: int, flight_ms: int, field_name: str, seed: i
     resolved = resolved_field(load_field(find_field(field_name), ()))
     if not resolved.drones or not resolved.cameras:
         raise click.UsageError(f"--field: {field_name} has no drone or no camera to copy")
-    use_kernel_cache()
+    use_all_kernels()
     from groundstation.bench.estimator import SAME_BELIEF, run_bench
 
     result = run_bench(sizes, resolved, rounds, flight_ms, seed, write_over)

@@ -6,18 +6,12 @@ from typing import Any
 
 import click
 
+from groundstation.cli.kernels import use_all_kernels
 from groundstation.cli.numbers import FiniteRange
 from groundstation.cli.terminal import write_over
-from groundstation.process import numba_cache
 
 _LAYOUTS = ("two-level", "random", "string", "flat")
 _PEERS = ("naive", "numpy", "jax")
-
-
-def use_kernel_cache() -> None:
-    """Let compiled kernels be kept and found again; say so when this start has to compile them."""
-    if not numba_cache.activate(numba_cache.EVERYTHING).exists():
-        click.echo("compiling kernels (once per version, a minute or two)", err=True)
 
 
 def choices(value: str, allowed: tuple[str, ...], option: str) -> list[str]:
@@ -78,7 +72,7 @@ def planner(
         layouts = _of_the_planner_that_flies(layouts, peers)
     for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
-    use_kernel_cache()
+    use_all_kernels()
     from groundstation.bench.planner import run_bench
 
     if model == "frustum":

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from groundstation.cli.bench_planner import choices, numbers, use_kernel_cache
+from groundstation.cli.bench_planner import choices, numbers
 from groundstation.cli.experiment_calibrations import calibrations
 from groundstation.cli.experiment_culprits import culprits
 from groundstation.cli.experiment_faults import faults
 from groundstation.cli.experiment_missions import missions
 from groundstation.cli.experiment_mrclam import mrclam
 from groundstation.cli.experiment_scenarios import scenarios
+from groundstation.cli.kernels import use_all_kernels
 from groundstation.cli.numbers import FiniteRange
 from groundstation.cli.terminal import progress
 from groundstation.errors import GroundStationError
@@ -118,7 +119,7 @@ def sensors(robots: int, seeds: int, **world: Any) -> None:
     """Which topology wins with which sensor: ranges, growing noise, bearings, ranges only, displaced disc."""
     if world["dropout"] or world["kidnap"]:
         raise click.UsageError("sensors knows neither --dropout nor --kidnap")
-    use_kernel_cache()
+    use_all_kernels()
     from groundstation.experiments.runner import write_atomically
     from groundstation.experiments.sensors import compare
     from groundstation.experiments.tasks import csv_text
@@ -175,7 +176,7 @@ def _tasks(
     world: dict[str, Any],
 ) -> "list[Task]":
     """Return all runs of a grid; only `certified` and `global` depart from the paper."""
-    use_kernel_cache()  # the next import compiles
+    use_all_kernels()  # the next import compiles
     from groundstation.experiments.tasks import DEPARTURES, Task
 
     if "global" in strategies and max(robots) > 6:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from groundstation.cli.bench_planner import use_kernel_cache
+from groundstation.cli.kernels import use_all_kernels
 
 if TYPE_CHECKING:
     from groundstation.experiments.mrclam.run import ScenarioErrors
@@ -35,7 +35,7 @@ def mrclam(folder: Path, seed: int, span: tuple[float, float], as_json: bool) ->
     """
     if not 0.0 <= span[0] < span[1] <= 1.0:
         raise click.UsageError("--span: two shares between 0 and 1, the smaller one first")
-    use_kernel_cache()
+    use_all_kernels()
     from groundstation.experiments.mrclam.dataset import read_dataset
     from groundstation.experiments.mrclam.run import run_scenario
     from groundstation.experiments.mrclam.scenarios import SCENARIOS

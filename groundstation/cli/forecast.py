@@ -43,7 +43,7 @@ def forecast(
     Figures are deviations of the target's place in the floor plan by the filter that flies, at the best stand that the
     planner finds for a target at each place. Errors of simulated flights were 0.7 to 0.8 of them.
     """
-    from groundstation.process import numba_cache
+    from groundstation.cli.kernels import use_flying_kernels
     from groundstation.settings.files import find_field
     from groundstation.settings.load import load_field
     from groundstation.settings.resolved import resolved_field
@@ -56,7 +56,7 @@ def forecast(
     settings = load_field(path, options)
     target = _target(settings, target)
     paths = _paths(settings, path, target, drawn, scenario)
-    numba_cache.activate()
+    use_flying_kernels()
     from groundstation.forecast.forecast import forecast as forecast_of
 
     began = time.process_time()

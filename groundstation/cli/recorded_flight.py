@@ -20,11 +20,11 @@ class RecordedFlight(NamedTuple):
 
 def recorded_flight(recording: tuple[Path, ...]) -> RecordedFlight:
     """Return the flight of a recording; raises UsageError where none can be read of it."""
-    from groundstation.process import numba_cache
+    from groundstation.cli.kernels import use_flying_kernels
     from groundstation.recording.reader import RecordingError
     from groundstation.settings.recorded import recorded_field
 
-    numba_cache.activate()
+    use_flying_kernels()
     from groundstation.calibration.recorded_likelihood import flown_of
     from groundstation.replay.source import open_source
 

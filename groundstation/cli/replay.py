@@ -114,7 +114,7 @@ def _run_again(
     output: Path | None,
     **playing: Any,
 ) -> int:
-    from groundstation.process import numba_cache
+    from groundstation.cli.kernels import use_flying_kernels
     from groundstation.settings.recorded import recorded_field
     from groundstation.settings.resolved import resolved_field
 
@@ -123,7 +123,7 @@ def _run_again(
         raise click.UsageError(f"{', '.join(given)} belongs to playing in the console, not to a re-run")
     field = resolved_field(recorded_field(source.field))
     changed = resolved_field(recorded_field(source.field, options, estimator))
-    numba_cache.activate()
+    use_flying_kernels()
     from groundstation.replay.rerun_report import Again
 
     changes = [*([f"estimator of {estimator}"] if estimator else []), *options]

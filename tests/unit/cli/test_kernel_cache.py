@@ -2,11 +2,17 @@
 
 import subprocess
 import sys
+from collections.abc import Callable
+from pathlib import Path
 
 import click
 import pytest
 
+from groundstation.cli import kernels
 from groundstation.cli.bench_planner import choices, numbers
+from groundstation.errors import GroundStationError
+from groundstation.process import numba_cache
+from groundstation.runtime import compile_kernels
 
 _SCRIPT = """
 import sys
@@ -26,6 +32,28 @@ run(sys.argv[1:])
 def test_the_place_of_compiled_kernels_is_set_before_numba_is_there(command: str) -> None:
     script = [sys.executable, "-c", _SCRIPT, "experiment", command]
     assert subprocess.run(script, capture_output=True, text=True, check=True).stdout.split() == ["False"]
+
+
+@pytest.mark.parametrize("use", [kernels.use_flying_kernels, kernels.use_all_kernels])
+def test_where_nothing_can_be_kept_is_told_at_once(
+    use: Callable[[], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A re-run compiled for minutes at each call, and said nothing of it."""
+    (tmp_path / "taken").write_text("")
+    monkeypatch.setattr(numba_cache, "activate", lambda *_: tmp_path / "taken" / "cache")
+    with pytest.raises(GroundStationError, match="let NUMBA_CACHE_DIR name a folder"):
+        use()
+
+
+def test_compiling_is_told_and_done_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(numba_cache, "activate", lambda *_: tmp_path)
+    monkeypatch.setattr(compile_kernels, "compile_kernels", numba_cache.mark_complete)
+    kernels.use_flying_kernels()
+    assert "compiling kernels" in capsys.readouterr().err
+    kernels.use_flying_kernels()
+    assert not capsys.readouterr().err
 
 
 def test_what_is_named_twice_is_computed_once() -> None:

@@ -36,7 +36,7 @@ def reach_information(problem: PlanarProblem, reach: MatrixStack) -> None:
                 free = slack[a] + slack[b]
                 dx, dy = max(abs(x[b] - x[a]) - free, 0.0), max(abs(y[b] - y[a]) - free, 0.0)
                 distance = math.sqrt(dx * dx + dy * dy + constants.epsilon_m * constants.epsilon_m)
-                exponent[b] = min((distance - constants.range_m) / constants.softness_m, FARTHEST)
+                exponent[b] = min(max((distance - constants.range_m) / constants.softness_m, -FARTHEST), FARTHEST)
                 far[b] = constants.tail * square / (square + distance * distance)
             exponentials(exponent, out, a + 1)
             for b in range(a + 1):

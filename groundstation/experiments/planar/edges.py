@@ -14,7 +14,7 @@ from groundstation.experiments.planar.records import Observers, PlanarProblem, W
 from groundstation.kernel import kernel
 
 MAGIC = 6755399441055744.0  # 1.5 * 2^52: adding it leaves the nearest integer in the low bits of a float64
-FARTHEST = 40.0  # exponent beyond which a reading carries no information worth a different number
+FARTHEST = 40.0  # exponent beyond which a reading carries no, below the negative of which all information there is
 
 
 @kernel()
@@ -82,7 +82,7 @@ def edge_information(i: int, problem: PlanarProblem, work: Workspace) -> None:
     for e in range(count):
         d = math.sqrt(distance[i, e] + rounding)
         distance[i, e] = d
-        exponent[e] = min((d - reach) * steepness, FARTHEST)
+        exponent[e] = min(max((d - reach) * steepness, -FARTHEST), FARTHEST)
     exponentials(exponent, information[i], int(np.int64(count)))
     weight, square = 1.0 / (sigma * sigma), reach * reach
     for e in range(count):

@@ -14,7 +14,8 @@ class PlanarParameters:
     """Sensor, motion and cost constants; defaults are the bench scenario of the planning study.
 
     sigma_m: std of a relative position reading; range_m, softness_m: where and how softly readings end;
-    epsilon_m: rounds the distance at zero; robot_noise_m2_s, target_noise_m2_s: process variance rates;
+    epsilon_m: rounds the distance at zero, where it has no gradient otherwise;
+    robot_noise_m2_s, target_noise_m2_s: process variance rates;
     step_s, steps, discount: the horizon; max_speed_m_s: bound per axis; target_velocity_m_s: predicted mean motion.
     tail: share of a reading's information that is pretended to decay slowly, as r^2 / (r^2 + d^2), so that what is
     out of range still attracts.
@@ -37,14 +38,12 @@ class PlanarParameters:
 
     def __post_init__(self) -> None:
         positive = ("sigma_m", "range_m", "softness_m", "robot_noise_m2_s", "target_noise_m2_s", "step_s", "discount")
-        for name in (*positive, "max_speed_m_s"):
+        for name in (*positive, "epsilon_m", "max_speed_m_s"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):
                 raise ValueError(f"{name} must be positive and finite (got {value})")
-        if not (0.0 <= self.tail < 1.0 and 0.0 <= self.epsilon_m < math.inf):
-            raise ValueError(
-                f"tail must lie in [0, 1) and epsilon_m not be negative (got {self.tail}, {self.epsilon_m})"
-            )
+        if not 0.0 <= self.tail < 1.0:
+            raise ValueError(f"tail must lie in [0, 1) (got {self.tail})")
         if self.steps < 1:
             raise ValueError(f"steps must be at least 1 (got {self.steps})")
 

@@ -171,3 +171,20 @@ def _joseph_cost(mean: Any, covariance: Any, level: Any, parameters: PlanarParam
             p = keep @ p @ keep.T + np.outer(gain, gain) / np.longdouble(w)
         total += 2 * np.longdouble(parameters.discount) ** i * p[-1, -1]
     return float(total)
+
+
+@pytest.mark.parametrize("softness_m", [4e-4, 1e-5])
+def test_a_reading_may_end_as_sharply_as_a_step(softness_m: float) -> None:
+    """Far within the range the exponent left what the series of exp is made for, and nobody saw anything."""
+    parameters = PlanarParameters(softness_m=softness_m)
+    mean, x = np.array([[0.3, 0.1], [0.45, 0.2], [0.6, 0.3]]), np.zeros(4)
+    numpy = numpy_adjoint.Rollout(mean, 0.01 * np.eye(3), (0, 1), parameters).cost(x)
+    value, gradient = evaluate(mean, 0.01 * np.eye(3), (0, 1), parameters, x)
+    assert value == pytest.approx(numpy, rel=1e-12)
+    assert np.isfinite(gradient).all()
+
+
+def test_distances_must_be_rounded_at_zero() -> None:
+    """Above the sensor an unrounded distance has no gradient: NaN ended the descent where it began."""
+    with pytest.raises(ValueError, match="epsilon_m must be positive"):
+        PlanarParameters(epsilon_m=0.0)

@@ -51,7 +51,7 @@ def problem_of_error(error: Mapping[str, Any], tree: Node, model: type[BaseModel
     """Return the line for one error of pydantic on the plain value of `tree` (whose root is a `model`)."""
     path = tuple(key for key in error["loc"] if key != "[key]")
     origin = tree.origin_of(path)
-    if error["type"] == "missing" and origin.path[:1] != path[:1]:
+    if error["type"] == "missing" and origin.path[:1] != path[:1] and "calibration" not in path[:-1]:
         # Missing from what three levels gave together: it is the robot's entry that lacks it.
         origin = SourceLine(tree.origin_of(path[:2]).place, tree.origin_of(path[:2]).line, path)
     if error["type"] == "extra_forbidden":

@@ -1,5 +1,6 @@
 """A catalogue of broken field files: each with the exact lines that the operator reads."""
 
+import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -129,6 +130,17 @@ def test_what_is_missing_is_missed_where_it_belongs() -> None:
         "planner: is required",
         "plannr: unknown key, did you mean planner?",
     ]
+
+
+@pytest.mark.usefixtures("lab")
+def test_what_a_calibration_lacks_is_missed_in_its_own_file() -> None:
+    for name in ("ceiling", "ardrone_front"):
+        place = Path("cameras") / f"{name}.yaml"
+        kept = place.read_text(encoding="utf-8")
+        place.write_text("".join(one for one in kept.splitlines(keepends=True) if not one.startswith("cy_px")))
+        found = problems()
+        place.write_text(kept, encoding="utf-8")
+        assert found and all(re.fullmatch(rf"cameras/{name}\.yaml:\d+: cy_px: is required", one) for one in found)
 
 
 @pytest.mark.usefixtures("lab")

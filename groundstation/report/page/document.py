@@ -39,19 +39,17 @@ def write_page(data: RunData, report: RunReport, path: Path) -> None:
         ("Is it to be trusted?", trust_section(findings.trust)),
         ("What happened", tables.story_table(moments) + _pictures(moment_pictures(report.run_dir, data, moments))),
         ("Room", f'<div class="map">{_room(data)}</div>'),
-        *([("Searches", _searches(data))] if data.search_maps else []),
+        ("Searches", _searches(data)),
         ("Flight", holders(flight, 0)),
         ("Topology", tables.switches_table(findings)),
         ("Consistency", holders(health, len(flight)) + tables.edges_table(findings)),
         ("Safety", tables.happenings_table(findings) + tables.interventions_table(findings)),
         ("Links and timing", tables.links_table(findings) + tables.processes_table(data)),
         ("Events", tables.events_table(data)),
-        *(
-            [("Damage", "<ul>" + "".join(f"<li>{escape(line)}</li>" for line in report.damage) + "</ul>")]
-            * bool(report.damage)
-        ),
+        ("Damage", _damage(report)),
     ]
-    path.write_text(page(report.name, _lead(report), sections, [*flight, *health]), encoding="utf-8")
+    told = [(name, content) for name, content in sections if content]
+    path.write_text(page(report.name, _lead(report), told, [*flight, *health]), encoding="utf-8")
 
 
 def page(title: str, lead: str, sections: list[tuple[str, str]], charts: list[Chart]) -> str:
@@ -129,7 +127,9 @@ def _room(data: RunData) -> str:
 
 
 def _searches(data: RunData) -> str:
-    """Return the maps of the longest searches, each with what it shows."""
+    """Return the maps of the longest searches, each with what it shows, "" without any."""
+    if not data.search_maps:
+        return ""
     found = searches(data.search_maps)
     with mpl.rc_context({**_SVG, "axes.grid": False}):
         maps = _svg(draw_searches(data, found))
@@ -138,6 +138,12 @@ def _searches(data: RunData) -> str:
     )
     note = "The darker a cell, the likelier the target is there. Dots: drones, and where they look; cross: the truth."
     return f'<ul>{lines}</ul><p class="dim">{note}</p><div class="map">{maps}</div>'
+
+
+def _damage(report: RunReport) -> str:
+    """Return what could not be read of the recording, "" where all could."""
+    lines = "".join(f"<li>{escape(line)}</li>" for line in report.damage)
+    return f"<ul>{lines}</ul>" if lines else ""
 
 
 def _svg(figure: Figure) -> str:

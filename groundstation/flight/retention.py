@@ -7,6 +7,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from groundstation.recording.file_topics import STATE
+from groundstation.recording.part_names import part_path
+from groundstation.recording.stretch import is_stretch
+
 KEEP = "KEEP"
 # Folders of `make_run_dir`: nothing else in the folder of runs is ever touched.
 _NAME = re.compile(r"\d{8}T\d{6}Z-.+")
@@ -49,6 +53,8 @@ def make_room(parent: Path, limit_gb: float, now_s: float | None = None) -> list
 def _runs(parent: Path) -> Iterator[RecordedRun]:
     for folder in parent.iterdir() if parent.is_dir() else ():
         if _NAME.fullmatch(folder.name) and folder.is_dir() and not folder.is_symlink():
+            if is_stretch(part_path(folder, STATE, 1)):
+                continue  # somebody chose what is in it
             try:
                 status = [path.lstat() for path in (folder, *folder.rglob("*"))]
             except OSError:  # another flight removes it

@@ -7,6 +7,11 @@ from pathlib import Path
 import pytest
 
 from groundstation.flight.retention import KEEP, make_room
+from groundstation.recording.cut import cut_run
+from groundstation.recording.run import open_run
+from groundstation.recording.synthetic import write_run
+from groundstation.settings.files import find_field
+from groundstation.settings.load import load_field
 
 NOW_S = 2_000_000_000.0
 
@@ -63,3 +68,13 @@ def test_without_a_limit_or_a_folder_nothing_happens(tmp_path: Path) -> None:
     assert make_room(tmp_path, 0.0, NOW_S) == []
     assert make_room(tmp_path / "none", 1.0, NOW_S) == []
     assert names(tmp_path) == ["20261120T100000Z-lab"]
+
+
+def test_what_was_cut_out_of_a_run_is_nobodys_to_remove(tmp_path: Path) -> None:
+    """A cut lies beside its run under a name like one, and was made to be kept."""
+    flown = tmp_path / "20261120T100000Z-lab"
+    flown.mkdir()
+    write_run(flown, load_field(find_field("lab"), ()).model_dump_json().encode(), 0.5)
+    cut_run(open_run(flown), flown, 0.1, 0.3, None)
+    assert [one.folder for one in make_room(tmp_path, 1e-6, NOW_S)] == [flown]
+    assert names(tmp_path) == ["20261120T100000Z-lab-0.1s-0.3s"]

@@ -35,7 +35,8 @@ def number(value: Value, digits: int = 3) -> str:
         return "–"
     if isinstance(value, bool):
         return "yes" if value else "no"
-    return f"{value:.{digits}f}".rstrip("0").rstrip(".") if digits else f"{value:.0f}"
+    rounded = round(float(value), digits) + 0.0  # no "-0"
+    return f"{rounded:.{digits}f}".rstrip("0").rstrip(".") if digits else f"{rounded:.0f}"
 
 
 def criteria_table(report: RunReport) -> str:
@@ -104,7 +105,7 @@ def happenings_table(findings: Findings) -> str:
 def story_table(moments: Sequence[Moment]) -> str:
     """Return the story of the run, a line for each moment."""
     rows = [(f"{item.time_s:.1f}", item.kind, item.text) for item in moments[:_EVENTS_SHOWN]]
-    return table(("time [s]", "kind", "what happened"), rows, "Nothing happened.")
+    return table(("time [s]", "kind", "what happened"), rows, "Nothing happened.") + _left_out(moments)
 
 
 def links_table(findings: Findings) -> str:
@@ -155,10 +156,13 @@ def events_table(data: RunData) -> str:
     ]
     rows.sort(key=lambda row: row[0])
     shown = [(f"{row[0]:.1f}", *row[1:]) for row in rows[:_EVENTS_SHOWN]]
-    left_out = f'<p class="dim">{len(rows) - _EVENTS_SHOWN} more are in the recording.</p>' * (
-        len(rows) > _EVENTS_SHOWN
-    )
-    return table(("time [s]", "severity", "about", "what", "remedy"), shown, "Nothing happened.") + left_out
+    return table(("time [s]", "severity", "about", "what", "remedy"), shown, "Nothing happened.") + _left_out(rows)
+
+
+def _left_out(rows: Sequence[object]) -> str:
+    """Return how many rows of a long table are not shown, "" where all are."""
+    more = len(rows) - _EVENTS_SHOWN
+    return f'<p class="dim">{more} more are in the recording.</p>' if more > 0 else ""
 
 
 def _battery(ends: tuple[float, float] | None) -> str:

@@ -17,11 +17,13 @@ from groundstation.report.decisions import interventions, switches
 from groundstation.report.findings import findings_of
 from groundstation.report.judge import judge
 from groundstation.report.links import links
+from groundstation.report.page import tables
 from groundstation.report.page.chart import held, thin
 from groundstation.report.page.comparison import write_comparison
 from groundstation.report.page.document import write_page
 from groundstation.report.plot import draw
 from groundstation.report.run_facts import RunFacts
+from groundstation.report.story import Moment
 from groundstation.report.tracks import UNKNOWN_FIELD, EstimateTrack, RunData, TimedMessage, TruthTrack
 
 HEADER = m.Header(0, "here", "drone_1", "test", 0)
@@ -174,6 +176,18 @@ def test_a_run_of_any_name_has_its_pages(tmp_path: Path) -> None:
     for page in ("report.html", "comparison.html"):
         assert "run\N{REPLACEMENT CHARACTER}" in (tmp_path / page).read_text()
     draw(data, title(report), tmp_path / "trajectories.png")
+
+
+def test_a_long_story_says_what_it_leaves_out() -> None:
+    moments = [Moment(float(k), "event", "something") for k in range(502)]
+    assert tables.story_table(moments).count("something") == 500
+    assert "2 more are in the recording." in tables.story_table(moments)
+    assert "more are" not in tables.story_table(moments[:500])
+
+
+def test_nothing_is_less_than_zero_by_rounding() -> None:
+    assert [tables.number(value) for value in (-0.0001, 0.0, -0.001, 12.5, None)] == ["0", "0", "-0.001", "12.5", "–"]
+    assert tables.number(-0.4, 0) == "0"
 
 
 def test_findings_of_an_empty_run_are_empty() -> None:

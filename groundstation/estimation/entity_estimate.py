@@ -30,4 +30,5 @@ def entity_estimate(
         age_s=min(age_s, _NEVER_S),
         unlocalised_s=min(unlocalised_s, _NEVER_S),
         contradicted=joint.contradicted(name),
+        sighting=joint.sighting(name),
     )

@@ -187,6 +187,12 @@ class FixedLagFilter:
         memory = self._state.memory[self._index[name]]
         return self._seconds(self._now_ns) - float(memory["corrected_at"]) if memory["active"] else math.inf
 
+    def sighting(self, name: str) -> tuple[float, float] | None:
+        """Return when an entity was last seen [s ago], and how well its place was known then [m]; None: never."""
+        memory = self._state.memory[self._index[name]]
+        seen = memory["active"] and memory["seen_variance"] > 0.0
+        return (self.age_s(name), math.sqrt(float(memory["seen_variance"]))) if seen else None
+
     def contradicted(self, name: str) -> bool:
         """Return whether sightings far from an entity's place are being weighed against it, for twice the time that
         this takes: whatever then was not believed is not heeded any longer. One that moved the belief ends it."""

@@ -20,6 +20,7 @@ from groundstation.estimation.records import (
     INFLATED,
     KIND_CAMERA,
     KIND_ROBOT,
+    KIND_TARGET,
     MAX_ROWS,
     OBSERVER_UNCONFIRMED,
     OBSERVER_UNKNOWN,
@@ -70,6 +71,15 @@ def choose(
         return False
     set_noise(other.innovations, other.R)
     return confront(state, tables, event, rows, other) > evidence
+
+
+@kernel(inlined=True)
+def note_place(belief: Belief, e: int) -> None:
+    """Note how well a robot's or target's place is known right after an observation of it."""
+    entity = belief.entities[e]
+    if entity.kind == KIND_ROBOT or entity.kind == KIND_TARGET:
+        x, y = entity.start + X, entity.start + Y
+        belief.memory[e].seen_variance = max(belief.P[x, x], belief.P[y, y])
 
 
 @kernel()
@@ -126,6 +136,7 @@ def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> N
             correct(belief_of(state, tables, m), tables.headings, used.innovations[m], used.HP[m], excess)
     weigh(state.weights, used.innovations, rows, excess)
     forget_lie(subject, event.at)
+    note_place(first, event.subject)
     subject.corrected_at = state.used_at[event.sensor, event.subject] = event.at
 
 
@@ -167,3 +178,4 @@ def change(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> No
         memory.active = 1
         memory.wild.count = memory.refused.count = memory.unconfirmed = 0
         memory.corrected_at = event.at
+        note_place(belief_of(state, tables, 0), event.subject)

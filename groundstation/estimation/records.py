@@ -113,8 +113,9 @@ class EntityMemory(Record):
     camera's surprises add to the error of the reported velocity; velocity_lie [m/s]: by how much that error was lately
     seen to be larger than that of a sound sensor; unseen_s: time predicted since the last sighting.
     wild: observations far beyond the gate, the last of them at wild_at; refused: observations by which it would have
-    joined, had they not contradicted their observer; corrected_at: last use of an observation. gave_up, gave_up_at,
-    gave_up_whom: how many robots were lately re-initialised by what this one saw, when, and whom last.
+    joined, had they not contradicted their observer; corrected_at: last use of an observation; seen_variance: of the
+    worse of x and y [m^2] right after it. gave_up, gave_up_at, gave_up_whom: how many robots were lately re-initialised
+    by what this one saw, when, and whom last.
     """
 
     active: int
@@ -146,6 +147,7 @@ class EntityMemory(Record):
     wild_at: float
     refused: Streak
     corrected_at: float
+    seen_variance: float
     gave_up_at: float
     gave_up_whom: int
     gave_up: float

@@ -28,6 +28,9 @@ class EntityEstimate(msgspec.Struct, frozen=True):
     """For how long a flying robot may not have been where it is believed [s]; 0 while it is known."""
     contradicted: bool = False
     """Whether sightings far from this place are being weighed against it: nothing should be told by it meanwhile."""
+    sighting: tuple[float, float] | None = None
+    """Time since it was last seen itself [s], and how well its place was known right after that, the worse of x and y
+    [m]: where nothing tells how it moves, the covariance has grown since."""
 
 
 class TargetSearch(msgspec.Struct, frozen=True):

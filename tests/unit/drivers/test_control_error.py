@@ -152,6 +152,34 @@ def test_nothing_is_made_of_positions_that_nobody_sees_well(fields):
     assert seen_velocity([(0.5 * i / 50, 0.0) for i in range(100)], **fields)[-1] is None
 
 
+WIDE: dict[str, Any] = {"covariance": (0.15**2,) * 16}  # nothing tells how it moves, and pictures are 0.15 s under way
+
+
+def test_a_silent_vehicle_is_seen_where_its_last_picture_showed_it():
+    moving = [(0.5 * i / 50, 0.0) for i in range(100)]
+    assert seen_velocity(moving, sighting=(0.2, 0.015), **WIDE)[-1] == pytest.approx((0.5, 0.0), abs=1e-9)
+
+
+def test_a_silent_vehicle_is_timed_by_its_pictures():
+    """Ten of them a second, each 0.15 s late: in between its belief stands still."""
+    seen = SeenVelocity()
+    for turn in range(100):
+        late = turn % 5
+        place = 1.0 * (turn - late) / 50
+        entity = EntityEstimate(
+            name="v", kind="robot", mean=(place, 0.0, 0.8, 0.0), velocity_m_s=(0.0, 0.0, 0.0), converged=True,
+            age_s=0.15 + late / 50, sighting=(0.15 + late / 50, 0.015), **WIDE
+        )  # fmt: skip
+        seen.hear(turn * S // 50, 1, entity)
+        if turn > 40:
+            assert seen.velocity(turn * S // 50) == pytest.approx((1.0, 0.0), abs=1e-6)
+
+
+@pytest.mark.parametrize("sighting", [None, (0.5, 0.015), (0.2, 0.06)])
+def test_a_silent_vehicle_is_not_seen_by_an_old_or_a_poor_picture(sighting):
+    assert seen_velocity([(0.0, 0.0)] * 100, sighting=sighting, **WIDE)[-1] is None
+
+
 def test_a_belief_that_was_set_anew_is_no_flight():
     velocities = seen_velocity([(0.0, 0.0)] * 50 + [(1.0, 0.0)] * 50)
     assert max(abs(v[0]) for v in velocities if v is not None) < 1e-9

@@ -8,6 +8,7 @@ from functools import partial
 from typing import NamedTuple
 
 from drivers.ardrone import convert, velocity_loop
+from drivers.ardrone.adrift import AdriftWatch
 from drivers.ardrone.averages import MotionMean
 from drivers.ardrone.blind_descent import BlindDescent
 from drivers.ardrone.commands import orders_from_decision
@@ -102,6 +103,7 @@ class ArDrone:
         self._loop = VelocityLoop(settings.limits)
         self._motion = MotionMean()
         self._descent, self._sinks = BlindDescent(), False
+        self._adrift = AdriftWatch()
         self._plausibility = MotionMonitor(LIMITS)
         self._applied_ns = 0
         self._blind_ns = -_BRAKED_ON_NS
@@ -232,10 +234,15 @@ class ArDrone:
         told = fresh and not self._motion.frozen
         self._blind_ns = now_ns if blind and told else self._blind_ns
         was_blind = not told and now_ns - self._blind_ns <= _BRAKED_ON_NS
-        if (blind or was_blind) and (self._sinks or decision.action is Action.HOVER):
+        holds = decision.action is Action.HOVER
+        known_adrift, seen = self._adrift.adrift, decision.seen_m_s
+        adrift = self._adrift.step(now_ns, holds, not told, seen)
+        if adrift and not known_adrift and not was_blind and seen is not None:
+            self._loop.hold((*seen, 0.0), dt_s)  # nothing else tells from which speed it is to be braked
+        if (blind or was_blind or adrift) and (self._sinks or holds):
             climb_m_s = -self._settings.limits.max_climb_m_s if self._sinks else 0.0
             return self._loop.brake(dt_s, force if told else None, decision.seen_m_s, climb_m_s)
-        if decision.action is Action.HOVER and fresh:
+        if holds and fresh:
             return self._loop.hold(self._true(velocity), dt_s)
         if decision.action is not Action.FLY or not fresh:
             self._loop.reset()

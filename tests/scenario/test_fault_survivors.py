@@ -27,6 +27,12 @@ BLIND = {
 
 # Braked to rest, blind and out of all views, and then landed level: the air carried it off at 0.27 m/s.
 CARRIED_OFF = (42032, ["uniform_floor"])
+# Blind in sight of the ceiling camera, braked by what it knew last: carried off at 0.1 m/s until they had landed, as
+# their belief was too wide, while pictures were under way, for a speed to be seen in it.
+SEEN_WHILE_BLIND = {
+    "over_something": (70282, ["obstacle_below", "uniform_floor"], []),
+    "twice": (72017, ["uniform_floor", "uniform_floor"], ["uniform_floor"]),
+}
 # A velocity stuck at -0.6 m/s is no floor that is not seen: the firmware brakes better than the driver then.
 STUCK_IN_MOTION = (20223, ["velocity_stuck"])
 
@@ -36,6 +42,9 @@ SILENT_TOO = {
     "silent": (48303, ["navdata_silent", "uniform_floor"]),
     "frozen": (48132, ["telemetry_frozen", "uniform_floor"]),
 }
+
+# Silent and blind within 40 ms: nobody heard that its own hover would fail, but the ceiling camera saw it drift off.
+ADRIFT = (42024, ["navdata_silent", "uniform_floor"])
 
 # The ceiling saw the velocity drift off, and lost sight of the drone; the other drone was blind.
 BELIEVED_AGAIN = (50, ["picture_black", "velocity_drifting"])
@@ -104,6 +113,13 @@ def test_a_blind_drone_is_braked_while_it_comes_down() -> None:
 
 @pytest.mark.slow
 @pytest.mark.study
+@pytest.mark.parametrize(("seed", "kinds", "drawn"), SEEN_WHILE_BLIND.values(), ids=SEEN_WHILE_BLIND)
+def test_a_blind_drone_in_sight_of_a_camera_stands_still(seed: int, kinds: list[str], drawn: list[str]) -> None:
+    assert safely_flown(order_of([]) | {"kinds": drawn}, seed, kinds)["rest_s"] <= 2.5
+
+
+@pytest.mark.slow
+@pytest.mark.study
 def test_a_drone_whose_velocity_is_stuck_in_motion_is_left_to_its_firmware_as_it_lands() -> None:
     assert safely_flown(order_of([]), *STUCK_IN_MOTION)["rest_s"] <= 3.0
 
@@ -114,6 +130,12 @@ def test_a_drone_whose_velocity_is_stuck_in_motion_is_left_to_its_firmware_as_it
 def test_a_blind_drone_that_tells_nothing_new_is_braked_on(seed: int, kinds: list[str]) -> None:
     flown = safely_flown(order_of([]) | {"kinds": ["uniform_floor", kinds[0]]}, seed, kinds)
     assert flown["rest_s"] <= 2.0
+
+
+@pytest.mark.slow
+@pytest.mark.study
+def test_a_silent_drone_that_cameras_see_drift_is_braked() -> None:
+    assert safely_flown(order_of([]), *ADRIFT)["rest_s"] <= 3.0
 
 
 @pytest.mark.slow

@@ -1,0 +1,34 @@
+"""A silent AR.Drone that is carried off though it was told to hold its place. Pure.
+
+Whether its optical flow sees the floor is not heard. Cameras tell: its firmware brakes from full speed in a second.
+"""
+
+import math
+
+from groundstation.time_units import NS_PER_S
+
+_BRAKES_WITHIN_NS = NS_PER_S
+# Three deviations of a speed between two places that cameras know to 2 cm, half a second apart; a drone at rest by its
+# own means wanders at 0.05 m/s.
+_ADRIFT_M_S = 0.12
+
+
+class AdriftWatch:
+    """Says while the driver must brake it: from then on, as long as cameras see it, it is silent and is to stand."""
+
+    def __init__(self) -> None:
+        self._since_ns: int | None = None
+        self.adrift = False
+
+    def step(self, now_ns: int, holds: bool, silent: bool, seen_m_s: tuple[float, float] | None) -> bool:
+        """Return whether it is adrift.
+
+        holds: it is told to hold its place; silent: it tells nothing new; seen_m_s: its velocity as cameras see it.
+        """
+        if not holds or not silent:
+            self._since_ns, self.adrift = None, False
+            return False
+        self._since_ns = now_ns if self._since_ns is None else self._since_ns
+        late = now_ns - self._since_ns >= _BRAKES_WITHIN_NS
+        self.adrift = seen_m_s is not None and (self.adrift or (late and math.hypot(*seen_m_s) > _ADRIFT_M_S))
+        return self.adrift

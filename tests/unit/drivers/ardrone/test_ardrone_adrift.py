@@ -1,0 +1,39 @@
+"""A silent drone that cameras see drift though it was told to hold its place."""
+
+import pytest
+
+from drivers.ardrone.adrift import AdriftWatch
+
+S = 1_000_000_000
+TURN_NS = S // 40
+
+
+def watch(seconds, seen_m_s, holds=True, silent=True, watched=None):
+    """Return the watch after so long, and what it says then."""
+    watched, said = watched or AdriftWatch(), False
+    for turn in range(round(seconds * 40)):
+        said = watched.step(S + turn * TURN_NS, holds, silent, seen_m_s)
+    return watched, said
+
+
+def test_its_own_hover_has_a_second_to_brake_it() -> None:
+    assert not watch(1.0, (0.6, 0.0))[1]
+    assert watch(1.1, (0.6, 0.0))[1]
+
+
+@pytest.mark.parametrize("seen_m_s", [(0.08, 0.08), None])
+def test_one_that_stands_or_is_not_seen_is_left_to_itself(seen_m_s) -> None:
+    assert not watch(3.0, seen_m_s)[1]
+
+
+@pytest.mark.parametrize("known", [{"holds": False}, {"silent": False}])
+def test_one_that_is_heard_or_flown_is_not_adrift(known) -> None:
+    assert not watch(3.0, (0.6, 0.0), **known)[1]
+
+
+def test_it_is_braked_to_rest_and_as_long_as_it_is_seen() -> None:
+    watched, _ = watch(1.1, (0.0, 0.2))
+    assert watched.step(3 * S, True, True, (0.0, 0.01))
+    assert not watched.step(3 * S, True, True, None)
+    assert not watched.step(3 * S, True, True, (0.0, 0.01)), "it stood, as far as is known"
+    assert watched.step(3 * S, True, True, (0.0, 0.2))

@@ -5,8 +5,9 @@ Errors within a flight last (a ceiling camera hangs wrong all along), so flights
 over flights of a flight's mean NEES, or NIS, per degree of freedom. Its two-sided 95 % t-interval is stated; it must
 be narrow enough for the band 0.8..1.3 to mean something.
 
-The target is believed as gentle as the scenario's is (it never leaves its eight): a shipped field leaves it room for
-turns on the spot, and its covariance is then too large for an eight, by design.
+The lab is flown as it is shipped. It leaves its target room for turns on the spot, so its velocity is known better
+there than is said, by design; whether a target's whole state is believed as it should be is judged with one that moves
+as it is believed to (decision 0206).
 """
 
 import math
@@ -16,25 +17,57 @@ import numpy as np
 import pytest
 from msgspec import structs
 
+from groundstation.estimation.models import ConstantVelocityTarget
+from groundstation.estimation.parameters import parameters_from_field
 from groundstation.field.resolved import ResolvedField
 from sim_bridge.scenario import Scenario
 from sim_bridge.study.runner import Study, StudyOptions
 from sim_bridge.study.summary import summary
+from sim_bridge.world.noise import generator_of
+from sim_bridge.world.world import TICK_S
 
 pytestmark = pytest.mark.statistics
-GENTLE_M_S2 = 0.3
+# So that a target that wanders by it stays in the room.
+GENTLE_M_S2 = 0.2
 DURATION_S, OUTLIERS = 25.0, 0.02
 # So many flights; the interval of few is wide.
 MANY = 50
 FLIGHTS = [pytest.param(16, id="16"), pytest.param(MANY, id="50", marks=pytest.mark.exhaustive)]
+FIRST_SEED = 100
 LOW, HIGH = 0.8, 1.3
 Reports = list[dict[str, Any]]
 
 
-@pytest.fixture(scope="module")
-def gentle_field(lab_field: ResolvedField) -> ResolvedField:
-    assert lab_field.target is not None
-    return structs.replace(lab_field, target=structs.replace(lab_field.target, acceleration_std_m_s2=GENTLE_M_S2))
+class Wanderer:
+    """A target that is moved by white acceleration of a density [m^2/s^3], by nothing else, once it has departed."""
+
+    def __init__(self, density: float, rng: np.random.Generator) -> None:
+        self._kick_m_s, self._rng = math.sqrt(density * TICK_S), rng
+        self.x = self.y = self.vx = self.vy = 0.0
+        self.parked = True
+
+    def step(self) -> None:
+        if not self.parked:
+            self.vx += self._kick_m_s * float(self._rng.standard_normal())
+            self.vy += self._kick_m_s * float(self._rng.standard_normal())
+        self.x, self.y = self.x + self.vx * TICK_S, self.y + self.vy * TICK_S
+
+    def confine(self, half_x_m: float, half_y_m: float) -> None:
+        assert abs(self.x) < half_x_m and abs(self.y) < half_y_m, "no target is believed to stop at a wall"
+
+    def row(self) -> tuple[float, ...]:
+        return (self.x, self.y, 0.0, self.vx, self.vy, *[0.0] * 7, 1.0)
+
+
+def with_wanderer(study: Study, field: ResolvedField, seed: int) -> Study:
+    """Return a study whose target moves by just what its filter believes."""
+    assert field.target is not None
+    believed = parameters_from_field(field).entities[field.target.name]
+    assert isinstance(believed, ConstantVelocityTarget)
+    density = believed.acceleration_std_m_s2**2 * believed.correlation_s
+    targets: dict[str, Any] = study.world.targets
+    targets[field.target.name] = Wanderer(density, generator_of(seed, "wanderer"))
+    return study
 
 
 def fly(field: ResolvedField, seeds: range, duration_s: float, outliers: float) -> Reports:
@@ -52,30 +85,32 @@ def judge(reports: Reports, field: ResolvedField, names: tuple[str, ...]) -> Non
         assert LOW - slack <= found[name].mean <= HIGH + slack and found[name].half <= widest, stated
 
 
-def test_a_few_short_flights_are_near_consistent(gentle_field: ResolvedField) -> None:
+def test_a_few_short_flights_are_near_consistent(lab_field: ResolvedField) -> None:
     """4 flights of 12 s: a coarse alarm, wide enough for so few."""
-    found = summary(fly(gentle_field, range(1, 5), 12.0, 0.0), gentle_field)
+    found = summary(fly(lab_field, range(1, 5), 12.0, 0.0), lab_field)
     assert 0.3 <= found["anees robots"].mean <= 1.8
     assert 0.3 <= found["anees target"].mean <= 1.8
     assert 0.6 <= found["nis fixed cameras"].mean <= 1.5
 
 
 @pytest.fixture(scope="module", params=FLIGHTS)
-def flights(request: pytest.FixtureRequest, gentle_field: ResolvedField) -> Reports:
+def flights(request: pytest.FixtureRequest, lab_field: ResolvedField) -> Reports:
     """Some 2.8 s of CPU each. 25 s hold a whole approach, several changes of topology and 900 sightings per flight."""
-    return fly(gentle_field, range(100, 100 + request.param), DURATION_S, OUTLIERS)
+    return fly(lab_field, range(FIRST_SEED, FIRST_SEED + request.param), DURATION_S, OUTLIERS)
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(3000)
-def test_flights_are_consistent_in_state(flights: Reports, gentle_field: ResolvedField) -> None:
-    judge(flights, gentle_field, ("anees robots", "anees robots xy", "anees target", "anees target xy"))
+def test_flights_are_consistent_in_state(flights: Reports, lab_field: ResolvedField) -> None:
+    judge(flights, lab_field, ("anees robots", "anees robots xy", "anees target xy"))
+    assert summary(flights, lab_field)["anees target"].mean <= HIGH, "it has room for turns, and may not be too sure"
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(3000)
-def test_flights_are_consistent_in_innovation(flights: Reports, gentle_field: ResolvedField) -> None:
-    judge(flights, gentle_field, ("nis fixed cameras", "nis onboard cameras"))
+def test_flights_are_consistent_in_innovation(flights: Reports, lab_field: ResolvedField) -> None:
+    judge(flights, lab_field, ("nis fixed cameras",))
+    assert summary(flights, lab_field)["nis onboard cameras"].mean <= HIGH, "the target's room is in what they expect"
 
 
 @pytest.mark.slow
@@ -84,3 +119,20 @@ def test_flights_with_outliers_hold_the_target(flights: Reports) -> None:
     errors = np.array([report["target_rmse_m"] for report in flights])
     assert np.sqrt(np.mean(errors**2)) <= 0.12
     assert np.mean([report["target_lost_s"] for report in flights]) <= 0.1, "on average, from the beginning of tracking"
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3000)
+@pytest.mark.parametrize("count", FLIGHTS)
+def test_a_target_that_moves_as_it_is_believed_to_is_known_as_well_as_is_said(
+    lab_field: ResolvedField, count: int
+) -> None:
+    """What is left is the filter's own: delays, rewinds, the mounting's states, what robots know of each other."""
+    assert lab_field.target is not None
+    field = structs.replace(lab_field, target=structs.replace(lab_field.target, acceleration_std_m_s2=GENTLE_M_S2))
+    reports = []
+    for seed in range(FIRST_SEED, FIRST_SEED + count):
+        study = Study(field, Scenario(), StudyOptions(seed, DURATION_S, OUTLIERS))
+        reports.append(with_wanderer(study, field, seed).run())
+    states = ("anees robots", "anees robots xy", "anees target", "anees target xy")
+    judge(reports, field, (*states, "nis fixed cameras", "nis onboard cameras"))

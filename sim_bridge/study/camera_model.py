@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.arrays import Array
-from groundstation.bus.messages import Header, RelativeObservation, SearchedPicture
+from groundstation.bus.messages import Estimate, Header, RelativeObservation, SearchedPicture
 from groundstation.geometry.board import Checkerboard
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.rotations import euler_from_rotation, rotation_from_euler, world_from_downward_optical
@@ -23,14 +23,14 @@ from sim_bridge.mounting import (
 )
 from sim_bridge.scenario import CameraScenario
 from sim_bridge.site import Lens, Site, SiteCamera, SiteDrone
+from sim_bridge.study.attention import Attention, marker_of, mount_of, phase_s
 from sim_bridge.world.mavlink_copter import MavlinkCopter
 from sim_bridge.world.world import World
 
 _BORDER_PX = 6.0
-# Pixels per square that the detector needs: with a window predicted from the last sighting, and without
+# Pixels per square that the detector needs: in the window of the last sighting or of the belief, and without
 # (docs/reference/vision.md 2).
-_TRACKED_PX, _SEARCH_PX = 5.5, 8.5
-_SEARCH_SHARE = 2.0 / 15.0  # full searches run at 2 Hz
+_WINDOW_PX, _SEARCH_PX = 5.5, 8.5
 _FORGET_S = 0.4
 _STEEPEST_COS = math.cos(math.radians(72.0))
 # The detector estimates the variance of a pixel from the residuals of the pose and adds the square of a floor. On
@@ -101,12 +101,20 @@ class Eye:
             self._told = world_from_downward_optical(mount.rotation_deg)
         self._mounted = self._rotation
         self._told_lens, self._lens = lens.intrinsics, true_lens(lens, cameras.mounting_errors, rng)
-        self._boards = tuple(b for b in boards_of(site) if b.body != self._carrier)
-        self._robots = frozenset(site.drones)
+        fixed = self._carrier is None
+        self._boards = tuple(
+            b for b in boards_of(site) if b.body != self._carrier and (b.body in site.drones or not fixed)
+        )
         self._scenario, self._outliers, self._rng = cameras, outliers, rng
         self._last_seen = {b.body: -math.inf for b in self._boards}
         self._seq = 0
-        self._searching = False
+        markers = [marker_of(b.body, b.board, tuple(b.position.tolist()), site.drones) for b in self._boards]
+        self._attention = Attention(mount_of(name, mount), name, markers, self._told_lens, phase_s(name, site))
+        self._looked = False
+
+    def hear(self, estimate: Estimate) -> None:
+        """Take what the tracker believes, by which its driver knows where to look."""
+        self._attention.hear(estimate)
 
     @property
     def truth(self) -> tuple[Array, Array, CameraIntrinsics]:
@@ -119,10 +127,9 @@ class Eye:
 
     def look(self, world: World, stamp_ns: int, clock: str) -> list[RelativeObservation]:
         """Return what one exposure shows; stamps carry the error of a delay that is known as a mean only."""
-        self._searching = False
-        if self._rng.random() < self._scenario.frame_loss:
+        self._looked = bool(self._rng.random() >= self._scenario.frame_loss)
+        if not self._looked:
             return []
-        self._searching = bool(self._rng.random() < 3.0 * _SEARCH_SHARE)
         states = dict(zip(world.bodies, world.states(), strict=True))
         rotation, position, reported, told = self._rotation, self._position, (0.0, 0.0), self._told
         if self._carrier is not None:
@@ -133,11 +140,11 @@ class Eye:
             onboard = carrier.estimate if isinstance(carrier, MavlinkCopter) else world.onboard[self._carrier]
             reported = (onboard.roll, onboard.pitch)
             told = rotation_from_euler(*reported, 0.0) @ told
+        tracked = [name for name, seen_s in self._last_seen.items() if world.time_s - seen_s < _FORGET_S]
+        self._attention.begin(stamp_ns, reported, tracked)
         jitter = self._rng.uniform(-1.0, 1.0) * self._scenario.video_jitter_ms
         seen = []
         for carried in self._boards:
-            if self._carrier is None and carried.body not in self._robots:
-                continue
             if _hidden(world, carried, states[carried.body], position):
                 continue
             sighting = self._sight(carried, states[carried.body], rotation, position, world.time_s)
@@ -147,11 +154,12 @@ class Eye:
                 yaw = euler_from_rotation(told @ facing)[2]
                 stamp = stamp_ns + round(jitter * 1e6)
                 seen.append(self._message(carried.body, (place, unit), yaw, stamp, clock, reported))
+        self._attention.end([sighting.subject for sighting in seen])
         return seen
 
     def searched(self, seen: Sequence[RelativeObservation], stamp_ns: int, clock: str) -> SearchedPicture | None:
         """Return that the last picture was searched all over, and what it shows; None if only known boards were."""
-        if not self._searching:
+        if not (self._looked and self._attention.searching):
             return None
         self._seq += 1
         camera = f"{self.name}_camera"
@@ -175,17 +183,21 @@ class Eye:
         distance_m = float(np.linalg.norm(centre))
         if -float(normal @ centre) < _STEEPEST_COS * distance_m:
             return None
-        tracked = now_s - self._last_seen[carried.body] < _FORGET_S
-        if not tracked and not self._searching:
-            return None
-        pixels = self._lens.fx_px * _square_m(carried.board) / distance_m
-        if pixels < (_TRACKED_PX if tracked else _SEARCH_PX):
+        if self._lens.fx_px * _square_m(carried.board) / distance_m < self._least_px(carried.body, centre, now_s):
             return None
         if not self._is_framed(carried.outline @ facing.T + centre):
             return None
         self._last_seen[carried.body] = now_s
         place = as_measured(centre, self._lens, self._told_lens)
         return place, self._covariance(carried.corners @ facing.T, centre, rotation.T[:, 2]), facing
+
+    def _least_px(self, body: str, centre: Array, now_s: float) -> float:
+        """Return how large a marker's squares must be for the detector to find it; infinite where it does not look."""
+        if now_s - self._last_seen[body] < _FORGET_S:
+            return _WINDOW_PX
+        if self._attention.expects(body, self._lens.pixel(*centre.tolist())):
+            return _WINDOW_PX
+        return _SEARCH_PX if self._attention.searching else math.inf
 
     def _is_framed(self, points: Array) -> bool:
         """Return whether all points (n, 3) [optical] are in the picture, the border aside."""

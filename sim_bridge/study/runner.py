@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 
 from groundstation import plug_ins
-from groundstation.bus.messages import EntityEstimate, Message, Odometry, VehicleStatus
+from groundstation.bus.messages import EntityEstimate, Estimate, Header, Message, Odometry, VehicleStatus
 from groundstation.field.resolved import ResolvedField
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 from groundstation.tracker import Tracker, tracker_from_field
@@ -190,6 +190,8 @@ class Study:
             if isinstance(eye, RangingEye):
                 self._tell(eye, now_ns)
                 continue
+            if isinstance(eye, Eye):
+                eye.hear(self._estimate())
             delay_ms = eye.lateness_ms
             if delay_ms is None:
                 delay_ms = self._scenario.cameras.video_delay_ms + self._rng.uniform(*self.options.detector_ms)
@@ -203,6 +205,13 @@ class Study:
 
         for ear in self._reports.due(world.time_s):
             self._tell(ear, now_ns)
+
+    def _estimate(self) -> Estimate:
+        """Return what the tracker tells its cameras."""
+        tracker = self.tracker
+        header = Header(tracker.belief.stamp_ns, CLOCK, "team", "tracker", self.world.ticks)
+        searches = tracker.lookout.searches(self.now_ns)
+        return Estimate(header=header, entities=tracker.estimates(), epoch=tracker.epoch, searches=searches)
 
     def _tell(self, sensor: RangingEye | OdometryEar, now_ns: int) -> None:
         for told in sensor.look(self.world, now_ns, CLOCK):

@@ -38,10 +38,7 @@ STUCK_IN_MOTION = (20223, ["velocity_stuck"])
 
 # Blind, and half a second later silent or frozen: told to hold its place, which it does by the same optical flow, it
 # flew on level. Drawn of these two kinds.
-SILENT_TOO = {
-    "silent": (48303, ["navdata_silent", "uniform_floor"]),
-    "frozen": (48132, ["telemetry_frozen", "uniform_floor"]),
-}
+SILENT_TOO = {"frozen": (48132, ["telemetry_frozen", "uniform_floor"])}
 
 # Silent and blind within 40 ms: nobody heard that its own hover would fail, but the ceiling camera saw it drift off.
 ADRIFT = (42024, ["navdata_silent", "uniform_floor"])
@@ -60,7 +57,6 @@ BUMPED = {
 # A velocity that lies while nobody sees the drone, or as its only ceiling camera goes black.
 LYING = {
     "drifting_slowly_while_it_tracks_unseen": (7003, ["velocity_drifting"]),
-    "drifting_unnoticed_in_the_corner_of_the_view": (7115, ["battery_drop", "velocity_drifting"]),
     "jumping_as_the_ceiling_camera_goes_black": (7019, ["picture_black", "velocity_jumping"]),
 }
 
@@ -81,6 +77,15 @@ def order_of(changes: list[str]) -> dict[str, Any]:
     scenario = json.loads(json.dumps(load_scenario(find_scenario("realistic", path), changes)))
     builtins = msgspec.to_builtins(resolved_field(field))
     return {"field": builtins, "sections": sections, "scenario": scenario, "seconds": SECONDS, "kinds": []}
+
+
+# Not mended: cameras that look as their drivers do see less of these two than those of earlier studies. One falls blind
+# and silent as it leaves the ceiling's view, and is carried at up to 0.2 m/s until it has landed; the velocity of the
+# other drifts at the border of that view, and it is told to fly 0.5 m beside where it is believed for 1.6 s.
+UNSAFE = {
+    "silent_as_it_leaves_the_view": ([], ["uniform_floor", "navdata_silent"], 48303, {"rest"}),
+    "drifting_in_the_corner_of_the_view": (["cameras.fps=15"], [], 7115, {"unlocalised"}),
+}
 
 
 @pytest.fixture(scope="module")
@@ -177,3 +182,18 @@ def test_a_team_that_no_fixed_camera_tells_where_it_is_hovers(seed: int, kinds: 
 @pytest.mark.study
 def test_a_drone_that_is_put_elsewhere_again_and_again_stands_still() -> None:
     safely_flown(order_of([]), *SWINGING)
+
+
+@pytest.mark.slow
+@pytest.mark.study
+@pytest.mark.parametrize(("changes", "kinds", "seed", "unsafe"), UNSAFE.values(), ids=UNSAFE)
+def test_what_is_known_to_be_unsafe_does_no_more_than_that(
+    changes: list[str], kinds: list[str], seed: int, unsafe: set[str]
+) -> None:
+    """One that is safe belongs to those above."""
+    flown = fly(flight_order.order_of(order_of(changes) | {"kinds": kinds, "seeds": [seed]}), seed)
+    assert set(flown["unsafe"]) == unsafe
+    assert flown["fence_m"] == 0.0
+    assert flown["separation_m"] >= 0.7
+    assert flown["rest_s"] <= 7.0
+    assert flown["unlocalised_s"] <= 2.0

@@ -13,9 +13,9 @@ from groundstation.arrays import Array
 from groundstation.bus import clock
 from groundstation.bus.api import Received
 from groundstation.bus.keys import Key
-from groundstation.bus.messages import Message
+from groundstation.bus.messages import Estimate, Message
 from groundstation.bus.notice import Notice
-from groundstation.bus.topics import OBSERVATION, SEARCHED_PICTURE, Topic
+from groundstation.bus.topics import ESTIMATE, OBSERVATION, SEARCHED_PICTURE, Topic
 from groundstation.errors import EstimatorFault
 from groundstation.field.resolved import field_from_json
 from groundstation.planning.planner import Planner, PlanRequest
@@ -149,6 +149,7 @@ class FaultFlight:
         self._tick_every = round(1e9 / field.estimator.rate_hz) // TICK_NS
         eyes = [WrongEye(eye, faults) for eye in eyes_of(self.site, scenario.cameras, 0.0, seed)]
         self._exposures, self._eyes = Exposures(eyes), {eye.name: eye for eye in eyes}
+        self._estimates = self._bus("cameras").subscribe([ESTIMATE], newest=True)
         self._systems = FixedSystems(self.site, world, scenario, seed)
         self._schedule = FaultSchedule(scenario.faults, self.world, self.devices)
         limits = {name: drone.limits.max_speed_m_s for name, drone in field.drones.items()}
@@ -210,6 +211,10 @@ class FaultFlight:
 
     def _look(self) -> None:
         world, now_ns = self.world, self.now_ns
+        for received in self._estimates.drain():
+            if isinstance(received.message, Estimate):
+                for each in self._eyes.values():
+                    each.eye.hear(received.message)
         for eye in self._exposures.due(world.time_s):
             delay_ms = self._drawn.scenario.cameras.video_delay_ms + self._rng.uniform(*_DETECTOR_MS)
             seen = eye.look(world, now_ns, clock.clock_id())

@@ -40,7 +40,7 @@ class Lookout:
         robots: Sequence[str], targets: Sequence[str],
     ) -> None:  # fmt: skip
         self._excursions = Excursions(control, sensors)
-        self._search = Search(search, control.lost_after_s, sensors, targets, self._excursions)
+        self._search = Search(search, control, sensors, targets, self._excursions)
         self._robots = MissingRobots(sensors, robots)
         self._errors = OdometryErrors()
         self._names = tuple(robots)

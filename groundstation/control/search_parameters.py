@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from groundstation.control.parameters import SEARCH_SPEED_M_S, SEARCH_YAW_RATE_RAD_S
-from groundstation.control.search_height import search_height_m
 from groundstation.control.search_ranges import search_ranges_m
 from groundstation.field.resolved import ResolvedField
 from groundstation.field.room import MotionCapture, WorldCamera
@@ -21,19 +20,18 @@ class SearchParameters:
     """How a target that is not seen is searched for.
 
     room_m: size along x and y; ranges_m: how far each robot's pictures are searched with success, farther than plans
-    count on; observers: robots and world-fixed cameras that may see targets; height_m: of the search; begin_after_s:
-    unseen for so long, a map takes the Gaussian's place; given_up_below: probability that the target is where it was
-    predicted below which the search begins, though `lost_after_s` is not over; patience_s: what is seen so much later
-    counts 1/e; near_yaw_rate_rad_s: while all that are searched for were tracked before; keep_gain: another stand must
-    promise so much more; starts_ahead_m: how far before the team a target is expected that was never seen;
-    target_speed_m_s, target_straight_s: of a target that drives about; lost_after_s, lost_excluded: after so long a
-    search that excluded so much of the room a person is asked.
+    count on; observers: robots and world-fixed cameras that may see targets; begin_after_s: unseen for so long, a map
+    takes the Gaussian's place; given_up_below: probability that the target is where it was predicted below which the
+    search begins, though `lost_after_s` is not over; patience_s: what is seen so much later counts 1/e;
+    near_yaw_rate_rad_s: while all that are searched for were tracked before; keep_gain: another stand must promise so
+    much more; starts_ahead_m: how far before the team a target is expected that was never seen; target_speed_m_s,
+    target_straight_s: of a target that drives about; lost_after_s, lost_excluded: after so long a search that excluded
+    so much of the room a person is asked.
     """
 
     room_m: tuple[float, float]
     fence_x_m: Interval
     fence_y_m: Interval
-    height_m: float
     observers: tuple[str, ...]
     ranges_m: Mapping[str, float] = field(default_factory=dict)
     apart_m: float = 1.0
@@ -64,7 +62,6 @@ def search_from_field(resolved: ResolvedField) -> SearchParameters:
         room_m=(room.size_m[0], room.size_m[1]),
         fence_x_m=room.fence.x_m,
         fence_y_m=room.fence.y_m,
-        height_m=search_height_m(resolved),
         yaw_rate_rad_s=min(SEARCH_YAW_RATE_RAD_S, turn_rad_s),
         near_yaw_rate_rad_s=min(NEAR_YAW_RATE_RAD_S, turn_rad_s),
         observers=(*resolved.drones, *cameras),

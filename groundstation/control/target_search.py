@@ -11,6 +11,7 @@ from groundstation.arrays import Array
 from groundstation.bus.messages import RelativeObservation, SearchedPicture
 from groundstation.control.coverage import NO_OUTLOOK, Outlook, choose_stands, lattice_of, robots_in_order
 from groundstation.control.excursion import Excursions
+from groundstation.control.parameters import ControlParameters
 from groundstation.control.search_parameters import SearchParameters
 from groundstation.control.search_ranges import searching_cameras
 from groundstation.control.stand import Stand
@@ -62,13 +63,13 @@ class Search:
     """
 
     def __init__(
-        self, parameters: SearchParameters, lost_after_s: float, sensors: SensorSuite, targets: Sequence[str],
+        self, parameters: SearchParameters, control: ControlParameters, sensors: SensorSuite, targets: Sequence[str],
         excursions: Excursions,
     ) -> None:  # fmt: skip
         self.parameters = parameters
         self.grid = RoomGrid.over(*parameters.room_m)
         self.targets: dict[str, SearchState] = {name: SearchState(SearchMode.SEARCH, 0) for name in targets}
-        self._lost_after_s, self._sensors, self._excursions = lost_after_s, sensors, excursions
+        self._lost_after_s, self._sensors, self._excursions = control.lost_after_s, sensors, excursions
         observers = [name for name in parameters.observers if name in sensors.onboard or name in sensors.world]
         onboard = searching_cameras(sensors.onboard, parameters.ranges_m)
         self._cameras = {
@@ -76,7 +77,7 @@ class Search:
         }
         marker_m = max((sensors.marker_height_m[name] for name in targets), default=0.0)
         self._footprints = {
-            name: footprint_of(camera, self.grid.cell_m, parameters.height_m, marker_m, sensors.softness)
+            name: footprint_of(camera, self.grid.cell_m, control.search_height_m, marker_m, sensors.softness)
             for name, camera in onboard.items()
             if name in parameters.observers
         }

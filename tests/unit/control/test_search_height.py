@@ -7,7 +7,6 @@ import msgspec
 
 from groundstation.control.parameters import control_from_field
 from groundstation.control.search_height import search_height_m
-from groundstation.control.search_parameters import search_from_field
 from groundstation.control.search_ranges import search_ranges_m, searching_cameras
 from groundstation.sensing.footprint import footprint_of, turn_view
 from groundstation.sensing.from_field import sensors_from_field
@@ -37,8 +36,8 @@ def test_it_is_a_height_that_plans_fly() -> None:
     assert search_height_m(msgspec.structs.replace(LAB, planner=one)) == 1.7
 
 
-def test_who_returns_and_who_searches_fly_at_one_height() -> None:
-    assert control_from_field(LAB).search_height_m == search_from_field(LAB).height_m == search_height_m(LAB)
+def test_who_returns_and_who_searches_fly_at_that_height() -> None:
+    assert control_from_field(LAB).search_height_m == search_height_m(LAB)
 
 
 def test_cameras_without_a_range_stay_as_they_are() -> None:

@@ -10,7 +10,7 @@ import pytest
 from groundstation.bus.messages import Header, SearchedPicture
 from groundstation.control.coverage import choose_stands, lattice_of
 from groundstation.control.excursion import Excursions
-from groundstation.control.parameters import control_from_field
+from groundstation.control.parameters import ControlParameters, control_from_field
 from groundstation.control.search_parameters import SearchParameters, search_from_field
 from groundstation.control.target_search import Search, SearchMode
 from groundstation.estimation.belief import JointBelief
@@ -49,16 +49,22 @@ def picture(observer: str, stamp_s: float, *found: str) -> SearchedPicture:
     return SearchedPicture(header=header, observer=observer, camera=f"{observer}_camera", found=found)
 
 
-def new_search(parameters: SearchParameters = SEARCH, sensors: SensorSuite = SENSORS) -> Search:
-    return Search(parameters, CONTROL.lost_after_s, sensors, ("turtlebot",), Excursions(CONTROL, sensors))
+def new_search(
+    parameters: SearchParameters = SEARCH, sensors: SensorSuite = SENSORS, control: ControlParameters = CONTROL
+) -> Search:
+    return Search(parameters, control, sensors, ("turtlebot",), Excursions(control, sensors))
 
 
 def fly(
-    place: tuple[float, float], limit_s: float = 60.0, parameters: SearchParameters = SEARCH
+    place: tuple[float, float],
+    limit_s: float = 60.0,
+    parameters: SearchParameters = SEARCH,
+    control: ControlParameters = CONTROL,
 ) -> tuple[float, float, Search]:
     """Return when two drones that fly from stand to stand see a target at rest, and how near their stands came."""
-    search, rng = new_search(parameters), np.random.default_rng(1)
-    poses = {name: np.array([-0.5, y, parameters.height_m, 0.0]) for name, y in zip(NAMES, (0.5, -0.5), strict=True)}
+    search, rng = new_search(parameters, control=control), np.random.default_rng(1)
+    height_m = control.search_height_m
+    poses = {name: np.array([-0.5, y, height_m, 0.0]) for name, y in zip(NAMES, (0.5, -0.5), strict=True)}
     cameras = {name: camera_rows([SENSORS.onboard[name]], SENSORS.softness)[0] for name in NAMES}
     nearest = math.inf
     for tick in range(round(limit_s / TICK_S)):
@@ -97,8 +103,8 @@ def test_targets_all_over_the_room_are_found_sooner_from_where_more_of_it_is_see
     """Single places say little: a search that meets a wall of chance goes round the room once more."""
     places = np.random.default_rng(11).uniform((-3.8, -2.8), (3.8, 2.8), (50, 2)).tolist()
     found_s = [fly((x, y))[0] for x, y in places]
-    higher = replace(SEARCH, height_m=1.6)  # the first level's height, where searches flew before
-    higher_s = [fly((x, y), parameters=higher)[0] for x, y in places]
+    higher = replace(CONTROL, search_height_m=1.6)  # the first level's height, where searches flew before
+    higher_s = [fly((x, y), control=higher)[0] for x, y in places]
     assert np.mean(found_s) < 17.0  # turning on arrival only: 32 s at six places
     assert np.mean(found_s) < np.mean(higher_s) - 2.0
 
@@ -121,8 +127,8 @@ def test_a_searcher_turns_all_the_time_towards_what_it_has_not_seen() -> None:
 def test_who_looks_for_a_target_that_was_tracked_turns_faster(known: tuple[float, float] | None) -> None:
     search, ages_s = new_search(), (0.0, 2.0) if known else (math.inf, math.inf)
     poses = {
-        "drone_1": np.array([-0.5, 0.5, SEARCH.height_m, 0.0]),
-        "drone_2": np.array([-0.5, -0.5, SEARCH.height_m, 0.0]),
+        "drone_1": np.array([-0.5, 0.5, CONTROL.search_height_m, 0.0]),
+        "drone_2": np.array([-0.5, -0.5, CONTROL.search_height_m, 0.0]),
     }
     for stamp_s, age_s in zip((1.0, 3.0), ages_s, strict=True):
         now = belief(poses, stamp_s, known)

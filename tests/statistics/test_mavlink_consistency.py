@@ -47,7 +47,7 @@ def test_short_flights_are_near_consistent(field: ResolvedField) -> None:
 
 @pytest.mark.slow
 @pytest.mark.timeout(3000)
-@pytest.mark.parametrize("flights", [16, pytest.param(50, marks=pytest.mark.exhaustive)])
+@pytest.mark.parametrize("flights", [32, pytest.param(50, marks=pytest.mark.exhaustive)])
 def test_flights_with_the_loop_closed(field: ResolvedField, flights: int) -> None:
     """Flights of 20 s, some 3 s of CPU each; band 0.8..1.3 for what the means may be, of 50 flights +- 0.3 at most.
 

@@ -88,13 +88,19 @@ def _as_array(_context: Any, _builder: Any, _own: Any, _array: Any, field: Any) 
 lower_cast(types.NestedArray, types.Array)(_as_array)
 
 
+def _element(array: Any) -> Any:
+    """Return the type of the numbers of an `NDArray`: from numpy 2.5 on it is an alias that is given nothing else."""
+    arguments = get_args(array)
+    return arguments[0] if len(arguments) == 1 else get_args(arguments[1])[0]
+
+
 def _field(name: str, hint: Any) -> tuple[str, Any] | tuple[str, Any, tuple[int, ...]]:
     if hint in (float, int):
         return name, np.float64 if hint is float else np.int64
     if isinstance(hint, type) and issubclass(hint, Record):
         return name, hint.dtype
     array, shape = get_args(hint)
-    return name, get_args(get_args(array)[1])[0], shape
+    return name, _element(array), shape
 
 
 class Rows(Generic[Row]):
@@ -163,8 +169,7 @@ def compiled_type(hint: Any) -> Any:
     if origin is tuple:
         return types.BaseTuple.from_types([compiled_type(argument) for argument in arguments])
     if hasattr(hint, "__metadata__"):
-        element = get_args(get_args(arguments[0])[1])[0]
-        return types.Array(numba.from_dtype(np.dtype(element)), hint.__metadata__[0], "C")
+        return types.Array(numba.from_dtype(np.dtype(_element(arguments[0]))), hint.__metadata__[0], "C")
     if isinstance(hint, type) and issubclass(hint, Record):
         return numba.from_dtype(hint.dtype)
     if isinstance(hint, type) and hasattr(hint, "_fields"):

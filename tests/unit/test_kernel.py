@@ -1,13 +1,25 @@
 """Kernels are compiled for the signature of their annotations, and called by address with records and tuples."""
 
 from collections.abc import Callable
+from types import GenericAlias
 from typing import Annotated, Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 import pytest
 
-from groundstation.arrays import Array, IntArray, Matrix, Vector
-from groundstation.kernel import Record, Rows, RowsStack, address_of, caller, copy_rows, kernel, signature_of, viewed_as
+from groundstation.arrays import Array, IntArray, IntMatrix, Matrix, Vector
+from groundstation.kernel import (
+    Record,
+    Rows,
+    RowsStack,
+    address_of,
+    caller,
+    compiled_type,
+    copy_rows,
+    kernel,
+    signature_of,
+    viewed_as,
+)
 
 
 class Reading(Record):
@@ -73,6 +85,11 @@ def test_the_signature_is_the_annotations():
     text = str(signature_of(compiled.py_func))
     assert text.startswith("(int64, Filter(") and text.endswith("-> Tuple(float64, int64)")
     assert Reading.dtype.names == ("at", "kind", "z", "R") and Reading.dtype.itemsize == 8 * (2 + 2 + 4)
+
+
+def test_arrays_are_compiled_whatever_numpy_takes_its_alias_for():
+    alias = GenericAlias(np.ndarray, (np.int64,))  # numpy 2.5's, which is given the type of the numbers alone
+    assert compiled_type(Annotated[alias, 2]) == compiled_type(IntMatrix) != compiled_type(Matrix)
 
 
 def test_annotations_that_cannot_be_compiled_are_refused_by_name():

@@ -1,7 +1,9 @@
 """The drivers of a field, as they fly, with their watchdogs: hosted in one thread, at the emulated vehicles' wire."""
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
 
 from drivers.ardrone.driver import RATE_HZ as ARDRONE_HZ
 from drivers.ardrone.driver import ArDrone
@@ -81,6 +83,20 @@ def devices_of(
         placed = site.drones[name]
         devices[name] = open_at(addresses[name], name, placed, copter, scenario, wrong=wrong[name])
     return devices
+
+
+def on_pads(sections: Iterable[Section], drones: Mapping[str, Mapping[str, Any]]) -> list[Section]:
+    """Return the sections with the pads of these drones of a field (plain values): drivers refuse to start by them."""
+    return [(kind, json.dumps(_on_pads(json.loads(section), drones))) for kind, section in sections]
+
+
+def _on_pads(section: dict[str, Any], drones: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    for vehicle in section.get("vehicles") or [section]:
+        drone = drones[vehicle["name"]]
+        vehicle["pad_m"] = drone["pad_m"]
+        if "pad_yaw_rad" in vehicle:
+            vehicle["pad_yaw_rad"] = math.radians(drone["pad_yaw_deg"])
+    return section
 
 
 class Drivers:

@@ -5,9 +5,10 @@ Whether its optical flow sees the floor is not heard. Cameras tell: its firmware
 
 import math
 
-from groundstation.time_units import NS_PER_S
+from groundstation.time_units import NS_PER_MS
 
-_BRAKES_WITHIN_NS = NS_PER_S
+# Its firmware brakes within a second, and a speed between two places half a second apart is 0.3 s old.
+_BRAKES_WITHIN_NS = 1300 * NS_PER_MS
 # Three deviations of a speed between two places that cameras know to 2 cm, half a second apart; a drone at rest by its
 # own means wanders at 0.05 m/s.
 _ADRIFT_M_S = 0.12

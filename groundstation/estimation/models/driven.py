@@ -8,6 +8,8 @@ from groundstation.kernel import kernel
 
 # Nothing is known of the speed of a vehicle that is silent: 0.3 m/s, constant over some 0.5 s [m^2/s].
 SILENT_DENSITY = 0.09
+# Nor of its turn: 0.15 rad/s, likewise [rad^2/s]. It is told to hover, but may have turned when it was last heard.
+SILENT_TURN_DENSITY = 0.0225
 # Velocity is smoothed over this for all that is learnt from it [s].
 SLOW_S = 1.0
 

@@ -11,7 +11,14 @@ from groundstation.estimation.filter_state import Belief
 from groundstation.estimation.layout import ROBOT_CORE, EntityKind
 from groundstation.estimation.linear import wrap
 from groundstation.estimation.model_kernels import MotionKernels
-from groundstation.estimation.models.driven import hold_velocity, position_density, take_heading, world_velocity
+from groundstation.estimation.models.driven import (
+    SILENT_DENSITY,
+    SILENT_TURN_DENSITY,
+    hold_velocity,
+    position_density,
+    take_heading,
+    world_velocity,
+)
 from groundstation.estimation.models.height import EVEN_M, HeightEntries, correct_height
 from groundstation.estimation.models.protocol import Vector3, place_of
 from groundstation.estimation.motion import add_column, depend, fade, mirror, wander
@@ -87,6 +94,9 @@ def add_robot_noise(
     density = position_density(p.velocity_density, memory.odometry_age_s, p.hold_s)
     turning = memory.yaw_std * memory.yaw_std if memory.yaw_std > 0.0 else p.yaw_density
     climbing = 1e-6 if p.at_climb >= 0 or p.has_climb_rate != 0.0 else p.climb_std * p.climb_std * p.climb_tau_s
+    if memory.odometry_age_s > p.hold_s:
+        turning += SILENT_TURN_DENSITY
+        climbing += SILENT_DENSITY if p.at_climb < 0 else 0.0
     P[start, start] += density * dt
     P[start + 1, start + 1] += density * dt
     wander(P, start, Z, climbing * dt)

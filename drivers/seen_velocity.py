@@ -3,17 +3,13 @@
 import math
 from collections import deque
 
+from drivers.seen_place import MOST_STD_M, seen_ns
 from groundstation.bus.messages import EntityEstimate
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _WINDOW_NS = 600 * NS_PER_MS
 _LEAST_WINDOW_NS = 450 * NS_PER_MS
 _SEEN_AGE_S = 0.5
-# A place is that of its sighting where nothing tells how the vehicle moves since: as old as it gets at ten pictures a
-# second, 0.17 s late, one of them lost.
-_UNTOLD_AGE_S = 0.4
-# Two places known to 0.1 m tell a speed to 0.28 m/s, and the first sighting after a while moves the belief by as much.
-_MOST_VARIANCE_M2 = 0.05**2
 # Faster than this is no flight: the belief was set anew.
 _LEAP_M_S = 4.0
 _FRESH_NS = 300 * NS_PER_MS
@@ -22,12 +18,7 @@ _FRESH_NS = 300 * NS_PER_MS
 def _place_ns(now_ns: int, entity: EntityEstimate) -> int | None:
     """Return when a vehicle was where the estimate has it, None if that is not known well enough."""
     worst = max(entity.covariance[0], entity.covariance[5]) if len(entity.covariance) == 16 else math.inf
-    if entity.age_s <= _SEEN_AGE_S and worst <= _MOST_VARIANCE_M2:
-        return now_ns
-    # Nobody tells how an AR.Drone moves that sees no floor: its belief grows to 0.15 m until the next picture arrives.
-    age_s, std_m = entity.sighting or (math.inf, math.inf)
-    known = age_s <= _UNTOLD_AGE_S and std_m**2 <= _MOST_VARIANCE_M2
-    return now_ns - round(age_s * NS_PER_S) if known else None
+    return now_ns if entity.age_s <= _SEEN_AGE_S and worst <= MOST_STD_M**2 else seen_ns(now_ns, entity)
 
 
 class SeenVelocity:

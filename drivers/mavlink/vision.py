@@ -3,8 +3,9 @@
 On the floor the pad of the field file is fed, or where it landed last: the tracker has no estimate of a robot that is
 landed. Once the take-off has begun it has one, which is fed if it goes on from there.
 A position that observations do not keep sharp is not fed: it would be the autopilot's own dead reckoning. What counts
-is its covariance, not who was seen: a vehicle is localised by what its own camera sees as well. Nothing is fed while
-sightings far from the estimate are being weighed.
+is its covariance, not who was seen: a vehicle is localised by what its own camera sees as well. Of one whose telemetry
+is silent or not believed, only each place is fed at which it was seen. Nothing is fed while sightings far from the
+estimate are being weighed.
 """
 
 import math
@@ -12,6 +13,7 @@ from dataclasses import replace
 
 from drivers.mavlink.convert import VisionPose
 from drivers.mavlink.settings import VisionFeedback
+from drivers.seen_place import seen_ns
 from groundstation.bus.messages import EntityEstimate, Estimate
 from groundstation.geometry.angles import difference
 from groundstation.time_units import NS_PER_MS, NS_PER_S
@@ -41,7 +43,7 @@ class VisionFeed:
         self._aloft_ns: int | None = None
 
     def hear(self, now_ns: int, estimate: Estimate) -> EntityEstimate | None:
-        """Take the tracker's estimate; return that of this vehicle if it is good enough to fly on."""
+        """Take the tracker's estimate; return that of this vehicle if it is good enough to fly on now."""
         for entity in estimate.entities:
             if entity.name == self._name:
                 break
@@ -57,14 +59,19 @@ class VisionFeed:
             return None
         header = estimate.header
         stamp_ns = header.stamp_ns if header.clock == self._clock and header.stamp_ns <= now_ns else now_ns
-        if not self._is_good(entity):
-            return None
+        if self._is_good(entity):
+            self._take(entity, stamp_ns, (entity.covariance[0], entity.covariance[5]))
+            return entity
+        at_ns = seen_ns(stamp_ns, entity) if entity.converged else None
+        if at_ns is not None and entity.sighting is not None and at_ns > (self._good_ns or 0):
+            self._take(entity, at_ns, (entity.sighting[1] ** 2,) * 2)
+        return None
+
+    def _take(self, entity: EntityEstimate, at_ns: int, level_variances: tuple[float, float]) -> None:
         x, y, z, yaw = entity.mean[:4]
-        variances = (entity.covariance[0], entity.covariance[5], entity.covariance[10], entity.covariance[15])
         vx, vy, vz = entity.velocity_m_s[:3]
-        self._newest = VisionPose(stamp_ns, (x, y, z), yaw, variances, (vx, vy, vz))
-        self._good_ns = stamp_ns
-        return entity
+        variances = (*level_variances, entity.covariance[10], entity.covariance[15])
+        self._newest, self._good_ns = VisionPose(at_ns, (x, y, z), yaw, variances, (vx, vy, vz)), at_ns
 
     def _is_good(self, entity: EntityEstimate) -> bool:
         worst = max(entity.covariance[0], entity.covariance[5], entity.covariance[10])

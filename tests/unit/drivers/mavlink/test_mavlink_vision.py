@@ -78,3 +78,37 @@ def test_nothing_is_fed_while_sightings_contradict_the_estimate(feed: VisionFeed
     assert feed.lost_s(NOW + 133 * MS) == pytest.approx(0.1)
     believe(feed, NOW + 133 * MS, *PAD, 0.5)
     assert place(feed, NOW + 133 * MS, aloft=True) is not None
+
+
+def see(feed: VisionFeed, now_ns: int, x: float, age_s: float, std_m: float = 0.02) -> None:
+    """Hear of a vehicle that tells no motion: its covariance has grown since it was seen."""
+    covariance = tuple(0.15**2 if place % 5 == 0 else 0.0 for place in range(16))
+    place = (x, PAD[1], 0.5, 0.3)
+    entity = EntityEstimate("drone", "robot", place, covariance, (0.0,) * 3, True, age_s, 0.0, False, (age_s, std_m))
+    header = Header(now_ns, clock.clock_id(), "team", "tracker", 1)
+    feed.hear(now_ns, Estimate(header=header, entities=(entity,), epoch=1))
+
+
+def test_a_vehicle_that_tells_no_motion_is_fed_where_its_last_picture_showed_it(feed: VisionFeed) -> None:
+    believe(feed, NOW + 33 * MS, *PAD, 0.5)
+    feed.pose(NOW + 33 * MS, aloft=True)
+    see(feed, NOW + 300 * MS, 1.2, age_s=0.2)
+    pose = feed.pose(NOW + 300 * MS, aloft=True)
+    assert pose is not None
+    assert (pose.stamp_ns, pose.position_m[0]) == (NOW + 100 * MS, 1.2)
+    assert pose.variances[:2] == pytest.approx((4e-4, 4e-4))
+    assert feed.lost_s(NOW + 300 * MS) == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(("age_s", "std_m"), [(0.45, 0.02), (0.2, 0.06)], ids=["long ago", "badly"])
+def test_who_was_not_seen_well_and_lately_is_not_fed(feed: VisionFeed, age_s: float, std_m: float) -> None:
+    believe(feed, NOW + 33 * MS, *PAD, 0.5)
+    see(feed, NOW + 600 * MS, 1.2, age_s, std_m)
+    assert place(feed, NOW + 600 * MS, aloft=True) is None
+
+
+def test_a_picture_is_one_place(feed: VisionFeed) -> None:
+    believe(feed, NOW + 33 * MS, *PAD, 0.5)
+    see(feed, NOW + 300 * MS, 1.2, age_s=0.2)
+    see(feed, NOW + 350 * MS, 1.3, age_s=0.25)
+    assert place(feed, NOW + 350 * MS, aloft=True) == (1.2, PAD[1], 0.5)

@@ -43,6 +43,14 @@ SILENT_TOO = {"frozen": (48132, ["telemetry_frozen", "uniform_floor"])}
 # Silent and blind within 40 ms: nobody heard that its own hover would fail, but the ceiling camera saw it drift off.
 ADRIFT = (42024, ["navdata_silent", "uniform_floor"])
 
+# Frozen, and braked by its own firmware: cameras still saw the speed of half a second before.
+BRAKED_BY_ITSELF = (120292, ["telemetry_frozen"])
+# Autopilots whose telemetry is not believed, in view of a fixed camera: no longer told where they were, they drifted.
+NOT_BELIEVED = {
+    "frozen": (140014, ["battery_drop", "telemetry_frozen"]),
+    "turning_as_its_velocity_sticks": (140017, ["velocity_stuck"]),
+}
+
 # The ceiling saw the velocity drift off, and lost sight of the drone; the other drone was blind.
 BELIEVED_AGAIN = (50, ["picture_black", "velocity_drifting"])
 
@@ -69,9 +77,9 @@ UNROOTED = {
 SWINGING = (34051, ["camera_stall", "telemetry_delayed"])
 
 
-def order_of(changes: list[str]) -> dict[str, Any]:
+def order_of(changes: list[str], field_name: str = "lab") -> dict[str, Any]:
     """Return what `groundstation experiment faults` hands to the simulator, with changes of the scenario."""
-    path = find_field("lab")
+    path = find_field(field_name)
     field = load_field(path, ("recording.raw_datagrams=false",))
     sections = [(s.kind, s.section) for s in driver_sections(field) if s.kind != CAMERA]
     scenario = json.loads(json.dumps(load_scenario(find_scenario("realistic", path), changes)))
@@ -141,6 +149,19 @@ def test_a_blind_drone_that_tells_nothing_new_is_braked_on(seed: int, kinds: lis
 @pytest.mark.study
 def test_a_silent_drone_that_cameras_see_drift_is_braked() -> None:
     assert safely_flown(order_of([]), *ADRIFT)["rest_s"] <= 3.0
+
+
+@pytest.mark.slow
+@pytest.mark.study
+def test_a_frozen_drone_that_its_firmware_brakes_is_left_to_it() -> None:
+    assert safely_flown(order_of([]), *BRAKED_BY_ITSELF)["rest_s"] <= 2.5
+
+
+@pytest.mark.slow
+@pytest.mark.study
+@pytest.mark.parametrize(("seed", "kinds"), NOT_BELIEVED.values(), ids=NOT_BELIEVED)
+def test_an_autopilot_that_is_not_believed_holds_its_place(seed: int, kinds: list[str]) -> None:
+    assert safely_flown(order_of([], "mixed-team"), seed, kinds)["rest_s"] <= 3.2
 
 
 @pytest.mark.slow

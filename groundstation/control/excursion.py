@@ -58,8 +58,8 @@ def within_reach(
 
     It could from now on, into the world-fixed view at its height that is nearest to near_m [x, y], or to itself;
     another one that it reaches from there in time counts as the same. error_m_s: rms error of its odometry that is to
-    be expected, above 0 (infinite: it has no time at all); drift_m_s: motion besides what it is told (2) [m/s; world],
-    which counts towards the borders.
+    be expected, above 0 (infinite: it has no time at all, and goes to the middle of the view); drift_m_s: motion
+    besides what it is told (2) [m/s; world], which counts towards the borders.
     """
     mean, p = belief.mean_of(name), parameters
     left_s = time_left_s(spread_m(belief, name), 0.0, p, error_m_s)
@@ -67,6 +67,9 @@ def within_reach(
     view = _connected(mean[:2] if near_m is None else np.array(near_m), views, p.return_speed_m_s * max(0.0, left_s))
     if view is None:
         return velocity
+    if not math.isfinite(error_m_s):
+        # Believed in view and not seen, it is somewhere else: towards the middle it is seen the sooner.
+        view = view.shrunk(math.inf)
     reach_m = p.return_speed_m_s * max(0.0, left_s - p.return_margin_s)
     low, high = np.transpose((view.x_m, view.y_m))
     most, drift = p.return_speed_m_s, np.clip(drift_m_s, -p.return_drift_m_s, p.return_drift_m_s)

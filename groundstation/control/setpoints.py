@@ -113,7 +113,7 @@ def setpoints_from_plan(
         phases[scout] = FlightMode.SEARCH
     searching = sight.search([name for name in now.robots if phases[name] is FlightMode.SEARCH], missing)
     stands = _stands(phases, searching, now)
-    coming = [name for name in now.robots if phases[name] is FlightMode.RETURN and name not in sight.unsteered]
+    coming = [name for name in now.robots if _comes_back(name, phases[name], now)]
     wanted: dict[str, Setpoint] = {}
     for name, phase in phases.items():
         if phase is FlightMode.UNKNOWN:
@@ -121,10 +121,16 @@ def setpoints_from_plan(
         elif phase is FlightMode.TRACK and plan is not None:
             vx, vy, rate = _regained(name, plan, now)
             velocity = _recoverable(name, _giving_way(name, (vx, vy), coming, now), now)
-            wanted[name] = _with_height(name, velocity, rate, plan.heights[name], phase, now)
+            wanted[name] = _with_height(name, velocity, rate, _level_m(name, plan, now), phase, now)
         else:
             wanted[name] = _towards(name, stands[name], phase, now)
     return wanted
+
+
+def _comes_back(name: str, phase: FlightMode, now: _Moment) -> bool:
+    """Return whether a robot flies back into a view, and obeys."""
+    comes = phase is FlightMode.RETURN or (phase is FlightMode.TRACK and _is_untied(name, now))
+    return comes and name not in now.sight.unsteered
 
 
 def _regained(name: str, plan: PlanResult, now: _Moment) -> tuple[float, float, float]:
@@ -147,6 +153,22 @@ def _regained(name: str, plan: PlanResult, now: _Moment) -> tuple[float, float, 
     return vx, vy, rate
 
 
+def _level_m(name: str, plan: PlanResult, now: _Moment) -> float:
+    """Return the height of a robot's level; who looks for a view sinks a little, for views are narrower higher up.
+
+    Told to keep its height a vehicle in the midst of a climb rises on: it errs by its climb rate as well.
+    """
+    level_m, parameters = plan.heights[name], now.parameters
+    if not _is_untied(name, now):
+        return level_m
+    return min(level_m, float(now.belief.mean_of(name)[2]) - parameters.height_tolerance_m)
+
+
+def _is_untied(name: str, now: _Moment) -> bool:
+    """Return whether nothing tells where a robot is that flies on our estimate."""
+    return name in now.parameters.fed and now.sight.untied_s.get(name, 0.0) > now.parameters.untied_after_s
+
+
 def _giving_way(name: str, velocity: tuple[float, float], coming: Sequence[str], now: _Moment) -> tuple[float, float]:
     """Return the velocity [base_stabilized] of a robot that makes room for those that fly back.
 
@@ -154,7 +176,7 @@ def _giving_way(name: str, velocity: tuple[float, float], coming: Sequence[str],
     the view would keep them out of it.
     """
     mean, wanted = now.belief.mean_of(name), np.array(velocity)
-    for other in coming:
+    for other in (one for one in coming if one != name):
         away = mean[:2] - now.belief.mean_of(other)[:2]
         distance = max(float(np.linalg.norm(away)), 1e-6)
         lacking_m = now.parameters.column_m + _ROOM_SIGMAS * spread_m(now.belief, other) - distance
@@ -173,8 +195,7 @@ def _recoverable(name: str, velocity: tuple[float, float], now: _Moment) -> tupl
     """
     yaw, error_m_s = float(now.belief.mean_of(name)[3]), now.sight.velocity_errors_m_s.get(name, 0.0)
     drift = now.sight.drifts_m_s.get(name, _STILL)[:2]
-    untied = now.sight.untied_s.get(name, 0.0) > now.parameters.untied_after_s
-    if untied and name in now.parameters.fed:
+    if _is_untied(name, now):
         error_m_s, drift = math.inf, _STILL[:2]  # a drift was measured by what is no longer known
     if error_m_s <= now.parameters.sound_error_m_s:
         return velocity

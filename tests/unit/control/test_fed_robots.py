@@ -1,5 +1,6 @@
 """Who flies on our estimate turns back as soon as nothing tells where it is: it lands before its place is lost."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -32,12 +33,12 @@ def belief(pose: np.ndarray, std_m: float, name: str = "drone_2") -> JointBelief
     return JointBelief(np.array([*pose, *TARGET]), std_m**2 * np.eye(8), layout, 0)
 
 
-def plan(velocity: np.ndarray, pose: np.ndarray, name: str = "drone_2") -> PlanResult:
+def plan(velocity: np.ndarray, pose: np.ndarray, name: str = "drone_2", climb_m: float = 0.0) -> PlanResult:
     body = stabilized_from_world(np.append(velocity, 0.0), float(pose[3]))
     return PlanResult(
         topology=Topology.parse(name), cost=0.1, uncertainty=0.1, controls={name: np.array([body[0], body[1], 0.0])},
-        heights={name: float(pose[2])}, edges=(), alternatives=(), solver=SolverReport("complete", 1, 0.0, 1, 1),
-        mode="multistart", stamp_ns=0,
+        heights={name: float(pose[2]) + climb_m}, edges=(), alternatives=(), mode="multistart", stamp_ns=0,
+        solver=SolverReport("complete", 1, 0.0, 1, 1),
     )  # fmt: skip
 
 
@@ -99,6 +100,42 @@ def test_it_turns_back_at_full_speed_whatever_drift_was_measured_of_it() -> None
     sight = Sight(0.1, {"drone_2": 0.6}, untied_s={"drone_2": 0.6}, drifts_m_s={"drone_2": np.array([-0.2, 0.0, 0.0])})
     out = told(np.array([-0.31, -0.4, 1.25, 0.7]), np.array([0.1, 0.1]), sight, SEEN_STD_M).velocity_m_s
     assert world_from_stabilized(np.array(out), 0.7)[0] == pytest.approx(-CONTROL.return_speed_m_s)
+
+
+def test_it_goes_on_inwards_where_it_is_believed_in_view_and_not_seen() -> None:
+    """Who is not seen in the middle of a view is not there: its belief goes by a velocity that is wrong."""
+    sight = Sight(0.1, {"drone_2": 0.8}, untied_s={"drone_2": 0.8})
+    out = told(np.array([-0.75, -0.4, 1.2, 0.7]), np.array([0.3, -0.2]), sight, SEEN_STD_M).velocity_m_s
+    wanted = world_from_stabilized(np.array(out), 0.7)
+    assert wanted[0] == pytest.approx(-CONTROL.return_speed_m_s) and wanted[1] > 0.3
+
+
+def test_who_is_in_the_view_makes_room_for_it() -> None:
+    """A real PX4 stood still in front of the view, 3 cm from its border: another vehicle kept it off."""
+    here, there = np.array([-0.5, -0.3, 1.3, 0.0]), np.array([-1.2, -0.1, 1.3, 0.0])
+    layout = StateLayout().with_entity("drone_2", EntityKind.ROBOT, ROBOT_CORE)
+    layout = layout.with_entity("drone_1", EntityKind.ROBOT, ROBOT_CORE)
+    layout = layout.with_entity("turtlebot", EntityKind.TARGET, TARGET_CORE)
+    both = JointBelief(np.array([*here, *there, *TARGET]), SEEN_STD_M**2 * np.eye(12), layout, 0)
+    plans = plan(np.zeros(2), here)
+    plans = replace(
+        plans, controls={**plans.controls, "drone_1": np.zeros(3)}, heights={**plans.heights, "drone_1": 1.3}
+    )
+    for untied_s, away_m_s in ((0.3, 0.0), (0.5, -0.2)):
+        sight = Sight(0.1, {"drone_2": untied_s}, untied_s={"drone_2": untied_s})
+        told_to = setpoints_from_plan(plans, both, ("drone_1", "drone_2"), CONTROL, SENSORS, sight)
+        assert told_to["drone_1"].velocity_m_s[0] <= away_m_s
+        assert told_to["drone_2"].velocity_m_s[0] == pytest.approx(0.0 if untied_s < 0.4 else -0.5)
+
+
+@pytest.mark.parametrize(("untied_s", "climbs"), [(0.3, True), (0.5, False)])
+def test_it_does_not_climb_out_of_the_view_that_it_looks_for(untied_s: float, climbs: bool) -> None:
+    """Of a real PX4 the border of the view went before it: it rose from 1.17 to 1.44 m, where the view is narrower."""
+    pose, sight = np.array([-0.4, -0.67, 1.17, 0.7]), Sight(0.1, {"drone_2": untied_s}, untied_s={"drone_2": untied_s})
+    found = setpoints_from_plan(
+        plan(np.zeros(2), pose, climb_m=0.9), belief(pose, SEEN_STD_M), ("drone_2",), CONTROL, SENSORS, sight
+    )
+    assert found["drone_2"].velocity_m_s[2] == pytest.approx(0.4 if climbs else -0.18)
 
 
 def test_who_is_told_where_it_is_by_what_it_sees_flies_its_plan() -> None:

@@ -177,11 +177,12 @@ class Tracker:
 
     def converged(self, name: str) -> bool:
         """Return whether an entity is known well enough to fly on; without a camera to root the team nobody is."""
-        unrooted = name not in self._belief.layout or self._mounts.is_rootless or self._roots.is_silent
-        swings = self._joinings.is_unsettled(name) and name not in self.parameters.control.fed
-        if unrooted or swings:
+        if name not in self._belief.layout or self._mounts.is_rootless or self._roots.is_silent:
             return False
-        return self._localisation.holds(self._belief, name, self._tied_age_s(name))
+        # The deviation of who flies on our estimate tells how wrong its velocity becomes unseen.
+        fed = name in self.parameters.control.fed
+        settled = fed or not self._joinings.is_unsettled(name)
+        return settled and self._localisation.holds(self._belief, name, 0.0 if fed else self._tied_age_s(name))
 
     def estimates(self) -> tuple[EntityEstimate, ...]:
         """Return what is believed of each entity that has joined."""

@@ -142,6 +142,7 @@ def _robot(drone: FieldDrone) -> OdometryRobot:
         velocity_std_m_s=_QUICK_SHARE * odometry.velocity_std_m_s,
         velocity_bias_std_m_s=_LASTING_SHARE * odometry.velocity_std_m_s / odometry.velocity_scale,
         velocity_bias_correlation_s=habits.velocity_s,
+        velocity_walk=habits.velocity_walk,
         velocity_delay_s=odometry.velocity_delay_ms / 1000,
         yaw_std_rad=math.radians(odometry.yaw_rate_std_deg_s),
         attitude_std_rad=math.radians(odometry.attitude_std_deg),

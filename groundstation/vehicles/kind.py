@@ -36,7 +36,8 @@ class ErrorHabits:
 
     tells_attitude: its own attitude is better than what we could make of its IMU. flies_on_estimate: it is told where
     it is, so that the tracker has to know it before it lifts off. tells_steps: its velocities and angles come in steps
-    so coarse that they repeat while it hovers; a frozen one is its driver's to find.
+    so coarse that they repeat while it hovers; a frozen one is its driver's to find. velocity_walk: by how much the
+    error of its velocity changes while nobody sees it [m/s per root second].
     """
 
     velocity_s: float
@@ -48,6 +49,7 @@ class ErrorHabits:
     tells_attitude: bool
     flies_on_estimate: bool = False
     tells_steps: bool = False
+    velocity_walk: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

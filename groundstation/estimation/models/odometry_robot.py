@@ -25,23 +25,14 @@ from groundstation.estimation.motion import add_column, depend, fade, mirror, wa
 from groundstation.estimation.records import YAW, CondensedOdometry, EntityMemory, EntityRow, X, Y, Z, own_parameters
 from groundstation.kernel import Record, kernel
 
-SLOW_STATES = (
-    "roll_error",
-    "pitch_error",
-    "climb",
-    "velocity_scale",
-    "height_error",
-    "floor",
-    "velocity_bias_x",
-    "velocity_bias_y",
-    "yaw_offset",
-)
-AERIAL = SLOW_STATES[:6]
+AERIAL = ("roll_error", "pitch_error", "climb", "velocity_scale", "height_error", "floor")
+SLOW_STATES = (*AERIAL, "velocity_bias_x", "velocity_bias_y", "yaw_offset")
 _TURN_SHARE = 0.02  # of each turn is in error
 _BELIEVABLE, _WRONG = 3.0, 5.0  # deviations beyond which an error lasts longer, and beyond which the sensor lies
 _LIE_S, _UNSEEN_LIE_S, _UNSEEN_S = 2.0, 8.0, 0.5  # how long a lie lasts, seen and unseen, and from when on it is unseen
 # The field file's figure is what a vehicle states while it does not doubt itself; the lasting part of it is 0.6.
 _STATED_ROOM = 2.0
+_WALKS_AFTER_S = 0.2  # sightings of a robot in view come sooner
 _DOUBT_S = 1.0  # the doubt that surprises raise is forgotten over this
 
 
@@ -51,7 +42,8 @@ class RobotParameters(Record):
     velocity_gain: true over reported speed; velocity_density [m^2/s], yaw_density and yaw_offset_density [rad^2/s],
     scale_density [1/s], floor_density [m^2/s]: white noise; *_std, *_tau_s: Gauss-Markov states; has_climb_rate: 1.0 if
     the vehicle reports one; height_variance [m^2]: of one step's height; velocity_std [m/s]: what the
-    vehicle states beyond it is doubt; hold_s: how long a velocity holds in silence;
+    vehicle states beyond it is doubt; walk_density [m^2/s^3]: white noise of its error while nobody sees the vehicle;
+    hold_s: how long a velocity holds in silence;
     at_*: entries (-1: the block has none).
     """
 
@@ -70,6 +62,7 @@ class RobotParameters(Record):
     bias_std: float
     bias_tau_s: float
     velocity_std: float
+    walk_density: float
     has_climb_rate: float
     height_variance: float
     hold_s: float
@@ -124,7 +117,8 @@ def fade_velocity_bias(
     """Let the velocity's error decay over dt; one that no sound sensor has is given room, and stays longer.
 
     A heavy tail of its prior (0078): where sightings have drawn the error out of it, the deviation follows the error,
-    so that the next ones count for more; surprises of fixed cameras add to it. Not so of an unseen robot (0143).
+    so that the next ones count for more; surprises of fixed cameras add to it. Not so of an unseen robot (0143), whose
+    error walks, where its kind's does.
     """
     start, size = entity.start, entity.size
     x, y = mean[start + p.at_velocity_bias_x], mean[start + p.at_velocity_bias_y]
@@ -145,6 +139,9 @@ def fade_velocity_bias(
     deviation = math.sqrt(variance)
     fade(mean, P, start, size, p.at_velocity_bias_x, deviation, dt / lasts_s)
     fade(mean, P, start, size, p.at_velocity_bias_y, deviation, dt / lasts_s)
+    if memory.unseen_s > _WALKS_AFTER_S:
+        wander(P, start, p.at_velocity_bias_x, p.walk_density * dt)
+        wander(P, start, p.at_velocity_bias_y, p.walk_density * dt)
 
 
 @kernel()
@@ -236,8 +233,9 @@ class OdometryRobot:
     slow_states: those of SLOW_STATES that this type of vehicle needs; without any the block is the paper's four.
     velocity_scale: true speed over reported speed as calibrated, known to `scale_std` (a state follows the rest);
     velocity_std_m_s with its correlation time becomes white noise; heading wanders by yaw_std_rad per root second;
-    attitude, height and velocity errors are Gauss-Markov states; climb is one where the vehicle reports none. floor is
-    the height of what is below; yaw_offset what the vehicle's own heading is off by, for the heading sensor.
+    attitude, height and velocity errors are Gauss-Markov states; velocity_walk: change of the latter while nobody sees
+    the vehicle [m/s per root second]; climb is a state where the vehicle reports none. floor is the height of what is
+    below; yaw_offset what the vehicle's own heading is off by, for the heading sensor.
     """
 
     kind: ClassVar[EntityKind] = EntityKind.ROBOT
@@ -263,6 +261,7 @@ class OdometryRobot:
     hold_s: float = 0.2
     velocity_bias_std_m_s: float = 0.0
     velocity_bias_correlation_s: float = 2.0
+    velocity_walk: float = 0.0
     yaw_offset_std_rad: float = math.pi
     yaw_offset_drift_rad: float = math.radians(0.6)
     slow_states: tuple[str, ...] = AERIAL
@@ -295,6 +294,7 @@ class OdometryRobot:
             height_tau_s=self.height_correlation_s,
             bias_std=self.velocity_bias_std_m_s,
             bias_tau_s=self.velocity_bias_correlation_s,
+            walk_density=self.velocity_walk**2,
             velocity_std=_STATED_ROOM * max(self.velocity_std_m_s, self.velocity_bias_std_m_s * self.velocity_scale),
             has_climb_rate=float(self.reports_climb),
             # The slow part of the error is a state; what is left is quick, and alike in neighbouring samples.

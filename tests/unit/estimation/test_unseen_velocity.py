@@ -1,0 +1,53 @@
+"""The error of a vehicle's velocity walks while nobody sees it, where its kind's does."""
+
+import math
+
+import numpy as np
+import pytest
+
+from groundstation.estimation.filter_state import Belief
+from groundstation.estimation.models import OdometryRobot
+from groundstation.estimation.models.odometry_robot import SLOW_STATES
+from groundstation.estimation.motion import predict
+from groundstation.estimation.parameters import EstimatorParameters, parameters_from_field
+from groundstation.estimation.tables import empty_state, tables_from_parameters
+from groundstation.settings.files import find_field
+from groundstation.settings.load import load_field
+from groundstation.settings.resolved import resolved_field
+
+STEP_S = 0.01
+# Of a real PX4, each axis, after this long (docs/reference/mavlink.md 2.1): change of its velocity's error [m/s], and
+# how far a place that goes by its velocity, less the error when it was last seen, is off [m].
+MEASURED = {1.0: (0.15, 0.09), 2.0: (0.19, 0.24)}
+
+
+def deviations(model: OdometryRobot, seconds: float) -> tuple[float, float]:
+    """Return those of the velocity's error [m/s] and of the place [m] after a time unseen; both are exact at first."""
+    tables = tables_from_parameters(EstimatorParameters({"one": model}))
+    state = empty_state(tables, [True])
+    state.memory["active"] = 1
+    mean, P = state.means[0], np.zeros((state.means[0].size,) * 2)
+    for _ in range(round(seconds / STEP_S)):
+        predict(Belief(mean, P, tables.entities[0], state.memory), STEP_S)
+    at = model.labels.index("velocity_bias_x")
+    return math.sqrt(P[at, at]), math.sqrt(P[0, 0])
+
+
+def test_who_flies_on_our_estimate_is_known_no_better_than_was_measured() -> None:
+    model = parameters_from_field(resolved_field(load_field(find_field("mixed-team")))).entities["drone_2"]
+    assert isinstance(model, OdometryRobot)
+    for seconds, (error_m_s, off_m) in MEASURED.items():
+        velocity, place = deviations(model, seconds)
+        assert velocity == pytest.approx(error_m_s, rel=0.25), seconds
+        assert place == pytest.approx(off_m, rel=0.4), seconds
+
+
+def test_a_kind_whose_error_does_not_walk_coasts_as_before() -> None:
+    still = OdometryRobot(slow_states=SLOW_STATES, velocity_bias_std_m_s=0.03, velocity_bias_correlation_s=5.0)
+    assert deviations(still, 1.0)[0] == pytest.approx(0.03 * math.sqrt(1.0 - math.exp(-0.4)))
+
+
+def test_who_was_seen_just_now_does_not_walk_yet() -> None:
+    walks = OdometryRobot(slow_states=SLOW_STATES, velocity_bias_std_m_s=0.03, velocity_walk=0.15)
+    still = OdometryRobot(slow_states=SLOW_STATES, velocity_bias_std_m_s=0.03)
+    assert deviations(walks, 0.15) == deviations(still, 0.15)

@@ -169,8 +169,9 @@ def run_simulated(mode: str, field: str, asked: Rehearsal) -> int:
     try:
         simulation = Simulation(net, chosen, seed, parts)
         facts = RunFacts(
-            mode=mode, field=str(path), scenario=scenario, seed=seed, tracking_s=duration, real=parts.names
-        )
+            mode=mode, field=str(path), scenario=scenario, seed=seed, tracking_s=duration, real=parts.names,
+            expected=chosen.get("expected"),
+        )  # fmt: skip
         there = simulated(loaded, net, parts)
         output = asked.output
         return _run(path, there, plan, facts, headless=asked.headless, simulation=simulation, output=output)

@@ -1,10 +1,11 @@
-"""What a run must reach to pass; the one place where the limits stand."""
+"""What a run must reach to pass: the usual limits, which stand here alone, or those that its scenario expects."""
 
 from collections.abc import Iterator
 
 import msgspec
 
 from groundstation.field.resolved import ResolvedField
+from groundstation.report.expectation import Expectation, expectation_of
 from groundstation.report.metrics import RunFigures
 from groundstation.report.run_facts import RunFacts
 
@@ -25,7 +26,10 @@ Value = float | bool | None
 
 
 class Criterion(msgspec.Struct, frozen=True, omit_defaults=True):
-    """One requirement: value relation limit. A value of None was not measured, and fails. why: what it failed by."""
+    """One requirement: value relation limit. A value of None was not measured, and fails.
+
+    why: what it failed by; by: who asks for this limit, "" for the usual one.
+    """
 
     name: str
     value: Value
@@ -33,19 +37,21 @@ class Criterion(msgspec.Struct, frozen=True, omit_defaults=True):
     limit: float | bool
     ok: bool
     why: str = ""
+    by: str = ""
 
 
 def criteria_of(figures: RunFigures, field: ResolvedField, facts: RunFacts) -> list[Criterion]:
     """Return all criteria that apply: those against the truth need a simulator or motion capture."""
+    expected = expectation_of(facts)[0]
     criteria = [
         *_promises(figures, facts),
-        _of_failsafes(figures),
+        _of_failsafes(figures, expected),
         _below("planner_p99_ms", figures.planner_p99_ms, MAX_PLANNER_P99_MS),
         _under("tracker_missed_percent", figures.tracker_missed_percent, MAX_MISSED_PERCENT),
         _above("tracker_rate_hz", figures.tracker_rate_hz, MIN_RATE_SHARE * field.estimator.rate_hz),
     ]
     if figures.sim_overrun_percent is not None or figures.target is not None:
-        criteria = [*_against_truth(figures, field), *_of_the_demo(figures, facts), *criteria]
+        criteria = [*_against_truth(figures, field, expected), *_of_the_demo(figures, facts), *criteria]
         criteria.append(_below("mean_cpu_cores", figures.mean_cpu_cores, MAX_CPU_CORES))
         if figures.sim_overrun_percent is not None or not field.truth:
             criteria.append(_below("sim_overrun_percent", figures.sim_overrun_percent, MAX_SIM_OVERRUN_PERCENT))
@@ -59,9 +65,8 @@ def is_valid(figures: RunFigures) -> bool:
     return figures.sim_overrun_percent is None or figures.sim_overrun_percent <= MAX_SIM_OVERRUN_PERCENT
 
 
-def _against_truth(figures: RunFigures, field: ResolvedField) -> Iterator[Criterion]:
-    yield _below("target_rmse_m", figures.target_rmse_m, MAX_TARGET_RMSE_M)
-    yield _below("target_lost_s", figures.target_lost_s, MAX_TARGET_LOST_S)
+def _against_truth(figures: RunFigures, field: ResolvedField, expected: Expectation) -> Iterator[Criterion]:
+    yield from _of_the_target(figures, expected)
     judged = min((one.judged for one in figures.targets.values()), default=None)
     if judged is not None and judged < 1.0:
         yield _above("target_judged", judged, MIN_JUDGED)
@@ -69,6 +74,28 @@ def _against_truth(figures: RunFigures, field: ResolvedField) -> Iterator[Criter
     if len(field.drones) > 1:
         yield _above("min_separation_m", figures.min_separation_m, field.safety.min_separation_m)
     yield _landed(figures)
+
+
+def _of_the_target(figures: RunFigures, expected: Expectation) -> Iterator[Criterion]:
+    """Judge the errors of the worst target, from when it was found where a search for it is expected.
+
+    Where a loss is expected and no error with it, that of the time without losses is judged.
+    """
+    rmse_m, lost_s, kept_m = figures.target_rmse_m, figures.target_lost_s, None
+    found = [one for one in figures.found.values() if one is not None]
+    if found and len(found) == len(figures.found):
+        kept_m = max(one.kept_rmse_m for one in found)
+        if expected.found_s is not None:
+            rmse_m, lost_s = max(one.rmse_m for one in found), max(one.lost_s for one in found)
+            yield _expected("target_found_s", max(one.found_s for one in found), 0.0, expected.found_s, expected.by)
+    elif expected.found_s is not None:
+        yield Criterion("target_found_s", None, "<=", expected.found_s, ok=False, why="never found", by=expected.by)
+    may_be_lost = expected.found_s is not None or (expected.lost_s or 0.0) > MAX_TARGET_LOST_S
+    if may_be_lost and expected.rmse_m is None:
+        yield _below("target_kept_rmse_m", kept_m, MAX_TARGET_RMSE_M)
+    else:
+        yield _expected("target_rmse_m", rmse_m, MAX_TARGET_RMSE_M, expected.rmse_m, expected.by)
+    yield _expected("target_lost_s", lost_s, MAX_TARGET_LOST_S, expected.lost_s, expected.by)
 
 
 def _landed(figures: RunFigures) -> Criterion:
@@ -94,10 +121,19 @@ def _promises(figures: RunFigures, facts: RunFacts) -> Iterator[Criterion]:
         yield _below("command_to_airborne_s", figures.command_to_airborne_s, limit)
 
 
-def _of_failsafes(figures: RunFigures) -> Criterion:
-    """A flight that a failsafe ended may be a good test of the failsafe; it is no flight as it should be."""
-    found = figures.failsafe_landings
-    return Criterion("failsafe_landings", float(len(found)), "==", 0.0, not found, "; ".join(found))
+def _of_failsafes(figures: RunFigures, expected: Expectation) -> Criterion:
+    """A flight that a failsafe ended may be a good test of the failsafe; unless it was expected, it is no good one."""
+    found, most, why = figures.failsafe_landings, expected.landings, "; ".join(figures.failsafe_landings)
+    if most:
+        ok = len(found) <= most
+        return Criterion("failsafe_landings", float(len(found)), "<=", float(most), ok, why, expected.by)
+    return Criterion("failsafe_landings", float(len(found)), "==", 0.0, not found, why)
+
+
+def _expected(name: str, value: float | None, usual: float, expected: float | None, by: str) -> Criterion:
+    """Judge by the larger one of the usual limit and what is expected: never stricter than without a scenario."""
+    limit = usual if expected is None else max(usual, expected)
+    return Criterion(name, value, "<=", limit, value is not None and value <= limit, by=by if limit > usual else "")
 
 
 def _below(name: str, value: float | None, limit: float) -> Criterion:

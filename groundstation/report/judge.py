@@ -9,7 +9,9 @@ import msgspec
 from groundstation.recording.part_names import shown
 from groundstation.recording.rerun import Rerun
 from groundstation.recording.stretch import Stretch
+from groundstation.report import run_facts
 from groundstation.report.criteria import Criterion, criteria_of, is_valid
+from groundstation.report.expectation import expectation_of
 from groundstation.report.findings import Findings, findings_of
 from groundstation.report.metrics import RunFigures, figures_of
 from groundstation.report.run_facts import RunFacts
@@ -91,6 +93,7 @@ def judge(data: RunData, run_dir: Path) -> RunReport:
     figures = figures_of(data)
     is_flight = data.rerun is None and data.stretch is None
     criteria = tuple(criteria_of(figures, data.resolved, data.facts)) if is_flight else ()
+    unread = expectation_of(data.facts)[1] if is_flight else ""
     return RunReport(
         run_dir=run_dir,
         facts=data.facts,
@@ -98,7 +101,7 @@ def judge(data: RunData, run_dir: Path) -> RunReport:
         criteria=criteria,
         findings=findings_of(data),
         valid=is_valid(figures),
-        damage=tuple(data.damage[:_DAMAGE_LINES]),
+        damage=(*([f"{run_facts.NAME}: {unread}"] if unread else []), *data.damage[:_DAMAGE_LINES]),
         rerun=data.rerun,
         stretch=data.stretch,
     )

@@ -6,8 +6,9 @@ import msgspec
 import numpy as np
 
 from groundstation.bus.messages import Severity, Verdict
+from groundstation.estimation.tracking_errors import TrackingFigures, tracking_figures
 from groundstation.report import load, safety, topology_use
-from groundstation.report.accuracy import Accuracy, accuracy, time_grid
+from groundstation.report.accuracy import RATE_HZ, Accuracy, accuracy, errors_at, time_grid
 from groundstation.report.happenings import happenings, landings
 from groundstation.report.interval import tracking_interval
 from groundstation.report.tracks import RunData
@@ -16,7 +17,8 @@ from groundstation.report.tracks import RunData
 class RunFigures(msgspec.Struct, frozen=True, kw_only=True):
     """What report.json says of a run; None where there was nothing to measure.
 
-    target_*: of several targets, those of the worst; target: all figures of the one with the largest error.
+    target_*: of several targets, those of the worst; target: all figures of the one with the largest error; found: of
+    each target from when it was found, None where it never was.
     failsafe_landings: which drones a failsafe landed or cut, when and why. truth: what the errors are measured against,
     a motion capture system of the field or the simulator, "" for nothing.
     """
@@ -26,6 +28,7 @@ class RunFigures(msgspec.Struct, frozen=True, kw_only=True):
     target_lost_s: float | None
     target: Accuracy | None
     targets: dict[str, Accuracy] = {}
+    found: dict[str, TrackingFigures | None] = {}
     robots: dict[str, Accuracy]
     max_fence_violation_m: float | None
     min_separation_m: float | None
@@ -69,6 +72,7 @@ def figures_of(data: RunData) -> RunFigures:
         target_lost_s=max((one.lost_s for one in targets.values()), default=None),
         target=target,
         targets=targets,
+        found={name: _found(data, name, start, end) for name in targets},
         robots=robots,
         max_fence_violation_m=safety.max_fence_violation_m(data),
         min_separation_m=safety.min_separation_m(data),
@@ -112,6 +116,13 @@ def _accuracies(data: RunData, interval: tuple[float, float] | None) -> tuple[di
         if truth is not None and (found := accuracy(flying, truth, data.estimates.get(name), 3)) is not None:
             robots[name] = found
     return targets, robots
+
+
+def _found(data: RunData, name: str, start: float, end: float) -> TrackingFigures | None:
+    """Return the figures of a target from when it was found, over the times at which its truth is known."""
+    truth, grid = data.truth[name], time_grid(start, end)
+    errors = errors_at(grid[truth.known_at(grid)], truth, data.estimates.get(name), 2)
+    return tracking_figures(np.linalg.norm(errors, axis=1), 1.0 / RATE_HZ)
 
 
 def _command_to_airborne_s(data: RunData) -> float | None:

@@ -1,6 +1,7 @@
 """What only the command that started a run knows of it; written to `run.json` beside the recording."""
 
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
@@ -12,7 +13,8 @@ class RunFacts(msgspec.Struct, frozen=True, omit_defaults=True):
 
     mode: demo, sitl or fly; command_unix_ns: when the operator gave the command (0 = unknown); tracking_s: time of
     tracking asked for; kernels_lacked: whether they had to be compiled first, once per version; real: what of a
-    simulated run was not emulated; command: what was typed, without passwords.
+    simulated run was not emulated; command: what was typed, without passwords; expected: what the scenario's file said
+    of it, as it stood there (`report/expectation.py` reads it).
     """
 
     mode: str = ""
@@ -24,6 +26,7 @@ class RunFacts(msgspec.Struct, frozen=True, omit_defaults=True):
     kernels_lacked: bool = False
     real: tuple[str, ...] = ()
     command: str = ""
+    expected: Any = None
 
 
 def write(run_dir: Path, facts: RunFacts) -> None:

@@ -9,6 +9,8 @@ _BOUNDS = {"<=": "at most", "<": "below", ">=": "at least", ">": "more than"}
 _TITLES = {
     "target_rmse_m": ("target error (rms)", "m"),
     "target_lost_s": ("target lost", "s"),
+    "target_found_s": ("target found after", "s"),
+    "target_kept_rmse_m": ("target error (rms) while it was not lost", "m"),
     "target_judged": ("share of the time with a truth of the target", ""),
     "max_fence_violation_m": ("beyond the fence", "m"),
     "min_separation_m": ("least separation", "m"),
@@ -57,9 +59,9 @@ def quantity(name: str, value: Value) -> str:
 
 
 def bound(criterion: Criterion) -> str:
-    """Return what a criterion asks for: "at most 0.2 m", "0" or "yes"."""
+    """Return what a criterion asks for, and who does unless it always does: "at most 0.2 m", "0" or "yes"."""
     limit = quantity(criterion.name, criterion.limit)
-    return f"{_BOUNDS.get(criterion.relation, '')} {limit}".strip()
+    return f"{_BOUNDS.get(criterion.relation, '')} {limit}{f' by {criterion.by}' if criterion.by else ''}".strip()
 
 
 def missed(criterion: Criterion) -> str:

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from groundstation.arrays import Array, BoolArray
+from groundstation.arrays import Array
+from groundstation.estimation.tracking_errors import tracking_figures
 from sim_bridge.surroundings import ScenarioExpectation
 
-FOUND_M, LOST_M, SEPARATION_M = 0.3, 0.5, 0.6
+SEPARATION_M = 0.6
 
 
 @dataclass(slots=True)
@@ -33,27 +34,16 @@ class TrackingErrors:
         return max(found, key=lambda one: (one["found_s"] is None, one["rmse_m"] or 0.0))
 
     def _of(self, errors: Array) -> dict[str, Any]:
-        near = np.flatnonzero(errors < FOUND_M)
-        if not near.size:
+        found = tracking_figures(errors, self.period_s)
+        if found is None:
             return {"found_s": None, "rmse_m": None, "worst_m": None, "lost_s": None, "longest_loss_s": None}
-        since = errors[near[0] :]
-        known = np.where(np.isfinite(since), since, 2.0 * LOST_M)
-        lost = known > LOST_M
         return {
-            "found_s": round(float(near[0]) * self.period_s, 2),
-            "rmse_m": round(float(np.sqrt(np.mean(known**2))), 4),
-            "worst_m": round(float(known.max()), 3),
-            "lost_s": round(float(lost.sum()) * self.period_s, 2),
-            "longest_loss_s": round(_longest(lost) * self.period_s, 2),
+            "found_s": round(found.found_s, 2),
+            "rmse_m": round(found.rmse_m, 4),
+            "worst_m": round(found.worst_m, 3),
+            "lost_s": round(found.lost_s, 2),
+            "longest_loss_s": round(found.longest_loss_s, 2),
         }
-
-
-def _longest(lost: BoolArray) -> int:
-    longest = run = 0
-    for now in lost.tolist():
-        run = run + 1 if now else 0
-        longest = max(longest, run)
-    return longest
 
 
 def shortfalls(figures: Mapping[str, Any], expected: ScenarioExpectation) -> list[str]:

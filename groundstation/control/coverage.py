@@ -1,18 +1,20 @@
 """Sweeps from which a team sees most of where a lost target may be, soonest: robots turn while they fly somewhere."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import permutations
+from typing import TypeVar
 
 import numpy as np
 
-from groundstation.arrays import Array, BoolArray, IntVector
+from groundstation.arrays import Array, BoolArray, IntArray, IntVector
 from groundstation.control.search_parameters import SearchParameters
 from groundstation.control.stand import Stand
 from groundstation.estimation.room_map import RoomGrid
 from groundstation.sensing.footprint import HEADINGS, Footprint, seen_from
 
+Searcher = TypeVar("Searcher")
 _ANY_ORDER = 3  # of so many robots any may choose first
 _STEP_RAD = math.tau / HEADINGS
 # Views of a sweep that count: the next 300 degrees, about 6.5 s.
@@ -24,11 +26,27 @@ _LEAD_RAD = 0.5 * math.pi
 
 @dataclass(frozen=True, slots=True)
 class Lattice:
-    """The stands that are considered, a rectangle by rows: their cells, and their places (n, 2) [m; world]."""
+    """The stands that are considered, a rectangle by rows: their cells, and their places (n, 2) [m; world].
+
+    cell_m: side of a cell.
+    """
 
     rows: IntVector
     columns: IntVector
     places: Array
+    cell_m: float
+
+    def nearest(self, places: Array) -> IntVector:
+        """Return the stand nearest to each place (..., 2)."""
+        xs, ys = np.unique(self.places[:, 0]), np.unique(self.places[:, 1])
+        column = np.abs(places[..., :1] - xs).argmin(axis=-1)
+        row = np.abs(places[..., 1:] - ys).argmin(axis=-1)
+        return np.asarray(row * len(xs) + column, dtype=np.int64)
+
+    def cells(self, places: Array) -> tuple[IntArray, IntArray]:
+        """Return row and column of the cell of each place (..., 2)."""
+        offset = np.rint((places - self.places[0]) / self.cell_m).astype(np.int64)
+        return self.rows[0] + offset[..., 1], self.columns[0] + offset[..., 0]
 
 
 def lattice_of(grid: RoomGrid, parameters: SearchParameters) -> Lattice:
@@ -42,7 +60,7 @@ def lattice_of(grid: RoomGrid, parameters: SearchParameters) -> Lattice:
     ]
     rows, columns, xs, ys = zip(*cells, strict=True) if cells else ((), (), (), ())
     places = np.array([xs, ys], dtype=np.float64).T
-    return Lattice(np.array(rows, dtype=np.int64), np.array(columns, dtype=np.int64), places)
+    return Lattice(np.array(rows, dtype=np.int64), np.array(columns, dtype=np.int64), places, grid.cell_m)
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,10 +109,13 @@ def choose_stands(
         name: _searcher(footprint, lattice, poses[name], allowed_s[name], held.get(name), parameters)
         for name, footprint in footprints.items()
     }
+    return in_best_order(searchers, lambda ordered: _chosen(np.array(chances), lattice, ordered, parameters))
+
+
+def in_best_order(searchers: Mapping[str, Searcher], chosen: Callable[[Mapping[str, Searcher]], Outlook]) -> Outlook:
+    """Return what robots choose that choose in the best order; of more than three: in the order given."""
     orders = permutations(searchers) if len(searchers) <= _ANY_ORDER else (tuple(searchers),)
-    outlooks = [
-        _chosen(np.array(chances), lattice, {name: searchers[name] for name in order}, parameters) for order in orders
-    ]
+    outlooks = [chosen({name: searchers[name] for name in order}) for order in orders]
     return max(outlooks, key=lambda outlook: outlook.value)
 
 
@@ -129,7 +150,7 @@ def _searcher(
     flight_s = np.hypot(*ways.T) / parameters.speed_m_s
     free = flight_s + parameters.look_s <= allowed_s
     share = np.minimum(1.0, _times_s(parameters) / np.maximum(flight_s, 1e-9)[:, None])
-    at = _nearest(pose[:2] + share[:, :, None] * ways[:, None, :], lattice)
+    at = lattice.nearest(pose[:2] + share[:, :, None] * ways[:, None, :])
     yaw_rad = float(pose[3])
     return _Searcher(footprint, yaw_rad, at, round(yaw_rad / _STEP_RAD), free, held)
 
@@ -167,14 +188,6 @@ def _chosen(left: Array, lattice: Lattice, searchers: Mapping[str, _Searcher], p
 def _times_s(parameters: SearchParameters) -> Array:
     """Return when the views of a sweep are seen [s]."""
     return np.arange(1.0, _VIEWS + 1) * (_STEP_RAD / parameters.yaw_rate_rad_s)
-
-
-def _nearest(places: Array, lattice: Lattice) -> IntVector:
-    """Return the stand nearest to each place (..., 2)."""
-    xs, ys = np.unique(lattice.places[:, 0]), np.unique(lattice.places[:, 1])
-    column = np.abs(places[..., :1] - xs).argmin(axis=-1)
-    row = np.abs(places[..., 1:] - ys).argmin(axis=-1)
-    return np.asarray(row * len(xs) + column, dtype=np.int64)
 
 
 def _take(left: Array, lattice: Lattice, footprint: Footprint, stand: int, heading: int) -> None:

@@ -12,6 +12,7 @@ from groundstation.bus.messages import RelativeObservation, SearchedPicture
 from groundstation.control.coverage import NO_OUTLOOK, Outlook, choose_stands, lattice_of, robots_in_order
 from groundstation.control.excursion import Excursions
 from groundstation.control.parameters import ControlParameters
+from groundstation.control.pursuit import choose_pursuit
 from groundstation.control.search_parameters import SearchParameters
 from groundstation.control.search_ranges import searching_cameras
 from groundstation.control.stand import Stand
@@ -152,9 +153,10 @@ class Search:
         footprints = {name: self._footprints[name] for name in order}
         allowed_s = {name: self._excursions.allowed_s(name, belief, self._lattice.places) for name in robots}
         held, parameters = self._outlook.sweeps, self.parameters
+        choose = choose_stands
         if all(self.targets[name].near for name in targets):
-            parameters = replace(parameters, yaw_rate_rad_s=parameters.near_yaw_rate_rad_s)
-        return choose_stands(chances, self._lattice, footprints, poses, allowed_s, held, parameters)
+            choose, parameters = choose_pursuit, replace(parameters, yaw_rate_rad_s=parameters.near_yaw_rate_rad_s)
+        return choose(chances, self._lattice, footprints, poses, allowed_s, held, parameters)
 
     def _begun(self, name: str, state: SearchState, belief: JointBelief, age_s: float) -> SearchState:
         p, now_ns = self.parameters, belief.stamp_ns

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from groundstation.arrays import IntVector, Matrix, Vector
+from groundstation.arrays import IntMatrix, IntVector, Matrix, Vector
 from groundstation.kernel import kernel
 from groundstation.sensing.detection import detection_map
 from groundstation.sensing.models import OnboardCameraModel, Softness
@@ -76,3 +76,41 @@ def seen_from(
                     total += chances[row, column] * seen[k]
             found[stand, heading] = total
     return found
+
+
+@kernel()
+def swept(
+    chances: Matrix, at_row: IntMatrix, at_column: IntMatrix, headings: IntMatrix, worth: Vector,
+    rows: IntVector, columns: IntVector, seen: Vector, first: IntVector,
+) -> tuple[Matrix, Matrix]:  # fmt: skip
+    """Return what pictures show on each way (n, views: its cells) turned in each manner (m, views: headings): (n, m).
+
+    First the sum of the chances to see the target, each times what its view is worth, then without that. What one view
+    shows counts as seen for the next. rows, columns, seen, first: of a footprint.
+    """
+    views, most = at_row.shape[1], 0
+    for heading in range(first.shape[0] - 1):
+        most = max(most, first[heading + 1] - first[heading])
+    left = chances.copy()
+    changed = np.empty((views * most, 2), dtype=np.int64)
+    value = np.zeros((at_row.shape[0], headings.shape[0]))
+    found = np.zeros((at_row.shape[0], headings.shape[0]))
+    for way in range(at_row.shape[0]):
+        for manner in range(headings.shape[0]):
+            count = 0
+            for view in range(views):
+                heading, total = headings[manner, view], 0.0
+                for k in range(first[heading], first[heading + 1]):
+                    row, column = at_row[way, view] + rows[k], at_column[way, view] + columns[k]
+                    if 0 <= row < left.shape[0] and 0 <= column < left.shape[1]:
+                        gain = left[row, column] * seen[k]
+                        left[row, column] -= gain
+                        total += gain
+                        changed[count, 0], changed[count, 1] = row, column
+                        count += 1
+                value[way, manner] += worth[view] * total
+                found[way, manner] += total
+            for k in range(count):
+                row, column = changed[k, 0], changed[k, 1]
+                left[row, column] = chances[row, column]
+    return value, found

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from groundstation.sensing.detection import FOUND_SHARE, detection, detection_map
-from groundstation.sensing.footprint import HEADINGS, footprint_of, seen_from
+from groundstation.sensing.footprint import HEADINGS, footprint_of, seen_from, swept
 from groundstation.sensing.from_field import sensors_from_field
 from groundstation.sensing.visibility import camera_rows
 from groundstation.settings.load import load_field
@@ -61,6 +61,18 @@ def test_a_footprint_turns_with_the_heading_and_agrees_with_the_map() -> None:
         row, column = (int(v) for v in np.argwhere(there == there.max())[0])
         assert math.hypot(xs[column], xs[row]) > 0.5
         assert math.cos(math.atan2(xs[row], xs[column]) - pose[3]) > 0.8
+
+
+def test_what_one_view_of_a_sweep_shows_counts_as_seen_for_the_next() -> None:
+    print_, chances = footprint_of(ONBOARD, 0.2, 1.45, 0.4, SENSORS.softness), np.full((41, 41), 1.0)
+    before, cells = chances.copy(), (print_.rows, print_.columns, print_.chances, print_.first)
+    at, turns = np.full((1, 2), 20, dtype=np.int64), np.array([[3, 3], [3, 4], [3, 9]], dtype=np.int64)
+    value, found = swept(chances, at, at, turns, np.array([1.0, 0.5]), *cells)
+    once = print_.chances[print_.first[3] : print_.first[4]]
+    assert found[0, 0] == pytest.approx(once.sum() + (once * (1.0 - once)).sum())
+    assert value[0, 0] == pytest.approx(once.sum() + 0.5 * (once * (1.0 - once)).sum())
+    assert found[0, 0] < found[0, 1] < found[0, 2], "the same again, the one beside it, the opposite one"
+    assert (chances == before).all()
 
 
 def test_the_largest_marker_must_be_in_the_picture_and_the_smallest_be_read() -> None:

@@ -109,7 +109,7 @@ def _chosen(left: Array, lattice: Lattice, searchers: Mapping[str, _Searcher], p
         if not compared.size:
             continue
         footprint, rows, columns = searcher.footprint, searcher.rows[compared], searcher.columns[compared]
-        cells = (footprint.rows, footprint.columns, searcher.seen, footprint.first)
+        cells = (np.stack((footprint.rows, footprint.columns)), searcher.seen, footprint.first)
         value, found = swept(left, rows, columns, searcher.headings, worth, *cells)
         if searcher.kept is not None:
             value[compared == searcher.kept.stand, _DIRECTIONS.index(searcher.kept.direction)] *= parameters.keep_gain

@@ -81,12 +81,12 @@ def seen_from(
 @kernel()
 def swept(
     chances: Matrix, at_row: IntMatrix, at_column: IntMatrix, headings: IntMatrix, worth: Vector,
-    rows: IntVector, columns: IntVector, seen: Vector, first: IntVector,
+    cells: IntMatrix, seen: Vector, first: IntVector,
 ) -> tuple[Matrix, Matrix]:  # fmt: skip
     """Return what pictures show on each way (n, views: its cells) turned in each manner (m, views: headings): (n, m).
 
     First the sum of the chances to see the target, each times what its view is worth, then without that. What one view
-    shows counts as seen for the next. rows, columns, seen, first: of a footprint.
+    shows counts as seen for the next. cells (2, k: row, column), seen, first: of a footprint.
     """
     views, most = at_row.shape[1], 0
     for heading in range(first.shape[0] - 1):
@@ -101,7 +101,7 @@ def swept(
             for view in range(views):
                 heading, total = headings[manner, view], 0.0
                 for k in range(first[heading], first[heading + 1]):
-                    row, column = at_row[way, view] + rows[k], at_column[way, view] + columns[k]
+                    row, column = at_row[way, view] + cells[0, k], at_column[way, view] + cells[1, k]
                     if 0 <= row < left.shape[0] and 0 <= column < left.shape[1]:
                         gain = left[row, column] * seen[k]
                         left[row, column] -= gain

@@ -1,6 +1,7 @@
 """Loops around the filter's own kernels, so that they can be timed without the cost of a call from Python."""
 
 from groundstation.arrays import IntVector
+from groundstation.estimation.deferred import make_all
 from groundstation.estimation.filter_state import Belief, State, Tables, belief_of
 from groundstation.estimation.model_kernels import call_handle
 from groundstation.estimation.models.camera import measure_relative_pose
@@ -21,9 +22,10 @@ def predict_often(state: State, tables: Tables, dt: float, times: int) -> None:
 def correct_frame(
     event_kernels: IntVector, state: State, tables: Tables, events: Rows[EventRow], outcomes: Rows[OutcomeRow]
 ) -> None:
-    """Take all observations of one frame: gate, correction and outcome, as in flight."""
+    """Take all observations of one frame: gate, corrections and outcomes, as in flight."""
     for i in range(events.shape[0]):
         call_handle(event_kernels[events[i].kind], (state, tables, events[i], outcomes[i]))
+    make_all(state)
 
 
 @kernel()

@@ -1,8 +1,8 @@
 """One correction of the joint belief by a measurement of up to four rows that touches two blocks of the state.
 
-P - (L^-1 H P)^T (L^-1 H P) with S = L L^T: Joseph's form less a square of rounding errors (see `apply`). P stays
-symmetric to the bit, and positive definite because R is never below what double precision tells from an exact
-measurement.
+P - (L^-1 H P)^T (L^-1 H P) with S = L L^T: Joseph's form less a square of rounding errors (see `apply`), made when P is
+needed (deferred.py). P stays symmetric to the bit, and positive definite because R is never below what double precision
+tells from an exact measurement.
 """
 
 import math
@@ -10,57 +10,53 @@ from typing import NamedTuple
 
 import numpy as np
 
-from groundstation.arrays import Matrix, Vector
-from groundstation.estimation.filter_state import Belief
+from groundstation.arrays import IntVector, Matrix, Vector
+from groundstation.estimation.deferred import count_in, put_off
+from groundstation.estimation.filter_state import Belief, Deferred
 from groundstation.estimation.linear import cholesky
-from groundstation.estimation.records import EntityRow, Innovation
+from groundstation.estimation.records import MAX_ROWS, EntityRow, Innovation
+from groundstation.estimation.register_blocks import add_rows
 from groundstation.kernel import kernel
 
 
-class Touched(NamedTuple):
-    """A block of the state and the Jacobian (rows, block) of a measurement by it."""
+class Jacobian(NamedTuple):
+    """The columns of a measurement's Jacobian that are not zero: F (4, count of them), and where they stand: `at`."""
 
-    start: int
-    size: int
-    H: Matrix
-
-
-@kernel(inlined=True)
-def touched(entity: EntityRow, H: Matrix) -> Touched:
-    """Return an entity's block with the Jacobian by it."""
-    return Touched(entity.start, entity.size, H)
+    F: Matrix
+    at: IntVector
 
 
 @kernel(inlined=True)
-def project(P: Matrix, a: Touched, b: Touched, rows: int, W: Matrix) -> None:
-    """Write H P (rows, n) into W, H being zero outside blocks a and b."""
-    n = P.shape[0]
-    for i in range(rows):
-        for j in range(n):
+def gather(block: EntityRow, H: Matrix, found: Jacobian, count: int) -> int:
+    """Add the columns of H (4, block) that are not zero to those that were found; returns how many there are."""
+    for k in range(block.size):
+        if H[0, k] != 0.0 or H[1, k] != 0.0 or H[2, k] != 0.0 or H[3, k] != 0.0:
+            found.at[count] = block.start + k
+            for i in range(MAX_ROWS):
+                found.F[i, count] = H[i, k]
+            count += 1
+    return count
+
+
+@kernel(inlined=True)
+def project(belief: Belief, deferred: Deferred, jacobian: Jacobian, count: int, W: Matrix) -> None:
+    """Write H P into W (4, n)."""
+    for i in range(W.shape[0]):
+        for j in range(W.shape[1]):
             W[i, j] = 0.0
-        for k in range(a.size):
-            f = a.H[i, k]
-            if f != 0.0:
-                for j in range(n):
-                    W[i, j] += f * P[a.start + k, j]
-        for k in range(b.size):
-            f = b.H[i, k]
-            if f != 0.0:
-                for j in range(n):
-                    W[i, j] += f * P[b.start + k, j]
+    add_rows(W, jacobian.F, belief.P, jacobian.at, count)
+    count_in(W, jacobian.F, jacobian.at, count, deferred)
 
 
 @kernel(inlined=True)
-def project_columns(A: Matrix, a: Touched, b: Touched, rows: int, B: Matrix) -> None:
-    """Write H A^T (rows, m) into B for A (m, n): the projection of each row of A."""
+def project_columns(W: Matrix, jacobian: Jacobian, count: int, rows: int, HPH: Matrix) -> None:
+    """Write H W^T, that is H P H^T, for W = H P."""
     for i in range(rows):
-        for j in range(A.shape[0]):
+        for j in range(rows):
             value = 0.0
-            for k in range(a.size):
-                value += a.H[i, k] * A[j, a.start + k]
-            for k in range(b.size):
-                value += b.H[i, k] * A[j, b.start + k]
-            B[i, j] = value
+            for k in range(count):
+                value += jacobian.F[i, k] * W[j, jacobian.at[k]]
+            HPH[i, j] = value
 
 
 # Double precision cannot tell a measurement that is this much better than what was known from an exact one.
@@ -110,53 +106,15 @@ def inflate(HPH: Matrix, R: Matrix, rows: int, factor: float) -> None:
             R[i, j] = factor * R[i, j] + (factor - 1.0) * 0.5 * (HPH[i, j] + HPH[j, i])
 
 
-@kernel()
-def subtract_two(P: Matrix, V: Matrix) -> None:
-    """Subtract V^T V from P for two rows, in one pass and symmetric to the bit."""
-    V_0, V_1 = V[0], V[1]
-    for a in range(P.shape[0]):
-        row, v_0, v_1 = P[a], V_0[a], V_1[a]
-        for j in range(P.shape[0]):
-            row[j] -= v_0 * V_0[j] + v_1 * V_1[j]
-
-
 @kernel(inlined=True)
-def subtract_four(P: Matrix, V: Matrix) -> None:
-    """Subtract V^T V from P for the first four rows of V, in one pass and symmetric to the bit.
-
-    Four rows of P at a time share what is loaded of V: nearly half of a correction's time is spent here. The fifth row
-    of V is room for rows beyond the last of P.
-    """
-    n = P.shape[0]
-    V_0, V_1, V_2, V_3 = V[0], V[1], V[2], V[3]
-    spare = V[4]
-    for a in range(0, n, 4):
-        b, c, d = min(a + 1, n - 1), min(a + 2, n - 1), min(a + 3, n - 1)
-        p = P[a]
-        q = P[b] if b == a + 1 else spare
-        r = P[c] if c == a + 2 else spare
-        t = P[d] if d == a + 3 else spare
-        e_0, e_1, e_2, e_3 = V_0[a], V_1[a], V_2[a], V_3[a]
-        f_0, f_1, f_2, f_3 = V_0[b], V_1[b], V_2[b], V_3[b]
-        g_0, g_1, g_2, g_3 = V_0[c], V_1[c], V_2[c], V_3[c]
-        h_0, h_1, h_2, h_3 = V_0[d], V_1[d], V_2[d], V_3[d]
-        for j in range(n):
-            v_0, v_1, v_2, v_3 = V_0[j], V_1[j], V_2[j], V_3[j]
-            p[j] -= (e_0 * v_0 + e_1 * v_1) + (e_2 * v_2 + e_3 * v_3)
-            q[j] -= (f_0 * v_0 + f_1 * v_1) + (f_2 * v_2 + f_3 * v_3)
-            r[j] -= (g_0 * v_0 + g_1 * v_1) + (g_2 * v_2 + g_3 * v_3)
-            t[j] -= (h_0 * v_0 + h_1 * v_1) + (h_2 * v_2 + h_3 * v_3)
-
-
-@kernel(inlined=True)
-def apply(mean: Vector, P: Matrix, rows: int, W: Matrix, factor: Matrix, y: Vector) -> None:
-    """Correct mean and P in place, given W = H P (4, n) and the Cholesky factor L of S.
+def apply(mean: Vector, P: Matrix, deferred: Deferred, rows: int, W: Matrix, factor: Matrix, y: Vector) -> None:
+    """Correct the mean, and put the correction of P off, given W = H P (4, n) and the Cholesky factor L of S.
 
     Joseph's form (I - K H) P (I - K H)^T + K R K^T, multiplied out with V = L^-1 W and U = L^T K, is
     P - V^T V + (U - V)^T (U - V). U - V is what rounding did to the gain (1e-16 of V): its square is left out.
     """
-    n = P.shape[0]
-    V, u = np.zeros((5, n)), np.empty(4)
+    n, first, u = P.shape[0], put_off(P, deferred, rows), np.empty(4)
+    V = deferred.V[first : first + rows]
     for i in range(rows):
         u[i] = y[i]
         for j in range(n):
@@ -171,10 +129,6 @@ def apply(mean: Vector, P: Matrix, rows: int, W: Matrix, factor: Matrix, y: Vect
         for j in range(n):
             V[i, j] *= d
             mean[j] += V[i, j] * u[i]
-    if rows > 2:
-        subtract_four(P, V)
-    else:
-        subtract_two(P, V)
 
 
 @kernel()

@@ -6,7 +6,7 @@ import numpy as np
 
 from groundstation.arrays import Matrix, Vector
 from groundstation.estimation.correction import log_determinant
-from groundstation.estimation.filter_state import Hypothesis, State, Tables, belief_of
+from groundstation.estimation.filter_state import Hypothesis, State, Tables, belief_of, deferred_of
 from groundstation.estimation.linear import copy_matrix
 from groundstation.estimation.records import EventRow, Innovation
 from groundstation.estimation.update import linearise
@@ -27,7 +27,8 @@ def confront(state: State, tables: Tables, event: EventRow, rows: int, hypothesi
     scores, best = np.empty(modes), -math.inf
     for m in range(modes):
         innovation = hypothesis.innovations[m]
-        linearise(belief_of(state, tables, m), sensor, event, rows, hypothesis.z, innovation, hypothesis.HP[m])
+        belief, deferred = belief_of(state, tables, m), deferred_of(state, m)
+        linearise(belief, deferred, sensor, event, rows, hypothesis.z, innovation, hypothesis.HP[m])
         scores[m] = -math.inf
         if innovation.nis >= 0.0:
             scores[m] = math.log(max(state.weights[m], 1e-300)) - 0.5 * (

@@ -5,7 +5,7 @@ m modes (joint beliefs that are kept side by side), n entries of the state, e en
 
 from typing import NamedTuple
 
-from groundstation.arrays import IntVector, Matrix, MatrixStack, MatrixStacks, Vector
+from groundstation.arrays import IntMatrix, IntVector, Matrix, MatrixStack, MatrixStacks, Vector
 from groundstation.estimation.records import (
     CondensedOdometry,
     EntityMemory,
@@ -63,7 +63,8 @@ class Tables(NamedTuple):
 class State(NamedTuple):
     """State of the filter: means (m, n), covariances (m, n, n), the modes' probabilities (m), memory (e).
 
-    used_at (s, e): when a sensor's reading of a subject was last used.
+    used_at (s, e): when a sensor's reading of a subject was last used; deferred (m, r, n) with its rows in use (m, 1):
+    corrections that the covariances lack (`Deferred`).
     """
 
     means: Matrix
@@ -71,10 +72,12 @@ class State(NamedTuple):
     weights: Vector
     memory: Rows[EntityMemory]
     used_at: Matrix
+    deferred: MatrixStack
+    deferred_used: IntMatrix
 
 
 class Checkpoints(NamedTuple):
-    """The state at the beginning of each step, in a ring (r, ...)."""
+    """The state at the beginning of each step, in a ring (r, ...); no correction is put off then."""
 
     means: MatrixStack
     covariances: MatrixStacks
@@ -117,6 +120,13 @@ class Belief(NamedTuple):
     memory: Rows[EntityMemory]
 
 
+class Deferred(NamedTuple):
+    """Corrections of one mode's covariance, which is P - V^T V for the first `used` (1) rows of V (r, n)."""
+
+    V: Matrix
+    used: IntVector
+
+
 class Hypothesis(NamedTuple):
     """One reading of an observation: z (4), R (4, 4) with the sensor's noise; its innovation (m) and H P by mode."""
 
@@ -130,3 +140,9 @@ class Hypothesis(NamedTuple):
 def belief_of(state: State, tables: Tables, m: int) -> Belief:
     """Return the belief of one mode, by reference."""
     return Belief(state.means[m], state.covariances[m], tables.entities[m], state.memory)
+
+
+@kernel(inlined=True)
+def deferred_of(state: State, m: int) -> Deferred:
+    """Return the corrections that one mode's covariance lacks, by reference."""
+    return Deferred(state.deferred[m], state.deferred_used[m])

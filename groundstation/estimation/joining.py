@@ -93,11 +93,20 @@ def note_joining(memory: EntityMemory) -> None:
 def admit(state: State, tables: Tables, event: EventRow, rows: int, hypothesis: Hypothesis) -> int:
     """Let the subject join and prepare the innovations for `correct`; or return why not, the belief unchanged.
 
+    No correction is put off when it is called.
     CONTRADICTED: the surplus lies beyond the gate. After enough of these in a row the subject joins all the same
     (INFLATED), with R raised until the surplus lies on the gate.
     """
     memory, settings = state.memory[event.subject], tables.settings
-    trial = State(state.means.copy(), state.covariances.copy(), state.weights, state.memory, state.used_at)
+    trial = State(
+        state.means.copy(),
+        state.covariances.copy(),
+        state.weights,
+        state.memory,
+        state.used_at,
+        state.deferred,
+        state.deferred_used,
+    )
     if not settle(trial, tables, event, hypothesis.z):
         return NOT_LOCATED
     confront(trial, tables, event, rows, hypothesis)

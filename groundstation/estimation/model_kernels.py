@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from groundstation.arrays import Matrix, Vector
-from groundstation.estimation.filter_state import Belief, State, Tables
+from groundstation.estimation.filter_state import Belief, Deferred, State, Tables
 from groundstation.estimation.records import CondensedOdometry, EventRow, OutcomeRow, Prediction, SensorRow
 from groundstation.kernel import caller, kernel
 
@@ -13,8 +13,8 @@ def predict(belief: Belief, e: int, dt: float) -> None:
     """Move one entity's block of the mean, and P with it."""
 
 
-def begin(belief: Belief, odometry: CondensedOdometry, e: int, step_s: float, gate: float) -> None:
-    """Take one step's condensed odometry of one entity; gate: of a single row."""
+def begin(belief: Belief, deferred: Deferred, odometry: CondensedOdometry, e: int, step_s: float, gate: float) -> None:
+    """Take one step's condensed odometry of one entity; gate: of a single row; deferred: what P lacks so far."""
 
 
 def measure(belief: Belief, sensor: SensorRow, event: EventRow, out: Prediction) -> None:
@@ -22,7 +22,10 @@ def measure(belief: Belief, sensor: SensorRow, event: EventRow, out: Prediction)
 
 
 def prepare(belief: Belief, sensor: SensorRow, event: EventRow, z: Vector, R: Matrix) -> int:
-    """Add the sensor's own noise to R; return how many rows of z are used, or minus a verdict."""
+    """Add the sensor's own noise to R; return how many rows of z are used, or minus a verdict.
+
+    P lacks the observations of the same instant (deferred.py), but not where an entity reports its own motion.
+    """
     raise NotImplementedError
 
 
@@ -59,7 +62,7 @@ class MotionKernels(NamedTuple):
     """The kernels of a motion model; None where it does nothing."""
 
     predict: Callable[[Belief, int, float], None] | None = None
-    begin: Callable[[Belief, CondensedOdometry, int, float, float], None] | None = None
+    begin: Callable[[Belief, Deferred, CondensedOdometry, int, float, float], None] | None = None
 
 
 class SensorKernels(NamedTuple):

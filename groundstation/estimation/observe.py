@@ -7,8 +7,9 @@ import math
 
 import numpy as np
 
+from groundstation.estimation.deferred import make_all, variance_of
 from groundstation.estimation.evidence import confront, least_nis, likeliest, set_noise, weigh
-from groundstation.estimation.filter_state import Belief, Hypothesis, State, Tables, belief_of
+from groundstation.estimation.filter_state import Belief, Deferred, Hypothesis, State, Tables, belief_of, deferred_of
 from groundstation.estimation.joining import admit
 from groundstation.estimation.motion import clear, enter, join
 from groundstation.estimation.outliers import blame, doubt_velocity, forget_lie, note_given_up
@@ -74,12 +75,13 @@ def choose(
 
 
 @kernel(inlined=True)
-def note_place(belief: Belief, e: int) -> None:
+def note_place(belief: Belief, deferred: Deferred, e: int) -> None:
     """Note how well a robot's or target's place is known right after an observation of it."""
     entity = belief.entities[e]
     if entity.kind == KIND_ROBOT or entity.kind == KIND_TARGET:
         x, y = entity.start + X, entity.start + Y
-        belief.memory[e].seen_variance = max(belief.P[x, x], belief.P[y, y])
+        variance = max(variance_of(belief.P, deferred, x), variance_of(belief.P, deferred, y))
+        belief.memory[e].seen_variance = variance
 
 
 @kernel()
@@ -113,7 +115,8 @@ def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> N
         write_ahead(out, first.entities[event.subject], used.innovations[mode])
         excess = max(least_nis(used.innovations) / gate, 1.0)
         if excess > settings.wild_gates:
-            out.verdict = blame(first, sensor, settings, event, rows, used)
+            make_all(state)
+            out.verdict = blame(first, deferred_of(state, 0), sensor, settings, event, rows, used)
             if out.verdict != PENDING:
                 return
             joins = True
@@ -123,6 +126,7 @@ def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> N
             doubt_velocity(subject)
     out.verdict = INFLATED if excess > 1.0 else ACCEPTED
     if joins:
+        make_all(state)
         out.verdict = admit(state, tables, event, rows, used)
         if fresh and out.verdict == CONTRADICTED:
             write_outcome(out, used.innovations[likeliest(state.weights, used.innovations)])
@@ -133,10 +137,13 @@ def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> N
         excess, out.joined = 1.0, 1
     for m in range(modes):
         if used.innovations[m].nis >= 0.0:
-            correct(belief_of(state, tables, m), tables.headings, used.innovations[m], used.HP[m], excess)
+            belief, deferred = belief_of(state, tables, m), deferred_of(state, m)
+            correct(belief, deferred, tables.headings, used.innovations[m], used.HP[m], excess)
+    if joins:
+        make_all(state)  # a diffuse prior is so wide that nothing may be put off beside it
     weigh(state.weights, used.innovations, rows, excess)
     forget_lie(subject, event.at)
-    note_place(first, event.subject)
+    note_place(first, deferred_of(state, 0), event.subject)
     subject.corrected_at = state.used_at[event.sensor, event.subject] = event.at
 
 
@@ -159,6 +166,7 @@ def place(belief: Belief, e: int, prior: PriorRow, event: EventRow) -> None:
 @kernel()
 def change(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> None:
     """Let an entity in, out, or put it somewhere."""
+    make_all(state)
     kind, memory, prior = event.kind, state.memory[event.subject], tables.priors[event.subject]
     out.verdict = ACCEPTED
     known = memory.active != 0
@@ -178,4 +186,4 @@ def change(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> No
         memory.active = 1
         memory.wild.count = memory.refused.count = memory.unconfirmed = 0
         memory.corrected_at = event.at
-        note_place(belief_of(state, tables, 0), event.subject)
+        note_place(belief_of(state, tables, 0), deferred_of(state, 0), event.subject)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from groundstation.estimation.filter_state import Belief, Hypothesis, Settings
+from groundstation.estimation.filter_state import Belief, Deferred, Hypothesis, Settings
 from groundstation.estimation.linear import copy_matrix
 from groundstation.estimation.records import (
     IMPLAUSIBLE,
@@ -47,8 +47,9 @@ def apart_m(sensor: SensorRow, innovation: Innovation) -> float:
 
 @kernel()
 def fits_another(
-    belief: Belief, sensor: SensorRow, settings: Settings, event: EventRow, rows: int, hypothesis: Hypothesis
-) -> bool:
+    belief: Belief, deferred: Deferred, sensor: SensorRow, settings: Settings, event: EventRow, rows: int,
+    hypothesis: Hypothesis,
+) -> bool:  # fmt: skip
     """Return whether what was seen is where the belief has another robot or target: its marker was misread."""
     subject = event.subject
     work, HP = np.empty(1, _INNOVATION), np.empty((4, belief.mean.shape[0]))
@@ -62,7 +63,7 @@ def fits_another(
         shared = rows if rows < 4 or entity.at_yaw >= 0 else 3
         event.subject = other
         copy_matrix(hypothesis.innovations[0].R, work[0].R)
-        linearise(belief, sensor, event, shared, hypothesis.z, work[0], HP)
+        linearise(belief, deferred, sensor, event, shared, hypothesis.z, work[0], HP)
         fits = 0.0 <= work[0].nis <= settings.wild_gates * settings.gates[shared]
         found = found or (fits and apart_m(sensor, work[0]) <= _SAME_M)
     event.subject = subject
@@ -143,15 +144,16 @@ def forget_lie(memory: EntityMemory, at: float) -> None:
 
 @kernel()
 def blame(
-    belief: Belief, sensor: SensorRow, settings: Settings, event: EventRow, rows: int, hypothesis: Hypothesis
-) -> int:
+    belief: Belief, deferred: Deferred, sensor: SensorRow, settings: Settings, event: EventRow, rows: int,
+    hypothesis: Hypothesis,
+) -> int:  # fmt: skip
     """Return why a wild observation is refused, or PENDING when the subject's belief has to be given up for it.
 
     belief: of the first mode, as is the noise of the hypothesis that counts.
     """
     if is_doubted(belief.memory[event.observer], settings, event.at):
         return OBSERVER_DOUBTED
-    if fits_another(belief, sensor, settings, event, rows, hypothesis):
+    if fits_another(belief, deferred, sensor, settings, event, rows, hypothesis):
         return MISTAKEN
     subject, robot = belief.memory[event.subject], belief.entities[event.subject].kind == KIND_ROBOT
     confirmed = subject.unconfirmed == 0

@@ -3,6 +3,7 @@
 import numpy as np
 
 from groundstation.arrays import IntVector
+from groundstation.estimation.deferred import make_all
 from groundstation.estimation.filter_state import (
     Checkpoints,
     Inputs,
@@ -11,6 +12,7 @@ from groundstation.estimation.filter_state import (
     State,
     Tables,
     belief_of,
+    deferred_of,
 )
 from groundstation.estimation.linear import copy_matrix
 from groundstation.estimation.model_kernels import call_begin, call_handle
@@ -31,10 +33,10 @@ def begin_step(state: State, tables: Tables, odometry: Rows[CondensedOdometry]) 
     for m in range(state.means.shape[0]):
         if m > 0:
             copy_rows(before, state.memory)
-        belief = belief_of(state, tables, m)
+        belief, deferred = belief_of(state, tables, m), deferred_of(state, m)
         for e in range(belief.entities.shape[0]):
             if belief.entities[e].begin != 0:
-                call_begin(belief.entities[e].begin, (belief, odometry[e], e, step_s, gate))
+                call_begin(belief.entities[e].begin, (belief, deferred, odometry[e], e, step_s, gate))
 
 
 @kernel()
@@ -49,10 +51,11 @@ def copy_state(source: State, to: State) -> None:
 
 
 @kernel(inlined=True)
-def checkpoint(ring: Checkpoints, step: int) -> State:
-    """Return the state at the beginning of a step, by reference."""
+def checkpoint(ring: Checkpoints, step: int, state: State) -> State:
+    """Return the state at the beginning of a step, by reference; nothing is put off in `state`, and so not there."""
     k = step % ring.means.shape[0]
-    return State(ring.means[k], ring.covariances[k], ring.weights[k], ring.memory[k], ring.used_at[k])
+    means, covariances, weights, memory = ring.means[k], ring.covariances[k], ring.weights[k], ring.memory[k]
+    return State(means, covariances, weights, memory, ring.used_at[k], state.deferred, state.deferred_used)
 
 
 @kernel(inlined=True)
@@ -63,7 +66,8 @@ def is_reading(event: EventRow) -> bool:
 
 @kernel(inlined=True)
 def predict_modes(state: State, tables: Tables, dt: float) -> None:
-    """Predict all modes."""
+    """Predict all modes, after what was put off until then."""
+    make_all(state)
     for m in range(state.weights.shape[0]):
         predict(belief_of(state, tables, m), dt)
 
@@ -79,11 +83,11 @@ def replay(
     first step whose observations wait is predicted only, and has no checkpoints.
     """
     step_s, order, events = tables.settings.step_s, inputs.order, inputs.events
-    copy_state(checkpoint(ring, span.first), state)
+    copy_state(checkpoint(ring, span.first, state), state)
     i = 0
     for k in range(span.first, span.last + 1):
         if span.first < k <= span.waiting:
-            copy_state(state, checkpoint(ring, k))
+            copy_state(state, checkpoint(ring, k, state))
         mix(state, tables)
         begin_step(state, tables, inputs.odometry[k % ring.means.shape[0]])
         t = k * step_s
@@ -100,4 +104,5 @@ def replay(
             call_handle(event_kernels[events[row].kind], (state, tables, events[row], inputs.outcomes[row]))
         if end > t:
             predict_modes(state, tables, end - t)
+        make_all(state)
     combine(state, tables, out)

@@ -7,6 +7,7 @@ corrects its own entity's block and nothing else, so that a target that lies mov
 import numpy as np
 
 from groundstation.estimation.correction import apply_to_block
+from groundstation.estimation.deferred import make_all
 from groundstation.estimation.evidence import confront, least_nis, likeliest, set_noise, weigh
 from groundstation.estimation.filter_state import Hypothesis, State, Tables, belief_of
 from groundstation.estimation.linear import wrap
@@ -44,6 +45,7 @@ def heed(state: State, tables: Tables, event: EventRow, rows: int, told: Hypothe
 @kernel()
 def report(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> None:
     """Confront the belief with what an entity says of its motion; a REPORTED event within the gate is used."""
+    make_all(state)
     modes, first = state.means.shape[0], belief_of(state, tables, 0)
     innovations = np.zeros((1, modes), _INNOVATION)
     HP = np.empty((modes, MAX_ROWS, state.means.shape[1]))

@@ -9,6 +9,7 @@ import numpy as np
 from groundstation.arrays import Array
 from groundstation.estimation import model_kernels as declared
 from groundstation.estimation.chi_square import gate
+from groundstation.estimation.deferred import MOST
 from groundstation.estimation.filter_state import Checkpoints, Settings, State, Tables
 from groundstation.estimation.layout import EntityKind
 from groundstation.estimation.models.protocol import MotionModel, ObservationModel, SwitchingModel, place_of
@@ -142,6 +143,8 @@ def empty_state(tables: Tables, admitted: Sequence[bool]) -> State:
         np.full(modes, 1.0 / modes),
         EntityMemory.rows(count),
         np.full((len(tables.sensors), count), _NEVER_S),
+        _zeros_on_a_line((modes, MOST, n)),
+        np.zeros((modes, 1), dtype=np.int64),
     )
     state.memory["admitted"] = admitted
     for index in np.flatnonzero(tables.entities["present"][0]):
@@ -162,7 +165,7 @@ def checkpoints_of(state: State, steps: int) -> Checkpoints:
         EntityMemory.rows(steps, len(state.memory)),
         np.empty((steps, *state.used_at.shape)),
     )
-    for copies, value in zip(ring, state, strict=True):
+    for copies, value in zip(ring, state[: len(ring)], strict=True):
         np.asarray(copies)[:] = value
     return ring
 

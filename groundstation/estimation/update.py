@@ -4,15 +4,16 @@ import numpy as np
 
 from groundstation.arrays import IntVector, Matrix, Vector
 from groundstation.estimation.correction import (
+    Jacobian,
     apply,
     bound_precision,
+    gather,
     inflate,
     project,
     project_columns,
     surprise,
-    touched,
 )
-from groundstation.estimation.filter_state import Belief
+from groundstation.estimation.filter_state import Belief, Deferred
 from groundstation.estimation.linear import cholesky, wrap
 from groundstation.estimation.model_kernels import call_measure, call_prepare
 from groundstation.estimation.records import (
@@ -109,8 +110,9 @@ def add_timing_noise(sensor: SensorRow, event: EventRow, innovation: Innovation)
 
 @kernel(inlined=True)
 def linearise(
-    belief: Belief, sensor: SensorRow, event: EventRow, rows: int, z: Vector, innovation: Innovation, HP: Matrix
-) -> None:
+    belief: Belief, deferred: Deferred, sensor: SensorRow, event: EventRow, rows: int, z: Vector,
+    innovation: Innovation, HP: Matrix,
+) -> None:  # fmt: skip
     """Write HP = H P and the innovation of z, whose R is given; its R gains what the time of measurement adds."""
     observer, subject, out = belief.entities[event.observer], belief.entities[event.subject], innovation.prediction
     out.size = rows
@@ -124,21 +126,24 @@ def linearise(
         if sensor.is_angle[i] != 0:
             innovation.y[i] = wrap(innovation.y[i])
     add_timing_noise(sensor, event, innovation)
-    a, b = touched(observer, out.H_observer), touched(subject, out.H_subject)
-    project(belief.P, a, b, rows, HP)
-    project_columns(HP[:rows], a, b, rows, innovation.HPH)
+    jacobian = Jacobian(np.empty((MAX_ROWS, 2 * MAX_BLOCK)), np.empty(2 * MAX_BLOCK, np.int64))
+    count = gather(subject, out.H_subject, jacobian, gather(observer, out.H_observer, jacobian, 0))
+    project(belief, deferred, jacobian, count, HP)
+    project_columns(HP, jacobian, count, rows, innovation.HPH)
     bound_precision(innovation.HPH, innovation.R, rows)
     innovation.nis = surprise(innovation.HPH, innovation.R, innovation.y, rows, innovation.factor)
 
 
 @kernel(inlined=True)
-def correct(belief: Belief, headings: IntVector, innovation: Innovation, HP: Matrix, factor: float) -> None:
+def correct(
+    belief: Belief, deferred: Deferred, headings: IntVector, innovation: Innovation, HP: Matrix, factor: float
+) -> None:
     """Apply what `linearise` prepared, with S inflated by a factor >= 1; wraps all headings."""
     rows = innovation.prediction.size
     if factor > 1.0:
         inflate(innovation.HPH, innovation.R, rows, factor)
         surprise(innovation.HPH, innovation.R, innovation.y, rows, innovation.factor)
-    apply(belief.mean, belief.P, rows, HP, innovation.factor, innovation.y)
+    apply(belief.mean, belief.P, deferred, rows, HP, innovation.factor, innovation.y)
     for i in range(headings.shape[0]):
         belief.mean[headings[i]] = wrap(belief.mean[headings[i]])
 

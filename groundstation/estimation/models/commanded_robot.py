@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 
 from groundstation.arrays import Array, Matrix
-from groundstation.estimation.filter_state import Belief
+from groundstation.estimation.filter_state import Belief, Deferred
 from groundstation.estimation.layout import ROBOT_CORE, EntityKind
 from groundstation.estimation.linear import wrap
 from groundstation.estimation.model_kernels import MotionKernels
@@ -115,7 +115,9 @@ def predict_commanded_robot(belief: Belief, e: int, dt: float) -> None:
 
 
 @kernel()
-def begin_commanded_robot(belief: Belief, odometry: CondensedOdometry, e: int, step_s: float, gate: float) -> None:
+def begin_commanded_robot(
+    belief: Belief, deferred: Deferred, odometry: CondensedOdometry, e: int, step_s: float, gate: float
+) -> None:
     """Let the robot's speeds approach those that were commanded for this step."""
     memory, p = belief.memory[e], _own(belief.entities[e])
     forward, rate = memory.held_vx, memory.yaw_rate

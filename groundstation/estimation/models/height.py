@@ -10,6 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from groundstation.arrays import Matrix, Vector
+from groundstation.estimation.deferred import make, put_off
+from groundstation.estimation.filter_state import Belief, Deferred
 from groundstation.kernel import kernel
 
 # Deviations of the floor under the vehicle: even floor, an object of unknown height on it; and the least object [m].
@@ -37,70 +39,70 @@ def forget(mean: Vector, P: Matrix, index: int, deviation: float) -> None:
 
 
 @kernel()
-def project_height(P: Matrix, at: HeightEntries, W: Vector) -> float:
-    """Write H P into W for H x = z + error - floor (entries that the block lacks left out) and return H P H^T."""
-    for j in range(P.shape[0]):
-        W[j] = P[at.z, j]
+def height_of(x: Vector, at: HeightEntries) -> float:
+    """Return H x, that is z + error - floor (entries that the block lacks left out)."""
+    value = float(x[at.z])
     if at.error >= 0:
-        for j in range(P.shape[0]):
-            W[j] += P[at.error, j]
+        value += x[at.error]
     if at.floor >= 0:
-        for j in range(P.shape[0]):
-            W[j] -= P[at.floor, j]
-    variance = float(W[at.z])
-    if at.error >= 0:
-        variance += W[at.error]
-    if at.floor >= 0:
-        variance -= W[at.floor]
-    return variance
-
-
-@kernel()
-def height_of(mean: Vector, at: HeightEntries) -> float:
-    """Return h(x)."""
-    value = float(mean[at.z])
-    if at.error >= 0:
-        value += mean[at.error]
-    if at.floor >= 0:
-        value -= mean[at.floor]
+        value -= x[at.floor]
     return value
 
 
 @kernel()
+def project_height(P: Matrix, deferred: Deferred, at: HeightEntries, W: Vector) -> float:
+    """Write H P into W and return H P H^T."""
+    n = P.shape[0]
+    for j in range(n):
+        W[j] = P[at.z, j]
+    if at.error >= 0:
+        for j in range(n):
+            W[j] += P[at.error, j]
+    if at.floor >= 0:
+        for j in range(n):
+            W[j] -= P[at.floor, j]
+    for q in range(deferred.used[0]):
+        v = deferred.V[q]
+        f = height_of(v, at)
+        for j in range(n):
+            W[j] -= f * v[j]
+    return height_of(W, at)
+
+
+@kernel()
 def attribute_jump(
-    mean: Vector, P: Matrix, at: HeightEntries, height: float, R: float, gate: float, W: Vector
+    belief: Belief, deferred: Deferred, at: HeightEntries, height: float, R: float, gate: float, W: Vector
 ) -> float:
     """Let the floor take up a height that is beyond the gate: the even floor again, else an object; returns H P H^T."""
-    variance = project_height(P, at, W)
+    mean, P = belief.mean, belief.P
+    variance = project_height(P, deferred, at, W)
     y = height - height_of(mean, at)
     if at.floor < 0 or y * y <= max(gate * (variance + R), LEAST_OBJECT_M * LEAST_OBJECT_M):
         return variance
+    make(P, deferred)
     forget(mean, P, at.floor, EVEN_M)
-    variance = project_height(P, at, W)
+    variance = project_height(P, deferred, at, W)
     y = height - height_of(mean, at)
     if y * y > gate * (variance + R):
         forget(mean, P, at.floor, OBJECT_M)
-        variance = project_height(P, at, W)
+        variance = project_height(P, deferred, at, W)
     return variance
 
 
 @kernel()
-def correct_height(mean: Vector, P: Matrix, at: HeightEntries, height: float, R: float, gate: float) -> None:
+def correct_height(belief: Belief, deferred: Deferred, at: HeightEntries, height: float, R: float, gate: float) -> None:
     """Correct by one height, softly gated.
 
-    As in correction.apply: P - W^T W / S.
+    As in correction.apply: P - W^T W / S, put off.
     """
-    n = P.shape[0]
+    mean, n = belief.mean, belief.P.shape[0]
     W = np.empty(n)
-    S = attribute_jump(mean, P, at, height, R, gate, W) + R
+    S = attribute_jump(belief, deferred, at, height, R, gate, W) + R
     y = height - height_of(mean, at)
     if y * y > gate * S:
         S = y * y / gate
     root = math.sqrt(S)
+    v = deferred.V[put_off(belief.P, deferred, 1)]
     for j in range(n):
-        W[j] /= root
-        mean[j] += W[j] * (y / root)
-    for i in range(n):
-        row, v = P[i], W[i]
-        for j in range(n):
-            row[j] -= v * W[j]
+        v[j] = W[j] / root
+        mean[j] += v[j] * (y / root)

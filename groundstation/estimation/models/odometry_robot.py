@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from groundstation.arrays import Array, Matrix, Vector
-from groundstation.estimation.filter_state import Belief
+from groundstation.estimation.filter_state import Belief, Deferred
 from groundstation.estimation.layout import ROBOT_CORE, EntityKind
 from groundstation.estimation.linear import wrap
 from groundstation.estimation.model_kernels import MotionKernels
@@ -208,7 +208,9 @@ def predict_odometry_robot(belief: Belief, e: int, dt: float) -> None:
 
 
 @kernel()
-def begin_odometry_robot(belief: Belief, odometry: CondensedOdometry, e: int, step_s: float, gate: float) -> None:
+def begin_odometry_robot(
+    belief: Belief, deferred: Deferred, odometry: CondensedOdometry, e: int, step_s: float, gate: float
+) -> None:
     """Take the odometry of one step and, where the robot is in the state, correct by its height."""
     entity, memory = belief.entities[e], belief.memory[e]
     start, p = entity.start, _own(entity)
@@ -223,7 +225,7 @@ def begin_odometry_robot(belief: Belief, odometry: CondensedOdometry, e: int, st
     error = start + p.at_height_error if p.at_height_error >= 0 else -1
     floor = start + p.at_floor if p.at_floor >= 0 else -1
     height = odometry.height_sum / odometry.height_count
-    correct_height(belief.mean, belief.P, HeightEntries(start + Z, error, floor), height, p.height_variance, gate)
+    correct_height(belief, deferred, HeightEntries(start + Z, error, floor), height, p.height_variance, gate)
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ import pytest
 
 from groundstation.arrays import Vector
 from groundstation.estimation.chi_square import gate
-from groundstation.estimation.filter_state import Belief
+from groundstation.estimation.filter_state import Belief, Deferred
 from groundstation.estimation.model_kernels import call_locate
 from groundstation.estimation.models import (
     Anchor,
@@ -29,7 +29,7 @@ from groundstation.estimation.models.protocol import MotionModel, ObservationMod
 from groundstation.estimation.motion import predict
 from groundstation.estimation.parameters import WORLD_FROM_DOWN, EstimatorParameters
 from groundstation.estimation.records import EntityMemory, EventRow, Innovation, SensorRow
-from groundstation.estimation.tables import empty_state, tables_from_parameters
+from groundstation.estimation.tables import empty_state, tables_from_parameters, width_of
 from groundstation.estimation.update import linearise
 from groundstation.geometry.rotations import base_from_tilted_optical, rotation_from_euler
 from groundstation.kernel import Rows, kernel
@@ -154,9 +154,11 @@ def observed(mean: np.ndarray, sensor: str, subject: str, rows: int, roll: float
         observer=observer, subject=NAMES.index(subject), sensor=number, roll=roll, pitch=pitch, subject_roll=0.06,
         subject_pitch=-0.11,
     )  # fmt: skip
-    innovation, HP, P = Innovation.rows(1), np.zeros((4, mean.size)), np.eye(mean.size)
+    innovation, n = Innovation.rows(1), width_of(TABLES)
     innovation["R"] = np.eye(4)
-    linearise(belief_with(mean, P), TABLES.sensors[number], event, rows, np.zeros(4), innovation[0], HP)
+    belief = belief_with(np.append(mean, np.zeros(n - mean.size)), np.eye(n))
+    deferred, HP = Deferred(np.zeros((0, n)), np.zeros(1, dtype=np.int64)), np.zeros((4, n))
+    linearise(belief, deferred, TABLES.sensors[number], event, rows, np.zeros(4), innovation[0], HP)
     H = np.zeros((rows, mean.size))
     prediction = innovation["prediction"][0]
     for block, index in ((prediction["H_observer"], observer), (prediction["H_subject"], NAMES.index(subject))):

@@ -1,0 +1,143 @@
+"""Matrices in blocks that stay in vector registers: what corrections cost, in compiled code.
+
+Rows are as long as a multiple of 8 numbers. Products are added in one rounding (`contract`), one after the other in the
+order of the factors' rows.
+"""
+
+from collections.abc import Callable
+from typing import Any, cast
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from groundstation.arrays import IntVector, Matrix
+from groundstation.kernel import kernel
+
+LANES = 8
+ROWS = 4  # that `add_rows` and `subtract_rows` work on
+_VECTOR = ir.VectorType(ir.DoubleType(), LANES)
+
+
+class _Builder:
+    """Writes instructions on blocks of the arrays among an intrinsic's arguments."""
+
+    def __init__(self, context: Any, builder: Any, signature: Any, values: Any) -> None:
+        self.builder = builder
+        self._arrays = {
+            i: context.make_array(kind)(context, builder, values[i])
+            for i, kind in enumerate(signature.args)
+            if isinstance(kind, types.Array)
+        }
+
+    def plus(self, value: Any, more: int) -> Any:
+        """Return an index that is larger by a constant."""
+        return self.builder.add(value, ir.Constant(value.type, more))
+
+    def place(self, argument: int, i: Any, j: Any, kind: Any = _VECTOR) -> Any:
+        """Return where entry (i, j) of a matrix stands."""
+        array, builder = self._arrays[argument], self.builder
+        width = builder.extract_value(array.shape, 1)
+        at = builder.gep(array.data, [builder.add(builder.mul(i, width), j)])
+        return builder.bitcast(at, kind.as_pointer())
+
+    def entry(self, argument: int, i: Any) -> Any:
+        """Return entry i of a vector."""
+        return self.builder.load(self.builder.gep(self._arrays[argument].data, [i]))
+
+    def everywhere(self, place: Any) -> Any:
+        """Return the number at a place in all lanes."""
+        nothing, first = ir.Constant(_VECTOR, ir.Undefined), ir.Constant(ir.IntType(32), 0)
+        one = self.builder.insert_element(nothing, self.builder.load(place), first)
+        return self.shuffled(one, one, [0] * LANES)
+
+    def shuffled(self, a: Any, b: Any, places: list[int]) -> Any:
+        """Return numbers picked from two vectors."""
+        return self.builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(ir.IntType(32), len(places)), places))
+
+    def gain(self, held: Any, factor: Any, value: Any, subtract: bool) -> None:
+        """Add a product to what is held, or subtract it."""
+        product = self.builder.fmul(factor, value, flags=["contract"])
+        operation = self.builder.fsub if subtract else self.builder.fadd
+        self.builder.store(operation(self.builder.load(held), product, flags=["contract"]), held)
+
+    def transposed(self, rows: list[Any]) -> list[Any]:
+        """Return the columns of 8 x 8 numbers: pairs of rows exchange single numbers, then two, then four."""
+        for width in (1, 2, 4):
+            low = [i + (LANES - width if i & width else 0) for i in range(LANES)]
+            high = [place + width for place in low]
+            for i in (i for i in range(LANES) if not i & width):
+                a, b = rows[i], rows[i + width]
+                rows[i], rows[i + width] = self.shuffled(a, b, low), self.shuffled(a, b, high)
+        return rows
+
+
+def _square(_typing: Any, P: Any, V: Any, count: Any, row: Any, column: Any) -> Any:
+    """Subtract from the 8 x 8 block of P that begins at (row, column), and write its transpose to (column, row)."""
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        to, (count, row, column) = _Builder(context, builder, signature, values), values[2:]
+        places = [to.place(0, to.plus(row, i), column) for i in range(LANES)]
+        held = [cgutils.alloca_once_value(builder, builder.load(at, align=8)) for at in places]
+        with cgutils.for_range(builder, count) as loop:
+            value = builder.load(to.place(1, loop.index, column), align=8)
+            for i in range(LANES):
+                factor = to.everywhere(to.place(1, loop.index, to.plus(row, i), ir.DoubleType()))
+                to.gain(held[i], factor, value, subtract=True)
+        rows = [builder.load(at) for at in held]
+        for value, at in zip(rows, places, strict=True):
+            builder.store(value, at, align=8)
+        with builder.if_then(builder.icmp_signed("!=", row, column)):
+            for i, value in enumerate(to.transposed(rows)):
+                builder.store(value, to.place(0, to.plus(column, i), row), align=8)
+        return context.get_dummy_value()
+
+    return types.void(P, V, types.intp, types.intp, types.intp), generate
+
+
+def _rows(_typing: Any, W: Any, F: Any, A: Any, at: Any, count: Any, column: Any) -> Any:
+    """Add F A to 8 columns of W, of A the rows `at`; or, where `at` is None, subtract F A."""
+    picked = isinstance(at, types.Array)
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        to, (count, column) = _Builder(context, builder, signature, values), values[4:]
+        places = [to.place(0, ir.Constant(column.type, i), column) for i in range(ROWS)]
+        held = [cgutils.alloca_once_value(builder, builder.load(place, align=8)) for place in places]
+        with cgutils.for_range(builder, count) as loop:
+            row = to.entry(3, loop.index) if picked else loop.index
+            value = builder.load(to.place(2, row, column), align=8)
+            for i in range(ROWS):
+                factor = to.everywhere(to.place(1, ir.Constant(column.type, i), loop.index, ir.DoubleType()))
+                to.gain(held[i], factor, value, subtract=not picked)
+        for one, place in zip(held, places, strict=True):
+            builder.store(builder.load(one), place, align=8)
+        return context.get_dummy_value()
+
+    return types.void(W, F, A, at, types.intp, types.intp), generate
+
+
+_subtract_square = cast(Callable[[Matrix, Matrix, int, int, int], None], intrinsic(_square))
+_gain_rows = cast(Callable[[Matrix, Matrix, Matrix, IntVector | None, int, int], None], intrinsic(_rows))
+
+
+@kernel()
+def subtract_square(P: Matrix, V: Matrix, count: int) -> None:
+    """Subtract V^T V from a symmetric P (n, n) for the first `count` rows of V: one half, copied to the other."""
+    for row in range(0, P.shape[0], LANES):
+        for column in range(row, P.shape[0], LANES):
+            _subtract_square(P, V, count, row, column)
+
+
+@kernel(inlined=True)
+def add_rows(W: Matrix, F: Matrix, A: Matrix, at: IntVector, count: int) -> None:
+    """Add to the four rows of W (4, n) the sum over k < count of F[:, k] A[at[k]]."""
+    for column in range(0, W.shape[1], LANES):
+        _gain_rows(W, F, A, at, count, column)
+
+
+@kernel(inlined=True)
+def subtract_rows(W: Matrix, F: Matrix, A: Matrix, count: int) -> None:
+    """Subtract from the four rows of W (4, n) the sum over k < count of F[:, k] A[k]."""
+    for column in range(0, W.shape[1], LANES):
+        _gain_rows(W, F, A, None, count, column)

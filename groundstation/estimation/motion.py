@@ -4,12 +4,13 @@ Each model predicts its own block row of P and mirrors it, so a step costs O(dim
 """
 
 import math
+from typing import NamedTuple
 
 from groundstation.arrays import Matrix, Vector
 from groundstation.estimation.filter_state import Belief
-from groundstation.estimation.linear import copy_two
 from groundstation.estimation.model_kernels import call_predict
 from groundstation.estimation.records import YAW, PriorRow, X, Y, Z
+from groundstation.estimation.register_blocks import copy_to_columns
 from groundstation.kernel import kernel
 
 # Prior of what joins, about the place that its first measurement puts it at: wide against any measurement, yet so
@@ -22,15 +23,8 @@ DIFFUSE_RAD2 = 10.0
 def mirror(P: Matrix, start: int, size: int, changed: int) -> None:
     """Copy the first `changed` rows of a block onto its columns, so that P stays symmetric to the bit."""
     stop = start + size
-    for i in range(start, start + changed - 1, 2):
-        copy_two(P, i, 0, start)
-        copy_two(P, i, stop, P.shape[0])
-    if changed % 2 == 1:
-        last = start + changed - 1
-        for j in range(start):
-            P[j, last] = P[last, j]
-        for j in range(stop, P.shape[0]):
-            P[j, last] = P[last, j]
+    copy_to_columns(P, start, changed, 0, start)
+    copy_to_columns(P, start, changed, stop, P.shape[0])
     for i in range(start, stop):
         for j in range(start, min(i, start + changed)):
             mean = 0.5 * (P[i, j] + P[j, i])
@@ -59,6 +53,25 @@ def depend(P: Matrix, start: int, size: int, to: int, source: int, factor: float
     add_column(P, start, size, start + to, start + source, factor)
 
 
+class Dependence(NamedTuple):
+    """How an entry of a block depends on two others: where they stand in the block, and by which factors."""
+
+    a: int
+    by_a: float
+    b: int
+    by_b: float
+
+
+@kernel(inlined=True)
+def depend_on_two(P: Matrix, start: int, size: int, to: int, on: Dependence) -> None:
+    """Let entry `to` of a block gain multiples of two others, to the bit as by two calls of `depend`, in one pass."""
+    row, a, b = P[start + to], P[start + on.a], P[start + on.b]
+    for j in range(P.shape[0]):
+        row[j] = (row[j] + on.by_a * a[j]) + on.by_b * b[j]
+    add_column(P, start, size, start + to, start + on.a, on.by_a)
+    add_column(P, start, size, start + to, start + on.b, on.by_b)
+
+
 @kernel()
 def fade(mean: Vector, P: Matrix, start: int, size: int, offset: int, deviation: float, share: float) -> None:
     """Let a Gauss-Markov entry decay towards zero over `share` of its correlation time, keeping its deviation.
@@ -67,13 +80,14 @@ def fade(mean: Vector, P: Matrix, start: int, size: int, offset: int, deviation:
     """
     if offset < 0:
         return
-    index, decay = start + offset, math.exp(-share)
+    index, lost = start + offset, math.expm1(-share)
+    decay = 1.0 + lost
     mean[index] *= decay
     for j in range(P.shape[0]):
         P[index, j] *= decay
     for i in range(start, start + size):
         P[i, index] *= decay
-    P[index, index] += deviation * deviation * -math.expm1(-2.0 * share)
+    P[index, index] += deviation * deviation * -lost * (2.0 + lost)  # 1 - decay^2
 
 
 @kernel(inlined=True)

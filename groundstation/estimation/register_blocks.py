@@ -1,4 +1,4 @@
-"""Matrices in blocks that stay in vector registers: what corrections cost, in compiled code.
+"""Matrices in blocks that stay in vector registers: what predictions and corrections cost, in compiled code.
 
 Rows are as long as a multiple of 8 numbers. Products are added in one rounding (`contract`), one after the other in the
 order of the factors' rows.
@@ -72,6 +72,20 @@ class _Builder:
                 rows[i], rows[i + width] = self.shuffled(a, b, low), self.shuffled(a, b, high)
         return rows
 
+    def columns_of(self, rows: list[Any]) -> list[Any]:
+        """Return the 8 columns of 2, 4 or 8 rows."""
+        if len(rows) == LANES:
+            return self.transposed(rows)
+        even = [i + k for k in range(0, LANES, 2) for i in (0, LANES)]
+        odd = [place + 1 for place in even]
+        pairs = [[self.shuffled(rows[i], rows[i + 1], half) for i in range(0, len(rows), 2)] for half in (even, odd)]
+        columns = []
+        for k in range(LANES):
+            a, places = pairs[k % 2], [k - k % 2, k - k % 2 + 1]
+            places += [LANES + place for place in places] * (len(a) - 1)
+            columns.append(self.shuffled(a[0], a[-1], places))
+        return columns
+
 
 def _square(_typing: Any, P: Any, V: Any, count: Any, row: Any, column: Any) -> Any:
     """Subtract from the 8 x 8 block of P that begins at (row, column), and write its transpose to (column, row)."""
@@ -117,6 +131,27 @@ def _rows(_typing: Any, W: Any, F: Any, A: Any, at: Any, count: Any, column: Any
     return types.void(W, F, A, at, types.intp, types.intp), generate
 
 
+def _columns(rows: int) -> Callable[..., Any]:
+    """Return what copies 8 entries of 2, 4 or 8 rows, from a column on, into the columns of the rows' numbers.
+
+    Spelled out, since the compiler makes single stores of it: the columns are neighbours, and take one.
+    """
+
+    def copy(_typing: Any, P: Any, row: Any, column: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+            to, (row, column) = _Builder(context, builder, signature, values), values[1:]
+            loaded = [builder.load(to.place(0, to.plus(row, i), column), align=8) for i in range(rows)]
+            kind = ir.VectorType(ir.DoubleType(), rows)
+            for i, value in enumerate(to.columns_of(loaded)):
+                builder.store(value, to.place(0, to.plus(column, i), row, kind), align=8)
+            return context.get_dummy_value()
+
+        return types.void(P, types.intp, types.intp), generate
+
+    return cast(Callable[..., Any], intrinsic(copy))
+
+
+_copy_two, _copy_four, _copy_eight = (_columns(rows) for rows in (2, 4, 8))
 _subtract_square = cast(Callable[[Matrix, Matrix, int, int, int], None], intrinsic(_square))
 _gain_rows = cast(Callable[[Matrix, Matrix, Matrix, IntVector | None, int, int], None], intrinsic(_rows))
 
@@ -141,3 +176,25 @@ def subtract_rows(W: Matrix, F: Matrix, A: Matrix, count: int) -> None:
     """Subtract from the four rows of W (4, n) the sum over k < count of F[:, k] A[k]."""
     for column in range(0, W.shape[1], LANES):
         _gain_rows(W, F, A, None, count, column)
+
+
+@kernel()
+def copy_to_columns(P: Matrix, row: int, rows: int, first: int, last: int) -> None:
+    """Copy columns first..last of some rows of P (n, n) into the columns of the rows' numbers."""
+    whole = last - LANES + 1
+    while rows > 0:
+        width = 8 if rows >= 8 else 4 if rows >= 4 else 2 if rows >= 2 else 1
+        if width == 8:
+            for j in range(first, whole, LANES):
+                _copy_eight(P, row, j)
+        elif width == 4:
+            for j in range(first, whole, LANES):
+                _copy_four(P, row, j)
+        elif width == 2:
+            for j in range(first, whole, LANES):
+                _copy_two(P, row, j)
+        done = first if width == 1 else first + (last - first) // LANES * LANES
+        for j in range(done, last):
+            for i in range(row, row + width):
+                P[j, i] = P[i, j]
+        row, rows = row + width, rows - width

@@ -21,7 +21,7 @@ from groundstation.estimation.models.driven import (
 )
 from groundstation.estimation.models.height import EVEN_M, HeightEntries, correct_height
 from groundstation.estimation.models.protocol import Vector3, place_of
-from groundstation.estimation.motion import add_column, depend, fade, mirror, wander
+from groundstation.estimation.motion import Dependence, add_column, depend, depend_on_two, fade, mirror, wander
 from groundstation.estimation.records import YAW, CondensedOdometry, EntityMemory, EntityRow, X, Y, Z, own_parameters
 from groundstation.kernel import Record, kernel
 
@@ -195,10 +195,8 @@ def predict_odometry_robot(belief: Belief, e: int, dt: float) -> None:
         depend(P, start, size, X, scale, c * slow_x - n * slow_y)
         depend(P, start, size, Y, scale, n * slow_x + c * slow_y)
     if bias_x >= 0:
-        depend(P, start, size, X, bias_x, -c)
-        depend(P, start, size, X, bias_y, n)
-        depend(P, start, size, Y, bias_x, -n)
-        depend(P, start, size, Y, bias_y, -c)
+        depend_on_two(P, start, size, X, Dependence(bias_x, -c, bias_y, n))
+        depend_on_two(P, start, size, Y, Dependence(bias_x, -n, bias_y, -c))
     if climb >= 0:
         depend(P, start, size, Z, climb, dt)
     if size > len(ROBOT_CORE):

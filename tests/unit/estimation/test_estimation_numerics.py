@@ -14,7 +14,7 @@ from groundstation.estimation.filter_state import Belief, Deferred
 from groundstation.estimation.linear import cholesky
 from groundstation.estimation.models.height import HeightEntries, correct_height
 from groundstation.estimation.records import EntityMemory, EntityRow
-from groundstation.estimation.register_blocks import subtract_square
+from groundstation.estimation.register_blocks import copy_to_columns, subtract_square
 from groundstation.kernel import kernel
 
 
@@ -137,6 +137,17 @@ def test_a_square_is_subtracted_from_both_halves(rows: int) -> None:
     subtract_square(P, V, rows)
     np.testing.assert_allclose(P, expected, atol=1e-12)
     assert np.array_equal(P, P.T)
+
+
+@pytest.mark.parametrize("rows", range(1, 17))
+@pytest.mark.parametrize(("first", "last"), [(0, 3), (0, 16), (21, 40), (40, 40)])
+def test_rows_are_copied_to_their_columns(rows: int, first: int, last: int) -> None:
+    P = np.random.default_rng(rows).normal(size=(40, 40))
+    row = 4 if first > 20 else 22
+    expected = P.copy()
+    expected[first:last, row : row + rows] = P[row : row + rows, first:last].T
+    copy_to_columns(P, row, rows, first, last)
+    np.testing.assert_array_equal(P, expected)
 
 
 @kernel()

@@ -116,21 +116,12 @@ def observation_values(
     kind: int = r.OBSERVATION,
 ) -> list[float]:  # fmt: skip
     """Return the first values of an observation's EventRow; raises ValueError for a reading of the wrong shape."""
-    other = m.alternative if isinstance(m, Measurement) else None
-    rows = len(m.z) if isinstance(m, SensorReading) else 3 if m.yaw_rad is None else 4
-    values = [
-        at,
-        kind,
-        observer,
-        subject,
-        sensor,
-        step,
-        rows,
-        int(other is not None),
-        m.roll_rad,
-        m.pitch_rad,
-        *(_padded(m.z, m.covariance) if isinstance(m, SensorReading) else _pose(m)),
-    ]
+    if isinstance(m, Measurement):
+        other, measured, rows = m.alternative, _pose(m), 3 if m.yaw_rad is None else 4
+    else:
+        other, measured, rows = None, _padded(m.z, m.covariance), len(m.z)
+    has_other = 0 if other is None else 1
+    values = [at, kind, observer, subject, sensor, step, rows, has_other, m.roll_rad, m.pitch_rad, *measured]
     return values if other is None else values + _pose(other)
 
 
@@ -140,8 +131,9 @@ def change_values(kind: int, at: float, step: int, subject: int, placed: Sequenc
 
 
 def _pose(pose: Measurement | PoseHypothesis) -> list[float]:
-    yaw = () if pose.yaw_rad is None else (pose.yaw_rad,)
-    return _padded((*pose.position_m, *yaw), pose.covariance)
+    if pose.yaw_rad is None:
+        return _padded(pose.position_m, pose.covariance)
+    return _padded((*pose.position_m, pose.yaw_rad), pose.covariance)
 
 
 def _padded(z: tuple[float, ...], covariance: tuple[float, ...]) -> list[float]:

@@ -261,10 +261,12 @@ class FixedLagFilter:
             self._now_ns, self._last, self._dirty = now_ns, self._behind, 0
 
     def _timing(self, stamp_ns: int, now_ns: int) -> Verdict:
-        self._start(now_ns)
+        if not self._started:
+            self._start(now_ns)
         if self._step_of(now_ns) > self._last + _IDLE_STEPS:
             self.advance(now_ns)
-        now_ns = max(now_ns, self._now_ns)
+        if now_ns < self._now_ns:
+            now_ns = self._now_ns
         if stamp_ns < now_ns - self._lag_ns:
             return Verdict.LATE
         return Verdict.IMPLAUSIBLE if stamp_ns > now_ns + FUTURE_NS else Verdict.ACCEPTED
@@ -276,8 +278,9 @@ class FixedLagFilter:
         return (stamp_ns - self._origin_ns) / NS_PER_S
 
     def _mark(self, stamp_ns: int) -> int:
-        step = self._step_of(stamp_ns)
-        self._dirty = min(self._dirty, step)
+        step = (stamp_ns - self._origin_ns) // self._step_ns
+        if step < self._dirty:
+            self._dirty = step
         return step
 
     def _replay_to(self, now_ns: int) -> None:

@@ -31,8 +31,11 @@ class FreezeWatch:
     def judge(self, source: object, values: Values, stamp_ns: int) -> Novelty:
         """Take what a source says at a time of measurement; sources are few, and one spell is kept of each."""
         spell = self._spells.get(source)
-        if spell is None or spell.values != values:
+        if spell is None:
             self._spells[source] = _Spell(values, stamp_ns)
+            return Novelty.NEW
+        if spell.values != values:
+            spell.values, spell.since_ns, spell.count = values, stamp_ns, 1
             return Novelty.NEW
         spell.count += 1
         frozen = spell.count > self._count and stamp_ns - spell.since_ns >= self._span_ns

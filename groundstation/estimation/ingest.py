@@ -29,7 +29,7 @@ _AIRBORNE = {
     FlightState.LANDED: False,
     FlightState.EMERGENCY: False,
 }
-_HEARD = (Odometry, RelativeObservation, RangeObservation, ReportedMotion, VehicleStatus, ImuSample)
+_HEARD = (RelativeObservation, Odometry, ImuSample, RangeObservation, ReportedMotion, VehicleStatus)  # often first
 
 REASONS = {
     Verdict.LATE: "older than the rewind reaches",
@@ -61,31 +61,36 @@ class Intake:
 
     def take(self, key: str, message: Message, now_ns: int) -> Verdict:
         """Take one message that came under a key; ACCEPTED, or why not. Other kinds of messages are none of ours."""
-        if isinstance(message, ClockOffset):
-            if message.header.clock == self._clock:
-                self._offsets[message.of] = message.offset_ns
-            return Verdict.ACCEPTED
-        stamp_ns = self._local_stamp(message)
-        if isinstance(message, SearchedPicture) and stamp_ns is not None and stamp_ns > now_ns + FUTURE_NS:
-            return Verdict.IMPLAUSIBLE
         if not isinstance(message, _HEARD):
-            return Verdict.ACCEPTED
+            return self._other(message, now_ns)
+        stamp_ns = self._local_stamp(message)
         if stamp_ns is None:
             return Verdict.UNSYNCED
-        if refusal := self._screen.refusal(key, message, stamp_ns, now_ns):
+        refusal = self._screen.refusal(key, message, stamp_ns, now_ns)
+        if refusal is not None:
             return refusal
-        if isinstance(message, ImuSample):
-            return self._attitudes.imu(message, stamp_ns, self._screen.stands(message.header.entity))
+        if isinstance(message, RelativeObservation):
+            return self._observation(key, message, stamp_ns, now_ns)
         if isinstance(message, Odometry):
             self.ranges.hear(message, stamp_ns)
             return self._filter.add_motion(message.header.entity, self._attitudes.motion(message, stamp_ns), now_ns)
-        if isinstance(message, RelativeObservation):
-            return self._observation(key, message, stamp_ns, now_ns)
+        if isinstance(message, ImuSample):
+            return self._attitudes.imu(message, stamp_ns, self._screen.stands(message.header.entity))
         if isinstance(message, RangeObservation):
             return self.ranges.take(key, message, stamp_ns, now_ns)
         if isinstance(message, ReportedMotion):
             return self.reports.take(key, message, stamp_ns, now_ns)
         return self._status(message, stamp_ns, now_ns)
+
+    def _other(self, message: Message, now_ns: int) -> Verdict:
+        """Take a message that says nothing of where anybody is."""
+        if isinstance(message, ClockOffset) and message.header.clock == self._clock:
+            self._offsets[message.of] = message.offset_ns
+        if isinstance(message, SearchedPicture):
+            stamp_ns = self._local_stamp(message)
+            if stamp_ns is not None and stamp_ns > now_ns + FUTURE_NS:
+                return Verdict.IMPLAUSIBLE
+        return Verdict.ACCEPTED
 
     def _status(self, message: VehicleStatus, stamp_ns: int, now_ns: int) -> Verdict:
         entity, airborne = message.header.entity, _AIRBORNE.get(message.flight_state)
@@ -126,7 +131,8 @@ class Intake:
         return self._attitudes.tilt(message.observer, stamp_ns, (message.roll_rad, message.pitch_rad))
 
     def _local_stamp(self, message: Message) -> int | None:
-        if message.header.clock == self._clock:
-            return message.header.stamp_ns
-        offset = self._offsets.get(message.header.clock)
-        return None if offset is None else message.header.stamp_ns + offset
+        header = message.header
+        if header.clock == self._clock:
+            return header.stamp_ns
+        offset = self._offsets.get(header.clock)
+        return None if offset is None else header.stamp_ns + offset

@@ -55,12 +55,12 @@ class MessageScreen:
         if not isinstance(message, ImuSample) and self._is_duplicate(key, message, stamp_ns, now_ns):
             return Verdict.DUPLICATE
         match message:
-            case ImuSample():
-                return Verdict.IMPLAUSIBLE if stamp_ns > now_ns + FUTURE_NS else None
-            case Odometry():
-                return self._odometry(message, stamp_ns, now_ns)
             case RelativeObservation():
                 return self._observation(message, stamp_ns)
+            case Odometry():
+                return self._odometry(message, stamp_ns, now_ns)
+            case ImuSample():
+                return Verdict.IMPLAUSIBLE if stamp_ns > now_ns + FUTURE_NS else None
             case RangeObservation():
                 return self._range(message, stamp_ns, now_ns)
             case ReportedMotion():
@@ -92,10 +92,11 @@ class MessageScreen:
     def _observation(self, message: RelativeObservation, stamp_ns: int) -> Verdict | None:
         if message.header.entity != message.observer:
             return Verdict.UNKNOWN_ENTITY
-        for pose in (message, message.alternative):
-            fault = _fault_of(pose) if pose is not None else None
-            if fault is not None:
-                return fault
+        fault = _fault_of(message)
+        if fault is None and message.alternative is not None:
+            fault = _fault_of(message.alternative)
+        if fault is not None:
+            return fault
         if not _plausible(message.roll_rad, message.pitch_rad):
             return Verdict.IMPLAUSIBLE
         values = (message.position_m, message.yaw_rad)
@@ -121,9 +122,12 @@ class MessageScreen:
         return _STALE[self._sight_watch.judge(source, values, stamp_ns)]
 
     def _is_duplicate(self, key: str, message: Message, stamp_ns: int, now_ns: int) -> bool:
-        identity = (message.header.seq, message.header.stamp_ns)
-        seen = self._seen.setdefault(key, {})
-        if identity in seen:
+        header = message.header
+        identity = (header.seq, header.stamp_ns)
+        seen = self._seen.get(key)
+        if seen is None:
+            seen = self._seen[key] = {}
+        elif identity in seen:
             return True
         seen[identity] = stamp_ns
         # Beyond the rewind a message is late by itself; what could still count is remembered at any rate.
@@ -145,7 +149,7 @@ def _fault_of(pose: RelativeObservation | PoseHypothesis) -> Verdict | None:
     """Return why a measured pose cannot be used whatever the belief, or None."""
     if len(pose.position_m) != 3 or not _plausible(*pose.position_m, pose.yaw_rad or 0.0):
         return Verdict.IMPLAUSIBLE
-    if not all(map(math.isfinite, pose.covariance)):
+    if not (math.isfinite(sum(pose.covariance)) or all(map(math.isfinite, pose.covariance))):
         return Verdict.IMPLAUSIBLE
     rows = 3 if pose.yaw_rad is None else 4
     return None if _is_covariance(pose.covariance, rows) else Verdict.SINGULAR

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import msgspec
 import numpy as np
 
 from groundstation.arrays import Array
@@ -77,7 +78,7 @@ class FlownFilter:
             while sight <= now:
                 for reading in seen or self._seen(poses, place, (sight - begin) / NS_PER_S, circling):
                     tie = f"{reading.sensor}/{reading.subject}"
-                    joint.add_observation(replace(reading, stamp_ns=sight), tie, now)
+                    joint.add_observation(msgspec.structs.replace(reading, stamp_ns=sight), tie, now)
                 sight += period_ns
             joint.advance(now)
         return joint.belief()

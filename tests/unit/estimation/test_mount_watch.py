@@ -2,10 +2,10 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from groundstation.bus.messages import Header, RelativeObservation, Severity, Verdict
 from groundstation.bus.notice import Notice

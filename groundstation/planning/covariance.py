@@ -8,7 +8,7 @@ import numpy as np
 
 from groundstation.arrays import Matrix
 from groundstation.kernel import kernel
-from groundstation.planning.dense import PIVOTS, negative_inverse, padded, subtract_products
+from groundstation.planning.dense import PIVOTS, copy_upper, negative_inverse, padded, subtract_products
 from groundstation.planning.records import TARGET_STATES, CostOptions
 
 
@@ -64,7 +64,7 @@ def invert(A: Matrix) -> None:
     for i in range(m):
         for j in range(i, m):
             A[i, j] = -A[i, j]
-            A[j, i] = A[i, j]
+    copy_upper(A)
     if not sound:
         for i in range(m):
             A[i, i] = np.nan

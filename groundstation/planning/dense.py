@@ -14,6 +14,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from groundstation.arrays import Matrix
+from groundstation.estimation.register_blocks import copy_to_columns
 from groundstation.kernel import kernel
 
 LANES = 8
@@ -92,6 +93,17 @@ def subtract_products(target: Matrix, matrix: Matrix, columns: Matrix, count: in
         for a in range(0, m, 4):
             factors = columns.ctypes.data + c * stride + a * 8
             _rank4(target.ctypes.data + c * stride, matrix.ctypes.data + a * stride, stride, factors, 8, stride, m >> 3)
+
+
+@kernel()
+def copy_upper(matrix: Matrix) -> None:
+    """Copy the upper triangle onto what is below."""
+    m = matrix.shape[0]
+    for k in range(0, m, LANES):
+        copy_to_columns(matrix, k, LANES, k + LANES, m)
+        for i in range(k, k + LANES):
+            for j in range(k, i):
+                matrix[i, j] = matrix[j, i]
 
 
 @kernel(contract=True)

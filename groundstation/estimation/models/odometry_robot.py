@@ -6,97 +6,28 @@ from typing import ClassVar
 
 import numpy as np
 
-from groundstation.arrays import Array, Matrix, Vector
+from groundstation.arrays import Array, Matrix
 from groundstation.estimation.filter_state import Belief, Deferred
 from groundstation.estimation.layout import ROBOT_CORE, EntityKind
 from groundstation.estimation.linear import wrap
 from groundstation.estimation.model_kernels import MotionKernels
-from groundstation.estimation.models.driven import (
-    SILENT_DENSITY,
-    SILENT_TURN_DENSITY,
-    hold_velocity,
-    position_density,
-    take_heading,
-    world_velocity,
-)
+from groundstation.estimation.models.driven import hold_velocity, take_heading, world_velocity
 from groundstation.estimation.models.height import EVEN_M, HeightEntries, correct_height
 from groundstation.estimation.models.protocol import Vector3, place_of
-from groundstation.estimation.motion import Dependence, add_column, depend, depend_on_two, fade, mirror, wander
-from groundstation.estimation.records import YAW, CondensedOdometry, EntityMemory, EntityRow, X, Y, Z, own_parameters
-from groundstation.kernel import Record, kernel
+from groundstation.estimation.models.robot_errors import RobotParameters, add_robot_noise, fade_errors
+from groundstation.estimation.motion import Dependence, add_column, depend, depend_on_two, mirror
+from groundstation.estimation.records import YAW, CondensedOdometry, EntityMemory, X, Y, Z, own_parameters
+from groundstation.kernel import kernel
 
 AERIAL = ("roll_error", "pitch_error", "climb", "velocity_scale", "height_error", "floor")
 SLOW_STATES = (*AERIAL, "velocity_bias_x", "velocity_bias_y", "yaw_offset")
-_TURN_SHARE = 0.02  # of each turn is in error
-_BELIEVABLE, _WRONG = 3.0, 5.0  # deviations beyond which an error lasts longer, and beyond which the sensor lies
-_LIE_S, _UNSEEN_LIE_S, _UNSEEN_S = 2.0, 8.0, 0.5  # how long a lie lasts, seen and unseen, and from when on it is unseen
 # The field file's figure is what a vehicle states while it does not doubt itself; the lasting part of it is 0.6.
 _STATED_ROOM = 2.0
-_WALKS_AFTER_S = 0.2  # sightings of a robot in view come sooner
 _DOUBT_S = 1.0  # the doubt that surprises raise is forgotten over this
-
-
-class RobotParameters(Record):
-    """Densities, deviations and correlation times of the errors, and where in the block the states of them stand.
-
-    velocity_gain: true over reported speed; velocity_density [m^2/s], yaw_density and yaw_offset_density [rad^2/s],
-    scale_density [1/s], floor_density [m^2/s]: white noise; *_std, *_tau_s: Gauss-Markov states; has_climb_rate: 1.0 if
-    the vehicle reports one; height_variance [m^2]: of one step's height; velocity_std [m/s]: what the
-    vehicle states beyond it is doubt; walk_density [m^2/s^3]: white noise of its error while nobody sees the vehicle;
-    hold_s: how long a velocity holds in silence;
-    at_*: entries (-1: the block has none).
-    """
-
-    velocity_gain: float
-    velocity_density: float
-    yaw_density: float
-    yaw_offset_density: float
-    scale_density: float
-    floor_density: float
-    climb_std: float
-    climb_tau_s: float
-    attitude_std: float
-    attitude_tau_s: float
-    height_std: float
-    height_tau_s: float
-    bias_std: float
-    bias_tau_s: float
-    velocity_std: float
-    walk_density: float
-    has_climb_rate: float
-    height_variance: float
-    hold_s: float
-    at_climb: int
-    at_velocity_scale: int
-    at_height_error: int
-    at_floor: int
-    at_velocity_bias_x: int
-    at_velocity_bias_y: int
 
 
 _OWN_STATES = ("climb", "velocity_scale", "height_error", "floor", "velocity_bias_x", "velocity_bias_y")
 _own = own_parameters(RobotParameters)
-
-
-@kernel(inlined=True)
-def add_robot_noise(
-    P: Matrix, entity: EntityRow, p: RobotParameters, memory: EntityMemory, dt: float, turn: float
-) -> None:
-    """Add the process noise of an odometry-driven robot over dt, in which it turned by `turn`."""
-    start = entity.start
-    density = position_density(p.velocity_density, memory.odometry_age_s, p.hold_s)
-    turning = memory.yaw_std * memory.yaw_std if memory.yaw_std > 0.0 else p.yaw_density
-    climbing = 1e-6 if p.at_climb >= 0 or p.has_climb_rate != 0.0 else p.climb_std * p.climb_std * p.climb_tau_s
-    if memory.odometry_age_s > p.hold_s:
-        turning += SILENT_TURN_DENSITY
-        climbing += SILENT_DENSITY if p.at_climb < 0 else 0.0
-    P[start, start] += density * dt
-    P[start + 1, start + 1] += density * dt
-    wander(P, start, Z, climbing * dt)
-    wander(P, start, YAW, turning * dt + _TURN_SHARE * _TURN_SHARE * turn * turn)
-    wander(P, start, p.at_velocity_scale, p.scale_density * dt)
-    wander(P, start, p.at_floor, p.floor_density * dt)
-    wander(P, start, entity.at_yaw_offset, p.yaw_offset_density * dt)
 
 
 @kernel(inlined=True)
@@ -108,55 +39,6 @@ def turn_with_heading(P: Matrix, start: int, size: int, dx: float, dy: float) ->
         P[start + 1, j] += dx * yaw
     add_column(P, start, size, start, start + YAW, -dy)
     add_column(P, start, size, start + 1, start + YAW, dx)
-
-
-@kernel(inlined=True)
-def fade_velocity_bias(
-    mean: Vector, P: Matrix, entity: EntityRow, p: RobotParameters, memory: EntityMemory, dt: float
-) -> None:
-    """Let the velocity's error decay over dt; one that no sound sensor has is given room, and stays longer.
-
-    A heavy tail of its prior (0078): where sightings have drawn the error out of it, the deviation follows the error,
-    so that the next ones count for more; surprises of fixed cameras add to it. Not so of an unseen robot (0143), whose
-    error walks, where its kind's does.
-    """
-    start, size = entity.start, entity.size
-    x, y = mean[start + p.at_velocity_bias_x], mean[start + p.at_velocity_bias_y]
-    believable = _BELIEVABLE * _BELIEVABLE * p.bias_std * p.bias_std
-    square, variance, lasts_s = x * x + y * y, p.bias_std * p.bias_std, p.bias_tau_s
-    variance += memory.velocity_doubt * memory.velocity_doubt
-    seen = memory.unseen_s < _UNSEEN_S
-    if square > believable and seen:
-        variance += square - believable
-        lasts_s = max(lasts_s, lasts_s + (_LIE_S - lasts_s) * (1.0 - believable / square))
-    if square > _WRONG * _WRONG * p.bias_std * p.bias_std and seen:
-        memory.velocity_lie = max(memory.velocity_lie, math.sqrt(square - believable))
-    memory.unseen_s += dt
-    if memory.velocity_lie > 0.0:
-        lie = memory.velocity_lie * memory.velocity_lie * min(1.0, memory.unseen_s / _UNSEEN_S)
-        variance = max(variance, p.bias_std * p.bias_std + lie)
-        lasts_s = max(lasts_s, lasts_s + (_UNSEEN_LIE_S - lasts_s) * lie / (lie + p.bias_std * p.bias_std))
-    deviation = math.sqrt(variance)
-    fade(mean, P, start, size, p.at_velocity_bias_x, deviation, dt / lasts_s)
-    fade(mean, P, start, size, p.at_velocity_bias_y, deviation, dt / lasts_s)
-    if memory.unseen_s > _WALKS_AFTER_S:
-        wander(P, start, p.at_velocity_bias_x, p.walk_density * dt)
-        wander(P, start, p.at_velocity_bias_y, p.walk_density * dt)
-
-
-@kernel()
-def fade_errors(
-    mean: Vector, P: Matrix, entity: EntityRow, p: RobotParameters, memory: EntityMemory, dt: float
-) -> None:
-    """Let all Gauss-Markov entries that the block has decay over dt."""
-    start, size = entity.start, entity.size
-    attitude_std = memory.attitude_std if memory.attitude_std > 0.0 else p.attitude_std
-    fade(mean, P, start, size, p.at_climb, p.climb_std, dt / p.climb_tau_s)
-    fade(mean, P, start, size, entity.at_roll_error, attitude_std, dt / p.attitude_tau_s)
-    fade(mean, P, start, size, entity.at_pitch_error, attitude_std, dt / p.attitude_tau_s)
-    fade(mean, P, start, size, p.at_height_error, p.height_std, dt / p.height_tau_s)
-    if p.at_velocity_bias_x >= 0:
-        fade_velocity_bias(mean, P, entity, p, memory, dt)
 
 
 @kernel()

@@ -12,11 +12,12 @@ from groundstation.bus.notice import Notice
 from groundstation.control.drift import DriftWatch
 from groundstation.control.joinings import Joinings
 from groundstation.control.lookout import Lookout
+from groundstation.control.moment import Sight
 from groundstation.control.output_limiter import Limited, limit_setpoint
 from groundstation.control.parameters import ControlParameters, SafetyParameters, control_from_field, safety_from_field
 from groundstation.control.root_watch import RootWatch
 from groundstation.control.search_parameters import SearchParameters, search_from_field
-from groundstation.control.setpoints import HOVER, Sight, setpoints_from_plan
+from groundstation.control.setpoints import HOVER, setpoints_from_plan
 from groundstation.control.view import Localisation, spread_m
 from groundstation.errors import EstimatorFault
 from groundstation.estimation import parameters as estimation

@@ -1,33 +1,28 @@
 """Setpoints of all robots from a plan: held velocities, level heights, and the way back or around when needed."""
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from groundstation.arrays import Array
 from groundstation.bus.messages import Vector3
-from groundstation.control.excursion import within_reach
 from groundstation.control.flight_mode import FlightMode, Situation, flight_mode_of
+from groundstation.control.holding_off import giving_way, recoverable
+from groundstation.control.moment import STILL, Moment, Sight, is_untied, soon
 from groundstation.control.parameters import ControlParameters
 from groundstation.control.regaining import regaining, who_regains
 from groundstation.control.returning import is_lost, return_stand
 from groundstation.control.search_spacing import apart
 from groundstation.control.stand import Stand
-from groundstation.control.view import spread_m, view_of
+from groundstation.control.view import view_of
 from groundstation.estimation.belief import JointBelief
 from groundstation.geometry.angles import difference
 from groundstation.geometry.stabilized_frame import stabilized_from_world, world_from_stabilized
 from groundstation.planning.planner import PlanResult
 from groundstation.sensing.models import SensorSuite
 
-_STILL = np.zeros(3)
 _STAND_GAIN, _TURN_GAIN = 1.0, 1.5  # of the way and the turn to a stand [1/s]
-# Between two views a robot goes on to the one that it flies to: the nearest one changes with each estimate.
-_AHEAD_S = 1.0
-# Deviations of a robot's place by which others make room for it: two keep it away from them, one is to spare.
-_ROOM_SIGMAS = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,47 +36,8 @@ class Setpoint:
     blocked: str = ""
 
 
-Stands = Callable[[Sequence[str], Collection[str]], Mapping[str, Stand]]
-"""Where robots search for targets; who has nowhere to search is left out."""
-
-
-@dataclass(frozen=True, slots=True)
-class Sight:
-    """Who is not seen, and where those look that search.
-
-    target_age_s: since any target was last observed where it is believed, None if never; unseen_s: since a camera last
-    saw each robot; missed_s: since when a camera should see a robot and does not; missing: targets that are to be
-    searched for: while others are tracked, one robot does; velocity_errors_m_s: of each robot's odometry, rms;
-    drifts_m_s: motion of each robot besides what it is told (3) [m/s; world]; unsteered: robots that follow no
-    setpoints: they wait or land; untied_s: since something fixed in the room last told where each robot is, or somebody
-    saw it; velocities_m_s: of each robot (3) [m/s; world].
-    """
-
-    target_age_s: float | None = None
-    unseen_s: Mapping[str, float] = field(default_factory=dict)
-    missed_s: Mapping[str, float] = field(default_factory=dict)
-    missing: Collection[str] = ()
-    search: Stands = lambda _robots, _targets: {}
-    velocity_errors_m_s: Mapping[str, float] = field(default_factory=dict)
-    drifts_m_s: Mapping[str, Array] = field(default_factory=dict)
-    unsteered: Collection[str] = ()
-    untied_s: Mapping[str, float] = field(default_factory=dict)
-    velocities_m_s: Mapping[str, Array] = field(default_factory=dict)
-
-
 NOTHING_SEEN = Sight()
 HOVER = Setpoint((0.0, 0.0, 0.0), 0.0, FlightMode.UNKNOWN)
-
-
-@dataclass(frozen=True, slots=True)
-class _Moment:
-    """What all setpoints of a step depend on; robots: those in the air whose place is believed."""
-
-    belief: JointBelief
-    robots: Sequence[str]
-    parameters: ControlParameters
-    sensors: SensorSuite
-    sight: Sight
 
 
 def setpoints_from_plan(
@@ -95,7 +51,7 @@ def setpoints_from_plan(
     """Return a setpoint for every airborne robot; plan: the last valid one, or None."""
     age_s, missing = sight.target_age_s, sight.missing
     fresh = age_s is not None and age_s <= parameters.lost_after_s and bool(belief.layout.targets)
-    now = _Moment(belief, [name for name in belief.layout.robots if name in airborne], parameters, sensors, sight)
+    now = Moment(belief, [name for name in belief.layout.robots if name in airborne], parameters, sensors, sight)
     phases = {
         name: flight_mode_of(
             Situation(
@@ -120,20 +76,20 @@ def setpoints_from_plan(
             wanted[name] = HOVER
         elif phase is FlightMode.TRACK and plan is not None:
             vx, vy, rate = _regained(name, plan, now)
-            velocity = _recoverable(name, _giving_way(name, (vx, vy), coming, now), now)
+            velocity = recoverable(name, giving_way(name, (vx, vy), coming, now), now)
             wanted[name] = _with_height(name, velocity, rate, _level_m(name, plan, now), phase, now)
         else:
             wanted[name] = _towards(name, stands[name], phase, now)
     return wanted
 
 
-def _comes_back(name: str, phase: FlightMode, now: _Moment) -> bool:
+def _comes_back(name: str, phase: FlightMode, now: Moment) -> bool:
     """Return whether a robot flies back into a view, and obeys."""
-    comes = phase is FlightMode.RETURN or (phase is FlightMode.TRACK and _is_untied(name, now))
+    comes = phase is FlightMode.RETURN or (phase is FlightMode.TRACK and is_untied(name, now))
     return comes and name not in now.sight.unsteered
 
 
-def _regained(name: str, plan: PlanResult, now: _Moment) -> tuple[float, float, float]:
+def _regained(name: str, plan: PlanResult, now: Moment) -> tuple[float, float, float]:
     """Return what the plan holds for a robot, or, if it should look at a target that is not seen, what brings it back.
 
     PAPER (docs/explanation/method.md 7): plans assume level robots; one that brakes before a target tips it out of its
@@ -153,71 +109,23 @@ def _regained(name: str, plan: PlanResult, now: _Moment) -> tuple[float, float, 
     return vx, vy, rate
 
 
-def _level_m(name: str, plan: PlanResult, now: _Moment) -> float:
+def _level_m(name: str, plan: PlanResult, now: Moment) -> float:
     """Return the height of a robot's level; who looks for a view sinks a little, for views are narrower higher up.
 
     Told to keep its height a vehicle in the midst of a climb rises on: it errs by its climb rate as well.
     """
     level_m, parameters = plan.heights[name], now.parameters
-    if not _is_untied(name, now):
+    if not is_untied(name, now):
         return level_m
     return min(level_m, float(now.belief.mean_of(name)[2]) - parameters.height_tolerance_m)
 
 
-def _is_untied(name: str, now: _Moment) -> bool:
-    """Return whether nothing tells where a robot is that flies on our estimate."""
-    return name in now.parameters.fed and now.sight.untied_s.get(name, 0.0) > now.parameters.untied_after_s
-
-
-def _giving_way(name: str, velocity: tuple[float, float], coming: Sequence[str], now: _Moment) -> tuple[float, float]:
-    """Return the velocity [base_stabilized] of a robot that makes room for those that fly back.
-
-    Where they are is doubtful, so the limit of separation holds them off from afar: one that hovers in the middle of
-    the view would keep them out of it.
-    """
-    mean, wanted = now.belief.mean_of(name), np.array(velocity)
-    for other in (one for one in coming if one != name):
-        away = mean[:2] - now.belief.mean_of(other)[:2]
-        distance = max(float(np.linalg.norm(away)), 1e-6)
-        lacking_m = now.parameters.column_m + _ROOM_SIGMAS * spread_m(now.belief, other) - distance
-        if lacking_m <= 0.0:
-            continue
-        off = stabilized_from_world(np.append(away / distance, 0.0), float(mean[3]))[:2]
-        least = min(now.parameters.search_speed_m_s, _STAND_GAIN * lacking_m)
-        wanted = wanted + max(0.0, least - float(off @ wanted)) * off
-    return float(wanted[0]), float(wanted[1])
-
-
-def _recoverable(name: str, velocity: tuple[float, float], now: _Moment) -> tuple[float, float]:
-    """Return the part of a velocity [base_stabilized] that keeps a robot where it comes back from, if it gets lost.
-
-    One that flies on our estimate comes back as soon as nothing tells where it is: it lands before its place is lost.
-    """
-    yaw, error_m_s = float(now.belief.mean_of(name)[3]), now.sight.velocity_errors_m_s.get(name, 0.0)
-    drift = now.sight.drifts_m_s.get(name, _STILL)[:2]
-    if _is_untied(name, now):
-        error_m_s, drift = math.inf, _STILL[:2]  # a drift was measured by what is no longer known
-    if error_m_s <= now.parameters.sound_error_m_s:
-        return velocity
-    wanted = world_from_stabilized(np.array([*velocity, 0.0]), yaw)
-    near = _soon(name, now)
-    held = within_reach(wanted[:2], name, now.belief, now.parameters, now.sensors, error_m_s, drift, near)
-    forward, left, _ = stabilized_from_world(np.append(held, 0.0), yaw).tolist()
-    return forward, left
-
-
-def _soon(name: str, now: _Moment) -> tuple[float, float]:
-    """Return where a robot will be in a second [x, y; world]."""
-    x, y = now.belief.mean_of(name)[:2] + _AHEAD_S * now.sight.velocities_m_s.get(name, _STILL)[:2]
-    return float(x), float(y)
-
-
-def _is_lost(name: str, now: _Moment) -> bool:
+def _is_lost(name: str, now: Moment) -> bool:
     unseen_s, error_m_s = now.sight.unseen_s.get(name, 0.0), now.sight.velocity_errors_m_s.get(name, 0.0)
     return name in now.sight.missed_s or is_lost(name, now.belief, now.parameters, now.sensors, unseen_s, error_m_s)
 
 
-def _scout(tracking: Sequence[str], now: _Moment) -> str | None:
+def _scout(tracking: Sequence[str], now: Moment) -> str | None:
     """Return the robot that can be spared: the farthest from the tracked targets; None if it is the only one."""
     belief = now.belief
     seen = [belief.mean_of(name)[:2] for name in belief.layout.targets if name not in now.sight.missing]
@@ -226,7 +134,7 @@ def _scout(tracking: Sequence[str], now: _Moment) -> str | None:
     return max(tracking, key=lambda name: min(math.dist(belief.mean_of(name)[:2], place) for place in seen))
 
 
-def _stands(phases: Mapping[str, FlightMode], searching: Mapping[str, Stand], now: _Moment) -> dict[str, Stand]:
+def _stands(phases: Mapping[str, FlightMode], searching: Mapping[str, Stand], now: Moment) -> dict[str, Stand]:
     """Return where each robot stands that returns or searches, apart from each other; who returns comes first.
 
     Who searches and has nowhere to go waits in view.
@@ -234,7 +142,7 @@ def _stands(phases: Mapping[str, FlightMode], searching: Mapping[str, Stand], no
     robots = [name for name in now.robots if phases[name] in (FlightMode.RETURN, FlightMode.SEARCH)]
     means = {name: now.belief.mean_of(name) for name in robots}
     places = {name: (float(mean[0]), float(mean[1])) for name, mean in means.items()}
-    views = {name: view_of(*_soon(name, now), name, now.parameters, now.sensors) for name in robots}
+    views = {name: view_of(*soon(name, now), name, now.parameters, now.sensors) for name in robots}
     back = {
         name: return_stand(means[name], views[name], now.sight.missed_s.get(name, 0.0))
         for name in robots
@@ -250,13 +158,13 @@ def _stands(phases: Mapping[str, FlightMode], searching: Mapping[str, Stand], no
     return apart(back | out | idle, places, within, now.parameters.column_m)
 
 
-def _towards(name: str, stand: Stand, phase: FlightMode, now: _Moment) -> Setpoint:
+def _towards(name: str, stand: Stand, phase: FlightMode, now: Moment) -> Setpoint:
     """Return a setpoint that flies to a stand and turns to its heading, keeping off other robots.
 
     Of who returns, motion besides what it is told is subtracted, as far as such a drift is believed.
     """
     mean, parameters = now.belief.mean_of(name), now.parameters
-    drift_m_s = now.sight.drifts_m_s.get(name, _STILL) if phase is FlightMode.RETURN else _STILL
+    drift_m_s = now.sight.drifts_m_s.get(name, STILL) if phase is FlightMode.RETURN else STILL
     velocity = _STAND_GAIN * np.array([stand.x - mean[0], stand.y - mean[1], 0.0])
     speed = float(np.linalg.norm(velocity))
     most = parameters.return_speed_m_s if phase is FlightMode.RETURN else parameters.search_speed_m_s
@@ -277,7 +185,7 @@ def _towards(name: str, stand: Stand, phase: FlightMode, now: _Moment) -> Setpoi
 
 
 def _with_height(
-    name: str, velocity: tuple[float, float], rate: float, level_m: float, phase: FlightMode, now: _Moment
+    name: str, velocity: tuple[float, float], rate: float, level_m: float, phase: FlightMode, now: Moment
 ) -> Setpoint:
     """Return the setpoint with the climb towards its level height; near another robot it side-steps first."""
     belief, parameters = now.belief, now.parameters
@@ -300,7 +208,7 @@ def _with_height(
     return Setpoint((float(held[0]), float(held[1]), 0.0), rate, phase, blocked=other)
 
 
-def _nearest(name: str, now: _Moment) -> tuple[str, float] | None:
+def _nearest(name: str, now: Moment) -> tuple[str, float] | None:
     """Return the other robot that is horizontally closest, with its distance."""
     mean = now.belief.mean_of(name)
     distances = {

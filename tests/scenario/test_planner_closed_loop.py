@@ -11,10 +11,11 @@ import pytest
 from groundstation.arrays import Array
 from groundstation.bus.messages import Header, SearchedPicture
 from groundstation.control.lookout import Lookout
+from groundstation.control.moment import Sight
 from groundstation.control.output_limiter import limit_setpoint
 from groundstation.control.parameters import control_from_field, safety_from_field
 from groundstation.control.search_parameters import search_from_field
-from groundstation.control.setpoints import Sight, setpoints_from_plan
+from groundstation.control.setpoints import setpoints_from_plan
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, StateLayout
 from groundstation.field.resolved import ResolvedField

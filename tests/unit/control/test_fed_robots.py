@@ -8,8 +8,9 @@ import pytest
 
 from groundstation.bus.messages import SolverReport
 from groundstation.control.flight_mode import FlightMode
+from groundstation.control.moment import Sight
 from groundstation.control.parameters import control_from_field
-from groundstation.control.setpoints import Setpoint, Sight, setpoints_from_plan
+from groundstation.control.setpoints import Setpoint, setpoints_from_plan
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, StateLayout
 from groundstation.geometry.stabilized_frame import stabilized_from_world, world_from_stabilized

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from groundstation.bus.messages import SolverReport
+from groundstation.control.moment import Sight
 from groundstation.control.parameters import control_from_field
 from groundstation.control.regaining import regaining
-from groundstation.control.setpoints import Setpoint, Sight, setpoints_from_plan
+from groundstation.control.setpoints import Setpoint, setpoints_from_plan
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, StateLayout
 from groundstation.planning.planner import PlanResult

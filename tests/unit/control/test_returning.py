@@ -9,9 +9,10 @@ import pytest
 
 from groundstation.control.excursion import Excursions, time_left_s, within_reach
 from groundstation.control.flight_mode import FlightMode
+from groundstation.control.moment import Sight
 from groundstation.control.parameters import control_from_field
 from groundstation.control.returning import is_lost
-from groundstation.control.setpoints import Sight, setpoints_from_plan
+from groundstation.control.setpoints import setpoints_from_plan
 from groundstation.control.view import VIEW_INSET_M, velocity_error_m_s, way_back_m
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, StateLayout

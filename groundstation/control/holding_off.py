@@ -1,0 +1,52 @@
+"""What holds robots off their plans: others that fly back into a view, and a place from which they come back."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from groundstation.control.excursion import within_reach
+from groundstation.control.moment import STILL, Moment, is_untied, soon
+from groundstation.control.view import spread_m
+from groundstation.geometry.stabilized_frame import stabilized_from_world, world_from_stabilized
+
+# Deviations of a robot's place by which others make room for it: two keep it away from them, one is to spare.
+_ROOM_SIGMAS = 3.0
+_ROOM_GAIN = 1.0  # of the way that lacks [1/s]
+
+
+def giving_way(name: str, velocity: tuple[float, float], coming: Sequence[str], now: Moment) -> tuple[float, float]:
+    """Return the velocity [base_stabilized] of a robot that makes room for those that fly back.
+
+    Where they are is doubtful, so the limit of separation holds them off from afar: one that hovers in the middle of
+    the view would keep them out of it.
+    """
+    mean, wanted = now.belief.mean_of(name), np.array(velocity)
+    for other in (one for one in coming if one != name):
+        away = mean[:2] - now.belief.mean_of(other)[:2]
+        distance = max(float(np.linalg.norm(away)), 1e-6)
+        lacking_m = now.parameters.column_m + _ROOM_SIGMAS * spread_m(now.belief, other) - distance
+        if lacking_m <= 0.0:
+            continue
+        off = stabilized_from_world(np.append(away / distance, 0.0), float(mean[3]))[:2]
+        least = min(now.parameters.search_speed_m_s, _ROOM_GAIN * lacking_m)
+        wanted = wanted + max(0.0, least - float(off @ wanted)) * off
+    return float(wanted[0]), float(wanted[1])
+
+
+def recoverable(name: str, velocity: tuple[float, float], now: Moment) -> tuple[float, float]:
+    """Return the part of a velocity [base_stabilized] that keeps a robot where it comes back from, if it gets lost.
+
+    One that flies on our estimate comes back as soon as nothing tells where it is: it lands before its place is lost.
+    """
+    yaw, error_m_s = float(now.belief.mean_of(name)[3]), now.sight.velocity_errors_m_s.get(name, 0.0)
+    drift = now.sight.drifts_m_s.get(name, STILL)[:2]
+    if is_untied(name, now):
+        error_m_s, drift = math.inf, STILL[:2]  # a drift was measured by what is no longer known
+    if error_m_s <= now.parameters.sound_error_m_s:
+        return velocity
+    wanted = world_from_stabilized(np.array([*velocity, 0.0]), yaw)
+    near = soon(name, now)
+    held = within_reach(wanted[:2], name, now.belief, now.parameters, now.sensors, error_m_s, drift, near)
+    forward, left, _ = stabilized_from_world(np.append(held, 0.0), yaw).tolist()
+    return forward, left

@@ -92,7 +92,8 @@ def on_pads(sections: Iterable[Section], drones: Mapping[str, Mapping[str, Any]]
 
 def _on_pads(section: dict[str, Any], drones: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     for vehicle in section.get("vehicles") or [section]:
-        drone = drones[vehicle["name"]]
+        if (drone := drones.get(vehicle["name"])) is None:
+            continue  # what places the team, or a target's own word
         vehicle["pad_m"] = drone["pad_m"]
         if "pad_yaw_rad" in vehicle:
             vehicle["pad_yaw_rad"] = math.radians(drone["pad_yaw_deg"])

@@ -1,6 +1,5 @@
 """The fault campaign: what is drawn, how truth judges, what stands in for threads and sockets, and its table."""
 
-import json
 import math
 from types import SimpleNamespace
 from typing import Any
@@ -19,7 +18,6 @@ from sim_bridge.study.faults.local_bus import LocalBus, LocalExchange
 from sim_bridge.study.faults.memory_network import MemoryNetwork, NothingWaits
 from sim_bridge.study.faults.observed import ObservedValues
 from sim_bridge.study.faults.stand_ins import in_memory, manual_clock, read_all
-from sim_bridge.study.faults.vehicles import on_pads
 from sim_bridge.study.faults.wrong_cameras import WrongEye
 from sim_bridge.world.readings import Readings
 
@@ -59,18 +57,6 @@ def test_pads_are_apart() -> None:
     for seed in range(100):
         pads = [d["pad_m"] for d in draw(FIELD, Scenario(), seed, (11.0, 20.0)).field["drones"].values()]
         assert math.dist(*pads) >= 1.1
-
-
-def test_drivers_know_the_pads_that_were_drawn() -> None:
-    """They refuse to start where somebody flies, and feed an autopilot its pad until it is seen."""
-    drones = draw(FIELD, Scenario(), 7, (11.0, 20.0)).field["drones"]
-    alone = json.dumps({"name": "drone_1", "pad_m": [9.0, 9.0]})
-    fleet = json.dumps({"link": {}, "vehicles": [{"name": "px4_1", "pad_m": [9.0, 9.0], "pad_yaw_rad": 9.0}]})
-    (_, first), (_, second) = on_pads([("ardrone", alone), ("mavlink", fleet)], drones)
-    assert json.loads(first) == {"name": "drone_1", "pad_m": list(drones["drone_1"]["pad_m"])}
-    (px4,) = json.loads(second)["vehicles"]
-    assert px4["pad_m"] == list(drones["px4_1"]["pad_m"])
-    assert px4["pad_yaw_rad"] == pytest.approx(math.radians(drones["px4_1"]["pad_yaw_deg"]))
 
 
 # -- judged by truth ------------------------------------------------------------------------------------------------

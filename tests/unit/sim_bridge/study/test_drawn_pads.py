@@ -1,0 +1,31 @@
+"""What the drivers of a campaign are told of the pads that a seed draws."""
+
+import json
+import math
+from typing import Any
+
+import pytest
+
+from sim_bridge.scenario import Scenario
+from sim_bridge.study.faults.draw import draw
+from sim_bridge.study.faults.vehicles import on_pads
+
+FIELD: dict[str, Any] = {
+    "room": {"fence": {"x_m": (-3.7, 3.7), "y_m": (-2.7, 2.7), "z_m": (0.0, 2.8)}},
+    "cameras": {"ceiling": {}},
+    "drones": {"drone_1": {"kind": "ardrone"}, "px4_1": {"kind": "mavlink"}},
+}
+
+
+def test_drivers_know_the_pads_that_were_drawn() -> None:
+    """They refuse to start where somebody flies, and feed an autopilot its pad until it is seen."""
+    drones = draw(FIELD, Scenario(), 7, (11.0, 20.0)).field["drones"]
+    alone = json.dumps({"name": "drone_1", "pad_m": [9.0, 9.0]})
+    fleet = json.dumps({"link": {}, "vehicles": [{"name": "px4_1", "pad_m": [9.0, 9.0], "pad_yaw_rad": 9.0}]})
+    others = json.dumps({"name": "mocap"})
+    placed = on_pads([("ardrone", alone), ("mavlink", fleet), ("motion_capture", others)], drones)
+    first, second, third = (section for _, section in placed)
+    assert json.loads(first) == {"name": "drone_1", "pad_m": list(drones["drone_1"]["pad_m"])} and third == others
+    (px4,) = json.loads(second)["vehicles"]
+    assert px4["pad_m"] == list(drones["px4_1"]["pad_m"])
+    assert px4["pad_yaw_rad"] == pytest.approx(math.radians(drones["px4_1"]["pad_yaw_deg"]))

@@ -266,8 +266,7 @@ class Tracker:
 
     def setpoints(self, now_ns: int) -> dict[str, Limited]:
         """Return each airborne robot's setpoint, limited last on the newest belief; unknown robots hover."""
-        p = self.parameters
-        airborne = self.airborne
+        p, airborne = self.parameters, self.airborne
         if self.holding or self._is_plan_stale(now_ns):
             return {name: Limited(HOVER, ("hold" if self.holding else "stale plan",)) for name in airborne}
         belief, lookout = self._belief.core(), self.lookout

@@ -79,14 +79,34 @@ def within_reach(
     return np.asarray(np.clip(velocity, slowest, fastest))
 
 
-def _connected(place: Array, views: Sequence[Rectangle], way_m: float) -> Rectangle | None:
+def within_views(
+    velocity: Array, name: str, belief: JointBelief, parameters: ControlParameters, sensors: SensorSuite
+) -> Array:
+    """Return the part of a velocity (2) [m/s; world] with which a robot stays in the box about all world-fixed views.
+
+    For one that flies on our estimate: out of sight it has a second, of which turning round takes most. What lies
+    between two views counts as inside, else a team could not follow its target from one into the other.
+    """
+    mean = belief.mean_of(name)
+    views = sensors.root_views(float(mean[2]) + sensors.marker_height_m[name])
+    box = _connected(mean[:2], views, math.inf, inset_m=0.0)
+    if box is None:
+        return velocity
+    most = parameters.return_speed_m_s
+    low, high = (_HOLD_GAIN * (border - mean[:2]) for border in np.transpose((box.x_m, box.y_m)))
+    return np.asarray(np.clip(velocity, np.minimum(low, most), np.maximum(high, -most)))
+
+
+def _connected(
+    place: Array, views: Sequence[Rectangle], way_m: float, inset_m: float = VIEW_INSET_M
+) -> Rectangle | None:
     """Return the box about the view nearest to a place (2) and those at most a way from it, a little inside."""
     nearest = min(views, key=lambda view: math.dist(place, view.nearest(*place.tolist())), default=None)
     if nearest is None:
         return None
     near = [view for view in views if _apart_m(nearest, view) <= way_m]
     xs, ys = [x for view in near for x in view.x_m], [y for view in near for y in view.y_m]
-    return Rectangle((min(xs), max(xs)), (min(ys), max(ys))).shrunk(VIEW_INSET_M)
+    return Rectangle((min(xs), max(xs)), (min(ys), max(ys))).shrunk(inset_m)
 
 
 def _apart_m(one: Rectangle, other: Rectangle) -> float:

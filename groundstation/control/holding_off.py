@@ -1,11 +1,11 @@
-"""What holds robots off their plans: others that fly back into a view, and a place from which they come back."""
+"""What holds robots off their plans: others that fly back into a view, and what they need to see, or be seen."""
 
 import math
 from collections.abc import Sequence
 
 import numpy as np
 
-from groundstation.control.excursion import within_reach
+from groundstation.control.excursion import within_reach, within_views
 from groundstation.control.moment import STILL, Moment, is_untied, soon
 from groundstation.control.view import spread_m
 from groundstation.geometry.stabilized_frame import stabilized_from_world, world_from_stabilized
@@ -48,5 +48,16 @@ def recoverable(name: str, velocity: tuple[float, float], now: Moment) -> tuple[
     wanted = world_from_stabilized(np.array([*velocity, 0.0]), yaw)
     near = soon(name, now)
     held = within_reach(wanted[:2], name, now.belief, now.parameters, now.sensors, error_m_s, drift, near)
+    forward, left, _ = stabilized_from_world(np.append(held, 0.0), yaw).tolist()
+    return forward, left
+
+
+def in_view(name: str, velocity: tuple[float, float], now: Moment) -> tuple[float, float]:
+    """Return the part of a velocity [base_stabilized] that keeps a robot which flies on our estimate in view."""
+    if name not in now.parameters.fed:
+        return velocity
+    yaw = float(now.belief.mean_of(name)[3])
+    wanted = world_from_stabilized(np.array([*velocity, 0.0]), yaw)
+    held = within_views(wanted[:2], name, now.belief, now.parameters, now.sensors)
     forward, left, _ = stabilized_from_world(np.append(held, 0.0), yaw).tolist()
     return forward, left

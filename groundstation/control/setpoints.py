@@ -8,7 +8,7 @@ import numpy as np
 
 from groundstation.bus.messages import Vector3
 from groundstation.control.flight_mode import FlightMode, Situation, flight_mode_of
-from groundstation.control.holding_off import giving_way, recoverable
+from groundstation.control.holding_off import giving_way, in_view, recoverable
 from groundstation.control.moment import STILL, Moment, Sight, is_untied, soon
 from groundstation.control.parameters import ControlParameters
 from groundstation.control.regaining import regaining, who_regains
@@ -56,7 +56,7 @@ def setpoints_from_plan(
         name: flight_mode_of(
             Situation(
                 in_belief=name in now.robots,
-                lost=name in now.robots and _is_lost(name, now),
+                lost=name in now.robots and (_is_lost(name, now) or (not fresh and is_untied(name, now))),
                 target_fresh=fresh,
                 planned=plan is not None and name in plan.controls,
             )
@@ -76,8 +76,8 @@ def setpoints_from_plan(
             wanted[name] = HOVER
         elif phase is FlightMode.TRACK and plan is not None:
             vx, vy, rate = _regained(name, plan, now)
-            velocity = recoverable(name, giving_way(name, (vx, vy), coming, now), now)
-            wanted[name] = _with_height(name, velocity, rate, _level_m(name, plan, now), phase, now)
+            velocity = in_view(name, recoverable(name, giving_way(name, (vx, vy), coming, now), now), now)
+            wanted[name] = _with_height(name, velocity, rate, _level_m(name, plan.heights[name], now), phase, now)
         else:
             wanted[name] = _towards(name, stands[name], phase, now)
     return wanted
@@ -109,15 +109,25 @@ def _regained(name: str, plan: PlanResult, now: Moment) -> tuple[float, float, f
     return vx, vy, rate
 
 
-def _level_m(name: str, plan: PlanResult, now: Moment) -> float:
-    """Return the height of a robot's level; who looks for a view sinks a little, for views are narrower higher up.
+def _level_m(name: str, level_m: float, now: Moment) -> float:
+    """Return the height to which a robot flies; who looks for a view sinks a little, for views are narrower higher up.
 
     Told to keep its height a vehicle in the midst of a climb rises on: it errs by its climb rate as well.
     """
-    level_m, parameters = plan.heights[name], now.parameters
     if not is_untied(name, now):
         return level_m
-    return min(level_m, float(now.belief.mean_of(name)[2]) - parameters.height_tolerance_m)
+    return min(level_m, float(now.belief.mean_of(name)[2]) - now.parameters.height_tolerance_m)
+
+
+def _search_level_m(name: str, now: Moment) -> float:
+    """Return the height at which a robot searches or returns.
+
+    One that flies on our estimate climbs where it is seen from that height as well, else it would leave its view.
+    """
+    x, y, z = (float(value) for value in now.belief.mean_of(name)[:3])
+    view = view_of(x, y, name, now.parameters, now.sensors) if name in now.parameters.fed else None
+    level_m, inside = now.parameters.search_height_m, view is None or view.nearest(x, y) == (x, y)
+    return _level_m(name, level_m if inside else min(level_m, z), now)
 
 
 def _is_lost(name: str, now: Moment) -> bool:
@@ -181,7 +191,8 @@ def _towards(name: str, stand: Stand, phase: FlightMode, now: Moment) -> Setpoin
     limit = stand.turn_rad_s or parameters.search_yaw_rate_rad_s
     body = stabilized_from_world(velocity, float(mean[3]))
     rate = min(max(rate, -limit), limit)
-    return _with_height(name, (float(body[0]), float(body[1])), rate, parameters.search_height_m, phase, now)
+    kept = in_view(name, (float(body[0]), float(body[1])), now)
+    return _with_height(name, kept, rate, _search_level_m(name, now), phase, now)
 
 
 def _with_height(

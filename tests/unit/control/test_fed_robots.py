@@ -170,3 +170,28 @@ def test_on_the_way_back_it_goes_on_to_the_view_that_it_flies_to(x: float) -> No
     out = setpoints_from_plan(None, belief(pose, 0.05), ("drone_2",), CONTROL, SENSORS, sight)["drone_2"]
     assert out.phase is FlightMode.RETURN
     assert out.velocity_m_s[0] > 0.3
+
+
+def test_who_flies_on_our_estimate_stops_before_the_border_behind_which_nobody_sees_it() -> None:
+    """Copters that looked for the target left the views at 0.5 m/s, and landed before they were back."""
+    near, tied = np.array([-1.7, -0.75, 1.2, 0.0]), Sight(0.1, untied_s={"drone_2": 0.1})
+    border_m = min(view.y_m[0] for view in SENSORS.root_views(1.2 + SENSORS.marker_height_m["drone_2"]))
+    for name, slowest in (("drone_2", border_m + 0.75), ("drone_1", -0.5)):
+        out = told(near, np.array([0.1, -0.5]), tied, SEEN_STD_M, name).velocity_m_s
+        assert out[:2] == pytest.approx([0.1, slowest])
+
+
+def test_a_search_does_not_lift_it_out_of_its_view() -> None:
+    """Views are narrower at the height of a search."""
+    for y, rises in ((-0.1, True), (-0.85, False)):
+        pose = np.array([-1.7, y, 1.1, 0.0])
+        found = setpoints_from_plan(None, belief(pose, SEEN_STD_M), ("drone_2",), CONTROL, SENSORS, Sight(9.0))
+        assert found["drone_2"].phase is FlightMode.SEARCH
+        assert (found["drone_2"].velocity_m_s[2] > 0.0) is rises
+
+
+def test_who_searches_and_is_not_told_where_it_is_returns() -> None:
+    pose, sight = np.array([-1.7, -0.9, 1.2, 0.0]), Sight(9.0, {"drone_2": 0.5}, untied_s={"drone_2": 0.5})
+    found = setpoints_from_plan(None, belief(pose, SEEN_STD_M), ("drone_2",), CONTROL, SENSORS, sight)
+    assert found["drone_2"].phase is FlightMode.RETURN
+    assert found["drone_2"].velocity_m_s[1] > 0.2 and found["drone_2"].velocity_m_s[2] < 0.0

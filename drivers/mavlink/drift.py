@@ -137,6 +137,10 @@ class DriftFeedback:
         self._climb.hear(now_ns, z, reported_m_s[2])
         self._correct(now_ns, (c * forward - s * left - vx, s * forward + c * left - vy))
 
+    def see_place(self, now_ns: int, place: Vector3, yaw_rad: float) -> None:
+        """Take where a picture showed a vehicle whose velocity nobody knows: it holds its place by that."""
+        self._place, self._yaw_rad, self._believed_ns = place, yaw_rad, now_ns
+
     def _correct(self, now_ns: int, error: Vector2) -> None:
         first, since_ns = self._at_ns is None, now_ns - (self._at_ns or now_ns)
         if not first and math.dist(error, self._drift) > _SUDDEN_M_S + _SUDDEN_M_S2 * since_ns / NS_PER_S:

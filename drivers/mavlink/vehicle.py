@@ -168,6 +168,8 @@ class MavlinkVehicle:
         reported = known.velocity_m_s if known.tells_motion(now_ns) else None
         if good is not None and self.orders.see(now_ns, good, reported):
             self._publisher.stated.see_drift(now_ns, self.orders.drift.size_m_s)
+        if (seen := self.vision.sighted) is not None and self.orders.lift.lifted:
+            self.orders.drift.see_place(now_ns, seen.position_m, seen.yaw_rad)
 
     def view(self, now_ns: int) -> VehicleView:
         """Return the vehicle's last reported state."""

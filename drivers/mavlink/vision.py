@@ -28,12 +28,16 @@ _FIRST_SIGHT_NS = 4 * NS_PER_S
 
 
 class VisionFeed:
-    """The poses for one vehicle. resets: rises at each jump and after each pause in flight, as autopilots require."""
+    """The poses for one vehicle. resets: rises at each jump and after each pause in flight, as autopilots require.
+
+    sighted: where the picture showed it that was new with the last estimate, if nothing better is known.
+    """
 
     def __init__(
         self, name: str, clock: str, vision: VisionFeedback, pad_m: tuple[float, float], pad_yaw_rad: float
     ) -> None:
         self.resets = 0
+        self.sighted: VisionPose | None = None
         self._name, self._clock, self._vision = name, clock, vision
         self._standing = VisionPose(0, (*pad_m, 0.0), pad_yaw_rad, _STANDING_VARIANCES, (0.0, 0.0, 0.0))
         self._last: VisionPose | None = None
@@ -44,6 +48,7 @@ class VisionFeed:
 
     def hear(self, now_ns: int, estimate: Estimate) -> EntityEstimate | None:
         """Take the tracker's estimate; return that of this vehicle if it is good enough to fly on now."""
+        self.sighted = None
         for entity in estimate.entities:
             if entity.name == self._name:
                 break
@@ -65,6 +70,7 @@ class VisionFeed:
         at_ns = seen_ns(stamp_ns, entity) if entity.converged else None
         if at_ns is not None and entity.sighting is not None and at_ns > (self._good_ns or 0):
             self._take(entity, at_ns, (entity.sighting[1] ** 2,) * 2)
+            self.sighted = self._newest
         return None
 
     def _take(self, entity: EntityEstimate, at_ns: int, level_variances: tuple[float, float]) -> None:

@@ -49,6 +49,7 @@ BRAKED_BY_ITSELF = (120292, ["telemetry_frozen"])
 NOT_BELIEVED = {
     "frozen": (140014, ["battery_drop", "telemetry_frozen"]),
     "turning_as_its_velocity_sticks": (140017, ["velocity_stuck"]),
+    "at_a_place_that_pictures_show": (141040, ["telemetry_frozen"]),
 }
 
 # The ceiling saw the velocity drift off, and lost sight of the drone; the other drone was blind.

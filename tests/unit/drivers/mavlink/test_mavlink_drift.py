@@ -225,3 +225,17 @@ def test_a_place_that_is_given_is_held_instead_of_the_one_where_the_hover_began(
     vehicle.feedback.hold_at((0.3, -0.1, 0.8))
     vehicle.fly(8.0)
     assert vehicle.place[:2] == pytest.approx((0.3, -0.1), abs=0.03)
+
+
+def test_a_vehicle_whose_velocity_nobody_knows_holds_its_place_by_pictures():
+    """Ten a second, 0.2 s late; told to stand by its own velocity alone it flies off at what that is wrong by."""
+    vehicle = Vehicle()
+    vehicle.seen, vehicle.error = False, (-0.15, 0.05)
+    shown = []
+    for step in range(500):
+        shown.append(tuple(vehicle.place))
+        if step % 5 == 0 and step >= 10:
+            vehicle.feedback.see_place(vehicle.now_ns, shown[step - 10], YAW)
+        vehicle.step()
+    assert math.hypot(*vehicle.velocity) < 0.02
+    assert math.hypot(*vehicle.place[:2]) < 0.3

@@ -112,3 +112,13 @@ def test_a_picture_is_one_place(feed: VisionFeed) -> None:
     see(feed, NOW + 300 * MS, 1.2, age_s=0.2)
     see(feed, NOW + 350 * MS, 1.3, age_s=0.25)
     assert place(feed, NOW + 350 * MS, aloft=True) == (1.2, PAD[1], 0.5)
+
+
+def test_a_place_that_a_picture_showed_is_told_once_and_only_where_nothing_better_is_known(feed: VisionFeed) -> None:
+    see(feed, NOW + 300 * MS, 1.2, age_s=0.2)
+    assert feed.sighted is not None and feed.sighted.position_m[0] == 1.2
+    see(feed, NOW + 320 * MS, 1.2, age_s=0.22)
+    assert feed.sighted is None
+    see(feed, NOW + 400 * MS, 1.3, age_s=0.2)
+    believe(feed, NOW + 420 * MS, *PAD, 0.5)
+    assert feed.sighted is None

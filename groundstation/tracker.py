@@ -180,7 +180,7 @@ class Tracker:
         """Return whether an entity is known well enough to fly on; without a camera to root the team nobody is."""
         if name not in self._belief.layout or self._mounts.is_rootless or self._roots.is_silent:
             return False
-        # The deviation of who flies on our estimate tells how wrong its velocity becomes unseen.
+        # The deviation of who flies on our estimate tells how wrong its velocity becomes unseen (0214).
         fed = name in self.parameters.control.fed
         settled = fed or not self._joinings.is_unsettled(name)
         return settled and self._localisation.holds(self._belief, name, 0.0 if fed else self._tied_age_s(name))

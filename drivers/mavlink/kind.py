@@ -169,7 +169,7 @@ def _offer(flavour: str, title: str) -> Offer:
     return Offer(title, of_type, "    mavlink: {system_id: {id}}\n")
 
 
-# Unseen, the error of a PX4's velocity changes by 0.09 m/s an axis in half a second, by 0.15 in one and by 0.19 in two
+# The error of a PX4's velocity changes by 0.09 m/s an axis in half a second, by 0.15 in one and by 0.19 in two
 # (docs/reference/mavlink.md 2.1).
 _HABITS = ErrorHabits(
     5.0, 10.0, 2.0, 0.05, 0.0, reports_climb=True, tells_attitude=True, flies_on_estimate=True, velocity_walk=0.15

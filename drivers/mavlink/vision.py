@@ -30,7 +30,7 @@ _FIRST_SIGHT_NS = 4 * NS_PER_S
 class VisionFeed:
     """The poses for one vehicle. resets: rises at each jump and after each pause in flight, as autopilots require.
 
-    sighted: where the picture showed it that was new with the last estimate, if nothing better is known.
+    sighted: where a picture that is new with the last estimate showed it, while nothing better is known.
     """
 
     def __init__(

@@ -16,12 +16,12 @@ from groundstation.sensing.footprint import HEADINGS, Footprint, seen_from
 
 Searcher = TypeVar("Searcher")
 _ANY_ORDER = 3  # of so many robots any may choose first
-_STEP_RAD = math.tau / HEADINGS
+STEP_RAD = math.tau / HEADINGS
 # Views of a sweep that count: the next 300 degrees, about 6.5 s.
 _VIEWS = 10
 _DIRECTIONS = (1, -1)
 # How far ahead of a robot the heading is that it turns to: too far to slow down for.
-_LEAD_RAD = 0.5 * math.pi
+LEAD_RAD = 0.5 * math.pi
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,10 +149,10 @@ def _searcher(
     ways = lattice.places - pose[:2]
     flight_s = np.hypot(*ways.T) / parameters.speed_m_s
     free = flight_s + parameters.look_s <= allowed_s
-    share = np.minimum(1.0, _times_s(parameters) / np.maximum(flight_s, 1e-9)[:, None])
+    share = np.minimum(1.0, times_s(_VIEWS, parameters) / np.maximum(flight_s, 1e-9)[:, None])
     at = lattice.nearest(pose[:2] + share[:, :, None] * ways[:, None, :])
     yaw_rad = float(pose[3])
-    return _Searcher(footprint, yaw_rad, at, round(yaw_rad / _STEP_RAD), free, held)
+    return _Searcher(footprint, yaw_rad, at, round(yaw_rad / STEP_RAD), free, held)
 
 
 def _chosen(left: Array, lattice: Lattice, searchers: Mapping[str, _Searcher], parameters: SearchParameters) -> Outlook:
@@ -160,8 +160,8 @@ def _chosen(left: Array, lattice: Lattice, searchers: Mapping[str, _Searcher], p
     stands: dict[str, Stand] = {}
     sweeps: dict[str, Sweep] = {}
     missed, total = 1.0, 0.0
-    times_s = _times_s(parameters)
-    worth = np.exp(-times_s / parameters.patience_s)
+    seen_s = times_s(_VIEWS, parameters)
+    worth = np.exp(-seen_s / parameters.patience_s)
     for name, searcher in searchers.items():
         footprint, free = searcher.footprint, searcher.free.copy()
         for other in stands.values():
@@ -177,26 +177,26 @@ def _chosen(left: Array, lattice: Lattice, searchers: Mapping[str, _Searcher], p
         stand, way = divmod(int(np.argmax(value)), len(_DIRECTIONS))
         sweep = sweeps[name] = Sweep(stand, _DIRECTIONS[way])
         x, y = lattice.places[stand].tolist()
-        stands[name] = Stand(x, y, searcher.yaw_rad + sweep.direction * _LEAD_RAD, turn_rad_s=parameters.yaw_rate_rad_s)
+        stands[name] = Stand(x, y, searcher.yaw_rad + sweep.direction * LEAD_RAD, turn_rad_s=parameters.yaw_rate_rad_s)
         missed *= 1.0 - min(1.0, float(views[stand, way].sum()))
         total += float(value[stand, way])
         for view, heading in zip(searcher.at[stand], searcher.headings(sweep.direction), strict=True):
-            _take(left, lattice, footprint, int(view), int(heading))
-    return Outlook(stands, sweeps, 1.0 - missed, float(times_s[-1]), total) if stands else NO_OUTLOOK
+            at = int(lattice.rows[view]), int(lattice.columns[view])
+            mark_seen(left, footprint, footprint.chances, at, int(heading))
+    return Outlook(stands, sweeps, 1.0 - missed, float(seen_s[-1]), total) if stands else NO_OUTLOOK
 
 
-def _times_s(parameters: SearchParameters) -> Array:
-    """Return when the views of a sweep are seen [s]."""
-    return np.arange(1.0, _VIEWS + 1) * (_STEP_RAD / parameters.yaw_rate_rad_s)
+def times_s(views: int, parameters: SearchParameters) -> Array:
+    """Return when so many views of a sweep are seen [s]."""
+    return np.arange(1.0, views + 1) * (STEP_RAD / parameters.yaw_rate_rad_s)
 
 
-def _take(left: Array, lattice: Lattice, footprint: Footprint, stand: int, heading: int) -> None:
-    """Mark one view of a robot's sweep as seen, for the robots that choose after it."""
+def mark_seen(left: Array, footprint: Footprint, seen: Array, at: tuple[int, int], heading: int) -> None:
+    """Take what one view finds from the chances that are left; seen: of each cell of the footprint; at: row, column."""
     part = slice(int(footprint.first[heading]), int(footprint.first[heading + 1]))
-    rows = lattice.rows[stand] + footprint.rows[part]
-    columns = lattice.columns[stand] + footprint.columns[part]
+    rows, columns = at[0] + footprint.rows[part], at[1] + footprint.columns[part]
     inside = (rows >= 0) & (rows < left.shape[0]) & (columns >= 0) & (columns < left.shape[1])
-    left[rows[inside], columns[inside]] *= 1.0 - footprint.chances[part][inside]
+    left[rows[inside], columns[inside]] *= 1.0 - seen[part][inside]
 
 
 def robots_in_order(robots: Sequence[str], chances: Array, poses: Mapping[str, Array], grid: RoomGrid) -> list[str]:

@@ -100,7 +100,7 @@ def within_views(
 def _connected(
     place: Array, views: Sequence[Rectangle], way_m: float, inset_m: float = VIEW_INSET_M
 ) -> Rectangle | None:
-    """Return the box about the view nearest to a place (2) and those at most a way from it, a little inside."""
+    """Return the box about the view nearest to a place (2) and those at most a way from it, less an inset."""
     nearest = min(views, key=lambda view: math.dist(place, view.nearest(*place.tolist())), default=None)
     if nearest is None:
         return None

@@ -1,10 +1,11 @@
 """What holds robots off their plans: others that fly back into a view, and what they need to see, or be seen."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from groundstation.arrays import Array
 from groundstation.control.excursion import within_reach, within_views
 from groundstation.control.moment import STILL, Moment, is_untied, soon
 from groundstation.control.view import spread_m
@@ -39,25 +40,33 @@ def recoverable(name: str, velocity: tuple[float, float], now: Moment) -> tuple[
 
     One that flies on our estimate comes back as soon as nothing tells where it is: it lands before its place is lost.
     """
-    yaw, error_m_s = float(now.belief.mean_of(name)[3]), now.sight.velocity_errors_m_s.get(name, 0.0)
+    error_m_s = now.sight.velocity_errors_m_s.get(name, 0.0)
     drift = now.sight.drifts_m_s.get(name, STILL)[:2]
     if is_untied(name, now):
         error_m_s, drift = math.inf, STILL[:2]  # a drift was measured by what is no longer known
     if error_m_s <= now.parameters.sound_error_m_s:
         return velocity
-    wanted = world_from_stabilized(np.array([*velocity, 0.0]), yaw)
     near = soon(name, now)
-    held = within_reach(wanted[:2], name, now.belief, now.parameters, now.sensors, error_m_s, drift, near)
-    forward, left, _ = stabilized_from_world(np.append(held, 0.0), yaw).tolist()
-    return forward, left
+    return _held(
+        name, velocity, now,
+        lambda wanted: within_reach(wanted, name, now.belief, now.parameters, now.sensors, error_m_s, drift, near),
+    )  # fmt: skip
 
 
-def in_view(name: str, velocity: tuple[float, float], now: Moment) -> tuple[float, float]:
-    """Return the part of a velocity [base_stabilized] that keeps a robot which flies on our estimate in view."""
+def within_box(name: str, velocity: tuple[float, float], now: Moment) -> tuple[float, float]:
+    """Return the part of a velocity [base_stabilized] that keeps who flies on our estimate in the box about views."""
     if name not in now.parameters.fed:
         return velocity
+    return _held(
+        name, velocity, now, lambda wanted: within_views(wanted, name, now.belief, now.parameters, now.sensors)
+    )
+
+
+def _held(
+    name: str, velocity: tuple[float, float], now: Moment, limit: Callable[[Array], Array]
+) -> tuple[float, float]:
+    """Return what a limit of velocities (2) [world] leaves of one [base_stabilized]."""
     yaw = float(now.belief.mean_of(name)[3])
     wanted = world_from_stabilized(np.array([*velocity, 0.0]), yaw)
-    held = within_views(wanted[:2], name, now.belief, now.parameters, now.sensors)
-    forward, left, _ = stabilized_from_world(np.append(held, 0.0), yaw).tolist()
+    forward, left, _ = stabilized_from_world(np.append(limit(wanted[:2]), 0.0), yaw).tolist()
     return forward, left

@@ -69,7 +69,7 @@ class SafetyParameters:
     margin_m: kept from fence and separation on top of `sigmas` standard deviations of the belief. drift_m_s: motion
     besides the commanded one that nobody has noticed yet; most_drift_m_s: largest one that is held off.
     max_known_velocity_error_m_s, max_velocity_error_m_s: mean and rms error of the odometry, as the belief has it, with
-    which nobody may fly unseen.
+    which nobody may fly unseen but those that fly on our estimate.
     """
 
     fence: tuple[Interval, Interval, Interval]

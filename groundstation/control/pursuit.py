@@ -7,19 +7,26 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.arrays import Array, BoolArray, IntMatrix, Vector
-from groundstation.control.coverage import NO_OUTLOOK, Lattice, Outlook, Sweep, in_best_order
+from groundstation.control.coverage import (
+    LEAD_RAD,
+    NO_OUTLOOK,
+    STEP_RAD,
+    Lattice,
+    Outlook,
+    Sweep,
+    in_best_order,
+    mark_seen,
+    times_s,
+)
 from groundstation.control.search_parameters import SearchParameters
 from groundstation.control.stand import Stand
 from groundstation.sensing.footprint import HEADINGS, Footprint, swept
 
-_STEP_RAD = math.tau / HEADINGS
 # Views of a sweep that count: 660 degrees, 11 s. In the time of each about three pictures are searched.
 _VIEWS, _PICTURES = 22, 3
 _DIRECTIONS = (1, -1)
 # Stands that are compared: how far away, and in how many directions.
 _WAYS_M, _BEARINGS = (0.8, 2.0, 4.0), 12
-# How far ahead of a robot the heading is that it turns to: too far to slow down for.
-_LEAD_RAD = 0.5 * math.pi
 
 
 def choose_pursuit(
@@ -74,7 +81,7 @@ def _searcher(
 ) -> _Searcher:
     ways = lattice.places - pose[:2]
     flight_s = np.hypot(*ways.T) / parameters.speed_m_s
-    share = np.minimum(1.0, _times_s(parameters) / np.maximum(flight_s, 1e-9)[:, None])
+    share = np.minimum(1.0, times_s(_VIEWS, parameters) / np.maximum(flight_s, 1e-9)[:, None])
     cells = lattice.cells(pose[:2] + share[:, :, None] * ways[:, None, :])
     yaw_rad = float(pose[3])
     near = np.zeros(len(flight_s), dtype=np.bool_)
@@ -87,7 +94,7 @@ def _searcher(
         yaw_rad=yaw_rad,
         rows=cells[0],
         columns=cells[1],
-        headings=(round(yaw_rad / _STEP_RAD) + np.outer(_DIRECTIONS, np.arange(1, _VIEWS + 1))) % HEADINGS,
+        headings=(round(yaw_rad / STEP_RAD) + np.outer(_DIRECTIONS, np.arange(1, _VIEWS + 1))) % HEADINGS,
         free=flight_s + parameters.look_s <= allowed_s,
         near=near,
         kept=held,
@@ -99,8 +106,8 @@ def _chosen(left: Array, lattice: Lattice, searchers: Mapping[str, _Searcher], p
     stands: dict[str, Stand] = {}
     sweeps: dict[str, Sweep] = {}
     missed, total = 1.0, 0.0
-    times_s = _times_s(parameters)
-    worth = np.exp(-times_s / parameters.patience_s)
+    seen_s = times_s(_VIEWS, parameters)
+    worth = np.exp(-seen_s / parameters.patience_s)
     for name, searcher in searchers.items():
         free = searcher.free.copy()
         for other in stands.values():
@@ -116,12 +123,13 @@ def _chosen(left: Array, lattice: Lattice, searchers: Mapping[str, _Searcher], p
         best, turn = divmod(int(np.argmax(value)), len(_DIRECTIONS))
         sweep = sweeps[name] = Sweep(int(compared[best]), _DIRECTIONS[turn])
         x, y = lattice.places[sweep.stand].tolist()
-        stands[name] = Stand(x, y, searcher.yaw_rad + sweep.direction * _LEAD_RAD, turn_rad_s=parameters.yaw_rate_rad_s)
+        stands[name] = Stand(x, y, searcher.yaw_rad + sweep.direction * LEAD_RAD, turn_rad_s=parameters.yaw_rate_rad_s)
         missed *= 1.0 - min(1.0, float(found[best, turn]))
         total += float(value[best, turn])
         for view, heading in enumerate(searcher.headings[turn].tolist()):
-            _take(left, searcher, int(rows[best, view]), int(columns[best, view]), heading)
-    return Outlook(stands, sweeps, 1.0 - missed, float(times_s[-1]), total) if stands else NO_OUTLOOK
+            at = int(rows[best, view]), int(columns[best, view])
+            mark_seen(left, footprint, searcher.seen, at, heading)
+    return Outlook(stands, sweeps, 1.0 - missed, float(seen_s[-1]), total) if stands else NO_OUTLOOK
 
 
 def _around() -> Array:
@@ -129,17 +137,3 @@ def _around() -> Array:
     bearings = np.arange(_BEARINGS) * (math.tau / _BEARINGS)
     ring = np.column_stack((np.cos(bearings), np.sin(bearings)))
     return np.concatenate((np.zeros((1, 2)), *(way_m * ring for way_m in _WAYS_M)))
-
-
-def _times_s(parameters: SearchParameters) -> Array:
-    """Return when the views of a sweep are seen [s]."""
-    return np.arange(1.0, _VIEWS + 1) * (_STEP_RAD / parameters.yaw_rate_rad_s)
-
-
-def _take(left: Array, searcher: _Searcher, at_row: int, at_column: int, heading: int) -> None:
-    """Mark one view of a robot's sweep as seen, for the robots that choose after it."""
-    footprint = searcher.footprint
-    part = slice(int(footprint.first[heading]), int(footprint.first[heading + 1]))
-    rows, columns = at_row + footprint.rows[part], at_column + footprint.columns[part]
-    inside = (rows >= 0) & (rows < left.shape[0]) & (columns >= 0) & (columns < left.shape[1])
-    left[rows[inside], columns[inside]] *= 1.0 - searcher.seen[part][inside]

@@ -8,7 +8,7 @@ import numpy as np
 
 from groundstation.bus.messages import Vector3
 from groundstation.control.flight_mode import FlightMode, Situation, flight_mode_of
-from groundstation.control.holding_off import giving_way, in_view, recoverable
+from groundstation.control.holding_off import giving_way, recoverable, within_box
 from groundstation.control.moment import STILL, Moment, Sight, is_untied, soon
 from groundstation.control.parameters import ControlParameters
 from groundstation.control.regaining import regaining, who_regains
@@ -76,7 +76,7 @@ def setpoints_from_plan(
             wanted[name] = HOVER
         elif phase is FlightMode.TRACK and plan is not None:
             vx, vy, rate = _regained(name, plan, now)
-            velocity = in_view(name, recoverable(name, giving_way(name, (vx, vy), coming, now), now), now)
+            velocity = within_box(name, recoverable(name, giving_way(name, (vx, vy), coming, now), now), now)
             wanted[name] = _with_height(name, velocity, rate, _level_m(name, plan.heights[name], now), phase, now)
         else:
             wanted[name] = _towards(name, stands[name], phase, now)
@@ -122,7 +122,7 @@ def _level_m(name: str, level_m: float, now: Moment) -> float:
 def _search_level_m(name: str, now: Moment) -> float:
     """Return the height at which a robot searches or returns.
 
-    One that flies on our estimate climbs where it is seen from that height as well, else it would leave its view.
+    One that flies on our estimate climbs only where it is seen from that height as well, else it would leave its view.
     """
     x, y, z = (float(value) for value in now.belief.mean_of(name)[:3])
     view = view_of(x, y, name, now.parameters, now.sensors) if name in now.parameters.fed else None
@@ -191,7 +191,7 @@ def _towards(name: str, stand: Stand, phase: FlightMode, now: Moment) -> Setpoin
     limit = stand.turn_rad_s or parameters.search_yaw_rate_rad_s
     body = stabilized_from_world(velocity, float(mean[3]))
     rate = min(max(rate, -limit), limit)
-    kept = in_view(name, (float(body[0]), float(body[1])), now)
+    kept = within_box(name, (float(body[0]), float(body[1])), now)
     return _with_height(name, kept, rate, _search_level_m(name, now), phase, now)
 
 

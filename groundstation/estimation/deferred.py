@@ -1,7 +1,7 @@
 """Corrections of P that are put off until P itself is needed, so that many are made while P is read once.
 
-Sightings of one picture have one time: nothing but the next of them asks for P, and only for what few of its rows are
-by then. The covariance meanwhile is P - V^T V.
+Sightings of one picture have one time: until time goes on, only the next of them asks for P, and for a few of its rows.
+Meanwhile the covariance is P - V^T V.
 """
 
 import numpy as np

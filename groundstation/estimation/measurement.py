@@ -1,6 +1,6 @@
 """Inputs and results of the filter, as values without headers.
 
-Structs, as messages are: one is made of each message, and of a frozen dataclass that takes ten times as long.
+Structs, as messages are: one is made of each message, and a frozen dataclass takes ten times as long to make.
 """
 
 import msgspec

@@ -24,7 +24,8 @@ def measure(belief: Belief, sensor: SensorRow, event: EventRow, out: Prediction)
 def prepare(belief: Belief, sensor: SensorRow, event: EventRow, z: Vector, R: Matrix) -> int:
     """Add the sensor's own noise to R; return how many rows of z are used, or minus a verdict.
 
-    P lacks the observations of the same instant (deferred.py), but not where an entity reports its own motion.
+    P is without the observations of the same instant (deferred.py), except where an entity reports its own motion:
+    reports.py makes them first.
     """
     raise NotImplementedError
 

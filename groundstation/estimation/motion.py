@@ -64,7 +64,7 @@ class Dependence(NamedTuple):
 
 @kernel(inlined=True)
 def depend_on_two(P: Matrix, start: int, size: int, to: int, on: Dependence) -> None:
-    """Let entry `to` of a block gain multiples of two others, to the bit as by two calls of `depend`, in one pass."""
+    """Let entry `to` of a block gain multiples of two others in one pass, as by two calls of `depend`."""
     row, a, b = P[start + to], P[start + on.a], P[start + on.b]
     for j in range(P.shape[0]):
         row[j] = (row[j] + on.by_a * a[j]) + on.by_b * b[j]

@@ -4,12 +4,12 @@ import msgspec
 import numpy as np
 
 from groundstation.arrays import Array
+from groundstation.estimation.tracking_errors import LOST_M
 from groundstation.report.tracks import EstimateTrack, TruthTrack
 
 RATE_HZ = 10.0
 STALE_S = 0.5
 MISSING_ERROR_M = 1.0
-LOST_ERROR_M = 0.5
 
 
 class Accuracy(msgspec.Struct, frozen=True):
@@ -60,7 +60,7 @@ def accuracy(time_s: Array, truth: TruthTrack, estimate: EstimateTrack | None, d
     return Accuracy(
         rmse_m=float(np.sqrt(np.mean(counted**2))),
         max_error_m=float(counted.max()),
-        lost_s=float(np.count_nonzero(counted > LOST_ERROR_M) / RATE_HZ),
+        lost_s=float(np.count_nonzero(counted > LOST_M) / RATE_HZ),
         covered=float(np.mean(known)),
         anees=_anees(time_s[known], errors[known], estimate, dim),
         yaw_rmse_rad=_yaw_rmse(time_s[known], truth, estimate) if dim == 3 else None,

@@ -79,7 +79,7 @@ def _against_truth(figures: RunFigures, field: ResolvedField, expected: Expectat
 def _of_the_target(figures: RunFigures, expected: Expectation) -> Iterator[Criterion]:
     """Judge the errors of the worst target, from when it was found where a search for it is expected.
 
-    Where a loss is expected and no error with it, that of the time without losses is judged.
+    Where a search or a loss is expected and no error with it, that of the time without losses is judged.
     """
     rmse_m, lost_s, kept_m = figures.target_rmse_m, figures.target_lost_s, None
     found = [one for one in figures.found.values() if one is not None]

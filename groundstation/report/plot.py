@@ -9,7 +9,8 @@ from matplotlib.figure import Figure
 
 from groundstation.appearance.topology import topology_words
 from groundstation.arrays import Array, BoolArray
-from groundstation.report.accuracy import LOST_ERROR_M, errors_at, time_grid
+from groundstation.estimation.tracking_errors import LOST_M
+from groundstation.report.accuracy import errors_at, time_grid
 from groundstation.report.criteria import MAX_TARGET_RMSE_M
 from groundstation.report.interval import tracking_interval
 from groundstation.report.plot_map import draw_map
@@ -48,7 +49,7 @@ def _interval(data: RunData) -> tuple[float, float]:
 
 def _draw_errors(axes: Axes, data: RunData) -> None:
     grid = time_grid(*_interval(data))
-    top = 1.16 * LOST_ERROR_M
+    top = 1.16 * LOST_M
     for name in (*data.drones, *data.tracked):
         truth = data.truth.get(name)
         if truth is None:
@@ -63,7 +64,7 @@ def _draw_errors(axes: Axes, data: RunData) -> None:
             _mark_missing(axes, grid, ~np.isfinite(distance) & truth.known_at(grid))
         if np.isfinite(distance).any():
             top = max(top, min(1.5, 1.1 * float(np.nanmax(distance))))
-    for limit, text in ((MAX_TARGET_RMSE_M, "rms limit"), (LOST_ERROR_M, "lost")):
+    for limit, text in ((MAX_TARGET_RMSE_M, "rms limit"), (LOST_M, "lost")):
         axes.axhline(limit, color=MUTED, lw=0.8, ls=(0, (4, 3)), zorder=1)
         axes.annotate(text, (1.0, limit), xycoords=("axes fraction", "data"), xytext=(4, 0),
                       textcoords="offset points", va="center", fontsize=8, color=MUTED)  # fmt: skip

@@ -96,6 +96,7 @@ def begin_odometry_robot(
     start, p = entity.start, _own(entity)
     hold_velocity(odometry, memory, p.hold_s, step_s)
     take_heading(odometry, memory, step_s)
+    memory.unseen_s += step_s
     memory.velocity_doubt *= math.exp(-step_s / _DOUBT_S)
     if odometry.newest_velocity_std > p.velocity_std:
         # What the vehicle itself doubts is doubted for as long as it does.

@@ -19,10 +19,9 @@ class RobotParameters(Record):
 
     velocity_gain: true over reported speed; velocity_density [m^2/s], yaw_density and yaw_offset_density [rad^2/s],
     scale_density [1/s], floor_density [m^2/s]: white noise; *_std, *_tau_s: Gauss-Markov states; has_climb_rate: 1.0 if
-    the vehicle reports one; height_variance [m^2]: of one step's height; velocity_std [m/s]: what the
-    vehicle states beyond it is doubt; walk_density [m^2/s^3]: white noise of its error while nobody sees the vehicle;
-    hold_s: how long a velocity holds in silence;
-    at_*: entries (-1: the block has none).
+    the vehicle reports one; height_variance [m^2]: of one step's height; velocity_std [m/s]: what the vehicle states
+    beyond it is doubt; walk_density [m^2/s^3]: white noise of the velocity's error while nobody sees the vehicle;
+    hold_s: how long a velocity holds in silence; at_*: entries (-1: the block has none).
     """
 
     velocity_gain: float
@@ -94,7 +93,6 @@ def fade_velocity_bias(
         lasts_s = max(lasts_s, lasts_s + (_LIE_S - lasts_s) * (1.0 - believable / square))
     if square > _WRONG * _WRONG * p.bias_std * p.bias_std and seen:
         memory.velocity_lie = max(memory.velocity_lie, math.sqrt(square - believable))
-    memory.unseen_s += dt
     if memory.velocity_lie > 0.0:
         lie = memory.velocity_lie * memory.velocity_lie * min(1.0, memory.unseen_s / _UNSEEN_S)
         variance = max(variance, p.bias_std * p.bias_std + lie)

@@ -86,7 +86,7 @@ def devices_of(
 
 
 def on_pads(sections: Iterable[Section], drones: Mapping[str, Mapping[str, Any]]) -> list[Section]:
-    """Return the sections with the pads of these drones of a field (plain values): drivers refuse to start by them."""
+    """Return the sections with the pads of these drones (plain values), by which drivers judge whether to start."""
     return [(kind, json.dumps(_on_pads(json.loads(section), drones))) for kind, section in sections]
 
 

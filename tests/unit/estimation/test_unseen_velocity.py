@@ -6,16 +6,27 @@ import numpy as np
 import pytest
 
 from groundstation.estimation.filter_state import Belief
-from groundstation.estimation.models import OdometryRobot
+from groundstation.estimation.fixed_lag import FixedLagFilter
+from groundstation.estimation.measurement import Measurement
+from groundstation.estimation.models import (
+    ConstantVelocityTarget,
+    FixedMount,
+    ManoeuvringTarget,
+    MountedCamera,
+    OdometryRobot,
+)
 from groundstation.estimation.models.odometry_robot import SLOW_STATES
+from groundstation.estimation.models.protocol import MotionModel
 from groundstation.estimation.motion import predict
-from groundstation.estimation.parameters import EstimatorParameters, parameters_from_field
+from groundstation.estimation.parameters import WORLD_FROM_DOWN, EstimatorParameters, parameters_from_field
 from groundstation.estimation.tables import empty_state, tables_from_parameters
 from groundstation.settings.files import find_field
 from groundstation.settings.load import load_field
 from groundstation.settings.resolved import resolved_field
 
 STEP_S = 0.01
+BEGIN_NS = 5_000_000_000_000
+NOISE = tuple(np.diag([1e-4, 1e-4, 4e-4, 1e-3]).ravel().tolist())
 # Of a real PX4, each axis, after this long (docs/reference/mavlink.md 2.1): change of its velocity's error [m/s], and
 # how far a place that goes by its velocity, less the error when it was last seen, is off [m].
 MEASURED = {1.0: (0.15, 0.09), 2.0: (0.19, 0.24)}
@@ -28,12 +39,13 @@ def deviations(model: OdometryRobot, seconds: float) -> tuple[float, float]:
     state.memory["active"] = 1
     mean, P = state.means[0], np.zeros((state.means[0].size,) * 2)
     for _ in range(round(seconds / STEP_S)):
+        state.memory["unseen_s"] += STEP_S  # as each step begins
         predict(Belief(mean, P, tables.entities[0], state.memory), STEP_S)
     at = model.labels.index("velocity_bias_x")
     return math.sqrt(P[at, at]), math.sqrt(P[0, 0])
 
 
-def test_who_flies_on_our_estimate_is_known_no_better_than_was_measured() -> None:
+def test_who_flies_on_our_estimate_is_known_as_well_as_was_measured() -> None:
     model = parameters_from_field(resolved_field(load_field(find_field("mixed-team")))).entities["drone_2"]
     assert isinstance(model, OdometryRobot)
     for seconds, (error_m_s, off_m) in MEASURED.items():
@@ -51,3 +63,22 @@ def test_who_was_seen_just_now_does_not_walk_yet() -> None:
     walks = OdometryRobot(slow_states=SLOW_STATES, velocity_bias_std_m_s=0.03, velocity_walk=0.15)
     still = OdometryRobot(slow_states=SLOW_STATES, velocity_bias_std_m_s=0.03)
     assert deviations(walks, 0.15) == deviations(still, 0.15)
+
+
+@pytest.mark.parametrize("target", [ConstantVelocityTarget(), ManoeuvringTarget()], ids=["one mode", "two modes"])
+def test_time_unseen_passes_once_however_many_modes_the_target_has(target: MotionModel) -> None:
+    """Between two pictures, 0.1 s apart, nothing walks."""
+    deviation = []
+    for walk in (0.0, 0.15):
+        robot = OdometryRobot(slow_states=SLOW_STATES, velocity_bias_std_m_s=0.03, velocity_walk=walk)
+        ceiling = FixedMount((0.0, 0.0, 4.2), 0.0035, 0.01)
+        sensors = {"ceiling": MountedCamera("ceiling", WORLD_FROM_DOWN, observes_targets=False)}
+        joint = FixedLagFilter(EstimatorParameters({"one": robot, "target": target, "ceiling": ceiling}, sensors))
+        joint.set_airborne("one", True, BEGIN_NS, BEGIN_NS)
+        for picture in range(10):
+            at = BEGIN_NS + picture * 100_000_000
+            joint.add_observation(Measurement(at, "ceiling", "one", (0.0, 0.0, 2.9), 0.0, NOISE), "", at)
+            joint.advance(at)
+        joint.advance(at + 150_000_000)
+        deviation.append(joint.belief().covariance_of("one").trace())
+    assert deviation[0] == pytest.approx(deviation[1], rel=1e-9)

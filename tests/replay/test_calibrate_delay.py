@@ -19,7 +19,7 @@ SHIFT_MS = 40.0
 def measured(folder: Path) -> dict[str, Any]:
     result = CliRunner().invoke(groundstation, ["calibrate", "delay", str(folder), "--json"], standalone_mode=False)
     assert result.exception is None, result.exception
-    return {one["sensor"]: one for one in json.loads(result.output)}
+    return {one["sensor"]: one for one in json.loads(result.stdout)}
 
 
 @pytest.fixture(scope="module")

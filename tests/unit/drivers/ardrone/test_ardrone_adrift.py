@@ -16,9 +16,9 @@ def watch(seconds, seen_m_s, holds=True, silent=True, watched=None):
     return watched, said
 
 
-def test_its_own_hover_has_a_second_to_brake_it() -> None:
-    assert not watch(1.0, (0.6, 0.0))[1]
-    assert watch(1.1, (0.6, 0.0))[1]
+def test_its_own_hover_has_a_second_to_brake_it_and_cameras_time_to_see_it() -> None:
+    assert not watch(1.3, (0.6, 0.0))[1]
+    assert watch(1.4, (0.6, 0.0))[1]
 
 
 @pytest.mark.parametrize("seen_m_s", [(0.08, 0.08), None])
@@ -32,7 +32,7 @@ def test_one_that_is_heard_or_flown_is_not_adrift(known) -> None:
 
 
 def test_it_is_braked_to_rest_and_as_long_as_it_is_seen() -> None:
-    watched, _ = watch(1.1, (0.0, 0.2))
+    watched, _ = watch(1.4, (0.0, 0.2))
     assert watched.step(3 * S, True, True, (0.0, 0.01))
     assert not watched.step(3 * S, True, True, None)
     assert not watched.step(3 * S, True, True, (0.0, 0.01)), "it stood, as far as is known"

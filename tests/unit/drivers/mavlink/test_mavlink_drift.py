@@ -233,7 +233,8 @@ def test_a_vehicle_whose_velocity_nobody_knows_holds_its_place_by_pictures():
     vehicle.seen, vehicle.error = False, (-0.15, 0.05)
     shown = []
     for step in range(500):
-        shown.append(tuple(vehicle.place))
+        x, y, z = vehicle.place
+        shown.append((x, y, z))
         if step % 5 == 0 and step >= 10:
             vehicle.feedback.see_place(vehicle.now_ns, shown[step - 10], YAW)
         vehicle.step()

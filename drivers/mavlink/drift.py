@@ -138,8 +138,11 @@ class DriftFeedback:
         self._correct(now_ns, (c * forward - s * left - vx, s * forward + c * left - vy))
 
     def see_place(self, now_ns: int, place: Vector3, yaw_rad: float) -> None:
-        """Take where a picture showed a vehicle whose velocity nobody knows: it holds its place by that."""
-        self._place, self._yaw_rad, self._believed_ns = place, yaw_rad, now_ns
+        """Take where a picture showed a vehicle whose velocity nobody knows: it holds its place by that.
+
+        What its velocity erred by was learnt from one that was wrong already before that was noticed.
+        """
+        self._place, self._yaw_rad, self._believed_ns, self._at_ns = place, yaw_rad, now_ns, None
 
     def _correct(self, now_ns: int, error: Vector2) -> None:
         first, since_ns = self._at_ns is None, now_ns - (self._at_ns or now_ns)

@@ -9,13 +9,14 @@ import numpy as np
 
 from groundstation.arrays import Array
 from groundstation.bus.messages import RelativeObservation, SearchedPicture
-from groundstation.control.coverage import NO_OUTLOOK, Outlook, choose_stands, lattice_of, robots_in_order
+from groundstation.control.coverage import choose_stands, robots_in_order
 from groundstation.control.excursion import Excursions
 from groundstation.control.parameters import ControlParameters
 from groundstation.control.pursuit import choose_pursuit
 from groundstation.control.search_parameters import SearchParameters
 from groundstation.control.search_ranges import searching_cameras
 from groundstation.control.stand import Stand
+from groundstation.control.sweeps import NO_OUTLOOK, Outlook, lattice_of
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.belief_history import BeliefHistory
 from groundstation.estimation.room_map import RoomGrid, RoomMap, lost_at, unknown_place

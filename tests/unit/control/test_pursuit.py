@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from groundstation.control.coverage import Lattice, Outlook, lattice_of
 from groundstation.control.parameters import control_from_field
 from groundstation.control.pursuit import choose_pursuit
 from groundstation.control.search_parameters import search_from_field
 from groundstation.control.search_ranges import searching_cameras
+from groundstation.control.sweeps import Lattice, Outlook, lattice_of
 from groundstation.estimation.room_map import RoomGrid
 from groundstation.field.resolved import ResolvedField
 from groundstation.sensing.footprint import Footprint, footprint_of

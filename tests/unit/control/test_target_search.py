@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from groundstation.bus.messages import Header, SearchedPicture
-from groundstation.control.coverage import choose_stands, lattice_of
+from groundstation.control.coverage import choose_stands
 from groundstation.control.excursion import Excursions
 from groundstation.control.parameters import ControlParameters, control_from_field
 from groundstation.control.search_parameters import SearchParameters, search_from_field
+from groundstation.control.sweeps import lattice_of
 from groundstation.control.target_search import Search, SearchMode
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, StateLayout

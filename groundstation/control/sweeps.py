@@ -1,0 +1,227 @@
+"""How a team chooses its sweeps: robots in turn, each the one with the best chances in what those before it leave.
+
+A robot turns while it flies somewhere. Which stands it compares, and what it counts, is its `Searcher`'s.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from itertools import permutations
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from groundstation.arrays import Array, BoolArray, IntArray, IntMatrix, IntVector
+from groundstation.control.search_parameters import SearchParameters
+from groundstation.control.stand import Stand
+from groundstation.estimation.room_map import RoomGrid
+from groundstation.sensing.footprint import HEADINGS, Footprint
+
+_ANY_ORDER = 3  # of so many robots any may choose first
+_STEP_RAD = math.tau / HEADINGS
+DIRECTIONS = (1, -1)
+# How far ahead of a robot the heading is that it turns to: too far to slow down for.
+_LEAD_RAD = 0.5 * math.pi
+
+
+@dataclass(frozen=True, slots=True)
+class Lattice:
+    """The stands that are considered, a rectangle by rows: their cells, and their places (n, 2) [m; world].
+
+    cell_m: side of a cell.
+    """
+
+    rows: IntVector
+    columns: IntVector
+    places: Array
+    cell_m: float
+
+    def nearest(self, places: Array) -> IntVector:
+        """Return the stand nearest to each place (..., 2)."""
+        xs, ys = np.unique(self.places[:, 0]), np.unique(self.places[:, 1])
+        column = np.abs(places[..., :1] - xs).argmin(axis=-1)
+        row = np.abs(places[..., 1:] - ys).argmin(axis=-1)
+        return np.asarray(row * len(xs) + column, dtype=np.int64)
+
+    def cells(self, places: Array) -> tuple[IntArray, IntArray]:
+        """Return row and column of the cell of each place (..., 2)."""
+        offset = np.rint((places - self.places[0]) / self.cell_m).astype(np.int64)
+        return self.rows[0] + offset[..., 1], self.columns[0] + offset[..., 0]
+
+
+def lattice_of(grid: RoomGrid, parameters: SearchParameters) -> Lattice:
+    """Return every other cell of a grid that lies well inside the fence."""
+    (x0, x1), (y0, y1), inset = parameters.fence_x_m, parameters.fence_y_m, parameters.fence_inset_m
+    cells = [
+        (row, column, x, y)
+        for row, y in enumerate(grid.ys.tolist())
+        for column, x in enumerate(grid.xs.tolist())
+        if row % 2 == column % 2 == 0 and x0 + inset <= x <= x1 - inset and y0 + inset <= y <= y1 - inset
+    ]
+    rows, columns, xs, ys = zip(*cells, strict=True) if cells else ((), (), (), ())
+    places = np.array([xs, ys], dtype=np.float64).T
+    return Lattice(np.array(rows, dtype=np.int64), np.array(columns, dtype=np.int64), places, grid.cell_m)
+
+
+@dataclass(frozen=True, slots=True)
+class Sweep:
+    """What one robot does: the stand of the lattice that it flies to, and which way it turns (1: left, -1: right)."""
+
+    stand: int
+    direction: int
+
+
+@dataclass(frozen=True, slots=True)
+class Outlook:
+    """The chosen sweeps, with the stands that bring them about, and the chance to see the target within `after_s`.
+
+    value: sum of the chances, each the less worth the later.
+    """
+
+    stands: Mapping[str, Stand]
+    sweeps: Mapping[str, Sweep]
+    chance: float
+    after_s: float
+    value: float = 0.0
+
+
+NO_OUTLOOK = Outlook({}, {}, 0.0, math.inf)
+
+
+class Compared(NamedTuple):
+    """Stands that a robot may fly to (n), by direction (n, 2) what their sweeps are worth, and the chance to find."""
+
+    stands: IntVector
+    worth: Array
+    found: Array
+
+
+class Searcher(Protocol):
+    """One robot that may look.
+
+    seen: chance of each cell of its footprint to be found within a view; free (n): stands where it may be; kept: its
+    sweep so far.
+    """
+
+    @property
+    def footprint(self) -> Footprint:
+        """Return what it sees of the floor."""
+
+    @property
+    def seen(self) -> Array:
+        """Return the chances."""
+
+    @property
+    def yaw_rad(self) -> float:
+        """Return its heading."""
+
+    @property
+    def free(self) -> BoolArray:
+        """Return where it may be."""
+
+    @property
+    def kept(self) -> Sweep | None:
+        """Return its sweep so far."""
+
+    def compare(self, left: Array, free: BoolArray, worth: Array) -> Compared:
+        """Return what the stands that are still free promise; left: of the chances; worth: of each view."""
+
+    def views(self, stand: int, turn: int) -> Iterable[tuple[int, int, int]]:
+        """Return the views of a sweep: row and column of the cell where it is, and its heading as a number."""
+
+
+class Kind(NamedTuple):
+    """A way to choose sweeps: how many views of them count, and what makes a searcher of a robot.
+
+    searcher: of footprint, lattice, pose, allowed times, sweep so far and parameters.
+    """
+
+    views: int
+    searcher: Callable[[Footprint, Lattice, Array, Array, Sweep | None, SearchParameters], Searcher]
+
+
+def choose(
+    kind: Kind,
+    chances: Array,
+    lattice: Lattice,
+    footprints: Mapping[str, Footprint],
+    poses: Mapping[str, Array],
+    allowed_s: Mapping[str, Array],
+    held: Mapping[str, Sweep],
+    parameters: SearchParameters,
+) -> Outlook:
+    """Return a sweep for each robot that has a footprint: in turn, that with the best chances at the earliest times.
+
+    poses: x, y, z, yaw; allowed_s: by stand, within how long a robot may be there (negative: not at all); held: the
+    sweeps so far, which are kept unless another is clearly better. No two stands are within the distance `apart_m`.
+    Of few robots, whoever had better choose first does; the first in the order of `footprints` if that is the same.
+    """
+    if not len(lattice.places):
+        return NO_OUTLOOK
+    searchers = {
+        name: kind.searcher(footprint, lattice, poses[name], allowed_s[name], held.get(name), parameters)
+        for name, footprint in footprints.items()
+    }
+    orders = permutations(searchers) if len(searchers) <= _ANY_ORDER else (tuple(searchers),)
+    outlooks = [
+        _chosen(np.array(chances), lattice, {name: searchers[name] for name in order}, kind.views, parameters)
+        for order in orders
+    ]
+    return max(outlooks, key=lambda outlook: outlook.value)
+
+
+def _chosen(
+    left: Array, lattice: Lattice, searchers: Mapping[str, Searcher], views: int, parameters: SearchParameters
+) -> Outlook:
+    """Return what robots that choose in this order choose; left: of the chances, changed."""
+    stands: dict[str, Stand] = {}
+    sweeps: dict[str, Sweep] = {}
+    missed, total = 1.0, 0.0
+    seen_s = times_s(views, parameters)
+    worth = np.exp(-seen_s / parameters.patience_s)
+    for name, searcher in searchers.items():
+        free = searcher.free.copy()
+        for other in stands.values():
+            free &= np.hypot(*(lattice.places - (other.x, other.y)).T) >= parameters.apart_m
+        if not free.any():
+            continue
+        compared, value, found = searcher.compare(left, free, worth)
+        if (kept := searcher.kept) is not None:
+            value[compared == kept.stand, DIRECTIONS.index(kept.direction)] *= parameters.keep_gain
+        best, turn = divmod(int(np.argmax(value)), len(DIRECTIONS))
+        sweep = sweeps[name] = Sweep(int(compared[best]), DIRECTIONS[turn])
+        x, y = lattice.places[sweep.stand].tolist()
+        yaw = searcher.yaw_rad + sweep.direction * _LEAD_RAD
+        stands[name] = Stand(x, y, yaw, turn_rad_s=parameters.yaw_rate_rad_s)
+        missed *= 1.0 - min(1.0, float(found[best, turn]))
+        total += float(value[best, turn])
+        for row, column, heading in searcher.views(sweep.stand, turn):
+            _mark_seen(left, searcher, row, column, heading)
+    return Outlook(stands, sweeps, 1.0 - missed, float(seen_s[-1]), total) if stands else NO_OUTLOOK
+
+
+def times_s(views: int, parameters: SearchParameters) -> Array:
+    """Return when so many views of a sweep are seen [s]."""
+    return np.arange(1.0, views + 1) * (_STEP_RAD / parameters.yaw_rate_rad_s)
+
+
+def on_the_way(lattice: Lattice, pose: Array, views: int, parameters: SearchParameters) -> tuple[Array, Array]:
+    """Return the time of flight to each stand (n) [s], and where a robot is at each view of its sweep (n, views, 2)."""
+    ways = lattice.places - pose[:2]
+    flight_s = np.hypot(*ways.T) / parameters.speed_m_s
+    share = np.minimum(1.0, times_s(views, parameters) / np.maximum(flight_s, 1e-9)[:, None])
+    return flight_s, pose[:2] + share[:, :, None] * ways[:, None, :]
+
+
+def headings(yaw_rad: float, views: int) -> IntMatrix:
+    """Return the heading of each view (2, views), as numbers, by direction."""
+    return (round(yaw_rad / _STEP_RAD) + np.outer(DIRECTIONS, np.arange(1, views + 1))) % HEADINGS
+
+
+def _mark_seen(left: Array, searcher: Searcher, row: int, column: int, heading: int) -> None:
+    """Take what one view finds from the chances that are left for the robots that choose after it."""
+    footprint = searcher.footprint
+    part = slice(int(footprint.first[heading]), int(footprint.first[heading + 1]))
+    rows, columns = row + footprint.rows[part], column + footprint.columns[part]
+    inside = (rows >= 0) & (rows < left.shape[0]) & (columns >= 0) & (columns < left.shape[1])
+    left[rows[inside], columns[inside]] *= 1.0 - searcher.seen[part][inside]

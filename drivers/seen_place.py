@@ -1,7 +1,5 @@
 """When a vehicle was where an estimate has it, though nothing tells how it has moved since. Pure."""
 
-import math
-
 from groundstation.bus.messages import EntityEstimate
 from groundstation.time_units import NS_PER_S
 
@@ -11,11 +9,13 @@ _OLDEST_S = 0.4
 MOST_STD_M = 0.05
 
 
-def seen_ns(now_ns: int, entity: EntityEstimate) -> int | None:
-    """Return when the vehicle was last seen; None if that is long ago, or its place was not known to 5 cm then.
+def last_seen(now_ns: int, entity: EntityEstimate) -> tuple[int, float] | None:
+    """Return when the vehicle was last seen, and how well its place was known then [m].
 
-    A belief of a vehicle that tells no motion stays where the vehicle was seen, and grows to 0.15 m until the next
-    picture arrives.
+    None if that is long ago, or the place was not known to 5 cm. A belief of a vehicle that tells no motion stays where
+    the vehicle was seen, and grows to 0.15 m until the next picture arrives.
     """
-    age_s, std_m = entity.sighting or (math.inf, math.inf)
-    return now_ns - round(age_s * NS_PER_S) if age_s <= _OLDEST_S and std_m <= MOST_STD_M else None
+    if entity.sighting is None:
+        return None
+    age_s, std_m = entity.sighting
+    return (now_ns - round(age_s * NS_PER_S), std_m) if age_s <= _OLDEST_S and std_m <= MOST_STD_M else None

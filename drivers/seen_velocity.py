@@ -3,7 +3,7 @@
 import math
 from collections import deque
 
-from drivers.seen_place import MOST_STD_M, seen_ns
+from drivers.seen_place import MOST_STD_M, last_seen
 from groundstation.bus.messages import EntityEstimate
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
@@ -18,7 +18,10 @@ _FRESH_NS = 300 * NS_PER_MS
 def _place_ns(now_ns: int, entity: EntityEstimate) -> int | None:
     """Return when a vehicle was where the estimate has it, None if that is not known well enough."""
     worst = max(entity.covariance[0], entity.covariance[5]) if len(entity.covariance) == 16 else math.inf
-    return now_ns if entity.age_s <= _SEEN_AGE_S and worst <= MOST_STD_M**2 else seen_ns(now_ns, entity)
+    if entity.age_s <= _SEEN_AGE_S and worst <= MOST_STD_M**2:
+        return now_ns
+    seen = last_seen(now_ns, entity)
+    return None if seen is None else seen[0]
 
 
 class SeenVelocity:

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 from drivers.mavlink.convert import VisionPose
 from drivers.mavlink.settings import VisionFeedback
-from drivers.seen_place import seen_ns
+from drivers.seen_place import last_seen
 from groundstation.bus.messages import EntityEstimate, Estimate
 from groundstation.geometry.angles import difference
 from groundstation.time_units import NS_PER_MS, NS_PER_S
@@ -67,9 +67,9 @@ class VisionFeed:
         if self._is_good(entity):
             self._take(entity, stamp_ns, (entity.covariance[0], entity.covariance[5]))
             return entity
-        at_ns = seen_ns(stamp_ns, entity) if entity.converged else None
-        if at_ns is not None and entity.sighting is not None and at_ns > (self._good_ns or 0):
-            self._take(entity, at_ns, (entity.sighting[1] ** 2,) * 2)
+        seen = last_seen(stamp_ns, entity) if entity.converged else None
+        if seen is not None and seen[0] > (self._good_ns or 0):
+            self._take(entity, seen[0], (seen[1] ** 2,) * 2)
             self.sighted = self._newest
         return None
 

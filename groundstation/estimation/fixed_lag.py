@@ -254,15 +254,15 @@ class FixedLagFilter:
         return Verdict.ACCEPTED
 
     def _start(self, now_ns: int) -> None:
-        if not self._started:
-            self._started = True
-            # On a grid that does not depend on what came first: step borders are multiples of the step.
-            self._origin_ns = (now_ns // self._step_ns - self._behind) * self._step_ns
-            self._now_ns, self._last, self._dirty = now_ns, self._behind, 0
+        if self._started:
+            return
+        self._started = True
+        # On a grid that does not depend on what came first: step borders are multiples of the step.
+        self._origin_ns = (now_ns // self._step_ns - self._behind) * self._step_ns
+        self._now_ns, self._last, self._dirty = now_ns, self._behind, 0
 
     def _timing(self, stamp_ns: int, now_ns: int) -> Verdict:
-        if not self._started:
-            self._start(now_ns)
+        self._start(now_ns)
         if self._step_of(now_ns) > self._last + _IDLE_STEPS:
             self.advance(now_ns)
         if now_ns < self._now_ns:

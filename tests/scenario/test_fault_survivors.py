@@ -148,14 +148,11 @@ def test_a_blind_drone_that_tells_nothing_new_is_braked_on(seed: int, kinds: lis
 
 @pytest.mark.slow
 @pytest.mark.study
-def test_a_silent_drone_that_cameras_see_drift_is_braked() -> None:
-    assert safely_flown(order_of([]), *ADRIFT)["rest_s"] <= 3.0
-
-
-@pytest.mark.slow
-@pytest.mark.study
-def test_a_frozen_drone_that_its_firmware_brakes_is_left_to_it() -> None:
-    assert safely_flown(order_of([]), *BRAKED_BY_ITSELF)["rest_s"] <= 2.5
+@pytest.mark.parametrize(
+    ("seed", "kinds", "rest_s"), [(*ADRIFT, 3.0), (*BRAKED_BY_ITSELF, 2.5)], ids=["drifting", "braked by its firmware"]
+)
+def test_a_silent_drone_is_braked_where_cameras_see_it_drift(seed: int, kinds: list[str], rest_s: float) -> None:
+    assert safely_flown(order_of([]), seed, kinds)["rest_s"] <= rest_s
 
 
 @pytest.mark.slow

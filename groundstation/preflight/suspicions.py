@@ -10,8 +10,8 @@ import numpy as np
 from groundstation.preflight.pad_fit import TEAM_PRINT, Fit, Key, PadFit
 from groundstation.preflight.stand import PadSighting, Stand
 
-# Of a figure that nobody measured, or measured wrongly: one sigma.
-_MOVED_M, _TURNED_RAD, _TILTED_RAD, _SHARE, _CARRIED_M = 0.5, 0.6, 0.15, 0.08, 1.0
+# Of a figure that nobody measured, or measured wrongly: one sigma. A camera hangs askew, or is turned the wrong way.
+_MOVED_M, _TURNED_RAD, _ASKEW_RAD, _TILTED_RAD, _SHARE, _CARRIED_M = 0.5, 0.6, 0.06, 0.15, 0.08, 1.0
 # A fit is good as long as its chi-square is not beyond what chance brings once in 100,000 (this many sigmas).
 _CHANCE_SIGMAS = 4.26
 # Explanations that are this much less likely (1 to 20) than the best one are ruled out.
@@ -75,8 +75,9 @@ def opinion(stand: Stand, sightings: Sequence[PadSighting]) -> Opinion:
     tried = [Explanation(s, _explained(plain, s)) for s in ranked]
     good = [v for v in tried if _good(v.fit, len(v.suspicion.loose))]
     best = max((v.fit.evidence for v in good), default=-math.inf)
-    left = sorted((v for v in good if v.fit.evidence > best - _RULED_OUT), key=lambda v: -v.fit.evidence)
-    return Opinion(False, tuple(left), nothing)
+    left = sorted((v for v in good if v.fit.evidence > best - _RULED_OUT), key=lambda v: v.fit.evidence)
+    likeliest = {(v.suspicion.what, v.suspicion.who, *v.suspicion.exchanged.values()): v for v in left}
+    return Opinion(False, tuple(sorted(likeliest.values(), key=lambda v: -v.fit.evidence)), nothing)
 
 
 def _suspicions(plain: PadFit) -> Iterator[Suspicion]:
@@ -87,7 +88,8 @@ def _suspicions(plain: PadFit) -> Iterator[Suspicion]:
         yield Suspicion("aside", name, {(name, "x"): _MOVED_M, (name, "y"): _MOVED_M})
         yield Suspicion("height", name, {(name, "z"): _MOVED_M})
         yield Suspicion("focal", name, {(name, "focal"): _SHARE})
-        yield Suspicion("turned", name, {(name, "yaw"): _TURNED_RAD})
+        for turn in (_ASKEW_RAD, _TURNED_RAD):
+            yield Suspicion("turned", name, {(name, "yaw"): turn})
         yield Suspicion("tilted", name, {(name, "roll"): _TILTED_RAD, (name, "pitch"): _TILTED_RAD})
     for name in drones:
         place: dict[Key, float] = {(name, "aside_x"): _CARRIED_M, (name, "aside_y"): _CARRIED_M}

@@ -107,6 +107,12 @@ def test_a_size_is_within_its_deviation(
         assert abs(found - value) < 3.0 * std and std < 0.3 * value
 
 
+def test_a_camera_askew_by_three_degrees_is_named_in_nine_of_ten_rooms(lab_field: ResolvedField) -> None:
+    for turn_deg in (3.0, -3.0):
+        said = [only(lab_field, Truth(turn_deg=(0.0, 0.0, turn_deg)), seed) for seed in range(100, 120)]
+        assert sum("ceiling is turned by" in one.found and one.level is Level.MUST for one in said) >= 18
+
+
 def test_the_supervisor_does_not_wait_for_an_opinion_of_a_large_team(lab_field: ResolvedField) -> None:
     drone = lab_field.drones["drone_1"]
     drones = {f"drone_{n}": replace(drone, pad_m=(0.8 * (n % 4) - 1.2, 0.8 * (n // 4) - 0.4)) for n in range(8)}

@@ -1,8 +1,8 @@
 """What a decision of the watchdog means to PX4 and ArduPilot: modes, arming, take-off, setpoints, landing. Pure.
 
 Each setpoint of the tracker goes out once, at most setpoint_hz times a second. While hovering it is told to stand
-still: at the place where the hover began, as far as the tracker knows where it is, else by zero velocity. What sends is
-our own loop: when it stands still, nothing is sent and the vehicle's own time-out acts.
+still: at the place where it comes to rest, as far as the tracker knows where it is, else by zero velocity. What sends
+is our own loop: when it stands still, nothing is sent and the vehicle's own time-out acts.
 """
 
 from collections import deque

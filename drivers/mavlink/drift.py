@@ -40,6 +40,9 @@ _HOLD_GAIN, _HOLD_UP_GAIN = 0.8, 1.3  # [1/s], sideways and upwards
 # Below what the control error tolerates of a vehicle that is told to stand still.
 _HOLD_M_S = 0.2
 _SEEN_S = 0.5
+# A vehicle that is told to stop has stopped once it is so slow over so long, two pictures at least, and after so long
+# at most: one that still moves then drifts.
+_STOPPED_M_S, _PACE_NS, _STOPS_WITHIN_NS = 0.1, 500 * NS_PER_MS, NS_PER_S
 _STILL: Vector3 = (0.0, 0.0, 0.0)
 Vector2 = tuple[float, float]
 
@@ -89,6 +92,28 @@ class ClimbError:
         self.error_m_s -= _CLIMB_PER_S**2 * step_s * off_m
 
 
+class Stop:
+    """The place to hold of a vehicle that may still move as its hover begins: where it comes to rest.
+
+    Held where the hover began, it would fly back by the way that it took to stop.
+    """
+
+    def __init__(self, now_ns: int, place: Vector3) -> None:
+        self._until_ns, self._height_m = now_ns + _STOPS_WITHIN_NS, place[2]
+        self._place, self._at_ns = place, now_ns
+        self._rests = False
+
+    def place(self, now_ns: int, here: Vector3) -> Vector3:
+        """Return the place to hold: here, at the first height, until it rests."""
+        elapsed_ns = now_ns - self._at_ns
+        if not self._rests and elapsed_ns >= _PACE_NS:
+            slow = math.dist(here[:2], self._place[:2]) < _STOPPED_M_S * elapsed_ns / NS_PER_S
+            self._rests = slow or now_ns >= self._until_ns
+            self._place, self._at_ns = here, now_ns
+        x, y, _ = self._place if self._rests else here
+        return x, y, self._height_m
+
+
 class DriftFeedback:
     """Belief of one flying vehicle [world, FLU] beside the velocity that its autopilot reports."""
 
@@ -110,6 +135,7 @@ class DriftFeedback:
         self._place: Vector3 = _STILL
         self._yaw_rad = 0.0
         self._held: Vector3 | None = None
+        self._stop: Stop | None = None
 
     def stand(self, now_ns: int) -> None:
         """Note that it has not lifted off yet: the error of its climb rate, which sways there, does not count."""
@@ -186,11 +212,11 @@ class DriftFeedback:
         return self._place
 
     def let_go(self) -> None:
-        """Hold no place any more: the next hover holds the one where it begins."""
-        self._held = None
+        """Hold no place any more: the next hover holds the one where it comes to rest."""
+        self._held = self._stop = None
 
     def hold_at(self, place: Vector3) -> None:
-        """Hold a place [world] from now on, rather than the one where the hover began."""
+        """Hold a place [world] from now on, rather than the one where it comes to rest."""
         self._held = place
 
     def hold(self, now_ns: int, height_m: float | None = None) -> Vector3:
@@ -200,14 +226,18 @@ class DriftFeedback:
         """
         place = self.place(now_ns)
         if place is None:
-            self._held = None
+            self.let_go()
             return _STILL
-        x, y, z = self._held = self._held or place
+        x, y, z = self._held or self._comes_to_rest(now_ns, place)
         wanted = (x - place[0], y - place[1], (z if height_m is None else height_m) - place[2])
         size = math.hypot(*wanted[:2])
         gain = min(_HOLD_GAIN, _HOLD_M_S / size) if size > 0.0 else 0.0
         up = max(-_HOLD_M_S, min(_HOLD_M_S, _HOLD_UP_GAIN * wanted[2]))
         return self._in_heading(gain * wanted[0], gain * wanted[1], up)
+
+    def _comes_to_rest(self, now_ns: int, place: Vector3) -> Vector3:
+        self._stop = self._stop or Stop(now_ns, place)
+        return self._stop.place(now_ns, place)
 
     def _in_heading(self, x: float, y: float, up: float) -> Vector3:
         c, s = math.cos(self._yaw_rad), math.sin(self._yaw_rad)

@@ -219,12 +219,39 @@ def test_the_error_of_a_climb_rate_is_corrected_up_to_a_limit():
         assert climber.feedback.drift(climber.now_ns)[2] == pytest.approx(corrected, abs=0.01)
 
 
-def test_a_place_that_is_given_is_held_instead_of_the_one_where_the_hover_began():
+def test_a_place_that_is_given_is_held_instead_of_the_one_where_it_comes_to_rest():
     vehicle = Vehicle()
     vehicle.fly(1.0)
     vehicle.feedback.hold_at((0.3, -0.1, 0.8))
     vehicle.fly(8.0)
     assert vehicle.place[:2] == pytest.approx((0.3, -0.1), abs=0.03)
+
+
+@pytest.mark.parametrize("seen", [True, False])
+def test_a_hover_that_begins_in_flight_holds_the_place_where_it_comes_to_rest(seen):
+    """Held where it began, the vehicle would fly back by 0.2 m. Pictures come ten times a second, 0.2 s late."""
+    vehicle = Vehicle()
+    vehicle.fly(3.0, wanted=(0.5, 0.0))
+    vehicle.seen, began, shown = seen, tuple(vehicle.place), []
+    for step in range(400):
+        shown.append(tuple(vehicle.place))
+        if not seen and step % 5 == 0:
+            vehicle.feedback.see_place(vehicle.now_ns, shown[max(0, step - 10)], YAW)
+        vehicle.step()
+    farthest = max(math.dist(place[:2], began[:2]) for place in shown)
+    assert math.hypot(*vehicle.velocity) < 0.02
+    assert math.dist(vehicle.place[:2], began[:2]) > farthest - 0.07
+
+
+def test_a_vehicle_that_drifts_as_its_hover_begins_is_held_a_second_later():
+    vehicle = Vehicle()
+    vehicle.fly(0.5)
+    vehicle.feedback.let_go()
+    vehicle.seen, vehicle.error = False, (-0.15, 0.0)
+    for _ in range(500):
+        vehicle.feedback.see_place(vehicle.now_ns, tuple(vehicle.place), YAW)
+        vehicle.step()
+    assert math.hypot(*vehicle.velocity) < 0.02 and math.hypot(*vehicle.place[:2]) < 0.4
 
 
 def test_a_vehicle_whose_velocity_nobody_knows_holds_its_place_by_pictures():

@@ -8,7 +8,7 @@ const LEVELS = { empty: "bad", unknown: "warn", low: "warn", good: "good" };
 // Until it lands its drone by itself, in the same words in the bar and on the cards; "" where nobody knows.
 export function lastsWords({ battery, good_for: time, battery_min: limit }) {
   const least = `${(100 * limit).toFixed(0)} %`;
-  return time && (battery < limit ? `below ${least}` : `${time} until ${least}`);
+  return time && (battery < limit ? `below ${least}` : `${time} of flight`);
 }
 
 const share = ({ battery }) => (battery === null ? "unknown" : `${(100 * battery).toFixed(0)} %`);

@@ -99,7 +99,8 @@ class Handle:
 def deadman(name: str | None, gamepad: str | None) -> int:
     """Hold on, and the flight goes on; let go, and the drones hold (space bar: after 0.9 s), and land 5 s later.
 
-    A gamepad that is pulled out, or a closed terminal, lets go; Ctrl-C holds and leaves, as q. No emergency stop.
+    A gamepad that is pulled out, or a closed terminal, lets go; Ctrl-C and Ctrl-Z hold and leave, as q. No
+    emergency stop.
     """
     record = choose_run(name)
     bus = join(record, "deadman", Role.CLI)
@@ -116,7 +117,10 @@ def deadman(name: str | None, gamepad: str | None) -> int:
 
 
 def heed_signals(handle: Handle) -> None:
-    """Let Ctrl-C leave as `q` does, and a closed terminal or the end of this process let go; main thread only."""
+    """Let Ctrl-C leave as `q` does, and a closed terminal or the end of this process let go; main thread only.
+
+    Ctrl-Z and Ctrl-\\ leave as well: who is stopped, or dead, orders nothing when the handle is let go.
+    """
 
     def leave(_number: int, _frame: object) -> None:
         handle.left = True
@@ -124,9 +128,11 @@ def heed_signals(handle: Handle) -> None:
     def lose(_number: int, _frame: object) -> None:
         handle.gone = True
 
-    signal.signal(signal.SIGINT, leave)
-    signal.signal(signal.SIGTERM, lose)
-    signal.signal(signal.SIGHUP, lose)
+    for number in (signal.SIGINT, signal.SIGTSTP, signal.SIGQUIT):
+        signal.signal(number, leave)
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, lose)
+    signal.signal(signal.SIGTTOU, signal.SIG_IGN)  # in the background it would be stopped for what it shows
 
 
 def watch(bus: "Bus", drones: tuple[str, ...], handle: Handle, man: DeadMan, go_on: Callable[[], bool]) -> None:
@@ -190,17 +196,32 @@ def _opened(gamepad: str | None) -> Iterator[Handle]:
     if gamepad is not None:
         descriptor = _joystick(gamepad)
         try:
-            yield Handle(descriptor, gamepad=True)
+            with _terminal(of_keys=False):
+                yield Handle(descriptor, gamepad=True)
         finally:
             os.close(descriptor)
         return
     if not sys.stdin.isatty():
         raise OperatorMistake("no keyboard here: run it in a terminal, or give --gamepad")
+    with _terminal(of_keys=True):
+        yield Handle(sys.stdin.fileno(), gamepad=False)
+
+
+@contextmanager
+def _terminal(*, of_keys: bool) -> Iterator[None]:
+    """Take each key as it comes, if keys are wanted; Ctrl-S stops no output, in which orders would wait as well."""
+    if not sys.stdin.isatty():
+        yield
+        return
     descriptor = sys.stdin.fileno()
     before = termios.tcgetattr(descriptor)
     try:
-        tty.setcbreak(descriptor)
-        yield Handle(descriptor, gamepad=False)
+        if of_keys:
+            tty.setcbreak(descriptor)
+        mode = termios.tcgetattr(descriptor)
+        mode[tty.IFLAG] &= ~termios.IXON
+        termios.tcsetattr(descriptor, termios.TCSANOW, mode)
+        yield
     finally:
         with suppress(termios.error):  # the terminal is gone
             termios.tcsetattr(descriptor, termios.TCSADRAIN, before)

@@ -2,8 +2,11 @@
 
 import contextlib
 import os
+import pty
 import signal
 import struct
+import sys
+import termios
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -110,6 +113,8 @@ def test_it_goes_out_to_everybody_and_is_repeated(pipe: tuple[int, int]) -> None
     ("number", "orders"),
     [
         (signal.SIGINT, [Verb.HOLD]),
+        (signal.SIGTSTP, [Verb.HOLD]),
+        (signal.SIGQUIT, [Verb.HOLD]),
         (signal.SIGTERM, [Verb.HOLD, Verb.LAND]),
         (signal.SIGHUP, [Verb.HOLD, Verb.LAND]),
     ],
@@ -123,7 +128,8 @@ def test_no_signal_takes_the_handle_away_without_a_stop(
     exchange = MemoryExchange()
     bus, drone = MemoryBus(exchange, "lab", "deadman_1"), MemoryBus(exchange, "lab", "drone_1")
     commands = drone.subscribe([t.COMMAND])
-    before = {each: signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    taken = (signal.SIGINT, signal.SIGTSTP, signal.SIGQUIT, signal.SIGTERM, signal.SIGHUP, signal.SIGTTOU)
+    before = {each: signal.getsignal(each) for each in taken}
     handle, man, began = Handle(pipe[0], gamepad=True), DeadMan(1 << 62), time.monotonic()
     man.press(time.monotonic_ns())
     try:
@@ -136,6 +142,18 @@ def test_no_signal_takes_the_handle_away_without_a_stop(
     assert time.monotonic() - began < 4.0, "it left by itself"
     verbs = [one.message.verb for one in commands.drain() if isinstance(one.message, Command)]
     assert list(dict.fromkeys(verbs)) == orders
+
+
+@pytest.mark.parametrize("gamepad", [None, "/dev/null"])
+def test_ctrl_s_holds_back_no_order(monkeypatch: pytest.MonkeyPatch, gamepad: str | None) -> None:
+    operator, terminal = pty.openpty()
+    before = termios.tcgetattr(terminal)
+    with os.fdopen(terminal) as stdin, os.fdopen(operator):
+        monkeypatch.setattr(sys, "stdin", stdin)
+        with deadman._opened(gamepad):
+            assert not termios.tcgetattr(terminal)[0] & termios.IXON
+            assert bool(termios.tcgetattr(terminal)[3] & termios.ICANON) == (gamepad is not None)
+        assert termios.tcgetattr(terminal) == before
 
 
 def broken(*_: object, **__: object) -> None:

@@ -1,7 +1,5 @@
 """One flight from start to landing: supervisor and operator in one loop, until the time is up or someone stops it."""
 
-import os
-import select
 import time
 from dataclasses import dataclass
 
@@ -9,6 +7,7 @@ from groundstation.bus.messages import RUN, Event, Severity
 from groundstation.bus.topics import EVENT
 from groundstation.errors import GroundStationError
 from groundstation.flight.flight_plan import FlightPlan
+from groundstation.flight.keyboard import Keyboard
 from groundstation.flight.looking import Looking
 from groundstation.runtime.before_take_off import BeforeTakeOff
 from groundstation.runtime.operator import Operator
@@ -18,7 +17,6 @@ from groundstation.supervisor.supervisor import Supervisor
 from groundstation.supervisor.terminal import Terminal
 from groundstation.time_units import NS_PER_S
 
-_STDIN = 0
 _FAILED_LANDING_S = 2.0
 
 
@@ -44,6 +42,7 @@ class Flight:
         self._plan = plan
         self._terminal = terminal
         self._began_ns = time.monotonic_ns()
+        self._keyboard = Keyboard()
         self._prompting = False
         self._grounded = False
         self._forbidden = False
@@ -123,6 +122,7 @@ class Flight:
             return self._supervisor.failure  # what broke the look off must not be answered by a take-off
         if self._plan.asks:
             self._prompting = True
+            self._keyboard.forget()
             insist = "type anyway and press Enter" if self._forbidden else "press Enter"
             self._say(f"{self._state()}. To take off and track {insist} (Ctrl-C ends), or use: groundstation takeoff")
         else:
@@ -177,19 +177,24 @@ class Flight:
     def _prompt(self, operator: Operator, now_ns: int) -> None:
         if operator.phase is not TeamPhase.GROUND:
             self._prompting = False  # another shell was faster
-        elif select.select([_STDIN], [], [], 0)[0]:
-            # os.read and not input(): nothing here may block the watch over the processes.
-            line = os.read(_STDIN, 4096)
-            self._prompting = bool(line) and b"\n" not in line
-            if not line:
-                self._say("no keyboard here: waiting for groundstation takeoff")
-            elif not self._prompting:
-                operator.take_off(now_ns, anyway=self._plan.anyway or line.strip() == b"anyway")
-                self._prompting = bool(operator.forbidden)
-                if self._prompting:
-                    self._say("fix it and press Enter, or type anyway and press Enter")
+        else:
+            self._answer(operator, now_ns)
         if not self._prompting:
             self._start.show_screen()
+
+    def _answer(self, operator: Operator, now_ns: int) -> None:
+        """Take what was typed: Enter alone takes off, and so does the word anyway; nothing else does."""
+        word = self._keyboard.line()
+        if self._keyboard.gone:
+            self._prompting = False
+            self._say("no keyboard here: waiting for groundstation takeoff")
+        elif word in (b"", b"anyway"):
+            operator.take_off(now_ns, anyway=self._plan.anyway or word == b"anyway")
+            self._prompting = bool(operator.forbidden)
+            if self._prompting:
+                self._say("fix it and press Enter, or type anyway and press Enter")
+        elif word is not None:
+            self._say("nobody takes off by that: press Enter alone to take off, Ctrl-C to end")
 
     # -- land ----------------------------------------------------------------------------------------------------
 

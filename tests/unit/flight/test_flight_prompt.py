@@ -1,6 +1,7 @@
 """What is pressed before a take-off: the prompt stays, and a flight that asks nobody does not take off after a stop."""
 
 import os
+import pty
 import time
 from collections.abc import Iterator
 from types import SimpleNamespace
@@ -11,6 +12,7 @@ import pytest
 from groundstation.bus import messages as m
 from groundstation.bus import topics as t
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+from groundstation.flight import keyboard as keyboards
 from groundstation.flight import loop
 from groundstation.flight.flight_plan import FlightPlan
 from groundstation.runtime.operator import Operator
@@ -20,13 +22,13 @@ from groundstation.supervisor.start import Start
 from groundstation.supervisor.supervisor import Supervisor
 from groundstation.supervisor.terminal import Terminal
 
-_LONGEST_S = 5.0
+_LONGEST_S = 2.0
 
 
 class Waiting:
     """A run whose drone stands; a page presses a button at the first turn, the keyboard Enter at the fifth."""
 
-    def __init__(self, keyboard: int, pressed: m.Verb) -> None:
+    def __init__(self, keyboard: int, pressed: m.Verb, typed: bytes = b"\n") -> None:
         exchange = MemoryExchange()
         self.bus, self._drone = MemoryBus(exchange, "lab", "supervisor"), MemoryBus(exchange, "lab", "drone_1")
         self._page = MemoryBus(exchange, "lab", "console")
@@ -36,7 +38,7 @@ class Waiting:
         self.failure, self.unwell = "", list[str]()
         self.said: list[str] = []
         self.heard: list[m.Verb] = []
-        self._pressed = pressed
+        self._pressed, self._typed = pressed, typed
         self._keyboard, self._turns, self._began = keyboard, 0, time.monotonic()
 
     def step(self) -> None:
@@ -50,7 +52,7 @@ class Waiting:
             order = m.Command(header=header, id="page-1", verb=self._pressed, scope=scope, issuer="console")
             self._page.publish(t.COMMAND, order)
         if self._turns == 5:
-            os.write(self._keyboard, b"\n")
+            os.write(self._keyboard, self._typed)
         late = time.monotonic() - self._began > _LONGEST_S
         self.interrupts.stop_requested = late or m.Verb.TAKEOFF in self.heard
         time.sleep(0.002)
@@ -62,10 +64,19 @@ class Waiting:
 @pytest.fixture
 def keyboard(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     read, write = os.pipe()
-    monkeypatch.setattr(loop, "_STDIN", read)
+    monkeypatch.setattr(keyboards.Keyboard.__init__, "__defaults__", (read,))
     yield write
     os.close(read)
     os.close(write)
+
+
+@pytest.fixture
+def terminal(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    operator, run = pty.openpty()
+    monkeypatch.setattr(keyboards.Keyboard.__init__, "__defaults__", (run,))
+    yield operator
+    os.close(operator)
+    os.close(run)
 
 
 def flown(waiting: Waiting, *, asks: bool) -> loop.FlightOutcome:
@@ -98,6 +109,46 @@ def test_a_start_that_nobody_can_obey_before_the_take_off_does_not_end_the_promp
     flown(waiting, asks=True)
     assert m.Verb.TAKEOFF in waiting.heard, "Enter takes off after it as before it"
     assert not any("without an order to all" in line for line in waiting.said)
+
+
+def test_enter_pressed_before_it_is_asked_for_takes_nobody_off(terminal: int) -> None:
+    os.write(terminal, b"\n")  # while the processes start
+    waiting = Waiting(terminal, m.Verb.HOLD, typed=b"")
+    flown(waiting, asks=True)
+    assert m.Verb.TAKEOFF not in waiting.heard
+
+
+def test_enter_in_a_terminal_takes_off(terminal: int) -> None:
+    waiting = Waiting(terminal, m.Verb.HOLD)
+    flown(waiting, asks=True)
+    assert m.Verb.TAKEOFF in waiting.heard
+
+
+@pytest.mark.parametrize("typed", [b"exit\n", b"groundstation land\n", b"no"])
+def test_no_other_word_takes_off(keyboard: int, typed: bytes) -> None:
+    waiting = Waiting(keyboard, m.Verb.HOLD, typed)
+    flown(waiting, asks=True)
+    assert m.Verb.TAKEOFF not in waiting.heard
+    assert any("press Enter alone" in line for line in waiting.said) == typed.endswith(b"\n")
+
+
+@pytest.mark.parametrize("typed", [b"anyway\n", b"\r\n", b" \n"])
+def test_enter_and_anyway_take_off(keyboard: int, typed: bytes) -> None:
+    waiting = Waiting(keyboard, m.Verb.HOLD, typed)
+    flown(waiting, asks=True)
+    assert m.Verb.TAKEOFF in waiting.heard
+
+
+def test_a_keyboard_that_is_another_programs_is_left_alone(monkeypatch: pytest.MonkeyPatch, keyboard: int) -> None:
+    waiting = Waiting(keyboard, m.Verb.HOLD)
+    monkeypatch.setattr(os, "read", refused)
+    flown(waiting, asks=True)
+    assert m.Verb.TAKEOFF not in waiting.heard
+    assert not any("no keyboard" in line for line in waiting.said)
+
+
+def refused(*_: object) -> bytes:
+    raise OSError(5, "Input/output error")
 
 
 def test_who_was_landed_one_by_one_is_not_said_to_have_landed_by_itself() -> None:

@@ -1,0 +1,37 @@
+"""The operator's keyboard at the prompt of a run: whole lines, without ever waiting for one."""
+
+import os
+import select
+import termios
+from contextlib import suppress
+
+_STDIN = 0
+
+
+class Keyboard:
+    """What is typed into a terminal, or comes out of a pipe. gone: nothing more will."""
+
+    def __init__(self, descriptor: int = _STDIN) -> None:
+        self._descriptor = descriptor
+        self._typed = b""
+        self.gone = False
+
+    def forget(self) -> None:
+        """Drop what was typed into a terminal before it was asked for: nobody knew then what it would answer."""
+        self._typed = b""
+        with suppress(OSError, termios.error):  # no terminal: a pipe was filled on purpose
+            termios.tcflush(self._descriptor, termios.TCIFLUSH)
+
+    def line(self) -> bytes | None:
+        """Return the next line without the blanks around it, None while there is none."""
+        if self.gone or not select.select([self._descriptor], [], [], 0)[0]:
+            return None
+        try:
+            # os.read and not input(): nothing here may block the watch over the processes.
+            data = os.read(self._descriptor, 4096)
+        except OSError:
+            return None  # a run in the background: the keyboard is another program's for now
+        self.gone = not data
+        line, ended, _ = (self._typed + data).partition(b"\n")
+        self._typed = b"" if ended else line
+        return line.strip() if ended else None

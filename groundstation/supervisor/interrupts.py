@@ -1,4 +1,7 @@
-"""Signals of the supervisor: Ctrl-C, SIGTERM and a closed terminal alike ask to land and stop; a second hurries."""
+"""Signals of the supervisor: Ctrl-C, SIGTERM and a closed terminal alike ask to land and stop; a second hurries.
+
+Ctrl-\\ asks for it as well. Ctrl-Z does nothing: who watches over drones in the air cannot be put aside.
+"""
 
 import os
 import signal
@@ -10,6 +13,9 @@ from groundstation.time_units import NS_PER_MS
 
 # `timeout` and some shells signal a process twice at once; a person needs longer for the second thought.
 _SAME_WISH_NS = 500 * NS_PER_MS
+_WISHES = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+# A reader of our output that has gone, Ctrl-Z, and what stops a program that is in the background of its terminal.
+_UNHEEDED = (signal.SIGPIPE, signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU)
 
 
 class Interrupts:
@@ -23,9 +29,10 @@ class Interrupts:
 
     def install(self) -> None:
         """Take over the signals of this process; main thread only."""
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        for number in _WISHES:
             signal.signal(number, self._on_signal)
-        signal.signal(signal.SIGPIPE, signal.SIG_IGN)
+        for number in _UNHEEDED:
+            signal.signal(number, signal.SIG_IGN)
         signal.set_wakeup_fd(self._write, warn_on_full_buffer=False)
 
     def _on_signal(self, number: int, _frame: FrameType | None) -> None:

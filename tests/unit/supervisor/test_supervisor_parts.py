@@ -15,7 +15,7 @@ import pytest
 from groundstation.errors import GroundStationError
 from groundstation.supervisor import runtime_file
 from groundstation.supervisor.failsafe_sender import FailsafeSender
-from groundstation.supervisor.interrupts import Interrupts
+from groundstation.supervisor.interrupts import _UNHEEDED, _WISHES, Interrupts
 from groundstation.supervisor.process_spec import FailsafeDatagrams
 from groundstation.supervisor.runtime_file import ProcessRecord, RuntimeRecord
 from groundstation.supervisor.terminal import Terminal
@@ -144,7 +144,7 @@ def test_muted_lines_come_later() -> None:
 
 @pytest.fixture
 def interrupts() -> Iterator[Interrupts]:
-    kept = {n: signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGPIPE)}
+    kept = {n: signal.getsignal(n) for n in (*_WISHES, *_UNHEEDED)}
     made = Interrupts()
     made.install()
     yield made
@@ -161,6 +161,15 @@ def test_first_wish_lands_second_hurries(interrupts: Interrupts) -> None:
     time.sleep(0.6)
     os.kill(os.getpid(), signal.SIGINT)
     assert interrupts.hurry
+
+
+def test_no_key_of_the_terminal_stops_or_kills_who_watches_over_drones(interrupts: Interrupts) -> None:
+    for number in (signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU):
+        assert signal.getsignal(number) is signal.SIG_IGN
+        os.kill(os.getpid(), number)
+    assert not interrupts.stop_requested
+    os.kill(os.getpid(), signal.SIGQUIT)
+    assert interrupts.stop_requested
 
 
 def test_closing_terminal_never_hurries(interrupts: Interrupts) -> None:

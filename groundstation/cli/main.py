@@ -3,7 +3,6 @@
 import sys
 from collections.abc import Sequence
 from importlib.util import find_spec
-from io import TextIOWrapper
 from pathlib import Path
 from pkgutil import resolve_name
 
@@ -12,6 +11,7 @@ import click
 from groundstation.cli.exits import ExitCode, exit_code_of
 from groundstation.cli.verbs import RENAMED, VERBS, CommandRow, all_verbs, meant, of_kinds
 from groundstation.errors import GroundStationError, SettingsError
+from groundstation.process.standard_streams import make_usable
 
 
 def _meant(word: str) -> str:
@@ -153,9 +153,7 @@ def _tell(error: BaseException) -> None:
 
 def main() -> None:
     """Carry out the command of this process, and end it."""
-    if isinstance(sys.stdout, TextIOWrapper) and sys.stdout.errors == "strict":
-        # A name or a sign that the terminal cannot show is written as Python writes it on stderr, not a fault.
-        sys.stdout.reconfigure(errors="backslashreplace")
+    make_usable()
     try:
         code = run()
     except Exception:  # noqa: BLE001  the outermost loop: a bug must not look like a failed run (exit code 1)

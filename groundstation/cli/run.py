@@ -13,6 +13,7 @@ import click
 
 from groundstation.cli.exits import ExitCode
 from groundstation.cli.numbers import FiniteRange
+from groundstation.cli.terminal import can_be_drawn_on
 
 if TYPE_CHECKING:
     from groundstation.flight.composition import Simulation
@@ -204,7 +205,7 @@ def _run(
     write_facts(run_dir, facts)
     log_to(run_dir)
     endpoint = simulation.network.endpoint if simulation else fly_endpoint(field)
-    monitor = not headless and sys.stdout.isatty()
+    monitor = not headless and can_be_drawn_on()
     table = process_table(field, endpoint, run_dir, simulation=simulation, monitor=monitor)
     terminal = Terminal()
     terminal.say(f"{facts.mode} {path}: {len(table)} processes, run folder {run_dir}")

@@ -1,5 +1,6 @@
 """Output on a terminal: tables and drawings of rich, and a bar for long work."""
 
+import os
 import sys
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,11 @@ def show(picture: "RenderableType") -> None:
 
     terminal = Console()
     (terminal if terminal.is_terminal else Console(width=_WHOLE)).print(picture)
+
+
+def can_be_drawn_on() -> bool:
+    """Return whether standard output is a terminal on which a table can be redrawn in its place."""
+    return sys.stdout.isatty() and os.environ.get("TERM", "").lower() not in ("dumb", "unknown")
 
 
 def progress(done: int, total: int) -> None:

@@ -13,6 +13,7 @@ import msgspec
 
 from groundstation.errors import GroundStationError
 from groundstation.process.child import Child, ChildSpec
+from groundstation.process.standard_streams import show_all_signs
 
 EXIT_FAILED = 1
 _log = logging.getLogger(__name__)
@@ -20,6 +21,7 @@ _log = logging.getLogger(__name__)
 
 def main(arguments: list[str]) -> int:
     """Run one child to its end and return its exit code."""
+    show_all_signs()
     spec = msgspec.json.decode(sys.stdin.buffer.read(), type=ChildSpec)
     try:
         with Child(spec) as child:

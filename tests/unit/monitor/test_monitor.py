@@ -171,6 +171,16 @@ def test_without_a_terminal_it_prints_a_line_now_and_then() -> None:
     assert len(output.getvalue().splitlines()) == 3
 
 
+def test_a_terminal_that_cannot_be_drawn_on_gets_lines_as_well() -> None:
+    output = io.StringIO()
+    bus = MemoryBus(MemoryExchange(), "lab", "monitor")
+    console = Console(file=output, force_terminal=True, _environ={"TERM": "dumb"})
+    with Screen(bus, CAST, NOW, console) as screen:
+        for second in range(11):
+            screen.turn(NOW + second * S)
+    assert len(output.getvalue().splitlines()) == 3 and "\x1b" not in output.getvalue()
+
+
 def test_the_line_names_modes_and_alarms(world: World) -> None:
     world.vehicle("drone_1", mode="HOLD", battery=0.1)
     world.text()

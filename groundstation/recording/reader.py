@@ -128,6 +128,8 @@ def parts(run_dir: Path, stem: str) -> list[Path]:
 def open_recording(path: Path) -> Recording:
     """Return a recording with its attachments and metadata; raises RecordingError if it is none of ours."""
     recording = Recording(path)
+    if path.is_fifo():  # it is read more than once; opening one that nobody writes to would wait for ever
+        raise RecordingError(f"{path}: is a pipe, not a file")
     try:
         with path.open("rb") as stream:
             start = stream.read(len(MCAP0_MAGIC))

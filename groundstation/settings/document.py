@@ -1,5 +1,6 @@
 """YAML 1.2 documents as trees whose every node knows the line it was written on."""
 
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -92,7 +93,7 @@ def read(path: Path, name: str = "") -> Node:
     """Return a file's content; raises SettingsError naming file and line of all that makes it unreadable."""
     name = name or str(path)
     try:
-        with path.open("rb") as stream:
+        with open(path, "rb", opener=_without_waiting) as stream:
             content = stream.read(_MAX_BYTES + 1)  # a device (`/dev/zero`) has no end
     except FileNotFoundError:
         raise SettingsError([f"{name}: no such file{_neighbours(path)}"]) from None
@@ -105,6 +106,13 @@ def read(path: Path, name: str = "") -> Node:
     except UnicodeDecodeError as error:
         raise SettingsError([f"{name}:{content[: error.start].count(10) + 1}: is not UTF-8 text"]) from None
     return parse(text, name)
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    """Open a file; a pipe that nobody writes to reads as empty, where opening it would wait for ever."""
+    descriptor = os.open(path, flags | os.O_NONBLOCK)
+    os.set_blocking(descriptor, True)
+    return descriptor
 
 
 def _neighbours(path: Path) -> str:

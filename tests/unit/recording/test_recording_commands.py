@@ -228,7 +228,10 @@ def test_what_cannot_be_read_is_refused_by_name(command: tuple[str, ...], tmp_pa
     assert code is ExitCode.SETTINGS and "is it a run folder" in text
     code, text = _refusal(*command, tmp_path / "absent")
     assert code is ExitCode.SETTINGS
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["empty.mcap", "folder", "foreign.mcap", "text.mcap"]
+    os.mkfifo(tmp_path / "pipe")  # which nobody writes to
+    assert _refusal(*command, tmp_path / "pipe") == (ExitCode.SETTINGS, f"{tmp_path / 'pipe'}: is a pipe, not a file")
+    there = ["empty.mcap", "folder", "foreign.mcap", "pipe", "text.mcap"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == there
 
 
 def test_a_file_that_may_not_be_read_is_named(run_dir: Path, monkeypatch: pytest.MonkeyPatch) -> None:

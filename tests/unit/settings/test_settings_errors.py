@@ -1,5 +1,6 @@
 """A catalogue of broken field files: each with the exact lines that the operator reads."""
 
+import os
 import re
 import shutil
 from collections.abc import Iterator
@@ -259,6 +260,21 @@ def test_a_file_without_end_is_given_up() -> None:
     expected = "/dev/zero: is larger than 1000000 bytes: not a settings file"
     assert problems(name="/dev/zero") == [expected]
     assert expected in problems("cameras.ceiling.calibration=/dev/zero")[0]
+
+
+@pytest.mark.timeout(20)
+def test_a_pipe_that_nobody_writes_to_is_not_waited_for(lab: Path) -> None:
+    os.mkfifo(lab / "pipe.yaml")
+    assert problems(name="pipe.yaml") == ["pipe.yaml: is empty"]
+
+
+@pytest.mark.usefixtures("lab")
+def test_a_field_may_come_out_of_a_pipe() -> None:
+    read, write = os.pipe()
+    os.write(write, GOOD.replace("discount: 0.9", "discount: 2").encode())
+    os.close(write)
+    assert any("planner.discount" in problem for problem in problems(name=f"/dev/fd/{read}"))
+    os.close(read)
 
 
 @pytest.mark.usefixtures("lab")

@@ -14,6 +14,7 @@ _SECONDS, _LINE_S = 32, 8
 _TRIPS_TO_START = 10
 _STEADIEST_NS = 200_000.0
 _DRIFT_LIMIT = 200e-6
+_MARGIN_NS = NS_PER_MS  # stamps are taken beside the bus, not in it
 # Corrections by which a clock that is followed is led to its offset; more than _STEP_NS is a clock that was set.
 _SLEW_PER_S, _STEP_NS = 500e-6, 20 * NS_PER_MS
 
@@ -39,7 +40,7 @@ class RoundTrip:
 
 
 class OffsetFilter:
-    """Keeps the quickest round trip of each second, and the line through them."""
+    """Keeps the quickest round trip of each second, and the line through them, since a clock was set last."""
 
     def __init__(self) -> None:
         self._trips = 0
@@ -50,6 +51,8 @@ class OffsetFilter:
         if trip.delay_ns < 0 or trip.answered_ns < trip.received_ns:
             return
         self._trips += 1
+        if self._quickest and _contradict(trip, self._quickest[-1]):
+            self._quickest.clear()  # a host slept meanwhile: its boot clock stood still
         last = self._quickest[-1] if self._quickest else None
         if last is None or trip.sent_ns // NS_PER_S != last.sent_ns // NS_PER_S:
             self._quickest.append(trip)
@@ -83,6 +86,13 @@ class OffsetFilter:
             limit = _DRIFT_LIMIT * NS_PER_S
             drift = max(-limit, min(limit, lean / spread)) if spread > 0.0 else 0.0
         return base_ns + round(mean - drift * mean_s)
+
+
+def _contradict(one: RoundTrip, other: RoundTrip) -> bool:
+    """Return whether no offset can explain both: each is right to half of its delay, and clocks run apart slowly."""
+    apart_ns = abs(one.offset_ns - other.offset_ns)
+    drifted_ns = _DRIFT_LIMIT * abs(one.sent_ns - other.sent_ns)
+    return apart_ns > (one.delay_ns + other.delay_ns) / 2 + drifted_ns + _MARGIN_NS
 
 
 def led(offset_ns: int, wanted_ns: int, elapsed_s: float) -> int:

@@ -62,3 +62,23 @@ def test_a_clock_is_led_slowly_and_set_when_it_is_far_off() -> None:
     assert led(0, -5 * MS, 0.05) == -25_000
     assert led(0, 1_000, 0.05) == 1_000
     assert led(0, 30 * MS, 0.05) == 30 * MS
+
+
+@pytest.mark.parametrize("asleep_s", [0.5, -0.5, 30.0, -3600.0])
+def test_after_one_host_slept_only_the_new_offset_counts(asleep_s: float) -> None:
+    dice, clock = random.Random(5), OffsetFilter()
+    worst_ns = 0
+    for tick in range(20 * 40):
+        at_ns = tick * 50 * MS
+        offset_ns = OFFSET_NS + (round(asleep_s * S) if tick >= 400 else 0)
+        clock.take(trip(at_ns, way_ns(dice), way_ns(dice), offset_ns))
+        if tick >= 405:  # five trips, a quarter of a second
+            worst_ns = max(worst_ns, abs(clock.offset_ns(at_ns) - offset_ns))
+    assert worst_ns < 25 * MS
+
+
+def test_a_trip_that_was_held_up_on_one_way_is_not_taken_for_a_clock_that_was_set() -> None:
+    clock = OffsetFilter()
+    for tick in range(200):
+        clock.take(trip(tick * 50 * MS, 900 * MS if tick % 40 == 39 else 20 * MS, 20 * MS))
+    assert clock.offset_ns(10 * S) == pytest.approx(OFFSET_NS, abs=MS)

@@ -1,7 +1,8 @@
 """Interface of a model: its parameters in Python, and its kernels.
 
 A new model is one file: a frozen dataclass of its figures with these members, its kernels as model_kernels.py declares
-them, and a Record of what they read. Nothing else has to know it (docs/how-to/add-a-sensor-model.md 1).
+them, and a Record of what they read. Nothing else has to know it (docs/how-to/add-a-sensor-model.md 1,
+docs/how-to/add-a-model-of-motion.md 1).
 """
 
 from typing import Protocol, runtime_checkable

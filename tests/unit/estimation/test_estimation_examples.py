@@ -12,6 +12,7 @@ from groundstation.estimation import models
 
 HOW_TO = Path(__file__).parents[3] / "docs" / "how-to"
 PAGE, SENSOR_PAGE = HOW_TO / "use-the-estimator-as-a-library.md", HOW_TO / "add-a-sensor-model.md"
+MOTION_PAGE = HOW_TO / "add-a-model-of-motion.md"
 
 
 def examples_of(page: Path) -> list[str]:
@@ -48,3 +49,13 @@ def test_the_sensor_model_of_the_how_to_passes_its_own_test(tmp_path: Path, monk
     names["test_the_derivatives_are_exact"]()
     names["test_four_anchors_find_the_robot"]()
     assert len(model[model.index("\nclass") :].strip().splitlines()) <= 40
+
+
+def test_the_model_of_motion_of_the_how_to_passes_its_own_test(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    model, test = examples_of(MOTION_PAGE)
+    (tmp_path / "coasting_target.py").write_text(model)
+    monkeypatch.setattr(models, "__path__", [*models.__path__, str(tmp_path)])
+    names: dict[str, Any] = {}
+    exec(compile(test, str(MOTION_PAGE), "exec"), names)
+    names["test_out_of_sight_it_rolls_to_rest"]()
+    names["test_its_velocity_becomes_as_uncertain_as_it_was_and_no_more"]()

@@ -11,6 +11,8 @@ import pytest
 
 from groundstation.cli import main as cli
 from groundstation.cli import verbs
+from groundstation.errors import GroundStationError
+from groundstation.flight.real_parts import parse_real
 from groundstation.settings.files import SHIPPED
 from groundstation.settings.load import load_field
 
@@ -72,6 +74,18 @@ def mistakes(line: str) -> Iterator[str]:
             yield f"no option {name}"
         if word == "--set":
             load_field(SHIPPED / "lab.yaml", (words[place + 1],))
+    yield from no_parts(words)
+
+
+def no_parts(words: list[str]) -> Iterator[str]:
+    """Yield what is no part of a field that ships, where such a one is flown."""
+    named = [words[place + 1] for place, word in enumerate(words) if word == "--real" and place + 1 < len(words)]
+    field = SHIPPED / f"{Path(words[0]).stem}.yaml" if named else SHIPPED
+    if field.is_file():
+        try:
+            parse_real(load_field(field, ()), named)
+        except GroundStationError as error:
+            yield str(error)
 
 
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))

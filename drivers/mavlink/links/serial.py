@@ -7,6 +7,7 @@ from collections import Counter
 from contextlib import suppress
 
 from drivers.mavlink.links.seam import Heard, Sniffer, ignore_bytes
+from drivers.mavlink.links.signing_time import time_to_sign
 from drivers.mavlink.links.tty import open_raw
 from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.wire.errors import WireError
@@ -56,6 +57,7 @@ class SerialLink:
         self._decoder = FrameDecoder(signing)
         self._encoder = FrameEncoder(settings.system_id, settings.component_id, signing)
         self._cutter, self._lock, self._sniffer = StreamCutter(), threading.RLock(), sniffer
+        self._signed = signing is not None
         self._closed = False
         self._device, self._baud = device, int(baud)
         self._fd = open_raw(self._device, self._baud)
@@ -113,7 +115,8 @@ class SerialLink:
     def send(self, system: int, message: Message) -> None:
         """Write one frame; a line that is too slow loses it."""
         with self._lock:  # signed frames must leave in the order of their times
-            self.send_raw(system, self._encoder.encode(message))
+            not_before = time_to_sign(self._decoder) if self._signed else 0
+            self.send_raw(system, self._encoder.encode(message, not_before=not_before))
 
     def send_raw(self, system: int, data: bytes) -> None:
         """Write whole frames; a line that is too slow loses them."""

@@ -9,6 +9,7 @@ from contextlib import suppress
 
 from drivers import vehicle_socket
 from drivers.mavlink.links.seam import Heard, Sniffer, ignore_bytes
+from drivers.mavlink.links.signing_time import time_to_sign
 from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.frames import MAX_DATAGRAM, FrameDecoder, FrameEncoder, Message, ReceivedFrame, split
@@ -96,7 +97,7 @@ class UdpLink:
             return heard
         try:
             for raw in split(data):
-                frame = self._decode(raw)
+                frame = self._decode(now_ns, raw, source)
                 if frame is None or (frame.system, frame.component) == self._own:
                     continue
                 if self._is_at(now_ns, frame, source):
@@ -121,7 +122,8 @@ class UdpLink:
                         self._sniffer(system, now_ns, raw, True)
 
     def _greet(self, now_ns: int, source: tuple[str, int]) -> None:
-        """Send a vehicle that uses MAVLink 1 a frame of version 2, after which it uses version 2.
+        """Send a vehicle that uses MAVLink 1 a frame of version 2, after which it uses version 2; or one whose time of
+        signing is old our time, from which it goes on: it stood still while the vehicle was off.
 
         WIRE (docs/reference/mavlink.md 5.10): PX4 with MAV_PROTO_VER 0. Nothing is learnt from it: no address is bound.
         """
@@ -129,15 +131,17 @@ class UdpLink:
             return
         self._greeted[source] = now_ns
         with self._lock:
-            greeting = self._encoder.encode(OUR_HEARTBEAT)
+            greeting = self._encode(OUR_HEARTBEAT)
         with suppress(OSError):
             self._socket.sendto(greeting, source)
 
-    def _decode(self, raw: bytes) -> ReceivedFrame | None:
+    def _decode(self, now_ns: int, raw: bytes, source: tuple[str, int]) -> ReceivedFrame | None:
         try:
             return self._decoder.decode(raw)
         except WireError as error:
             self._reject(error.reason, str(error))
+            if error.reason == "replayed" and self._peer is None:
+                self._greet(now_ns, source)
             return None
 
     def _is_at(self, now_ns: int, frame: ReceivedFrame, source: tuple[str, int]) -> bool:
@@ -163,7 +167,10 @@ class UdpLink:
         if self._address_of(system) is None:
             return
         with self._lock:
-            self.send_raw(system, self._encoder.encode(message))
+            self.send_raw(system, self._encode(message))
+
+    def _encode(self, message: Message) -> bytes:
+        return self._encoder.encode(message, not_before=time_to_sign(self._decoder) if self._signed else 0)
 
     def _address_of(self, system: int) -> tuple[str, int] | None:
         known = self._addresses.get(system)

@@ -97,6 +97,11 @@ class FrameDecoder:
         self._verifier = Verifier(signing)
         self._mav = dialect.MAVLink(None)
 
+    @property
+    def newest_stamp(self) -> int:
+        """Return the newest time of signing that was heard, or the one from which we began."""
+        return self._verifier.newest
+
     def decode(self, frame: bytes) -> ReceivedFrame:
         """Return the message of a verified frame; raises WireError (those of Verifier.verify, malformed)."""
         self._verifier.verify(frame)
@@ -124,8 +129,13 @@ class FrameEncoder:
             self._mav.signing.link_id = signing.link_id
             self._mav.signing.timestamp = signing.timestamp
 
-    def encode(self, message: Message, old: bool = False) -> bytes:
-        """Return the frame of a message; raises WireError when a value does not fit its field. old: of MAVLink 1."""
+    def encode(self, message: Message, old: bool = False, not_before: int = 0) -> bytes:
+        """Return the frame of a message; raises WireError when a value does not fit its field.
+
+        old: of MAVLink 1; not_before: the least time of signing [10 us since 2015-01-01 UTC]; times always grow.
+        """
+        signing = self._mav.signing
+        signing.timestamp = max(signing.timestamp, not_before)
         try:
             fields = [v.encode("ascii", "replace") if isinstance(v, str) else v for v in message]
             packet = dialect.mavlink_map[id_of(type(message))](*fields)

@@ -43,11 +43,14 @@ def number_of(frame: bytes) -> int:
 
 
 class Verifier:
-    """Verifies the frames of one link: the checksum, and with a key the signature and the order of its times."""
+    """Verifies the frames of one link: the checksum, and with a key the signature and the order of its times.
+
+    newest: the newest time of signing that was heard, or the one from which we began [10 us since 2015-01-01 UTC].
+    """
 
     def __init__(self, signing: Signing | None = None) -> None:
         self._key = None if signing is None else signing.key
-        self._newest = 0 if signing is None else signing.timestamp
+        self.newest = 0 if signing is None else signing.timestamp
         self._stamps: dict[tuple[int, int, int], int] = {}
 
     def verify(self, frame: bytes) -> None:
@@ -67,10 +70,10 @@ class Verifier:
         # WIRE (docs/reference/mavlink.md 5.9): times of one sender on one of its links grow from frame to frame.
         sender = (frame[-SIGNATURE], frame[5], frame[6])
         stamp = int.from_bytes(frame[-12:-6], "little")
-        if stamp <= self._stamps.get(sender, self._newest - _NEW_SENDER_LAG - 1):
+        if stamp <= self._stamps.get(sender, self.newest - _NEW_SENDER_LAG - 1):
             raise WireError("replayed", f"from system {frame[5]}")
         self._stamps[sender] = stamp
-        self._newest = max(self._newest, stamp)
+        self.newest = max(self.newest, stamp)
 
 
 def _check_signature(frame: bytes, key: bytes) -> None:

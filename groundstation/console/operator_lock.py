@@ -1,4 +1,6 @@
-"""One operator at a time among the viewers; anybody may stop, and anybody may take over, in plain sight."""
+"""One operator at a time among the viewers, of this console and of others; anybody may stop, and anybody may take over,
+in plain sight.
+"""
 
 from dataclasses import dataclass
 
@@ -6,6 +8,8 @@ from groundstation.time_units import NS_PER_S
 
 # A page that reconnects within this time is still the operator.
 _GRACE_NS = 15 * NS_PER_S
+# Before the name of another console: no page here is it.
+_ELSEWHERE = "elsewhere: "
 
 
 @dataclass(slots=True)
@@ -24,6 +28,15 @@ class OperatorLock:
         """Make a viewer the operator; returns the name of the one it replaces, or ""."""
         replaced = self.name if self.client not in ("", client) else ""
         self.client, self.name, self._left_ns = client, name, 0
+        return replaced
+
+    def passed_to(self, console: str) -> bool:
+        """Note that a start was given at another console of the run; returns whether a viewer here was the operator.
+
+        It stays there until somebody here takes over: nobody hears when the other page is closed.
+        """
+        replaced = bool(self.client) and not self.client.startswith(_ELSEWHERE)
+        self.client, self.name, self._left_ns = f"{_ELSEWHERE}{console}", console, 0
         return replaced
 
     def release(self, client: str) -> None:

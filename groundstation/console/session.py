@@ -9,7 +9,8 @@ import msgspec
 
 from groundstation.bus import clock
 from groundstation.bus.api import Bus
-from groundstation.bus.messages import SimCommand
+from groundstation.bus.messages import Command, SimCommand
+from groundstation.bus.roles import Role
 from groundstation.bus.topics import SIM_COMMAND
 from groundstation.console.commands import CommandDesk, Given
 from groundstation.console.devices import DeviceRole
@@ -79,6 +80,7 @@ class Sessions:
         self._newest_pictures = pictures
         self._player = player
         self.operator_lock = OperatorLock()
+        self._starts_ns: dict[str, int] = {}
         self.viewers: dict[int, PageConnection] = {}
         self.refused: Counter[str] = Counter()
 
@@ -104,6 +106,16 @@ class Sessions:
             "viewers": len(self.viewers),
             "lease": self.desk.lease_holder(now_ns),
         }
+
+    def hear(self, order: Command) -> None:
+        """Let the place of the operator go to another console at which a start was given; what is repeated is one."""
+        source, stamp_ns = order.header.source, order.header.stamp_ns
+        foreign = source.split("_")[0] == Role.CONSOLE and source != self._bus.source
+        if order.verb.stops or not foreign or self._player is not None or stamp_ns <= self._starts_ns.get(source, 0):
+            return
+        self._starts_ns[source] = stamp_ns
+        if self.operator_lock.passed_to(source):
+            self._tell(f"{order.verb} was given at {source}, another console: who did that is the operator now")
 
     def handle(self, viewer: PageConnection, message: PageMessage) -> None:
         """Do what a page asks for; what it may not is answered with the reason."""
@@ -188,9 +200,13 @@ class Sessions:
     def _take_over(self, viewer: PageConnection) -> None:
         replaced = self.operator_lock.take(viewer.client, viewer.name)
         text = f"{viewer.name} has taken over from {replaced}: TAKE OFF, TRACK, RESUME are its own. Any page may stop"
-        for other in self.viewers.values():
-            if replaced and other is not viewer:
-                other.say(encoded("notice", text=text, grave=False, ref=""))
+        if replaced:
+            self._tell(text, viewer)
+
+    def _tell(self, text: str, but: PageConnection | None = None) -> None:
+        for viewer in self.viewers.values():
+            if viewer is not but:
+                viewer.say(encoded("notice", text=text, grave=False, ref=""))
 
     def _steer(self, viewer: PageConnection, message: Steering) -> None:
         if not self._targets:

@@ -9,6 +9,7 @@ from groundstation.errors import GroundStationError
 from groundstation.flight.flight_plan import FlightPlan
 from groundstation.flight.keyboard import Keyboard
 from groundstation.flight.looking import Looking
+from groundstation.process.sleep_watch import SleepWatch
 from groundstation.runtime.before_take_off import BeforeTakeOff
 from groundstation.runtime.operator import Operator
 from groundstation.runtime.team import TeamPhase
@@ -42,7 +43,7 @@ class Flight:
         self._plan = plan
         self._terminal = terminal
         self._began_ns = time.monotonic_ns()
-        self._keyboard = Keyboard()
+        self._keyboard, self._sleep = Keyboard(), SleepWatch()
         self._prompting = False
         self._grounded = False
         self._forbidden = False
@@ -139,6 +140,9 @@ class Flight:
             self._tell_grounded(operator, now_ns)
             if self._breaks_off():
                 return self._supervisor.failure
+            slept_s = self._sleep.slept_s()
+            if slept_s and self._plan.asks and not operator.landed(now_ns):
+                return f"this computer slept for {slept_s:.0f} s in flight: nobody watched over the drones"
             if self._plan.asks and operator.phase is TeamPhase.GROUND:
                 began_ns = now_ns
             ended, failure = self._is_over(operator, now_ns, began_ns)

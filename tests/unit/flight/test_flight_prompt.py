@@ -15,6 +15,7 @@ from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.flight import keyboard as keyboards
 from groundstation.flight import loop
 from groundstation.flight.flight_plan import FlightPlan
+from groundstation.process.sleep_watch import SleepWatch
 from groundstation.runtime.operator import Operator
 from groundstation.runtime.take_off import TakeOffLimits
 from groundstation.runtime.team import TeamPhase
@@ -149,6 +150,20 @@ def test_a_keyboard_that_is_another_programs_is_left_alone(monkeypatch: pytest.M
 
 def refused(*_: object) -> bytes:
     raise OSError(5, "Input/output error")
+
+
+@pytest.mark.parametrize("asks", [True, False], ids=["real", "emulated"])
+def test_a_computer_that_slept_in_flight_lands_real_drones(keyboard: int, asks: bool) -> None:
+    waiting = Waiting(keyboard, m.Verb.HOLD, typed=b"")
+    terminal = cast(Terminal, SimpleNamespace(say=waiting.said.append, unmute=lambda: None))
+    plan = FlightPlan(None, asks=asks, cameras={}, limits=TakeOffLimits(unseen_s=10.0), landing_limit_s=0.1)
+    flight = loop.Flight(cast(Supervisor, waiting), plan, terminal)
+    flight._start = cast(Start, SimpleNamespace(run=lambda: None, show_screen=lambda: None))
+    flight._sleep = cast(SleepWatch, SimpleNamespace(slept_s=lambda: 12.3))
+    operator = cast(Operator, SimpleNamespace(phase=TeamPhase.TRACKING, landed=lambda _now_ns: False, forbidden="",
+                                              step=lambda _now_ns: None, take_off=lambda *_, **__: None,
+                                              mistake=None, tracking_since_ns=0))  # fmt: skip
+    assert ("slept for 12 s in flight" in flight._fly(operator)) == asks
 
 
 def test_who_was_landed_one_by_one_is_not_said_to_have_landed_by_itself() -> None:

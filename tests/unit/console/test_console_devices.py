@@ -6,6 +6,7 @@ import json
 import os
 import ssl
 import stat
+import time
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 
@@ -176,3 +177,15 @@ def test_an_old_invitation_is_none_and_all_is_for_its_owner(tmp_path: Path, monk
     monkeypatch.setattr("groundstation.console.devices.time.time", lambda: max(p.stat().st_mtime for p in kept) + 601)
     assert devices.welcome({"query_string": code}) == b""
     assert devices.welcome({"query_string": b"code=../../url"}) == devices.welcome({"query_string": b""}) == b""
+
+
+@pytest.mark.parametrize(("later_s", "let_in"), [(500.0, True), (-500.0, True), (601.0, False), (-3600.0, False)])
+def test_a_clock_that_was_set_keeps_no_invitation_alive(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, later_s: float, let_in: bool
+) -> None:
+    devices = Devices(tmp_path / "devices")
+    devices.open(ADDRESS, 1)
+    code = devices.invite(DeviceRole.COMMAND).partition("?")[2].encode()
+    then_s = time.time()
+    monkeypatch.setattr("groundstation.console.devices.time.time", lambda: then_s + later_s)
+    assert bool(devices.welcome({"query_string": code})) == let_in

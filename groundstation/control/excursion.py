@@ -80,21 +80,29 @@ def within_reach(
 
 
 def within_views(
-    velocity: Array, name: str, belief: JointBelief, parameters: ControlParameters, sensors: SensorSuite
-) -> Array:
+    velocity: Array, name: str, belief: JointBelief, parameters: ControlParameters, sensors: SensorSuite,
+    height_m: float,
+) -> Array:  # fmt: skip
     """Return the part of a velocity (2) [m/s; world] with which a robot stays in the box about all world-fixed views.
 
-    For one that flies on our estimate: out of sight it has a second, of which turning round takes most. What lies
-    between two views counts as inside, else a team could not follow its target from one into the other.
+    For one that flies on our estimate: out of sight it has a second, of which turning round takes most. height_m: at
+    which it has to be in it.
     """
-    mean = belief.mean_of(name)
-    views = sensors.root_views(float(mean[2]) + sensors.marker_height_m[name])
-    box = _connected(mean[:2], views, math.inf, inset_m=0.0)
+    place, box = belief.mean_of(name)[:2], box_about_views(name, belief, sensors, height_m)
     if box is None:
         return velocity
     most = parameters.return_speed_m_s
-    low, high = (_HOLD_GAIN * (border - mean[:2]) for border in np.transpose((box.x_m, box.y_m)))
+    low, high = (_HOLD_GAIN * (border - place) for border in np.transpose((box.x_m, box.y_m)))
     return np.asarray(np.clip(velocity, np.minimum(low, most), np.maximum(high, -most)))
+
+
+def box_about_views(name: str, belief: JointBelief, sensors: SensorSuite, height_m: float) -> Rectangle | None:
+    """Return the box about all world-fixed views of a robot at a height, None without one.
+
+    What lies between two views counts as inside, else a team could not follow its target from one into the other.
+    """
+    views = sensors.root_views(height_m + sensors.marker_height_m[name])
+    return _connected(belief.mean_of(name)[:2], views, math.inf, inset_m=0.0)
 
 
 def _connected(

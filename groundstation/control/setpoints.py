@@ -8,7 +8,7 @@ import numpy as np
 
 from groundstation.bus.messages import Vector3
 from groundstation.control.flight_mode import FlightMode, Situation, flight_mode_of
-from groundstation.control.holding_off import giving_way, recoverable, within_box
+from groundstation.control.holding_off import climbs_within_box, giving_way, recoverable, within_box
 from groundstation.control.moment import STILL, Moment, Sight, is_untied, soon
 from groundstation.control.parameters import ControlParameters
 from groundstation.control.regaining import regaining, who_regains
@@ -76,8 +76,9 @@ def setpoints_from_plan(
             wanted[name] = HOVER
         elif phase is FlightMode.TRACK and plan is not None:
             vx, vy, rate = _regained(name, plan, now)
-            velocity = within_box(name, recoverable(name, giving_way(name, (vx, vy), coming, now), now), now)
-            wanted[name] = _with_height(name, velocity, rate, _level_m(name, plan.heights[name], now), phase, now)
+            level_m = _level_m(name, plan.heights[name], now)
+            velocity = within_box(name, recoverable(name, giving_way(name, (vx, vy), coming, now), now), now, level_m)
+            wanted[name] = _with_height(name, velocity, rate, level_m, phase, now)
         else:
             wanted[name] = _towards(name, stands[name], phase, now)
     return wanted
@@ -202,7 +203,7 @@ def _with_height(
     belief, parameters = now.belief, now.parameters
     mean = belief.mean_of(name)
     climb = parameters.limits_of(name).max_climb_m_s
-    way = level_m - float(mean[2])
+    way = climbs_within_box(name, level_m, now) - float(mean[2])
     vz = min(max(parameters.height_gain_per_s * way, -climb), climb)
     if abs(way) <= parameters.height_tolerance_m:
         return Setpoint((*velocity, vz), rate, phase)
@@ -216,7 +217,8 @@ def _with_height(
     outward = stabilized_from_world(away, float(mean[3]))[:2]
     held = np.array(velocity)
     held += max(0.0, parameters.side_step_m_s - float(held @ outward)) * outward
-    return Setpoint((float(held[0]), float(held[1]), 0.0), rate, phase, blocked=other)
+    aside = within_box(name, (float(held[0]), float(held[1])), now, level_m)
+    return Setpoint((*aside, 0.0), rate, phase, blocked=other)
 
 
 def _nearest(name: str, now: Moment) -> tuple[str, float] | None:

@@ -88,9 +88,9 @@ def measure_relative_pose(belief: Belief, sensor: SensorRow, event: EventRow, ou
     """Write h(x) and its Jacobians by the observer's and the subject's block."""
     mean, observer, subject = belief.mean, belief.entities[event.observer], belief.entities[event.subject]
     p, h, H_observer, H_subject = _own(sensor), out.h, out.H_observer, out.H_subject
-    work, D = np.empty((5, 3)), np.empty((3, 6))
-    point, slope, d, b, by_point = work[0], work[1], work[2], work[3], work[4]
-    marker_point(belief, event, point, slope)
+    work, D = np.empty((7, 3)), np.empty((3, 6))
+    point, d, b, by_point, slopes = work[0], work[1], work[2], work[3], work[4:]
+    marker_point(belief, event, point, slopes)
     for i in range(3):
         d[i] = point[i] - mean[observer.start + i]
     point_in_base(d, observer_attitude(mean, observer, event), D, b)
@@ -111,7 +111,7 @@ def measure_relative_pose(belief: Belief, sensor: SensorRow, event: EventRow, ou
         if observer.at_roll_error >= 0:
             H_observer[i, observer.at_pitch_error] = by_pitch
             H_observer[i, observer.at_roll_error] = by_roll
-        chain_subject(subject, slope, by_point, H_subject, i)
+        chain_subject(subject, slopes, by_point, H_subject, i)
     if out.size > YAW:
         h[YAW] = wrap(mean[subject.start + subject.at_yaw] - mean[observer.start + YAW])
         H_observer[YAW, YAW] = -1.0
@@ -148,7 +148,7 @@ def locate_relative_pose(belief: Belief, sensor: SensorRow, event: EventRow, z: 
     fy, fz = cr * b[Y] - sr * b[Z], sr * b[Y] + cr * b[Z]
     ex, ez = cp * b[X] + sp * fz, -sp * b[X] + cp * fz
     yaw = wrap(mean[start + YAW] + z[YAW])
-    marker_offset(belief.entities[event.subject], event, yaw, offset)
+    marker_offset(mean, belief.entities[event.subject], event, yaw, offset)
     pose[X] = mean[start + X] + cy * ex - sy * fy - offset[X]
     pose[Y] = mean[start + Y] + sy * ex + cy * fy - offset[Y]
     pose[Z] = mean[start + Z] + ez - offset[Z]

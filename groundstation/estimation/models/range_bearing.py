@@ -39,9 +39,9 @@ def measure_range_bearing(belief: Belief, sensor: SensorRow, event: EventRow, ou
     """Write h(x) and its Jacobians by the observer's and the subject's block."""
     mean, observer, subject = belief.mean, belief.entities[event.observer], belief.entities[event.subject]
     p, h, H_observer, H_subject = _own(sensor), out.h, out.H_observer, out.H_subject
-    work = np.zeros((3, 3))
-    point, slope, by_point = work[0], work[1], work[2]
-    marker_point(belief, event, point, slope)
+    work = np.zeros((5, 3))
+    point, by_point, slopes = work[0], work[1], work[2:]
+    marker_point(belief, event, point, slopes)
     start = observer.start
     dx, dy = point[X] - mean[start + X], point[Y] - mean[start + Y]
     distance = max(math.hypot(dx, dy), _NEAREST_M)
@@ -60,7 +60,7 @@ def measure_range_bearing(belief: Belief, sensor: SensorRow, event: EventRow, ou
         h[row] = scale * way
         by_point[X], by_point[Y] = scale * by_point[X], scale * by_point[Y]
         H_observer[row, X], H_observer[row, Y] = -by_point[X], -by_point[Y]
-        chain_subject(subject, slope, by_point, H_subject, row)
+        chain_subject(subject, slopes, by_point, H_subject, row)
         if observer.at_range_bias >= 0:
             h[row] += mean[start + observer.at_range_bias]
             H_observer[row, observer.at_range_bias] = 1.0
@@ -69,7 +69,7 @@ def measure_range_bearing(belief: Belief, sensor: SensorRow, event: EventRow, ou
         h[row] = wrap(math.atan2(dy, dx) - mean[start + YAW])
         by_point[X], by_point[Y] = -dy / distance**2, dx / distance**2
         H_observer[row, X], H_observer[row, Y], H_observer[row, YAW] = -by_point[X], -by_point[Y], -1.0
-        chain_subject(subject, slope, by_point, H_subject, row)
+        chain_subject(subject, slopes, by_point, H_subject, row)
         if observer.at_bearing_bias >= 0:
             h[row] = wrap(h[row] + mean[start + observer.at_bearing_bias])
             H_observer[row, observer.at_bearing_bias] = 1.0
@@ -93,7 +93,7 @@ def locate_range_bearing(belief: Belief, sensor: SensorRow, event: EventRow, z: 
     mean, start = belief.mean, belief.entities[event.observer].start
     direction = mean[start + YAW] + z[p.bearing_row]
     offset = np.empty(3)
-    marker_offset(belief.entities[event.subject], event, 0.0, offset)
+    marker_offset(mean, belief.entities[event.subject], event, 0.0, offset)
     way = z[p.range_row]
     if p.is_depth != 0:
         way /= max(math.cos(z[p.bearing_row]), _LEAST_COS)

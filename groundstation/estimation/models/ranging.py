@@ -15,7 +15,15 @@ from groundstation.estimation.filter_state import Belief
 from groundstation.estimation.layout import EntityKind
 from groundstation.estimation.model_kernels import MotionKernels, SensorKernels
 from groundstation.estimation.models.protocol import SensorDefaults, Vector3
-from groundstation.estimation.models.subject import offset_in_world
+from groundstation.estimation.models.subject import (
+    BY_PITCH,
+    BY_ROLL,
+    BY_YAW,
+    along,
+    lean_of,
+    offset_in_world,
+    write_slopes,
+)
 from groundstation.estimation.motion import fade, mirror
 from groundstation.estimation.records import OUT_OF_VIEW, YAW, EventRow, Prediction, SensorRow, X, Y, Z, own_parameters
 from groundstation.kernel import Record, kernel
@@ -55,17 +63,24 @@ def predict_anchor(belief: Belief, e: int, dt: float) -> None:
 def measure_range(belief: Belief, sensor: SensorRow, event: EventRow, out: Prediction) -> None:
     """Write h(x) and its Jacobians by the anchor's bias and the subject's pose."""
     mean, anchor, subject = belief.mean, belief.entities[event.observer], belief.entities[event.subject]
-    p, start, offset = _own(sensor), subject.start, np.empty(3)
-    yaw = mean[start + YAW]
-    offset_in_world(p.transponder_x, p.transponder_y, p.transponder_z, event, yaw, offset)
-    dx = mean[start + X] + offset[X] - anchor.place_x
-    dy = mean[start + Y] + offset[Y] - anchor.place_y
-    dz = mean[start + Z] + offset[Z] - anchor.place_z
-    distance = max(math.sqrt(dx * dx + dy * dy + dz * dz), _NEAREST_M)
+    p, start, work = _own(sensor), subject.start, np.empty((5, 3))
+    offset, away, slopes = work[0], work[1], work[2:]
+    yaw, lean = mean[start + YAW], lean_of(mean, subject, event)
+    offset_in_world(p.transponder_x, p.transponder_y, p.transponder_z, lean, yaw, offset)
+    write_slopes(offset, lean.pitch, yaw, slopes)
+    away[X] = mean[start + X] + offset[X] - anchor.place_x
+    away[Y] = mean[start + Y] + offset[Y] - anchor.place_y
+    away[Z] = mean[start + Z] + offset[Z] - anchor.place_z
+    distance = max(math.sqrt(away[X] * away[X] + away[Y] * away[Y] + away[Z] * away[Z]), _NEAREST_M)
     out.h[0] = distance + mean[anchor.start + anchor.at_range_bias]
     out.H_observer[0, anchor.at_range_bias] = 1.0
-    out.H_subject[0, X], out.H_subject[0, Y], out.H_subject[0, Z] = dx / distance, dy / distance, dz / distance
-    out.H_subject[0, YAW] = (dy * offset[X] - dx * offset[Y]) / distance
+    for i in (X, Y, Z):
+        away[i] /= distance
+        out.H_subject[0, i] = away[i]
+    out.H_subject[0, YAW] = along(away, slopes, BY_YAW)
+    if subject.at_roll_error >= 0:
+        out.H_subject[0, subject.at_roll_error] = along(away, slopes, BY_ROLL)
+        out.H_subject[0, subject.at_pitch_error] = along(away, slopes, BY_PITCH)
 
 
 @kernel()

@@ -1,56 +1,79 @@
 """Where the marker of any entity is, and how that depends on the entity's block: for all sensors that look at one."""
 
 import math
+from typing import NamedTuple
 
 from groundstation.arrays import Matrix, Vector
 from groundstation.estimation.filter_state import Belief
 from groundstation.estimation.records import EntityRow, EventRow, X, Y, Z
 from groundstation.kernel import kernel
 
+BY_YAW, BY_ROLL, BY_PITCH = range(3)  # rows of derivatives
+
+
+class Lean(NamedTuple):
+    """How a body leans [rad]."""
+
+    roll: float
+    pitch: float
+
 
 @kernel(inlined=True)
-def lean(x: float, y: float, z: float, event: EventRow, offset: Vector) -> None:
-    """Write where a point (x, y, z) of the subject [base] is [base_stabilized]: what accelerates leans."""
+def lean_of(mean: Vector, entity: EntityRow, event: EventRow) -> Lean:
+    """Return how the subject leans: as its vehicle says, plus the error states."""
     roll, pitch = event.subject_roll, event.subject_pitch
-    cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
-    offset[Y], up = cr * y - sr * z, sr * y + cr * z
-    offset[X], offset[Z] = cp * x + sp * up, cp * up - sp * x
+    if entity.at_roll_error >= 0:
+        roll += mean[entity.start + entity.at_roll_error]
+        pitch += mean[entity.start + entity.at_pitch_error]
+    return Lean(roll, pitch)
 
 
 @kernel(inlined=True)
-def offset_in_world(x: float, y: float, z: float, event: EventRow, yaw: float, offset: Vector) -> None:
-    """Write where a point (x, y, z) of the subject [base] is from its centre [world's axes] for a given heading."""
-    lean(x, y, z, event, offset)
+def offset_in_world(x: float, y: float, z: float, lean: Lean, yaw: float, offset: Vector) -> None:
+    """Write where a point (x, y, z) of the subject [base] is from its centre [world's axes]: what accelerates leans."""
+    cr, sr, cp, sp = math.cos(lean.roll), math.sin(lean.roll), math.cos(lean.pitch), math.sin(lean.pitch)
     c, n = math.cos(yaw), math.sin(yaw)
-    offset[X], offset[Y] = c * offset[X] - n * offset[Y], n * offset[X] + c * offset[Y]
+    left, up = cr * y - sr * z, sr * y + cr * z
+    forward = cp * x + sp * up
+    offset[X], offset[Y], offset[Z] = c * forward - n * left, n * forward + c * left, cp * up - sp * x
 
 
 @kernel(inlined=True)
-def marker_offset(entity: EntityRow, event: EventRow, yaw: float, offset: Vector) -> None:
+def write_slopes(offset: Vector, pitch: float, yaw: float, slopes: Matrix) -> None:
+    """Write the derivatives (3, 3) of an offset [world's axes] by yaw, roll and pitch: turns about three axes."""
+    c, n, cp, sp = math.cos(yaw), math.sin(yaw), math.cos(pitch), math.sin(pitch)
+    forward, left, up = c * offset[X] + n * offset[Y], c * offset[Y] - n * offset[X], offset[Z]
+    ahead, aside = sp * left, -sp * forward - cp * up
+    slopes[BY_YAW, X], slopes[BY_YAW, Y], slopes[BY_YAW, Z] = -offset[Y], offset[X], 0.0
+    slopes[BY_ROLL, X], slopes[BY_ROLL, Y], slopes[BY_ROLL, Z] = c * ahead - n * aside, n * ahead + c * aside, cp * left
+    slopes[BY_PITCH, X], slopes[BY_PITCH, Y], slopes[BY_PITCH, Z] = c * up, n * up, -forward
+
+
+@kernel(inlined=True)
+def marker_offset(mean: Vector, entity: EntityRow, event: EventRow, yaw: float, offset: Vector) -> None:
     """Write where the marker is from the entity's centre [world's axes] for a given heading."""
     if entity.at_yaw < 0:
         offset[X], offset[Y], offset[Z] = entity.place_x, entity.place_y, entity.place_z
         return
-    offset_in_world(entity.place_x, entity.place_y, entity.place_z, event, yaw, offset)
+    offset_in_world(entity.place_x, entity.place_y, entity.place_z, lean_of(mean, entity, event), yaw, offset)
 
 
 @kernel(inlined=True)
-def marker_point(belief: Belief, event: EventRow, point: Vector, slope: Vector) -> None:
-    """Write the subject's marker's centre [world] and its derivative (x, y) by the subject's yaw.
+def marker_point(belief: Belief, event: EventRow, point: Vector, slopes: Matrix) -> None:
+    """Write the subject's marker's centre [world] and its derivatives (3, 3) by the subject's yaw, roll and pitch.
 
     Without z in the block the marker is at a known height; without yaw it is over the centre; without a block the
     entity stands where its parameters say.
     """
     mean, entity = belief.mean, belief.entities[event.subject]
     start = entity.start
-    slope[X] = slope[Y] = 0.0
     point[X], point[Y], point[Z] = entity.place_x, entity.place_y, entity.place_z
     if entity.size == 0:
         return
     if entity.at_yaw >= 0:
         yaw = mean[start + entity.at_yaw]
-        marker_offset(entity, event, yaw, point)
-        slope[X], slope[Y] = -point[Y], point[X]
+        marker_offset(mean, entity, event, yaw, point)
+        write_slopes(point, lean_of(mean, entity, event).pitch, yaw, slopes)
     point[X] += mean[start + X]
     point[Y] += mean[start + Y]
     if entity.at_z >= 0:
@@ -58,7 +81,13 @@ def marker_point(belief: Belief, event: EventRow, point: Vector, slope: Vector) 
 
 
 @kernel(inlined=True)
-def chain_subject(entity: EntityRow, slope: Vector, by_point: Vector, H: Matrix, row: int) -> None:
+def along(direction: Vector, slopes: Matrix, by: int) -> float:
+    """Return the derivative of a row by one of the subject's angles, from that by its marker's point (3)."""
+    return float(direction[X] * slopes[by, X] + direction[Y] * slopes[by, Y] + direction[Z] * slopes[by, Z])
+
+
+@kernel(inlined=True)
+def chain_subject(entity: EntityRow, slopes: Matrix, by_point: Vector, H: Matrix, row: int) -> None:
     """Write one row of H for the subject's block from the derivative by its marker's point (3)."""
     if entity.size == 0:
         return
@@ -66,4 +95,7 @@ def chain_subject(entity: EntityRow, slope: Vector, by_point: Vector, H: Matrix,
     if entity.at_z >= 0:
         H[row, entity.at_z] = by_point[Z]
     if entity.at_yaw >= 0:
-        H[row, entity.at_yaw] += by_point[X] * slope[X] + by_point[Y] * slope[Y]
+        H[row, entity.at_yaw] += along(by_point, slopes, BY_YAW)
+        if entity.at_roll_error >= 0:
+            H[row, entity.at_roll_error] = along(by_point, slopes, BY_ROLL)
+            H[row, entity.at_pitch_error] = along(by_point, slopes, BY_PITCH)

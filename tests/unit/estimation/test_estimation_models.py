@@ -223,12 +223,22 @@ def test_a_camera_follows_the_geometry_of_the_frames() -> None:
     assert h[3] == pytest.approx(1.3)
 
 
+def test_a_marker_leans_by_what_its_vehicle_says_and_by_the_error_of_it() -> None:
+    mean, _ = random_state(0, 0.7)
+    mean[TABLES.part(NAMES.index("mount"))] = (0.0, 0.0, 4.0, 0.0, 0.0, 0.0)
+    mean[TABLES.part(NAMES.index("full"))][:6] = (1.2, 0.4, 1.1, 2.0, -0.02, 0.03)
+    h, _, _ = observed(mean, "mount", "full", 4, roll=0.0, pitch=0.0)
+    marker = np.array([1.2, 0.4, 1.1]) + rotation_from_euler(0.04, -0.08, 2.0) @ (0.05, -0.03, 0.08)
+    expected = TILTED.T @ (marker - (0.0, 0.0, 4.0) - (0.09, 0.01, -0.02))
+    np.testing.assert_allclose(h[:3], expected, atol=1e-12)
+
+
 def test_a_range_is_that_from_the_tag_to_the_anchor_and_its_bias() -> None:
     mean, _ = random_state(0, 0.7)
-    mean[TABLES.part(NAMES.index("full"))][:4] = (0.4, -0.2, 1.1, 0.7)
+    mean[TABLES.part(NAMES.index("full"))][:6] = (0.4, -0.2, 1.1, 0.7, -0.02, 0.03)  # it leans more than it says
     mean[TABLES.part(NAMES.index("anchor"))] = 0.07
     h, _, _ = observed(mean, "radio", "full", 1)
-    tag = np.array([0.4, -0.2, 1.1]) + rotation_from_euler(0.06, -0.11, 0.7) @ (0.12, -0.05, 0.06)
+    tag = np.array([0.4, -0.2, 1.1]) + rotation_from_euler(0.04, -0.08, 0.7) @ (0.12, -0.05, 0.06)
     np.testing.assert_allclose(h, [np.linalg.norm(tag - (-2.5, 1.9, 2.4)) + 0.07], atol=1e-12)
 
 

@@ -51,12 +51,14 @@ def estimate(now_ns: int, x_m: float, std_m: float, age_s: float = 0.2) -> Estim
 
 def test_a_flying_vehicle_holds_the_place_where_the_picture_showed_it(vehicle: MavlinkVehicle) -> None:
     vehicle.orders.lift.lifted = True
-    vehicle.see(NOW, estimate(NOW, PLACE[0], std_m=0.15))
-    assert vehicle.orders.drift.place(NOW) == PLACE
-    assert vehicle.orders.drift.hold(NOW) == (0.0, 0.0, 0.0), "it is there"
-    vehicle.see(NOW + 100 * MS, estimate(NOW + 100 * MS, PLACE[0] + 0.2, std_m=0.15))
-    forward, left, _ = vehicle.orders.drift.hold(NOW + 100 * MS)
-    assert forward < -0.05 and left > 0.0, "back to where it was seen first, in its own axes"
+    for now_ns in range(NOW, NOW + 600 * MS, 100 * MS):
+        vehicle.see(now_ns, estimate(now_ns, PLACE[0], std_m=0.15))
+        assert vehicle.orders.drift.place(now_ns) == PLACE
+        assert vehicle.orders.drift.hold(now_ns) == (0.0, 0.0, 0.0), "it is there"
+    now_ns += 100 * MS
+    vehicle.see(now_ns, estimate(now_ns, PLACE[0] + 0.2, std_m=0.15))
+    forward, left, _ = vehicle.orders.drift.hold(now_ns)
+    assert forward < -0.05 and left > 0.0, "back to where it was seen at rest, in its own axes"
 
 
 def test_what_its_velocity_errs_by_is_not_learnt_from_pictures(vehicle: MavlinkVehicle) -> None:

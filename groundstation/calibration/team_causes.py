@@ -17,9 +17,8 @@ from groundstation.calibration.team_figures import Suspicion
 
 # By how much (log) a cause must raise the evidence; causes this much worse than the best are ruled out.
 _SURE, RULED_OUT = math.log(100.0), math.log(20.0)
-# What a velocity errs by is known least: noise that happens to look late was worth e^8 in a healthy flight. Nothing
-# that is well looks like a wrong lens, which shows slowly.
-_SURE_OF = {"velocity_delay": math.log(1e4), "focal": RULED_OUT}
+# What a velocity errs by is known least: noise that happens to look late was worth e^8 in a healthy flight.
+_SURE_OF = {"velocity_delay": math.log(1e4)}
 # What the linear model gives so little for is not tried; of what is left, so many at once.
 _WORTH_A_TRIAL, _AT_ONCE = math.log(10.0), 4
 _MOST = 8

@@ -92,7 +92,7 @@ class ClimbError:
         self.error_m_s -= _CLIMB_PER_S**2 * step_s * off_m
 
 
-class Stop:
+class ComingToRest:
     """The place to hold of a vehicle that may still move as its hover begins: where it comes to rest.
 
     Held where the hover began, it would fly back by the way that it took to stop.
@@ -135,7 +135,7 @@ class DriftFeedback:
         self._place: Vector3 = _STILL
         self._yaw_rad = 0.0
         self._held: Vector3 | None = None
-        self._stop: Stop | None = None
+        self._coming: ComingToRest | None = None
 
     def stand(self, now_ns: int) -> None:
         """Note that it has not lifted off yet: the error of its climb rate, which sways there, does not count."""
@@ -213,7 +213,7 @@ class DriftFeedback:
 
     def let_go(self) -> None:
         """Hold no place any more: the next hover holds the one where it comes to rest."""
-        self._held = self._stop = None
+        self._held = self._coming = None
 
     def hold_at(self, place: Vector3) -> None:
         """Hold a place [world] from now on, rather than the one where it comes to rest."""
@@ -228,16 +228,16 @@ class DriftFeedback:
         if place is None:
             self.let_go()
             return _STILL
-        x, y, z = self._held or self._comes_to_rest(now_ns, place)
+        x, y, z = self._held or self._place_to_rest(now_ns, place)
         wanted = (x - place[0], y - place[1], (z if height_m is None else height_m) - place[2])
         size = math.hypot(*wanted[:2])
         gain = min(_HOLD_GAIN, _HOLD_M_S / size) if size > 0.0 else 0.0
         up = max(-_HOLD_M_S, min(_HOLD_M_S, _HOLD_UP_GAIN * wanted[2]))
         return self._in_heading(gain * wanted[0], gain * wanted[1], up)
 
-    def _comes_to_rest(self, now_ns: int, place: Vector3) -> Vector3:
-        self._stop = self._stop or Stop(now_ns, place)
-        return self._stop.place(now_ns, place)
+    def _place_to_rest(self, now_ns: int, here: Vector3) -> Vector3:
+        self._coming = self._coming or ComingToRest(now_ns, here)
+        return self._coming.place(now_ns, here)
 
     def _in_heading(self, x: float, y: float, up: float) -> Vector3:
         c, s = math.cos(self._yaw_rad), math.sin(self._yaw_rad)

@@ -58,7 +58,7 @@ def recoverable(name: str, velocity: tuple[float, float], now: Moment) -> tuple[
 def within_box(name: str, velocity: tuple[float, float], now: Moment, level_m: float = 0.0) -> tuple[float, float]:
     """Return the part of a velocity [base_stabilized] that keeps who flies on our estimate in the box about views.
 
-    level_m: to which it climbs; below it counts the height at which it is.
+    level_m: to which it climbs; where it is higher already, that height counts.
     """
     if name not in now.parameters.fed:
         return velocity

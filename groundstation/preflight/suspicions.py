@@ -75,9 +75,10 @@ def opinion(stand: Stand, sightings: Sequence[PadSighting]) -> Opinion:
     tried = [Explanation(s, _explained(plain, s)) for s in ranked]
     good = [v for v in tried if _good(v.fit, len(v.suspicion.loose))]
     best = max((v.fit.evidence for v in good), default=-math.inf)
-    left = sorted((v for v in good if v.fit.evidence > best - _RULED_OUT), key=lambda v: v.fit.evidence)
-    likeliest = {(v.suspicion.what, v.suspicion.who, *v.suspicion.exchanged.values()): v for v in left}
-    return Opinion(False, tuple(sorted(likeliest.values(), key=lambda v: -v.fit.evidence)), nothing)
+    left: dict[tuple[str, ...], Explanation] = {}
+    for one in sorted((v for v in good if v.fit.evidence > best - _RULED_OUT), key=lambda v: -v.fit.evidence):
+        left.setdefault((one.suspicion.what, one.suspicion.who, *one.suspicion.exchanged.values()), one)
+    return Opinion(False, tuple(left.values()), nothing)
 
 
 def _suspicions(plain: PadFit) -> Iterator[Suspicion]:

@@ -57,7 +57,6 @@ class SerialLink:
         self._decoder = FrameDecoder(signing)
         self._encoder = FrameEncoder(settings.system_id, settings.component_id, signing)
         self._cutter, self._lock, self._sniffer = StreamCutter(), threading.RLock(), sniffer
-        self._signed = signing is not None
         self._closed = False
         self._device, self._baud = device, int(baud)
         self._fd = open_raw(self._device, self._baud)
@@ -115,8 +114,7 @@ class SerialLink:
     def send(self, system: int, message: Message) -> None:
         """Write one frame; a line that is too slow loses it."""
         with self._lock:  # signed frames must leave in the order of their times
-            not_before = time_to_sign(self._decoder) if self._signed else 0
-            self.send_raw(system, self._encoder.encode(message, not_before=not_before))
+            self.send_raw(system, self._encoder.encode(message, not_before=time_to_sign(self._decoder)))
 
     def send_raw(self, system: int, data: bytes) -> None:
         """Write whole frames; a line that is too slow loses them."""

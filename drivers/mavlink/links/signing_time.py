@@ -7,7 +7,7 @@ from drivers.mavlink.wire.signature import stamp_at
 
 
 def time_to_sign(decoder: FrameDecoder) -> int:
-    """Return the least time for the next frame [10 us since 2015-01-01 UTC]; decoder: of what the link hears.
+    """Return the least time for the next frame [10 us since 2015-01-01 UTC], if it is signed; decoder: of the link.
 
     WIRE (docs/reference/mavlink.md 5.9): a vehicle that was started anew hears nobody whose time is more than a minute
     older than the newest that it knows, from another ground station or from a clock that was ahead.

@@ -170,7 +170,7 @@ class UdpLink:
             self.send_raw(system, self._encode(message))
 
     def _encode(self, message: Message) -> bytes:
-        return self._encoder.encode(message, not_before=time_to_sign(self._decoder) if self._signed else 0)
+        return self._encoder.encode(message, not_before=time_to_sign(self._decoder))
 
     def _address_of(self, system: int) -> tuple[str, int] | None:
         known = self._addresses.get(system)

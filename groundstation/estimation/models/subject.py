@@ -71,9 +71,9 @@ def marker_point(belief: Belief, event: EventRow, point: Vector, slopes: Matrix)
     if entity.size == 0:
         return
     if entity.at_yaw >= 0:
-        yaw = mean[start + entity.at_yaw]
-        marker_offset(mean, entity, event, yaw, point)
-        write_slopes(point, lean_of(mean, entity, event).pitch, yaw, slopes)
+        yaw, lean = mean[start + entity.at_yaw], lean_of(mean, entity, event)
+        offset_in_world(entity.place_x, entity.place_y, entity.place_z, lean, yaw, point)
+        write_slopes(point, lean.pitch, yaw, slopes)
     point[X] += mean[start + X]
     point[Y] += mean[start + Y]
     if entity.at_z >= 0:

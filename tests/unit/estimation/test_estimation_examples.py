@@ -39,23 +39,29 @@ def test_the_example_on_real_data_runs(monkeypatch: pytest.MonkeyPatch, real_dat
     assert max(run_example(1)["errors_m"]) < 0.3
 
 
-def test_the_sensor_model_of_the_how_to_passes_its_own_test(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The page's files, saved beside the models as it says."""
-    model, test = examples_of(SENSOR_PAGE)
-    (tmp_path / "uwb_range.py").write_text(model)
-    monkeypatch.setattr(models, "__path__", [*models.__path__, str(tmp_path)])
-    names: dict[str, Any] = {}
-    exec(compile(test, str(SENSOR_PAGE), "exec"), names)
+@pytest.fixture
+def tests_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[Path, str], dict[str, Any]]:
+    """Save a page's model beside the models, as it says, and return what its test defines."""
+
+    def saved(page: Path, name: str) -> dict[str, Any]:
+        model, test = examples_of(page)
+        (tmp_path / name).write_text(model)
+        monkeypatch.setattr(models, "__path__", [*models.__path__, str(tmp_path)])
+        names: dict[str, Any] = {}
+        exec(compile(test, str(page), "exec"), names)
+        return names
+
+    return saved
+
+
+def test_the_sensor_model_of_the_how_to_passes_its_own_test(tests_of: Callable[[Path, str], dict[str, Any]]) -> None:
+    names, (model, _) = tests_of(SENSOR_PAGE, "uwb_range.py"), examples_of(SENSOR_PAGE)
     names["test_the_derivatives_are_exact"]()
     names["test_four_anchors_find_the_robot"]()
     assert len(model[model.index("\nclass") :].strip().splitlines()) <= 40
 
 
-def test_the_model_of_motion_of_the_how_to_passes_its_own_test(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    model, test = examples_of(MOTION_PAGE)
-    (tmp_path / "coasting_target.py").write_text(model)
-    monkeypatch.setattr(models, "__path__", [*models.__path__, str(tmp_path)])
-    names: dict[str, Any] = {}
-    exec(compile(test, str(MOTION_PAGE), "exec"), names)
+def test_the_model_of_motion_of_the_how_to_passes_its_own_test(tests_of: Callable[[Path, str], dict[str, Any]]) -> None:
+    names = tests_of(MOTION_PAGE, "coasting_target.py")
     names["test_out_of_sight_it_rolls_to_rest"]()
     names["test_its_velocity_becomes_as_uncertain_as_it_was_and_no_more"]()

@@ -64,28 +64,32 @@ class Waiting:
 
 @pytest.fixture
 def keyboard(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
-    read, write = os.pipe()
+    yield from typed_into(monkeypatch, *os.pipe())
+
+
+@pytest.fixture
+def terminal(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    operator, run = pty.openpty()
+    yield from typed_into(monkeypatch, run, operator)
+
+
+def typed_into(monkeypatch: pytest.MonkeyPatch, read: int, write: int) -> Iterator[int]:
     monkeypatch.setattr(keyboards.Keyboard.__init__, "__defaults__", (read,))
     yield write
     os.close(read)
     os.close(write)
 
 
-@pytest.fixture
-def terminal(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
-    operator, run = pty.openpty()
-    monkeypatch.setattr(keyboards.Keyboard.__init__, "__defaults__", (run,))
-    yield operator
-    os.close(operator)
-    os.close(run)
-
-
 def flown(waiting: Waiting, *, asks: bool) -> loop.FlightOutcome:
+    return flight_of(waiting, asks=asks).run()
+
+
+def flight_of(waiting: Waiting, *, asks: bool) -> loop.Flight:
     terminal = cast(Terminal, SimpleNamespace(say=waiting.said.append, unmute=lambda: None))
     plan = FlightPlan(None, asks=asks, cameras={}, limits=TakeOffLimits(unseen_s=10.0), landing_limit_s=0.1)
     flight = loop.Flight(cast(Supervisor, waiting), plan, terminal)
     flight._start = cast(Start, SimpleNamespace(run=lambda: None, show_screen=lambda: None))
-    return flight.run()
+    return flight
 
 
 def test_hold_before_the_take_off_ends_neither_the_prompt_nor_a_flight_that_was_none(keyboard: int) -> None:
@@ -155,10 +159,7 @@ def refused(*_: object) -> bytes:
 @pytest.mark.parametrize("asks", [True, False], ids=["real", "emulated"])
 def test_a_computer_that_slept_in_flight_lands_real_drones(keyboard: int, asks: bool) -> None:
     waiting = Waiting(keyboard, m.Verb.HOLD, typed=b"")
-    terminal = cast(Terminal, SimpleNamespace(say=waiting.said.append, unmute=lambda: None))
-    plan = FlightPlan(None, asks=asks, cameras={}, limits=TakeOffLimits(unseen_s=10.0), landing_limit_s=0.1)
-    flight = loop.Flight(cast(Supervisor, waiting), plan, terminal)
-    flight._start = cast(Start, SimpleNamespace(run=lambda: None, show_screen=lambda: None))
+    flight = flight_of(waiting, asks=asks)
     flight._sleep = cast(SleepWatch, SimpleNamespace(slept_s=lambda: 12.3))
     operator = cast(Operator, SimpleNamespace(phase=TeamPhase.TRACKING, landed=lambda _now_ns: False, forbidden="",
                                               step=lambda _now_ns: None, take_off=lambda *_, **__: None,

@@ -280,16 +280,16 @@ class Tracker:
         sight = Sight(
             min(seen_s, default=None), unseen_s, lookout.missed_s, lookout.missing,
             lambda robots, targets: lookout.stands(robots, targets, belief), lookout.velocity_errors_m_s, drifts,
-            lookout.unsteered, {n: self._tied_age_s(n) for n in belief.layout.robots}, velocities)  # fmt: skip
+            lookout.unsteered, {n: self._tied_age_s(n) for n in belief.layout.robots}, velocities,
+            {n: self._roots.helped_age_s(n) for n in belief.layout.robots})  # fmt: skip
         wanted = setpoints_from_plan(self.current, belief, airborne, p.control, p.sensors, sight)
         limited = {
             name: limit_setpoint(name, setpoint, belief, now_ns, p.safety, velocities, drifts)
             for name, setpoint in wanted.items()
         }
-        for name, one in limited.items():
-            if name in drifts:
-                velocity = np.array(one.setpoint.velocity_m_s)
-                self._drifts[name].tell(world_from_stabilized(velocity, float(belief.mean_of(name)[3])))
+        for name in drifts.keys() & limited.keys():
+            velocity = np.array(limited[name].setpoint.velocity_m_s)
+            self._drifts[name].tell(world_from_stabilized(velocity, float(belief.mean_of(name)[3])))
         return limited
 
     def _is_plan_stale(self, now_ns: int) -> bool:

@@ -28,7 +28,8 @@ class Sight:
     searched for: while others are tracked, one robot does; velocity_errors_m_s: of each robot's odometry, rms;
     drifts_m_s: motion of each robot besides what it is told (3) [m/s; world]; unsteered: robots that follow no
     setpoints: they wait or land; untied_s: since something fixed in the room last told where each robot is, or somebody
-    saw it; velocities_m_s: of each robot (3) [m/s; world].
+    saw it; velocities_m_s: of each robot (3) [m/s; world]; helped_s: since others than the sensors fixed in the room
+    last told where each robot is.
     """
 
     target_age_s: float | None = None
@@ -41,6 +42,7 @@ class Sight:
     unsteered: Collection[str] = ()
     untied_s: Mapping[str, float] = field(default_factory=dict)
     velocities_m_s: Mapping[str, Array] = field(default_factory=dict)
+    helped_s: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,7 +35,8 @@ class RootWatch:
     def __init__(self, roots: Collection[str], carried: Iterable[str], links: Collection[str] = ()) -> None:
         self._roots, self._carried = frozenset(roots), frozenset(carried)
         self._placing = self._roots | frozenset(links)
-        self._rooted_ns: dict[str, int] = {}
+        # By whom a root saw: for each entity, when it last saw each one from which that reached it.
+        self._rooted_ns: dict[str, dict[str, int]] = {}
         self._heard_ns: dict[str, int] = {}
         self._telling: set[str] = set()
         self._hanging: set[str] = set()
@@ -79,7 +80,15 @@ class RootWatch:
 
     def age_s(self, name: str) -> float:
         """Return how old the newest sighting by a root is that reached an entity, itself or by others; or infinity."""
-        return (self._now_ns - self._rooted_ns[name]) / NS_PER_S if name in self._rooted_ns else math.inf
+        return self._since_s(max(self._rooted_ns.get(name, {}).values(), default=None))
+
+    def helped_age_s(self, name: str) -> float:
+        """Return the same of sightings that reached it by others alone: it would be known where no root sees it."""
+        others = (at_ns for seen, at_ns in self._rooted_ns.get(name, {}).items() if seen != name)
+        return self._since_s(max(others, default=None))
+
+    def _since_s(self, at_ns: int | None) -> float:
+        return math.inf if at_ns is None else (self._now_ns - at_ns) / NS_PER_S
 
     def _note(self, root: str, now_ns: int, *, works: bool) -> None:
         """Take what a root says that also says when it sees nobody; with its first word it works."""
@@ -100,9 +109,11 @@ class RootWatch:
     def _tie(self, one: Correction, at_ns: int) -> None:
         """Let both ends of a sighting know what the better rooted one knows."""
         if one.observer in self._placing:
-            self._rooted_ns[one.subject] = max(at_ns, self._rooted_ns.get(one.subject, at_ns))
+            own = self._rooted_ns.setdefault(one.subject, {})
+            own[one.subject] = max(at_ns, own.get(one.subject, at_ns))
             return
-        ends = (one.observer, one.subject)
-        known = [self._rooted_ns[name] for name in ends if name in self._rooted_ns]
-        if known:
-            self._rooted_ns |= dict.fromkeys(ends, max(known))
+        ends = [self._rooted_ns.setdefault(name, {}) for name in (one.observer, one.subject)]
+        for seen in ends[0].keys() | ends[1].keys():
+            newest = max(end[seen] for end in ends if seen in end)
+            for end in ends:
+                end[seen] = newest

@@ -37,6 +37,18 @@ def test_what_a_root_sees_is_passed_on_along_sightings_in_either_direction() -> 
     assert ages_s(watch) == [0.0, 0.0, 0.0]
 
 
+def test_what_others_tell_of_one_is_not_what_it_told_them() -> None:
+    """One that is in view and sees a target that nobody else sees would not be known by it outside of the view."""
+    watch = RootWatch(["ceiling"], CARRIED)
+    alone = [used("ceiling", "drone_1"), used("drone_1", "turtlebot"), used("drone_1", "turtlebot")]
+    watch.advance(TICK_NS, alone, flying=True)
+    assert watch.age_s("drone_1") == 0.0 and watch.helped_age_s("drone_1") == math.inf
+    assert watch.helped_age_s("turtlebot") == 0.0
+    seen = [used("ceiling", "drone_2", latency_ms=100.0), used("drone_2", "turtlebot"), used("drone_1", "turtlebot")]
+    watch.advance(2 * TICK_NS, [*seen, used("ceiling", "drone_1")], flying=True)
+    assert (watch.age_s("drone_1"), watch.helped_age_s("drone_1")) == pytest.approx((0.0, 0.1))
+
+
 def test_a_range_roots_a_robot_by_the_name_of_its_link() -> None:
     watch = RootWatch(["uwb"], CARRIED, ["uwb_a1_drone_1"])
     watch.advance(TICK_NS, [used("uwb_a1_drone_1", "drone_1")], flying=True)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from groundstation.arrays import Array
-from groundstation.control.excursion import box_about_views, within_reach, within_views
+from groundstation.control.excursion import within_reach
 from groundstation.control.moment import STILL, Moment, is_untied, soon
 from groundstation.control.view import spread_m
 from groundstation.geometry.stabilized_frame import stabilized_from_world, world_from_stabilized
@@ -14,8 +14,6 @@ from groundstation.geometry.stabilized_frame import stabilized_from_world, world
 # Deviations of a robot's place by which others make room for it: two keep it away from them, one is to spare.
 _ROOM_SIGMAS = 3.0
 _ROOM_GAIN = 1.0  # of the way that lacks [1/s]
-# Views are narrower higher up, and a vehicle in the midst of a climb rises on for so long before it is held.
-_RISES_ON_M = 0.3
 
 
 def giving_way(name: str, velocity: tuple[float, float], coming: Sequence[str], now: Moment) -> tuple[float, float]:
@@ -49,39 +47,13 @@ def recoverable(name: str, velocity: tuple[float, float], now: Moment) -> tuple[
     if error_m_s <= now.parameters.sound_error_m_s:
         return velocity
     near = soon(name, now)
-    return _held(
+    return held(
         name, velocity, now,
         lambda wanted: within_reach(wanted, name, now.belief, now.parameters, now.sensors, error_m_s, drift, near),
     )  # fmt: skip
 
 
-def within_box(name: str, velocity: tuple[float, float], now: Moment, level_m: float = 0.0) -> tuple[float, float]:
-    """Return the part of a velocity [base_stabilized] that keeps who flies on our estimate in the box about views.
-
-    level_m: to which it climbs; where it is higher already, that height counts.
-    """
-    if name not in now.parameters.fed:
-        return velocity
-    height_m = max(level_m, float(now.belief.mean_of(name)[2]))
-    return _held(
-        name, velocity, now,
-        lambda wanted: within_views(wanted, name, now.belief, now.parameters, now.sensors, height_m),
-    )  # fmt: skip
-
-
-def climbs_within_box(name: str, level_m: float, now: Moment) -> float:
-    """Return the height up to which a robot climbs on its way to its level: one that flies on our estimate no higher
-    than it is in the box about views."""
-    x, y, z = (float(value) for value in now.belief.mean_of(name)[:3])
-    if name not in now.parameters.fed or level_m <= z:
-        return level_m
-    box = box_about_views(name, now.belief, now.sensors, min(level_m, z + _RISES_ON_M))
-    return level_m if box is None or box.nearest(x, y) == (x, y) else z
-
-
-def _held(
-    name: str, velocity: tuple[float, float], now: Moment, limit: Callable[[Array], Array]
-) -> tuple[float, float]:
+def held(name: str, velocity: tuple[float, float], now: Moment, limit: Callable[[Array], Array]) -> tuple[float, float]:
     """Return what a limit of velocities (2) [world] leaves of one [base_stabilized]."""
     yaw = float(now.belief.mean_of(name)[3])
     wanted = world_from_stabilized(np.array([*velocity, 0.0]), yaw)

@@ -8,7 +8,8 @@ import numpy as np
 
 from groundstation.bus.messages import Vector3
 from groundstation.control.flight_mode import FlightMode, Situation, flight_mode_of
-from groundstation.control.holding_off import climbs_within_box, giving_way, recoverable, within_box
+from groundstation.control.holding_off import giving_way, recoverable
+from groundstation.control.in_sight import is_between_views, kept_in_sight
 from groundstation.control.moment import STILL, Moment, Sight, is_untied, soon
 from groundstation.control.parameters import ControlParameters
 from groundstation.control.regaining import regaining, who_regains
@@ -22,6 +23,7 @@ from groundstation.geometry.stabilized_frame import stabilized_from_world, world
 from groundstation.planning.planner import PlanResult
 from groundstation.sensing.models import SensorSuite
 
+_PLANNED_S = 3.0  # as far as plans reach
 _STAND_GAIN, _TURN_GAIN = 1.0, 1.5  # of the way and the turn to a stand [1/s]
 
 
@@ -77,7 +79,9 @@ def setpoints_from_plan(
         elif phase is FlightMode.TRACK and plan is not None:
             vx, vy, rate = _regained(name, plan, now)
             level_m = _level_m(name, plan.heights[name], now)
-            velocity = within_box(name, recoverable(name, giving_way(name, (vx, vy), coming, now), now), now, level_m)
+            velocity = recoverable(name, giving_way(name, (vx, vy), coming, now), now)
+            ahead_m = _PLANNED_S * math.hypot(*velocity)
+            velocity, level_m = kept_in_sight(name, velocity, level_m, ahead_m, now)
             wanted[name] = _with_height(name, velocity, rate, level_m, phase, now)
         else:
             wanted[name] = _towards(name, stands[name], phase, now)
@@ -86,7 +90,9 @@ def setpoints_from_plan(
 
 def _comes_back(name: str, phase: FlightMode, now: Moment) -> bool:
     """Return whether a robot flies back into a view, and obeys."""
-    comes = phase is FlightMode.RETURN or (phase is FlightMode.TRACK and is_untied(name, now))
+    comes = phase is FlightMode.RETURN or (
+        phase is FlightMode.TRACK and (is_untied(name, now) or is_between_views(name, now))
+    )
     return comes and name not in now.sight.unsteered
 
 
@@ -192,8 +198,9 @@ def _towards(name: str, stand: Stand, phase: FlightMode, now: Moment) -> Setpoin
     limit = stand.turn_rad_s or parameters.search_yaw_rate_rad_s
     body = stabilized_from_world(velocity, float(mean[3]))
     rate = min(max(rate, -limit), limit)
-    kept = within_box(name, (float(body[0]), float(body[1])), now)
-    return _with_height(name, kept, rate, _search_level_m(name, now), phase, now)
+    ahead_m, level_m = math.dist((stand.x, stand.y), mean[:2]), _search_level_m(name, now)
+    kept, level_m = kept_in_sight(name, (float(body[0]), float(body[1])), level_m, ahead_m, now)
+    return _with_height(name, kept, rate, level_m, phase, now)
 
 
 def _with_height(
@@ -203,7 +210,7 @@ def _with_height(
     belief, parameters = now.belief, now.parameters
     mean = belief.mean_of(name)
     climb = parameters.limits_of(name).max_climb_m_s
-    way = climbs_within_box(name, level_m, now) - float(mean[2])
+    way = level_m - float(mean[2])
     vz = min(max(parameters.height_gain_per_s * way, -climb), climb)
     if abs(way) <= parameters.height_tolerance_m:
         return Setpoint((*velocity, vz), rate, phase)
@@ -217,7 +224,7 @@ def _with_height(
     outward = stabilized_from_world(away, float(mean[3]))[:2]
     held = np.array(velocity)
     held += max(0.0, parameters.side_step_m_s - float(held @ outward)) * outward
-    aside = within_box(name, (float(held[0]), float(held[1])), now, level_m)
+    aside, _ = kept_in_sight(name, (float(held[0]), float(held[1])), level_m, _PLANNED_S * math.hypot(*held), now)
     return Setpoint((*aside, 0.0), rate, phase, blocked=other)
 
 

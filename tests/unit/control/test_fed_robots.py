@@ -83,13 +83,18 @@ class Flight:
     [
         ((-0.29, -0.52, 1.31), (0.12, -0.38), (0.16, -0.10)),
         ((-0.14, -0.59, 1.17), (0.14, -0.03), (0.00, 0.17)),
+        ((-0.15, -0.72, 1.06), (0.27, -0.01), (-0.30, 0.10)),
     ],
-    ids=["it left the view and saw nothing itself", "the one that saw the same target left the view too"],
+    ids=[
+        "it left the view and saw nothing itself",
+        "the one that saw the same target left the view too",
+        "its plan turned round in the midst of the gap",
+    ],
 )
 def test_who_left_every_view_is_back_in_one_before_it_lands(
     place: tuple[float, ...], velocity: tuple[float, float], planned: tuple[float, float]
 ) -> None:
-    """Places, velocities and plans of two flights of a PX4 in step with the room that ended in a landing."""
+    """Places, velocities and plans of three flights of a PX4 in step with the room that ended in a landing."""
     flight = Flight(place, velocity)
     while not seen(flight.pose):
         assert flight.step(planned), f"landed {flight.tied_s:.1f} s after it was last seen, at {flight.pose[:2]}"
@@ -133,7 +138,7 @@ def test_who_is_in_the_view_makes_room_for_it() -> None:
 @pytest.mark.parametrize(("untied_s", "climbs"), [(0.3, True), (0.5, False)])
 def test_it_does_not_climb_out_of_the_view_that_it_looks_for(untied_s: float, climbs: bool) -> None:
     """Of a real PX4 the border of the view went before it: it rose from 1.17 to 1.44 m, where the view is narrower."""
-    pose, sight = np.array([-0.4, -0.3, 1.17, 0.7]), Sight(0.1, {"drone_2": untied_s}, untied_s={"drone_2": untied_s})
+    pose, sight = np.array([-0.8, -0.3, 1.17, 0.7]), Sight(0.1, {"drone_2": untied_s}, untied_s={"drone_2": untied_s})
     found = setpoints_from_plan(
         plan(np.zeros(2), pose, climb_m=0.9), belief(pose, SEEN_STD_M), ("drone_2",), CONTROL, SENSORS, sight
     )
@@ -141,8 +146,8 @@ def test_it_does_not_climb_out_of_the_view_that_it_looks_for(untied_s: float, cl
 
 
 def test_who_is_told_where_it_is_by_what_it_sees_flies_its_plan() -> None:
-    pose = np.array([-0.1, -0.55, 1.3, 0.7])
-    sight = Sight(0.1, {"drone_2": 3.0}, untied_s={"drone_2": 0.3})
+    pose = np.array([-0.1, -0.55, 1.4, 0.7])
+    sight = Sight(0.1, {"drone_2": 3.0}, untied_s={"drone_2": 0.3}, helped_s={"drone_2": 0.3})
     out = told(pose, np.array([0.3, 0.1]), sight, SEEN_STD_M).velocity_m_s
     assert world_from_stabilized(np.array(out), 0.7)[:2] == pytest.approx([0.3, 0.1])
 
@@ -161,7 +166,7 @@ def test_between_two_views_it_goes_on_to_the_one_that_it_flies_to(x: float) -> N
         0.1, {"drone_2": 1.0}, untied_s={"drone_2": 1.0}, velocities_m_s={"drone_2": np.array([0.2, 0.0, 0.0])}
     )
     out = told(np.array([x, -0.3, 1.3, 0.7]), np.array([-0.2, 0.0]), sight, SEEN_STD_M).velocity_m_s
-    assert world_from_stabilized(np.array(out), 0.7)[0] == pytest.approx(CONTROL.return_speed_m_s)
+    assert world_from_stabilized(np.array(out), 0.7)[0] > 0.95 * CONTROL.limits_of("drone_2").max_speed_m_s
 
 
 @pytest.mark.parametrize("x", [-0.02, 0.02])
@@ -175,9 +180,9 @@ def test_on_the_way_back_it_goes_on_to_the_view_that_it_flies_to(x: float) -> No
 
 def test_who_flies_on_our_estimate_stops_before_the_border_behind_which_nobody_sees_it() -> None:
     """Copters that looked for the target left the views at 0.5 m/s, and landed before they were back."""
-    near, tied = np.array([-1.7, -0.75, 1.2, 0.0]), Sight(0.1, untied_s={"drone_2": 0.1})
+    near, tied = np.array([-1.7, -0.70, 1.2, 0.0]), Sight(0.1, untied_s={"drone_2": 0.1})
     border_m = min(view.y_m[0] for view in SENSORS.root_views(1.2 + SENSORS.marker_height_m["drone_2"]))
-    for name, slowest in (("drone_2", border_m + 0.75), ("drone_1", -0.5)):
+    for name, slowest in (("drone_2", border_m + 0.70), ("drone_1", -0.5)):
         out = told(near, np.array([0.1, -0.5]), tied, SEEN_STD_M, name).velocity_m_s
         assert out[:2] == pytest.approx([0.1, slowest])
 
@@ -195,7 +200,7 @@ def test_a_plan_does_not_lift_it_out_of_the_views_and_brings_it_inside_first() -
         (-0.55, "drone_2", 0.4, 0.01),
         (-0.79, "drone_1", 0.4, 0.01),
     ):
-        pose = np.array([-0.37, y, 0.83, 0.0])
+        pose = np.array([-1.37, y, 0.83, 0.0])
         plans = plan(np.array([0.3, 0.01]), pose, name, climb_m=0.67)
         found = setpoints_from_plan(plans, belief(pose, SEEN_STD_M, name), (name,), CONTROL, SENSORS, tied)[name]
         assert found.velocity_m_s == pytest.approx((0.3, inwards, climb))

@@ -1,0 +1,109 @@
+"""How a robot crosses from one world-fixed view into another where nobody sees it on the way. Pure."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from groundstation.arrays import Array
+from groundstation.sensing.models import Rectangle
+
+RUN_UP_M = 0.3  # before the border: a vehicle needs so far to come to speed
+_INSET_M = 0.1  # behind the border it is seen for certain
+_GAIN = 3.0  # of the way that is left into the view [1/s]: a velocity's error carries it out of a weaker hold
+_STANDS_M_S = 1e-3
+_ASIDE_M_S = 0.3  # along the gap, while it crosses: as much as the limit of speed leaves
+
+
+@dataclass(frozen=True, slots=True)
+class Passage:
+    """A straight way from a view into the next one: where it leaves and reaches one [m from its begin], the unit way
+    (2), and how much of the velocity goes that way."""
+
+    leaves_m: float
+    reaches_m: float
+    way: Array
+    share: float
+
+    @property
+    def gap_m(self) -> float:
+        """Return how far nobody sees whoever goes this way."""
+        return max(0.0, self.reaches_m - self.leaves_m)
+
+
+def view_around(place: Array, views: Sequence[Rectangle]) -> Rectangle | None:
+    """Return the view in which a place (2) [m] lies deepest, or which it is outside of by least; None without views."""
+    return max(views, key=lambda view: _depth_m(place, view), default=None)
+
+
+def is_inside(place: Array, views: Sequence[Rectangle]) -> bool:
+    """Return whether a place (2) [m] lies in a view."""
+    return any(_depth_m(place, view) >= 0.0 for view in views)
+
+
+def passage(place: Array, velocity: Array, views: Sequence[Rectangle]) -> Passage | None:
+    """Return the passage from the view about a place (2) [m] into the next one along a velocity (2); None if none.
+
+    Where the way misses the other view, that along the greater part of the velocity counts: straight across.
+    """
+    home = view_around(place, views)
+    if home is None or _depth_m(place, home) < 0.0:
+        return None
+    others = [view for view in views if view is not home]
+    ways = (velocity, *sorted(np.diag(velocity), key=np.linalg.norm, reverse=True))
+    speed = max(math.hypot(*velocity), _STANDS_M_S)
+    found = (_passage(place, way, home, others, speed) for way in ways if math.hypot(*way) > _STANDS_M_S)
+    return next((one for one in found if one is not None), None)
+
+
+def _passage(
+    place: Array, velocity: Array, home: Rectangle, others: Sequence[Rectangle], speed: float
+) -> Passage | None:
+    size = math.hypot(*velocity)
+    way = velocity / size
+    _, leaves_m = _inside_m(place, way, home)
+    spans = (_inside_m(place, way, view) for view in others)
+    reached = [first for first, last in spans if first <= last and last > leaves_m]
+    return Passage(leaves_m, max(0.0, min(reached)), way, size / speed) if reached else None
+
+
+def gap_about_m(place: Array, views: Sequence[Rectangle]) -> float:
+    """Return how wide what lies between the two views nearest to a place (2) [m] is there; infinite without two."""
+    ways = sorted(math.dist(place, view.nearest(*place.tolist())) for view in views)
+    return ways[0] + ways[1] if len(ways) > 1 else math.inf
+
+
+def hold(view: Rectangle, place: Array, velocity: Array, most: float) -> Array:
+    """Return the part of a velocity (2) [m/s] with which who is in a view stays there, at most so fast inwards."""
+    low, high = (np.array(side) - place for side in np.transpose((view.x_m, view.y_m)))
+    return np.asarray(np.clip(velocity, np.minimum(low, most), np.maximum(high, -most)))
+
+
+def into(view: Rectangle, place: Array, velocity: Array, most: float) -> Array:
+    """Return the velocity (2) [m/s] of who is outside of a view and flies straight into it, as fast as it wants
+    to or at most so fast."""
+    low, high = (np.array(side) for side in np.transpose((view.x_m, view.y_m)))
+    inner = view.shrunk(_INSET_M)
+    near = np.array(inner.nearest(*place.tolist()))
+    straight, below, above = np.clip(_GAIN * (near - place), -most, most), place < low, place > high
+    straight = np.where(below, np.maximum(straight, velocity), np.minimum(straight, velocity))
+    along = np.clip(np.clip(velocity, -_ASIDE_M_S, _ASIDE_M_S), low - place, high - place)
+    return np.asarray(np.where(below | above, straight, along))
+
+
+def _depth_m(place: Array, view: Rectangle) -> float:
+    x, y = float(place[0]), float(place[1])
+    return min(x - view.x_m[0], view.x_m[1] - x, y - view.y_m[0], view.y_m[1] - y)
+
+
+def _inside_m(place: Array, way: Array, view: Rectangle) -> tuple[float, float]:
+    """Return from where to where a line is inside of a view [m from its begin]; first after last where it is not."""
+    first, last = -math.inf, math.inf
+    for at, along, (low, high) in zip(place.tolist(), way.tolist(), (view.x_m, view.y_m), strict=True):
+        if abs(along) < 1e-9:
+            first, last = (first, last) if low <= at <= high else (math.inf, -math.inf)
+            continue
+        ends = sorted(((low - at) / along, (high - at) / along))
+        first, last = max(first, ends[0]), min(last, ends[1])
+    return first, last

@@ -138,7 +138,7 @@ class VehicleHost:
             link_quality=health.link_quality,
             rate_hz=health.rate_hz,
             rejected=health.rejected | self._ignored | self._refused(),
-            detail=health.detail or self.watchdog.explanation,
+            detail=self._detail(health.detail),
             not_ready=view.not_ready,
             firmware=health.firmware,
             braked=self.watchdog.braked,
@@ -149,6 +149,11 @@ class VehicleHost:
         )
         self._bus.publish(VEHICLE_STATUS, status)
         self._announcements.tell_intrusions(now_ns, status.rejected)
+
+    def _detail(self, of_link: str) -> str:
+        """Return why a vehicle does what it does; unless a failsafe has it, what its link awaits comes first."""
+        stopped = self.watchdog.braked or (self.watchdog.failsafe and self.watchdog.mode is not DriverMode.LANDED)
+        return self.watchdog.explanation if stopped else of_link or self.watchdog.explanation
 
     def _upstream(self) -> Upstream:
         return Upstream(self._child.supervisor_alive, self._child.supervisor_fresh, self._child.stop_requested)

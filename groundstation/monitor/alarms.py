@@ -22,7 +22,9 @@ _BEFORE_FLIGHT = {
 }
 _AFTER_LANDING = "Nothing to do now: check its power and cable once all have landed."
 _SWITCHED_OFF = "Nothing to do now: switch it on before it flies again."
+_SEARCH = "Nothing to do: the drones in TRACK search for it."
 _RESTARTED = "Nothing to do: it is restarted if it hangs."
+_CALL = f"{_TO_DO}check its marker and the light; drive it into the middle of the room; or LAND ALL."
 _DOWN = {
     FlightState.EMERGENCY: (
         "EMERGENCY",
@@ -59,6 +61,7 @@ def alarms_of(state: MonitorState, now_ns: int) -> list[Alarm]:
         *_vehicles(state, now_ns),
         *_tracker(state, now_ns),
         *_lost(state),
+        *_searched(state),
         *_cameras(state, now_ns),
         *_processes(state, now_ns),
         *_events(state, now_ns),
@@ -127,15 +130,26 @@ def _tracker(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
 def _lost(state: MonitorState) -> Iterator[Alarm]:
     """Who should be seen and is not; of a drone that lands for it, that alarm tells."""
     entities = state.estimate.message.entities if state.estimate else ()
-    for entity in (entity for entity in entities if entity.age_s > state.cast.lost_after_s):
+    searched = {search.target for search in state.estimate.message.searches} if state.estimate else set()
+    for entity in (one for one in entities if one.age_s > state.cast.lost_after_s and one.name not in searched):
         seen = state.vehicles.get(entity.name)
         if entity.name in state.cast.targets:
-            advice = "Nothing to do: the drones in TRACK search for it."
+            advice = _SEARCH
         elif seen and seen.message.flight_state in AIRBORNE and seen.message.lands_in_s is None:
             advice = "Nothing to do: it lands by itself if this lasts."
         else:
             continue
         yield Alarm(f"{entity.name} lost", f"{entity.name} is lost: not seen for {entity.age_s:.0f} s", False, advice)
+
+
+def _searched(state: MonitorState) -> Iterator[Alarm]:
+    """Targets of which the belief holds no place any more, or none yet."""
+    for search in state.estimate.message.searches if state.estimate else ():
+        x, y = search.place_m
+        text = f"{search.target} is lost: searched for {search.since_s:.0f} s, now around ({x:.1f}, {y:.1f})"
+        if search.mode == "LOST":
+            text = f"{search.target} is not found: {search.searched:.0%} of the room was searched"
+        yield Alarm(f"{search.target} lost", text, False, _CALL if search.mode == "LOST" else _SEARCH)
 
 
 def _cameras(state: MonitorState, now_ns: int) -> Iterator[Alarm]:

@@ -180,7 +180,8 @@ def test_a_silent_drone_is_asked_again_and_nothing_moves_after_it_comes_back(rig
         time.sleep(0.02)
     assert rig.decision.action == "HOVER"
     rig.host.publish_status(time.monotonic_ns())
-    assert rig.messages(VEHICLE_STATUS)[-1].flight_state == "LOST"
+    status = rig.messages(VEHICLE_STATUS)[-1]
+    assert status.flight_state == "LOST" and status.detail == rig.host.watchdog.explanation != "waiting for navdata"
     assert any("does not answer" in text for _, text, _ in rig.process.events)
     rig.speaking = True
     rig.fake.lines.clear()

@@ -120,6 +120,21 @@ def test_a_drone_that_nobody_sees_is_lost_unless_its_landing_says_so(world: Worl
     assert _alarms(world) == ["drone_1 lands in 6 s: not seen by any camera for too long"]
 
 
+@pytest.mark.parametrize(
+    ("mode", "text", "asks"),
+    [
+        ("SEARCH", "turtlebot is lost: searched for 5 s, now around (1.7, -0.9)", False),
+        ("LOST", "turtlebot is not found: 96% of the room was searched", True),
+    ],
+)
+def test_a_target_that_is_searched_for_is_one_alarm_of_its_own(world: World, mode: str, text: str, asks: bool) -> None:
+    search = m.TargetSearch("turtlebot", mode, 5.0, (1.7, -0.9), 0.96, 21.0, "in words")
+    world.estimate(4.0, 0.0, search)
+    world.text()
+    (alarm,) = alarms_of(world.state, NOW)
+    assert (alarm.about, alarm.text, alarm.asks) == ("turtlebot lost", text, asks)
+
+
 def test_a_camera_without_pictures_raises_an_alarm(world: World) -> None:
     header = world.header("ceiling")
     status = m.CameraStatus(header=header, connected=False, fps=0, age_ms=0, frames=0, skipped=0, detections=0)

@@ -7,7 +7,7 @@ import { momentWords } from "./playback.js";
 import { store } from "./store.js";
 
 // What is to be done about an alarm: the word that leads it, and how it is counted.
-const RANKS = { ACT: "to act on", WATCH: "to watch", notice: "more" };
+const RANKS = { ACT: "more to act on", WATCH: "more to watch", notice: "more" };
 let shown = "";
 
 export function startStrip() {
@@ -47,7 +47,7 @@ export function showMore(ranks, whole) {
   const more = byId("more");
   more.hidden = !ranks.length && whole;
   if (more.hidden) openAlarms(false);
-  text(more, byId("alarms").classList.contains("open") ? "close" : ranks.length ? `+ ${counted(ranks).join(", ")}` : "whole text");
+  text(more, byId("alarms").classList.contains("open") ? "close" : ranks.length ? `${counted(ranks).join(", ")}` : "whole text");
 }
 
 function counted(ranks) {

@@ -2,7 +2,7 @@
 
 import { joined } from "./dom.js";
 import { isLost } from "./glance.js";
-import { ageS, store } from "./store.js";
+import { ageS, seenBy, store } from "./store.js";
 
 const FRESH_S = 1;
 // Information [1/m²] from which a plan relies on a link, as in the report's doubts.
@@ -27,7 +27,7 @@ const sentence = (words) => words ? `${words[0].toUpperCase()}${words.slice(1)}$
 function tracked(name, plan) {
   const relied = (plan.edges ?? []).filter(([, , information]) => information >= RELIED_ON);
   const watched = relied.filter(([observer]) => observer === name).map(([, subject]) => subject);
-  const watchers = relied.filter(([, subject]) => subject === name).map(([observer]) => observer);
+  const watchers = seenBy(name);
   const targets = store.scene.targets.map((target) => target.name), sought = targets.filter(isLost);
   const limits = limitsOf(plan.controls.find(({ robot }) => robot === name));
   const [, who] = store.s.vehicles[name].detail.match(/^tracking for (.+)$/) ?? [];
@@ -41,11 +41,18 @@ const ORDERS = /^(landing|taking off|held|tracking) (?:for|by) (.+)$/;
 const ORDERED = { landing: "lands:", "taking off": "takes off:", held: "hovers in place: HOLD", tracking: "tracks:" };
 
 // The driver's own reason; what it is the reason for, where it does not say so, and who ordered what "landing for" says.
-function reasonOf({ mode, detail }) {
+function reasonOf({ mode, detail, lands_in_s }) {
   if (mode === "LANDED" || mode === "CUT") return standing(detail);
   const [, doing, who] = detail.match(ORDERS) ?? [];
   if (who) return `${ORDERED[doing]} ordered by ${who}`;
-  return mode === "LANDING" && detail && !detail.startsWith("land") ? `lands: ${detail}` : detail;
+  if (mode === "LANDING" && detail && !detail.startsWith("land")) return `lands: ${detail}`;
+  return mode === "HOVER" ? hovering(detail, lands_in_s) : detail;
+}
+
+// RESUME helps while no landing is near.
+function hovering(detail, landsInS) {
+  const [, why] = detail.match(/^(.+); RESUME is needed$/) ?? [];
+  return why ? `hovers${landsInS === null ? "" : ", then lands"}: ${why}${landsInS === null ? ". RESUME lets it go on" : ""}` : detail;
 }
 
 // Why it landed stands in brackets in its driver's words.

@@ -101,5 +101,10 @@ export const isTarget = (name) => (store.scene?.targets ?? []).some((target) => 
 // Footprints are drawn at one height: that of the highest target's marker.
 export const targetHeight = () => Math.max(0, ...(store.scene?.targets ?? []).map((target) => target.height_m));
 export const droneNames = () => (store.scene?.drones ?? []).map((drone) => drone.name);
+// How long ago a body corrected the belief; of one that the belief does not hold, how long ago it was in a picture.
+export function unseenS(name) {
+  const body = entity(name), pictures = (store.s.sightings ?? []).filter(([, subject]) => subject === name);
+  return body ? body.age_s + estimateAge() : Math.min(...pictures.map(([, , at]) => ageS(at)), Infinity);
+}
 export const seenBy = (name) => (store.s.sightings ?? []).filter(([, subject, at]) => subject === name && ageS(at) < 0.6).map(([observer]) => observer);
 export const isSeen = (observer, subject) => (store.s.sightings ?? []).some(([o, s, at]) => o === observer && s === subject && ageS(at) < 0.6);

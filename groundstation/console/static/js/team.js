@@ -8,7 +8,7 @@ import { aloft, doing, modeOf, modeWord } from "./glance.js";
 import { withShortNames } from "./names.js";
 import { give } from "./own_orders.js";
 import { colourOf } from "./palette.js";
-import { ageS, entity, estimateAge, runOver, seenBy, store, trackerSilent } from "./store.js";
+import { ageS, entity, estimateAge, runOver, seenBy, store, trackerSilent, unseenS } from "./store.js";
 
 const STALE_S = 1;
 const LONGEST_CAPTION = 9; // letters of a name that the column of its buttons has room for
@@ -139,7 +139,7 @@ function beliefWords(body, age, lost) {
 const standsInSight = (name) => (store.s.standing ?? []).some((one) => one.name === name);
 
 function showBelief(name, { root, values, mode, detail, drone }) {
-  const body = entity(name), age = body ? estimateAge() + body.age_s : Infinity;
+  const body = entity(name), age = unseenS(name);
   const old = estimateAge() > STALE_S;
   for (const field of BELIEF) values[field]?.parentElement.classList.toggle("old", old);
   if (!drone) {
@@ -149,8 +149,9 @@ function showBelief(name, { root, values, mode, detail, drone }) {
     text(detail, withShortNames(words ?? beliefWords(body, age, lost)));
     root.classList.toggle("stale", estimateAge() > STALE_S || !store.connected);
   }
-  text(values.seen, body ? `${seconds(age)} ago` : standsInSight(name) ? "it stands" : "not yet");
-  values.seen.className = !body ? "" : age > 3 ? "empty" : age > 1 ? "low" : "";
+  const stands = !body && standsInSight(name), seen = Number.isFinite(age) && !stands;
+  text(values.seen, seen ? `${seconds(age)} ago` : stands ? "it stands" : "not yet");
+  values.seen.className = !seen ? "" : age > 3 ? "empty" : age > 1 ? "low" : "";
   text(values.by, withShortNames(seenBy(name).join(", ") || "nobody"));
   if (!body) { for (const field of ["position", "ellipse", "speed"]) text(values[field], "unknown"); return; }
   const { major, minor } = ellipse95(body.cov);

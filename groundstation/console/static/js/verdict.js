@@ -5,7 +5,7 @@ import { landsIn } from "./duty.js";
 import { refusalOf } from "./effects.js";
 import { aloft, doing, isLost, lostTarget, modes, stage, teamMode } from "./glance.js";
 import { mustWords, openMusts } from "./preflight.js";
-import { droneNames, entity, estimateAge, store, trackerSilent } from "./store.js";
+import { droneNames, entity, store, trackerSilent, unseenS } from "./store.js";
 
 const NAMED = 4; // more drones than this are counted
 // Of one, of several.
@@ -38,11 +38,17 @@ function sought() {
   return [...droneNames().filter((name) => !floor.has(name)), ...store.scene.targets.map(({ name }) => name)];
 }
 
+function since(name) {
+  const age = unseenS(name);
+  if (!entity(name) && age < 1) return "seen, but not localised";
+  return Number.isFinite(age) && age < 1e5 ? `not seen for ${age.toFixed(0)} s` : "not seen yet";
+}
+
 function lost() {
   if (trackerSilent()) return "Nobody knows who is lost.";
-  const unseen = sought().filter(isLost).map((name) => [name, (entity(name)?.age_s ?? Infinity) + estimateAge()]);
-  const words = unseen.map(([name, age]) => `${name}, not seen ${Number.isFinite(age) && age < 1e5 ? `for ${age.toFixed(0)} s` : "yet"}`);
-  return words.length ? `Lost: ${joined(words)}.` : "Nobody is lost.";
+  const unseen = sought().filter(isLost), spells = [...new Set(unseen.map(since))];
+  const words = spells.map((spell) => `${joined(unseen.filter((name) => since(name) === spell))}, ${spell}`);
+  return words.length ? `Lost: ${words.join("; ")}.` : "Nobody is lost.";
 }
 
 // What lets those go on that wait for it.

@@ -1,12 +1,14 @@
 """What is asked of a flight, and what a field says of it."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+from groundstation.doctor.finding import Finding, Level
 from groundstation.field.resolved import ResolvedField, field_from_json
 from groundstation.geometry.rotations import world_from_downward_optical
 from groundstation.runtime.marker_height import FixedCamera
 from groundstation.runtime.take_off import TakeOffLimits
+from groundstation.settings.cautions import OF_A_FIELD, Caution
 from groundstation.settings.schema import Field
 
 # What tells positions in the world.
@@ -19,8 +21,9 @@ class FlightPlan:
 
     duration_s: tracking time, None = until stopped; asks: take off only when the operator says so at the prompt or
     from another shell; cameras: those fixed in the world; landing_limit_s: how long a landing may take before the
-    processes are stopped anyway; field: what the checks before the take-off go by (none: no checks); anyway: take off
-    whatever they say; look_only: nobody takes off, the checks are all that is wanted.
+    processes are stopped anyway; field: what the checks before the take-off go by (none: no checks); cautions: what
+    they say of the field file; anyway: take off whatever they say; look_only: nobody takes off, the checks are all
+    that is wanted.
     """
 
     duration_s: float | None
@@ -30,12 +33,15 @@ class FlightPlan:
     start_tracking_limit_s: float = 90.0
     landing_limit_s: float = 15.0
     field: ResolvedField | None = None
+    cautions: tuple[Finding, ...] = ()
     anyway: bool = False
     look_only: bool = False
 
 
-def plan_of(field: Field, duration_s: float | None, *, asks: bool) -> FlightPlan:
-    """Return the plan of a flight in this field."""
+def plan_of(
+    field: Field, duration_s: float | None, *, asks: bool, checks: Iterable[Caution] = OF_A_FIELD
+) -> FlightPlan:
+    """Return the plan of a flight in this field; checks: what its file is warned about."""
     cameras = {}
     for name, camera in field.cameras.items():
         right, down, forward = world_from_downward_optical(camera.rotation_deg)[2].tolist()
@@ -46,4 +52,9 @@ def plan_of(field: Field, duration_s: float | None, *, asks: bool) -> FlightPlan
     cameras |= dict.fromkeys(field.ranging, _IN_WORLD)
     limits = TakeOffLimits(unseen_s=field.safety.unseen_land_after_s)
     resolved = field_from_json(field.model_dump_json().encode())
-    return FlightPlan(duration_s, asks, cameras, limits, field=resolved)
+    return FlightPlan(duration_s, asks, cameras, limits, field=resolved, cautions=_cautions(field, checks))
+
+
+def _cautions(field: Field, checks: Iterable[Caution]) -> tuple[Finding, ...]:
+    found = ((".".join(map(str, path)), text) for check in checks for path, text in check(field))
+    return tuple(Finding(Level.SHOULD, where, text, "mend it in the field file") for where, text in found)

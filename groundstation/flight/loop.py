@@ -3,7 +3,7 @@
 import time
 from dataclasses import dataclass
 
-from groundstation.bus.messages import RUN, Event, Severity
+from groundstation.bus.messages import RUN, RUN_ENDED, Event, Severity
 from groundstation.bus.topics import EVENT
 from groundstation.errors import GroundStationError
 from groundstation.flight.flight_plan import FlightPlan
@@ -69,7 +69,7 @@ class Flight:
             raise
         assert supervisor.bus is not None
         plan = self._plan
-        checks = None if plan.field is None else BeforeTakeOff(supervisor.bus, plan.field)
+        checks = None if plan.field is None else BeforeTakeOff(supervisor.bus, plan.field, plan.cautions)
         operator = Operator(supervisor.bus, supervisor.run.drones, plan.cameras, plan.limits, self._say, checks)
         if checks is not None and self._look(operator, checks):
             return FlightOutcome("", supervisor.interrupts.stop_requested, landed=True, forbidden=self._forbidden)
@@ -81,7 +81,7 @@ class Flight:
         """Say on the bus that the run ends, and how, while there is still somebody to hear it."""
         if self._supervisor.bus is not None:
             header = self._supervisor.bus.header(RUN)
-            self._supervisor.bus.publish(EVENT, Event(header=header, severity=severity, text=f"run ended: {how}"))
+            self._supervisor.bus.publish(EVENT, Event(header=header, severity=severity, text=f"{RUN_ENDED}{how}"))
 
     def _say(self, text: str) -> None:
         elapsed_s = (time.monotonic_ns() - self._began_ns) / NS_PER_S

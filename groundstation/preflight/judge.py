@@ -20,11 +20,15 @@ def judge(
     cameras: Mapping[str, CameraStatus],
     sightings: Sequence[PadSighting],
     flew: Collection[str] = (),
+    cautions: Sequence[Finding] = (),
 ) -> list[Finding]:
-    """Return all findings, those that must be mended first; flew: who may stand anywhere by now."""
+    """Return all findings, those that must be mended first.
+
+    flew: who may stand anywhere by now; cautions: what the field file is warned about.
+    """
     sees = {camera: sorted({s.drone for s in sightings if s.camera == camera}) for camera in field.world_sensors}
     found = [*drone_findings(field, vehicles), *camera_findings(field, cameras, sees)]
-    found += pad_findings(field, sightings, flew)
+    found += [*pad_findings(field, sightings, flew), *cautions]
     return sorted(found, key=lambda one: _GRAVITY[one.level])
 
 

@@ -16,6 +16,7 @@ SUBJECT = "pads"
 _MUST_SHARE, _MUST_M, _MUST_TURN, _MUST_TILT = 0.02, 0.08, math.radians(1.5), math.radians(1.2)
 _MUST_PLACED_M, _MUST_HEADING = 0.25, math.radians(10.0)
 _MOST_TOLD = 3
+_SURVEY = ", or survey it: groundstation calibrate extrinsics"
 _Told = tuple[bool, str, str]
 """Whether it must be mended, what is wrong, and the remedy."""
 
@@ -32,10 +33,9 @@ def finding(field: ResolvedField, opinion: Opinion) -> Finding:
     if len(told) == 1:
         return Finding(level, SUBJECT, told[0][1], told[0][2])
     either = ", or ".join(text for _, text, _ in told)
-    checks = "; or ".join(remedy for _, _, remedy in told)
-    return Finding(
-        level, SUBJECT, f"{either}: which of them it is cannot be told from here, the first is the most likely", checks
-    )
+    survey = _SURVEY if any(remedy.endswith(_SURVEY) for _, _, remedy in told) else ""
+    checks = "; or ".join(remedy.removesuffix(_SURVEY) for _, _, remedy in told) + survey
+    return Finding(level, SUBJECT, f"{either}: which of these cannot be told from here, the first is likeliest", checks)
 
 
 def _unexplained(opinion: Opinion) -> Finding:
@@ -68,7 +68,7 @@ def _moved(field: ResolvedField, e: Explanation, text: str, size_m: float) -> _T
     who = e.suspicion.who
     place = (p + e.fit.value[who, axis] for p, axis in zip(field.cameras[who].position_m, "xyz", strict=True))
     x, y, z = place if e.suspicion.what == "aside" else (*field.cameras[who].position_m[:2], tuple(place)[2])
-    remedy = f"set cameras.{who}.position_m: [{x:.2f}, {y:.2f}, {z:.2f}], or groundstation calibrate extrinsics"
+    remedy = f"set cameras.{who}.position_m: [{x:.2f}, {y:.2f}, {z:.2f}]{_SURVEY}"
     return abs(size_m) >= _MUST_M, text, remedy
 
 
@@ -90,10 +90,7 @@ def _rotation(field: ResolvedField, e: Explanation, text: str, must: bool) -> _T
     error = rotation_from_euler(*(e.fit.value[who, part] for part in ("roll", "pitch", "yaw")))
     known = rotation_from_euler(*np.radians(field.cameras[who].rotation_deg).tolist())
     roll, pitch, yaw = np.degrees(euler_from_rotation(error @ known)).tolist()
-    remedy = (
-        f"set cameras.{who}.rotation_deg: [{roll:.1f}, {pitch:.1f}, {yaw:.1f}], or groundstation calibrate extrinsics"
-    )
-    return must, text, remedy
+    return must, text, f"set cameras.{who}.rotation_deg: [{roll:.1f}, {pitch:.1f}, {yaw:.1f}]{_SURVEY}"
 
 
 def _turned(field: ResolvedField, e: Explanation) -> _Told:
@@ -132,7 +129,10 @@ def _heading(field: ResolvedField, e: Explanation) -> _Told:
 def _exchanged(field: ResolvedField, e: Explanation) -> _Told:
     pairs = [f"{one} stands on the pad of {other}" for one, other in e.suspicion.exchanged.items()]
     names = " and ".join(dict.fromkeys((*e.suspicion.exchanged, *e.suspicion.exchanged.values())))
-    remedy = f"exchange the drones; if they stand right, the marker codes (or pads) of {names} in the field file do not"
+    remedy = (
+        "read their markers, and see with `groundstation vehicle blink` which answers to which name: then exchange the "
+        f"drones, or the marker codes (or pads) of {names} in the field file"
+    )
     return True, ", and ".join(pairs), remedy
 
 

@@ -1,6 +1,6 @@
 """Collects what the preflight checks judge, from the bus, and answers whether a take-off is open."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from typing import TypeVar
 
 from groundstation.bus.api import Bus
@@ -36,11 +36,11 @@ class BeforeTakeOff:
     """Call `update` often; `findings` takes up to a tenth of a second with a team of eight.
 
     Once `publish` has told the list, `update` tells it again every 3 s while nobody flies. A drone that flew once in
-    this run may stand anywhere: its pad says nothing of it any more.
+    this run may stand anywhere: its pad says nothing of it any more. cautions: what the field file is warned about.
     """
 
-    def __init__(self, bus: Bus, field: ResolvedField) -> None:
-        self._bus, self._field = bus, field
+    def __init__(self, bus: Bus, field: ResolvedField, cautions: Sequence[Finding] = ()) -> None:
+        self._bus, self._field, self._cautions = bus, field, cautions
         self._inbox = bus.subscribe([OBSERVATION, RANGE, VEHICLE_STATUS, CAMERA_STATUS])
         self._vehicles: dict[str, tuple[int, VehicleStatus]] = {}
         self._cameras: dict[str, tuple[int, CameraStatus]] = {}
@@ -81,7 +81,7 @@ class BeforeTakeOff:
     def findings(self, now_ns: int) -> list[Finding]:
         """Return everything that is to be said now, the grave first."""
         vehicles, cameras = _spoken(self._vehicles, now_ns), _spoken(self._cameras, now_ns)
-        return judge(self._field, vehicles, cameras, self._record.medians(now_ns), self._flew)
+        return judge(self._field, vehicles, cameras, self._record.medians(now_ns), self._flew, self._cautions)
 
     def left_out(self, now_ns: int) -> tuple[str, ...]:
         """Return whom a take-off of all would leave on the ground now."""

@@ -20,29 +20,33 @@ from groundstation.settings.schema import Field
 from groundstation.settings.unlikely_figures import unlikely
 
 _STANDING_MARKER_M = 0.14
+# The markers of drones that have taken off; half of a board, as for the pads of a new field.
+_RISEN_MARKER_M, _RISEN_ROOM_M = 1.0, 0.15
 _FENCE_MARGIN_M, _FENCE_LEAST_M = 0.3, 1.0
 _LEAST_STD_M = 0.1
 _ABOVE_OBSTACLE_M = 0.3
 _LEAST_TILT_DEG = 5.0
+Caution = Callable[[Field], Iterator[Finding]]
 # Cosine of the angle between the optical axis and straight down from which on a camera looks at walls.
 _AT_WALLS = math.cos(math.radians(75.0))
 
 
 def cautions(field: Field) -> Iterator[Finding]:
     """Yield everything about a sound field that somebody should think over."""
-    for check in _CHECKS:
+    for check in (*OF_A_FIELD, *OF_THIS_COMPUTER):
         yield from check(field)
 
 
 def _views(field: Field) -> Iterator[Finding]:
     pads = {name: np.array([*drone.pad_m, _STANDING_MARKER_M]) for name, drone in field.drones.items()}
-    unseen = set(pads)
+    unseen, risen = set(pads), set(pads)
     for name, camera in field.cameras.items():
         path = ("cameras", name, "rotation_deg")
         if world_from_downward_optical(camera.rotation_deg)[2, 2] > -_AT_WALLS:
             yield path, "lets it look at the walls or the ceiling: drones below it are not seen"
         seen = {pad for pad, centre in pads.items() if _in_picture(camera, centre)}
         unseen -= seen
+        risen -= {name for name, drone in field.drones.items() if _in_picture_risen(camera, drone.pad_m)}
         if not seen:
             yield path, "and its place leave no pad in its view: it knows of a drone only after that has flown there"
     boxes = [one.volume_m for name, one in field.motion_capture.items() if name != field.truth.get("from")]
@@ -50,10 +54,19 @@ def _views(field: Field) -> Iterator[Finding]:
         unseen -= {name for name in unseen if _within(box.x_m, pads[name][0]) and _within(box.y_m, pads[name][1])}
     for name in sorted(unseen):
         yield ("drones", name, "pad_m"), "is in view of nothing fixed: nobody knows where it is when it takes off"
+    for name in sorted(risen - unseen) if field.cameras and not boxes and not field.ranging else ():
+        text = f"is near the edge of the view: {_RISEN_MARKER_M:g} m above it, no fixed camera sees a whole marker"
+        yield ("drones", name, "pad_m"), text
 
 
 def _within(span: tuple[float, float], value: float) -> bool:
     return span[0] <= value <= span[1]
+
+
+def _in_picture_risen(camera: WorldCameraSettings, pad_m: tuple[float, float]) -> bool:
+    """Return whether a camera sees the whole marker of a drone that has risen from its pad."""
+    corners = ((dx, dy, 0.0) for dx in (-_RISEN_ROOM_M, _RISEN_ROOM_M) for dy in (-_RISEN_ROOM_M, _RISEN_ROOM_M))
+    return all(_in_picture(camera, np.array([*pad_m, _RISEN_MARKER_M]) + corner) for corner in corners)
 
 
 def _in_picture(camera: WorldCameraSettings, centre: Array) -> bool:
@@ -165,15 +178,13 @@ def _places(field: Field) -> Iterator[Finding]:
             yield path, f"is not there on this machine (got {address.path})"
 
 
-_CHECKS: tuple[Callable[[Field], Iterator[Finding]], ...] = (
+OF_A_FIELD: tuple[Caution, ...] = (
     _views,
     _carried_cameras,
     _fence,
     _obstacles,
     _uncertainty,
-    _addresses,
-    _adapters,
     _lenses,
-    _places,
     unlikely,
 )
+OF_THIS_COMPUTER: tuple[Caution, ...] = (_addresses, _adapters, _places)

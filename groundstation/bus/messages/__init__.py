@@ -38,7 +38,7 @@ from groundstation.bus.messages.flight import (
 from groundstation.bus.messages.hosts import ClockOffset, HostAnswer, HostOrder, HostReport, Supervision
 from groundstation.bus.messages.plan import Alternative, Control, Edge, Plan, SolverReport
 from groundstation.bus.messages.preflight import Preflight, PreflightFinding
-from groundstation.bus.messages.process import RUN, Event, Lifecycle, ProcessStatus, Severity
+from groundstation.bus.messages.process import RUN, RUN_ENDED, Event, Lifecycle, ProcessStatus, Severity
 from groundstation.bus.messages.sensing import (
     BodyPose,
     BodyPoses,
@@ -59,6 +59,7 @@ __all__ = [
     "UNHEARD",
     "UP",
     "RUN",
+    "RUN_ENDED",
     "OPERATOR",
     "STOP_LIVES_NS",
     "AckStage",

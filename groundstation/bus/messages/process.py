@@ -6,6 +6,7 @@ from groundstation.bus.messages.base import Message
 
 # The entity of the one event about a run as a whole: that it ends, and how.
 RUN = "run"
+RUN_ENDED = "run ended: "
 
 
 class Severity(StrEnum):

@@ -23,7 +23,7 @@ from groundstation.supervisor.terminal import Terminal
 class Unfinished:
     """Checks that go on for ever and have found nothing so far."""
 
-    def __init__(self, _bus: object, _field: object) -> None:
+    def __init__(self, _bus: object, _field: object, _cautions: object) -> None:
         pass
 
     def update(self, now_ns: int) -> None:

@@ -1,5 +1,7 @@
 """A take-off with something that must be mended: refused, unless a person insists, which is put on record."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -20,12 +22,14 @@ from groundstation.bus.messages import (
 from groundstation.bus.topics import CAMERA_STATUS, COMMAND, COMMAND_ACK, EVENT, OBSERVATION, PREFLIGHT, VEHICLE_STATUS
 from groundstation.doctor.finding import Finding, Level
 from groundstation.field.resolved import ResolvedField
+from groundstation.flight.flight_plan import plan_of
 from groundstation.flight.looking import Looking
 from groundstation.preflight.stand import marker_centres, stand_of
 from groundstation.runtime.before_take_off import BeforeTakeOff
 from groundstation.runtime.operator import Operator
 from groundstation.runtime.take_off import TakeOffLimits
 from groundstation.runtime.team import TeamPhase
+from groundstation.settings.load import load_field
 
 MS = 1_000_000
 
@@ -180,6 +184,15 @@ def test_a_look_ends_where_nothing_arrives(lab_field: ResolvedField) -> None:
     told = "\n".join(looking.tell(whole=True))
     assert "no sensor that is fixed in the world sends anything" in told and "nothing is heard of it" in told
     assert looking.nobody and told.endswith("before take-off: 2 must be mended; nobody would take off")
+
+
+def test_what_a_field_file_is_warned_about_is_told_and_forbids_nothing(lab_field: ResolvedField) -> None:
+    path = Path(__file__).parents[3] / "config" / "lab.yaml"
+    foolish = load_field(path, ("types.ardrone_2.camera.tilt_down_deg=-45",))
+    lab = Lab(lab_field)
+    lab.checks = BeforeTakeOff(lab.bus, lab_field, plan_of(foolish, None, asks=False).cautions)
+    told = [one for one in lab.checks.findings(lab.now_ns) if one.subject.endswith("camera.tilt_down_deg")]
+    assert [one.level for one in told] == [Level.SHOULD] * 2 and "seen from above only" in told[0].found
 
 
 @pytest.mark.parametrize("silent", [("drone_2",), ("drone_1", "drone_2")])

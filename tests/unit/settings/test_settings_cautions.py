@@ -20,6 +20,7 @@ FOOLISH = [
     ("cameras.ceiling.rotation_deg=[80,0,0]", "cameras.ceiling.rotation_deg", "at the walls or the ceiling"),
     ("cameras.ceiling.rotation_deg=[45,0,0]", "cameras.ceiling.rotation_deg", "leave no pad in its view"),
     ("drones.drone_1.pad_m=[-3.0,2.0]", "drones.drone_1.pad_m", "in view of nothing fixed"),
+    ("drones.drone_1.pad_m=[-0.45,0.85]", "drones.drone_1.pad_m", "1 m above it, no fixed camera sees a whole marker"),
     ("drones.drone_1.camera.tilt_down_deg=-45", "drones.drone_1.camera.tilt_down_deg", "seen from above only"),
     ("room.fence.x_m=[-0.95,3.7]", "drones.drone_1.pad_m", "0.05 m from the fence"),
     ("room.fence.x_m=[-1.6,-0.7]", "room.fence.x_m", "leaves 0.90 m"),

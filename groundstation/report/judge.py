@@ -6,6 +6,7 @@ from typing import Any
 
 import msgspec
 
+from groundstation.bus.messages import RUN, RUN_ENDED, Severity
 from groundstation.recording.part_names import shown
 from groundstation.recording.rerun import Rerun
 from groundstation.recording.stretch import Stretch
@@ -24,7 +25,8 @@ _DAMAGE_LINES = 20
 
 @dataclass(frozen=True, slots=True)
 class RunReport:
-    """A judged run. `valid`: the simulator kept real time; rerun, stretch: what it repeats or is a part of."""
+    """A judged run. `valid`: the simulator kept real time; rerun, stretch: what it repeats or is a part of;
+    broken_off: the failure that ended it, "" without."""
 
     run_dir: Path
     facts: RunFacts
@@ -35,6 +37,7 @@ class RunReport:
     damage: tuple[str, ...]
     rerun: Rerun | None = None
     stretch: Stretch | None = None
+    broken_off: str = ""
 
     @property
     def no_flight(self) -> Rerun | Stretch | None:
@@ -60,6 +63,8 @@ class RunReport:
             return ()
         if not self.valid:
             return ("the simulator did not keep real time",)
+        if self.broken_off and not self.figures.tracked_s:
+            return (self.broken_off,)  # without a flight every other criterion is missed for that reason
         return tuple(missed(criterion) for criterion in self.criteria if not criterion.ok)
 
     @property
@@ -104,4 +109,12 @@ def judge(data: RunData, run_dir: Path) -> RunReport:
         damage=(*([f"{run_facts.NAME}: {unread}"] if unread else []), *data.damage[:_DAMAGE_LINES]),
         rerun=data.rerun,
         stretch=data.stretch,
+        broken_off=_broken_off(data),
     )
+
+
+def _broken_off(data: RunData) -> str:
+    """Return the failure that the run said it ended with."""
+    events = [timed.message for timed in data.events]
+    failures = [one.text for one in events if one.header.entity == RUN and one.severity is Severity.ERROR]
+    return next((text.removeprefix(RUN_ENDED) for text in failures if text.startswith(RUN_ENDED)), "")

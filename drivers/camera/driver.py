@@ -61,6 +61,7 @@ class CameraDriver:
             settings.detector,
             settings.search_rate_hz,
             settings.search_phase_s,
+            others=settings.markers,
         )
         self._surroundings = Surroundings(child.bus, settings)
         self._newest: Image | None = None

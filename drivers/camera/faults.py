@@ -1,6 +1,7 @@
-"""Faults of printed markers that a person has to put right: mirrored, of the wrong size, used twice."""
+"""Faults of printed markers that a person has to put right: mirrored, of the wrong size, used twice, nobody's."""
 
 from collections import Counter, defaultdict
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,8 +11,11 @@ from drivers.camera.settings import MarkerSettings
 from drivers.camera.size_check import SizeCheck
 from groundstation.bus.messages import Severity
 from groundstation.bus.notice import Notice
+from groundstation.time_units import NS_PER_S
 
 _MIRRORED_MARGIN, _MIRRORED_TIMES = 2.0, 5
+# A code that nobody has is read so often, and for so long, before it is told: a code is misread now and then.
+_FOREIGN_TIMES, _FOREIGN_NS = 4, 3 * NS_PER_S
 
 
 class MarkerFaults:
@@ -20,6 +24,7 @@ class MarkerFaults:
     def __init__(self) -> None:
         self._sizes: defaultdict[str, SizeCheck] = defaultdict(SizeCheck)
         self._mirrored: Counter[str] = Counter()
+        self._foreign: dict[int, tuple[int, int]] = {}
         self._notices: list[Notice] = []
         self._told: set[tuple[str, str]] = set()
 
@@ -54,6 +59,18 @@ class MarkerFaults:
             "double",
             Notice(Severity.WARNING, text, "remove all but one, or give them identities of their own", marker.entity),
         )
+
+    def foreign(self, code: int, stamp_ns: int, expected: Iterable[MarkerSettings]) -> None:
+        """Take in that a board carries a code that the field gives to nobody; it may be that of one never seen."""
+        first_ns, times = self._foreign.get(code, (stamp_ns, 0))
+        self._foreign[code] = (first_ns, times + 1)
+        if times + 1 < _FOREIGN_TIMES or stamp_ns - first_ns < _FOREIGN_NS:
+            return
+        unseen = [f"{marker.entity} ({marker.label})" for marker in expected if marker.entity not in self._sizes]
+        whose = f"that of {' or '.join(unseen)}, not seen here so far" if unseen else "that of a vehicle or target"
+        remedy = f"if it is {whose}, set its code in the field; else cover or remove it"
+        text = f"marker {code} is in view, which the field gives to nobody"
+        self._tell(f"foreign {code}", Notice(Severity.WARNING, text, remedy))
 
     def _tell(self, kind: str, notice: Notice) -> None:
         if (kind, notice.entity) not in self._told:

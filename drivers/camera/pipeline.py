@@ -37,7 +37,8 @@ class Pipeline:
     """Finds, follows, identifies and measures the expected markers of one camera.
 
     `counts` says what was found, missed and refused since the start, by name; `searched`: whether the last picture was
-    searched all over. cpu_s: tells how much CPU this thread has used [s].
+    searched all over. cpu_s: tells how much CPU this thread has used [s]; others: markers of the field that this camera
+    does not report.
     """
 
     def __init__(
@@ -48,10 +49,12 @@ class Pipeline:
         search_rate_hz: float,
         search_phase_s: float = 0.0,
         cpu_s: Callable[[], float] = time.thread_time,
+        others: tuple[MarkerSettings, ...] = (),
     ) -> None:
         self._intrinsics = intrinsics
         self._settings = settings
         self._expected = {marker.code: marker for marker in expected if marker.code is not None}
+        self._known = {marker.code for marker in (*expected, *others)}
         self._points = {marker.entity: marker.printed.corners() for marker in self._expected.values()}
         self._markers = {marker.entity: marker for marker in expected}
         self._tags = TagFinder(intrinsics, expected, settings)
@@ -206,6 +209,8 @@ class Pipeline:
         least = self._settings.identity_margin
         reading = markers.read_bar(picture, find, self._intrinsics, rays=rays)
         track.identify(reading, stamp_ns, least)
+        if track.code is not None and track.code not in self._known:
+            self._faults.foreign(track.code, stamp_ns, self._markers.values())
         if track.code is not None or (reading is not None and reading.is_sure(least)):
             return
         mirrored = markers.read_bar(picture, find, self._intrinsics, mirrored=True, rays=rays)

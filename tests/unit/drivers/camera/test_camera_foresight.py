@@ -283,6 +283,21 @@ def test_a_mirrored_print_is_refused_by_name():
     assert "mirrored" in pipeline.take_notices()[0].text
 
 
+@pytest.mark.parametrize(("others", "told"), [((), True), ((9,), False)])
+def test_a_marker_that_the_field_gives_to_nobody_is_named(others, told):
+    states = [state(0.0, 0.0, 1.6), state(1.0, 0.3, 0.9), state(1.2, -0.4, 0.0, 0.6)]
+    known = tuple(MARKERS[0].model_copy(update={"entity": "another", "code": code}) for code in others)
+    pipeline = Pipeline(FRONT, MARKERS, DetectorSettings(), search_rate_hz=2.0, others=known)
+    picture = renderer_of(codes=(2, 9)).render(np.array(states))
+    for k in range(75):
+        pipeline.process(picture, k * FRAME_NS, gravity_of(states))
+    texts = [f"{notice.text}: {notice.remedy}" for notice in pipeline.take_notices()]
+    assert len(texts) == told
+    if told:
+        assert texts[0].startswith("marker 9 is in view, which the field gives to nobody: if it is that of bot (")
+        assert "drone_2" not in texts[0]
+
+
 @pytest.mark.parametrize(("square_mm", "told"), [(44.0, False), (36.0, True)])
 def test_a_print_of_the_wrong_size_is_noticed_by_its_heights(square_mm, told):
     renderer = renderer_of(square_mm=square_mm)

@@ -12,7 +12,8 @@ from groundstation.field.resolved import ResolvedField
 Key = tuple[str, str]
 """A figure: whose, and which."""
 
-# One sigma of a figure that was surveyed with care, and of one that may be quite wrong: [m], [rad], [s], shares.
+# One sigma of a figure that was surveyed with care (more where the field says so), and of one that may be quite wrong:
+# [m], [rad], [s], shares.
 _SURVEYED = {
     "print": 0.003,
     "focal": 0.004,
@@ -29,7 +30,7 @@ _SURVEYED = {
 }
 _WRONG = {
     "print": 0.08,
-    "focal": 0.06,
+    "focal": 0.03,
     "pan": 0.09,
     "tilt": 0.09,
     "ahead": 0.05,
@@ -51,6 +52,8 @@ ONBOARD = ("pan", "tilt", "ahead", "left", "up", "focal", "delay")
 FIXED = ("x", "y", "z", "roll", "pitch", "yaw", "focal", "delay")
 OWN = ("scale", "velocity_delay", "height_delay", "own_delay")  # the last: of all that a drone tells of itself
 _PLACES, _ANGLES = ("x", "y", "z"), ("roll", "pitch", "yaw")
+_PLACED = ("ahead", "left", "up")
+_OF_DRONES_CAMERAS = ("pan", "tilt", "focal", *_PLACED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +92,18 @@ class Figures:
             return max(self.field.cameras[who].position_std_m, 2e-3)
         if part in _ANGLES:
             return max(math.radians(self.field.cameras[who].attitude_std_deg), 1e-3)
-        return _SURVEYED[part]
+        return max(_SURVEYED[part], self._told(who, part))
+
+    def _told(self, who: str, part: str) -> float:
+        """Return one sigma that the field gives a lens or the mounting of a drone's camera; 0: it gives none."""
+        if part == "focal" and who in self.field.cameras:
+            return self.field.cameras[who].calibration.focal_std
+        if part not in _OF_DRONES_CAMERAS:
+            return 0.0
+        camera = self.field.drones[who].camera
+        if part == "focal":
+            return camera.calibration.focal_std
+        return camera.position_std_m if part in _PLACED else math.radians(camera.attitude_std_deg)
 
     def of(self, theta: Vector, names: Sequence[str], part: str) -> Vector:
         """Return one figure for each of many names, 0 where a name has none."""

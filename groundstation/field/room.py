@@ -64,6 +64,13 @@ class LensCalibration(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
     views: int | None = None
     std: LensStd | None = None
 
+    @property
+    def focal_std(self) -> float:
+        """Return how well its focal length is known, as a share; 0: the file does not say."""
+        if self.std is None:
+            return 0.0
+        return max(self.std.fx_px / self.fx_px, self.std.fy_px / self.fy_px)
+
 
 class WorldCamera(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A camera fixed in the world [m; world]; rotation_deg turns it about the world's axes from looking down."""

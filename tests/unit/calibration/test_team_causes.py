@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -10,6 +11,7 @@ from groundstation.arrays import Array, Vector
 from groundstation.calibration.team_causes import Cause, causes, evidence, freed, posterior
 from groundstation.calibration.team_figures import Figures, Suspicion
 from groundstation.field.resolved import ResolvedField
+from groundstation.field.room import LensStd
 
 SURVEYED = np.array([0.01, 0.01, 0.01])
 
@@ -84,4 +86,19 @@ def test_every_figure_of_the_lab_has_a_survey_and_a_suspicion(lab_field: Resolve
     covered = sum(np.any(s.directions != 0.0, axis=1) for s in figures.suspicions())
     assert (
         (np.asarray(covered) >= 1).all() and (figures.surveyed > 0.0).all() and (figures.wide >= figures.surveyed).all()
+    )
+
+
+def test_what_the_field_says_of_mountings_and_lenses_counts(lab_field: ResolvedField) -> None:
+    drone, before = lab_field.drones["drone_1"], Figures(lab_field, tuple(lab_field.drones))
+    std = LensStd(fx_px=9.2, fy_px=4.6, cx_px=1.0, cy_px=1.0, k1=0.01, k2=0.01, p1=0.0, p2=0.0, k3=0.0)
+    lens = msgspec.structs.replace(drone.camera.calibration, fx_px=460.0, fy_px=460.0, std=std)
+    camera = msgspec.structs.replace(drone.camera, calibration=lens, attitude_std_deg=2.0, position_std_m=0.03)
+    drones = {**lab_field.drones, "drone_1": msgspec.structs.replace(drone, camera=camera)}
+    after = Figures(msgspec.structs.replace(lab_field, drones=drones), tuple(drones))
+    changed = {key: after.surveyed[at] for key, at in after.place.items() if after.surveyed[at] != before.surveyed[at]}
+    assert changed == pytest.approx(
+        {("drone_1", part): 0.03 for part in ("ahead", "left", "up")}
+        | {("drone_1", part): math.radians(2.0) for part in ("pan", "tilt")}
+        | {("drone_1", "focal"): 0.02}
     )

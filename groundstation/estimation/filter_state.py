@@ -77,7 +77,10 @@ class State(NamedTuple):
 
 
 class Checkpoints(NamedTuple):
-    """The state at the beginning of each step, in a ring (r, ...); no correction is put off then."""
+    """The state at the beginning of each step, in a ring (r, ...); no correction is put off then.
+
+    Of the covariances only what `copy_upper_blocks` copies is meant.
+    """
 
     means: MatrixStack
     covariances: MatrixStacks

@@ -1,6 +1,8 @@
 """What motion models are built from, and the loop that calls them; how an entity enters the state and leaves it.
 
-Each model predicts its own block row of P and mirrors it, so a step costs O(dim) per entity.
+Each model predicts the rows of its own block of P, so a step costs O(dim) per entity. `predict` copies them into the
+columns, of several entities at once: a column of P is as many lines of memory as P has rows, however few entries of
+each are written.
 """
 
 import math
@@ -10,33 +12,24 @@ from groundstation.arrays import Matrix, Vector
 from groundstation.estimation.filter_state import Belief
 from groundstation.estimation.model_kernels import call_predict
 from groundstation.estimation.records import YAW, PriorRow, X, Y, Z
-from groundstation.estimation.register_blocks import copy_to_columns
+from groundstation.estimation.register_blocks import LANES, add_to_row, add_two_to_row, copy_to_columns, scale_row
 from groundstation.kernel import kernel
 
 # Prior of what joins, about the place that its first measurement puts it at: wide against any measurement, yet so
 # that the correction which follows loses no more than eight digits.
 DIFFUSE_M2 = 100.0
 DIFFUSE_RAD2 = 10.0
+_MOST_ROWS = 32  # that wait to be copied into columns
 
 
 @kernel(inlined=True)
 def mirror(P: Matrix, start: int, size: int, changed: int) -> None:
-    """Copy the first `changed` rows of a block onto its columns, so that P stays symmetric to the bit."""
-    stop = start + size
-    copy_to_columns(P, start, changed, 0, start)
-    copy_to_columns(P, start, changed, stop, P.shape[0])
-    for i in range(start, stop):
+    """Make a block symmetric to the bit of which the first `changed` rows and columns were moved."""
+    for i in range(start, start + size):
         for j in range(start, min(i, start + changed)):
             mean = 0.5 * (P[i, j] + P[j, i])
             P[i, j] = mean
             P[j, i] = mean
-
-
-@kernel()
-def add_row(P: Matrix, to: int, source: int, factor: float) -> None:
-    """Add a multiple of one row of P to another."""
-    for j in range(P.shape[0]):
-        P[to, j] += factor * P[source, j]
 
 
 @kernel(inlined=True)
@@ -49,7 +42,7 @@ def add_column(P: Matrix, start: int, size: int, to: int, source: int, factor: f
 @kernel()
 def depend(P: Matrix, start: int, size: int, to: int, source: int, factor: float) -> None:
     """Let entry `to` of a block gain factor * entry `source`: F P F^T for F = I + factor e_to e_source^T."""
-    add_row(P, start + to, start + source, factor)
+    add_to_row(P, start + to, start + source, factor)
     add_column(P, start, size, start + to, start + source, factor)
 
 
@@ -65,9 +58,7 @@ class Dependence(NamedTuple):
 @kernel(inlined=True)
 def depend_on_two(P: Matrix, start: int, size: int, to: int, on: Dependence) -> None:
     """Let entry `to` of a block gain multiples of two others in one pass, as by two calls of `depend`."""
-    row, a, b = P[start + to], P[start + on.a], P[start + on.b]
-    for j in range(P.shape[0]):
-        row[j] = (row[j] + on.by_a * a[j]) + on.by_b * b[j]
+    add_two_to_row(P, start + to, (start + on.a, start + on.b), (on.by_a, on.by_b))
     add_column(P, start, size, start + to, start + on.a, on.by_a)
     add_column(P, start, size, start + to, start + on.b, on.by_b)
 
@@ -83,8 +74,7 @@ def fade(mean: Vector, P: Matrix, start: int, size: int, offset: int, deviation:
     index, lost = start + offset, math.expm1(-share)
     decay = 1.0 + lost
     mean[index] *= decay
-    for j in range(P.shape[0]):
-        P[index, j] *= decay
+    scale_row(P, index, decay)
     for i in range(start, start + size):
         P[i, index] *= decay
     P[index, index] += deviation * deviation * -lost * (2.0 + lost)  # 1 - decay^2
@@ -98,11 +88,36 @@ def wander(P: Matrix, start: int, offset: int, variance: float) -> None:
 
 
 @kernel(inlined=True)
+def copy_out(P: Matrix, first: int, stop: int) -> None:
+    """Copy some rows into the columns of their numbers, but where the rows cross these."""
+    if first == stop:
+        return
+    copy_to_columns(P, first, stop - first, 0, first)
+    copy_to_columns(P, first, stop - first, stop, P.shape[0])
+
+
+@kernel()
 def predict(belief: Belief, dt: float) -> None:
-    """Predict all entities that are in the state, each by its own model's kernel."""
+    """Predict all entities that are in the state, each by its own model's kernel; P stays symmetric to the bit.
+
+    Rows first..stop are those that the columns lack as yet, of neighbours whose blocks share lines of memory.
+    """
+    P, first, stop = belief.P, 0, 0
     for e in range(belief.entities.shape[0]):
-        if belief.memory[e].active != 0 and belief.entities[e].predict != 0:
-            call_predict(belief.entities[e].predict, (belief, e, dt))
+        entity = belief.entities[e]
+        if belief.memory[e].active == 0 or entity.predict == 0:
+            continue
+        start, end = entity.start, entity.start + entity.size
+        if start != stop or start % LANES == 0 or end - first > _MOST_ROWS:
+            copy_out(P, first, stop)
+            first = stop = start
+        if first < start:
+            copy_to_columns(P, first, start - first, start, end)
+        call_predict(entity.predict, (belief, e, dt))
+        if first < start:
+            copy_to_columns(P, start, end - start, first, start)
+        stop = end
+    copy_out(P, first, stop)
 
 
 @kernel()

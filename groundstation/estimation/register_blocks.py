@@ -7,6 +7,7 @@ order of the factors' rows.
 from collections.abc import Callable
 from typing import Any, cast
 
+import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
@@ -46,11 +47,15 @@ class _Builder:
         """Return entry i of a vector."""
         return self.builder.load(self.builder.gep(self._arrays[argument].data, [i]))
 
+    def filled(self, number: Any) -> Any:
+        """Return a number in all lanes."""
+        nothing, first = ir.Constant(_VECTOR, ir.Undefined), ir.Constant(ir.IntType(32), 0)
+        one = self.builder.insert_element(nothing, number, first)
+        return self.shuffled(one, one, [0] * LANES)
+
     def everywhere(self, place: Any) -> Any:
         """Return the number at a place in all lanes."""
-        nothing, first = ir.Constant(_VECTOR, ir.Undefined), ir.Constant(ir.IntType(32), 0)
-        one = self.builder.insert_element(nothing, self.builder.load(place), first)
-        return self.shuffled(one, one, [0] * LANES)
+        return self.filled(self.builder.load(place))
 
     def shuffled(self, a: Any, b: Any, places: list[int]) -> Any:
         """Return numbers picked from two vectors."""
@@ -131,6 +136,34 @@ def _rows(_typing: Any, W: Any, F: Any, A: Any, at: Any, count: Any, column: Any
     return types.void(W, F, A, at, types.intp, types.intp), generate
 
 
+def _sum(_typing: Any, P: Any, to: Any, sources: Any, factors: Any, column: Any) -> Any:
+    """Add to 8 columns of one row of P multiples of others, one after the other, each product rounded."""
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        blocks, (to, sources, factors, column) = _Builder(context, builder, signature, values), values[1:]
+        place = blocks.place(0, to, column)
+        held = builder.load(place, align=8)
+        for i in range(signature.args[2].count):
+            value = builder.load(blocks.place(0, builder.extract_value(sources, i), column), align=8)
+            held = builder.fadd(held, builder.fmul(blocks.filled(builder.extract_value(factors, i)), value))
+        builder.store(held, place, align=8)
+        return context.get_dummy_value()
+
+    return types.void(P, types.intp, sources, factors, types.intp), generate
+
+
+def _scaled(_typing: Any, P: Any, row: Any, factor: Any, column: Any) -> Any:
+    """Multiply 8 columns of one row of P."""
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        blocks, (row, factor, column) = _Builder(context, builder, signature, values), values[1:]
+        place = blocks.place(0, row, column)
+        builder.store(builder.fmul(builder.load(place, align=8), blocks.filled(factor)), place, align=8)
+        return context.get_dummy_value()
+
+    return types.void(P, types.intp, types.float64, types.intp), generate
+
+
 def _columns(rows: int) -> Callable[..., Any]:
     """Return what copies 8 entries of 2, 4 or 8 rows, from a column on, into the columns of the rows' numbers.
 
@@ -154,6 +187,8 @@ def _columns(rows: int) -> Callable[..., Any]:
 _copy_two, _copy_four, _copy_eight = (_columns(rows) for rows in (2, 4, 8))
 _subtract_square = cast(Callable[[Matrix, Matrix, int, int, int], None], intrinsic(_square))
 _gain_rows = cast(Callable[[Matrix, Matrix, Matrix, IntVector | None, int, int], None], intrinsic(_rows))
+_sum_rows = cast(Callable[[Matrix, int, tuple[int, ...], tuple[float, ...], int], None], intrinsic(_sum))
+_scale_row = cast(Callable[[Matrix, int, float, int], None], intrinsic(_scaled))
 
 
 @kernel()
@@ -178,12 +213,35 @@ def subtract_rows(W: Matrix, F: Matrix, A: Matrix, count: int) -> None:
         _gain_rows(W, F, A, None, count, column)
 
 
+@kernel(inlined=True)
+def add_to_row(P: Matrix, to: int, source: int, factor: float) -> None:
+    """Add a multiple of one row of P to another."""
+    for column in range(0, P.shape[1], LANES):
+        _sum_rows(P, to, (source,), (factor,), column)
+
+
+@kernel(inlined=True)
+def add_two_to_row(P: Matrix, to: int, sources: tuple[int, int], factors: tuple[float, float]) -> None:
+    """Add multiples of two rows of P to a third."""
+    for column in range(0, P.shape[1], LANES):
+        _sum_rows(P, to, sources, factors, column)
+
+
+@kernel(inlined=True)
+def scale_row(P: Matrix, row: int, factor: float) -> None:
+    """Multiply one row of P."""
+    for column in range(0, P.shape[1], LANES):
+        _scale_row(P, row, factor, column)
+
+
 @kernel()
 def copy_to_columns(P: Matrix, row: int, rows: int, first: int, last: int) -> None:
     """Copy columns first..last of some rows of P (n, n) into the columns of the rows' numbers."""
     whole = last - LANES + 1
     while rows > 0:
-        width = 8 if rows >= 8 else 4 if rows >= 4 else 2 if rows >= 2 else 1
+        # As many as stand within one line of each row that is written.
+        width = 8 if rows >= 8 and row % 8 == 0 else 4 if rows >= 4 and row % 4 == 0 else 1
+        width = 2 if width == 1 and rows >= 2 and row % 2 == 0 else width
         if width == 8:
             for j in range(first, whole, LANES):
                 _copy_eight(P, row, j)
@@ -198,3 +256,19 @@ def copy_to_columns(P: Matrix, row: int, rows: int, first: int, last: int) -> No
             for i in range(row, row + width):
                 P[j, i] = P[i, j]
         row, rows = row + width, rows - width
+
+
+@kernel()
+def copy_upper_blocks(source: Matrix, to: Matrix) -> None:
+    """Copy the blocks of 8 x 8 numbers on the diagonal and above of one matrix into another of its shape."""
+    n = np.uint64(source.shape[1])
+    for i in range(source.shape[0]):
+        for j in range(np.uint64(i & ~7), n):  # unsigned: signed indices are tested, and nothing is vectorised
+            to[i, j] = source[i, j]
+
+
+@kernel()
+def reflect(P: Matrix) -> None:
+    """Copy the blocks above the diagonal to below it."""
+    for k in range(0, P.shape[0], LANES):
+        copy_to_columns(P, k, LANES, k + LANES, P.shape[0])

@@ -19,6 +19,7 @@ from groundstation.estimation.model_kernels import call_begin, call_handle
 from groundstation.estimation.modes import combine, mix
 from groundstation.estimation.motion import predict
 from groundstation.estimation.records import COMPARED, OBSERVATION, REPORTED, CondensedOdometry, EntityMemory, EventRow
+from groundstation.estimation.register_blocks import copy_upper_blocks, reflect
 from groundstation.kernel import Rows, copy_rows, kernel
 
 _MEMORY = EntityMemory.dtype
@@ -41,10 +42,10 @@ def begin_step(state: State, tables: Tables, odometry: Rows[CondensedOdometry]) 
 
 @kernel()
 def copy_state(source: State, to: State) -> None:
-    """Copy all that a checkpoint holds."""
+    """Copy all that a checkpoint holds: of the covariances the upper halves, since they are symmetric to the bit."""
     copy_matrix(source.means, to.means)
     for m in range(source.weights.shape[0]):
-        copy_matrix(source.covariances[m], to.covariances[m])
+        copy_upper_blocks(source.covariances[m], to.covariances[m])
         to.weights[m] = source.weights[m]
     copy_rows(source.memory, to.memory)
     copy_matrix(source.used_at, to.used_at)
@@ -84,6 +85,8 @@ def replay(
     """
     step_s, order, events = tables.settings.step_s, inputs.order, inputs.events
     copy_state(checkpoint(ring, span.first, state), state)
+    for m in range(state.covariances.shape[0]):
+        reflect(state.covariances[m])
     i = 0
     for k in range(span.first, span.last + 1):
         if span.first < k <= span.waiting:

@@ -11,8 +11,9 @@ from groundstation.estimation.filter_state import Belief
 from groundstation.estimation.layout import TARGET_CORE, EntityKind
 from groundstation.estimation.model_kernels import MotionKernels
 from groundstation.estimation.models.protocol import Vector3
-from groundstation.estimation.motion import add_row, mirror, wander
+from groundstation.estimation.motion import mirror, wander
 from groundstation.estimation.records import VX, VY, X, Y, own_parameters
+from groundstation.estimation.register_blocks import add_to_row
 from groundstation.kernel import Record, kernel
 
 
@@ -43,7 +44,7 @@ def predict_constant_velocity(belief: Belief, e: int, dt: float) -> None:
     start, size, p = entity.start, entity.size, _own(entity)
     for axis in (X, Y):
         mean[start + axis] += dt * mean[start + VX + axis]
-        add_row(P, start + axis, start + VX + axis, dt)
+        add_to_row(P, start + axis, start + VX + axis, dt)
     for axis in (X, Y):
         for i in range(start, start + size):
             P[i, start + axis] += dt * P[i, start + VX + axis]

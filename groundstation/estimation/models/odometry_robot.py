@@ -17,6 +17,7 @@ from groundstation.estimation.models.protocol import Vector3, place_of
 from groundstation.estimation.models.robot_errors import RobotParameters, add_robot_noise, fade_errors
 from groundstation.estimation.motion import Dependence, add_column, depend, depend_on_two, mirror
 from groundstation.estimation.records import YAW, CondensedOdometry, EntityMemory, X, Y, Z, own_parameters
+from groundstation.estimation.register_blocks import add_to_row
 from groundstation.kernel import kernel
 
 AERIAL = ("roll_error", "pitch_error", "climb", "velocity_scale", "height_error", "floor")
@@ -33,10 +34,8 @@ _own = own_parameters(RobotParameters)
 @kernel(inlined=True)
 def turn_with_heading(P: Matrix, start: int, size: int, dx: float, dy: float) -> None:
     """Couple the position to the yaw by which a displacement was rotated."""
-    for j in range(P.shape[0]):
-        yaw = P[start + YAW, j]
-        P[start, j] -= dy * yaw
-        P[start + 1, j] += dx * yaw
+    add_to_row(P, start, start + YAW, -dy)
+    add_to_row(P, start + 1, start + YAW, dx)
     add_column(P, start, size, start, start + YAW, -dy)
     add_column(P, start, size, start + 1, start + YAW, dx)
 

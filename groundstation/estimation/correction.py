@@ -49,8 +49,8 @@ def project(belief: Belief, deferred: Deferred, jacobian: Jacobian, count: int, 
 
 
 @kernel(inlined=True)
-def project_columns(W: Matrix, jacobian: Jacobian, count: int, rows: int, HPH: Matrix) -> None:
-    """Write H W^T, that is H P H^T, for W = H P."""
+def measured_covariance(W: Matrix, jacobian: Jacobian, count: int, rows: int, HPH: Matrix) -> None:
+    """Write H P H^T for W = H P: the covariance of what is measured, without noise."""
     for i in range(rows):
         for j in range(rows):
             value = 0.0

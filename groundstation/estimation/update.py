@@ -9,8 +9,8 @@ from groundstation.estimation.correction import (
     bound_precision,
     gather,
     inflate,
+    measured_covariance,
     project,
-    project_columns,
     surprise,
 )
 from groundstation.estimation.filter_state import Belief, Deferred
@@ -129,7 +129,7 @@ def linearise(
     jacobian = Jacobian(np.empty((MAX_ROWS, 2 * MAX_BLOCK)), np.empty(2 * MAX_BLOCK, np.int64))
     count = gather(subject, out.H_subject, jacobian, gather(observer, out.H_observer, jacobian, 0))
     project(belief, deferred, jacobian, count, HP)
-    project_columns(HP, jacobian, count, rows, innovation.HPH)
+    measured_covariance(HP, jacobian, count, rows, innovation.HPH)
     bound_precision(innovation.HPH, innovation.R, rows)
     innovation.nis = surprise(innovation.HPH, innovation.R, innovation.y, rows, innovation.factor)
 

@@ -14,10 +14,9 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from groundstation.arrays import Matrix
-from groundstation.estimation.register_blocks import copy_to_columns
+from groundstation.estimation.register_blocks import LANES, reflect
 from groundstation.kernel import kernel
 
-LANES = 8
 PIVOTS = 4
 
 
@@ -98,9 +97,8 @@ def subtract_products(target: Matrix, matrix: Matrix, columns: Matrix, count: in
 @kernel()
 def copy_upper(matrix: Matrix) -> None:
     """Copy the upper triangle onto what is below."""
-    m = matrix.shape[0]
-    for k in range(0, m, LANES):
-        copy_to_columns(matrix, k, LANES, k + LANES, m)
+    reflect(matrix)
+    for k in range(0, matrix.shape[0], LANES):
         for i in range(k, k + LANES):
             for j in range(k, i):
                 matrix[i, j] = matrix[j, i]

@@ -8,7 +8,7 @@ import pytest
 
 from groundstation.arrays import Matrix, Vector
 from groundstation.estimation import correction
-from groundstation.estimation.correction import Jacobian, apply, bound_precision, project, project_columns, surprise
+from groundstation.estimation.correction import Jacobian, apply, bound_precision, measured_covariance, project, surprise
 from groundstation.estimation.deferred import MOST, make, variance_of
 from groundstation.estimation.filter_state import Belief, Deferred
 from groundstation.estimation.linear import cholesky
@@ -41,7 +41,7 @@ def put_off(belief, deferred, R, H, y):
     jacobian = Jacobian(np.zeros((4, H.shape[1])), np.arange(H.shape[1]))
     jacobian.F[:rows] = H
     project(belief, deferred, jacobian, H.shape[1], W)
-    project_columns(W, jacobian, H.shape[1], rows, HPH)
+    measured_covariance(W, jacobian, H.shape[1], rows, HPH)
     bound_precision(HPH, R, rows)
     nis = surprise(HPH, R, y, rows, factor)
     apply(belief.mean, belief.P, deferred, rows, W, factor, y)

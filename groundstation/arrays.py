@@ -1,5 +1,6 @@
 """The array types of the project; shapes stand in brackets in docstrings."""
 
+import math
 from typing import Annotated
 
 import numpy as np
@@ -20,3 +21,14 @@ IntVector = Annotated[IntArray, 1]
 IntMatrix = Annotated[IntArray, 2]
 BoolVector = Annotated[BoolArray, 1]
 WordVector = Annotated[NDArray[np.uint64], 1]
+
+# Numbers in one line of the cache.
+LINE = 8
+
+
+def zeros_on_a_line(shape: tuple[int, ...]) -> Array:
+    """Return zeros that begin on a line of the cache: vectors of 8 numbers then never cross into another one."""
+    size = math.prod(shape)
+    room: Array = np.zeros(size + LINE)
+    first = -room.ctypes.data // room.itemsize % LINE
+    return room[first : first + size].reshape(shape)

@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from groundstation.arrays import Array
+from groundstation.arrays import LINE, Array, zeros_on_a_line
 from groundstation.estimation import model_kernels as declared
 from groundstation.estimation.chi_square import gate
 from groundstation.estimation.deferred import MOST
@@ -37,8 +37,6 @@ _KINDS = {
     EntityKind.LANDMARK: KIND_LANDMARK,
 }
 _NEVER_S = -1e9
-# Numbers in one line of the cache. Rows of P that begin on a line spare a quarter of a correction's time.
-_LINE = 8
 
 
 def tables_from_parameters(parameters: EstimatorParameters) -> Tables:
@@ -130,20 +128,23 @@ def _transition(models: tuple[MotionModel, ...], step_s: float) -> Array:
 
 
 def width_of(tables: Tables) -> int:
-    """Return the length of the arrays that hold the state: its dimension and entries that stay zero, in whole lines."""
-    return -(-tables.dim // _LINE) * _LINE
+    """Return the length of the arrays that hold the state: its dimension and entries that stay zero, in whole lines.
+
+    Rows of P that begin on a line spare a quarter of a correction's time.
+    """
+    return -(-tables.dim // LINE) * LINE
 
 
 def empty_state(tables: Tables, admitted: Sequence[bool]) -> State:
     """Return the state before anything was measured; entities with a prior are in it; admitted: who may join."""
     modes, n, count = tables.modes, width_of(tables), len(tables.priors)
     state = State(
-        _zeros_on_a_line((modes, n)),
-        _zeros_on_a_line((modes, n, n)),
+        zeros_on_a_line((modes, n)),
+        zeros_on_a_line((modes, n, n)),
         np.full(modes, 1.0 / modes),
         EntityMemory.rows(count),
         np.full((len(tables.sensors), count), _NEVER_S),
-        _zeros_on_a_line((modes, MOST, n)),
+        zeros_on_a_line((modes, MOST, n)),
         np.zeros((modes, 1), dtype=np.int64),
     )
     state.memory["admitted"] = admitted
@@ -159,8 +160,8 @@ def empty_state(tables: Tables, admitted: Sequence[bool]) -> State:
 def checkpoints_of(state: State, steps: int) -> Checkpoints:
     """Return a ring of so many copies of a state."""
     ring = Checkpoints(
-        _zeros_on_a_line((steps, *state.means.shape)),
-        _zeros_on_a_line((steps, *state.covariances.shape)),
+        zeros_on_a_line((steps, *state.means.shape)),
+        zeros_on_a_line((steps, *state.covariances.shape)),
         np.empty((steps, *state.weights.shape)),
         EntityMemory.rows(steps, len(state.memory)),
         np.empty((steps, *state.used_at.shape)),
@@ -168,10 +169,3 @@ def checkpoints_of(state: State, steps: int) -> Checkpoints:
     for copies, value in zip(ring, state[: len(ring)], strict=True):
         np.asarray(copies)[:] = value
     return ring
-
-
-def _zeros_on_a_line(shape: tuple[int, ...]) -> Array:
-    size = math.prod(shape)
-    room: Array = np.zeros(size + _LINE)
-    first = -room.ctypes.data // room.itemsize % _LINE
-    return room[first : first + size].reshape(shape)

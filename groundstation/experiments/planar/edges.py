@@ -55,7 +55,7 @@ def exponentials(x: Vector, out: Vector, count: int) -> None:
     for e in range(count):
         k = out[e] - MAGIC
         r = (x[e] - k * 0.693147180369123816490) - k * 1.90821492927058770002e-10
-        tail = 1 / 40320 + r * (1 / 362880 + r * (1 / 3628800 + r * (1 / 39916800 + r / 479001600)))
+        tail = 1 / 40320 + r * (1 / 362880 + r * (1 / 3628800 + r * (1 / 39916800 + r * (1 / 479001600))))
         series = 1 / 24 + r * (1 / 120 + r * (1 / 720 + r * (1 / 5040 + r * tail)))
         x[e] = 1.0 + r * (1.0 + r * (0.5 + r * (1 / 6 + r * series)))
         bits[e] = (bits[e] + 1023) << 52

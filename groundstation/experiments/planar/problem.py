@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from groundstation.arrays import Array, IntVector, Matrix
+from groundstation.arrays import Array, IntVector, Matrix, zeros_on_a_line
 from groundstation.experiments.planar.edges import sort_team
 from groundstation.experiments.planar.parameters import PlanarParameters
 from groundstation.experiments.planar.records import Observers, PlanarProblem, Workspace, X, Y
@@ -17,22 +17,24 @@ STABLE_ABOVE = 1e6
 def make_workspace(robots: int, steps: int) -> Workspace:
     """Return scratch memory; edges of n robots never exceed those of two equal levels, n^2 / 4 + n + 1."""
     size = robots + 1
-    m, edges = padded(size), robots * robots // 4 + robots + 2
+    m, edges = padded(size), padded(robots * robots // 4 + robots + 2)
+    prior = zeros_on_a_line((steps, m, m))
+    prior[:] = np.eye(m)
     return Workspace(
         order=np.arange(size),
         observers=Observers(*np.zeros((3, robots + 2), dtype=np.uint64)),
         mean=np.zeros((2, m)),
         variance=np.ones(size),
-        prior=np.tile(np.eye(m), (steps, 1, 1)),
-        factor=np.zeros((steps, m, m)),
-        square=np.zeros((m, m)),
-        panel=np.zeros((8, m)),
-        columns=np.zeros((steps, steps + 3, m)),
-        distance=np.zeros((steps, edges)),
-        weights=np.zeros((steps, edges)),
-        scratch=np.zeros(max(edges, m)),
-        position=np.zeros((steps, 2, m)),
-        gradient=np.zeros((steps, 2, m)),
+        prior=prior,
+        factor=zeros_on_a_line((steps, m, m)),
+        square=zeros_on_a_line((m, m)),
+        panel=zeros_on_a_line((8, m)),
+        columns=zeros_on_a_line((steps, steps + 3, m)),
+        distance=zeros_on_a_line((steps, edges)),
+        weights=zeros_on_a_line((steps, edges)),
+        scratch=zeros_on_a_line((max(edges, m),)),
+        position=zeros_on_a_line((steps, 2, m)),
+        gradient=zeros_on_a_line((steps, 2, m)),
     )
 
 

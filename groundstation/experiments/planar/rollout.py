@@ -10,14 +10,7 @@ from groundstation.arrays import Matrix, MatrixStack, Vector
 from groundstation.experiments.planar.edges import add_laplacian
 from groundstation.experiments.planar.records import PlanarProblem, Workspace
 from groundstation.kernel import kernel
-from groundstation.planning.dense import cholesky_upper, negative_inverse, subtract_products
-
-
-@kernel()
-def _mirror(matrix: Matrix, size: int) -> None:
-    for a in range(size):
-        for b in range(a):
-            matrix[a, b] = matrix[b, a]
+from groundstation.planning.dense import cholesky_upper, copy_upper, negative_inverse, subtract_products
 
 
 @kernel()
@@ -142,7 +135,7 @@ def adjoint_columns(discount: float, work: Workspace) -> None:
     for i in range(steps - 1, -1, -1):
         own = steps - 1 - i
         if i + 1 < steps:
-            _mirror(prior[i + 1], target + 1)
+            copy_upper(prior[i + 1])
             columns[i, :own, :] = 0.0
             subtract_products(columns[i], prior[i + 1], columns[i + 1], own)
             for c in range(own):

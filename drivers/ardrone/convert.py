@@ -28,7 +28,8 @@ _MOST_DEG_S, _MOST_MG = 5_000.0, 50_000.0
 # A heading step is a jump when it exceeds what the gyro explains by this much.
 _JUMP_RAD = math.radians(8)
 _JUMP_RATE_RAD_S = math.radians(100)
-_GAP_S = 0.5
+_GROUND_GAP_S = 0.5
+_GAP_S = 5.0  # silent for longer, it may have had a new battery
 # Numbers of their own: asking an enum for a member costs as much as reading an option.
 _FLY, _EMERGENCY, _TAKING_OFF = int(StateBit.FLY), int(StateBit.EMERGENCY), int(ControlState.TRANS_TAKEOFF)
 _PHASES: dict[int, FlightState] = {
@@ -146,7 +147,8 @@ def flight_state_from_navdata(state: int, control_state: int | None) -> FlightSt
 class HeadingWatch:
     """Counts the jumps of the heading, across which its increments are void.
 
-    WIRE: at lift-off the magnetometer is fused in and psi jumps, 143 deg in one sample in a recorded flight.
+    WIRE: at lift-off the magnetometer is fused in and psi jumps, 143 deg in one sample in a recorded flight. In flight
+    it goes on through a silence, in which a drone turns on as it was told last (docs/decisions/9301).
     """
 
     def __init__(self) -> None:
@@ -159,7 +161,8 @@ class HeadingWatch:
         """Take the heading of a packet; returns the number of jumps so far."""
         elapsed_s = (stamp_ns - self._stamp_ns) * 1e-9
         aloft = motion.height_m is not None
-        void = self._yaw_rad is not None and (elapsed_s > _GAP_S or self._has_jumped(elapsed_s, motion))
+        gap_s = _GAP_S if aloft else _GROUND_GAP_S
+        void = self._yaw_rad is not None and (elapsed_s > gap_s or self._has_jumped(elapsed_s, motion))
         self.resets += void or (aloft and not self._aloft)
         self._yaw_rad, self._stamp_ns, self._aloft = motion.yaw_rad, stamp_ns, aloft
         return self.resets

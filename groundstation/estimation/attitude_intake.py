@@ -5,8 +5,9 @@ from collections.abc import Mapping
 
 from groundstation.bus.messages import ImuSample, Odometry, Verdict
 from groundstation.estimation.frozen_sensor import FreezeWatch
-from groundstation.estimation.inertial import InertialAttitude
+from groundstation.estimation.inertial import Attitude, InertialAttitude
 from groundstation.estimation.measurement import OdometrySample
+from groundstation.geometry.angles import difference, wrap
 
 _FROZEN_COUNT, _FROZEN_S = 10, 0.1
 _MOST = 1e3  # neither turns nor accelerations that a vehicle survives are as large
@@ -17,7 +18,7 @@ class AttitudeIntake:
 
     def __init__(self, inertial: Mapping[str, float]) -> None:
         self._inertial = {name: InertialAttitude(scale) for name, scale in inertial.items()}
-        self._sources = {name: _HeadingSource() for name in inertial}
+        self._headings = {name: _Heading() for name in inertial}
         self._frozen = FreezeWatch(_FROZEN_COUNT, _FROZEN_S)
 
     def imu(self, message: ImuSample, stamp_ns: int, standing: bool) -> Verdict:
@@ -41,14 +42,14 @@ class AttitudeIntake:
         velocity_std_m_s = math.sqrt(max(message.velocity_covariance[0], message.velocity_covariance[4], 0.0))
         inertial = self._inertial.get(name)
         if inertial is not None:
-            source = self._sources[name]
-            if stamp_ns > source.newest_ns:
+            heading = self._headings[name]
+            if stamp_ns > heading.newest_ns:
                 inertial.take_velocity(stamp_ns, message.velocity_m_s)
                 inertial.take_heading(stamp_ns, message.yaw_rad, message.reset)
             attitude = inertial.at(stamp_ns)
-            reset = source.resets(stamp_ns, attitude is not None, reset if attitude is None else attitude.resets)
+            yaw_rad, reset = heading.take(stamp_ns, message.yaw_rad, message.reset, attitude)
         if attitude is not None:
-            yaw_rad, roll_rad, pitch_rad = attitude.yaw_rad, attitude.roll_rad, attitude.pitch_rad
+            roll_rad, pitch_rad = attitude.roll_rad, attitude.pitch_rad
             attitude_std_rad, yaw_std_rad = attitude.attitude_std_rad, attitude.yaw_std_rad
         return OdometrySample(
             stamp_ns,
@@ -73,23 +74,38 @@ class AttitudeIntake:
         return reported if tilt is None else tilt
 
 
-class _HeadingSource:
-    """Counts the resets of a heading whose source changes."""
+class _Heading:
+    """A heading whose source changes: gyroscopes, the vehicle's own where they say nothing, gyroscopes begun again.
+
+    From one source to the next it goes on by what the vehicle's own heading did meanwhile; where that jumped, it is
+    reset.
+    """
 
     def __init__(self) -> None:
-        self._count, self._source, self.newest_ns = 0, (False, 0), 0
-        self._counted: dict[tuple[bool, int], int] = {}
+        self._source, self._own, self.newest_ns = (False, 0), (0.0, 0), 0
+        self._yaw_rad, self._count = 0.0, 0
+        self._told: dict[tuple[bool, int], tuple[float, int]] = {}
 
-    def resets(self, stamp_ns: int, inertial: bool, resets: int) -> int:
-        """Return the resets until then: another source, or a reset of the present one, is one more.
+    def take(self, stamp_ns: int, own_rad: float, own_reset: int, attitude: Attitude | None) -> tuple[float, int]:
+        """Return the heading, and how often it was reset until then.
 
-        What comes late changes nothing: it belongs to the resets that its source last had.
+        What comes late changes nothing: it belongs to what its source last told.
         """
-        source = inertial, resets
-        if stamp_ns <= self.newest_ns:
-            return self._counted.get(source, self._count)
-        self.newest_ns = stamp_ns
-        if source != self._source:
-            self._count, self._source = self._count + 1, source
-        self._counted[source] = self._count
-        return self._count
+        source, read_rad = (False, own_reset), own_rad
+        if attitude is not None:
+            source, read_rad = (True, attitude.resets), attitude.yaw_rad
+        if stamp_ns > self.newest_ns:
+            self._go_on(stamp_ns, source, read_rad, (own_rad, own_reset))
+        ahead_rad, count = self._told.get(source, (0.0, self._count))
+        return wrap(read_rad + ahead_rad), count
+
+    def _go_on(self, stamp_ns: int, source: tuple[bool, int], read_rad: float, own: tuple[float, int]) -> None:
+        if source != self._source or not self.newest_ns:
+            if self.newest_ns and own[1] == self._own[1]:
+                turned_rad = difference(own[0], self._own[0])
+                self._told[source] = wrap(self._yaw_rad + turned_rad - read_rad), self._count
+            else:
+                self._count += 1
+                self._told[source] = 0.0, self._count
+        self._yaw_rad = wrap(read_rad + self._told[source][0])
+        self._source, self._own, self.newest_ns = source, own, stamp_ns

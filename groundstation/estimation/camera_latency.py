@@ -19,6 +19,7 @@ from groundstation.time_units import NS_PER_S
 _TRIED_S = np.arange(-0.10, 0.2001, 0.02)
 _WINDOW_S, _WIDEST_S = 1.0, 1.3
 _KEPT_S, _SPACING_S = 3.0, 0.01
+_GAP_S = 0.5  # how it turned in a longer one is not known
 _NEAR = 4
 _HALF_LIFE_S = 60.0
 # Deviation of such a difference, and from how many of them squared on a wild one must not decide.
@@ -46,7 +47,7 @@ class _Turning:
     headings: deque[float] = field(default_factory=deque)
 
     def take(self, at: float, yaw: float, reset: int) -> None:
-        if reset != self.reset or (self.times and at - self.times[-1] > _WINDOW_S):
+        if reset != self.reset or (self.times and at - self.times[-1] > _GAP_S):
             self.times.clear()
             self.headings.clear()
             self.reset = reset

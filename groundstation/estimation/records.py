@@ -108,7 +108,8 @@ class EntityMemory(Record):
     held_*, yaw_rate: inputs held during a step: velocity [m/s; base_stabilized], turn rate [rad/s], roll and pitch
     [rad]; slow_v*: the velocity smoothed; commanded_*: what a CommandedRobot was last told; odometry_age_s: since the
     last velocity; attitude_std [rad], yaw_std [rad per root second]: errors as the odometry states them (0: the model's
-    own count); last_yaw, last_reset, has_yaw: the vehicle's own heading [rad; odom] at the step before.
+    own count); last_yaw, last_reset, has_yaw: the vehicle's own heading [rad; odom] at the step before, told yaw_age_s
+    ago.
     velocity_x, _y, _z: how they change [m/s; world], as last predicted; velocity_doubt [m/s]: deviation that a fixed
     camera's surprises add to the error of the reported velocity; velocity_lie [m/s]: by how much that error was lately
     seen to be larger than that of a sound sensor; unseen_s: time predicted since the last sighting.
@@ -137,6 +138,7 @@ class EntityMemory(Record):
     last_yaw: float
     last_reset: float
     has_yaw: int
+    yaw_age_s: float
     velocity_x: float
     velocity_y: float
     velocity_z: float

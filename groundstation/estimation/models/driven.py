@@ -10,6 +10,7 @@ from groundstation.kernel import kernel
 SILENT_DENSITY = 0.09
 # Nor of its turn: 0.15 rad/s, likewise [rad^2/s]. It is told to hover, but may have turned when it was last heard.
 SILENT_TURN_DENSITY = 0.0225
+_SILENT_S = 0.3  # a heading that is older than this at the next one was not told for a while
 # Velocity is smoothed over this for all that is learnt from it [s].
 SLOW_S = 1.0
 
@@ -37,13 +38,18 @@ def take_heading(odometry: CondensedOdometry, memory: EntityMemory, step: float)
     """Turn the vehicle's own heading into the yaw rate of this step (and hold how it leans); an increment across a
     reset is void.
 
-    The heading jumped then, the vehicle did not.
+    The heading jumped then, the vehicle did not. Of an increment across a silence counts what lies after the last
+    sighting of the vehicle, which saw the rest already: it turned evenly, as far as anybody knows.
     """
     memory.yaw_rate = 0.0
+    memory.yaw_age_s += step
     if odometry.newest_at < 0.0:
         return
     if memory.has_yaw != 0 and memory.last_reset == odometry.newest_reset:
         memory.yaw_rate = wrap(odometry.newest_yaw - memory.last_yaw) / step
+        if memory.yaw_age_s > _SILENT_S:
+            memory.yaw_rate *= min(1.0, memory.unseen_s / memory.yaw_age_s)
+    memory.yaw_age_s = 0.0
     memory.held_roll, memory.held_pitch = odometry.newest_roll, odometry.newest_pitch
     memory.attitude_std, memory.yaw_std = odometry.newest_attitude_std, odometry.newest_yaw_std
     memory.last_yaw, memory.last_reset, memory.has_yaw = odometry.newest_yaw, odometry.newest_reset, 1

@@ -5,10 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from groundstation.bus.messages import Header, Odometry, Vector3
+from groundstation.bus.messages import Header, ImuSample, Odometry, Vector3
 from groundstation.estimation.attitude_intake import AttitudeIntake
 from groundstation.estimation.gyro_bias import GyroBias
 from groundstation.estimation.inertial import InertialAttitude
+from groundstation.estimation.models.driven import take_heading
+from groundstation.estimation.records import CondensedOdometry, EntityMemory
 from groundstation.geometry.angles import difference
 from groundstation.geometry.rotations import rotation_from_euler
 from groundstation.geometry.stabilized_frame import STANDARD_GRAVITY_M_S2
@@ -239,6 +241,47 @@ def test_odometry_that_comes_late_counts_no_reset() -> None:
     after = resets(3.0, 1)
     assert after != resets(2.5, 0) == resets(1.0, 0)
     assert resets(4.0, 1) == after
+
+
+@pytest.mark.parametrize("resets", [0, 1])
+def test_across_a_silence_the_heading_goes_on_by_the_vehicles_own_unless_that_jumped(resets: int) -> None:
+    intake = AttitudeIntake({"drone_1": 1.0})
+    rate, level = math.radians(40.0), (0.0, 0.0, STANDARD_GRAVITY_M_S2)
+
+    def heard(at_s: float, reset: int) -> tuple[float, int]:
+        header = Header(START + round(at_s * 1e9), "boot", "drone_1", "drone_1", 1)
+        imu = ImuSample(header=header, angular_velocity_rad_s=(0.0, 0.0, rate), specific_force_m_s2=level)
+        intake.imu(imu, header.stamp_ns, standing=False)
+        odometry = Odometry(
+            header=header, velocity_m_s=(0.0, 0.0, 0.0), velocity_covariance=(0.01, 0, 0, 0, 0.01, 0, 0, 0, 0.01),
+            yaw_rad=math.remainder(1.0 + rate * at_s, math.tau), roll_rad=0.0, pitch_rad=0.0, reset=reset,
+        )  # fmt: skip
+        sample = intake.motion(odometry, header.stamp_ns)
+        return sample.yaw_rad, sample.reset
+
+    before = [heard(0.02 * k, 0) for k in range(50)][-1]
+    after = [heard(2.2 + 0.02 * k, resets) for k in range(50)]
+    assert {count - before[1] for _, count in after} == {resets}
+    if not resets:
+        assert math.degrees(difference(after[0][0], before[0])) == pytest.approx(40.0 * (2.2 - 0.98), abs=1.0)
+    assert math.degrees(difference(after[-1][0], after[0][0])) == pytest.approx(40.0 * 0.98, abs=0.5)
+
+
+@pytest.mark.parametrize(("silent_s", "unseen_s", "share"), [(0.0, 5.0, 1.0), (1.2, 5.0, 1.0), (1.2, 0.3, 0.25)])
+def test_a_turn_in_a_silence_counts_from_the_last_sighting_on(silent_s: float, unseen_s: float, share: float) -> None:
+    memory, told, nothing = EntityMemory.rows(1), CondensedOdometry.rows(1), CondensedOdometry.rows(1)
+    nothing["newest_at"] = -1.0
+    step_s = 0.02
+    take_heading(told[0], memory[0], step_s)
+    for _ in range(round(silent_s / step_s) - 1):
+        take_heading(nothing[0], memory[0], step_s)
+        assert memory["yaw_rate"][0] == 0.0
+    told["newest_yaw"], told["newest_at"], memory["unseen_s"] = 0.8, 1.0, unseen_s
+    take_heading(told[0], memory[0], step_s)
+    assert step_s * memory["yaw_rate"][0] == pytest.approx(share * 0.8, rel=0.02)
+    told["newest_yaw"] = 0.81
+    take_heading(told[0], memory[0], step_s)
+    assert step_s * memory["yaw_rate"][0] == pytest.approx(0.01)
 
 
 def test_a_velocity_that_the_driver_doubts_is_doubted_though_the_attitude_is_not_the_vehicles() -> None:

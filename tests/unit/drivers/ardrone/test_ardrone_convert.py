@@ -178,8 +178,10 @@ def test_turning_and_wrapping_are_no_jumps():
     assert set(count_resets(lost_datagrams, period_ms=100)) == {1}
 
 
-def test_a_long_silence_voids_the_increment():
-    assert count_resets([turning(0), turning(1)], period_ms=600) == [1, 2]
+def test_a_silence_voids_the_increment_on_the_floor_and_a_long_one_in_flight():
+    assert count_resets([turning(0, height=None), turning(1, height=None)], period_ms=600) == [0, 1]
+    assert count_resets([turning(0), turning(50)], period_ms=1500) == [1, 1], "it may have turned on"
+    assert count_resets([turning(0), turning(1)], period_ms=6000) == [1, 2]
 
 
 # -- commands ---------------------------------------------------------------------------------------------------------

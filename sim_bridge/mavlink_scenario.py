@@ -24,7 +24,8 @@ class CopterScenario(Section):
     hover_drift_m_s: Annotated[float, Field(ge=0, le=2)] = 0.0
     """Steady horizontal drift while a velocity is asked for, zero included, one sigma per axis [m/s]."""
     lift_off_velocity_m_s: Annotated[float, Field(ge=0, le=2)] = 0.0
-    """Error of the estimated horizontal velocity at lift-off, one sigma per axis [m/s]."""
+    """Error of the estimated horizontal velocity at lift-off, one sigma per axis [m/s]: of a PX4. An ArduPilot has a
+    twentieth of it."""
     one_partner: bool = False
     """true: it answers only the first that spoke to it, until it is started again, as PX4's UDP link does."""
     mavlink_1_until_greeted: bool = False

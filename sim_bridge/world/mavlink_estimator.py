@@ -30,7 +30,9 @@ class InertialEstimate:
     test_ratio: of the last pose, how far from the estimate it was as a share of the gate, beyond 1 refused.
     """
 
-    def __init__(self, scenario: CopterScenario, tick_s: float, rng: np.random.Generator) -> None:
+    def __init__(
+        self, scenario: CopterScenario, tick_s: float, rng: np.random.Generator, lift_off: float = 1.0
+    ) -> None:
         draw = self._draw = standard_normals(rng)
         tilt = math.radians(scenario.attitude_noise_deg)
         self.position: Vector3 = (0.0, 0.0, 0.0)
@@ -47,7 +49,7 @@ class InertialEstimate:
             GaussMarkov(tilt, _TILT_CORRELATION_S, tick_s, draw),
             GaussMarkov(tilt, _TILT_CORRELATION_S, tick_s, draw),
         )
-        self._lift_off_m_s = scenario.lift_off_velocity_m_s
+        self._lift_off_m_s = lift_off * scenario.lift_off_velocity_m_s
         self._stood = True
         self._gyro_bias = float(rng.normal(0.0, math.radians(scenario.gyro_bias_deg_s)))
         self._up_bias = float(rng.normal(0.0, 0.05))

@@ -18,15 +18,15 @@ from sim_bridge.devices.mavlink import LinkHabits, MavlinkEmulator
 from sim_bridge.devices.mavlink_parameters import Parameters
 from sim_bridge.mavlink_scenario import CopterScenario
 from sim_bridge.scenario import parse_scenario
-from sim_bridge.world.mavlink_copter import PX4_RESPONSE, MavlinkCopter
+from sim_bridge.world.mavlink_copter import ARDUPILOT_RESPONSE, PX4_RESPONSE, MavlinkCopter, Response
 from sim_bridge.world.world import TICK_S
 
 SCENARIO = Path(__file__).parents[3] / "config" / "scenarios" / "unkind-autopilots.yaml"
 _net = count(1)
 
 
-def copter(scenario: CopterScenario, seed: int = 1) -> MavlinkCopter:
-    return MavlinkCopter((0.0, 0.0), 0.0, scenario, PX4_RESPONSE, TICK_S, np.random.default_rng(seed))
+def copter(scenario: CopterScenario, seed: int = 1, firmware: Response = PX4_RESPONSE) -> MavlinkCopter:
+    return MavlinkCopter((0.0, 0.0), 0.0, scenario, firmware, TICK_S, np.random.default_rng(seed))
 
 
 def fly(vehicle: MavlinkCopter, velocity: tuple[float, float, float], seconds: float) -> None:
@@ -59,6 +59,21 @@ def test_less_speed_than_asked_for_and_a_drift_at_zero() -> None:
         math.hypot(*drifting._drift), abs=0.05
     )
     assert math.hypot(*drifting._drift) > 0.05
+
+
+@pytest.mark.parametrize(("firmware", "least_m", "most_m"), [(PX4_RESPONSE, 0.5, 1.3), (ARDUPILOT_RESPONSE, 0.03, 0.5)])
+def test_a_px4_drifts_from_its_pad_as_measured_and_an_ardupilot_less(
+    firmware: Response, least_m: float, most_m: float
+) -> None:
+    scenario, ways = CopterScenario(lift_off_velocity_m_s=0.5, hover_drift_m_s=0.05), []
+    for seed in range(9):
+        vehicle = copter(scenario, seed, firmware)
+        for _ in range(10):
+            vehicle.estimate.aid((0.0, 0.0, 0.0), 0.0, 0)
+        fly(vehicle, (0.0, 0.0, 0.5), 2.0)
+        fly(vehicle, (0.0, 0.0, 0.0), 1.0)
+        ways.append(math.hypot(vehicle.airframe.x, vehicle.airframe.y))
+    assert least_m <= np.median(ways) <= most_m
 
 
 def test_the_velocity_is_wrong_after_lift_off() -> None:

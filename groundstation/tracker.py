@@ -243,7 +243,7 @@ class Tracker:
     def request(self) -> PlanRequest:
         """Return the snapshot for the next plan."""
         warm = {} if self.current is None else self.current.warm_start
-        return PlanRequest(self._belief.core(without=self._hopeless()), self._topology, warm)
+        return PlanRequest(self._belief.core(without=self._hopeless()), self._topology, warm, self.lookout.held)
 
     def adopt(self, plan: PlanResult) -> None:
         """Put a finished plan in force, as far as its robots still fly."""
@@ -257,7 +257,7 @@ class Tracker:
         """Plan on the belief and adopt the plan; None when planning failed and the last plan stays."""
         request = self.request()
         try:
-            plan = self.planner.plan(request.belief, request.topology, request.warm_start, should_stop, max_evaluations)
+            plan = self.planner.plan(*request.scene, should_stop, max_evaluations, request.held)
         except EstimatorFault as fault:
             self._fault(str(fault))
             return None

@@ -70,6 +70,11 @@ class Lookout:
         return tuple(name for name in self._names if self._modes.get(name, _OBEYS) != _OBEYS)
 
     @property
+    def held(self) -> frozenset[str]:
+        """Return the robots that follow no setpoints while others do; before a flight begins all wait."""
+        return frozenset(self.unsteered if len(self.unsteered) < len(self._names) else ())
+
+    @property
     def velocity_errors_m_s(self) -> Mapping[str, float]:
         """Return the rms error of each robot's odometry that is to be expected [m/s]."""
         return self._excursions.velocity_errors_m_s

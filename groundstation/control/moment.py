@@ -56,6 +56,11 @@ class Moment:
     sight: Sight
 
 
+def steered(names: Sequence[str], now: Moment) -> list[str]:
+    """Return the robots among some that follow setpoints; all of them where none does, for they may soon."""
+    return [name for name in names if name not in now.sight.unsteered] or list(names)
+
+
 def is_untied(name: str, now: Moment) -> bool:
     """Return whether nothing tells where a robot is that flies on our estimate."""
     return name in now.parameters.fed and now.sight.untied_s.get(name, 0.0) > now.parameters.untied_after_s

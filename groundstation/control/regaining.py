@@ -20,10 +20,15 @@ _MOST_SPREAD_M = 0.6  # a belief that is wider says too little of how far to bac
 _NEAREST_M = 0.3
 
 
-def who_regains(target: str, topology: Topology, belief: JointBelief, sensors: SensorSuite) -> Collection[str]:
-    """Return the robots that get a target back: the lowest level, or the nearest where only others have it in reach."""
-    at, lowest = belief.mean_of(target)[:2], topology.levels[-1]
-    eyes = [name for name in belief.layout.robots if name in topology.robots and name in sensors.onboard]
+def who_regains(
+    target: str, topology: Topology, belief: JointBelief, sensors: SensorSuite, able: Collection[str]
+) -> Collection[str]:
+    """Return the robots that get a target back: the lowest level, or the nearest where only others have it in reach.
+
+    able: those that follow setpoints.
+    """
+    at, lowest = belief.mean_of(target)[:2], topology.levels[-1].intersection(able)
+    eyes = [name for name in able if name in topology.robots and name in sensors.onboard]
     ways_m = {name: math.dist(belief.mean_of(name)[:2], at) for name in eyes}
     near = [name for name in eyes if ways_m[name] <= sensors.onboard[name].view.range_m]
     return lowest if not near or lowest.intersection(near) else (min(near, key=ways_m.__getitem__),)

@@ -10,7 +10,7 @@ from groundstation.bus.messages import Vector3
 from groundstation.control.flight_mode import FlightMode, Situation, flight_mode_of
 from groundstation.control.holding_off import giving_way, recoverable
 from groundstation.control.in_sight import is_between_views, kept_in_sight
-from groundstation.control.moment import STILL, Moment, Sight, is_untied, soon
+from groundstation.control.moment import STILL, Moment, Sight, is_untied, soon, steered
 from groundstation.control.parameters import ControlParameters
 from groundstation.control.regaining import regaining, who_regains
 from groundstation.control.returning import is_lost, return_stand
@@ -65,11 +65,12 @@ def setpoints_from_plan(
         )
         for name in airborne
     }
-    tracking = [name for name in now.robots if phases[name] is FlightMode.TRACK]
+    tracking = [name for name in steered(now.robots, now) if phases[name] is FlightMode.TRACK]
     scout = _scout(tracking, now) if fresh and missing else None
     if scout is not None:
         phases[scout] = FlightMode.SEARCH
-    searching = sight.search([name for name in now.robots if phases[name] is FlightMode.SEARCH], missing)
+    able = [name for name in steered(now.robots, now) if phases[name] is FlightMode.SEARCH]
+    searching = sight.search(able, missing)
     stands = _stands(phases, searching, now)
     coming = [name for name in now.robots if _comes_back(name, phases[name], now)]
     wanted: dict[str, Setpoint] = {}
@@ -110,7 +111,8 @@ def _regained(name: str, plan: PlanResult, now: Moment) -> tuple[float, float, f
     tracked = (one for one in belief.layout.targets if one not in now.sight.missing)
     target = min(tracked, key=lambda one: math.dist(belief.mean_of(one)[:2], place))
     found = regaining(name, target, belief, now.sensors)
-    if found is None or name not in who_regains(target, plan.topology, belief, now.sensors):
+    able = steered(now.robots, now)
+    if found is None or name not in who_regains(target, plan.topology, belief, now.sensors, able):
         return vx, vy, rate
     (vx, vy), rate = found[0].tolist(), found[1]
     return vx, vy, rate
@@ -154,25 +156,27 @@ def _scout(tracking: Sequence[str], now: Moment) -> str | None:
 def _stands(phases: Mapping[str, FlightMode], searching: Mapping[str, Stand], now: Moment) -> dict[str, Stand]:
     """Return where each robot stands that returns or searches, apart from each other; who returns comes first.
 
-    Who searches and has nowhere to go waits in view.
+    Who searches and has nowhere to go waits in view. Who follows no setpoints stays where it is: all others give way.
     """
     robots = [name for name in now.robots if phases[name] in (FlightMode.RETURN, FlightMode.SEARCH)]
     means = {name: now.belief.mean_of(name) for name in robots}
     places = {name: (float(mean[0]), float(mean[1])) for name, mean in means.items()}
     views = {name: view_of(*soon(name, now), name, now.parameters, now.sensors) for name in robots}
+    able = steered(robots, now)
+    held = {name: return_stand(means[name], None) for name in robots if name not in able}
     back = {
         name: return_stand(means[name], views[name], now.sight.missed_s.get(name, 0.0))
-        for name in robots
+        for name in able
         if phases[name] is FlightMode.RETURN
     }
-    out = {name: searching[name] for name in robots if phases[name] is FlightMode.SEARCH and name in searching}
+    out = {name: searching[name] for name in able if phases[name] is FlightMode.SEARCH and name in searching}
     idle = {
         name: return_stand(means[name], views[name])
-        for name in robots
+        for name in able
         if phases[name] is FlightMode.SEARCH and name not in searching
     }
-    within = {name: None if name in out else view for name, view in views.items()}
-    return apart(back | out | idle, places, within, now.parameters.column_m)
+    within = {name: None if name in out or name in held else view for name, view in views.items()}
+    return apart(held | back | out | idle, places, within, now.parameters.column_m)
 
 
 def _towards(name: str, stand: Stand, phase: FlightMode, now: Moment) -> Setpoint:

@@ -21,11 +21,17 @@ from groundstation.sensing.topology import Topology
 
 @dataclass(frozen=True, slots=True)
 class PlanRequest:
-    """A snapshot to plan on, away from the tracker's loop."""
+    """A snapshot to plan on, away from the tracker's loop; held: robots that follow no plan and stay where they are."""
 
     belief: JointBelief
     topology: Topology
     warm_start: Mapping[str, Array]
+    held: frozenset[str] = frozenset()
+
+    @property
+    def scene(self) -> tuple[JointBelief, Topology, Mapping[str, Array]]:
+        """Return belief, topology and warm start."""
+        return self.belief, self.topology, self.warm_start
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,15 +147,17 @@ class Planner:
         warm_start: Mapping[str, Array] | None,
         should_stop: Callable[[], bool],
         max_evaluations: int | None = None,
+        held: frozenset[str] = frozenset(),
     ) -> PlanResult:
         """Return the best of the current topology and its neighbours; raises EstimatorFault for a broken belief.
 
-        current: over the robots to plan for (those missing in the belief are ignored). `should_stop` is asked after
+        current: over the robots to plan for (those missing in the belief are ignored); held: those of them that stay
+        where they are, and only look. `should_stop` is asked after
         every few evaluations, some 0.3 ms for ten robots. A plan that was stopped is repeated exactly by giving its
         number of evaluations as `max_evaluations`.
         """
         current = current.reconciled(current.robots & frozenset(belief.layout.robots))
-        scene = scene_from_belief(belief, current.robots)
+        scene = scene_from_belief(belief, current.robots, held)
         if not scene.robots or not scene.targets:
             return self._idle(current, belief.stamp_ns)
         search = _Search(should_stop, max_evaluations, self.parameters)

@@ -11,13 +11,14 @@ from groundstation.estimation.belief import JointBelief
 from groundstation.kernel import Rows
 from groundstation.planning.bound import lower_bound
 from groundstation.planning.gradient import evaluate
-from groundstation.planning.parameters import PlannerParameters
+from groundstation.planning.parameters import MotionLimits, PlannerParameters
 from groundstation.planning.records import HEIGHT, ROBOT_CONTROLS, TARGET_STATES, CostOptions, CostProblem, EdgeRow
 from groundstation.sensing.models import SensorSuite
 from groundstation.sensing.occlusion import box_rows
 from groundstation.sensing.topology import Topology
 from groundstation.sensing.visibility import camera_rows
 
+_HELD = 0.01  # of its limits, what one that stays where it is may do: the search divides by them
 _LEAST_BAND_M = 1e-3  # of heights to choose from, where the field names one only
 _FLOPS_PER_CHECK = 1.5e6  # some 0.3 ms: how much is computed between two questions for the time
 _FLOPS_PER_EDGE = 300.0
@@ -28,7 +29,7 @@ class PlanningScene:
     """What all topologies of one planning step share: robots and targets of the belief, in state order.
 
     poses (n, 4) x, y, z, yaw; moving (k, 4) x, y, vx, vy; prior (n + 2 k square): positions of robots, then position
-    and velocity of each target, per axis; yaw_variances (n) [rad^2].
+    and velocity of each target, per axis; yaw_variances (n) [rad^2]; held: robots that stay where they are.
     """
 
     robots: tuple[str, ...]
@@ -37,9 +38,10 @@ class PlanningScene:
     moving: Array
     prior: Array
     yaw_variances: Array
+    held: frozenset[str] = frozenset()
 
 
-def scene_from_belief(belief: JointBelief, robots: frozenset[str]) -> PlanningScene:
+def scene_from_belief(belief: JointBelief, robots: frozenset[str], held: frozenset[str] = frozenset()) -> PlanningScene:
     """Return the scene of the given robots and all targets; raises EstimatorFault for an indefinite covariance.
 
     Both axes get the mean of their covariances, which is one as well. Heights and any calibration entries are
@@ -61,7 +63,7 @@ def scene_from_belief(belief: JointBelief, robots: frozenset[str]) -> PlanningSc
     yaws: Array = np.diag(full)[2 * d :].copy()
     poses = np.array([belief.mean_of(name)[:4] for name in names]).reshape(-1, 4)
     moving = np.array([belief.mean_of(name)[:4] for name in targets]).reshape(-1, 4)
-    return PlanningScene(names, targets, poses, moving, prior, yaws)
+    return PlanningScene(names, targets, poses, moving, prior, yaws, held)
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,9 +149,19 @@ class ProblemBuilder:
 
     def scale(self, scene: PlanningScene) -> Array:
         """Return the bounds of the controls: any corner of the box respects the speed limit."""
-        limits = [self._parameters.limits_of(name) for name in scene.robots]
+        limits = self._limits(scene)
         rows = [(m.max_speed_m_s / 2**0.5,) * 2 + (m.max_yaw_rate_rad_s, self._half_m) for m in limits]
         return np.array(rows, dtype=np.float64).ravel()
+
+    def _limits(self, scene: PlanningScene) -> list[MotionLimits]:
+        """Return what each robot of a scene may do; next to nothing, where it stays where it is."""
+        limits = {name: self._parameters.limits_of(name) for name in scene.robots}
+        for name in scene.held.intersection(scene.robots):
+            own = limits[name]
+            limits[name] = MotionLimits(
+                _HELD * own.max_speed_m_s, _HELD * own.max_climb_m_s, _HELD * own.max_yaw_rate_rad_s
+            )
+        return list(limits.values())
 
     def heights(self, controls: Array) -> list[float]:
         """Return the heights of controls (4 n) [m]."""
@@ -166,7 +178,7 @@ class ProblemBuilder:
         self._of, self._scale = scene, self.scale(scene)
         self._markers = np.array([self._sensors.marker_height_m[name] for name in scene.robots + scene.targets])
         self._target_weights = np.array([self._parameters.target_weights.get(name, 1.0) for name in scene.targets])
-        self._climbs = np.array([self._parameters.limits_of(name).max_climb_m_s for name in scene.robots])
+        self._climbs = np.array([limits.max_climb_m_s for limits in self._limits(scene)])
         self._pairs = self._all_pairs(scene)
 
     def _all_pairs(self, scene: PlanningScene) -> _Pairs:

@@ -59,7 +59,8 @@ class Starts:
         return x.ravel()
 
     def height(self, i: int, height_m: float) -> float:
-        """Return a robot's height as a part of a start."""
+        """Return a robot's height as a part of a start; one that stays where it is keeps its own."""
+        height_m = self._poses[i][2] if self._scene.robots[i] in self._scene.held else height_m
         share = (height_m - self._height_m) / self._scale[ROBOT_CONTROLS * i + HEIGHT]
         return max(-1.0, min(1.0, share))
 

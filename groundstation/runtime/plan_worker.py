@@ -77,7 +77,7 @@ class PlanWorker:
         began = self._clock()
         budget = TimeBudget(self._budget_s, self._clock)
         try:
-            plan = self._planner.plan(request.belief, request.topology, request.warm_start, budget.must_stop)
+            plan = self._planner.plan(*request.scene, budget.must_stop, held=request.held)
         except EstimatorFault as fault:
             _log.error("planning failed: %s", fault)
             return Adoption(tick, None)

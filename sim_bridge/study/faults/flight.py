@@ -91,7 +91,7 @@ class InlineWorker:
     def submit(self, tick: int, request: PlanRequest) -> None:
         """Plan."""
         try:
-            plan = self._planner.plan(request.belief, request.topology, request.warm_start, lambda: False)
+            plan = self._planner.plan(*request.scene, lambda: False, held=request.held)
         except EstimatorFault:
             self._done = Adoption(tick, None)
             return

@@ -33,10 +33,11 @@ class FixedPlanner(Planner):
         warm_start: Mapping[str, Array] | None,
         should_stop: Callable[[], bool],
         max_evaluations: int | None = None,
+        held: frozenset[str] = frozenset(),
     ) -> PlanResult:
         """Return the best plan of the topology."""
         fixed = self.fixed(sorted(current.robots))
-        return super().plan(belief, fixed, warm_start, should_stop, max_evaluations)
+        return super().plan(belief, fixed, warm_start, should_stop, max_evaluations, held)
 
     def options(self, current: Topology) -> tuple[Topology, ...]:
         """Return no other topology."""

@@ -38,11 +38,12 @@ class RulePlanner(Planner):
         warm_start: Mapping[str, Array] | None,
         should_stop: Callable[[], bool],
         max_evaluations: int | None = None,
+        held: frozenset[str] = frozenset(),
     ) -> PlanResult:
         """Return what the rule says."""
         robots = [name for name in belief.layout.robots if name in current.robots]
         if not robots or not belief.layout.targets:
-            return super().plan(belief, current, warm_start, should_stop, max_evaluations)
+            return super().plan(belief, current, warm_start, should_stop, max_evaluations, held)
         target = belief.mean_of(belief.layout.targets[0])
         places = {name: _place(belief.mean_of(name)) for name in robots}
         at = _place(target)

@@ -37,12 +37,13 @@ class TryingPlanner(FixedPlanner):
         warm_start: Mapping[str, Array] | None,
         should_stop: Callable[[], bool],
         max_evaluations: int | None = None,
+        held: frozenset[str] = frozenset(),
     ) -> PlanResult:
         """Return the best of what was tried; what it last did is tried first."""
         topology = self.fixed(sorted(current.robots & frozenset(belief.layout.robots)))
-        scene = scene_from_belief(belief, topology.robots)
+        scene = scene_from_belief(belief, topology.robots, held)
         if not scene.robots or not scene.targets:
-            return super().plan(belief, current, warm_start, should_stop, max_evaluations)
+            return super().plan(belief, current, warm_start, should_stop, max_evaluations, held)
         problem = self._builder.build(scene, topology)
         starts = Starts(scene, self.parameters, self.sensors, problem.scale, self._builder.height_m)
         first = self._warm(scene, warm_start, np.zeros(problem.scale.size), starts, problem.scale)

@@ -151,3 +151,14 @@ def test_nobody_is_said_to_search_who_lands_or_holds() -> None:
     (notice,) = lookout.take_notices()
     assert "the team searches around" in notice.text
     assert [search.target for search in lookout.searches(round(2.84e9))] == ["turtlebot"]
+
+
+def test_who_follows_no_setpoints_is_held_while_another_does() -> None:
+    two = Lookout(
+        search_from_field(LAB), control_from_field(LAB), sensors_from_field(LAB), ("drone_1", "drone_2"), ("turtlebot",)
+    )
+    two.take(driver_in("HOVER"))
+    assert (two.unsteered, two.held) == (("drone_1",), frozenset({"drone_1"}))
+    alone = lookout_of_the_lab()
+    alone.take(driver_in("HOVER"))
+    assert (alone.unsteered, alone.held) == (("drone_1",), frozenset())

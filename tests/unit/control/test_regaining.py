@@ -34,11 +34,18 @@ def belief(first: np.ndarray, target: np.ndarray, target_std: float = 0.05) -> J
     return JointBelief(mean, np.diag([0.03**2] * 8 + [target_std**2] * 4), layout, 0)
 
 
-def wanted(now: JointBelief, age_s: float | None, topology: str, missing: tuple[str, ...] = ()) -> dict[str, Setpoint]:
+def wanted(
+    now: JointBelief,
+    age_s: float | None,
+    topology: str,
+    missing: tuple[str, ...] = (),
+    unsteered: tuple[str, ...] = (),
+) -> dict[str, Setpoint]:
     report = SolverReport("complete", 1, 0.0, 1, 1)
     heights = {"drone_1": 1.6, "drone_2": 1.6}
     plan = PlanResult(Topology.parse(topology), 0.1, 0.1, HELD, heights, (), (), report, "multistart", 0)
-    return setpoints_from_plan(plan, now, ("drone_1", "drone_2"), CONTROL, SENSORS, Sight(age_s, missing=missing))
+    sight = Sight(age_s, missing=missing, unsteered=unsteered)
+    return setpoints_from_plan(plan, now, ("drone_1", "drone_2"), CONTROL, SENSORS, sight)
 
 
 @pytest.mark.parametrize("start", [(-0.2, 0.0, 1.6, 0.3), (0.6, 0.1, 1.6, 2.0), (-1.3, 0.5, 1.6, -1.0)])
@@ -87,6 +94,14 @@ def test_the_nearest_gets_back_what_the_lowest_level_cannot_reach() -> None:
     assert far["drone_2"].velocity_m_s[:2] == pytest.approx((0.0, 0.1))
     nobody = wanted(belief(np.array([0.5, 0.0, 1.6, 0.2]), np.array([4.0, 0.0, 0.0, 0.0])), 0.5, "drone_1/drone_2")
     assert nobody["drone_1"].velocity_m_s[:2] == pytest.approx((0.2, -0.1))
+
+
+def test_the_next_gets_back_what_one_that_follows_no_setpoints_does_not() -> None:
+    now = belief(np.array([-1.2, 0.5, 1.6, 0.2]), np.array([-1.2, 0.6, 0.0, 0.0]))
+    for held, moves in ((("drone_2",), "drone_1"), (("drone_1",), "drone_2")):
+        out = wanted(now, 0.5, "drone_1/drone_2" if held == ("drone_2",) else "drone_2/drone_1", unsteered=held)
+        assert out[moves].yaw_rate_rad_s != pytest.approx(HELD[moves][2])
+        assert out[held[0]].yaw_rate_rad_s == pytest.approx(HELD[held[0]][2])
 
 
 def test_a_place_that_is_known_badly_is_looked_at_from_farther_away() -> None:

@@ -181,6 +181,22 @@ def test_nobody_makes_room_for_one_that_lands() -> None:
     assert out["drone_2"].velocity_m_s[:2] == pytest.approx((0.0, 0.1))
 
 
+def test_who_follows_no_setpoints_searches_nothing_and_others_keep_off_its_place() -> None:
+    asked: list[list[str]] = []
+
+    def search(robots: Sequence[str], _targets: Collection[str]) -> dict[str, Stand]:
+        asked.append(list(robots))
+        return {name: Stand(1.5, 1.3, 0.0) for name in robots}
+
+    at = belief((1.5, 1.5, 1.5, 0.0), (0.0, 1.5, 1.5, 0.0), target=None)
+    held = Sight(None, search=search, unsteered=("drone_1",))
+    out = setpoints_from_plan(None, at, NAMES, CONTROL, SENSORS, held)
+    free = setpoints_from_plan(None, at, NAMES, CONTROL, SENSORS, Sight(None, search=search, unsteered=NAMES))
+    assert asked == [["drone_2"], list(NAMES)], "where nobody follows any yet, all may soon"
+    assert out["drone_1"].velocity_m_s[:2] == pytest.approx((0.0, 0.0))
+    assert out["drone_2"].velocity_m_s[0] < free["drone_2"].velocity_m_s[0]
+
+
 def test_a_plan_does_not_take_out_of_the_view_whose_odometry_errs() -> None:
     at = belief((1.2, 0.0, 1.5, 0.0), (0.0, 0.0, 1.5, 0.0))
     wrong, sound = (

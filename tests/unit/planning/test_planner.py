@@ -72,6 +72,18 @@ def test_heights_are_chosen_between_the_lowest_and_the_highest() -> None:
     assert max(near.heights.values()) < low + 0.15
 
 
+def test_one_that_follows_no_plan_stays_where_it_is_and_still_looks() -> None:
+    free = plan(FAR, STRING)
+    held = Planner(PARAMETERS, SENSORS).plan(FAR, STRING, None, lambda: False, held=frozenset({"drone_2"}))
+    limits = PARAMETERS.limits_of("drone_2")
+    assert np.linalg.norm(free.controls["drone_2"][:2]) > 0.1
+    assert np.linalg.norm(held.controls["drone_2"][:2]) < 0.02 * limits.max_speed_m_s
+    assert abs(held.controls["drone_2"][2]) < 0.02 * limits.max_yaw_rate_rad_s
+    assert held.heights["drone_2"] == pytest.approx(1.2, abs=0.05)
+    assert np.linalg.norm(held.controls["drone_1"][:2]) > 0.02
+    assert held.cost > free.cost
+
+
 def test_the_last_plan_is_gone_on_with_heights_included() -> None:
     first = plan(NEAR, FLAT)
     starts = (first.warm_start, None)

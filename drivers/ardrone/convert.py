@@ -148,7 +148,7 @@ class HeadingWatch:
     """Counts the jumps of the heading, across which its increments are void.
 
     WIRE: at lift-off the magnetometer is fused in and psi jumps, 143 deg in one sample in a recorded flight. In flight
-    it goes on through a silence, in which a drone turns on as it was told last (docs/decisions/9301).
+    it goes on through a silence, in which a drone turns on as it was told last (docs/decisions/0233).
     """
 
     def __init__(self) -> None:

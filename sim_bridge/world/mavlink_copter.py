@@ -56,7 +56,7 @@ class Response:
 
 
 PX4_RESPONSE = Response(dead_s=0.06, rate=3.3, damping=0.92, gain=0.85, lift_off=1.0)
-# From its pad to the first velocity ArduCopter drifted by 0.03 m, where PX4 did by 0.5 to 1.3 m (docs/decisions/9303).
+# From its pad to the first velocity ArduCopter drifted by 0.03 m, where PX4 did by 0.5 to 1.3 m (docs/decisions/0235).
 ARDUPILOT_RESPONSE = Response(dead_s=0.13, rate=3.5, damping=1.0, gain=1.0, lift_off=0.05)
 
 

@@ -284,16 +284,6 @@ def test_a_run_that_never_tracked_fails_and_says_so(tmp_path: Path) -> None:
     assert (tmp_path / "trajectories.png").stat().st_size > 10_000
 
 
-def test_a_run_that_was_broken_off_before_it_flew_failed_for_that_reason_alone(tmp_path: Path) -> None:
-    tape = Tape(tmp_path)
-    _statuses(tape, Flight(), 1.0)
-    text = "run ended: nobody took off: pads: drone_1 stands on the pad of drone_2; all drones are on the ground"
-    tape.put(t.EVENT, m.Event(header=tape.header(2.0, m.RUN, "supervisor"), severity=m.Severity.ERROR, text=text))
-    tape.close()
-    report = judge(gather(tmp_path), tmp_path)
-    assert report.passed is False and report.reasons == (text.removeprefix(m.RUN_ENDED),)
-
-
 def test_a_recording_cut_in_flight_still_reports(tmp_path: Path) -> None:
     fly(tmp_path, Flight())
     path = tmp_path / "state.mcap"

@@ -1,5 +1,7 @@
 """The rules of the report one by one: what counts as tracking, as a switch, as late, as CPU."""
 
+from pathlib import Path
+
 import msgspec
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from groundstation.report import load, topology_use
 from groundstation.report.accuracy import accuracy
 from groundstation.report.criteria import criteria_of
 from groundstation.report.interval import tracking_interval
+from groundstation.report.judge import judge
 from groundstation.report.metrics import figures_of
 from groundstation.report.run_facts import RunFacts
 from groundstation.report.safety import all_airborne_s, fence_violation_m
@@ -186,3 +189,10 @@ def test_ellipse_holds_95_percent() -> None:
 @pytest.mark.parametrize(("counters", "percent"), [([1000, 5, 0, 0], 0.5), ([1000, 5, 200, 4], 2.0)])
 def test_a_simulator_is_as_late_as_the_worse_of_its_ticks_and_pictures(counters: list[int], percent: float) -> None:
     assert load.sim_overrun_percent(_data(sim_counters=np.array([counters], dtype=float))) == pytest.approx(percent)
+
+
+def test_a_run_that_was_broken_off_before_it_flew_failed_for_that_reason_alone(tmp_path: Path) -> None:
+    text = "run ended: nobody took off: drone_1 stands on the pad of drone_2; all drones are on the ground"
+    header = m.Header(0, "here", m.RUN, "supervisor", 0)
+    ended = TimedMessage(2.0, m.Event(header=header, severity=m.Severity.ERROR, text=text))
+    assert judge(_data(events=[ended]), tmp_path).reasons == (text.removeprefix(m.RUN_ENDED),)

@@ -26,9 +26,9 @@ const sentence = (words) => words ? `${words[0].toUpperCase()}${words.slice(1)}$
 
 function tracked(name, plan) {
   const relied = (plan.edges ?? []).filter(([, , information]) => information >= RELIED_ON);
-  const watched = relied.filter(([observer]) => observer === name).map(([, subject]) => subject);
   const watchers = seenBy(name);
   const targets = store.scene.targets.map((target) => target.name), sought = targets.filter(isLost);
+  const watched = relied.filter(([observer, subject]) => observer === name && !sought.includes(subject)).map(([, subject]) => subject);
   const limits = limitsOf(plan.controls.find(({ robot }) => robot === name));
   const [, who] = store.s.vehicles[name].detail.match(/^tracking for (.+)$/) ?? [];
   const task = sought.length ? `Looks for ${joined(sought)}` : `Tracks ${joined(targets)}${who ? `, ordered by ${who}` : ""}`;

@@ -144,7 +144,7 @@ function showBelief(name, { root, values, mode, detail, drone }) {
   for (const field of BELIEF) values[field]?.parentElement.classList.toggle("old", old);
   if (!drone) {
     const lost = age > store.scene.lost_after_s, [search, words] = trackerSilent() ? [] : store.s.estimate?.searches?.[name] ?? [];
-    text(mode, runOver() ? "run over" : trackerSilent() ? "unknown" : lost && body ? "lost" : search?.toLowerCase() ?? (!body ? "not found yet" : age > UNSEEN_S ? "not seen" : doing("TRACK").length ? "tracked" : "seen"));
+    text(mode, runOver() ? "run over" : trackerSilent() ? "unknown" : lost && body ? "lost" : search?.toLowerCase() ?? (!body ? (lost && Number.isFinite(age) ? "lost" : "not found yet") : age > UNSEEN_S ? "not seen" : doing("TRACK").length ? "tracked" : "seen"));
     mode.dataset.level = !body || trackerSilent() ? "wait" : lost ? "bad" : search ? "warn" : age > UNSEEN_S ? "warn" : "good";
     text(detail, withShortNames(words ?? beliefWords(body, age, lost)));
     root.classList.toggle("stale", estimateAge() > STALE_S || !store.connected);

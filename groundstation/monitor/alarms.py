@@ -136,7 +136,8 @@ def _lost(state: MonitorState) -> Iterator[Alarm]:
         if entity.name in state.cast.targets:
             advice = _SEARCH
         elif seen and seen.message.flight_state in AIRBORNE and seen.message.lands_in_s is None:
-            advice = "Nothing to do: it lands by itself if this lasts."
+            lands = seen.message.flight_state is FlightState.LANDING
+            advice = f"Nothing to do: it lands{'' if lands else ' by itself if this lasts'}."
         else:
             continue
         yield Alarm(f"{entity.name} lost", f"{entity.name} is lost: not seen for {entity.age_s:.0f} s", False, advice)

@@ -116,6 +116,9 @@ def test_a_drone_that_nobody_sees_is_lost_unless_its_landing_says_so(world: Worl
     world.vehicle("drone_1")
     world.estimate(drone_age_s=4.0)
     assert _alarms(world) == ["drone_1 is lost: not seen for 4 s"]
+    world.vehicle("drone_1", "LANDING", flight_state=m.FlightState.LANDING)
+    world.text()
+    assert [alarm.advice for alarm in alarms_of(world.state, NOW)] == ["Nothing to do: it lands."]
     world.vehicle("drone_1", detail="not seen by any camera for too long", lands_in_s=6.0)
     assert _alarms(world) == ["drone_1 lands in 6 s: not seen by any camera for too long"]
 

@@ -14,6 +14,7 @@ PROCESS_SILENT_S = 3.0
 CAMERA_SILENT_S = 2.0
 WEAK_LINK, BAD_LINK = 0.6, 0.3
 _EVENT_SHOWN_S = 8.0
+_SPEAKS_HZ = 5.0
 _TO_DO = "To do: "
 _BEFORE_FLIGHT = {
     Charge.LOW: "charge it before it flies again",
@@ -25,6 +26,7 @@ _SWITCHED_OFF = "Nothing to do now: switch it on before it flies again."
 _SEARCH = "Nothing to do: the drones in TRACK search for it."
 _RESTARTED = "Nothing to do: it is restarted if it hangs."
 _CALL = f"{_TO_DO}check its marker and the light; drive it into the middle of the room; or LAND ALL."
+_NOT_BELIEVED = ("what it says is not believed", "Nothing to do: it hovers, then lands. Check its sensors then.")
 _DOWN = {
     FlightState.EMERGENCY: (
         "EMERGENCY",
@@ -80,11 +82,17 @@ def _vehicles(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
         if stood_last(seen.message.flight_state, seen.message.mode):
             yield Alarm(f"{name} LOST", f"{name}: not heard any more, it stood until then", False, _SWITCHED_OFF)
         elif down := _DOWN.get(seen.message.flight_state):
-            words, advice = down
+            words, advice = _NOT_BELIEVED if _is_heard_in_vain(seen.message) else down
             yield Alarm(f"{name} {seen.message.flight_state}", f"{name}: {words}", advice=advice)
         up = flies(seen.message, state.take_offs.get(name))
         yield from _battery(name, seen.message.flight_state, up, battery_of(state, name))
         yield from _link(name, seen.message.link_quality)
+
+
+def _is_heard_in_vain(status: VehicleStatus) -> bool:
+    """Return whether a vehicle speaks, and its driver takes nothing of it: it is no better known than a silent one."""
+    lost = status.flight_state is FlightState.LOST and status.mode != "CONNECTING"
+    return lost and status.rate_hz >= _SPEAKS_HZ
 
 
 def _failsafe(name: str, status: VehicleStatus) -> Iterator[Alarm]:

@@ -42,11 +42,11 @@ class World:
     def vehicle(
         self, name: str, mode: str = "TRACK", battery: float | None = 0.8, age_s: float = 0.0, **more: Any
     ) -> None:
-        state = more.pop("flight_state", m.FlightState.FLYING)
+        state, rate_hz = more.pop("flight_state", m.FlightState.FLYING), more.pop("rate_hz", 199.7)
         header = self.header(name, age_s)
         self.say(
             t.VEHICLE_STATUS,
-            m.VehicleStatus(header=header, flight_state=state, mode=mode, battery=battery, rate_hz=199.7, **more),
+            m.VehicleStatus(header=header, flight_state=state, mode=mode, battery=battery, rate_hz=rate_hz, **more),
         )
 
     def estimate(

@@ -145,6 +145,19 @@ def test_a_camera_without_pictures_raises_an_alarm(world: World) -> None:
     assert _alarms(world) == ["ceiling: no pictures"]
 
 
+@pytest.mark.parametrize(
+    ("rate_hz", "words", "asks"),
+    [(0.0, "its driver no longer hears it", True), (199.7, "what it says is not believed", False)],
+)
+def test_a_drone_that_is_heard_and_not_believed_is_not_called_silent(
+    world: World, rate_hz: float, words: str, asks: bool
+) -> None:
+    world.vehicle("drone_1", "LANDING", flight_state=m.FlightState.LOST, rate_hz=rate_hz)
+    world.text()
+    (alarm,) = alarms_of(world.state, NOW)
+    assert (alarm.text, alarm.grave, alarm.asks) == (f"drone_1: {words}", True, asks)
+
+
 def test_each_alarm_says_first_whether_there_is_anything_to_do(world: World) -> None:
     world.vehicle("drone_1", battery=0.18, link_quality=0.5, detail="hovers: its velocity is stuck", braked=True)
     world.vehicle("drone_2", age_s=4.0, flight_state=m.FlightState.LOST)

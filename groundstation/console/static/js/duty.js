@@ -2,7 +2,7 @@
 
 import { joined } from "./dom.js";
 import { isLost } from "./glance.js";
-import { ageS, seenBy, store } from "./store.js";
+import { ageS, SEEN_S, seenBy, store, unseenS } from "./store.js";
 
 const FRESH_S = 1;
 // Information [1/m²] from which a plan relies on a link, as in the report's doubts.
@@ -33,7 +33,8 @@ function tracked(name, plan) {
   const [, who] = store.s.vehicles[name].detail.match(/^tracking for (.+)$/) ?? [];
   const task = sought.length ? `Looks for ${joined(sought)}` : `Tracks ${joined(targets)}${who ? `, ordered by ${who}` : ""}`;
   const does = watched.length ? `${task}: watches ${joined(watched)}` : sought.length ? task : `${task}: moves to where it will see it`;
-  const known = watchers.length ? `Seen by ${joined(watchers)}` : "Nobody sees it now";
+  // One that nobody sees may be known by whom it sees itself.
+  const known = watchers.length ? `Seen by ${joined(watchers)}` : unseenS(name) > SEEN_S ? "Nobody sees it now" : "Known by what it sees";
   return [`${does}.`, `${known}.`, limits && `Slowed by ${limits}.`].filter(Boolean).join(" ");
 }
 

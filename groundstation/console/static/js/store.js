@@ -106,7 +106,7 @@ export function unseenS(name) {
   const body = entity(name), pictures = (store.s.sightings ?? []).filter(([, subject]) => subject === name);
   return body ? body.age_s + estimateAge() : Math.min(...pictures.map(([, , at]) => ageS(at)), Infinity);
 }
-const SEEN_S = 1;
+export const SEEN_S = 1;
 const inSight = (name) => (store.s.sightings ?? []).filter(([, subject, at]) => subject === name && ageS(at) < SEEN_S);
 export const seenBy = (name) => inSight(name).map(([observer]) => observer);
 export const isSeen = (observer, subject) => inSight(subject).some(([one]) => one === observer);

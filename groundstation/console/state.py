@@ -275,7 +275,12 @@ def _event(seen: StampedMessage[m.Event]) -> dict[str, Any]:
 def _switch(switch: Switch | None) -> dict[str, Any] | None:
     if switch is None:
         return None
-    return {"at": switch.time_s * 1e3, "before": topology_words(switch.before), "reason": switch.reason}
+    return {
+        "at": switch.time_s * 1e3,
+        "before": topology_words(switch.before),
+        "now": topology_words(switch.after),
+        "reason": switch.reason,
+    }
 
 
 def _option(topology: str, cost_m2: float) -> dict[str, Any]:

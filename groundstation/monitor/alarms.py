@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from groundstation.bus.messages import AIRBORNE, FlightState, Lifecycle, Severity, VehicleStatus, stood_last
+from groundstation.field.drones import camera_name
 from groundstation.monitor.batteries import Battery, Charge, battery_of
 from groundstation.monitor.endurance import flies
 from groundstation.monitor.state import MonitorState
@@ -12,6 +13,7 @@ VEHICLE_SILENT_S = 1.0
 ESTIMATE_SILENT_S = 0.3
 PROCESS_SILENT_S = 3.0
 CAMERA_SILENT_S = 2.0
+DARK = 0.08  # of white, on average
 WEAK_LINK, BAD_LINK = 0.6, 0.3
 _EVENT_SHOWN_S = 8.0
 _SPEAKS_HZ = 5.0
@@ -22,8 +24,9 @@ _BEFORE_FLIGHT = {
     Charge.UNKNOWN: "until it is known it may not take off",
 }
 _AFTER_LANDING = "Nothing to do now: check its power and cable once all have landed."
+_DARK_ADVICE = "Nothing to do but light: who is not seen lands by itself."
 _SWITCHED_OFF = "Nothing to do now: switch it on before it flies again."
-_SEARCH = "Nothing to do: the drones in TRACK search for it."
+_SEARCH = "Nothing to do: the drones look for it."
 _RESTARTED = "Nothing to do: it is restarted if it hangs."
 _CALL = f"{_TO_DO}check its marker and the light; drive it into the middle of the room; or LAND ALL."
 _NOT_BELIEVED = ("what it says is not believed", "Nothing to do: it hovers, then lands. Check its sensors then.")
@@ -155,7 +158,7 @@ def _searched(state: MonitorState) -> Iterator[Alarm]:
     """Targets of which the belief holds no place any more, or none yet."""
     for search in state.estimate.message.searches if state.estimate else ():
         x, y = search.place_m
-        text = f"{search.target} is lost: searched for {search.since_s:.0f} s, now around ({x:.1f}, {y:.1f})"
+        text = f"{search.target} is lost: {search.since_s:.0f} s of search, now around ({x:.1f}, {y:.1f})"
         if search.mode == "LOST":
             text = f"{search.target} is not found: {search.searched:.0%} of the room was searched"
         yield Alarm(f"{search.target} lost", text, False, _CALL if search.mode == "LOST" else _SEARCH)
@@ -166,6 +169,14 @@ def _cameras(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
         if not seen.message.connected or seen.age_s(now_ns) > CAMERA_SILENT_S:
             why = f" ({seen.message.detail})" if seen.message.detail else ""
             yield Alarm(f"{name} pictures", f"{name}: no pictures{why}", False, _AFTER_LANDING)
+        elif (light := seen.message.brightness) is not None and light < DARK and not _stands_with(state, name):
+            yield Alarm(f"{name} dark", f"{name}: its picture is dark, it sees nobody", False, _DARK_ADVICE)
+
+
+def _stands_with(state: MonitorState, camera: str) -> bool:
+    """Return whether a camera is that of a drone on the floor, which may look into anything."""
+    carriers = (seen.message for drone, seen in state.vehicles.items() if camera_name(drone) == camera)
+    return any(carrier.flight_state not in AIRBORNE for carrier in carriers)
 
 
 def _processes(state: MonitorState, now_ns: int) -> Iterator[Alarm]:

@@ -7,6 +7,7 @@ from groundstation.bus.messages import UNHEARD, CameraStatus, FlightState, Vehic
 from groundstation.doctor.finding import Finding, Level
 from groundstation.field.drones import camera_name
 from groundstation.field.resolved import ResolvedField
+from groundstation.monitor.alarms import DARK
 
 # Drivers write the command that mends what they found behind it.
 _COMMAND = ": groundstation "
@@ -17,7 +18,7 @@ _PICTURES_HZ, _PICTURES_OLD_MS = 5.0, 700.0
 _DRIFT_PPM, _LATE_MS = 1000.0, 150.0
 # Mean grey values beyond which black or white is lost. Edges of emulated pictures are 2 to 4 px wide, and 4.5 to 7 px
 # after a blur of 2 px (1 sigma), which costs far sightings.
-_DARK, _BRIGHT, _BLURRED_PX = 0.08, 0.92, 5.5
+_BRIGHT, _BLURRED_PX = 0.92, 5.5
 
 
 def drone_findings(field: ResolvedField, statuses: Mapping[str, VehicleStatus]) -> Iterator[Finding]:
@@ -110,8 +111,8 @@ def camera_findings(
 def _picture(name: str, status: CameraStatus) -> Iterator[Finding]:
     """Yield what is wrong with exposure and focus of a camera's newest picture."""
     light, edge_px = status.brightness, status.edge_px
-    if light is not None and not _DARK <= light <= _BRIGHT:
-        too = "dark" if light < _DARK else "bright"
+    if light is not None and not DARK <= light <= _BRIGHT:
+        too = "dark" if light < DARK else "bright"
         yield Finding(Level.SHOULD, name, f"its picture is too {too} (mean {light:.0%} of white)",
                       "more light, or none into the lens; set its exposure")  # fmt: skip
     if edge_px is not None and edge_px > _BLURRED_PX:

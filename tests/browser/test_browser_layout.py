@@ -185,7 +185,7 @@ def test_each_drone_says_what_it_does_and_why(stage: Any) -> None:
     page = stage.open()
     duty = page.there("drone_1-duty")
     page.wait(lambda s: duty.inner_text().startswith("Tracks turtlebot, ordered by operator: watches turtlebot"))
-    assert "Seen by ceiling." in duty.inner_text()
+    assert "Itself seen by ceiling." in duty.inner_text()
     stage.flight.fenced = True
     page.wait(lambda s: "Slowed by the fence." in page.there("drone_2-duty").inner_text())
     stage.flight.detail["drone_1"] = "hovers: no telemetry from the vehicle"

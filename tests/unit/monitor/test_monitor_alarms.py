@@ -126,7 +126,7 @@ def test_a_drone_that_nobody_sees_is_lost_unless_its_landing_says_so(world: Worl
 @pytest.mark.parametrize(
     ("mode", "text", "asks"),
     [
-        ("SEARCH", "turtlebot is lost: searched for 5 s, now around (1.7, -0.9)", False),
+        ("SEARCH", "turtlebot is lost: 5 s of search, now around (1.7, -0.9)", False),
         ("LOST", "turtlebot is not found: 96% of the room was searched", True),
     ],
 )
@@ -143,6 +143,25 @@ def test_a_camera_without_pictures_raises_an_alarm(world: World) -> None:
     status = m.CameraStatus(header=header, connected=False, fps=0, age_ms=0, frames=0, skipped=0, detections=0)
     world.say(t.CAMERA_STATUS, status)
     assert _alarms(world) == ["ceiling: no pictures"]
+
+
+def test_a_dark_camera_is_an_alarm_unless_its_drone_stands(world: World) -> None:
+    world.vehicle("drone_1")
+    world.vehicle("drone_2", "LANDED", flight_state=m.FlightState.LANDED)
+    for camera, light in (("ceiling", 0.01), ("drone_1_camera", 0.06), ("drone_2_camera", 0.01), ("east", 0.4)):
+        status = m.CameraStatus(
+            header=world.header(camera),
+            connected=True,
+            fps=10,
+            age_ms=0,
+            frames=9,
+            skipped=0,
+            detections=0,
+            brightness=light,
+        )
+        world.say(t.CAMERA_STATUS, status)
+    dark = "its picture is dark, it sees nobody"
+    assert _alarms(world) == [f"ceiling: {dark}", f"drone_1_camera: {dark}"]
 
 
 @pytest.mark.parametrize(

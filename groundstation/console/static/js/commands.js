@@ -103,7 +103,8 @@ function showStarts(why) {
   for (const [id, verb] of [["takeoff", "TAKEOFF"], ["track", "TRACK"], ["resume", "RESUME"]]) {
     const button = byId(id), reason = why ?? startRefusal(verb), caption = button.querySelector("small");
     caption.dataset.caption ??= caption.textContent;
-    text(caption, reason?.[0] ?? caption.dataset.caption);
+    const one = verb === "TAKEOFF" && modes().length - aloft() === 1;
+    text(caption, reason?.[0] ?? (one ? "from the floor" : caption.dataset.caption));
     enable(button, reason);
   }
   for (const node of document.querySelectorAll("[data-takeoff]")) enable(node, why ?? startRefusal("TAKEOFF", [node.dataset.takeoff]));

@@ -2,6 +2,7 @@
 
 import { joined } from "./dom.js";
 import { isLost } from "./glance.js";
+import { me } from "./link.js";
 import { ageS, SEEN_S, seenBy, store, unseenS } from "./store.js";
 
 const FRESH_S = 1;
@@ -31,21 +32,31 @@ function tracked(name, plan) {
   const watched = relied.filter(([observer, subject]) => observer === name && !sought.includes(subject)).map(([, subject]) => subject);
   const limits = limitsOf(plan.controls.find(({ robot }) => robot === name));
   const [, who] = store.s.vehicles[name].detail.match(/^tracking for (.+)$/) ?? [];
-  const task = sought.length ? `Looks for ${joined(sought)}` : `Tracks ${joined(targets)}${who ? `, ordered by ${who}` : ""}`;
+  const task = sought.length ? `Looks for ${joined(sought)}` : `Tracks ${joined(targets)}${who ? `, ordered by ${orderedBy(who, name, ...VERBS.tracking)}` : ""}`;
   const does = watched.length ? `${task}: watches ${joined(watched)}` : sought.length ? task : `${task}: moves to where it will see it`;
   // One that nobody sees may be known by whom it sees itself.
-  const known = watchers.length ? `Seen by ${joined(watchers)}` : unseenS(name) > SEEN_S ? "Nobody sees it now" : "Known by what it sees";
+  const unseen = unseenS(name) > SEEN_S ? `Nobody sees ${name} now` : `Nobody sees ${name}, known by what it sees`;
+  const known = watchers.length ? `Itself seen by ${joined(watchers)}` : unseen;
   return [`${does}.`, `${known}.`, limits && `Slowed by ${limits}.`].filter(Boolean).join(" ");
 }
 
 const ORDERS = /^(landing|taking off|held|tracking) (?:for|by) (.+)$/;
 const ORDERED = { landing: "lands:", "taking off": "takes off:", held: "hovers in place: HOLD", tracking: "tracks:" };
 
+// Drivers name the program that an order came from; of a page's it is known who gave the last one of its kind.
+function orderedBy(who, name, ...verbs) {
+  const own = (store.s.orders ?? []).find((order) => verbs.includes(order.verb) && order.rows.some((row) => row.name === name));
+  return who !== "console" ? who : own?.by === me.name ? "you" : own?.by ?? "a page";
+}
+
+const VERBS = { landing: ["LAND"], "taking off": ["TAKEOFF"], held: ["HOLD"], tracking: ["TRACK", "RESUME"] };
+const by = (doing, who, name) => `ordered by ${orderedBy(who, name, ...VERBS[doing])}`;
+
 // The driver's own reason; what it is the reason for, where it does not say so, and who ordered what "landing for" says.
-function reasonOf({ mode, detail, lands_in_s }) {
-  if (mode === "LANDED" || mode === "CUT") return standing(detail);
+function reasonOf(name, { mode, detail, lands_in_s }) {
+  if (mode === "LANDED" || mode === "CUT") return standing(name, detail);
   const [, doing, who] = detail.match(ORDERS) ?? [];
-  if (who) return `${ORDERED[doing]} ordered by ${who}`;
+  if (who) return `${ORDERED[doing]} ${by(doing, who, name)}`;
   if (mode === "LANDING" && detail && !detail.startsWith("land")) return `lands: ${detail}`;
   return mode === "HOVER" ? hovering(detail, lands_in_s) : detail;
 }
@@ -57,9 +68,9 @@ function hovering(detail, landsInS) {
 }
 
 // Why it landed stands in brackets in its driver's words.
-function standing(detail) {
-  const [, why] = detail.match(/^landed \((.+)\)$/) ?? [], [, , who] = why?.match(ORDERS) ?? [];
-  return why ? `stands, motors off. It landed: ${who ? `ordered by ${who}` : why}` : `stands with its motors off${detail && `: ${detail}`}`;
+function standing(name, detail) {
+  const [, why] = detail.match(/^landed \((.+)\)$/) ?? [], [, doing, who] = why?.match(ORDERS) ?? [];
+  return why ? `stands, motors off. It landed: ${who ? by(doing, who, name) : why}` : `stands with its motors off${detail && `: ${detail}`}`;
 }
 
 // In TRACK what the plan has it do, unless its driver knows better; else the driver's own reason.
@@ -68,7 +79,7 @@ export function dutyOf(name) {
   if (!status) return "";
   const planned = status.mode === "TRACK" && !status.braked && status.lands_in_s === null && status.flight !== "LOST" && plan && ageS(plan.at) < FRESH_S;
   const goesOn = status.mode === "TRACK" && !status.braked && status.lands_in_s !== null ? "Follows its plan still. " : "";
-  return planned ? tracked(name, plan) : goesOn + sentence(reasonOf(status));
+  return planned ? tracked(name, plan) : goesOn + sentence(reasonOf(name, status));
 }
 
 // In how many seconds a failsafe will land it, if nothing changes; "" if none is near.

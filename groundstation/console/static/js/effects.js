@@ -1,6 +1,6 @@
 // What a start or a stop would do now.
 
-import { ALOFT, aloft, lostTarget, modeNow, modes } from "./glance.js";
+import { ALOFT, aloft, lostTarget, modeNow, modes, waits } from "./glance.js";
 import { droneNames, store, trackerSilent } from "./store.js";
 
 // Why a start would be refused or do nothing now; "" if it would not. Stops are never withheld while a run goes on.
@@ -24,7 +24,7 @@ function takeOffRefusal(standing) {
 
 // After an order or a failsafe a drone hovers until RESUME; after its take-off until TRACK. RESUME lets both go on.
 function needResume(names) {
-  return names.map((name) => store.s.vehicles?.[name]).some((status) => status?.mode === "HOLD" || (status?.mode === "HOVER" && status.detail.includes("RESUME")));
+  return names.map((name) => store.s.vehicles?.[name]).some((status) => status?.mode === "HOLD" || (status?.mode === "HOVER" && waits(status.detail)));
 }
 
 const SHORT = 8; // letters of a name that has room on a button

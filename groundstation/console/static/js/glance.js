@@ -56,12 +56,20 @@ export function stage() {
   if (runOver()) return "over";
   if (all.includes("LANDING") && !all.some((mode) => ALOFT.has(mode) && mode !== "LANDING")) return "land";
   if (all.includes("TAKING_OFF")) return "take-off";
-  if (all.includes("HOVER") && !all.includes("TRACK")) return all.includes("LANDED") ? "take-off" : "form";
+  if (statuses().some(forms) && !all.includes("TRACK")) return all.includes("LANDED") ? "take-off" : "form";
   return aloft() ? "track" : store.s.flight?.flown ? "land" : "pre-flight";
 }
 
-// What a stage is called now: who has lost the target searches for it.
-export const stageWord = (name) => (name === "track" && stage() === "track" && doing("TRACK").length && lostTarget() ? "search" : name);
+const forms = ({ mode, detail }) => mode === "HOVER" && !waits(detail);
+// After an order or a failsafe a drone hovers until RESUME.
+export const waits = (detail) => detail.includes("RESUME");
+
+// What a stage is called now: who has lost the target searches for it, and nobody may be left who follows it.
+export function stageWord(name) {
+  if (name !== "track" || stage() !== "track") return name;
+  if (doing("TRACK").length) return lostTarget() ? "search" : name;
+  return doing("HOLD").length ? "hold" : doing("HOVER").length ? "hover" : name;
+}
 
 // NaN once the run is over: nothing gets older any more.
 export const oldestS = () => runOver() ? NaN : Math.max(estimateAge(), ...droneNames().map((name) => ageS(store.s.vehicles?.[name]?.at)));

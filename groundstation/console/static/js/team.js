@@ -8,7 +8,7 @@ import { aloft, doing, modeOf, modeWord } from "./glance.js";
 import { withShortNames } from "./names.js";
 import { give } from "./own_orders.js";
 import { colourOf } from "./palette.js";
-import { ageS, entity, estimateAge, runOver, seenBy, store, trackerSilent, unseenS } from "./store.js";
+import { ageS, entity, estimateAge, runOver, SEEN_S, seenBy, store, trackerSilent, unseenS } from "./store.js";
 
 const STALE_S = 1;
 const LONGEST_CAPTION = 9; // letters of a name that the column of its buttons has room for
@@ -124,14 +124,13 @@ function showBattery(node, status) {
   node.replaceChildren(...(known ? [el("span", { class: "battery" }, fill)] : []), words);
 }
 
-const UNSEEN_S = 0.6; // a target may then be hidden, or be elsewhere
 
 function beliefWords(body, age, lost) {
   if (runOver()) return "The run is over.";
   if (trackerSilent()) return "Where it is now is not known: the tracker is silent.";
   if (!body) return "";
   if (lost) return `Lost: nobody has seen it for ${seconds(age)}. ${doing("TRACK").length ? `${joined(doing("TRACK"))} ${doing("TRACK").length > 1 ? "look" : "looks"} for it.` : ""}`.trim();
-  if (age > UNSEEN_S) return `Not seen for ${seconds(age)}: it may be hidden near (${body.mean.slice(0, 2).map((value) => value.toFixed(1)).join(", ")}).`;
+  if (age > SEEN_S) return `Not seen for ${seconds(age)}: it may be hidden near (${body.mean.slice(0, 2).map((value) => value.toFixed(1)).join(", ")}).`;
   return doing("TRACK").length ? "Seen: the team tracks it." : aloft() ? "Seen; nobody follows it now." : "Seen.";
 }
 
@@ -144,8 +143,8 @@ function showBelief(name, { root, values, mode, detail, drone }) {
   for (const field of BELIEF) values[field]?.parentElement.classList.toggle("old", old);
   if (!drone) {
     const lost = age > store.scene.lost_after_s, [search, words] = trackerSilent() ? [] : store.s.estimate?.searches?.[name] ?? [];
-    text(mode, runOver() ? "run over" : trackerSilent() ? "unknown" : lost && body ? "lost" : search?.toLowerCase() ?? (!body ? (lost && Number.isFinite(age) ? "lost" : "not found yet") : age > UNSEEN_S ? "not seen" : doing("TRACK").length ? "tracked" : "seen"));
-    mode.dataset.level = !body || trackerSilent() ? "wait" : lost ? "bad" : search ? "warn" : age > UNSEEN_S ? "warn" : "good";
+    text(mode, runOver() ? "run over" : trackerSilent() ? "unknown" : lost && body ? "lost" : search?.toLowerCase() ?? (!body ? (lost && Number.isFinite(age) ? "lost" : "not found yet") : age > SEEN_S ? "not seen" : doing("TRACK").length ? "tracked" : "seen"));
+    mode.dataset.level = !body || trackerSilent() ? "wait" : lost ? "bad" : search ? "warn" : age > SEEN_S ? "warn" : "good";
     text(detail, withShortNames(words ?? beliefWords(body, age, lost)));
     root.classList.toggle("stale", estimateAge() > STALE_S || !store.connected);
   }

@@ -257,7 +257,7 @@ class Tracker:
         """Plan on the belief and adopt the plan; None when planning failed and the last plan stays."""
         request = self.request()
         try:
-            plan = self.planner.plan(*request.scene, should_stop, max_evaluations, request.held)
+            plan = request.put_to(self.planner, should_stop, max_evaluations)
         except EstimatorFault as fault:
             self._fault(str(fault))
             return None

@@ -275,12 +275,8 @@ def _event(seen: StampedMessage[m.Event]) -> dict[str, Any]:
 def _switch(switch: Switch | None) -> dict[str, Any] | None:
     if switch is None:
         return None
-    return {
-        "at": switch.time_s * 1e3,
-        "before": topology_words(switch.before),
-        "now": topology_words(switch.after),
-        "reason": switch.reason,
-    }
+    before, now = topology_words(switch.before), topology_words(switch.after)
+    return {"at": switch.time_s * 1e3, "before": before, "now": now, "reason": switch.reason}
 
 
 def _option(topology: str, cost_m2: float) -> dict[str, Any]:

@@ -3,6 +3,8 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from inspect import signature
+from typing import Any
 
 import numpy as np
 
@@ -28,10 +30,13 @@ class PlanRequest:
     warm_start: Mapping[str, Array]
     held: frozenset[str] = frozenset()
 
-    @property
-    def scene(self) -> tuple[JointBelief, Topology, Mapping[str, Array]]:
-        """Return belief, topology and warm start."""
-        return self.belief, self.topology, self.warm_start
+    def put_to(self, planner: Any, should_stop: Callable[[], bool], max_evaluations: int | None = None) -> "PlanResult":
+        """Return what a planner answers: `Planner`, or one of another package, which need not take `held`."""
+        takes_held = "held" in signature(planner.plan).parameters
+        more = {"held": self.held} if takes_held else {}
+        scene = self.belief, self.topology, self.warm_start
+        answer: PlanResult = planner.plan(*scene, should_stop, max_evaluations, **more)
+        return answer
 
 
 @dataclass(frozen=True, slots=True)

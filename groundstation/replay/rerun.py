@@ -97,7 +97,7 @@ class JournalWorker:
         (tick, request), self._pending = self._pending, None
         budget = entry.evaluations if entry.stop_reason == STOPPED else None
         try:
-            plan = self._planner.plan(*request.scene, lambda: False, budget, request.held)
+            plan = request.put_to(self._planner, lambda: False, budget)
         except EstimatorFault:
             return Adoption(tick, None)
         except Exception:  # noqa: BLE001 - as in flight (PlanWorker): what was flown through can be replayed

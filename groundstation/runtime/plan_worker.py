@@ -77,7 +77,7 @@ class PlanWorker:
         began = self._clock()
         budget = TimeBudget(self._budget_s, self._clock)
         try:
-            plan = self._planner.plan(*request.scene, budget.must_stop, held=request.held)
+            plan = request.put_to(self._planner, budget.must_stop)
         except EstimatorFault as fault:
             _log.error("planning failed: %s", fault)
             return Adoption(tick, None)

@@ -61,7 +61,7 @@ class Worker:
         return self._done is None
 
     def submit(self, tick: int, request: PlanRequest) -> None:
-        plan = self._planner.plan(*request.scene, lambda: False, _EVALUATIONS, request.held)
+        plan = request.put_to(self._planner, lambda: False, _EVALUATIONS)
         self._done = (self._polls + _PLANNING_TICKS, Adoption(tick, plan))
 
     def poll(self) -> Adoption | None:

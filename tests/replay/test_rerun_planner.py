@@ -1,6 +1,5 @@
 """A planner that crashes: a flight survives it, and so does its replay."""
 
-from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
@@ -23,7 +22,7 @@ class Crashing:
 @pytest.mark.parametrize("error", [IndexError("index 3 is out of bounds"), EstimatorFault("no distribution")])
 def test_a_planner_that_crashed_in_flight_crashes_alike_in_a_replay(error: Exception) -> None:
     worker = JournalWorker(cast(Planner, Crashing(error)))
-    worker.submit(7, cast(PlanRequest, SimpleNamespace(belief=None, topology=None, warm_start=None)))
+    worker.submit(7, PlanRequest(cast(Any, None), cast(Any, None), {}))
     header = Header(1, "here", "team", "tracker", 1)
     worker.entry = JournalEntry(header=header, tick=9, now_ns=1, ingested=(), plan_tick=7, stop_reason=FAULT)
     assert worker.poll() == Adoption(7, None) and worker.idle

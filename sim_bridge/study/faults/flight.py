@@ -91,7 +91,7 @@ class InlineWorker:
     def submit(self, tick: int, request: PlanRequest) -> None:
         """Plan."""
         try:
-            plan = self._planner.plan(*request.scene, lambda: False, held=request.held)
+            plan = request.put_to(self._planner, lambda: False)
         except EstimatorFault:
             self._done = Adoption(tick, None)
             return

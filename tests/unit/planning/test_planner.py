@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from groundstation.errors import EstimatorFault
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, StateLayout
 from groundstation.planning.parameters import PlannerParameters, parameters_from_field
-from groundstation.planning.planner import Planner, PlanResult, choose
+from groundstation.planning.planner import Planner, PlanRequest, PlanResult, choose
 from groundstation.sensing.from_field import sensors_from_field
 from groundstation.sensing.models import SensorSuite
 from groundstation.sensing.topology import Topology
@@ -70,6 +71,20 @@ def test_heights_are_chosen_between_the_lowest_and_the_highest() -> None:
     near, far = plan(NEAR, FLAT), plan(FAR, STRING)
     assert all(low <= height <= high for result in (near, far) for height in result.heights.values())
     assert max(near.heights.values()) < low + 0.15
+
+
+class OfAnotherPackage:
+    """Plans as `Planner`s did before they were told who is held."""
+
+    def plan(self, at: JointBelief, current: Topology, *_: Any) -> PlanResult:
+        return plan(at, current)
+
+
+def test_a_planner_of_another_package_need_not_ask_who_is_held() -> None:
+    request = PlanRequest(NEAR, FLAT, {}, frozenset({"drone_2"}))
+    told = request.put_to(Planner(PARAMETERS, SENSORS), lambda: False)
+    untold = request.put_to(OfAnotherPackage(), lambda: False)
+    assert told.cost > untold.cost == plan(NEAR, FLAT).cost
 
 
 def test_one_that_follows_no_plan_stays_where_it_is_and_still_looks() -> None:

@@ -65,9 +65,9 @@ def alarms_of(state: MonitorState, now_ns: int) -> list[Alarm]:
     alarms = [
         *_vehicles(state, now_ns),
         *_tracker(state, now_ns),
+        *_cameras(state, now_ns),
         *_lost(state),
         *_searched(state),
-        *_cameras(state, now_ns),
         *_processes(state, now_ns),
         *_events(state, now_ns),
         *_suspected(state),

@@ -29,7 +29,6 @@ _SWITCHED_OFF = "Nothing to do now: switch it on before it flies again."
 _SEARCH = "Nothing to do: the drones look for it."
 _RESTARTED = "Nothing to do: it is restarted if it hangs."
 _CALL = f"{_TO_DO}check its marker and the light; drive it into the middle of the room; or LAND ALL."
-_NOT_BELIEVED = ("what it says is not believed", "Nothing to do: it hovers, then lands. Check its sensors then.")
 _DOWN = {
     FlightState.EMERGENCY: (
         "EMERGENCY",
@@ -85,10 +84,10 @@ def _vehicles(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
         if stood_last(seen.message.flight_state, seen.message.mode):
             yield Alarm(f"{name} LOST", f"{name}: not heard any more, it stood until then", False, _SWITCHED_OFF)
         elif down := _DOWN.get(seen.message.flight_state):
-            words, advice = _NOT_BELIEVED if _is_heard_in_vain(seen.message) else down
+            words, advice = _not_believed(seen.message) if _is_heard_in_vain(seen.message) else down
             yield Alarm(f"{name} {seen.message.flight_state}", f"{name}: {words}", advice=advice)
         up = flies(seen.message, state.take_offs.get(name))
-        yield from _battery(name, seen.message.flight_state, up, battery_of(state, name))
+        yield from _battery(name, seen.message, up, battery_of(state, name))
         yield from _link(name, seen.message.link_quality)
 
 
@@ -96,6 +95,16 @@ def _is_heard_in_vain(status: VehicleStatus) -> bool:
     """Return whether a vehicle speaks, and its driver takes nothing of it: it is no better known than a silent one."""
     lost = status.flight_state is FlightState.LOST and status.mode != "CONNECTING"
     return lost and status.rate_hz >= _SPEAKS_HZ
+
+
+def _not_believed(status: VehicleStatus) -> tuple[str, str]:
+    does = "it lands" if _lands(status) else "it hovers, then lands"
+    return "what it says is not believed", f"Nothing to do: {does}. Check its sensors then."
+
+
+def _lands(status: VehicleStatus) -> bool:
+    """Return whether it lands, or was just told to."""
+    return status.flight_state is FlightState.LANDING or status.mode == "LANDING"
 
 
 def _failsafe(name: str, status: VehicleStatus) -> Iterator[Alarm]:
@@ -108,11 +117,11 @@ def _failsafe(name: str, status: VehicleStatus) -> Iterator[Alarm]:
         yield Alarm(f"{name} braked", f"{name} {status.detail}", False, advice)
 
 
-def _battery(name: str, flight: FlightState, up: bool, battery: Battery) -> Iterator[Alarm]:
-    if battery.charge is Charge.GOOD or (battery.level is None and flight is FlightState.UNKNOWN):
+def _battery(name: str, status: VehicleStatus, up: bool, battery: Battery) -> Iterator[Alarm]:
+    if battery.charge is Charge.GOOD or (battery.level is None and status.flight_state is FlightState.UNKNOWN):
         return
     about, held, lands = f"{name} battery", f"{name}: {battery.words}", f"it lands by itself at {battery.limit:.0%}"
-    if flight is FlightState.LANDING:
+    if _lands(status):
         yield Alarm(about, f"{held}, it lands", False, "Nothing to do.")
     elif not up:
         yield Alarm(about, held, False, f"Nothing to do now: {_BEFORE_FLIGHT[battery.charge]}.")
@@ -147,8 +156,7 @@ def _lost(state: MonitorState) -> Iterator[Alarm]:
         if entity.name in state.cast.targets:
             advice = _SEARCH
         elif seen and seen.message.flight_state in AIRBORNE and seen.message.lands_in_s is None:
-            lands = seen.message.flight_state is FlightState.LANDING
-            advice = f"Nothing to do: it lands{'' if lands else ' by itself if this lasts'}."
+            advice = f"Nothing to do: it lands{'' if _lands(seen.message) else ' by itself if this lasts'}."
         else:
             continue
         yield Alarm(f"{entity.name} lost", f"{entity.name} is lost: not seen for {entity.age_s:.0f} s", False, advice)

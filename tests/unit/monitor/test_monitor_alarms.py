@@ -77,8 +77,13 @@ def test_an_unknown_battery_is_an_alarm_once_the_vehicle_speaks(world: World) ->
     assert _alarms(world) == ["drone_2: battery unknown"]
 
 
-def test_a_low_battery_that_lands_its_drone_is_no_grave_alarm_any_more(world: World) -> None:
-    world.vehicle("drone_1", battery=0.13, flight_state=m.FlightState.LANDING)
+@pytest.mark.parametrize(
+    ("mode", "state"), [("TRACK", m.FlightState.LANDING), ("LANDING", m.FlightState.FLYING)]
+)  # told to land, it says a moment later that it does
+def test_a_low_battery_that_lands_its_drone_is_no_grave_alarm_any_more(
+    world: World, mode: str, state: m.FlightState
+) -> None:
+    world.vehicle("drone_1", mode, battery=0.13, flight_state=state)
     world.text()
     (alarm,) = alarms_of(world.state, NOW)
     assert alarm.text == "drone_1: battery 13%, it lands" and not alarm.grave

@@ -24,7 +24,7 @@ export function showBar() {
   show("air-time", airborne === null || replaying() ? "–" : `${Math.floor(airborne / 60)}:${String(Math.floor(airborne % 60)).padStart(2, "0")}`);
   const battery = worstBattery();
   show("worst-battery", battery ? withShortNames(`${battery.words} ${battery.name}`) : "–", battery?.level);
-  text(byId("battery-lasts"), battery?.lasts ? `worst battery, ${battery.lasts}` : "worst battery");
+  text(byId("battery-lasts"), battery?.title ?? "worst battery");
   const oldest = oldestS();
   show("worst-age", Number.isFinite(oldest) ? seconds(oldest) : "–", Number.isNaN(oldest) ? "calm" : oldest > TOO_OLD_S ? "bad" : oldest > OLD_S ? "warn" : "good");
   show("recording", ...(replaying() ? ["–", ""] : recording()));

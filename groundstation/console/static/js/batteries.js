@@ -13,7 +13,7 @@ export function lastsWords({ battery, good_for: time, battery_min: limit }) {
 
 const share = ({ battery }) => (battery === null ? "unknown" : `${(100 * battery).toFixed(0)} %`);
 
-// The battery that is nearest to its end, of the drones that were heard, and fly if any does: {name, words, level, lasts};
+// The battery that is nearest to its end, of the drones that were heard, and fly if any does: {name, words, level, title};
 // null where none was.
 export function worstBattery() {
   const up = droneNames().filter((name) => ALOFT.has(modeNow(name)));
@@ -21,7 +21,8 @@ export function worstBattery() {
   if (!all.length) return null;
   const [[name, status]] = all.sort(([, a], [, b]) => RANKS.indexOf(a.charge) - RANKS.indexOf(b.charge)
     || (a.minutes ?? Infinity) - (b.minutes ?? Infinity) || a.battery - b.battery);
-  return { name, words: share(status), level: LEVELS[status.charge], lasts: lastsWords(status) };
+  const what = up.length && up.length < droneNames().length ? "worst in the air" : "worst battery", lasts = lastsWords(status);
+  return { name, words: share(status), level: LEVELS[status.charge], title: lasts ? `${what}, ${lasts}` : what };
 }
 
 const SCARCE = 0.15; // above its limit; else it is the time that is short

@@ -14,8 +14,8 @@ from groundstation.bus.notice import Notice
 from groundstation.time_units import NS_PER_S
 
 _MIRRORED_MARGIN, _MIRRORED_TIMES = 2.0, 5
-# A code that nobody has is read so often, and for so long, before it is told: a code is misread now and then.
-_FOREIGN_TIMES, _FOREIGN_NS = 4, 3 * NS_PER_S
+# A code that nobody has is read so often before it is told, in no less and no more time: one is misread now and then.
+_FOREIGN_TIMES, _FOREIGN_NS, _MISREAD_NS = 4, 3 * NS_PER_S, 30 * NS_PER_S
 
 
 class MarkerFaults:
@@ -63,6 +63,8 @@ class MarkerFaults:
     def foreign(self, code: int, stamp_ns: int, expected: Iterable[MarkerSettings]) -> None:
         """Take in that a board carries a code that the field gives to nobody; it may be that of one never seen."""
         first_ns, times = self._foreign.get(code, (stamp_ns, 0))
+        if stamp_ns - first_ns > _MISREAD_NS:
+            first_ns, times = stamp_ns, 0
         self._foreign[code] = (first_ns, times + 1)
         if times + 1 < _FOREIGN_TIMES or stamp_ns - first_ns < _FOREIGN_NS:
             return

@@ -7,7 +7,6 @@ import pytest
 
 from drivers.camera import pose
 from drivers.camera.convert import stabilized_from_optical
-from drivers.camera.faults import MarkerFaults
 from drivers.camera.pipeline import Pipeline
 from drivers.camera.prediction import Foresight
 from drivers.camera.settings import DetectorSettings, MarkerKind, MarkerSettings, MountSettings
@@ -297,13 +296,6 @@ def test_a_marker_that_the_field_gives_to_nobody_is_named(others, told):
     if told:
         assert texts[0].startswith("marker 9 is in view, which the field gives to nobody: if it is that of bot (")
         assert "drone_2" not in texts[0]
-
-
-def test_a_code_that_is_misread_now_and_then_is_not_taken_for_a_marker():
-    faults = MarkerFaults()
-    for minute in range(20):
-        faults.foreign(9, 60 * minute * 10**9, MARKERS)
-    assert not faults.take()
 
 
 @pytest.mark.parametrize(("square_mm", "told"), [(44.0, False), (36.0, True)])

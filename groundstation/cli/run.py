@@ -112,14 +112,14 @@ def run_real(
     from groundstation.flight.composition import fly_endpoint
     from groundstation.flight.flight_plan import plan_of
     from groundstation.report.run_facts import RunFacts
-    from groundstation.settings.cautions import OF_A_FIELD, OF_THIS_COMPUTER
+    from groundstation.settings.cautions import ALL
     from groundstation.settings.files import find_field
     from groundstation.settings.load import load_field
     from groundstation.supervisor.network import require_free
 
     path = find_field(field)
     loaded = load_field(path, options)
-    plan = plan_of(loaded, None, asks=not look_only, checks=(*OF_A_FIELD, *OF_THIS_COMPUTER))
+    plan = plan_of(loaded, None, asks=not look_only, checks=ALL)
     plan = replace(plan, anyway=anyway, look_only=look_only)
     require_free(fly_endpoint(loaded))
     return _run(path, loaded, plan, RunFacts(mode=mode, field=str(path)), headless=headless)

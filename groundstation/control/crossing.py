@@ -11,6 +11,7 @@ from groundstation.sensing.models import Rectangle
 
 RUN_UP_M = 0.3  # before the border: a vehicle needs so far to come to speed
 _INSET_M = 0.1  # behind the border it is seen for certain
+HOLD_GAIN = 1.0  # of the way to the border [1/s]
 _GAIN = 3.0  # of the way that is left into the view [1/s]: a velocity's error carries it out of a weaker hold
 _STANDS_M_S = 1e-3
 _ASIDE_M_S = 0.3  # along the gap, while it crosses: as much as the limit of speed leaves
@@ -76,7 +77,7 @@ def gap_about_m(place: Array, views: Sequence[Rectangle]) -> float:
 
 def hold(view: Rectangle, place: Array, velocity: Array, most: float) -> Array:
     """Return the part of a velocity (2) [m/s] with which who is in a view stays there, at most so fast inwards."""
-    low, high = (np.array(side) - place for side in np.transpose((view.x_m, view.y_m)))
+    low, high = (HOLD_GAIN * (side - place) for side in np.transpose((view.x_m, view.y_m)))
     return np.asarray(np.clip(velocity, np.minimum(low, most), np.maximum(high, -most)))
 
 

@@ -7,13 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.arrays import Array
+from groundstation.control.crossing import HOLD_GAIN, hold
 from groundstation.control.parameters import ControlParameters
 from groundstation.control.view import VIEW_INSET_M, spread_m, view_of, way_back_m
 from groundstation.estimation.belief import JointBelief
 from groundstation.sensing.models import Rectangle, SensorSuite
 
 # Of the way that is left to the border of where a robot may be [1/s]; and of the way back of one that has no time.
-_HOLD_GAIN, _BACK_GAIN = 1.0, 3.0
+_BACK_GAIN = 3.0
 
 
 @dataclass
@@ -73,7 +74,7 @@ def within_reach(
     reach_m = p.return_speed_m_s * max(0.0, left_s - p.return_margin_s)
     low, high = np.transpose((view.x_m, view.y_m))
     most, drift = p.return_speed_m_s, np.clip(drift_m_s, -p.return_drift_m_s, p.return_drift_m_s)
-    gain = _HOLD_GAIN if math.isfinite(error_m_s) else _BACK_GAIN
+    gain = HOLD_GAIN if math.isfinite(error_m_s) else _BACK_GAIN
     slowest = np.clip(gain * (low - reach_m - mean[:2]), -most, most) - drift
     fastest = np.clip(gain * (high + reach_m - mean[:2]), -most, most) - drift
     return np.asarray(np.clip(velocity, slowest, fastest))
@@ -91,9 +92,7 @@ def within_views(
     place, box = belief.mean_of(name)[:2], box_about_views(name, belief, sensors, height_m)
     if box is None:
         return velocity
-    most = parameters.return_speed_m_s
-    low, high = (_HOLD_GAIN * (border - place) for border in np.transpose((box.x_m, box.y_m)))
-    return np.asarray(np.clip(velocity, np.minimum(low, most), np.maximum(high, -most)))
+    return hold(box, place, velocity, parameters.return_speed_m_s)
 
 
 def box_about_views(name: str, belief: JointBelief, sensors: SensorSuite, height_m: float) -> Rectangle | None:

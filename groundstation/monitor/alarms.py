@@ -3,7 +3,15 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from groundstation.bus.messages import AIRBORNE, FlightState, Lifecycle, Severity, VehicleStatus, stood_last
+from groundstation.bus.messages import (
+    AIRBORNE,
+    FlightState,
+    Lifecycle,
+    Severity,
+    TargetSearch,
+    VehicleStatus,
+    stood_last,
+)
 from groundstation.field.drones import camera_name
 from groundstation.monitor.batteries import Battery, Charge, battery_of
 from groundstation.monitor.endurance import flies
@@ -66,7 +74,6 @@ def alarms_of(state: MonitorState, now_ns: int) -> list[Alarm]:
         *_tracker(state, now_ns),
         *_cameras(state, now_ns),
         *_lost(state),
-        *_searched(state),
         *_processes(state, now_ns),
         *_events(state, now_ns),
         *_suspected(state),
@@ -149,9 +156,13 @@ def _tracker(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
 
 def _lost(state: MonitorState) -> Iterator[Alarm]:
     """Who should be seen and is not; of a drone that lands for it, that alarm tells."""
-    entities = state.estimate.message.entities if state.estimate else ()
-    searched = {search.target for search in state.estimate.message.searches} if state.estimate else set()
-    for entity in (one for one in entities if one.age_s > state.cast.lost_after_s and one.name not in searched):
+    if state.estimate is None:
+        return
+    estimate = state.estimate.message
+    searched = {search.target for search in estimate.searches}
+    for entity in estimate.entities:
+        if entity.age_s <= state.cast.lost_after_s or entity.name in searched:
+            continue
         seen = state.vehicles.get(entity.name)
         if entity.name in state.cast.targets:
             advice = _SEARCH
@@ -160,16 +171,18 @@ def _lost(state: MonitorState) -> Iterator[Alarm]:
         else:
             continue
         yield Alarm(f"{entity.name} lost", f"{entity.name} is lost: not seen for {entity.age_s:.0f} s", False, advice)
+    yield from map(_searched, estimate.searches)
 
 
-def _searched(state: MonitorState) -> Iterator[Alarm]:
-    """Targets of which the belief holds no place any more, or none yet."""
-    for search in state.estimate.message.searches if state.estimate else ():
-        x, y = search.place_m
-        text = f"{search.target} is lost: {search.since_s:.0f} s of search, now around ({x:.1f}, {y:.1f})"
-        if search.mode == "LOST":
-            text = f"{search.target} is not found: {search.searched:.0%} of the room was searched"
-        yield Alarm(f"{search.target} lost", text, False, _CALL if search.mode == "LOST" else _SEARCH)
+def _searched(search: TargetSearch) -> Alarm:
+    """A target of which the belief holds no place any more, or none yet."""
+    about, (x, y) = f"{search.target} lost", search.place_m
+    if search.mode == "LOST":
+        return Alarm(
+            about, f"{search.target} is not found: {search.searched:.0%} of the room was searched", False, _CALL
+        )
+    text = f"{search.target} is lost: {search.since_s:.0f} s of search, now around ({x:.1f}, {y:.1f})"
+    return Alarm(about, text, False, _SEARCH)
 
 
 def _cameras(state: MonitorState, now_ns: int) -> Iterator[Alarm]:

@@ -157,9 +157,8 @@ class Planner:
         """Return the best of the current topology and its neighbours; raises EstimatorFault for a broken belief.
 
         current: over the robots to plan for (those missing in the belief are ignored); held: those of them that stay
-        where they are, and only look. `should_stop` is asked after
-        every few evaluations, some 0.3 ms for ten robots. A plan that was stopped is repeated exactly by giving its
-        number of evaluations as `max_evaluations`.
+        where they are, and only look. `should_stop` is asked after every few evaluations, some 0.3 ms for ten robots.
+        A plan that was stopped is repeated exactly by giving its number of evaluations as `max_evaluations`.
         """
         current = current.reconciled(current.robots & frozenset(belief.layout.robots))
         scene = scene_from_belief(belief, current.robots, held)

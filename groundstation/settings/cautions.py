@@ -20,8 +20,8 @@ from groundstation.settings.schema import Field
 from groundstation.settings.unlikely_figures import unlikely
 
 _STANDING_MARKER_M = 0.14
-# The markers of drones that have taken off; half of a board, as for the pads of a new field.
-_RISEN_MARKER_M, _RISEN_ROOM_M = 1.0, 0.15
+# The markers of drones that have taken off; half of a board.
+RISEN_MARKER_M, RISEN_ROOM_M = 1.0, 0.15
 _FENCE_MARGIN_M, _FENCE_LEAST_M = 0.3, 1.0
 _LEAST_STD_M = 0.1
 _ABOVE_OBSTACLE_M = 0.3
@@ -33,7 +33,7 @@ _AT_WALLS = math.cos(math.radians(75.0))
 
 def cautions(field: Field) -> Iterator[Finding]:
     """Yield everything about a sound field that somebody should think over."""
-    for check in (*OF_A_FIELD, *OF_THIS_COMPUTER):
+    for check in ALL:
         yield from check(field)
 
 
@@ -55,7 +55,7 @@ def _views(field: Field) -> Iterator[Finding]:
     for name in sorted(unseen):
         yield ("drones", name, "pad_m"), "is in view of nothing fixed: nobody knows where it is when it takes off"
     for name in sorted(risen - unseen) if field.cameras and not boxes and not field.ranging else ():
-        text = f"is near the edge of the view: {_RISEN_MARKER_M:g} m above it, no fixed camera sees a whole marker"
+        text = f"is near the edge of the view: {RISEN_MARKER_M:g} m above it, no fixed camera sees a whole marker"
         yield ("drones", name, "pad_m"), text
 
 
@@ -65,8 +65,8 @@ def _within(span: tuple[float, float], value: float) -> bool:
 
 def _in_picture_risen(camera: WorldCameraSettings, pad_m: tuple[float, float]) -> bool:
     """Return whether a camera sees the whole marker of a drone that has risen from its pad."""
-    corners = ((dx, dy, 0.0) for dx in (-_RISEN_ROOM_M, _RISEN_ROOM_M) for dy in (-_RISEN_ROOM_M, _RISEN_ROOM_M))
-    return all(_in_picture(camera, np.array([*pad_m, _RISEN_MARKER_M]) + corner) for corner in corners)
+    corners = ((dx, dy, 0.0) for dx in (-RISEN_ROOM_M, RISEN_ROOM_M) for dy in (-RISEN_ROOM_M, RISEN_ROOM_M))
+    return all(_in_picture(camera, np.array([*pad_m, RISEN_MARKER_M]) + corner) for corner in corners)
 
 
 def _in_picture(camera: WorldCameraSettings, centre: Array) -> bool:
@@ -187,4 +187,4 @@ OF_A_FIELD: tuple[Caution, ...] = (
     _lenses,
     unlikely,
 )
-OF_THIS_COMPUTER: tuple[Caution, ...] = (_addresses, _adapters, _places)
+ALL: tuple[Caution, ...] = (*OF_A_FIELD, _addresses, _adapters, _places)  # of this computer as well

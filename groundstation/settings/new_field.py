@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from groundstation.errors import OperatorMistake
+from groundstation.settings.cautions import RISEN_MARKER_M, RISEN_ROOM_M
 from groundstation.vehicles import Offer, VehicleKind, all_kinds
 
 Place = tuple[float, float]
@@ -16,7 +17,7 @@ Place = tuple[float, float]
 _HALF_VIEW = (640.0 / 1179.0, 360.0 / 1179.0)
 _WALL_M, _CEILING_M, _CAMERA_BELOW_CEILING_M = 0.3, 1.7, 0.3
 _LOWEST_CEILING_M = 3.0
-_PAD_GAP_M, _PAD_MARGIN_M, _PAD_SEEN_AT_M = 1.0, 0.15, 1.0
+_PAD_GAP_M = 1.0
 _TARGET_CODE = 5
 _LONGEST_SITE = 40
 _PLAIN = re.compile(r"[a-z0-9][\w.:/@?=&%+-]*[\w/]", re.ASCII)
@@ -99,7 +100,7 @@ def check_room(room: NewRoom) -> None:
 
 def pads(room: NewRoom, count: int) -> list[Place]:
     """Return pads [m; world], one metre apart, inside what the ceiling camera sees; raises OperatorMistake."""
-    half = [length - _PAD_MARGIN_M for length in room.half_view_m(_PAD_SEEN_AT_M)]
+    half = [length - RISEN_ROOM_M for length in room.half_view_m(RISEN_MARKER_M)]
     columns, rows = (1 + int(2 * side / _PAD_GAP_M) for side in half)
     if count > columns * rows:
         raise OperatorMistake(

@@ -61,6 +61,11 @@ class World:
         header = self.header("team", age_s)
         self.say(t.ESTIMATE, m.Estimate(header=header, entities=entities, epoch=1, searches=searches))
 
+    def camera(self, name: str, connected: bool = True, **more: Any) -> None:
+        header = self.header(name)
+        figures = {"fps": 10.0, "age_ms": 0.0, "frames": 9, "skipped": 0, "detections": 0} | more
+        self.say(t.CAMERA_STATUS, m.CameraStatus(header=header, connected=connected, **figures))
+
     def status(self, name: str, state: m.Lifecycle = m.Lifecycle.READY, age_s: float = 0.0, detail: str = "") -> None:
         header = self.header(name, age_s)
         self.say(

@@ -144,9 +144,7 @@ def test_a_target_that_is_searched_for_is_one_alarm_of_its_own(world: World, mod
 
 
 def test_a_camera_without_pictures_raises_an_alarm(world: World) -> None:
-    header = world.header("ceiling")
-    status = m.CameraStatus(header=header, connected=False, fps=0, age_ms=0, frames=0, skipped=0, detections=0)
-    world.say(t.CAMERA_STATUS, status)
+    world.camera("ceiling", connected=False)
     assert _alarms(world) == ["ceiling: no pictures"]
 
 
@@ -154,17 +152,7 @@ def test_a_dark_camera_is_an_alarm_unless_its_drone_stands(world: World) -> None
     world.vehicle("drone_1")
     world.vehicle("drone_2", "LANDED", flight_state=m.FlightState.LANDED)
     for camera, light in (("ceiling", 0.01), ("drone_1_camera", 0.06), ("drone_2_camera", 0.01), ("east", 0.4)):
-        status = m.CameraStatus(
-            header=world.header(camera),
-            connected=True,
-            fps=10,
-            age_ms=0,
-            frames=9,
-            skipped=0,
-            detections=0,
-            brightness=light,
-        )
-        world.say(t.CAMERA_STATUS, status)
+        world.camera(camera, brightness=light)
     dark = "its picture is dark, it sees nobody"
     assert _alarms(world) == [f"ceiling: {dark}", f"drone_1_camera: {dark}"]
 

@@ -47,7 +47,7 @@ export function showMore(ranks, whole) {
   const more = byId("more");
   more.hidden = !ranks.length && whole;
   if (more.hidden) openAlarms(false);
-  text(more, byId("alarms").classList.contains("open") ? "close" : ranks.length ? `${counted(ranks).join(", ")}` : "whole text");
+  text(more, byId("alarms").classList.contains("open") ? "close" : ranks.length ? counted(ranks).join(", ") : "whole text");
 }
 
 function counted(ranks) {

@@ -1,6 +1,6 @@
 // What the batteries hold and how long they are good for, as the console's process works it out for all pages.
 
-import { ALOFT, modeNow } from "./glance.js";
+import { up } from "./glance.js";
 import { droneNames, store } from "./store.js";
 
 const RANKS = ["empty", "unknown", "low", "good"];
@@ -16,12 +16,11 @@ const share = ({ battery }) => (battery === null ? "unknown" : `${(100 * battery
 // The battery that is nearest to its end, of the drones that were heard, and fly if any does: {name, words, level, title};
 // null where none was.
 export function worstBattery() {
-  const up = droneNames().filter((name) => ALOFT.has(modeNow(name)));
-  const all = (up.length ? up : droneNames()).map((name) => [name, store.s.vehicles?.[name]]).filter(([, status]) => status);
+  const flying = up(), all = (flying.length ? flying : droneNames()).map((name) => [name, store.s.vehicles?.[name]]).filter(([, status]) => status);
   if (!all.length) return null;
   const [[name, status]] = all.sort(([, a], [, b]) => RANKS.indexOf(a.charge) - RANKS.indexOf(b.charge)
     || (a.minutes ?? Infinity) - (b.minutes ?? Infinity) || a.battery - b.battery);
-  const what = up.length && up.length < droneNames().length ? "worst in the air" : "worst battery", lasts = lastsWords(status);
+  const what = flying.length && flying.length < droneNames().length ? "worst in the air" : "worst battery", lasts = lastsWords(status);
   return { name, words: share(status), level: LEVELS[status.charge], title: lasts ? `${what}, ${lasts}` : what };
 }
 

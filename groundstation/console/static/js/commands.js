@@ -3,7 +3,7 @@
 import { moment, sinceMs } from "./clock.js";
 import { byId, el, seconds, text } from "./dom.js";
 import { effectOf, holding, isIdle, refusalOf } from "./effects.js";
-import { aloft, doing, modes } from "./glance.js";
+import { aloft, doing, modes, standing } from "./glance.js";
 import { me, send } from "./link.js";
 import { give, mayGive, OVER, ownOrders, roleText, startOwnOrders } from "./own_orders.js";
 import { forbidden } from "./preflight.js";
@@ -56,7 +56,7 @@ function holdToPress(button, fire) {
 function showCounts(names) {
   const known = modes(names).length, up = aloft(), landing = doing("LANDING").length;
   for (const node of document.querySelectorAll(".count")) {
-    const count = node.closest("#takeoff") ? known - up : node.closest("#hold") ? holding(names).length : node.closest("#land") ? up - landing : up;
+    const count = node.closest("#takeoff") ? standing() : node.closest("#hold") ? holding(names).length : node.closest("#land") ? up - landing : up;
     text(node, known && count ? `${count}` : "");
   }
 }
@@ -103,7 +103,7 @@ function showStarts(why) {
   for (const [id, verb] of [["takeoff", "TAKEOFF"], ["track", "TRACK"], ["resume", "RESUME"]]) {
     const button = byId(id), reason = why ?? startRefusal(verb), caption = button.querySelector("small");
     caption.dataset.caption ??= caption.textContent;
-    const one = verb === "TAKEOFF" && modes().length - aloft() === 1;
+    const one = verb === "TAKEOFF" && standing() === 1;
     text(caption, reason?.[0] ?? (one ? "from the floor" : caption.dataset.caption));
     enable(button, reason);
   }

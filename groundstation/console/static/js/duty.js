@@ -32,7 +32,7 @@ function tracked(name, plan) {
   const watched = relied.filter(([observer, subject]) => observer === name && !sought.includes(subject)).map(([, subject]) => subject);
   const limits = limitsOf(plan.controls.find(({ robot }) => robot === name));
   const [, who] = store.s.vehicles[name].detail.match(/^tracking for (.+)$/) ?? [];
-  const task = sought.length ? `Looks for ${joined(sought)}` : `Tracks ${joined(targets)}${who ? `, ordered by ${orderedBy(who, name, ...VERBS.tracking)}` : ""}`;
+  const task = sought.length ? `Looks for ${joined(sought)}` : `Tracks ${joined(targets)}${who ? `, ${orderedBy(who, name, "tracking")}` : ""}`;
   const does = watched.length ? `${task}: watches ${joined(watched)}` : sought.length ? task : `${task}: moves to where it will see it`;
   // One that nobody sees may be known by whom it sees itself.
   const unseen = unseenS(name) > SEEN_S ? `Nobody sees ${name} now` : `Nobody sees ${name}, known by what it sees`;
@@ -43,20 +43,19 @@ function tracked(name, plan) {
 const ORDERS = /^(landing|taking off|held|tracking) (?:for|by) (.+)$/;
 const ORDERED = { landing: "lands:", "taking off": "takes off:", held: "hovers in place: HOLD", tracking: "tracks:" };
 
-// Drivers name the program that an order came from; of a page's it is known who gave the last one of its kind.
-function orderedBy(who, name, ...verbs) {
-  const own = (store.s.orders ?? []).find((order) => verbs.includes(order.verb) && order.rows.some((row) => row.name === name));
-  return who !== "console" ? who : own?.by === me.name ? "you" : own?.by ?? "a page";
-}
-
 const VERBS = { landing: ["LAND"], "taking off": ["TAKEOFF"], held: ["HOLD"], tracking: ["TRACK", "RESUME"] };
-const by = (doing, who, name) => `ordered by ${orderedBy(who, name, ...VERBS[doing])}`;
+
+// Drivers name the program that an order came from; of a page's it is known who gave the last one of its kind.
+function orderedBy(who, name, doing) {
+  const last = (store.s.orders ?? []).find((order) => VERBS[doing].includes(order.verb) && order.rows.some((row) => row.name === name));
+  return `ordered by ${who !== "console" ? who : last?.by === me.name ? "you" : last?.by ?? "a page"}`;
+}
 
 // The driver's own reason; what it is the reason for, where it does not say so, and who ordered what "landing for" says.
 function reasonOf(name, { mode, detail, lands_in_s }) {
   if (mode === "LANDED" || mode === "CUT") return standing(name, detail);
   const [, doing, who] = detail.match(ORDERS) ?? [];
-  if (who) return `${ORDERED[doing]} ${by(doing, who, name)}`;
+  if (who) return `${ORDERED[doing]} ${orderedBy(who, name, doing)}`;
   if (mode === "LANDING" && detail && !detail.startsWith("land")) return `lands: ${detail}`;
   return mode === "HOVER" ? hovering(detail, lands_in_s) : detail;
 }
@@ -64,13 +63,14 @@ function reasonOf(name, { mode, detail, lands_in_s }) {
 // RESUME helps while no landing is near.
 function hovering(detail, landsInS) {
   const [, why] = detail.match(/^(.+); RESUME is needed$/) ?? [];
-  return why ? `hovers${landsInS === null ? "" : ", then lands"}: ${why}${landsInS === null ? ". RESUME lets it go on" : ""}` : detail;
+  if (!why) return detail;
+  return landsInS === null ? `hovers: ${why}. RESUME lets it go on` : `hovers, then lands: ${why}`;
 }
 
 // Why it landed stands in brackets in its driver's words.
 function standing(name, detail) {
   const [, why] = detail.match(/^landed \((.+)\)$/) ?? [], [, doing, who] = why?.match(ORDERS) ?? [];
-  return why ? `stands, motors off. It landed: ${who ? by(doing, who, name) : why}` : `stands with its motors off${detail && `: ${detail}`}`;
+  return why ? `stands, motors off. It landed: ${who ? orderedBy(who, name, doing) : why}` : `stands with its motors off${detail && `: ${detail}`}`;
 }
 
 // In TRACK what the plan has it do, unless its driver knows better; else the driver's own reason.

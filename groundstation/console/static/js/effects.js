@@ -1,6 +1,6 @@
 // What a start or a stop would do now.
 
-import { ALOFT, aloft, lostTarget, modeNow, modes, waits } from "./glance.js";
+import { aloft, lostTarget, modeNow, modes, up, waits } from "./glance.js";
 import { droneNames, store, trackerSilent } from "./store.js";
 
 // Why a start would be refused or do nothing now; "" if it would not. Stops are never withheld while a run goes on.
@@ -37,12 +37,12 @@ function does(names, one, many) {
 
 // What a stop of these drones would do now, to whom, and to whom not; "" where it does to all what it is for.
 export function effectOf(verb, names = droneNames()) {
-  const up = names.filter((name) => ALOFT.has(modeNow(name))), down = names.filter((name) => modeNow(name) && !up.includes(name));
+  const flying = up(names), down = names.filter((name) => modeNow(name) && !flying.includes(name));
   if (!modes(names).length) return "";
-  if (!up.length) return names.length > 1 ? "nobody flies" : "it stands";
-  if (verb === "CUT_MOTORS") return up.length > 1 ? "" : "press 1 s: it falls";
-  const idle = isIdle(verb, names), held = holding(names), bound = up.filter((name) => !held.includes(name));
-  if (verb === "LAND") return idle ? "landing already" : landing(up, down);
+  if (!flying.length) return names.length > 1 ? "nobody flies" : "it stands";
+  if (verb === "CUT_MOTORS") return flying.length > 1 ? "" : "press 1 s: it falls";
+  const idle = isIdle(verb, names), held = holding(names), bound = flying.filter((name) => !held.includes(name));
+  if (verb === "LAND") return idle ? "landing already" : landing(flying, down);
   if (bound.length === names.length) return "all land anyway";
   if (held.length === names.length) return idle ? "hovering already" : "";
   const already = idle ? " already" : "";
@@ -50,19 +50,19 @@ export function effectOf(verb, names = droneNames()) {
 }
 
 // What LAND would do to who flies, where not all of the team follow it anew; "" where they do.
-function landing(up, down) {
-  const anew = up.filter((name) => modeNow(name) !== "LANDING"), already = up.filter((name) => !anew.includes(name));
+function landing(flying, down) {
+  const anew = flying.filter((name) => modeNow(name) !== "LANDING"), already = flying.filter((name) => !anew.includes(name));
   return down.length || already.length ? [does(anew, "lands", "land where they are"), does(already, "lands already", "land already")].filter(Boolean).join(";\n") : "";
 }
 
 // Whether a stop would change nothing now.
 export function isIdle(verb, names = droneNames()) {
   if (!modes(names).length) return false;
-  const left = { HOLD: "HOLD", LAND: "LANDING" }[verb], moved = verb === "HOLD" ? holding(names) : names.filter((name) => ALOFT.has(modeNow(name)));
+  const left = { HOLD: "HOLD", LAND: "LANDING" }[verb], moved = verb === "HOLD" ? holding(names) : up(names);
   return moved.every((name) => modeNow(name) === left);
 }
 
 // Whom HOLD holds: neither a landing nor what leads to one by itself is stopped by it.
-export const holding = (names = droneNames()) => names.filter((name) => ALOFT.has(modeNow(name)) && modeNow(name) !== "LANDING" && (store.s.vehicles[name].lands_in_s ?? null) === null);
+export const holding = (names = droneNames()) => up(names).filter((name) => modeNow(name) !== "LANDING" && (store.s.vehicles[name].lands_in_s ?? null) === null);
 
 export const STOPS = new Set(["HOLD", "LAND", "CUT_MOTORS"]);

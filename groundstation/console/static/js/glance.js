@@ -4,7 +4,7 @@ import { ageS, droneNames, estimateAge, isTarget, entities, entity, runOver, sto
 
 const HEARD_S = 1; // as in groundstation/monitor/alarms.py
 const RECORDING_SILENT_S = 3;
-export const ALOFT = new Set(["TAKING_OFF", "HOVER", "HOLD", "TRACK", "LANDING"]);
+const ALOFT = new Set(["TAKING_OFF", "HOVER", "HOLD", "TRACK", "LANDING"]);
 export const STAGES = ["pre-flight", "take-off", "form", "track", "land", "over"];
 
 const statuses = () => droneNames().map((name) => store.s.vehicles?.[name]).filter(Boolean);
@@ -12,7 +12,11 @@ const statuses = () => droneNames().map((name) => store.s.vehicles?.[name]).filt
 export const modeOf = (status) => (status?.braked ? "HOVER" : status?.mode);
 export const modeNow = (name) => store.s.vehicles?.[name]?.mode;
 export const modes = (names = droneNames()) => names.map(modeNow).filter(Boolean);
-export const aloft = () => modes().filter((mode) => ALOFT.has(mode)).length;
+// Of these drones those that fly.
+export const up = (names = droneNames()) => names.filter((name) => ALOFT.has(modeNow(name)));
+export const aloft = () => up().length;
+// How many do not fly.
+export const standing = () => modes().length - aloft();
 export const targetAgeS = () => Math.min(...entities().filter(({ name }) => isTarget(name)).map((body) => body.age_s + estimateAge()), Infinity);
 
 // What they do who do not stand, the most careful first: [words, level, who does each if not all do the same].

@@ -5,7 +5,7 @@ import { landsIn } from "./duty.js";
 import { refusalOf } from "./effects.js";
 import { aloft, doing, isLost, lostTarget, modes, stage, teamMode } from "./glance.js";
 import { mustWords, openMusts } from "./preflight.js";
-import { droneNames, entity, store, trackerSilent, unseenS } from "./store.js";
+import { droneNames, entity, SEEN_S, store, trackerSilent, unseenS } from "./store.js";
 
 const NAMED = 4; // more drones than this are counted
 // Of one, of several.
@@ -40,7 +40,7 @@ function sought() {
 
 function since(name) {
   const age = unseenS(name);
-  if (!entity(name) && age < 1) return "seen, but not localised";
+  if (!entity(name) && age < SEEN_S) return "seen, but not localised";
   return Number.isFinite(age) && age < 1e5 ? `not seen for ${age.toFixed(0)} s` : "not seen yet";
 }
 

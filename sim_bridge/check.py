@@ -1,31 +1,39 @@
-"""`python -m sim_bridge.check < scenario.json`: judge a scenario without running it.
+"""`python -m sim_bridge.check < order.json`: judge a scenario without running it, by itself or for a field.
 
+The order holds `scenario`, and for a field `field` (resolved), `cameras` (the emulated ones) and `real` (bodies).
 Prints a JSON list with an object for each fault (type, loc, msg, ctx, input as pydantic has them; known: the keys that
-exist where an unknown one was given). The ground station, which knows the lines of the file, words them.
-Exit codes: 0 good, 2 faults.
+exist where an unknown one was given; "misfit" is the type of what the field does not have). The ground station, which
+knows the lines of the file, words them. Exit codes: 0 good, 2 faults.
 """
 
 import json
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
 from sim_bridge.scenario import Scenario
+from sim_bridge.scenario_fit import misfits
+from sim_bridge.site import parse_site
+
+MISFIT = "misfit"
 
 
-def faults_of(text: bytes) -> list[dict[str, Any]]:
-    """Return the mistakes of a scenario in JSON; empty without any."""
+def faults_of(order: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return the mistakes of a scenario (decoded JSON); empty without any."""
     try:
-        Scenario.model_validate_json(text)
+        scenario = Scenario.model_validate_json(json.dumps(order["scenario"]))
     except ValidationError as error:
         faults: list[dict[str, Any]] = json.loads(error.json(include_url=False))
         for fault in faults:
             if fault["type"] == "extra_forbidden":
                 fault["known"] = _known(fault["loc"][:-1])
         return faults
-    return []
+    if "field" not in order:
+        return []
+    unfit = misfits(scenario, parse_site(order["field"]), order["cameras"], order["real"])
+    return [{"type": MISFIT, "loc": one.path, "msg": one.text, "input": None} for one in unfit]
 
 
 def _known(path: Sequence[str | int]) -> list[str]:
@@ -51,8 +59,8 @@ def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:
 
 
 def main() -> int:
-    """Judge the scenario on standard input."""
-    faults = faults_of(sys.stdin.buffer.read())
+    """Judge the order on standard input."""
+    faults = faults_of(json.load(sys.stdin))
     print(json.dumps(faults))
     return 2 if faults else 0
 

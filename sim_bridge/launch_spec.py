@@ -1,7 +1,7 @@
 """What the bridge is started with: `python -m sim_bridge --spec FILE`."""
 
 import json
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
@@ -12,10 +12,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from groundstation.errors import SettingsError
 from groundstation.field.targets import odometry_name
 from groundstation.process.child import ChildSpec
-from groundstation.vehicles import kind_named
-from sim_bridge.fault_kinds import RULES, Fault, FaultKind, Part
 from sim_bridge.scenario import Scenario, describe_problems, parse_scenario
-from sim_bridge.site import Site, SiteDrone, parse_site
+from sim_bridge.scenario_fit import misfits
+from sim_bridge.site import Site, parse_site
 
 
 class PoseSource(StrEnum):
@@ -94,48 +93,11 @@ def read_order(path: Path) -> LaunchSpec:
     heard = map(odometry_name, site.tracked)
     if strangers := sorted(set(envelope.captures) - {*site.motion_capture, *site.ranging, *heard}):
         raise SettingsError([f"{path}: captures: {name!r} is no system or odometry of the field" for name in strangers])
-    _check_faults(scenario.faults, site, envelope.streams, envelope.real)
-    strangers = sorted(set(scenario.drones.firmware_by_drone) - set(site.drones))
-    if strangers:
-        names = ", ".join(site.drones)
-        raise SettingsError([f"scenario: drones.firmware_by_drone: {name!r} is none of {names}" for name in strangers])
-    if strangers := sorted(set(scenario.targets) - set(site.tracked)):
-        names = ", ".join(site.tracked)
-        raise SettingsError([f"scenario: targets.{name}: there is no such target, only {names}" for name in strangers])
+    if unfit := misfits(scenario, site, envelope.streams, envelope.real):
+        raise SettingsError([f"scenario: {'.'.join(map(str, one.path))}: {one.text}" for one in unfit])
     missing = sorted(set(site.drones) - set(envelope.addresses) - set(envelope.real))
     if missing:
         raise SettingsError([f"{path}: addresses: none for {', '.join(missing)}"])
     seed = scenario.seed if envelope.seed is None else envelope.seed
     addresses, streams, real, captures = envelope.addresses, envelope.streams, envelope.real, envelope.captures
     return LaunchSpec(envelope.child, site, scenario, addresses, streams, seed, real, captures)
-
-
-def _able(vehicles: Mapping[str, SiteDrone], kind: FaultKind) -> list[str]:
-    return sorted(name for name, drone in vehicles.items() if kind in kind_named(drone.kind).emulated_faults)
-
-
-def _check_faults(faults: Iterable[Fault], site: Site, cameras: Iterable[str], real: Collection[str] = ()) -> None:
-    """Raise SettingsError naming every fault of an entity that does not exist, is real, or cannot have it."""
-    vehicles = {name: drone for name, drone in site.drones.items() if name not in real}
-    known = {
-        Part.VEHICLE: sorted(vehicles),
-        Part.CAMERA: sorted(cameras),
-        Part.MARKER: list(site.bodies),
-        Part.CAPTURE: sorted(site.motion_capture),
-        Part.BODY: list(site.bodies),
-        Part.RANGING: sorted(site.ranging),
-        Part.TRANSPONDER: list(site.drones) if site.ranging else [],
-        Part.ODOMETRY: [name for name, target in site.tracked.items() if target.odometry is not None],
-    }
-    problems = []
-    for number, fault in enumerate(faults):
-        part = RULES[fault.kind].part
-        names = _able(vehicles, fault.kind) if part is Part.ABLE_VEHICLE else known[part]
-        for key, name in (("entity", fault.entity), ("other", fault.other or fault.entity)):
-            if name not in names:
-                problems.append(f"scenario: faults.{number}.{key}: {name!r} is none of {', '.join(names)}")
-        pair = [site.drones[name].kind for name in (fault.entity, fault.other) if name in site.drones]
-        if fault.kind is FaultKind.IDS_SWAPPED and len(set(pair)) > 1:
-            problems.append(f"scenario: faults.{number}.other: {fault.entity} and {fault.other} are of different kinds")
-    if problems:
-        raise SettingsError(list(dict.fromkeys(problems)))

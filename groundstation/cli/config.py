@@ -65,7 +65,7 @@ def _check(name: str, options: tuple[str, ...], scenario: str | None) -> list[st
     from groundstation.settings import drawing
     from groundstation.settings.files import find_field, find_scenario
     from groundstation.settings.load import cautions_of, load_field
-    from groundstation.settings.scenario import load_scenario
+    from groundstation.settings.scenario import Room, load_scenario
 
     path = find_field(name)
     problems: list[str] = []
@@ -77,7 +77,7 @@ def _check(name: str, options: tuple[str, ...], scenario: str | None) -> list[st
         problems += error.problems
     if scenario is not None:
         try:
-            plain = load_scenario(find_scenario(scenario, path))
+            plain = load_scenario(find_scenario(scenario, path), room=Room(field) if field else None)
             if field is not None:
                 paths = drawing.paths_of(plain, field.tracked)
                 problems += [f"{scenario}: {sentence}" for sentence in drawing.beyond_walls(field, paths)]

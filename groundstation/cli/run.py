@@ -153,7 +153,7 @@ def run_simulated(mode: str, field: str, asked: Rehearsal) -> int:
     from groundstation.settings import drawing
     from groundstation.settings.files import find_field, find_scenario
     from groundstation.settings.load import load_field
-    from groundstation.settings.scenario import load_scenario
+    from groundstation.settings.scenario import Room, load_scenario
     from groundstation.supervisor import network, runtime_file
 
     path, scenario, duration, seed = find_field(field), asked.scenario, asked.duration, asked.seed
@@ -163,7 +163,7 @@ def run_simulated(mode: str, field: str, asked: Rehearsal) -> int:
         click.echo(line, err=True)
     plan = plan_of(loaded, duration, asks=bool(parts.drones) and not asked.look_only)
     plan = replace(plan, anyway=asked.anyway, look_only=asked.look_only)
-    chosen = load_scenario(find_scenario(scenario, path))
+    chosen = load_scenario(find_scenario(scenario, path), room=Room(loaded, parts.bodies, parts.cameras))
     if seed is None:
         seed = int(chosen.get("seed", 1))
     for sentence in drawing.beyond_walls(loaded, drawing.paths_of(chosen, loaded.tracked)):

@@ -3,20 +3,39 @@
 import json
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from groundstation.errors import GroundStationError, SettingsError
 from groundstation.settings.document import KeyPath, Node, read
 from groundstation.settings.levels import with_option
+from groundstation.settings.schema import Field
 from groundstation.settings.wording import closest, ordered, problem, text_of_error
 
 _CHECK_LIMIT_S = 120.0  # two seconds of work, on a machine that does much else
 
 
-def load_scenario(path: Path, options: Sequence[str] = ()) -> dict[str, Any]:
-    """Return a scenario as plain values with `a.b=c` options applied; raises SettingsError with all problems."""
+@dataclass(frozen=True, slots=True)
+class Room:
+    """For what a scenario is to be: a field, and the bodies and cameras of it that are real."""
+
+    field: Field
+    real: Collection[str] = ()
+    real_cameras: Collection[str] = ()
+
+    def asked(self) -> dict[str, Any]:
+        """Return what the simulator is asked about besides the scenario; a drone's camera has the drone's name."""
+        cameras = [name for name in (*self.field.cameras, *self.field.drones) if name not in self.real_cameras]
+        return {"field": self.field.model_dump(mode="json"), "cameras": cameras, "real": list(self.real)}
+
+
+def load_scenario(path: Path, options: Sequence[str] = (), room: Room | None = None) -> dict[str, Any]:
+    """Return a scenario as plain values with `a.b=c` options applied; raises SettingsError with all problems.
+
+    room: where it names what that does not have, that is a problem too.
+    """
     tree = read(path)
     if not isinstance(tree.value, dict):
         raise SettingsError([f"{tree.origin}: must be a mapping with schema_version, target, drones, ..."])
@@ -27,15 +46,15 @@ def load_scenario(path: Path, options: Sequence[str] = ()) -> dict[str, Any]:
         except SettingsError as error:
             problems += error.problems
     plain: dict[str, Any] = tree.plain()
-    problems += [_worded(fault, tree) for fault in _faults(plain)]
+    problems += [_worded(fault, tree) for fault in _faults(plain, room)]
     if problems:
         raise SettingsError(ordered(problems))
     return plain
 
 
-def _faults(plain: dict[str, Any]) -> list[dict[str, Any]]:
+def _faults(plain: dict[str, Any], room: Room | None) -> list[dict[str, Any]]:
     command = [sys.executable, "-m", "sim_bridge.check"]
-    given = json.dumps(plain).encode()
+    given = json.dumps({"scenario": plain} | (room.asked() if room else {})).encode()
     try:
         result = subprocess.run(command, input=given, capture_output=True, timeout=_CHECK_LIMIT_S, check=False)
     except subprocess.TimeoutExpired as error:
@@ -51,7 +70,7 @@ def _worded(fault: dict[str, Any], tree: Node) -> str:
     path = _without_variants(fault["loc"], tree)
     if fault["type"] == "extra_forbidden":
         return problem(tree.origin_of(path), f"unknown key{closest(str(path[-1]), fault['known'])}")
-    return problem(tree.origin_of(path), text_of_error(fault))
+    return problem(tree.origin_of(path), fault["msg"] if fault["type"] == "misfit" else text_of_error(fault))
 
 
 def _without_variants(location: Sequence[str | int], tree: Node) -> KeyPath:

@@ -16,7 +16,7 @@ from groundstation.settings.json_schema import field_file_schema
 from groundstation.settings.levels import merged
 from groundstation.settings.load import load_field
 from groundstation.settings.resolved import summary_of, yaml_of
-from groundstation.settings.scenario import load_scenario
+from groundstation.settings.scenario import Room, load_scenario
 from groundstation.settings.schema import Field
 from sim_bridge.fault_kinds import FaultKind
 
@@ -219,6 +219,33 @@ def test_scenarios_are_judged_by_the_simulator_and_worded_here(tmp_path: Path) -
     assert caught.value.problems == [
         f"{path}:3: target.path: shape must be one of 'figure_eight', 'none', 'anywhere', 'waypoints', 'random_walk',"
         " 'sprint', 'along_walls' (got \"figure_eigth\"), did you mean figure_eight?"
+    ]
+
+
+def test_a_scenario_names_only_what_its_field_has(tmp_path: Path, field: Field) -> None:
+    path = tmp_path / "s.yaml"
+    path.write_text(
+        "targets:\n  roomba: {path: {shape: none}}\nfaults:\n"
+        "  - {kind: velocity_stuck, entity: drone_9, start_s: 1, value: 0}\n"
+        "  - {kind: picture_frozen, entity: ceiling, start_s: 1}\n"
+        "  - {kind: picture_frozen, entity: drone_2, start_s: 1}\n",
+        encoding="utf-8",
+    )
+    load_scenario(path)
+    with pytest.raises(SettingsError) as caught:
+        load_scenario(path, room=Room(field))
+    unknown = [
+        f"{path}:2: targets.roomba: there is no such target, only turtlebot",
+        f"{path}:4: faults[0].entity: 'drone_9' is none of drone_1, drone_2",
+    ]
+    assert caught.value.problems == unknown
+    with pytest.raises(SettingsError) as caught:
+        load_scenario(path, room=Room(field, ["drone_1"], ["ceiling", "drone_2"]))
+    assert caught.value.problems == [
+        unknown[0],
+        f"{path}:4: faults[0].entity: 'drone_9' is none of drone_2",
+        f"{path}:5: faults[1].entity: 'ceiling' is none of drone_1",
+        f"{path}:6: faults[2].entity: 'drone_2' is none of drone_1",
     ]
 
 

@@ -100,7 +100,7 @@ def test_without_a_seed_the_scenario_decides(tmp_path: Path) -> None:
         ),
         (
             lambda o: o["scenario"].update(drones={"firmware_by_drone": {"drone_9": "ar1-1.7"}}),
-            "firmware_by_drone: 'drone_9' is none of drone_1, drone_2",
+            r"firmware_by_drone\.drone_9: there is no such drone, only drone_1, drone_2",
         ),
         (lambda o: o["child"].pop("role"), r"child\.role: Field required"),
         (lambda o: o["scenario"].update(drones={"firmware": "ar3"}), "firmware: known firmwares: ar1-1.5, "),

@@ -26,9 +26,9 @@ class ControlParameters:
     return_drift_m_s: largest measured drift that is subtracted on the way back; drift_m_s: how fast a place becomes
     uncertain out of sight at least, seen_std_m: from where; sound_error_m_s: a larger error of the odometry is not that
     of a sound one; regain_after_s: nobody has seen a target for so long, those that track it turn to it and back off;
-    hint_std_m: no plan goes by a target that is known worse; max_plan_age_s: held controls of an older plan are not
-    flown any more; fed: robots that fly on our estimate; untied_after_s: of nothing that tells where they are, after
-    which they turn back; the next sighting takes 0.3 s at most, where there is one.
+    hint_std_m: no plan goes by a target that is known worse; planned_s: as far as plans reach; max_plan_age_s: held
+    controls of an older plan are not flown any more; fed: robots that fly on our estimate; untied_after_s: of nothing
+    that tells where they are, after which they turn back; the next sighting takes 0.3 s at most, where there is one.
     """
 
     search_height_m: float
@@ -52,6 +52,7 @@ class ControlParameters:
     search_speed_m_s: float = SEARCH_SPEED_M_S
     search_yaw_rate_rad_s: float = SEARCH_YAW_RATE_RAD_S
     hint_std_m: float = 1.5
+    planned_s: float = 3.0
     max_plan_age_s: float = 1.0
     fed: frozenset[str] = frozenset()
     untied_after_s: float = 0.4
@@ -100,6 +101,7 @@ def control_from_field(field: ResolvedField) -> ControlParameters:
         return_std_m=0.6 * safety.max_position_std_m,
         return_limit_m=0.8 * safety.max_position_std_m,
         return_within_s=1.5 * safety.unseen_land_after_s,
+        planned_s=planner.horizon_steps * planner.step_s,
         max_plan_age_s=max(1.0, 3.0 / planner.rate_hz),
         fed=frozenset(n for n, drone in field.drones.items() if kind_named(drone.kind).habits.flies_on_estimate),
     )

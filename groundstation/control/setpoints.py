@@ -23,7 +23,6 @@ from groundstation.geometry.stabilized_frame import stabilized_from_world, world
 from groundstation.planning.planner import PlanResult
 from groundstation.sensing.models import SensorSuite
 
-_PLANNED_S = 3.0  # as far as plans reach
 _STAND_GAIN, _TURN_GAIN = 1.0, 1.5  # of the way and the turn to a stand [1/s]
 
 
@@ -81,7 +80,7 @@ def setpoints_from_plan(
             vx, vy, rate = _regained(name, plan, now)
             level_m = _level_m(name, plan.heights[name], now)
             velocity = recoverable(name, giving_way(name, (vx, vy), coming, now), now)
-            ahead_m = _PLANNED_S * math.hypot(*velocity)
+            ahead_m = parameters.planned_s * math.hypot(*velocity)
             velocity, level_m = kept_in_sight(name, velocity, level_m, ahead_m, now)
             wanted[name] = _with_height(name, velocity, rate, level_m, phase, now)
         else:
@@ -228,7 +227,8 @@ def _with_height(
     outward = stabilized_from_world(away, float(mean[3]))[:2]
     held = np.array(velocity)
     held += max(0.0, parameters.side_step_m_s - float(held @ outward)) * outward
-    aside, _ = kept_in_sight(name, (float(held[0]), float(held[1])), level_m, _PLANNED_S * math.hypot(*held), now)
+    ahead_m = now.parameters.planned_s * math.hypot(*held)
+    aside, _ = kept_in_sight(name, (float(held[0]), float(held[1])), level_m, ahead_m, now)
     return Setpoint((*aside, 0.0), rate, phase, blocked=other)
 
 

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -251,3 +252,11 @@ def test_who_searches_and_is_not_told_where_it_is_returns() -> None:
     found = setpoints_from_plan(None, belief(pose, SEEN_STD_M), ("drone_2",), CONTROL, SENSORS, sight)
     assert found["drone_2"].phase is FlightMode.RETURN
     assert found["drone_2"].velocity_m_s[1] > 0.2 and found["drone_2"].velocity_m_s[2] < 0.0
+
+
+def test_a_way_is_kept_in_sight_as_far_as_the_plans_of_the_field_reach() -> None:
+    assert CONTROL.planned_s == pytest.approx(FIELD.planner.horizon_steps * FIELD.planner.step_s) == pytest.approx(3.0)
+    near = control_from_field(
+        msgspec.structs.replace(FIELD, planner=msgspec.structs.replace(FIELD.planner, step_s=0.1))
+    )
+    assert near.planned_s == pytest.approx(1.0)

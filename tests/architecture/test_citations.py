@@ -186,3 +186,11 @@ def test_decisions_are_numbered_and_have_one_form() -> None:
         assert record.name.startswith(f"{number:04d}-"), f"{record.name}: the next number is {number:04d}"
         assert title.startswith(f"{number:04d} "), record.name
         assert parts == RECORD_PARTS, f"{record.name}: {parts}"
+
+
+def test_the_index_names_each_decision_once_by_its_title() -> None:
+    folder = ROOT / "docs" / "decisions"
+    listed = [line for line in (folder / "index.md").read_text(encoding="utf-8").splitlines() if line.startswith("- [")]
+    wanted = [f"- [{headings(record)[0]}]({record.name})" for record in folder.glob("[0-9]*.md")]
+    wrong = sorted(set(wanted) ^ set(listed)) + [line for line in set(listed) if listed.count(line) > 1]
+    assert not wrong, "\n".join(["lines that docs/decisions/index.md lacks, has twice, or should not have:", *wrong])

@@ -9,14 +9,14 @@ from pydantic import TypeAdapter, ValidationError
 
 from groundstation.errors import SettingsError
 from groundstation.geometry.lens import CameraIntrinsics
-from groundstation.settings.document import read
+from groundstation.settings.foreign_lens import read_calibration
 from groundstation.settings.room import CalibrationSettings
 from groundstation.settings.wording import ordered, problem_of_error
 
 
 def load_calibration(path: Path) -> CalibrationSettings:
     """Return a calibration file's content; raises SettingsError with all problems, each with its line."""
-    tree = read(path)
+    tree = read_calibration(path)
     text = json.dumps(tree.plain())
     try:
         return TypeAdapter(CalibrationSettings).validate_json(text)

@@ -6,7 +6,8 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from groundstation.errors import SettingsError, without_password
-from groundstation.settings.document import KeyPath, Node, SourceLine, dotted, parse, read
+from groundstation.settings.document import KeyPath, Node, SourceLine, dotted, parse
+from groundstation.settings.foreign_lens import read_calibration
 from groundstation.settings.wording import problem
 
 # Sections of what is fixed in the world, and all that are mappings of names.
@@ -108,7 +109,7 @@ class Calibrations:
         name = entry.value
         if name not in self._known:
             try:
-                self._known[name] = read(self._directory / name, str(Path(self._name).parent / name))
+                self._known[name] = read_calibration(self._directory / name, str(Path(self._name).parent / name))
             except SettingsError as error:
                 self._known[name] = None
                 self.problems += [problem(entry.origin, text) for text in error.problems]

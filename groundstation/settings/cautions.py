@@ -11,15 +11,15 @@ import numpy as np
 
 from drivers.camera.settings import SourceKind, parse_source
 from groundstation.adapters import adapters, drops_strangers
-from groundstation.arrays import Array
 from groundstation.geometry.rotations import world_from_downward_optical
 from groundstation.settings.document import KeyPath
+from groundstation.settings.in_view import STANDING_MARKER_M, in_picture
+from groundstation.settings.marker_sizes import too_small
 from groundstation.settings.parts import Finding
 from groundstation.settings.room import CalibrationSettings, WorldCameraSettings
 from groundstation.settings.schema import Field
 from groundstation.settings.unlikely_figures import unlikely
 
-_STANDING_MARKER_M = 0.14
 # The markers of drones that have taken off; half of a board.
 RISEN_MARKER_M, RISEN_ROOM_M = 1.0, 0.15
 _FENCE_MARGIN_M, _FENCE_LEAST_M = 0.3, 1.0
@@ -38,17 +38,18 @@ def cautions(field: Field) -> Iterator[Finding]:
 
 
 def _views(field: Field) -> Iterator[Finding]:
-    pads = {name: np.array([*drone.pad_m, _STANDING_MARKER_M]) for name, drone in field.drones.items()}
+    pads = {name: np.array([*drone.pad_m, STANDING_MARKER_M]) for name, drone in field.drones.items()}
     unseen, risen = set(pads), set(pads)
     for name, camera in field.cameras.items():
         path = ("cameras", name, "rotation_deg")
         if world_from_downward_optical(camera.rotation_deg)[2, 2] > -_AT_WALLS:
             yield path, "lets it look at the walls or the ceiling: drones below it are not seen"
-        seen = {pad for pad, centre in pads.items() if _in_picture(camera, centre)}
+        seen = {pad for pad, centre in pads.items() if in_picture(camera, centre)}
         unseen -= seen
         risen -= {name for name, drone in field.drones.items() if _in_picture_risen(camera, drone.pad_m)}
         if not seen:
-            yield path, "and its place leave no pad in its view: it knows of a drone only after that has flown there"
+            text = "and rotation_deg leave no pad in its view: it knows of a drone only after that has flown there"
+            yield ("cameras", name, "position_m"), text
     boxes = [one.volume_m for name, one in field.motion_capture.items() if name != field.truth.get("from")]
     for box in (*boxes, *(one.volume_m for one in field.ranging.values())):
         unseen -= {name for name in unseen if _within(box.x_m, pads[name][0]) and _within(box.y_m, pads[name][1])}
@@ -66,16 +67,7 @@ def _within(span: tuple[float, float], value: float) -> bool:
 def _in_picture_risen(camera: WorldCameraSettings, pad_m: tuple[float, float]) -> bool:
     """Return whether a camera sees the whole marker of a drone that has risen from its pad."""
     corners = ((dx, dy, 0.0) for dx in (-RISEN_ROOM_M, RISEN_ROOM_M) for dy in (-RISEN_ROOM_M, RISEN_ROOM_M))
-    return all(_in_picture(camera, np.array([*pad_m, RISEN_MARKER_M]) + corner) for corner in corners)
-
-
-def _in_picture(camera: WorldCameraSettings, centre: Array) -> bool:
-    x, y, z = world_from_downward_optical(camera.rotation_deg).T @ (centre - np.array(camera.position_m))
-    lens = camera.calibration
-    if z <= 0.0:
-        return False
-    column, row = lens.cx_px + lens.fx_px * x / z, lens.cy_px + lens.fy_px * y / z
-    return bool(0.0 < column < lens.width_px and 0.0 < row < lens.height_px)
+    return all(in_picture(camera, np.array([*pad_m, RISEN_MARKER_M]) + corner) for corner in corners)
 
 
 def _carried_cameras(field: Field) -> Iterator[Finding]:
@@ -185,6 +177,7 @@ OF_A_FIELD: tuple[Caution, ...] = (
     _obstacles,
     _uncertainty,
     _lenses,
+    too_small,
     unlikely,
 )
 ALL: tuple[Caution, ...] = (*OF_A_FIELD, _addresses, _adapters, _places)  # of this computer as well

@@ -18,7 +18,7 @@ def test_shipped_fields_are_no_cause_for_caution(name: str) -> None:
 
 FOOLISH = [
     ("cameras.ceiling.rotation_deg=[80,0,0]", "cameras.ceiling.rotation_deg", "at the walls or the ceiling"),
-    ("cameras.ceiling.rotation_deg=[45,0,0]", "cameras.ceiling.rotation_deg", "leave no pad in its view"),
+    ("cameras.ceiling.rotation_deg=[45,0,0]", "cameras.ceiling.position_m", "leave no pad in its view"),
     ("drones.drone_1.pad_m=[-3.0,2.0]", "drones.drone_1.pad_m", "in view of nothing fixed"),
     ("drones.drone_1.pad_m=[-0.45,0.85]", "drones.drone_1.pad_m", "1 m above it, no fixed camera sees a whole marker"),
     ("drones.drone_1.camera.tilt_down_deg=-45", "drones.drone_1.camera.tilt_down_deg", "seen from above only"),
@@ -40,6 +40,12 @@ FOOLISH = [
     ("cameras.ceiling.attitude_std_deg=0.0035", "cameras.ceiling.attitude_std_deg", "in radians"),
     ("estimator.max_lateness_s=1e-3", "estimator.max_lateness_s", "would be refused"),
     ("planner.planned_range_m=0.019", "planner.planned_range_m", "no sighting at all"),
+    ("planner.planned_range_m=8", "planner.planned_range_m", "2.5 px in the picture of drone_1's camera"),
+    (
+        "defaults.marker.square_mm=12",
+        "defaults.marker.square_mm",
+        "too small for ceiling (got 12): on a pad they have 3.4 px",
+    ),
     ("planner.step_s=2e-4", "planner.step_s", "0.002 s ahead"),
     ("cameras.ceiling.source=/dev/video97", "cameras.ceiling.source", "not there on this machine"),
 ]

@@ -62,7 +62,7 @@ def _targets(names: tuple[str, ...]) -> str:
 
 def _check(name: str, options: tuple[str, ...], scenario: str | None) -> list[str]:
     """Return the warnings about a sound field; raises SettingsError with all mistakes."""
-    from groundstation.settings import drawing
+    from groundstation.settings import drawing, parked
     from groundstation.settings.files import find_field, find_scenario
     from groundstation.settings.load import cautions_of, load_field
     from groundstation.settings.scenario import Room, load_scenario
@@ -80,7 +80,8 @@ def _check(name: str, options: tuple[str, ...], scenario: str | None) -> list[st
             plain = load_scenario(find_scenario(scenario, path), room=Room(field) if field else None)
             if field is not None:
                 paths = drawing.paths_of(plain, field.tracked)
-                problems += [f"{scenario}: {sentence}" for sentence in drawing.beyond_walls(field, paths)]
+                foolish = drawing.beyond_walls(field, paths) + parked.on_pads(field, plain)
+                problems += [f"{scenario}: {sentence}" for sentence in foolish]
         except SettingsError as error:
             problems += error.problems
     if problems:

@@ -1,6 +1,6 @@
 """What a run must reach to pass: the usual limits, which stand here alone, or those that its scenario expects."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import msgspec
 
@@ -94,8 +94,17 @@ def _of_the_target(figures: RunFigures, expected: Expectation) -> Iterator[Crite
     if may_be_lost and expected.rmse_m is None:
         yield _below("target_kept_rmse_m", kept_m, MAX_TARGET_RMSE_M)
     else:
-        yield _expected("target_rmse_m", rmse_m, MAX_TARGET_RMSE_M, expected.rmse_m, expected.by)
-    yield _expected("target_lost_s", lost_s, MAX_TARGET_LOST_S, expected.lost_s, expected.by)
+        why = _whose(figures, {name: one.rmse_m for name, one in figures.targets.items()})
+        yield _expected("target_rmse_m", rmse_m, MAX_TARGET_RMSE_M, expected.rmse_m, expected.by, why)
+    why = _whose(figures, {name: one.lost_s for name, one in figures.targets.items()})
+    yield _expected("target_lost_s", lost_s, MAX_TARGET_LOST_S, expected.lost_s, expected.by, why)
+
+
+def _whose(figures: RunFigures, of_targets: Mapping[str, float]) -> str:
+    """Return which target is the worst by a figure, where there are several, and whether it was never found."""
+    worst = max(of_targets, key=lambda name: of_targets[name], default="")
+    never = "never found" if worst and figures.targets[worst].covered == 0.0 else ""
+    return ": ".join(part for part in (worst if len(of_targets) > 1 else "", never) if part)
 
 
 def _landed(figures: RunFigures) -> Criterion:
@@ -130,10 +139,13 @@ def _of_failsafes(figures: RunFigures, expected: Expectation) -> Criterion:
     return Criterion("failsafe_landings", float(len(found)), "==", 0.0, not found, why)
 
 
-def _expected(name: str, value: float | None, usual: float, expected: float | None, by: str) -> Criterion:
+def _expected(
+    name: str, value: float | None, usual: float, expected: float | None, by: str, why: str = ""
+) -> Criterion:
     """Judge by the larger one of the usual limit and what is expected: never stricter than without a scenario."""
     limit = usual if expected is None else max(usual, expected)
-    return Criterion(name, value, "<=", limit, value is not None and value <= limit, by=by if limit > usual else "")
+    ok = value is not None and value <= limit
+    return Criterion(name, value, "<=", limit, ok, "" if ok else why, by if limit > usual else "")
 
 
 def _below(name: str, value: float | None, limit: float) -> Criterion:

@@ -93,6 +93,27 @@ def test_where_a_search_is_expected_errors_count_from_when_the_target_was_found(
     assert "never found" in missed(never["target_found_s"])
 
 
+def reasons(field: ResolvedField, **covered: float) -> list[str]:
+    """Return why a flight failed by the last of its targets, each covered for a share of the time."""
+    data = flight(field, None, lost=(15.0, 28.0))
+    figures = figures_of(data)
+    (bad,) = figures.targets.values()
+    good = msgspec.structs.replace(bad, rmse_m=0.01, lost_s=0.0)
+    *others, last = covered
+    targets = dict.fromkeys(others, good) | {last: msgspec.structs.replace(bad, covered=covered[last])}
+    criteria = criteria_of(msgspec.structs.replace(figures, targets=targets), field, data.facts)
+    return [item.why for item in criteria if item.name in ("target_rmse_m", "target_lost_s")]
+
+
+def test_a_target_that_was_never_found_is_called_so_and_of_several_the_worst_is_named(
+    lab_field: ResolvedField,
+) -> None:
+    assert reasons(lab_field, rabbit=0.0) == ["never found"] * 2
+    assert reasons(lab_field, rabbit=0.7) == [""] * 2
+    assert reasons(lab_field, rabbit=1.0, fox=0.7) == ["fox"] * 2
+    assert reasons(lab_field, rabbit=1.0, fox=0.0) == ["fox: never found"] * 2
+
+
 def test_landings_that_are_expected_are_counted(lab_field: ResolvedField) -> None:
     data = flight(lab_field, {"landings": 1}, lost=(0.0, 0.0))
     for landed, good in (([], True), (["drone_1"], True), (["drone_1", "drone_2"], False)):

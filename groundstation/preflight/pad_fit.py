@@ -26,6 +26,9 @@ PER_CAMERA = ("x", "y", "z", "roll", "pitch", "yaw", "focal")
 PER_DRONE = ("aside_x", "aside_y", "turned", "higher", "print")
 TEAM_PRINT = ("", "print")
 _SCATTER_M, _SCATTER_SHARE, _SCATTER_RAD = 0.003, 0.002, math.radians(0.5)
+# Few pixels a square: where the board lies in their grid shifts its distance, by this share at 4 px (docs/reference/
+# vision.md 8), and however long one looks.
+_COARSE_SHARE, _COARSE_PX, _COARSE_POWER = 0.0035, 4.0, 10
 _STEPS, _DIFFERENCE = 8, 1e-6
 
 Key = tuple[str, str]
@@ -66,7 +69,15 @@ class PadFit:
         self._at_rest: tuple[Vector, Array] | None = None
         self._seen = np.concatenate([[*s.position_m, s.yaw_rad] for s in self.sightings])
         self._used = np.isfinite(self._seen)
-        self._weights = np.concatenate([_deviations(s) for s in self.sightings])[self._used]
+        self._weights = np.concatenate([self._deviations(s) for s in self.sightings])[self._used]
+
+    def _deviations(self, s: PadSighting) -> Vector:
+        """Return the standard deviations of one sighting: its own, and what lasts however long one looks."""
+        far = float(np.linalg.norm(s.position_m))
+        pixels = self.stand.cameras[s.camera].focal_px * self.stand.pads[s.drone].square_m / far
+        share = math.hypot(_SCATTER_SHARE, _COARSE_SHARE * (_COARSE_PX / pixels) ** _COARSE_POWER)
+        floor = np.array([_SCATTER_M, _SCATTER_M, math.hypot(_SCATTER_M, share * far), _SCATTER_RAD])
+        return np.asarray(np.hypot(np.sqrt(np.maximum(np.diag(s.covariance), 0.0)), floor))
 
     def _prior(self, key: Key) -> float:
         name, part = key
@@ -164,10 +175,3 @@ def _wrapped(rows: Array) -> Array:
     rows = rows.copy()
     rows[..., 3::4] = np.remainder(rows[..., 3::4] + math.pi, math.tau) - math.pi
     return rows
-
-
-def _deviations(s: PadSighting) -> Vector:
-    """Return the standard deviations of one sighting: its own, and what lasts however long one looks."""
-    far = float(np.linalg.norm(s.position_m))
-    floor = np.array([_SCATTER_M, _SCATTER_M, math.hypot(_SCATTER_M, _SCATTER_SHARE * far), _SCATTER_RAD])
-    return np.asarray(np.hypot(np.sqrt(np.maximum(np.diag(s.covariance), 0.0)), floor))

@@ -10,6 +10,7 @@ from groundstation.arrays import Array
 from groundstation.field.drones import FieldDrone
 from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.rotations import world_from_downward_optical
+from groundstation.sensing.from_field import square_m
 from groundstation.vehicles import kind_named
 
 # How well a person sets a drone on a cross and a line on the floor.
@@ -36,7 +37,7 @@ class PadSighting:
 class Pad:
     """A place to stand: x, y [m; world], heading [rad]; the drone's standing height and its deviation [m].
 
-    marker_m: centre of the marker [m; base].
+    marker_m: centre of the marker [m; base]; square_m: side of its squares, or of those seen as far as a tag.
     """
 
     place_m: tuple[float, float]
@@ -44,6 +45,7 @@ class Pad:
     height_m: float
     height_std_m: float
     marker_m: tuple[float, float, float]
+    square_m: float
 
     def of(self, other: "Pad") -> "Pad":
         """Return this drone on the pad of another one."""
@@ -66,12 +68,16 @@ def marker_centres(pads: Sequence[Pad], aside_m: Array, turned_rad: Array, highe
 
 @dataclass(frozen=True, slots=True)
 class SurveyedCamera:
-    """A fixed camera as the field has it: rotation world_from_optical, position [m; world], deviations [rad], [m]."""
+    """A fixed camera as the field has it: rotation world_from_optical, position [m; world], deviations [rad], [m].
+
+    focal_px: focal length along the picture's x axis.
+    """
 
     rotation: Array
     position_m: Array
     attitude_std_rad: float
     position_std_m: float
+    focal_px: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +101,7 @@ def stand_of(field: ResolvedField) -> Stand:
             np.array(camera.position_m),
             max(math.radians(camera.attitude_std_deg), 1e-3),
             max(camera.position_std_m, 2e-3),
+            camera.calibration.fx_px,
         )
         for name, camera in field.cameras.items()
     }
@@ -103,4 +110,5 @@ def stand_of(field: ResolvedField) -> Stand:
 
 def _pad(drone: FieldDrone) -> Pad:
     height, std = kind_named(drone.kind).standing_m
-    return Pad(drone.pad_m, math.radians(drone.pad_yaw_deg), height, std, drone.marker.position_m)
+    marker = drone.marker
+    return Pad(drone.pad_m, math.radians(drone.pad_yaw_deg), height, std, marker.position_m, square_m(marker))

@@ -23,6 +23,14 @@ Forward = Annotated[str, Field(pattern=r"^(udp:\d{1,3}(\.\d{1,3}){3}:\d{1,5})?$"
 """Where a second ground station listens, such as udp:127.0.0.1:14550; empty: nowhere."""
 
 
+def _has_a_port(target: str) -> str:
+    way, _, number = target.split(":")
+    least = int(way == "udpout")  # udpin with port 0 waits at any free one
+    if way != "serial" and not least <= int(number) <= 65535:
+        raise PydanticCustomError("port", "must end in a port from 1 to 65535")
+    return target
+
+
 class VisionFeedback(DriverSection):
     """Poses sent to the autopilot from the tracker's estimate, and the effect of their loss.
 
@@ -65,7 +73,7 @@ class LinkSettings(DriverSection):
     """
 
     kind: Literal["pymavlink", "mavsdk"] = "pymavlink"
-    target: Annotated[str, Field(pattern=r"^(udpout|udpin|serial):[^:]+:\d+$")]
+    target: Annotated[str, Field(pattern=r"^(udpout|udpin|serial):[^:]+:\d{1,7}$"), AfterValidator(_has_a_port)]
     system_id: Annotated[int, Field(ge=1, le=255)] = 255
     component_id: Annotated[int, Field(ge=1, le=255)] = 190
     key_file: str = ""

@@ -108,7 +108,9 @@ def _recorded(path: Path) -> "tuple[Field, Pictures]":
         run = open_run(path)
     except RecordingError as error:
         raise click.UsageError(str(error)) from error
-    return recorded_field(run.attachments.get(FIELD_NAME, b"{}")), lambda name, _: recorded_pictures(run, name)
+    if FIELD_NAME not in run.attachments:
+        raise click.UsageError(f"{path}: no recording of a ground station (no field is in it)")
+    return recorded_field(run.attachments[FIELD_NAME]), lambda name, _: recorded_pictures(run, name)
 
 
 def _of_camera(_name: str, camera: "WorldCameraSettings") -> "Iterable[SourcePicture]":

@@ -14,6 +14,11 @@ _SILENCE = (
     "and who calls whom: udpin: waits for the vehicle's call, udpout: calls it"
 )
 
+_OLD = (
+    "somebody there speaks MAVLink 1 only, which is not understood: set version 2 on the vehicle "
+    "(PX4: MAV_PROTO_VER 2; ArduPilot: SERIALn_PROTOCOL 2)"
+)
+
 
 @click.group(
     epilog="\b\nExamples:\n  groundstation mavlink probe udpin:0.0.0.0:14550\n"
@@ -60,7 +65,8 @@ def probe(link: str, seconds: float, key_file: str, with_mavsdk: bool) -> int:
     for reason, count in sorted(opened.rejected.items()):
         click.echo(f"refused: {count} x {reason.replace('_', ' ')}")
     if not found:
-        click.echo(f"nobody answers on {link} within {seconds:g} s; {_SILENCE}", err=True)
+        remedy = _OLD if opened.rejected["mavlink_1"] else _SILENCE
+        click.echo(f"nobody answers on {link} within {seconds:g} s; {remedy}", err=True)
         return ExitCode.FAULT
     return ExitCode.OK
 
@@ -108,9 +114,10 @@ def _link_settings(target: str, key_file: str, kind: str) -> Any:
 
     try:
         return LinkSettings.model_validate({"kind": kind, "target": target, "key_file": key_file})
-    except ValidationError:
-        like = "udpin:0.0.0.0:14550, udpout:ADDRESS:PORT, serial:DEVICE:BAUD"
-        raise OperatorMistake(f"{target}: must be like {like}; MAVSDK cannot sign") from None
+    except ValidationError as error:
+        like = "must be like udpin:0.0.0.0:14550, udpout:ADDRESS:PORT, serial:DEVICE:BAUD"
+        told = [like if one["type"] == "string_pattern_mismatch" else one["msg"] for one in error.errors()]
+        raise OperatorMistake(f"{target}: {'; '.join(text.removeprefix('Value error, ') for text in told)}") from None
 
 
 def _vehicle(path: Path, name: str) -> tuple[Any, Any]:

@@ -114,7 +114,11 @@ def _run_dir(path: Path) -> Path:
     """Return the run folder that is meant by a folder or by a recording in it."""
     if not path.exists():
         raise OperatorMistake(f"{path}: there is no such run")
-    return path if path.is_dir() else path.parent
+    if path.is_dir():
+        return path
+    if not any(path.parent.glob("state*.mcap")):
+        raise OperatorMistake(f"{path}: no recording of a run, and no state.mcap beside it: name a run's folder")
+    return path.parent
 
 
 def newest_run(folder: Path) -> Path:

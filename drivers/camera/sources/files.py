@@ -36,6 +36,8 @@ class FileReader:
         """Yield every picture as fast as it is asked for: when it is due [s], its name, and the picture itself."""
         if not self._path.exists():
             raise DriverError("there is no such file or folder")
+        if not self._path.is_file() and not self._path.is_dir():  # opening a pipe would wait for who writes to it
+            raise DriverError("it is neither a file nor a folder")
         yield from self._folder() if self._path.is_dir() else self._video()
 
     def read(self, drain: Drain) -> None:

@@ -11,6 +11,8 @@ def make_raw(fd: int, baud: int) -> None:
     speed = getattr(termios, f"B{baud}", None)
     if speed is None:
         raise DriverError("no such speed")
+    if not os.isatty(fd):
+        raise DriverError("it is no serial port")
     attributes = termios.tcgetattr(fd)
     control = termios.CS8 | termios.CREAD | termios.CLOCAL
     termios.tcsetattr(fd, termios.TCSANOW, [0, 0, control, 0, speed, speed, attributes[6]])

@@ -1,6 +1,8 @@
 """`groundstation mavlink probe` and `setup` against emulated vehicles on loopback; refusals on a link by name."""
 
 import os
+import socket
+import threading
 import time
 from pathlib import Path
 
@@ -101,6 +103,33 @@ def test_setup_refuses_another_autopilot_and_an_armed_one(hangar):
     emulator.firmware.armed = True
     result = run("setup", "--apply", FIELD, "drone_3", "--address", f"{address}:{port}")
     assert isinstance(result.exception, DriverError) and "armed" in str(result.exception)
+
+
+@pytest.mark.parametrize(
+    ("link", "told"),
+    [
+        ("udpin:127.0.0.1:80800", "must end in a port from 1 to 65535"),
+        ("udpout:127.0.0.1:0", "must end in a port from 1 to 65535"),
+        ("tcp:127.0.0.1:5760", "must be like udpin:0.0.0.0:14550"),
+        ("serial:/dev/null:57600", "it is no serial port"),
+    ],
+)
+def test_a_link_that_cannot_be_is_refused_by_name(link, told):
+    assert told in str(run("probe", link).exception)
+
+
+def test_probe_says_that_somebody_speaks_mavlink_1_only():
+    old = mavutil.mavlink.MAVLink(None, srcSystem=7, srcComponent=1)
+    heartbeat = old.heartbeat_encode(2, 3, 0, 0, 4).pack(old, force_mavlink1=True)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle:
+        vehicle.bind(("127.0.0.1", 0))
+        port = vehicle.getsockname()[1]
+        answering = threading.Thread(target=lambda: [vehicle.sendto(heartbeat, vehicle.recvfrom(300)[1])])
+        answering.start()
+        result = run("probe", f"udpout:127.0.0.1:{port}", "--seconds", 1)
+        answering.join(5.0)
+    assert result.return_value == 4
+    assert "speaks MAVLink 1 only" in result.output and "MAV_PROTO_VER 2" in result.output
 
 
 def test_signed_link_hears_only_who_has_the_key(hangar, tmp_path):

@@ -91,6 +91,12 @@ def test_report_names_a_folder_without_recording(tmp_path: Path, capsys: pytest.
     assert "no state.mcap in this folder" in capsys.readouterr().err
 
 
+def test_report_names_the_file_that_is_no_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "flight.ulg").write_bytes(b"ULog")
+    assert run(["report", str(tmp_path / "flight.ulg")]) == 2
+    assert "flight.ulg: no recording of a run" in capsys.readouterr().err
+
+
 def test_report_without_argument_takes_the_newest(tmp_path: Path) -> None:
     for index, name in enumerate(("b", "a")):
         (tmp_path / name).mkdir()

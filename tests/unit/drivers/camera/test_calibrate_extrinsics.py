@@ -283,6 +283,9 @@ def test_a_recording_is_checked_by_its_first_pictures(tmp_path, capsys):
     (tmp_path / "other.mcap").write_bytes(b"no recording")
     assert run(["calibrate", "check", str(tmp_path / "other.mcap")]) == 2
     assert "not an MCAP recording" in capsys.readouterr().err
+    (tmp_path / "cut.mcap").write_bytes(raw.read_bytes()[:8])
+    assert run(["calibrate", "check", str(tmp_path / "cut.mcap")]) == 2
+    assert "cut.mcap: no recording of a ground station" in capsys.readouterr().err
 
 
 def test_a_marker_that_moves_judges_no_camera(tmp_path, capsys):

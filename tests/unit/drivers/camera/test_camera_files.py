@@ -1,5 +1,6 @@
 """Pictures from the disk: video files and folders, and what is wrong with them."""
 
+import os
 import time
 from contextlib import contextmanager
 
@@ -89,6 +90,7 @@ def test_a_folder_is_shown_by_name_without_what_is_no_picture(tmp_path):
         (lambda path: path.mkdir(), "no picture in it"),
         (lambda path: path.write_bytes(b"not a video at all" * 50), "Invalid data"),
         (lambda path: path.write_bytes(b""), ""),
+        (os.mkfifo, "neither a file nor a folder"),
     ],
 )
 def test_what_is_wrong_with_a_file_is_said(tmp_path, make, complaint):

@@ -26,7 +26,8 @@ _DAMAGE_LINES = 20
 @dataclass(frozen=True, slots=True)
 class RunReport:
     """A judged run. `valid`: the simulator kept real time; rerun, stretch: what it repeats or is a part of;
-    broken_off: the failure that ended it, "" without."""
+    broken_off: the failure that ended it, "" without; recorded_s: where the recording breaks off in flight, None
+    where it does not."""
 
     run_dir: Path
     facts: RunFacts
@@ -38,6 +39,7 @@ class RunReport:
     rerun: Rerun | None = None
     stretch: Stretch | None = None
     broken_off: str = ""
+    recorded_s: float | None = None
 
     @property
     def no_flight(self) -> Rerun | Stretch | None:
@@ -51,10 +53,10 @@ class RunReport:
 
     @property
     def passed(self) -> bool | None:
-        """Whether the run was what it should be: valid, and all criteria met; None for what is no flight."""
+        """Whether it was what it should be: valid, recorded until the landing, all criteria met; None for no flight."""
         if self.no_flight is not None:
             return None
-        return self.valid and all(criterion.ok for criterion in self.criteria)
+        return self.valid and self.recorded_s is None and all(criterion.ok for criterion in self.criteria)
 
     @property
     def reasons(self) -> tuple[str, ...]:
@@ -65,7 +67,10 @@ class RunReport:
             return ("the simulator did not keep real time",)
         if self.broken_off and not self.figures.tracked_s:
             return (self.broken_off,)  # without a flight every other criterion is missed for that reason
-        return tuple(missed(criterion) for criterion in self.criteria if not criterion.ok)
+        missing = tuple(missed(criterion) for criterion in self.criteria if not criterion.ok)
+        if self.recorded_s is None:
+            return missing
+        return (f"the recording breaks off after {self.recorded_s:.0f} s, before the run ended", *missing)
 
     @property
     def verdict(self) -> str:
@@ -110,6 +115,7 @@ def judge(data: RunData, run_dir: Path) -> RunReport:
         rerun=data.rerun,
         stretch=data.stretch,
         broken_off=_broken_off(data),
+        recorded_s=data.end_s if data.breaks_off and figures.landed is None else None,
     )
 
 

@@ -49,8 +49,13 @@ def landed(data: RunData) -> bool | None:
     """Return whether every drone stood on the ground at the end.
 
     Without a simulator: by what those said last that flew, as motion capture may have lost sight of one long before;
-    None where nobody did.
+    None where nobody did, and where the recording breaks off while somebody flies.
     """
+    down = _down_at_last(data)
+    return None if down is False and data.breaks_off else down
+
+
+def _down_at_last(data: RunData) -> bool | None:
     tracks = [data.truth[name] for name in data.drones if name in data.truth]
     if any(track.is_simulated for track in tracks):
         return all(bool(track.on_ground[-1]) for track in tracks) and len(tracks) == len(data.drones)

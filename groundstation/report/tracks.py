@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from groundstation.arrays import Array, BoolArray
 from groundstation.bus.messages import (
+    RUN,
+    RUN_ENDED,
     Belief,
     Command,
     CommandAck,
@@ -158,6 +160,12 @@ class RunData:
     damage: list[str] = field(default_factory=list)
     rerun: Rerun | None = None
     stretch: Stretch | None = None
+
+    @property
+    def breaks_off(self) -> bool:
+        """Return whether the recording is damaged and lacks the end of the run: a full disk, or a recorder's death."""
+        ended = (one.message.header.entity == RUN and one.message.text.startswith(RUN_ENDED) for one in self.events)
+        return bool(self.damage) and not any(ended)
 
     @property
     def drones(self) -> tuple[str, ...]:

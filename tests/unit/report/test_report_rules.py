@@ -196,3 +196,11 @@ def test_a_run_that_was_broken_off_before_it_flew_failed_for_that_reason_alone(t
     header = m.Header(0, "here", m.RUN, "supervisor", 0)
     ended = TimedMessage(2.0, m.Event(header=header, severity=m.Severity.ERROR, text=text))
     assert judge(_data(events=[ended]), tmp_path).reasons == (text.removeprefix(m.RUN_ENDED),)
+
+
+def test_what_a_recording_that_breaks_off_does_not_show_is_not_judged(tmp_path: Path) -> None:
+    flying = {"a": _truth([True, False]), "b": _truth([True, False])}
+    cut = judge(_data(truth=flying, damage=["state.mcap: cut off at byte 9"]), tmp_path)
+    assert cut.figures.landed is None
+    assert cut.reasons[0] == "the recording breaks off after 100 s, before the run ended"
+    assert judge(_data(truth=flying), tmp_path).figures.landed is False

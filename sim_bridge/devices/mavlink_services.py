@@ -26,9 +26,13 @@ _PX4_RATES: dict[type[Message], float] = {
     t.SysStatus: 5, t.ExtendedSysState: 5, t.EstimatorStatus: 1, t.BatteryStatus: 0.5, t.HomePosition: 0.5,
 }  # fmt: skip
 _GLOBAL_RATES: dict[type[Message], float] = {GlobalPositionInt: 50, GpsRawInt: 8}
-_OLD_STREAMS: tuple[type[Message], ...] = (
-    t.SysStatus, t.LocalPositionNed, t.Attitude, t.ExtendedSysState, t.BatteryStatus, GpsRawInt, GlobalPositionInt,
-)  # fmt: skip
+# WIRE (REQUEST_DATA_STREAM): what ArduPilot sends by each number of a stream; 0 is all of them.
+_OLD_STREAMS: dict[int, tuple[type[Message], ...]] = {
+    2: (t.SysStatus, t.ExtendedSysState, GpsRawInt),
+    6: (t.LocalPositionNed, GlobalPositionInt),
+    10: (t.Attitude,),
+    12: (t.BatteryStatus, t.EkfStatusReport),
+}
 _UNSUPPORTED: Answer = (MavResult.UNSUPPORTED, "")
 _OK: Answer = (MavResult.ACCEPTED, "")
 _MISSION_UNSUPPORTED, _NO_SUCH_ITEM = 3, 13
@@ -177,8 +181,8 @@ class Services:
                 yield _mission_answer(frame, message)
             case s.FileTransferProtocol():
                 yield refusal(message, frame.system, frame.component)
-            case s.RequestDataStream() if message.start_stop:
-                self._old_rates(message.req_message_rate)
+            case s.RequestDataStream() if self._firmware.flavour is Flavour.ARDUPILOT and message.start_stop in (0, 1):
+                self._old_rates(message.req_stream_id, message.req_message_rate * message.start_stop)
 
     def _write(self, message: s.ParamSet) -> None:
         parameters = self._firmware.parameters
@@ -189,10 +193,14 @@ class Services:
             return
         parameters.values[message.param_id] = value
 
-    def _old_rates(self, rate_hz: int) -> None:
-        ticks = max(4, round(TICK_HZ / max(1, rate_hz)))
-        for kind in (*_OLD_STREAMS, *((t.EkfStatusReport,) if self.clock.learns else ())):
-            self.intervals.setdefault(kind, ticks)
+    def _old_rates(self, stream: int, rate_hz: int) -> None:
+        """Send a stream at a rate from now on, whatever was asked for before, or no more (0)."""
+        for number, kinds in _OLD_STREAMS.items():
+            for kind in kinds if stream in (0, number) else ():
+                if rate_hz:
+                    self.intervals[kind] = max(4, round(TICK_HZ / rate_hz))
+                else:
+                    self.intervals.pop(kind, None)
 
     # -- position from outside ----------------------------------------------------------------------------------------
 

@@ -264,3 +264,24 @@ def test_px4_follows_the_ground_stations_clock_and_bears_its_jump(bench_of):
     jump = 3_000_000
     run(1.5)
     assert run(1.0) > 15
+
+
+def heard_in_a_second(bench, kind):
+    bench.heard.clear()
+    bench.run(1.0)
+    return sum(isinstance(message, kind) for message in bench.heard)
+
+
+def test_an_ardupilot_sends_each_stream_by_the_last_request_and_a_px4_ignores_them(bench_of):
+    bench = bench_of("ardupilot").up()
+    for rate_hz in (1, 10, 2):
+        bench.say(s.RequestDataStream(5, 1, 0, rate_hz, 1))
+        assert heard_in_a_second(bench, t.Attitude) == heard_in_a_second(bench, t.LocalPositionNed) == rate_hz
+    bench.say(s.RequestDataStream(5, 1, 10, 20, 1))
+    assert (heard_in_a_second(bench, t.Attitude), heard_in_a_second(bench, t.LocalPositionNed)) == (20, 2)
+    bench.say(s.RequestDataStream(5, 1, 0, 4, 0))
+    assert heard_in_a_second(bench, t.Attitude) == heard_in_a_second(bench, t.SysStatus) == 0
+    other = bench_of("px4").up()
+    before = heard_in_a_second(other, t.Attitude)
+    other.say(s.RequestDataStream(5, 1, 0, 1, 1))
+    assert before > 50 and abs(heard_in_a_second(other, t.Attitude) - before) <= 1

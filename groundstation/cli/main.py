@@ -1,5 +1,6 @@
 """The command line: each verb imported only when it is called, and one place for errors."""
 
+import errno
 import sys
 from collections.abc import Sequence
 from importlib.util import find_spec
@@ -143,6 +144,8 @@ def _tell(error: BaseException) -> None:
             click.echo("\n".join([*problems, f"{count}: nothing was started"]), err=True)
         case click.Abort() | KeyboardInterrupt():
             click.echo("interrupted", err=True)
+        case OSError(errno=errno.EMFILE):
+            click.echo(f"groundstation: {error.strerror}: raise what this shell allows (ulimit -n 1024)", err=True)
         case OSError(filename=place, strerror=why) if place is not None:
             click.echo(f"groundstation: {place}: {why}", err=True)
         case BrokenPipeError():

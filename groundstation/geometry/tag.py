@@ -3,8 +3,9 @@
 Marker frame: origin at the centre, z out of the face, x to the right and y up as printed; forward is x.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from typing import Protocol
 
 import numpy as np
@@ -109,5 +110,13 @@ def tag_fault(dictionary: str, number: int) -> str:
         except plug_ins.PlugInError as error:
             return f"dictionary {error}"
     else:
-        return f"dictionary must be one of {', '.join((*sorted(DICTIONARIES), *installed))} (got {dictionary})"
+        known = (*sorted(DICTIONARIES), *installed)
+        return f"dictionary must be one of {', '.join(known)}{_meant(dictionary, known)} (got {dictionary})"
     return "" if 0 <= number < count else f"id must be in 0..{count - 1} of {dictionary} (got {number})"
+
+
+def _meant(dictionary: str, known: Sequence[str]) -> str:
+    """Return which dictionary was probably meant: OpenCV itself writes 36h11 in C++, and both in Python."""
+    by_capitals = {name.upper(): name for name in known}
+    near = get_close_matches(dictionary.upper(), by_capitals, 1, 0.8)
+    return f"; did you mean {by_capitals[near[0]]}?" if near else ""

@@ -125,6 +125,10 @@ def test_exit_codes(error: BaseException, code: int) -> None:
         (DriverError("drone_1 does not answer"), "groundstation: drone_1 does not answer\n"),
         (SettingsError(["a:1: b", "a:2: c"]), "a:1: b\na:2: c\n2 problems: nothing was started\n"),
         (PermissionError(13, "Permission denied", "/a/b"), "groundstation: /a/b: Permission denied\n"),
+        (
+            OSError(24, "Too many open files", "/a/b.py"),
+            "groundstation: Too many open files: raise what this shell allows (ulimit -n 1024)\n",
+        ),
         (KeyboardInterrupt(), "\ninterrupted\n"),
     ],
 )

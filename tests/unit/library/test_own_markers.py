@@ -117,6 +117,7 @@ REFUSED = [
     ("hollow", 3, r"drones.drone_1.marker.dictionary: hollow cannot be used: my-lab .*TypeError"),
     ("nothing", 3, r"drones.drone_1.marker.dictionary: nothing cannot be used: .*without finder"),
     ("DICT_MINE", 3, r"drones.drone_1.marker.dictionary: must be one of .*LAB_TAGS"),
+    ("DICT_APRILTAG_36h11", 3, r"must be one of .*; did you mean DICT_APRILTAG_36H11\?"),
 ]
 
 

@@ -26,8 +26,8 @@ PER_CAMERA = ("x", "y", "z", "roll", "pitch", "yaw", "focal")
 PER_DRONE = ("aside_x", "aside_y", "turned", "higher", "print")
 TEAM_PRINT = ("", "print")
 _SCATTER_M, _SCATTER_SHARE, _SCATTER_RAD = 0.003, 0.002, math.radians(0.5)
-# Few pixels a square: where the board lies in their grid shifts its distance, by this share at 4 px (docs/reference/
-# vision.md 8), and however long one looks.
+# Few pixels a square (docs/reference/vision.md 8): where the board lies in their grid shifts its distance, by this
+# share at 4 px, and however long one looks.
 _COARSE_SHARE, _COARSE_PX, _COARSE_POWER = 0.0035, 4.0, 10
 _STEPS, _DIFFERENCE = 8, 1e-6
 

@@ -22,14 +22,15 @@ def recorded_flight(recording: tuple[Path, ...]) -> RecordedFlight:
     """Return the flight of a recording; raises UsageError where none can be read of it."""
     from groundstation.cli.kernels import use_flying_kernels
     from groundstation.recording.reader import RecordingError
-    from groundstation.settings.recorded import recorded_field
-
-    use_flying_kernels()
-    from groundstation.calibration.recorded_likelihood import flown_of
     from groundstation.replay.source import open_source
+    from groundstation.settings.recorded import recorded_field
 
     try:
         source = open_source(recording)
-        return RecordedFlight(source.name, recorded_field(source.field), flown_of(source))
+        field = recorded_field(source.field)
+        use_flying_kernels()
+        from groundstation.calibration.recorded_likelihood import flown_of
+
+        return RecordedFlight(source.name, field, flown_of(source))
     except RecordingError as error:
         raise click.UsageError(str(error)) from error

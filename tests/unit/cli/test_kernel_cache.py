@@ -10,6 +10,7 @@ import pytest
 
 from groundstation.cli import kernels
 from groundstation.cli.bench_planner import choices, numbers
+from groundstation.cli.recorded_flight import recorded_flight
 from groundstation.errors import GroundStationError
 from groundstation.process import numba_cache
 from groundstation.runtime import compile_kernels
@@ -64,3 +65,12 @@ def test_what_is_named_twice_is_computed_once() -> None:
 def test_a_list_of_nothing_is_refused() -> None:
     with pytest.raises(click.UsageError, match="at least one of"):
         choices(" ,", ("paper",), "--strategies")
+
+
+def test_what_is_no_recording_is_refused_before_kernels_are_compiled(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(kernels, "use_flying_kernels", lambda: pytest.fail("compiled for nothing"))
+    (tmp_path / "flight.mcap").write_bytes(b"another program's")
+    with pytest.raises(click.UsageError, match="not an MCAP recording"):
+        recorded_flight((tmp_path / "flight.mcap",))

@@ -1,11 +1,13 @@
-"""How long batteries last: by the mean drain of this flight, before that by what a kind usually flies. Pure."""
+"""How long batteries last: by what a kind usually flies, and more and more by the drain of this flight. Pure."""
 
 from dataclasses import dataclass
 
 from groundstation.bus.messages import AIRBORNE, FlightState, VehicleStatus
 
-# What has to be spent before a drain is believed, and for how long.
+# What has to be spent before a drain is believed that nothing is known of, and for how long.
 _LEAST_DRAIN, _LEAST_MIN = 0.02, 0.5
+# Minutes of this flight that the usual drain of a kind weighs as much as: a battery says its charge in whole points.
+_USUAL_MIN = 1.0
 _NS_PER_MIN = 60e9
 
 
@@ -19,17 +21,14 @@ class TakeOff:
 
 @dataclass(frozen=True, slots=True)
 class Endurance:
-    """Minutes until a battery lands its drone; measured: by the mean drain of this flight, not by its kind."""
+    """Minutes until a battery lands its drone."""
 
     minutes: float
-    measured: bool
 
     @property
     def words(self) -> str:
-        """Say it: "6 min" as measured, "~6 min" by the kind."""
-        if self.minutes < 1.0:
-            return "< 1 min"
-        return f"{'' if self.measured else '~'}{int(self.minutes)} min"
+        """Say it: "~6 min"."""
+        return "< 1 min" if self.minutes < 1.0 else f"~{int(self.minutes)} min"
 
 
 def flies(status: VehicleStatus, take_off: TakeOff | None) -> bool:
@@ -56,9 +55,11 @@ def endurance(
     battery, limit: shares of a full one, at `stamp_ns` and when it lands its drone. flight_time_s: of a full battery,
     None where its kind does not say.
     """
-    left = max(0.0, battery - limit)
+    left, minutes, spent = max(0.0, battery - limit), 0.0, 0.0
     if take_off is not None:
         minutes, spent = (stamp_ns - take_off.stamp_ns) / _NS_PER_MIN, take_off.battery - battery
-        if minutes >= _LEAST_MIN and spent >= _LEAST_DRAIN:
-            return Endurance(left * minutes / spent, True)
-    return None if flight_time_s is None else Endurance(left * flight_time_s / 60.0, False)
+    if flight_time_s is not None:
+        usual = _USUAL_MIN / (flight_time_s / 60.0)
+        return Endurance(left * (_USUAL_MIN + minutes) / (usual + spent))
+    believed = minutes >= _LEAST_MIN and spent >= _LEAST_DRAIN
+    return Endurance(left * minutes / spent) if believed else None

@@ -1,6 +1,5 @@
 """Evidence for the conditions of the table of failsafes: which hold now, for how long they have, and why. Pure."""
 
-import math
 from dataclasses import dataclass
 
 from drivers.failsafe_table import Condition, Failsafe, Reaction
@@ -13,8 +12,10 @@ from groundstation.time_units import NS_PER_S
 _STREAM_S = 0.15
 # What a condition is credited with when it is met anew, however long nobody looked.
 _FIRST_S = 0.05
-# What is told of a reaction to come: its condition has lasted for so long, and it is so near.
-_LASTING_S, _NEAR_S = 0.3, 3.0
+# What is told of a reaction to come: its condition has lasted for so long, and it is so near; a fault that has lasted
+# for longer is told however far off that is. A take-off takes its time: it is overdue at the end only.
+_LASTING_S, _NEAR_S, _FAULT_S = 0.3, 3.0, 3.0
+_USUAL = frozenset({Condition.TAKE_OFF_OVERDUE})
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,6 +133,20 @@ def timed(at: Situation) -> dict[Condition, float]:
     return lasted
 
 
+@dataclass(frozen=True, slots=True)
+class Outlook:
+    """A row that will act, and in what time if nothing changes [s]."""
+
+    row: Failsafe
+    in_s: float
+
+
+def _is_told(row: Failsafe, lasted_s: float) -> bool:
+    """Return whether an operator should know by now that a row will act."""
+    near = row.after_s - lasted_s <= _NEAR_S
+    return lasted_s >= _LASTING_S and (near or (lasted_s >= _FAULT_S and row.condition not in _USUAL))
+
+
 class Evidence:
     """Keeps the duration of conditions; ended ones are forgotten by the rules of the table."""
 
@@ -162,16 +177,15 @@ class Evidence:
         """Return for how long a condition has lasted [s], or None if it does not hold."""
         return self.charged_s.get(condition, 0.0) if condition in self.holding else None
 
-    def soonest_s(self, mode: DriverMode, reaction: Reaction) -> float | None:
-        """Return the time until the first row with a reaction acts if nothing changes [s]; None: none is near."""
+    def soonest(self, mode: DriverMode, reaction: Reaction) -> Outlook | None:
+        """Return which row with a reaction acts first if nothing changes, and when; None: none is to be told."""
         waits = [
-            row.after_s - lasted_s
+            Outlook(row, max(0.0, row.after_s - lasted_s))
             for row in self._table
             if row.reaction is reaction and mode in row.modes
-            and (lasted_s := self.lasted_s(row.condition) or 0.0) >= _LASTING_S
+            and _is_told(row, lasted_s := self.lasted_s(row.condition) or 0.0)
         ]  # fmt: skip
-        soonest_s = max(0.0, min(waits, default=math.inf))
-        return soonest_s if soonest_s <= _NEAR_S else None
+        return min(waits, key=lambda outlook: outlook.in_s, default=None)
 
     def forget(self, *conditions: Condition) -> None:
         """Begin anew with some conditions, or with all."""

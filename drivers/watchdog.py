@@ -6,7 +6,7 @@ Tables: docs/explanation/authority.md#the-watchdog.
 """
 
 from drivers.acknowledgements import AckBook
-from drivers.failsafe_evidence import Evidence, Situation, observed
+from drivers.failsafe_evidence import Evidence, Outlook, Situation, observed
 from drivers.failsafe_table import Condition, Failsafe, Latch, Reaction, failsafes
 from drivers.lease import LeaseBook
 from drivers.setpoints import SetpointGate
@@ -196,13 +196,20 @@ class Watchdog:
 
     @property
     def explanation(self) -> str:
-        """Return why the vehicle does what it does now, in words."""
-        return self.reason if self._braked_by is None else f"hovers: {self._text_of(self._braked_by)}"
+        """Return why the vehicle does what it does now, in words; where it obeys an order still, why it will land."""
+        if self._braked_by is not None:
+            return f"hovers: {self._text_of(self._braked_by)}"
+        outlook = None if self.failsafe else self._landing
+        return self.reason if outlook is None else self._text_of(outlook.row)
 
     @property
     def lands_in_s(self) -> float | None:
         """Return when the table lands the vehicle if nothing changes [s]; None while no such condition lasts."""
-        return self.evidence.soonest_s(self.mode, Reaction.LAND)
+        return None if self._landing is None else self._landing.in_s
+
+    @property
+    def _landing(self) -> Outlook | None:
+        return self.evidence.soonest(self.mode, Reaction.LAND)
 
     # -- step ---------------------------------------------------------------------------------------------------------
 

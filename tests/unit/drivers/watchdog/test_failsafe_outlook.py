@@ -47,6 +47,19 @@ def test_it_lands_when_it_said_that_it_would(new_bench, fault, why):
     assert waited_s == pytest.approx(expected_s, abs=0.05)
 
 
+def test_an_unseen_drone_says_when_it_will_land_from_when_it_is_lost(new_bench):
+    bench = new_bench().fly()
+    bench.unseen = True
+    bench.run(2.9)
+    assert bench.watchdog.lands_in_s is None
+    bench.run(0.2)
+    assert bench.watchdog.lands_in_s == pytest.approx(7.0, abs=0.2)
+    assert bench.watchdog.explanation == "not seen by any camera for too long" and not bench.watchdog.braked
+    bench.unseen = False
+    bench.run(0.1)
+    assert bench.watchdog.lands_in_s is None and bench.watchdog.explanation == "tracking for op"
+
+
 def test_a_landing_is_no_longer_announced_once_its_condition_is_over(new_bench):
     bench = new_bench().fly()
     bench.tracker_speaks = False

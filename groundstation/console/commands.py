@@ -1,7 +1,8 @@
 """Commands of the page: given as the command line gives them, repeated until heard, followed until confirmed."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any
 
 from groundstation.bus.api import Bus
@@ -16,11 +17,15 @@ _START_LIVES_MS = 2000.0
 _STOP_LIVES_MS = 5000.0
 # How many are followed: newer ones displace those that need no repeating first, the others only in a flood.
 _KEPT, _MOST = 8, 32
+_NOBODY: Mapping[str, str] = MappingProxyType({})
 
 
 @dataclass(slots=True)
 class Followed:
-    """One command on the bus, with its answers; `by`: the viewer who gave it, `ref`: that page's own id of it."""
+    """One command on the bus, with its answers; `by`: the viewer who gave it, `ref`: that page's own id of it.
+
+    instead: what each who has not done it said it was doing when its time was out.
+    """
 
     book: AwaitedAnswers
     given_ns: int
@@ -28,6 +33,7 @@ class Followed:
     by: str = ""
     ref: str = ""
     closed: bool = False
+    instead: dict[str, str] = field(default_factory=dict)
 
     @property
     def is_repeated(self) -> bool:
@@ -101,11 +107,15 @@ class CommandDesk:
                 followed.book.note(ack)
             self._keep(followed)
 
-    def step(self, now_ns: int) -> None:
-        """Repeat what was not answered; close what is settled or out of time."""
+    def step(self, now_ns: int, doing: Mapping[str, str] = _NOBODY) -> None:
+        """Repeat what was not answered; close what is settled or out of time. doing: what each drone says it does."""
         for order in self._orders.values():
             patience_ns = patience_s(order.book.command.verb) * NS_PER_S
-            order.closed = order.closed or order.book.settled or now_ns - order.given_ns > patience_ns
+            if not order.closed and now_ns - order.given_ns > patience_ns:
+                late = (name for name, progress in order.book.progress.items() if not progress.settled)
+                order.instead = {name: doing[name] for name in late if name in doing}
+                order.closed = True
+            order.closed = order.closed or order.book.settled
             due_ns = order.repeated_ns + order.book.repeat_after_s * NS_PER_S
             if order.is_repeated and now_ns > due_ns:
                 order.repeated_ns = now_ns
@@ -153,7 +163,10 @@ def _summary(order: Followed) -> dict[str, Any]:
         "given_ms": order.given_ns / NS_PER_MS,
         "closed": order.closed,
         "state": _state(order),
-        "rows": [{"name": n, "stage": p.stage, "reason": p.reason} for n, p in book.progress.items()],
+        "rows": [
+            {"name": n, "stage": p.stage, "reason": p.reason, "instead": order.instead.get(n, "")}
+            for n, p in book.progress.items()
+        ],
     }
 
 

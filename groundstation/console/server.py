@@ -224,7 +224,7 @@ class ConsoleServer:
         if self._player is not None or self.board.turn % 2:
             self.ingest(self._less_often.drain(), now_ns)
         self.ingest(self._each.drain(), now_ns)
-        self.sessions.desk.step(now_ns)
+        self.sessions.desk.step(now_ns, self.state.doing())
         self.sessions.operator_lock.step(now_ns)
         self._take_pictures(now_ns)
         self.state.note(now_ns)

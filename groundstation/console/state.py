@@ -81,6 +81,10 @@ class ConsoleState:
         nis = self.health.nis() if estimate is not None and self.history.sample_due(now_ns) else None
         self._sample = self.history.step(now_ns, estimate, plan, nis, truth) or self._sample
 
+    def doing(self) -> dict[str, str]:
+        """Return what each drone says it does."""
+        return {name: seen.message.detail or seen.message.mode for name, seen in self.monitor.vehicles.items()}
+
     def put(self, board: Snapshot, now_ns: int) -> None:
         """Put what changed on the board."""
         board.put("estimate", told.estimate(self.monitor.estimate))

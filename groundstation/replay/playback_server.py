@@ -122,7 +122,7 @@ class Show:
         self._ingest([record for _, record in recently], now_ns)
         for record in self._newest(at_ns, (IMAGE,)):
             self._deliver(record)
-        server.sessions.desk.step(now_ns)
+        server.sessions.desk.step(now_ns, server.state.doing())
         server.show_anew(now_ns)
 
     def _newest(self, at_ns: int, topics: tuple[Topic, ...]) -> list[RawRecord]:

@@ -190,6 +190,23 @@ def test_everybody_s_orders_are_followed_even_if_answers_come_first() -> None:
     assert len(room.desk.summary()) == 8
 
 
+def test_an_order_that_is_not_confirmed_says_what_was_done_instead() -> None:
+    room = Room()
+    header = room.others.header("team")
+    command = m.Command(header=header, id="x", verb=m.Verb.TRACK, scope=(), issuer="cli_1")
+    room.desk.hear(command, room.now_ns)
+    room.ack(command, "drone_1", m.AckStage.EFFECTIVE)
+    room.ack(command, "drone_2", m.AckStage.ACCEPTED)
+    doing = {"drone_1": "tracking for cli_1", "drone_2": "hovers: no setpoint from the tracker"}
+    room.desk.step(room.now_ns, doing)
+    assert [row["instead"] for row in room.desk.summary()[0]["rows"]] == ["", ""]
+    room.desk.step(room.now_ns + 60 * NS_PER_S, doing)
+    room.desk.step(room.now_ns + 61 * NS_PER_S, {"drone_2": "landed"})
+    (given,) = room.desk.summary()
+    assert given["state"] == "not_confirmed"
+    assert [row["instead"] for row in given["rows"]] == ["", "hovers: no setpoint from the tracker"]
+
+
 def test_a_stop_is_repeated_until_it_is_heard_whatever_is_ordered_after_it() -> None:
     room = Room()
     room.desk.give(m.Verb.LAND, ("drone_1",), Given("viewer 1", ref="first"), room.now_ns)

@@ -164,7 +164,7 @@ def _message(name: str, state: SearchState, now_ns: int) -> TargetSearch:
     x, y = state.place or (0.0, 0.0)
     how_long = "nobody can search now" if state.expected_s is None else f"about {state.expected_s:.0f} s more"
     done = f"{state.excluded:.0%} of the room done"
-    text = f"searched for {since_s:.0f} s, now around ({x:.1f}, {y:.1f}); {done}, {how_long}"
+    text = f"searched for {since_s:.0f} s, most likely near ({x:.1f}, {y:.1f}); {done}, {how_long}"
     if state.mode is SearchMode.LOST:
         text = f"not found in {since_s:.0f} s, {done}: {_CALL_REMEDY}"
     expected_s = None if state.expected_s is None else round(state.expected_s, 1)

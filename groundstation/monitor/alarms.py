@@ -1,6 +1,6 @@
 """What the operator must not overlook, from the state; pure."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from groundstation.bus.messages import (
@@ -32,7 +32,7 @@ _BEFORE_FLIGHT = {
     Charge.UNKNOWN: "until it is known it may not take off",
 }
 _AFTER_LANDING = "Nothing to do now: check its power and cable once all have landed."
-_DARK_ADVICE = "Nothing to do but light: who is not seen lands by itself."
+_DARK_ADVICE = "Nothing to do: who is not seen lands by itself. Light ends it."
 _SWITCHED_OFF = "Nothing to do now: switch it on before it flies again."
 _SEARCH = "Nothing to do: the drones look for it."
 _RESTARTED = "Nothing to do: it is restarted if it hangs."
@@ -117,8 +117,9 @@ def _lands(status: VehicleStatus) -> bool:
 def _failsafe(name: str, status: VehicleStatus) -> Iterator[Alarm]:
     """What keeps a drone from its plan, or will land it."""
     if status.lands_in_s is not None:
-        advice = "Nothing to do: it lands by itself unless this ends. HOLD does not stop that."
-        yield Alarm(f"{name} lands", f"{name} lands in {status.lands_in_s:.0f} s: {status.detail}", advice=advice)
+        advice = "Nothing to do: that comes by itself unless this ends. HOLD does not stop it."
+        why = status.detail.removeprefix("hovers: ")
+        yield Alarm(f"{name} lands", f"{name} lands in {status.lands_in_s:.0f} s: {why}", advice=advice)
     elif status.braked:
         advice = "Nothing to do: it follows its plan again when this ends."
         yield Alarm(f"{name} braked", f"{name} {status.detail}", False, advice)
@@ -127,14 +128,14 @@ def _failsafe(name: str, status: VehicleStatus) -> Iterator[Alarm]:
 def _battery(name: str, status: VehicleStatus, up: bool, battery: Battery) -> Iterator[Alarm]:
     if battery.charge is Charge.GOOD or (battery.level is None and status.flight_state is FlightState.UNKNOWN):
         return
-    about, held, lands = f"{name} battery", f"{name}: {battery.words}", f"it lands by itself at {battery.limit:.0%}"
+    about, held, lands = f"{name} battery", f"{name}: {battery.words}", f"at {battery.limit:.0%} it lands by itself"
     if _lands(status):
         yield Alarm(about, f"{held}, it lands", False, "Nothing to do.")
     elif not up:
         yield Alarm(about, held, False, f"Nothing to do now: {_BEFORE_FLIGHT[battery.charge]}.")
     elif battery.charge is Charge.EMPTY:
         below = battery.level is not None and battery.level < battery.limit
-        yield Alarm(about, f"{held}{battery.good_for}", below, f"{_TO_DO}LAND it where it suits you; {lands}.")
+        yield Alarm(about, f"{held}{battery.good_for}", below, f"{_TO_DO}LAND it while you can choose where; {lands}.")
     else:
         yield Alarm(about, f"{held}{battery.good_for}", False, f"Nothing to do yet: {lands}.")
 
@@ -181,17 +182,27 @@ def _searched(search: TargetSearch) -> Alarm:
         return Alarm(
             about, f"{search.target} is not found: {search.searched:.0%} of the room was searched", False, _CALL
         )
-    text = f"{search.target} is lost: {search.since_s:.0f} s of search, now around ({x:.1f}, {y:.1f})"
+    text = f"{search.target} is lost: searched for {search.since_s:.0f} s, most likely near ({x:.1f}, {y:.1f})"
     return Alarm(about, text, False, _SEARCH)
 
 
 def _cameras(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
+    dark = []
     for name, seen in state.cameras.items():
         if not seen.message.connected or seen.age_s(now_ns) > CAMERA_SILENT_S:
             why = f" ({seen.message.detail})" if seen.message.detail else ""
             yield Alarm(f"{name} pictures", f"{name}: no pictures{why}", False, _AFTER_LANDING)
         elif (light := seen.message.brightness) is not None and light < DARK and not _stands_with(state, name):
-            yield Alarm(f"{name} dark", f"{name}: its picture is dark, it sees nobody", False, _DARK_ADVICE)
+            dark.append(name)
+    if dark:
+        yield Alarm("dark", _dark_words(dark), False, _DARK_ADVICE)
+
+
+def _dark_words(names: Sequence[str]) -> str:
+    """Say it of one camera or of several together: then it is the light and no camera."""
+    if len(names) == 1:
+        return f"{names[0]}: its picture is dark, it sees nobody"
+    return f"{', '.join(names[:-1])} and {names[-1]}: their pictures are dark, they see nobody"
 
 
 def _stands_with(state: MonitorState, camera: str) -> bool:

@@ -35,6 +35,7 @@ def scene_from_field(field: ResolvedField, truth: bool) -> Json:
         "hysteresis": planner.hysteresis,
         "planned_range_m": planner.planned_range_m,
         "lost_after_s": field.estimator.lost_after_s,
+        "unseen_land_s": field.safety.unseen_land_at_last_s,
     }
 
 
@@ -53,6 +54,7 @@ def bare_scene(site: str, drones: tuple[str, ...], truth: bool) -> Json:
         "hysteresis": 0.0,
         "planned_range_m": 2.0,
         "lost_after_s": 3.0,
+        "unseen_land_s": 30.0,
     }
 
 

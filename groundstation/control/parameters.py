@@ -100,7 +100,7 @@ def control_from_field(field: ResolvedField) -> ControlParameters:
         lost_after_s=field.estimator.lost_after_s,
         return_std_m=0.6 * safety.max_position_std_m,
         return_limit_m=0.8 * safety.max_position_std_m,
-        return_within_s=1.5 * safety.unseen_land_after_s,
+        return_within_s=0.5 * safety.unseen_land_at_last_s,
         planned_s=planner.horizon_steps * planner.step_s,
         max_plan_age_s=max(1.0, 3.0 / planner.rate_hz),
         fed=frozenset(n for n, drone in field.drones.items() if kind_named(drone.kind).habits.flies_on_estimate),

@@ -43,6 +43,11 @@ class SafetyValues(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     unseen_land_after_s: float = 10.0
     max_position_std_m: float = 0.6
 
+    @property
+    def unseen_land_at_last_s(self) -> float:
+        """Return after what time unseen a drone lands however well it is known [s]."""
+        return 3.0 * self.unseen_land_after_s
+
 
 class RecordingValues(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What is recorded of a run, and where."""

@@ -129,12 +129,12 @@ def _battery(name: str, status: VehicleStatus, up: bool, battery: Battery) -> It
     if battery.charge is Charge.GOOD or (battery.level is None and status.flight_state is FlightState.UNKNOWN):
         return
     about, held, lands = f"{name} battery", f"{name}: {battery.words}", f"at {battery.limit:.0%} it lands by itself"
-    if _lands(status):
+    below = battery.level is not None and battery.level < battery.limit
+    if _lands(status) or (below and status.lands_in_s is not None):
         yield Alarm(about, f"{held}, it lands", False, "Nothing to do.")
     elif not up:
         yield Alarm(about, held, False, f"Nothing to do now: {_BEFORE_FLIGHT[battery.charge]}.")
     elif battery.charge is Charge.EMPTY:
-        below = battery.level is not None and battery.level < battery.limit
         yield Alarm(about, f"{held}{battery.good_for}", below, f"{_TO_DO}LAND it while you can choose where; {lands}.")
     else:
         yield Alarm(about, f"{held}{battery.good_for}", False, f"Nothing to do yet: {lands}.")
@@ -168,7 +168,9 @@ def _lost(state: MonitorState) -> Iterator[Alarm]:
         if entity.name in state.cast.targets:
             advice = _SEARCH
         elif seen and seen.message.flight_state in AIRBORNE and seen.message.lands_in_s is None:
-            advice = f"Nothing to do: it lands{'' if _lands(seen.message) else ' by itself if this lasts'}."
+            left_s = max(0.0, state.cast.unseen_land_s - entity.age_s)
+            soon = f" by itself within {left_s:.0f} s, unless it is seen"
+            advice = f"Nothing to do: it lands{'' if _lands(seen.message) else soon}."
         else:
             continue
         yield Alarm(f"{entity.name} lost", f"{entity.name} is lost: not seen for {entity.age_s:.0f} s", False, advice)

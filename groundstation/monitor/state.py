@@ -23,7 +23,7 @@ class Cast:
     """Who should be there: drones with their battery limit, targets, world-fixed cameras.
 
     flight_times_s: what a full battery of a drone usually lasts, where its kind says so. lost_after_s: unseen for so
-    long, a robot or target is lost.
+    long, a robot or target is lost. unseen_land_s: after so long a robot lands at the latest.
     """
 
     site: str = ""
@@ -32,6 +32,7 @@ class Cast:
     cameras: tuple[str, ...] = ()
     flight_times_s: dict[str, float] = field(default_factory=dict)
     lost_after_s: float = 3.0
+    unseen_land_s: float = 30.0
 
 
 def cast_from_field(resolved: ResolvedField) -> Cast:
@@ -40,7 +41,8 @@ def cast_from_field(resolved: ResolvedField) -> Cast:
     usual = {name: kind_named(drone.kind).flight_time_s for name, drone in resolved.drones.items()}
     flight_times_s = {name: time_s for name, time_s in usual.items() if time_s is not None}
     lost_after_s = resolved.estimator.lost_after_s
-    return Cast(resolved.site, drones, tuple(resolved.tracked), tuple(resolved.cameras), flight_times_s, lost_after_s)
+    targets, cameras, land_s = tuple(resolved.tracked), tuple(resolved.cameras), resolved.safety.unseen_land_at_last_s
+    return Cast(resolved.site, drones, targets, cameras, flight_times_s, lost_after_s, land_s)
 
 
 @dataclass(frozen=True, slots=True)

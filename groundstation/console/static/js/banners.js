@@ -3,6 +3,7 @@
 import { showLog, showMore } from "./alarm_strip.js";
 import { byId, el, seconds, text } from "./dom.js";
 import { resultWords } from "./ending.js";
+import { modeNow, up } from "./glance.js";
 import { drawn } from "./map.js";
 import { withShortNames } from "./names.js";
 import { noteOwnAlarms, ownAlarms } from "./own_alarms.js";
@@ -11,6 +12,7 @@ import { estimateAge, replaying, runOver, silentS, store, trackerSilent } from "
 
 const SHOWN = 4, NOTICE_MS = 8000, LEVELS = { SAFE: "good", WATCH: "warn", ACT: "bad" };
 const COLOURS = { ACT: "grave", WATCH: "mild" };  // an alarm's is that of its word
+const WIDE = matchMedia("(min-width: 1400px)"), ROOM = 110; // letters
 const notices = [];
 
 export function addNotice({ text: words, grave }) {
@@ -25,12 +27,23 @@ function banners(own) {
   const all = [...(ended ? [ending(ended)] : []), ...own.map((alarm) => ({ ...alarm, level: "grave", rank: "ACT" }))];
   if (!runOver() && !own.some(({ shell }) => shell) && trackerSilent()) all.push(silentTracker());
   for (const { words, grave } of notices.filter(({ at }) => performance.now() - at < NOTICE_MS)) all.push({ kind: "notice", level: grave ? "grave" : "mild", title: words, rank: "notice" });
-  for (const alarm of store.connected && !runOver() ? (store.s.alarms ?? []).slice(0, SHOWN) : []) {
-    if (alarm.about !== "tracker silent") all.push({ kind: "alarm", level: alarm.grave ? "grave" : "mild", title: alarm.told === null ? alarm.text : `${alarm.text} (told at ${momentWords(alarm.told)})`, more: alarm.advice, rank: alarm.asks ? "ACT" : "WATCH" });
-  }
+  const told = (store.s.alarms ?? []).filter(({ about }) => about !== "tracker silent").map((alarm) => ({ kind: "alarm", level: alarm.grave ? "grave" : "mild",
+    title: alarm.told === null ? alarm.text : `${alarm.text} (told at ${momentWords(alarm.told)})`, more: alarm.advice, rank: alarm.asks ? "ACT" : "WATCH" }));
+  if (store.connected && !runOver()) all.push(...together(told).slice(0, SHOWN));
   if (!all.length && !replaying()) all.push({ kind: "none", level: "calm", title: store.s.safety?.reason ?? "No alarms yet." });
   const urgency = ({ level, rank }) => (rank === "ACT" ? 0 : level === "grave" ? 1 : 2);
   return all.sort((a, b) => urgency(a) - urgency(b));
+}
+
+// Where there is room, alarms with the same advice stand in one line: the second is no less than the first.
+function together(alarms) {
+  const all = [];
+  for (const alarm of alarms) {
+    const same = WIDE.matches && all.find((other) => other.more && other.more === alarm.more && other.rank === alarm.rank && other.level === alarm.level && other.title.length + alarm.title.length < ROOM);
+    if (same) same.title += `; ${alarm.title}`;
+    else all.push(alarm);
+  }
+  return all;
 }
 
 function ending({ severity, text: words }) {
@@ -39,8 +52,9 @@ function ending({ severity, text: words }) {
 }
 
 function silentTracker() {
-  return { kind: "tracker", level: "grave", title: `TRACKER SILENT for ${seconds(estimateAge())}`, rank: "WATCH",
-    more: "Nothing to do: the drones hover, then land by themselves. LAND ALL still works." };
+  const flying = up(), land = flying.length && flying.every((name) => modeNow(name) === "LANDING");
+  return { kind: "tracker", level: "grave", title: `TRACKER SILENT for ${seconds(estimateAge())}${WIDE.matches ? ": nobody knows where they are" : ""}`, rank: "WATCH",
+    more: `Nothing to do: the drones ${land ? "land" : "hover, then land by themselves. LAND ALL still works"}.` };
 }
 
 // As the console's process judges it, but for what only this page can know.

@@ -2,8 +2,8 @@
 
 import { moment, sinceMs } from "./clock.js";
 import { byId, el, seconds, text } from "./dom.js";
-import { effectOf, holding, isIdle, refusalOf } from "./effects.js";
-import { aloft, doing, modes, standing } from "./glance.js";
+import { effectOf, holding, isIdle, refusalOf, SHORT } from "./effects.js";
+import { aloft, doing, modeNow, modes, standing } from "./glance.js";
 import { me, send } from "./link.js";
 import { give, mayGive, OVER, ownOrders, roleText, startOwnOrders } from "./own_orders.js";
 import { forbidden } from "./preflight.js";
@@ -77,14 +77,12 @@ function showStops() {
     node.disabled = replaying() || runOver() || !mayGive("LAND");
     node.title = runOver() ? OVER : !mayGive("LAND") ? roleText() : node.dataset.title;
   }
-  for (const node of document.querySelectorAll(".stops small")) {
+  for (const node of document.querySelectorAll("small[data-effect]")) {
+    const { effect: verb, whom } = node.dataset, names = whom ? [whom] : droneNames();
     node.dataset.caption ??= node.textContent;
-    const effect = runOver() ? "" : store.connected ? effectOf(node.dataset.effect) : "no connection";
+    const effect = runOver() ? "" : store.connected ? effectOf(verb, names) : "no connection";
     text(node, effect || node.dataset.caption);
-    node.closest("button").classList.toggle("idle", store.connected && !runOver() && isIdle(node.dataset.effect));
-  }
-  for (const node of document.querySelectorAll("[data-land], [data-hold]")) {
-    node.classList.toggle("idle", isIdle(node.dataset.land ? "LAND" : "HOLD", [node.dataset.land ?? node.dataset.hold]));
+    node.closest("button").classList.toggle("idle", store.connected && !runOver() && isIdle(verb, names));
   }
 }
 
@@ -103,12 +101,28 @@ function showStarts(why) {
   for (const [id, verb] of [["takeoff", "TAKEOFF"], ["track", "TRACK"], ["resume", "RESUME"]]) {
     const button = byId(id), reason = why ?? startRefusal(verb), caption = button.querySelector("small");
     caption.dataset.caption ??= caption.textContent;
-    const one = verb === "TAKEOFF" && standing() === 1;
-    text(caption, reason?.[0] ?? (one ? "from the floor" : caption.dataset.caption));
+    text(caption, reason?.[0] ?? ((verb === "TAKEOFF" && takeOffWords()) || caption.dataset.caption));
     enable(button, reason);
   }
-  for (const node of document.querySelectorAll("[data-takeoff]")) enable(node, why ?? startRefusal("TAKEOFF", [node.dataset.takeoff]));
+  for (const node of document.querySelectorAll("[data-takeoff]")) {
+    const reason = why ?? startRefusal("TAKEOFF", [node.dataset.takeoff]);
+    enable(node, reason);
+    text(node.querySelector("small"), reason ? inFewer(reason[0]) : "it takes off");
+  }
   enable(byId("anyway"), why ?? twice(refusalOf("TAKEOFF")));
+}
+
+// Why one drone may not take off, where a card has less room or knows better than the bar.
+const OF_ONE = {
+  "nobody on the floor": "it flies", "one is taking off": "one takes off", "another page starts": "another page", "battery too low": "battery low",
+  "battery unknown": "battery?",
+};
+const inFewer = (words) => OF_ONE[words] ?? (words.startsWith("must") ? "see the list" : words);
+
+// Who takes off if only one can; "" if several do, one after the other.
+function takeOffWords() {
+  const [first, ...more] = droneNames().filter((name) => ["LANDED", "CUT"].includes(modeNow(name)));
+  return !first || more.length ? "" : first.length > SHORT ? "from the floor" : `${first} takes off`;
 }
 
 const startRefusal = (verb, names = droneNames()) => twice(refusalOf(verb, names)) ?? (verb === "TAKEOFF" ? forbidden(names) : null);
@@ -147,5 +161,6 @@ function line(order) {
 
 function stage(row, order) {
   if (!row.stage) return ["unsent", "dropped"].includes(order.state) ? "not sent" : order.state === "refused" ? "—" : "no answer";
-  return row.stage === "REFUSED" ? `refused: ${row.reason}` : STAGES[row.stage];
+  if (row.stage === "REFUSED") return `refused: ${row.reason}`;
+  return row.instead ? `${STAGES[row.stage]}, not done: ${row.instead}` : STAGES[row.stage];
 }

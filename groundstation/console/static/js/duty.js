@@ -1,6 +1,6 @@
 // What a drone does now and why, in a sentence or two, and what limits it.
 
-import { joined } from "./dom.js";
+import { joined, seconds } from "./dom.js";
 import { isLost } from "./glance.js";
 import { me } from "./link.js";
 import { ageS, SEEN_S, seenBy, store, unseenS } from "./store.js";
@@ -34,10 +34,16 @@ function tracked(name, plan) {
   const [, who] = store.s.vehicles[name].detail.match(/^tracking for (.+)$/) ?? [];
   const task = sought.length ? `Looks for ${joined(sought)}` : `Tracks ${joined(targets)}${who ? `, ${orderedBy(who, name, "tracking")}` : ""}`;
   const does = watched.length ? `${task}: watches ${joined(watched)}` : sought.length ? task : `${task}: moves to where it will see it`;
-  // One that nobody sees may be known by whom it sees itself.
-  const unseen = unseenS(name) > SEEN_S ? `Nobody sees ${name} now` : `Nobody sees ${name}, known by what it sees`;
-  const known = watchers.length ? `Itself seen by ${joined(watchers)}` : unseen;
+  const known = watchers.length ? `Itself seen by ${joined(watchers)}` : unseen(name);
   return [`${does}.`, `${known}.`, limits && `Slowed by ${limits}.`].filter(Boolean).join(" ");
+}
+
+// One that nobody sees may be known by whom it sees itself; who stays lost lands.
+function unseen(name) {
+  const age = unseenS(name), { lost_after_s, unseen_land_s } = store.scene;
+  if (age <= SEEN_S) return `Nobody sees ${name}, known by what it sees`;
+  const left = Math.max(0, unseen_land_s - age);
+  return isLost(name) ? `Lost: it lands by itself within ${left.toFixed(0)} s, unless it is seen` : `Not seen for ${seconds(age)}; it is lost from ${seconds(lost_after_s)} on`;
 }
 
 const ORDERS = /^(landing|taking off|held|tracking) (?:for|by) (.+)$/;

@@ -27,7 +27,7 @@ function needResume(names) {
   return names.map((name) => store.s.vehicles?.[name]).some((status) => status?.mode === "HOLD" || (status?.mode === "HOVER" && waits(status.detail)));
 }
 
-const SHORT = 8; // letters of a name that has room on a button
+export const SHORT = 8; // letters of a name that has room on a button
 
 // Who does what, in the few words that a button has room for: "drone_1 hovers", "2 hover".
 function does(names, one, many) {
@@ -41,12 +41,18 @@ export function effectOf(verb, names = droneNames()) {
   if (!modes(names).length) return "";
   if (!flying.length) return names.length > 1 ? "nobody flies" : "it stands";
   if (verb === "CUT_MOTORS") return flying.length > 1 ? "" : "press 1 s: it falls";
+  if (names.length === 1) return effectOnOne(verb, names);
   const idle = isIdle(verb, names), held = holding(names), bound = flying.filter((name) => !held.includes(name));
   if (verb === "LAND") return idle ? "landing already" : landing(flying, down);
   if (bound.length === names.length) return "all land anyway";
   if (held.length === names.length) return idle ? "hovering already" : "";
   const already = idle ? " already" : "";
   return [does(held, `hovers${already}`, `hover${already}`), does(bound, "lands anyway", "land anyway"), does(down, "stands", "stand")].filter(Boolean).join(";\n");
+}
+
+function effectOnOne(verb, names) {
+  if (verb === "LAND") return isIdle(verb, names) ? "it lands" : "";
+  return !holding(names).length ? "lands anyway" : isIdle(verb, names) ? "it hovers" : "";
 }
 
 // What LAND would do to who flies, where not all of the team follow it anew; "" where they do.

@@ -11,7 +11,6 @@ import { colourOf } from "./palette.js";
 import { ageS, entity, estimateAge, runOver, SEEN_S, seenBy, store, trackerSilent, unseenS } from "./store.js";
 
 const STALE_S = 1;
-const LONGEST_CAPTION = 9; // letters of a name that the column of its buttons has room for
 const LEVELS = { TRACK: "good", HOVER: "good", HOLD: "warn", TAKING_OFF: "warn", LANDING: "warn", CUT: "bad", LANDED: "calm", CONNECTING: "calm" };
 const NARROW = matchMedia("(max-width: 1180px)"), LOW = matchMedia("(max-height: 990px)");
 const cards = new Map();
@@ -55,13 +54,13 @@ function card(name, fields, drone) {
 
 // Each in its place for good: a click that comes late must not find another button there.
 function actions(name) {
-  const button = (verb, words) => {
-    const kind = verb.toLowerCase(), made = el("button", { class: "small", "aria-label": `${words} ${name}`, data: { testid: `${name}-${kind}`, [kind]: name } }, words);
+  const button = (verb, words, effect) => {
+    const kind = verb.toLowerCase(), what = el("small", { data: verb === "TAKEOFF" ? {} : { effect: verb, whom: name } }, effect);
+    const made = el("button", { class: "small", "aria-label": `${words} ${name}`, data: { testid: `${name}-${kind}`, [kind]: name } }, words, what);
     made.onclick = () => give(verb, [name]);
     return made;
   };
-  const whom = el("span", { class: "whom" }, name.length <= LONGEST_CAPTION ? `only ${name}` : "only this one");
-  return el("div", { class: "actions" }, whom, button("TAKEOFF", "Take off"), button("HOLD", "Hold"), button("LAND", "Land"));
+  return el("div", { class: "actions" }, button("TAKEOFF", "Take off", ""), button("HOLD", "Hold", "hovers here"), button("LAND", "Land", "lands here"));
 }
 
 export function paint(only) {
@@ -85,7 +84,7 @@ function showVehicle(name, { root, values, mode, detail }) {
   root.classList.toggle("stale", stale);
   const left = status && landsIn(name);
   text(mode, silent ? "silent" : left ? `lands in ${left}` : status ? modeWord(modeOf(status)).toLowerCase() : "no word yet");
-  mode.dataset.level = silent || left ? "bad" : !status || stale ? "wait" : status.flight === "LOST" || status.flight === "EMERGENCY" ? "bad" : (modeOf(status) === status.mode ? LEVELS[status.mode] : "warn") ?? "wait";
+  mode.dataset.level = silent || left ? "bad" : !status || stale ? "wait" : status.flight === "LOST" || status.flight === "EMERGENCY" ? "bad" : levelOf(status);
   const heard = values.heard;
   text(heard, status ? `${seconds(age)} ago` : "never");
   heard.className = age > 4 ? "empty" : age > STALE_S ? "low" : "";
@@ -95,6 +94,12 @@ function showVehicle(name, { root, values, mode, detail }) {
   values.rate.className = status.rate_hz < 1 ? "empty" : status.rate_hz < 10 ? "low" : "";
   showLink(values.link, status.link);
   showDuty(detail, name, silent);
+}
+
+// Who does as planned is green; who searches, or is kept from its plan, is not.
+function levelOf(status) {
+  const mode = modeOf(status);
+  return mode !== status.mode || (mode === "TRACK" && modeWord(mode) !== mode) ? "warn" : LEVELS[mode] ?? "wait";
 }
 
 // A vehicle that is not heard does nobody knows what: only its landing is certain.
@@ -143,9 +148,9 @@ function showBelief(name, { root, values, mode, detail, drone }) {
   for (const field of BELIEF) values[field]?.parentElement.classList.toggle("old", old);
   if (!drone) {
     const lost = age > store.scene.lost_after_s, [search, words] = trackerSilent() ? [] : store.s.estimate?.searches?.[name] ?? [];
-    text(mode, runOver() ? "run over" : trackerSilent() ? "unknown" : lost && body ? "lost" : search?.toLowerCase() ?? (!body ? (lost && Number.isFinite(age) ? "lost" : "not found yet") : age > SEEN_S ? "not seen" : doing("TRACK").length ? "tracked" : "seen"));
+    text(mode, runOver() ? "run over" : trackerSilent() ? "unknown" : search || (lost && body) || !body ? (Number.isFinite(age) ? "lost" : "not found yet") : age > SEEN_S ? "not seen" : doing("TRACK").length ? "tracked" : "seen");
     mode.dataset.level = !body || trackerSilent() ? "wait" : lost ? "bad" : search ? "warn" : age > SEEN_S ? "warn" : "good";
-    text(detail, withShortNames(words ?? beliefWords(body, age, lost)));
+    text(detail, withShortNames(words ? `${Number.isFinite(age) ? "Lost" : "Not found yet"}: ${words}.` : beliefWords(body, age, lost)));
     root.classList.toggle("stale", estimateAge() > STALE_S || !store.connected);
   }
   const stands = !body && standsInSight(name), seen = Number.isFinite(age) && !stands;

@@ -118,8 +118,8 @@ def _failsafe(name: str, status: VehicleStatus) -> Iterator[Alarm]:
     """What keeps a drone from its plan, or will land it."""
     if status.lands_in_s is not None:
         advice = "Nothing to do: that comes by itself unless this ends. HOLD does not stop it."
-        why = status.detail.removeprefix("hovers: ")
-        yield Alarm(f"{name} lands", f"{name} lands in {status.lands_in_s:.0f} s: {why}", advice=advice)
+        why, soon_s = status.detail.removeprefix("hovers: ").removesuffix("; RESUME is needed"), status.lands_in_s
+        yield Alarm(f"{name} lands", f"{name} lands in {max(1, round(soon_s))} s: {why}", advice=advice)
     elif status.braked:
         advice = "Nothing to do: it follows its plan again when this ends."
         yield Alarm(f"{name} braked", f"{name} {status.detail}", False, advice)
@@ -128,7 +128,8 @@ def _failsafe(name: str, status: VehicleStatus) -> Iterator[Alarm]:
 def _battery(name: str, status: VehicleStatus, up: bool, battery: Battery) -> Iterator[Alarm]:
     if battery.charge is Charge.GOOD or (battery.level is None and status.flight_state is FlightState.UNKNOWN):
         return
-    about, held, lands = f"{name} battery", f"{name}: {battery.words}", f"at {battery.limit:.0%} it lands by itself"
+    about, held = f"{name} battery", f"{name}: {battery.words}"
+    lands = f"{'if that lasts' if battery.level is None else f'at {battery.limit:.0%}'} it lands by itself"
     below = battery.level is not None and battery.level < battery.limit
     if _lands(status) or (below and status.lands_in_s is not None):
         yield Alarm(about, f"{held}, it lands", False, "Nothing to do.")

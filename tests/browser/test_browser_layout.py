@@ -166,7 +166,7 @@ def test_one_sentence_says_what_the_team_does_and_what_may_be_done(stage: Any) -
     lasting = "No alarms. All who fly are heard and seen; batteries are good for ~5 min or more."
     assert page.there("banner-none").inner_text() == lasting
     stage.flight.modes = {"drone_1": "HOLD", "drone_2": "TRACK"}
-    said = "drone_2 tracks the target; drone_1 holds. Nobody is lost. RESUME lets them go on."
+    said = "drone_2 tracks the target; drone_1 holds. Nobody is lost. RESUME lets drone_1 go on."
     page.wait(lambda s: verdict.inner_text() == said)
     stage.flight.battery["drone_2"] = 0.42
     low = "drone_2: battery 42%, good for ~1 min\nNothing to do yet: at 15% it lands by itself."

@@ -2,7 +2,7 @@
 
 import { moment, sinceMs } from "./clock.js";
 import { byId, el, seconds, text } from "./dom.js";
-import { effectOf, holding, isIdle, refusalOf, SHORT } from "./effects.js";
+import { effectOf, holding, isIdle, refusalOf, SHORT, waiting } from "./effects.js";
 import { aloft, doing, modeNow, modes, standing } from "./glance.js";
 import { me, send } from "./link.js";
 import { give, mayGive, OVER, ownOrders, roleText, startOwnOrders } from "./own_orders.js";
@@ -101,7 +101,7 @@ function showStarts(why) {
   for (const [id, verb] of [["takeoff", "TAKEOFF"], ["track", "TRACK"], ["resume", "RESUME"]]) {
     const button = byId(id), reason = why ?? startRefusal(verb), caption = button.querySelector("small");
     caption.dataset.caption ??= caption.textContent;
-    text(caption, reason?.[0] ?? ((verb === "TAKEOFF" && takeOffWords()) || caption.dataset.caption));
+    text(caption, reason?.[0] ?? (ofOne(verb) || caption.dataset.caption));
     enable(button, reason);
   }
   for (const node of document.querySelectorAll("[data-takeoff]")) {
@@ -119,10 +119,11 @@ const OF_ONE = {
 };
 const inFewer = (words) => OF_ONE[words] ?? (words.startsWith("must") ? "see the list" : words);
 
-// Who takes off if only one can; "" if several do, one after the other.
-function takeOffWords() {
-  const [first, ...more] = droneNames().filter((name) => ["LANDED", "CUT"].includes(modeNow(name)));
-  return !first || more.length ? "" : first.length > SHORT ? "from the floor" : `${first} takes off`;
+// What a start does where only one drone obeys it; "" where several do.
+function ofOne(verb) {
+  const stand = () => droneNames().filter((name) => ["LANDED", "CUT"].includes(modeNow(name)));
+  const [first, ...more] = { TAKEOFF: stand, RESUME: waiting }[verb]?.() ?? [];
+  return !first || more.length ? "" : `${first.length > SHORT ? "one" : first} ${verb === "TAKEOFF" ? "takes off" : "goes on"}`;
 }
 
 const startRefusal = (verb, names = droneNames()) => twice(refusalOf(verb, names)) ?? (verb === "TAKEOFF" ? forbidden(names) : null);

@@ -57,11 +57,15 @@ function orderedBy(who, name, doing) {
   return `ordered by ${who !== "console" ? who : last?.by === me.name ? "you" : last?.by ?? "a page"}`;
 }
 
+// What it does until a failsafe lands it.
+const GOES_ON = { TRACK: "follows its plan", HOLD: "hovers" };
+
 // The driver's own reason; what it is the reason for, where it does not say so, and who ordered what "landing for" says.
-function reasonOf(name, { mode, detail, lands_in_s }) {
+function reasonOf(name, { mode, detail, lands_in_s, braked }) {
   if (mode === "LANDED" || mode === "CUT") return standing(name, detail);
   const [, doing, who] = detail.match(ORDERS) ?? [];
   if (who) return `${ORDERED[doing]} ${orderedBy(who, name, doing)}`;
+  if (lands_in_s !== null && !braked && mode in GOES_ON && detail) return `${GOES_ON[mode]}, then lands: ${detail}`;
   if (mode === "LANDING" && detail && !detail.startsWith("land")) return `lands: ${detail}`;
   return mode === "HOVER" ? hovering(detail, lands_in_s) : detail;
 }
@@ -84,12 +88,11 @@ export function dutyOf(name) {
   const status = store.s.vehicles?.[name], plan = store.s.plan;
   if (!status) return "";
   const planned = status.mode === "TRACK" && !status.braked && status.lands_in_s === null && status.flight !== "LOST" && plan && ageS(plan.at) < FRESH_S;
-  const goesOn = status.mode === "TRACK" && !status.braked && status.lands_in_s !== null ? "Follows its plan still. " : "";
-  return planned ? tracked(name, plan) : goesOn + sentence(reasonOf(name, status));
+  return planned ? tracked(name, plan) : sentence(reasonOf(name, status));
 }
 
 // In how many seconds a failsafe will land it, if nothing changes; "" if none is near.
 export function landsIn(name) {
   const left = store.s.vehicles?.[name]?.lands_in_s ?? null;
-  return left === null ? "" : `${left.toFixed(0)} s`;
+  return left === null ? "" : `${Math.max(1, Math.round(left))} s`;
 }

@@ -10,7 +10,7 @@ export function refusalOf(verb, names = droneNames()) {
   if (verb === "TAKEOFF") return takeOffRefusal(names.map((name) => [name, store.s.vehicles?.[name]]).filter(([, status]) => ["LANDED", "CUT"].includes(status?.mode)));
   if (!aloft()) return "nobody flies";
   if (trackerSilent()) return "tracker silent";
-  const resumes = needResume(names);
+  const resumes = waiting(names).length;
   if (verb === "RESUME") return resumes ? "" : "nobody waits for it";
   if (resumes) return "press RESUME";
   return all.includes("HOVER") ? "" : all.includes("TRACK") ? (lostTarget() ? "searching already" : "tracking already") : "nobody hovers";
@@ -23,8 +23,9 @@ function takeOffRefusal(standing) {
 }
 
 // After an order or a failsafe a drone hovers until RESUME; after its take-off until TRACK. RESUME lets both go on.
-function needResume(names) {
-  return names.map((name) => store.s.vehicles?.[name]).some((status) => status?.mode === "HOLD" || (status?.mode === "HOVER" && waits(status.detail)));
+export function waiting(names = droneNames()) {
+  const waitsNow = (status) => status?.mode === "HOLD" || (status?.mode === "HOVER" && waits(status.detail));
+  return names.filter((name) => waitsNow(store.s.vehicles?.[name]));
 }
 
 export const SHORT = 8; // letters of a name that has room on a button

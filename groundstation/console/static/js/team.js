@@ -56,11 +56,11 @@ function card(name, fields, drone) {
 function actions(name) {
   const button = (verb, words, effect) => {
     const kind = verb.toLowerCase(), what = el("small", { data: verb === "TAKEOFF" ? {} : { effect: verb, whom: name } }, effect);
-    const made = el("button", { class: "small", "aria-label": `${words} ${name}`, data: { testid: `${name}-${kind}`, [kind]: name } }, words, what);
+    const made = el("button", { class: "small", data: { testid: `${name}-${kind}`, [kind]: name } }, words, what);
     made.onclick = () => give(verb, [name]);
     return made;
   };
-  return el("div", { class: "actions" }, button("TAKEOFF", "Take off", ""), button("HOLD", "Hold", "hovers here"), button("LAND", "Land", "lands here"));
+  return el("div", { class: "actions", role: "group", "aria-label": `only ${name}` }, button("TAKEOFF", "Take off", ""), button("HOLD", "Hold", "hovers here"), button("LAND", "Land", "lands here"));
 }
 
 export function paint(only) {
@@ -133,6 +133,7 @@ function showBattery(node, status) {
 function beliefWords(body, age, lost) {
   if (runOver()) return "The run is over.";
   if (trackerSilent()) return "Where it is now is not known: the tracker is silent.";
+  if (lost && Number.isFinite(age) && !aloft()) return `Not seen for ${seconds(age)}: nobody flies to look for it.`;
   if (!body) return "";
   if (lost) return `Lost: nobody has seen it for ${seconds(age)}. ${doing("TRACK").length ? `${joined(doing("TRACK"))} ${doing("TRACK").length > 1 ? "look" : "looks"} for it.` : ""}`.trim();
   if (age > SEEN_S) return `Not seen for ${seconds(age)}: it may be hidden near (${body.mean.slice(0, 2).map((value) => value.toFixed(1)).join(", ")}).`;
@@ -148,7 +149,7 @@ function showBelief(name, { root, values, mode, detail, drone }) {
   for (const field of BELIEF) values[field]?.parentElement.classList.toggle("old", old);
   if (!drone) {
     const lost = age > store.scene.lost_after_s, [search, words] = trackerSilent() ? [] : store.s.estimate?.searches?.[name] ?? [];
-    text(mode, runOver() ? "run over" : trackerSilent() ? "unknown" : search || (lost && body) || !body ? (Number.isFinite(age) ? "lost" : "not found yet") : age > SEEN_S ? "not seen" : doing("TRACK").length ? "tracked" : "seen");
+    text(mode, runOver() ? "run over" : trackerSilent() ? "unknown" : Number.isFinite(age) && lost && !aloft() ? "not seen" : search || (lost && body) || !body ? (Number.isFinite(age) ? "lost" : "not found yet") : age > SEEN_S ? "not seen" : doing("TRACK").length ? "tracked" : "seen");
     mode.dataset.level = !body || trackerSilent() ? "wait" : lost ? "bad" : search ? "warn" : age > SEEN_S ? "warn" : "good";
     text(detail, withShortNames(words ? `${Number.isFinite(age) ? "Lost" : "Not found yet"}: ${words}.` : beliefWords(body, age, lost)));
     root.classList.toggle("stale", estimateAge() > STALE_S || !store.connected);

@@ -2,7 +2,7 @@
 
 import { joined } from "./dom.js";
 import { landsIn } from "./duty.js";
-import { refusalOf } from "./effects.js";
+import { refusalOf, waiting } from "./effects.js";
 import { aloft, doing, isLost, lostTarget, modes, stage, teamMode } from "./glance.js";
 import { mustWords, openMusts } from "./preflight.js";
 import { droneNames, entity, SEEN_S, store, trackerSilent, unseenS } from "./store.js";
@@ -53,7 +53,8 @@ function lost() {
 
 // What lets those go on that wait for it.
 function start() {
-  if (!refusalOf("RESUME")) return "RESUME lets them go on.";
+  const stay = waiting().filter((name) => !landsIn(name));
+  if (stay.length && !refusalOf("RESUME")) return `RESUME lets ${stay.length > 1 ? "them" : stay[0]} go on.`;
   return refusalOf("TRACK") ? "" : "TRACK begins the task.";
 }
 

@@ -250,7 +250,7 @@ class ConsoleServer:
         self.board.begin()
         self.board.forget()
         self.state.put(self.board, now_ns)
-        self.state.put_often(self.board)
+        self.state.put_often(self.board, now_ns)
         self.state.put_seldom(self.board, now_ns)
         self.state.history.take_passed()  # the seed holds it
         self._put_own(now_ns)

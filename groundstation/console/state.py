@@ -94,11 +94,11 @@ class ConsoleState:
         if self._sample is not None:
             board.put("sample", self._sample)
         if board.turn % _OFTEN == 0:
-            self.put_often(board)
+            self.put_often(board, now_ns)
         if board.turn % _SELDOM == 0:
             self.put_seldom(board, now_ns)
 
-    def put_often(self, board: Snapshot) -> None:
+    def put_often(self, board: Snapshot, now_ns: int) -> None:
         """Put what changes ten times a second."""
         known = self.monitor
         vehicles = known.vehicles.items()
@@ -110,6 +110,11 @@ class ConsoleState:
         board.put("switch", told.switch(self.switch))
         board.put("sightings", [[*edge, stamp_ns / 1e6] for edge, stamp_ns in known.sightings.items()])
         board.put("events", [told.event(seen) for seen in list(known.events)[-_EVENTS:]])
+        # As often as what the page works out itself: an alarm that is over must not stand beside that.
+        alarms = alarms_of(known, now_ns)
+        self.alarm_log.note(alarms, now_ns)
+        board.put("alarms", [told.alarm(alarm) for alarm in alarms])
+        board.put("safety", asdict(safety_of(known, alarms)))
 
     def _flight(self) -> dict[str, Any]:
         """Return since when somebody is in the air, and whether anybody ever was."""
@@ -146,10 +151,6 @@ class ConsoleState:
         board.put("processes", {name: told.process(seen) for name, seen in known.processes.items()})
         board.put("standing", self._standing(now_ns))
         board.put("search_maps", self._search_maps())
-        alarms = alarms_of(known, now_ns)
-        self.alarm_log.note(alarms, now_ns)
-        board.put("alarms", [told.alarm(alarm) for alarm in alarms])
-        board.put("safety", asdict(safety_of(known, alarms)))
         board.put("past_alarms", self.alarm_log.as_json())
         board.put("health", self.health.summary())
         if self.preflight is not None:

@@ -77,6 +77,7 @@ def alarms_of(state: MonitorState, now_ns: int) -> list[Alarm]:
         *_processes(state, now_ns),
         *_events(state, now_ns),
         *_suspected(state),
+        *_standing(state),
     ]
     return sorted(dict.fromkeys(alarms), key=lambda alarm: (not alarm.asks, not alarm.grave))
 
@@ -93,8 +94,8 @@ def _vehicles(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
         elif down := _DOWN.get(seen.message.flight_state):
             words, advice = _not_believed(seen.message) if _is_heard_in_vain(seen.message) else down
             yield Alarm(f"{name} {seen.message.flight_state}", f"{name}: {words}", advice=advice)
-        up = flies(seen.message, state.take_offs.get(name))
-        yield from _battery(name, seen.message, up, battery_of(state, name))
+        if flies(seen.message, state.take_offs.get(name)):
+            yield from _battery(name, seen.message, battery_of(state, name))
         yield from _link(name, seen.message.link_quality)
 
 
@@ -125,16 +126,24 @@ def _failsafe(name: str, status: VehicleStatus) -> Iterator[Alarm]:
         yield Alarm(f"{name} braked", f"{name} {status.detail}", False, advice)
 
 
-def _battery(name: str, status: VehicleStatus, up: bool, battery: Battery) -> Iterator[Alarm]:
-    if battery.charge is Charge.GOOD or (battery.level is None and status.flight_state is FlightState.UNKNOWN):
+def _standing(state: MonitorState) -> Iterator[Alarm]:
+    """Batteries of drones on the floor: they come after all that concerns who flies."""
+    for name, seen in state.vehicles.items():
+        status, battery = seen.message, battery_of(state, name)
+        unheard = battery.level is None and status.flight_state is FlightState.UNKNOWN
+        if battery.charge is not Charge.GOOD and not unheard and not flies(status, state.take_offs.get(name)):
+            advice = f"Nothing to do now: {_BEFORE_FLIGHT[battery.charge]}."
+            yield Alarm(f"{name} battery", f"{name}: {battery.words}", False, advice)
+
+
+def _battery(name: str, status: VehicleStatus, battery: Battery) -> Iterator[Alarm]:
+    if battery.charge is Charge.GOOD:
         return
     about, held = f"{name} battery", f"{name}: {battery.words}"
     lands = f"{'if that lasts' if battery.level is None else f'at {battery.limit:.0%}'} it lands by itself"
     below = battery.level is not None and battery.level < battery.limit
     if _lands(status) or (below and status.lands_in_s is not None):
         yield Alarm(about, f"{held}, it lands", False, "Nothing to do.")
-    elif not up:
-        yield Alarm(about, held, False, f"Nothing to do now: {_BEFORE_FLIGHT[battery.charge]}.")
     elif battery.charge is Charge.EMPTY:
         yield Alarm(about, f"{held}{battery.good_for}", below, f"{_TO_DO}LAND it while you can choose where; {lands}.")
     else:

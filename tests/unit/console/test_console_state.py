@@ -73,7 +73,7 @@ def test_the_time_in_the_air_goes_on_while_a_drone_is_not_heard() -> None:
         status = m.VehicleStatus(header=head, flight_state=flight, mode="TRACK", battery=0.5)
         state.ingest([received(t.VEHICLE_STATUS, status)])
         board.begin()
-        state.put_often(board)
+        state.put_often(board, NS_PER_S)
         shown.append(json.loads(board.since(-1))["flight"]["airborne_since_ms"])
     assert shown == [None, 2000.0, 2000.0, 2000.0, None, None]
 
@@ -195,7 +195,7 @@ def test_the_last_switch_of_topology_stays_with_its_reason() -> None:
     state.ingest([plan(1.0, "a,b", 0.2, {}), plan(2.0, "a/b", 0.1, {"a,b": 0.2})])
     state.ingest([plan(3.0, "a/b", 0.1, {"a,b": 0.2})])
     board.begin()
-    state.put_often(board)
+    state.put_often(board, NS_PER_S)
     said = json.loads(board.since(-1))["switch"]
     assert said == {"at": 2000.0, "before": "a + b", "now": "a over b", "reason": "expected uncertainty 50 % lower"}
 

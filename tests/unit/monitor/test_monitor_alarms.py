@@ -108,6 +108,25 @@ def test_a_drone_that_stands_with_a_low_battery_asks_for_nothing_now(world: Worl
     assert (alarm.text, alarm.asks) == ("drone_1: battery 10%", False)
 
 
+def test_who_is_lost_in_flight_goes_before_the_battery_of_one_that_stands(world: World) -> None:
+    world.vehicle("drone_2", "LANDED", battery=0.1, flight_state=m.FlightState.LANDED)
+    world.vehicle("drone_1")
+    world.estimate(drone_age_s=4.0)
+    assert _alarms(world) == ["drone_1 is lost: not seen for 4 s", "drone_2: battery 10%"]
+    advice = "Nothing to do: it lands by itself within 26 s, unless it is seen."
+    assert alarms_of(world.state, NOW)[0].advice == advice
+
+
+def test_a_battery_that_lands_its_drone_within_seconds_asks_for_nothing(world: World) -> None:
+    world.vehicle("drone_1", battery=0.14, detail="battery below its limit", lands_in_s=2.0)
+    world.text()
+    alarms = alarms_of(world.state, NOW)
+    assert [alarm.text for alarm in alarms] == [
+        "drone_1 lands in 2 s: battery below its limit", "drone_1: battery 14%, it lands",
+    ]  # fmt: skip
+    assert not any(alarm.asks for alarm in alarms)
+
+
 def test_the_battery_of_a_drone_that_is_not_heard_in_flight_is_that_of_one_that_flies(world: World) -> None:
     world.vehicle("drone_1", battery=0.18, age_s=0.5)
     world.text()

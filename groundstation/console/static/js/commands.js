@@ -80,7 +80,7 @@ function showStops() {
   for (const node of document.querySelectorAll("small[data-effect]")) {
     const { effect: verb, whom } = node.dataset, names = whom ? [whom] : droneNames();
     node.dataset.caption ??= node.textContent;
-    const effect = runOver() ? "" : store.connected ? effectOf(verb, names) : "no connection";
+    const effect = runOver() ? "run over" : store.connected ? effectOf(verb, names) : "no connection";
     text(node, effect || node.dataset.caption);
     node.closest("button").classList.toggle("idle", store.connected && !runOver() && isIdle(verb, names));
   }

@@ -5,7 +5,7 @@ import { landsIn } from "./duty.js";
 import { refusalOf, waiting } from "./effects.js";
 import { aloft, doing, isLost, lostTarget, modes, stage, teamMode } from "./glance.js";
 import { mustWords, openMusts } from "./preflight.js";
-import { droneNames, entity, SEEN_S, store, trackerSilent, unseenS } from "./store.js";
+import { droneNames, entity, store, trackerSilent, unseenS } from "./store.js";
 
 const NAMED = 4; // more drones than this are counted
 // Of one, of several.
@@ -40,15 +40,18 @@ function sought() {
 
 function since(name) {
   const age = unseenS(name);
-  if (!entity(name) && age < SEEN_S) return "seen, but not localised";
   return Number.isFinite(age) && age < 1e5 ? `not seen for ${age.toFixed(0)} s` : "not seen yet";
 }
 
+// In pictures, and not localised.
+const isUnplaced = (name) => !entity(name) && unseenS(name) <= store.scene.lost_after_s;
+
 function lost() {
   if (trackerSilent()) return "Nobody knows who is lost.";
-  const unseen = sought().filter(isLost), spells = [...new Set(unseen.map(since))];
+  const gone = sought().filter(isLost), unplaced = gone.filter(isUnplaced), unseen = gone.filter((name) => !isUnplaced(name)), spells = [...new Set(unseen.map(since))];
   const words = spells.map((spell) => `${joined(unseen.filter((name) => since(name) === spell))}, ${spell}`);
-  return words.length ? `Lost: ${words.join("; ")}.` : "Nobody is lost.";
+  const yet = unplaced.length ? ` It is not known yet where ${joined(unplaced)} ${unplaced.length > 1 ? "are" : "is"}.` : "";
+  return `${words.length ? `Lost: ${words.join("; ")}` : "Nobody is lost"}.${yet}`;
 }
 
 // What lets those go on that wait for it.

@@ -207,7 +207,7 @@ def _cameras(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
         elif (light := seen.message.brightness) is not None and light < DARK and not _stands_with(state, name):
             dark.append(name)
     if dark:
-        yield Alarm("dark", _dark_words(dark), False, _DARK_ADVICE)
+        yield Alarm("dark", _dark_words(sorted(dark)), False, _DARK_ADVICE)
 
 
 def _dark_words(names: Sequence[str]) -> str:

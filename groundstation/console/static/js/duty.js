@@ -43,7 +43,7 @@ function unseen(name) {
   const age = unseenS(name), { lost_after_s, unseen_land_s } = store.scene;
   if (age <= SEEN_S) return `Nobody sees ${name}, known by what it sees`;
   const left = Math.max(0, unseen_land_s - age);
-  return isLost(name) ? `Itself lost: lands by itself within ${left.toFixed(0)} s, unless it is seen` : `Not seen for ${seconds(age)}; it is lost from ${seconds(lost_after_s)} on`;
+  return isLost(name) ? `Itself lost: lands by itself within ${left.toFixed(0)}\u00a0s, unless it is seen` : `Not seen for ${seconds(age)}; it is lost from ${seconds(lost_after_s)} on`;
 }
 
 const ORDERS = /^(landing|taking off|held|tracking) (?:for|by) (.+)$/;

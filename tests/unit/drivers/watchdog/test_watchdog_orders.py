@@ -69,6 +69,12 @@ def test_a_restarted_driver_lands_the_sooner_the_longer_others_braked(braked_s, 
     assert lands_s <= (landing[0] - steps[0]) / S < lands_s + 0.07
 
 
+def test_what_is_braked_lands_as_soon_as_that_is_over():
+    dog, view = Watchdog(WatchdogLimits(), "clock", braked_ns=400 * MS), VehicleView(FlightState.FLYING, True, 0.9, "")
+    told = [dog.step(at, view, Upstream()).action for at in (S, S + 600 * MS - 1, S + 600 * MS)]
+    assert told == [Action.HOVER, Action.HOVER, Action.LAND]
+
+
 def test_before_the_vehicle_was_heard_nothing_is_decided(new_bench):
     bench = new_bench(state=FlightState.UNKNOWN)
     bench.fresh = False
@@ -288,3 +294,18 @@ def test_a_vehicle_that_flies_without_order_is_landed(new_bench):
     bench = new_bench()
     bench.state = FlightState.FLYING
     assert bench.step().action is Action.LAND
+
+
+def test_a_watchdog_begins_knowing_nothing_and_by_no_failsafe():
+    watchdog = Watchdog(WatchdogLimits(), "clock")
+    assert (watchdog.failsafe, watchdog.vehicle, watchdog.upstream) == ("", VehicleView(), Upstream())
+    decision = watchdog.step(S, VehicleView(), Upstream())
+    assert (decision.action, decision.entered_ns) == (Action.WAIT, 0)
+
+
+@pytest.mark.parametrize(("state", "then"), [(FlightState.UNKNOWN, Action.WAIT), (FlightState.LANDED, Action.IDLE)])
+def test_one_that_is_not_in_the_air_as_far_as_is_known_is_told_to_land_for_a_second(new_bench, state, then):
+    bench = new_bench(state)
+    bench.order(Verb.LAND, issuer="anyone")
+    assert bench.step(S - 1).action is Action.LAND
+    assert bench.step(1).action is then

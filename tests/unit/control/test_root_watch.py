@@ -168,6 +168,27 @@ def test_a_root_that_hung_and_sees_somebody_again_works() -> None:
     assert not watch.is_silent
 
 
+def test_a_root_that_hung_for_a_moment_has_as_long_as_any_other() -> None:
+    watch = RootWatch(["ceiling"], CARRIED)
+    watch.hear_frozen(sighting())
+    watch.hear(sighting(), 0)
+    watch.advance(6 * TICK_NS, [], flying=True)
+    assert not watch.is_silent
+
+
+@pytest.mark.parametrize(("hangs", "limit_ms"), [(False, 1500), (True, 500)])
+def test_it_is_silent_after_a_second_and_a_half_or_half_a_second_if_it_hangs(hangs: bool, limit_ms: int) -> None:
+    watch = RootWatch(["ceiling"], CARRIED)
+    watch.hear(picture(), 0)
+    if hangs:
+        watch.hear_frozen(sighting())
+    assert not watch.is_silent, "before the first tick"
+    watch.advance(limit_ms * 1_000_000, [], flying=True)
+    assert not watch.is_silent
+    watch.advance(limit_ms * 1_000_000 + 1, [], flying=True)
+    assert watch.is_silent
+
+
 @pytest.mark.parametrize("message", [picture(), sighting()])
 def test_one_that_sees_somebody_or_nobody_is_not_silent(message: Message) -> None:
     assert silent_after(message, 60) == []

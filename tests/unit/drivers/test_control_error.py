@@ -2,14 +2,12 @@
 
 import math
 import random
-from typing import Any
 
 import pytest
 
 from drivers.control_error import ControlErrorMonitor
-from drivers.seen_velocity import SeenVelocity
 from drivers.watchdog_types import Action, DriverMode, VehicleView, WatchdogDecision
-from groundstation.bus.messages import EntityEstimate, FlightState
+from groundstation.bus.messages import FlightState
 
 S = 1_000_000_000
 TURN_S = 0.025
@@ -119,67 +117,3 @@ def test_the_speed_is_the_faster_of_what_is_reported_and_seen():
     judged = ControlErrorMonitor().judge(S, view(0.3, 0.4), told(0.5), (1.5, 0.0))
     assert judged.speed_m_s == pytest.approx(1.3)
     assert ControlErrorMonitor().judge(S, view(0.3, 0.4), told(0.5), None).speed_m_s == pytest.approx(0.5)
-
-
-def seen_velocity(positions, yaw=0.0, yaw_rate=0.0, **fields):
-    seen, velocities = SeenVelocity(), []
-    for turn, (x, y) in enumerate(positions):
-        heading = yaw + yaw_rate * turn / 50
-        values: dict[str, Any] = {"converged": True, "age_s": 0.1, "covariance": (1e-4,) * 16} | fields
-        entity = EntityEstimate(
-            name="v", kind="robot", mean=(x, y, 0.8, heading), velocity_m_s=(0.0, 0.0, 0.0), **values
-        )
-        seen.hear(turn * S // 50, 1, entity)
-        velocities.append(seen.velocity(turn * S // 50))
-    return velocities
-
-
-def test_positions_seen_become_a_velocity_in_the_vehicles_frame():
-    moving = [(0.5 * i / 50, 0.0) for i in range(100)]
-    assert seen_velocity(moving)[10] is None
-    assert seen_velocity(moving, yaw=math.pi / 2)[-1] == pytest.approx((0.0, -0.5), abs=1e-9)
-
-
-def test_a_velocity_seen_while_turning_is_the_mean_one_of_the_vehicles_frame():
-    velocity = seen_velocity([(0.5 * i / 50, 0.0) for i in range(50)], yaw_rate=1.0)[-1]
-    window = [i / 50 for i in range(19, 50)]  # headings of the last 0.6 s
-    mean = [0.5 * sum(map(f, window)) / len(window) for f in (math.cos, lambda yaw: -math.sin(yaw))]
-    assert velocity == pytest.approx(mean, abs=0.01)
-
-
-@pytest.mark.parametrize("fields", [{"converged": False}, {"age_s": 2.0}, {"covariance": (0.06**2,) * 16}])
-def test_nothing_is_made_of_positions_that_nobody_sees_well(fields):
-    assert seen_velocity([(0.5 * i / 50, 0.0) for i in range(100)], **fields)[-1] is None
-
-
-WIDE: dict[str, Any] = {"covariance": (0.15**2,) * 16}  # nothing tells how it moves, and pictures are 0.15 s under way
-
-
-def test_a_silent_vehicle_is_seen_where_its_last_picture_showed_it():
-    moving = [(0.5 * i / 50, 0.0) for i in range(100)]
-    assert seen_velocity(moving, sighting=(0.2, 0.015), **WIDE)[-1] == pytest.approx((0.5, 0.0), abs=1e-9)
-
-
-def test_a_silent_vehicle_is_timed_by_its_pictures():
-    """Ten of them a second, each 0.15 s late: in between its belief stands still."""
-    seen = SeenVelocity()
-    for turn in range(100):
-        late = turn % 5
-        place = 1.0 * (turn - late) / 50
-        entity = EntityEstimate(
-            name="v", kind="robot", mean=(place, 0.0, 0.8, 0.0), velocity_m_s=(0.0, 0.0, 0.0), converged=True,
-            age_s=0.15 + late / 50, sighting=(0.15 + late / 50, 0.015), **WIDE
-        )  # fmt: skip
-        seen.hear(turn * S // 50, 1, entity)
-        if turn > 40:
-            assert seen.velocity(turn * S // 50) == pytest.approx((1.0, 0.0), abs=1e-6)
-
-
-@pytest.mark.parametrize("sighting", [None, (0.5, 0.015), (0.2, 0.06)])
-def test_a_silent_vehicle_is_not_seen_by_an_old_or_a_poor_picture(sighting):
-    assert seen_velocity([(0.0, 0.0)] * 100, sighting=sighting, **WIDE)[-1] is None
-
-
-def test_a_belief_that_was_set_anew_is_no_flight():
-    velocities = seen_velocity([(0.0, 0.0)] * 50 + [(1.0, 0.0)] * 50)
-    assert max(abs(v[0]) for v in velocities if v is not None) < 1e-9

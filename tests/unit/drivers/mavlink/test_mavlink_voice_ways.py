@@ -1,0 +1,115 @@
+"""What a voice does with a line that fails or is full, with an adapter, and with words for many vehicles."""
+
+import json
+import os
+import pty
+import socket
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from drivers.mavlink.voice import MavlinkVoice
+from groundstation.errors import DriverError
+
+
+def frame(payload: int) -> bytes:
+    """Return an unsigned frame of 12 bytes and so many more."""
+    return bytes([0xFD, payload, *[0] * 8]) + bytes(payload + 2)
+
+
+def way(serial: str = "", interface: str = "") -> str:
+    return json.dumps({"serial": serial, "key_file": "", "interface": interface})
+
+
+def descriptors() -> int:
+    return len(list(Path("/proc/self/fd").iterdir()))
+
+
+@pytest.fixture
+def device(tmp_path):
+    """A place where lines can be plugged in."""
+    ends: list[int] = []
+
+    def plug() -> int:
+        end, line = pty.openpty()
+        ends.extend((end, line))
+        path = tmp_path / "line"
+        path.unlink(missing_ok=True)
+        path.symlink_to(os.ttyname(line))
+        return end
+
+    yield str(tmp_path / "line"), plug
+    for end in ends:
+        with suppress(OSError):
+            os.close(end)
+
+
+def test_a_line_that_fails_is_opened_anew_once_it_is_there_again(device):
+    path, plug = device
+    voice, end = MavlinkVoice(way(f"{path}:57600"), 2), plug()
+    voice.say(frame(1), [])
+    assert os.read(end, 64) == frame(1)
+    before = descriptors()
+    os.close(end)
+    with pytest.raises(OSError):
+        voice.say(frame(1), [])
+    assert descriptors() == before - 2, "its end, and its own"
+    Path(path).unlink()
+    with pytest.raises(OSError, match="cannot open"):
+        voice.say(frame(1), [])
+    end = plug()
+    voice.say(frame(2), [])
+    assert os.read(end, 64) == frame(2)
+    voice.close()
+
+
+def test_a_line_that_is_full_is_kept(device):
+    path, plug = device
+    voice, end = MavlinkVoice(way(f"{path}:57600"), 2), plug()
+    with pytest.raises(BlockingIOError):
+        for _ in range(1000):
+            voice.say(frame(200), [])
+    before, heard = descriptors(), b""
+    deadline = time.monotonic() + 5.0
+    while not heard.endswith(frame(9)) and time.monotonic() < deadline:
+        heard = os.read(end, 65_536)
+        with suppress(BlockingIOError):
+            voice.say(frame(9), [])
+    assert heard.endswith(frame(9))
+    assert descriptors() == before
+    voice.close()
+
+
+def test_a_line_is_closed_once(device):
+    path, plug = device
+    plug()
+    voice, before = MavlinkVoice(way(f"{path}:57600"), 2), descriptors()
+    voice.say(frame(1), [])
+    voice.close()
+    voice.close()
+    assert descriptors() == before
+    os.fstat(0)
+
+
+def test_a_voice_waits_for_no_network_and_keeps_to_its_adapter():
+    voice = MavlinkVoice(way(interface="lo"), 2)
+    assert voice._socket is not None and not voice._socket.getblocking()
+    assert voice._socket.getsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, 16).startswith(b"lo\0")
+    voice.close()
+    with pytest.raises(DriverError, match="interface"):
+        MavlinkVoice(way(interface="no-such-adapter"), 2)
+
+
+@pytest.mark.parametrize(("last", "sizes"), [(120, [1200]), (121, [1068, 133])], ids=["as much as fits", "a byte more"])
+def test_as_many_whole_frames_go_together_as_fit_in_a_usual_network(last, sizes):
+    udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    udp.bind(("127.0.0.1", 0))
+    udp.settimeout(2.0)
+    voice = MavlinkVoice(way(), 2)
+    voice.say(b"", [udp.getsockname()])
+    voice.say(frame(255) * 4 + frame(last), [udp.getsockname()])
+    assert [len(udp.recv(4096)) for _ in sizes] == sizes
+    voice.close()
+    udp.close()

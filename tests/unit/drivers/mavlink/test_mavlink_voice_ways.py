@@ -102,14 +102,18 @@ def test_a_voice_waits_for_no_network_and_keeps_to_its_adapter():
         MavlinkVoice(way(interface="no-such-adapter"), 2)
 
 
-@pytest.mark.parametrize(("last", "sizes"), [(120, [1200]), (121, [1068, 133])], ids=["as much as fits", "a byte more"])
-def test_as_many_whole_frames_go_together_as_fit_in_a_usual_network(last, sizes):
+@pytest.mark.parametrize(
+    ("payloads", "sizes"),
+    [([255] * 4 + [120], [1200]), ([255] * 4 + [121], [1068, 133]), ([255] * 9, [1068, 1068, 267])],
+    ids=["as much as fits", "a byte more", "twice as much and more"],
+)
+def test_as_many_whole_frames_go_together_as_fit_in_a_usual_network(payloads, sizes):
     udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     udp.bind(("127.0.0.1", 0))
     udp.settimeout(2.0)
     voice = MavlinkVoice(way(), 2)
     voice.say(b"", [udp.getsockname()])
-    voice.say(frame(255) * 4 + frame(last), [udp.getsockname()])
+    voice.say(b"".join(map(frame, payloads)), [udp.getsockname()])
     assert [len(udp.recv(4096)) for _ in sizes] == sizes
     voice.close()
     udp.close()

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from groundstation.arrays import Array, IntVector, Matrix, zeros_on_a_line
+from groundstation.arrays import Array, IntVector, Matrix, Vector, zeros_on_a_line
 from groundstation.experiments.planar.edges import sort_team
 from groundstation.experiments.planar.parameters import PlanarParameters
 from groundstation.experiments.planar.records import Observers, PlanarProblem, Workspace, X, Y
@@ -49,6 +49,17 @@ def load_topology(level: IntVector, problem: PlanarProblem, work: Workspace) -> 
         variance[a] = problem.variance[own]
         for b in range(order.shape[0]):
             prior[0, a, b] = problem.information[own, order[b]]
+
+
+@kernel()
+def reorder(source: Vector, robots: int, work: Workspace, target: Vector, to_sorted: bool) -> None:
+    """Copy controls (segments * n * 2) into, or out of, the sorted order of the workspace's topology."""
+    for first in range(0, source.shape[0], 2 * robots):
+        for place in range(robots):
+            a, b = first + 2 * int(work.order[place]), first + 2 * place
+            if not to_sorted:
+                a, b = b, a
+            target[b], target[b + 1] = source[a], source[a + 1]
 
 
 FINE, NOT_FINITE, NOT_SYMMETRIC, NOT_PSD = 0, 1, 2, 3

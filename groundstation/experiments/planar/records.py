@@ -95,3 +95,19 @@ class Candidates(NamedTuple):
     costs: Vector
     fates: IntVector
     controls: Matrix
+
+
+class Optimum(NamedTuple):
+    """The current topology at its optimum, by entity: robots, target, the global sensor (n + 2).
+
+    controls (segments * n * 2), scaled; gradient: of the cost in them [m^2]; position (h, 2, n + 2) [m]; columns
+    (h, h, n + 2): the adjoint's, of which row c of step i belongs to the variance after step h - 1 - c; held
+    (h, n + 2): the diagonal of the information matrix of all steps [1/m^2].
+    """
+
+    level: IntVector
+    controls: Vector
+    gradient: Vector
+    position: MatrixStack
+    columns: MatrixStack
+    held: Matrix

@@ -5,8 +5,10 @@ import numpy as np
 from groundstation.arrays import IntVector, Vector
 from groundstation.experiments.planar.bounds import reach_bound, reach_information, tangent_bounds
 from groundstation.experiments.planar.minimise import FAILED, OUT_OF_BUDGET, minimise
-from groundstation.experiments.planar.problem import load_topology
+from groundstation.experiments.planar.moved import optimum_of
+from groundstation.experiments.planar.problem import load_topology, reorder
 from groundstation.experiments.planar.records import Candidates, Limits, PlanarProblem, Workspace
+from groundstation.experiments.planar.resting import learn, resting_cost, take_controls
 from groundstation.kernel import kernel
 
 DROPPED_BY_TANGENT, DROPPED_BY_REACH, SOLVED, SKIPPED = 0, 1, 2, 3
@@ -16,17 +18,6 @@ _ROUNDING = 1.0 + 1e-9
 
 # Where a topology is solved with so few evaluations, a reach bound to avoid the next one costs as much.
 _CHEAP = 2
-
-
-@kernel()
-def reorder(source: Vector, robots: int, work: Workspace, target: Vector, to_sorted: bool) -> None:
-    """Copy controls (segments * n * 2) into, or out of, the sorted order of the workspace's topology."""
-    for first in range(0, source.shape[0], 2 * robots):
-        for place in range(robots):
-            a, b = first + 2 * int(work.order[place]), first + 2 * place
-            if not to_sorted:
-                a, b = b, a
-            target[b], target[b + 1] = source[a], source[a + 1]
 
 
 @kernel()
@@ -74,7 +65,8 @@ def certified_search(
         tangent_bounds(levels, reach, problem, work, bounds)
         evaluations += 1
     order = 1 + np.argsort(bounds[1:], kind="mergesort")
-    used = limits.budget
+    used, resting, at = limits.budget, 0, optimum_of(levels[0], controls[0], problem.steps)
+    doubt = np.full((2 * levels.shape[1], 2), np.inf)
     for k in range(total - 1):
         t = int(order[k])
         if bounds[t] >= limit * _ROUNDING:
@@ -89,6 +81,12 @@ def certified_search(
             if bounds[t] >= limit * _ROUNDING:
                 fates[t] = DROPPED_BY_REACH
                 continue
+        if prune:
+            costs[t] = resting_cost(levels[t], at, scale, problem, limits.tolerance, doubt)
+            if costs[t] >= limit * _ROUNDING:
+                fates[t] = SOLVED
+                take_controls(at, controls[t])
+                continue
         rest_of = Limits(limits.tolerance, limits.budget - evaluations, stop)
         costs[t], used, status = solve_topology(levels[t], controls[0], problem, work, scale, rest_of, controls[t])
         evaluations += used
@@ -98,4 +96,7 @@ def certified_search(
         fates[t] = SKIPPED if status == OUT_OF_BUDGET else SOLVED
         if costs[t] < limit:
             best, limit = t, costs[t]
+        if prune and used == 1:
+            resting += 1
+            evaluations += learn(levels[t], costs[t], resting, at, scale, problem, work, doubt)
     return best, evaluations

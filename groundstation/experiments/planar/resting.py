@@ -1,0 +1,82 @@
+"""Which neighbours are best where the current topology is: no step of theirs helps, as far as the tolerance asks.
+
+In a large team that is what most survivors of the bounds are found to be, each with one evaluation. `moved` says the
+same within the square of a robot's share; how far it is believed, it has shown on a move between the same levels.
+"""
+
+import math
+
+import numpy as np
+
+from groundstation.arrays import IntVector, Matrix, Vector
+from groundstation.experiments.planar.moved import evaluate, look, moved_cost, moved_robot
+from groundstation.experiments.planar.records import Optimum, PlanarProblem, Workspace
+from groundstation.kernel import kernel
+from groundstation.planning.lbfgs import projected_gradient
+
+_FEW = 4  # topologies that must be found to be such before it pays to ask
+_DOUBT = 3.0  # times the errors that were found for a like move
+_EXACT = 1e-4  # error of a cost, over the current one, up to which it is taken
+
+
+@kernel()
+def _kind(before: IntVector, after: IntVector) -> int:
+    """Return which robots a move is alike for: those that leave the same level to the same side; -1 for no move."""
+    robot = moved_robot(before, after)
+    if robot < 0:
+        return -1
+    return 2 * int(before[robot]) + (1 if after[robot] > before[robot] else 0)
+
+
+@kernel()
+def learn(
+    level: IntVector, exact: float, found: int, at: Optimum, cost: float, problem: PlanarProblem, work: Workspace,
+    doubt: Matrix,
+) -> int:  # fmt: skip
+    """Find out, once, how far a kind of move is to be believed, from one that was evaluated; return evaluations.
+
+    found: how many topologies were best where the current one is, this one too; exact, cost: of this one and of the
+    current one, both there [m^2]. doubt (2n, 2): errors of cost and gradient over the current cost, for each kind of
+    move, and for an imbalance of 1; infinite where nothing is known.
+    """
+    kind, looks = _kind(at.level, level), 1 if found == _FEW else 0
+    if looks == 1:
+        look(at, problem, work)
+    if found < _FEW or kind < 0 or np.isfinite(doubt[kind, 0]):
+        return looks
+    expected, true, worst = np.empty(at.controls.shape[0]), np.empty(at.controls.shape[0]), 0.0
+    value, imbalance = moved_cost(level, at, cost, problem, expected)
+    evaluate(level, at.controls, problem, work, true)
+    for k in range(true.shape[0]):
+        worst = max(worst, abs(expected[k] - true[k]))
+    imbalance = max(imbalance / cost, 1e-300)
+    doubt[kind, 0] = _DOUBT * max(exact - value, 0.0) / (cost * imbalance)
+    doubt[kind, 1] = _DOUBT * worst / (cost * math.sqrt(imbalance))
+    return looks + 1
+
+
+@kernel()
+def resting_cost(
+    level: IntVector, at: Optimum, cost: float, problem: PlanarProblem, tolerance: float, doubt: Matrix
+) -> float:
+    """Return what a topology costs at the current one's optimum [m^2], at least; NaN where it may be better elsewhere.
+
+    cost: the current topology's; tolerance: of the projected gradient over that cost.
+    """
+    kind = _kind(at.level, level)
+    if kind < 0 or not np.isfinite(doubt[kind, 0]):
+        return np.nan
+    gradient = np.empty(at.controls.shape[0])
+    value, imbalance = moved_cost(level, at, cost, problem, gradient)
+    imbalance /= cost
+    for k in range(gradient.shape[0]):
+        gradient[k] /= cost
+    slope = projected_gradient(at.controls, gradient) + doubt[kind, 1] * math.sqrt(imbalance)
+    return value if doubt[kind, 0] * imbalance <= _EXACT and slope <= tolerance else np.nan
+
+
+@kernel()
+def take_controls(at: Optimum, controls: Vector) -> None:
+    """Copy the current topology's controls."""
+    for k in range(controls.shape[0]):
+        controls[k] = at.controls[k]

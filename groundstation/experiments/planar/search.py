@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from groundstation.arrays import IntVector, Vector
+from groundstation.arrays import IntVector, Matrix, Vector
 from groundstation.experiments.planar.bounds import reach_bound, reach_information, tangent_bounds
 from groundstation.experiments.planar.minimise import FAILED, OUT_OF_BUDGET, minimise
 from groundstation.experiments.planar.moved import optimum_of
 from groundstation.experiments.planar.problem import load_topology, reorder
-from groundstation.experiments.planar.records import Candidates, Limits, PlanarProblem, Workspace
+from groundstation.experiments.planar.records import Candidates, Limits, Optimum, PlanarProblem, Workspace
 from groundstation.experiments.planar.resting import learn, resting_cost, take_controls
 from groundstation.kernel import kernel
 
@@ -33,6 +33,19 @@ def solve_topology(
     result = minimise(x, problem, work, scale, limits)
     reorder(x, robots, work, controls, False)
     return result
+
+
+@kernel()
+def _rests(
+    t: int, candidates: Candidates, at: Optimum, problem: PlanarProblem, limits: Limits, limit: float, doubt: Matrix
+) -> bool:
+    """Judge a candidate by the current topology's adjoint; return whether that will do."""
+    cost = resting_cost(candidates.levels[t], at, candidates.costs[0], problem, limits.tolerance, doubt)
+    if not cost >= limit * _ROUNDING:
+        return False
+    candidates.costs[t], candidates.fates[t] = cost, SOLVED
+    take_controls(at, candidates.controls[t])
+    return True
 
 
 @kernel()
@@ -81,12 +94,8 @@ def certified_search(
             if bounds[t] >= limit * _ROUNDING:
                 fates[t] = DROPPED_BY_REACH
                 continue
-        if prune:
-            costs[t] = resting_cost(levels[t], at, scale, problem, limits.tolerance, doubt)
-            if costs[t] >= limit * _ROUNDING:
-                fates[t] = SOLVED
-                take_controls(at, controls[t])
-                continue
+        if prune and _rests(t, candidates, at, problem, limits, limit, doubt):
+            continue
         rest_of = Limits(limits.tolerance, limits.budget - evaluations, stop)
         costs[t], used, status = solve_topology(levels[t], controls[0], problem, work, scale, rest_of, controls[t])
         evaluations += used

@@ -16,7 +16,7 @@ from groundstation.experiments.planar.scenarios import bench_belief, scattered_b
 PARAMETERS = PlanarParameters()
 
 
-def moves(belief: Any, parameters: PlanarParameters = PARAMETERS, segments: int = 1) -> list[tuple[float, ...]]:
+def moves(belief: Any, parameters: PlanarParameters = PARAMETERS, segments: int = 1) -> list[Any]:
     """Return what is said of each move and what is true: cost, then the gradients' largest difference and entry."""
     mean, covariance, level = belief
     robots = len(level)

@@ -45,7 +45,8 @@ class SearchState:
     """How the search for one target stands.
 
     since_ns: since when the mode holds; place: where it most likely is [m; world]; excluded: share of the floor where
-    it is not; expected_s: about how long finding it takes; near: it was tracked when it got out of sight.
+    it is not; expected_s: about how long finding it takes; near: it was tracked when it got out of sight; predicted: to
+    where the map has followed its prediction [x, y in m] and that one's variance (mean of both axes) [m^2].
     """
 
     mode: SearchMode
@@ -56,6 +57,7 @@ class SearchState:
     expected_s: float | None = None
     given_up: bool = False
     near: bool = False
+    predicted: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 class Search:
@@ -126,7 +128,7 @@ class Search:
             if after.given_up and not before.given_up and name in belief.layout:
                 dropped.append(name)
             self.targets[name] = after
-        self._move(now_ns)
+        self._move(belief)
         pictures, self._pictures = self._pictures, []
         for picture in pictures:
             self._look(picture, now_ns)
@@ -174,7 +176,10 @@ class Search:
                 return state
             return SearchState(SearchMode.SEARCH, now_ns, self._anywhere(belief), given_up=True)
         mean, covariance = belief.mean_of(name)[:2], belief.covariance_of(name)[:2, :2]
-        room = state.room or lost_at(self.grid, mean, covariance)
+        room = state.room
+        if room is None:
+            room, predicted = lost_at(self.grid, mean, covariance), _place_and_variance(belief, name)
+            state = replace(state, predicted=predicted)
         state = replace(state, room=room, near=True)
         if state.given_up:
             return state
@@ -192,16 +197,33 @@ class Search:
         places = [(float(p[0] + ahead_m * np.cos(p[3])), float(p[1] + ahead_m * np.sin(p[3]))) for p in poses]
         return unknown_place(self.grid, places)
 
-    def _move(self, now_ns: int) -> None:
+    def _move(self, belief: JointBelief) -> None:
         """Let the targets of the maps drive on, in steps."""
-        if now_ns - self._moved_ns < _STEP_NS:
+        if belief.stamp_ns - self._moved_ns < _STEP_NS:
             return
-        self._moved_ns = now_ns
+        self._moved_ns = belief.stamp_ns
         p = self.parameters
         variance = p.target_speed_m_s**2 * p.target_straight_s * _STEP_NS / NS_PER_S
-        for name, state in self.targets.items():
+        for name in self.targets:
+            state = self._predicted(name, belief)
             if state.room is not None:
-                self.targets[name] = replace(state, room=state.room.moved(variance).uncovered(_STEP_NS / NS_PER_S))
+                state = replace(state, room=state.room.moved(variance).uncovered(_STEP_NS / NS_PER_S))
+            self.targets[name] = state
+
+    def _predicted(self, name: str, belief: JointBelief) -> SearchState:
+        """Return the state whose map has followed the prediction of its target, by whole cells."""
+        state = self.targets[name]
+        if state.room is None:
+            return state
+        if state.given_up or name not in belief.layout:
+            return replace(state, room=state.room.given_up())
+        cell_m, (x, y, before) = self.grid.cell_m, state.predicted
+        at_x, at_y, variance = _place_and_variance(belief, name)
+        columns, rows = round((at_x - x) / cell_m), round((at_y - y) / cell_m)
+        predicted = (x + columns * cell_m, y + rows * cell_m, variance)
+        return replace(
+            state, room=state.room.predicted(rows, columns, max(0.0, variance - before)), predicted=predicted
+        )
 
     def _look(self, picture: SearchedPicture, now_ns: int) -> None:
         """Count a picture for all targets that it does not show."""
@@ -246,3 +268,9 @@ class Search:
                 excluded=excluded,
                 expected_s=expected_s,
             )
+
+
+def _place_and_variance(belief: JointBelief, name: str) -> tuple[float, float, float]:
+    """Return where an entity is believed [x, y in m], and the mean variance of both axes [m^2]."""
+    mean, variances = belief.mean_of(name), np.diag(belief.covariance_of(name))[:2]
+    return float(mean[0]), float(mean[1]), float(variances.mean())

@@ -1,7 +1,9 @@
-"""Where in the room a target is that is not seen: probabilities on a grid, that it stands, drives, or is hidden there.
+"""Where in the room a target is that is not seen: probabilities on a grid, that it stands, drives about, drives on as
+it was predicted, or is hidden there.
 
 Hypotheses are kept apart, since what was searched stays empty of a target that stands, and does not of one that drives;
-and no picture shows one that something hides. Every operation returns a new value.
+one that drives on takes its probability along; and no picture shows one that something hides. Every operation returns
+a new value.
 """
 
 import math
@@ -48,7 +50,8 @@ class RoomGrid:
 
 @dataclass(frozen=True, slots=True)
 class RoomMap:
-    """Probabilities by cell (rows along y, columns along x): that it stands there, drives there, or is hidden there.
+    """Probabilities by cell (rows along y, columns along x): that it stands there, drives there, goes on there as
+    it was predicted, or is hidden there.
 
     hidden: by something that the field does not name, from all cameras; overlooked: chance that all pictures since the
     beginning would have missed a target standing there in plain view.
@@ -57,18 +60,19 @@ class RoomMap:
     grid: RoomGrid
     stands: Array
     drives: Array
+    goes_on: Array
     hidden: Array
     overlooked: Array
 
     @property
     def chances(self) -> Array:
         """Return the probability of each cell; their sum is 1."""
-        return self.stands + self.drives + self.hidden
+        return self.stands + self.drives + self.goes_on + self.hidden
 
     @property
     def in_view(self) -> Array:
         """Return the probability of each cell for a target that nothing hides: what a search can find there."""
-        shown = self.stands + self.drives
+        shown = self.stands + self.drives + self.goes_on
         return np.asarray(shown / max(float(shown.sum()), 1e-12))
 
     def moved(self, variance_m2: float) -> "RoomMap":
@@ -76,27 +80,39 @@ class RoomMap:
 
         Walls keep it in. variance_m2: at most half the square of a cell.
         """
+        return replace(self, drives=self._spread(self.drives, variance_m2))
+
+    def predicted(self, rows: int, columns: int, variance_m2: float) -> "RoomMap":
+        """Return the map after the prediction went on by some cells, and its variance grew, for each axis.
+
+        What goes on as predicted goes with it, in view or hidden; only the former spreads. Walls keep it in.
+        """
+        goes_on, hidden = (_shifted(_shifted(one, 0, rows), 1, columns) for one in (self.goes_on, self.hidden))
+        return replace(self, goes_on=self._spread(goes_on, variance_m2), hidden=hidden)
+
+    def given_up(self) -> "RoomMap":
+        """Return the map of a target that is not predicted any more: what went on drives about."""
+        return replace(self, drives=self.drives + self.goes_on, goes_on=np.zeros(self.grid.shape))
+
+    def _spread(self, values: Array, variance_m2: float) -> Array:
         share = min(0.5 * variance_m2 / self.grid.cell_m**2, 0.25)
-        drives = self.drives
-        for axis in (0, 1):
-            drives = _smoothed(drives, axis, share)
-        return replace(self, drives=drives)
+        return _smoothed(_smoothed(values, 0, share), 1, share)
 
     def uncovered(self, time_s: float) -> "RoomMap":
-        """Return the map after some time, in which what hides the target may have gone: it stands or drives in view."""
+        """Return the map after some time, in which what hides it may have gone: it stands or goes on in view."""
         left = math.exp(-time_s / HIDDEN_S)
         shown = (1.0 - left) * self.hidden
-        stands, drives = self.stands + STANDS_SHARE * shown, self.drives + (1.0 - STANDS_SHARE) * shown
-        return replace(self, stands=stands, drives=drives, hidden=left * self.hidden)
+        stands, goes_on = self.stands + STANDS_SHARE * shown, self.goes_on + (1.0 - STANDS_SHARE) * shown
+        return replace(self, stands=stands, goes_on=goes_on, hidden=left * self.hidden)
 
     def emptied(self, chance: Array) -> "RoomMap":
         """Return the map after a picture without the target; chance: with which it shows a target in each cell."""
         missed = 1.0 - chance
-        stands, drives = self.stands * missed, self.drives * missed
-        total = float(stands.sum() + drives.sum() + self.hidden.sum())
+        stands, drives, goes_on = self.stands * missed, self.drives * missed, self.goes_on * missed
+        total, overlooked = float((stands + drives + goes_on + self.hidden).sum()), self.overlooked * missed
         if total <= 1e-9:
-            return replace(unknown_place(self.grid), overlooked=self.overlooked * missed)
-        return RoomMap(self.grid, stands / total, drives / total, self.hidden / total, self.overlooked * missed)
+            return replace(unknown_place(self.grid), overlooked=overlooked)
+        return RoomMap(self.grid, stands / total, drives / total, goes_on / total, self.hidden / total, overlooked)
 
     def mass_near(self, mean: Sequence[float] | Array, covariance: Array, sigmas: float, least_m: float) -> float:
         """Return the probability that the target is within some standard deviations of a place, or a least distance."""
@@ -119,10 +135,10 @@ def unknown_place(grid: RoomGrid, hints: Sequence[tuple[float, float]] = ()) -> 
     """Return the map of a target that was never seen: anywhere, and rather near the middle of some places."""
     even = np.full(grid.shape, 1.0 / (grid.shape[0] * grid.shape[1]))
     if not hints:
-        return _shared(grid, even, np.zeros(grid.shape))
+        return _shared(grid, even)
     x, y = np.mean(hints, axis=0)
     near = np.exp(-np.hypot(grid.xs[None, :] - x, grid.ys[:, None] - y) / _NEAR_M)
-    return _shared(grid, _HINTED * near / near.sum() + (1.0 - _HINTED) * even, np.zeros(grid.shape))
+    return _shared(grid, _HINTED * near / near.sum() + (1.0 - _HINTED) * even)
 
 
 def lost_at(grid: RoomGrid, mean: Sequence[float] | Array, covariance: Array) -> RoomMap:
@@ -137,8 +153,8 @@ def lost_at(grid: RoomGrid, mean: Sequence[float] | Array, covariance: Array) ->
     away = np.hypot(dx, dy)
     near = np.exp(-(away - away.min()) / _NEAR_M)  # of a place far beyond the walls, the nearest cells
     there *= _THERE / there.sum()
-    chances = (1.0 - _HIDDEN) * there + _NEAR * near / near.sum() + _ANYWHERE / there.size
-    return _shared(grid, chances, _HIDDEN * there)
+    elsewhere = _NEAR * near / near.sum() + _ANYWHERE / there.size
+    return _shared(grid, elsewhere, (1.0 - _HIDDEN) * there, _HIDDEN * there)
 
 
 def _squared_distance(dx: Array, dy: Array, covariance: Array) -> Array:
@@ -147,13 +163,24 @@ def _squared_distance(dx: Array, dy: Array, covariance: Array) -> Array:
     return np.asarray((yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy))
 
 
-def _shared(grid: RoomGrid, chances: Array, hidden: Array) -> RoomMap:
-    return RoomMap(grid, STANDS_SHARE * chances, (1.0 - STANDS_SHARE) * chances, hidden, np.ones(grid.shape))
+def _shared(grid: RoomGrid, elsewhere: Array, there: Array | float = 0.0, hidden: Array | float = 0.0) -> RoomMap:
+    """Return the map of a target that is elsewhere, or there where it was predicted: in view or hidden."""
+    none, drives = np.zeros(grid.shape), 1.0 - STANDS_SHARE
+    stands = STANDS_SHARE * (elsewhere + there)
+    return RoomMap(grid, stands, drives * elsewhere, none + drives * there, none + hidden, np.ones(grid.shape))
 
 
 def _centres(size_m: float, cell_m: float) -> Array:
     count = max(1, round(size_m / cell_m))
     return (np.arange(count, dtype=np.float64) - (count - 1) / 2) * cell_m
+
+
+def _shifted(values: Array, axis: int, cells: int) -> Array:
+    """Return values moved along an axis by some cells; at a wall they add up."""
+    count = values.shape[axis]
+    moved, at = np.zeros_like(values), np.clip(np.arange(count) + cells, 0, count - 1)
+    np.add.at(np.moveaxis(moved, axis, 0), at, np.moveaxis(values, axis, 0))
+    return moved
 
 
 def _smoothed(values: Array, axis: int, share: float) -> Array:

@@ -37,7 +37,7 @@ def test_a_target_that_was_never_seen_is_rather_where_a_hint_says() -> None:
 
 
 def test_walls_keep_in_what_drives_and_what_stands_stays() -> None:
-    room = lost_at(GRID, (3.9, 2.9), 0.01 * np.eye(2))
+    room = lost_at(GRID, (3.9, 2.9), 0.01 * np.eye(2)).given_up()
     moved = room
     for _ in range(100):
         moved = moved.moved(0.018)
@@ -50,8 +50,8 @@ def test_walls_keep_in_what_drives_and_what_stands_stays() -> None:
 
 def test_the_spread_of_one_that_drives_grows_by_the_variance_given() -> None:
     room = lost_at(GRID, (0.0, 0.0), 1e-4 * np.eye(2))
-    nowhere, peak = np.zeros(GRID.shape), np.where(room.drives == room.drives.max(), 0.25, 0.0)
-    start = RoomMap(GRID, nowhere, peak, nowhere, room.overlooked)
+    nowhere, peak = np.zeros(GRID.shape), np.where(room.goes_on == room.goes_on.max(), 0.25, 0.0)
+    start = RoomMap(GRID, nowhere, peak, nowhere, nowhere, room.overlooked)
     moved = start
     for _ in range(10):
         moved = moved.moved(0.018)
@@ -92,12 +92,15 @@ def test_what_nobody_sees_for_a_moment_may_be_hidden_and_is_not_for_long() -> No
     assert left_at_the_prediction(4.0) < 0.15
 
 
-def test_who_comes_out_from_behind_something_stands_or_drives() -> None:
+def test_who_comes_out_from_behind_something_stands_or_goes_on() -> None:
     room = lost_at(GRID, (0.0, 0.0), 0.01 * np.eye(2))
     later = room.uncovered(HIDDEN_S)
     assert later.hidden.sum() == pytest.approx(room.hidden.sum() / np.e)
     assert later.chances == pytest.approx(room.chances)
-    assert later.stands.sum() / later.drives.sum() == pytest.approx(room.stands.sum() / room.drives.sum())
+    assert np.array_equal(later.drives, room.drives)
+    shown = (1.0 - 1.0 / np.e) * room.hidden.sum()
+    assert later.stands.sum() - room.stands.sum() == pytest.approx(0.3 * shown)
+    assert later.goes_on.sum() - room.goes_on.sum() == pytest.approx(0.7 * shown)
 
 
 @pytest.mark.parametrize("place", [(900.0, 0.0), (-1e5, 3e4), (4.5, -3.5)])
@@ -108,3 +111,28 @@ def test_a_target_that_was_predicted_beyond_the_walls_is_looked_for_in_the_room(
     row, column = np.unravel_index(int(room.chances.argmax()), GRID.shape)
     near = np.argmin(np.hypot(GRID.xs[None, :] - place[0], GRID.ys[:, None] - place[1]))
     assert (row, column) == np.unravel_index(int(near), GRID.shape)
+
+
+@pytest.mark.parametrize("speed_m_s", [0.0, 0.22, 0.45])
+def test_one_that_drives_on_as_it_did_is_not_given_up_by_time_alone(speed_m_s: float) -> None:
+    room, cells = lost_at(GRID, (-1.0, 0.0), 0.01 * np.eye(2)), 0
+    for step in range(24):
+        way_m = speed_m_s * 0.1 * (step + 1)
+        room = room.predicted(0, round(way_m / GRID.cell_m) - cells, 0.002).moved(0.018).uncovered(0.1)
+        cells = round(way_m / GRID.cell_m)
+    assert room.chances.sum() == pytest.approx(1.0)
+    assert room.mass_near((way_m - 1.0, 0.0), 0.05 * np.eye(2), 2.0, 0.5) > 0.35
+
+
+def test_what_is_not_predicted_any_more_drives_about_where_it_was() -> None:
+    room = lost_at(GRID, (1.0, 0.0), 0.01 * np.eye(2))
+    about = room.given_up()
+    assert about.chances == pytest.approx(room.chances)
+    assert about.predicted(0, 5, 0.0).drives == pytest.approx(about.drives)
+
+
+def test_a_prediction_that_goes_through_a_wall_stays_in_the_room() -> None:
+    room = lost_at(GRID, (3.5, -2.5), 0.01 * np.eye(2))
+    beyond = room.predicted(-200, 200, 0.0)
+    assert beyond.chances.sum() == pytest.approx(1.0)
+    assert int(beyond.goes_on.argmax()) == GRID.shape[1] - 1, "in the corner"

@@ -14,6 +14,7 @@ _INSET_M = 0.1  # behind the border it is seen for certain
 HOLD_GAIN = 1.0  # of the way to the border [1/s]
 _GAIN = 3.0  # of the way that is left into the view [1/s]: a velocity's error carries it out of a weaker hold
 _STANDS_M_S = 1e-3
+_HALVINGS = 12  # of a second or so: to a millisecond
 _ASIDE_M_S = 0.3  # along the gap, while it crosses: as much as the limit of speed leaves
 
 
@@ -75,8 +76,26 @@ def gap_about_m(place: Array, views: Sequence[Rectangle]) -> float:
     return ways[0] + ways[1] if len(ways) > 1 else math.inf
 
 
+def unseen_way_m(leaves_m: float, speed: float, most: float, follows_s: float, unseen_s: float) -> float:
+    """Return how far a vehicle gets beyond a border in a time, which it comes to after a way, at a speed [m/s] now.
+
+    Told to fly at its most it follows with a lag.
+    """
+    lacks = max(0.0, most - speed)
+    low, high = 0.0, follows_s + leaves_m / max(most, _STANDS_M_S)
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        way_m = most * middle - lacks * follows_s * -math.expm1(-middle / follows_s)
+        low, high = (middle, high) if way_m < leaves_m else (low, middle)
+    lacks *= math.exp(-high / follows_s)
+    return max(0.0, most * unseen_s - lacks * follows_s * -math.expm1(-unseen_s / follows_s))
+
+
 def hold(view: Rectangle, place: Array, velocity: Array, most: float) -> Array:
-    """Return the part of a velocity (2) [m/s] with which who is in a view stays there, at most so fast inwards."""
+    """Return the part of a velocity (2) [m/s] with which who is in a view stays there, at most so fast inwards.
+
+    place (2) [m]: where it would come to rest; held from where it is, a vehicle that follows late leaves the view.
+    """
     low, high = (HOLD_GAIN * (side - place) for side in np.transpose((view.x_m, view.y_m)))
     return np.asarray(np.clip(velocity, np.minimum(low, most), np.maximum(high, -most)))
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.arrays import Array
-from groundstation.control.crossing import HOLD_GAIN, hold
+from groundstation.control.crossing import HOLD_GAIN
 from groundstation.control.parameters import ControlParameters
 from groundstation.control.view import VIEW_INSET_M, spread_m, view_of, way_back_m
 from groundstation.estimation.belief import JointBelief
@@ -78,21 +78,6 @@ def within_reach(
     slowest = np.clip(gain * (low - reach_m - mean[:2]), -most, most) - drift
     fastest = np.clip(gain * (high + reach_m - mean[:2]), -most, most) - drift
     return np.asarray(np.clip(velocity, slowest, fastest))
-
-
-def within_views(
-    velocity: Array, name: str, belief: JointBelief, parameters: ControlParameters, sensors: SensorSuite,
-    height_m: float,
-) -> Array:  # fmt: skip
-    """Return the part of a velocity (2) [m/s; world] with which a robot stays in the box about all world-fixed views.
-
-    For one that flies on our estimate: out of sight it has a second, of which turning round takes most. height_m: at
-    which it has to be in it.
-    """
-    place, box = belief.mean_of(name)[:2], box_about_views(name, belief, sensors, height_m)
-    if box is None:
-        return velocity
-    return hold(box, place, velocity, parameters.return_speed_m_s)
 
 
 def box_about_views(name: str, belief: JointBelief, sensors: SensorSuite, height_m: float) -> Rectangle | None:

@@ -5,10 +5,20 @@ import math
 import numpy as np
 
 from groundstation.arrays import Array
-from groundstation.control.crossing import RUN_UP_M, Passage, gap_about_m, hold, into, is_inside, passage, view_around
-from groundstation.control.excursion import box_about_views, within_views
+from groundstation.control.crossing import (
+    RUN_UP_M,
+    Passage,
+    gap_about_m,
+    hold,
+    into,
+    is_inside,
+    passage,
+    unseen_way_m,
+    view_around,
+)
+from groundstation.control.excursion import box_about_views
 from groundstation.control.holding_off import held
-from groundstation.control.moment import STILL, Moment, soon
+from groundstation.control.moment import FOLLOWS_S, STILL, Moment, at_rest, soon
 from groundstation.sensing.models import Rectangle
 
 Kept = tuple[Array, float]
@@ -16,10 +26,10 @@ Kept = tuple[Array, float]
 # Views are narrower higher up, and a vehicle in the midst of a climb rises on for so long before it is held.
 _RISES_ON_M = 0.3
 # Unseen a vehicle's place is known for a second, after which it is fed nothing, hovers, and lands 0.7 s later (0214).
-_UNSEEN_S = 1.1
+_UNSEEN_S = 1.0
 # The limits of separation let two robots come as near as that, and this of the way that is left to it be flown [1/s].
 _APART_M, _CLOSING_GAIN = 0.8, 0.5
-_SINKS_M, _SINK_STEPS = 0.1, 4  # to where a gap is short enough
+_SINKS_M, _SINK_STEPS = 0.1, 6  # to where a gap is short enough
 
 
 def kept_in_sight(
@@ -54,7 +64,7 @@ def _kept(name: str, wanted: Array, level_m: float, ahead_m: float, now: Moment)
     most, found = now.parameters.limits_of(name).max_speed_m_s, passage(place, wanted, views)
     if found is None:
         return _held_in(name, wanted, level_m, now)
-    short_m, helped = _UNSEEN_S * _pace_m_s(name, found, now), _is_helped(name, now)
+    short_m, helped = _short_m(name, found, now), _is_helped(name, now)
     # Whom others see may be told in the gap to stay there, but does not stay: half of the way is enough.
     needed_m = 0.5 * (found.leaves_m + found.reaches_m) if helped else found.reaches_m
     crosses = needed_m <= ahead_m * found.share
@@ -67,6 +77,14 @@ def _kept(name: str, wanted: Array, level_m: float, ahead_m: float, now: Moment)
     if found.gap_m == 0.0 or found.leaves_m > RUN_UP_M:
         return wanted, _climbed(name, level_m, now)
     return most * found.way, _sunk(z, level_m, now)
+
+
+def _short_m(name: str, found: Passage, now: Moment) -> float:
+    """Return how wide a gap a robot crosses in time, from where it is or from the begin of its run-up."""
+    speed = float(now.sight.velocities_m_s.get(name, STILL)[:2] @ found.way)
+    return unseen_way_m(
+        min(found.leaves_m, RUN_UP_M), max(0.0, speed), _pace_m_s(name, found, now), FOLLOWS_S, _UNSEEN_S
+    )
 
 
 def _pace_m_s(name: str, found: Passage, now: Moment) -> float:
@@ -105,17 +123,20 @@ def _held_in(name: str, wanted: Array, level_m: float, now: Moment) -> Kept:
     """Return what keeps a robot in its view, at the height to which it climbs."""
     place, z = now.belief.mean_of(name)[:2], float(now.belief.mean_of(name)[2])
     view = view_around(place, _views(name, max(level_m, z), now))
-    kept = wanted if view is None else hold(view, place, wanted, now.parameters.return_speed_m_s)
-    return kept, _climbed(name, level_m, now)
+    return _held_by(view, name, wanted, now), _climbed(name, level_m, now)
 
 
 def _in_box(name: str, wanted: Array, level_m: float, now: Moment) -> Kept:
     """Return what keeps a robot, that others see, in the box about all views."""
     x, y, z = (float(value) for value in now.belief.mean_of(name)[:3])
-    kept = within_views(wanted, name, now.belief, now.parameters, now.sensors, max(level_m, z))
+    kept = _held_by(box_about_views(name, now.belief, now.sensors, max(level_m, z)), name, wanted, now)
     box = box_about_views(name, now.belief, now.sensors, max(z, min(level_m, z + _RISES_ON_M)))
     rises = box is None or box.nearest(x, y) == (x, y)
     return kept, level_m if rises else min(level_m, z)
+
+
+def _held_by(view: Rectangle | None, name: str, wanted: Array, now: Moment) -> Array:
+    return wanted if view is None else hold(view, at_rest(name, now), wanted, now.parameters.return_speed_m_s)
 
 
 def _climbed(name: str, level_m: float, now: Moment) -> float:

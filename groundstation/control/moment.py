@@ -14,6 +14,8 @@ from groundstation.sensing.models import SensorSuite
 STILL = np.zeros(3)
 # Between two views a robot goes on to the one that it flies to: the nearest one changes with each estimate.
 _AHEAD_S = 1.0
+# After a step of its setpoint a real autopilot has come to 63 % of the velocity within 0.5 to 0.9 s.
+FOLLOWS_S = 0.7
 
 Stands = Callable[[Sequence[str], Collection[str]], Mapping[str, Stand]]
 """Where robots search for targets; who has nowhere to search is left out."""
@@ -70,3 +72,8 @@ def soon(name: str, now: Moment) -> tuple[float, float]:
     """Return where a robot will be in a second [x, y; world]."""
     x, y = now.belief.mean_of(name)[:2] + _AHEAD_S * now.sight.velocities_m_s.get(name, STILL)[:2]
     return float(x), float(y)
+
+
+def at_rest(name: str, now: Moment) -> Array:
+    """Return where a robot would come to rest if it were told to stand (2) [m; world]."""
+    return np.asarray(now.belief.mean_of(name)[:2] + FOLLOWS_S * now.sight.velocities_m_s.get(name, STILL)[:2])

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from groundstation.control.crossing import gap_about_m, hold, into, is_inside, passage, view_around
+from groundstation.control.crossing import gap_about_m, hold, into, is_inside, passage, unseen_way_m, view_around
 from groundstation.sensing.models import Rectangle
 
 WEST, EAST = Rectangle((-3.0, -0.3), (-0.7, 0.7)), Rectangle((0.3, 3.0), (-0.7, 0.7))
@@ -69,6 +69,15 @@ def test_a_gap_is_as_wide_as_what_lies_between_its_two_views() -> None:
     for x in (-0.2, 0.0, 0.29):
         assert gap_about_m(at(x, 0.0), (WEST, EAST, NORTH)) == pytest.approx(0.6)
     assert gap_about_m(at(0.0, 0.0), (WEST,)) == math.inf
+
+
+@pytest.mark.parametrize(
+    ("leaves_m", "speed", "most", "way_m"),
+    [(0.0, 0.6, 0.6, 0.6), (0.3, 0.6, 0.6, 0.6), (0.0, 0.0, 0.6, 0.28), (9.0, 0.0, 0.6, 0.6), (0.1, 0.2, 0.0, 0.0)],
+    ids=["at full speed", "the same, later", "from standing", "after a long run", "not at all"],
+)
+def test_how_far_one_gets_unseen_in_a_second(leaves_m: float, speed: float, most: float, way_m: float) -> None:
+    assert unseen_way_m(leaves_m, speed, most, 0.7, 1.0) == pytest.approx(way_m, abs=0.01)
 
 
 def test_who_is_held_stops_at_the_border_and_slides_along_it() -> None:

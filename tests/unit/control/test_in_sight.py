@@ -81,8 +81,29 @@ def test_without_another_view_it_is_held_at_the_border() -> None:
 
 
 def test_before_a_gap_that_is_too_wide_at_its_height_it_waits_and_sinks() -> None:
-    assert kept(TWO, (-0.55, 0.2, 1.5), (0.6, 0.0), 1.5) == pytest.approx((0.1, 0.0, 1.2))  # 0.9 m
+    assert kept(TWO, (-0.55, 0.2, 1.5), (0.6, 0.0), 1.5) == pytest.approx((0.1, 0.0, 1.0))  # 0.9 m
     assert kept(TWO, (-0.95, 0.2, 2.2), (0.6, 0.0), 2.2) == pytest.approx((0.15, 0.0, 2.2))  # 1.6 m
+
+
+@pytest.mark.parametrize(("speed", "crosses"), [(0.0, False), (0.5, True)])
+def test_it_enters_a_gap_only_as_fast_as_takes_it_through_in_time(speed: float, crosses: bool) -> None:
+    """A real vehicle that started at the border was unseen for up to 1.5 s."""
+    moving = Sight(helped_s=ALONE.helped_s, velocities_m_s={"fed": np.array([speed, 0.0, 0.0])})
+    vx, _, level_m = kept(TWO, (-0.26, 0.2, 1.1), (0.6, 0.0), 1.1, moving)  # 0.5 m wide
+    assert (vx == pytest.approx(MOST_M_S)) == crosses
+    assert level_m < 1.1, "it sinks to where the gap is short enough, or flies on"
+
+
+def test_a_vehicle_that_follows_late_stops_before_the_border() -> None:
+    """A real one that was held from where it was, and not from where it would stop, flew out of its view."""
+    x, speed, step_s = -0.9, 0.4, 0.05
+    for _ in range(round(5.0 / step_s)):
+        moving = Sight(velocities_m_s={"fed": np.array([speed, 0.0, 0.0])})
+        told, _, _ = kept(ONE, (x, 0.2, 1.0), (0.6, 0.0), 1.0, moving)
+        speed += (told - speed) * step_s / 0.7
+        x += speed * step_s
+        assert x < -0.2 + 0.01
+    assert x > -0.3
 
 
 def test_whom_others_tell_where_it_is_crosses_a_short_gap_if_it_wants_into_its_midst() -> None:
@@ -119,7 +140,8 @@ def test_overlapping_views_are_passed_at_the_speed_of_the_plan_and_climbed_in() 
 
 
 def test_into_a_third_view_it_flies_along_the_axis_that_it_is_on() -> None:
-    vx, vy, _ = kept(THREE, (-1.5, 0.9, 1.0), (0.1, 0.4), 1.0)  # from y = 1.0 to 1.5
+    moving = Sight(helped_s=ALONE.helped_s, velocities_m_s={"fed": np.array([0.1, 0.4, 0.0])})
+    vx, vy, _ = kept(THREE, (-1.5, 0.85, 1.0), (0.1, 0.4), 1.0, moving)  # from y = 1.0 to 1.5
     assert vy > 0.58 and abs(vx) < 0.16
 
 

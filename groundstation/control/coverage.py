@@ -1,4 +1,4 @@
-"""Sweeps from which a team sees most of where a lost target may be, soonest: robots turn while they fly somewhere."""
+"""Sweeps with which a team soonest sees most of the floor where a lost target may be; robots turn while they fly."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -19,10 +19,10 @@ _VIEWS = 10
 
 @dataclass(frozen=True, slots=True)
 class _Searcher:
-    """One robot that may look: from which stands it will, at which headings, and where it may be.
+    """One robot that may look for the target: the stands and headings of its sweeps, and where it may be.
 
-    at (n, _VIEWS): stand nearest to where it is at each view of the sweep to a stand; headings (2, _VIEWS): as numbers,
-    by direction.
+    at (n, _VIEWS): for the sweep to each stand, the stand nearest to the robot at each view; headings (2, _VIEWS): as
+    numbers, by direction.
     """
 
     footprint: Footprint
@@ -35,11 +35,11 @@ class _Searcher:
 
     @property
     def seen(self) -> Array:
-        """Return the chance of each cell of the footprint to be found within a view: in one picture."""
+        """Return for each cell of the footprint the chance that one picture shows a target there."""
         return self.footprint.chances
 
     def compare(self, left: Array, free: BoolArray, worth: Array) -> Compared:
-        """Return what the stands that are free promise: on average over a turn at the stands on the way."""
+        """Return what the free stands promise: on average over a turn at the stands on the way."""
         footprint, lattice = self.footprint, self.lattice
         cells = (footprint.rows, footprint.columns, footprint.chances, footprint.first)
         seen = footprint.fresh * seen_from(left, lattice.rows, lattice.columns, *cells)
@@ -76,6 +76,6 @@ choose_stands = partial(choose, Kind(_VIEWS, _searcher))
 
 
 def robots_in_order(robots: Sequence[str], chances: Array, poses: Mapping[str, Array], grid: RoomGrid) -> list[str]:
-    """Return robots, the one first that is nearest to where the target is expected."""
+    """Return the robots, first the one nearest to where the target is expected."""
     centre = (float(chances.sum(axis=0) @ grid.xs), float(chances.sum(axis=1) @ grid.ys))
     return sorted(robots, key=lambda name: (math.dist(poses[name][:2], centre), name))

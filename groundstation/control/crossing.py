@@ -1,4 +1,4 @@
-"""How a robot crosses from one world-fixed view into another where nobody sees it on the way. Pure."""
+"""How a robot crosses from one world-fixed view into the next, through a gap where nobody sees it. Pure."""
 
 import math
 from collections.abc import Sequence
@@ -9,10 +9,10 @@ import numpy as np
 from groundstation.arrays import Array
 from groundstation.sensing.models import Rectangle
 
-RUN_UP_M = 0.3  # before the border: a vehicle needs so far to come to speed
-_INSET_M = 0.1  # behind the border it is seen for certain
-HOLD_GAIN = 1.0  # of the way to the border [1/s]
-_GAIN = 3.0  # of the way that is left into the view [1/s]: a velocity's error carries it out of a weaker hold
+RUN_UP_M = 0.3  # before the border: a vehicle needs this distance to reach its speed
+_INSET_M = 0.1  # behind the border, where it is seen for certain
+HOLD_GAIN = 1.0  # of the distance to the border [1/s]
+_GAIN = 3.0  # of the remaining way into the view [1/s]: with a smaller gain a velocity error carries it out
 _STANDS_M_S = 1e-3
 _HALVINGS = 12  # of a second or so: to a millisecond
 _ASIDE_M_S = 0.3  # along the gap, while it crosses: as much as the limit of speed leaves
@@ -20,8 +20,11 @@ _ASIDE_M_S = 0.3  # along the gap, while it crosses: as much as the limit of spe
 
 @dataclass(frozen=True, slots=True)
 class Passage:
-    """A straight way from a view into the next one: where it leaves and reaches one [m from its begin], the unit way
-    (2), and how much of the velocity goes that way."""
+    """A straight way from a view into the next one.
+
+    It leaves the first view and reaches the next one at distances [m] from its begin, along a unit vector (2); share:
+    the part of the velocity that goes that way.
+    """
 
     leaves_m: float
     reaches_m: float
@@ -30,12 +33,12 @@ class Passage:
 
     @property
     def gap_m(self) -> float:
-        """Return how far nobody sees whoever goes this way."""
+        """Return the length of the way on which nobody sees the robot [m]."""
         return max(0.0, self.reaches_m - self.leaves_m)
 
 
 def view_around(place: Array, views: Sequence[Rectangle]) -> Rectangle | None:
-    """Return the view in which a place (2) [m] lies deepest, or which it is outside of by least; None without views."""
+    """Return the view in which a place (2) [m] lies deepest, or else the nearest one; None without views."""
     return max(views, key=lambda view: _depth_m(place, view), default=None)
 
 
@@ -71,7 +74,7 @@ def _passage(
 
 
 def gap_about_m(place: Array, views: Sequence[Rectangle]) -> float:
-    """Return how wide what lies between the two views nearest to a place (2) [m] is there; infinite without two."""
+    """Return the width [m] of the gap between the two views nearest to a place (2) [m]; infinite with fewer views."""
     ways = sorted(math.dist(place, view.nearest(*place.tolist())) for view in views)
     return ways[0] + ways[1] if len(ways) > 1 else math.inf
 
@@ -101,8 +104,10 @@ def hold(view: Rectangle, place: Array, velocity: Array, most: float) -> Array:
 
 
 def into(view: Rectangle, place: Array, velocity: Array, most: float) -> Array:
-    """Return the velocity (2) [m/s] of who is outside of a view and flies straight into it, as fast as it wants
-    to or at most so fast."""
+    """Return the velocity (2) [m/s] with which a robot outside a view flies straight into it.
+
+    Its speed is the wanted one, or at most `most`.
+    """
     low, high = (np.array(side) for side in np.transpose((view.x_m, view.y_m)))
     inner = view.shrunk(_INSET_M)
     near = np.array(inner.nearest(*place.tolist()))
@@ -118,7 +123,7 @@ def _depth_m(place: Array, view: Rectangle) -> float:
 
 
 def _inside_m(place: Array, way: Array, view: Rectangle) -> tuple[float, float]:
-    """Return from where to where a line is inside of a view [m from its begin]; first after last where it is not."""
+    """Return where a line enters and leaves a view [m from its begin]; the first is beyond the last if it misses it."""
     first, last = -math.inf, math.inf
     for at, along, (low, high) in zip(place.tolist(), way.tolist(), (view.x_m, view.y_m), strict=True):
         if abs(along) < 1e-9:

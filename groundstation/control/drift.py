@@ -1,4 +1,4 @@
-"""Motion of a robot beyond its commands: the control error that the output limiter allows for. Pure."""
+"""Drift: a robot's motion beyond its commands, for which the output limiter allows. Pure."""
 
 from collections import deque
 
@@ -8,7 +8,7 @@ from groundstation.arrays import Array
 from groundstation.time_units import NS_PER_S
 
 _WINDOW_NS, _LEAST_NS = 2 * NS_PER_S, NS_PER_S
-# After a pause nobody knows what was obeyed meanwhile.
+# After a pause it is not known which commands were obeyed meanwhile.
 _GAP_NS = NS_PER_S // 2
 
 

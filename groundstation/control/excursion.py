@@ -1,4 +1,4 @@
-"""How far robots may leave the sight of the world-fixed cameras, so that they come back before they are lost."""
+"""How far robots may leave the sight of the world-fixed cameras, so that they are back before they are lost."""
 
 import math
 from collections.abc import Sequence
@@ -13,15 +13,15 @@ from groundstation.control.view import VIEW_INSET_M, spread_m, view_of, way_back
 from groundstation.estimation.belief import JointBelief
 from groundstation.sensing.models import Rectangle, SensorSuite
 
-# Of the way that is left to the border of where a robot may be [1/s]; and of the way back of one that has no time.
+# Of the distance left to the border of the permitted area [1/s]; and of the way back of a robot whose time is up.
 _BACK_GAIN = 3.0
 
 
 @dataclass
 class Excursions:
-    """Judges ways out of sight by uncertainty and time.
+    """Judges by uncertainty and time how far robots may go out of sight.
 
-    `unseen_s`: since a camera last saw each robot; `velocity_errors_m_s`: rms errors of their odometry.
+    `unseen_s`: time since a camera last saw each robot; `velocity_errors_m_s`: rms errors of their odometry.
     """
 
     parameters: ControlParameters
@@ -33,13 +33,13 @@ class Excursions:
         self.velocity_errors_m_s: dict[str, float] = {}
 
     def left_s(self, name: str, belief: JointBelief) -> float:
-        """Return for how long a robot may stay out of sight from now on, until its place is known too badly [s]."""
+        """Return how long a robot may stay out of sight from now on, until its place is too uncertain [s]."""
         p = self.parameters
         unseen_s, error_m_s = self.unseen_s.get(name, 0.0), self.velocity_errors_m_s.get(name, 0.0)
         return time_left_s(spread_m(belief, name), unseen_s, p, error_m_s)
 
     def allowed_s(self, name: str, belief: JointBelief, places: Array) -> Array:
-        """Return within how long a robot has to be at each place (n, 2), to be back in time; where it is seen: inf."""
+        """Return the latest time [s] to be at each place (n, 2) and get back in view in time; inf inside a view."""
         p = self.parameters
         mean = belief.mean_of(name)
         view = view_of(float(mean[0]), float(mean[1]), name, p, self.sensors)
@@ -55,12 +55,12 @@ def within_reach(
     velocity: Array, name: str, belief: JointBelief, parameters: ControlParameters, sensors: SensorSuite,
     error_m_s: float, drift_m_s: Array, near_m: tuple[float, float] | None = None,
 ) -> Array:  # fmt: skip
-    """Return the part of a velocity (2) [m/s; world] with which a robot stays where it could come back from unseen.
+    """Return the part of a velocity (2) [m/s; world] that keeps a robot where it could still fly back into view.
 
-    It could from now on, into the world-fixed view at its height that is nearest to near_m [x, y], or to itself;
-    another one that it reaches from there in time counts as the same. error_m_s: rms error of its odometry that is to
-    be expected, above 0 (infinite: it has no time at all, and goes to the middle of the view); drift_m_s: motion
-    besides what it is told (2) [m/s; world], which counts towards the borders.
+    It is assumed to be unseen from now on. The view is the world-fixed one at its height nearest to near_m [x, y], or
+    to the robot itself; views that it reaches from there in time count as one with it. error_m_s: expected rms error of
+    its odometry, above 0 (infinite: it has no time left, and goes to the middle of the view); drift_m_s: motion beyond
+    its commands (2) [m/s; world], allowed for at the borders.
     """
     mean, p = belief.mean_of(name), parameters
     left_s = time_left_s(spread_m(belief, name), 0.0, p, error_m_s)
@@ -69,7 +69,7 @@ def within_reach(
     if view is None:
         return velocity
     if not math.isfinite(error_m_s):
-        # Believed in view and not seen, it is somewhere else: towards the middle it is seen the sooner.
+        # Believed in view but not seen, it is somewhere else: towards the middle it is seen sooner.
         view = view.shrunk(math.inf)
     reach_m = p.return_speed_m_s * max(0.0, left_s - p.return_margin_s)
     low, high = np.transpose((view.x_m, view.y_m))
@@ -83,7 +83,7 @@ def within_reach(
 def box_about_views(name: str, belief: JointBelief, sensors: SensorSuite, height_m: float) -> Rectangle | None:
     """Return the box about all world-fixed views of a robot at a height, None without one.
 
-    What lies between two views counts as inside, else a team could not follow its target from one into the other.
+    Gaps between views count as inside, else a team could not follow its target from one into the other.
     """
     views = sensors.root_views(height_m + sensors.marker_height_m[name])
     return _connected(belief.mean_of(name)[:2], views, math.inf, inset_m=0.0)
@@ -92,7 +92,7 @@ def box_about_views(name: str, belief: JointBelief, sensors: SensorSuite, height
 def _connected(
     place: Array, views: Sequence[Rectangle], way_m: float, inset_m: float = VIEW_INSET_M
 ) -> Rectangle | None:
-    """Return the box about the view nearest to a place (2) and those at most a way from it, less an inset."""
+    """Return the box about the view nearest to a place (2) and all views within `way_m` of that view, less an inset."""
     nearest = min(views, key=lambda view: math.dist(place, view.nearest(*place.tolist())), default=None)
     if nearest is None:
         return None
@@ -109,10 +109,11 @@ def _apart_m(one: Rectangle, other: Rectangle) -> float:
 def time_left_s(
     spread: float, unseen_s: float, parameters: ControlParameters, velocity_error_m_s: float = 0.0
 ) -> float:
-    """Return how long a robot may go on unseen: until its deviation reaches the limit, or odometry is trusted no more.
+    """Return how long a robot may go on unseen [s]: until its deviation reaches the limit or its odometry is too old.
 
-    Its deviation has grown with the time, and goes on so: a wrong velocity adds up evenly. velocity_error_m_s: rms
-    error of the odometry; one that no sound odometry has adds up from now on, though it has not yet.
+    The deviation is assumed to go on growing at its mean rate so far: a wrong velocity adds up evenly.
+    velocity_error_m_s: rms error of the odometry; if larger than that of sound odometry, it counts from now on, even if
+    the deviation does not show it yet.
     """
     p = parameters
     wrong = velocity_error_m_s if velocity_error_m_s > p.sound_error_m_s else 0.0

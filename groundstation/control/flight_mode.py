@@ -5,19 +5,19 @@ from enum import StrEnum
 
 
 class FlightMode(StrEnum):
-    """What a robot is flown by."""
+    """What determines a robot's setpoint."""
 
-    UNKNOWN = "UNKNOWN"  # not in the belief: hover until a camera has seen it
-    RETURN = "RETURN"  # badly localised or unseen for too long: back to the middle of the world-fixed cameras' view
-    SEARCH = "SEARCH"  # localised, but no target: look around
+    UNKNOWN = "UNKNOWN"  # not in the belief: hover until a camera sees it
+    RETURN = "RETURN"  # badly localised, or unseen for too long: back to the middle of the world-fixed cameras' view
+    SEARCH = "SEARCH"  # localised, but no target is: look around
     TRACK = "TRACK"  # obey the plan
 
 
 @dataclass(frozen=True, slots=True)
 class Situation:
-    """What the table reads of one airborne robot.
+    """The inputs of the table for one airborne robot.
 
-    target_fresh: seen within lost_after_s; planned: the plan holds controls.
+    target_fresh: a target was seen within lost_after_s; planned: the plan holds controls for the robot.
     """
 
     in_belief: bool
@@ -27,7 +27,7 @@ class Situation:
 
 
 def flight_mode_of(situation: Situation) -> FlightMode:
-    """Return the mode; the first row that fits, from the most careful to the boldest."""
+    """Return the mode: that of the first row that applies, from the most careful to the boldest."""
     if not situation.in_belief:
         return FlightMode.UNKNOWN
     if situation.lost:

@@ -1,7 +1,7 @@
-"""The velocity nearest to a wanted one that some half-spaces allow. Pure.
+"""The velocity that is nearest to a wanted one and satisfies a set of half-spaces. Pure.
 
-Exact: a point of R^3 is fixed by three of them at most, so that a basis of the violated ones is exchanged until nothing
-is violated (Sharir and Welzl's scheme for problems of low dimension).
+Exact: at most three half-spaces fix a point of R^3, so a basis of the violated ones is exchanged until none is violated
+(Sharir and Welzl's scheme for problems of low dimension).
 """
 
 from itertools import combinations
@@ -18,10 +18,10 @@ _HALVINGS = 8
 
 
 def project(wanted: Array, normals: Array, most: Array) -> tuple[Array, list[int]]:
-    """Return the nearest velocity v with normals @ v <= most, and which half-spaces were met on the way.
+    """Return the nearest velocity v with normals @ v <= most, and the half-spaces that limited it on the way.
 
-    normals: unit rows [m, 3]. Where no velocity satisfies all, those that ask for motion (most < 0) ask for less, all
-    by the same amount, as little as it takes, and none for less than to stand: zero satisfies all in the end.
+    normals: unit rows [m, 3]. Where no velocity satisfies all, those that demand motion (most < 0) are relaxed, all by
+    the same smallest sufficient amount, but not beyond most = 0: zero satisfies all in the end.
     """
     velocity, met = _nearest(wanted, normals, most)
     if velocity is not None:
@@ -39,7 +39,7 @@ def project(wanted: Array, normals: Array, most: Array) -> tuple[Array, list[int
 
 
 def _nearest(wanted: Array, normals: Array, most: Array) -> tuple[Array | None, list[int]]:
-    """Return the nearest velocity, or None where there is none."""
+    """Return the nearest velocity, or None if no velocity is allowed."""
     velocity, basis, met = wanted, tuple[Plane, ...](), list[int]()
     x, y, z = wanted.tolist()
     for _ in range(_EXCHANGES):
@@ -57,7 +57,7 @@ def _nearest(wanted: Array, normals: Array, most: Array) -> tuple[Array | None, 
 
 
 def _corner(wanted: Vector3, asked: tuple[Plane, ...]) -> tuple[Vector3, tuple[Plane, ...]] | None:
-    """Return the nearest velocity that some half-spaces allow, the last of which it touches, and those it touches."""
+    """Return the nearest velocity that some half-spaces allow and the last of them touches, and those that touch it."""
     for size in range(min(3, len(asked))):
         for others in combinations(asked[:-1], size):
             touched = (*others, asked[-1])

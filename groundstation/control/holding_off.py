@@ -1,4 +1,4 @@
-"""What holds robots off their plans: others that fly back into a view, and what they need to see, or be seen."""
+"""Where a robot departs from its plan: to make room for robots that return, and to stay where it can return itself."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -11,16 +11,16 @@ from groundstation.control.moment import STILL, Moment, is_untied, soon
 from groundstation.control.view import spread_m
 from groundstation.geometry.stabilized_frame import stabilized_from_world, world_from_stabilized
 
-# Deviations of a robot's place by which others make room for it: two keep it away from them, one is to spare.
+# Standard deviations of a robot's place that others leave as room: two keep it away from them, one is to spare.
 _ROOM_SIGMAS = 3.0
-_ROOM_GAIN = 1.0  # of the way that lacks [1/s]
+_ROOM_GAIN = 1.0  # of the missing distance [1/s]
 
 
 def giving_way(name: str, velocity: tuple[float, float], coming: Sequence[str], now: Moment) -> tuple[float, float]:
-    """Return the velocity [base_stabilized] of a robot that makes room for those that fly back.
+    """Return the velocity [base_stabilized] of a robot that makes room for robots that fly back.
 
-    Where they are is doubtful, so the limit of separation holds them off from afar: one that hovers in the middle of
-    the view would keep them out of it.
+    Their places are uncertain, so the separation limit keeps them far off: a robot that hovers in the middle of the
+    view would keep them out of it.
     """
     mean, wanted = now.belief.mean_of(name), np.array(velocity)
     for other in (one for one in coming if one != name):
@@ -36,14 +36,14 @@ def giving_way(name: str, velocity: tuple[float, float], coming: Sequence[str], 
 
 
 def recoverable(name: str, velocity: tuple[float, float], now: Moment) -> tuple[float, float]:
-    """Return the part of a velocity [base_stabilized] that keeps a robot where it comes back from, if it gets lost.
+    """Return the part of a velocity [base_stabilized] that keeps a robot where it can come back from if it gets lost.
 
-    One that flies on our estimate comes back as soon as nothing tells where it is: it lands before its place is lost.
+    A robot that flies on our estimate comes back as soon as nothing tells its place: it would land before that is lost.
     """
     error_m_s = now.sight.velocity_errors_m_s.get(name, 0.0)
     drift = now.sight.drifts_m_s.get(name, STILL)[:2]
     if is_untied(name, now):
-        error_m_s, drift = math.inf, STILL[:2]  # a drift was measured by what is no longer known
+        error_m_s, drift = math.inf, STILL[:2]  # the drift was measured against a place that is no longer known
     if error_m_s <= now.parameters.sound_error_m_s:
         return velocity
     near = soon(name, now)
@@ -54,7 +54,7 @@ def recoverable(name: str, velocity: tuple[float, float], now: Moment) -> tuple[
 
 
 def held(name: str, velocity: tuple[float, float], now: Moment, limit: Callable[[Array], Array]) -> tuple[float, float]:
-    """Return what a limit of velocities (2) [world] leaves of one [base_stabilized]."""
+    """Return a velocity [base_stabilized] after a limit of velocities (2) [world] was applied to it."""
     yaw = float(now.belief.mean_of(name)[3])
     wanted = world_from_stabilized(np.array([*velocity, 0.0]), yaw)
     forward, left, _ = stabilized_from_world(np.append(limit(wanted[:2]), 0.0), yaw).tolist()

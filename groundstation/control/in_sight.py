@@ -1,4 +1,4 @@
-"""What keeps who flies on our estimate where world-fixed sensors see it: velocity, climb, and ways between views."""
+"""Keeps robots that fly on our estimate in view of world-fixed sensors: velocity, climb, and ways between views."""
 
 import math
 
@@ -23,7 +23,7 @@ from groundstation.sensing.models import Rectangle
 
 Kept = tuple[Array, float]
 
-# Views are narrower higher up, and a vehicle in the midst of a climb rises on for so long before it is held.
+# Views are narrower higher up, and a climbing vehicle rises on by this much before it holds its height.
 _RISES_ON_M = 0.3
 # Unseen a vehicle's place is known for a second, after which it is fed nothing, hovers, and lands 0.7 s later (0214).
 _UNSEEN_S = 1.0
@@ -35,11 +35,11 @@ _SINKS_M, _SINK_STEPS = 0.1, 6  # to where a gap is short enough
 def kept_in_sight(
     name: str, velocity: tuple[float, float], level_m: float, ahead_m: float, now: Moment
 ) -> tuple[tuple[float, float], float]:
-    """Return velocity [base_stabilized] and level of a robot with which it is not unseen for longer than it can be.
+    """Return velocity [base_stabilized] and level [m] with which a robot is never unseen for longer than it can afford.
 
-    It stays in a view, as that is at the height to which it climbs, and leaves it only towards another one that it
-    reaches in time: straight, at full speed, and without a climb. Whom others tell where it is may be anywhere between
-    views that are farther apart. ahead_m: how far it is about to go.
+    It stays in its view, as large as that is at the height to which it climbs, and leaves it only towards another view
+    that it reaches in time: straight, at full speed, and without a climb. A robot whose place others tell may be
+    anywhere between views that are farther apart. ahead_m: how far the robot is about to go.
     """
     if name not in now.parameters.fed:
         return velocity, level_m
@@ -54,7 +54,7 @@ def kept_in_sight(
 
 
 def _kept(name: str, wanted: Array, level_m: float, ahead_m: float, now: Moment) -> Kept:
-    """Return the same for a velocity (2) [world]."""
+    """Return the same as `kept_in_sight` for a velocity (2) [world]."""
     place, z = now.belief.mean_of(name)[:2], float(now.belief.mean_of(name)[2])
     views = _views(name, z, now)
     if not views:
@@ -88,7 +88,7 @@ def _short_m(name: str, found: Passage, now: Moment) -> float:
 
 
 def _pace_m_s(name: str, found: Passage, now: Moment) -> float:
-    """Return how fast a robot gets along a passage: less against its drift, and towards another one in its way."""
+    """Return a robot's speed along a passage [m/s]: its maximum, less for an adverse drift or a robot in its way."""
     way = np.append(found.way, 0.0)
     pace = now.parameters.limits_of(name).max_speed_m_s
     pace += min(0.0, float(now.sight.drifts_m_s.get(name, STILL) @ way))
@@ -102,7 +102,7 @@ def _pace_m_s(name: str, found: Passage, now: Moment) -> float:
 
 
 def _outside(name: str, wanted: Array, level_m: float, views: tuple[Rectangle, ...], now: Moment) -> Kept:
-    """Return what brings who is in no view into that which it flies to."""
+    """Return velocity and level that bring a robot which is in no view into the one that it flies to."""
     mean, most = now.belief.mean_of(name), now.parameters.limits_of(name).max_speed_m_s
     place, gap_m = mean[:2], gap_about_m(mean[:2], views)
     if math.isfinite(gap_m) and gap_m > _UNSEEN_S * most and _is_helped(name, now):
@@ -120,14 +120,14 @@ def is_between_views(name: str, now: Moment) -> bool:
 
 
 def _held_in(name: str, wanted: Array, level_m: float, now: Moment) -> Kept:
-    """Return what keeps a robot in its view, at the height to which it climbs."""
+    """Return velocity and level that keep a robot in its view, at the height to which it climbs."""
     place, z = now.belief.mean_of(name)[:2], float(now.belief.mean_of(name)[2])
     view = view_around(place, _views(name, max(level_m, z), now))
     return _held_by(view, name, wanted, now), _climbed(name, level_m, now)
 
 
 def _in_box(name: str, wanted: Array, level_m: float, now: Moment) -> Kept:
-    """Return what keeps a robot, that others see, in the box about all views."""
+    """Return velocity and level that keep a robot which others see in the box about all views."""
     x, y, z = (float(value) for value in now.belief.mean_of(name)[:3])
     kept = _held_by(box_about_views(name, now.belief, now.sensors, max(level_m, z)), name, wanted, now)
     box = box_about_views(name, now.belief, now.sensors, max(z, min(level_m, z + _RISES_ON_M)))
@@ -140,7 +140,7 @@ def _held_by(view: Rectangle | None, name: str, wanted: Array, now: Moment) -> A
 
 
 def _climbed(name: str, level_m: float, now: Moment) -> float:
-    """Return the level up to which a robot in view climbs: no higher than there is a view as well."""
+    """Return the level of a robot in view, which climbs only if it is still in a view higher up."""
     mean = now.belief.mean_of(name)
     z = float(mean[2])
     if level_m <= z:
@@ -150,12 +150,12 @@ def _climbed(name: str, level_m: float, now: Moment) -> float:
 
 
 def _sunk(z: float, level_m: float, now: Moment) -> float:
-    """Return the level of who is between two views: told to keep its height it would rise on (0213)."""
+    """Return the level of a robot between two views: told to keep its height, a climbing robot would rise on (0213)."""
     return min(level_m, z - now.parameters.height_tolerance_m)
 
 
 def _level_of_a_gap(name: str, wanted: Array, short_m: float, level_m: float, now: Moment) -> float:
-    """Return the level below at which a gap is short enough, or the same where it is nowhere near."""
+    """Return a lower level at which the gap is short enough, or `level_m` if there is none near."""
     mean = now.belief.mean_of(name)
     for step in range(1, _SINK_STEPS + 1):
         lower_m = float(mean[2]) - step * _SINKS_M

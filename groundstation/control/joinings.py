@@ -1,4 +1,4 @@
-"""Who joined the belief and who was put somewhere else in it: told, and not flown on if it happens again soon. Pure."""
+"""Entities that join the belief or are re-initialised in it: told to the operator, and unsettled if repeated. Pure."""
 
 import math
 from collections.abc import Iterable
@@ -8,14 +8,14 @@ from groundstation.bus.notice import Notice
 from groundstation.estimation.measurement import Correction
 from groundstation.time_units import NS_PER_S
 
-# Two within so long: what the belief goes by is wrong, and goes on being so.
+# Two re-initialisations within this time: what the belief relies on is wrong, and remains so.
 _AGAIN_NS = 5 * NS_PER_S
-# Without a further one for so long, it is settled.
+# Without another one for this time, the entity is settled.
 _SETTLED_NS = 3 * NS_PER_S
 
 
 class Joinings:
-    """Use: `take` what became of the observations, once a tick; ask `is_unsettled`."""
+    """Use: call `take` with the corrections once a tick; ask `is_unsettled`."""
 
     def __init__(self) -> None:
         self._last_ns: dict[str, int] = {}
@@ -25,7 +25,7 @@ class Joinings:
     def take(
         self, now_ns: int, corrections: Iterable[Correction], ranged: Iterable[tuple[str, str, bool]] = ()
     ) -> list[Notice]:
-        """Return what is to be told. ranged: by whose ranges who joined, and whether again."""
+        """Return the notices for the operator; ranged: (observer, subject, whether again) of joinings by ranges."""
         self._now_ns = now_ns
         seen = ((one.observer, one.subject, one.nis is not None) for one in corrections if one.joined)
         return [self._note(*one) for one in (*seen, *ranged)]

@@ -1,4 +1,4 @@
-"""Targets and robots that pictures do not show: searches, missed robots, events for the operator."""
+"""Targets and robots that pictures do not show: searches, missed robots, and events for the operator."""
 
 from collections.abc import Collection, Mapping, Sequence
 
@@ -56,31 +56,31 @@ class Lookout:
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """Return the targets that are searched for."""
+        """Return the targets that the team searches for."""
         return tuple(name for name in self.targets if self._search.is_missing(name))
 
     @property
     def missed_s(self) -> Mapping[str, float]:
-        """Return since when cameras should see which robots and do not [s]."""
+        """Return for how long cameras should have seen robots and did not, by robot [s]."""
         return self._robots.missed_s
 
     @property
     def unsteered(self) -> tuple[str, ...]:
-        """Return the robots that follow no setpoints, as their drivers say: they wait or land."""
+        """Return the robots that follow no setpoints according to their drivers: they wait or land."""
         return tuple(name for name in self._names if self._modes.get(name, _OBEYS) != _OBEYS)
 
     @property
     def held(self) -> frozenset[str]:
-        """Return the robots that follow no setpoints while others do; before a flight begins all wait."""
+        """Return the robots that follow no setpoints while others do; none before a flight begins, when all wait."""
         return frozenset(self.unsteered if len(self.unsteered) < len(self._names) else ())
 
     @property
     def velocity_errors_m_s(self) -> Mapping[str, float]:
-        """Return the rms error of each robot's odometry that is to be expected [m/s]."""
+        """Return the expected rms error of each robot's odometry [m/s]."""
         return self._excursions.velocity_errors_m_s
 
     def take(self, message: Message, in_our_time: bool = True) -> None:
-        """Take in the mode of a driver, or a picture that was searched all over; one in foreign time does not count."""
+        """Take in a driver's mode, or a fully searched picture; a picture stamped by another clock does not count."""
         match message:
             case VehicleStatus():
                 self._modes[message.header.entity] = message.mode
@@ -89,16 +89,16 @@ class Lookout:
                 self._robots.take(message)
 
     def see(self, sighting: RelativeObservation) -> None:
-        """Take in a sighting in our time that the filter is given."""
+        """Take in a sighting, stamped by our clock, that the filter is given."""
         self._search.see(sighting)
 
     def advance(
         self, belief: JointBelief, ages_s: Mapping[str, float], rooted_s: Mapping[str, float]
     ) -> tuple[str, ...]:
-        """Count all pictures; returns the targets that are not where the belief has them any more.
+        """Count all pictures; returns the targets that are no longer where the belief has them.
 
-        ages_s: since each airborne robot and each target was last seen; rooted_s: since something fixed last told where
-        each airborne robot is, itself or through others. Infinite: not in the belief.
+        ages_s: time since each airborne robot and each target was last seen; rooted_s: time since a sensor fixed in the
+        room last located each airborne robot, directly or through others. Infinite: not in the belief.
         """
         self._excursions.unseen_s = {name: age_s for name, age_s in ages_s.items() if name in self._names}
         self._excursions.velocity_errors_m_s = self._errors.advance(belief)
@@ -111,19 +111,19 @@ class Lookout:
         return gone
 
     def stands(self, robots: Sequence[str], targets: Collection[str], belief: JointBelief) -> Mapping[str, Stand]:
-        """Return where robots look for targets."""
+        """Return the stand from which each robot looks for targets."""
         found = self._search.stands(robots, targets, belief)
         self._tell()
         return found
 
     def searches(self, now_ns: int) -> tuple[TargetSearch, ...]:
-        """Return how the search for each target that is searched for stands, for people; none while nobody searches."""
+        """Return for people how each search stands; none while nobody searches."""
         if not self._obeyed:
             return ()
         return tuple(_message(name, self.targets[name], now_ns) for name in self.missing if self.targets[name].place)
 
     def maps(self) -> Mapping[str, RoomMap]:
-        """Return where each target may be that is searched for."""
+        """Return the map of each target that is searched for: where it may be."""
         rooms = {name: self.targets[name].room for name in self.missing}
         return {name: room for name, room in rooms.items() if room is not None}
 
@@ -134,16 +134,16 @@ class Lookout:
 
     @property
     def _obeyed(self) -> bool:
-        """Return whether any robot flies where the search wants it: not while all hold or land."""
+        """Return whether any robot obeys the search's setpoints: not while all hold or land."""
         return _OBEYS in self._modes.values()
 
     def _unseen_s(self, now_ns: int, ages_s: Mapping[str, float]) -> Mapping[str, float]:
-        """Return since when no picture has shown each target that the team tracks."""
+        """Return for how long no picture has shown each target that the team tracks [s]."""
         tracked = [name for name in self.targets if not self._search.is_missing(name)] if self._obeyed else []
         return {name: min(ages_s[name], self._search.shown_s(name, now_ns)) for name in tracked}
 
     def _tell(self) -> None:
-        """Say of each target that a search for it began, ended, or became hopeless, once there is one who searches."""
+        """Tell the operator when the search for a target begins, ends or becomes hopeless, once a robot can search."""
         for name, state in self.targets.items():
             if state.mode is self._told[name] or (state.mode is not SearchMode.TRACK and not self._obeyed):
                 continue

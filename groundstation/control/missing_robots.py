@@ -1,4 +1,4 @@
-"""Robots that a world-fixed camera should see and does not: their estimate is doubted."""
+"""Finds robots that a world-fixed camera should see and does not: their estimate is doubted."""
 
 import math
 from collections.abc import Collection, Mapping, Sequence
@@ -15,9 +15,9 @@ from groundstation.sensing.occlusion import SOFT_M, box_rows, sight
 from groundstation.sensing.visibility import camera_rows
 from groundstation.time_units import NS_PER_S
 
-_SEEN_S = 0.6  # seen so recently, one is not missing
-_DOUBT = math.log(0.02)  # chance of so many pictures without a robot that is where it is believed
-_BODY_M = 0.5  # within it of the line of sight, a robot hides what is behind it
+_SEEN_S = 0.6  # a robot seen this recently is not missing
+_DOUBT = math.log(0.02)  # log of the chance that a robot is where it is believed and yet in none of the pictures
+_BODY_M = 0.5  # a robot this near to the line of sight hides what is behind it
 _FIXED = np.zeros(4)
 
 
@@ -40,10 +40,10 @@ class MissingRobots:
             self._pictures.append(picture)
 
     def advance(self, belief: JointBelief, ages_s: Mapping[str, float]) -> tuple[str, ...]:
-        """Count the pictures; returns who is missing from now on.
+        """Count the pictures; returns the robots that are missing from now on.
 
-        ages_s: since a fixed camera last saw each airborne robot, itself or through others: two that see only each
-        other are both missing where it should see them.
+        ages_s: time since a fixed camera last saw each airborne robot, directly or through others: two robots that see
+        only each other are both missing where the camera should see them.
         """
         self._history.append(belief)
         for name in self._robots:

@@ -1,4 +1,4 @@
-"""What the setpoints of a step depend on: the belief, and who is not seen."""
+"""The inputs of a step's setpoints: the belief, and who has not been seen for how long."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -12,26 +12,26 @@ from groundstation.estimation.belief import JointBelief
 from groundstation.sensing.models import SensorSuite
 
 STILL = np.zeros(3)
-# Between two views a robot goes on to the one that it flies to: the nearest one changes with each estimate.
+# Between two views a robot goes on towards the one ahead: the nearest one may change with each estimate.
 _AHEAD_S = 1.0
 # After a step of its setpoint a real autopilot has come to 63 % of the velocity within 0.5 to 0.9 s.
 FOLLOWS_S = 0.7
 
 Stands = Callable[[Sequence[str], Collection[str]], Mapping[str, Stand]]
-"""Where robots search for targets; who has nowhere to search is left out."""
+"""Returns where robots search for targets; robots without a place to search are left out."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sight:
-    """Who is not seen, and where those look that search.
+    """Who is not seen and for how long, and where robots search.
 
-    target_age_s: since any target was last observed where it is believed, None if never; unseen_s: since a camera last
-    saw each robot; missed_s: since when a camera should see a robot and does not; missing: targets that are to be
-    searched for: while others are tracked, one robot does; velocity_errors_m_s: of each robot's odometry, rms;
-    drifts_m_s: motion of each robot besides what it is told (3) [m/s; world]; unsteered: robots that follow no
-    setpoints: they wait or land; untied_s: since something fixed in the room last told where each robot is, or somebody
-    saw it; velocities_m_s: of each robot (3) [m/s; world]; helped_s: since others than the sensors fixed in the room
-    last told where each robot is.
+    target_age_s: time since any target was last observed where it is believed, None if never; unseen_s: time since a
+    camera last saw each robot; missed_s: for how long a camera should have seen a robot and did not; missing: targets
+    to be searched for, by one robot while others are tracked; velocity_errors_m_s: rms error of each robot's odometry;
+    drifts_m_s: motion of each robot beyond its commands (3) [m/s; world]; unsteered: robots that follow no setpoints:
+    they wait or land; untied_s: time since a sensor fixed in the room last located each robot, or somebody saw it;
+    velocities_m_s: of each robot (3) [m/s; world]; helped_s: time since others than the sensors fixed in the room last
+    told where each robot is.
     """
 
     target_age_s: float | None = None
@@ -49,7 +49,7 @@ class Sight:
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """What all setpoints of a step depend on; robots: those in the air whose place is believed."""
+    """The inputs of all setpoints of a step; robots: those in the air whose place is believed."""
 
     belief: JointBelief
     robots: Sequence[str]
@@ -59,17 +59,17 @@ class Moment:
 
 
 def steered(names: Sequence[str], now: Moment) -> list[str]:
-    """Return the robots among some that follow setpoints; all of them where none does, for they may soon."""
+    """Return those of the robots that follow setpoints; all of them if none does, for they may soon."""
     return [name for name in names if name not in now.sight.unsteered] or list(names)
 
 
 def is_untied(name: str, now: Moment) -> bool:
-    """Return whether nothing tells where a robot is that flies on our estimate."""
+    """Return whether a robot flies on our estimate and nothing tells any more where it is."""
     return name in now.parameters.fed and now.sight.untied_s.get(name, 0.0) > now.parameters.untied_after_s
 
 
 def soon(name: str, now: Moment) -> tuple[float, float]:
-    """Return where a robot will be in a second [x, y; world]."""
+    """Return where a robot will be in one second (x, y) [m; world]."""
     x, y = now.belief.mean_of(name)[:2] + _AHEAD_S * now.sight.velocities_m_s.get(name, STILL)[:2]
     return float(x), float(y)
 

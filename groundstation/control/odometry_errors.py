@@ -1,4 +1,4 @@
-"""How far each robot's odometry is to be expected off, from what it was off by lately. Pure."""
+"""The error to be expected of each robot's odometry, from its recent errors. Pure."""
 
 import math
 
@@ -6,19 +6,19 @@ from groundstation.control.view import known_velocity_error_m_s, velocity_error_
 from groundstation.estimation.belief import JointBelief
 from groundstation.time_units import NS_PER_S
 
-# An autopilot errs by its tilt, which sways over 10 s: an error that passes zero comes back.
+# An autopilot's error comes from its tilt, which sways over 10 s: an error that passes zero comes back.
 _FORGOTTEN_S = 10.0
 
 
 class OdometryErrors:
-    """Use: `advance` with each belief."""
+    """Call `advance` with each belief."""
 
     def __init__(self) -> None:
         self._known_m_s: dict[str, float] = {}
         self._at_ns = 0
 
     def advance(self, belief: JointBelief) -> dict[str, float]:
-        """Return the rms error of each robot's odometry that is to be expected, for as long as it flies on [m/s]."""
+        """Return the rms error to be expected of each robot's odometry while it flies on [m/s]."""
         kept = math.exp((self._at_ns - belief.stamp_ns) / NS_PER_S / _FORGOTTEN_S)
         self._at_ns = belief.stamp_ns
         robots = belief.layout.robots

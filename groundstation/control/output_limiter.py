@@ -20,11 +20,11 @@ from groundstation.estimation.belief import JointBelief
 from groundstation.geometry.stabilized_frame import stabilized_from_world, world_from_stabilized
 from groundstation.planning.parameters import MotionLimits
 
-# No two bodies are this near: a belief that has them there does not say on which side the other one is.
+# No two bodies are this near to each other: a belief that says so does not tell on which side the other one is.
 _NO_SIDE_M = 0.1
-# The sides of a polygon within the circle of the fastest horizontal velocities.
+# Number of sides of a polygon within the circle of the fastest horizontal velocities.
 _ROUND = np.array([(math.cos(a), math.sin(a), 0.0) for a in np.arange(16) * (2.0 * math.pi / 16)])
-# By so much a velocity that was clipped to a limit may exceed it.
+# A velocity that was clipped to a limit may exceed it by this much.
 _ROUNDING_M_S = 1e-10
 _UP_DOWN = np.array(((0.0, 0.0, 1.0), (0.0, 0.0, -1.0)))
 _AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -59,9 +59,9 @@ def limit_setpoint(
     """Return the part of a setpoint that is safe to send.
 
     velocities: measured ones [m/s; world], by robot, where known: braking starts later than without. drifts: motion
-    besides what is told [m/s; world], by robot: one that has any is allowed `drift_m_s` more of it in any direction,
-    and may be moved away from a wall to hold it off; None: nothing is added. Each of two robots may use half of the
-    closing speed between them, so that every robot is limited on its own.
+    beyond the commands [m/s; world], by robot: a robot in it is assumed to drift by up to `drift_m_s` more in any
+    direction, and may be moved away from a wall to counter the drift; None: nothing is added. Each of two robots may
+    use half of the closing speed between them, so that every robot is limited on its own.
     """
     reason = _unfit(robot, setpoint, belief, now_ns, parameters)
     if reason:
@@ -89,12 +89,12 @@ def _held_off(wall: _Wall, drift: Vector3, parameters: SafetyParameters) -> _Wal
 
 
 def _nearest(wanted: Array, walls: list[_Wall], limits: MotionLimits) -> tuple[Array, list[int]]:
-    """Return the nearest velocity [world] that walls and limits allow, and which walls were met on the way."""
+    """Return the nearest velocity [world] that walls and limits allow, and the walls that limited it on the way."""
     normals, most = np.array([wall.normal for wall in walls]), np.array([wall.most for wall in walls])
     velocity, met = project(wanted, normals, most)
     across, climbs = math.hypot(velocity[0], velocity[1]), abs(velocity[2])
     slow = across <= limits.max_speed_m_s + _ROUNDING_M_S and climbs <= limits.max_climb_m_s + _ROUNDING_M_S
-    if not slow:  # two walls that push, at an acute angle, meet far away
+    if not slow:  # two pushing walls at an acute angle meet far away
         speed = np.full(len(_ROUND), limits.max_speed_m_s * math.cos(math.pi / len(_ROUND)))
         climb = np.full(2, limits.max_climb_m_s)
         velocity, _ = project(wanted, np.concatenate((normals, _ROUND, _UP_DOWN)), np.concatenate((most, speed, climb)))
@@ -102,7 +102,7 @@ def _nearest(wanted: Array, walls: list[_Wall], limits: MotionLimits) -> tuple[A
 
 
 def _turning(wall: _Wall, rate: float, reaction_s: float) -> _Wall:
-    """Return the wall as a turning vehicle meets it.
+    """Return the wall for a vehicle that turns.
 
     A vehicle that holds its velocity v in its own frame carries it along when it turns: it flies v + T rate (z x v),
     for as long as its reaction T lags behind.
@@ -134,7 +134,7 @@ def _unfit(robot: str, setpoint: Setpoint, belief: JointBelief, now_ns: int, par
 
 
 def _coincides(robot: str, belief: JointBelief) -> bool:
-    """Return whether another robot is believed in the same place, so that every direction may be the one towards it."""
+    """Return whether another robot is believed in the same place: its direction is then unknown."""
     place = _place(robot, belief)
     others = (_place(other, belief) for other in belief.layout.robots if other != robot)
     return not all(math.dist(other, place) >= _NO_SIDE_M for other in others)
@@ -172,7 +172,8 @@ def _clip(robot: str, setpoint: Setpoint, parameters: SafetyParameters) -> tuple
 def _braking(
     robot: str, belief: JointBelief, parameters: SafetyParameters, velocities: Mapping[str, Array]
 ) -> tuple[Vector3, float]:
-    """Return where the robot would come to rest (its place if the velocity is unknown), and the time to shed slack in.
+    """Return where the robot would come to rest (its place if the velocity is unknown), and the time to shed slack in
+    [s].
 
     A vehicle that follows a velocity c with lag T obeys d/dt (x + T v) = c: the point of rest is an integrator of the
     command. Without v the loop x' = v, v' = (slack / time - v) / T overshoots by 0.4 % of the slack at time = 3 T.
@@ -215,7 +216,7 @@ def _others(
         apart = _difference(_place(other, belief), place)
         for gap in (_difference(there, rest), apart):
             distance = math.hypot(*gap)
-            # Points of rest may coincide between robots that fly at each other: the direction is then today's.
+            # Points of rest of robots that fly at each other may coincide: the present direction is used then.
             x, y, z = gap if distance > 1e-6 else apart
             size = math.hypot(x, y, z)
             normal = (x / size, y / size, z / size)
@@ -230,7 +231,7 @@ def _difference(a: Vector3, b: Vector3) -> Vector3:
 
 
 def _relative_covariance(robot: str, other: str, belief: JointBelief) -> list[Vector3]:
-    """Return the covariance (3, 3) of the way from one robot to another [m^2]."""
+    """Return the covariance (3, 3) of the vector from one robot to another [m^2]."""
     a, b = belief.layout.block(robot).start, belief.layout.block(other).start
     P = belief.covariance
     own, its, cross = P[a : a + 3, a : a + 3], P[b : b + 3, b : b + 3], P[a : a + 3, b : b + 3]

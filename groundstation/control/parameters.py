@@ -10,7 +10,7 @@ from groundstation.vehicles import kind_named
 
 Interval = tuple[float, float]
 _USUAL_LIMITS = MotionLimits()
-# Of whoever searches: as fast as pictures stay sharp and follow each other densely enough.
+# Of robots that search: slow enough for sharp pictures that follow each other densely.
 SEARCH_SPEED_M_S, SEARCH_YAW_RATE_RAD_S = 0.5, 0.8
 
 
@@ -18,17 +18,17 @@ SEARCH_SPEED_M_S, SEARCH_YAW_RATE_RAD_S = 0.5, 0.8
 class ControlParameters:
     """Settings of the setpoints.
 
-    search_height_m: height while searching or returning; column_m: horizontal distance within which nobody changes
-    height, and which stands of two robots keep; return_std_m: a robot outside the world-fixed views that is known
-    worse than this flies back; so does one whose deviation would reach return_limit_m before it is back in view, or
+    search_height_m: height while searching or returning; column_m: horizontal distance between two robots within which
+    neither changes height, and the least between two stands; return_std_m: a robot outside the world-fixed views with a
+    larger deviation flies back; so does one whose deviation would reach return_limit_m before it is back in view, or
     that would then have been unseen for return_within_s (odometry may be worse than it says), each with return_margin_s
-    to turn round and be found, but never before return_soonest_s: so long a gap between sightings is usual;
-    return_drift_m_s: largest measured drift that is subtracted on the way back; drift_m_s: how fast a place becomes
-    uncertain out of sight at least, seen_std_m: from where; sound_error_m_s: a larger error of the odometry is not that
-    of a sound one; regain_after_s: nobody has seen a target for so long, those that track it turn to it and back off;
-    hint_std_m: no plan goes by a target that is known worse; planned_s: as far as plans reach; max_plan_age_s: held
-    controls of an older plan are not flown any more; fed: robots that fly on our estimate; untied_after_s: of nothing
-    that tells where they are, after which they turn back; the next sighting takes 0.3 s at most, where there is one.
+    to turn round and be found; but none before return_soonest_s, a usual gap between sightings; return_drift_m_s:
+    largest measured drift that is subtracted on the way back; drift_m_s: least rate at which a place becomes uncertain
+    out of sight, starting from seen_std_m; sound_error_m_s: largest error of sound odometry; regain_after_s: when
+    nobody has seen a target for this long, the robots that track it turn to it and back off; hint_std_m: no plan uses a
+    target with a larger deviation; planned_s: how far plans reach; max_plan_age_s: controls of an older plan are no
+    longer flown; fed: robots that fly on our estimate; untied_after_s: if nothing tells their place for this long, they
+    turn back; the next sighting takes 0.3 s at most, where there is one.
     """
 
     search_height_m: float
@@ -66,11 +66,11 @@ class ControlParameters:
 class SafetyParameters:
     """Settings of the output limiter.
 
-    fence: intervals of x, y, z [m; world]; reaction_s: lag with which a vehicle follows a velocity;
-    margin_m: kept from fence and separation on top of `sigmas` standard deviations of the belief. drift_m_s: motion
-    besides the commanded one that nobody has noticed yet; most_drift_m_s: largest one that is held off.
-    max_known_velocity_error_m_s, max_velocity_error_m_s: mean and rms error of the odometry, as the belief has it, with
-    which nobody may fly unseen but those that fly on our estimate.
+    fence: intervals of x, y, z [m; world]; reaction_s: lag with which a vehicle follows a velocity; margin_m: distance
+    kept from fence and other robots beyond `sigmas` standard deviations of the belief. drift_m_s: motion beyond the
+    commands that may not have been noticed yet; most_drift_m_s: largest drift that is countered.
+    max_known_velocity_error_m_s, max_velocity_error_m_s: largest mean and rms error of the odometry, by the belief,
+    with which a robot may fly unseen; robots that fly on our estimate are exempt.
     """
 
     fence: tuple[Interval, Interval, Interval]

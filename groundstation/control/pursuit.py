@@ -1,4 +1,4 @@
-"""Sweeps towards a target that was carried off: what a team will have seen on its way counts as seen."""
+"""Sweeps towards a target that was carried off: cells that the team passes on its way count as seen."""
 
 import math
 from collections.abc import Iterator
@@ -14,17 +14,17 @@ from groundstation.sensing.footprint import Footprint, swept
 
 # Views of a sweep that count: 660 degrees, 11 s. In the time of each about three pictures are searched.
 _VIEWS, _PICTURES = 22, 3
-# Stands that are compared: how far away, and in how many directions.
+# Stands that are compared: their distances, and the number of directions.
 _WAYS_M, _BEARINGS = (0.8, 2.0, 4.0), 12
 
 
 @dataclass(frozen=True, slots=True)
 class _Searcher:
-    """One robot that may look: on which ways to stands it will, at which headings, and where it may be.
+    """One robot that may look for the target: the ways and headings of its sweeps, and where it may be.
 
-    seen: chance of each cell of its footprint to be found within a view; rows, columns (n, _VIEWS): cells of the grid
-    on the way to each stand; headings (2, _VIEWS): as numbers, by direction; free, near (n): where it may be, and which
-    stands are compared if it may be there.
+    seen: chance that a target in each cell of its footprint is found within a view; rows, columns (n, _VIEWS): cells of
+    the grid on the way to each stand; headings (2, _VIEWS): as numbers, by direction; free, near (n): where it may be,
+    and the stands that are compared if it may be there.
     """
 
     footprint: Footprint
@@ -38,7 +38,7 @@ class _Searcher:
     kept: Sweep | None
 
     def compare(self, left: Array, free: BoolArray, worth: Array) -> Compared:
-        """Return what the stands about it that are free promise, view by view; all that are free where none of them."""
+        """Return what the free stands about it promise, view by view; of all free ones if none about it is free."""
         near = free & self.near
         stands = np.flatnonzero(near if near.any() else free)
         footprint = self.footprint
@@ -79,7 +79,7 @@ def _searcher(
 
 
 def _around() -> Array:
-    """Return the places about a robot that it may fly to, and its own (n, 2) [m; from itself]."""
+    """Return the places about a robot that it may fly to, including its own (n, 2) [m; from the robot]."""
     bearings = np.arange(_BEARINGS) * (math.tau / _BEARINGS)
     ring = np.column_stack((np.cos(bearings), np.sin(bearings)))
     return np.concatenate((np.zeros((1, 2)), *(way_m * ring for way_m in _WAYS_M)))

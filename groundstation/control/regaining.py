@@ -1,4 +1,4 @@
-"""How a robot that tracks gets a target back into its picture: it turns to it and backs off, before any search."""
+"""How a tracking robot regains a target that left its picture: it turns to it and backs off, before any search."""
 
 import math
 from collections.abc import Collection
@@ -13,17 +13,17 @@ from groundstation.geometry.stabilized_frame import stabilized_from_world
 from groundstation.sensing.models import SensorSuite
 from groundstation.sensing.topology import Topology
 
-_WAY_GAIN, _TURN_GAIN = 1.5, 2.0  # of what a robot is off its distance and heading [1/s]
+_WAY_GAIN, _TURN_GAIN = 1.5, 2.0  # of its error in distance and heading [1/s]
 _FASTEST_M_S = 0.5
-_ABOVE_RAD = 0.12  # a target is kept so much above the middle of the picture: who backs off tips it up
-_MOST_SPREAD_M = 0.6  # a belief that is wider says too little of how far to back off
+_ABOVE_RAD = 0.12  # a target is kept this much above the middle of the picture: a robot that backs off tips it up
+_MOST_SPREAD_M = 0.6  # a wider belief does not tell how far to back off
 _NEAREST_M = 0.3
 
 
 def who_regains(
     target: str, topology: Topology, belief: JointBelief, sensors: SensorSuite, able: Collection[str]
 ) -> Collection[str]:
-    """Return the robots that get a target back: the lowest level, or the nearest where only others have it in reach.
+    """Return the robots that regain a target: the lowest level, or the nearest robot if only others have it in reach.
 
     able: those that follow setpoints.
     """
@@ -38,7 +38,8 @@ def regaining(robot: str, target: str, belief: JointBelief, sensors: SensorSuite
     """Return velocity (2) [m/s; base_stabilized] and yaw rate [rad/s] that bring a target into the picture.
 
     The robot faces the target, at the distance from which its camera has it above the middle of the picture, farther by
-    one standard deviation of its place, and moves along with it. None for a robot whose camera does not look down.
+    one standard deviation of its place, and moves along with it. Returns None for a robot whose camera does not look
+    down.
     """
     eye = sensors.onboard.get(robot)
     if eye is None:

@@ -1,4 +1,4 @@
-"""When a robot flies back to where a world-fixed camera sees it, where to, and how it looks for the view there."""
+"""When a robot flies back into view of a world-fixed camera, where to, and how it looks for the view there."""
 
 import math
 
@@ -24,10 +24,10 @@ def is_lost(
     unseen_s: float = 0.0,
     velocity_error_m_s: float = 0.0,
 ) -> bool:
-    """Return whether a robot must fly back now, or soon would be known too badly to be seen again.
+    """Return whether a robot must fly back now, else its place would soon be too uncertain for it to be found again.
 
-    By its own uncertainty, the error of its odometry, the way and its time; without any world-fixed view, when it is
-    known too badly.
+    It depends on its uncertainty, the error of its odometry, and the length and time of the way back; without any
+    world-fixed view, on the uncertainty alone.
     """
     if unseen_s > max(parameters.return_soonest_s, parameters.return_within_s):
         return True
@@ -37,7 +37,7 @@ def is_lost(
     left_s = time_left_s(spread, unseen_s, parameters, velocity_error_m_s)
     marker = sensors.marker(name, mean, is_robot=True)
     if any(sensors.world_in_view(camera, marker) for camera in sensors.world):
-        # Who is believed in view and not seen may be beside it: towards the middle it is seen the sooner.
+        # A robot believed in view but not seen may be beside it: towards the middle it is seen sooner.
         return unseen_s > parameters.return_soonest_s and left_s < parameters.return_margin_s
     view = view_of(float(mean[0]), float(mean[1]), name, parameters, sensors)
     if view is None or unseen_s <= parameters.return_soonest_s:
@@ -49,8 +49,8 @@ def is_lost(
 def return_stand(mean: Array, view: Rectangle | None, looks_s: float = 0.0) -> Stand:
     """Return the middle of a world-fixed view, with the heading as it is; without a view, where the robot is.
 
-    looks_s: since when the robot should be in view and is not: it turns, and goes about the middle in a wider and wider
-    circle, until a camera sees it or it sees something that it knows.
+    looks_s: for how long the robot should have been in view and was not: it turns, and circles the middle ever wider,
+    until a camera sees it or it sees something that it knows.
     """
     x, y, yaw = float(mean[0]), float(mean[1]), float(mean[3])
     x, y = view.center if view else (x, y)

@@ -1,4 +1,4 @@
-"""How long ago something fixed in the room last told where each robot is; and whether anything still does. Pure."""
+"""How long ago a sensor fixed in the room last located each robot, and whether any such sensor still works. Pure."""
 
 import math
 from collections.abc import Collection, Iterable
@@ -17,25 +17,25 @@ from groundstation.estimation.measurement import Correction
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _USED = (Verdict.ACCEPTED, Verdict.INFLATED)
-# Longer than a camera of 2 pictures a second, or one that is started again, is silent; of one that goes on with what
-# is refused, no longer than two of its pictures take.
+# Longer than the silence of a camera with 2 pictures a second, or of one that is restarted; for a sensor whose data are
+# refused, no longer than two of its pictures take.
 _SILENT_NS, _HANGS_NS = 1_500 * NS_PER_MS, 500 * NS_PER_MS
 _SILENCE = "no fixed sensor tells anything new of the room: drones hover, and land if none does"
 _REMEDY = "see to the cameras and motion capture (frozen? unplugged?); the team goes on once one sees it"
 
 
 class RootWatch:
-    """Use: `hear` each message that counts, `advance` once a tick; ask `age_s` and `is_silent`.
+    """Call `hear` with each message that counts and `advance` once a tick; ask `age_s` and `is_silent`.
 
-    roots: sensors that are fixed in the room; carried: robots and targets, of which one that sees another passes on
-    where it is. Two that see only each other drift together, and nothing in their sightings shows it. links: what the
-    filter calls the parts of ranging systems, one for each anchor and robot.
+    roots: sensors that are fixed in the room; carried: robots and targets, which pass on their place when one sees
+    another. Two that see only each other drift together, and nothing in their sightings shows it. links: the filter's
+    names for the parts of ranging systems, one for each anchor and robot.
     """
 
     def __init__(self, roots: Collection[str], carried: Iterable[str], links: Collection[str] = ()) -> None:
         self._roots, self._carried = frozenset(roots), frozenset(carried)
         self._placing = self._roots | frozenset(links)
-        # By whom a root saw: for each entity, when it last saw each one from which that reached it.
+        # For each entity: the entities from which a root's sighting reached it, and when a root last saw each of them.
         self._rooted_ns: dict[str, dict[str, int]] = {}
         self._heard_ns: dict[str, int] = {}
         self._telling: set[str] = set()
@@ -45,9 +45,9 @@ class RootWatch:
 
     @property
     def is_silent(self) -> bool:
-        """Return whether no root has told anything new for 1.5 s, or 0.5 s where all that it still tells is refused.
+        """Return whether no root has told anything new for 1.5 s, or 0.5 s if all that it still sends is refused.
 
-        One that never says that it sees nobody may just see nobody; it is judged only while it repeats itself.
+        A root that never reports empty pictures may just see nobody; it is judged only while it repeats itself.
         """
         return bool(self._roots) and all(map(self._says_nothing, self._roots))
 
@@ -65,12 +65,12 @@ class RootWatch:
                 self._renew(message.observer, now_ns)
 
     def hear_frozen(self, message: Message) -> None:
-        """Take a message that was refused since its sensor hangs; what is new in the same picture comes with it."""
+        """Take a message that was refused because its sensor hangs; what is new in the same picture comes with it."""
         if isinstance(message, RelativeObservation | RangeObservation) and message.observer in self._roots:
             self._hanging.add(message.observer)
 
     def advance(self, now_ns: int, corrections: Iterable[Correction], *, flying: bool) -> list[Notice]:
-        """Take what the filter used since the last call; returns what is to be told."""
+        """Take what the filter used since the last call; returns the notices for the operator."""
         self._now_ns = now_ns
         for one in corrections:
             if one.verdict in _USED and one.subject in self._carried:
@@ -79,11 +79,11 @@ class RootWatch:
         return [Notice(Severity.ERROR, _SILENCE, _REMEDY)] if self._told and not told else []
 
     def age_s(self, name: str) -> float:
-        """Return how old the newest sighting by a root is that reached an entity, itself or by others; or infinity."""
+        """Return the age [s] of a root's newest sighting that reached an entity, directly or not; or infinity."""
         return self._since_s(max(self._rooted_ns.get(name, {}).values(), default=None))
 
     def helped_age_s(self, name: str) -> float:
-        """Return the same of sightings that reached it by others alone: it would be known where no root sees it."""
+        """Return the same of sightings that reached it through others alone: they still count where no root sees it."""
         others = (at_ns for seen, at_ns in self._rooted_ns.get(name, {}).items() if seen != name)
         return self._since_s(max(others, default=None))
 
@@ -91,7 +91,7 @@ class RootWatch:
         return math.inf if at_ns is None else (self._now_ns - at_ns) / NS_PER_S
 
     def _note(self, root: str, now_ns: int, *, works: bool) -> None:
-        """Take what a root says that also says when it sees nobody; with its first word it works."""
+        """Take word of a root that also reports when it sees nobody; with its first word it counts as working."""
         self._telling.add(root)
         if works or root not in self._heard_ns:
             self._renew(root, now_ns)
@@ -107,7 +107,7 @@ class RootWatch:
         return self._now_ns - self._heard_ns.get(root, self._now_ns) > limit_ns
 
     def _tie(self, one: Correction, at_ns: int) -> None:
-        """Let both ends of a sighting know what the better rooted one knows."""
+        """Give both ends of a sighting the newest roots that either of them has."""
         if one.observer in self._placing:
             own = self._rooted_ns.setdefault(one.subject, {})
             own[one.subject] = max(at_ns, own.get(one.subject, at_ns))

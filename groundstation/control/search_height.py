@@ -1,4 +1,4 @@
-"""At which height robots that turn see most of the floor."""
+"""The height from which turning robots see most of the floor."""
 
 import numpy as np
 
@@ -11,9 +11,9 @@ _STEP_M, _CELL_M = 0.05, 0.2
 
 
 def search_height_m(field: ResolvedField) -> float:
-    """Return the height [m] from which the team's cameras show most of the floor in a turn, of those that are planned.
+    """Return the height [m], of the planned ones, from which the team's cameras show most of the floor in a turn.
 
-    Too low, they see far markers too flatly; too high, all are far, and what is beneath is a wider blind spot.
+    Too low, far markers are seen too flatly; too high, all are far, and the blind spot beneath is wider.
     """
     sensors = sensors_from_field(field)
     marker_m = max((sensors.marker_height_m[name] for name in field.tracked), default=0.0)

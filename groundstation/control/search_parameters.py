@@ -12,21 +12,21 @@ from groundstation.field.room import MotionCapture, WorldCamera
 Interval = tuple[float, float]
 
 NEAR_YAW_RATE_RAD_S = 1.04
-"""For a target that was tracked when it got out of sight: near, and large in a picture that is not quite sharp."""
+"""For a target that was tracked when it got out of sight: near, and large even in a picture that is not quite sharp."""
 
 
 @dataclass(frozen=True, slots=True)
 class SearchParameters:
     """How a target that is not seen is searched for.
 
-    room_m: size along x and y; ranges_m: how far each robot's pictures are searched with success, farther than plans
-    count on; observers: robots and world-fixed cameras that may see targets; begin_after_s: unseen for so long, a map
-    takes the Gaussian's place; given_up_below: probability that the target is where it was predicted below which the
-    search begins, though `lost_after_s` is not over; patience_s: what is seen so much later counts 1/e;
-    near_yaw_rate_rad_s: while all that are searched for were tracked before; keep_gain: another stand must promise so
-    much more; starts_ahead_m: how far before the team a target is expected that was never seen; target_speed_m_s,
-    target_straight_s: of a target that drives about; lost_after_s, lost_excluded: after so long a search that excluded
-    so much of the room a person is asked.
+    room_m: size along x and y; ranges_m: within which a search of each robot's pictures succeeds, larger than those
+    that plans count on; observers: robots and world-fixed cameras that may see targets; begin_after_s: time unseen
+    after which a map replaces the Gaussian; given_up_below: the search begins early, before `lost_after_s`, when the
+    probability that the target is where it was predicted falls below this; patience_s: a view this much later counts
+    1/e; near_yaw_rate_rad_s: yaw rate while all targets searched for were tracked before; keep_gain: another stand must
+    promise this much more; starts_ahead_m: how far before the team a target that was never seen is expected;
+    target_speed_m_s, target_straight_s: of a target that drives about; lost_after_s, lost_excluded: length of a search,
+    and share of the room excluded by it, after which a person is asked.
     """
 
     room_m: tuple[float, float]

@@ -11,7 +11,7 @@ from groundstation.sensing.models import Rectangle
 Point = tuple[float, float]
 
 _RING = 64  # directions in which another stand is passed
-_OWN_SHARE = 0.1  # of the way that a robot would have to fly: of two stands alike, the nearer one
+_OWN_SHARE = 0.1  # of the way that a robot would have to fly: of two equal stands it takes the nearer one
 _ROUNDING_M = 1e-9
 
 
@@ -21,10 +21,10 @@ def apart(
     views: Mapping[str, Rectangle | None],
     distance_m: float,
 ) -> dict[str, Stand]:
-    """Return the stands, each moved as little as makes any two of them at least a distance apart.
+    """Return the stands, each moved as little as needed for any two to be at least a distance apart.
 
     The first keeps its own, the others give way in order. places: where each robot is [m; world]; views: where its
-    stand must lie, None: anywhere. In views too small for that the stands are as far apart as corners allow.
+    stand must lie, None: anywhere. In views too small for that distance, stands are as far apart as the corners allow.
     """
     points: dict[str, Point] = {}
     for name, stand in wanted.items():
@@ -37,7 +37,7 @@ def apart(
 def _free_point(
     wanted: Point, place: Point, taken: Collection[Point], view: Rectangle | None, distance_m: float
 ) -> Point:
-    """Return the point nearest to the wanted one far enough from the taken ones, else the farthest from them."""
+    """Return the point nearest to the wanted one that is far enough from the taken ones, else the farthest one."""
     options = [wanted, *(point for other in taken for point in _ring(other, wanted, distance_m))]
     if view is not None:
         options = [point for point in options if math.dist(view.nearest(*point), point) <= _ROUNDING_M]
@@ -56,7 +56,7 @@ def _ring(centre: Point, towards: Point, radius_m: float) -> list[Point]:
 
 
 def _in_corners(points: Mapping[str, Point], views: Mapping[str, Rectangle | None]) -> dict[str, Point]:
-    """Return corners of the views, that nearest to the first point first, then whichever keeps off best."""
+    """Return corners of the views: first the nearest to the first point, then always the farthest from the others."""
     chosen: dict[str, Point] = {}
     for name, point in points.items():
         view = views[name]

@@ -1,4 +1,4 @@
-"""Setpoints of all robots from a plan: held velocities, level heights, and the way back or around when needed."""
+"""Setpoints of all robots from a plan: held velocities, heights of levels, and returns and searches when needed."""
 
 import math
 from collections.abc import Collection, Mapping, Sequence
@@ -23,13 +23,15 @@ from groundstation.geometry.stabilized_frame import stabilized_from_world, world
 from groundstation.planning.planner import PlanResult
 from groundstation.sensing.models import SensorSuite
 
-_STAND_GAIN, _TURN_GAIN = 1.0, 1.5  # of the way and the turn to a stand [1/s]
+_STAND_GAIN, _TURN_GAIN = 1.0, 1.5  # of the distance and the turn to a stand [1/s]
 
 
 @dataclass(frozen=True, slots=True)
 class Setpoint:
-    """Velocity [m/s; base_stabilized] and yaw rate [rad/s] wanted of a robot, before safety; `blocked`: by whom a
-    change of height is held up."""
+    """A robot's wanted velocity [m/s; base_stabilized] and yaw rate [rad/s], before the output limiter.
+
+    blocked: the robot that holds up a change of height.
+    """
 
     velocity_m_s: Vector3
     yaw_rate_rad_s: float
@@ -89,7 +91,7 @@ def setpoints_from_plan(
 
 
 def _comes_back(name: str, phase: FlightMode, now: Moment) -> bool:
-    """Return whether a robot flies back into a view, and obeys."""
+    """Return whether a robot is flying back into a view and follows setpoints."""
     comes = phase is FlightMode.RETURN or (
         phase is FlightMode.TRACK and (is_untied(name, now) or is_between_views(name, now))
     )
@@ -97,10 +99,10 @@ def _comes_back(name: str, phase: FlightMode, now: Moment) -> bool:
 
 
 def _regained(name: str, plan: PlanResult, now: Moment) -> tuple[float, float, float]:
-    """Return what the plan holds for a robot, or, if it should look at a target that is not seen, what brings it back.
+    """Return the plan's velocity and yaw rate, or those that bring an unseen target back into the robot's picture.
 
-    PAPER (docs/explanation/method.md 7): plans assume level robots; one that brakes before a target tips it out of its
-    picture, and no plan of it mends that.
+    PAPER (docs/explanation/method.md 7): plans assume level robots; a robot that brakes before a target tips it out of
+    its picture, and no plan corrects that.
     """
     vx, vy, rate = (float(value) for value in plan.controls[name])
     belief, age_s = now.belief, now.sight.target_age_s
@@ -118,9 +120,9 @@ def _regained(name: str, plan: PlanResult, now: Moment) -> tuple[float, float, f
 
 
 def _level_m(name: str, level_m: float, now: Moment) -> float:
-    """Return the height to which a robot flies; who looks for a view sinks a little, for views are narrower higher up.
+    """Return a robot's height [m]; while it looks for a view it sinks a little, for views are narrower higher up.
 
-    Told to keep its height a vehicle in the midst of a climb rises on: it errs by its climb rate as well.
+    Told to keep its height, a climbing vehicle would rise on, because its climb rate is in error as well.
     """
     if not is_untied(name, now):
         return level_m
@@ -130,7 +132,8 @@ def _level_m(name: str, level_m: float, now: Moment) -> float:
 def _search_level_m(name: str, now: Moment) -> float:
     """Return the height at which a robot searches or returns.
 
-    One that flies on our estimate climbs only where it is seen from that height as well, else it would leave its view.
+    One that flies on our estimate climbs only where it is in a view at that height as well, else it would leave its
+    view.
     """
     x, y, z = (float(value) for value in now.belief.mean_of(name)[:3])
     view = view_of(x, y, name, now.parameters, now.sensors) if name in now.parameters.fed else None
@@ -144,7 +147,7 @@ def _is_lost(name: str, now: Moment) -> bool:
 
 
 def _scout(tracking: Sequence[str], now: Moment) -> str | None:
-    """Return the robot that can be spared: the farthest from the tracked targets; None if it is the only one."""
+    """Return the robot that can be spared for a search: the farthest from the tracked targets; None if it is alone."""
     belief = now.belief
     seen = [belief.mean_of(name)[:2] for name in belief.layout.targets if name not in now.sight.missing]
     if len(tracking) < 2 or not seen:
@@ -153,9 +156,10 @@ def _scout(tracking: Sequence[str], now: Moment) -> str | None:
 
 
 def _stands(phases: Mapping[str, FlightMode], searching: Mapping[str, Stand], now: Moment) -> dict[str, Stand]:
-    """Return where each robot stands that returns or searches, apart from each other; who returns comes first.
+    """Return a stand for each robot that returns or searches, apart from each other; returning robots choose first.
 
-    Who searches and has nowhere to go waits in view. Who follows no setpoints stays where it is: all others give way.
+    A searching robot without a place to go waits in view. One that follows no setpoints stays where it is, and all
+    others give way.
     """
     robots = [name for name in now.robots if phases[name] in (FlightMode.RETURN, FlightMode.SEARCH)]
     means = {name: now.belief.mean_of(name) for name in robots}
@@ -181,7 +185,7 @@ def _stands(phases: Mapping[str, FlightMode], searching: Mapping[str, Stand], no
 def _towards(name: str, stand: Stand, phase: FlightMode, now: Moment) -> Setpoint:
     """Return a setpoint that flies to a stand and turns to its heading, keeping off other robots.
 
-    Of who returns, motion besides what it is told is subtracted, as far as such a drift is believed.
+    From a returning robot's velocity its drift is subtracted, up to the largest that is believed.
     """
     mean, parameters = now.belief.mean_of(name), now.parameters
     drift_m_s = now.sight.drifts_m_s.get(name, STILL) if phase is FlightMode.RETURN else STILL
@@ -209,7 +213,7 @@ def _towards(name: str, stand: Stand, phase: FlightMode, now: Moment) -> Setpoin
 def _with_height(
     name: str, velocity: tuple[float, float], rate: float, level_m: float, phase: FlightMode, now: Moment
 ) -> Setpoint:
-    """Return the setpoint with the climb towards its level height; near another robot it side-steps first."""
+    """Return the setpoint with the climb towards its level height; near another robot it first moves aside."""
     belief, parameters = now.belief, now.parameters
     mean = belief.mean_of(name)
     climb = parameters.limits_of(name).max_climb_m_s

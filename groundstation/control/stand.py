@@ -1,4 +1,4 @@
-"""A place where a robot is to be, and where it is to look."""
+"""A stand: a place and heading from which a robot looks for a target, or waits."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 class Stand:
     """A place [m; world], a heading [rad; world] and how fast the heading itself turns [rad/s].
 
-    turn_rad_s: how fast a robot turns to it at most; None: as who returns.
+    turn_rad_s: largest yaw rate with which a robot turns to it; None: that of a returning robot.
     """
 
     x: float

@@ -1,6 +1,6 @@
-"""How a team chooses its sweeps: robots in turn, each the one with the best chances in what those before it leave.
+"""How a team chooses its sweeps: robots in turn, each the one with the best chances in what earlier ones leave unseen.
 
-A robot turns while it flies somewhere. Which stands it compares, and what it counts, is its `Searcher`'s.
+A robot turns while it flies to a stand. Its `Searcher` says which stands are compared, and what counts.
 """
 
 import math
@@ -17,10 +17,10 @@ from groundstation.control.stand import Stand
 from groundstation.estimation.room_map import RoomGrid
 from groundstation.sensing.footprint import HEADINGS, Footprint
 
-_ANY_ORDER = 3  # of so many robots any may choose first
+_ANY_ORDER = 3  # with up to this many robots, any may choose first
 _STEP_RAD = math.tau / HEADINGS
 DIRECTIONS = (1, -1)
-# How far ahead of a robot the heading is that it turns to: too far to slow down for.
+# How far ahead of a robot's heading its commanded heading is: too far for the robot to slow down.
 _LEAD_RAD = 0.5 * math.pi
 
 
@@ -65,7 +65,7 @@ def lattice_of(grid: RoomGrid, parameters: SearchParameters) -> Lattice:
 
 @dataclass(frozen=True, slots=True)
 class Sweep:
-    """What one robot does: the stand of the lattice that it flies to, and which way it turns (1: left, -1: right)."""
+    """A robot's sweep: the stand of the lattice that it flies to, and its direction of turn (1: left, -1: right)."""
 
     stand: int
     direction: int
@@ -73,9 +73,9 @@ class Sweep:
 
 @dataclass(frozen=True, slots=True)
 class Outlook:
-    """The chosen sweeps, with the stands that bring them about, and the chance to see the target within `after_s`.
+    """The chosen sweeps, with their stands, and the chance that the target is seen within `after_s`.
 
-    value: sum of the chances, each the less worth the later.
+    value: sum of the chances, discounted by their time.
     """
 
     stands: Mapping[str, Stand]
@@ -89,7 +89,7 @@ NO_OUTLOOK = Outlook({}, {}, 0.0, math.inf)
 
 
 class Compared(NamedTuple):
-    """Stands that a robot may fly to (n), by direction (n, 2) what their sweeps are worth, and the chance to find."""
+    """Stands that a robot may fly to (n), the worth of their sweeps by direction (n, 2), and the chances to find."""
 
     stands: IntVector
     worth: Array
@@ -97,15 +97,15 @@ class Compared(NamedTuple):
 
 
 class Searcher(Protocol):
-    """One robot that may look.
+    """A robot that may look for the target.
 
-    seen: chance of each cell of its footprint to be found within a view; free (n): stands where it may be; kept: its
-    sweep so far.
+    seen: chance that a target in each cell of its footprint is found within a view; free (n): stands where it may be;
+    kept: its sweep so far.
     """
 
     @property
     def footprint(self) -> Footprint:
-        """Return what it sees of the floor."""
+        """Return the part of the floor that it sees."""
 
     @property
     def seen(self) -> Array:
@@ -117,21 +117,21 @@ class Searcher(Protocol):
 
     @property
     def free(self) -> BoolArray:
-        """Return where it may be."""
+        """Return the stands where it may be."""
 
     @property
     def kept(self) -> Sweep | None:
         """Return its sweep so far."""
 
     def compare(self, left: Array, free: BoolArray, worth: Array) -> Compared:
-        """Return what the stands that are still free promise; left: of the chances; worth: of each view."""
+        """Return what the stands still free promise; left: remaining chances of the cells; worth: of each view."""
 
     def views(self, stand: int, turn: int) -> Iterable[tuple[int, int, int]]:
-        """Return the views of a sweep: row and column of the cell where it is, and its heading as a number."""
+        """Return the views of a sweep: row and column of the robot's cell, and its heading as a number."""
 
 
 class Kind(NamedTuple):
-    """A way to choose sweeps: how many views of them count, and what makes a searcher of a robot.
+    """A way to choose sweeps: how many of their views count, and the function that makes a searcher of a robot.
 
     searcher: of footprint, lattice, pose, allowed times, sweep so far and parameters.
     """
@@ -150,11 +150,11 @@ def choose(
     held: Mapping[str, Sweep],
     parameters: SearchParameters,
 ) -> Outlook:
-    """Return a sweep for each robot that has a footprint: in turn, that with the best chances at the earliest times.
+    """Return a sweep for each robot with a footprint: in turn, the one with the best chances at the earliest times.
 
-    poses: x, y, z, yaw; allowed_s: by stand, within how long a robot may be there (negative: not at all); held: the
+    poses: x, y, z, yaw; allowed_s: by stand, the latest time at which a robot may be there (negative: never); held: the
     sweeps so far, which are kept unless another is clearly better. No two stands are within the distance `apart_m`.
-    Of few robots, whoever had better choose first does; the first in the order of `footprints` if that is the same.
+    With few robots the best choice of the first one is taken; if all are equal, the first in the order of `footprints`.
     """
     if not len(lattice.places):
         return NO_OUTLOOK
@@ -173,7 +173,7 @@ def choose(
 def _chosen(
     left: Array, lattice: Lattice, searchers: Mapping[str, Searcher], views: int, parameters: SearchParameters
 ) -> Outlook:
-    """Return what robots that choose in this order choose; left: of the chances, changed."""
+    """Return the sweeps of robots that choose in this order; left: remaining chances of the cells, changed in place."""
     stands: dict[str, Stand] = {}
     sweeps: dict[str, Sweep] = {}
     missed, total = 1.0, 0.0
@@ -201,7 +201,7 @@ def _chosen(
 
 
 def times_s(views: int, parameters: SearchParameters) -> Array:
-    """Return when so many views of a sweep are seen [s]."""
+    """Return the times of a sweep's views [s]."""
     return np.arange(1.0, views + 1) * (_STEP_RAD / parameters.yaw_rate_rad_s)
 
 
@@ -219,7 +219,7 @@ def headings(yaw_rad: float, views: int) -> IntMatrix:
 
 
 def _mark_seen(left: Array, searcher: Searcher, row: int, column: int, heading: int) -> None:
-    """Take what one view finds from the chances that are left for the robots that choose after it."""
+    """Subtract what one view finds from the chances left for the robots that choose later."""
     footprint = searcher.footprint
     part = slice(int(footprint.first[heading]), int(footprint.first[heading + 1]))
     rows, columns = row + footprint.rows[part], column + footprint.columns[part]

@@ -1,4 +1,4 @@
-"""What is known of targets that are not seen, and where the team looks for them: maps in place of Gaussians."""
+"""The search for targets that are not seen: maps of where they may be replace the Gaussians, and robots get stands."""
 
 import math
 from collections.abc import Collection, Mapping, Sequence
@@ -29,15 +29,15 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _STEP_NS = 100 * NS_PER_MS  # of the maps' motion
 _SLOW_SEARCH_S = 999.0
-_TIPPED_M = 0.08  # what a robot's picture is off at the distance of a target, since it is not level as it is believed
+_TIPPED_M = 0.08  # error of a picture at the distance of a target, since the robot is not level as believed
 
 
 class SearchMode(StrEnum):
     """What the team does about one target."""
 
-    TRACK = "TRACK"  # it is seen, or was just now
-    SEARCH = "SEARCH"  # it is looked for where it may be
-    LOST = "LOST"  # it was looked for nearly everywhere: a person is asked
+    TRACK = "TRACK"  # it is seen, or was a moment ago
+    SEARCH = "SEARCH"  # the team looks for it where it may be
+    LOST = "LOST"  # the team has looked nearly everywhere: a person is asked
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,9 +61,10 @@ class SearchState:
 
 
 class Search:
-    """Maps of the targets that are not seen, updated by pictures without them, and the stands of those that search.
+    """Maps of the targets that are not seen, updated by pictures without them, and the stands of the searching robots.
 
-    Use: `see` sightings, `take` searched pictures, `advance` with each belief, read `targets`, ask for `stands`.
+    Call `see` with sightings, `take` with searched pictures, `advance` with each belief; read `targets`, ask for
+    `stands`.
     """
 
     def __init__(
@@ -100,7 +101,7 @@ class Search:
             self._pictures.append(picture)
 
     def see(self, sighting: RelativeObservation) -> None:
-        """Take a sighting, which the filter may still refuse: the target is where a camera sees it all the same."""
+        """Take a sighting; even if the filter refuses it, the target is where a camera sees it."""
         name = sighting.subject
         if sighting.observer in self._cameras and name in self.targets:
             self._shown_ns[name] = max(sighting.header.stamp_ns, self._shown_ns.get(name, 0))
@@ -110,14 +111,14 @@ class Search:
         return self.targets[name].mode is not SearchMode.TRACK
 
     def shown_s(self, name: str, now_ns: int) -> float:
-        """Return since when no picture has shown a target; infinite: none ever did."""
+        """Return for how long no picture has shown a target [s]; infinite if none ever did."""
         stamp_ns = self._shown_ns.get(name)
         return math.inf if stamp_ns is None else (now_ns - stamp_ns) / NS_PER_S
 
     def advance(self, belief: JointBelief, ages_s: Mapping[str, float]) -> tuple[str, ...]:
-        """Bring the maps to a belief; returns the targets that are not where the belief has them any more.
+        """Update the maps to a belief's time; returns the targets that are no longer where the belief has them.
 
-        ages_s: since each target was last seen (infinite: not in the belief).
+        ages_s: time since each target was last seen (infinite: not in the belief).
         """
         self._history.append(belief)
         now_ns = belief.stamp_ns
@@ -135,7 +136,7 @@ class Search:
         return tuple(dropped)
 
     def stands(self, robots: Sequence[str], targets: Collection[str], belief: JointBelief) -> Mapping[str, Stand]:
-        """Return where robots look for targets now, none within a column of another; some may have nowhere to go."""
+        """Return where robots look for targets, none within `column_m` of another; some may have no stand."""
         wanted = tuple(name for name in sorted(targets) if name in self.targets and self.targets[name].room is not None)
         able = tuple(name for name in robots if name in self._footprints)
         planned_ns, of_robots, of_targets = self._planned
@@ -163,7 +164,7 @@ class Search:
 
     def _begun(self, name: str, state: SearchState, belief: JointBelief, age_s: float) -> SearchState:
         p, now_ns = self.parameters, belief.stamp_ns
-        # A picture that shows it elsewhere than it was predicted is the filter's business, not a reason to search.
+        # A picture that shows it elsewhere than predicted is for the filter to judge, no reason to search.
         shown = self.shown_s(name, now_ns) <= p.begin_after_s and name in belief.layout
         if age_s <= p.begin_after_s or shown:
             return (
@@ -191,7 +192,7 @@ class Search:
         return state
 
     def _anywhere(self, belief: JointBelief) -> RoomMap:
-        """Return the map of a target that was never seen: rather before the team, which starts towards it."""
+        """Return the map of a target that was never seen: likeliest ahead of the team, which starts towards it."""
         ahead_m = self.parameters.starts_ahead_m
         poses = (belief.mean_of(name) for name in belief.layout.robots)
         places = [(float(p[0] + ahead_m * np.cos(p[3])), float(p[1] + ahead_m * np.sin(p[3]))) for p in poses]
@@ -226,7 +227,7 @@ class Search:
         )
 
     def _look(self, picture: SearchedPicture, now_ns: int) -> None:
-        """Count a picture for all targets that it does not show."""
+        """Count a picture against all targets that it does not show."""
         pose, slack_m = self._pose_at(picture.observer, picture.header.stamp_ns)
         missing = [name for name, state in self.targets.items() if state.room is not None and name not in picture.found]
         if pose is None or not missing:
@@ -242,7 +243,7 @@ class Search:
             self.targets[name] = replace(state, room=state.room.emptied(chance))
 
     def _pose_at(self, observer: str, stamp_ns: int) -> tuple[Array | None, float]:
-        """Return where a camera's carrier was, and its standard deviation; None if that is not known."""
+        """Return the pose of a camera's carrier and its standard deviation; None if unknown."""
         if observer in self._sensors.world:
             return np.zeros(4), 0.0
         belief = self._history.at(stamp_ns)
@@ -252,7 +253,7 @@ class Search:
         return np.array(belief.mean_of(observer)[:4]), variance**0.5 + _TIPPED_M
 
     def _judge(self, now_ns: int) -> None:
-        """Say how each search stands, and which has become hopeless."""
+        """Update the mode of each search, and find those that have become hopeless."""
         p, outlook = self.parameters, self._outlook
         expected_s = min(_SLOW_SEARCH_S, (outlook.after_s + p.look_s) / outlook.chance) if outlook.chance > 0 else None
         for name, state in self.targets.items():

@@ -3,9 +3,9 @@
 from groundstation.bus.messages import Vector3
 
 Plane = tuple[Vector3, float]
-"""A unit normal, and how far along it the plane lies from the origin."""
+"""A plane: its unit normal, and its distance from the origin along that."""
 
-# The square of the area or volume that normals span, below which their planes are parallel to a line.
+# The square of the area or volume that normals span, below which their planes count as parallel to a line.
 _PARALLEL = 1e-12
 
 
@@ -22,8 +22,8 @@ def cross(a: Vector3, b: Vector3) -> Vector3:
 def touching(wanted: Vector3, planes: tuple[Plane, ...]) -> Vector3 | None:
     """Return the point nearest to `wanted` on all of up to three planes.
 
-    None where they do not meet in one plane, line or point, or where one of them would have to be pulled to: it does
-    not hold `wanted` back, so that without it a nearer point is allowed.
+    None if they do not meet in one plane, line or point, or if one of them does not hold `wanted` back: without that
+    one a nearer point is allowed.
     """
     if len(planes) == 1:
         ((normal, most),) = planes
@@ -39,7 +39,7 @@ def touching(wanted: Vector3, planes: tuple[Plane, ...]) -> Vector3 | None:
 
 
 def _two(wanted: Vector3, first: Plane, second: Plane) -> tuple[float, ...] | None:
-    """Return how far the way to the line of two planes goes against each normal."""
+    """Return the components along both normals of the way to the line in which two planes meet."""
     (a, most_a), (b, most_b) = first, second
     line = cross(a, b)
     area = dot(line, line)
@@ -50,7 +50,7 @@ def _two(wanted: Vector3, first: Plane, second: Plane) -> tuple[float, ...] | No
 
 
 def _three(wanted: Vector3, first: Plane, second: Plane, third: Plane) -> tuple[float, ...] | None:
-    """Return how far the way to the point of three planes goes against each normal."""
+    """Return the components along each normal of the way to the point in which three planes meet."""
     (a, most_a), (b, most_b), (c, most_c) = first, second, third
     bc, ca, ab = cross(b, c), cross(c, a), cross(a, b)
     volume = dot(a, bc)

@@ -1,4 +1,4 @@
-"""Targets that no picture has shown for a moment: told at once, before it is known whether they are hidden or gone."""
+"""Tells the operator at once of targets that no picture has shown for a moment: they may be hidden or gone."""
 
 from collections.abc import Iterable, Mapping
 
@@ -7,11 +7,11 @@ from groundstation.bus.notice import Notice
 from groundstation.estimation.belief import JointBelief
 
 TELL_AFTER_S = 0.6
-"""Unseen for so long, a target may be hidden, or be elsewhere."""
+"""Time unseen after which a target may be hidden, or elsewhere."""
 
 
 def unseen_words(name: str, unseen_s: float, place_m: Iterable[float]) -> str:
-    """Return what is said of a target that is unseen for so long, and expected there [x, y in m; world]."""
+    """Return the message for a target that is unseen for a time [s], and where it is expected (x, y) [m; world]."""
     x, y = place_m
     return f"{name} is not seen for {unseen_s:.1f} s: it may be hidden near ({x:.1f}, {y:.1f})"
 
@@ -23,7 +23,7 @@ class UnseenTargets:
         self._told: frozenset[str] = frozenset()
 
     def advance(self, belief: JointBelief, unseen_s: Mapping[str, float]) -> list[Notice]:
-        """Return what is new; unseen_s: since when no picture has shown each target that is not searched for."""
+        """Return new notices; unseen_s: for how long no picture has shown each target that is not searched for."""
         unseen = {name: age_s for name, age_s in unseen_s.items() if age_s > TELL_AFTER_S and name in belief.layout}
         told, self._told = self._told, frozenset(unseen)
         new = [

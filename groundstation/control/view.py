@@ -1,4 +1,4 @@
-"""Where world-fixed cameras see robots, and how well a place is known."""
+"""Where world-fixed cameras see robots, and how well the place of a robot is known."""
 
 import math
 
@@ -11,8 +11,8 @@ from groundstation.sensing.models import Rectangle, SensorSuite
 
 VIEW_INSET_M = 0.3
 _VELOCITY_ERRORS = ("velocity_bias_x", "velocity_bias_y")
-_POINT_M = 1e-6  # a view that is narrower is a line
-_SEEN_S = 0.5  # between two sightings of a robot in view
+_POINT_M = 1e-6  # a narrower view counts as a line
+_SEEN_S = 0.5  # longest time between two sightings of a robot in view
 
 
 def view_of(x: float, y: float, name: str, parameters: ControlParameters, sensors: SensorSuite) -> Rectangle | None:
@@ -23,7 +23,7 @@ def view_of(x: float, y: float, name: str, parameters: ControlParameters, sensor
 
 
 def spread_m(belief: JointBelief, name: str) -> float:
-    """Return the standard deviation of a position along the axis on which it is known worst [m]."""
+    """Return the standard deviation of a position along its most uncertain axis [m]."""
     P = belief.covariance_of(name)
     xx, xy, yy = float(P[0, 0]), float(P[0, 1]), float(P[1, 1])
     return math.sqrt(0.5 * (xx + yy + math.hypot(xx - yy, 2.0 * xy)))
@@ -52,7 +52,7 @@ def _velocity_errors(belief: JointBelief, name: str) -> list[int]:
 def is_localised(belief: JointBelief, name: str, unseen_s: float, parameters: SafetyParameters) -> bool:
     """Return whether a robot is known well enough to fly on.
 
-    An unseen robot must know its velocity as well: else its position is wrong sooner than its deviation shows.
+    The velocity of an unseen robot must be known as well: else its position is wrong sooner than its deviation shows.
     """
     P = belief.covariance_of(name)
     lies = (
@@ -65,7 +65,7 @@ def is_localised(belief: JointBelief, name: str, unseen_s: float, parameters: Sa
 
 
 class Localisation:
-    """`is_localised`, judged once for each belief and name: the answer is wanted many times a tick."""
+    """Results of `is_localised`, computed once for each belief and name: they are needed many times a tick."""
 
     def __init__(self, parameters: SafetyParameters) -> None:
         self._parameters = parameters
@@ -83,7 +83,7 @@ class Localisation:
 
 
 def way_back_m(places: Array, view: Rectangle) -> Array:
-    """Return how far it is from places (..., 2) towards the middle of a view until they are inside; 0 inside."""
+    """Return the distance [m] from places (..., 2), on the way to the middle of a view, until inside it; 0 inside."""
     apart = np.asarray(places) - view.center
     half_sides = np.maximum(np.ptp((view.x_m, view.y_m), axis=1), _POINT_M) / 2.0
     outside = np.maximum((np.abs(apart) / half_sides).max(axis=-1), 1.0)

@@ -55,15 +55,15 @@ class AwaitedAnswers:
 
     @property
     def unheard(self) -> tuple[str, ...]:
-        """Drones that have not answered at all."""
+        """Return the drones that have not answered at all."""
         return tuple(name for name, progress in self.progress.items() if progress.stage is None)
 
     @property
     def repeat_after_s(self) -> float:
         """Return how long to wait for the next answer before the command is sent again under the same id.
 
-        Whoever has it answers a repetition with its last answer: on this bus any single message may be lost. A stop
-        that nobody has heard does not wait longer than an answer takes on a busy machine.
+        Any single message may be lost on this bus; a drone that has the command answers a repetition with its last
+        answer. An unheard stop is repeated as soon as an answer would have come on a busy machine.
         """
         if not self.unheard:
             return 1.0

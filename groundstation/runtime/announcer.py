@@ -1,4 +1,4 @@
-"""What the tracker says on the bus: estimate, belief, setpoints, plan, innovations, journal, orders to land."""
+"""What the tracker publishes: estimate, belief, setpoints, plan, innovations, journal, orders to land."""
 
 from collections.abc import Iterable, Mapping
 
@@ -23,7 +23,7 @@ from groundstation.planning.planner import PlanResult
 from groundstation.runtime.asking import TEAM
 from groundstation.tracker import Tracker
 
-_SHADES = 255.0  # of the likeliest cell of a map
+_SHADES = 255.0  # value of the likeliest cell of a map
 
 
 class Announcer:
@@ -41,7 +41,7 @@ class Announcer:
         self._bus.publish(ESTIMATE, message)
 
     def belief(self, tracker: Tracker, lateness: tuple[SensorLateness, ...], now_ns: int) -> None:
-        """Publish the joint belief, and by how much cameras seem late."""
+        """Publish the joint belief, and how late each camera seems to be."""
         belief = tracker.belief
         upper = belief.covariance[np.triu_indices(belief.layout.dim)]
         message = Belief(
@@ -54,7 +54,7 @@ class Announcer:
         self._bus.publish(BELIEF, message)
 
     def search_maps(self, tracker: Tracker, now_ns: int) -> None:
-        """Publish where each target may be that is searched for."""
+        """Publish the map of each target that is searched for."""
         for name, room in tracker.lookout.maps().items():
             grid, chances = room.grid, room.chances
             message = SearchMap(
@@ -80,7 +80,7 @@ class Announcer:
             self._bus.publish(SETPOINT, message)
 
     def plan(self, plan: PlanResult, limited: Mapping[str, Limited], mode: str) -> None:
-        """Publish a plan that was adopted, with what safety makes of it now."""
+        """Publish a plan that was adopted, with the setpoints that the output limiter makes of it now."""
         controls = tuple(
             Control(
                 name, entry.setpoint.velocity_m_s, entry.setpoint.yaw_rate_rad_s, entry.limited_by, entry.wanted_m_s
@@ -100,7 +100,7 @@ class Announcer:
         self._bus.publish(PLAN, message)
 
     def innovations(self, corrections: Iterable[Correction], now_ns: int) -> None:
-        """Publish what became of each observation."""
+        """Publish the verdict on each observation."""
         for correction in corrections:
             message = Innovation(
                 header=self._bus.header(correction.observer, now_ns),

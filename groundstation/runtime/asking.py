@@ -1,18 +1,18 @@
-"""What a page or a shell asks of the team: the command, and how long an answer to it may take."""
+"""Commands that a page or a shell gives to the team, and how long their answers may take."""
 
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import OPERATOR, Command, Verb
 from groundstation.time_units import NS_PER_S
 
 TEAM = "team"
-# A start that was not heard by then is given up: it must not surprise anybody later.
+# A start that was not heard by then is dropped: executed later, it would surprise people.
 START_LIVES_NS = 5 * NS_PER_S
 _PATIENCE_S = {Verb.LAND: 20.0, Verb.TAKEOFF: 60.0, Verb.TRACK: 8.0, Verb.RESUME: 8.0}
 _PATIENCE_DEFAULT_S = 5.0
 
 
 def patience_s(verb: Verb) -> float:
-    """Return how long to wait until all have done it [s]; then it is not confirmed."""
+    """Return how long to wait until all drones have done it [s]; after that it is not confirmed."""
     return _PATIENCE_S.get(verb, _PATIENCE_DEFAULT_S)
 
 
@@ -21,8 +21,9 @@ def command_of(
 ) -> Command:
     """Return a command to drones (none: all), stamped now.
 
-    A stop goes to the drones at once and never expires; a start is the operator's, who holds the lease. number: tells
-    commands of one stamp apart; anyway: a take-off although the checks forbid it; viewer: who of a console said so.
+    A stop goes to the drones at once and never expires; a start goes to the operator, who holds the lease. number:
+    distinguishes commands with one stamp; anyway: take off although the checks forbid it; viewer: the person at a
+    console who gave it.
     """
     stop = verb.stops
     header = bus.header(TEAM if stop else OPERATOR)

@@ -1,4 +1,4 @@
-"""Collects what the preflight checks judge, from the bus, and answers whether a take-off is open."""
+"""Collects from the bus the input of the preflight checks, and answers whether a take-off is permitted."""
 
 from collections.abc import Collection, Mapping, Sequence
 from typing import TypeVar
@@ -25,7 +25,7 @@ from groundstation.runtime.asking import TEAM
 from groundstation.time_units import NS_PER_S
 
 _AGAIN_NS = 3 * NS_PER_S
-# Drivers speak twice a second at least: what was said longer ago is not how it is now.
+# Drivers report at least twice a second: older reports do not describe the present.
 _SPOKEN_NS = 3 * NS_PER_S
 _SEVERITIES = {Level.MUST: Severity.ERROR, Level.SHOULD: Severity.WARNING}
 
@@ -35,8 +35,8 @@ _Status = TypeVar("_Status", VehicleStatus, CameraStatus)
 class BeforeTakeOff:
     """Call `update` often; `findings` takes up to a tenth of a second with a team of eight.
 
-    Once `publish` has told the list, `update` tells it again every 3 s while nobody flies. A drone that flew once in
-    this run may stand anywhere: its pad says nothing of it any more. cautions: what the field file is warned about.
+    Once `publish` has sent the list, `update` sends it again every 3 s while nobody flies. A drone that has flown in
+    this run may stand anywhere, so it is no longer compared with its pad. cautions: warnings about the field file.
     """
 
     def __init__(self, bus: Bus, field: ResolvedField, cautions: Sequence[Finding] = ()) -> None:
@@ -72,27 +72,27 @@ class BeforeTakeOff:
             self._record.forget(name)
 
     def complete(self, now_ns: int) -> bool:
-        """Return whether every fixed sensor has spoken and every drone that has not flown was seen often enough."""
+        """Return whether every fixed sensor has reported and every drone that has not flown was seen often enough."""
         if not set(self._field.world_sensors) <= self._cameras.keys():
             return False
         seen = {sighting.drone for sighting in self._record.medians(now_ns)}
         return set(self._field.drones) <= seen | self._flew
 
     def findings(self, now_ns: int) -> list[Finding]:
-        """Return everything that is to be said now, the grave first."""
+        """Return all present findings, the grave first."""
         vehicles, cameras = _spoken(self._vehicles, now_ns), _spoken(self._cameras, now_ns)
         return judge(self._field, vehicles, cameras, self._record.medians(now_ns), self._flew, self._cautions)
 
     def left_out(self, now_ns: int) -> tuple[str, ...]:
-        """Return whom a take-off of all would leave on the ground now."""
+        """Return the drones that a take-off of all would leave on the ground now."""
         return left_out(self._field, _spoken(self._vehicles, now_ns))
 
     def forbids(self, now_ns: int, drones: Collection[str]) -> list[Finding]:
-        """Return what forbids a take-off of the given drones (none: all)."""
+        """Return the findings that forbid a take-off of the given drones (none: all)."""
         return open_musts(self.findings(now_ns), drones, self._field.drones)
 
     def publish(self, findings: Collection[Finding], now_ns: int) -> None:
-        """Tell the console and the recording everything, and what is not well as events."""
+        """Send all findings to the console and the recording, and those that are not OK as events too."""
         self._tell(findings, now_ns)
         for one in findings:
             if one.level in _SEVERITIES:
@@ -108,7 +108,7 @@ class BeforeTakeOff:
         self._bus.publish(PREFLIGHT, Preflight(header=self._bus.header(TEAM), findings=rows))
 
     def record_override(self, who: str, findings: Collection[Finding]) -> None:
-        """Tell everybody, and the recording, that somebody takes off although it was forbidden."""
+        """Report, and record, that somebody takes off although the checks forbid it."""
         what = "; ".join(f"{one.subject}: {one.found}" for one in findings)
         text = f"{who} takes off although it must not: {what}"
         event = Event(header=self._bus.header(TEAM), severity=Severity.WARNING, text=text, remedy="land")
@@ -116,5 +116,5 @@ class BeforeTakeOff:
 
 
 def _spoken(heard: Mapping[str, tuple[int, _Status]], now_ns: int) -> dict[str, _Status]:
-    """Return what was said lately: a driver that is dead says nothing, and not what it said last."""
+    """Return the recent reports: the last report of a dead driver no longer counts."""
     return {name: status for name, (at_ns, status) in heard.items() if now_ns - at_ns < _SPOKEN_NS}

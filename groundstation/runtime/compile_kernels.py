@@ -7,8 +7,8 @@ from groundstation.process import numba_cache
 
 
 def compile_kernels(cache: Path) -> None:
-    """Fill the kernel cache, which `numba_cache.activate` has returned."""
-    # Two halves that take about as long and share little.
+    """Fill the kernel cache, the folder that `numba_cache.activate` returned."""
+    # Two halves that take about the same time and share little.
     other_half = numba_cache.ParallelCompilation(["groundstation.planning.planner", "groundstation.estimation.models"])
     for module in (
         "groundstation.estimation.observe",
@@ -21,7 +21,7 @@ def compile_kernels(cache: Path) -> None:
 
 
 def main() -> None:
-    """Compile what is not in the cache yet, so that the first flight starts at once."""
+    """Compile the kernels that are not in the cache yet, so that the first flight starts at once."""
     cache = numba_cache.activate()
     if not numba_cache.is_complete(cache):
         compile_kernels(cache)

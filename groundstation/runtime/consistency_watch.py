@@ -1,7 +1,7 @@
-"""Which entity contradicts the belief for seconds on end? The operator is warned, with the remedy; no action follows.
+"""Warns the operator of entities that contradict the belief for seconds on end; no action follows.
 
-The filter inflates what lies beyond the gate and re-initialises what diverged. What goes on all the same has a cause
-that it cannot mend: a camera that was knocked, a wrong setting, a sensor or a stream that hangs.
+The filter inflates observations beyond the gate and re-initialises entities that diverged. A contradiction that lasts
+all the same has a cause that it cannot mend: a camera that was knocked, a wrong setting, a sensor or stream that hangs.
 """
 
 from collections.abc import Collection, Iterable
@@ -12,9 +12,10 @@ from groundstation.bus.notice import Notice
 from groundstation.estimation.measurement import Correction
 from groundstation.time_units import NS_PER_S
 
-# NIS per degree of freedom is 1 where the belief is right. Up at the first, down again at the second, each for so long.
+# NIS per degree of freedom is 1 where the belief is right. A warning begins above the first value and ends below the
+# second, each held for this long.
 _FAR, _NEAR, _LASTING_NS = 4.0, 2.0, 3 * NS_PER_S
-# One sighting counts no more than this: a wild one alone is none of a lasting contradiction.
+# One sighting counts no more than this: a single wild one is no lasting contradiction.
 _MOST = 12.0
 _FORGETTING_S, _SILENT_NS = 2.0, 2 * NS_PER_S
 _LEAST_SIGHTINGS = 10.0
@@ -46,13 +47,13 @@ class _Edge:
 
 @dataclass(slots=True)
 class _Alarm:
-    """One entity: whether a warning stands, and since when the evidence says otherwise."""
+    """One entity: whether a warning stands, and since when the evidence has been against it."""
 
     raised: bool = False
     since_ns: int | None = None
 
     def changes(self, wanted: bool, after_ns: int, now_ns: int) -> bool:
-        """Return whether it changes now: once the other has been wanted long enough."""
+        """Return whether the state changes now: once the other one has been wanted for long enough."""
         if wanted == self.raised:
             self.since_ns = None
             return False
@@ -64,7 +65,7 @@ class _Alarm:
 
 
 class ConsistencyWatch:
-    """Fed with what became of observations and with what was refused; `notices` once a tick or less often."""
+    """Call `take` with corrections, `refused` with refused messages, and `notices` once a tick or less often."""
 
     def __init__(self, names: Collection[str]) -> None:
         self._edges: dict[tuple[str, str], _Edge] = {}
@@ -73,13 +74,13 @@ class ConsistencyWatch:
         self._froze_at: dict[tuple[str, str], int] = {}
 
     def refused(self, message: Message, verdict: Verdict, now_ns: int) -> None:
-        """Take a message that was refused: one that repeats itself says that its sensor hangs."""
+        """Take a refused message; a message that repeats itself shows that its sensor hangs."""
         if verdict is Verdict.FROZEN and message.header.entity in self._frozen:
             kind = {RelativeObservation: "camera", Odometry: "odometry"}.get(type(message), "sensor")
             self._froze_at[message.header.entity, kind] = now_ns
 
     def take(self, corrections: Iterable[Correction], now_ns: int) -> None:
-        """Take what became of observations; those that brought their subject in say nothing of the belief before."""
+        """Take corrections; one that brought its subject into the belief says nothing of the belief before."""
         for c in corrections:
             if c.nis is not None and c.residual and not c.joined and {c.observer, c.subject} <= self._alarms.keys():
                 edge = self._edges.setdefault((c.observer, c.subject), _Edge())
@@ -103,7 +104,7 @@ class ConsistencyWatch:
         for name, alarm in self._alarms.items():
             own = [mean for pair, mean in live.items() if name in pair]
             if not own:
-                alarm.since_ns = None  # what is not seen says nothing, for or against
+                alarm.since_ns = None  # an entity that is not seen gives no evidence, for or against
                 continue
             wanted = name in blamed if not alarm.raised else max(own) > _NEAR
             if not alarm.changes(wanted, _LASTING_NS, now_ns):
@@ -130,10 +131,9 @@ class ConsistencyWatch:
 
 
 def _culprit(pair: tuple[str, str], far: Collection[tuple[str, str]], live: Collection[tuple[str, str]]) -> str:
-    """Return whom to name for one contradicting pair: the observer if it alone contradicts, or contradicts elsewhere.
+    """Return the entity to blame for a contradicting pair: the observer if it contradicts alone, or elsewhere as well.
 
-    Where all that see a subject contradict the belief of it, the subject is named: which of them is right, none can
-    tell.
+    If all that see a subject contradict the belief of it, the subject is named: nobody can tell which of them is right.
     """
     observer, subject = pair
     rivals = [other for other in live if other[1] == subject and other[0] != observer]

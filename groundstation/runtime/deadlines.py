@@ -1,4 +1,4 @@
-"""When the turns of a loop of a fixed rate are due, and how many come too late."""
+"""Due times of a fixed-rate loop, and a count of ticks that start too late."""
 
 from dataclasses import dataclass
 
@@ -17,7 +17,7 @@ class Deadlines:
     overruns: int = 0
 
     def start_tick(self, now_ns: int) -> None:
-        """Count a tick that starts now. Ticks that were slept through are counted as overruns and not made up for."""
+        """Count a tick that starts now. Missed ticks count as overruns and are not made up for."""
         self.ticks += 1
         late_ns = now_ns - self.next_ns
         if late_ns > _LATE_NS:

@@ -1,4 +1,4 @@
-"""What has arrived for the tracker since the last tick: decoded, in order of arrival, refusals counted."""
+"""The messages that arrived for the tracker since the last tick: decoded, in order of arrival; refusals are counted."""
 
 from collections import Counter
 
@@ -29,7 +29,7 @@ _MAX_PER_TICK = 4096
 class Inbox:
     """Drains one bounded subscription; the network thread only enqueues into it.
 
-    The order of arrival need not be the order of measurement: the filter puts it right (estimation/fixed_lag.py).
+    The order of arrival need not be the order of measurement: the filter restores that (estimation/fixed_lag.py).
     """
 
     def __init__(self, bus: Bus) -> None:
@@ -44,7 +44,7 @@ class Inbox:
         return self._subscription.overflowed + self._skipped
 
     def pop_ready(self) -> list[tuple[str, Message]]:
-        """Return (key, message) of all that has arrived, in order; what cannot be decoded is counted by reason."""
+        """Return (key, message) of all that arrived, in order; undecodable messages are counted by reason."""
         ready = []
         samples = self._subscription.drain_samples()
         self._skipped += max(0, len(samples) - _MAX_PER_TICK)

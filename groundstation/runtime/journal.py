@@ -11,7 +11,7 @@ STOPPED = "stopped"
 
 @dataclass(frozen=True, slots=True)
 class Adoption:
-    """A plan that came back: the tick whose snapshot it was made on; `plan` is None when planning failed."""
+    """A finished plan with the tick on whose snapshot it was made; `plan` is None if planning failed."""
 
     tick: int
     plan: PlanResult | None

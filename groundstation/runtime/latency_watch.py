@@ -1,4 +1,4 @@
-"""Are a camera's pictures as old as its setting says? If not, the operator is warned; no action follows."""
+"""Warns the operator when a camera's pictures are older or newer than its delay setting says; no action follows."""
 
 import math
 
@@ -7,8 +7,8 @@ from groundstation.bus.notice import Notice
 from groundstation.estimation.camera_latency import Lateness, LatenessWatch
 from groundstation.field.resolved import ResolvedField
 
-# Told where a delay that may be wrong by so much explains the turns 100 times better than a right one, as the diagnosis
-# asks for, and from so much on; withdrawn below the second figures.
+# A warning begins when a delay this wrong explains the turns 100 times better than a right one, as in the diagnosis,
+# and the error exceeds this; it ends below the second figures.
 _WRONG_S, _SURE, _TOLERATED_S = 0.08, math.log(100.0), 0.015
 _SIGMAS_AGAIN, _TOLERATED_AGAIN_S = 2.0, 0.010
 
@@ -16,7 +16,7 @@ _SIGMAS_AGAIN, _TOLERATED_AGAIN_S = 2.0, 0.010
 class PictureAge:
     """Feeds a LatenessWatch with accepted sightings, and turns its findings into notices.
 
-    clock: whose stamps count; those of another host would need its offset.
+    clock: the clock whose stamps count; stamps of another host would need its offset.
     """
 
     def __init__(self, field: ResolvedField, clock: str) -> None:
@@ -42,11 +42,11 @@ class PictureAge:
             self._watch.saw(name, name, message.subject, header.stamp_ns, message.yaw_rad)
 
     def lateness(self) -> tuple[SensorLateness, ...]:
-        """Return what is known of the cameras' delays."""
+        """Return the measured lateness of each camera against its setting."""
         return tuple(SensorLateness(one.sensor, 1e3 * one.offset_s, 1e3 * one.std_s) for one in self._watch.told())
 
     def notices(self) -> list[Notice]:
-        """Return new warnings about cameras, and their ends; call it about once a second."""
+        """Return new warnings about cameras, and withdrawals; call it about once a second."""
         found = []
         for one in self._watch.told():
             told, off_s = self._told.get(one.sensor, False), abs(one.offset_s)
@@ -63,7 +63,7 @@ class PictureAge:
     def _warning(self, one: Lateness) -> Notice:
         key, now_ms = self._settings[one.sensor]
         than, other = ("older", "newer") if one.offset_s > 0.0 else ("newer", "older")
-        # Turns in pictures are compared with turns in telemetry: which of the two is late does not show here.
+        # Turns in pictures are compared with turns in telemetry: which of the two is late is not observable.
         text = (
             f"its pictures seem {1e3 * abs(one.offset_s):.0f} +- {1e3 * one.std_s:.0f} ms {than} than configured, "
             f"or the telemetry that they are compared with is as much {other}"
@@ -79,6 +79,6 @@ class PictureAge:
 
 
 def _lead(one: Lateness) -> float:
-    """Return by how much (log) a wrong delay explains what was measured better than a right one."""
+    """Return the log likelihood ratio of a wrong delay against a right one."""
     wide, narrow = _WRONG_S**2 + one.std_s**2, one.std_s**2
     return 0.5 * (one.offset_s**2 * (1.0 / narrow - 1.0 / wide) - math.log(wide / narrow))

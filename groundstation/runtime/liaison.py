@@ -1,7 +1,7 @@
 """The liaison process: speaks for the supervisor with one other host that runs devices of the field.
 
-It says what the host is to run, answers its questions for the time, and passes the supervisor's silence on. To the
-supervisor it stands for all devices there: it is not well while the host is not, and ends when they have.
+It sends the host its order of what to run, answers its time requests, and falls silent to it when the supervisor does.
+To the supervisor it stands for all devices there: it is unwell while the host is, and ends when they have ended.
 """
 
 from importlib.metadata import version
@@ -26,9 +26,9 @@ VERSION = version("skein-groundstation")
 _TURN_NS = 50 * NS_PER_MS
 _ORDER_PERIOD_NS = NS_PER_S
 _SILENT_NS = 500 * NS_PER_MS
-# As long as drivers may take to land and end, with the guardian that waits for them.
+# As long as drivers may take to land and end, including the guardian that waits for them.
 _LINGER_NS = 25 * NS_PER_S
-# A host whose devices are starting is waited for; one that nobody has started is not.
+# A host whose devices are still starting is waited for; a host that nobody has started is not.
 _START_NS = 15 * NS_PER_S
 
 
@@ -41,9 +41,9 @@ class LiaisonSection(msgspec.Struct, frozen=True):
 
 
 class Liaison:
-    """The talk with one host; times are of the run's clock.
+    """The exchange with one host; times are of the run's clock.
 
-    Of two processes under its name the first is heard until it is silent. doubled: whether a second was heard just now.
+    If two processes use its name, only the first is heard until it is silent. doubled: whether a second was just heard.
     """
 
     def __init__(self, bus: Bus, section: LiaisonSection) -> None:
@@ -55,7 +55,7 @@ class Liaison:
         self._next_order_ns = 0
 
     def turn(self, now_ns: int, supervision: Supervision) -> None:
-        """Answer what came; give the order to a host that does not serve this run yet."""
+        """Answer messages; give the order to a host that does not serve this run yet."""
         reports = [(one, one.message) for one in self.reports.drain() if isinstance(one.message, HostReport)]
         if reports:
             self.doubled = False
@@ -89,7 +89,7 @@ class Liaison:
 
     @property
     def serving(self) -> bool:
-        """Return whether the host said last that it serves this run."""
+        """Return whether the host's last report says that it serves this run."""
         return self._newest is not None and self._newest.run == self._bus.run
 
     def silent(self, now_ns: int) -> bool:
@@ -97,7 +97,7 @@ class Liaison:
         return now_ns - self._heard_ns > _SILENT_NS
 
     def state(self, now_ns: int) -> tuple[Lifecycle, str]:
-        """Return how the devices of the host are, in a word and in words."""
+        """Return the lifecycle state of the host's devices, and a description."""
         host, newest = self._section.host, self._newest
         if newest is None:
             return Lifecycle.STARTING, f"{host} is not there: on it, groundstation host"
@@ -109,7 +109,7 @@ class Liaison:
 
 
 def run(child: Child) -> int:
-    """Speak with the host until the run ends and the devices there have; the process entry."""
+    """Exchange messages with the host until the run and the devices there have ended; the process entry."""
     liaison = Liaison(child.bus, msgspec.json.decode(child.section, type=LiaisonSection))
     liaison.reports.on_arrival = child.wake
     began_ns, ends_ns, was_silent, was_doubled = clock.now_ns(), 0, False, False

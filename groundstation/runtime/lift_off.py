@@ -1,7 +1,7 @@
 """Whether the drone that reports flight is the one whose marker rose. Pure.
 
-What a drone reports comes from its address, what cameras see from its marker: where the two disagree, the addresses or
-the markers of two drones are exchanged, and the tracker would move one by what it sees of the other.
+Reports are assigned to a drone by address, sightings by marker. If the two disagree, the addresses or the markers of
+two drones are exchanged, and the tracker would steer one drone by sightings of the other.
 """
 
 from collections.abc import Mapping
@@ -12,16 +12,16 @@ from groundstation.time_units import NS_PER_S
 
 # Ten times the error of a fixed camera's heights (2 to 3 cm at 4 m), and less than the lowest take-off height (0.4 m).
 RISEN_M = 0.25
-# A height is reported 0.1 s before the sighting is here, at climbs of up to 1 m/s; the edge of a pad or a cable below
-# the drone takes off 0.2 m; lenses are calibrated to 2 %. An AR.Drone hovers at 0.8 m: a marker on the floor is off by
-# twice the tolerance. An autopilot's height is a barometer's or our own belief come back, and is never published
-# (drivers/mavlink/publisher.py): of those vehicles only the rise counts.
+# Tolerance between the two heights. A height is reported 0.1 s before the sighting arrives, at climbs of up to 1 m/s;
+# the edge of a pad or a cable below the drone takes off 0.2 m; lenses are calibrated to 2 %. An AR.Drone hovers at 0.8
+# m: a marker on the floor is off by twice the tolerance. An autopilot's height is a barometer's or our own belief sent
+# back, and is never published (drivers/mavlink/publisher.py): of those vehicles only the rise counts.
 AGREES_M = 0.4
-# A vehicle whose estimator is fed with another's height climbs on without end, up to 1 m/s in the simulator.
+# A vehicle whose estimator is fed another one's height climbs without end, at up to 1 m/s in the simulator.
 _OTHER_ROSE_NS = NS_PER_S // 2
 _NOTHING_ROSE_NS = 3 * NS_PER_S
-# A vehicle that reports no height may say that it is in the air as soon as its skids are free: PX4 took 2 s from there
-# to RISEN_M in the simulator, and climbs as slowly as its limits say.
+# A vehicle that reports no height may report flight as soon as its skids are free: PX4 took 2 s from there to RISEN_M
+# in the simulator, and its limits may make it climb more slowly.
 _NOTHING_ROSE_YET_NS = 5 * NS_PER_S
 _REMEDY = (
     "check address, system id and marker code of {} in the field file against what the drones are and carry "
@@ -31,7 +31,7 @@ _REMEDY = (
 
 @dataclass(frozen=True, slots=True)
 class Mistake:
-    """A likely mistake in the field file or on the markers, and what to check."""
+    """A likely mistake in the field file or in the placing of markers, and what to check."""
 
     text: str
     remedy: str
@@ -41,7 +41,7 @@ class Mistake:
 
 
 def is_seen_in_flight(member: Member, now_ns: int) -> bool:
-    """Return whether a camera sees the marker of a drone that is up, risen to where the drone says that it is."""
+    """Return whether a camera sees the marker of a flying drone as high as the drone reports."""
     rise_m, reported_m = member.rise_m(now_ns), member.reported_m(now_ns)
     if not member.up or rise_m is None or rise_m < RISEN_M:
         return False
@@ -49,7 +49,7 @@ def is_seen_in_flight(member: Member, now_ns: int) -> bool:
 
 
 def why_unseen(member: Member, now_ns: int, for_s: float) -> str:
-    """Return why a drone that is up was not seen in flight for a time."""
+    """Return why a flying drone was not seen in flight for a time [s]."""
     rise_m, reported_m = member.rise_m(now_ns), member.reported_m(now_ns)
     if rise_m is None:
         return f"not seen by any fixed camera for {for_s:g} s"
@@ -58,13 +58,13 @@ def why_unseen(member: Member, now_ns: int, for_s: float) -> str:
 
 
 class LiftOffWatch:
-    """Watches one take-off for a marker that stays on the floor."""
+    """Watches one take-off for a marker that stays on the floor while its drone flies."""
 
     def __init__(self) -> None:
         self._since: dict[str, int] = {}
 
     def step(self, now_ns: int, name: str, members: Mapping[str, Member]) -> Mistake | None:
-        """Return the likely mistake if the drone of that name flies and its marker does not."""
+        """Return the likely mistake if the named drone flies and its marker does not."""
         member = members[name]
         if not _has_lifted(member, now_ns) or _has_risen(member, now_ns):
             self._since.clear()

@@ -1,4 +1,4 @@
-"""How high the drones' markers are, by the cameras fixed in the world. Pure."""
+"""The heights of the drones' markers as seen by fixed cameras. Pure."""
 
 import statistics
 from collections import deque
@@ -7,21 +7,21 @@ from dataclasses import dataclass
 from groundstation.bus.messages import Vector3
 from groundstation.time_units import NS_PER_S
 
-# The median of five forgets a wrong sighting or two, and is a fifth of a second late at 15 pictures a second. A machine
-# that is too busy brought two a second.
+# The median of five ignores one or two wrong sightings, and is a fifth of a second late at 15 pictures a second. An
+# overloaded machine delivered two a second.
 _WINDOW_NS = 2 * NS_PER_S
 _MOST, _LEAST = 5, 3
 
 
 @dataclass(frozen=True, slots=True)
 class FixedCamera:
-    """Where a camera is fixed: height_m above the floor; up: the world's z axis [camera_optical]."""
+    """The place of a fixed camera: height_m above the floor; up: the world's z axis [camera_optical]."""
 
     height_m: float
     up: Vector3
 
     def height_of(self, position_m: Vector3) -> float:
-        """Return how high above the floor a point [camera_optical] is [m]."""
+        """Return the height of a point [camera_optical] above the floor [m]."""
         return self.height_m + sum(a * b for a, b in zip(self.up, position_m, strict=True))
 
 
@@ -36,10 +36,10 @@ class MarkerHeight:
         self._sightings.append((now_ns, height_m))
 
     def forget(self) -> None:
-        """Start anew: where the marker was says nothing of where it is."""
+        """Start anew: past places of the marker say nothing of its present one."""
         self._sightings.clear()
 
     def at(self, now_ns: int) -> float | None:
-        """Return the height [m], or None unless the marker is in view now."""
+        """Return the height [m], or None if the marker is not in view now."""
         heights = [height_m for seen_ns, height_m in self._sightings if now_ns - seen_ns < _WINDOW_NS]
         return statistics.median(heights) if len(heights) >= _LEAST else None

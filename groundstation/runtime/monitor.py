@@ -12,7 +12,7 @@ from groundstation.monitor.state import cast_from_field
 from groundstation.process.child import Child
 from groundstation.time_units import NS_PER_MS
 
-# A third of the drawing period: the heartbeat wants 10 turns a second, the eye four pictures.
+# A third of the drawing period: the heartbeat needs 10 turns a second, the eye four pictures.
 _PERIOD_NS = 84 * NS_PER_MS
 
 
@@ -23,7 +23,7 @@ class MonitorSection(msgspec.Struct, frozen=True):
 
 
 def run(child: Child) -> int:
-    """Draw until asked to stop or until the supervisor is gone; always gives the terminal back."""
+    """Draw until asked to stop or until the supervisor is gone; always restores the terminal."""
     section = msgspec.json.decode(child.section, type=MonitorSection)
     cast = cast_from_field(section.field)
     with Screen(child.bus, cast, clock.now_ns(), hint="Ctrl-C lands all") as screen:

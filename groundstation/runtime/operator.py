@@ -1,4 +1,4 @@
-"""The operator's hands: holds the lease, gives orders, and follows each of them until it is confirmed or is not."""
+"""The operator: holds the lease, gives orders, and follows each of them until it is confirmed or given up."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ _IN_THE_AIR = (TeamPhase.UP, TeamPhase.TRACKING, TeamPhase.HELD)
 
 @dataclass(slots=True)
 class _Dialogue:
-    """An order that is still followed, and the request from another shell that it answers."""
+    """An order that is still being followed, and the request of another shell that it answers."""
 
     book: AwaitedAnswers
     given_ns: int
@@ -46,7 +46,7 @@ class _Dialogue:
 
 
 class Operator:
-    """Call `step` 10 times a second or more. `say` gets lines for the person.
+    """Call `step` 10 times a second or more; `say` receives lines for the person.
 
     cameras: those fixed in the world; mistake, forbidden: why the last take-off was stopped, or did not begin.
     """
@@ -83,7 +83,7 @@ class Operator:
     # -- orders --------------------------------------------------------------------------------------------------
 
     def take_off(self, now_ns: int, drones: tuple[str, ...] = (), anyway: bool = False, given_ns: int = 0) -> None:
-        """Take off, all or given drones, then track, unless `forbidden`, as by a stop after given_ns (0: given now)."""
+        """Take off with all or given drones, then track, unless `forbidden` or stopped since given_ns (0: now)."""
         overtaken = self._requests.overtaken(given_ns or now_ns)
         self.forbidden = overtaken or self._forbids(now_ns, drones, OPERATOR if anyway else "")
         if self.forbidden:
@@ -92,7 +92,7 @@ class Operator:
         self._begin(now_ns, drones, then_track=True)
 
     def _forbids(self, now_ns: int, drones: tuple[str, ...], insists: str) -> str:
-        """Return why nobody may take off, or "": nothing is wrong, or somebody insists, which is put on record."""
+        """Return why nobody may take off, or "" if nothing is wrong or somebody insists, which is recorded."""
         if self._checks is None:
             return ""
         musts = self._checks.forbids(now_ns, drones)
@@ -109,13 +109,14 @@ class Operator:
         self._phase_before, self.phase = self.phase, TeamPhase.TAKING_OFF
 
     def track(self, now_ns: int, drones: tuple[str, ...] = (), request: Command | None = None) -> None:
-        """Let the tracker move the given drones (none given: all that are up)."""
+        """Let the tracker move the given drones (none given: all that fly)."""
         self._give(Verb.TRACK, drones or self.team.up, now_ns, request)
 
     def land(self, now_ns: int) -> None:
-        """Land everybody; whatever else was going on ends."""
+        """Land all drones; whatever else is in progress ends."""
         given = [dialogue.book.command for dialogue in self._dialogues]
-        # Not by the phase: another shell's LAND, which sets it as well, may have been lost on its way.
+        # Not judged by the phase: another shell's LAND sets it as well, and may have been lost on its way to the
+        # drones.
         if not any(order.verb is Verb.LAND and not order.scope for order in given):
             self.phase = TeamPhase.LANDING
             stop = self._give(Verb.LAND, (), now_ns).command
@@ -123,11 +124,11 @@ class Operator:
             self._end_starts(stop, now_ns)
 
     def landed(self, now_ns: int) -> bool:
-        """Return whether no drone is in the air, as far as they say."""
+        """Return whether no drone is in the air, as far as the drones report."""
         return not self.team.airborne(now_ns)
 
     def _end_starts(self, stop: Command, now_ns: int) -> None:
-        """Give up what was to begin, for a stop of the whole team, and tell who asked for it."""
+        """Cancel starts for a stop of the whole team, and tell the shells that requested them."""
         why = StopMark.of(stop, now_ns, clock.clock_id()).words
         starts = [dialogue for dialogue in self._dialogues if not dialogue.book.command.verb.stops]
         for request in (self._sequence_request, *(dialogue.request for dialogue in starts)):
@@ -159,7 +160,7 @@ class Operator:
     # -- turn ----------------------------------------------------------------------------------------------------
 
     def step(self, now_ns: int) -> None:
-        """Renew the lease, hear everybody, go on with what is under way."""
+        """Renew the lease, take messages, and continue orders in progress."""
         if now_ns >= self._next_lease_ns:
             self._next_lease_ns = now_ns + _LEASE_PERIOD_NS
             header = self._bus.header(TEAM)
@@ -168,7 +169,7 @@ class Operator:
         self.team.update(now_ns)
         if self._checks is not None:
             self._checks.update(now_ns)
-        # Requests last: a stop that waits behind one has overtaken it.
+        # Requests come last: a stop that waits behind one in the queue takes precedence.
         for message in sorted((received.message for received in self._inbox.drain()), key=is_request):
             match message:
                 case CommandAck() as ack:
@@ -188,14 +189,14 @@ class Operator:
                 self.phase, self.tracking_since_ns = TeamPhase.TRACKING, self.tracking_since_ns or now_ns
             line = f"{ack.header.entity}: {ack.verb} {progress.text()}"
             if progress.settled and line != self._said.get(ack.header.entity):
-                self._said[ack.header.entity] = line  # a refusal is asked again several times a second
+                self._said[ack.header.entity] = line  # the same refusal comes several times a second
                 self._say(line)
 
     def _hear_command(self, command: Command, now_ns: int) -> None:
         if OPERATOR in command.scope:
             self._serve(command, now_ns)
         elif why_another_runs(command, self._bus.run) or why_too_old(command, now_ns, clock.clock_id()):
-            return  # no driver obeys it, and it is theirs to say so
+            return  # no driver obeys it, and drivers report that themselves
         elif command.verb.stops and self._requests.hear_stop(now_ns, command):
             self._hear_stop(command, now_ns)
 
@@ -247,7 +248,7 @@ class Operator:
     # -- what is under way ---------------------------------------------------------------------------------------
 
     def _follow(self, now_ns: int) -> None:
-        """Repeat orders that were not answered; close those that are settled or out of time."""
+        """Repeat orders that were not answered; close those that are settled or timed out."""
         for dialogue in list(self._dialogues):
             book, verb = dialogue.book, dialogue.book.command.verb
             late = now_ns - dialogue.given_ns > _CONFIRM_NS.get(verb, _CONFIRM_DEFAULT_NS)
@@ -306,7 +307,7 @@ class Operator:
     def _finish(self, sequence: TakeOff, now_ns: int) -> None:
         request, self._sequence, self._sequence_request = self._sequence_request, None, None
         if self._phase_before in _IN_THE_AIR and not self.landed(now_ns):
-            self.phase = self._phase_before  # others have flown all the while
+            self.phase = self._phase_before  # the others have flown all the while
         else:
             self.phase = TeamPhase.UP if sequence.up else TeamPhase.GROUND
         self.mistake = sequence.mistake

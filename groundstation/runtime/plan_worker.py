@@ -20,7 +20,7 @@ _log = logging.getLogger(__name__)
 class PlanWorker:
     """One request at a time: `submit` while `idle`, `poll` each tick for the result.
 
-    budget_s: wall time within which the planner is asked to stop with the best plan so far.
+    budget_s: wall time after which the planner is asked to stop with the best plan so far.
     """
 
     def __init__(self, planner: Planner, budget_s: float, clock: Callable[[], float] = time.monotonic) -> None:
@@ -54,7 +54,7 @@ class PlanWorker:
             return done
 
     def close(self) -> None:
-        """Stop the thread after the plan that it is at."""
+        """Stop the thread once its present plan is done."""
         with self._wake:
             self._closed = True
             self._wake.notify()

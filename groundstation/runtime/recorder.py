@@ -1,4 +1,4 @@
-"""The recorder process: everything on the bus into MCAP files, cheaply, and through a full disk.
+"""The recorder process: writes everything on the bus to MCAP files at little cost, and survives a full disk.
 
 Started as `groundstation.runtime.recorder:run`. See groundstation/recording for files and formats.
 """
@@ -51,7 +51,7 @@ def _blurred(pictures: list[Sample]) -> list[Sample]:
 
 
 def _rotation(settings: RecordingValues) -> "Rotation":
-    """Return when a part is full."""
+    """Return the limits at which a part of the recording is full."""
     from groundstation.recording.rotating_file import Rotation
 
     return Rotation(round(settings.rotate_mb * 1e6), round(settings.rotate_minutes * 60 * NS_PER_S))
@@ -61,21 +61,21 @@ class Recorder:
     """Drains the bus into the files of one run."""
 
     def __init__(self, child: Child, section: RecorderSection) -> None:
-        # First of all: what is said from now on waits in these queues, whatever writing it still takes to load. Bounded
-        # in bytes as well as in number: a picture is a hundred times a state message.
+        # First of all: messages from now on wait in these queues while the writer still loads. Bounded in bytes as well
+        # as in number: a picture is a hundred times a state message.
         settings = field_from_json(section.field).recording
         self._state_queue = child.bus.subscribe(STATE_TOPICS, capacity=8192)
         self._image_queue = child.bus.subscribe(_PICTURES[settings.pictures], capacity=64)
         self._blurs = settings.pictures == "blurred"
         self._datagram_queue = child.bus.subscribe(DATAGRAM_TOPICS if settings.raw_datagrams else (), capacity=4096)
-        # Only here: formats and compression take half a second, which a recorder that was killed does not have.
+        # Only here: importing formats and compression takes half a second, which a restarted recorder must not lose.
         from groundstation.recording.reader import recorded_offset_ns
         from groundstation.recording.writing import RunWriter
 
         self._child = child
         self._folder = Path(section.run_dir)
         self._folder.mkdir(parents=True, exist_ok=True)
-        # One that was killed and started again goes on with the first one's: the system's clock may be another by now.
+        # A restarted recorder keeps the first one's clock offset: the system's clock may have been set since.
         kept_ns = recorded_offset_ns(self._folder, clock.clock_id())
         timeline = Timeline(clock.clock_id(), clock.unix_offset_ns() if kept_ns is None else kept_ns)
         self._space = Space.AMPLE
@@ -112,7 +112,7 @@ class Recorder:
                 self._child.degrade(trouble.text)
 
     def announce(self) -> None:
-        """Say READY with the folder, unless a file still cannot be written."""
+        """Report READY with the folder, unless a file still cannot be written."""
         if not any(series.failing for series in self._series):
             self._child.ready(str(self._folder))
 
@@ -129,7 +129,7 @@ class Recorder:
         return sum(series.written for series in self._series)
 
     def close(self) -> None:
-        """Write what is left and finish the files; says what does not succeed."""
+        """Write what is left and finish the files; reports what fails."""
         self.turn()
         self._writer.close()
         for series in self._series:
@@ -145,7 +145,7 @@ class Recorder:
         try:
             free = free_bytes(self._folder)
         except OSError:
-            return  # the folder is gone: writing will say so
+            return  # the folder is gone: writing will report it
         before, self._space = self._space, assess(free, self._space)
         if self._space > before:
             text = f"{free / 1e6:.0f} MB left for recordings: {_CONSEQUENCE[self._space]}"

@@ -1,7 +1,7 @@
-"""Beliefs that are given up for what a camera says: who is the likely culprit? Said once, not at each time.
+"""Names the likely culprit when a camera's sightings re-initialise robots; said once, not each time.
 
-One robot that is re-initialised was lost. All that one camera sees at once, or one again and again, have a cause that
-re-initialising does not mend.
+A single re-initialised robot was lost. If all that one camera sees are re-initialised at once, or one robot again and
+again, there is a cause that re-initialising does not mend.
 """
 
 from collections.abc import Iterable
@@ -19,7 +19,7 @@ _EITHER_REMEDY = "its odometry or that camera is wrong; hold or land it and look
 
 
 class RejoinWatch:
-    """Fed with what became of observations; robots: the names of those that fly."""
+    """Call `take` with the corrections; robots: the names of those that fly."""
 
     def __init__(self, robots: Iterable[str]) -> None:
         self._robots = frozenset(robots)
@@ -27,7 +27,7 @@ class RejoinWatch:
         self._told: dict[str, int] = {}
 
     def take(self, corrections: Iterable[Correction], now_ns: int) -> list[Notice]:
-        """Take corrections; returns what is worth telling now."""
+        """Take corrections; returns the notices for the operator."""
         found = []
         for c in corrections:
             given_up = c.joined and c.nis is not None

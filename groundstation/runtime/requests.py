@@ -1,4 +1,4 @@
-"""Requests of other shells: each is obeyed once, answered as often as it is repeated, and never after a later stop."""
+"""Requests of other shells: each is obeyed once, never after a later stop, and answered as often as it is repeated."""
 
 from collections.abc import Collection
 from typing import Any
@@ -14,14 +14,14 @@ _REMEMBERED = 256
 
 
 def is_request(message: object) -> bool:
-    """Return whether this asks the operator for something; other commands are for the drivers."""
+    """Return whether this is a request to the operator; other commands are for the drivers."""
     return isinstance(message, Command) and OPERATOR in message.scope
 
 
 def asked_ns(start: Command | None) -> int | None:
-    """Return when a start was asked for [ns; our boot clock]; None for anything else, and from another clock.
+    """Return when a start was requested [ns; our boot clock]; None for other commands, and for stamps of another clock.
 
-    Drivers that have heard of a later stop must know.
+    Drivers need it to refuse a start that is older than a stop they heard.
     """
     if start is None or start.verb.stops or start.header.clock != clock.clock_id():
         return None
@@ -29,7 +29,7 @@ def asked_ns(start: Command | None) -> int | None:
 
 
 class Requests:
-    """Remembers the last answer to each request, which stops were heard, and the last one of each drone."""
+    """Remembers the last answer to each request, the stops that were heard, and the last stop of each drone."""
 
     def __init__(self, bus: Bus, drones: Collection[str]) -> None:
         self._bus = bus
@@ -69,9 +69,10 @@ class Requests:
         return True
 
     def refusal(self, now_ns: int, request: Command) -> str:
-        """Return why a request does not count, or "".
+        """Return why a request is refused, or "".
 
-        Whoever misses an answer repeats a request for as long as a minute. It must not undo a stop that came meanwhile.
+        A shell that misses an answer repeats its request for up to a minute. It must not undo a stop that came
+        meanwhile.
         """
         names = [name for name in request.scope if name != OPERATOR]
         strangers = [name for name in names if name not in self._drones]
@@ -86,7 +87,7 @@ class Requests:
         return self.overtaken(request.header.stamp_ns, names)
 
     def overtaken(self, given_ns: int, names: Collection[str] = ()) -> str:
-        """Return which stop came after a start of some drones (none named: of all) was given, or ""."""
+        """Return the stop that came after a start of some drones (none named: of all) was given, or ""."""
         later = [self._stops[name] for name in names or self._drones if name in self._stops]
         return next((stop.words for stop in later if stop.overtakes(given_ns)), "")
 

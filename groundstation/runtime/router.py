@@ -1,4 +1,4 @@
-"""The router process: it listens and forwards, and does nothing else, so that no stall here can stall the team."""
+"""The router process: listens and forwards, and does nothing else that could stall the team's messages."""
 
 import time
 from typing import Any
@@ -15,14 +15,15 @@ from groundstation.runtime.router_refusals import RouterRefusals
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _TURN_NS = 50 * NS_PER_MS
-# Longer than sim_bridge and drivers take to land without a supervisor; they still want to be heard meanwhile.
+# Longer than sim_bridge and drivers take to land without a supervisor; their messages must still arrive.
 _LINGER_NS = 25 * NS_PER_S
 
 
 class RouterSection(msgspec.Struct, frozen=True):
     """What the supervisor hands to the router: where to listen, and whom to let in (None: everybody).
 
-    also: further endpoints, for other hosts. name_refusals: whether events name members that publish what they may not.
+    also: further endpoints, for other hosts. name_refusals: whether events name members that publish without the right
+    to.
     """
 
     endpoint: str
@@ -40,7 +41,7 @@ def run(child: Child) -> int:
     )
     bus = ZenohBus(session, child.spec.site, child.name)
     child.ready()
-    go_first()  # only this loop, which beats: where nothing is left of the processor, a living router counted as hung
+    go_first()  # for this loop alone, which beats: on an overloaded processor a living router once counted as hung
     orphaned_ns = 0
     while not child.stop_requested:
         now_ns = time.monotonic_ns()

@@ -1,4 +1,4 @@
-"""What the router refused: Zenoh says so on standard output, and nowhere else."""
+"""What the router refused: Zenoh reports it on standard output only."""
 
 import fcntl
 import logging
@@ -17,7 +17,7 @@ _STDOUT = 1
 _KEPT_LINES = 20
 _PIPE_BYTES, _BLOCK_BYTES = 1 << 20, 8192
 _STRANGERS = ""
-# WIRE: lines of Zenoh's access list, docs/reference/zenoh.md 10.3. Found literally: there may be a megabyte a second.
+# WIRE: lines of Zenoh's access list, docs/reference/zenoh.md 10.3. Matched literally: there may be a megabyte a second.
 _DENIED = b" is unauthorized to Put (ingress) on "
 _WHO = re.compile(rb"([0-9a-f]{1,32})( on \S+)?$")
 _NAME = re.compile(rb"CertCommonName\(([\w.-]+)\)")
@@ -25,9 +25,9 @@ _log = logging.getLogger(__name__)
 
 
 class RouterRefusals:
-    """Takes standard output over and tells what it says of connections and messages that were refused.
+    """Redirects standard output and reports the refused connections and messages that Zenoh writes there.
 
-    The router never waits for its reader: what does not fit into the pipe is lost.
+    The router never waits for this reader: lines that do not fit into the pipe are lost.
     """
 
     def __init__(self) -> None:
@@ -47,7 +47,7 @@ class RouterRefusals:
         self._next_ns: dict[str, int] = {}
 
     def take(self, now_ns: int) -> list[str]:
-        """Return texts of what was refused; of strangers, and of each member, one in 10 s at most."""
+        """Return texts about refusals: one in 10 s at most for all strangers, and one for each member."""
         self._read()
         waiting = [*self._denied, *([_STRANGERS] if self._strangers else [])]
         due = [who for who in waiting if now_ns >= self._next_ns.get(who, 0)]
@@ -55,7 +55,7 @@ class RouterRefusals:
         return [self._text(who) for who in due]
 
     def close(self) -> None:
-        """Give standard output back."""
+        """Restore standard output."""
         os.dup2(self._stdout, _STDOUT)
         os.close(self._stdout)
         os.close(self._source)
@@ -83,11 +83,12 @@ class RouterRefusals:
     def _deny(self, line: bytes, before: bytes) -> None:
         subject, _, key = line.partition(_DENIED)
         who = _WHO.search(subject)
-        if who is None:  # what is left of a line in a full pipe
+        if who is None:  # the rest of a line in a full pipe
             return
         if name := _NAME.search(who[0]):
             self._members[who[1]] = name[1].decode()
-            # Whoever declares a key, to subscribe to it too, is told of all rights to it in one block: nothing was put.
+            # A member that declares a key, if only to subscribe, is told all rights to it in one block: nothing was
+            # put.
             if who[0] + _DENIED.replace(b"Put", b"Reply") + key in before:
                 return
         self._denied[self._members.get(who[1], "a member")] = _described(key.decode(errors="replace"))
@@ -99,7 +100,7 @@ class RouterRefusals:
 
 
 def _lines_with(text: bytes, word: bytes) -> Iterator[tuple[int, bytes]]:
-    """Yield the place and content of each line that has a word."""
+    """Yield position and content of each line that contains a word."""
     at = text.find(word)
     while at >= 0:
         begin, end = text.rfind(b"\n", 0, at) + 1, text.find(b"\n", at)
@@ -109,7 +110,7 @@ def _lines_with(text: bytes, word: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 def _described(text: str) -> str:
-    """Return a key in the operator's words; a key that is none of ours is not repeated on the terminal."""
+    """Return a key in the operator's words; a key that is not ours is not repeated on the terminal."""
     try:
         key = keys.parse(text)
     except MessageError:

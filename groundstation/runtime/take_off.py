@@ -1,4 +1,4 @@
-"""Take-off one by one: the next drone after the former is seen in flight; nobody else after a likely mix-up.
+"""Take-off one by one: the next drone starts once the one before is seen in flight, and none after a likely mix-up.
 
 A state machine without clock or bus: `step` gets the time and returns what to order.
 """
@@ -26,7 +26,7 @@ class TakeOffLimits:
 
 @dataclass(frozen=True, slots=True)
 class TakeOffCommand:
-    """What the sequence wants said to one drone, and why if it is a landing."""
+    """A command of the sequence to one drone, with a reason if it is a landing."""
 
     verb: Verb
     drone: str
@@ -40,10 +40,10 @@ class _Step(Enum):
 
 
 class TakeOff:
-    """One sequence over the given drones but for those that fly already; finished when nobody is left waiting.
+    """One take-off of the given drones, except those that fly already; finished when no drone is waiting.
 
-    up: who flew already or was seen in flight; left_out: who was not, and why; mistake: what ended the sequence before
-    its time.
+    up: drones that flew already or were seen in flight; left_out: the others, with reasons; mistake: what ended the
+    sequence early.
     """
 
     def __init__(
@@ -67,7 +67,7 @@ class TakeOff:
 
     @property
     def current(self) -> str:
-        """The drone whose turn it is, or ""."""
+        """Return the drone whose turn it is, or ""."""
         return self._waiting[0] if self._waiting else ""
 
     def drop(self, drone: str, reason: str, now_ns: int) -> None:
@@ -83,7 +83,7 @@ class TakeOff:
             self.left_out[drone] = reason
 
     def step(self, now_ns: int, team: TeamStatus, progress: Progress | None) -> TakeOffCommand | None:
-        """Return what to order now; progress: the answers to the last TAKEOFF of the current drone."""
+        """Return the next command; progress: the answers to the last TAKEOFF of the current drone."""
         if self.finished:
             return None
         member = team.members[self.current]
@@ -125,7 +125,7 @@ class TakeOff:
         if is_seen_in_flight(member, now_ns):
             self.up.append(self._waiting.pop(0))
             self._next(now_ns)
-            self._ordered_ns = now_ns  # the next one's driver has to hear first where this one flies
+            self._ordered_ns = now_ns  # the next one's driver must hear first where this one flies
         elif self._late(now_ns, self._limits.unseen_s):
             return self._leave_out(why_unseen(member, now_ns, self._limits.unseen_s), now_ns, land=True)
         return None

@@ -1,4 +1,4 @@
-"""What the operator knows of each drone: what it says of itself, and how high what is fixed in the room sees it."""
+"""What the operator knows of each drone: its own reports, and the height at which fixed sensors see it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -23,12 +23,12 @@ from groundstation.runtime.marker_height import FixedCamera, MarkerHeight
 from groundstation.time_units import NS_PER_MS
 
 _FRESH_NS = 1_500 * NS_PER_MS
-# The marker of a standing drone that no camera saw there.
+# For a standing drone whose marker no camera saw.
 _STANDING_M = 0.1
 
 
 class TeamPhase(StrEnum):
-    """What the team is asked to do."""
+    """The phase that the team is ordered into."""
 
     GROUND = "GROUND"
     TAKING_OFF = "TAKING_OFF"
@@ -40,10 +40,10 @@ class TeamPhase(StrEnum):
 
 @dataclass(slots=True)
 class Member:
-    """One drone; times are when this process learned of it [ns], 0 = never.
+    """One drone; times are when this process learned of a thing [ns], 0 = never.
 
-    marker: its height above the floor; floor_m: the same, before the last take-off of anyone began; height_m: above the
-    ground, as the drone itself measured it, or None.
+    marker: its height above the floor; floor_m: the same, before the latest take-off in the team began; height_m: above
+    the ground, as the drone itself measured it, or None.
     """
 
     state: FlightState = FlightState.UNKNOWN
@@ -56,11 +56,11 @@ class Member:
     measured_ns: int = 0
 
     def connected(self, now_ns: int) -> bool:
-        """Return whether its driver speaks and hears the drone."""
+        """Return whether its driver reports, and hears the drone."""
         return self.fresh(now_ns) and self.state not in UNHEARD
 
     def fresh(self, now_ns: int) -> bool:
-        """Return whether its driver spoke lately."""
+        """Return whether its driver reported lately."""
         return self.heard_ns > 0 and now_ns - self.heard_ns < _FRESH_NS
 
     @property
@@ -70,17 +70,17 @@ class Member:
 
     @property
     def on_ground(self) -> bool:
-        """Return whether it says that it stands, motors off."""
+        """Return whether it reports that it stands with motors off."""
         return self.state in STANDING
 
     @property
     def stood(self) -> bool:
-        """Return whether it is not heard any more, and stood until then."""
+        """Return whether it is no longer heard, and stood until then."""
         return stood_last(self.state, self.mode)
 
     @property
     def standing(self) -> bool:
-        """Return whether it says that it stands, or never said anything."""
+        """Return whether it reports that it stands, or has never reported."""
         return self.on_ground or self.state is FlightState.UNKNOWN
 
     @property
@@ -93,12 +93,12 @@ class Member:
         return self.height_m if now_ns - self.measured_ns < _FRESH_NS else None
 
     def rise_m(self, now_ns: int) -> float | None:
-        """Return by how much its marker has risen since the take-off began [m], or None if it is out of view."""
+        """Return the rise of its marker since the take-off began [m], or None if it is out of view."""
         marker_m = self.marker.at(now_ns)
         return None if marker_m is None else marker_m - self.floor_m
 
     def note_floor(self, now_ns: int) -> None:
-        """Measure rises from where the marker of a standing drone is now."""
+        """Measure rises from the present height of a standing drone's marker."""
         marker_m = self.marker.at(now_ns)
         if self.standing and marker_m is not None:
             self.floor_m = marker_m
@@ -130,14 +130,14 @@ class TeamStatus:
         member = self.members.get(status.header.entity)
         if member is not None:
             if not member.standing and status.flight_state in STANDING:
-                member.marker.forget()  # it was seen in the air until now
+                member.marker.forget()  # its sightings until now were in the air
             before = FlightState.LANDED if member.stood else member.state
             member.state = known_state(before, status.flight_state)
             member.mode, member.detail = status.mode, status.detail
             member.heard_ns = now_ns
 
     def _see(self, observer: str, subject: str, position_m: Vector3, now_ns: int) -> None:
-        # Only fixed cameras know how high they are themselves, whatever is wrong with the drones.
+        # Only fixed cameras know their own height, whatever is wrong with the drones.
         camera, member = self._cameras.get(observer), self.members.get(subject)
         if camera is not None and member is not None:
             member.marker.see(now_ns, camera.height_of(position_m))
@@ -148,19 +148,19 @@ class TeamStatus:
             member.height_m, member.measured_ns = odometry.height_m, now_ns
 
     def note_floor(self, now_ns: int) -> None:
-        """Measure rises from where the markers of all standing drones are now."""
+        """Measure rises from the present heights of all standing drones' markers."""
         for member in self.members.values():
             member.note_floor(now_ns)
 
     @property
     def up(self) -> tuple[str, ...]:
-        """Return who flies, its take-off finished."""
+        """Return the drones that fly, their take-off finished."""
         return tuple(name for name, member in self.members.items() if member.up)
 
     def airborne(self, now_ns: int) -> tuple[str, ...]:
-        """Return who is not known to stand: a drone that was heard once and then lost counts as flying.
+        """Return the drones not known to stand: a drone that was heard once and then lost counts as flying.
 
-        But for one whose driver had it on the floor, without an order to take off: its battery is out.
+        Except one that last stood, without an order to take off: its battery is empty.
         """
         return tuple(name for name, member in self.members.items() if member.heard_ns and not _at_rest(member, now_ns))
 

@@ -1,4 +1,4 @@
-"""The tracker's loop: one tick takes in what arrived, advances the belief, and says what follows from it."""
+"""The tracker's loop: one tick takes in what arrived, advances the belief, and publishes the results."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -27,11 +27,11 @@ from groundstation.runtime.unseen_watch import UnseenWatch
 from groundstation.tracker import Tracker, tracker_from_field
 
 _BELIEF_HZ = 5
-# What is not due at each tick: in which of its ticks it is. All in one made that tick late, once a second; beliefs stay
-# where recordings made earlier have them.
+# Work that is not due at each tick, and the ticks in which it is done: all in one tick made that late, once a second.
+# Beliefs stay in the ticks where earlier recordings have them.
 _PLAN_PHASE, _BELIEF_PHASE, _MAP_PHASE, _WATCH_PHASE = 0, 0, 2, 24
-_PLAN_BUDGET_SHARE = 0.4  # of the planner's period: a plan is never older than one period when it is adopted
-EPOCHS_PER_LIFE = 1000  # the tracker itself begins a new epoch when its belief broke
+_PLAN_BUDGET_SHARE = 0.4  # of the planner's period: an adopted plan is never older than one period
+EPOCHS_PER_LIFE = 1000  # the tracker begins a new epoch itself when its belief breaks
 
 
 class TrackerSection(msgspec.Struct, frozen=True):
@@ -42,7 +42,7 @@ class TrackerSection(msgspec.Struct, frozen=True):
 
 
 class Arrivals(Protocol):
-    """What has come for the tracker since the last tick (see Inbox)."""
+    """The messages that came for the tracker since the last tick (see Inbox)."""
 
     refused: Counter[str]
 
@@ -55,7 +55,7 @@ class Arrivals(Protocol):
 
 
 class Worker(Protocol):
-    """Who plans on snapshots (see PlanWorker)."""
+    """Plans on snapshots of the belief (see PlanWorker)."""
 
     @property
     def idle(self) -> bool:
@@ -73,7 +73,7 @@ class Worker(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class TrackerFeed:
-    """Where a tracker's messages and plans come from, and whose clock it reads: live ones, or those of a journal."""
+    """A tracker's sources of messages, plans and time: live ones, or those of a journal."""
 
     arrivals: Arrivals
     worker_of: Callable[[Planner], Worker]
@@ -82,7 +82,7 @@ class TrackerFeed:
 
 
 def live_feed(bus: Bus, plan_hz: float) -> TrackerFeed:
-    """Return what arrives on a bus, planned on a thread of its own."""
+    """Return the feed of a bus, with plans made on a thread of their own."""
     budget_s = _PLAN_BUDGET_SHARE / plan_hz
     return TrackerFeed(Inbox(bus), lambda planner: PlanWorker(planner, budget_s), clock.clock_id())
 
@@ -116,7 +116,7 @@ class Tracking:
         self._known_refusals: Counter[str] = Counter()
 
     def tick(self, now_ns: int) -> None:
-        """Do everything that is due at one time."""
+        """Do all work that is due at this time."""
         tracker, announcer = self.tracker, self._announcer
         ingested = self.inbox.pop_ready()
         for key, message in ingested:
@@ -171,7 +171,7 @@ class Tracking:
             self._report_refusals()
 
     def _report_refusals(self) -> None:
-        """Say once of each kind that messages are refused; their numbers are in the log of the process."""
+        """Report once for each kind that messages are refused; their numbers are in the log of the process."""
         for reason in set(self.inbox.refused) | set(self.tracker.rejected):
             if reason not in self._known_refusals:
                 self._known_refusals[reason] = 1

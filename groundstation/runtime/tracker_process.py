@@ -1,7 +1,7 @@
 """The tracker process. Started as `groundstation.runtime.tracker_process:run`.
 
-Bus callbacks only enqueue; one loop ticks at the estimator's rate; one worker thread plans. Numba and everything that
-needs it is imported only after the kernel cache is chosen.
+Bus callbacks only enqueue; one loop ticks at the estimator's rate; one worker thread plans. Numba, and all that needs
+it, is imported only after the kernel cache is chosen.
 """
 
 from __future__ import annotations

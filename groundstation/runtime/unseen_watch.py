@@ -1,4 +1,4 @@
-"""Robots that fly although nobody knows where they are."""
+"""Names robots that fly unlocalised for too long."""
 
 import math
 from collections.abc import Mapping
@@ -9,7 +9,7 @@ _REPEAT_NS = NS_PER_S
 
 
 class UnseenWatch:
-    """Finds robots that fly although nobody knows where they are for too long; their drivers land them."""
+    """Finds robots that fly unlocalised for too long; their drivers land them."""
 
     def __init__(self, limit_s: float) -> None:
         self._limit_ns = round(limit_s * NS_PER_S)
@@ -18,9 +18,10 @@ class UnseenWatch:
         self._told: dict[str, int] = {}
 
     def step(self, now_ns: int, ages_s: Mapping[str, float]) -> list[str]:
-        """Return who is to be named now; ages_s: for how long each airborne robot is not localised.
+        """Return the robots to name now; ages_s: for how long each airborne robot has not been localised.
 
-        Infinite: never since it flies, or not since its belief was given up; then the time goes on from before.
+        Infinite: never since it flies, or not since its belief was given up; its time then goes on counting from
+        before.
 
         A name is repeated once a second for as long as it applies.
         """

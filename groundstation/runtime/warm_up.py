@@ -1,4 +1,4 @@
-"""Runs every compiled kernel once before the tracker is READY, on a made-up second of a flight."""
+"""Runs every compiled kernel once before the tracker is READY, on an invented second of flight."""
 
 from groundstation.bus.messages import FlightState, Header, Odometry, RelativeObservation, VehicleStatus
 from groundstation.field.resolved import ResolvedField
@@ -11,7 +11,7 @@ _CLOCK = "warm-up"
 
 
 def warm_up(field: ResolvedField) -> None:
-    """Fly a tracker of its own through take-off, localisation and one plan; nothing of it is kept."""
+    """Fly a tracker of its own through take-off, localisation and one plan; nothing is kept of it."""
     tracker = tracker_from_field(field, _CLOCK, 0)
     now_ns = _START_NS
     for step in range(10):

@@ -1,1 +1,1 @@
-"""The live terminal table: what the bus says, as a state, and the state as a picture."""
+"""The live terminal table: messages of the bus become a state, and the state a picture."""

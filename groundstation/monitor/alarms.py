@@ -1,4 +1,4 @@
-"""What the operator must not overlook, from the state; pure."""
+"""Alarms: what the operator must not overlook, from the state. Pure."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ VEHICLE_SILENT_S = 1.0
 ESTIMATE_SILENT_S = 0.3
 PROCESS_SILENT_S = 3.0
 CAMERA_SILENT_S = 2.0
-DARK = 0.08  # of white, on average
+DARK = 0.08  # mean brightness, as a share of white
 WEAK_LINK, BAD_LINK = 0.6, 0.3
 _EVENT_SHOWN_S = 8.0
 _SPEAKS_HZ = 5.0
@@ -48,11 +48,13 @@ _DOWN = {
 
 @dataclass(frozen=True, slots=True)
 class Alarm:
-    """One line; `grave` ones are red, the others yellow.
+    """An alarm line; `grave` ones are red, the others yellow.
 
-    about: the same for as long as it is the same alarm, while figures in its text change.
-    advice: whether an operator must do something now, which it says first, and what happens next.
-    told_ns: when it was told, where it stands from then on.
+    about: identifies the alarm while figures in its text change.
+
+    advice: first whether an operator must do something now, then what happens next.
+
+    told_ns: when it was first raised, for an alarm that stands from then on.
     """
 
     about: str
@@ -68,7 +70,7 @@ class Alarm:
 
 
 def alarms_of(state: MonitorState, now_ns: int) -> list[Alarm]:
-    """Return all alarms: those that ask for an act first, then the grave ones."""
+    """Return all alarms: first those that require an action, then the grave ones."""
     alarms = [
         *_vehicles(state, now_ns),
         *_tracker(state, now_ns),
@@ -100,7 +102,7 @@ def _vehicles(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
 
 
 def _is_heard_in_vain(status: VehicleStatus) -> bool:
-    """Return whether a vehicle speaks, and its driver takes nothing of it: it is no better known than a silent one."""
+    """Return whether a vehicle sends but its driver accepts nothing: it is no better known than a silent one."""
     lost = status.flight_state is FlightState.LOST and status.mode != "CONNECTING"
     return lost and status.rate_hz >= _SPEAKS_HZ
 
@@ -111,12 +113,12 @@ def _not_believed(status: VehicleStatus) -> tuple[str, str]:
 
 
 def _lands(status: VehicleStatus) -> bool:
-    """Return whether it lands, or was just told to."""
+    """Return whether a vehicle lands, or was just told to."""
     return status.flight_state is FlightState.LANDING or status.mode == "LANDING"
 
 
 def _failsafe(name: str, status: VehicleStatus) -> Iterator[Alarm]:
-    """What keeps a drone from its plan, or will land it."""
+    """Yield what keeps a drone from its plan, or will land it."""
     if status.lands_in_s is not None:
         advice = "Nothing to do: that comes by itself unless this ends. HOLD does not stop it."
         why, soon_s = status.detail.removeprefix("hovers: ").removesuffix("; RESUME is needed"), status.lands_in_s
@@ -166,7 +168,7 @@ def _tracker(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
 
 
 def _lost(state: MonitorState) -> Iterator[Alarm]:
-    """Who should be seen and is not; of a drone that lands for it, that alarm tells."""
+    """Yield robots that should be seen and are not; a drone that lands because of it has that alarm instead."""
     if state.estimate is None:
         return
     estimate = state.estimate.message
@@ -188,7 +190,7 @@ def _lost(state: MonitorState) -> Iterator[Alarm]:
 
 
 def _searched(search: TargetSearch) -> Alarm:
-    """A target of which the belief holds no place any more, or none yet."""
+    """Return the alarm for a target whose place the belief no longer holds, or not yet."""
     about, (x, y) = f"{search.target} lost", search.place_m
     if search.mode == "LOST":
         return Alarm(
@@ -218,7 +220,7 @@ def _dark_words(names: Sequence[str]) -> str:
 
 
 def _stands_with(state: MonitorState, camera: str) -> bool:
-    """Return whether a camera is that of a drone on the floor, which may look into anything."""
+    """Return whether a camera belongs to a drone on the floor, where it may look into anything."""
     carriers = (seen.message for drone, seen in state.vehicles.items() if camera_name(drone) == camera)
     return any(carrier.flight_state not in AIRBORNE for carrier in carriers)
 
@@ -247,7 +249,7 @@ def _events(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
 
 
 def _suspected(state: MonitorState) -> Iterator[Alarm]:
-    """Figures of the field that the diagnosis holds wrong, until it withdraws them."""
+    """Yield figures of the field that the diagnosis suspects, until it withdraws them."""
     for one in state.suspicion.figures if state.suspicion else ():
         advice = f"Nothing to do now. When all have landed: {one.remedy}."
         about = f"suspected {one.about} {one.told_ns}"

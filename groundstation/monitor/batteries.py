@@ -1,4 +1,4 @@
-"""What each battery is good for, and how far that is from what it should be. Pure."""
+"""The state of each battery: how long it lasts, and whether that is too little. Pure."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -7,13 +7,13 @@ from groundstation.bus.messages import FlightState
 from groundstation.monitor.endurance import Endurance, endurance, flies
 from groundstation.monitor.state import MonitorState
 
-LIMIT = 0.15  # of a drone whose own is not known
+LIMIT = 0.15  # for a drone whose own limit is not known
 _LOW, _EMPTY = 0.15, 0.05  # above the limit
 _LOW_MIN, _EMPTY_MIN = 3.0, 1.0
 
 
 class Charge(StrEnum):
-    """How a battery is, by its level and, in the air, by the minutes left."""
+    """State of a battery, by its level and, in the air, by the minutes left."""
 
     GOOD = "good"
     LOW = "low"
@@ -23,7 +23,7 @@ class Charge(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Battery:
-    """level: share of a full one, None if unknown. limit: the level that lands its drone."""
+    """level: share of a full one, None if unknown. limit: the level at which its drone lands."""
 
     level: float | None
     limit: float
@@ -37,7 +37,7 @@ class Battery:
 
     @property
     def good_for(self) -> str:
-        """Return ", good for ~6 min"; "" where nobody knows."""
+        """Return ", good for ~6 min"; "" if unknown."""
         return f", good for {self.endurance.words}" if self.endurance else ""
 
 

@@ -13,7 +13,7 @@ _NS_PER_MIN = 60e9
 
 @dataclass(frozen=True, slots=True)
 class TakeOff:
-    """When a drone was first heard in the air, and its battery then."""
+    """When a drone was first heard in the air, and its battery level then."""
 
     stamp_ns: int
     battery: float
@@ -32,7 +32,7 @@ class Endurance:
 
 
 def flies(status: VehicleStatus, take_off: TakeOff | None) -> bool:
-    """Return whether it is in the air, or was when it was last heard."""
+    """Return whether a vehicle is in the air, or was when it was last heard."""
     return status.flight_state in AIRBORNE or (status.flight_state is FlightState.LOST and take_off is not None)
 
 
@@ -50,10 +50,10 @@ def take_off_of(known: TakeOff | None, stamp_ns: int, status: VehicleStatus) -> 
 def endurance(
     stamp_ns: int, battery: float, limit: float, take_off: TakeOff | None, flight_time_s: float | None
 ) -> Endurance | None:
-    """Return how long a battery is good for; None where nobody knows.
+    """Return how long a battery lasts; None if unknown.
 
     battery, limit: shares of a full one, at `stamp_ns` and when it lands its drone. flight_time_s: of a full battery,
-    None where its kind does not say.
+    None if its kind does not say.
     """
     left, minutes, spent = max(0.0, battery - limit), 0.0, 0.0
     if take_off is not None:

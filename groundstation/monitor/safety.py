@@ -1,4 +1,4 @@
-"""Whether it is safe, in a word and a sentence. Pure."""
+"""The state of the team in one word, with a reason. Pure."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from groundstation.monitor.state import MonitorState
 
 
 class Level(StrEnum):
-    """SAFE: nothing is wrong. WATCH: something is, and nothing need be done. ACT: somebody must do something now."""
+    """SAFE: nothing is wrong. WATCH: something is, but nobody need act. ACT: somebody must do something now."""
 
     SAFE = "SAFE"
     WATCH = "WATCH"
@@ -20,14 +20,14 @@ class Level(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Safety:
-    """The word, and the reason for it as a sentence or two."""
+    """The level, and its reason in a sentence or two."""
 
     level: Level
     reason: str
 
 
 def safety_of(state: MonitorState, alarms: Sequence[Alarm]) -> Safety:
-    """Judge the team by the alarms that stand, in the order of `alarms_of`."""
+    """Judge the team by its present alarms, in the order of `alarms_of`."""
     if alarms:
         first = alarms[0]
         return Safety(Level.ACT if first.asks else Level.WATCH, f"{first.text}. {first.advice}".rstrip())

@@ -1,4 +1,4 @@
-"""Draws the state on a terminal, or as a line now and then where there is none."""
+"""Draws the state on a terminal; without a terminal, prints a line now and then."""
 
 from contextlib import ExitStack, suppress
 from types import TracebackType
@@ -41,14 +41,14 @@ class Screen:
         self._newest = bus.subscribe(
             (ESTIMATE, PLAN, VEHICLE_STATUS, CAMERA_STATUS, PROCESS_STATUS, LEASE, SIM_STATUS, SUSPICION), newest=True
         )
-        # Of these each one counts, not only the newest of a key.
+        # Of these every message counts, not only the newest of a key.
         self._each: Subscription = bus.subscribe((EVENT, COMMAND, COMMAND_ACK, OBSERVATION), capacity=1024)
         self._due_ns = 0
         self._live: Live | None = None
         self._stack = ExitStack()
 
     def __enter__(self) -> Self:
-        if self._console.is_terminal and not self._console.is_dumb_terminal:  # on such a one Live draws nothing
+        if self._console.is_terminal and not self._console.is_dumb_terminal:  # Live draws nothing on a dumb terminal
             live = Live(
                 console=self._console, screen=True, auto_refresh=False, redirect_stdout=False, redirect_stderr=False
             )
@@ -59,15 +59,15 @@ class Screen:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         with suppress(OSError):
-            self._stack.close()  # gives the terminal its former content back
+            self._stack.close()  # restores the terminal's former content
 
     def listen(self) -> None:
-        """Take in what has arrived, without drawing."""
+        """Take in messages without drawing."""
         self.state.ingest(self._newest.drain())
         self.state.ingest(self._each.drain())
 
     def turn(self, now_ns: int) -> None:
-        """Take in what has arrived and draw, if it is time."""
+        """Take in messages, and draw if it is time."""
         if now_ns < self._due_ns:
             return
         self.listen()

@@ -1,4 +1,4 @@
-"""What an observer of the bus remembers: the newest of everything, and when it was."""
+"""What an observer of the bus remembers: the newest message of each kind, and its time."""
 
 from collections import deque
 from collections.abc import Iterable, Mapping
@@ -20,7 +20,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Cast:
-    """Who should be there: drones with their battery limit, targets, world-fixed cameras.
+    """The expected entities: drones with their battery limit, targets, world-fixed cameras.
 
     flight_times_s: what a full battery of a drone usually lasts, where its kind says so. lost_after_s: unseen for so
     long, a robot or target is lost. unseen_land_s: after so long a robot lands at the latest.
@@ -59,7 +59,7 @@ class StampedMessage(Generic[T]):
 
 @dataclass(slots=True)
 class MonitorState:
-    """The newest message of each kind and entity; `hint` is what Ctrl-C does here."""
+    """The newest message of each kind and entity; `hint` says what Ctrl-C does here."""
 
     cast: Cast = field(default_factory=Cast)
     hint: str = ""
@@ -79,13 +79,13 @@ class MonitorState:
     answers: dict[str, dict[str, m.CommandAck]] = field(default_factory=dict)
 
     def ingest(self, received: Iterable[Received]) -> None:
-        """Remember messages; unknown types are passed over."""
+        """Remember messages; unknown types are ignored."""
         for item in received:
             if item.message is not None:
                 self._take(item.header.entity, item.header.stamp_ns, item.message)
 
     def entity(self, name: str) -> m.EntityEstimate | None:
-        """Return what is believed of an entity."""
+        """Return the estimate of an entity, or None."""
         entities = self.estimate.message.entities if self.estimate else ()
         return next((entity for entity in entities if entity.name == name), None)
 

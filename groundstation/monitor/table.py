@@ -1,4 +1,4 @@
-"""The state as a rich renderable; pure: the same state and time give the same picture."""
+"""Renders the state with rich. Pure: the same state and time give the same picture."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ _ALARMS = 5
 _COMMAND_SHOWN_S = 10.0
 _MODE, _POSITION, _ELLIPSE, _SEEN_BY = "mode", "position [m]", "95 % ellipse\n[m]", "seen by"
 _COLUMNS = ("", _MODE, "vehicle", "battery", "link", "age", _POSITION, _ELLIPSE, _SEEN_BY)
-# What a narrow terminal goes without, in this order: alarms tell of links that fail.
+# Columns that a narrow terminal omits, in this order: alarms report failing links.
 _SPARED = ("vehicle", "link", _ELLIPSE, _SEEN_BY, "age", "battery", _POSITION)
 _GAP, _AMPLE = 2, 10_000
 _MODE_STYLES = {
@@ -76,9 +76,9 @@ def _title(state: MonitorState, now_ns: int) -> Text:
 
 @dataclass(frozen=True, slots=True)
 class _Entities:
-    """Drones and targets, with as many columns as the terminal has room for; nothing is shortened.
+    """Drones and targets, with as many columns as the terminal has room for; no text is shortened.
 
-    Which columns these are depends on what does not change during a flight, so that none comes and goes.
+    The choice of columns depends only on what does not change during a flight, so that none comes and goes.
     """
 
     state: MonitorState
@@ -95,7 +95,7 @@ class _Entities:
             yield Text(f"too narrow for {', '.join(_SPARED[:spared])}".replace("\n", " "), style="dim")
 
     def _observers_width(self, spared: int) -> int:
-        """Return the room for the names of observers, one below the other if need be."""
+        """Return the width for names of observers, one below the other if need be."""
         names = (*self.state.cast.drones, *self.state.cast.cameras, _SEEN_BY)
         return 0 if _SEEN_BY in _SPARED[:spared] else _GAP + max(len(name) + 1 for name in names)
 
@@ -105,7 +105,7 @@ class _Entities:
         for index in kept:
             title = _COLUMNS[index]
             table.add_column(
-                Text(title),  # brackets in a plain string would be taken for markup
+                Text(title),  # rich would take brackets in a plain string for markup
                 justify="right" if 3 <= index <= 7 else "left",
                 overflow="fold",
                 no_wrap=len(kept) > 2 and title != _SEEN_BY,
@@ -133,7 +133,7 @@ def _searches(state: MonitorState) -> Iterator[Text]:
 
 
 def _unseen(state: MonitorState, now_ns: int) -> Iterator[Text]:
-    """Say where each target is expected that is unseen, until it is searched for or an alarm says so."""
+    """Yield where each unseen target is expected, until it is searched for or an alarm names it."""
     searched = {search.target for search in state.estimate.message.searches} if state.estimate else set()
     for name in state.cast.targets:
         target = state.entity(name)
@@ -229,7 +229,7 @@ def _command(state: MonitorState) -> Text:
     text.append(str(state.command.message.verb), style="bold")
     answers = state.answers.get(state.command.message.id, {})
     names = state.command.message.scope or tuple(state.cast.drones)
-    for name in (OPERATOR,) if OPERATOR in names else names:  # of a request, the drones answer nothing
+    for name in (OPERATOR,) if OPERATOR in names else names:  # drones do not answer a request to the operator
         answer = answers.get(name)
         if answer is None:
             text.append(f"  {name} NOT CONFIRMED", style="bold red")

@@ -1,1 +1,1 @@
-"""Says in flight which figure of the field is wrong, if one is."""
+"""Says in flight which figure of the field is wrong, if any."""

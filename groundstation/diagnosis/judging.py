@@ -1,4 +1,4 @@
-"""Who reaches the verdicts: a thread beside the loop, or the loop itself."""
+"""Computes verdicts, on a thread beside the loop or in the loop itself."""
 
 import threading
 from collections.abc import Callable
@@ -7,11 +7,11 @@ from typing import Protocol
 from groundstation.diagnosis.suspects import Verdict
 
 Judge = Callable[[], Verdict | None]
-"""Returns a verdict, or None where none can be reached."""
+"""Returns a verdict, or None if there is too little to judge."""
 
 
 class Judging(Protocol):
-    """One verdict at a time: `begin` while not `busy`, then `take` what it came to."""
+    """Computes one verdict at a time: `begin` while not `busy`, then `take` the result."""
 
     @property
     def busy(self) -> bool:
@@ -25,7 +25,7 @@ class Judging(Protocol):
 
 
 class AtOnce:
-    """Reaches a verdict when it is taken: where no clock runs meanwhile."""
+    """Computes a verdict when it is taken, for use without a running clock."""
 
     busy = False
 
@@ -33,7 +33,7 @@ class AtOnce:
         self._judge: Judge | None = None
 
     def begin(self, judge: Judge) -> None:
-        """Remember what to do."""
+        """Remember the judge."""
         self._judge = judge
 
     def take(self) -> Verdict | None:
@@ -43,7 +43,7 @@ class AtOnce:
 
 
 class OnThread:
-    """Reaches verdicts on threads of their own, which nothing waits for at the end."""
+    """Computes verdicts on threads of their own, for which nothing waits at the end."""
 
     def __init__(self) -> None:
         self._thread: threading.Thread | None = None
@@ -55,7 +55,7 @@ class OnThread:
         return self._thread is not None and self._thread.is_alive()
 
     def begin(self, judge: Judge) -> None:
-        """Start a thread."""
+        """Start a thread that computes a verdict."""
         self._thread = threading.Thread(target=self._run, args=(judge,), name="verdict", daemon=True)
         self._thread.start()
 
@@ -63,6 +63,6 @@ class OnThread:
         self._verdict = judge()
 
     def take(self) -> Verdict | None:
-        """Return and forget the verdict; None too where its thread failed, which the log has."""
+        """Return and forget the verdict; None also if its thread failed, which is logged."""
         verdict, self._verdict = self._verdict, None
         return verdict

@@ -1,7 +1,6 @@
-"""Takes in what the team sees, and reaches one verdict after another.
+"""Takes in the team's messages, and reaches one verdict after another.
 
-A verdict takes half a second of a core, and more with more robots; it is never reached for more than a fifth of the
-time.
+A verdict takes half a second of a core, more with more robots; the work never takes more than a fifth of the time.
 """
 
 from functools import partial
@@ -24,7 +23,7 @@ _CAPACITY = 8192
 
 
 class Diagnosis:
-    """`turn` takes in what came and tells the tracker; what is for the operator is left in `notices`."""
+    """Call `turn`: it takes in messages and informs the tracker; notices for the operator are left in `notices`."""
 
     def __init__(self, bus: Bus, field: ResolvedField, judging: Judging) -> None:
         self.notices: list[Notice] = []
@@ -37,11 +36,11 @@ class Diagnosis:
 
     @property
     def overflowed(self) -> int:
-        """Return how many messages were dropped because nobody took them in time."""
+        """Return how many messages were dropped because they were not taken in time."""
         return self._queue.overflowed
 
     def turn(self, now_ns: int) -> None:
-        """Take in what came; begin a verdict when one is due, and tell the one that was reached."""
+        """Take in messages; begin a verdict when one is due, and announce a finished one."""
         for received in self._queue.drain():
             if received.message is not None:
                 self._window.take(str(received.key), received.message, now_ns)
@@ -52,7 +51,7 @@ class Diagnosis:
             self._due_ns, self._begun_ns = max(self._begun_ns + _PAUSE_NS, now_ns + _PAUSES * took_ns), None
             self._tell(now_ns)
         if self._watch.figures and now_ns >= self._told_ns + _PAUSE_NS:
-            self._publish(now_ns)  # a console that was started again has not heard it
+            self._publish(now_ns)  # for a console that was restarted since
         if now_ns >= self._due_ns and (flown := self._window.flown()) is not None:
             self._begun_ns = now_ns
             self._judging.begin(partial(verdict_on, flown, self._field))

@@ -1,7 +1,7 @@
-"""The diagnosis process: says in flight which figure of the field is wrong. Nobody flies by it.
+"""The diagnosis process: says in flight which figure of the field is wrong. No setpoint depends on it.
 
-Started as `groundstation.diagnosis.process:run`. Numba, which the models of sensors need, is imported only after the
-cache of its kernels is chosen.
+Started as `groundstation.diagnosis.process:run`. Numba, which the sensor models need, is imported only after the kernel
+cache is chosen.
 """
 
 import msgspec

@@ -1,7 +1,7 @@
-"""Which figures of the field does a stretch of flight show to be wrong? Pure.
+"""Judges which figures of the field a stretch of flight shows to be wrong. Pure.
 
-All figures and paths are fitted at once, as `calibrate team` does; causes are told on less evidence, because the
-operator reads them as suspicions and a flight is short.
+All figures and paths are fitted at once, as `calibrate team` does; causes need less evidence, because the operator
+reads them as suspicions and a flight is short.
 """
 
 import math
@@ -22,9 +22,9 @@ from groundstation.errors import OperatorMistake
 from groundstation.field.resolved import ResolvedField
 
 Suspect = tuple[str, str]
-"""One thing that may be wrong: whose ("": of all), and what."""
+"""One thing that may be wrong: its owner ("": all) and which figure."""
 
-# Less does not harm, and is not told: [m], [rad], [s], shares.
+# Smaller errors do no harm, and are not reported: [m], [rad], [s], shares.
 _WORTH_TELLING = {
     "print": 0.02,
     "focal": 0.02,
@@ -39,15 +39,15 @@ _WORTH_TELLING = {
     "own_delay": 0.03,
 }
 _WORTH_TELLING_M = 0.06
-# Mean squared deviation of a healthy simulated flight, whose sightings differ at random; where it is more, they share
-# what disturbs them.
+# Mean squared deviation of a healthy simulated flight, whose sightings err independently; a larger one means that they
+# share a disturbance.
 _USUAL_MISFIT = 0.25
 _MOST = 3
 
 
 @dataclass(frozen=True, slots=True)
 class Charge:
-    """A suspect with the size of its error, one sigma, and by how much (log) it explains more than nothing does."""
+    """A suspect: its error, one sigma, and by how much (log) it explains the flight better than no error does."""
 
     suspect: Suspect
     size: float
@@ -57,14 +57,17 @@ class Charge:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """causes: of each thing that is wrong the charges that cannot be told apart, likeliest first; leads: of all."""
+    """A verdict on a stretch of flight.
+
+    causes: for each thing that is wrong the charges that cannot be told apart, likeliest first; leads: of all suspects.
+    """
 
     causes: tuple[tuple[Charge, ...], ...]
     leads: Mapping[Suspect, float]
 
 
 def verdict_on(flown: Flown, field: ResolvedField) -> Verdict | None:
-    """Return what a stretch of flight shows; None where it has too little, or nothing that fits it was found."""
+    """Return the verdict on a stretch of flight; None if it has too little, or no fit was found."""
     try:
         batch = TeamBatch(team_record(flown, field), field)
         wide = np.diag(batch.figures.wide**2)
@@ -79,9 +82,10 @@ def verdict_on(flown: Flown, field: ResolvedField) -> Verdict | None:
 
 
 def _tried(verdict: Verdict, batch: TeamBatch, alike: float) -> Verdict:
-    """Return what is left of a verdict once the flight was explained with each charge, and without any.
+    """Return the verdict after the flight was fitted with each of its charges, and without any.
 
-    Leads of what was tried are those of the fits: what explains nothing is refuted, however sure the linear model is.
+    Leads of charges that were tried come from the fits: a charge that explains nothing is refuted, however sure the
+    linear model is.
     """
     known = {(s.who, s.what): s for s in batch.figures.suspicions()}
     sigma, causes, leads = np.diag(batch.figures.surveyed**2), list[tuple[Charge, ...]](), dict(verdict.leads)
@@ -92,7 +96,7 @@ def _tried(verdict: Verdict, batch: TeamBatch, alike: float) -> Verdict:
         charges = [
             _charge(one.explained.information, one.explained.pull, sigma, one.suspicion, one.lead) for one in trials
         ]
-        if not causes:  # later ones lead beside those that were found
+        if not causes:  # later leads come on top of causes that were found
             leads |= {charge.suspect: charge.lead for charge in charges}
         best = charges[0]
         if not _is_told(best):
@@ -103,7 +107,7 @@ def _tried(verdict: Verdict, batch: TeamBatch, alike: float) -> Verdict:
 
 
 def weighed(H: Array, g: Vector, surveyed: Vector, suspicions: Sequence[Suspicion]) -> Verdict:
-    """Return the verdict by information (n, n) and pull (n) on figures that were surveyed to one sigma (n)."""
+    """Return the linear model's verdict from information (n, n) and pull (n) on figures surveyed to one sigma (n)."""
     leads: dict[Suspect, float] = {}
     causes: list[tuple[Charge, ...]] = []
     for one in islice(rounds(H, g, surveyed, suspicions), _MOST):

@@ -1,4 +1,4 @@
-"""From one verdict after another to what the operator is told: new suspicions, and those that are refuted. Pure."""
+"""Turns successive verdicts into notices for the operator: new suspicions, and refuted ones. Pure."""
 
 import math
 
@@ -12,7 +12,7 @@ _REFUTED = math.log(3.0)
 
 
 class FigureWatch:
-    """Fed with verdicts; no action follows. `cause`: what stands, in a few words, or ""."""
+    """Takes verdicts; no action follows. `cause`: the standing suspicion in a few words, or ""."""
 
     def __init__(self, field: ResolvedField) -> None:
         self._field = field
@@ -20,23 +20,23 @@ class FigureWatch:
 
     @property
     def figures(self) -> tuple[SuspectedFigure, ...]:
-        """What stands: told, and not refuted."""
+        """Return the standing suspicions: reported, and not refuted."""
         return tuple(self._standing.values())
 
     @property
     def cause(self) -> str:
-        """What explains best why sightings do not meet."""
+        """Return the best explanation of sightings that disagree."""
         return "; ".join(figure.text for figure in self.figures)
 
     def take(self, verdict: Verdict, now_ns: int) -> list[Notice]:
-        """Return what is new of a verdict that was reached at this time."""
+        """Return the notices that follow from a verdict reached at this time."""
         named = {(key := _suspects(one)): self._suspected(key, one, now_ns) for one in verdict.causes}
         refuted = [one for one in self._standing if all(verdict.leads.get(s, 0.0) < _REFUTED for s in one)]
         notices = [_accusation(figure, len(key)) for key, figure in named.items() if key not in self._standing]
         for key in refuted:
             text = f"{self._standing.pop(key).text}: no longer suspected"
             notices.append(Notice(Severity.INFO, text, entity=key[0][0]))
-        if named:  # what explained it before is explained otherwise
+        if named:  # another suspect explains it now
             self._standing = named
         return notices
 

@@ -1,4 +1,4 @@
-"""The last seconds of a flight, as they came."""
+"""The messages of the last seconds of a flight, as they arrived."""
 
 from collections import deque
 
@@ -12,7 +12,7 @@ from groundstation.time_units import NS_PER_S
 
 TOPICS = (ODOMETRY, IMU, OBSERVATION, VEHICLE_STATUS)
 _LASTS_NS = 40 * NS_PER_S
-# So much flight is judged; more where it began in the air and no pad tells from where, so that figures bend paths.
+# Length of flight that is judged; longer if it began in the air, where no pad tells the start and figures bend paths.
 _LEAST_NS, _LEAST_ALOFT_NS = 8 * NS_PER_S, 20 * NS_PER_S
 _DOWN = STANDING | {FlightState.UNKNOWN}
 
@@ -20,7 +20,7 @@ _DOWN = STANDING | {FlightState.UNKNOWN}
 class Window:
     """Takes messages as they arrive; `flown` returns those of the last 40 s while somebody flies.
 
-    What the tracker refuses by itself does not count here either: a picture that hangs is no wrong figure.
+    Messages that the tracker would refuse do not count here either: a frozen picture is no wrong figure.
     """
 
     def __init__(self, field: ResolvedField, clock: str) -> None:
@@ -31,7 +31,7 @@ class Window:
         self._stood: set[str] = set()
 
     def take(self, key: str, message: Message, now_ns: int) -> None:
-        """Take a message; what another clock stamped tells nothing here."""
+        """Take a message; stamps of another clock are ignored."""
         stamp_ns = message.header.stamp_ns
         if message.header.clock != self._clock or self._screen.refusal(key, message, stamp_ns, now_ns):
             return
@@ -45,7 +45,7 @@ class Window:
             self._rows.popleft()
 
     def flown(self) -> Flown | None:
-        """Return what was taken; None while nobody flies, or for less than 8 s, 20 s where a start was missed."""
+        """Return the messages; None while nobody flies, or before 8 s (20 s if the start was missed)."""
         aloft = {name for name, flies in self._flying.items() if flies}
         least_ns = _LEAST_NS if aloft <= self._stood else _LEAST_ALOFT_NS
         if not aloft or self._rows[-1][0] - self._rows[0][0] < least_ns:

@@ -1,4 +1,4 @@
-"""A suspected figure in words: what is wrong, by how much, how sure, and what to do about it. Pure."""
+"""A suspected figure in words: what is wrong, by how much, how sure, and the remedy. Pure."""
 
 from collections.abc import Sequence
 
@@ -9,7 +9,7 @@ from groundstation.preflight.figure_words import calibrated_lens, fixed_camera, 
 
 _MOST_TOLD = 3
 _UNITS = {"tilted": "roll", "aside": "x"}
-# Of the mounting of a drone's camera: what is more, and what is less.
+# For the mounting of a drone's camera: words for more, and for less.
 _MOUNTED = {
     "pan": ("looks {size} farther to the left", "looks {size} farther to the right"),
     "tilt": ("looks {size} lower", "looks {size} higher"),
@@ -23,12 +23,12 @@ _SURVEY = "fix the camera {who} where the field has it, or survey it anew (groun
 
 
 def sentence(charges: Sequence[Charge], field: ResolvedField) -> str:
-    """Return who is named, in a few words."""
+    """Return the suspects in a few words."""
     return " or ".join(_what(one, field) for one in charges[:_MOST_TOLD])
 
 
 def remedies(charges: Sequence[Charge], field: ResolvedField) -> str:
-    """Return what a person can do, for each that is named."""
+    """Return what a person can do about each suspect."""
     return "; or ".join(dict.fromkeys(_remedy(one, field) for one in charges[:_MOST_TOLD]))
 
 
@@ -75,7 +75,7 @@ def _remedy(charge: Charge, field: ResolvedField) -> str:
 
 
 def _setting(name: str, part: str, error: float, field: ResolvedField) -> str:
-    """Return the setting that a camera's mounting would have, if it stays as it is."""
+    """Return the setting that would describe a camera's mounting as it is."""
     path = ".".join(paths_of(field, (name, part))[0])
     camera, factor = field.drones[name].camera, unit_of(part)[0]
     now = {"pan": camera.pan_left_deg, "tilt": camera.tilt_down_deg}.get(part)

@@ -1,1 +1,1 @@
-"""What is looked at before a take-off: links, cameras, and who stands where."""
+"""Checks before a take-off: links, cameras, and where each drone stands."""

@@ -1,4 +1,4 @@
-"""Where motion capture and ranging systems have the standing drones, against their pads. Pure."""
+"""Compares where motion capture and ranging systems see standing drones with their pads. Pure."""
 
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -8,9 +8,9 @@ from groundstation.field.drones import FieldDrone
 from groundstation.field.resolved import ResolvedField
 from groundstation.preflight.stand import PadSighting
 
-# A person sets a drone on its cross to a centimetre; who is farther off stands somewhere else.
+# A person sets a drone on its cross to a centimetre; a drone farther off stands somewhere else.
 _ASIDE_M, _TURNED_RAD = 0.25, math.radians(25.0)
-# Ranges of one place are off by as much again as lasts of them, times what the anchors' places make of it.
+# Ranges of one place err by as much again as the part of their error that lasts, times the geometry of the anchors.
 _RANGED_SIGMAS = 4.0
 
 _BODIES = "check that it streams rigid bodies, their names, up, position_m and yaw_deg in the field file"
@@ -22,7 +22,7 @@ _ELSEWHERE = "check who has its name in the system, where it stands, and the sys
 def captured_pad_findings(
     field: ResolvedField, sightings: Sequence[PadSighting], flew: Collection[str] = ()
 ) -> Iterator[Finding]:
-    """Yield what motion capture and ranges say of drones on their pads: not followed, elsewhere, or well."""
+    """Yield findings of motion capture and ranges on drones on their pads: not followed, elsewhere, or well."""
     remedies = dict.fromkeys(field.sensing_capture, _BODIES) | dict.fromkeys(field.ranging, _RADIOS)
     for system, remedy in remedies.items():
         known = {s.drone: s for s in sightings if s.camera == system and s.drone in field.drones}
@@ -50,7 +50,7 @@ def _judged(name: str, seen: PadSighting, drones: Mapping[str, FieldDrone], asid
         found = f"{seen.camera} has it {aside_m:.2f} m from its pad{where}"
         return Finding(Level.MUST, name, found, _ELSEWHERE)
     turned = math.remainder(seen.yaw_rad - math.radians(pad.pad_yaw_deg), math.tau)
-    if abs(turned) >= _TURNED_RAD:  # ranges know no heading: theirs is no number
+    if abs(turned) >= _TURNED_RAD:  # ranges give no heading: it is NaN
         found = f"{seen.camera} has its heading {math.degrees(turned):.0f} deg off that of its pad"
         remedy = "turn it, or define its body anew while it looks along the system's x axis (or give bodies.yaw_deg)"
         return Finding(Level.MUST, name, found, remedy)

@@ -1,6 +1,6 @@
-"""What is wrong of a marker, a lens or a fixed camera, in words: the same before a take-off and in flight. Pure."""
+"""Words for a wrong marker, lens or fixed camera, the same before a take-off and in flight. Pure."""
 
-# Of a fixed camera's mounting: what is more, and what is less.
+# For a fixed camera's mounting: words for more, and for less.
 _HANGS = {
     "z": ("hangs {size} higher than the field says", "hangs {size} lower than the field says"),
     "aside": ("hangs {size} to the side of where the field puts it",) * 2,
@@ -20,28 +20,28 @@ def marker_is(who: str, share: float, std: float) -> str:
 
 
 def measured_by(setting: str = "its size in the field", told: str = "") -> str:
-    """Return the remedy for a marker of another size; told: the size that was found, in brackets."""
+    """Return the remedy for a marker of another size; told: the measured size, in brackets."""
     return f"measure it with a ruler{told}: print it without scaling, or set {setting}"
 
 
 def lens_is(camera: str, share: float, std: float) -> str:
-    """Return by what share a camera's focal length is longer or shorter than calibrated."""
+    """Return by what share a camera's focal length is longer or shorter than its calibration says."""
     longer = "longer" if share > 0.0 else "shorter"
     return f"{camera} has a focal length {_percent(share, std)} {longer} than calibrated"
 
 
 def calibrated_lens(who: str) -> str:
-    """Return the remedy for a lens that is not as calibrated."""
+    """Return the remedy for a lens that differs from its calibration."""
     return _LENS.format(who=who)
 
 
 def fixed_camera(who: str) -> str:
-    """Return what a camera that is fixed in the world is called."""
+    """Return the name of a camera that is fixed in the world."""
     return f"the camera {who}"
 
 
 def hangs(who: str, what: str, more: bool, size: str) -> str:
-    """Return how a fixed camera hangs otherwise than the field says; what: z, aside, yaw, tilted; more: its sign."""
+    """Return how a fixed camera's mounting differs from the field; what: z, aside, yaw, tilted; more: its sign."""
     return f"{fixed_camera(who)} {_HANGS[what][not more].format(size=size)}"
 
 

@@ -1,4 +1,4 @@
-"""Links, batteries and cameras before a take-off, from what their processes say. Pure."""
+"""Checks links, batteries and cameras before a take-off, from the reports of their processes. Pure."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
@@ -9,20 +9,20 @@ from groundstation.field.drones import camera_name
 from groundstation.field.resolved import ResolvedField
 from groundstation.monitor.alarms import DARK
 
-# Drivers write the command that mends what they found behind it.
+# Drivers append the command that mends what they found.
 _COMMAND = ": groundstation "
 _BATTERY_MARGIN, _BATTERY_SHOULD = 0.05, 0.4
 _TELEMETRY_HZ, _LINK_SHARE = 5.0, 0.9
 _PICTURES_HZ, _PICTURES_OLD_MS = 5.0, 700.0
 # A quartz keeps 100 ppm. Setpoints live for 300 ms, and odometry is dated by its arrival.
 _DRIFT_PPM, _LATE_MS = 1000.0, 150.0
-# Mean grey values beyond which black or white is lost. Edges of emulated pictures are 2 to 4 px wide, and 4.5 to 7 px
-# after a blur of 2 px (1 sigma), which costs far sightings.
+# Mean grey values beyond which detail in black or white is lost. Edges of emulated pictures are 2 to 4 px wide, and 4.5
+# to 7 px after a blur of 2 px (1 sigma), which loses far sightings.
 _BRIGHT, _BLURRED_PX = 0.92, 5.5
 
 
 def drone_findings(field: ResolvedField, statuses: Mapping[str, VehicleStatus]) -> Iterator[Finding]:
-    """Yield what is told of each drone; one that is not connected is left out by the take-off, and stops nobody."""
+    """Yield findings on each drone; one that is not connected is left out of the take-off, and stops no other."""
     for name, drone in field.drones.items():
         status = statuses.get(name)
         if status is None or status.flight_state in UNHEARD:
@@ -42,13 +42,13 @@ def drone_findings(field: ResolvedField, statuses: Mapping[str, VehicleStatus]) 
 
 
 def left_out(field: ResolvedField, statuses: Mapping[str, VehicleStatus]) -> tuple[str, ...]:
-    """Return whom a take-off would leave out: drones that are not heard, or would refuse it."""
+    """Return the drones that a take-off would leave out: those not heard, or that would refuse it."""
     known = {name: statuses.get(name) for name in field.drones}
     return tuple(n for n, told in known.items() if told is None or told.flight_state in UNHEARD or told.not_ready)
 
 
 def _readiness(name: str, status: VehicleStatus) -> Iterator[Finding]:
-    """Yield why a drone would refuse to take off, which leaves it out and stops nobody else; and its firmware."""
+    """Yield why a drone would refuse to take off, which leaves out only that drone; and its firmware."""
     if status.not_ready:
         found, _, command = status.not_ready.partition(_COMMAND)
         remedy = f"groundstation {command}" if command else "do what it asks for; until then it does not take off"
@@ -58,7 +58,7 @@ def _readiness(name: str, status: VehicleStatus) -> Iterator[Finding]:
 
 
 def _clock(name: str, status: VehicleStatus) -> Iterator[Finding]:
-    """Yield what is told of a drone's clock against ours; nothing where it tells no time."""
+    """Yield findings on a drone's clock against ours; none if it reports no time."""
     drift, late_ms = status.clock_drift_ppm, status.telemetry_late_ms
     if drift is not None:
         found = f"its clock goes {abs(drift):.0f} ppm {'fast' if drift > 0.0 else 'slow'}"
@@ -87,7 +87,10 @@ def _battery(name: str, status: VehicleStatus, lands_at: float) -> Finding:
 def camera_findings(
     field: ResolvedField, statuses: Mapping[str, CameraStatus], sees: Mapping[str, Sequence[str]] = MappingProxyType({})
 ) -> Iterator[Finding]:
-    """Yield what is told of each camera; statuses: by the camera's name on the bus; sees: whose markers."""
+    """Yield findings on each camera; statuses: by the camera's name on the bus.
+
+    sees: the entities whose markers it sees.
+    """
     fixed = field.world_sensors
     dark = [name for name in fixed if name not in statuses or not statuses[name].connected]
     if len(dark) == len(fixed):
@@ -109,7 +112,7 @@ def camera_findings(
 
 
 def _picture(name: str, status: CameraStatus) -> Iterator[Finding]:
-    """Yield what is wrong with exposure and focus of a camera's newest picture."""
+    """Yield faults in exposure and focus of a camera's newest picture."""
     light, edge_px = status.brightness, status.edge_px
     if light is not None and not DARK <= light <= _BRIGHT:
         too = "dark" if light < DARK else "bright"

@@ -1,4 +1,4 @@
-"""Everything that is to be said before a take-off, the grave first. Pure."""
+"""All findings before a take-off, the grave first. Pure."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
@@ -24,7 +24,7 @@ def judge(
 ) -> list[Finding]:
     """Return all findings, those that must be mended first.
 
-    flew: who may stand anywhere by now; cautions: what the field file is warned about.
+    flew: drones that have flown and may stand anywhere by now; cautions: warnings about the field file.
     """
     sees = {camera: sorted({s.drone for s in sightings if s.camera == camera}) for camera in field.world_sensors}
     found = [*drone_findings(field, vehicles), *camera_findings(field, cameras, sees)]
@@ -35,7 +35,7 @@ def judge(
 def pad_findings(
     field: ResolvedField, sightings: Sequence[PadSighting], flew: Collection[str] = ()
 ) -> Iterator[Finding]:
-    """Yield what is fixed in the room says of drones on their pads: who is not seen, what is wrong with who is."""
+    """Yield findings of fixed sensors on drones on their pads: those not seen, and what is wrong with the others."""
     yield from captured_pad_findings(field, sightings, flew)
     if not field.cameras:
         return
@@ -53,7 +53,7 @@ def pad_findings(
 
 
 def open_musts(findings: Iterable[Finding], wanted: Collection[str], team: Collection[str]) -> list[Finding]:
-    """Return what forbids a take-off of the wanted drones (none: all): musts of others of the team do not."""
+    """Return the findings that forbid a take-off of the wanted drones (none: all); musts of others do not."""
     others = set(team) - set(wanted) if wanted else set()
     return [one for one in findings if one.level is Level.MUST and one.subject not in others]
 

@@ -1,7 +1,7 @@
-"""What standing drones say of the cameras, the prints and the pads: one least-squares fit for each suspicion. Pure.
+"""Fits figures of cameras, prints and pads to sightings of standing drones: one least-squares fit per suspicion. Pure.
 
-All figures have priors as tight as their surveys; a suspicion loosens those of one part. The evidence of a suspicion is
-Laplace's approximation: how well it explains the sightings, less what its freedom is worth.
+All figures have priors as tight as their surveys; a suspicion loosens the priors of one part. The evidence of a
+suspicion is Laplace's approximation: how well it explains the sightings, less a penalty for its freedom.
 """
 
 import math
@@ -32,12 +32,15 @@ _COARSE_SHARE, _COARSE_PX, _COARSE_POWER = 0.0035, 4.0, 10
 _STEPS, _DIFFERENCE = 8, 1e-6
 
 Key = tuple[str, str]
-"""A figure: the name of its camera or drone ("": of all), and which of its figures."""
+"""A figure: the name of its camera or drone ("": all), and which of its figures."""
 
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """value, std: of each figure, as an error of the field; evidence: log; misfit: chi-square of `rows` rows."""
+    """The result of a fit.
+
+    value, std: of each figure, as an error of the field; evidence: log; misfit: chi-square of `rows` rows.
+    """
 
     value: Mapping[Key, float]
     std: Mapping[Key, float]
@@ -47,7 +50,7 @@ class Fit:
 
 
 class PadFit:
-    """Sightings of standing drones, ready to be explained."""
+    """Sightings of standing drones, ready to be fitted."""
 
     def __init__(self, stand: Stand, sightings: Sequence[PadSighting]) -> None:
         self.stand, self.sightings = stand, tuple(sightings)
@@ -98,7 +101,7 @@ class PadFit:
                 return PLACED_M
 
     def promise(self, loose: Mapping[Key, float]) -> float:
-        """Return roughly the evidence that `explain` would find, by derivatives where nothing is off."""
+        """Return the approximate evidence that `explain` would find, by derivatives at zero error."""
         sigma = self._sigma(loose)
         if self._at_rest is None:
             self._at_rest = self._linearised(np.zeros(len(self.keys)))
@@ -114,7 +117,7 @@ class PadFit:
         return sigma
 
     def explain(self, loose: Mapping[Key, float], start: Mapping[Key, float] | None = None) -> Fit:
-        """Return the best fit where the given figures may be off by so much (one sigma), from a start."""
+        """Return the best fit if the given figures may err by the given sigmas, from a start."""
         sigma, theta = self._sigma(loose), np.zeros(len(self.keys))
         for key, value in (start or {}).items():
             theta[self._place[key]] = value
@@ -140,7 +143,7 @@ class PadFit:
         )
 
     def _linearised(self, theta: Vector) -> tuple[Vector, Array]:
-        """Return the residuals (n) and the derivatives of what is predicted (n, figures), both in deviations."""
+        """Return residuals (n) and derivatives of the prediction (n, figures), both in standard deviations."""
         moved = theta + np.vstack((np.zeros(len(theta)), _DIFFERENCE * np.eye(len(theta))))
         predicted, *others = self._predicted(moved)
         J = _wrapped(np.array(others) - predicted).T / _DIFFERENCE
@@ -150,7 +153,8 @@ class PadFit:
     def _predicted(self, thetas: Array) -> Array:
         """Return (x, y, z [camera_optical], heading) of all sightings under sets of errors of the field.
 
-        thetas: (n, figures), the result (n, 4 sightings). All sets at once: the supervisor waits for the answer.
+        thetas: (n, figures), the result (n, 4 sightings). All sets are computed at once: the supervisor waits for the
+        answer.
         """
         of = {part: thetas[:, columns] for part, columns in self._columns.items()}
         aside = np.stack((of["aside_x"], of["aside_y"]), axis=-1)

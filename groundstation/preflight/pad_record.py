@@ -1,4 +1,4 @@
-"""The last sightings of drones that stand, condensed to medians. Pure."""
+"""The latest sightings of standing drones, condensed to medians. Pure."""
 
 from collections import deque
 from collections.abc import Collection
@@ -12,32 +12,32 @@ from groundstation.time_units import NS_PER_S
 _WINDOW_NS = 12 * NS_PER_S
 _MOST = 60
 LEAST = 8
-"""Sightings of one drone by one camera that make a median worth having."""
-# Variance of a median against that of a mean, for many normal samples.
+"""Least number of sightings of one drone by one camera for a median."""
+# Variance of a median relative to that of a mean, for many normal samples.
 _MEDIAN_COST = 1.57
 
 
 class PadRecord:
-    """What each sensor that is fixed in the room lately saw of each drone."""
+    """The latest sightings of each drone by each sensor fixed in the room."""
 
     def __init__(self, cameras: Collection[str]) -> None:
         self._cameras = frozenset(cameras)
         self._seen: dict[tuple[str, str], deque[tuple[int, tuple[float, ...]]]] = {}
 
     def see(self, sighting: RelativeObservation | RangeObservation, now_ns: int) -> None:
-        """Take a sighting, or ranges that tell a place; those by drones are passed over."""
+        """Take a sighting, or ranges that determine a place; those by drones are ignored."""
         if sighting.observer in self._cameras and sighting.position_m is not None:
             yaw = sighting.yaw_rad if isinstance(sighting, RelativeObservation) else None
             rows = self._seen.setdefault((sighting.observer, sighting.subject), deque(maxlen=_MOST))
             rows.append((now_ns, (*sighting.position_m, float("nan") if yaw is None else yaw)))
 
     def forget(self, drone: str) -> None:
-        """Begin anew with a drone that flew, or was carried."""
+        """Discard the sightings of a drone that flew, or was carried."""
         for pair in [pair for pair in self._seen if pair[1] == drone]:
             del self._seen[pair]
 
     def medians(self, now_ns: int) -> tuple[PadSighting, ...]:
-        """Return a median for each pair that was seen often enough lately."""
+        """Return a median for each pair of sensor and drone with enough recent sightings."""
         found = []
         for (camera, drone), rows in self._seen.items():
             fresh = np.array([row for at_ns, row in rows if now_ns - at_ns < _WINDOW_NS])
@@ -47,7 +47,7 @@ class PadRecord:
 
 
 def _median(camera: str, drone: str, rows: np.ndarray) -> PadSighting:
-    """Return the median of rows (n, 4); the spread is judged by quartiles, which single wrong rows do not move."""
+    """Return the median of rows (n, 4); its spread comes from quartiles, which single wrong rows do not move."""
     rows = rows.copy()
     known = rows[np.isfinite(rows[:, 3]), 3]
     if len(known) >= LEAST:

@@ -1,4 +1,4 @@
-"""Where each drone stands on its pad, and what fixed cameras see of it there. Pure values."""
+"""Where each drone stands on its pad, and how fixed cameras see it there. Pure values."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -13,9 +13,9 @@ from groundstation.geometry.rotations import world_from_downward_optical
 from groundstation.sensing.from_field import square_m
 from groundstation.vehicles import kind_named
 
-# How well a person sets a drone on a cross and a line on the floor.
+# How precisely a person sets a drone on a cross and a line on the floor.
 PLACED_M, PLACED_RAD = 0.01, math.radians(1.5)
-# Of a lens and of a print that were measured, as shares.
+# Relative errors of a lens and of a print that were measured.
 LENS_STD, PRINT_STD = 0.004, 0.003
 
 
@@ -48,12 +48,12 @@ class Pad:
     square_m: float
 
     def of(self, other: "Pad") -> "Pad":
-        """Return this drone on the pad of another one."""
+        """Return this drone as it would stand on the pad of another one."""
         return replace(self, place_m=other.place_m, yaw_rad=other.yaw_rad)
 
 
 def marker_centres(pads: Sequence[Pad], aside_m: Array, turned_rad: Array, higher_m: Array) -> Array:
-    """Return the centres (..., n, 3) of the markers [m; world] of n drones that stand a little off their pads.
+    """Return the centres (..., n, 3) of the markers [m; world] of n drones that stand slightly off their pads.
 
     aside_m: (..., n, 2); turned_rad, higher_m: (..., n).
     """

@@ -1,4 +1,4 @@
-"""Which one thing, if it were wrong, would explain what fixed cameras see of standing drones? Pure."""
+"""Finds the one thing that, if it were wrong, would explain how fixed cameras see standing drones. Pure."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -10,13 +10,13 @@ import numpy as np
 from groundstation.preflight.pad_fit import TEAM_PRINT, Fit, Key, PadFit
 from groundstation.preflight.stand import PadSighting, Stand
 
-# Of a figure that nobody measured, or measured wrongly: one sigma. A camera hangs askew, or is turned the wrong way.
+# For a figure that nobody measured, or measured wrongly: one sigma. A camera hangs askew, or is turned the wrong way.
 _MOVED_M, _TURNED_RAD, _ASKEW_RAD, _TILTED_RAD, _SHARE, _CARRIED_M = 0.5, 0.6, 0.06, 0.15, 0.08, 1.0
-# A fit is good as long as its chi-square is not beyond what chance brings once in 100,000 (this many sigmas).
+# A fit is good while its chi-square is not beyond what chance exceeds once in 100,000 (this many sigmas).
 _CHANCE_SIGMAS = 4.26
-# Explanations that are this much less likely (1 to 20) than the best one are ruled out.
+# Explanations this much less likely (1 to 20) than the best one are ruled out.
 _RULED_OUT = math.log(20.0)
-# Where chance might explain everything, one thing wrong must explain it so much better (1 to 30) to be told.
+# Where chance might explain everything, one wrong thing must explain it this much better (1 to 30) to be reported.
 _TELLING = math.log(30.0)
 _REFINED = 8
 _ANGLES = frozenset({"roll", "pitch", "yaw", "turned"})
@@ -24,7 +24,7 @@ _ANGLES = frozenset({"roll", "pitch", "yaw", "turned"})
 
 @dataclass(frozen=True, slots=True)
 class Suspicion:
-    """One thing that may be wrong: what sort of thing, of whom ("": all), the figures that it frees, exchanged drones.
+    """One thing that may be wrong: its sort, its owner ("": all), the figures that it frees, exchanged drones.
 
     what: nothing, prints, aside, height, focal, turned, tilted, placed, heading, print, exchanged.
     """
@@ -37,7 +37,7 @@ class Suspicion:
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """A suspicion that explains the sightings, and the figures that it needs."""
+    """A suspicion that explains the sightings, and the figures that it implies."""
 
     suspicion: Suspicion
     fit: Fit
@@ -56,7 +56,11 @@ class Explanation:
 
 @dataclass(frozen=True, slots=True)
 class Opinion:
-    """all_well: nothing has to be wrong; explanations: what may be, likeliest first; empty: no one thing does."""
+    """The conclusion from the sightings.
+
+    all_well: nothing has to be wrong; explanations: what may be wrong, likeliest first; empty: no single thing explains
+    them.
+    """
 
     all_well: bool
     explanations: tuple[Explanation, ...]
@@ -64,7 +68,7 @@ class Opinion:
 
 
 def opinion(stand: Stand, sightings: Sequence[PadSighting]) -> Opinion:
-    """Return what follows from the sightings of standing drones, one at least."""
+    """Return the conclusion from the sightings of standing drones, at least one."""
     plain = PadFit(stand, sightings)
     nothing = plain.explain({})
     if _good(nothing, 0):
@@ -105,7 +109,7 @@ def _suspicions(plain: PadFit) -> Iterator[Suspicion]:
 
 
 def _promise(plain: PadFit, suspicion: Suspicion) -> float:
-    """Return how far a suspicion is worth a fit: those with large angles have no use for derivatives at zero."""
+    """Return how promising a fit of a suspicion is; derivatives at zero say nothing about those with large angles."""
     if suspicion.exchanged:
         return _exchanged(plain, suspicion).promise({})
     if any(part in _ANGLES and std >= _TURNED_RAD for (_, part), std in suspicion.loose.items()):
@@ -124,7 +128,7 @@ def _exchanged(plain: PadFit, suspicion: Suspicion) -> PadFit:
 
 
 def _start(plain: PadFit, suspicion: Suspicion) -> dict[Key, float]:
-    """Return where to look first: what turned is found from headings, beyond the reach of derivatives."""
+    """Return the start of the fit: a turn is found from headings, beyond the reach of derivatives."""
     turns = [key for key in suspicion.loose if key[1] in ("yaw", "turned")]
     if not turns:
         return {}

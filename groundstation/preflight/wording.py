@@ -1,4 +1,4 @@
-"""An explanation in words: what is wrong, by how much, how sure, and what to do about it. Pure."""
+"""An explanation in words: what is wrong, by how much, how sure, and the remedy. Pure."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -12,7 +12,7 @@ from groundstation.preflight.figure_words import calibrated_lens, fixed_camera, 
 from groundstation.preflight.suspicions import Explanation, Opinion
 
 SUBJECT = "pads"
-# From here on a flight is not worth its risk (docs/explanation/preflight.md#checks-of-standing-drones).
+# From this size on a flight is not worth its risk (docs/explanation/preflight.md#checks-of-standing-drones).
 _MUST_SHARE, _MUST_M, _MUST_TURN, _MUST_TILT = 0.02, 0.08, math.radians(1.5), math.radians(1.2)
 _MUST_PLACED_M, _MUST_HEADING = 0.25, math.radians(10.0)
 _MOST_TOLD = 3
@@ -22,7 +22,7 @@ _Told = tuple[bool, str, str]
 
 
 def finding(field: ResolvedField, opinion: Opinion) -> Finding:
-    """Return the one finding that an opinion comes to."""
+    """Return the finding for an opinion."""
     if opinion.all_well:
         chance = f"chi-square {opinion.nothing_wrong.misfit:.0f} of {opinion.nothing_wrong.rows} rows"
         return Finding(Level.OK, SUBJECT, f"every drone that is seen stands where the field says ({chance})")

@@ -1,4 +1,4 @@
-"""Delays of cameras on vehicles by the filter: each is judged by what all cameras see."""
+"""Delays of cameras on vehicles, found with the filter: each is judged by what all cameras see."""
 
 import math
 from collections import Counter
@@ -13,17 +13,17 @@ from groundstation.calibration.sensor_delay import LEAST_SEEN, Delay
 from groundstation.field.resolved import ResolvedField
 
 _ROUNDS = 2
-# A camera is dated anew when others have since changed by more than this: a third of it is blamed on the first.
+# A camera's delay is found anew when others have since changed by more than this: a third of it is blamed on the first.
 _SETTLED_MS = 5.0
 _TARGET_ONLY = "doubtful: it saw hardly any other drone, and how the target moves nobody knows"
 _WATCH = "turn and move while it sees another drone"
 
 
 def onboard_cameras(flown: Flown, resolved: ResolvedField, fixed: Mapping[str, Delay]) -> list[Delay]:
-    """Return the delays of the cameras on vehicles, one after the other; again where others have changed since.
+    """Return the delays of the cameras on vehicles, found in turn, and again where others have changed since.
 
-    fixed: what is known of the fixed cameras. The filter hardly minds if all cameras are late together, so that how
-    well those are known is how well these can be.
+    fixed: delays of the fixed cameras. The filter is hardly affected if all cameras are equally late, so these delays
+    can be no better known than those.
     """
     found = dict(fixed)
     assumed: dict[str, dict[str, float]] = {}
@@ -39,7 +39,7 @@ def onboard_cameras(flown: Flown, resolved: ResolvedField, fixed: Mapping[str, D
 
 
 def _later_ms(delay: Delay) -> float:
-    """Return by how much it is later than its setting says; an unsure one is left as it is set."""
+    """Return by how much a camera is later than its setting says [ms]; 0 if that is not sure."""
     return (delay.measured_ms or delay.now_ms) - delay.now_ms if delay.sure else 0.0
 
 

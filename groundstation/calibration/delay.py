@@ -1,8 +1,8 @@
-"""How late is each sensor? Found in a recorded flight, from what sensors say of the same motion.
+"""Finds the delay of each sensor in a recorded flight, by comparing what sensors say of the same motion.
 
-A fixed camera sees headings, which a vehicle's gyroscopes tell without delay: that dates its pictures. Its positions
-then date the vehicles' velocities and heights. Cameras on vehicles are dated by the filter: it predicts what all
-cameras see worse where one is dated wrongly.
+A fixed camera sees headings, which a vehicle's gyroscopes report without delay: that gives the camera's delay. Its
+positions then give the delays of the vehicles' velocities and heights. Delays of cameras on vehicles come from the
+filter, which predicts all sightings worse if one delay is wrong.
 """
 
 from collections.abc import Callable, Mapping
@@ -26,7 +26,7 @@ from groundstation.geometry.rotations import rotation_from_euler, world_from_dow
 
 M = TypeVar("M", bound=Message)
 
-# A height is told by climbs of so much within the window, for so long.
+# The delay of a height needs climbs of this much within the window, for this long.
 _CLIMB_M, _CLIMBING_S = 0.2, 10.0
 _TURN = "turn the drones to and fro in its sight, or let the target circle them"
 _DASH = "dash to and fro in sight of a fixed camera, or chase a target that keeps turning back; or fly four minutes"
@@ -42,7 +42,7 @@ class _Track:
     headings: Array
 
 
-# Of a field without a fixed camera: motion capture and ranges date nothing yet.
+# For a field without a fixed camera: motion capture and ranges determine no delay yet.
 _UNSEEN = _Track(np.empty(0), np.empty((0, 3)), np.empty(0))
 
 
@@ -59,7 +59,7 @@ class _Own:
 
 
 def delays(flown: Flown, resolved: ResolvedField) -> list[Delay]:
-    """Return the delay of every camera, and of velocity and height of every robot."""
+    """Return the delays of every camera, and of velocity and height of every robot."""
     own = {name: _own(flown, name) for name in resolved.drones}
     models = parameters_from_field(resolved).entities
     habits = {name: model for name, model in models.items() if isinstance(model, OdometryRobot)}
@@ -126,7 +126,7 @@ def _fixed_camera(name: str, camera: WorldCamera, tracks: Mapping[str, _Track], 
             reason="it saw too little of any drone's turning",
             flight=_TURN,
         )
-    # Exposed later than was thought means that the way to us is shorter.
+    # A later exposure than assumed means that the way to us is shorter.
     return Delay(name, f"cameras.{name}.video_delay_ms", now_ms, now_ms - 1e3 * shift[0], 1e3 * shift[1], flight=_TURN)
 
 
@@ -159,7 +159,7 @@ def _odometry(drone: str, settings: FieldDrone, habits: OdometryRobot, track: _T
 
 
 def _body_positions(track: _Track, own: _Own, marker_m: tuple[float, float, float]) -> Array:
-    """Return where the drone's centre was, not its marker: that leans with it."""
+    """Return the path of the drone's centre from that of its marker, which leans with it."""
     lean = [np.interp(track.times, own.times, angle) for angle in (own.roll, own.pitch)]
     offsets = [
         rotation_from_euler(roll, pitch, yaw) @ marker_m for roll, pitch, yaw in zip(*lean, track.headings, strict=True)
@@ -168,7 +168,7 @@ def _body_positions(track: _Track, own: _Own, marker_m: tuple[float, float, floa
 
 
 def _path(track: _Track, own: _Own) -> Callable[[Array, float], Array]:
-    """Return (times, delay) -> positions that the reported velocities add up to, if they are so late."""
+    """Return (times, delay) -> positions, integrated from the reported velocities if they are this late."""
     at = np.interp(track.times, own.times, own.heading)
     drift = np.polyfit(track.times, np.unwrap(track.headings - at), 2)
 

@@ -1,4 +1,4 @@
-"""What a tracker took in: the input of every calibration."""
+"""The messages that a tracker took in: the input of every calibration."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -8,18 +8,18 @@ from groundstation.bus.messages import Message, RelativeObservation
 
 @dataclass(frozen=True, slots=True)
 class Flown:
-    """What a tracker took in: (now [ns], its messages with their keys) by tick, and the clock it read."""
+    """The messages of a tracker: (now [ns], messages with their keys) by tick, and the clock it read."""
 
     ticks: tuple[tuple[int, tuple[tuple[str, Message], ...]], ...]
     clock: str
 
     @property
     def duration_s(self) -> float:
-        """Return how long it is."""
+        """Return the length of the flight [s]."""
         return (self.ticks[-1][0] - self.ticks[0][0]) / 1e9
 
     @property
     def cameras(self) -> Counter[str]:
-        """Return how many observations each camera made."""
+        """Return the number of observations of each camera."""
         messages = (message for _, inputs in self.ticks for _, message in inputs)
         return Counter(message.camera for message in messages if isinstance(message, RelativeObservation))

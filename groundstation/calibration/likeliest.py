@@ -1,4 +1,4 @@
-"""Under which delay of a camera is a recording likeliest, and how sure is that?"""
+"""Finds the delay of a camera under which a recording is likeliest, and its uncertainty."""
 
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
@@ -9,9 +9,9 @@ from groundstation.arrays import Array
 from groundstation.geometry.parabola import Least, least
 from groundstation.time_units import NS_PER_S
 
-# Delays are tried this far apart until one is better than its neighbours, then half as far around it.
+# Delays are tried at this spacing until one is better than its neighbours, then at half of it around that one.
 _COARSE_MS, _FARTHEST_MS = 40.0, 120.0
-# Errors that are alike are seldom further apart than this.
+# Errors are seldom correlated over longer than this.
 _BLOCK_NS = 3 * NS_PER_S
 _LEAST_BLOCKS = 5
 
@@ -20,14 +20,14 @@ Costs = Mapping[tuple[str, str, int], float]
 
 
 class Likeliest(NamedTuple):
-    """By how much later a camera is than its setting says, and one sigma [ms]; infinite where nothing tells."""
+    """By how much later a camera is than its setting says, and one sigma [ms]; infinite if undetermined."""
 
     later_ms: float
     std_ms: float
 
 
 def likeliest(cost: Callable[[float], Costs]) -> Likeliest | None:
-    """Return the delay under which the sum of costs is least; None if that is at the end of what is tried.
+    """Return the delay with the least sum of costs; None if that is at the end of the range tried.
 
     cost: of all observations if the camera is so much later [ms].
     """
@@ -51,7 +51,7 @@ def _best(tried: Mapping[float, Costs]) -> float:
 
 
 def _by_block(tried: Mapping[float, Costs]) -> tuple[Array, Array]:
-    """Return the delays tried (n) and their costs (blocks of time, n), of what was used under each of them."""
+    """Return the delays tried (n) and their costs (blocks of time, n), of observations used under all of them."""
     later_ms = sorted(tried)
     common = sorted(set.intersection(*(set(costs) for costs in tried.values())), key=lambda seen: seen[2])
     stamps = np.array([stamp for _, _, stamp in common], dtype=np.int64)
@@ -63,7 +63,7 @@ def _by_block(tried: Mapping[float, Costs]) -> tuple[Array, Array]:
 
 
 def _fitted(later_ms: Array, blocks: Array) -> Likeliest:
-    """Return the minimum; its deviation by leaving out one block of time after the other (jackknife).
+    """Return the minimum; its deviation comes from leaving out one block of time at a time (jackknife).
 
     A heading that wanders by itself dents the cost: its curvature alone promises too much.
     """

@@ -1,4 +1,4 @@
-"""Re-runs the filter on a recorded flight with given delays and returns the likelihood of its measurements.
+"""Re-runs the filter on a recorded flight with given delays, for the likelihood of its measurements.
 
 No planner, no truth: only what the tracker took in, tick by tick.
 """
@@ -20,13 +20,13 @@ from groundstation.replay.tick_log import Tape
 from groundstation.time_units import NS_PER_S
 from groundstation.tracker import tracker_from_field
 
-# A correction counts like one of Student's distribution with so many degrees of freedom: outliers must not decide.
+# Corrections are weighted by a Student distribution with this many degrees of freedom: outliers must not decide.
 _FREEDOM = 8.0
 _SETTLING_NS = 3 * NS_PER_S
 
 
 def flown_of(source: Source) -> Flown:
-    """Return the longest life of the tracker in a recording; raises OperatorMistake when there is nothing in it."""
+    """Return the longest life of the tracker in a recording; raises OperatorMistake if it is empty."""
     lives: list[list[tuple[int, tuple[tuple[str, Message], ...]]]] = []
     clock = ""
     for tick in Tape(source.state).ticks():
@@ -46,9 +46,9 @@ def flown_of(source: Source) -> Flown:
 def costs(flown: Flown, resolved: ResolvedField, later_ms: Mapping[str, float]) -> Costs:
     """Return minus twice the log-likelihood of each observation of any observer, once the filter has settled.
 
-    later_ms: by how much longer than their settings say observers' pictures are on their way. What one camera sees is
-    predicted from what all saw: only the sum over all is the likelihood of a delay. A camera by itself is predicted
-    well also where its delay is blamed on the target.
+    later_ms: by how much observers' pictures are later than their settings say. One camera's sightings are predicted
+    from those of all, so only the sum over all is the likelihood of a delay: one camera alone is predicted well even if
+    its delay is blamed on the target.
     """
     shifts_ns = {name: round(later * 1e6) for name, later in later_ms.items()}
     tracker = tracker_from_field(resolved, flown.clock, 1)

@@ -1,18 +1,18 @@
-"""One sensor's delay as a recording shows it."""
+"""One sensor's delay as found in a recording."""
 
 from dataclasses import dataclass
 
-# What was seen less often tells nothing.
+# Fewer sightings than this determine nothing.
 LEAST_SEEN = 60
 _UNSURE_MS, _TOLERATED_MS = 15.0, 10.0
 
 
 @dataclass(frozen=True, slots=True)
 class Delay:
-    """One sensor: the setting, what it says [ms], what was measured and one sigma of it.
+    """One sensor's delay: the setting, its value [ms], the measured delay and one sigma of it.
 
-    reason: why it was not measured, or why what was measured is not to be trusted.
-    flight: which flight would tell it.
+    reason: why it was not measured, or why the measurement is not to be trusted. flight: the flight that would
+    determine it.
     """
 
     sensor: str
@@ -25,12 +25,12 @@ class Delay:
 
     @property
     def sure(self) -> bool:
-        """Return whether the recording shows it to better than 15 ms."""
+        """Return whether the recording determines it to better than 15 ms."""
         return self.measured_ms is not None and self.std_ms is not None and self.std_ms <= _UNSURE_MS
 
     @property
     def differs(self) -> bool:
-        """Return whether something trustworthy contradicts the setting: by three sigmas, and by more than 10 ms."""
+        """Return whether a trustworthy measurement contradicts the setting, by three sigmas and by more than 10 ms."""
         if self.measured_ms is None or self.std_ms is None or not self.sure or self.reason:
             return False
         return abs(self.measured_ms - self.now_ms) > max(_TOLERATED_MS, 3.0 * self.std_ms)

@@ -1,4 +1,4 @@
-"""All figures of a team at once, from one recorded flight: what it shows, what is wrong, and which settings mend it."""
+"""Calibrates all figures of a team from one recorded flight: which are wrong, and which settings mend them."""
 
 import math
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from groundstation.calibration.team_record import team_record
 from groundstation.calibration.team_settings import Path, changes, unit_of, with_changes
 from groundstation.field.resolved import ResolvedField
 
-# A figure whose deviation is worse than this, with all others in doubt as well, is not shown by a recording.
+# A recording does not determine a figure whose deviation is worse than this, with all others in doubt as well.
 _NEEDED = {
     "print": 0.015,
     "focal": 0.015,
@@ -38,7 +38,7 @@ _NEEDED = {
     "pitch": math.radians(0.5),
     "yaw": math.radians(1.5),
 }
-# Less than this does no harm, and is not proposed.
+# Smaller errors do no harm, and no change is proposed.
 _WORTH = {
     "print": 0.01,
     "focal": 0.012,
@@ -54,17 +54,17 @@ _WORTH = {
     "yaw": math.radians(1.5),
 }
 _WORTH_M, _SIGMAS = 0.02, 3.0
-# What disturbs sightings lasts: so many of them say the same.
+# Disturbances last: this many sightings count as one.
 _ALIKE = 4.0
 _HALF = 0.5
 
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """One figure: its error against the field and one sigma [unit], the same with all figures in doubt.
+    """One figure: its error against the field and one sigma [unit], and the same with all figures in doubt.
 
-    shown: whether the recording alone tells it well enough to be used; beside: the figure (who, part) that what is
-    doubtful of it is told apart from least, None where no single one stands out.
+    shown: whether the recording alone determines it well enough for use; beside: the figure (who, part) from which it
+    is hardest to separate, None if no single one stands out.
     """
 
     who: str
@@ -79,7 +79,7 @@ class Measured:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """A cause that is proposed: who ("": all), what, its largest error and one sigma [unit], and its rivals."""
+    """A proposed cause: owner ("": all), part, its largest error and one sigma [unit], and its rivals."""
 
     who: str
     what: str
@@ -91,9 +91,13 @@ class Found:
 
 @dataclass(frozen=True, slots=True)
 class TeamCalibration:
-    """figures: all, in the field's order; found: what is wrong, gravest first; settings: what mends it; gain of that.
+    """The result of a calibration.
 
-    sightings: used; misfit: their mean squared deviation (1: as expected or, with all that is allowed for, less).
+    figures: all, in the field's order; found: what is wrong, gravest first; settings: changes that mend it; gain: of
+    those changes.
+
+    sightings: number used; misfit: their mean squared deviation (1: as expected or, with all that is allowed for,
+    less).
     """
 
     figures: tuple[Measured, ...]
@@ -105,7 +109,7 @@ class TeamCalibration:
 
 
 def calibrate_team(flown: Flown, field: ResolvedField) -> TeamCalibration:
-    """Return what a recording says of all figures; raises OperatorMistake where it has too little."""
+    """Return the calibration from a recording; raises OperatorMistake if it has too little."""
     batch = TeamBatch(team_record(flown, field), field)
     figures = batch.figures
     explain = partial(batch.fit, alike=_ALIKE)
@@ -129,7 +133,7 @@ def calibrate_team(flown: Flown, field: ResolvedField) -> TeamCalibration:
 
 
 def _beside(index: int, covariance: Array, keys: tuple[Key, ...]) -> Key | None:
-    """Return the figure that, if it were known, would halve the variance of this one at least: the nearest."""
+    """Return the figure that, if it were known, would reduce the variance of this one most, and at least by half."""
     std = np.sqrt(np.diag(covariance))
     alike = np.abs(covariance[index] / (std * std[index]))
     alike[index] = 0.0

@@ -1,7 +1,7 @@
-"""Paths of a team and figures of its field that together explain a recording best: Gauss and Newton, knots eliminated.
+"""Fits a team's paths and its field's figures to a recording at once, by Gauss-Newton with the knots eliminated.
 
-The normal equations of the knots are banded in time; what is left after their elimination (Schur's complement) is the
-information that the recording holds on the figures.
+The normal equations of the knots are banded in time; their elimination (Schur complement) leaves the information that
+the recording holds on the figures.
 """
 
 from collections.abc import Mapping
@@ -31,22 +31,25 @@ from groundstation.field.resolved import ResolvedField
 from groundstation.preflight.stand import PLACED_M, PLACED_RAD, stand_of
 
 LEAST_SEEN = 60
-"""Sightings of a drone by fixed cameras that its path needs, and of a target by drones."""
+"""Least numbers of sightings of a drone by fixed cameras, for its path, and of a target by drones."""
 _FREEDOM = 8.0
 # Sightings this near to a jump of the drone's own heading are left out [s].
 _JUMP_S = 0.4
-# First rounds forgive more, so that what is far off still draws.
+# The first rounds weigh outliers more, so that distant ones still attract.
 _FORGIVING = (30.0, 10.0, 4.0, 2.0)
 _ROUNDS, _SETTLED = 14, 0.02
-# Whole steps swing about the best common delay of all sensors, which little holds.
+# Full steps oscillate about the best common delay of all sensors, which little constrains.
 _DAMPED = 0.5
 
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """theta (n): the figures' errors; information (n, n), pull (n): of the recording alone, about zero; misfit: mean
-    squared deviation of a sighting's row; used: sightings; cost: twice the negative log likelihood, but for a constant,
-    of paths and theta."""
+    """The best explanation of a recording under a prior.
+
+    theta (n): the figures' errors; information (n, n), pull (n): of the recording alone, about zero; misfit: mean
+    squared deviation of a sighting's row; used: number of sightings; cost: twice the negative log likelihood of paths
+    and theta, but for a constant.
+    """
 
     theta: Vector
     information: Array
@@ -56,10 +59,9 @@ class Fit:
     cost: float
 
     def log_evidence(self, sigma: Array) -> float:
-        """Return the log evidence, but for a constant, of the prior (n, n) that this fit had.
+        """Return the log evidence, but for a constant, of the prior (n, n) of this fit.
 
-        The cost is that of the paths which fit this prior best, not what the paths of another fit let expect: delays
-        bend the paths, and from the best delay it does not follow how well another explains the same flight.
+        The paths must be fitted under this prior: delays bend them, so the best delay's fit says little of others.
         """
         spread = np.linalg.slogdet(np.eye(len(self.theta)) + sigma @ self.information)[1]
         prior = float(self.theta @ np.linalg.solve(sigma, self.theta))
@@ -67,7 +69,7 @@ class Fit:
 
 
 class TeamBatch:
-    """One recording, ready to be explained; raises OperatorMistake where no fixed camera saw a drone long enough."""
+    """One recording, ready to be fitted; raises OperatorMistake if no fixed camera saw a drone long enough."""
 
     def __init__(self, record: TeamRecord, field: ResolvedField) -> None:
         grid = grid_of(record.duration_s)
@@ -143,9 +145,9 @@ class TeamBatch:
         return self.robots[name] if name in self.robots else self.targets[name]
 
     def fit(self, sigma: Array, alike: float = 1.0) -> Fit:
-        """Return the best explanation where the figures' errors have a prior with this covariance (n, n).
+        """Return the best explanation if the figures' errors have a prior with this covariance (n, n).
 
-        alike: so many sightings say the same, as what disturbs them lasts; how well a pad is known stays as it is.
+        alike: this many sightings count as one, because disturbances last; the precision of pads is not changed by it.
         """
         theta, precision = np.zeros(len(self.figures.keys)), np.linalg.inv(sigma)
         rounds = (*_FORGIVING, *([1.0] * _ROUNDS))
@@ -236,9 +238,9 @@ class TeamBatch:
             self._by_knots(rows, at, by[part], names, times)
 
     def _nearer(self, here: Array) -> Array:
-        """Return seen minus predicted, of the pose that is nearer where the detector gave two."""
+        """Return seen minus predicted, for the nearer pose where the detector gave two."""
         first, second = off(self._sightings.seen, here), off(self._sightings.other, here)
-        nearer = np.linalg.norm(second, axis=1) < np.linalg.norm(first, axis=1)  # NaN is not
+        nearer = np.linalg.norm(second, axis=1) < np.linalg.norm(first, axis=1)  # false for NaN
         return np.where(nearer[:, None], second, first)
 
     def _by_figures(self, rows: Rows, at: IntArray, by: Mapping[str, Array]) -> None:
@@ -268,12 +270,12 @@ class TeamBatch:
                     rows.by_knots(at[mine].ravel(), columns, (values * part[:, None]).ravel())
 
     def _by_attitude(self, rows: Rows, at: IntArray, slopes_: Array, name: str, times: Array) -> None:
-        """Add how an attitude changes with the delay of all that its drone tells."""
+        """Add the derivatives of an attitude by the common delay of all that its drone reports."""
         values = np.einsum("nic,nc->ni", slopes_[:, :, 3:], self.robots[name].turning(times))
         rows.by_figures(at.ravel(), np.full(at.size, self.figures.place[name, "own_delay"]), values.ravel())
 
     def _by_bulge(self, rows: Rows, at: IntArray, slopes_: Array, name: str, times: Array) -> None:
-        """Add how the way between knots bends with the velocity's scale and delay, and with the heading."""
+        """Add the derivatives of the curved way between knots by the velocity's scale and delay, and by the heading."""
         path, place = self.robots[name], self.figures.place
         bulge, later = path.bulge(times)
         turned = np.column_stack((-bulge[:, 1], bulge[:, 0]))
@@ -297,7 +299,7 @@ def _seen(sightings: Sightings, field: ResolvedField, name: str) -> bool:
 
 
 def _calm(record: TeamRecord, names: tuple[str, str], at_s: float) -> bool:
-    """Return whether no heading of those who take part jumps about that time."""
+    """Return whether no heading of the two entities jumps about that time."""
     for name in names:
         if name in record.own:
             own = record.own[name]

@@ -1,8 +1,8 @@
-"""Which figures of a field does a recording show to be wrong? As few causes as explain it. Pure arrays.
+"""Finds the figures of a field that a recording shows to be wrong: as few causes as explain it. Pure arrays.
 
-All figures are free within their surveys. One cause after another is let loose, the one that raises the evidence most,
-until none raises it enough. A linear Gaussian model says which are worth a trial; what counts is how much better the
-recording is explained with a cause than without it, by a fit each.
+All figures are free within their surveys. One cause after another is freed, always the one that raises the evidence
+most, until none raises it enough. A linear Gaussian model selects those worth a trial; what counts is how much better a
+fit with the cause explains the recording than one without it.
 """
 
 import math
@@ -15,17 +15,17 @@ import numpy as np
 from groundstation.arrays import Array, Vector
 from groundstation.calibration.team_figures import Suspicion
 
-# By how much (log) a cause must raise the evidence; causes this much worse than the best are ruled out.
+# By how much (log) a cause must raise the evidence; causes worse than the best by this much are ruled out.
 _SURE, RULED_OUT = math.log(100.0), math.log(20.0)
-# What a velocity errs by is known least: noise that happens to look late was worth e^8 in a healthy flight.
+# Velocity errors are the least known: noise that happened to look like a delay was worth e^8 in a healthy flight.
 _SURE_OF = {"velocity_delay": math.log(1e4)}
-# What the linear model gives so little for is not tried; of what is left, so many at once.
+# Causes with a smaller lead in the linear model are not tried; of the others, this many at once.
 _WORTH_A_TRIAL, _AT_ONCE = math.log(10.0), 4
 _MOST = 8
 
 
 class Explained(Protocol):
-    """A recording as it is explained under a prior: information (n, n) and pull (n) of the recording alone."""
+    """A recording fitted under a prior: information (n, n) and pull (n) of the recording alone."""
 
     @property
     def information(self) -> Array:
@@ -36,16 +36,16 @@ class Explained(Protocol):
         """Return the pull on the figures, about zero."""
 
     def log_evidence(self, sigma: Array) -> float:
-        """Return the log evidence, but for a constant, of that prior (n, n)."""
+        """Return the log evidence, but for a constant, of the fit's prior (n, n)."""
 
 
 Explain = Callable[[Array], Explained]
-"""Explains a recording where the figures' errors have a prior with this covariance (n, n)."""
+"""Fits a recording if the figures' errors have a prior with this covariance (n, n)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """A suspicion, how a recording is explained with it, and by how much (log) better than without."""
+    """A suspicion, the fit with it, and by how much (log) that is better than without."""
 
     suspicion: Suspicion
     explained: Explained
@@ -63,7 +63,7 @@ class Cause:
 
 @dataclass(frozen=True, slots=True)
 class Round:
-    """What lets each suspicion explain more: sigma (n, n): the prior so far; gains (log): of those that are left."""
+    """One round of the linear model: sigma (n, n): the prior so far; gains (log): of the remaining suspicions."""
 
     sigma: Array
     gains: tuple[tuple[Suspicion, float], ...]
@@ -75,13 +75,13 @@ class Round:
 
     @property
     def near(self) -> tuple[tuple[Suspicion, float], ...]:
-        """Return the best and those that are not ruled out beside it."""
+        """Return the best suspicion and those that are not ruled out beside it."""
         least = self.best[1] - RULED_OUT
         return tuple(one for one in self.gains if one[1] > least)
 
 
 def round_of(H: Array, g: Vector, sigma: Array, suspicions: Iterable[Suspicion]) -> Round:
-    """Return by how much more each suspicion would explain beside what has been let loose already.
+    """Return the gain of each suspicion beyond what has been freed already.
 
     H (n, n), g (n): information and pull on figures whose errors have the prior sigma (n, n).
     """
@@ -90,7 +90,7 @@ def round_of(H: Array, g: Vector, sigma: Array, suspicions: Iterable[Suspicion])
 
 
 def rounds(H: Array, g: Vector, surveyed: Vector, suspicions: Iterable[Suspicion]) -> Iterator[Round]:
-    """Yield one round after another; in each the best is let loose for those that follow; surveyed (n): one sigma."""
+    """Yield round after round; the best of each is freed for those that follow; surveyed (n): one sigma."""
     sigma, left = np.diag(surveyed**2), list(suspicions)
     while left:
         one = round_of(H, g, sigma, left)
@@ -106,7 +106,7 @@ def sure_of(what: str) -> float:
 
 
 def tried(explain: Explain, sigma: Array, suspicions: Iterable[Suspicion], without: float) -> list[Trial]:
-    """Return a fit with each suspicion, best first; without: the log evidence of sigma (n, n), without any."""
+    """Return a trial of each suspicion, best first; without: the log evidence of sigma (n, n) without any."""
     found = []
     for s in suspicions:
         freed_too = sigma + spread(s)
@@ -118,9 +118,9 @@ def tried(explain: Explain, sigma: Array, suspicions: Iterable[Suspicion], witho
 def causes(
     explain: Explain, free: Explained, surveyed: Vector, suspicions: Iterable[Suspicion]
 ) -> tuple[tuple[Cause, ...], Array]:
-    """Return what is wrong, gravest first, and the prior's covariance (n, n) that goes with it.
+    """Return the causes, gravest first, and the prior's covariance (n, n) that includes them.
 
-    free: the recording with all figures in doubt, by which the linear model chooses what to try; surveyed (n): one
+    free: the recording with all figures in doubt, by which the linear model chooses the trials; surveyed (n): one
     sigma.
     """
     sigma, left, found = np.diag(surveyed**2), list(suspicions), list[Cause]()
@@ -161,5 +161,5 @@ def posterior(H: Array, g: Vector, sigma: Array) -> tuple[Vector, Array]:
 
 
 def freed(found: Sequence[Cause]) -> Array:
-    """Return which figures (n) any cause moves; empty for no cause."""
+    """Return for each figure (n) whether any cause moves it; empty for no cause."""
     return np.any(np.hstack([one.suspicion.directions for one in found]) != 0.0, axis=1) if found else np.zeros(0, bool)

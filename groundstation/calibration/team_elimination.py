@@ -1,4 +1,4 @@
-"""The knots of all paths eliminated from the normal equations: their part is banded in time."""
+"""Eliminates the knots of all paths from the normal equations, which are banded in time."""
 
 from dataclasses import dataclass
 
@@ -11,18 +11,18 @@ from groundstation.arrays import Array, Vector
 
 @dataclass(frozen=True, slots=True)
 class Knots:
-    """What is needed to find the knots again once the figures are known."""
+    """The data from which the knots follow once the figures are known."""
 
     own: Vector
     by_figures: Array
 
     def step(self, figures: Vector) -> Vector:
-        """Return the step of all knots that belongs to a step of the figures."""
+        """Return the step of all knots that goes with a step of the figures."""
         return np.asarray(self.own - self.by_figures @ figures)
 
 
 def eliminated(r: Vector, local: csr_matrix, figures: csr_matrix, band: int) -> tuple[Array, Vector, Knots]:
-    """Return information and pull of the figures with all knots eliminated, and how the knots follow."""
+    """Return information and pull of the figures with all knots eliminated, and the data to find the knots again."""
     H = (local.T @ local).tocoo()
     count = H.shape[0]
     banded = np.zeros((band + 1, count))

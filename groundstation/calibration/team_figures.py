@@ -1,4 +1,4 @@
-"""The figures of a field that a recording may show to be wrong: names, how well they are known, where they are set."""
+"""The figures of a field that a recording may show to be wrong: names, precision, and place in the field."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -10,7 +10,7 @@ from groundstation.arrays import Array, IntArray, Vector
 from groundstation.field.resolved import ResolvedField
 
 Key = tuple[str, str]
-"""A figure: whose, and which."""
+"""A figure: its owner, and which figure."""
 
 # One sigma of a figure that was surveyed with care (more where the field says so), and of one that may be quite wrong:
 # [m], [rad], [s], shares.
@@ -50,7 +50,7 @@ _WRONG = {
 }
 ONBOARD = ("pan", "tilt", "ahead", "left", "up", "focal", "delay")
 FIXED = ("x", "y", "z", "roll", "pitch", "yaw", "focal", "delay")
-OWN = ("scale", "velocity_delay", "height_delay", "own_delay")  # the last: of all that a drone tells of itself
+OWN = ("scale", "velocity_delay", "height_delay", "own_delay")  # own_delay: of all that a drone reports of itself
 _PLACES, _ANGLES = ("x", "y", "z"), ("roll", "pitch", "yaw")
 _PLACED = ("ahead", "left", "up")
 _OF_DRONES_CAMERAS = ("pan", "tilt", "focal", *_PLACED)
@@ -58,9 +58,9 @@ _OF_DRONES_CAMERAS = ("pan", "tilt", "focal", *_PLACED)
 
 @dataclass(frozen=True, slots=True)
 class Suspicion:
-    """Figures that may be wrong together: directions (n, k) that a common cause moves them in, one sigma each (k).
+    """Figures that may be wrong together: directions (n, k) in which a common cause moves them, one sigma each (k).
 
-    what: the part's name, or what its parts have in common; who: "" for all.
+    what: the part's name, or the common name of its parts; who: "" for all.
     """
 
     who: str
@@ -70,7 +70,7 @@ class Suspicion:
 
 
 class Figures:
-    """The figures of the cameras, markers and drones that a recording can tell of, in a fixed order."""
+    """The figures of cameras, markers and drones that a recording can determine, in a fixed order."""
 
     def __init__(self, field: ResolvedField, drones: Sequence[str]) -> None:
         self.field, self.drones = field, tuple(drones)
@@ -95,7 +95,7 @@ class Figures:
         return max(_SURVEYED[part], self._told(who, part))
 
     def _told(self, who: str, part: str) -> float:
-        """Return one sigma that the field gives a lens or the mounting of a drone's camera; 0: it gives none."""
+        """Return the sigma that the field gives for a lens or the mounting of a drone's camera; 0 if it gives none."""
         if part == "focal" and who in self.field.cameras:
             return self.field.cameras[who].calibration.focal_std
         if part not in _OF_DRONES_CAMERAS:
@@ -106,16 +106,16 @@ class Figures:
         return camera.position_std_m if part in _PLACED else math.radians(camera.attitude_std_deg)
 
     def of(self, theta: Vector, names: Sequence[str], part: str) -> Vector:
-        """Return one figure for each of many names, 0 where a name has none."""
+        """Return one figure for each of many names, 0 if a name has none."""
         lookup = {name: float(theta[self.place[name, part]]) for name in set(names) if (name, part) in self.place}
         return np.array([lookup.get(name, 0.0) for name in names])
 
     def columns(self, names: Sequence[str], part: str) -> IntArray:
-        """Return the index of one figure for each of many names, -1 where a name has none."""
+        """Return the index of one figure for each of many names, -1 if a name has none."""
         return np.array([self.place.get((name, part), -1) for name in names], dtype=np.int64)
 
     def suspicions(self) -> Iterator[Suspicion]:
-        """Yield everything that one cause may put wrong."""
+        """Yield all suspicions: the figures that one cause may put wrong."""
         n = len(self.keys)
         for place, (who, part) in enumerate(self.keys):
             if part not in ("x", "y", "roll", "pitch"):

@@ -1,4 +1,4 @@
-"""What is left wrong of a field whose figures are wrong, once some of its settings were changed. Pure."""
+"""The errors that remain in a wrong field after some of its settings were changed. Pure."""
 
 from collections.abc import Iterable, Sequence
 
@@ -7,12 +7,12 @@ from groundstation.calibration.team_settings import paths_of, value_at
 from groundstation.field.resolved import ResolvedField
 
 Error = tuple[str, str, float]
-"""Whose, which part, true minus told: m, deg, ms, shares."""
+"""An error: owner, part, true minus set: m, deg, ms, shares."""
 _AXES = ("x", "y", "z"), ("ahead", "left", "up"), ("roll", "pitch", "yaw")
 
 
 def errors_left(errors: Sequence[Error], before: ResolvedField, after: ResolvedField) -> tuple[Error, ...]:
-    """Return true minus told once a field was changed; errors: what it was before."""
+    """Return the errors (true minus set) of a changed field; errors: those before the change."""
     told = {(who, part): size for who, part, size in errors}
     left = {key: _left(key, told.get(key, 0.0), before, after) for key in _keys(before)}
     return tuple((who, part, size) for (who, part), size in left.items() if size)

@@ -1,4 +1,4 @@
-"""Where drones and targets were, as knots in time between which their own sensors tell the way."""
+"""Paths of drones and targets: knots in time, between which their own sensors give the way."""
 
 import math
 from dataclasses import dataclass
@@ -15,9 +15,9 @@ ROBOT, TARGET = 6, 3
 """Entries of a knot: (x, y, z, correction of the heading, errors of roll and pitch); (x, y, heading)."""
 _SPACING_S = 0.2
 LATER_S = 0.04
-"""Half of the step by which derivatives by delays are taken [s]: about what a wrong delay comes to.
+"""Half of the step by which derivatives by delays are taken [s]: about the size of a wrong delay.
 
-Over less they are mostly noise of the velocities, which the fit would take for knowledge of the delay.
+Over a smaller step they are mostly noise of the velocities, which the fit would take for information on the delay.
 """
 
 
@@ -42,7 +42,7 @@ def grid_of(duration_s: float) -> Grid:
 
 
 class RobotPath:
-    """A drone's path: `knots` (k, 6); between them the way that its odometry tells."""
+    """A drone's path: `knots` (k, 6), and between them the way by its odometry."""
 
     def __init__(self, own: OwnMotion, drone: FieldDrone, grid: Grid, knots: Array) -> None:
         self.own, self.grid, self.knots = own, grid, knots
@@ -51,9 +51,9 @@ class RobotPath:
         self.refresh(0.0, 0.0, 0.0, 0.0)
 
     def refresh(self, scale: float, later_s: float, height_later_s: float, own_later_s: float) -> None:
-        """Add up the reported velocities anew, under errors of their scale (a share) and of the delays [s].
+        """Integrate the reported velocities anew, under errors of their scale (a share) and of the delays [s].
 
-        own_later_s: of attitudes, and of velocities and heights besides.
+        own_later_s: delay of attitudes, added to those of velocities and heights.
         """
         self.height_delay_s = self._height_delay_s + height_later_s + own_later_s
         self._own_later_s = own_later_s
@@ -63,7 +63,7 @@ class RobotPath:
         self.at_knots, self.later_at_knots = self._told(self.grid.times), self._told_later(self.grid.times)
 
     def _way(self, scale: float, later_s: float) -> tuple[Array, Array]:
-        """Return times (n) and the way until then (n, 2)."""
+        """Return times (n) and the way up to each (n, 2)."""
         own, grid = self.own, self.grid
         times = own.times - self._delay_s - later_s
         heading = self._angle(own.yaw, times) + np.interp(times, grid.times, self.knots[:, 3])
@@ -81,7 +81,7 @@ class RobotPath:
         return (_along(self._later, times) - _along(self._earlier, times)) / (2.0 * LATER_S)
 
     def bulge(self, times: Array) -> tuple[Array, Array]:
-        """Return how far the way between two knots is from their line (n, 2), and its derivative by the delay."""
+        """Return the distance of the way between two knots from their line (n, 2), and its derivative by the delay."""
         first, share = self.grid.between(times)
         return (
             self._told(times) - _between(self.at_knots, first, share),
@@ -101,7 +101,7 @@ class RobotPath:
         return np.asarray(np.interp(times + self._own_later_s, self.own.times, angle))
 
     def turning(self, times: Array) -> Array:
-        """Return how fast yaw, roll and pitch change (n, 3) [rad/s]: their derivative by the delay of all."""
+        """Return the rates of yaw, roll and pitch (n, 3) [rad/s]: their derivatives by the common delay."""
         own, step = self.own, LATER_S
         columns = [self._angle(a, times + step) - self._angle(a, times - step) for a in (own.yaw, own.roll, own.pitch)]
         return np.column_stack(columns) / (2.0 * step)
@@ -131,7 +131,7 @@ def _between(table: Array, first: IntArray, share: Array) -> Array:
 
 
 def robot_start(field: ResolvedField, name: str, own: OwnMotion, sightings: Sightings, grid: Grid) -> Array:
-    """Return first knots of a drone, from what fixed cameras saw of it."""
+    """Return initial knots of a drone, from sightings by fixed cameras."""
     rows = [i for i, s in enumerate(sightings.subjects) if s == name and sightings.observers[i] in field.cameras]
     times, seen = sightings.times[rows], sightings.seen[rows]
     headings = np.unwrap(seen[:, 3])
@@ -151,7 +151,7 @@ def robot_start(field: ResolvedField, name: str, own: OwnMotion, sightings: Sigh
 
 
 def _heading_start(own: OwnMotion, times: Array, headings: Array, grid: Grid) -> Array:
-    """Return the correction of the heading at the knots, one value between two resets of the drone's own."""
+    """Return the correction of the heading at the knots, one value between two resets of the drone's own heading."""
     gap = headings - np.interp(times, own.times, own.yaw)
     block = np.interp(times, own.times, own.resets).round()
     at_knots = np.interp(grid.times, own.times, own.resets).round()
@@ -168,14 +168,14 @@ def _mean_angle(angles: Array) -> float:
 
 
 def target_start(times: Array, places: Array, headings: Array, grid: Grid) -> Array:
-    """Return first knots of a target, from where drones told it to be (n, 2) and its headings (n)."""
+    """Return initial knots of a target, from its places by drones' sightings (n, 2) and its headings (n)."""
     turned = np.unwrap(headings)
     columns = [_smooth(times, values, grid) for values in (places[:, 0], places[:, 1], turned)]
     return np.column_stack(columns)
 
 
 def _smooth(times: Array, values: Array, grid: Grid) -> Array:
-    """Return medians of values about the knots, with lines across what nobody saw."""
+    """Return medians of values about the knots, interpolated linearly across gaps."""
     first, share = grid.between(times)
     nearest = first + (share > 0.5)
     order = np.argsort(nearest, kind="stable")

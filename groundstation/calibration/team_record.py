@@ -1,4 +1,4 @@
-"""What a recording holds for the calibration of a team: own motion of each drone, sightings, and who stood where."""
+"""The data of a recording for the calibration of a team: own motion of each drone, sightings, and stands on pads."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ from groundstation.time_units import NS_PER_S
 
 _STANDING = frozenset({FlightState.LANDED})
 _UNKNOWN_YAW = 1e6
-# A stand shorter than this may be a drone that somebody still sets down.
+# During a shorter stand somebody may still be placing the drone.
 _LEAST_STAND_S = 0.5
 
 
@@ -62,7 +62,7 @@ class Sightings:
 
 @dataclass(frozen=True, slots=True)
 class TeamRecord:
-    """A recording; stands: from when to when [s] a drone stood before it first flew."""
+    """The data of a recording; stands: from when to when [s] a drone stood before its first flight."""
 
     own: Mapping[str, OwnMotion]
     sightings: Sightings
@@ -71,7 +71,7 @@ class TeamRecord:
 
 
 def team_record(flown: Flown, field: ResolvedField) -> TeamRecord:
-    """Return the record of a flight; times count from its first tick."""
+    """Return the data of a flight; times count from its first tick."""
     zero_ns = flown.ticks[0][0]
     intake = AttitudeIntake(parameters_from_field(field).inertial)
     standing = dict.fromkeys(field.drones, True)
@@ -87,7 +87,7 @@ def team_record(flown: Flown, field: ResolvedField) -> TeamRecord:
             standing[name] = message.flight_state in _STANDING
             if not standing[name]:
                 flew.add(name)
-            elif name not in flew:  # later it may stand anywhere
+            elif name not in flew:  # after its first flight it may stand anywhere
                 stands[name].append(at_s)
         elif isinstance(message, ImuSample):
             intake.imu(message, stamp_ns, standing[name])

@@ -1,4 +1,4 @@
-"""Rows of the batch: residuals in deviations, with their derivatives by knots and by figures; what joins the knots."""
+"""Rows of the batch: residuals in deviations with their derivatives by knots and figures, and rows that join knots."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,7 +11,7 @@ from groundstation.calibration.team_paths import RobotPath, TargetPath
 from groundstation.field.drones import FieldDrone
 from groundstation.vehicles import kind_named
 
-# What a climb and a target's heading change by [m/s^2], [rad/s^2]; a target that turns accelerates beyond its wheels.
+# How fast a climb and a target's heading change [m/s^2], [rad/s^2]; a turning target accelerates beyond its wheels.
 _CLIMB_M_S2, _TURN_RAD_S2, _TURNING_M_S2 = 0.8, 2.0, 0.3
 _HEIGHT_EACH_S, _HEIGHT_LASTS_S, _LOWEST_M = 0.4, 2.0, 0.3
 _RESET_RAD, _STILL, _FREEDOM = 10.0, 5e-4, 8.0
@@ -20,9 +20,9 @@ _UNHEARD_M_S = 0.5
 
 @dataclass
 class Rows:
-    """Residuals and derivatives that are collected; `local` columns are knots', `figures` those of figures.
+    """Collects residuals and derivatives; `local` columns belong to knots, `figures` columns to figures.
 
-    beyond: by how much their cost is more than their squares, where outliers count less.
+    beyond: the cost beyond their squares, where outliers count less.
     """
 
     residuals: list[Vector] = field(default_factory=list)
@@ -32,7 +32,7 @@ class Rows:
     beyond: float = 0.0
 
     def add(self, residual: Vector, std: Vector | float) -> tuple[IntArray, Vector]:
-        """Take residuals (what is seen minus predicted); returns their row numbers and weights (1 over deviation)."""
+        """Take residuals (seen minus predicted); returns their row numbers and weights (1 over deviation)."""
         weight: Vector = np.broadcast_to(1.0 / np.asarray(std, dtype=np.float64), residual.shape).copy()
         rows = self.count + np.arange(len(residual), dtype=np.int64)
         self.residuals.append(residual * weight)
@@ -44,12 +44,12 @@ class Rows:
         self.local.append((rows, columns, values))
 
     def by_figures(self, rows: IntArray, columns: IntArray, values: Vector) -> None:
-        """Take derivatives by figures; a column of -1 is no figure."""
+        """Take derivatives by figures; column -1: no figure."""
         known = columns >= 0
         self.figures.append((rows[known], columns[known], values[known]))
 
     def count_as_one_of(self, alike: float) -> None:
-        """Let the rows so far count as one of so many that say the same."""
+        """Make every `alike` of the rows so far count as one, because they say the same."""
         share = alike**-0.5
         self.residuals = [share * values for values in self.residuals]
         self.local = [(rows, columns, share * values) for rows, columns, values in self.local]
@@ -74,7 +74,7 @@ def _sparse(entries: list[tuple[IntArray, IntArray, Vector]], shape: tuple[int, 
 
 @dataclass(frozen=True, slots=True)
 class Columns:
-    """Where one entity's knots are among all: column of entry `e` of knot `k` is first + e + stride k."""
+    """The columns of one entity's knots: entry `e` of knot `k` has column first + e + stride k."""
 
     first: int
     stride: int
@@ -85,7 +85,7 @@ class Columns:
 
 
 def robot_rows(rows: Rows, path: RobotPath, drone: FieldDrone, columns: Columns, figures: Mapping[str, int]) -> None:
-    """Add what a drone tells of itself; figures: columns of its own figures, by part."""
+    """Add the rows of a drone's own sensors; figures: columns of its own figures, by part."""
     _way_rows(rows, path, drone, columns, figures)
     _heading_rows(rows, path, drone, columns)
     _lean_rows(rows, path, drone, columns)
@@ -104,14 +104,14 @@ def _way_rows(rows: Rows, path: RobotPath, drone: FieldDrone, columns: Columns, 
     bent = np.column_stack((-told[:, 1], told[:, 0]))
     hasty = np.diff(path.later_at_knots, axis=0)
     for axis in range(2):
-        # What is told is the measurement, the step between knots its prediction.
+        # The report is the measurement, the step between knots its prediction.
         at, weight = rows.add(gap[:, axis], deviations)
         rows.by_knots(at, columns.of(knots, axis), -weight)
         rows.by_knots(at, columns.of(knots + 1, axis), weight)
         for knot in (knots, knots + 1):
             rows.by_knots(at, columns.of(knot, 3), -0.5 * weight * bent[:, axis])
         rows.by_figures(at, np.full(len(at), figures["scale"]), -weight * told[:, axis])
-        # Where attitudes are late too, the headings of these velocities turn a little; that is left out.
+        # If attitudes are late too, the headings of these velocities turn a little; that is neglected.
         for part in ("velocity_delay", "own_delay"):
             rows.by_figures(at, np.full(len(at), figures[part]), -weight * hasty[:, axis])
 
@@ -161,7 +161,7 @@ def _height_rows(rows: Rows, path: RobotPath, drone: FieldDrone, columns: Column
 
 
 def target_rows(rows: Rows, path: TargetPath, acceleration_m_s2: float, columns: Columns) -> None:
-    """Add that a target can accelerate and turn so much."""
+    """Add the rows that limit how fast a target accelerates and turns."""
     squared = path.grid.spacing_s**2
     for entry in (0, 1):
         _bend_rows(rows, path.knots[:, entry], columns, entry, (acceleration_m_s2 + _TURNING_M_S2) * squared)
@@ -171,7 +171,10 @@ def target_rows(rows: Rows, path: TargetPath, acceleration_m_s2: float, columns:
 def stand_rows(
     rows: Rows, path: RobotPath, columns: Columns, span: tuple[float, float], pose: Array, std: Array
 ) -> None:
-    """Add that a drone stood still from when to when; pose, std (4): x, y, z, heading [m, rad; world] of its pad."""
+    """Add the rows of a drone standing still over a span; pose, std (4): x, y, z, heading [m, rad.
+
+    World] of its pad.
+    """
     knots = np.flatnonzero((path.grid.times >= span[0]) & (path.grid.times <= span[1]))
     if len(knots) < 2:
         return

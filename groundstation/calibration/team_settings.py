@@ -1,4 +1,4 @@
-"""Errors of figures as settings of the field: what each is now, what it becomes, and the whole field with them."""
+"""Errors of figures as settings of the field: each present and new value, and the whole field with the new ones."""
 
 import math
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ _ODOMETRY = {"scale": "velocity_scale", "velocity_delay": "velocity_delay_ms", "
 
 
 def unit_of(part: str) -> tuple[float, str]:
-    """Return what a figure's error is multiplied by to be read, and its unit."""
+    """Return the factor that turns a figure's error into its displayed unit, and that unit."""
     if part in _DEGREES:
         return math.degrees(1.0), "deg"
     if part in _PLACED:
@@ -29,7 +29,7 @@ def unit_of(part: str) -> tuple[float, str]:
 
 
 def paths_of(field: ResolvedField, key: Key) -> tuple[Path, ...]:
-    """Return the settings that a figure stands in; none where stamps must be mended instead."""
+    """Return the settings that contain a figure; none if stamps must be mended instead."""
     who, part = key
     if part == "print":
         owner: Path = (
@@ -50,7 +50,7 @@ def paths_of(field: ResolvedField, key: Key) -> tuple[Path, ...]:
 
 
 def changes(figures: Figures, theta: Vector, moved: Vector) -> dict[Path, Any]:
-    """Return new values of the settings whose figures are moved, rounded to what can be set."""
+    """Return new values of the settings of moved figures, rounded to what can be set."""
     field, found = figures.field, dict[Path, Any]()
     values = msgspec.to_builtins(field)
     for index in np.flatnonzero(moved):
@@ -91,7 +91,7 @@ def value_at(field: ResolvedField, path: Path) -> Any:
 
 
 def entry_at(values: Any, path: Path) -> Any:
-    """Return what stands at a path of nested mappings."""
+    """Return the entry at a path of nested mappings."""
     for name in path:
         values = values[name]
     return values

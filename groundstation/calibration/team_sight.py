@@ -1,4 +1,4 @@
-"""What cameras see of markers under errors of the field's figures, many sightings at once. Pure arrays.
+"""Predicts sightings of markers under errors of the field's figures, many at once. Pure arrays.
 
 A pose is (x, y, z, yaw, roll, pitch) [m, rad; world]. A fixed camera's pose is its survey with its errors.
 """
@@ -14,7 +14,7 @@ from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.rotations import BASE_FROM_LEVEL_OPTICAL, world_from_downward_optical
 
 _STEP = 1e-5
-# What a detector's pose is off by beyond its covariance: across, along per metre, heading [m, share, rad].
+# Errors of a detector's pose beyond its covariance: across, along per metre, heading [m, share, rad].
 _FLOOR_M, _FLOOR_SHARE, _FLOOR_RAD = 0.003, 0.002, math.radians(0.5)
 
 
@@ -71,7 +71,7 @@ def looks_of(field: ResolvedField, observers: Sequence[str], subjects: Sequence[
 
 
 def predicted(looks: Looks, scene: Scene) -> Array:
-    """Return what is reported of each marker (n, 4): centre [m; camera_optical] and heading [rad]."""
+    """Return the predicted report of each marker (n, 4): centre [m; camera_optical] and heading [rad]."""
     base = _rotations(scene.observer[:, 3], scene.observer[:, 5], scene.observer[:, 4])
     pan, tilt = looks.pan + scene.mounting[:, 0], looks.tilt + scene.mounting[:, 1]
     turned = _rotations(pan, tilt, np.zeros(len(pan)))

@@ -1,4 +1,4 @@
-"""By how much one record of a motion is later than another: their changes are compared under many delays."""
+"""Finds by how much one record of a motion is later than another, by comparing their changes under many delays."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 from groundstation.arrays import Array
 from groundstation.geometry.parabola import least
 
-# Differences over so long are compared: what drifts more slowly does not count.
+# Differences over this time are compared: slower drifts do not count.
 _WINDOW_S = 1.0
-# Of velocities: a vehicle's velocity loop answers an error of its velocity within some 0.2 s, and then what was really
-# flown depends on the error. So short differences are taken, less what an error that lasts has in common with before.
+# For velocities: a vehicle's velocity loop answers an error of its velocity within some 0.2 s, after which the true
+# motion depends on the error. So short differences are taken, less the part of a lasting error that they share with
+# earlier ones.
 _BRIEF_S = 0.13
-# Of those, so many say the same beyond what overlaps, by the scatter over flights: pictures are not dated alike.
+# Of those, this many count as one beyond their overlap, by the scatter over flights: pictures are not all equally late.
 _ALIKE = 4.0
 _GRID_S = np.arange(-0.10, 0.2001, 0.01)
 _REACH = 6
@@ -26,7 +27,7 @@ _FREEDOM = 8.0
 class Change:
     """Differences of a record: over a window, less `kept` of those over the window before. Indices into its times.
 
-    alike: so many of them say the same, beyond those that overlap.
+    alike: this many of them count as one, beyond those that overlap.
     """
 
     window_s: float
@@ -44,7 +45,7 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """Two records of one motion: times and values (n, k) of one, the other as a function, what is compared."""
+    """Two records of one motion: times and values (n, k) of one, the other as a function, and the changes compared."""
 
     times: Array
     values: Array
@@ -68,7 +69,7 @@ def across(times: Array) -> Change:
 
 
 def briefly(times: Array, lasting_s: float) -> Change:
-    """Return short differences of positions, freed of an error of the velocity that lasts so long [s]."""
+    """Return short differences of positions, less the effect of a velocity error that lasts this long [s]."""
     first, second = _pairs(times, _BRIEF_S)
     follows = np.full(len(times), -1)
     follows[first] = second
@@ -78,7 +79,7 @@ def briefly(times: Array, lasting_s: float) -> Change:
 
 
 def interpolated(times: Array, values: Array) -> Callable[[Array, float], Array]:
-    """Return (times, delay) -> reported values, if they are so late."""
+    """Return (times, delay) -> reported values, if they are this late."""
 
     def at(wanted: Array, delay_s: float) -> Array:
         return np.column_stack([np.interp(wanted, times - delay_s, column) for column in values.T])
@@ -89,12 +90,12 @@ def interpolated(times: Array, values: Array) -> Callable[[Array, float], Array]
 def shift_between(parts: list[Part], scaled: bool) -> tuple[float, float] | None:
     """Return by how much the second of two records of the same motion is late, and one sigma [s].
 
-    scaled: up to a factor. None when there is too little, or no minimum.
+    scaled: up to a factor. None if there are too few data, or no minimum.
     """
     parts = [part for part in parts if len(part.change(part.values)) >= _LEAST]
     if not parts:
         return None
-    # Each part is weighed by its own noise, and what is far beyond it does not decide.
+    # Each part is weighted by its own noise, and outliers far beyond it do not decide.
     noise = [np.median(_misfits(part, 0.0, scaled)) / part.values.shape[1] for part in parts]
     chi = np.array(
         [sum(_robust(_misfits(p, delay, scaled) / n) for p, n in zip(parts, noise, strict=True)) for delay in _GRID_S]
@@ -102,14 +103,14 @@ def shift_between(parts: list[Part], scaled: bool) -> tuple[float, float] | None
     found = least(_GRID_S, chi, _REACH)
     if found is None or found.curvature <= 0.0:
         return None
-    # Differences overlap: so many of them say the same.
+    # Differences overlap: this many of them say the same.
     change = parts[0].change
     variance = change.alike * max(1.0, rate_hz(parts[0].times) * change.window_s) / found.curvature
     return found.place, float(np.sqrt(variance))
 
 
 def rate_hz(times: Array) -> float:
-    """Return how often a record was taken."""
+    """Return the rate of a record [Hz]."""
     return len(times) / float(np.ptp(times))
 
 
@@ -118,7 +119,7 @@ def _robust(squares: Array) -> float:
 
 
 def _misfits(part: Part, delay_s: float, scaled: bool) -> Array:
-    """Return the squared differences (n) of what both records say of each change."""
+    """Return the squared differences (n) between the two records' values of each change."""
     moved, told = part.change(part.values), part.change(part.other(part.times, delay_s))
     scale = float((moved * told).sum() / max((told * told).sum(), 1e-12)) if scaled else 1.0
     return np.asarray(((moved - scale * told) ** 2).sum(axis=1))

@@ -1,1 +1,1 @@
-"""Adapters between vehicles or cameras and the bus: one package per protocol, and their shared parts."""
+"""Adapters between devices (vehicles, cameras and others) and the bus: one package per protocol, and shared parts."""

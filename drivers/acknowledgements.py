@@ -1,4 +1,4 @@
-"""What was answered to which command, and when an accepted one has become effective. Pure."""
+"""Answers to commands, and the moment when an accepted one becomes effective. Pure."""
 
 from drivers.watchdog_types import ALOFT, FREE, Ack, DriverMode, VehicleView
 from groundstation.bus.messages import UP, AckStage, Command, FlightState, Verb
@@ -18,7 +18,7 @@ class AckBook:
         return self._answers.get(command.id)
 
     def answer(self, command: Command, refusal: str) -> Ack:
-        """Note the answer to a command; an accepted one is waited for."""
+        """Note the answer to a command, and wait for an accepted one to become effective."""
         stage = AckStage.REFUSED if refusal else AckStage.ACCEPTED
         answer = Ack(command.id, command.verb, stage, refusal)
         if len(self._answers) >= _REMEMBERED_COMMANDS:
@@ -34,7 +34,7 @@ class AckBook:
             self._pending = None
 
     def effective(self, mode: DriverMode, vehicle: VehicleView, flies: bool) -> tuple[Ack, ...]:
-        """Return the answers that are due; flies: a setpoint is obeyed."""
+        """Return the answers that are due; flies: whether a setpoint is obeyed."""
         if self._pending is None or not _is_effective(self._pending.verb, mode, vehicle, flies):
             return ()
         ack = Ack(self._pending.id, self._pending.verb, AckStage.EFFECTIVE)
@@ -44,7 +44,7 @@ class AckBook:
 
 
 def _is_effective(verb: Verb, mode: DriverMode, vehicle: VehicleView, flies: bool) -> bool:
-    # Seen on the vehicle, not merely sent.
+    # Judged by the vehicle's reports, not by what was sent.
     state = vehicle.flight_state if vehicle.fresh else FlightState.UNKNOWN
     match verb:
         case Verb.TAKEOFF:

@@ -1,4 +1,4 @@
-"""What the operator is told of a vehicle: its modes, its silence, and what was refused; each once, as it changes."""
+"""Events about a vehicle for the operator: its modes, silence and refusals, each told once per change."""
 
 from collections.abc import Mapping
 
@@ -13,7 +13,7 @@ from groundstation.time_units import NS_PER_S
 _UNANSWERED_NS, _UNCONFIGURED_NS = 5 * NS_PER_S, 15 * NS_PER_S
 _SILENCE_EVENT_NS = _REFUSAL_PERIOD_NS = NS_PER_S
 _UNSOUND = "restart it; if it says this again, have that sensor repaired"
-# Refusals that nothing of ours causes, as the operator reads them.
+# Refusals caused from outside of this run, in the operator's words.
 _INTRUSIONS = {
     "unsigned": "unsigned frames",
     "signature": "frames signed with another key",
@@ -26,7 +26,7 @@ _INTRUSIONS = {
 
 
 class Announcements:
-    """Events of one vehicle. heard_ns: when it was last heard, at first when its driver started."""
+    """Events of one vehicle. heard_ns: when it was last heard; initially when its driver started."""
 
     def __init__(self, child: HostProcess, vehicle: Vehicle, mode: DriverMode, reason: str) -> None:
         self._child, self._vehicle = child, vehicle
@@ -37,7 +37,10 @@ class Announcements:
         self.heard_ns = self._unconfigured_ns = clock.now_ns()
 
     def tell_mode(self, decision: WatchdogDecision, failsafe: str) -> bool:
-        """Tell a new mode or reason; returns whether the mode has changed. failsafe: the row that it comes from."""
+        """Tell a new mode or reason.
+
+        Returns whether the mode has changed. failsafe: the row of the table that caused it.
+        """
         before, self._told = self._told, (decision.mode, decision.reason)
         if before != self._told:
             cut, sinks = decision.mode is DriverMode.CUT, decision.mode is DriverMode.LANDING and failsafe
@@ -46,18 +49,18 @@ class Announcements:
         return before[0] is not decision.mode
 
     def tell_refusal(self, now_ns: int, command: Command, reason: str) -> None:
-        """Tell of a command without the right to give it, once a second."""
+        """Tell of a command from somebody without the right to give it, at most once a second."""
         if now_ns >= self._next_refusal_ns:
             self._next_refusal_ns = now_ns + _REFUSAL_PERIOD_NS
             self._event(Severity.WARNING, f"{command.verb} of {command.header.source} refused: {reason}")
 
     def tell_intrusions(self, now_ns: int, rejected: Mapping[str, int]) -> None:
-        """Tell of refused messages from outside of the run; rejected: how many so far, by reason."""
+        """Tell of refused messages from outside of the run; rejected: their numbers so far, by reason."""
         if refused := self._intrusions.news(now_ns, rejected):
             self._event(Severity.WARNING, f"{self._vehicle.name} refused {refused}")
 
     def tell_silence(self, now_ns: int, view: VehicleView, mode: DriverMode) -> None:
-        """Tell that the vehicle is silent, or answers again, and whether the driver is ready."""
+        """Tell when the vehicle falls silent or answers again, and whether the driver is ready."""
         name, address = self._vehicle.name, self._vehicle.address
         if view.fresh:
             self.heard_ns = now_ns
@@ -69,7 +72,7 @@ class Announcements:
         limit_ns = _UNANSWERED_NS if mode is DriverMode.CONNECTING else _SILENCE_EVENT_NS
         if not self._silent and now_ns - self.heard_ns >= limit_ns:
             self._silent = True
-            if view.unsound and mode is not DriverMode.CONNECTING:  # the watchdog's reason says what
+            if view.unsound and mode is not DriverMode.CONNECTING:  # the watchdog's reason names the fault
                 return
             told = f"{name}: {view.silence}" if view.unsound else f"{name} does not answer at {address}"
             remedy = _UNSOUND if view.unsound else how_to_reach(address)
@@ -77,7 +80,7 @@ class Announcements:
             self._child.degrade(told)
 
     def _tell_start(self, now_ns: int, view: VehicleView, mode: DriverMode) -> None:
-        """Say READY once the vehicle may take off, or at once when it flies: then it has to be spoken for."""
+        """Report READY once the vehicle may take off, or at once if it flies and needs commands."""
         name, address = self._vehicle.name, self._vehicle.address
         if view.configured or view.flight_state in AIRBORNE:
             self._unconfigured_ns = now_ns

@@ -1,4 +1,4 @@
-"""How many of the numbered packets of a link arrive. Pure."""
+"""The rate of a link's numbered packets, and the share that arrives. Pure."""
 
 from collections import deque
 
@@ -6,7 +6,7 @@ from groundstation.time_units import NS_PER_S
 
 
 class Arrivals:
-    """Packets of the last second, each with its step: how far its number is above that of the one before."""
+    """The packets of the last second, each with the step of its number from the one before."""
 
     def __init__(self) -> None:
         self._window: deque[tuple[int, int]] = deque()

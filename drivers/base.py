@@ -1,4 +1,4 @@
-"""What a vehicle driver implements; the host does the rest. And what every driver process is handed."""
+"""The interface that a vehicle driver implements (the host does the rest), and what a driver process is given."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -17,10 +17,9 @@ _Settings = TypeVar("_Settings", bound=BaseModel)
 
 @dataclass(frozen=True, slots=True)
 class LinkHealth:
-    """State of a driver's link; rejected: datagrams dropped, by reason; clock: None where no time is told.
+    """State of a driver's link; rejected: datagrams dropped, by reason; clock: None if no time is reported.
 
-    firmware: of the vehicle, with its version; "": not known. asks_time: whether it asks for our time, None: it
-    need not.
+    firmware: of the vehicle, with its version; "": unknown. asks_time: whether it asks for our time; None: it need not.
     """
 
     link_quality: float | None = None
@@ -66,28 +65,28 @@ class HostProcess(Protocol):
 
     @property
     def stop_requested(self) -> bool:
-        """SIGTERM came: land, then exit."""
+        """Return whether SIGTERM came: land, then exit."""
 
     @property
     def supervisor_alive(self) -> bool:
-        """False: hover, land, exit."""
+        """Return whether the supervisor lives; if not, hover, land, exit."""
 
     @property
     def supervisor_fresh(self) -> bool:
-        """False while the supervisor is frozen."""
+        """Return whether the supervisor is responsive; False while it is frozen."""
 
     @property
     def spoken_for_ns(self) -> int:
-        """For how long others have told the vehicle to hover in this driver's place [ns], 0: nobody does."""
+        """Return for how long others have told the vehicle to hover in this driver's place [ns]; 0: nobody does."""
 
     def beat(self) -> None:
-        """Say that the main loop turns."""
+        """Signal that the main loop turns."""
 
     def ready(self, detail: str = "") -> None:
-        """Declare the start finished."""
+        """Report that the start is finished."""
 
     def degrade(self, detail: str) -> None:
-        """Declare that something is missing."""
+        """Report that something is missing."""
 
     def tick_status(self, ticks: int = 0, overruns: int = 0, overflowed: int = 0) -> None:
         """Publish the process status when due."""
@@ -99,14 +98,14 @@ class HostProcess(Protocol):
         """End a sleep early, the one under way or the next; from any thread."""
 
     def note_addresses(self, addresses: Sequence[tuple[str, int]]) -> None:
-        """Record where vehicles that call us were heard last, for whoever speaks to them after this process."""
+        """Record the last addresses of vehicles that call us, for the process that speaks to them after this one."""
 
     def event(self, severity: Severity | str, text: str, remedy: str = "", entity: str | None = None) -> None:
-        """Publish something that happened."""
+        """Publish an event."""
 
 
 def read_section(model: type[_Settings], text: str, driver: str) -> _Settings:
-    """Return the settings of a driver of that name from JSON; raises SettingsError with a line for each mistake."""
+    """Return the settings of the named driver from JSON; raises SettingsError with a line for each mistake."""
     try:
         return model.model_validate_json(text)
     except ValidationError as error:

@@ -1,6 +1,7 @@
-"""Whether a vehicle follows its commands: commanded velocity against the reported one, and against cameras. Pure.
+"""Judges whether a vehicle follows its commands, by its reported velocity and by cameras. Pure.
 
-Half of it holds for every kind of vehicle: whatever lags without overshoot stays between the command and where it was.
+One part holds for every kind of vehicle: any vehicle that lags without overshoot has a velocity between the command and
+its earlier velocity.
 """
 
 import math
@@ -10,12 +11,12 @@ from drivers.watchdog_types import FREE, Action, VehicleView, WatchdogDecision
 from groundstation.bus.messages import UP
 from groundstation.time_units import NS_PER_S
 
-# The slowest vehicle follows a command with this time constant; what is left of a step counts as told.
+# The slowest vehicle follows a command with this time constant; when this share of a step is left, it counts as done.
 _SLOWEST_S = 1.0
-# A velocity held in a turning frame lags behind by so much of the turn.
+# A velocity held in a turning frame lags behind by this share of the turn.
 _TURNING_S = 0.5
 _LONGEST_STEP_S = 0.2
-# What is left of a take-off.
+# Residual motion after a take-off.
 _FIRST_M_S = 0.2
 
 
@@ -23,8 +24,8 @@ _FIRST_M_S = 0.2
 class Tolerance:
     """deviation_m_s: explained by noise, gusts and overshoot; excess_m: distance beyond that before it counts.
 
-    forgets_m_s: how fast the excess shrinks while there is none; over_s: a vehicle that obeys for so long strays no
-    more.
+    forgets_m_s: how fast the excess shrinks while there is none; over_s: after obeying for this long a vehicle no
+    longer strays.
     """
 
     deviation_m_s: float
@@ -33,25 +34,25 @@ class Tolerance:
     over_s: float = 0.3
 
 
-# Reported velocities are noisy by 0.05 m/s; those of positions that cameras see by twice as much, and late.
+# Reported velocities have noise of 0.05 m/s; those from camera positions twice as much, and a delay.
 REPORTED = Tolerance(deviation_m_s=0.25, excess_m=0.2)
 SEEN = Tolerance(deviation_m_s=0.4, excess_m=0.4)
 
 
 class Envelope:
-    """Interval of one axis between the command and what a slow vehicle still makes of earlier ones."""
+    """The interval, along one axis, between the command and what a slow vehicle still does of earlier ones."""
 
     def __init__(self, start_m_s: float) -> None:
         self.low = self.high = start_m_s
 
     def step(self, wanted_m_s: float, dt_s: float) -> None:
-        """Take a command that holds for a while."""
+        """Take a command that holds for a time step."""
         share = min(1.0, dt_s / _SLOWEST_S)
         self.high = max(wanted_m_s, self.high + (wanted_m_s - self.high) * share)
         self.low = min(wanted_m_s, self.low + (wanted_m_s - self.low) * share)
 
     def beyond(self, velocity_m_s: float) -> float:
-        """Return by how much a velocity is outside [m/s]."""
+        """Return by how much a velocity is outside the interval [m/s]."""
         return max(0.0, velocity_m_s - self.high, self.low - velocity_m_s)
 
 
@@ -64,7 +65,7 @@ class Excess:
         self._obeys_s = math.inf
 
     def step(self, deviation_m_s: float, extra_m_s: float, dt_s: float) -> bool:
-        """Take a deviation; extra_m_s is tolerated besides. Return whether the vehicle strays."""
+        """Take a deviation; extra_m_s is tolerated in addition. Return whether the vehicle strays."""
         tolerance = self._tolerance
         over = deviation_m_s - tolerance.deviation_m_s - extra_m_s
         if over > 0.0:
@@ -77,23 +78,23 @@ class Excess:
 
 
 class ControlErrorMonitor:
-    """Judges one vehicle while its watchdog alone moves it."""
+    """Judges one vehicle while only its watchdog moves it."""
 
     def __init__(self) -> None:
         self._last_ns: int | None = None
         self.reset()
 
     def reset(self) -> None:
-        """Begin anew: it takes off, lands, or is flown by somebody else."""
+        """Begin anew, when it takes off, lands, or is flown by somebody else."""
         self._envelopes: tuple[Envelope, Envelope] | None = None
         self._reported, self._seen = Excess(REPORTED), Excess(SEEN)
 
     def judge(
         self, now_ns: int, view: VehicleView, told: WatchdogDecision | None, seen_m_s: tuple[float, float] | None
     ) -> VehicleView:
-        """Return the view with its speed, whether cameras see that, and whether it strays from its last command.
+        """Return the view completed by speed, whether cameras see it, and whether it strays from its last command.
 
-        seen_m_s: velocity forward and left as cameras see it, None if they do not.
+        seen_m_s: velocity forward and left by cameras, None if they do not see it.
         """
         dt_s = 0.0 if self._last_ns is None else min((now_ns - self._last_ns) / NS_PER_S, _LONGEST_STEP_S)
         self._last_ns = now_ns

@@ -1,4 +1,4 @@
-"""The datagrams of one vehicle: a thread hands on what comes, everything is recorded, a loss is silent as in radio."""
+"""The datagrams of one vehicle: a thread passes them on, all are recorded, and losses are silent, as in radio."""
 
 import logging
 import select
@@ -16,7 +16,7 @@ from groundstation.bus import clock
 from groundstation.time_units import NS_PER_MS
 
 # Takes a datagram with its arrival [ns] and returns whether it was a report of the vehicle. A ValueError refuses it;
-# the error's `reason`, if it has one, is the word that it is counted by.
+# the error's `reason`, if it has one, is the name under which it is counted.
 Take = Callable[[int, bytes], bool]
 
 _WAIT_S = 0.1
@@ -26,11 +26,11 @@ _log = logging.getLogger(__name__)
 
 
 class DatagramLink:
-    """Ports of this computer, each with who takes what comes there; the vehicle is spoken to from the first.
+    """Ports of this computer, each with a taker of its datagrams; the first one sends to the vehicle.
 
-    All are connected to the vehicle's one port: only it is heard, and several vehicles may share a port of ours. Takers
-    are called from the reader thread, which begins at once. Raises DriverError for a port or an address that cannot be
-    had.
+    All are connected to the vehicle's one port: only that is heard, and several vehicles may share a port of ours.
+    Takers are called from the reader thread, which starts at once. Raises DriverError for a port or an address that is
+    not available.
     """
 
     def __init__(
@@ -85,7 +85,7 @@ class DatagramLink:
             self._log.sent(now_ns, data)
 
     def health(self, now_ns: int) -> LinkHealth:
-        """Return the rate of the vehicle's reports, 0 after 0.3 s without any, and what was refused."""
+        """Return the rate of the vehicle's reports, 0 after 0.3 s without any, and the refusals."""
         silent = now_ns - self._heard_ns > _SILENT_NS
         return LinkHealth(None, 0.0 if silent else self._rate_hz, dict(self._rejected))
 
@@ -106,7 +106,7 @@ class DatagramLink:
 
 
 class DatagramVehicle:
-    """Base of a `drivers.base.Vehicle` behind one link, which it makes as `_link` once it can take what comes."""
+    """Base of a `drivers.base.Vehicle` behind one link, which it creates as `_link` once it can take datagrams."""
 
     _link: DatagramLink
 

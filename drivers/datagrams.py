@@ -1,6 +1,6 @@
 """Raw datagrams for the recording: several in one bus message, each with its stamp and length.
 
-Framing of a RAW_RX or RAW_TX payload, repeated: int64 stamp_ns, uint32 length, then so many bytes; little-endian.
+Framing of a RAW_RX or RAW_TX payload, repeated: int64 stamp_ns, uint32 length, then that many bytes; little-endian.
 """
 
 import struct

@@ -1,4 +1,4 @@
-"""Evidence for the conditions of the table of failsafes: which hold now, for how long they have, and why. Pure."""
+"""Evidence for the failsafe table: which conditions hold now, for how long, and why. Pure."""
 
 from dataclasses import dataclass
 
@@ -8,9 +8,9 @@ from drivers.watchdog_types import DriverMode, Upstream, VehicleView, WatchdogLi
 from groundstation.bus.messages import AIRBORNE, STANDING, UNHEARD, FlightState
 from groundstation.time_units import NS_PER_S
 
-# A setpoint older than this is not the stream that it should be.
+# An older setpoint is not part of a continuous stream.
 _STREAM_S = 0.15
-# What a condition is credited with when it is met anew, however long nobody looked.
+# The most credit that a condition has when it is met anew, however long nobody looked.
 _FIRST_S = 0.05
 # What is told of a reaction to come: its condition has lasted for so long, and it is so near; a fault that has lasted
 # for longer is told however far off that is. A take-off takes its time: it is overdue at the end only.
@@ -20,10 +20,10 @@ _USUAL = frozenset({Condition.TAKE_OFF_OVERDUE})
 
 @dataclass(frozen=True, slots=True)
 class Situation:
-    """The watchdog's inputs at one moment; times in ns, gap_s: time for which its own loop stood still.
+    """The watchdog's inputs at one moment; times in ns, gap_s: time for which the driver's own loop stood still.
 
-    clearing: an emergency is being cleared by a take-off, in time. paused_ns: last setpoint before a pause that needs
-    RESUME, None without.
+    clearing: a take-off is clearing an emergency, within its time. paused_ns: last setpoint before a pause that needs
+    RESUME, or None.
     """
 
     now_ns: int
@@ -70,7 +70,7 @@ def observed(at: Situation, limits: WatchdogLimits) -> dict[Condition, str]:
 
 
 def _observe_state(at: Situation, holding: dict[Condition, str]) -> None:
-    """Note the vehicle's report, and its actions against its commands."""
+    """Note conditions of the vehicle's report, and of its actions against its commands."""
     vehicle, state = at.vehicle, at.vehicle.flight_state
     if state in UNHEARD:
         holding[Condition.STATE_UNKNOWN] = ""
@@ -118,7 +118,7 @@ def timed(at: Situation) -> dict[Condition, float]:
     if heard_ns is None:
         lasted = {Condition.UNSEEN: at.since_s(at.take_off_ended_ns)}
     else:
-        # Whoever orders TRACK before the tracker speaks again means it: the pause counts from that order.
+        # A person who orders TRACK before the tracker is heard again means it: the pause counts from that order.
         pause_s = at.since_s(max(heard_ns, at.entered_ns))
         lasted = {Condition.TRACKER_SILENT: at.since_s(heard_ns), Condition.TRACKER_PAUSED: pause_s}
     for condition, lasted_s in (
@@ -128,7 +128,7 @@ def timed(at: Situation) -> dict[Condition, float]:
         if lasted_s > 0.0:
             lasted[condition] = lasted_s
     if at.paused_ns is not None:
-        # Setpoints that come back after a pause do not stop the land timer: only an order does.
+        # Setpoints that return after a pause do not stop the land timer: only an order does.
         lasted[Condition.NOT_RESUMED] = at.since_s(at.paused_ns)
     return lasted
 
@@ -148,7 +148,7 @@ def _is_told(row: Failsafe, lasted_s: float) -> bool:
 
 
 class Evidence:
-    """Keeps the duration of conditions; ended ones are forgotten by the rules of the table."""
+    """Keeps the duration of each condition; when one ends, its duration decays by the rules of the table."""
 
     def __init__(self, table: tuple[Failsafe, ...]) -> None:
         self._table = table

@@ -1,6 +1,6 @@
 """The table of failsafes: everything that stops a vehicle, or keeps it from starting, as data.
 
-Rows stand by priority: of those that apply the first one acts. The documentation's table is made from this one.
+Rows are ordered by priority: the first that applies acts. The documentation's table is generated from this one.
 """
 
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from drivers.watchdog_types import ALOFT, FREE, DriverMode, WatchdogLimits
 
 
 class Reaction(StrEnum):
-    """What is done; REFUSE: a TAKEOFF is not obeyed."""
+    """The reaction of a row; REFUSE: a TAKEOFF is not obeyed."""
 
     CUT = "CUT"
     LAND = "LAND"
@@ -28,7 +28,7 @@ class Latch(StrEnum):
 
 
 class Condition(StrEnum):
-    """What can be wrong; evidence for it: `failsafe_evidence.py`."""
+    """A condition that can be wrong; its evidence: `failsafe_evidence.py`."""
 
     EMERGENCY = auto()
     FLEW_AT_START = auto()
@@ -60,7 +60,7 @@ class Condition(StrEnum):
     SOMEBODY_NEAR = auto()
 
 
-# Seconds of a condition that a second without it makes forgotten: what fails one sixth of the time adds up.
+# Seconds by which a condition's duration decays for each second without it: failing one sixth of the time adds up.
 SLOWLY = 0.2
 EVENLY = 1.0
 
@@ -69,9 +69,10 @@ EVENLY = 1.0
 class Failsafe:
     """One row.
 
-    after_s: how long the condition must have lasted (its debounce). forgets: seconds forgotten per second without it
-    (its hysteresis); None: all at once. modes: in which it counts. text: for the operator; `{why}` is the evidence's
-    own word. brake: hover first, because nobody knows what the vehicle was doing. limit: the setting that says when.
+    after_s: how long the condition must have lasted (its debounce). forgets: seconds of decay per second without it
+    (its hysteresis); None: all at once. modes: in which it counts. text: for the operator; `{why}` is filled in from
+    the evidence. brake: hover first, because it is unknown what the vehicle was doing. limit: the setting that gives
+    the time.
     """
 
     condition: Condition
@@ -85,11 +86,11 @@ class Failsafe:
     brake: bool = False
 
     def applies(self, mode: DriverMode, lasted_s: float | None) -> bool:
-        """Return whether it acts in a mode, given for how long its condition has lasted (None: it does not hold)."""
+        """Return whether it acts in a mode; lasted_s: how long its condition has lasted (None: it does not hold)."""
         return lasted_s is not None and mode in self.modes and lasted_s >= self.after_s
 
 
-# What a vehicle does while it is asked for nothing else.
+# A vehicle's action while nothing else is asked of it.
 _TRACK = frozenset({DriverMode.TRACK})
 _STANDS = frozenset({DriverMode.LANDED, DriverMode.CUT})
 _UNCONVERGED = "the tracker does not know well enough where it is (safety.max_position_std_m)"
@@ -114,16 +115,17 @@ def _ends(_limits: WatchdogLimits) -> tuple[Failsafe, ...]:
 
 
 def _landings(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
-    # Who is noticed to be silent has been silent for hover_after_s already.
+    # When silence is noticed, it has lasted for hover_after_s already.
     noticed_s = limits.land_after_s - limits.hover_after_s
     land, patience = Reaction.LAND, "safety.land_after_s"
     return (
         Failsafe(Condition.STOP_REQUESTED, land, "the driver was ordered to stop"),
         Failsafe(Condition.SUPERVISOR_DEAD, land, "the supervisor is dead", limits.brake_s),
         Failsafe(Condition.SUPERVISOR_SILENT, land, "the supervisor does not answer", noticed_s, patience, SLOWLY),
-        # Its own hover may rest on what is wrong, and cameras do not show how to brake it.
+        # Its own hover may rely on the faulty value, and cameras do not show how to brake it.
         Failsafe(Condition.BLIND, land, "{why}, and no camera sees it", limits.blind_land_s, "", SLOWLY, modes=FREE),
-        # Frozen and stuck sensors as well: drivers/plausibility says which, VehicleView.plausible makes them silence.
+        # This covers frozen and stuck sensors: drivers/plausibility names them, and VehicleView.plausible makes them
+        # silence.
         Failsafe(Condition.TELEMETRY_SILENT, land, "{why}", noticed_s, patience, SLOWLY),
         Failsafe(Condition.STATE_UNKNOWN, land, "the vehicle does not say what it does", noticed_s, patience, SLOWLY),
         Failsafe(Condition.BATTERY_LOW, land, "battery below its limit", limits.battery_hold_s,

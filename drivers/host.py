@@ -1,4 +1,4 @@
-"""What every vehicle driver shares: orders in, acknowledgements and status out, and the sender loop."""
+"""The part that all vehicle drivers share: orders in, acknowledgements and status out, and the sender loop."""
 
 import itertools
 import math
@@ -31,7 +31,7 @@ from groundstation.time_units import NEVER_NS, NS_PER_MS, NS_PER_S
 
 RATE_HZ = 30.0
 _STATUS_PERIOD_NS, _FLUSH_PERIOD_NS, _FLOOD_NS = 200 * NS_PER_MS, 100 * NS_PER_MS, 10 * NS_PER_MS
-# How long a driver that is to exit goes on for a vehicle it cannot hear.
+# How long a driver that is to exit stays for a vehicle that it cannot hear.
 _GIVE_UP_NS = 10 * NS_PER_S
 
 
@@ -65,7 +65,7 @@ class VehicleHost:
         self._setpoints.on_arrival = wake
 
     def due_ns(self) -> int:
-        """Return when a setpoint or command asks for a turn; a flood of commands waits a little."""
+        """Return when a setpoint or command requires a turn; a flood of commands waits a little."""
         asked_ns = self._turned_ns + _FLOOD_NS if self._commands.waiting else NEVER_NS
         return 0 if self._setpoints.waiting else asked_ns
 
@@ -109,14 +109,14 @@ class VehicleHost:
                     self._localised_ns = now_ns - round(entity.unlocalised_s * NS_PER_S)
 
     def _near(self, now_ns: int, view: VehicleView) -> str:
-        """Return who in the air is too near to the pad of a vehicle that stands."""
+        """Return the airborne vehicle that is too near to the pad of this one, which stands; "" if none."""
         for received in self._statuses.drain():
             if isinstance(received.message, VehicleStatus):
                 self._neighbours.hear(received.message)
         return "" if view.flight_state in AIRBORNE else self._neighbours.obstacle(now_ns)
 
     def is_finished(self, now_ns: int) -> bool:
-        """Return whether a driver that is to exit may: no motor turns any more, or the vehicle was silent too long."""
+        """Return whether a driver that is to exit may: no motor turns, or the vehicle has been silent too long."""
         if not self._child.stop_requested and self._child.supervisor_alive:
             return False
         state, mode = self.watchdog.vehicle, self.watchdog.mode
@@ -151,7 +151,7 @@ class VehicleHost:
         self._announcements.tell_intrusions(now_ns, status.rejected)
 
     def _detail(self, of_link: str) -> str:
-        """Return why a vehicle does what it does; unless a failsafe has it, what its link awaits comes first."""
+        """Return why a vehicle does what it does; if no failsafe acts, what its link waits for comes first."""
         stopped = self.watchdog.braked or (self.watchdog.failsafe and self.watchdog.mode is not DriverMode.LANDED)
         return self.watchdog.explanation if stopped else of_link or self.watchdog.explanation
 
@@ -176,7 +176,7 @@ class VehicleHost:
             self._answer(ack)
 
     def _refuse_strangers(self, now_ns: int, command: Command) -> None:
-        """Count and tell a command without the right to give it; a repetition counts once."""
+        """Count and report a command from somebody without the right to give it; repetitions count once."""
         reason = "" if self.watchdog.has_answered(command) else self.watchdog.lease.refusal(now_ns, command)
         if reason:
             self._count("command", "unauthorised")
@@ -193,7 +193,7 @@ class VehicleHost:
         for ack in decision.acks:
             self._answer(ack)
         if self._announcements.tell_mode(decision, self.watchdog.failsafe):
-            # The status of a changed mode must not wait: the tracker learns from it who is airborne.
+            # A status with a changed mode must not wait: it tells the tracker who is airborne.
             self._next_status_ns = 0
         self._announcements.tell_silence(now_ns, view, decision.mode)
         if now_ns >= self._next_flush_ns:
@@ -227,7 +227,7 @@ def run_hosts(
 ) -> int:
     """Turn all hosts at the sender's rate, and at once on a command, until each is finished; returns the exit code 0.
 
-    before: what the vehicles of one link share, done ahead of each turn.
+    before: work that the vehicles of one link share, done ahead of each turn.
     """
     period_ns, overruns = round(1e9 / rate_hz), 0
     for host in hosts:

@@ -1,6 +1,6 @@
-"""Which orders count: those for this run that are not too old; to start, those of the holder of a live lease.
+"""Decides which orders count: recent ones of this run, and starts only from the holder of a live lease.
 
-A start that was given before the last stop never counts: repetitions of it may come after that stop.
+A start given before the last stop never counts: its repetitions may arrive after that stop.
 """
 
 from dataclasses import dataclass
@@ -9,19 +9,19 @@ from groundstation.bus.messages import Command, Lease, Verb
 from groundstation.bus.stop_mark import StopMark, why_another_runs, why_too_old
 from groundstation.time_units import NS_PER_S
 
-# Orders that begin or go on with a motion; all others stop, and anyone may stop.
+# Orders that begin or continue a motion; all others stop, and anyone may stop.
 STARTING_VERBS = frozenset({Verb.TAKEOFF, Verb.TRACK, Verb.RESUME})
-# A lease may not claim to live longer than this after it was heard.
+# A lease may not claim a longer life than this from its receipt.
 _LONGEST_NS = 5 * NS_PER_S
-# Both ends read the same clock; only the order of reading may differ.
+# Both ends read the same clock; only the order of readings may differ.
 _FUTURE_NS = NS_PER_S
 
 
 @dataclass(slots=True)
 class LeaseBook:
-    """Remembers the live lease; another holder gets it only after the former ran out or was given back.
+    """Remembers the live lease; another holder gets it only after that expired or was given back.
 
-    run: whose orders count, "" for those of any. source: who sent the lease, as the bus vouches for it.
+    run: the run whose orders count, "" for any. source: sender of the lease, as verified by the bus.
     """
 
     clock: str
@@ -37,7 +37,7 @@ class LeaseBook:
         if lease.header.clock != self.clock:
             return "other_clock"
         if lease.header.stamp_ns > now_ns + _FUTURE_NS:
-            return "future"  # it would make every true lease look old
+            return "future"  # it would make every genuine lease look old
         if lease.header.stamp_ns <= self.stamp_ns:
             return "old"
         if now_ns < self.expires_ns and (lease.holder, lease.header.source) != (self.holder, self.source):
@@ -64,7 +64,7 @@ class LeaseBook:
         return stop.words if stop is not None and stop.overtakes(command.header.stamp_ns) else ""
 
     def hear_stop(self, now_ns: int, stop: Command) -> None:
-        """Remember a stop that counts."""
+        """Remember a valid stop."""
         mark = StopMark.of(stop, now_ns, self.clock)
         if self.last_stop is None or self.last_stop.given_ns < mark.given_ns:
             self.last_stop = mark

@@ -1,4 +1,4 @@
-"""Who else is in the air, and whether one of them is where this vehicle would climb. Pure."""
+"""Other airborne vehicles, and whether one of them is where this vehicle would climb. Pure."""
 
 import math
 from collections.abc import Iterable
@@ -11,7 +11,7 @@ _SIGMAS = 2.0
 
 
 class Neighbours:
-    """The other vehicles; pad_m: place of the own climb [x, y; world], None: unknown, then none is near."""
+    """The other vehicles; pad_m: place of this vehicle's climb [x, y; world]; None: unknown, then none is near."""
 
     def __init__(self, name: str, pad_m: tuple[float, float] | None, separation_m: float) -> None:
         self._name, self._pad_m, self._separation_m = name, pad_m, separation_m
@@ -27,11 +27,11 @@ class Neighbours:
             self._aloft.discard(name)
 
     def see(self, now_ns: int, entities: Iterable[EntityEstimate]) -> None:
-        """Take the tracker's estimates of all."""
+        """Take the tracker's estimates of all entities."""
         self._believed |= {entity.name: (now_ns, entity) for entity in entities}
 
     def obstacle(self, now_ns: int) -> str:
-        """Return why a take-off would be too near to somebody in the air, or ""."""
+        """Return why a take-off would be too near to an airborne vehicle, or ""."""
         if self._pad_m is None:
             return ""
         for name in sorted(self._aloft - {self._name}):

@@ -1,4 +1,4 @@
-"""How fast a vehicle is by what cameras see, whatever it reports. Pure."""
+"""A vehicle's velocity by what cameras see, whatever it reports. Pure."""
 
 import math
 from collections import deque
@@ -10,13 +10,13 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 _WINDOW_NS = 600 * NS_PER_MS
 _LEAST_WINDOW_NS = 450 * NS_PER_MS
 _SEEN_AGE_S = 0.5
-# Faster than this is no flight: the belief was set anew.
+# A faster change is no flight: the belief was set anew.
 _LEAP_M_S = 4.0
 _FRESH_NS = 300 * NS_PER_MS
 
 
 def _place_ns(now_ns: int, entity: EntityEstimate) -> int | None:
-    """Return when a vehicle was where the estimate has it, None if that is not known well enough."""
+    """Return when a vehicle was where the estimate has it, None if that is too uncertain."""
     worst = max(entity.covariance[0], entity.covariance[5]) if len(entity.covariance) == 16 else math.inf
     if entity.age_s <= _SEEN_AGE_S and worst <= MOST_STD_M**2:
         return now_ns
@@ -25,7 +25,7 @@ def _place_ns(now_ns: int, entity: EntityEstimate) -> int | None:
 
 
 class SeenVelocity:
-    """Velocity of a vehicle by the positions that cameras correct, over half a second; reports nothing while unseen."""
+    """Velocity of a vehicle from positions that cameras correct, over half a second; None while unseen."""
 
     def __init__(self) -> None:
         self._places: deque[tuple[int, float, float, float]] = deque()
@@ -45,7 +45,7 @@ class SeenVelocity:
         if self._places:
             then_ns, then_x, then_y, _ = self._places[-1]
             if at_ns <= then_ns:
-                return  # the same picture still
+                return  # still the same picture
             if math.hypot(x - then_x, y - then_y) > 0.1 + _LEAP_M_S * (at_ns - then_ns) / NS_PER_S:
                 self._places.clear()
         self._places.append((at_ns, x, y, yaw))

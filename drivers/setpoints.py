@@ -1,6 +1,6 @@
-"""Which setpoint may move a vehicle: the newest in sequence, of the authorised epoch, not expired.
+"""Decides which setpoint may move a vehicle: the newest in sequence, of the authorised epoch, not expired.
 
-Pure; times are monotonic nanoseconds handed in.
+Pure; times are monotonic nanoseconds from the caller.
 """
 
 from dataclasses import dataclass
@@ -8,16 +8,16 @@ from dataclasses import dataclass
 from groundstation.bus.messages import VelocitySetpoint
 from groundstation.time_units import NS_PER_MS
 
-# A thousand lives of the tracker, each of which may begin a thousand epochs.
+# A thousand lives of the tracker, each with up to a thousand epochs.
 _LONGEST_LEAP = 1_000_000
 
 
 @dataclass(slots=True)
 class SetpointGate:
-    """Remembers the newest setpoint and when the authorised epoch was last heard. The first sender is the only one.
+    """Remembers the newest setpoint and when the authorised epoch was last heard. Only the first sender is accepted.
 
-    max_lifetime_ns caps the lifetime that a setpoint claims. epoch: the one that may move the vehicle (None: the first
-    that comes is authorised). last_heard_ns: receipt of the last live setpoint of that epoch.
+    max_lifetime_ns caps the lifetime that a setpoint claims. epoch: the authorised one (None: the first that comes is
+    authorised). last_heard_ns: receipt of the last live setpoint of that epoch.
     """
 
     max_lifetime_ns: int
@@ -33,13 +33,14 @@ class SetpointGate:
         Reasons: other_source, old_epoch, epoch_leap, old_sequence, expired.
         """
         if self.newest is not None:
-            # The tracker's later lives have its name: whoever has another is none, and his numbers mean nothing.
+            # Later lives of the tracker have its name: a sender with another name is not the tracker, and its numbers
+            # mean nothing.
             if setpoint.header.source != self.newest.header.source:
                 return "other_source"
             if setpoint.epoch < self.newest.epoch:
                 return "old_epoch"
             if setpoint.epoch > self.newest.epoch + _LONGEST_LEAP:
-                return "epoch_leap"  # it would make every true setpoint look old
+                return "epoch_leap"  # it would make every genuine setpoint look old
             if setpoint.epoch == self.newest.epoch and setpoint.header.seq <= self.newest.header.seq:
                 return "old_sequence"
         expires_ns = self._expiry(now_ns, setpoint)
@@ -82,5 +83,5 @@ class SetpointGate:
         return True
 
     def forget_epoch(self) -> None:
-        """Withdraw the authorisation (a new take-off); sequence and epoch order are kept."""
+        """Withdraw the authorisation, for a new take-off; sequence and epoch order are kept."""
         self.epoch = self.last_heard_ns = None

@@ -1,4 +1,4 @@
-"""Whether a world sensor's stream flows: its lifecycle, the operator's events, and its status twice a second."""
+"""The health of a world sensor's stream: its lifecycle, events for the operator, and its status twice a second."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -16,10 +16,10 @@ _STATUS_PERIOD_NS = 500 * NS_PER_MS
 
 @dataclass(frozen=True, slots=True)
 class StreamNames:
-    """How events speak of a stream.
+    """The words in which events speak of a stream.
 
-    kind, name: of the sensor; piece: what comes ("frame"); source: from where; remedy: against silence; refused:
-    against pieces that cannot be used.
+    kind, name: of the sensor; piece: its unit ("frame"); source: where it comes from; remedy: against silence; refused:
+    remedy against unusable pieces.
     """
 
     kind: str
@@ -31,10 +31,10 @@ class StreamNames:
 
 
 class StreamHealth:
-    """Use: `came` with each piece, `end_turn` at the end of each turn of the driver's loop.
+    """Call `came` with each piece, and `end_turn` at the end of each turn of the driver's loop.
 
-    start_within_s, silent_after_s: how long nothing may come at first, and later. pieces: counted by `came`, or by who
-    says only `flows`.
+    start_within_s, silent_after_s: permitted silence at first, and later. pieces: counted by `came`, or by the caller
+    that uses only `flows`.
     """
 
     def __init__(self, child: HostProcess, names: StreamNames, start_within_s: float, silent_after_s: float) -> None:
@@ -47,7 +47,7 @@ class StreamHealth:
 
     @property
     def flowing(self) -> bool:
-        """Return whether pieces come that can be used."""
+        """Return whether usable pieces arrive."""
         return self._watch.state is StreamState.FLOWING
 
     def came(self, arrival_ns: int) -> None:
@@ -63,7 +63,7 @@ class StreamHealth:
             self._child.event(Severity.INFO, f"{names.kind} {names.name}: {names.piece}s arrive", entity=names.name)
 
     def refuse(self, reason: str, arrival_ns: int) -> None:
-        """Note that a piece arrived that cannot be used, and why."""
+        """Note that an unusable piece arrived, and why."""
         if self._watch.refused(reason, arrival_ns):
             self._warn(reason, self._names.refused)
 
@@ -75,9 +75,9 @@ class StreamHealth:
         self, why_silent: str, wrong: str, rejected: Counter[str],
         quality: Callable[[], tuple[float | None, float | None]] = lambda: (None, None),
     ) -> None:  # fmt: skip
-        """Say that the loop turns, tell of silence, and publish the status when it is due.
+        """Signal that the loop turns, report silence, and publish the status when due.
 
-        wrong: what else is, in words; quality: brightness and width of edges [px] of what flows.
+        wrong: other faults, in words; quality: brightness and width of edges [px] of the pictures.
         """
         now_ns = clock.now_ns()
         patience_s = self._watch.patience_s

@@ -1,4 +1,4 @@
-"""State of a stream by arrival times, as a pure state machine; the driver turns its changes into events."""
+"""State of a stream by arrival times, as a pure state machine; the driver turns changes into events."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -7,7 +7,7 @@ from groundstation.time_units import NS_PER_S
 
 
 class StreamState(StrEnum):
-    """WAITING for the first piece, FLOWING, SILENT for too long, or REFUSED: pieces that cannot be used."""
+    """WAITING for the first piece, FLOWING, SILENT for too long, or REFUSED: pieces are unusable."""
 
     WAITING = "WAITING"
     FLOWING = "FLOWING"
@@ -17,7 +17,7 @@ class StreamState(StrEnum):
 
 @dataclass(slots=True)
 class StreamWatch:
-    """Follows one stream; `since_ns` is the last piece, or the start."""
+    """Follows one stream; `since_ns` is the time of the last piece, or of the start."""
 
     start_within_s: float
     stall_after_s: float
@@ -31,7 +31,7 @@ class StreamWatch:
         return self._go(StreamState.FLOWING, "")
 
     def refused(self, reason: str, now_ns: int) -> bool:
-        """Take in a piece that cannot be used, and why; returns whether state or reason changed."""
+        """Take in an unusable piece, and why; returns whether state or reason changed."""
         self.since_ns = now_ns
         return self._go(StreamState.REFUSED, reason)
 
@@ -43,7 +43,7 @@ class StreamWatch:
 
     @property
     def patience_s(self) -> float:
-        """Return how long nothing may come [s]: a sensor may take its time for the first piece only."""
+        """Return the permitted silence [s]: longer for the first piece only."""
         return self.start_within_s if self.state is StreamState.WAITING else self.stall_after_s
 
     def silent_s(self, now_ns: int) -> float:

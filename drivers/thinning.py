@@ -20,7 +20,7 @@ class Decimator:
 
 
 class Grid:
-    """Lets events through on the grid of a rate, so that 15 Hz thin out to 5 and not to every fourth."""
+    """Lets events through on the grid of a rate, so that 15 Hz become 5 Hz, not every fourth event."""
 
     def __init__(self, rate_hz: float) -> None:
         self._period_ns = round(NS_PER_S / rate_hz) if rate_hz > 0 else None

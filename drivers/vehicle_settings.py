@@ -23,7 +23,7 @@ Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,47}$")]
 
 
 def is_address(value: str) -> str:
-    """Return an IPv4 address as it is; raises what pydantic tells of another text."""
+    """Return an IPv4 address unchanged; raises pydantic's error for any other text."""
     try:
         ipaddress.IPv4Address(value)
     except ValueError:
@@ -89,7 +89,7 @@ class SilenceLimits(DriverSection):
 
 
 def silence_limits(safety: SafetyValues) -> SilenceLimits:
-    """Return what a field's safety section says of silence."""
+    """Return the silence limits of a field's safety section."""
     return SilenceLimits(
         setpoint_lifetime_ms=safety.setpoint_lifetime_ms,
         land_after_s=safety.land_after_s,
@@ -99,7 +99,7 @@ def silence_limits(safety: SafetyValues) -> SilenceLimits:
 
 
 def vehicle_limits(limits: DroneLimits) -> VehicleLimits:
-    """Return what a field says that a drone of any kind is never asked to exceed."""
+    """Return a field's limits for a drone of any kind."""
     return VehicleLimits(
         max_speed_m_s=limits.max_speed_m_s,
         max_climb_m_s=limits.max_climb_m_s,
@@ -151,5 +151,5 @@ def values_of(order: VehicleOrder) -> dict[str, Any]:
 def a_process_each(
     settings_of: Callable[[VehicleOrder], BaseModel],
 ) -> Callable[[Sequence[VehicleOrder]], list[DriverProcess]]:
-    """Return what gives each vehicle a driver process of its own; settings_of: what that is told."""
+    """Return a function that gives each vehicle a driver process of its own; settings_of: that process's settings."""
     return lambda orders: [DriverProcess((order.name,), settings_of(order).model_dump_json()) for order in orders]

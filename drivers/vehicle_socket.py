@@ -12,8 +12,8 @@ from groundstation.process.ports import why_refused
 def open_udp(local: Address, interface: str = "", peer: Address | None = None) -> socket.socket:
     """Return a datagram socket on an own address ("": any) and port (0: any free), through one adapter ("": any).
 
-    With a peer it hears that one only, and several sockets may share the port, each with a peer of its own. Raises
-    DriverError: who holds the port, that there is no way to the peer, or no such adapter.
+    With a peer it hears only that one, and several sockets may share the port, each with a peer of its own. Raises
+    DriverError if the port is taken (naming its holder), the peer unreachable, or the adapter unknown.
     """
     one = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     bind_to_adapter(one, interface)
@@ -36,8 +36,8 @@ def open_udp(local: Address, interface: str = "", peer: Address | None = None) -
 
 
 def waits(udp: socket.socket, seconds: float) -> bool:
-    """Wait for a datagram, so long at most, and return whether one is there; by this, sending need not wait either.
+    """Wait for a datagram up to a time, and return whether one is there; so the socket itself needs no time limit.
 
-    A time limit of the socket's own would count for sending too: 0.1 s for each frame while the buffer is full.
+    Such a limit would apply to sending too: 0.1 s for each frame while the buffer is full.
     """
     return bool(select.select([udp], [], [], seconds)[0])

@@ -1,8 +1,8 @@
 """Who may move a vehicle, and its present action: one state machine for all kinds of vehicles.
 
 Pure: `now_ns` and inputs in, a decision out. Priority: CUT_MOTORS > LAND > HOLD > setpoint > TAKEOFF. LAND latches
-until a new TAKEOFF. What stops a vehicle without an order is the table of `failsafe_table.py`.
-Tables: docs/explanation/authority.md#the-watchdog.
+until a new TAKEOFF. Stops without an order follow the table of `failsafe_table.py`. Tables:
+docs/explanation/authority.md#the-watchdog.
 """
 
 from drivers.acknowledgements import AckBook
@@ -35,7 +35,7 @@ from groundstation.bus.messages import (
 )
 from groundstation.time_units import NS_PER_S
 
-# To land is told for so long at least, even to a vehicle that says that it stands: its word may be wrong.
+# LAND is sent for at least this long, even to a vehicle that reports standing: the report may be wrong.
 _TELLS_NS = NS_PER_S
 _PAUSES = frozenset({Condition.TRACKER_PAUSED, Condition.SETPOINTS_PATCHY})
 
@@ -43,9 +43,9 @@ _PAUSES = frozenset({Condition.TRACKER_PAUSED, Condition.SETPOINTS_PATCHY})
 class Watchdog:
     """Authority over one vehicle. Feed it with `accept_*`, then call `step` at the sender's rate.
 
-    mode, reason: see `WatchdogDecision`; failsafe: condition of the row by which it is in that mode, "" without. The
-    vehicle's and upstream's last words are remembered between steps. braked_ns: for how long others have told the
-    vehicle to hover as this driver starts.
+    mode, reason: see `WatchdogDecision`; failsafe: condition of the row that caused the mode, or "". The last states of
+    vehicle and upstream are kept between steps. braked_ns: for how long others had told the vehicle to hover when this
+    driver started.
     """
 
     def __init__(self, limits: WatchdogLimits, clock: str, run: str = "", braked_ns: int = 0) -> None:
@@ -82,7 +82,7 @@ class Watchdog:
         return self.lease.accept(now_ns, lease)
 
     def see(self, vehicle: VehicleView, upstream: Upstream) -> None:
-        """Keep the newest view of the vehicle and of those above, by which commands are judged."""
+        """Keep the newest view of the vehicle, and of tracker and supervisor, by which commands are judged."""
         self.vehicle, self.upstream = vehicle, upstream
 
     def accept_command(self, now_ns: int, command: Command) -> tuple[Ack, ...]:
@@ -147,7 +147,7 @@ class Watchdog:
         return "it was in an emergency: this order ends that and starts nothing; order TAKEOFF again"
 
     def _refusal(self, now_ns: int, *conditions: Condition) -> str:
-        """Return why the table refuses a start now, or ""; conditions: those that count, if not all."""
+        """Return why the table refuses a start now, or ""; conditions: those to check, if not all."""
         holding = observed(self._situation(now_ns), self.limits)
         for row in self.table:
             counts = not conditions or row.condition in conditions
@@ -191,7 +191,7 @@ class Watchdog:
 
     @property
     def braked(self) -> bool:
-        """Return whether a row of the table keeps it hovering in TRACK for now."""
+        """Return whether a row of the table makes it hover within TRACK for now."""
         return self._braked_by is not None
 
     @property
@@ -263,7 +263,7 @@ class Watchdog:
             self._enter(now_ns, DriverMode.HOVER, "airborne, waiting for TRACK")
 
     def _heed_table(self, now_ns: int) -> Failsafe | None:
-        """React by the first row of the table that applies; returns it if it only brakes for now, in the same mode."""
+        """React by the first row of the table that applies; returns it if it only brakes for now, within the mode."""
         evidence = self.evidence
         for row in self._acting:
             if row.condition not in evidence.holding or not row.applies(self.mode, evidence.lasted_s(row.condition)):
@@ -292,7 +292,7 @@ class Watchdog:
 
     def _action(self, now_ns: int) -> Action:
         match self.mode:
-            case DriverMode.CONNECTING:  # a vehicle that is not heard may hear
+            case DriverMode.CONNECTING:  # a vehicle that we do not hear may still hear us
                 return Action.LAND if now_ns < self._land_until_ns else Action.WAIT
             case DriverMode.LANDED:
                 if self.vehicle.clears and self._clears_in_time(now_ns):

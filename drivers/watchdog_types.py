@@ -10,7 +10,7 @@ _SAFETY = SafetyValues()
 
 
 class DriverMode(StrEnum):
-    """What the driver is about; published in VehicleStatus.mode."""
+    """The driver's mode; published in VehicleStatus.mode."""
 
     CONNECTING = "CONNECTING"
     LANDED = "LANDED"
@@ -25,7 +25,7 @@ class DriverMode(StrEnum):
 class Action(StrEnum):
     """The command for the vehicle.
 
-    WAIT: say nothing that could start or end a flight; IDLE: stay on the ground with motors off; CLEAR: likewise, and
+    WAIT: send nothing that could start or end a flight; IDLE: stay on the ground with motors off; CLEAR: likewise, and
     end its emergency; HOVER: stand still if it flies, never take off.
     """
 
@@ -41,7 +41,7 @@ class Action(StrEnum):
 
 FREE = frozenset({DriverMode.HOVER, DriverMode.TRACK, DriverMode.HOLD})
 ALOFT = FREE | {DriverMode.TAKING_OFF}
-# What a vehicle may refuse, in the operator's words.
+# Reasons for which a vehicle may refuse, in the operator's words.
 REFUSABLE = {Action.TAKE_OFF: "take off", Action.LAND: "land", Action.CUT: "stop its motors"}
 
 
@@ -49,15 +49,15 @@ REFUSABLE = {Action.TAKE_OFF: "take off", Action.LAND: "land", Action.CUT: "stop
 class WatchdogLimits:
     """Times and limits of the watchdog [s].
 
-    resume_within_s: silence of vehicle or supervisor longer than this needs a RESUME; tracker_resume_within_s:
-    likewise of the tracker, whatever broke on the way from it; gap_s: likewise a pause of our own loop; brake_s:
-    hover before landing where nobody knows what the vehicle was doing. tolerated_speed_m_s: actual speed that gusts
-    and noise explain while max_speed_m_s is asked at most; beyond it for fast_brake_s the vehicle brakes, for
-    fast_resume_s it needs a RESUME, for fast_land_s it lands. stray_land_s: likewise while it strays from what it
-    is told: from 1 m/s it stands after 0.8 s with 2 m/s^2 and a lag of 0.3 s, doubled. blind_land_s: likewise while
-    its sensors are wrong and no camera sees it. lost_hover_s, lost_land_s: without a position from the cameras, for
-    vehicles that need one. pad_m: where it takes off [x, y; world], if known; min_separation_m: how far from there
-    everybody in the air must be.
+    resume_within_s: silence of vehicle or supervisor longer than this needs a RESUME; tracker_resume_within_s: likewise
+    of the tracker, whatever broke on the way from it; gap_s: likewise a pause of our own loop; brake_s: hover before
+    landing when it is unknown what the vehicle was doing. tolerated_speed_m_s: actual speed that gusts and noise
+    explain while at most max_speed_m_s is commanded; beyond it for fast_brake_s the vehicle brakes, for fast_resume_s
+    it needs a RESUME, for fast_land_s it lands. stray_land_s: likewise while it strays from its commands: from 1 m/s it
+    stands after 0.8 s with 2 m/s^2 and a lag of 0.3 s, doubled. blind_land_s: likewise while its sensors are wrong and
+    no camera sees it. lost_hover_s, lost_land_s: without a position from the cameras, for vehicles that need one.
+    pad_m: where it takes off [x, y; world], if known; min_separation_m: least distance from there of all airborne
+    vehicles.
     """
 
     hover_after_s: float = _SAFETY.setpoint_lifetime_ms / 1000
@@ -90,15 +90,15 @@ class WatchdogLimits:
 
 @dataclass(frozen=True, slots=True)
 class VehicleView:
-    """What the vehicle says; fresh: its telemetry is younger than 0.3 s; not_ready: why it may not take off, or "".
+    """The vehicle's state by its reports; fresh: telemetry is younger than 0.3 s.
 
-    configured: the driver has prepared it for flight; a driver of a standing vehicle is not READY before. unsound:
-    why what it says of its motion cannot be true, or ""; its telemetry then counts as silent. velocity_m_s: true
-    (scaled) one that it reports, None if it reports none. speed_m_s, stray: what the host makes of that: horizontal
-    speed, and how the vehicle strays from what it is told, or ""; seen: whether cameras show how fast it is;
-    unseen_s: for how long it may not have been where it is believed, as the tracker says; near: who in the air is
-    too near to its pad, or "". lost_s: for how long it had no position that it needs. clears: an order of its own
-    ends its emergency, and starts no motor.
+    not_ready: why it may not take off, or "". configured: the driver has prepared it for flight; a driver of a standing
+    vehicle is not READY before. unsound: why its reported motion cannot be true, or ""; its telemetry then counts as
+    silent. velocity_m_s: the reported one, scaled to the true one; None if it reports none. speed_m_s, stray: computed
+    by the host: horizontal speed, and how the vehicle strays from its commands, or ""; seen: whether cameras show its
+    speed; unseen_s: how long it may not have been where it is believed, by the tracker; near: airborne vehicle too near
+    to its pad, or "". lost_s: how long it has lacked a position that it needs. clears: whether a separate order ends
+    its emergency without starting motors.
     """
 
     flight_state: FlightState = FlightState.UNKNOWN
@@ -118,12 +118,12 @@ class VehicleView:
 
     @property
     def plausible(self) -> "VehicleView":
-        """Return the view that may be acted upon: a vehicle whose values cannot be true counts as silent."""
+        """Return the view to act upon: a vehicle whose values cannot be true counts as silent."""
         return replace(self, fresh=False) if self.unsound and self.fresh else self
 
     @property
     def silence(self) -> str:
-        """Return why nothing is heard of the vehicle, in words; it counts while the view is not fresh."""
+        """Return why the vehicle is not heard, in words; valid while the view is not fresh."""
         return f"its sensors cannot be believed: {self.unsound}" if self.unsound else "no telemetry from the vehicle"
 
 
@@ -148,11 +148,11 @@ class Ack:
 
 @dataclass(frozen=True, slots=True)
 class WatchdogDecision:
-    """What to do now; velocity and yaw rate count for FLY only. `reason` says why the mode is what it is.
+    """The present decision; velocity and yaw rate count for FLY only. `reason` explains the mode.
 
-    setpoint_ns: stamp of the setpoint obeyed, for vehicles that are told each setpoint once; 0 when none is. seen_m_s:
-    velocity forward and left as cameras see it, for a vehicle that brakes without a velocity of its own; None if they
-    do not. entered_ns: when it came to the mode, or was ordered to once more; to TRACK only an operator's order leads.
+    setpoint_ns: stamp of the setpoint obeyed, for vehicles that get each setpoint once; 0 if none is. seen_m_s:
+    velocity forward and left by cameras, for a vehicle that brakes without a velocity of its own; None if they do not
+    see it. entered_ns: when it entered the mode, or was last ordered into it; only an operator's order leads to TRACK.
     """
 
     mode: DriverMode

@@ -1,1 +1,1 @@
-"""Whether what a vehicle says of its motion can be true: health per sensor, from values and their times. Pure."""
+"""Judges whether a vehicle's reported motion can be true: health per sensor, from values and their times. Pure."""

@@ -1,4 +1,4 @@
-"""How a vehicle's clock goes against ours, and how unevenly what it says arrives. Pure."""
+"""The rate of a vehicle's clock against ours, and how unevenly its packets arrive. Pure."""
 
 import math
 from collections import deque
@@ -8,14 +8,14 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _SPAN_NS, _KEPT, _NEEDED = 500 * NS_PER_MS, 60, 8
 _JUMP_NS = 10 * NS_PER_S
-_KNOWN_PPM = 100.0  # a drift that is known worse than this is not told
+_KNOWN_PPM = 100.0  # a less certain drift is not reported
 
 
 @dataclass(frozen=True, slots=True)
 class ClockFigures:
-    """drift_ppm: how much faster the vehicle's clock goes than ours; late_ms: how late the latest packet was.
+    """drift_ppm: by how much the vehicle's clock runs faster than ours; late_ms: delay of the most delayed packet.
 
-    Late against the freshest of its half second, over the last 30 s.
+    Delay against the freshest packet of its half second, over the last 30 s.
     """
 
     drift_ppm: float | None
@@ -25,7 +25,7 @@ class ClockFigures:
 class ClockDrift:
     """Fits a line through the freshest packet of each half second; `figures` is replaced as a whole, for other threads.
 
-    A clock that jumps by more than 10 s, or starts over, is compared anew.
+    If the clock jumps by more than 10 s or starts over, the comparison begins anew.
     """
 
     def __init__(self) -> None:
@@ -56,7 +56,7 @@ class ClockDrift:
 
 
 def _drift_ppm(spans: deque[tuple[float, float, float]]) -> float | None:
-    """Return the slope of the least lags, the other way round; None while it is not known well."""
+    """Return the negative slope of the least lags; None while it is uncertain."""
     count = len(spans)
     if count < _NEEDED:
         return None

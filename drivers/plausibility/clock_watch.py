@@ -1,15 +1,18 @@
-"""A vehicle's own clock against ours: standing, or late. Pure."""
+"""Compares a vehicle's own clock with ours: it may stand, or run late. Pure."""
 
 from groundstation.time_units import NS_PER_S
 
 _BUCKET_NS = 5 * NS_PER_S
-# A clock that went back by less tells that what comes is older than what came. By more: it was set, or the vehicle was
-# started again; on no link do values wait for so long.
+# A clock that went back by less means an older packet. By more: the clock was set, or the vehicle was restarted; no
+# link delays packets for so long.
 _LONGEST_NS = 3 * NS_PER_S
 
 
 class ClockWatch:
-    """Compares when values were made with when they came; the freshest of the last 5 to 10 s are what is usual."""
+    """Compares the times at which values were made and received.
+
+    The freshest of the last 5 to 10 s define the usual delay.
+    """
 
     def __init__(self, wrap_s: float | None = None) -> None:
         self._wrap_ns = None if wrap_s is None else round(wrap_s * 1e9)
@@ -24,7 +27,10 @@ class ClockWatch:
         self._bucket_ns = 0
 
     def update(self, stamp_ns: int, vehicle_ns: int) -> tuple[float, float]:
-        """Take the receipt of a value and its time [vehicle]; return (how long that stands, how late it is) [s]."""
+        """Take receipt and vehicle time of a value.
+
+        Return how long that time has stood, and how late the value is [s].
+        """
         before = self._last_ns
         vehicle_ns += self._turns_ns
         if before is not None and vehicle_ns < before:
@@ -37,7 +43,7 @@ class ClockWatch:
         return (stamp_ns - self._moved_ns) * 1e-9, self._late(stamp_ns, stamp_ns - vehicle_ns)
 
     def _wrapped(self, before: int, vehicle_ns: int) -> int:
-        # Half a turn backwards is a turn forwards.
+        # A step back by more than half the clock's range is a wrap forwards.
         if self._wrap_ns is None or before - vehicle_ns < self._wrap_ns // 2:
             return vehicle_ns
         self._turns_ns += self._wrap_ns

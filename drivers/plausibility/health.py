@@ -1,9 +1,9 @@
-"""Vocabulary: sensors, their health, and what was found about them."""
+"""Vocabulary of plausibility: sensors, their health, and findings about them."""
 
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 
-# What a SUSPECT velocity is worth.
+# Weight of a SUSPECT velocity.
 SUSPECT_VELOCITY_STD_M_S = 0.5
 
 
@@ -16,7 +16,7 @@ class Health(IntEnum):
 
 
 class Sensor(StrEnum):
-    """What is judged; TELEMETRY: all values together."""
+    """A judged sensor; TELEMETRY: all values together."""
 
     TELEMETRY = "telemetry"
     CLOCK = "clock"
@@ -36,13 +36,13 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class HealthReport:
-    """What is not GOOD, the worst first."""
+    """Findings on all sensors that are not GOOD, the worst first."""
 
     findings: tuple[Finding, ...] = ()
 
     def of(self, *sensors: Sensor) -> Health:
         """Return the worst health of some sensors."""
-        if not self.findings:  # as most reports are, and each packet asks several times
+        if not self.findings:  # true of most reports, and each packet asks several times
             return Health.GOOD
         return max((one.health for one in self.findings if one.sensor in sensors), default=Health.GOOD)
 

@@ -1,4 +1,4 @@
-"""What a kind of vehicle can do, as data: beyond it a value is no measurement."""
+"""The physical limits of a kind of vehicle, as data: a value beyond them is no measurement."""
 
 import math
 from dataclasses import dataclass
@@ -10,13 +10,13 @@ from drivers.plausibility.health import Sensor
 class PlausibilityLimits:
     """Limits of one kind of vehicle.
 
-    frozen_s: all values repeat for so long; stuck_s: one sensor does while others move; stuck_alone_s: whatever the
-    tilt says; stuck_m_s: change of speed that the tilt must account for meanwhile. clock_stands_s, clock_suspect_s,
-    clock_late_s: the vehicle's clock stands, or its values are older than the freshest ones by so much.
-    speed_m_s, tilt_rad: beyond the vehicle's means, for beyond_s. jump_m_s, acceleration_m_s2 and jump_rad,
-    turn_rad_s: the largest step between two values, at once and by time. jumps, jumps_within_s: so many of them are too
-    many. hold_s: how long a verdict outlives its evidence. clock_wrap_s: where the vehicle's clock starts over.
-    essential: sensors without which nobody can fly.
+    frozen_s: how long all values may repeat; stuck_s: how long one sensor may while others move; stuck_alone_s:
+    likewise whatever the tilt is; stuck_m_s: change of speed that the tilt must imply meanwhile. clock_stands_s,
+    clock_suspect_s, clock_late_s: how long the vehicle's clock may stand, and how much older than the freshest its
+    values may be. speed_m_s, tilt_rad: beyond the vehicle's means, for beyond_s. jump_m_s, acceleration_m_s2 and
+    jump_rad, turn_rad_s: the largest step between two values, at once and by time. jumps, jumps_within_s: number of
+    such steps that is too many within a time. hold_s: how long a verdict outlives its evidence. clock_wrap_s: time at
+    which the vehicle's clock starts over. essential: sensors without which the vehicle cannot fly.
     """
 
     frozen_s: float = 0.3

@@ -1,7 +1,7 @@
-"""The monitor of one vehicle: each sample of its motion in, the health of its sensors out. Pure.
+"""Monitors one vehicle: takes samples of its motion, gives the health of its sensors. Pure.
 
-Judged in the air only: on the floor values may stand still, and attitudes may be anything. While it takes off or lands
-it may touch the floor: its velocity alone may stand then.
+Judged in the air only: on the floor values may stand still, and attitudes may be anything. During take-off or landing
+it may touch the floor, and only its velocity may stand still.
 """
 
 import math
@@ -16,15 +16,15 @@ from drivers.plausibility.repeats import RepeatWatch, StandstillWatch
 from groundstation.bus.messages import AIRBORNE, UP, FlightState
 
 _Judged = tuple[Sensor, Health, str]
-# After a pause no step between two values means anything.
+# After a pause a step between two values means nothing.
 _GAP_S = 0.3
 
 
 class MotionSample(NamedTuple):
     """Motion in one packet. stamp_ns: receipt; vehicle_ns: time on the vehicle's clock, None if it has none.
 
-    velocity_m_s: horizontal, as told, in axes of the vehicle's own choice; heading_rad: of the vehicle in these axes.
-    roll_rad, pitch_rad [FLU]; inertial: rates and specific forces, empty if not told.
+    velocity_m_s: horizontal, as reported, in axes of the vehicle's choice; heading_rad: of the vehicle in these axes.
+    roll_rad, pitch_rad [FLU]; inertial: rates and specific forces, empty if not reported.
     """
 
     stamp_ns: int
@@ -37,7 +37,7 @@ class MotionSample(NamedTuple):
 
     @property
     def lean_rad(self) -> tuple[float, float]:
-        """Return the small tilts towards the axes of the velocity."""
+        """Return the (small) tilts towards the axes of the velocity."""
         forward, left = self.pitch_rad, -self.roll_rad
         c, s = math.cos(self.heading_rad), math.sin(self.heading_rad)
         return c * forward - s * left, s * forward + c * left
@@ -46,7 +46,7 @@ class MotionSample(NamedTuple):
 class MotionMonitor:
     """Health of the sensors of one vehicle; `report` is replaced as a whole, so that another thread may read it.
 
-    clock: its clock against ours, on the floor as well.
+    clock: figures of its clock against ours, also on the floor.
     """
 
     def __init__(self, limits: PlausibilityLimits) -> None:
@@ -57,7 +57,7 @@ class MotionMonitor:
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything: the vehicle stands."""
+        """Forget everything, for a vehicle that stands."""
         self.report = ALL_GOOD
         for watch in (self._contents, self._attitude, self._inertial, *self._velocity, self._clock):
             watch.reset()
@@ -67,7 +67,7 @@ class MotionMonitor:
         self._held: dict[Sensor, tuple[int, Finding]] = {}
 
     def update(self, sample: MotionSample, state: FlightState) -> HealthReport:
-        """Take a sample of a vehicle in some state; return what is known to be wrong now."""
+        """Take a sample of a vehicle in a flight state; return the present health report."""
         if sample.vehicle_ns is not None:
             self.clock.update(sample.stamp_ns, sample.vehicle_ns)
         if state not in AIRBORNE:
@@ -177,7 +177,7 @@ class MotionMonitor:
 
 
 def _repeated(sensor: Sensor, held_s: float, limit_s: float, reason: str) -> list[_Judged]:
-    # Half of the time is reason to doubt.
+    # Half of the limit gives reason for doubt.
     if held_s < limit_s / 2:
         return []
     return [(sensor, Health.BAD if held_s >= limit_s else Health.SUSPECT, reason)]

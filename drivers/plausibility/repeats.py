@@ -1,22 +1,22 @@
-"""For how long a value has been the same to the last bit. Pure.
+"""Measures how long a value has been the same to the last bit. Pure.
 
-Estimates and measurements in flight never are: in a recorded flight of an AR.Drone no velocity came twice, and no
-attitude for longer than 24 ms.
+Estimates and measurements in flight never repeat for long: in a recorded flight of an AR.Drone no velocity came twice,
+and no attitude stayed for longer than 24 ms.
 """
 
 import math
 
 from groundstation.geometry.stabilized_frame import STANDARD_GRAVITY_M_S2
 
-# Two datagrams of one moment are no standstill.
+# Two datagrams of one instant are no standstill.
 _LEAST_SAMPLES = 4
 
 
 class RepeatWatch:
-    """Counts how long a value stands. Nothing is known of a value that did not come for `gap_s`.
+    """Measures how long a value has stood. After a pause of `gap_s` the count begins anew.
 
-    `FreezeWatch` of the estimator is its near twin: it has no gap, because sightings come and go, and answers yes or no
-    for many sources. Neither package may import the other, and no package below both is about sensors.
+    `FreezeWatch` of the estimator is its near twin: that has no gap, because sightings come and go, and answers yes or
+    no for many sources. Neither package may import the other, and no package below both is about sensors.
     """
 
     def __init__(self, gap_s: float = 0.3) -> None:
@@ -39,7 +39,7 @@ class RepeatWatch:
 
 
 class StandstillWatch:
-    """A velocity along one axis that stands, and the change of speed that the tilt accounts for meanwhile."""
+    """Watches a velocity along one axis that stands, and the change of speed that the tilt implies meanwhile."""
 
     def __init__(self) -> None:
         self._repeats = RepeatWatch()

@@ -1,4 +1,4 @@
-"""Roll and pitch of vehicles over the last moments, to be read at a picture's exposure."""
+"""Roll and pitch of vehicles in the recent past, to be read at a picture's exposure."""
 
 from collections import defaultdict, deque
 
@@ -17,7 +17,7 @@ class AttitudeHistory:
         )
 
     def add(self, entity: str, stamp_ns: int, roll_rad: float, pitch_rad: float) -> None:
-        """Remember a sample; what is older than the newest one is ignored."""
+        """Remember a sample; one older than the newest is ignored."""
         samples = self._samples[entity]
         if not samples or stamp_ns > samples[-1][0]:
             samples.append((stamp_ns, roll_rad, pitch_rad))

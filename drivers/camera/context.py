@@ -1,4 +1,4 @@
-"""Context for a camera from the bus: attitudes and heights of vehicles, and the belief."""
+"""A camera's context from the bus: attitudes and heights of vehicles, and the belief."""
 
 import math
 from collections.abc import Collection
@@ -18,7 +18,7 @@ _LEVEL = (0.0, 0.0)
 
 
 class Surroundings:
-    """Listens to odometry and estimates; answers for the moment of an exposure."""
+    """Listens to odometry and estimates; answers for the time of an exposure."""
 
     def __init__(self, bus: Bus, settings: CameraDriverSettings) -> None:
         self._settings = settings
@@ -36,7 +36,7 @@ class Surroundings:
         self._foresight = Foresight(settings.mount, settings.observer, markers, settings.calibration.intrinsics())
 
     def read(self) -> None:
-        """Take in what has arrived; stamps of other clocks mean nothing here."""
+        """Take in messages; those with stamps of other clocks are ignored."""
         for subscription in (*self._odometry, self._estimates):
             for received in subscription.drain():
                 message = received.message
@@ -55,7 +55,7 @@ class Surroundings:
         return _LEVEL if settings.mount.in_world else self._attitudes.at(settings.observer, exposure_ns)
 
     def gravity(self, entity: str, exposure_ns: int) -> Gravity:
-        """Return what is known of "down" for a subject; targets stand level."""
+        """Return the known direction of "down" for a subject; targets stand level."""
         observer = self.attitude(exposure_ns)
         subject = _LEVEL if entity in self._targets else self._attitudes.at(entity, exposure_ns)
         rotation = convert.stabilized_from_optical(self._settings.mount, *(observer or _LEVEL))
@@ -66,11 +66,14 @@ class Surroundings:
         return self._foresight.at(exposure_ns, self.attitude(exposure_ns))
 
     def sought(self, exposure_ns: int, predictions: Predictions) -> Collection[str]:
-        """Return what whole pictures are searched for often; nothing where nothing is heard of the tracker."""
+        """Return the entities for which whole pictures are searched often; none while the tracker is not heard."""
         return self._foresight.sought(exposure_ns, predictions)
 
     def drop_m(self, entity: str, exposure_ns: int) -> float | None:
-        """Return how far a marker is below the camera by height sensors alone; None when one of them says nothing."""
+        """Return how far a marker is below the camera by height sensors alone [m].
+
+        None if one of them gives no height.
+        """
         marker, mount = self._markers[entity], self._settings.mount
         subject = 0.0 if entity in self._targets else self._heights.get(entity)
         own = 0.0 if mount.in_world else self._heights.get(self._settings.observer)

@@ -1,4 +1,4 @@
-"""Frames and messages: mounting and attitudes to `Gravity`, a sighting to a `RelativeObservation`."""
+"""Conversions: from mounting and attitudes to `Gravity`, and from a sighting to a `RelativeObservation`."""
 
 import math
 from functools import lru_cache
@@ -30,7 +30,10 @@ def parent_from_optical(mount: MountSettings) -> Array:
 
 
 def stabilized_from_optical(mount: MountSettings, roll_rad: float, pitch_rad: float) -> Array:
-    """Return base_stabilized_from_camera_optical of a carrier with that attitude; the world's own when fixed in it."""
+    """Return base_stabilized_from_camera_optical of a carrier with that attitude.
+
+    That of the world for a fixed camera.
+    """
     if mount.in_world:
         return parent_from_optical(mount)
     return np.asarray(rotation_from_euler(roll_rad, pitch_rad, 0.0) @ parent_from_optical(mount))

@@ -17,13 +17,13 @@ _LEAST_ENLARGEMENT, _MOST_ENLARGEMENT = 0.4, 6.0
 # Equalising the histogram first (CALIB_CB_NORMALIZE_IMAGE) costs time and every tenth board with small squares.
 _FLAGS = cv2.CALIB_CB_ADAPTIVE_THRESH
 _REFINE = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 30, 0.005)
-# Half a refinement window at most [px]: in an enlarged picture all of it is square, in others more is not needed.
+# Half a refinement window at most [px]: enlarged pictures are sharp enough for all of it, others need no more.
 _MOST_HALF_ENLARGED_PX, _MOST_HALF_PX = 10, 8
 _LEAST_CONTRAST = 12.0
 _MOST_WRONG_SQUARES = 1
 _GRID = marker.corner_grid()
 _CENTRES, _BLACK = marker.square_centres()
-# Five points around each centre: one sample alone would hang on a single noisy pixel.
+# Five points around each centre: a single sample would depend on one noisy pixel.
 _SPREAD = np.array([[0.0, 0.0], [0.18, 0.18], [0.18, -0.18], [-0.18, 0.18], [-0.18, -0.18]])
 _X0, _X1, _Y0, _Y1 = marker.EXTENT
 _CARD = np.array([[_X0, _Y0], [_X1, _Y0], [_X1, _Y1], [_X0, _Y1]])
@@ -93,7 +93,7 @@ def enlargement(spacing: float) -> float:
 
 
 def find_board(picture: Image, window: Window, spacing: float) -> Find | None:
-    """Return the board in the window, whose squares are about `spacing` pixels wide, or None."""
+    """Return the board in the window with squares about `spacing` pixels wide, or None."""
     part = picture[window.top : window.bottom, window.left : window.right]
     enlarged, ratio = resized(part, enlargement(spacing))
     found, raw = cv2.findChessboardCorners(enlarged, (marker.CORNERS_X, marker.CORNERS_Y), flags=_FLAGS)
@@ -169,7 +169,7 @@ def ordered(picture: Image, corners: Array) -> Find | None:
 
 
 def _has_white_rim(picture: Image, pixels_from_plane: Array, least: float) -> bool:
-    """Return whether the board ends where it should: a lattice shifted by one square fits the colours just as well."""
+    """Return whether the board ends where it should: colours alone would also fit a lattice shifted by a square."""
     rim = _mapped(pixels_from_plane, _RIM)
     if rim.min() < 0.0 or rim[:, 0].max() > picture.shape[1] - 1 or rim[:, 1].max() > picture.shape[0] - 1:
         return False

@@ -1,4 +1,4 @@
-"""The bits of tags and their detector, which OpenCV or another package holds."""
+"""The bits of tags and their detector, from OpenCV or another package."""
 
 import cv2
 import numpy as np
@@ -25,7 +25,7 @@ class OpenCvTags:
         self._dictionary = dictionary_of(name)
 
     def finder(self) -> Finder:
-        """Return what finds its tags in a grey picture."""
+        """Return a finder of its tags in grey pictures."""
         parameters = cv2.aruco.DetectorParameters()
         parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
         detector = cv2.aruco.ArucoDetector(self._dictionary, parameters)
@@ -44,7 +44,7 @@ class OpenCvTags:
 
 
 def family_of(dictionary: str) -> TagFamily:
-    """Return who knows the tags of a dictionary; raises PlugInError for a plug-in that cannot be used."""
+    """Return the family of the tags of a dictionary; raises PlugInError for an unusable plug-in."""
     family: TagFamily = OpenCvTags(dictionary) if dictionary in DICTIONARIES else plug_ins.tag_family(dictionary)
     return family
 

@@ -74,12 +74,12 @@ class CameraDriver:
         self.counts: Counter[str] = Counter()
 
     def tell_counts(self) -> None:
-        """Log what became of all pictures and boards."""
+        """Log the counts of all pictures and boards."""
         counts = {"pictures": self._health.pieces, "skipped": self._skipped, **self.counts, **self._pipeline.counts}
         _log.info("%s", ", ".join(f"{name} {count}" for name, count in counts.items()))
 
     def turn(self) -> None:
-        """Wait shortly for a picture, handle it, and keep up heartbeat, status and stream watch."""
+        """Wait briefly for a picture, process it, and keep up heartbeat, status and stream watch."""
         packet = self._source.take_newest(_POLL_S)
         self._publish_video()
         self._surroundings.read()
@@ -111,7 +111,7 @@ class CameraDriver:
         self._health.pieces += 1
 
     def _exposed(self, taken: Packet | Unit) -> int:
-        """Return when a picture was exposed: the calibrated delay before it came, or would have come usually [ns]."""
+        """Return a picture's exposure time [ns]: its (usual) arrival less the calibrated delay."""
         return min(taken.settled_ns - self._delay_ns, taken.arrival_ns)
 
     def _decoded(self, packet: Packet) -> Image | None:
@@ -129,7 +129,7 @@ class CameraDriver:
         return np.asarray(decoded, dtype=np.uint8)
 
     def _has_size(self, width: int, height: int, packet: Packet) -> bool:
-        """Return whether a picture has the calibrated size; one that has not is refused by name."""
+        """Return whether a picture has the calibrated size; another size is refused by name."""
         wanted = self._intrinsics
         if (width, height) == (wanted.width_px, wanted.height_px):
             return True
@@ -165,14 +165,14 @@ class CameraDriver:
             self._child.event(notice.severity, f"camera {settings.name}: {notice.text}", notice.remedy, notice.entity)
 
     def _publish_image(self, packet: Packet, exposure_ns: int) -> None:
-        """Pass a JPEG on, at most `image_fps` times a second: as it came, or made of what was decoded."""
+        """Pass a JPEG on, at most `image_fps` times a second: as received, or encoded from the decoded picture."""
         if not self._images.is_due(exposure_ns):
             return
         data = packet.data or (packet.picture.jpeg() if packet.picture is not None else b"")
         self._child.bus.publish_bytes(IMAGE, self._child.bus.header(self._settings.name, exposure_ns), data)
 
     def _publish_video(self) -> None:
-        """Pass H.264 on as it came and all of it, for the recording: each picture needs those before it."""
+        """Pass all H.264 on as received, for the recording: each picture needs those before it."""
         for unit in self._source.take_video():
             if self._settings.image_fps > 0.0:
                 header = self._child.bus.header(self._settings.name, self._exposed(unit))

@@ -1,4 +1,4 @@
-"""Faults of printed markers that a person has to put right: mirrored, of the wrong size, used twice, nobody's."""
+"""Faults of printed markers that a person must put right: mirrored, wrong size, used twice, or unknown."""
 
 from collections import Counter, defaultdict
 from collections.abc import Iterable
@@ -14,7 +14,7 @@ from groundstation.bus.notice import Notice
 from groundstation.time_units import NS_PER_S
 
 _MIRRORED_MARGIN, _MIRRORED_TIMES = 2.0, 5
-# A code that nobody has is read so often before it is told, in no less and no more time: one is misread now and then.
+# An unknown code is reported after this many readings over this time: now and then a code is misread.
 _FOREIGN_TIMES, _FOREIGN_NS, _MISREAD_NS = 4, 3 * NS_PER_S, 30 * NS_PER_S
 
 
@@ -34,7 +34,7 @@ class MarkerFaults:
         return notices
 
     def mirrored(self, marker: MarkerSettings, reading: BarReading) -> None:
-        """Take in that a bar reads on the wrong side of its board; a few times, since clutter may look like one."""
+        """Take in that a bar reads on the wrong side of its board; several times, since clutter may look like one."""
         self._mirrored[marker.entity] += reading.is_sure(_MIRRORED_MARGIN)
         if self._mirrored[marker.entity] >= _MIRRORED_TIMES:
             text = f"the {marker.label} of {marker.entity} is mirrored and cannot be used"
@@ -43,7 +43,7 @@ class MarkerFaults:
     def measured(
         self, marker: MarkerSettings, stamp_ns: int, relative_m: NDArray[np.float64], drop_m: float | None
     ) -> None:
-        """Take in where a marker was seen from the camera [m; z up], and how far below height sensors have it."""
+        """Take in a marker's place relative to the camera [m; z up], and its depth below by height sensors [m]."""
         check = self._sizes[marker.entity]
         check.add(stamp_ns, relative_m, drop_m)
         ratio = check.ratio
@@ -61,7 +61,7 @@ class MarkerFaults:
         )
 
     def foreign(self, code: int, stamp_ns: int, expected: Iterable[MarkerSettings]) -> None:
-        """Take in that a board carries a code that the field gives to nobody; it may be that of one never seen."""
+        """Take in a board with a code that the field assigns to nobody; it may be a misread one."""
         first_ns, times = self._foreign.get(code, (stamp_ns, 0))
         if stamp_ns - first_ns > _MISREAD_NS:
             first_ns, times = stamp_ns, 0

@@ -12,23 +12,23 @@ from groundstation.arrays import Array
 from groundstation.geometry import board as marker
 from groundstation.geometry.lens import CameraIntrinsics
 
-# Inner part of each cell, 3 x 3 samples, in squares.
+# The inner part of each cell, 3 x 3 samples, in squares.
 _OFFSETS = np.array([[x, y] for x in (-0.16, 0.0, 0.16) for y in (-0.1, 0.0, 0.1)])
 _SAMPLES = (marker.cell_centres()[:, None] + _OFFSETS).reshape(-1, 2)
-# Lens, pixel and sampling together; the sharper figure of measured pictures, so that contrast is not overrated.
+# Blur of lens, pixel and sampling together; the sharper figure of measured pictures, so that contrast is not overrated.
 _BLUR_PX = 0.9
 _GRID = marker.corner_grid()
 
 
 @dataclass(frozen=True, slots=True)
 class BarReading:
-    """What the bar says: the likeliest code (0..15), and by how many cells the next one fits worse (0..4)."""
+    """A reading of the bar: the likeliest code (0..15), and by how many cells the next one fits worse (0..4)."""
 
     code: int
     margin: float
 
     def is_sure(self, least_margin: float) -> bool:
-        """Return whether this may be taken as an identity; blank and solid bars leave no margin."""
+        """Return whether it is reliable as an identity; blank and solid bars leave no margin."""
         return self.margin > least_margin
 
 
@@ -41,8 +41,8 @@ def read_bar(
 ) -> BarReading | None:
     """Return the reading of a board's bar, or None when the bar is not fully in the picture.
 
-    rays: of the board's corners, normalised (n, 2), where the caller has them.
-    mirrored: where the bar of a print that was mirrored lies; the squares alone look the same both ways.
+    rays: of the board's corners, normalised (n, 2), if the caller has them. mirrored: read the place where a mirrored
+    print has its bar; the squares alone look the same both ways.
     """
     if rays is None:
         rays = intrinsics.normalised_from_pixels(find.corners)
@@ -70,7 +70,7 @@ def decode(darkness: Array, pitch_px: float, width_px: float) -> BarReading:
 
 @lru_cache(maxsize=1024)
 def _expected(quarter_pitch: int, quarter_width: int) -> Array:
-    """Return the darkness (16, 8) that each word's cells have after the camera's blur, for sizes in quarter pixels."""
+    """Return the expected darkness (16, 8) of each word's cells after camera blur, for sizes in quarter pixels."""
     pitch, width = max(1, quarter_pitch) / 4.0, max(1, quarter_width) / 4.0
     distance = np.abs(np.subtract.outer(np.arange(marker.CELLS), np.arange(marker.CELLS))) * pitch
     mixing = _step((distance + pitch / 2) / _BLUR_PX) - _step((distance - pitch / 2) / _BLUR_PX)
@@ -83,7 +83,7 @@ def _step(ratio: Array) -> Array:
 
 
 def _bar_pixels(rays: Array, intrinsics: CameraIntrinsics, samples: Array) -> Array | None:
-    """Return where the cells' samples are in the picture: a homography of undistorted corners, then the lens."""
+    """Return the pixels of the cells' samples: a homography of undistorted corners, then the lens."""
     if not np.isfinite(rays).all():
         return None
     h = homography(_GRID, rays)

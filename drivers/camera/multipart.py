@@ -1,6 +1,6 @@
-"""JPEG frames out of a multipart/x-mixed-replace byte stream; pure bytes, bounded, never trusting the sender.
+"""Extracts JPEG frames from a multipart/x-mixed-replace byte stream; pure, bounded, never trusting the sender.
 
-WIRE: RFC 2046 section 5.1 and what IP cameras make of it: boundaries with and without leading dashes, parts with and
+WIRE: RFC 2046 section 5.1 as IP cameras implement it: boundaries with and without leading dashes, parts with and
 without Content-Length, lines that end in LF alone, any number of blank lines between parts.
 """
 
@@ -23,7 +23,7 @@ def boundary_from_head(head: bytes) -> bytes | None:
 
 
 class MultipartParser:
-    """Feed it bytes as they come; it returns the complete JPEG frames in them.
+    """Takes bytes as they come; returns the complete JPEG frames in them.
 
     `rejected` counts parts that are no JPEG, too long, or cut short.
     """
@@ -82,7 +82,7 @@ class MultipartParser:
         return True
 
     def _take_ended(self, body: int, frames: list[bytes]) -> None:
-        """Take a picture whose end is here, though not the boundary behind it: that may come with the next picture."""
+        """Take a picture that has ended although its boundary is missing: that may come with the next picture."""
         if self._buffer[-4:].rstrip(b"\r\n").endswith(_JPEG_END) and has_ended(data := bytes(self._buffer[body:])):
             self._emit(data.rstrip(b"\r\n"), len(self._buffer), frames)
 

@@ -8,18 +8,18 @@ import numpy as np
 
 from groundstation.arrays import Image
 
-# Of so many pixels, evenly spaced rows of the picture: enough for shares of a thousandth.
+# Number of pixels judged, in evenly spaced rows: enough for shares of a thousandth.
 _PIXELS = 120_000
-# Between the darkest and the brightest hundredth: with less there is no edge to judge by, only noise.
+# Least contrast between the darkest and the brightest hundredth: below it there is no edge to judge, only noise.
 _CONTRAST = 60.0
 _EDGE_SHARE = 99.9
-# What is wider is light that fades across the picture, such as on the floor before a standing drone, and no edge.
+# A wider transition is light that fades across the picture, as on the floor before a standing drone, and no edge.
 _WIDEST_PX = 16.0
 
 
 @dataclass(frozen=True, slots=True)
 class PictureQuality:
-    """brightness: mean grey value, 0 to 1; edge_px: width of the sharpest edges [px], None where there is none."""
+    """brightness: mean grey value, 0 to 1; edge_px: width of the sharpest edges [px], None if there are none."""
 
     brightness: float
     edge_px: float | None
@@ -28,7 +28,7 @@ class PictureQuality:
 def quality_of(picture: Image) -> PictureQuality:
     """Return the quality of a grey picture (rows, columns).
 
-    An edge from dark to bright that is w pixels wide has a slope of contrast / w: the steepest slopes tell its width.
+    An edge from dark to bright that is w pixels wide has a slope of contrast / w: the steepest slopes give its width.
     """
     step = max(1, picture.size // _PIXELS)
     rows = np.ascontiguousarray(picture[::step])
@@ -44,7 +44,7 @@ def quality_of(picture: Image) -> PictureQuality:
 
 
 def _percentiles(values: Image, *percents: float) -> list[float]:
-    """Return what np.percentile does, in a tenth of its time: bytes are sorted by counting them."""
+    """Return percentiles as np.percentile does, in a tenth of its time: bytes are sorted by counting."""
     up_to = np.cumsum(cv2.calcHist([values], [0], None, [256], [0.0, 256.0]).ravel(), dtype=np.int64)
     found = []
     for percent in percents:

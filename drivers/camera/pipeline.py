@@ -1,4 +1,4 @@
-"""One camera's eyes without its wires: picture, attitudes and belief in, sightings out; keeps tracks in between."""
+"""One camera's detection without I/O: picture, attitudes and belief in, sightings out; keeps tracks in between."""
 
 import time
 from collections import Counter, defaultdict
@@ -24,7 +24,7 @@ Followed = list[tuple[Track, detect.Find]]
 GravityOf = Callable[[str], pose.Gravity]
 DropOf = Callable[[str], float | None]
 
-# Corners beside a tracked board, its bar's among them, are no new board.
+# Corners beside a tracked board, including those of its bar, are no new board.
 _TAKEN_SQUARES = 2.2
 _NOTHING_EXPECTED: Mapping[str, Prediction | None] = MappingProxyType({})
 
@@ -36,9 +36,9 @@ def _unknown_drop(_entity: str) -> float | None:
 class Pipeline:
     """Finds, follows, identifies and measures the expected markers of one camera.
 
-    `counts` says what was found, missed and refused since the start, by name; `searched`: whether the last picture was
-    searched all over. cpu_s: tells how much CPU this thread has used [s]; others: markers of the field that this camera
-    does not report.
+    `counts`: what was found, missed and refused since the start, by name; `searched`: whether the last picture was
+    wholly searched. cpu_s: returns the CPU time of this thread [s]; others: markers of the field that this camera does
+    not report.
     """
 
     def __init__(
@@ -73,12 +73,12 @@ class Pipeline:
         return (*boards, *self._tags.tracked)
 
     def windows(self, stamp_ns: int, shape: tuple[int, ...]) -> list[detect.Window]:
-        """Return where the boards in view will be looked for in a picture of that time and shape."""
+        """Return the windows in which the boards in view will be looked for, in a picture of that time and shape."""
         found = (track.window(stamp_ns, shape, None) for track in self._tracks)
         return [window for window in found if window is not None]
 
     def take_notices(self) -> list[Notice]:
-        """Return and forget what an operator should hear; the same thing is never said twice."""
+        """Return and forget new notices for the operator; none is repeated."""
         return self._faults.take()
 
     def process(
@@ -92,8 +92,8 @@ class Pipeline:
     ) -> list[Sighting]:
         """Return the sightings in a picture exposed at `stamp_ns`.
 
-        gravity_of, drop_of: what is known for a subject; predictions: where the belief expects which marker; sought:
-        entities that whole pictures are searched for often.
+        gravity_of, drop_of: known "down" and depth of a subject; predictions: where the belief expects each marker;
+        sought: entities for which whole pictures are searched often.
         """
         finds = self._follow(picture, stamp_ns, predictions)
         self._look_where_expected(picture, stamp_ns, predictions, finds)
@@ -138,7 +138,7 @@ class Pipeline:
     def _look_where_expected(
         self, picture: Image, stamp_ns: int, predictions: Mapping[str, Prediction | None], finds: Followed
     ) -> None:
-        """Look for markers that are not in view but should be, where the belief has them; adds to `finds`."""
+        """Look for missing markers where the belief expects them; adds to `finds`."""
         followed = {self._entity_of(track) for track, _ in finds}
         boards = {marker.entity for marker in self._expected.values()}
         for entity, prediction in predictions.items():
@@ -157,7 +157,7 @@ class Pipeline:
             finds.append((self._adopted(find, stamp_ns, prediction), find))
 
     def _adopted(self, find: detect.Find, stamp_ns: int, prediction: Prediction) -> Track:
-        """Return the track that had lost this board, else a new one; its bar identifies it later."""
+        """Return the track that lost this board, else a new one; its bar identifies it later."""
         for track in self._tracks:
             if track.misses and track.accepts(find, stamp_ns):
                 track.follow(find, stamp_ns, prediction)
@@ -175,7 +175,7 @@ class Pipeline:
         known = [(track, detect.Find(track.corners, 0.0, 0.0)) for track in self._tracks if track.misses == 0]
         finds = [find for find in search(picture, taken) if not _is_taken(find, known)]
         fresh = [(Track(find.corners, stamp_ns), find) for find in finds]
-        # A board that is found again replaces the track that had missed it.
+        # A board that is found again replaces the track that missed it.
         self._tracks = [t for t in self._tracks if t.misses == 0 or not _is_taken_by(t, fresh)]
         self._tracks += [track for track, _ in fresh]
         self.counts["searches"] += 1
@@ -189,12 +189,12 @@ class Pipeline:
         return self._searches.is_due(stamp_ns, bool(seen), bool(set(sought) & set(self._markers) - seen))
 
     def _schedule_search(self, stamp_ns: int, predictions: Mapping[str, Prediction | None], cost_s: float) -> None:
-        """Plan the next search by what is missing; what the belief has elsewhere is not."""
+        """Plan the next search by the missing markers; those that the belief has elsewhere are not missing."""
         missing = {entity for entity in self._markers if predictions.get(entity, ...) is not None} - set(self.tracked)
         self._searches.done(stamp_ns, bool(missing), cost_s)
 
     def _forget(self, stamp_ns: int, predictions: Mapping[str, Prediction | None]) -> None:
-        """Drop tracks that are over; when a marker was lost that should still be in view, search soon."""
+        """Drop tracks that have ended; if a marker was lost that should still be in view, search soon."""
         over = [track for track in self._tracks if self._is_over(track, stamp_ns)]
         self._tracks = [track for track in self._tracks if not self._is_over(track, stamp_ns)]
         lost = [entity for track in over if (entity := self._entity_of(track)) is not None]
@@ -246,8 +246,8 @@ class Pipeline:
     def _resolved(self, sightings: list[Sighting], predictions: Mapping[str, Prediction | None]) -> list[Sighting]:
         """Return one sighting per entity; of two boards with one code, one is the other's alternative.
 
-        The one nearer to where the belief has it comes first, and the estimator decides. Without a belief nothing tells
-        them apart, and both are withheld; so are three.
+        The one nearer to where the belief has it comes first, and the estimator decides. Without a belief they cannot
+        be told apart, and both are withheld; so are three.
         """
         by_entity: defaultdict[str, list[Sighting]] = defaultdict(list)
         for sighting in sightings:

@@ -1,4 +1,4 @@
-"""From twelve corners to a relative pose: both planar solutions, gravity to choose, covariance from the Jacobian."""
+"""The relative pose from twelve corners: both planar solutions, choice by gravity, covariance from the Jacobian."""
 
 import math
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from groundstation.arrays import Array
 from groundstation.geometry.angles import difference
 from groundstation.geometry.lens import CameraIntrinsics
 
-# How far the measured roll and pitch of both vehicles may be off together, and how far assumed levelness may.
+# By how much the measured roll and pitch of both vehicles may err together, and by how much assumed levelness may.
 _GRAVITY_STD_RAD = math.radians(3.0)
 _LEVEL_STD_RAD = math.radians(8.0)
 _REFINE = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 20, 1e-9)
@@ -27,7 +27,7 @@ class PlanarPose:
 
 @dataclass(frozen=True, slots=True)
 class Gravity:
-    """What is known of "down": stabilized_from_optical (3, 3) of the observer, the subject's roll and pitch.
+    """The known direction of "down": stabilized_from_optical (3, 3) of the observer, the subject's roll and pitch.
 
     For a world-fixed camera the stabilized frame is the world. known: both attitudes were measured, not assumed level.
     """
@@ -49,7 +49,7 @@ class RelativePose:
 
 @dataclass(frozen=True, slots=True)
 class PoseChoice:
-    """The pose gravity prefers; the other one if it stands as well; residual rms per corner [px]."""
+    """The pose that gravity prefers; the other one if not ruled out; residual rms per corner [px]."""
 
     best: RelativePose
     alternative: RelativePose | None
@@ -61,7 +61,7 @@ def planar_poses(
 ) -> list[PlanarPose]:
     """Return the one or two poses of a flat board (points (n, 3) [m; marker]), refined on the distorted pixels.
 
-    rays: of the corners, normalised (n, 2), where the caller has them.
+    rays: of the corners, normalised (n, 2), if the caller has them.
     """
     if rays is None:
         rays = intrinsics.normalised_from_pixels(corners)
@@ -125,7 +125,7 @@ def choose(
 def _cost(pose: PlanarPose, variance: float, gravity: Gravity) -> float:
     (xx, _, xz), (yx, _, yz), (_, _, zz) = (gravity.stabilized_from_optical @ pose.rotation).tolist()
     yaw, roll, pitch = math.atan2(yx, xx), gravity.subject_roll_rad, gravity.subject_pitch_rad
-    # The subject's z axis as its roll, its pitch and that yaw have it.
+    # The subject's z axis by its roll, its pitch and that yaw.
     ahead, left, up = math.sin(pitch) * math.cos(roll), -math.sin(roll), math.cos(pitch) * math.cos(roll)
     c, s = math.cos(yaw), math.sin(yaw)
     cosine = xz * (c * ahead - s * left) + yz * (s * ahead + c * left) + zz * up
@@ -135,7 +135,7 @@ def _cost(pose: PlanarPose, variance: float, gravity: Gravity) -> float:
 
 
 def _differ(best: RelativePose, other: RelativePose) -> bool:
-    """Return whether two solutions are worth telling apart: seen face on, both say nearly the same."""
+    """Return whether two solutions differ enough to matter: seen face on, they are nearly the same."""
     gap = np.append(other.position_m - best.position_m, difference(other.yaw_rad, best.yaw_rad))
     return float(gap @ np.linalg.solve(best.covariance + other.covariance, gap)) > 1.0
 

@@ -1,4 +1,4 @@
-"""Where markers should be in a picture: the belief about every entity, the camera's pose and both attitudes."""
+"""Predicts where markers are in a picture, from the belief about all entities, the camera's pose and both attitudes."""
 
 import math
 from collections import deque
@@ -18,12 +18,12 @@ from groundstation.time_units import NS_PER_MS
 
 Attitude = tuple[float, float]
 
-# Estimates at 50 Hz; a picture is exposed up to 0.5 s before it is looked at.
+# Estimates come at 50 Hz; a picture is exposed up to 0.5 s before it is processed.
 _KEPT = 48
 _FARTHEST_NS = 300 * NS_PER_MS
-# A target that no camera has seen for so long is sought by all; after so long the tracker says whether it is.
+# A target that no camera has seen for this long is sought by all; after the longer time the tracker decides that.
 _SOUGHT_AFTER_S, _SOUGHT_FOR_S = 0.5, 10.0
-# Roll, pitch and mounting of an observer that measures its attitude, of one whose levelness is assumed, and of a mount.
+# Errors of roll, pitch and mounting: of an observer that measures its attitude, of one assumed level, and of a mount.
 _ATTITUDE_STD_RAD, _LEVEL_STD_RAD, _MOUNT_STD_RAD = math.radians(2.0), math.radians(8.0), math.radians(0.5)
 _FLOOR_STD_M = 0.02
 _SIGMAS = 2.5
@@ -35,7 +35,7 @@ _WIDEST_SHARE = 0.2
 # From the centre of a checkerboard to its outer corners.
 _RADIUS_SQUARES = 1.803
 _MARGIN_SQUARES = 1.6
-# Where the belief expects a marker that does not show, it is looked for in so many pictures, then in every third.
+# A marker that does not show where the belief expects it is looked for in this many pictures, then in every third.
 _EAGER_LOOKS, _PATIENT_STRIDE = 4, 3
 
 
@@ -50,25 +50,25 @@ class Prediction:
 
     @property
     def reach_px(self) -> float:
-        """Return how far from its centre to look, wide enough for the uncertainty."""
+        """Return the radius of the search about its centre [px], wide enough for the uncertainty."""
         return self.radius_px + _MARGIN_SQUARES * self.spacing_px + _SIGMAS * self.std_px + _SLACK_PX
 
     def window(self, shape: tuple[int, ...]) -> Window | None:
-        """Return where to look; None when that is outside of the picture."""
+        """Return the window to look in; None if it is outside of the picture."""
         return window_around(self.centre[None], self.reach_px, shape)
 
 
 def is_looked_for(missing: int) -> bool:
-    """Return whether a marker is looked for where the belief has it: in how many pictures it has not been found."""
+    """Return whether a marker is looked for where the belief has it; missing: number of pictures without it."""
     return missing <= _EAGER_LOOKS or missing % _PATIENT_STRIDE == 0
 
 
-# None: certainly not in the picture. Entities of which nothing useful is known are missing.
+# None: certainly not in the picture. Entities without a useful belief are absent.
 Predictions = dict[str, Prediction | None]
 
 
 class Foresight:
-    """The newest estimates, and what they mean for one camera; pure values."""
+    """The newest estimates, and their predictions for one camera; pure values."""
 
     def __init__(
         self, mount: MountSettings, observer: str, markers: tuple[MarkerSettings, ...], intrinsics: CameraIntrinsics
@@ -83,7 +83,10 @@ class Foresight:
             self._estimates.append(estimate)
 
     def at(self, stamp_ns: int, attitude: Attitude | None) -> Predictions:
-        """Return where each marker should be in a picture exposed then; `attitude` is the observer's, if measured."""
+        """Return where each marker should be in a picture with that exposure.
+
+        attitude: of the observer, if measured.
+        """
         estimate = self._nearest(stamp_ns)
         if estimate is None:
             return {}
@@ -103,11 +106,11 @@ class Foresight:
         return found
 
     def sought(self, stamp_ns: int, predictions: Predictions) -> frozenset[str]:
-        """Return the entities that whole pictures are searched for often, unless they are in view.
+        """Return the entities for which whole pictures are searched often unless they are in view.
 
-        Those are targets that no camera saw at an exposure: the tracker searches for them, or lost them just now. For a
-        camera fixed in the world they are also the robots that `predictions` have in its picture: how often it misses
-        one is how the tracker learns that it is not where it is believed.
+        These are targets that no camera saw at the exposure: the tracker searches for them, or has just lost them. For
+        a world-fixed camera they are also the robots that `predictions` have in its picture: by missing one repeatedly
+        the tracker learns that it is not where it is believed.
         """
         estimate = self._nearest(stamp_ns)
         if estimate is None:
@@ -119,7 +122,7 @@ class Foresight:
         return frozenset(wanted | (missed - targets if self._mount.in_world else set()))
 
     def _nearest(self, stamp_ns: int) -> Estimate | None:
-        """Return the estimate nearest to an exposure, unless that is long before or after."""
+        """Return the estimate nearest to an exposure, or None if all are long before or after."""
         estimate = min(self._estimates, key=lambda e: abs(e.header.stamp_ns - stamp_ns), default=None)
         near = estimate is not None and abs(estimate.header.stamp_ns - stamp_ns) <= _FARTHEST_NS
         return estimate if near else None
@@ -166,7 +169,7 @@ def _marker_place(entity: EntityEstimate, marker: MarkerSettings, seconds: float
         full = np.diag([0.0, 0.0, _FLOOR_STD_M**2])
         full[:2, :2] = covariance[:2, :2]
         along = np.append(np.array(entity.velocity_m_s)[:2], 0.0)
-        # Its heading is unknown: what its marker lies beside its centre is uncertainty.
+        # Its heading is unknown, so the marker's offset from its centre is uncertainty.
         full[:2, :2] += np.eye(2) * float(offset[:2] @ offset[:2])
         return np.append(mean[:2], 0.0) + seconds * along + (0.0, 0.0, offset[2]), full
     if size != 4:
@@ -178,7 +181,7 @@ def _marker_place(entity: EntityEstimate, marker: MarkerSettings, seconds: float
 def _seen(
     camera: _Camera, centre: Array, covariance: Array, reach_m: float, intrinsics: CameraIntrinsics
 ) -> tuple[bool, Prediction | None]:
-    """Return whether anything can be said, and where the marker is seen (None: certainly nowhere)."""
+    """Return whether a prediction is possible, and where the marker is seen (None: certainly nowhere)."""
     rotation = camera.pose.rotation
     point = camera.pose.inverse().apply(centre)
     relative = rotation.T @ (covariance + camera.covariance_of(centre)) @ rotation
@@ -200,7 +203,7 @@ def _seen(
     centre_px = np.array(pixel)
     if not intrinsics.contains(centre_px, -_SIGMAS * std_px):
         return True, None
-    # The marker lies level; how it is turned does not change its largest and least extent.
+    # The marker lies level; its heading does not change its largest and least extent.
     most, least = _singular_values(jacobian @ rotation[:2].T)
     return True, Prediction(centre_px, most * reach_m, least * reach_m / _RADIUS_SQUARES, std_px)
 

@@ -1,7 +1,8 @@
-"""The full search for boards in a whole picture: saddle points in clusters that look like a lattice.
+"""The search for boards in a whole picture: saddle points in lattice-like clusters.
 
 Inner corners of a checkerboard are saddle points of brightness, and direct neighbours are turned by 90 degrees against
-each other, which carpets, cables and furniture seldom imitate. Only the best clusters are worth the slow board finder.
+each other, a pattern that carpets, cables and furniture seldom show. Only the best clusters go to the slow board
+finder.
 """
 
 from dataclasses import dataclass
@@ -18,13 +19,12 @@ _HALVE_ABOVE_PX = 800
 _SMOOTHING_PX = 1.2
 _MOST_SEEDS = 220
 _LEAST_STRENGTH = 250.0
-# Inner corners of one board are equally strong; the ends of its black squares have less than half of that.
-# A foreshortened board's squares may be twice as long one way; the next opposite neighbour is sqrt(5) away.
+# Inner corners of one board are equally strong; the ends of its black squares have less than half that strength.
 _REACH = 2.1
 _LEAST_CLUSTER, _MOST_CLUSTER = 6, 40
 _MOST_WINDOWS = 4
 _MARGIN_SQUARES = 2.6
-# Up to here the board finder is cheaper than a search for saddle points in the same window [px, enlarged].
+# Up to this size the board finder is cheaper than a search for saddle points in the same window [px, enlarged].
 _MOST_ENLARGED_PX = 150_000
 
 
@@ -79,7 +79,7 @@ def _without(picture: Image, window: Window, others: list[Array]) -> Image:
 
 
 def search(picture: Image, taken: list[Window], most: int = _MOST_WINDOWS) -> list[Find]:
-    """Return the boards found in the whole picture but for the windows already taken; looks at `most` of them."""
+    """Return the boards in the whole picture outside the windows already taken; tries at most `most` clusters."""
     finds: list[Find] = []
     for cluster in clusters(saddle_points(picture), taken)[:most]:
         window = window_around(cluster.points, _MARGIN_SQUARES * cluster.spacing, picture.shape)
@@ -102,7 +102,7 @@ def saddle_points(picture: Image) -> Seeds:
     peak = (strength >= cv2.dilate(strength, np.ones((3, 3), np.uint8))) & (strength > _LEAST_STRENGTH)
     rows, columns = np.nonzero(peak)
     a, b, c, s = (image[rows, columns].astype(np.float64) for image in (xx, yy, xy, strength))
-    # Opposite curvatures of similar size; an edge has one only.
+    # Opposite curvatures of similar size; an edge has only one.
     keep = np.flatnonzero((a + b) ** 2 < 1.4 * s)
     keep = keep[np.argsort(-s[keep])[:_MOST_SEEDS]]
     direction = np.column_stack((a - b, 2.0 * c))[keep]

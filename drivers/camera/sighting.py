@@ -1,4 +1,4 @@
-"""Results of the detector: an identified marker with its pose, and notices for the operator."""
+"""A result of the detector: an identified marker with its pose."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Compares a marker's distance by its size with that by height sensors, to find a wrong print size."""
+"""Compares a marker's distance by its size with that by height sensors, to detect a wrong print size."""
 
 import math
 from collections import deque
@@ -23,7 +23,7 @@ class SizeCheck:
         self._ratios: deque[tuple[int, float, float]] = deque(maxlen=_KEPT)
 
     def add(self, stamp_ns: int, relative_m: NDArray[np.float64], drop_m: float | None) -> None:
-        """Take in a sighting: marker relative to the camera [m; z up], and how far below height sensors have it."""
+        """Take in a sighting: marker relative to the camera [m; z up], and its depth below by height sensors [m]."""
         seen_drop = -float(relative_m[2])
         if drop_m is None or drop_m < _LEAST_DROP_M or seen_drop <= 0.0:
             return

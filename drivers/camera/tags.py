@@ -1,4 +1,4 @@
-"""The second kind of marker: square tags, found by their family where they are expected, else seldom anywhere."""
+"""Square tags, the second kind of marker: looked for where they are expected, and seldom in whole pictures."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -18,9 +18,9 @@ from groundstation.time_units import NS_PER_MS
 GravityOf = Callable[[str], pose.Gravity]
 
 _LIFETIME_NS = 450 * NS_PER_MS
-# A tag's side in a window: smaller ones are enlarged to this, for their bits need three pixels each.
+# A tag's side in a window: smaller ones are enlarged to this, because their bits need three pixels each.
 _WANTED_PX, _MOST_ENLARGEMENT = 48.0, 4.0
-# A tag is read as a whole, with the parity of its dictionary: there are no half-sure readings.
+# A tag is read as a whole, with the parity of its dictionary: no reading is half-sure.
 _MARGIN = 2.0
 
 
@@ -74,7 +74,7 @@ class TagFinder:
     def _window(
         self, entity: str, stamp_ns: int, predictions: Mapping[str, Prediction | None], shape: tuple[int, ...]
     ) -> tuple[Window | None, float]:
-        """Return where to look, and about how long a side will be [px]."""
+        """Return the window to look in, and the approximate side of the tag [px]."""
         seen, prediction = self._seen.get(entity), predictions.get(entity)
         if seen is not None:
             side = _side_px(seen.corners)
@@ -100,7 +100,7 @@ class TagFinder:
         place = np.array([window.left, window.top])
         try:
             finds = [(int(number), np.asarray(four, np.float64)) for number, four in self._finders[name](enlarged)]
-        except Exception as error:  # a detector is anybody's program: the picture is counted as one that failed
+        except Exception as error:  # a detector may be any plug-in: the picture is counted as failed
             raise ValueError(f"tags {name}: {type(error).__name__}: {error}") from error
         return [(number, (four + 0.5) * ratio - 0.5 + place) for number, four in finds if four.shape == (4, 2)]
 

@@ -1,4 +1,4 @@
-"""Boards followed from picture to picture: where to look next, and whose each one is between sure readings."""
+"""Boards followed from picture to picture: where to look next, and the identity of each between sure readings."""
 
 from dataclasses import dataclass, field
 
@@ -11,7 +11,7 @@ from groundstation.arrays import Array
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _MARGIN_SQUARES = 1.6
-# A window grows with the time since the last detection, for what constant velocity does not foresee.
+# A window grows with the time since the last detection, for motion beyond constant velocity.
 _UNREST_PX_S = 120.0
 _MOST_UNREST_PX = 45.0
 _LIFETIME_NS = 450 * NS_PER_MS
@@ -20,7 +20,7 @@ _MOST_MISSES = 5
 _IDENTITY_NS = 2 * NS_PER_S
 
 
-# Below this a new board's code has to be read twice: far away, one reading in seventy is wrong with margin > 1.
+# Below this margin a new board's code must be read twice: far away, one reading in seventy is wrong with margin > 1.
 _AT_ONCE_MARGIN = 2.0
 
 
@@ -28,7 +28,7 @@ _AT_ONCE_MARGIN = 2.0
 class Track:
     """One board: last corners (12, 2) [px] and their time, image velocity [px/s], identity if known.
 
-    foreseen: where the belief had its centre in the picture of the last corners [px].
+    foreseen: its centre by the belief in the picture of the last corners [px].
     """
 
     corners: Array
@@ -44,14 +44,15 @@ class Track:
     def expected_corners(self, stamp_ns: int, prediction: Prediction | None = None) -> Array:
         """Return where the corners should be at a later time.
 
-        They move as the belief does, which knows how both vehicles turn; without one, at constant image velocity.
+        They move as the belief does, which includes the turning of both vehicles; without it, at constant image
+        velocity.
         """
         if prediction is not None and self.foreseen is not None:
             return np.asarray(self.corners + (prediction.centre - self.foreseen))
         return np.asarray(self.corners + self.velocity * ((stamp_ns - self.stamp_ns) / NS_PER_S))
 
     def window(self, stamp_ns: int, shape: tuple[int, ...], prediction: Prediction | None = None) -> Window | None:
-        """Return where to look, or None when that has left the picture."""
+        """Return the window to look in, or None when that has left the picture."""
         unrest = min(_MOST_UNREST_PX, _UNREST_PX_S * (stamp_ns - self.stamp_ns) / NS_PER_S)
         margin = _MARGIN_SQUARES * spacing_px(self.corners) + unrest
         return window_around(self.expected_corners(stamp_ns, prediction), margin, shape)

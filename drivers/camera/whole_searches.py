@@ -1,4 +1,7 @@
-"""When a whole picture is searched: seldom while all is tracked, as often as it may cost for what should be found."""
+"""Decides when a whole picture is searched: seldom while all is tracked.
+
+For missing markers, as often as CPU permits.
+"""
 
 from dataclasses import dataclass
 
@@ -11,8 +14,8 @@ class SearchRates:
     """How often a camera searches whole pictures [Hz], and what that may cost.
 
     idle_hz: while nothing is in view, so that a camera that sees nobody is not taken for a dead one; half of it while
-    something is in view and something else missing; tracked_hz: while nothing is missing; sought_hz: while something is
-    not in view that is sought; share: of a processor's time then, unless `idle_hz` costs more.
+    something is in view and something else is missing; tracked_hz: while nothing is missing; sought_hz: while something
+    sought is not in view; share: of a processor's time then, unless `idle_hz` costs more.
     """
 
     tracked_hz: float
@@ -22,14 +25,14 @@ class SearchRates:
 
     @classmethod
     def of(cls, detector: DetectorSettings, idle_hz: float) -> "SearchRates":
-        """Return what the settings of a camera's driver say."""
+        """Return the rates from the settings of a camera's driver."""
         return cls(detector.tracked_search_rate_hz, idle_hz, detector.sought_search_rate_hz, detector.search_share)
 
 
 class WholeSearches:
     """Schedule of one camera's whole searches, by times of exposure [ns].
 
-    Use: ask `is_due` for each picture, say `done` after each search, and `lost` when a marker is not tracked any more.
+    Ask `is_due` for each picture; call `done` after each search, and `lost` when a marker is no longer tracked.
     """
 
     def __init__(self, rates: SearchRates, phase_s: float) -> None:
@@ -39,9 +42,9 @@ class WholeSearches:
         self._cost_s = 0.0
 
     def is_due(self, stamp_ns: int, sees: bool, sought: bool) -> bool:
-        """Return whether a picture is searched all over.
+        """Return whether a whole picture is to be searched.
 
-        sees: any expected marker is in view; sought: one is not that should be found soon.
+        sees: any expected marker is in view; sought: one that is not in view should be found soon.
         """
         if self._next_ns is None:
             self._next_ns = stamp_ns + self._phase_ns

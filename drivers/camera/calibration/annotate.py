@@ -1,4 +1,4 @@
-"""Pictures for people: what was found is drawn upon them."""
+"""Draws what was found into pictures, for people."""
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -66,7 +66,7 @@ def jpeg_of(picture: Image) -> bytes:
 
 
 def save(folder: Path, name: str, picture: Image) -> Path:
-    """Write a picture as JPEG below a folder; raises OSError, which names the file, where it cannot be written."""
+    """Write a picture as JPEG below a folder; raises OSError, which names the file, if it cannot be written."""
     path = folder / f"{Path(name).stem.replace(' ', '_')}.jpg"
     path.write_bytes(jpeg_of(picture))
     return path

@@ -1,4 +1,4 @@
-"""What the kept views show of the lens so far, and what is still missing: regions, distances, tilts. Pure."""
+"""What the kept views cover so far, and what is still missing: regions, distances, tilts. Pure."""
 
 import math
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from drivers.camera.calibration.view_quality import KeptView
 from groundstation.arrays import Array
 
 _ROWS, _COLUMNS = ("top", "middle", "bottom"), ("left", "centre", "right")
-# The outer regions are narrower: a lens is known least where it bends most.
+# The outer regions are narrower: the lens is least certain where it bends most.
 _EDGES = (0.28, 0.72)
 _VIEWS_PER_REGION = 2
 _NEAR_SHARE, _FAR_SHARE = 0.4, 0.25
@@ -22,7 +22,7 @@ TILTS = ("left side nearer", "right side nearer", "top nearer", "bottom nearer")
 
 @dataclass(frozen=True, slots=True)
 class Coverage:
-    """Which regions of the picture have been seen (3, 3) [views], and the names of all that is missing."""
+    """The views in each region of the picture (3, 3), and the names of all that is missing."""
 
     regions: NDArray[np.int64]
     missing_regions: tuple[str, ...]
@@ -58,7 +58,7 @@ def coverage_of(views: list[KeptView], pattern: Pattern, size: tuple[int, int]) 
 
 
 def region_name(row: int, column: int) -> str:
-    """Return what a region is called, such as `top left`."""
+    """Return the name of a region, such as `top left`."""
     return "centre" if (row, column) == (1, 1) else f"{_ROWS[row]} {_COLUMNS[column]}"
 
 
@@ -69,7 +69,7 @@ def share_of_picture(corners: Array, size: tuple[int, int]) -> float:
 
 
 def tilts_of(corners: Array, pattern: Pattern, size: tuple[int, int]) -> set[str]:
-    """Return which way a board leans, judged with a lens of 53 degrees: directions need no better one."""
+    """Return the directions in which a board leans, judged with a lens of 53 degrees: directions need no better one."""
     matrix = np.array([[size[0], 0.0, size[0] / 2], [0.0, size[0], size[1] / 2], [0.0, 0.0, 1.0]])
     found, turn, _ = cv2.solvePnP(pattern.points, corners.reshape(-1, 1, 2), matrix, None, flags=cv2.SOLVEPNP_IPPE)
     if not found:

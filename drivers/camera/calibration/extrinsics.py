@@ -1,7 +1,7 @@
-"""Where a camera is, from markers that lie flat at known places: least squares over all corners at once. Pure.
+"""A camera's pose from markers that lie flat at known places: least squares over all corners at once. Pure.
 
-Unknown are the camera's pose, and each marker's small displacement from where it was said to be: a tape measure is good
-to millimetres, and what all markers say together tells which one was put elsewhere.
+The unknowns are the camera's pose, and each marker's small displacement from its stated place: a tape measure is good
+to millimetres, and all markers together show which one was put elsewhere.
 """
 
 import math
@@ -29,7 +29,7 @@ _WORST_RMS_PX = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """A marker flat on the floor or a table: code, centre [m], and which way its x axis points (None: unknown)."""
+    """A marker flat on the floor or a table: code, centre [m], and the direction of its x axis (None: unknown)."""
 
     code: int
     position_m: tuple[float, float, float]
@@ -40,7 +40,7 @@ class Mark:
 class Placing:
     """frame_from_optical with the covariance (6, 6) of (left rotation error [rad], position [m]), rms [px].
 
-    offsets_m: how far each marker seems to lie from where it was said to be; misplaced: those that were left out.
+    offsets_m: estimated distance of each marker from its stated place; misplaced: those that were left out.
     """
 
     pose: Pose
@@ -63,9 +63,10 @@ class Placing:
 def place_camera(
     marks: Sequence[Mark], steady: Mapping[int, Steady], lens: CameraIntrinsics, square_mm: float, mark_std_m: float
 ) -> Placing:
-    """Return where the camera is in the frame that the marks are given in.
+    """Return the camera's pose in the frame in which the marks are given.
 
-    mark_std_m: how well they were put there. Raises DriverError when what is seen does not tell, with what is missing.
+    mark_std_m: how precisely they were placed. Raises DriverError, with what is missing, if the sightings do not
+    determine it.
     """
     used = [mark for mark in marks if mark.code in steady]
     misplaced: dict[int, float] = {}
@@ -132,7 +133,7 @@ class _Problem:
         self._points = flat_points(square_mm)
         self._corners = [steady[mark.code].corners for mark in marks]
         noise = max(steady[mark.code].std_px for mark in marks)
-        # The lens explains its own board to its residual only: what is left of it does not average out.
+        # The lens explains its own calibration board only to its residual: the rest does not average out.
         self.sigma_px = math.hypot(noise, max(lens.residual_px, 0.05))
         self.pixel_rows = 24 * len(marks)
         self._yaws = [0.0 if mark.yaw_rad is None else mark.yaw_rad for mark in marks]
@@ -179,7 +180,7 @@ class _Problem:
         return starts
 
     def _heading(self, first: int, centres: Array) -> float:
-        """Return how the first marker is turned: as was said, else as the places of the others ask for."""
+        """Return the heading of the first marker: the stated one, else that implied by the places of the others."""
         said = self._marks[first].yaw_rad
         if said is not None:
             return said

@@ -1,4 +1,4 @@
-"""Pictures of any source, one after the other, for tools that look at them on the spot."""
+"""Pictures of any source, one after the other, for tools that process them at once."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ PATIENCE_S = 6.0
 
 @dataclass(frozen=True, slots=True)
 class SourcePicture:
-    """One picture: its name (of a file, else its number), brightness (h, w), when it came, and its age then [ms]."""
+    """One picture: its name (of a file, else its number), brightness (h, w), when it arrived, and its age then [ms]."""
 
     name: str
     grey: Image
@@ -35,10 +35,10 @@ class SourcePicture:
 
 
 def shots(source: str, size: tuple[int, int] | None = None) -> Iterator[SourcePicture]:
-    """Yield pictures: of a file or folder every one, as fast as they are asked for; of a camera always the newest.
+    """Yield pictures: every one of a file or folder, as fast as they are requested; always the newest of a camera.
 
-    size: what a camera of this machine is asked for. A camera never ends; raises DriverError when none comes
-    for 6 s, or when a file holds none.
+    size: the picture size requested of a camera of this machine. A camera never ends; raises DriverError when no
+    picture comes for 6 s, or when a file holds none.
     """
     cv2.setNumThreads(1)
     try:
@@ -92,9 +92,9 @@ def _grey(packet: Packet) -> Image | None:
 
 
 def decoded(data: bytes) -> Image | None:
-    """Return the brightness (h, w) of a picture as it is stored or sent, such as a JPEG; None where it is none."""
+    """Return the brightness (h, w) of a picture as it is stored or sent, such as a JPEG; None if it is none."""
     try:
         grey = cv2.imdecode(np.frombuffer(data, np.uint8), GREY_AS_EXPOSED) if data else None
-    except cv2.error:  # one that claims to be huge
+    except cv2.error:  # a picture that claims to be huge
         return None
     return None if grey is None else np.asarray(grey, dtype=np.uint8)

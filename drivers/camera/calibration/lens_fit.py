@@ -1,4 +1,4 @@
-"""From views of a board to a lens: least squares, views that fit nothing dropped, and how well each figure is known."""
+"""Fits a lens to views of a board by least squares, without views that fit no lens, with each figure's deviation."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,9 +20,9 @@ _NAMES = ("fx_px", "fy_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3")
 
 @dataclass(frozen=True, slots=True)
 class LensFit:
-    """A lens, one sigma of each of its nine figures, rms [px] by view, and what became of the others.
+    """A lens, one sigma of each of its nine figures, rms [px] by view, and the dropped views.
 
-    dropped: views that fit no lens, with their rms; all_views_px: rms of a fit to all views, those included.
+    dropped: views that fit no lens, with their rms; all_views_px: rms of a fit to all views, including those.
     """
 
     lens: CameraIntrinsics
@@ -41,7 +41,7 @@ def fit_lens(
 ) -> LensFit:
     """Return the lens of pictures of (width, height).
 
-    keep_all: drop no view. Raises DriverError when the views are too few, or no lens comes of them.
+    keep_all: drop no view. Raises DriverError when the views are too few, or no lens fits them.
     """
     dropped: dict[str, float] = {}
     kept, all_views_px = list(views), 0.0
@@ -80,7 +80,7 @@ def _fitted(
     except cv2.error:
         raise DriverError("no lens comes of these views: show the board from more directions, tilted") from None
     figures = np.asarray(std, dtype=np.float64).ravel()[: len(_NAMES)].copy()
-    if square_pixels:  # one focal length was fitted; its deviation is told for the other axis only
+    if square_pixels:  # one focal length was fitted; its deviation is given for the other axis only
         figures[0] = figures[1]
     lens = np.asarray(matrix, dtype=np.float64), np.asarray(distortion, dtype=np.float64).ravel()[:5]
     return float(rms), *lens, figures, np.asarray(errors, dtype=np.float64).ravel()

@@ -1,4 +1,4 @@
-"""The board that a lens is measured with: any checkerboard, or one of our own markers, and where its corners are."""
+"""The board for measuring a lens: any checkerboard, or one of our own markers, and where its corners are."""
 
 import re
 from dataclasses import dataclass
@@ -20,10 +20,11 @@ _LEAST, _MOST = 3, 30
 
 @dataclass(frozen=True, slots=True)
 class Pattern:
-    """A checkerboard with so many inner corners along its sides; square_mm: the side of a square.
+    """A checkerboard with given numbers of inner corners along its sides; square_mm: the side of a square.
 
-    is_marker: one of ours, whose identity bar does not matter. as_opencv: corners are refined in a fixed window of
-    23 px as in OpenCV's samples, which published calibrations mostly come from; small squares suffer from it.
+    is_marker: whether it is one of our markers, whose identity bar does not matter. as_opencv: corners are refined in a
+    fixed window of 23 px as in OpenCV's samples, which published calibrations mostly come from; small squares suffer
+    from it.
     """
 
     columns: int
@@ -40,11 +41,11 @@ class Pattern:
 
     @property
     def label(self) -> str:
-        """Return what an operator calls it."""
+        """Return the operator's name for it."""
         return "marker" if self.is_marker else f"{self.columns}x{self.rows} board"
 
     def corners(self, picture: Image) -> Array | None:
-        """Return its corners (n, 2) [px] to fractions of a pixel, or None where it is not whole in the picture."""
+        """Return its corners (n, 2) [px] to fractions of a pixel, or None if it is not wholly in the picture."""
         if self.is_marker:
             finds = search(picture, [])
             largest = max(finds, key=lambda find: float(np.ptp(find.corners, axis=0).max()), default=None)

@@ -17,13 +17,13 @@ from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.time_units import NS_PER_S
 
 _SEARCH_RATE_HZ = 2.0
-# Nobody knows how this camera hangs: what is assumed of "down" must not choose between poses here.
+# This camera's mounting is unknown: an assumed "down" must not choose between poses here.
 _NOWHERE = Gravity(np.eye(3), 0.0, 0.0, known=False)
 
 
 @dataclass(frozen=True, slots=True)
 class Marked:
-    """A marker in a picture: code, how sure, corners (12, 2) [px], pose by residual alone, its rms [px]."""
+    """A marker in a picture: code, margin, corners (12, 2) [px], pose by residual alone, its rms [px]."""
 
     code: int
     margin: float
@@ -33,13 +33,13 @@ class Marked:
 
     @property
     def range_m(self) -> float:
-        """Return how far it is [m]; NaN without a pose."""
+        """Return its distance [m]; NaN without a pose."""
         return float(np.linalg.norm(self.pose.translation)) if self.pose is not None else math.nan
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """One picture: what was found, the CPU time that it took [ms], and the picture with all of it drawn in."""
+    """Results for one picture: what was found, the CPU time [ms], and the picture with all results drawn in."""
 
     shot: SourcePicture
     marked: tuple[Marked, ...]
@@ -68,7 +68,7 @@ class DetectorPreview:
         self._square_m = square_mm / 1000.0
         self._points = marker.Checkerboard(0, square_mm).corners()
         expected = [MarkerSettings(entity=f"m{code}", code=code, square_mm=square_mm) for code in marker.VALID_CODES]
-        # A lens that is only guessed leaves residuals that are no fault of a board.
+        # A lens that is only guessed leaves residuals that are not the board's fault.
         settings = DetectorSettings() if lens is not None else DetectorSettings(max_residual_px=20.0)
         self._pipeline = Pipeline(self._lens, tuple(expected), settings, _SEARCH_RATE_HZ)
 

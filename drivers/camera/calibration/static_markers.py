@@ -1,4 +1,4 @@
-"""Markers that lie still in front of a camera: found, read and averaged over many pictures."""
+"""Markers that lie still before a camera: found, read and averaged over many pictures."""
 
 from collections import defaultdict
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ _STILL_PX = 1.5
 
 @dataclass(frozen=True, slots=True)
 class MarkerReading:
-    """A marker in one picture: its code (None: not sure), margin of the reading, corners (12, 2) [px]."""
+    """A marker in one picture: its code (None: uncertain), margin of the reading, corners (12, 2) [px]."""
 
     code: int | None
     margin: float
@@ -49,7 +49,7 @@ def markers_in(picture: Image, lens: CameraIntrinsics) -> list[MarkerReading]:
 
 
 class Gathering:
-    """Collects what single pictures show; `doubled` are codes that were seen twice in one picture."""
+    """Collects the markers of single pictures; `doubled`: codes that were seen twice in one picture."""
 
     def __init__(self, lens: CameraIntrinsics) -> None:
         self._lens = lens
@@ -71,7 +71,7 @@ class Gathering:
         return seen
 
     def steady(self) -> Mapping[int, Steady]:
-        """Return the mean of each marker that was seen, by code; the median, so that one bad picture does no harm."""
+        """Return corners of each marker, by code; their median, so that one bad picture does no harm."""
         found = {}
         for code, many in sorted(self._corners.items()):
             stack = np.array(many)

@@ -28,17 +28,17 @@ class PictureServer:
 
     @property
     def url(self) -> str:
-        """Return where the pictures are."""
+        """Return the address of the pictures."""
         return f"http://{_HOST}:{self._server.server_address[1]}/video.mjpg"
 
     def show(self, jpeg: bytes) -> None:
-        """Let all viewers see a picture."""
+        """Show a picture to all viewers."""
         with self._changed:
             self._jpeg, self._number = jpeg, self._number + 1
             self._changed.notify_all()
 
     def close(self) -> None:
-        """End all of it."""
+        """Stop the server."""
         with self._changed:
             self._open = False
             self._changed.notify_all()
@@ -85,6 +85,6 @@ class PictureServer:
                         self.wfile.write(head.encode() + jpeg + b"\r\n")
 
             def log_message(self, format: str, *args: object) -> None:
-                """Say nothing."""
+                """Log nothing."""
 
         return Handler

@@ -10,7 +10,7 @@ import numpy as np
 from drivers.camera.calibration.pattern import Pattern
 from groundstation.arrays import Array, Image
 
-# From dark to bright within so many pixels: measured 2.5 to 3.5 on sharp photographs, 8 with 3 px of blur.
+# Width of an edge from dark to bright [px]: measured 2.5 to 3.5 on sharp photographs, 8 with 3 px of blur.
 _BLURRED_PX = 5.0
 _LEAST_SPACING_PX = 8.0
 _SIMILAR_SHARE = 0.0125
@@ -38,7 +38,7 @@ class KeptView:
 
 
 class Judge:
-    """Looks at one picture after the other; `views` are kept, `flaws` counts the others."""
+    """Judges pictures; `views` are kept, `flaws` counts the others."""
 
     def __init__(self, pattern: Pattern, size: tuple[int, int]) -> None:
         self._pattern, self._size = pattern, size
@@ -47,7 +47,7 @@ class Judge:
         self._shapes: Counter[tuple[int, int]] = Counter()
 
     def look(self, name: str, picture: Image) -> tuple[Flaw | None, Array | None]:
-        """Return the flaw (None: the picture was kept), and the corners that were found."""
+        """Return the flaw (None: the picture was kept), and the corners found."""
         corners = self._pattern.corners(picture)
         flaw = self._without_board(picture) if corners is None else self._flaw_of(picture, corners)
         if flaw is not None:
@@ -58,7 +58,7 @@ class Judge:
 
     @property
     def other_board(self) -> str:
-        """Return what board the pictures seem to show where they do not show the one asked for; "" if unknown."""
+        """Return the board that pictures seem to show instead of the expected one; "" if unknown."""
         shape, count = self._shapes.most_common(1)[0] if self._shapes else ((0, 0), 0)
         return f"{shape[0]}x{shape[1]}" if count >= max(_LEAST_SHAPES, self._shapes.total() / 3) else ""
 
@@ -79,7 +79,7 @@ class Judge:
             return 0.0
 
     def _without_board(self, picture: Image) -> Flaw:
-        """Say what there is instead: part of a board at the border, or a board of another size."""
+        """Return the flaw of a picture without the whole board: it is cut at the border, or of another size."""
         if self._pattern.is_marker:
             return Flaw.NO_BOARD
         found, raw, meta = cv2.findChessboardCornersSBWithMeta(picture, (3, 3), cv2.CALIB_CB_LARGER)

@@ -1,1 +1,1 @@
-"""Where pictures come from: one file for each kind of source, all behind `frames.FrameSource`."""
+"""Sources of pictures: one file for each kind, all behind `frames.FrameSource`."""

@@ -1,6 +1,6 @@
-"""What ffmpeg opens for us: network cameras by RTSP, and the devices of this machine.
+"""Sources that ffmpeg opens: network cameras by RTSP, and the devices of this machine.
 
-The reader hands over packets as they come, H.264 and JPEG as received; nothing is decoded here.
+The reader passes on packets as they come, H.264 and JPEG as received; nothing is decoded here.
 """
 
 from collections import Counter
@@ -24,7 +24,10 @@ Choice = Mapping[str, str]
 
 
 class ContainerReader:
-    """Reads the first video stream of an address; `choices`: options of ffmpeg, the first set that works is taken."""
+    """Reads the first video stream of an address.
+
+    `choices`: sets of ffmpeg options, of which the first that works is used.
+    """
 
     def __init__(self, address: str, name: str, choices: tuple[Choice, ...], form: str | None = None) -> None:
         self.name = name
@@ -94,7 +97,7 @@ def _units(
 
 
 def rtsp(url: str, name: str) -> ContainerReader:
-    """Return the reader of a network camera: over TCP, for lost packets tear pictures, and without ffmpeg's buffers."""
+    """Return the reader of a network camera: over TCP, because losses tear pictures, and without ffmpeg's buffers."""
     options = {
         "rtsp_transport": "tcp",
         "fflags": "nobuffer",

@@ -1,10 +1,10 @@
-"""Pictures of H.264 that are cut into datagrams without numbers: a full one goes on, a shorter one ends. Pure."""
+"""H.264 pictures cut into unnumbered datagrams: after a full one the picture goes on, a shorter one ends it. Pure."""
 
 from typing import NamedTuple
 
 from drivers.camera.sources.nal_units import KEY_PICTURE, PICTURE, SEQUENCE_PARAMETERS, unit_types
 
-# Beyond any picture of a small camera: the end of one was lost again and again.
+# Larger than any picture of a small camera: the ends of several were lost.
 _MOST_BYTES = 1 << 20
 
 

@@ -20,7 +20,7 @@ _PACKET_INFO = struct.Struct("=i4s4s")
 
 
 class DatagramReader:
-    """Listens to the video of one vehicle; several share the port, each with the first of its own datagrams as peer.
+    """Receives the video of one vehicle; several may share the port, each connected to the sender of its own datagrams.
 
     port: of this computer, that the vehicle sends to; whole_bytes: size of a datagram that does not end a picture.
     """
@@ -32,7 +32,7 @@ class DatagramReader:
         self.decoder: PictureDecoder | None = H264Decoder(self.rejected)
 
     def interrupt(self) -> None:
-        """Make `read` return: it looks again four times a second."""
+        """Make `read` return: it checks four times a second."""
 
     def read(self, drain: Drain) -> None:
         """Hand over pictures until the drain closes."""
@@ -56,9 +56,10 @@ class DatagramReader:
                 assembly.skipped = 0
 
     def _find(self, drain: Drain) -> socket.socket | None:
-        """Return a socket that hears this vehicle only, once it sends; the kernel then gives the others what is theirs.
+        """Return a socket that hears only this vehicle, once it sends.
 
-        Which port it sends from is not documented, and to which of our addresses, only a datagram tells.
+        The kernel passes other datagrams to other sockets. The port that it sends from is undocumented, and only a
+        datagram shows to which of our addresses it sends.
         """
         with self._bound(("", self._port)) as udp:
             udp.setsockopt(socket.IPPROTO_IP, _IP_PKTINFO, 1)

@@ -33,7 +33,7 @@ class FileReader:
         """Do nothing: a file never keeps its reader waiting."""
 
     def pictures(self) -> Iterator[tuple[float, str, Picture]]:
-        """Yield every picture as fast as it is asked for: when it is due [s], its name, and the picture itself."""
+        """Yield every picture as fast as it is requested: its due time [s], its name, and the picture."""
         if not self._path.exists():
             raise DriverError("there is no such file or folder")
         if not self._path.is_file() and not self._path.is_dir():  # opening a pipe would wait for who writes to it
@@ -60,7 +60,7 @@ class FileReader:
         for path in paths:
             try:
                 pixels = cv2.imread(str(path), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
-            except cv2.error:  # one that claims to be huge
+            except cv2.error:  # a picture that claims to be huge
                 pixels = None
             if pixels is None:
                 self.rejected["unreadable"] += 1

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from groundstation.arrays import Image
 
-# A lens is calibrated for the rows and columns of its sensor, however a picture asks to be turned for the eye (EXIF).
+# A lens is calibrated for its sensor's rows and columns, so rotations for display (EXIF) are ignored.
 GREY_AS_EXPOSED = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION
 _JPEG_QUALITY = (cv2.IMWRITE_JPEG_QUALITY, 80)
 
@@ -22,7 +22,7 @@ class Picture(Protocol):
         """Return its brightness (h, w)."""
 
     def jpeg(self) -> bytes:
-        """Return it for eyes, in colour where it has any."""
+        """Return it for display, in colour if it has any."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,17 +38,17 @@ class Matrix:
         return np.asarray(cv2.cvtColor(self.pixels, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
 
     def jpeg(self) -> bytes:
-        """Return it compressed for eyes."""
+        """Return it compressed for display."""
         return cv2.imencode(".jpg", self.pixels, _JPEG_QUALITY)[1].tobytes()
 
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """One compressed picture as it came, with its arrival [ns, boot clock].
+    """One compressed picture as received, with its arrival [ns, boot clock].
 
-    settled_ns: when it would have come with the link's usual delay, where the stream tells times of its own; else the
-    arrival. starts: a decoder can begin here; follows: nothing is missing between its predecessor and it; picture:
-    where the reader has decoded it already.
+    settled_ns: arrival with the link's usual delay, if the stream carries times of its own; else the arrival. starts: a
+    decoder can begin here; follows: nothing is missing since its predecessor; picture: if the reader has already
+    decoded it.
     """
 
     data: bytes
@@ -63,7 +63,7 @@ class Unit:
 class Packet:
     """The newest picture of a source and its number in the stream; times as in `Unit`.
 
-    data: the JPEG as it came (empty: the source sends none); picture: given where the source decodes itself.
+    data: the JPEG as received (empty: the source sends none); picture: present if the source decodes itself.
     """
 
     data: bytes
@@ -84,7 +84,7 @@ class FrameSource(Protocol):
 
     @property
     def detail(self) -> str:
-        """Return what is wrong when it cannot."""
+        """Return the reason when it cannot."""
 
     @property
     def received(self) -> int:
@@ -94,7 +94,7 @@ class FrameSource(Protocol):
         """Return the newest picture not yet taken, waiting for one at most that long."""
 
     def take_video(self) -> list[Unit]:
-        """Return the H.264 access units that came up to the picture taken last, as received; a JPEG source has none."""
+        """Return the H.264 access units up to the picture taken last, as received; a JPEG source has none."""
 
     def close(self) -> None:
         """Stop reading; idempotent."""

@@ -1,4 +1,4 @@
-"""H.264 access units to pictures: from the newest key picture on, never across a gap."""
+"""Decodes H.264 access units to pictures: from the newest key picture on, never across a gap."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from av.codec.context import Flags
 from drivers.camera.sources.frames import Matrix, Picture, Unit
 from groundstation.arrays import Image
 
-# Larger than any camera that we know; ffmpeg refuses a stream that claims more before it takes the memory.
+# Larger than any known camera; ffmpeg refuses a stream that claims more before it allocates memory.
 _MOST_PIXELS = 4096 * 2304
 # Formats whose first plane is the brightness.
 _PLANAR = ("gray", "yuv4", "yuvj4", "nv12", "nv21")
@@ -32,7 +32,7 @@ class VideoPicture:
         return np.ascontiguousarray(rows[:, : plane.width])
 
     def jpeg(self) -> bytes:
-        """Return it in colour, compressed for eyes."""
+        """Return it in colour, compressed for display."""
         return Matrix(np.asarray(self.frame.to_ndarray(format="bgr24"), dtype=np.uint8)).jpeg()
 
 
@@ -71,7 +71,7 @@ class H264Decoder:
                 return frames[-1]
         except (av.FFmpegError, ValueError):
             pass
-        # What follows refers to a picture that is not there: begin again at the next one that refers to none.
+        # Later pictures refer to a missing one: begin again at the next key picture.
         self.rejected["h264"] += 1
         self._codec, self._waiting = _codec(), True
         return None

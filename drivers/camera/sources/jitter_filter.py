@@ -1,4 +1,4 @@
-"""Arrivals freed of the network's jitter by the times that a stream carries; pure.
+"""Removes the network's jitter from arrivals by the times that a stream carries. Pure.
 
 The sender's clock has an unknown offset to ours. Arrival minus sent is that offset plus the delay of each frame; the
 median over the last ten seconds or so is offset plus usual delay, and neither jitter nor a few late frames move it.
@@ -11,9 +11,9 @@ from statistics import median
 from groundstation.time_units import NS_PER_S
 
 _FRAMES = 151
-# A sender that was started anew, or whose clock is of no use.
+# The sender was restarted, or its clock is of no use.
 _JUMP_NS = 5 * NS_PER_S
-# No picture comes so much sooner than is usual: the sender's clock was put forward.
+# No picture comes this much earlier than usual: the sender's clock was put forward.
 _EARLY_NS = NS_PER_S
 
 
@@ -26,10 +26,10 @@ class SenderClock:
         self._last_sent_ns: int | None = None
 
     def settle(self, sent_ns: Sequence[int], arrival_ns: int) -> list[int]:
-        """Return when frames that came together would have come with the usual delay, by their sender's stamps.
+        """Return when frames that arrived together would have arrived with the usual delay, by their sender's stamps.
 
-        Only the newest of them says how late the link is: it held up the others. While the sender's clock
-        stands still or has just jumped, the result is the arrival.
+        Only the newest of them shows the link's delay: the others had to wait for it. While the sender's clock stands
+        still or has just jumped, the result is the arrival.
         """
         newest = sent_ns[-1]
         offset = arrival_ns - newest

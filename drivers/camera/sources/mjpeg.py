@@ -16,7 +16,7 @@ _MAX_HEAD_BYTES = 8192
 
 
 class MjpegReader:
-    """Asks for a stream and cuts it into JPEGs; login: "user:password", or "" where anybody may look."""
+    """Asks for a stream and cuts it into JPEGs; login: "user:password", or "" if none is needed."""
 
     decoder: PictureDecoder | None = None
 
@@ -25,7 +25,7 @@ class MjpegReader:
         self.name = self._line.name
         self.rejected: Counter[str] = Counter()
         request = f"GET {path} HTTP/1.0\r\nHost: {host}:{port}\r\nAccept: multipart/x-mixed-replace\r\n"
-        # WIRE (RFC 7617): sent with the first request; a camera that wants Digest answers 401 all the same.
+        # WIRE (RFC 7617): sent with the first request; a camera that requires Digest still answers 401.
         secret = f"Authorization: Basic {b64encode(login.encode()).decode()}\r\n" if login else ""
         self._request = f"{request}{secret}\r\n".encode("ascii", "replace")
 
@@ -51,7 +51,7 @@ class MjpegReader:
 
 
 def _read_head(connection: socket.socket) -> tuple[bytes, bytes]:
-    """Return the boundary and what follows the response head; raises DriverError when it is no MJPEG stream."""
+    """Return the boundary and the bytes after the response head; raises DriverError if it is no MJPEG stream."""
     head = b""
     while b"\r\n\r\n" not in head:
         data = connection.recv(4096)

@@ -1,4 +1,4 @@
-"""From a source's address to its reader."""
+"""Opens the reader of a source's address."""
 
 from pkgutil import resolve_name
 
@@ -19,7 +19,7 @@ _READER = ("name", "decoder", "rejected", "read", "interrupt")
 def open_source(source: str, size: tuple[int, int] | None = None) -> FrameSource:
     """Return the reader of a source, already at work; raises DriverError for an address of no known kind.
 
-    size: (width, height) [px] that a camera of this machine is asked for; others send what they are set to.
+    size: (width, height) [px] requested of a camera of this machine; others send what they are set to.
     """
     try:
         return Drain(_reader(parse_source(source), source, size))

@@ -1,4 +1,4 @@
-"""Pictures that came as they are, and pictures that a reader has decoded already: only the newest counts."""
+"""Uncompressed pictures, and pictures that a reader has decoded already: only the newest counts."""
 
 from collections.abc import Sequence
 

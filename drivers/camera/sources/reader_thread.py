@@ -1,8 +1,8 @@
-"""The thread behind every source: it reads everything at once, reconnects after a loss, and keeps the newest unit.
+"""The thread behind every source: it reads continuously, reconnects after a loss, and keeps the newest unit.
 
 A plain read loop would hand over pictures seconds old after a stall; draining keeps them as young as the link allows.
-What needs the pictures before it (H.264) is decoded when the newest picture is asked for, from the last place at which
-a decoder can begin: a picture that nobody looks at costs nothing but its reading.
+H.264, where a picture needs those before it, is decoded when the newest picture is requested, from the last place at
+which a decoder can begin: a picture that nobody requests costs only its reading.
 """
 
 import threading
@@ -15,16 +15,16 @@ from groundstation.errors import DriverError
 
 _FIRST_BACK_OFF_S = 0.2
 _LAST_BACK_OFF_S = 1.0
-# 20 s of 30 pictures a second: a reader that is not asked for so long begins anew at the next key picture.
+# 20 s at 30 pictures a second: a reader that is not polled for so long begins anew at the next key picture.
 _BACKLOG = 600
 
 
 class EndOfStreamError(DriverError):
-    """A source that has given all it has: it is not opened again."""
+    """A source that has ended: it is not opened again."""
 
 
 class PictureDecoder(Protocol):
-    """Turns units into pictures; needs_all: it has to see every unit, in order, and they make up a video."""
+    """Turns units into pictures; needs_all: whether it must see every unit, in order, because they form a video."""
 
     needs_all: bool
 
@@ -129,7 +129,7 @@ class Drain:
         return Packet(b"", unit.arrival_ns, unit.settled_ns, number, picture)
 
     def take_video(self) -> list[Unit]:
-        """Return the access units that came up to the picture taken last; a source of JPEGs has none."""
+        """Return the access units up to the picture taken last; a source of JPEGs has none."""
         units = list(self._video)
         self._video.clear()
         return units

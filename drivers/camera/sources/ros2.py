@@ -1,6 +1,6 @@
 """Pictures that a ROS 2 node publishes, by a client of its Zenoh router (`ros2://HOST:PORT/TOPIC?domain=N`).
 
-It hears, and says nothing. Stamps are of the sender's clock: they free arrivals of jitter, and are no times here.
+It only listens. Stamps are of the sender's clock: they serve to remove jitter, not as times.
 """
 
 import struct
@@ -34,7 +34,7 @@ class Ros2Reader:
         self.name = f"{host}:{port}/{topic.strip('/')}"
         self.rejected: Counter[str] = Counter()
         self.decoder: PictureDecoder | None = None
-        # Whether the last message was none that can be read: the stream is not open again before a better one came.
+        # Whether the last message was unreadable: the stream counts as open again only after a readable one.
         self._refused = False
         self._waiting: deque[tuple[int, str, bytes]] = deque(maxlen=_WAITING)
         self._came = threading.Event()
@@ -100,7 +100,7 @@ class Ros2Reader:
             raise WireError("size")
         try:
             pixels = cv2.imdecode(np.frombuffer(message.data, np.uint8), cv2.IMREAD_COLOR)
-        except cv2.error:  # one that claims to be huge
+        except cv2.error:  # a picture that claims to be huge
             pixels = None
         if pixels is None:
             raise WireError("unreadable")
@@ -118,7 +118,7 @@ def _await_router(session: RouterSession, drain: Drain) -> None:
 
 
 def _matrix(raw: pictures.RawPicture) -> Matrix:
-    """Return the pixels of an Image; raises DriverError for an encoding that is not read."""
+    """Return the pixels of an Image; raises DriverError for an unsupported encoding."""
     pixel = pictures.ENCODINGS.get(raw.encoding)
     if pixel is None:
         known = ", ".join(pictures.ENCODINGS)

@@ -1,4 +1,4 @@
-"""A TCP connection as a reader of a stream needs it: bounded waits, and an end from another thread."""
+"""A TCP connection for a reader of a stream: with bounded waits, and interruptible from another thread."""
 
 import socket
 from collections.abc import Iterator
@@ -11,7 +11,7 @@ _READ_TIMEOUT_S = 2.0
 
 
 class Line:
-    """Opens one connection after the other to the same place, through one network adapter or ("") any."""
+    """Opens one connection after the other to the same place, through one network adapter, or any ("")."""
 
     def __init__(self, host: str, port: int, interface: str = "") -> None:
         self.address = (host, port)
@@ -35,7 +35,7 @@ class Line:
                 self._socket = None
 
     def interrupt(self) -> None:
-        """End the connection, whoever reads from it."""
+        """End the connection, from any thread."""
         connection = self._socket
         if connection is not None:
             with suppress(OSError):

@@ -1,6 +1,7 @@
-"""A silent AR.Drone that is carried off though it was told to hold its place. Pure.
+"""Detects a silent AR.Drone that drifts off though it was told to hold its place. Pure.
 
-Whether its optical flow sees the floor is not heard. Cameras tell: its firmware brakes from full speed in a second.
+A silent drone does not report whether its optical flow sees the floor. Cameras show it: sound firmware brakes from full
+speed in a second.
 """
 
 import math
@@ -9,13 +10,16 @@ from groundstation.time_units import NS_PER_MS
 
 # Its firmware brakes within a second, and a speed between two places half a second apart is 0.3 s old.
 _BRAKES_WITHIN_NS = 1300 * NS_PER_MS
-# Three deviations of a speed between two places that cameras know to 2 cm, half a second apart; a drone at rest by its
-# own means wanders at 0.05 m/s.
+# Three deviations of a speed between two places that cameras know to 2 cm, half a second apart; a drone that holds its
+# place wanders at 0.05 m/s.
 _ADRIFT_M_S = 0.12
 
 
 class AdriftWatch:
-    """Says while the driver must brake it: from then on, as long as cameras see it, it is silent and is to stand."""
+    """Tells when the driver must brake the drone.
+
+    From detection on, as long as cameras see it, that is while it is silent and must stand.
+    """
 
     def __init__(self) -> None:
         self._since_ns: int | None = None
@@ -24,7 +28,7 @@ class AdriftWatch:
     def step(self, now_ns: int, holds: bool, silent: bool, seen_m_s: tuple[float, float] | None) -> bool:
         """Return whether it is adrift.
 
-        holds: it is told to hold its place; silent: it tells nothing new; seen_m_s: its velocity as cameras see it.
+        holds: it is told to hold its place; silent: it reports nothing new; seen_m_s: its velocity by cameras.
         """
         if not holds or not silent:
             self._since_ns, self.adrift = None, False

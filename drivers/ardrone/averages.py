@@ -6,9 +6,9 @@ from collections import deque
 from drivers.ardrone.convert import NavdataMotion
 from groundstation.bus.messages import Vector3
 
-# In flight no measured velocity comes twice: one that has come so often is none.
+# In flight no measured velocity repeats: one that repeats this often is no measurement.
 _REPEATED = 4
-# Nobody drains while the sender stands still.
+# The sender may stand still: then only the newest samples are kept.
 _MOST_WAITING = 50
 
 
@@ -38,16 +38,16 @@ class MotionMean:
 
     @property
     def repeats(self) -> bool:
-        """Return whether a horizontal velocity stands still to the last bit: the drone does not see its own motion."""
+        """Return whether a horizontal velocity repeats to the last bit: the drone does not see its own motion."""
         return max(self._standing) >= _REPEATED
 
     @property
     def frozen(self) -> bool:
-        """Return whether the accelerometers repeat themselves as well, or tell nothing: what comes is old."""
+        """Return whether the accelerometers repeat as well, or are absent: the packets are old."""
         return self._forces_standing >= _REPEATED
 
     def drain(self) -> tuple[tuple[float, float, float], tuple[float, float] | None]:
-        """Return (velocity, force forward and left or None) since the last call, or once more the last ones."""
+        """Return (velocity, force forward and left or None) since the last call, or else the last ones again."""
         with self._lock:
             waiting = list(self._waiting)
             self._waiting.clear()

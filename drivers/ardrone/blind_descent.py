@@ -1,19 +1,22 @@
-"""The landing of an AR.Drone whose optical flow sees no floor. Pure.
+"""Lands an AR.Drone whose optical flow sees no floor. Pure.
 
-Its firmware lands level then: it stops by the optical flow that fails, and moving air carries it off. So the driver
-lets it sink and goes on braking it, until it is so low that the firmware may land it.
+Its firmware would land it level: it stops by the optical flow that fails, and moving air carries it off. So the driver
+lets it sink and goes on braking it, until it is low enough for the firmware to land it.
 """
 
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 LOWEST_M = 0.35
 _LONGEST_NS = 6 * NS_PER_S
-# Who is told to sink answers after 0.7 s. Whatever does not sink lands as its firmware does.
+# A drone told to sink answers after 0.7 s. One that does not sink is landed by its firmware.
 _LOWER_M, _LOWER_WITHIN_NS = 0.1, 1_200 * NS_PER_MS
 
 
 class BlindDescent:
-    """Says while a drone that is to land sinks under its driver's braking: never again once it was told to land."""
+    """Tells while a landing drone sinks under its driver's braking.
+
+    Never again once the firmware was told to land it.
+    """
 
     def __init__(self) -> None:
         self._since_ns: int | None = None
@@ -23,8 +26,8 @@ class BlindDescent:
     def step(self, now_ns: int, lands: bool, blind: bool, height_m: float | None) -> bool:
         """Return whether it sinks.
 
-        lands: it is to land; blind: it sees no floor, and all else that it says is sound; height_m: above the
-        floor, None if it does not say.
+        lands: it is to land; blind: it sees no floor, but its other reports are sound; height_m: above the floor, None
+        if not reported.
         """
         if not lands:
             self._since_ns, self._over = None, False

@@ -1,4 +1,4 @@
-"""AT commands that a decision of the watchdog means to an AR.Drone. Pure.
+"""AT commands for a decision of the watchdog. Pure.
 
 WIRE (docs/reference/ardrone.md 2.4): REF bit 9 is a level (1 take off and stay up, 0 land), bit 8 toggles the emergency
 on its rising edge. PCMD flag 0 lets the drone hold its place. phi > 0 right, theta > 0 backward, gaz > 0 up, yaw > 0
@@ -17,7 +17,7 @@ from groundstation.bus.messages import FlightState
 def orders_from_decision(
     action: Action, attitude: AttitudeRequest, state: int, flight_state: FlightState, scale: Scale
 ) -> list[AtCommand]:
-    """Return REF and PCMD for an action, and COMWDG where the drone missed us; no REF while waiting.
+    """Return REF and PCMD for an action, and COMWDG if the drone missed our commands; no REF while waiting.
 
     attitude: of a drone that flies a setpoint, or that must be braked to hover.
     """
@@ -36,10 +36,10 @@ def _reference(action: Action, emergency: bool, flight_state: FlightState) -> At
         case Action.TAKE_OFF:
             return at.ref(start=not emergency)
         case Action.CLEAR:
-            # The button is pressed once more, and the drone stays down.
+            # The emergency button is pressed once more, and the drone stays down.
             return at.ref(start=False, select=emergency)
         case Action.FLY | Action.HOVER:
-            # Stay up, but never take off: a drone that stands, or is told to land by others, is not lifted again.
+            # Stay up, but never take off: a drone that stands, or that others told to land, is not lifted again.
             return at.ref(start=flight_state not in (FlightState.LANDED, FlightState.LANDING))
         case Action.CUT:
             return at.ref(start=False, select=not emergency)

@@ -1,6 +1,6 @@
-"""A conversation with one AR.Drone outside of a flight: navdata, AT commands, one key of its configuration at a time.
+"""A conversation with one AR.Drone outside of flight: navdata, AT commands, and single configuration keys.
 
-The caller decides what may be said: `speaking` feeds the drone's watchdog, and in flight that is the pilot's to do.
+The caller decides what may be sent: `speaking` feeds the drone's watchdog, which in flight only its pilot may do.
 """
 
 import socket
@@ -50,7 +50,7 @@ class Conversation:
         self.speaking = False
 
     def close(self) -> None:
-        """Give the sockets back."""
+        """Close the sockets."""
         self._navdata.close()
         self._at.close()
 
@@ -61,7 +61,7 @@ class Conversation:
         self._at.sendto(datagram, (self._address, AT_PORT))
 
     def listen(self, seconds: float, until: Callable[[], bool] = lambda: False) -> bool:
-        """Ask for navdata and take it for some seconds, or until something is so; returns whether it came true."""
+        """Request navdata and take it for some seconds, or until a condition holds; returns whether that came true."""
         self._numbers.clear()
         deadline_s, request_s = time.monotonic() + seconds, 0.0
         while (now_s := time.monotonic()) < deadline_s:
@@ -76,7 +76,7 @@ class Conversation:
         return False
 
     def repeat(self, command: AtCommand, until: Callable[[], bool]) -> None:
-        """Send a command again and again until something is so, at most for a while."""
+        """Repeat a command until a condition holds, at most for a while."""
         deadline_s = time.monotonic() + _ACK_S
         while not until() and time.monotonic() < deadline_s:
             self.say(command)
@@ -116,7 +116,7 @@ class Conversation:
         )
 
     def wait_for_answer(self) -> None:
-        """Return once navdata came; raises DriverError when none does within 1.5 s."""
+        """Wait for navdata; raises DriverError when none comes within 1.5 s."""
         if not self.listen(_ANSWER_S, lambda: self.packet is not None):
             text = f"no AR.Drone answers at {self._shown} (navdata, UDP {NAVDATA_PORT}) within {_ANSWER_S:g} s"
             raise DriverError(text)
@@ -150,10 +150,10 @@ def _open(interface: str) -> socket.socket:
 
 @contextmanager
 def with_standing(address: str) -> Iterator[Conversation]:
-    """Give a conversation with a drone that stands, and end it.
+    """Yield a conversation with a standing drone, and end it afterwards.
 
-    Raises DriverError when it does not answer, cannot be reached, or its motors may turn: whoever flies it numbers its
-    commands.
+    Raises DriverError when it does not answer, cannot be reached, or its motors may turn: then another program numbers
+    its commands.
     """
     line = Conversation(address)
     try:

@@ -20,7 +20,7 @@ from groundstation.geometry.stabilized_frame import STANDARD_GRAVITY_M_S2
 _RAD_FROM_MDEG = math.pi / 180_000
 _RAD_FROM_DEG = math.pi / 180
 _M_S2_FROM_MG = STANDARD_GRAVITY_M_S2 / 1000
-# Figures beyond these are no measurement of an AR.Drone.
+# Values beyond these are no measurement of an AR.Drone.
 _MOST_MDEG = 360_000.0
 _MOST_MM_S = 30_000.0
 _MOST_MM = 100_000
@@ -29,8 +29,8 @@ _MOST_DEG_S, _MOST_MG = 5_000.0, 50_000.0
 _JUMP_RAD = math.radians(8)
 _JUMP_RATE_RAD_S = math.radians(100)
 _GROUND_GAP_S = 0.5
-_GAP_S = 5.0  # silent for longer, it may have had a new battery
-# Numbers of their own: asking an enum for a member costs as much as reading an option.
+_GAP_S = 5.0  # after a longer silence it may have a new battery
+# Module constants: looking up an enum member costs as much as reading an option.
 _FLY, _EMERGENCY, _TAKING_OFF = int(StateBit.FLY), int(StateBit.EMERGENCY), int(ControlState.TRANS_TAKEOFF)
 _PHASES: dict[int, FlightState] = {
     ControlState.TRANS_TAKEOFF: FlightState.TAKING_OFF,
@@ -46,7 +46,7 @@ _PHASES: dict[int, FlightState] = {
 class NavdataMotion(NamedTuple):
     """The vehicle's motion by one packet, in our frames.
 
-    velocity_m_s [base_stabilized], as reported (no scale applied); rates and specific force [base], None in demo mode.
+    velocity_m_s [base_stabilized], as reported, without scale; rates and specific force [base], None in demo mode.
     """
 
     velocity_m_s: Vector3
@@ -87,7 +87,7 @@ def motion_from_navdata(packet: Navdata) -> NavdataMotion | None:
 
 def _require_sane(demo: Demo) -> None:
     _, _, theta, phi, psi, altitude_mm, vx, vy, vz, _ = demo
-    # Comparisons with a NaN are false, so one chained comparison refuses it together with what is too large.
+    # Comparisons with NaN are false, so one chained comparison rejects NaN together with values that are too large.
     turns = -_MOST_MDEG <= theta <= _MOST_MDEG and -_MOST_MDEG <= phi <= _MOST_MDEG and -_MOST_MDEG <= psi <= _MOST_MDEG
     moves = -_MOST_MM_S <= vx <= _MOST_MM_S and -_MOST_MM_S <= vy <= _MOST_MM_S and -_MOST_MM_S <= vz <= _MOST_MM_S
     if turns and moves and altitude_mm <= _MOST_MM:
@@ -98,7 +98,7 @@ def _require_sane(demo: Demo) -> None:
 
 
 def charge_from_demo(demo: Demo) -> float | None:
-    """Return the battery's charge, 0 to 1; None where the number is none."""
+    """Return the battery's charge, 0 to 1; None if it is not a number."""
     return demo.battery_percent / 100 if demo.battery_percent <= 100 else None
 
 
@@ -145,10 +145,10 @@ def flight_state_from_navdata(state: int, control_state: int | None) -> FlightSt
 
 
 class HeadingWatch:
-    """Counts the jumps of the heading, across which its increments are void.
+    """Counts jumps of the heading, across which its increments are void.
 
     WIRE: at lift-off the magnetometer is fused in and psi jumps, 143 deg in one sample in a recorded flight. In flight
-    it goes on through a silence, in which a drone turns on as it was told last (docs/decisions/0233).
+    the heading goes on through a silence, in which a drone keeps turning as last commanded (docs/decisions/0233).
     """
 
     def __init__(self) -> None:

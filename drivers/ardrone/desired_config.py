@@ -1,4 +1,4 @@
-"""Which configuration keys we want on a drone, in the order of writing. Pure."""
+"""The configuration keys that we set on a drone, in the order of writing. Pure."""
 
 import zlib
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ _CHANNELS = {"front": 0, "bottom": 1}
 
 
 class Wish(NamedTuple):
-    """One key to write; no flight before a required one is confirmed."""
+    """One key to write; a flight needs confirmation of the required ones."""
 
     key: str
     value: str
@@ -22,7 +22,7 @@ class Wish(NamedTuple):
 
 
 class Ids(NamedTuple):
-    """Names of the sets of settings that are ours: 8 hex digits each."""
+    """Names of our sets of settings: 8 hex digits each."""
 
     session: str
     user: str
@@ -31,7 +31,7 @@ class Ids(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """What a fraction of 1 in PCMD means, as configured: tilt [rad], climb [m/s], yaw rate [rad/s]."""
+    """The configured value of a fraction of 1 in PCMD: tilt [rad], climb [m/s], yaw rate [rad/s]."""
 
     tilt_rad: float
     climb_m_s: float
@@ -39,7 +39,7 @@ class Scale:
 
 
 def scale_from_settings(settings: ArDroneDriverSettings) -> Scale:
-    """Return the limits to configure: those of the settings, within the drone's range."""
+    """Return the limits to configure: those of the settings, clipped to the drone's range."""
     limits = settings.limits
     return Scale(
         _within("control:euler_angle_max", limits.max_tilt_rad),
@@ -67,8 +67,8 @@ FULL_NAVDATA = Wish("general:navdata_demo", format_value(False))
 def wishes(settings: ArDroneDriverSettings, identity: Identity, with_ids: bool) -> tuple[Wish, ...]:
     """Return the keys to write after `FULL_NAVDATA`.
 
-    WIRE: ids come first, since what is written before them goes to another set; `outdoor` copies one of two triples of
-    limits over the active ones, so it goes before those.
+    WIRE: ids come first, since earlier keys go to another set; `outdoor` copies one of two triples of limits over the
+    active ones, so it goes before those.
     """
     scale, flight = scale_from_settings(settings), settings.flight
     ids = ids_of(settings.name)

@@ -42,11 +42,11 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 # WIRE: at least every 30 ms (guide), 20-25 ms (SDK); on a busy machine a turn comes late.
 RATE_HZ = 40.0
 _FRESH_NS = 300 * NS_PER_MS
-# Long enough that the drone waits for RESUME.
+# A pause of this length makes the drone wait for RESUME.
 _DOUBTED_NS = 1_300 * NS_PER_MS
-# A blind drone that falls silent or freezes is braked on by what its loop knows, until it would land for that.
+# A blind drone that falls silent or freezes is braked on by the loop's knowledge, until it would land for that.
 _BRAKED_ON_NS = 3 * NS_PER_S
-# What a drone reports that sees no floor: not what it flew last, so that its firmware's own braking fails as well.
+# Velocity reported by a drone that sees no floor: not its true one, so that its firmware's own braking fails as well.
 _NO_FLOW_M_S = 0.02
 _RATE_PERIOD_NS = 200 * NS_PER_MS
 _FAULTS = int(StateBit.MOTORS | StateBit.SOFTWARE_FAULT | StateBit.VBAT_LOW)
@@ -62,9 +62,10 @@ _log = logging.getLogger(__name__)
 
 
 class LatestNavdata(NamedTuple):
-    """The newest word of the drone; heard_ns 0: never; moved_ns: when it last reported motion; velocity as reported.
+    """The newest telemetry of the drone; heard_ns 0: never; moved_ns: when it last reported motion.
 
-    obeyed: sequence number of the last PCMD that it says it obeyed, if it says so; height_m: above the floor, likewise.
+    Velocity as reported. obeyed: sequence number of the last PCMD that it reports as obeyed, if any; height_m: above
+    the floor, likewise.
     """
 
     heard_ns: int = 0
@@ -193,7 +194,7 @@ class ArDrone:
         attitude = self._attitude(now_ns, decision, heard)
         action = Action.HOVER if self._sinks else decision.action
         if action is Action.TAKE_OFF and self._session.phase is not SessionPhase.READY:
-            action = Action.HOVER  # it was restarted since the order: what flies stays up, what stands stays there
+            action = Action.HOVER  # restarted since the order: if it flies it stays up, if it stands it stays there
         commands = orders_from_decision(action, attitude, heard.state, heard.flight_state, self._scale)
         commands += self._session.step(now_ns, heard.state, silence_ns, heard.model)
         self._link.send(commands, restart=self._session.phase is SessionPhase.SEARCHING)
@@ -238,7 +239,7 @@ class ArDrone:
         known_adrift, seen = self._adrift.adrift, decision.seen_m_s
         adrift = self._adrift.step(now_ns, holds, not told, seen)
         if adrift and not known_adrift and not was_blind and seen is not None:
-            self._loop.hold((*seen, 0.0), dt_s)  # nothing else tells from which speed it is to be braked
+            self._loop.hold((*seen, 0.0), dt_s)  # nothing else gives the speed from which to brake it
         if (blind or was_blind or adrift) and (self._sinks or holds):
             climb_m_s = -self._settings.limits.max_climb_m_s if self._sinks else 0.0
             return self._loop.brake(dt_s, force if told else None, decision.seen_m_s, climb_m_s)
@@ -257,9 +258,10 @@ class ArDrone:
         return asked
 
     def _is_blind(self) -> bool:
-        """Return whether the drone sees nothing of its motion; one that wind pushes holds its place better itself.
+        """Return whether the drone sees nothing of its motion; one that only wind pushes holds its place better itself.
 
-        Before the velocity is BAD, too: the firmware's hover would end the loop, and with it the last correct speed.
+        True even before the velocity is BAD: the firmware's hover would end the loop, and with it the last correct
+        speed.
         """
         others = self._plausibility.report.of(Sensor.TELEMETRY, Sensor.CLOCK, Sensor.ATTITUDE, Sensor.IMU)
         return self._motion.repeats and others is not Health.BAD and self.telemetry.flight_state in UP
@@ -274,7 +276,7 @@ class ArDrone:
         return LinkHealth(quality, rate_hz, rejected, detail, clock, firmware)
 
     def flush(self) -> None:
-        """Publish the raw datagrams that wait."""
+        """Publish the waiting raw datagrams."""
         self._log.flush()
 
     def close(self) -> None:

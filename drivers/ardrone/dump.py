@@ -6,12 +6,12 @@ from collections.abc import Iterable
 from drivers.ardrone.wire.configuration import CONFIGURATION
 
 END = b"\0"
-# Text of a number loses digits on its way through the drone's 32-bit floats.
+# Numbers lose digits on their way through the drone's 32-bit floats.
 _RELATIVE = 1e-3
 
 
 def parse_dump(text: bytes) -> dict[str, str]:
-    """Return key -> value text of a dump with or without its NUL; a line that begins no key goes on with the last.
+    """Return key -> value text of a dump with or without its NUL; a line without a key continues the last.
 
     WIRE (docs/reference/ardrone.md 5.2): `section:key = value` lines; vectors and matrices may be wrapped over lines.
     """
@@ -28,7 +28,7 @@ def parse_dump(text: bytes) -> dict[str, str]:
 
 
 def differences(wanted: Iterable[tuple[str, str]], stored: dict[str, str]) -> tuple[tuple[tuple[str, str], str], ...]:
-    """Return ((key, wanted), stored) where they differ; a key that the drone does not list cannot be judged."""
+    """Return ((key, wanted), stored) where they differ; keys that the drone does not list are not compared."""
     return tuple(
         ((key, value), stored[key]) for key, value in wanted if key in stored and not _same(key, value, stored[key])
     )

@@ -1,21 +1,21 @@
-"""Heights that the drone cannot have reached: echoes of another drone's ultrasound. Pure."""
+"""Rejects heights that the drone cannot have reached: echoes of another drone's ultrasound. Pure."""
 
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
-# The fastest a drone climbs, and the step that noise and the ultrasound's own jumps explain.
+# The fastest climb of a drone, and the step that noise and the ultrasound's own jumps explain.
 _RATE_M_S = 2.0
 _STEP_M = 0.15
 _LONGEST_S = 0.1
-# Readings that agree for so long are the truth: a table below, or a bad start.
+# Readings that agree for this long are true: a table below, or a bad start.
 _INSIST_NS = 400 * NS_PER_MS
-# Nothing is known any more after a pause.
+# After a pause of this length the last height no longer counts.
 _FORGET_NS = NS_PER_S
 
 
 class HeightWatch:
-    """Lets a height through when the drone can have got there from the last good one.
+    """Accepts a height if the drone can have reached it from the last good one.
 
-    refused: heights held back. steps: new levels believed because they stayed.
+    refused: number of rejected heights. steps: number of new levels accepted because they lasted.
     """
 
     def __init__(self) -> None:
@@ -41,6 +41,6 @@ class HeightWatch:
 
 
 def _reachable(before: tuple[int, float], stamp_ns: int, height_m: float) -> bool:
-    # What it may have done during longer silence is left to `_INSIST_NS`: an echo may last as long.
+    # Longer silences are left to `_INSIST_NS`: an echo may last as long.
     elapsed_s = min((stamp_ns - before[0]) * 1e-9, _LONGEST_S)
     return abs(height_m - before[1]) <= _STEP_M + _RATE_M_S * elapsed_s

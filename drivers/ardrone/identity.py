@@ -1,4 +1,4 @@
-"""Which AR.Drone this is: generation and firmware, from version.txt, the configuration or navdata. Pure."""
+"""Identifies an AR.Drone: generation and firmware, from version.txt, the configuration or navdata. Pure."""
 
 import re
 from collections.abc import Mapping
@@ -26,7 +26,7 @@ class Model(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """What is known of a drone; firmware and serial are "" while they are not."""
+    """The identity of a drone; firmware and serial are "" while unknown."""
 
     model: Model = Model.UNKNOWN
     firmware: str = ""
@@ -34,7 +34,10 @@ class Identity:
 
     @property
     def has_ids(self) -> bool:
-        """Whether it keeps sets of settings by ids; an unknown firmware is taken to (all but a few early AR1 do)."""
+        """Return whether it keeps sets of settings by ids.
+
+        Assumed of an unknown firmware (all but a few early AR1 do).
+        """
         version = _parse(self.firmware)
         return version is None or version >= _FIRST_WITH_IDS
 

@@ -98,8 +98,8 @@ def _video(order: VehicleOrder) -> Video | None:
 
 
 def _stop(orders: Sequence[VehicleOrder]) -> StopDatagrams:
-    # WIRE: sequence number 1 resets the drone's count, so it obeys whoever speaks after its driver. Hovering is PCMD
-    # without flags, and no REF: a start bit would lift a drone that stands.
+    # WIRE: sequence number 1 resets the drone's count, so it obeys the one who speaks after its driver. Hovering is
+    # PCMD without flags, and no REF: a start bit would lift a drone that stands.
     hover = at.encode_datagram([at.pcmd(at.ProgressiveMotion())], 1)
     land = at.encode_datagram([at.ref(start=False), at.pcmd(at.ProgressiveMotion())], 1)
     return StopDatagrams(_own(orders[0]).at_port, hover, land)
@@ -133,8 +133,8 @@ _OFFER = """\
       yaw_rate_std_deg_s: 1.0
 """
 
-# An AR.Drone reports no climb rate: what it climbs is found by heights and cameras. Its navdata call a drone level that
-# leans into moving air.
+# An AR.Drone reports no climb rate: climbs come from heights and cameras. Its navdata report a level attitude for a
+# drone that leans into moving air.
 KIND = VehicleKind(
     name="ardrone",
     summary="Parrot AR.Drone 1.0 and 2.0",

@@ -1,4 +1,4 @@
-"""The two UDP links to one AR.Drone: who may speak to us, in which order, and with which number we speak."""
+"""The two UDP links to one AR.Drone: accepted senders, order of packets, and our command numbers."""
 
 import logging
 import socket
@@ -48,9 +48,9 @@ class SequenceFilter:
 
 
 class ArDroneLink:
-    """Sockets on free ports, unless the settings name some, so that many drones fit on one host.
+    """Sockets on free ports, or those that the settings name, so that many drones fit on one host.
 
-    Nothing that arrives raises; the constructor raises DriverError for a port or an address that cannot be had.
+    No received data raises; the constructor raises DriverError for an unavailable port or address.
     """
 
     def __init__(self, settings: ArDroneDriverSettings, log: DatagramLog) -> None:
@@ -68,7 +68,7 @@ class ArDroneLink:
         self.rejected: Counter[str] = Counter()
 
     def receive(self) -> tuple[int, Navdata] | None:
-        """Wait up to 0.1 s for a packet; returns (receipt_ns, packet), or None when nothing usable came."""
+        """Wait up to 0.1 s for a packet; returns (receipt_ns, packet), or None if none was usable."""
         try:
             if vehicle_socket.waits(self._navdata_socket, _POLL_S):
                 return self._judge(*self._navdata_socket.recvfrom(navdata.MAX_SIZE + 1))
@@ -94,13 +94,13 @@ class ArDroneLink:
         _log.debug("%s: %s: %s", self._settings.name, reason, detail)
 
     def request_navdata(self) -> None:
-        """Ask the drone to stream to our port."""
+        """Request that the drone streams to our port."""
         self._send_to(self._navdata_socket, navdata.REQUEST, self._settings.navdata_port)
 
     def send(self, commands: Sequence[AtCommand], restart: bool) -> None:
-        """Send commands in one datagram, numbered onwards, or from 1 on restart.
+        """Send commands in one datagram, with consecutive numbers, or from 1 on restart.
 
-        WIRE: number 1 is always accepted, so a drone that was not heard yet is spoken to with 1 until it is.
+        WIRE: number 1 is always accepted, so a drone gets number 1 until it is heard.
         """
         if restart:
             self._sequence = 1

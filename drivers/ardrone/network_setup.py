@@ -1,8 +1,7 @@
-"""Settings by which an AR.Drone joins a network and knows its owner; they outlive its power-down.
+"""Settings by which an AR.Drone joins a network and accepts one owner; they survive power-off.
 
 WIRE (docs/reference/ardrone.md 1, 5.4): `network:owner_mac` makes the drone's firewall drop all others, zeros undo it;
-`network:wifi_mode` 2 with `network:ssid_single_player` lets its start script join a network and take a free
-address.
+`network:wifi_mode` 2 with `network:ssid_single_player` lets its start script join a network and take a free address.
 """
 
 import fcntl
@@ -65,24 +64,24 @@ def own_hardware_address(drone: str) -> str:
 def _address_of(any_socket: socket.socket, interface: str) -> str:
     try:
         answer = fcntl.ioctl(any_socket.fileno(), _SIOCGIFADDR, struct.pack("256s", interface.encode()[:15]))
-    except OSError:  # it has none
+    except OSError:  # the adapter has no such address
         return ""
     return socket.inet_ntoa(answer[20:24])
 
 
 def trim(address: str) -> None:
-    """Let a drone that stands take its present attitude for level, until it is switched off.
+    """Let a standing drone take its present attitude as level, until it is switched off.
 
     Raises DriverError when it does not answer, or its motors may turn.
     """
     with with_standing(address) as line:
         for _ in range(_TRIMS):
-            line.say(at.ftrim())  # datagrams get lost, and nothing acknowledges it
+            line.say(at.ftrim())  # repeated: datagrams get lost, and there is no acknowledgement
             line.listen(0.05)
 
 
 def change(address: str, wanted: Mapping[str, str]) -> dict[str, tuple[str, str]]:
-    """Write settings of a drone that stands and read them back; returns key -> (before, after) of all of them.
+    """Write settings of a standing drone and read them back; returns key -> (before, after) of all of them.
 
     Raises DriverError when it does not answer, flies, or gives no configuration.
     """

@@ -1,7 +1,7 @@
-"""What the odometry of one horizontal axis is off by, as cameras see it. Pure.
+"""The odometry error of one horizontal axis, as cameras see it. Pure.
 
-A drifting velocity looks like any other to the loop that flies by it. Cameras know better, half a second later: they
-see the displacement over that time (`drivers/control_error.py`).
+To the velocity loop a drifting velocity looks like any other. Cameras show the difference half a second later: they see
+the displacement over that time (`drivers/control_error.py`).
 """
 
 import math
@@ -13,10 +13,12 @@ from drivers.ardrone.velocity_axis import SEEN_TICKS, clamp
 
 @dataclass(frozen=True, slots=True)
 class DriftLimits:
-    """ticks: calls over which cameras see a mean. smoothing_s, fades_s: of the difference, and without cameras.
-    tolerated_m_s: noise, a wrong scale, a floor that misleads a little: a drift begins beyond it, and is over below
-    half of it; most_m_s: largest correction; step_m_s: largest difference that counts at once, so that a picture that
-    hangs is found before it moves anything.
+    """Figures of the drift's estimate.
+
+    ticks: calls over which cameras average. smoothing_s, fades_s: time constants of the difference, and without
+    cameras. tolerated_m_s: effect of noise, a wrong scale, a slightly misleading floor: a drift begins beyond it, and
+    ends below half of it; most_m_s: largest correction; step_m_s: largest difference that counts at once, so that a
+    frozen picture is noticed before it moves a drone.
     """
 
     ticks: int = SEEN_TICKS
@@ -28,20 +30,20 @@ class DriftLimits:
 
 
 class OdometryDrift:
-    """Measured speed less the one that cameras see, smoothed."""
+    """The measured speed less the one that cameras see, smoothed."""
 
     def __init__(self, limits: DriftLimits) -> None:
         self._limits = limits
         self.reset()
 
     def reset(self) -> None:
-        """Forget it: the drone stands, or holds its place by itself."""
+        """Forget the drift: the drone stands, or holds its place by itself."""
         self._measured: deque[float] = deque(maxlen=self._limits.ticks)
         self._off_m_s = 0.0
         self._drifts = False
 
     def compare(self, measured_m_s: float, seen_m_s: float | None, dt_s: float) -> None:
-        """Take a measured speed and the mean one that cameras saw, None if they did not."""
+        """Take a measured speed and the mean one that cameras saw, or None."""
         limits = self._limits
         self._measured.append(measured_m_s)
         if seen_m_s is None:
@@ -53,5 +55,5 @@ class OdometryDrift:
 
     @property
     def correction_m_s(self) -> float:
-        """Return how much of a measured speed is not true [m/s]."""
+        """Return the error of the measured speed [m/s]."""
         return clamp(self._off_m_s, self._limits.most_m_s) if self._drifts else 0.0

@@ -1,8 +1,8 @@
-"""Looks at one AR.Drone without touching its flight: who it is, how it is, how it is set.
+"""Inspects one AR.Drone without affecting its flight: identity, state and settings.
 
-What is sent: navdata requests; questions over TCP; and, only to a drone that stands, COMWDG, CTRL and (out of the
-bootstrap, where nobody else flies it) CONFIG general:navdata_demo. Never REF, PCMD or FTRIM. A drone in the air hears
-no AT command at all: not even its watchdog is fed for whoever ought to fly it.
+It sends navdata requests; queries over TCP; and, only to a standing drone, COMWDG, CTRL and (out of the bootstrap,
+where nobody else flies it) CONFIG general:navdata_demo. Never REF, PCMD or FTRIM. A drone in the air gets no AT command
+at all: even its watchdog is left to its pilot.
 """
 
 from dataclasses import dataclass, field
@@ -27,7 +27,7 @@ _LOSS = 0.9
 
 @dataclass(slots=True)
 class ProbeReport:
-    """What was found; battery 0..1; config: key -> (value, category), both as text."""
+    """The findings; battery 0..1; config: key -> (value, category), both as text."""
 
     address: str
     identity: Identity = field(default_factory=Identity)
@@ -69,7 +69,7 @@ def probe(address: str) -> ProbeReport:
 
 
 def _look(line: Conversation, report: ProbeReport) -> None:
-    """Watch, sending no command; an idle drone on the ground is then asked for both kinds of navdata."""
+    """Listen without commands; then request both kinds of navdata of an idle drone on the ground."""
     first = line.stream(_LOOK_S)
     if first.mode != "bootstrap" or line.is_set(StateBit.FLY):
         report.streams.append(first)

@@ -1,4 +1,4 @@
-"""Odometry and IMU samples on the bus, at most so often as the settings say; of the IMU the mean since the last."""
+"""Publishes odometry and IMU samples, at most at the rates of the settings; of the IMU the mean since the last."""
 
 from drivers.ardrone.convert import HeadingWatch, NavdataMotion
 from drivers.ardrone.height import HeightWatch
@@ -12,12 +12,12 @@ from groundstation.geometry.angles import quaternion_from_euler
 
 # The climb rate is the derivative of an ultrasound altitude.
 _CLIMB_STD_M_S = 0.15
-# It says nothing while the ultrasound hears another drone.
+# It is not reported while the ultrasound hears another drone.
 _VOID_CLIMB_STD_M_S = 2.0
 
 
 class _InertialMean:
-    """Mean rates and specific force since they were last taken: integrated, they turn as far as all samples did."""
+    """Mean rates and specific force since last taken: their integral equals that of all samples."""
 
     def __init__(self) -> None:
         self._sums, self._count = [0.0] * 6, 0
@@ -52,7 +52,7 @@ class NavdataPublisher:
         }
 
     def publish(self, stamp_ns: int, motion: NavdataMotion, health: HealthReport = ALL_GOOD) -> None:
-        """Publish due data that is not BAD; every motion counts for the heading's jumps."""
+        """Publish due data that is not BAD; all motions are checked for jumps of the heading."""
         reset = self._heading.update(stamp_ns, motion)
         sound = motion.height_m is None or self.heights.accept(stamp_ns, motion.height_m)
         all_values = health.of(Sensor.TELEMETRY, Sensor.CLOCK)

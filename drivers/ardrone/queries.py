@@ -1,4 +1,4 @@
-"""Questions to the drone over TCP: version.txt by FTP, and the configuration dump of the control port."""
+"""Queries to the drone over TCP: version.txt by FTP, and the configuration dump of the control port."""
 
 import ftplib
 import socket
@@ -19,21 +19,21 @@ _DUMP_S = 2.0
 
 
 class _FtpThroughAdapter(ftplib.FTP):
-    """FTP whose connections go through one network adapter: the library's own takes any."""
+    """FTP with connections through one network adapter: the library itself uses any."""
 
     def __init__(self, timeout_s: float, interface: str) -> None:
         super().__init__(timeout=timeout_s)
         self._timeout_s, self._interface = timeout_s, interface
 
     def open(self, address: str, port: int) -> None:
-        """Connect and hear the greeting."""
+        """Connect and read the greeting."""
         self.host, self.port, self.af = address, port, socket.AF_INET
         self.sock = connected((address, port), self._timeout_s, self._interface)
         self.file = self.sock.makefile("r", encoding=self.encoding)
         self.welcome = self.getresp()
 
     def ntransfercmd(self, cmd: str, rest: int | str | None = None) -> tuple[socket.socket, int | None]:
-        """Open the passive connection of a transfer; restarting in the middle is not known here."""
+        """Open the passive connection of a transfer; restarting in the middle is not supported."""
         stream = connected(self.makepasv(), self._timeout_s, self._interface)
         try:
             answer = self.sendcmd(cmd)
@@ -46,7 +46,7 @@ class _FtpThroughAdapter(ftplib.FTP):
 
 
 def read_version(address: str, port: int, timeout_s: float = _FTP_S) -> str:
-    """Return version.txt of the drone, "" when it cannot be had; timeout_s is of each step.
+    """Return version.txt of the drone, or "" if unavailable; timeout_s: of each step.
 
     address: also ADDRESS%ADAPTER.
 
@@ -73,7 +73,7 @@ def read_version(address: str, port: int, timeout_s: float = _FTP_S) -> str:
 def read_dump(
     address: str, port: int, listening: Callable[[], None], wait_s: float = _DUMP_S, connect_s: float = _CONNECT_S
 ) -> bytes:
-    """Return the next configuration dump, without its NUL, b"" when none comes; `listening` is called in between.
+    """Return the next configuration dump, without its NUL, or b"" if none comes; `listening` is called once connected.
 
     address: also ADDRESS%ADAPTER.
 
@@ -97,7 +97,7 @@ def read_dump(
 
 
 class TcpInquirer:
-    """Asks one thing at a time in a thread of its own; an answer to a question given up is dropped.
+    """Makes one query at a time in a thread of its own; the answer to an abandoned query is dropped.
 
     address: also ADDRESS%ADAPTER.
     """

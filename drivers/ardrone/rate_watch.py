@@ -10,7 +10,7 @@ from groundstation.time_units import NS_PER_MS
 
 _SLOW_SHARE, _FINE_SHARE = 0.4, 0.7
 _LONG_ENOUGH_NS = 500 * NS_PER_MS
-# A rate below this was never a stream to fall from.
+# A lower rate was never a full stream.
 _LEAST_HZ = 50.0
 _REMEDY = (
     "does this computer scan for Wi-Fi networks? tie its connection to one access point (nmcli connection modify NAME "

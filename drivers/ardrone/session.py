@@ -1,9 +1,9 @@
-"""Bootstrap and configuration of the drone: commands beside REF and PCMD. Pure but for the given inquirer.
+"""Bootstrap and configuration of the drone: all commands but REF and PCMD. Pure but for the given inquirer.
 
 WIRE (docs/reference/ardrone.md 3, 5.1): CONFIG until state bit 6 rises, CTRL 5 until it falls, then the next key. A
 CONFIG sent while bit 6 is still up is lost, therefore each key waits for the whole cycle of the one before. A late
-duplicate can still raise the bit for a key that was lost: so at the end everything is read back over the control port,
-where the drone has one, and what differs is written again, at most three times in all.
+duplicate can still raise the bit for a key that was lost: so at the end all keys are read back over the control port,
+if the drone has one, and differing ones are written again, at most three times in all.
 """
 
 from collections import deque
@@ -26,17 +26,17 @@ _REQUEST_AFTER_NS = NS_PER_S
 _DISCONNECTED_NS = 2 * NS_PER_S
 _STAGE_NS = NS_PER_S
 _DUMP_PERIOD_NS = 300 * NS_PER_MS
-# WIRE: a dump raises bit 6 as well. The text may be here before the packet that says so.
+# WIRE: a dump raises bit 6 as well. Its text may arrive before the packet with the bit.
 _SETTLE_NS = 300 * NS_PER_MS
 _ROUNDS = 3
 _RETRY_NS = 5 * NS_PER_S
 _FLAT_TRIMS = 3
-# A drone may say for a while that it is in the mode that it was told to leave.
+# A drone may for a while report the mode that it was told to leave.
 _FORGOTTEN_NS = NS_PER_S
 
 
 class SessionPhase(StrEnum):
-    """State of the session; FAILED: a required setting was not confirmed, another attempt follows."""
+    """State of the session; FAILED: a required setting was not confirmed; another attempt follows."""
 
     SEARCHING = "SEARCHING"
     CONFIGURING = "CONFIGURING"
@@ -53,22 +53,22 @@ class _Cycle(StrEnum):
 
 
 class Inquirer(Protocol):
-    """Asks the drone over TCP, in a thread; an answer is None while it is awaited and empty when there is none.
+    """Queries the drone over TCP, in a thread; an answer is None while awaited, and empty if there is none.
 
-    listening: the control port is connected, so that a dump may be asked for.
+    listening: whether the control port is connected, so that a dump can be requested.
     """
 
     @property
     def version(self) -> str | None:
-        """Text of version.txt."""
+        """Return the text of version.txt."""
 
     @property
     def dump(self) -> bytes | None:
-        """Configuration dump."""
+        """Return the configuration dump."""
 
     @property
     def listening(self) -> bool:
-        """Return whether a dump would be heard."""
+        """Return whether a dump would be received."""
 
     def ask_version(self) -> None:
         """Begin to read version.txt."""
@@ -78,7 +78,7 @@ class Inquirer(Protocol):
 
 
 class ArdroneSession:
-    """Brings one drone from silence to full navdata with our limits, and back again when it forgets us."""
+    """Brings one drone from silence to full navdata with our limits, and again when the drone forgets us."""
 
     def __init__(
         self,
@@ -122,7 +122,7 @@ class ArdroneSession:
                 return self._problem
 
     def request_due(self, now_ns: int, silence_ns: int) -> bool:
-        """Return whether to ask for navdata now: every 100 ms while there is none."""
+        """Return whether to request navdata now: every 100 ms while there is none."""
         silent = self.phase is SessionPhase.SEARCHING or silence_ns > _REQUEST_AFTER_NS
         if not silent or now_ns < self._next_request_ns:
             return False
@@ -132,7 +132,7 @@ class ArdroneSession:
     def step(self, now_ns: int, state: int, silence_ns: int, seen: Model = Model.UNKNOWN) -> list[AtCommand]:
         """Return the commands to add to the next datagram.
 
-        state, silence_ns: the newest state word and its age; seen: the generation as far as navdata tells.
+        state, silence_ns: the newest state word and its age; seen: the generation by navdata, if known.
         """
         if silence_ns > _DISCONNECTED_NS:
             self.phase = SessionPhase.SEARCHING
@@ -145,7 +145,7 @@ class ArdroneSession:
         if self.phase is SessionPhase.VERIFYING:
             return self._verify(now_ns, pending)
         if pending:
-            return [at.ctrl(at.CTRL_ACK)]  # a late duplicate raised it
+            return [at.ctrl(at.CTRL_ACK)]  # a late duplicate raised the bit
         return self._trim(state) if self.phase is SessionPhase.TRIMMING else []
 
     def _must_begin(self, now_ns: int, state: int) -> bool:
@@ -158,7 +158,7 @@ class ArdroneSession:
             case SessionPhase.FAILED:
                 return now_ns - self._stage_ns > _RETRY_NS
             case SessionPhase.CONFIGURING:
-                return forgotten and bool(self._wanted)  # it left the bootstrap once, and is back in it
+                return forgotten and bool(self._wanted)  # it left the bootstrap earlier, and is back in it
             case _:
                 return forgotten
 
@@ -207,7 +207,7 @@ class ArdroneSession:
         return [*ids, at.config(wish.key, wish.value)]
 
     def _find_out(self, now_ns: int, seen: Model) -> bool:
-        """Choose the settings to write once the firmware is known, or will not be; returns whether that is so."""
+        """Choose the settings to write once the firmware is known, or will stay unknown; returns whether that is so."""
         version = self._inquirer.version
         if version is None:
             return False
@@ -248,7 +248,7 @@ class ArdroneSession:
 
     def _trim(self, state: int) -> list[AtCommand]:
         if self._trims_left and not state & StateBit.FLY:
-            self._trims_left -= 1  # several times, since datagrams get lost and nothing acknowledges it
+            self._trims_left -= 1  # several times, since datagrams get lost without acknowledgement
             return [at.ftrim()]
         self.phase = SessionPhase.READY
         return []
@@ -265,7 +265,7 @@ class ArdroneSession:
         required = [wish for wish in wrong if wish.required]
         if wrong and self._round < _ROUNDS:
             if any(wish.key.startswith("custom:") for wish in wrong):
-                self._want(self.identity, with_ids=False)  # it keeps no sets: what was named for one was ignored
+                self._want(self.identity, with_ids=False)  # it keeps no sets: keys written for a set were ignored
                 self._queue = deque(self._wanted)
             else:
                 self._queue = deque(wish for wish in self._wanted if wish in wrong)

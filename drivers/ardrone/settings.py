@@ -11,7 +11,7 @@ VideoCodec = Literal["h264_360p", "h264_720p"]
 
 
 class ArDroneLimits(VehicleLimits):
-    """What the drone is never asked to exceed; written to its configuration as well."""
+    """Limits that no command exceeds; also written to the drone's configuration."""
 
     max_tilt_deg: Annotated[float, Field(ge=3, le=29)] = 12.0
 

@@ -1,4 +1,4 @@
-"""The state word as text, with the operator's remedy. Pure."""
+"""The state word in words, with remedies for the operator. Pure."""
 
 from drivers.ardrone.wire.state import StateBit
 

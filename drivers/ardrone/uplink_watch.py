@@ -1,14 +1,14 @@
-"""Watches whether an AR.Drone 2 hears its commands, by the number of the last one that it says it obeyed. Pure.
+"""Watches whether an AR.Drone 2 hears its commands, by the number of the last one that it reports as obeyed. Pure.
 
 WIRE (docs/reference/ardrone.md 4.4, 2.3): REFERENCES ends with ui_seq, the sequence number of the last PCMD. Navdata
-may come at full rate while the other direction is dead; the drone then flies its last PCMD on.
+may come at full rate while the other direction is dead; the drone then keeps flying its last PCMD.
 """
 
 from groundstation.bus.messages import Severity
 from groundstation.bus.notice import Notice
 from groundstation.time_units import NS_PER_MS
 
-# A Wi-Fi link repeats a datagram for tenths of a second; 20 commands in a row are no bad luck.
+# A Wi-Fi link repeats a datagram for tenths of a second; 20 lost commands in a row are no chance.
 _CUT_NS = 500 * NS_PER_MS
 _REMEDY = (
     "the drone flies its last command on: move this computer or its access point nearer, and look for other senders"
@@ -16,7 +16,7 @@ _REMEDY = (
 
 
 class UplinkWatch:
-    """Detects when commands no longer arrive in flight, and for how long they did not; `cut` while they do not."""
+    """Detects commands that no longer arrive in flight, and for how long they did not; `cut` while they do not."""
 
     def __init__(self) -> None:
         self.reset()
@@ -29,13 +29,13 @@ class UplinkWatch:
 
     @property
     def cut(self) -> bool:
-        """Return whether the operator was told that commands do not arrive, and they still do not."""
+        """Return whether the operator was told that commands do not arrive, and this still holds."""
         return self._told
 
     def step(self, now_ns: int, obeyed: int, flies: bool) -> Notice | None:
-        """Take the newest number that a drone told, while it is heard; returns an event for the operator.
+        """Take the newest number that a drone reported, while it is heard; returns an event for the operator.
 
-        A drone that never told another number tells none, and is not judged.
+        A drone whose number never changes does not report it, and is not judged.
         """
         if obeyed != self._obeyed:
             first, since_ns, told = self._obeyed is None, self._moved_ns, self._told

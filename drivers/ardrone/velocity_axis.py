@@ -1,8 +1,8 @@
 """One horizontal axis of the velocity loop: wanted response, observer of the speed, pending tilt. Pure.
 
-The odometry's speed is noisy over half a second, too slow and off by a constant factor; what the accelerometers say of
-drag and wind, and what the tilts that were asked for must have done, is sharp at once but drifts. The observer follows
-the second and is drawn to the first with a time constant of a second or so.
+The odometry's speed is noisy over half a second, too slow and off by a constant factor; a prediction from the
+accelerometers (drag and wind) and the commanded tilts is sharp at once but drifts. The observer follows the prediction
+and is drawn to the odometry with a time constant of a second or so.
 """
 
 import math
@@ -23,17 +23,17 @@ class Gains:
 
     proportional [1/s]. reference_rad_s, reference_damping: of the wanted response, second order. observer_rad_s, and
     blind_observer_rad_s without accelerometers and in wind: bandwidth of the observer, its damping. tilt_rad_s,
-    tilt_damping, dead_ticks: how tilt answers, after so many calls. odometry_delay_s: age of the measured speed. drag
-    [1/s], drag_per_m [1/m]: of air. accelerometer_gain: measured / true. bias_m_s2: bound of what the observer adds.
-    still: speeds below this are zero [m/s, rad/s]. settle_s: after so long at zero the drone holds its place by itself.
-    standing_s: time constant with which a standing drone learns what its accelerometers show at rest. overshoot_m_s,
-    disturbance_m_s2: how much faster than wanted the tilts that are asked for may make the drone, and how much of a
-    steady push that only its speed shows (an attitude off by 1.2 degrees) they may work against. doubt_m_s, doubt_m:
-    difference between the measured speed and that one which a wrong scale and gusts explain, and the integral of what
-    exceeds it that nothing does; answer_s: by how much the measured one is later. lasting_s: what the measured speed
-    teaches in less time may be its drift. seen_ticks, seen_rad_s, first_seen: what cameras see is the mean of so many
-    calls, and draws the observer with this bandwidth where nothing else is measured, at first by this share. push_s:
-    time constant of the push that goes on where the accelerometers fall silent.
+    tilt_damping, dead_ticks: how tilt answers, after this many calls. odometry_delay_s: age of the measured speed. drag
+    [1/s], drag_per_m [1/m]: air drag. accelerometer_gain: measured / true. bias_m_s2: bound of the observer's bias.
+    still: speeds below this are zero [m/s, rad/s]. settle_s: after this long at zero the drone holds its place by
+    itself. standing_s: time constant with which a standing drone learns what its accelerometers show at rest.
+    overshoot_m_s, disturbance_m_s2: how much faster than wanted the commanded tilts may make the drone, and how much of
+    a steady push that only its speed shows (an attitude wrong by 1.2 degrees) they may counter. doubt_m_s, doubt_m:
+    difference between the measured speed and the one from commands that a wrong scale and gusts explain, and the
+    integral of the excess that nothing explains; answer_s: by how much the measured one is later. lasting_s: a bias
+    learnt in less time may be drift of the measured speed. seen_ticks, seen_rad_s, first_seen: cameras give the mean
+    over this many calls, which draws the observer with this bandwidth when nothing else is measured, at first by this
+    share. push_s: time constant with which a push decays after the accelerometers fall silent.
     """
 
     proportional: float = 1.6
@@ -66,7 +66,7 @@ class Gains:
 
 
 class Axis:
-    """State of one axis; `bias_m_s2`, what level flight really accelerates by, outlives `start`."""
+    """State of one axis; `bias_m_s2`, the true acceleration of level flight, outlives `start`."""
 
     def __init__(self, gains: Gains) -> None:
         self._gains = gains
@@ -86,7 +86,7 @@ class Axis:
 
     @property
     def contradicted(self) -> bool:
-        """Return whether the measured speed is not the one that the requests must have brought."""
+        """Return whether the measured speed contradicts the one that the commands must have caused."""
         return self._unexplained_m > self._gains.doubt_m
 
     def stand(self, force_m_s2: float, dt_s: float) -> None:
@@ -102,11 +102,11 @@ class Axis:
         self._lasting_m_s2, self._unexplained_m = self._rest_m_s2, 0.0
 
     def brake(self) -> None:
-        """Go on without the measured speed: what it taught in the last seconds may have been its drift."""
+        """Go on without the measured speed: its influence of the last seconds may have been drift."""
         self.bias_m_s2 = self._lasting_m_s2
 
     def see(self, seen_m_s: float, dt_s: float) -> None:
-        """Draw the speed to the mean one that cameras saw over the last calls, at first by half of the difference."""
+        """Correct the speed by the mean one that cameras saw over the last calls, at first by half of it."""
         error = seen_m_s - sum(self._lately) / len(self._lately)
         self._shift(min(1.0, max(self._unseen, self._gains.seen_rad_s * dt_s)) * error)
         self._unseen = 0.0
@@ -123,11 +123,11 @@ class Axis:
         dt_s: float,
         drift_m_s: float = 0.0,
     ) -> float:
-        """Take a measurement; returns how air and bias accelerate the vehicle [m/s^2].
+        """Take a measurement; returns the acceleration by air and bias [m/s^2].
 
-        measured_m_s: None where there is none, so that the speed is integrated. force_m_s2: specific force, None unless
-        measured: what it last showed besides drag then goes on. turn_m_s2: change of the speed by turning of its frame.
-        drift_m_s: known part of the measured speed that is not true.
+        measured_m_s: None if there is none; the speed is then integrated. force_m_s2: specific force, None if not
+        measured; its last part besides drag then goes on. turn_m_s2: change of the speed by turning of its frame.
+        drift_m_s: known error of the measured speed.
         """
         gains = self._gains
         blind = force_m_s2 is None
@@ -143,7 +143,7 @@ class Axis:
         self._expected_m_s += (self.flown_m_s - self._expected_m_s) * min(1.0, dt_s / gains.answer_s)
         doubt = math.fabs(measured_m_s - self._expected_m_s) - gains.doubt_m_s
         self._unexplained_m = max(0.0, self._unexplained_m + doubt * dt_s)
-        # In wind nobody knows how far the firmware leans against it by itself: the speed tells.
+        # In wind it is unknown how far the firmware leans against it by itself: the speed shows it.
         bandwidth = gains.blind_observer_rad_s if blind or self._wind_m_s2 else gains.observer_rad_s
         self.speed_m_s += min(1.0, 2 * gains.observer_damping * bandwidth * dt_s) * error
         self.bias_m_s2 = clamp(self.bias_m_s2 + bandwidth**2 * dt_s * error, gains.bias_m_s2)
@@ -160,9 +160,9 @@ class Axis:
         return air
 
     def _wind(self, air_m_s2: float) -> float:
-        """Return the push that the accelerometers show, if more than a wrong drag explains [m/s^2].
+        """Return the push by the accelerometers beyond what a wrong drag explains [m/s^2].
 
-        Whatever the odometry says has no part in it: what brakes a drone is judged by the speed it must have flown.
+        Odometry has no part in it: the drag of a drone is judged by the speed that it must have flown.
         """
         push = air_m_s2 + self._rest_m_s2 + self.drag(self.flown_m_s)
         unexplained = push - clamp(push, self._gains.disturbance_m_s2)
@@ -182,7 +182,7 @@ class Axis:
         return mean
 
     def wish(self, wanted_m_s: float, outside_m_s2: float, dt_s: float) -> float:
-        """Return the acceleration to ask of the tilt [m/s^2], before it is limited."""
+        """Return the acceleration to command by tilt [m/s^2], before it is limited."""
         gains, step_s = self._gains, dt_s / _SUBSTEPS
         for _ in range(_SUBSTEPS):
             pull = gains.reference_rad_s**2 * (wanted_m_s - self.reference_m_s)
@@ -190,7 +190,7 @@ class Axis:
                 pull - 2 * gains.reference_damping * gains.reference_rad_s * self._reference_rate
             ) * step_s
             self.reference_m_s += self._reference_rate * step_s
-        # Until what is asked now shows, what was asked before brings so much speed, and so does what is outside.
+        # Until a new command takes effect, earlier commands and outside pushes cause this much speed.
         lag_s = 2 * gains.tilt_damping / gains.tilt_rad_s
         coming = sum(self._under_way) * dt_s + self._tilt * lag_s + self._tilt_rate / gains.tilt_rad_s**2
         coming += outside_m_s2 * (len(self._under_way) * dt_s + lag_s)
@@ -200,11 +200,11 @@ class Axis:
     def bounded(self, acceleration_m_s2: float, wanted_m_s: float, outside_m_s2: float, dt_s: float) -> float:
         """Return the permitted part of an acceleration: no more than the drag at the wanted speed.
 
-        What is asked makes a drone fly `flown_m_s` in the air around it, whatever speed is measured. It may exceed the
-        wanted speed by a little only, so that a measured speed of 0 does not wind up tilt.
+        Commands make a drone fly `flown_m_s` in the surrounding air, whatever speed is measured. That may exceed the
+        wanted speed only a little, so that a measured speed of 0 does not wind up tilt.
         """
         gains, wind, most_m_s2 = self._gains, self._wind_m_s2, self._gains.disturbance_m_s2
-        # The firmware may lean against the wind by itself: anything between none of it and all of it is left.
+        # The firmware may lean against the wind by itself: any share of the wind may be left.
         push = outside_m_s2 + self.drag(self.speed_m_s)
         if wind:
             push += _LEARN_WIND * (self.speed_m_s - self.flown_m_s)
@@ -212,7 +212,7 @@ class Axis:
         slower = -self.drag(self.flown_m_s) + push
         fastest = max(wanted_m_s, self.reference_m_s, 0.0) + gains.overshoot_m_s
         slowest = min(wanted_m_s, self.reference_m_s, 0.0) - gains.overshoot_m_s
-        # Towards the bound in about the time in which tilt answers, no sooner: a hard stop would swing.
+        # Towards the bound in about the time in which tilt answers, not sooner: a hard stop would oscillate.
         most = (fastest - self.flown_m_s) * gains.reference_rad_s - slower
         least = (slowest - self.flown_m_s) * gains.reference_rad_s - slower
         asked = min(max(acceleration_m_s2, least), most)
@@ -224,7 +224,7 @@ class Axis:
         self._under_way.append(acceleration_m_s2)
 
     def drag(self, speed_m_s: float) -> float:
-        """Return how the air brakes at a speed [m/s^2]."""
+        """Return the deceleration by the air at a speed [m/s^2]."""
         return speed_m_s * (self._gains.drag + self._gains.drag_per_m * math.fabs(speed_m_s))
 
 

@@ -14,13 +14,13 @@ from groundstation.bus.messages import Vector3
 from groundstation.geometry.stabilized_frame import STANDARD_GRAVITY_M_S2
 
 _LONGEST_STEP_S = 0.1
-# Time constant with which the speed of a drone that holds its place by itself is followed: its noise, and its braking.
+# Time constant for following the speed of a drone that holds its place by itself: it covers noise, and its braking.
 _HELD_S = 0.15
 
 
 @dataclass(frozen=True, slots=True)
 class AttitudeRequest:
-    """What to ask of the drone, FLU: pitch nose down (forward) and roll right side down [rad], climb, yaw rate ccw.
+    """A request to the drone, FLU: pitch nose down (forward) and roll right side down [rad], climb, yaw rate ccw.
 
     hover: let the drone hold its place by itself; the other fields are zero then.
     """
@@ -36,8 +36,9 @@ HOVER = AttitudeRequest(hover=True)
 
 
 class VelocityLoop:
-    """Follows the wanted velocity by a model of its response, on both horizontal axes; drag and wind are met as the
-    accelerometers show them. Climb and yaw rate are passed on within limits.
+    """Follows the wanted velocity by a model of its response, on both horizontal axes.
+
+    It compensates drag and wind by the accelerometers. Climb and yaw rate are passed on within limits.
     """
 
     def __init__(self, limits: ArDroneLimits, gains: Gains | None = None) -> None:
@@ -54,7 +55,7 @@ class VelocityLoop:
         return self._flying and any(axis.contradicted for axis in self._axes)
 
     def reset(self) -> None:
-        """Forget the motion, not the learned figures of the vehicle; for times without this loop."""
+        """Forget the motion, but not the learned figures of the vehicle; for times without this loop."""
         self._flying = False
         self._still_s = 0.0
         self._held_m_s: tuple[float, float] | None = None
@@ -86,9 +87,9 @@ class VelocityLoop:
     ) -> AttitudeRequest:
         """Return the attitude for a wanted velocity, given the true (scaled) one [base_stabilized, FLU].
 
-        measured_m_s: None while the drone does not see its motion: it is then integrated from what was asked and the
-        forces. force_m_s2: specific force forward and left [base], None when the drone does not tell. seen_m_s:
-        velocity forward and left that cameras see, None if they do not.
+        measured_m_s: None while the drone does not see its motion: it is then integrated from commands and forces.
+        force_m_s2: specific force forward and left [base], None if not reported. seen_m_s: velocity forward and left by
+        cameras, or None.
         """
         gains = self._gains
         dt_s = min(max(dt_s, 0.0), _LONGEST_STEP_S)
@@ -113,7 +114,7 @@ class VelocityLoop:
         """Return the attitude that stops a drone whose velocity is wrong, from its last correct speed.
 
         Its own hover is no brake then: the firmware stops by the same optical flow. seen_m_s: velocity forward and left
-        that cameras see; without it the error of that last speed stays. climb_m_s: meanwhile, within limits.
+        by cameras; without it the error of that last speed stays. climb_m_s: climb meanwhile, within limits.
         """
         dt_s = min(max(dt_s, 0.0), _LONGEST_STEP_S)
         if self.contradicted:
@@ -153,7 +154,7 @@ class VelocityLoop:
         if not self._flying:
             self._flying = True
             first: tuple[float, ...] = self._held_m_s or (0.0, 0.0)
-            if measured_m_s is not None:  # half of it is noise: the drone holds its place
+            if measured_m_s is not None:  # half of it is noise of a drone that holds its place
                 first = tuple(0.5 * v for v in measured_m_s)
             self._held_m_s = None
             for axis, speed in zip(axes, first, strict=False):

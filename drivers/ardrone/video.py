@@ -1,7 +1,7 @@
 """The AR.Drone 2's own video: PaVE frames with H.264 over TCP 5555 (`ardrone://ADDRESS`).
 
-It never sends anything: codec and channel are the flight driver's to choose, for two speakers of AT commands would
-fight over their sequence numbers.
+It sends nothing: the flight driver chooses codec and channel, because two senders of AT commands would conflict over
+sequence numbers.
 """
 
 from collections import Counter
@@ -23,7 +23,7 @@ _AVC = 4
 
 
 class Assembly:
-    """PaVE frames to access units: joins slices, sees gaps, and gives each its settled arrival. Pure."""
+    """Turns PaVE frames into access units: joins slices, detects gaps, and gives each its settled arrival. Pure."""
 
     def __init__(self) -> None:
         self._clock = SenderClock()
@@ -70,7 +70,7 @@ def _is_next(last: PaveFrame, frame: PaveFrame) -> bool:
 
 
 class ArDroneReader:
-    """Listens to the video of one drone."""
+    """Receives the video of one drone."""
 
     def __init__(self, address: tuple[str, int], interface: str = "") -> None:
         self._line = Line(*address, interface)

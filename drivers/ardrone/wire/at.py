@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from drivers.ardrone.wire.errors import WireError
 
-# WIRE: Parrot's codec throws a datagram of 1024 bytes or more away as a whole; stay well below.
+# WIRE: Parrot's codec discards a whole datagram of 1024 bytes or more; stay well below.
 MAX_DATAGRAM = 1000
 CODEC_LIMIT = 1024
 MAX_STRING = 127
@@ -222,8 +222,8 @@ _ARGUMENT = re.compile(rb',(?:(-?\d{1,10})|"([^"]{1,127})")')
 def decode_datagram(datagram: bytes, strict: bool = False) -> list[AtCommand]:
     """Return the commands a drone would obey; never raises.
 
-    WIRE: as Parrot's own codec does (docs/reference/ardrone.md 2.1): only CR ends a command, what is malformed, unknown
-    or has the wrong number of arguments is skipped up to the next CR, and a datagram of 1024 bytes or more is dropped
+    WIRE: as Parrot's own codec does (docs/reference/ardrone.md 2.1): only CR ends a command; a command that is
+    malformed, unknown or has the wrong number of arguments is skipped, and a datagram of 1024 bytes or more is dropped
     whole. A trailing comma is accepted unless strict: several clients that fly real drones send it.
     """
     if len(datagram) >= CODEC_LIMIT:

@@ -16,9 +16,9 @@ _HEAD = 4
 class OptionLayout(Generic[Value]):
     """One option's number, value type and wire format.
 
-    fields: one token per field of the value type in `struct` notation; a token with a count is a tuple field.
-    start: offset in the option, its 4-byte head included; beyond the head only newer firmwares have that part.
-    newer: only newer firmwares send it; exact: another size is another thing.
+    fields: one token per field of the value type in `struct` notation; a token with a count is a tuple field. start:
+    offset in the option, its 4-byte head included; if beyond the head, only newer firmwares have that part. newer: only
+    newer firmwares send it; exact: an option of another size is something else.
     """
 
     def __init__(
@@ -33,13 +33,13 @@ class OptionLayout(Generic[Value]):
     ) -> None:
         self.tag, self.number, self.start = tag, int(tag), start
         self._optional, self._exact = newer or exact or start > _HEAD, exact
-        # The counts fit by construction: what `_make` does without its check.
+        # The counts match by construction: this is `_make` without its check.
         self._make: Callable[[tuple[Any, ...]], Value] = partial(tuple.__new__, value_type)
         self._struct = struct.Struct("<" + fields.replace(" ", ""))
         counts = [1 if token.endswith("s") else int(token[:-1] or 1) for token in fields.split()]
         ends = [sum(counts[: i + 1]) for i in range(len(counts))]
         self._flat = len(counts) == ends[-1]
-        # One item would come bare: the end of the tuple, an empty slice, keeps it company.
+        # itemgetter of one item would return it bare: an empty slice at the end makes it a tuple.
         places = [slice(e - n, e) if n > 1 else e - n for e, n in zip(ends, counts, strict=True)]
         self._group: Callable[[tuple[Any, ...]], tuple[Any, ...]] = itemgetter(*places, slice(0, 0))
         self._skip = start - _HEAD

@@ -1,7 +1,7 @@
 """Navdata packets: header, options, checksum.
 
-Options are kept as raw payloads, so that encoding a decoded packet gives the same bytes; `Navdata.read` interprets the
-ones that are asked for. Unknown tags are skipped by their size.
+Options are kept as raw payloads, so that encoding a decoded packet gives the same bytes; `Navdata.read` decodes the
+requested ones. Unknown tags are skipped by their size.
 """
 
 import struct
@@ -44,7 +44,7 @@ class Navdata(NamedTuple):
         Raises WireError (option_size) when it is there but shorter than the layout.
         """
         options, number = self.options, layout.number
-        # A full packet holds all options from 0 on: nothing to search for.
+        # A full packet holds all options from 0 on, so no search is needed.
         if number < len(options) and options[number][0] == number:
             payload = options[number][1]
         else:
@@ -78,7 +78,7 @@ def decode(datagram: bytes, strict: bool = True) -> Navdata:
 
 
 class _Cut:
-    """How a packet was cut into options, to cut the next one of that length in one go, a third of the time.
+    """The division of a packet into options, by which the next one of that length is divided in a third of the time.
 
     Its fields are tag, size and payload of each option, then tag and size of the checksum.
     """
@@ -91,7 +91,7 @@ class _Cut:
         self.end = end
 
     def options(self, datagram: bytes) -> Options | None:
-        """Return the options of a packet, or None when it is cut otherwise."""
+        """Return the options of a packet, or None if it is divided differently."""
         fields = self._struct.unpack_from(datagram)
         if fields[0::3] != self.tags or fields[1::3] != self.sizes:
             return None

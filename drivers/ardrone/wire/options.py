@@ -1,7 +1,7 @@
 """Layouts of the navdata options of flight, and the table of all layouts.
 
-A layout covers the part of an option that all firmwares which send it share; what only newer ones append is a layout
-of its own, which reads as None where it is missing. Surplus is ignored on decode and zero on encode.
+A layout covers the part of an option common to all firmwares that send it; a part that only newer ones append has a
+layout of its own, which reads as None if missing. Surplus is ignored on decode and zero on encode.
 
 WIRE: offsets from the Parrot SDK 2.0.1 headers, units from recordings of real drones (docs/reference/ardrone.md 4.4).
 """

@@ -1,4 +1,4 @@
-"""PaVE frames of the AR.Drone 2's video stream (TCP 5555): written, and found again after damage.
+"""PaVE frames of the AR.Drone 2's video stream (TCP 5555): encoding, and resynchronisation after damage.
 
 WIRE (docs/reference/ardrone.md 6): headers have 64, 68 or 76 bytes; the payload begins where `header_size` says.
 """
@@ -52,9 +52,9 @@ class PaveFrame:
 
 
 def encode_frame(frame: PaveFrame, position: int = 0, header_size: int = HEADER_SIZE) -> bytes:
-    """Return a frame with its header of 64 bytes or more; position: bytes of the stream before it.
+    """Return a frame with its header of at least 64 bytes; position: bytes of the stream before it.
 
-    What a longer header holds beyond the described fields is sent as 0.
+    Undescribed fields of a longer header are sent as 0.
     """
     # WIRE: pictures are encoded in whole blocks of 16 pixels: 640x368 for the 640x360 that are shown.
     blocks = (-(-side // _BLOCK_PX) * _BLOCK_PX for side in (frame.width, frame.height))
@@ -112,7 +112,7 @@ class FrameReader:
         return frames
 
     def _interrupted(self, start: int) -> bool:
-        # A frame whose length is damaged would swallow those behind it: a sound header inside says that it ended.
+        # A frame with a damaged length would swallow those behind it: a sound header inside shows that it ended.
         place = self._buffer.find(SIGNATURE, max(start, self._looked - len(SIGNATURE)))
         while place >= 0 and len(self._buffer) - place >= HEADER_SIZE:
             try:

@@ -1,4 +1,4 @@
-"""Layouts of the options about pictures: flow, trackers, detected tags, video. WIRE: docs/reference/ardrone.md 4.4."""
+"""Layouts of the options about vision: flow, trackers, detected tags, video. WIRE: docs/reference/ardrone.md 4.4."""
 
 from typing import Any, NamedTuple
 
@@ -91,7 +91,7 @@ class VisionDetectPoses(NamedTuple):
 
 
 class VideoStream(NamedTuple):
-    """Encoder's last frame [bytes], and how the AT commands came in."""
+    """Encoder's last frame [bytes], and the arrival of AT commands."""
 
     quantizer: int = 0
     frame_bytes: int = 0

@@ -1,4 +1,4 @@
-"""A disarmed MAVLink vehicle says which one it is: it plays a tune."""
+"""Lets a disarmed MAVLink vehicle play a tune, to show which one it is."""
 
 import time
 
@@ -16,7 +16,7 @@ _TUNE = "MFT200L8O3CEGCEGCEGO4C"
 
 
 def blink(section: str, name: str) -> str:
-    """Let a vehicle play a tune; returns what to listen for. section: the driver's, as JSON.
+    """Let a vehicle play a tune; returns a description of it. section: the driver's, as JSON.
 
     Raises DriverError when it does not answer, or is armed.
     """

@@ -1,8 +1,8 @@
-"""What a decision of the watchdog means to PX4 and ArduPilot: modes, arming, take-off, setpoints, landing. Pure.
+"""Turns watchdog decisions into requests to PX4 and ArduPilot: modes, arming, take-off, setpoints, landing. Pure.
 
-Each setpoint of the tracker goes out once, at most setpoint_hz times a second. While hovering it is told to stand
-still: at the place where it comes to rest, as far as the tracker knows where it is, else by zero velocity. What sends
-is our own loop: when it stands still, nothing is sent and the vehicle's own time-out acts.
+Each setpoint of the tracker goes out once, at most setpoint_hz times a second. A hovering vehicle is told to hold the
+place where it comes to rest if the tracker knows that place, else to keep zero velocity. Our own loop sends: when it
+stands still, nothing is sent and the vehicle's own time-out acts.
 """
 
 from collections import deque
@@ -33,17 +33,17 @@ _STREAM_FIRST_NS = 1_200 * NS_PER_MS
 _CLIMB_LIMIT_NS = 8 * NS_PER_S
 _TAKEN_OVER_NS = 1_500 * NS_PER_MS
 _REGAIN_NS = 1_400 * NS_PER_MS
-# A text older than this explains nothing that happens now.
+# An older text explains no present event.
 _EXPLAINS_NS = 4 * NS_PER_S
 _STILL: Vector3 = (0.0, 0.0, 0.0)
-# The last of a climb is slower, so that it ends at the height asked for.
+# The end of a climb is slower, so that it stops at the requested height.
 _CLIMBED, _CLIMB_GAIN, _LEAST_CLIMB_M_S = 0.95, 1.2, 0.12
-# Slower than this a climb that HOLD ended is over; one that has just begun grows until the vehicle obeys.
+# Below this speed a climb that HOLD ended is over; one that has just begun speeds up until the vehicle obeys.
 _STOPPED_M_S, _OBEYS_NS = 0.1, 500 * NS_PER_MS
 
 
 class Orders:
-    """Keeps the requests to one vehicle. events: (severity, text) for the operator; said: (time, its STATUSTEXT)."""
+    """Makes the requests to one vehicle. events: (severity, text) for the operator; said: (time, its STATUSTEXT)."""
 
     def __init__(self, vehicle: VehicleSettings, flavour: Flavour, requests: Requests) -> None:
         self.events: deque[tuple[int, str]] = deque(maxlen=32)
@@ -64,11 +64,11 @@ class Orders:
         self._ordered_ns = -1
 
     def are_heeded(self, now_ns: int, custom_mode: int) -> bool:
-        """Return whether the vehicle flies by our setpoints, and not for a pilot or by itself."""
+        """Return whether the vehicle obeys our setpoints, not a pilot's or its own."""
         return custom_mode == self._guided and not self._taken_over and not self.climbs_by_itself(now_ns)
 
     def climbs_by_itself(self, now_ns: int) -> bool:
-        """Return whether the vehicle ends its take-off by itself, told nothing."""
+        """Return whether the vehicle ends its take-off by itself, without setpoints."""
         hovers = self._flavour is Flavour.ARDUPILOT and self._action is Action.HOVER
         return hovers and self._rises_to_take_off and now_ns < self._climb_until_ns
 
@@ -81,7 +81,7 @@ class Orders:
     def see(self, now_ns: int, good: EntityEstimate, reported_m_s: Vector3 | None) -> bool:
         """Take a good estimate and the velocity [base_stabilized] reported at that time; return whether both count.
 
-        While its motors turn on the floor they do: leaning against a velocity that it does not have it would slide off.
+        They count as soon as its motors turn on the floor: if it leaned against a false velocity it would slide off.
         """
         lifted = self.lift.lifted
         if not lifted:
@@ -95,7 +95,7 @@ class Orders:
         self, now_ns: int, decision: WatchdogDecision, base_mode: int, custom_mode: int, landed: int, height_m: float,
         climb_m_s: float = 0.0,
     ) -> SetPositionTargetLocalNed | None:  # fmt: skip
-        """Return the setpoint to send now, if any; commands are asked through the requests."""
+        """Return the setpoint to send now, if any; commands go through the requests."""
         armed, guided = bool(base_mode & ARMED), custom_mode == self._guided
         climbed_m = self._climbed(now_ns, landed, height_m, climb_m_s)
         action = decision.action
@@ -114,10 +114,11 @@ class Orders:
                 self._end_climb(now_ns, decision.mode, climb_m_s)
                 return self._hover(now_ns, guided, climbed_m)
             case Action.LAND:
-                # Its word may be wrong, that it lands already or has disarmed: it is told until it has once accepted.
+                # A report that it lands already or has disarmed may be wrong: it is commanded until it has once
+                # accepted.
                 if "landing" not in self._requests.accepted or (armed and custom_mode != self._landing):
                     self._ask(now_ns, "landing", MavCmd.NAV_LAND)
-                # Until it obeys it must not fly on with the last velocity.
+                # Until it obeys it must not fly on at the last velocity.
                 return self._stand(now_ns) if armed and guided else None
             case Action.CUT:
                 if armed:
@@ -143,18 +144,21 @@ class Orders:
 
     @property
     def _floor_m(self) -> float:
-        """Where the tracker had it when it stood [m; world]: its own origin is some centimetres above the floor."""
+        """Return the height at which the tracker had it standing [m.
+
+        World]: its own origin is some centimetres higher.
+        """
         return self.lift.stood[2] if self.lift.stood is not None else 0.0
 
     def _enter(self, now_ns: int, action: Action) -> None:
         self.drift.let_go()
-        # The first hover after a take-off goes on to the height that was asked for.
+        # The first hover after a take-off continues to the requested height.
         starts = action is Action.TAKE_OFF or (self._rises_to_take_off and action is Action.HOVER)
         self._rises_to_take_off, self._stops_climbing = starts, False
         if action is Action.TAKE_OFF:
             self.starting, self._climb_until_ns = True, now_ns + 2 * _CLIMB_LIMIT_NS
             self._started = self._taken_over = False
-            self._requests.accepted -= {"arming", "take-off"}  # once per start: a second one begins its spool-up anew
+            self._requests.accepted -= {"arming", "take-off"}  # once per start: a second request restarts its spool-up
             self._requests.drop("motor cut", "disarming", "landing")
         elif action is not Action.HOVER or self._action is not Action.TAKE_OFF:
             self.starting, self._climb_until_ns = False, 0
@@ -167,12 +171,12 @@ class Orders:
         self._action, self._since_ns = action, now_ns
 
     def _take_back(self, now_ns: int, ordered_ns: int) -> None:
-        """Ask for the mode once more, by an operator's TRACK or RESUME; setpoints that come again are no order."""
+        """Request the mode again on an operator's TRACK or RESUME; returning setpoints are no order."""
         self._ordered_ns, self._taken_over = ordered_ns, False
         self._guided_ns, self._regain_until_ns = now_ns, now_ns + _REGAIN_NS
 
     def _watch_mode(self, now_ns: int, action: Action, armed: bool, guided: bool, custom_mode: int) -> None:
-        # A mode that we did not ask for is a pilot's or the autopilot's own: it is not fought over.
+        # A mode that we did not request is a pilot's or the autopilot's own: we do not fight it.
         if guided or not armed or action not in (Action.FLY, Action.HOVER):
             self._guided_ns = now_ns
             self._regain_until_ns = 0 if guided else self._regain_until_ns
@@ -185,8 +189,8 @@ class Orders:
         self.events.append((MavSeverity.WARNING, text + self.last_said(now_ns)))
 
     def _watch_start(self, now_ns: int, armed: bool, guided: bool, custom_mode: int) -> None:
-        # Nobody but a pilot, a second ground station or the autopilot itself ends what has begun: asked once more, it
-        # would climb against their stop.
+        # Only a pilot, a second ground station or the autopilot itself ends what has begun: a second request would make
+        # it climb against their stop.
         if armed and (guided or "arming" in self._requests.accepted):
             self._started = True
         if self._started and not (armed and guided) and not self._taken_over:
@@ -237,7 +241,7 @@ class Orders:
             self._climb_until_ns = 0
         if self.climbs_by_itself(now_ns):
             return None
-        if now_ns < self._climb_until_ns:  # it has left the ground, and goes on to its take-off height
+        if now_ns < self._climb_until_ns:  # the vehicle has left the ground, and continues to its take-off height
             return self._climb(now_ns, climbed_m)
         if not guided:
             return None
@@ -261,7 +265,7 @@ class Orders:
         self._requests.ask(now_ns, key, command, *params)
 
     def _send(self, now_ns: int, velocity_m_s: Vector3, yaw_rate: float) -> SetPositionTargetLocalNed | None:
-        if not self._pace.is_due(now_ns):  # the tracker's 50 Hz must come out as an even 20
+        if not self._pace.is_due(now_ns):  # the tracker's 50 Hz must become an even 20
             return None
         vehicle = self._vehicle
         drift = self.drift.correction(now_ns)

@@ -1,7 +1,7 @@
 """Units and frames: MAVLink telemetry to bus messages, our velocities and poses to MAVLink messages.
 
 WIRE (docs/reference/mavlink.md 5.1): NED and FRD, yaw clockwise. Since the autopilot's heading comes from our estimate,
-its local NED is the world turned upside down about x: north = world x, east = -y, down = -z.
+its local NED is the world turned by 180 degrees about x: north = world x, east = -y, down = -z.
 """
 
 import math
@@ -29,11 +29,11 @@ from groundstation.geometry.stabilized_frame import STANDARD_GRAVITY_M_S2
 
 _M_S2_FROM_MG = STANDARD_GRAVITY_M_S2 / 1000
 _RAD_S_FROM_MRAD_S = 0.001
-# Beyond these nothing is a measurement of an indoor vehicle.
+# Values beyond these are no measurement of an indoor vehicle.
 _MOST_M_S, _MOST_RAD_S, _MOST_M_S2, _MOST_M = 30.0, 60.0, 400.0, 10_000.0
 _STILL_M_S = 0.15
 _IN_EMERGENCY, _POWEROFF = 6, 7  # MAV_STATE; 8 is FLIGHT_TERMINATION
-# An estimator may be reset once by the first position that it is fed; time_boot_ms wraps after 49 days.
+# An estimator may be reset once, by the first position that it is fed; time_boot_ms wraps after 49 days.
 LIMITS = PlausibilityLimits(speed_m_s=8.0, tilt_rad=math.radians(50.0), jump_m_s=0.6)
 
 
@@ -49,7 +49,7 @@ class BaseAttitude:
 
 @dataclass(frozen=True, slots=True)
 class VisionPose:
-    """What is believed of a vehicle [world, FLU]: position, heading, their variances, velocity, time [ns]."""
+    """The belief about a vehicle [world, FLU]: position, heading, their variances, velocity, time [ns]."""
 
     stamp_ns: int
     position_m: Vector3
@@ -59,7 +59,7 @@ class VisionPose:
 
 
 def _sane(what: str, limit: float, *values: float) -> None:
-    # Comparisons with a NaN are false: one test refuses it together with what is too large.
+    # Comparisons with NaN are false: one test rejects NaN together with values that are too large.
     if not all(-limit <= value <= limit for value in values):
         finite = all(map(math.isfinite, values))
         raise WireError("implausible" if finite else "not_finite", f"{what} {values}")
@@ -90,7 +90,7 @@ def velocity_from_local(message: LocalPositionNed, attitude: BaseAttitude) -> Ve
 def sample_from_local(
     stamp_ns: int, message: LocalPositionNed, attitude: BaseAttitude, inertial: tuple[float, ...]
 ) -> MotionSample:
-    """Return the input of the plausibility check of a velocity, in the axes of the message, where it can stand."""
+    """Return the input of a velocity's plausibility check, in the axes of the message, in which it may stand still."""
     tilt = (attitude.roll_rad, attitude.pitch_rad)
     return MotionSample(
         stamp_ns, (message.vx, -message.vy), *tilt, inertial, message.time_boot_ms * 1_000_000, attitude.yaw_rad
@@ -98,7 +98,7 @@ def sample_from_local(
 
 
 def position_from_local(message: LocalPositionNed) -> Vector3:
-    """Return the estimated position [m; the frame that we fed]: for the driver's own use, never to be fused."""
+    """Return the estimated position [m; the frame that we fed]: for the driver's own use only, never to be fused."""
     _sane("position", _MOST_M, message.x, message.y, message.z)
     return message.x, -message.y, -message.z
 
@@ -111,7 +111,7 @@ def imu_from_highres(message: HighresImu) -> tuple[Vector3, Vector3]:
 
 
 def imu_from_raw(message: RawImu) -> tuple[Vector3, Vector3]:
-    """Return the same of RAW_IMU, whose units are mrad/s and mG."""
+    """Return (rates [rad/s], specific force [m/s^2]) of RAW_IMU, whose units are mrad/s and mG."""
     g, a = _RAD_S_FROM_MRAD_S, _M_S2_FROM_MG
     rates = (message.xgyro * g, -message.ygyro * g, -message.zgyro * g)
     return rates, (message.xacc * a, -message.yacc * a, -message.zacc * a)
@@ -120,13 +120,14 @@ def imu_from_raw(message: RawImu) -> tuple[Vector3, Vector3]:
 def flight_state_from(flavour: Flavour, base_mode: int, custom_mode: int, status: int, landed: int) -> FlightState:
     """Return the vehicle's flight state. status: MAV_STATE; landed: MAV_LANDED_STATE.
 
-    In the air means FLYING, also while it still climbs to its take-off height: from there on cameras may see it.
+    A vehicle in the air is FLYING even while it climbs to its take-off height: from then on cameras may see it.
     """
     if not base_mode & ARMED:
         return FlightState.LANDED
     if status >= _POWEROFF:
         return FlightState.EMERGENCY
-    # WIRE (docs/reference/mavlink.md 5.2): one in an emergency lands by itself: it must not fall for that.
+    # WIRE (docs/reference/mavlink.md 5.2): a vehicle in an emergency lands by itself: its motors must not be cut for
+    # that.
     lands = custom_mode == land_mode(flavour) or status == _IN_EMERGENCY
     if landed == Landed.LANDING or (landed == Landed.IN_AIR and lands):
         return FlightState.LANDING
@@ -149,7 +150,7 @@ def setpoint_from_velocity(
 ) -> SetPositionTargetLocalNed:  # fmt: skip
     """Return the setpoint of a velocity [base_stabilized, FLU], clamped to the limits.
 
-    drift_m_s: what the vehicle's own velocity is off by, added beyond the limits: they are of the true velocity.
+    drift_m_s: error of the vehicle's own velocity, added beyond the limits, because they apply to the true velocity.
     """
     (forward, left, up), turn = limits.within(velocity_m_s, yaw_rate_rad_s)
     return SetPositionTargetLocalNed(
@@ -174,7 +175,7 @@ _TILT_VARIANCE = math.radians(3.0) ** 2
 
 
 def vision_from_pose(pose: VisionPose, attitude: BaseAttitude, resets: int) -> VisionPositionEstimate:
-    """Return the pose as both flavours take it; roll and pitch are the vehicle's own, they are not ours to say."""
+    """Return the pose in the form that both flavours accept; roll and pitch are the vehicle's own."""
     x, y, z = pose.position_m
     vx, vy, vz, vyaw = pose.variances
     return VisionPositionEstimate(
@@ -186,14 +187,14 @@ def vision_from_pose(pose: VisionPose, attitude: BaseAttitude, resets: int) -> V
     )  # fmt: skip
 
 
-# MAVSDK refuses NaN, so an unknown velocity is one with a variance that makes it worthless [m^2/s^2].
+# MAVSDK refuses NaN, so an unknown velocity gets a variance that makes it worthless [m^2/s^2].
 _UNKNOWN_VARIANCE = 1e4
 
 
 def odometry_from_pose(pose: VisionPose, attitude: BaseAttitude, resets: int) -> OdometryMessage:
-    """Return the pose as PX4 takes it best: frame NED, child body FRD; the velocity counts as unknown.
+    """Return the pose in the form best for PX4: frame NED, child body FRD; the velocity counts as unknown.
 
-    A velocity of ours would be the autopilot's own, late and scaled: it differentiates our positions itself.
+    Our velocity would be the autopilot's own, late and scaled; it differentiates our positions itself.
     """
     x, y, z = pose.position_m
     vx, vy, vz, vyaw = pose.variances

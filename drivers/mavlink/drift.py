@@ -1,8 +1,9 @@
-"""What an autopilot's word of its own velocity is off by, as the cameras see it; and a place held by the belief. Pure.
+"""Corrects an autopilot's velocity error as cameras see it, and holds places by the belief. Pure.
 
-An autopilot obeys a velocity by its own estimate: one that is wrong by 0.3 m/s flies off at that speed while it is told
-to stand still (docs/reference/mavlink.md 2.1). The tracker knows both, so what it is told is corrected. Nothing here
-moves a vehicle by itself: without the tracker's word the correction fades, and hovering is zero velocity again.
+An autopilot obeys a velocity by its own estimate: with an error of 0.3 m/s it flies off at that speed while told to
+stand still (docs/reference/mavlink.md 2.1). The tracker knows both velocities, so the commands are corrected. Nothing
+here moves a vehicle by itself: without the tracker's estimate the correction fades, and hovering is zero velocity
+again.
 """
 
 import math
@@ -10,48 +11,49 @@ import math
 from groundstation.bus.messages import EntityEstimate, Vector3
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
-# Velocities of the belief are noisy by 0.05 m/s.
+# Velocities of the belief have noise of 0.05 m/s.
 _SMOOTHING_S = 0.12
-# The belief learns of an error half a second late (sightings are late, and it takes some); one that grows with a tilt
-# has changed by then as much as it did lately.
+# The belief learns of an error half a second late (sightings are late, and it takes time to learn); an error that grows
+# with a tilt has changed by then as much as it did in that time before.
 _LATELY_S = 0.6
 # An error of the climb rate sways within a second or two (docs/reference/mavlink.md 2.1). Heights show it sooner than
 # the belief's own climb rate, which is mostly the autopilot's; sought faster than this, it would be their noise.
 _CLIMB_PER_S, _MOST_CLIMB_M_S = 6.0, 0.3
 _GAP_S, _HEIGHT_JUMP_M, _STEP_S = 0.3, 0.3, 0.1
-# A measured estimator's error of the velocity is the same for that long; then so much of it is another's each second
+# The measured velocity error of an estimator is constant for that long; then this share of it is replaced each second
 # (docs/reference/mavlink.md 2.1): 0.73 of it is left half a second after it was seen, 0.33 after a second.
 _LASTS_S, _FORGETS_S = 0.35, 0.6
 _FRESH_NS = 300 * NS_PER_MS
-# Sudden ones are no error of an estimator that still works: what is told is not corrected then, and the limits of the
-# control error act. A large one is corrected as far as this, which 7 degrees of tilt explain: a correction that ended
-# there would itself be a step of that size.
+# A sudden error is not that of a working estimator: commands are not corrected then, and the limits of the control
+# error act. A large one is corrected up to this, which 7 degrees of tilt explain: a correction that ended there would
+# itself be a step of that size.
 _MOST_M_S = 1.5
 _SUDDEN_M_S, _SUDDEN_M_S2 = 0.45, 0.8
 _TRUSTED_AGAIN_NS = NS_PER_S
-# Right after lift-off a large error begins at once (docs/reference/mavlink.md 2.1), and a second of it is half a metre.
+# Right after lift-off a large error begins at once (docs/reference/mavlink.md 2.1), and one second of it is half a
+# metre.
 _LIFT_OFF_NS = 3 * NS_PER_S
-# Up to here it does not matter whose word is wrong.
+# Up to this difference it does not matter which velocity is wrong.
 _SMALL_M_S = 0.2
-_RESPONSE_S = 0.6  # of a vehicle to a velocity
-_JUDGED_S = 0.5  # over which what it reports and what is seen are compared with what was told
-_EVEN_M_S = 0.1  # so near to each other they are equally good
+_RESPONSE_S = 0.6  # time constant of a vehicle's response to a velocity
+_JUDGED_S = 0.5  # window over which reported and seen velocities are compared with commands
+_EVEN_M_S = 0.1  # within this the two fit equally well
 _HOLD_GAIN, _HOLD_UP_GAIN = 0.8, 1.3  # [1/s], sideways and upwards
-# Below what the control error tolerates of a vehicle that is told to stand still.
+# Below the control error's tolerance for a vehicle that is told to stand still.
 _HOLD_M_S = 0.2
 _SEEN_S = 0.5
-# A vehicle that is told to stop has stopped once it is so slow over so long, two pictures at least, and after so long
-# at most: one that still moves then drifts.
+# A vehicle told to stop has stopped once it is this slow for this long, at least two pictures, and after this long at
+# most: one that still moves then drifts.
 _STOPPED_M_S, _PACE_NS, _STOPS_WITHIN_NS = 0.1, 500 * NS_PER_MS, NS_PER_S
 _STILL: Vector3 = (0.0, 0.0, 0.0)
 Vector2 = tuple[float, float]
 
 
 class Obedience:
-    """Whether a vehicle follows its commands by its own report, rather than by the cameras.
+    """Judges whether a vehicle follows its commands by its own reported velocity rather than by the cameras'.
 
-    An estimator that errs obeys by its own word. Where cameras see what was told, it is the report that is wrong, not
-    what the vehicle flies by.
+    A vehicle with a wrong estimator obeys by that estimate. If cameras see the commanded velocity, only the report is
+    wrong, not the estimate that the vehicle flies by.
     """
 
     def __init__(self) -> None:
@@ -65,7 +67,7 @@ class Obedience:
         self._expected, self._told_ns = _towards(self._expected, velocity, share), now_ns
 
     def hear(self, now_ns: int, reported: Vector2, seen: Vector2) -> bool:
-        """Take both words of its velocity; return whether its own is the one that it flies by."""
+        """Take its reported and its seen velocity; return whether it flies by the reported one."""
         share, self._heard_ns = _share(now_ns - self._heard_ns, _JUDGED_S), now_ns
         self._reported_off += share * (math.dist(reported, self._expected) - self._reported_off)
         self._seen_off += share * (math.dist(seen, self._expected) - self._seen_off)
@@ -73,14 +75,17 @@ class Obedience:
 
 
 class ClimbError:
-    """error_m_s: reported less true climb rate, by how the believed height leaves the sum of the reported rate."""
+    """The error of the climb rate, from the drift of believed height against the integrated reported rate.
+
+    error_m_s: reported less true climb rate.
+    """
 
     def __init__(self) -> None:
         self.error_m_s = 0.0
         self._height_m, self._at_ns = 0.0, 0
 
     def hear(self, now_ns: int, height_m: float, reported_m_s: float) -> None:
-        """Take a height [world] that cameras keep right, and the climb rate reported meanwhile."""
+        """Take a height [world] that cameras keep accurate, and the climb rate reported meanwhile."""
         elapsed_s, self._at_ns = (now_ns - self._at_ns) / NS_PER_S, now_ns
         expected_m = self._height_m + elapsed_s * (reported_m_s - self.error_m_s)
         off_m = height_m - expected_m
@@ -93,9 +98,9 @@ class ClimbError:
 
 
 class ComingToRest:
-    """The place to hold of a vehicle that may still move as its hover begins: where it comes to rest.
+    """Finds the place to hold of a vehicle that may still move as its hover begins: where it comes to rest.
 
-    Held where the hover began, it would fly back by the way that it took to stop.
+    If it held the place where the hover began, it would fly back by its stopping distance.
     """
 
     def __init__(self, now_ns: int, place: Vector3) -> None:
@@ -104,7 +109,7 @@ class ComingToRest:
         self._rests = False
 
     def place(self, now_ns: int, here: Vector3) -> Vector3:
-        """Return the place to hold: here, at the first height, until it rests."""
+        """Return the place to hold: the present one, at the first height, until it rests."""
         elapsed_ns = now_ns - self._at_ns
         if not self._rests and elapsed_ns >= _PACE_NS:
             slow = math.dist(here[:2], self._place[:2]) < _STOPPED_M_S * elapsed_ns / NS_PER_S
@@ -115,13 +120,13 @@ class ComingToRest:
 
 
 class DriftFeedback:
-    """Belief of one flying vehicle [world, FLU] beside the velocity that its autopilot reports."""
+    """Compares the belief of one flying vehicle [world, FLU] with the velocity that its autopilot reports."""
 
     def __init__(self) -> None:
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything: the vehicle is on the floor."""
+        """Forget everything, for a vehicle on the floor."""
         self._drift: Vector2 = (0.0, 0.0)
         self._lately: Vector2 = (0.0, 0.0)
         self._climb = ClimbError()
@@ -138,7 +143,7 @@ class DriftFeedback:
         self._coming: ComingToRest | None = None
 
     def stand(self, now_ns: int) -> None:
-        """Note that it has not lifted off yet: the error of its climb rate, which sways there, does not count."""
+        """Note that it has not lifted off yet: the error of its climb rate sways there, and does not count."""
         self._stands, self._stood_ns = True, now_ns
 
     def lift(self) -> None:
@@ -146,7 +151,7 @@ class DriftFeedback:
         self._stands = False
 
     def tell(self, now_ns: int, velocity_m_s: Vector3) -> None:
-        """Note the velocity [base_stabilized] that goes out, correction included."""
+        """Note the velocity [base_stabilized] that is sent, including the correction."""
         self._obedience.tell(now_ns, velocity_m_s[:2])
 
     def hear(self, now_ns: int, estimate: EntityEstimate, reported_m_s: Vector3) -> None:
@@ -154,7 +159,7 @@ class DriftFeedback:
         x, y, z, yaw = estimate.mean[:4]
         self._place, self._yaw_rad, self._believed_ns = (x, y, z), yaw, now_ns
         if estimate.age_s > _SEEN_S:
-            return  # dead reckoning by the very velocity that is asked about
+            return  # dead reckoning with the same velocity that is being judged
         self._seen_ns = now_ns - round(estimate.age_s * NS_PER_S)
         c, s = math.cos(yaw), math.sin(yaw)
         forward, left = reported_m_s[:2]
@@ -164,9 +169,9 @@ class DriftFeedback:
         self._correct(now_ns, (c * forward - s * left - vx, s * forward + c * left - vy))
 
     def see_place(self, now_ns: int, place: Vector3, yaw_rad: float) -> None:
-        """Take where a picture showed a vehicle whose velocity nobody knows: it holds its place by that.
+        """Take the place where a picture showed a vehicle of unknown velocity: it holds its place by that.
 
-        What its velocity erred by was learnt from one that was wrong already before that was noticed.
+        The learnt velocity error is dropped: it came from a velocity that was wrong already before that was noticed.
         """
         self._place, self._yaw_rad, self._believed_ns, self._at_ns = place, yaw_rad, now_ns, None
 
@@ -179,16 +184,16 @@ class DriftFeedback:
         self._at_ns = now_ns
 
     def drift(self, now_ns: int) -> Vector3:
-        """Return reported less true velocity [m/s; base_stabilized], as it was seen last."""
+        """Return reported less true velocity [m/s; base_stabilized], as last seen."""
         return self._corrected(now_ns, self._drift)
 
     def correction(self, now_ns: int) -> Vector3:
-        """Return what a commanded velocity lacks [m/s; base_stabilized]: the drift, and what it has become by now."""
+        """Return the correction of a commanded velocity [m/s; base_stabilized]: the drift, extrapolated to now."""
         x, y = (2.0 * seen - before for seen, before in zip(self._drift, self._lately, strict=True))
         return self._corrected(now_ns, (x, y))
 
     def _corrected(self, now_ns: int, drift: Vector2) -> Vector3:
-        """Return as much of a drift [world] as is believed and corrected [base_stabilized]."""
+        """Return the part of a drift [world] that is believed and corrected [base_stabilized]."""
         size = math.hypot(*self._drift)
         doubted = now_ns < self._doubted_until_ns or (size > _SMALL_M_S and not self._obeys)
         lifts_off = self._stood_ns is not None and now_ns - self._stood_ns <= _LIFT_OFF_NS
@@ -202,21 +207,21 @@ class DriftFeedback:
 
     @property
     def size_m_s(self) -> float:
-        """Return how far both words of its velocity were apart last [m/s], whether that is corrected or not."""
+        """Return the last difference between reported and seen velocity [m/s], whether corrected or not."""
         return math.hypot(*self._drift)
 
     def place(self, now_ns: int) -> Vector3 | None:
-        """Return where it is [world], or None without a fresh belief."""
+        """Return its place [world], or None without a fresh belief."""
         if self._believed_ns is None or now_ns - self._believed_ns > _FRESH_NS:
             return None
         return self._place
 
     def let_go(self) -> None:
-        """Hold no place any more: the next hover holds the one where it comes to rest."""
+        """Release the place: the next hover holds the one where the vehicle comes to rest."""
         self._held = self._coming = None
 
     def hold_at(self, place: Vector3) -> None:
-        """Hold a place [world] from now on, rather than the one where it comes to rest."""
+        """Hold a given place [world] from now on, rather than the one where it comes to rest."""
         self._held = place
 
     def hold(self, now_ns: int, height_m: float | None = None) -> Vector3:

@@ -22,17 +22,19 @@ from groundstation.errors import DriverError
 from groundstation.process.priority import go_first
 from groundstation.time_units import NS_PER_S
 
-# Of what is due by the clock: poses, questions, status. Orders do not wait for a turn.
+# Rate of work that is due by the clock: poses, requests, status. Orders do not wait for a turn.
 RATE_HZ = 100.0
-# How long one thread may keep the others from the interpreter: Python's own 5 ms is all the time a setpoint has.
-# MAVSDK has its own threads for every message: shorter turns would cost it a third more CPU.
+# How long one thread may keep the others from the interpreter: Python's default of 5 ms is a setpoint's whole budget.
 _SWITCH_S = {"pymavlink": 0.0005, "mavsdk": 0.005}
 _SAME_TEXT_NS = 10 * NS_PER_S
 _log = logging.getLogger(__name__)
 
 
 class Fleet:
-    """All vehicles of one link. Frames go to the vehicle of their system id; other ids are counted and named once."""
+    """All vehicles of one link. Frames go to the vehicle with their system id.
+
+    Other ids are counted, and named once.
+    """
 
     def __init__(self, child: HostProcess, settings: MavlinkDriverSettings) -> None:
         faults = frames.dialect_faults()
@@ -84,7 +86,7 @@ class Fleet:
                 self._news.append((text, "see system_id in the field file"))
 
     def turn(self, now_ns: int) -> None:
-        """Pass the tracker's estimate to the vehicles and their events to the operator."""
+        """Pass the tracker's estimate to the vehicles, and their events to the operator."""
         for received in self._estimates.drain():
             if isinstance(received.message, Estimate):
                 for vehicle in self.vehicles.values():
@@ -108,7 +110,7 @@ class Fleet:
         self._child.event(level, f"{name}: {text}", "", name)
 
     def close(self) -> None:
-        """Stop the reader and give the port back."""
+        """Stop the reader and close the port."""
         self._closing.set()
         self._reader.join(timeout=1.0)
         self.link.close()

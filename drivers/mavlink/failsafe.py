@@ -1,4 +1,4 @@
-"""What supervisor or guardian tell vehicles for a driver that died or hangs."""
+"""Datagrams that supervisor or guardian send to vehicles for a driver that died or hangs."""
 
 from collections.abc import Sequence
 
@@ -9,17 +9,17 @@ from drivers.mavlink.wire.names import MavCmd
 from drivers.mavlink.wire.verification import Signing
 from drivers.vehicle_settings import VehicleLimits
 
-# Its positions end with its driver: told to stand still it slides off ever faster (docs/reference/mavlink.md 2.1). By
-# itself it would land as soon: COM_OF_LOSS_T.
+# Its positions end with its driver: told to stand still it slides off ever faster (docs/reference/mavlink.md 2.1).
+# Without these datagrams it would land as soon: COM_OF_LOSS_T.
 HOVERS_S = 0.5
-# Those that ground stations have.
+# The ids that ground stations have.
 _SYSTEM, _COMPONENT = 255, 190
 
 
 def hover_and_land(systems: Sequence[int], *, signed: bool = False) -> tuple[bytes, bytes]:
-    """Return the datagrams that stop and that land the vehicles of a link; both are obeyed as often as repeated.
+    """Return the datagrams that stop and land the vehicles of a link; both may be repeated.
 
-    signed: with room for signatures, which whoever sends them makes (`wire/signature.py`).
+    signed: with room for signatures, which the sender makes (`wire/signature.py`).
     """
     encoder = FrameEncoder(_SYSTEM, _COMPONENT, Signing(bytes(32), 0) if signed else None)
     stop = [setpoint_from_velocity(system, 0, (0.0, 0.0, 0.0), 0.0, VehicleLimits()) for system in systems]

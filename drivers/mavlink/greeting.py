@@ -1,4 +1,4 @@
-"""The first word of a vehicle on an open link without another reader."""
+"""Waits for the first heartbeat of a vehicle on an open link without another reader."""
 
 import time
 

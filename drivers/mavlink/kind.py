@@ -120,7 +120,7 @@ def _vehicle(order: VehicleOrder) -> VehicleSettings:
 
 
 def _stop(orders: Sequence[VehicleOrder]) -> StopDatagrams:
-    # Only here: pymavlink's dialect takes its time to load.
+    # Only here: pymavlink's dialect is slow to load.
     from drivers.mavlink.failsafe import HOVERS_S, hover_and_land
 
     mavlink = _own(orders[0])
@@ -169,13 +169,13 @@ def _offer(flavour: str, title: str) -> Offer:
     return Offer(title, of_type, "    mavlink: {system_id: {id}}\n")
 
 
-# The error of a PX4's velocity changes by 0.09 m/s an axis in half a second, by 0.15 in one and by 0.19 in two
+# The error of a PX4's velocity changes by 0.09 m/s per axis in half a second, by 0.15 in one and by 0.19 in two
 # (docs/reference/mavlink.md 2.1).
 _HABITS = ErrorHabits(
     5.0, 10.0, 2.0, 0.05, 0.0, reports_climb=True, tells_attitude=True, flies_on_estimate=True, velocity_walk=0.15
 )
-# It flies on our position: it has no height of its own to report; its velocity follows our errors as slowly as its
-# filter does.
+# It flies on our estimate: it has no height of its own to report; its velocity follows our errors with its filter's
+# time constant.
 KIND = VehicleKind(
     name="mavlink",
     summary="vehicles with a PX4 or ArduPilot autopilot",

@@ -1,4 +1,4 @@
-"""The newest word of a MAVLink vehicle."""
+"""The newest telemetry of a MAVLink vehicle."""
 
 from dataclasses import dataclass
 
@@ -8,15 +8,17 @@ from drivers.mavlink.wire.names import ARMED, Landed
 from groundstation.bus.messages import Vector3
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
-# Longer than the time in which a vehicle whose motors stand is on the floor, and says so.
+# Longer than a vehicle with stopped motors takes to be on the floor and to report it.
 _FALLS_NS = 5 * NS_PER_S
 FRESH_NS = 300 * NS_PER_MS
 
 
 @dataclass(frozen=True, slots=True)
 class LatestTelemetry:
-    """What was told last; times 0: never. moved_ns, attitude_ns are of the last velocity and attitude, asked_ns of the
-    last question for our time; disarmed_ns: since when heartbeats say again that its motors stand."""
+    """The last reports; times 0: never. moved_ns, attitude_ns: of the last velocity and attitude.
+
+    asked_ns: of the last request for our time; disarmed_ns: since when heartbeats report again that its motors stand.
+    """
 
     heard_ns: int = 0
     moved_ns: int = 0
@@ -43,14 +45,14 @@ class LatestTelemetry:
         return now_ns - self.moved_ns < FRESH_NS
 
     def disarmed_aloft(self, now_ns: int, landed: int) -> bool:
-        """Return whether it says since a moment ago that its motors stand, and that it flies (MAV_LANDED_STATE).
+        """Return whether it recently reports both that its motors stand and that it flies (MAV_LANDED_STATE).
 
-        Both cannot be true for longer: its heartbeat may be another's, or old.
+        Both cannot be true for long: the heartbeat may be old, or another vehicle's.
         """
         if self.base_mode & ARMED or landed in (Landed.UNDEFINED, Landed.ON_GROUND):
             return False
         return self.disarmed_ns > 0 and now_ns - self.disarmed_ns < _FALLS_NS
 
     def attitude_at(self, now_ns: int) -> BaseAttitude | None:
-        """Return the attitude as it is by now; None: never told."""
+        """Return the attitude extrapolated to now; None: never reported."""
         return None if self.attitude is None else turned_on(self.attitude, now_ns - self.attitude_ns)

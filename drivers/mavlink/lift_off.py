@@ -1,29 +1,29 @@
-"""Whether a vehicle that says that it flies has left the floor yet, where it stood, and what its word is worth. Pure.
+"""Judges whether a vehicle that reports flight has left the floor, where it stood, and how far its reports count. Pure.
 
-WIRE (docs/reference/mavlink.md 2.1): PX4 says that it is in the air up to 3.5 s before it leaves the floor. What
-cameras see of its height decides, and its own word where they do not see it.
+WIRE (docs/reference/mavlink.md 2.1): PX4 reports flight up to 3.5 s before it leaves the floor. The height that cameras
+see decides, and its own reports where they do not see it.
 """
 
 from drivers.mavlink.wire.names import Landed
 from groundstation.bus.messages import Vector3
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
-# An estimator that is told that it stands on its pad shows little of its height, and its climb sooner.
+# An estimator that is fed the pad's position shows little of its height, and its climb sooner.
 _RISEN_M, _CLIMBING_M_S, _CLIMBING_NS = 0.1, 0.1, 300 * NS_PER_MS
-# Three times the error of a height that cameras see.
+# Three times the error of a height seen by cameras.
 _SEEN_RISEN_M = 0.1
-# While they do, its own word alone counts from a height on by which it is never wrong on the floor.
+# While cameras see it, its own report alone counts only beyond a height by which it is never wrong on the floor.
 _SEEN_NS, _SURELY_RISEN_M = 500 * NS_PER_MS, 0.4
-_STANDING = 25  # estimates whose mean is the place where it stands
-# It is asked for five times a second, and anew after 3 s without it (`session.py`).
+_STANDING = 25  # number of estimates whose mean is the place where it stands
+# It is requested five times a second, and anew after 3 s without it (`session.py`).
 _OLD_NS = 6 * NS_PER_S
 
 
 def credible(landed: int, age_ns: int, motors_flew: bool) -> int:
-    """Return what a vehicle's word about the floor (MAV_LANDED_STATE) is worth at its age.
+    """Return the MAV_LANDED_STATE to believe, given the reported one and its age.
 
-    motors_flew: it has lifted off, and its motors turn. ON_GROUND then says that it lands, which ends as it disarms:
-    its detector may err, and a vehicle in the air must not be taken for one that stands.
+    motors_flew: it has lifted off, and its motors turn. ON_GROUND then counts as landing, until it disarms: its
+    detector may err, and a vehicle in the air must not be taken for a standing one.
     """
     if age_ns > _OLD_NS:
         return Landed.UNDEFINED
@@ -31,9 +31,9 @@ def credible(landed: int, age_ns: int, motors_flew: bool) -> int:
 
 
 class LiftOff:
-    """lifted: it is off the floor. A vehicle that was not asked to take off flies when it says so.
+    """lifted: it is off the floor. A vehicle that was not ordered to take off flies when it reports so.
 
-    stood: where the tracker had it before it lifted off [world], None if it was not seen then.
+    stood: its place by the tracker before it lifted off [world], None if it was not seen then.
     """
 
     def __init__(self) -> None:
@@ -45,7 +45,7 @@ class LiftOff:
         self._climbing_since_ns: int | None = None
 
     def see(self, now_ns: int, place: Vector3, age_s: float) -> None:
-        """Take where the tracker has it [world], while it has not lifted; age_s: of what cameras saw of it last."""
+        """Take its place by the tracker [world] while it has not lifted; age_s: of the last sighting."""
         if age_s * NS_PER_S < _SEEN_NS:
             self._seen_ns = now_ns
         stood = self.stood or place
@@ -57,7 +57,7 @@ class LiftOff:
         self.lifted = self.lifted or place[2] - stood[2] >= _SEEN_RISEN_M
 
     def hear(self, now_ns: int, starting: bool, landed: int, height_m: float, climb_m_s: float) -> float:
-        """Take its own words, and whether it was asked to take off; return its height above the floor [m]."""
+        """Take its reports, and whether it was ordered to take off; return its height above the floor [m]."""
         if landed == Landed.ON_GROUND or self._floor_m is None:
             self._floor_m = height_m
         risen_m = height_m - self._floor_m
@@ -71,7 +71,7 @@ class LiftOff:
         elif self._climbing_since_ns is None:
             self._climbing_since_ns = now_ns
         climbs = self._climbing_since_ns is not None and now_ns - self._climbing_since_ns >= _CLIMBING_NS
-        stood = self._places == _STANDING  # else they have only seen it rise
+        stood = self._places == _STANDING  # else cameras have only seen it rise
         if stood and self._seen_ns is not None and now_ns - self._seen_ns < _SEEN_NS:
             says = risen_m >= _SURELY_RISEN_M  # its climb rate errs by 0.15 m/s for seconds where it stands
         else:

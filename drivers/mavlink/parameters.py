@@ -10,7 +10,7 @@ from drivers.mavlink.wire.names import Flavour
 from drivers.mavlink.wire.parameters import INT32, REAL32
 
 Version = tuple[int, int]
-# Releases whose parameters were compared with the tables below: the first and the last of each flavour.
+# Releases whose parameters were compared with the tables below: first and last of each flavour.
 _CHECKED: dict[Flavour, tuple[Version, Version]] = {
     Flavour.PX4: ((1, 16), (1, 16)),
     Flavour.ARDUPILOT: ((4, 6), (4, 6)),
@@ -21,9 +21,8 @@ _CHECKED: dict[Flavour, tuple[Version, Version]] = {
 class Needed:
     """One parameter: the value that `setup` writes, its type on the wire, and its purpose.
 
-    accepted: lowest and highest value that will do as well; others: single values that will do; flown: a wider range,
-    which `setup` changes and the operator is told of, but with which it may take off; aliases: its names in other
-    releases.
+    accepted: lowest and highest value that are acceptable too; others: acceptable single values; flown: a wider range
+    that permits a take-off, but that `setup` changes and the operator is told of; aliases: its names in other releases.
     """
 
     name: str
@@ -41,7 +40,7 @@ class Needed:
         return (self.name, *self.aliases)
 
     def takes(self, value: float) -> bool:
-        """Return whether a value will do."""
+        """Return whether a value is acceptable."""
         in_range = _lies_in(self.accepted or (self.value, self.value), value)
         return in_range or any(_lies_in((other, other), value) for other in self.others)
 
@@ -129,7 +128,7 @@ def _overridden(wanted: Iterable[Needed], overrides: Mapping[str, float]) -> tup
 
 
 def overridden(flavour: Flavour, overrides: Mapping[str, float]) -> str:
-    """Return the warning for parameters that the field file has otherwise than indoor flight needs them, or ""."""
+    """Return the warning for parameters that the field file sets against the needs of indoor flight, or ""."""
     usual = {name: need for need in needed(flavour, 0) for name in need.names}
     bold = [
         f"{n} {v:.7g} instead of {usual[n].wish}" for n, v in overrides.items() if n in usual and not usual[n].takes(v)
@@ -149,7 +148,7 @@ def is_checked(flavour: Flavour, version: Version | None) -> bool:
 
 
 def difference(wanted: Needed, found: Mapping[str, float]) -> str:
-    """Return what one parameter differs by, or ""; found: by name or alias."""
+    """Return the difference of one parameter in words, or ""; found: by name or alias."""
     name = next((n for n in wanted.names if n in found), None)
     if name is None:
         return f"{wanted.name} is missing, needs {wanted.wish} ({wanted.reason})"

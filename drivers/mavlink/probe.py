@@ -23,7 +23,7 @@ _HEARTBEAT_S = 0.5
 
 @dataclass(slots=True)
 class Found:
-    """What one vehicle said of itself."""
+    """The reports of one vehicle about itself."""
 
     system: int
     autopilot: int
@@ -47,7 +47,7 @@ class Found:
 def probe(link: MavlinkLink, seconds: float, greet: tuple[int, ...] = (0,)) -> dict[int, Found]:
     """Return the vehicles that answer within some seconds, by system id; nothing is changed on them.
 
-    greet: systems to speak to first, where the link has to.
+    greet: systems to address first, if the link must.
     """
     found: dict[int, Found] = {}
     deadline, next_s = time.monotonic() + seconds, 0.0

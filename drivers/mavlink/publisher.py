@@ -1,8 +1,8 @@
-"""Odometry and IMU samples of one vehicle on the bus.
+"""Publishes odometry and IMU samples of one vehicle.
 
-The autopilot's position, height and heading are our own estimate come back, and are never published. Its velocity is
-partly ours: it goes out with an inflated covariance, more so where the autopilot or the cameras doubt it. Its heading
-is replaced by what its gyros say, whose increments are its own measurement (docs/explanation/estimation.md 8).
+The autopilot's position, height and heading are our own estimate sent back, and are never published. Its velocity is
+partly ours: it is published with an inflated covariance, more so if the autopilot or the cameras doubt it. Its heading
+is replaced by integrated gyro rates, whose increments are its own measurement (docs/explanation/estimation.md 8).
 """
 
 from drivers.mavlink.convert import BaseAttitude, attitude_quaternion
@@ -40,7 +40,7 @@ class GyroHeading:
         self._stamp_ns, self._rate_rad_s = stamp_ns, rate
 
     def at(self, stamp_ns: int) -> float:
-        """Return the heading a little after the last sample [rad]."""
+        """Return the heading, shortly after the last sample [rad]."""
         if self._stamp_ns is None:
             return self.yaw_rad
         return wrap(self.yaw_rad + lasting_s(stamp_ns - self._stamp_ns) * self._rate_rad_s)

@@ -1,4 +1,4 @@
-"""Why a vehicle may not take off yet, by what it has told."""
+"""Finds why a vehicle may not take off yet, from its reports."""
 
 from drivers.mavlink.latest_telemetry import LatestTelemetry
 from drivers.mavlink.requests import Requests
@@ -8,20 +8,20 @@ from drivers.mavlink.texts import Texts
 from drivers.mavlink.wire.names import EkfFlag, Flavour, SensorBits
 from groundstation.time_units import NS_PER_S
 
-# ArduPilot repeats what keeps it from arming every 30 s.
+# ArduPilot repeats its reasons against arming every 30 s.
 _COMPLAINTS_NS = 35 * NS_PER_S
 _FAULTS = SensorBits.GYRO | SensorBits.ACCELEROMETER
 
 
 class Readiness:
-    """Of one vehicle, with its session, pending requests, and texts."""
+    """Readiness of one vehicle, from its session, pending requests, and texts."""
 
     def __init__(self, flavour: Flavour, session: MavlinkSession, requests: Requests, said: Texts) -> None:
         self._flavour, self._session, self._requests, self._said = flavour, session, requests, said
         self._settling = Settling()
 
     def why_not(self, now_ns: int, known: LatestTelemetry) -> str:
-        """Return what keeps it from taking off, in words, or ""."""
+        """Return what prevents its take-off, in words, or ""."""
         detail = self._session.detail(self._requests)
         if detail:
             return detail

@@ -1,4 +1,4 @@
-"""Acknowledged requests to one vehicle, repeated until answered, with the answers. Pure."""
+"""Requests to one vehicle, repeated until acknowledged, with their answers. Pure."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -21,9 +21,9 @@ class _Open:
 
 
 class Requests:
-    """What was asked, by key. `ask` is called as often as the wish stands; it repeats nothing that is under way.
+    """Requests by key. Call `ask` as long as the wish stands; it repeats no request in progress.
 
-    failures: what the vehicle refused or never answered, for the operator; drained by the driver.
+    failures: requests refused or never answered, for the operator; drained by the driver.
     """
 
     def __init__(self, system: int) -> None:
@@ -34,18 +34,18 @@ class Requests:
         self.failures: deque[str] = deque(maxlen=16)
 
     def ask(self, now_ns: int, key: str, command: MavCmd, *params: float) -> None:
-        """Wish for a command; nothing happens while it is under way, or was answered within the last second."""
+        """Request a command; does nothing while it is in progress, or was answered within the last second."""
         if key in self._open or now_ns < self._quiet_until_ns.get(key, 0):
             return
         self._open[key] = _Open(command_to(self._system, command, *params), now_ns)
 
     def drop(self, *keys: str) -> None:
-        """Give up wishes: a landing must not be followed by a late order to climb."""
+        """Drop requests: a landing must not be followed by a late order to climb."""
         for key in keys:
             self._open.pop(key, None)
 
     def forget(self) -> None:
-        """Begin anew: the vehicle was restarted."""
+        """Begin anew, for a restarted vehicle."""
         self._open.clear()
         self._quiet_until_ns.clear()
         self.accepted.clear()
@@ -72,7 +72,7 @@ class Requests:
             return
         key, request = sent[0], self._open[sent[0]]
         if ack.result == MavResult.IN_PROGRESS:
-            # It was heard: none of its tries was in vain. It is said again all the same, for it may be a stop.
+            # It was heard, so no try failed. It is sent again all the same, for it may be a stop.
             request.due_ns, request.tries = now_ns + _RETRY_NS, 1
             return
         del self._open[key]

@@ -1,4 +1,4 @@
-"""What a second ground station may say to a vehicle: questions and stops, nothing that flies it. Pure."""
+"""Decides what a second ground station may send to a vehicle: queries and stops, nothing that flies it. Pure."""
 
 import math
 from collections.abc import Collection
@@ -19,7 +19,7 @@ from drivers.mavlink.wire.names import (
 
 
 class Passage(Enum):
-    """STOP: pass, at once and always; PASS: pass, if there is room; REFUSE: with an answer; DROP: in silence."""
+    """STOP: pass at once and always; PASS: pass if there is room; REFUSE: with an answer; DROP: silently."""
 
     STOP = "stop"
     PASS = "pass"
@@ -27,7 +27,7 @@ class Passage(Enum):
     DROP = "drop"
 
 
-# Modes in which a vehicle stops by itself: stands, lands, or is a pilot's to hold.
+# Modes in which a vehicle stops by itself: it stands, lands, or is held by a pilot.
 _STOPPED: dict[Flavour, dict[int, str]] = {
     Flavour.PX4: {
         px4_mode(Px4Main.AUTO, Px4Auto.HOLD): "HOLD",
@@ -42,7 +42,7 @@ _CHANGE_MODE = 1.0
 _QUESTIONS = frozenset((MavCmd.REQUEST_MESSAGE, MavCmd.REQUEST_PROTOCOL_VERSION, MavCmd.REQUEST_AUTOPILOT_CAPABILITIES))
 # WIRE (docs/reference/mavlink.md 5.11): values of `current` by which an ArduPilot flies there, or climbs, at once.
 _FLOWN_TO = (2, 3)
-# Kinds of messages by what the field file may allow besides.
+# Kinds of messages that the field file may allow in addition.
 _BY_SETTING = {
     "parameters": frozenset(number for name, number in IDS.items() if name.startswith(("PARAM_REQUEST", "PARAM_SET"))),
     "missions": frozenset(number for name, number in IDS.items() if name.startswith("MISSION_")),
@@ -51,7 +51,7 @@ _JUDGED = frozenset(IDS[name] for name in ("COMMAND_LONG", "COMMAND_INT", "SET_M
 
 
 def may_pass(number: int, allowed: Collection[str] = ()) -> bool:
-    """Return whether a frame of this kind can be more than dropped, so that it is worth to be verified."""
+    """Return whether a frame of this kind might not be dropped, so that it is worth verifying."""
     return number in _JUDGED or _is_allowed(number, allowed)
 
 
@@ -62,9 +62,9 @@ def _is_allowed(number: int, allowed: Collection[str]) -> bool:
 def passage_of(
     number: int, message: Message | None, system: int, flavour: Flavour, allowed: Collection[str] = ()
 ) -> Passage:
-    """Return what becomes of a verified frame of a second ground station.
+    """Return how to treat a verified frame of a second ground station.
 
-    number: of its kind; message: None where its content is not known; system: the vehicle; allowed: "parameters",
+    number: of its kind; message: None if its content is unknown; system: the vehicle; allowed: "parameters",
     "missions".
     """
     match message:
@@ -77,7 +77,8 @@ def passage_of(
             return Passage.REFUSE
         case service.FileTransferProtocol() if message.target_system == system:
             return Passage.REFUSE
-    # WIRE (docs/reference/mavlink.md 5.11): its heartbeat would hide the loss of ours, its clock upset the vehicle's.
+    # WIRE (docs/reference/mavlink.md 5.11): its heartbeat would hide the loss of ours, and its clock would disturb the
+    # vehicle's.
     return Passage.PASS if _is_allowed(number, allowed) else Passage.DROP
 
 
@@ -99,7 +100,7 @@ def _of_command(message: flight.CommandLong | flight.CommandInt, flavour: Flavou
 
 
 def _mode_of(message: flight.CommandLong | flight.CommandInt, flavour: Flavour) -> int:
-    """Return the custom mode that a DO_SET_MODE asks for, -1 for a value that is none."""
+    """Return the custom mode requested by a DO_SET_MODE, -1 if invalid."""
     base, main, sub = message.param1, message.param2, message.param3
     if not (0 <= base < 256 and 0 <= main < 256 and 0 <= sub < 256):
         return -1
@@ -113,7 +114,7 @@ def _mode_of(message: flight.CommandLong | flight.CommandInt, flavour: Flavour) 
 def _goes_nowhere(message: flight.CommandLong | flight.CommandInt) -> bool:
     """Return whether a DO_REPOSITION names no place, height or heading.
 
-    WIRE (docs/reference/mavlink.md 5.11): so QGroundControl's Pause of a PX4, which then holds where it comes to rest.
+    WIRE (docs/reference/mavlink.md 5.11): QGroundControl pauses a PX4 by this; it then holds where it comes to rest.
     """
     if not isinstance(message, flight.CommandLong) or message.param2 != _CHANGE_MODE:
         return False
@@ -121,10 +122,10 @@ def _goes_nowhere(message: flight.CommandLong | flight.CommandInt) -> bool:
 
 
 def made_good(message: Message, system: int, flavour: Flavour) -> Message | None:
-    """Return what has to follow a stop so that its vehicle is seen to have stopped, None for nothing.
+    """Return the message that must follow a stop so that we notice it, or None.
 
     WIRE (docs/reference/mavlink.md 5.11): an ArduPilot that is paused stays in GUIDED, deaf to velocities until the
-    mode is entered anew: nothing would tell us, and no RESUME of ours would end it.
+    mode is entered anew: we would not know, and no RESUME of ours would end it.
     """
     pauses = isinstance(message, flight.CommandLong | flight.CommandInt) and message.command == MavCmd.DO_PAUSE_CONTINUE
     if flavour is not Flavour.ARDUPILOT or not pauses:

@@ -1,8 +1,9 @@
-"""From silence to full telemetry: streams asked for, origin set, parameters checked. Pure.
+"""Brings a vehicle from silence to full telemetry: requests streams, sets the origin, checks parameters. Pure.
 
 WIRE (docs/reference/mavlink.md 1): ArduPilot streams nothing but heartbeats unless asked, one interval at a time; the
-origin is ignored until its estimator runs, so it is repeated until GPS_GLOBAL_ORIGIN comes back. One that is set is
-neither changed nor told: it is asked for as well. PX4 flies indoors without: nothing waits for its answer.
+origin is ignored until its estimator runs, so it is repeated until GPS_GLOBAL_ORIGIN comes back. An origin that is
+already set is neither changed nor reported, so it is requested as well. PX4 flies indoors without one: nothing waits
+for its answer.
 """
 
 from collections import Counter, deque
@@ -20,10 +21,11 @@ from groundstation.time_units import NEVER_NS, NS_PER_MS, NS_PER_S
 
 _ORIGIN_PERIOD_NS = 3 * NS_PER_S
 _PARAM_PERIOD_NS = 500 * NS_PER_MS
-# Eight of them in the 2 s after which an ArduPilot lands without: on a link that loses every fifth some always arrive.
+# Eight of them in the 2 s after which an ArduPilot without them lands: on a link that loses every fifth, some always
+# arrive.
 _HEARTBEAT_NS = 250 * NS_PER_MS
 _DISCONNECTED_NS = 2 * NS_PER_S
-# How long a stream may stay away, at least, before it is asked for anew; in periods of its own.
+# Least time without a stream before it is requested again, in periods of its own.
 _STREAM_NS, _PERIODS = 3 * NS_PER_S, 5
 _PARAM_BURST = 4
 _PARAM_TRIES = 20
@@ -31,12 +33,12 @@ _ORIGIN_TRIES_PX4 = 5
 _STOPPED = 0.0
 _CHECKED_WITH = "PX4 1.16 or ArduCopter 4.6"
 _VERSION_PERIOD_NS, _VERSION_TRIES = NS_PER_S, 5
-# After so many questions without an answer a parameter is asked for by its other names as well.
+# After this many unanswered requests a parameter is also requested by its other names.
 _ALIAS_AFTER = 3
 
 
 def streams(flavour: Flavour, odometry_hz: float, imu_hz: float) -> dict[type[Message], float]:
-    """Return the messages to request and their rates [Hz]; `_STOPPED` for unused ones that are sent unasked."""
+    """Return the messages to request and their rates [Hz]; `_STOPPED` for unused ones that come unrequested."""
     imu = telemetry.HighresImu if flavour is Flavour.PX4 else telemetry.RawImu
     wanted: dict[type[Message], float] = {
         telemetry.ExtendedSysState: 5.0,
@@ -50,18 +52,18 @@ def streams(flavour: Flavour, odometry_hz: float, imu_hz: float) -> dict[type[Me
     if flavour is Flavour.ARDUPILOT:
         wanted[telemetry.EkfStatusReport] = 5.0
     else:
-        # WIRE (docs/reference/mavlink.md 2): unasked, PX4 sends 100 and 30 of these a second; of the latter only its
-        # covariances are of use. Its ESTIMATOR_STATUS comes unasked.
+        # WIRE (docs/reference/mavlink.md 2): unrequested, PX4 sends 100 and 30 of these a second; of the latter only
+        # the covariances are of use. Its ESTIMATOR_STATUS comes unrequested.
         wanted |= {telemetry.Attitude: _STOPPED, OdometryMessage: 5.0}
     return wanted
 
 
 class MavlinkSession:
-    """What one vehicle still has to be asked; starts over when it was silent for 2 s, or its clock began anew.
+    """The requests still to be made of one vehicle; starts over when it was silent for 2 s, or its clock began anew.
 
-    problems: parameters that forbid a take-off. detail: what is waited for, or "". notes: for the operator; drained by
-    the driver. overrides: parameters as the field file has them. pinned: the serial number of the only vehicle that
-    may take off, "" for any.
+    problems: parameters that forbid a take-off. detail: the awaited step, or "". notes: for the operator; drained by
+    the driver. overrides: parameters set by the field file. pinned: the serial number of the only vehicle that may take
+    off, "" for any.
     """
 
     def __init__(
@@ -84,7 +86,7 @@ class MavlinkSession:
         self._asked: set[str] = set()
         self._doubted: set[str] = set()
         self._param_tries: Counter[str] = Counter()
-        self._stream_ns: dict[type[Message], int] = {}  # when it came last, or was asked for
+        self._stream_ns: dict[type[Message], int] = {}  # time of its last arrival or request
         self._has_origin = False
         self._origin_tries = 0
         self._next_origin_ns = self._next_param_ns = self._next_heartbeat_ns = 0
@@ -96,11 +98,11 @@ class MavlinkSession:
 
     @property
     def unread(self) -> list[str]:
-        """Return the parameters that were not read yet."""
+        """Return the parameters that have not been read yet."""
         return self._compared()[1]
 
     def _compared(self) -> tuple[list[str], list[str]]:
-        if self._comparison is None:  # asked at each turn, changed by a value only
+        if self._comparison is None:  # read at each turn, changed only by a value
             found = self._found
             read = [n for n in self._needed if not found.keys().isdisjoint(n.names)]
             faults = [text for n in read if (text := parameters.fault(n, found))]
@@ -109,7 +111,7 @@ class MavlinkSession:
 
     @property
     def unchecked(self) -> list[str]:
-        """Return the parameters that a firmware of another version does not have: nothing waits for those."""
+        """Return the parameters missing in a firmware of another version: nothing waits for those."""
         known = self._version is not None or self._version_tries >= _VERSION_TRIES
         if not known or parameters.is_checked(self._flavour, self._version):
             return []
@@ -139,12 +141,12 @@ class MavlinkSession:
         return f"it does not know parameter {name}: is its firmware {_CHECKED_WITH}?"
 
     def hear(self, now_ns: int, kind: type[Message]) -> None:
-        """Note that a message of a kind came; from the reader's thread."""
+        """Note that a message of a kind arrived; called on the reader's thread."""
         if kind in self._rates:
             self._stream_ns[kind] = now_ns
 
     def start_over(self, requests: Requests) -> None:
-        """Forget what was asked and told: the vehicle was silent, or was restarted."""
+        """Forget requests and answers, for a vehicle that was silent or restarted."""
         if not self._connected:
             return
         self._connected, self._has_origin, self._origin_tries = False, False, 0
@@ -163,14 +165,14 @@ class MavlinkSession:
             self._note_doubtful(self._by_name[message.param_id], {message.param_id: value})
 
     def _note_doubtful(self, wanted: parameters.Needed, found: dict[str, float]) -> None:
-        """Tell once of a value with which it flies, though not as well as it could."""
+        """Report once a value that permits flight but is not the best."""
         text = parameters.difference(wanted, found)
         if text and not parameters.fault(wanted, found) and wanted.name not in self._doubted:
             self._doubted.add(wanted.name)
             self.notes.append(f"parameter {text}: groundstation mavlink setup --apply")
 
     def hear_version(self, flight_sw_version: int, serial_number: str = "") -> None:
-        """Take its number and the version of its firmware; a new one of which nothing is known is noted."""
+        """Take its serial number and firmware version; an unchecked version is noted."""
         self._serial_number = serial_number
         version = parameters.version_of(flight_sw_version)
         if version != self._version and not parameters.is_checked(self._flavour, version):
@@ -180,7 +182,7 @@ class MavlinkSession:
 
     @property
     def firmware(self) -> str:
-        """Return whose firmware it runs and its version, "" while it has not said."""
+        """Return its firmware and version, "" while unknown."""
         if self._version is None:
             return ""
         name = "PX4" if self._flavour is Flavour.PX4 else "ArduPilot"
@@ -209,7 +211,7 @@ class MavlinkSession:
         return messages + self._service(now_ns)
 
     def _ended(self, now_ns: int) -> type[Message] | None:
-        """Return a stream that was granted and does not come: it may have been meant by nobody, or taken back."""
+        """Return a stream that was granted but does not come: the grant was meant for others, or withdrawn."""
         for kind, rate_hz in self._rates.items():
             patience_ns = max(_STREAM_NS, round(_PERIODS * NS_PER_S / rate_hz)) if rate_hz > 0.0 else NEVER_NS
             if now_ns - self._stream_ns.get(kind, now_ns) > patience_ns:
@@ -227,7 +229,7 @@ class MavlinkSession:
         unread = [name for name in self.unread if name not in self.unchecked]
         if unread and (now_ns >= self._next_param_ns or self._asked.isdisjoint(unread)):
             self._next_param_ns = now_ns + _PARAM_PERIOD_NS
-            # A burst at a time, so that a slow radio is not flooded; answers bring the next one forward.
+            # A burst at a time, so that a slow radio is not flooded; answers trigger the next one.
             burst = sorted(unread, key=self._param_tries.__getitem__)[:_PARAM_BURST]
             messages += [
                 service.ParamRequestRead(self._system, AUTOPILOT_COMPONENT, self._asked_as(name), -1) for name in burst
@@ -255,7 +257,7 @@ class MavlinkSession:
         o = self._origin
         place = (round(o.latitude_deg * 1e7), round(o.longitude_deg * 1e7), round(o.altitude_m * 1000))
         asked = float(id_of(telemetry.GpsGlobalOrigin))
-        # Not through the requests: "denied" here means "none yet", which is no news for the operator.
+        # Not through the requests: "denied" here means "none yet", which is no news.
         return [
             service.SetGpsGlobalOrigin(self._system, *place),
             command_to(self._system, MavCmd.REQUEST_MESSAGE, asked),

@@ -100,7 +100,7 @@ class VehicleSettings(DriverSection):
     limits: VehicleLimits = VehicleLimits()
     take_off_m: Annotated[float, Field(ge=0.4, le=3)] = 0.8
     odometry_hz: Annotated[float, Field(gt=0, le=100)] = 50.0
-    imu_hz: Annotated[float, Field(ge=0, le=200)] = 25.0  # for recordings, and against stuck values
+    imu_hz: Annotated[float, Field(ge=0, le=200)] = 25.0  # for recordings, and to detect stuck values
     setpoint_hz: Annotated[float, Field(ge=5, le=50)] = 20.0
     velocity_std_m_s: Positive = 0.15
     attitude_std_rad: Positive = 0.0053

@@ -20,7 +20,7 @@ _CONNECT_S = 5.0
 
 @dataclass(frozen=True, slots=True)
 class ParameterDifference:
-    """One parameter that is not as needed; found None: the vehicle does not answer for it."""
+    """One parameter with a wrong value; found None: the vehicle does not report it."""
 
     wanted: Needed
     found: float | None
@@ -36,7 +36,7 @@ class ParameterSetup:
     ) -> None:  # fmt: skip
         self._link, self._system, self._flavour = link, system, flavour
         self._needed = needed(flavour, our_system, overrides)
-        # As it answered: by which name, and how it travels.
+        # From its answer: the name, and the encoding.
         self._answers: dict[str, ParamValue] = {}
 
     def connect(self) -> None:

@@ -1,4 +1,4 @@
-"""Texts of a vehicle for its operator, joined from their pieces; jumps of its clock. Pure."""
+"""A vehicle's texts for the operator, joined from pieces, and jumps of its clock. Pure."""
 
 from collections import deque
 
@@ -24,7 +24,7 @@ class Texts:
         self._heard: deque[tuple[int, Said]] = deque(maxlen=32)
 
     def hear(self, now_ns: int, message: Statustext) -> Said | None:
-        """Take a piece; return the text that it completes, if it does. A piece that was lost is missed out."""
+        """Take a piece; return the text that it completes, if any. A lost piece is left out."""
         text = message.text
         if message.id:
             pieces = self._pieces.setdefault(message.id, [])
@@ -38,9 +38,9 @@ class Texts:
         return message.severity, text
 
     def reasons(self, since_ns: int, word: str = "", now_ns: int | None = None) -> list[str]:
-        """Return the distinct warnings that it gave since a time, oldest first; word: only those that hold it.
+        """Return its distinct warnings since a time, oldest first; word: only those that contain it.
 
-        now_ns: name the age of those that are older than 2 s.
+        now_ns: if given, add the age of those older than 2 s.
         """
         newest = {text: at for at, (level, text) in self._heard if at >= since_ns and level <= MavSeverity.WARNING}
         return [text + _age(at, now_ns) for text, at in newest.items() if word in text.lower()]
@@ -54,8 +54,8 @@ def _age(at_ns: int, now_ns: int | None) -> str:
 class BootClock:
     """Compares a vehicle's time since power-on with our own clock.
 
-    Its stamps are used for nothing else: what is measured is stamped when it arrives. restarted: its clock began anew
-    since somebody last set this to False.
+    Its stamps serve no other purpose: measurements are stamped on arrival. restarted: its clock began anew since this
+    was last set to False.
     """
 
     def __init__(self) -> None:
@@ -63,7 +63,7 @@ class BootClock:
         self._last: tuple[int, int] | None = None
 
     def hear(self, now_ns: int, boot_ms: int) -> int:
-        """Take a stamp; return by how much it jumped [ms], or 0; a gap in the link is none."""
+        """Take a stamp; return its jump [ms], or 0; a gap in the link is no jump."""
         before, self._last = self._last, (now_ns, boot_ms)
         if before is None:
             return 0

@@ -1,4 +1,4 @@
-"""A vehicle's attitude between two words of it: an autopilot tells attitudes, velocities and rates one by one."""
+"""Extrapolates a vehicle's attitude between reports: an autopilot sends attitudes, velocities and rates one by one."""
 
 import math
 from dataclasses import replace
@@ -6,7 +6,7 @@ from dataclasses import replace
 from drivers.mavlink.convert import BaseAttitude
 from groundstation.geometry.angles import wrap
 
-# For longer than this a turn rate tells nothing [s].
+# Beyond this age a turn rate means nothing [s].
 _LASTS_S = 0.1
 _STEEPEST = 0.2
 
@@ -19,12 +19,12 @@ def heading_rate_rad_s(attitude: BaseAttitude) -> float:
 
 
 def lasting_s(elapsed_ns: int) -> float:
-    """Return for how much of a time a turn rate holds [s]."""
+    """Return the part of a time for which a turn rate holds [s]."""
     return min(max(elapsed_ns * 1e-9, 0.0), _LASTS_S)
 
 
 def turned_on(attitude: BaseAttitude, elapsed_ns: int) -> BaseAttitude:
-    """Return what an attitude has become by its own body rates."""
+    """Return an attitude turned on by its own body rates."""
     p, q, r = attitude.rates_rad_s
     elapsed_s, heading_rate = lasting_s(elapsed_ns), heading_rate_rad_s(attitude)
     rolling = p + heading_rate * math.sin(attitude.pitch_rad)

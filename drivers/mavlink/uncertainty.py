@@ -1,7 +1,7 @@
 """Deviations of an autopilot's velocity and attitude, from its reports and from cameras. Pure.
 
-Its covariances say too little (docs/reference/mavlink.md 2.1), so they can only add to what the field file says; where
-its filter refuses what it is fed (test ratios near 1), its velocity is its accelerometers' alone.
+Its covariances are too small (docs/reference/mavlink.md 2.1), so they can only increase the field file's figures; where
+its filter refuses the fed positions (test ratios near 1), its velocity comes from its accelerometers alone.
 """
 
 import math
@@ -13,21 +13,21 @@ from groundstation.time_units import NS_PER_S
 # WIRE (ESTIMATOR_STATUS): below 0.5 under normal operation, above 1 a measurement is refused.
 _NORMAL_RATIO = 0.5
 _REFUSED_STD_M_S = 0.5
-# WIRE (docs/reference/mavlink.md 2.1): 0.3 to 0.9 m/s after lift-off, whatever its covariances say.
+# WIRE (docs/reference/mavlink.md 2.1): 0.3 to 0.9 m/s after lift-off, whatever its covariances are.
 _LIFT_OFF_STD_M_S = 0.5
-# An estimator that is levelled by positions alone errs by g times its tilt against a bandwidth of some 1.6 rad/s.
+# The error of an estimator levelled by positions alone is g times its tilt over a bandwidth of some 1.6 rad/s.
 _TILT_PER_VELOCITY = 0.08
 _NOISE_M_S = 0.05
 _FADES_S = 10.0
 _KEPT_NS = 3 * NS_PER_S
 _MOST_M_S, _MOST_RAD = 2.0, math.radians(10.0)
-_FILLED_IN = 1e3  # of 30 m/s: nobody measures that
+_FILLED_IN = 1e3  # a variance of 30 m/s: no measurement
 _ROLL_VARIANCE, _PITCH_VARIANCE = 15, 18
 _X_VARIANCE, _Y_VARIANCE = 0, 6
 
 
 class StatedUncertainty:
-    """Deviations of one vehicle's velocity [m/s] and of its roll and pitch [rad]; 0.0: nothing was stated."""
+    """Deviations of one vehicle's velocity [m/s], and of its roll and pitch [rad]; 0.0: not stated."""
 
     def __init__(self) -> None:
         self._velocity = self._attitude = self._ratio = 0.0
@@ -53,7 +53,7 @@ class StatedUncertainty:
         self._ratio_ns = now_ns
 
     def leave_floor(self, now_ns: int) -> None:
-        """Note that its motors turn and it has not lifted off yet."""
+        """Note that its motors turn before lift-off."""
         self._floor_ns = now_ns
 
     def see_drift(self, now_ns: int, drift_m_s: float) -> None:
@@ -77,6 +77,6 @@ class StatedUncertainty:
 
 
 def _std(*variances: float) -> float:
-    # A covariance that is not known is NaN by the standard, and 0 or huge where one fills it in.
+    # An unknown covariance is NaN by the standard; some send 0 or a huge value.
     known = [v for v in variances if 0.0 < v < _FILLED_IN]
     return math.sqrt(max(known)) if len(known) == len(variances) else 0.0

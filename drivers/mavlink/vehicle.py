@@ -32,15 +32,18 @@ from groundstation.time_units import NEVER_NS, NS_PER_MS, NS_PER_S
 
 _HEARTBEAT_NS = 4 * NS_PER_S
 _ASKS_NS = 3 * NS_PER_S
-# Asked for twice a second; a charge this old is unknown.
+# Requested twice a second; an older charge counts as unknown.
 _BATTERY_NS = 10 * NS_PER_S
-# Report a refusal only after its STATUSTEXT: the COMMAND_ACK arrives first.
+# A refusal is reported only after its STATUSTEXT: the COMMAND_ACK arrives first.
 _EXPLAIN_NS = 700 * NS_PER_MS
 _Value = service.ParamValue | telemetry.GpsGlobalOrigin | telemetry.AutopilotVersion
 
 
 class MavlinkVehicle:
-    """The reader thread calls `hear` and replaces `telemetry` as a whole; everything else is the sender loop's."""
+    """One MAVLink vehicle. The reader thread calls `hear` and replaces `telemetry` as a whole.
+
+    The sender loop does the rest.
+    """
 
     def __init__(self, settings: MavlinkDriverSettings, vehicle: VehicleSettings, link: MavlinkLink, bus: Bus) -> None:
         self.name, self.address = vehicle.name, settings.link.target
@@ -122,7 +125,7 @@ class MavlinkVehicle:
             return known
         velocity = convert.velocity_from_local(message, attitude)
         position = convert.position_from_local(message)
-        # As it came: what is turned on by its age no longer shows that it is stuck.
+        # As received: an attitude extrapolated by its age no longer shows that it is stuck.
         sample = convert.sample_from_local(now_ns, message, known.attitude, known.inertial)
         report = self._plausibility.update(sample, self._state(now_ns, known))
         self._publisher.velocity(now_ns, velocity, attitude, report)
@@ -192,7 +195,7 @@ class MavlinkVehicle:
         return VehicleView(state, fresh, battery, not_ready, unsound=unsound, velocity_m_s=velocity, lost_s=lost_s)
 
     def _true_velocity(self, now_ns: int, known: LatestTelemetry) -> Vector3:
-        # What it is told holds its drift as well: that is no error of control.
+        # Its commands include its drift: that is no control error.
         (x, y, z), (drift_x, drift_y, drift_z) = known.velocity_m_s, self.orders.drift.drift(now_ns)
         return x - drift_x, y - drift_y, z - drift_z
 
@@ -207,7 +210,7 @@ class MavlinkVehicle:
         return convert.flight_state_from(self.flavour, known.base_mode, known.custom_mode, known.status, landed)
 
     def _is_heard(self, now_ns: int, known: LatestTelemetry) -> bool:
-        # Velocities are what silence is judged by in the air; on the ground there may be none before the first pose.
+        # In the air, silence is judged by velocities; on the ground there may be none before the first pose.
         newest = known.heard_ns if self._landed(now_ns, known) == Landed.ON_GROUND else known.moved_ns
         return known.heartbeat_ns > 0 and now_ns - newest < FRESH_NS and now_ns - known.heartbeat_ns < _HEARTBEAT_NS
 
@@ -218,7 +221,7 @@ class MavlinkVehicle:
         silence_ns = now_ns - known.heard_ns if known.heartbeat_ns else NEVER_NS
         if self._boot_clock.restarted and not known.base_mode & ARMED:
             self._boot_clock.restarted = False
-            self._session.start_over(self._requests)  # origin and parameters went, though it was hardly silent
+            self._session.start_over(self._requests)  # origin and parameters were lost, though it was hardly silent
         messages = self._session.step(now_ns, silence_ns, self._requests)
         messages += self._feed(now_ns, known)
         up = (known.position_m[2] if known.position_m else 0.0, known.velocity_m_s[2])
@@ -277,7 +280,7 @@ class MavlinkVehicle:
         return [convert.vision_from_pose(pose, attitude, self.vision.resets)]
 
     def health(self, now_ns: int) -> LinkHealth:
-        """Return rates, losses and refusals; those of the link are shared by all vehicles on it."""
+        """Return rates, losses and refusals; refusals are of the whole link."""
         rate_hz, quality = self._traffic.rates(now_ns)
         lost_s, limit_s = self.vision.lost_s(now_ns), self._settings.vision.hover_after_s
         lost = f"no position from the cameras for {lost_s:.1f} s" if lost_s >= limit_s else ""
@@ -291,13 +294,13 @@ class MavlinkVehicle:
         return None if self.flavour is not Flavour.PX4 else now_ns - self.telemetry.asked_ns < _ASKS_NS
 
     def flush(self) -> None:
-        """Publish the raw datagrams that wait."""
+        """Publish the waiting raw datagrams."""
         self.log.flush()
 
     def close(self) -> None:
-        """Nothing to do: the link is the driver's."""
+        """Do nothing: the link is the driver's."""
 
 
 def _charged(now_ns: int, percent: int, known: LatestTelemetry) -> LatestTelemetry:
-    # WIRE: -1 means unknown; a vehicle that knew a moment ago has not forgotten.
+    # WIRE: -1 means unknown; a charge known a moment ago still holds.
     return replace(known, battery=min(percent, 100) / 100, battery_ns=now_ns) if percent >= 0 else known

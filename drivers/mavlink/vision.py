@@ -1,11 +1,11 @@
-"""Poses from the tracker's estimate for an autopilot, and the time without one. Pure.
+"""Poses for an autopilot from the tracker's estimate, and the time without one. Pure.
 
-On the floor the pad of the field file is fed, or where it landed last: the tracker has no estimate of a robot that is
-landed. Once the take-off has begun it has one, which is fed if it goes on from there.
-A position that observations do not keep sharp is not fed: it would be the autopilot's own dead reckoning. What counts
-is its covariance, not who was seen: a vehicle is localised by what its own camera sees as well. Of one whose telemetry
-is silent or not believed, only each place is fed at which it was seen. Nothing is fed while sightings far from the
-estimate are being weighed.
+On the floor the vehicle is fed the pad of the field file, or its last landing place: the tracker has no estimate of a
+landed robot. Once the take-off has begun there is one, which is fed if it continues from there. A position that
+observations do not keep accurate is not fed: it would be the autopilot's own dead reckoning. Its covariance decides,
+not who was seen: sightings by its own camera localise a vehicle as well. A vehicle whose telemetry is silent or not
+believed is fed only the places at which it was seen. Nothing is fed while sightings far from the estimate are being
+weighed.
 """
 
 import math
@@ -21,16 +21,16 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 _FRESH_NS = 300 * NS_PER_MS
 _JUMP_RAD = math.radians(15.0)
 _STANDING_VARIANCES = (0.05**2, 0.05**2, 0.02**2, math.radians(3.0) ** 2)
-# An autopilot that was told nothing for longer has coasted off by its own velocity, and refuses what it is told then.
+# Without poses for longer than this an autopilot has drifted by its own velocity, and then refuses poses.
 _COASTED_NS = 400 * NS_PER_MS
 # After lift-off cameras need a while to find it; autopilots coast for 4.8 s or more (docs/reference/mavlink.md 1.1, 2).
 _FIRST_SIGHT_NS = 4 * NS_PER_S
 
 
 class VisionFeed:
-    """The poses for one vehicle. resets: rises at each jump and after each pause in flight, as autopilots require.
+    """The poses for one vehicle. resets: counts jumps, and pauses in flight, as autopilots require.
 
-    sighted: where a picture that is new with the last estimate showed it, while nothing better is known.
+    sighted: the place where a picture new in the last estimate showed it, while nothing better is known.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class VisionFeed:
             self.resets += 1
         if len(entity.mean) < 4 or len(entity.velocity_m_s) < 3 or len(entity.covariance) != 16:
             return None
-        if entity.contradicted:  # the belief follows this autopilot's velocity, and would tell it that it is right
+        if entity.contradicted:  # the belief follows this autopilot's velocity, and would confirm it
             self._newest = None
             return None
         header = estimate.header
@@ -97,7 +97,7 @@ class VisionFeed:
                 self._aloft_ns, self._good_ns = now_ns, None if pose is None else self._good_ns
             if pose is None:
                 return None
-            # Where it will stand once it has landed.
+            # The place where it will stand after landing.
             self._standing = replace(pose, position_m=(*pose.position_m[:2], 0.0), variances=_STANDING_VARIANCES)
         if self._last is not None and (self._jumps(self._last, pose) or (aloft and self._coasted(self._last, pose))):
             self.resets += 1
@@ -105,7 +105,7 @@ class VisionFeed:
         return pose
 
     def _jumps(self, before: VisionPose, now: VisionPose) -> bool:
-        # A pose further off than the vehicle can have flown since.
+        # A pose farther off than the vehicle can have flown since.
         elapsed_s = (now.stamp_ns - before.stamp_ns) / NS_PER_S
         allowed_m = self._vision.jump_m + 2.0 * elapsed_s
         turned = abs(difference(now.yaw_rad, before.yaw_rad))

@@ -1,4 +1,4 @@
-"""How supervisor and guardian reach the vehicles of a link whose driver is silent: signed, called back, or by a line.
+"""Lets supervisor and guardian reach vehicles whose driver is silent: signed, at addresses that called, or by a line.
 
 No pymavlink here: the guardian is small. Reason for all of it: docs/decisions/0084-a-voice-for-every-link.md.
 """
@@ -15,15 +15,15 @@ from drivers.mavlink.wire.signature import frame_size, signed_anew, stamp_at
 from groundstation.adapters import Address, bind_to_adapter, send_to_all
 from groundstation.errors import DriverError
 
-# What is larger goes in fragments over a usual network: one that is lost takes the words to all vehicles with it.
+# Larger datagrams are fragmented on usual networks: one lost fragment would lose the orders to all vehicles.
 _MOST_BYTES = 1200
 
 
 class MavlinkVoice:
-    """Says prepared frames; made before anything flies, since the key must be at hand when it is needed.
+    """Sends prepared frames; created before anything flies, because the key must be at hand when it is needed.
 
     way: JSON with `serial` (DEVICE:BAUD, or "" for UDP), `key_file` ("" for unsigned frames) and `interface` (network
-    adapter, "" for any). speaker: a number of its own for each process that may speak, used as the signature's link.
+    adapter, "" for any). speaker: a distinct number for each process that may send, used as the signature's link id.
     """
 
     def __init__(self, way: str, speaker: int) -> None:
@@ -37,7 +37,7 @@ class MavlinkVoice:
             self._socket.setblocking(False)
 
     def say(self, datagram: bytes, addresses: Sequence[Address]) -> None:
-        """Send frames to every address, or into the line; raises OSError where that fails."""
+        """Send frames to every address, or into the line; raises OSError if that fails."""
         if self._key:
             # WIRE (docs/reference/mavlink.md 5.9): times must grow for each sender and link, and a new link may begin
             # at most a minute before the newest time that the vehicle knows.
@@ -49,7 +49,7 @@ class MavlinkVoice:
         send_to_all(self._socket, tuple(_in_parts(datagram)), addresses)
 
     def _write(self, datagram: bytes) -> None:
-        """Write into the device, opened beside the driver that hangs, or after it; one that fails is opened anew."""
+        """Write into the device, opened beside or after the silent driver; after a failure it is reopened."""
         if self._fd < 0:
             device, _, baud = self._serial.partition(":")
             try:
@@ -59,7 +59,7 @@ class MavlinkVoice:
         try:
             os.write(self._fd, datagram)
         except BlockingIOError:
-            raise  # full, and whole
+            raise  # the device is full, but still works
         except OSError:
             os.close(self._fd)
             self._fd = -1
@@ -75,7 +75,7 @@ class MavlinkVoice:
 
 
 def _in_parts(frames: bytes) -> Iterator[bytes]:
-    """Yield whole frames, as many together as go in one datagram unfragmented."""
+    """Yield whole frames, as many at a time as fit into one unfragmented datagram."""
     begin = end = 0
     while end < len(frames):
         size = frame_size(frames, end)

@@ -1,1 +1,1 @@
-"""The links that vehicles are behind: UDP, a serial line, and MAVSDK over either of them."""
+"""The links to vehicles: UDP, a serial line, and MAVSDK over either of them."""

@@ -1,4 +1,4 @@
-"""A link that a second ground station (QGroundControl, MAVProxy) sees as well; it may ask, and stop."""
+"""Shows a link to a second ground station (QGroundControl, MAVProxy) too, which may send queries and stops."""
 
 import logging
 import select
@@ -28,7 +28,10 @@ Tell = Callable[[str, str], None]
 
 
 def with_riders(transport: Transport, vehicles: Mapping[int, VehicleSettings], tell: Tell) -> Transport:
-    """Return the link with those who ride along, or as it is where nobody does; tell: texts with their remedies."""
+    """Return the link with its second ground stations (riders), unchanged if there are none.
+
+    tell: texts with remedies.
+    """
     riders = {system: Rider(vehicle) for system, vehicle in vehicles.items() if vehicle.forward}
     return ForwardedLink(transport, riders, tell) if riders else transport
 
@@ -37,8 +40,8 @@ class ForwardedLink:
     """Another transport, shown to riders; a thread of its own listens to them.
 
     A rider's frames are judged by `riding_along.passage_of`; what is refused or goes beyond 50 frames a second is
-    counted in `rejected` ("rider_..."). Every stop passes, if an equal one does not follow it within 20 ms; of one that
-    is repeated within a second only the first is told.
+    counted in `rejected` ("rider_..."). Every stop passes unless an equal one follows within 20 ms; of repetitions
+    within a second only the first is reported.
     """
 
     def __init__(self, transport: Transport, riders: Mapping[int, Rider], tell: Tell) -> None:
@@ -50,7 +53,7 @@ class ForwardedLink:
 
     @property
     def rejected(self) -> Counter[str]:
-        """Return the transport's counts, with ours in them."""
+        """Return the transport's counts together with ours."""
         return self._transport.rejected
 
     @rejected.setter
@@ -59,15 +62,15 @@ class ForwardedLink:
 
     @property
     def called_from(self) -> tuple[Address, ...]:
-        """Return where the vehicles call from."""
+        """Return the addresses from which the vehicles call."""
         return self._transport.called_from
 
     def receive(self) -> list[Heard]:
-        """Wait up to 0.1 s; return what came."""
+        """Wait up to 0.1 s; return what arrived."""
         return [heard for heard, _ in self.receive_raw()]
 
     def receive_raw(self) -> list[tuple[Heard, bytes]]:
-        """Wait up to 0.1 s; return what came, and show it to the vehicle's rider."""
+        """Wait up to 0.1 s; return what arrived, and show it to the vehicle's rider."""
         found = self._transport.receive_raw()
         for heard, raw in found:
             rider = self._riders.get(heard.frame.system)
@@ -90,7 +93,7 @@ class ForwardedLink:
         self._transport.send_raw(system, data)
 
     def close(self) -> None:
-        """End the listener and give all ports back."""
+        """End the listener and close all ports."""
         self._closing.set()
         self._listener.join(timeout=1.0)
         for rider in self._riders.values():
@@ -130,7 +133,7 @@ class ForwardedLink:
     def _take(self, rider: Rider) -> None:
         try:
             data, source = rider.socket.recvfrom(MAX_DATAGRAM)
-        except OSError:  # nobody is there: the answer to what was shown
+        except OSError:  # nobody is there: this answers what was shown
             return
         if source[0] != rider.target[0]:
             self.rejected["rider_address"] += 1
@@ -143,10 +146,10 @@ class ForwardedLink:
 
     def _take_frame(self, rider: Rider, raw: bytes) -> None:
         if not may_pass(number_of(raw), rider.allowed):
-            return  # as most are: its own position, heartbeats, an echo of what it hears
+            return  # true of most: its own position, heartbeats, echoes of what it hears
         try:
             self._judge(rider, raw, rider.decoder.decode(raw))
-        except WireError as error:  # a stop may come behind it
+        except WireError as error:  # a stop may follow it
             self._reject(rider, error)
 
     def _reject(self, rider: Rider, error: WireError) -> None:

@@ -1,12 +1,12 @@
 """Links through MAVSDK 4, a native library that discovers the vehicles and carries messages.
 
-The port itself stays ours (`raw://`): what a vehicle sent and was sent is recorded to the byte, refusals have the same
-names as on the other links, and each vehicle has a Mavsdk object of its own. With one object for all, messages that
-name no target (poses, clock answers) would go to every vehicle on the port.
+The port itself stays ours (`raw://`): traffic in both directions is recorded to the byte, refusals have the same names
+as on the other links, and each vehicle has a Mavsdk object of its own. With one object for all, messages that name no
+target (poses, clock answers) would go to every vehicle on the port.
 
 Messages go through `mavlink_direct`, whose JSON is made from tuples with all fields: a missing one would be sent as 0.
 Its offboard plugin, which repeats the last setpoint by itself, is not used; nor is its clock synchronisation, because
-the poses that we feed are stamped on our own boot clock. It sends a heartbeat each second, besides ours.
+the poses that we feed are stamped by our own boot clock. It sends a heartbeat each second in addition to ours.
 """
 
 import json
@@ -89,8 +89,8 @@ class _System:
             self._mavsdk.pass_received_raw_bytes(raw)
 
     def _meet(self, raw: bytes) -> None:
-        # The library finds out who is there on a thread of its own, and a plugin made in its callback would wait for
-        # itself; the heartbeat that introduced the vehicle is handed over again once somebody listens.
+        # The library discovers vehicles on a thread of its own, and a plugin made in its callback would wait for
+        # itself; the heartbeat that introduced the vehicle is passed on again once there is a listener.
         self._mavsdk.pass_received_raw_bytes(raw)
         for _ in range(_MEET_TRIES):
             if self._mavsdk.system_count():
@@ -117,7 +117,7 @@ class _System:
             self._transport.rejected["overflow"] += 1
 
     def _passed_as(self, decoded: Message | None) -> Heard | None:
-        # When the frame came and which number it had: the library keeps the order, but not every kind.
+        # Arrival and number of each frame: the library keeps the order, but not every kind.
         while self._passed:
             passed = self._passed.popleft()
             if type(passed.frame.message) is type(decoded):
@@ -125,7 +125,7 @@ class _System:
         return None
 
     def send(self, message: Message) -> None:
-        """Send a message; the library adds heartbeats of its own, one a second, which alone would be too few."""
+        """Send a message; the library adds its own heartbeats, one a second, which alone would be too few."""
         if self._direct is None:
             return
         carrier = MavlinkMessage(name_of(message), 0, 0, self.number, AUTOPILOT_COMPONENT, json_from_message(message))
@@ -178,7 +178,7 @@ class MavsdkLink:
 
     @property
     def called_from(self) -> tuple[Address, ...]:
-        """Where the vehicles were heard last, where the link waits for them."""
+        """Return where the vehicles were last heard, if the link waits for them."""
         return self._transport.called_from
 
     def receive(self) -> list[Heard]:
@@ -202,7 +202,7 @@ class MavsdkLink:
             self._transport.send(system, message)
 
     def close(self) -> None:
-        """Leave the library and give the port back."""
+        """Leave the library and close the port."""
         self._closing.set()
         self._pump.join(timeout=1.0)
         for system in self._systems.values():

@@ -19,7 +19,7 @@ def open_link(
 ) -> MavlinkLink:
     """Return the link that the settings describe; raises DriverError when it cannot be opened.
 
-    shown: makes of its port one that others see as well.
+    shown: wraps its transport in one that others see as well.
     """
     transport: Transport
     if settings.target.startswith("serial"):
@@ -29,14 +29,14 @@ def open_link(
     transport = shown(transport)
     if settings.kind == "pymavlink":
         return transport
-    # Only here: the native library takes its time to load.
+    # Only here: the native library is slow to load.
     from drivers.mavlink.links.mavsdk import MavsdkLink
 
     return MavsdkLink(settings, transport)
 
 
 def signing_of(settings: LinkSettings) -> Signing | None:
-    """Return the key of a signed link, with the time from which we sign; raises DriverError without naming the key."""
+    """Return the key of a signed link and the time from which we sign; raises DriverError without naming the key."""
     if not settings.key_file:
         return None
     return Signing(read_key(settings.key_file), stamp_at(time.time()))

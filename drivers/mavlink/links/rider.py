@@ -1,4 +1,4 @@
-"""A second ground station of one vehicle: its port, and what it may still say."""
+"""A second ground station of one vehicle (rider): its port, and its remaining allowance."""
 
 import socket
 from contextlib import suppress
@@ -15,7 +15,7 @@ from drivers.mavlink.wire.names import AUTOPILOT_COMPONENT, Flavour, MavResult
 from drivers.mavlink.wire.service import FileTransferProtocol
 from groundstation.time_units import NS_PER_S
 
-# What passes besides stops: enough for a table of parameters in half a minute, too little to make setpoints late.
+# Frames that pass in addition to stops: enough for a table of parameters in half a minute, too few to delay setpoints.
 _FRAMES_PER_S = 50
 _ANSWERED_NS = 3 * NS_PER_S
 _UNDERWAY = (MavResult.ACCEPTED, MavResult.IN_PROGRESS)
@@ -50,12 +50,12 @@ class Rider:
         self._asked: dict[int, tuple[int, str]] = {}
 
     def show(self, data: bytes) -> None:
-        """Send frames to the second ground station; one that is not there costs nothing."""
+        """Send frames to the second ground station; an absent one costs nothing."""
         with suppress(OSError):
             self.socket.sendto(data, self.target)
 
     def refuse(self, frame: ReceivedFrame) -> None:
-        """Answer as the vehicle would that does not do what is asked; a point of a mission gets no answer."""
+        """Answer like a vehicle that refuses the request; a point of a mission gets no answer."""
         match frame.message:
             case CommandLong(command=command) | CommandInt(command=command):
                 answer: Message = CommandAckMessage(command, MavResult.DENIED, 0, 0, frame.system, frame.component)
@@ -66,7 +66,7 @@ class Rider:
         self.show(self.encoder.encode(answer))
 
     def stop(self, now_ns: int, message: Message, raw: bytes) -> str:
-        """Take a stop into the queue, and return it in words."""
+        """Put a stop into the queue, and return it in words."""
         words, command = words_of(message, self.flavour), getattr(message, "command", None)
         self.stops.put((type(message), command, words), raw)
         if command is not None:
@@ -76,7 +76,7 @@ class Rider:
         return words
 
     def refused_stop(self, now_ns: int, answer: CommandAckMessage) -> str:
-        """Return which of its stops the vehicle refuses by an answer, with the reason; "" for none."""
+        """Return the stop that the vehicle refuses by an answer, with the reason; "" for none."""
         until_ns, words = self._asked.get(answer.command, (0, ""))
         if now_ns > until_ns or answer.result in _UNDERWAY:
             return ""

@@ -1,4 +1,4 @@
-"""The seam between the driver and a link: the driver sends and receives messages, the link carries them."""
+"""The interface between the driver and a link: the driver sends and receives messages, the link carries them."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -11,7 +11,7 @@ Sniffer = Callable[[int, int, bytes, bool], None]  # system, stamp_ns, bytes, re
 
 
 class Heard(NamedTuple):
-    """A frame and when it came."""
+    """A frame and its arrival."""
 
     stamp_ns: int
     frame: ReceivedFrame
@@ -24,20 +24,20 @@ class MavlinkLink(Protocol):
 
     @property
     def called_from(self) -> tuple[Address, ...]:
-        """Where the vehicles were heard last, on a link that they call themselves; empty on others."""
+        """Return where the vehicles were last heard, on a link that they call themselves; empty on others."""
 
     def receive(self) -> list[Heard]:
         """Wait up to 0.1 s; return the messages received."""
 
     def send(self, system: int, message: Message) -> None:
-        """Send to one vehicle; never blocks, a message to a vehicle that was never heard may be lost."""
+        """Send to one vehicle; never blocks; a message to a vehicle that was never heard may be lost."""
 
     def close(self) -> None:
-        """Give the port back."""
+        """Close the port."""
 
 
 class Transport(MavlinkLink, Protocol):
-    """A link that can also be used for frames that somebody else takes apart and makes."""
+    """A link that also carries raw frames, encoded and decoded by somebody else."""
 
     def receive_raw(self) -> list[tuple[Heard, bytes]]:
         """Wait up to 0.1 s; return the messages received, and the bytes of each frame."""
@@ -47,4 +47,4 @@ class Transport(MavlinkLink, Protocol):
 
 
 def ignore_bytes(system: int, stamp_ns: int, data: bytes, received: bool) -> None:
-    """Sniff nothing."""
+    """Ignore all traffic."""

@@ -1,4 +1,4 @@
-"""A serial radio or a wire: the same frames in a stream of bytes, one or more vehicles at the other end."""
+"""A serial radio or line: the same frames in a stream of bytes, with one or more vehicles at the other end."""
 
 import os
 import select
@@ -29,7 +29,7 @@ class StreamCutter:
         self._buffer = bytearray()
 
     def feed(self, data: bytes) -> list[bytes]:
-        """Return the whole frames that the stream holds by now; bytes that belong to none are skipped."""
+        """Return the frames that are complete by now; bytes that belong to none are skipped."""
         buffer, frames = self._buffer, []
         buffer += data
         while len(buffer) >= 3:
@@ -41,14 +41,14 @@ class StreamCutter:
             if len(buffer) < size:
                 break
             frames.append(bytes(buffer[:size]))
-            # A false start may hide a true frame: only what a checksum confirms is skipped as a whole, by the caller's
-            # count of refusals; at most one frame is lost with it.
+            # A false start may hide a true frame: only a confirmed checksum lets a whole frame be skipped, by the
+            # caller's count of refusals; at most one frame is lost with it.
             del buffer[:size]
         return frames
 
 
 class SerialLink:
-    """A terminal device, raw, 8N1; one that fails is opened anew, ten times a second."""
+    """A terminal device, raw, 8N1; after a failure it is reopened, ten times a second."""
 
     def __init__(self, settings: LinkSettings, signing: Signing | None = None, sniffer: Sniffer = ignore_bytes) -> None:
         _, device, baud = settings.target.split(":")
@@ -63,7 +63,7 @@ class SerialLink:
 
     @property
     def called_from(self) -> tuple[Address, ...]:
-        """Nobody calls over a line."""
+        """Return no address: nobody calls over a line."""
         return ()
 
     def receive(self) -> list[Heard]:
@@ -71,15 +71,15 @@ class SerialLink:
         return [heard for heard, _ in self.receive_raw()]
 
     def receive_raw(self) -> list[tuple[Heard, bytes]]:
-        """Wait up to 0.1 s for bytes; return the frames that are whole by now, each with its bytes."""
+        """Wait up to 0.1 s for bytes; return the frames complete by now, each with its bytes."""
         try:
             ready, _, _ = select.select([self._fd], [], [], _POLL_S)
             if not ready:
                 return []
             data = os.read(self._fd, _CHUNK)
-        except (OSError, ValueError):  # ValueError: it was unplugged, and is not back yet
+        except (OSError, ValueError):  # ValueError: the device was unplugged, and is not back yet
             data = b""
-        if not data:  # an unplugged radio fails, or ends, at once and for ever: do not spin
+        if not data:  # an unplugged radio fails, or ends, at once and forever: do not spin
             self.rejected["receive_failed"] += 1
             select.select([], [], [], _POLL_S)
             self._open_anew()
@@ -97,7 +97,7 @@ class SerialLink:
         return heard
 
     def _open_anew(self) -> None:
-        """Open the device once more: a radio that was plugged in again, or whose supply broke down, is another one."""
+        """Reopen the device: a radio that was replugged, or lost its supply, is a new device."""
         with self._lock:
             if self._closed:
                 return

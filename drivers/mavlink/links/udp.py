@@ -1,4 +1,4 @@
-"""One UDP port with any number of vehicles behind it: who may speak, who is where."""
+"""One UDP port with any number of vehicles behind it: accepted senders, and the address of each vehicle."""
 
 import logging
 import socket
@@ -30,10 +30,10 @@ _log = logging.getLogger(__name__)
 
 
 def _bind_as_ever(sock: socket.socket, target: str) -> None:
-    """Speak from the same port each time: PX4 answers the first one that spoke to it, until it restarts."""
+    """Send from the same port each time: until it restarts, PX4 answers the first port that spoke to it."""
     try:
         sock.bind(("", _FIRST_OWN_PORT + zlib.crc32(target.encode()) % _OWN_PORTS))
-    except OSError:  # somebody else speaks to that vehicle already
+    except OSError:  # another program speaks to that vehicle already
         sock.bind(("", 0))
 
 
@@ -71,7 +71,7 @@ class UdpLink:
 
     @property
     def called_from(self) -> tuple[Address, ...]:
-        """Where the vehicles were heard last, where the link waits for them."""
+        """Return where the vehicles were last heard, if the link waits for them."""
         return () if self._peer else tuple(dict.fromkeys(address for address, _ in self._addresses.copy().values()))
 
     def receive(self) -> list[Heard]:
@@ -84,8 +84,8 @@ class UdpLink:
             if not vehicle_socket.waits(self._socket, _POLL_S):
                 return []
             data, source = self._socket.recvfrom(MAX_DATAGRAM)
-        except (OSError, ValueError) as error:  # ValueError: it was closed meanwhile
-            # An ICMP "port unreachable" answers what was sent to a vehicle that is not there yet.
+        except (OSError, ValueError) as error:  # ValueError: the socket was closed meanwhile
+            # An ICMP "port unreachable" answers a datagram to a vehicle that is not there yet.
             self._reject("receive_failed", str(error))
             return []
         return self._judge(clock.now_ns(), data, source)
@@ -122,10 +122,10 @@ class UdpLink:
                         self._sniffer(system, now_ns, raw, True)
 
     def _greet(self, now_ns: int, source: tuple[str, int]) -> None:
-        """Send a vehicle that uses MAVLink 1 a frame of version 2, after which it uses version 2; or one whose time of
-        signing is old our time, from which it goes on: it stood still while the vehicle was off.
+        """Send a MAVLink 1 vehicle a frame of version 2, after which it uses version 2.
 
-        WIRE (docs/reference/mavlink.md 5.10): PX4 with MAV_PROTO_VER 0. Nothing is learnt from it: no address is bound.
+        Or send our time to one whose signing time is old because it stood still while the vehicle was off. WIRE
+        (docs/reference/mavlink.md 5.10): PX4 with MAV_PROTO_VER 0. No address is bound by it.
         """
         if now_ns - self._greeted.get(source, -_GREETED_NS) < _GREETED_NS or len(self._greeted) >= _MOST_GREETED:
             return
@@ -147,7 +147,7 @@ class UdpLink:
     def _is_at(self, now_ns: int, frame: ReceivedFrame, source: tuple[str, int]) -> bool:
         system, known = frame.system, self._addresses.get(frame.system)
         if frame.component != AUTOPILOT_COMPONENT:
-            # A camera or a computer on board may call from elsewhere: what flies is not there.
+            # A camera or computer on board may call from elsewhere: the autopilot is not there.
             if known is not None and known[0] != source:
                 self._reject("other_component", f"{system}.{frame.component} at {source[0]}:{source[1]}")
                 return False

@@ -1,4 +1,4 @@
-"""MAVLink FTP as far as it is refused: who gets no answer asks again for seconds, and only then goes on without."""
+"""Refusals of MAVLink FTP: a client without an answer repeats its request for seconds before it goes on without."""
 
 from drivers.mavlink.wire.service import FileTransferProtocol
 
@@ -6,7 +6,7 @@ _NAK, _FAIL, _SIZE = 129, 1, 251
 
 
 def refusal(request: FileTransferProtocol, system: int, component: int) -> FileTransferProtocol:
-    """Return the refusal of a request, to who asked."""
+    """Return the refusal of a request, addressed to its sender."""
     # WIRE (MAVLink FTP): sequence + 1, opcode NAK, the request's opcode, error FAIL.
     asked = request.payload
     sequence = (asked[0] | asked[1] << 8) + 1 & 0xFFFF

@@ -1,4 +1,4 @@
-"""What is sent to fly a vehicle, field by field in the order of the dialect."""
+"""Messages that fly a vehicle, field by field in the order of the dialect."""
 
 from typing import NamedTuple
 
@@ -8,7 +8,7 @@ Floats = tuple[float, ...]
 
 
 class SetPositionTargetLocalNed(NamedTuple):
-    """A setpoint; a bit of type_mask that is set means: ignore this.
+    """A setpoint; a set bit of type_mask means: ignore this field.
 
     WIRE (docs/reference/mavlink.md 5.1): frame 8 rotates the velocity by the current heading; both accept 1 and 8 only.
     """

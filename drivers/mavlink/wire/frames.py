@@ -1,4 +1,4 @@
-"""Frames: cut a datagram, decode and encode one message, sign it. No sockets, no clock.
+"""Frames: split a datagram, decode and encode one message, sign it. No sockets, no clock.
 
 pymavlink's dialect knows layout and order, and signs; `verification.py` decides which frames are decoded at all.
 """
@@ -38,7 +38,8 @@ def _classes() -> dict[str, type[Message]]:
                 and value is not tuple
                 and hasattr(value, "_fields")
             ):
-                # "Message" sets apart a class whose name the bus has as well; it is no part of the name on the wire.
+                # The suffix "Message" distinguishes classes that the bus has too; it is not part of the name on the
+                # wire.
                 found[re.sub(r"(?<!^)(?=[A-Z])", "_", name.removesuffix("Message")).upper()] = value
     return found
 
@@ -91,7 +92,7 @@ def split(data: bytes, *, old: bool = False) -> Iterator[bytes]:
 
 
 class FrameDecoder:
-    """Turns frames of one link into messages; only verified ones, which with a key are rightly signed."""
+    """Turns frames of one link into messages; only verified frames count, with a key only correctly signed ones."""
 
     def __init__(self, signing: Signing | None = None) -> None:
         self._verifier = Verifier(signing)

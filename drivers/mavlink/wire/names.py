@@ -16,14 +16,14 @@ ESTIMATOR_VISION = 2
 
 
 class MavSeverity(IntEnum):
-    """MAV_SEVERITY: 0 emergency .. 7 debug; the two that divide what an operator is told."""
+    """MAV_SEVERITY: 0 emergency .. 7 debug; the two limits for what the operator is told."""
 
     ERROR = 3
     WARNING = 4
 
 
 class Flavour(IntEnum):
-    """MAV_AUTOPILOT of the two that are flown."""
+    """MAV_AUTOPILOT of the two supported autopilots."""
 
     ARDUPILOT = 3
     PX4 = 12

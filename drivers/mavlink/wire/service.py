@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 
 class ParamRequestRead(NamedTuple):
-    """Ask for one parameter, by name where the index is -1."""
+    """Request one parameter, by name if the index is -1."""
 
     target_system: int
     target_component: int

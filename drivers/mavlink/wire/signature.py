@@ -1,4 +1,4 @@
-"""Length and signature of a frame, with nothing but the standard library: small processes sign with it, too."""
+"""Length and signature of a frame, with the standard library alone, so that small processes can sign too."""
 
 import hashlib
 

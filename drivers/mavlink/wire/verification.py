@@ -1,7 +1,7 @@
-"""What a frame must pass before anything is learned from it: signature, checksum, time of signing. No decoding.
+"""Verifies frames before anything is learned from them: signature, checksum, time of signing. No decoding.
 
-A frame of any kind that pymavlink's widest dialect knows can be verified, whether or not this project uses it; one of
-another kind cannot, because its checksum needs a seed that only its definition has.
+A frame of any kind that pymavlink's widest dialect knows can be verified, whether or not this project uses it; a frame
+of another kind cannot, because its checksum needs a seed from its definition.
 """
 
 import hmac
@@ -54,7 +54,7 @@ class Verifier:
         self._stamps: dict[tuple[int, int, int], int] = {}
 
     def verify(self, frame: bytes) -> None:
-        """Return if the frame is whole and its sender's own; raises WireError.
+        """Return if the frame is whole and genuine; raises WireError.
 
         Reasons: size, unsigned, signature, unknown_kind, checksum, replayed.
         """

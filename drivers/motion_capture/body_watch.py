@@ -1,4 +1,4 @@
-"""Whether the poses of a motion capture system can be true: frozen, jumped and exchanged bodies are found. Pure."""
+"""Judges whether poses of a motion capture system can be true: finds frozen, jumped and exchanged bodies. Pure."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -8,19 +8,19 @@ from itertools import combinations
 from groundstation.time_units import NS_PER_S
 
 Vector3 = tuple[float, float, float]
-# A marker that stands jitters by tenths of a millimetre from frame to frame; repeats to the last bit are none of it.
+# A standing marker jitters by tenths of a millimetre from frame to frame; exact repeats are no measurements.
 _FROZEN_S, _FROZEN_FRAMES = 0.2, 5
-# What noise and one lost frame may add to the way that a body makes between two frames.
+# Allowance for noise and one lost frame in a body's motion between two frames.
 _MARGIN_M = 0.05
-# Jumps that add up to less than this have led back to where the body was.
+# Jumps that add up to less than this have led back to the start.
 _BACK_M = 0.15
-# Who was out of sight for so long may be anywhere, and may have been named anew.
+# A body out of sight for this long may be anywhere, and may have been renamed.
 _FORGOTTEN_S = 1.0
 
 
 @dataclass(slots=True)
 class _Track:
-    """One body: its last pose, since when it has been there to the bit, and the sum of its jumps [m]."""
+    """One body: its last pose, since when it has repeated exactly, and the sum of its jumps [m]."""
 
     stamp_ns: int
     position: Vector3
@@ -32,14 +32,14 @@ class _Track:
 
 @dataclass(slots=True)
 class BodyWatch:
-    """Follows all bodies of one system from frame to frame; max_speed_m_s: nothing moves faster."""
+    """Follows all bodies of one system from frame to frame; max_speed_m_s: no body moves faster."""
 
     max_speed_m_s: float
     _tracks: dict[str, _Track] = field(default_factory=dict)
     _exchanged: set[frozenset[str]] = field(default_factory=set)
 
     def look(self, stamp_ns: int, positions: Mapping[str, Vector3]) -> dict[str, str]:
-        """Take in the tracked bodies of a frame; return for each why it must not be used, "" for those that may."""
+        """Take in the tracked bodies of a frame; return for each why it must not be used, or ""."""
         self._forget(stamp_ns)
         before = {name: track.position for name, track in self._tracks.items()}
         reach_m = {name: self._reach_m(track, stamp_ns) for name, track in self._tracks.items()}
@@ -63,7 +63,7 @@ class BodyWatch:
         self._exchanged = {pair for pair in self._exchanged if not pair & set(gone)}
 
     def _reach_m(self, track: _Track, stamp_ns: int) -> float:
-        """Return how far a body may have moved since its pose was new [m]: behind a frozen one it flies on."""
+        """Return how far a body may have moved since its last new pose [m]: it flies on while that is frozen."""
         return self.max_speed_m_s * max(0, stamp_ns - track.since_ns) / NS_PER_S + _MARGIN_M
 
     def _follow(self, name: str, stamp_ns: int, position: Vector3, jump: Vector3 | None) -> None:

@@ -1,4 +1,4 @@
-"""One frame of a motion capture system, as every source hands it over."""
+"""One frame of a motion capture system, in the form common to all sources."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,7 @@ Pose = tuple[Vector3, Quaternion]
 
 @dataclass(frozen=True, slots=True)
 class CapturedFrame:
-    """One frame: when it came, how long before its sending it was exposed [ns], and the tracked bodies by name.
+    """One frame: its arrival, the time from exposure to sending [ns], and the tracked bodies by name.
 
     poses: position [m; the system's axes], quaternion (x, y, z, w). untracked: known to the system, not seen.
     """

@@ -1,4 +1,4 @@
-"""From rigid bodies in the system's axes to entities in the world's."""
+"""Converts rigid bodies in the system's axes to entities in the world's."""
 
 import math
 from dataclasses import dataclass
@@ -13,13 +13,13 @@ from groundstation.geometry.rotations import euler_from_rotation, rotation_z
 
 Vector3 = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
-# No volume is so large; beyond, sums of jumps lose what a body moved by, and products overflow.
+# No volume is this large; beyond it, sums of jumps lose a body's motion to rounding, and products overflow.
 _FARTHEST_M = 1e4
 
 
 @dataclass(frozen=True, slots=True)
 class EntityPose:
-    """Where an entity is: centre [m; world], world_from_base (3, 3), centre of its marker [m; world]."""
+    """An entity's pose: centre [m; world], world_from_base (3, 3), centre of its marker [m; world]."""
 
     position: Vector3
     rotation: Array
@@ -35,7 +35,7 @@ class Placement:
         self._name, self._covariance = settings.name, settings.covariance()
 
     def entity_pose(self, body: BodySection, position: Vector3, quaternion: Quaternion) -> EntityPose | None:
-        """Return the pose of the entity that carries a body; None for numbers that are no pose.
+        """Return the pose of the entity that carries a body; None if the numbers are no pose.
 
         position [m], quaternion (x, y, z, w): of the body, in the system's axes.
         """
@@ -43,8 +43,8 @@ class Placement:
         if not 0.5 < length < 2.0 or not all(abs(value) < _FARTHEST_M for value in position):  # nan compares false
             return None
         system_from_body = _rotation_of(quaternion, length)
-        # WIRE (docs/reference/natnet.md 5): a body's axes are the system's at the moment of its definition, so what
-        # sets the system upright sets the body upright.
+        # WIRE (docs/reference/natnet.md 5): a body's axes are the system's at the moment of its definition, so the
+        # rotation that sets the system upright sets the body upright.
         world_from_body = self._rotation @ system_from_body @ self._upright.T
         world_from_base = world_from_body @ rotation_z(math.radians(body.yaw_deg)).T
         origin = self._rotation @ np.array(position) + self._translation
@@ -53,7 +53,7 @@ class Placement:
         return EntityPose(_triple(centre), world_from_base, _triple(marker))
 
     def observation(self, entity: str, pose: EntityPose, header: Header) -> RelativeObservation:
-        """Return what the tracker is told of an entity."""
+        """Return the observation of an entity for the tracker."""
         return RelativeObservation(
             header=header,
             observer=self._name,
@@ -67,7 +67,7 @@ class Placement:
 
 
 def body_pose(entity: str, pose: EntityPose) -> BodyPose:
-    """Return an entity's pose as it is published."""
+    """Return an entity's pose as a message."""
     return BodyPose(entity, pose.position, _quaternion_of(pose.rotation))
 
 

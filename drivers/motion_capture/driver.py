@@ -47,7 +47,7 @@ class MotionCaptureDriver:
         self.counts: Counter[str] = Counter()
 
     def turn(self) -> None:
-        """Wait shortly for frames, handle them, and keep up heartbeat, status and the watch over silence."""
+        """Wait briefly for frames, process them, and keep up heartbeat, status and the watch over silence."""
         for frame in self._source.poll(_POLL_S):
             self._handle(frame)
         wrong = "; ".join(f"{entity} {why}" for entity, why in self._faults.items() if why)
@@ -58,7 +58,7 @@ class MotionCaptureDriver:
         delay_ns = round(self._settings.delay_ms * NS_PER_MS)
         exposure_ns = frame.arrival_ns - frame.processing_ns - delay_ns
         if exposure_ns <= self._exposure_ns:
-            self._health.skipped += 1  # overtaken on the way
+            self._health.skipped += 1  # overtaken by a newer one on the way
             return
         self._exposure_ns = exposure_ns
         self._health.used(exposure_ns)
@@ -69,7 +69,7 @@ class MotionCaptureDriver:
             self._publish(exposure_ns, poses, faults)
 
     def _entity_poses(self, frame: CapturedFrame) -> dict[str, EntityPose]:
-        """Return the poses of our entities; what is no pose is counted and left out."""
+        """Return the poses of our entities; invalid poses are counted and left out."""
         poses = {}
         for name, (position, quaternion) in frame.poses.items():
             body = self._bodies.get(name)

@@ -1,4 +1,4 @@
-"""Which poses of a ROS 2 topic cannot be its own, or of now: of a second publisher, in another frame, late. Pure."""
+"""Refuses poses of a ROS 2 topic that come from a second publisher, in another frame, or late. Pure."""
 
 from dataclasses import dataclass, field
 
@@ -10,7 +10,7 @@ _LATE_S = 0.3
 
 @dataclass(slots=True)
 class _Topic:
-    """In which frame a body's poses come, who publishes them, and that clock against ours."""
+    """A body's frame and publisher, and that publisher's clock against ours."""
 
     frame: str
     tie: PublisherTie = field(default_factory=PublisherTie)
@@ -18,15 +18,15 @@ class _Topic:
 
 
 class PoseGuard:
-    """Ties each body to the publisher and the frame that it was heard with, until they are silent for a second."""
+    """Ties each body to its first publisher and frame, until they are silent for a second."""
 
     def __init__(self) -> None:
         self._topics: dict[str, _Topic] = {}
 
     def refusal(self, body: str, publisher: bytes, frame: str, stamp_ns: int, arrival_ns: int) -> str:
-        """Return why a pose is not used, in words, or ""; stamp_ns: on the publisher's clock, 0 where it has none.
+        """Return why a pose is not used, in words, or ""; stamp_ns: on the publisher's clock, 0 if it has none.
 
-        How late it is counts against the freshest poses of the last 5 to 10 s: the publisher's clock may differ.
+        Its lateness is judged against the freshest poses of the last 5 to 10 s: the publisher's clock may differ.
         """
         topic = self._topics.get(body)
         if topic is None or topic.tie.silent(arrival_ns):

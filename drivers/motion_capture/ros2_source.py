@@ -1,4 +1,4 @@
-"""Poses that ROS 2 nodes publish, by a client of their Zenoh router: it hears, and says nothing."""
+"""Poses that ROS 2 nodes publish, received by a client of their Zenoh router, which only listens."""
 
 import threading
 import time
@@ -12,7 +12,7 @@ from drivers.rmw_zenoh.session import RouterSession
 from drivers.rmw_zenoh.wire.cdr import WireError
 from groundstation.bus import clock
 
-# Bodies of one frame come one after the other; what comes within this time [s] is one frame.
+# Bodies of one frame arrive one after the other; those within this time [s] are one frame.
 _GATHER_S = 0.003
 _WAITING = 256
 
@@ -29,7 +29,7 @@ class Ros2Source:
         self._session = RouterSession(endpoint, [ros2_pose.expression(address.domain, address.path)], self._hear)
 
     def poll(self, wait_s: float) -> list[CapturedFrame]:
-        """Return what came as one frame, or nothing; waits for the first pose at most so long."""
+        """Return the poses that form one frame, or nothing; waits up to wait_s for the first pose."""
         if not self._came.wait(wait_s):
             return []
         time.sleep(_GATHER_S)

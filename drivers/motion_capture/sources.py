@@ -29,13 +29,13 @@ _USED = ("rejected", "detail", "poll", "close")
 
 
 class Source(Protocol):
-    """Where frames come from; rejected: what was refused, by reason; detail: what is wrong, in words."""
+    """A source of frames; rejected: refusals by reason; detail: present fault, in words."""
 
     rejected: Counter[str]
     detail: str
 
     def poll(self, wait_s: float) -> list[CapturedFrame]:
-        """Return the frames that came, the oldest first; waits for the first at most so long."""
+        """Return the arrived frames, the oldest first; waits up to wait_s for the first."""
 
     def close(self) -> None:
         """Release everything."""
@@ -44,7 +44,7 @@ class Source(Protocol):
 def open_source(address: SystemAddress) -> Source:
     """Return the source of a system.
 
-    Raises SettingsError where its library is missing, DriverError for a plug-in that cannot be loaded.
+    Raises SettingsError if its library is missing, DriverError for a plug-in that cannot be loaded.
     """
     if address.scheme in OURS:
         ours: Source = resolve_name(OURS[address.scheme].reader)(address)
@@ -68,11 +68,11 @@ class NatnetSource:
         self._frames: socket.socket | None = None
         self._server: natnet.Server | None = None
         self._names: dict[int, str] = {}
-        self._asks = True  # names are missing, or may be other bodies' by now
+        self._asks = True  # names are missing, or may belong to other bodies by now
         self._asked_ns = self._alive_ns = self._framed_ns = 0
 
     def poll(self, wait_s: float) -> list[CapturedFrame]:
-        """Return the frames that came, the oldest first; asks for whatever is missing once a second."""
+        """Return the arrived frames, the oldest first; requests missing descriptions once a second."""
         self._ask(clock.now_ns())
         sockets = [one for one in (self._requests, self._frames) if one is not None]
         readable, _, _ = select.select(sockets, [], [], wait_s)
@@ -85,7 +85,7 @@ class NatnetSource:
             self._frames.close()
 
     def _ask(self, now_ns: int) -> None:
-        # A system that was started anew knows no client: it streams to none that does not ask.
+        # A restarted system knows no clients: it streams only to those that ask.
         asks = self._asks or now_ns - self._framed_ns >= _ASK_AGAIN_NS
         if asks and now_ns - self._asked_ns >= _ASK_AGAIN_NS:
             self._asked_ns = now_ns
@@ -134,7 +134,7 @@ class NatnetSource:
         if server.group and self._frames is None:
             try:
                 self._frames = self._join(server.group, server.data_port)
-            except OSError as error:  # a port that another program has, an address that is none: asked again
+            except OSError as error:  # a port taken by another program, or an invalid address: tried again
                 place = f"{server.group}:{server.data_port}"
                 self.detail = f"its frames cannot be taken at {place}: {error.strerror or error}"
 

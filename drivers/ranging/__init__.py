@@ -1,1 +1,1 @@
-"""Radios that tell how far a robot is from anchors at surveyed places."""
+"""Ranging systems: radios that measure a robot's distances to anchors at surveyed places."""

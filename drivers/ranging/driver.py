@@ -1,4 +1,4 @@
-"""The ranging process: rounds of ranges in; the same, placed and checked, and status out."""
+"""The ranging process: rounds of ranges in; checked rounds with the anchors' places, and status out."""
 
 import math
 from collections import Counter
@@ -14,7 +14,7 @@ from groundstation.geometry.multilateration import fix_from_ranges, likely_in
 from groundstation.time_units import NS_PER_MS
 
 _POLL_S = 0.02
-# Noise of centimetres in several ranges does not repeat itself: a gateway that goes on telling its last round is stuck.
+# Noise of centimetres in several ranges does not repeat: a gateway that keeps sending its last round is stuck.
 _MOST_REPEATS = 3
 
 
@@ -46,7 +46,7 @@ class RangingDriver:
         self.counts: Counter[str] = Counter()
 
     def turn(self) -> None:
-        """Wait shortly for rounds, handle them, and keep up heartbeat, status and the watch over silence."""
+        """Wait briefly for rounds, process them, and keep up heartbeat, status and the watch over silence."""
         for arrival_ns, told in self._gateway.poll(_POLL_S):
             self._handle(arrival_ns, told)
         stuck = sorted(robot for robot, (_, repeats) in self._last.items() if repeats > _MOST_REPEATS)
@@ -64,7 +64,7 @@ class RangingDriver:
             return
         stamp_ns = arrival_ns - round((self._settings.delay_ms + told.age_ms) * NS_PER_MS)
         if stamp_ns <= self._newest_ns.get(robot, 0):
-            self._health.skipped += 1  # overtaken on the way
+            self._health.skipped += 1  # overtaken by a newer one on the way
             return
         self._newest_ns[robot] = stamp_ns
         self._health.used(stamp_ns)
@@ -74,7 +74,7 @@ class RangingDriver:
             self._child.bus.publish(RANGE, self._message(robot, ranges_m, stamp_ns))
 
     def _repeats(self, robot: str, ranges_m: dict[str, float]) -> bool:
-        """Return whether a robot's rounds have had the same contents too often."""
+        """Return whether a robot's rounds have repeated too often."""
         last, repeats = self._last.get(robot, ({}, 0))
         repeats = repeats + 1 if ranges_m == last else 0
         self._last[robot] = ranges_m, repeats

@@ -1,4 +1,4 @@
-"""The client of a gateway: asks it once a second, and hands over the rounds that it answers with."""
+"""The client of a gateway: sends a request once a second, and passes on the rounds received."""
 
 import select
 import socket
@@ -14,7 +14,7 @@ _DATAGRAMS = 64
 
 
 class Gateway:
-    """One socket; rejected: what was refused, by reason."""
+    """One socket; rejected: refusals, by reason."""
 
     def __init__(self, host: str, port: int) -> None:
         self.rejected: Counter[str] = Counter()
@@ -24,7 +24,7 @@ class Gateway:
         self._asked_ns = 0
 
     def poll(self, wait_s: float) -> list[tuple[int, ranges.Round]]:
-        """Return the rounds that came with their arrival [ns], the oldest first; waits for the first so long."""
+        """Return the rounds received with their arrival [ns], the oldest first; waits up to wait_s for the first."""
         now_ns = clock.now_ns()
         if now_ns - self._asked_ns >= _ASK_AGAIN_NS:
             self._asked_ns = now_ns

@@ -1,1 +1,1 @@
-"""ROS 2 over its own Zenoh router, as kinds of drivers share it: messages, keys, and a client of the router."""
+"""ROS 2 over its own Zenoh router, shared by several kinds of drivers: messages, keys, and a client of the router."""

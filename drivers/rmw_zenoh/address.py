@@ -1,6 +1,6 @@
-"""Where ROS 2's router is: what addresses of its topics and sections of a field file have in common."""
+"""The address of ROS 2's router: common to addresses of topics and to sections of a field file."""
 
-# WIRE (docs/reference/ros2.md 2): where the router listens. DDS leaves ports for so many domains.
+# WIRE (docs/reference/ros2.md 2): where the router listens. DDS has ports for this many domains.
 ROUTER_PORT, LAST_DOMAIN = 7447, 232
 
 

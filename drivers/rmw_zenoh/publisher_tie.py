@@ -1,13 +1,13 @@
-"""One publisher of a topic at a time. Pure."""
+"""Accepts one publisher of a topic at a time. Pure."""
 
 from groundstation.time_units import NS_PER_S
 
-# A publisher that is silent for so long may be followed by another one: the node was started anew.
+# After this silence another publisher may take over: the node was restarted.
 _HEIR_NS = NS_PER_S
 
 
 class PublisherTie:
-    """Ties a topic to the publisher that was heard on it, until that one is silent for a second."""
+    """Ties a topic to the first publisher heard, until that one is silent for a second."""
 
     def __init__(self) -> None:
         self._publisher, self._heard_ns = b"", 0

@@ -1,6 +1,6 @@
 """A client of a ROS 2 Zenoh router: joins as soon as the router is there, and again after each loss.
 
-A peer would not be brokered by the router, and scouting would find other people's.
+The router would not broker a peer, and scouting would find other people's routers.
 """
 
 import itertools
@@ -49,7 +49,7 @@ class RouterSession:
         return self.is_open and bool(list(self._session.info.routers_zid()))
 
     def declare(self, token: str) -> None:
-        """Show a node or publisher to the others until the session ends."""
+        """Announce a node or publisher to the others until the session ends."""
         self._declared.append(self._session.liveliness().declare_token(token))
 
     def publisher(self, key: str) -> "Publisher":
@@ -74,7 +74,7 @@ class RouterSession:
         self._joining.join(_PATIENCE_S)
         self.is_open = False
         for one in self._declared:
-            with suppress(zenoh.ZError):  # the router went before us
+            with suppress(zenoh.ZError):  # the router left before us
                 one.undeclare()
         self._leave()
 
@@ -88,7 +88,7 @@ class RouterSession:
             try:
                 self._session = zenoh.open(zenoh.Config.from_json5(json.dumps(settings)))
                 self._declare_all()
-            except zenoh.ZError:  # no router yet, or one that went while this was declared
+            except zenoh.ZError:  # no router yet, or one that left during the declaration
                 self._leave()
                 self._closing.wait(_AGAIN_S)
             else:
@@ -114,14 +114,14 @@ class RouterSession:
 
 
 class _Speaker:
-    """What speaks on one key: it numbers its messages."""
+    """A sender on one key, which numbers its messages."""
 
     def __init__(self, end: Any) -> None:
         self._end, self._identity, self._numbers = end, os.urandom(16), itertools.count(1)
 
     @property
     def is_heard(self) -> bool:
-        """Return whether anybody takes what is said here."""
+        """Return whether anybody receives its messages."""
         return bool(self._end.matching_status.matching)
 
     def _attachment(self) -> bytes:

@@ -1,4 +1,4 @@
-"""The driver of a vehicle behind a ROS 2 node: what it says, what a decision means to it, and the process entry."""
+"""The driver of a vehicle behind a ROS 2 node: its reports, its orders from decisions, and the process entry."""
 
 import math
 from collections import Counter
@@ -26,12 +26,12 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 RATE_HZ = 20.0
 _FRESH_NS = 300 * NS_PER_MS
-# Charges come seldom; an older one is unknown.
+# Charges come seldom; an older one counts as unknown.
 _CHARGE_NS = 30 * NS_PER_S
 _STANDING_M = 0.08  # the base of a standing vehicle, as its kind says
-# Orders are repeated until they are obeyed; a standing vehicle is told once a second that it shall not move.
+# Orders are repeated until they are obeyed; a standing vehicle is told once a second not to move.
 _PAUSE_NS = {Order.TAKE_OFF: 2 * NS_PER_S, Order.LAND: NS_PER_S // 2, Order.CUT: NS_PER_S // 2, None: NS_PER_S}
-# A take-off that is called off may begin for so long after it was ordered.
+# A take-off that is called off may still begin for this long after its order.
 _BEGINS_NS = 5 * NS_PER_S
 _ORDERS = {Action.TAKE_OFF: Order.TAKE_OFF, Action.LAND: Order.LAND, Action.CUT: Order.CUT}
 LIMITS = PlausibilityLimits(speed_m_s=8.0, tilt_rad=math.radians(50.0), jump_m_s=0.6)
@@ -106,7 +106,7 @@ class Ros2Vehicle:
     # -- sender loop --------------------------------------------------------------------------------------------------
 
     def view(self, now_ns: int) -> VehicleView:
-        """Return what the vehicle last said."""
+        """Return the vehicle's last reported state."""
         fresh = self._heard_ns > 0 and now_ns - self._heard_ns < _FRESH_NS
         known = self._charge_ns > 0 and now_ns - self._charge_ns < _CHARGE_NS
         trouble = self._link.trouble
@@ -125,13 +125,13 @@ class Ros2Vehicle:
         return f"its odometry (/{topic}) is refused: {self._refused}"
 
     def apply(self, now_ns: int, decision: WatchdogDecision) -> None:
-        """Say what the decision means to the vehicle; its climb after a take-off order is its own."""
+        """Send the orders of a decision; the vehicle climbs by itself after a take-off order."""
         if decision.action is not self._asked:
             self._asked = decision.action
             self._said_ns.clear()
             self._was_ordered |= self._asked is Action.TAKE_OFF
         match decision.action:
-            # Where that order is a switch, one more would undo it.
+            # If that order is a switch, a second one would undo it.
             case Action.CUT if self._flight.airborne or Order.CUT not in self._said_ns:
                 self._order(now_ns, Order.CUT)
             case Action.LAND:
@@ -166,7 +166,7 @@ class Ros2Vehicle:
             self._log.sent(now_ns, recorded(self._settings.ros2.topic(name), payload))
 
     def health(self, now_ns: int) -> LinkHealth:
-        """Return rate and refusals of the link, and in flight what keeps it from hearing or obeying."""
+        """Return rate and refusals of the link, and in flight what prevents it from hearing or obeying."""
         silent = now_ns - self._heard_ns > _FRESH_NS
         asked = _ORDERS.get(self._asked)
         refused = "" if asked is None else self._link.refused.get(asked, "")
@@ -178,14 +178,14 @@ class Ros2Vehicle:
 
     @property
     def _unordered(self) -> str:
-        """Return what to do where a vehicle that was never told to take off is said to be in the air, or ""."""
+        """Return the remedy if a vehicle reports flight without an order to take off, or ""."""
         if self._was_ordered:
             return ""
         z_m = self._height_m + self._settings.ros2.standing_z_m
         return f"its odometry says z = {z_m:.2f} m: if it stands, set ros2.standing_z_m to that"
 
     def flush(self) -> None:
-        """Publish the raw messages that wait."""
+        """Publish the waiting raw messages."""
         self._log.flush()
 
     def close(self) -> None:
@@ -195,7 +195,7 @@ class Ros2Vehicle:
 
 
 def recorded(name: str, payload: bytes) -> bytes:
-    """Return what the recording has of a message: its name, a zero, its bytes."""
+    """Return a message in the recording's form: its name, a zero, its bytes."""
     return name.encode() + b"\0" + payload
 
 

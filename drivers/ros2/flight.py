@@ -1,4 +1,4 @@
-"""Whether a vehicle flies, by its height and what it was told: no message of ROS 2 says it. Pure."""
+"""Judges whether a vehicle flies, by its height and orders: no ROS 2 message reports it. Pure."""
 
 import math
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from groundstation.time_units import NS_PER_MS
 _AIRBORNE_M, _STILL_M_S, _CLIMB_M_S = 0.2, 0.25, 0.15
 _STANDS_NS = 500 * NS_PER_MS
 _LEANS_RAD, _MOVES_M_S = math.radians(50.0), 1.0
-# Share of the height of its take-off at which that is over.
+# Share of the take-off height at which a take-off counts as finished.
 _UP = 0.7
 # While a vehicle is told one of these, a low height may be a low flight.
 _FLOWN = frozenset({Action.FLY, Action.HOVER})
@@ -22,8 +22,8 @@ _FLOWN = frozenset({Action.FLY, Action.HOVER})
 class FlightWatch:
     """Follows one vehicle; take_off_m: the height that its take-off climbs to.
 
-    Lower than 0.2 m and still for 0.5 s it stands, unless it was told to fly: a height that drifts must not make a
-    vehicle in the air a standing one, which nobody would land any more.
+    Lower than 0.2 m and still for 0.5 s it stands, unless it was told to fly: a drifting height must not turn a flying
+    vehicle into a standing one, which nobody would land.
     """
 
     take_off_m: float
@@ -33,7 +33,7 @@ class FlightWatch:
     _low_since_ns: int | None = None
 
     def see(self, now_ns: int, height_m: float, climb_m_s: float, asked: Action) -> None:
-        """Take in a height above where it stood [m] and a climb rate [m/s]; asked: what it is being told."""
+        """Take a height above its stand [m] and a climb rate [m/s]; asked: its present order."""
         low = height_m < _AIRBORNE_M
         if not low or abs(climb_m_s) > _CLIMB_M_S:
             self._low_since_ns = None
@@ -51,7 +51,7 @@ class FlightWatch:
         return height_m >= _UP * self.take_off_m
 
     def state(self, asked: Action, speed_m_s: float) -> FlightState:
-        """Return the state of the flight while it is told something and has a speed."""
+        """Return the flight state for its present order and speed."""
         if not self.heard:
             return FlightState.UNKNOWN
         if not self.airborne:
@@ -64,7 +64,7 @@ class FlightWatch:
 
 
 def fault_of_standing(height_m: float, velocity: Vector3, roll: float, pitch: float, standing_z_m: float) -> str:
-    """Return why what a standing vehicle says of itself cannot be flown by, with the remedy, or "".
+    """Return why a standing vehicle's odometry is unfit for flight, with the remedy, or "".
 
     height_m: above standing_z_m; velocity [m/s] and angles [rad] as its odometry has them, levelled.
     """

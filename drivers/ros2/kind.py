@@ -33,7 +33,7 @@ def _check(orders: Sequence[VehicleOrder]) -> Iterator[tuple[str, Finding]]:
                 yield order.name, (("ros2", key), f"/{topic} is already that of {other}: give each its namespace")
 
 
-# Whatever the node's odometry is made of; that of an optical flow is assumed.
+# The source of the node's odometry is unknown; optical flow is assumed.
 KIND = VehicleKind(
     name="ros2",
     summary="vehicles behind a ROS 2 node (Odometry in, Twist out)",

@@ -1,4 +1,4 @@
-"""One vehicle's topics and services at its router: what it says goes to a function, what it is told comes from here."""
+"""One vehicle's topics and services at its router: its messages go to a function, its orders are sent here."""
 
 import time
 from collections.abc import Callable
@@ -53,7 +53,7 @@ class Ros2Link:
 
     @property
     def trouble(self) -> str:
-        """Return why what is said here does not reach the vehicle, or ""."""
+        """Return why messages do not reach the vehicle, or ""."""
         session, section = self._session, self._section
         if not session.reaches_router or self._velocity is None:
             return f"no ROS 2 Zenoh router answers at {session.endpoint}"
@@ -67,7 +67,7 @@ class Ros2Link:
         return ""
 
     def fly(self, velocity: vehicle.Vector3, turn_rad_s: float) -> bytes:
-        """Say a velocity [m/s, rad/s; base_stabilized]; returns what was said, nothing where the router is away."""
+        """Send a velocity [m/s, rad/s; base_stabilized]; returns the bytes sent, empty while the router is away."""
         if self._velocity is None or not self._session.reaches_router:
             return b""
         payload = names.twist(self._section, velocity, turn_rad_s, time.time_ns())
@@ -75,7 +75,7 @@ class Ros2Link:
         return payload
 
     def order(self, order: Order) -> bytes:
-        """Say an order; returns what was said, nothing where the router is away."""
+        """Send an order; returns the bytes sent, empty while the router is away."""
         if order not in self._orders or not self._session.reaches_router:
             return b""
         self._orders[order].put(vehicle.NOTHING)

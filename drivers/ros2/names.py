@@ -1,16 +1,16 @@
-"""What is said under which key of the router, for driver and failsafe voice alike. Pure."""
+"""Keys and types of the messages sent to the router, for driver and failsafe voice alike. Pure."""
 
 from enum import StrEnum
 
 from drivers.rmw_zenoh.wire import graph, vehicle
 from drivers.ros2.settings import NO_HASH, Ros2Section
 
-# The words of the failsafe voice, which makes the messages itself.
+# The orders of the failsafe voice, which makes the messages itself.
 HOVER, LAND = b"hover", b"land"
 
 
 class Order(StrEnum):
-    """The orders that are no velocity; the values are keys of the section."""
+    """The orders other than velocities; the values are keys of the section."""
 
     TAKE_OFF = "take_off"
     LAND = "land"
@@ -23,7 +23,7 @@ def velocity_type(section: Ros2Section) -> str:
 
 
 def spoken_key(section: Ros2Section, name: str, kind: str) -> str:
-    """Return the key under which something of a type with a known hash is published, or asked for."""
+    """Return the key under which a message of a type with a known hash is published, or requested."""
     type_hash = NO_HASH if section.distro == "humble" else vehicle.HASHES[kind]
     return graph.topic_key(section.domain, section.topic(name), kind, type_hash)
 

@@ -1,6 +1,6 @@
-"""How supervisor and guardian stop and land a vehicle whose driver is dead: as clients of its router, themselves.
+"""Lets supervisor and guardian stop and land a vehicle whose driver is dead, as clients of its router.
 
-What they say reaches the vehicle by its router and its node, and by nothing else (docs/reference/ros2.md 4).
+Their orders reach the vehicle only through its router and its node (docs/reference/ros2.md 4).
 """
 
 import time
@@ -14,7 +14,7 @@ _PAUSE_S = 0.5
 
 
 class Ros2Voice:
-    """Says the two words; way: the driver's settings as JSON. It joins the router before it is needed."""
+    """Sends HOVER and LAND; way: the driver's settings as JSON. It joins the router before it is needed."""
 
     def __init__(self, way: str, speaker: int) -> None:
         settings = Ros2DriverSettings.model_validate_json(way)
@@ -22,7 +22,7 @@ class Ros2Voice:
         self._landed_s = float("-inf")
 
     def say(self, datagram: bytes, addresses: Sequence[tuple[str, int]]) -> None:
-        """Say HOVER, a velocity of zero, or LAND, that order twice a second; raises OSError without a router."""
+        """Send HOVER, a velocity of zero, or LAND, at most twice a second; raises OSError without a router."""
         if datagram == HOVER:
             said = self._link.fly((0.0, 0.0, 0.0), 0.0)
         elif time.monotonic() - self._landed_s < _PAUSE_S:

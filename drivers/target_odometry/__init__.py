@@ -1,1 +1,1 @@
-"""A target's own odometry, heard as a client of its ROS 2 router."""
+"""A target's own odometry, received by a client of its ROS 2 router."""

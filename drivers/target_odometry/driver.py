@@ -1,4 +1,7 @@
-"""The process that hears one target's odometry: messages in; reports and status out. It says nothing to the target."""
+"""The process that receives one target's odometry: messages in.
+
+Reports and status out. It sends nothing to the target.
+"""
 
 import math
 import threading
@@ -18,11 +21,11 @@ from groundstation.bus.topics import REPORTED_MOTION
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _POLL_S, _WAITING = 0.02, 64
-# The tracker is told no more often: neighbouring readings of one wheel err alike.
+# The tracker gets reports no more often: neighbouring readings of one wheel err alike.
 _PERIOD_NS = 45 * NS_PER_MS
-# What stands for so long hangs, what is so late was true long ago [s].
+# A message that repeats for this long is frozen, one this late is outdated [s].
 _STANDS_S, _LATE_S = 0.3, 0.3
-# More than a base can do is no slip any more.
+# Beyond a base's abilities it is no longer slip.
 _MARGIN = 1.5
 
 
@@ -55,7 +58,7 @@ class OdometryDriver:
         self._session = RouterSession(f"tcp/{address.host}:{address.port}", [expression], self._hear)
 
     def turn(self) -> None:
-        """Wait shortly for odometry, handle it, and keep up heartbeat, status and the watch over silence."""
+        """Wait briefly for odometry, process it, and keep up heartbeat, status and the watch over silence."""
         self._came.wait(_POLL_S)
         self._came.clear()
         while self._waiting:
@@ -93,7 +96,7 @@ class OdometryDriver:
 
 
 class OdometryGuard:
-    """Which messages of one topic cannot be true now: of a second publisher, too fast, hanging, or late. Pure."""
+    """Refuses messages of one topic that cannot be true now: of a second publisher, too fast, frozen, or late. Pure."""
 
     def __init__(self, fastest_m_s: float) -> None:
         self._fastest_m_s = fastest_m_s
@@ -110,14 +113,14 @@ class OdometryGuard:
             self._clock.reset()
         if math.hypot(*message.velocity[:2]) > self._fastest_m_s:
             return "too fast"
-        # A stamp of 0 is none: some nodes leave it out.
+        # A stamp of 0 counts as none: some nodes leave it out.
         stands_s, late_s = self._clock.update(arrival_ns, message.stamp_ns) if message.stamp_ns else (0.0, 0.0)
         if stands_s > _STANDS_S or self._repeats(arrival_ns, message):
             return "hangs"
         return "late" if late_s > _LATE_S else ""
 
     def _repeats(self, arrival_ns: int, message: vehicle.OdometryMessage) -> bool:
-        """Return whether it moves, as it says, and yet says the same of everything for too long."""
+        """Return whether a moving target's message has repeated exactly for too long."""
         told = (message.position, message.quaternion, message.velocity, message.turn)
         if told != self._told:
             self._told, self._changed_ns = told, arrival_ns

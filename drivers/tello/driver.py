@@ -1,4 +1,4 @@
-"""The Tello driver: what the vehicle says, what a decision means to it, and the process entry `run`."""
+"""The Tello driver: the vehicle's reports, its orders from decisions, and the process entry `run`."""
 
 import math
 from dataclasses import dataclass, replace
@@ -21,9 +21,9 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 RATE_HZ = 20.0
 _FRESH_NS = 300 * NS_PER_MS
-# A take-off that is called off may begin for so long after it was ordered.
+# A take-off that is called off may still begin for this long after its order.
 _BEGINS_NS = 5 * NS_PER_S
-# The motors' time is told in whole seconds.
+# The motors' time is reported in whole seconds.
 _MOTORS_NS = 1_300 * NS_PER_MS
 _AIRBORNE_CM = 20
 _STEP_STD_M_S = 0.03  # of a velocity in steps of 0.1 m/s
@@ -36,13 +36,13 @@ _PAUSE_NS = {
     text.EMERGENCY: 100 * NS_PER_MS,
     text.STREAM_ON: 3 * NS_PER_S,
 }
-# Whole numbers at 10 Hz: that one of them stands says nothing; the accelerations of all three axes never do.
+# Whole numbers at 10 Hz: a single standing value means nothing; the accelerations of all three axes never stand.
 LIMITS = PlausibilityLimits(frozen_s=0.6, stuck_s=math.inf, stuck_alone_s=math.inf, jump_m_s=0.8)
 
 
 @dataclass(frozen=True, slots=True)
 class Heard:
-    """The newest word of the vehicle; times 0: never. motors_ns: when the motors' time last rose."""
+    """The newest state of the vehicle; times 0: never. motors_ns: when the motors' time last rose."""
 
     heard_ns: int = 0
     motors_ns: int = 0
@@ -136,7 +136,7 @@ class Tello(DatagramVehicle):
         return FlightState.HOVERING if still else FlightState.FLYING
 
     def view(self, now_ns: int) -> VehicleView:
-        """Return what the vehicle last said."""
+        """Return the vehicle's last reported state."""
         heard = self.heard
         fresh = heard.heard_ns > 0 and now_ns - heard.heard_ns < _FRESH_NS
         battery = None if heard.state is None else heard.state.battery / 100
@@ -147,14 +147,14 @@ class Tello(DatagramVehicle):
         return VehicleView(state, fresh, battery, not_ready, self._ready, unsound, (scale * x, scale * y, z))
 
     def apply(self, now_ns: int, decision: WatchdogDecision) -> None:
-        """Send what the decision means to a Tello; sticks count only while it flies."""
+        """Send the orders of a decision; sticks count only while it flies."""
         if decision.action is not self._asked:
             self._asked, self._refused = decision.action, ""
         flies = self.heard.airborne(now_ns)
         match decision.action:
             case Action.CUT:
                 self._repeat(now_ns, text.EMERGENCY)
-            case Action.LAND:  # whether it flies or not: its word may be wrong
+            case Action.LAND:  # whether it flies or not: its report may be wrong
                 self._repeat(now_ns, text.LAND)
             case Action.TAKE_OFF if not flies:
                 self._repeat(now_ns, text.TAKE_OFF if self._ready else text.SDK)
@@ -172,7 +172,7 @@ class Tello(DatagramVehicle):
             self._repeat(now_ns, text.STREAM_ON)
 
     def health(self, now_ns: int) -> LinkHealth:
-        """Return the state of the link, and what the vehicle answered to an order that it refused."""
+        """Return the state of the link, and the vehicle's answer to an order that it refused."""
         word = REFUSABLE.get(self._asked)
         detail = f"it answers {self._refused!r} when told to {word}" if self._refused and word else ""
         return replace(super().health(now_ns), detail=detail)

@@ -1,4 +1,4 @@
-"""A Tello's own video (`tello://ADDRESS`), which comes once the driver has asked for it."""
+"""A Tello's own video (`tello://ADDRESS`), which comes once the driver has requested it."""
 
 from drivers.camera.sources.datagrams import DatagramReader
 from drivers.tello.wire.text import VIDEO_PORT

@@ -23,7 +23,7 @@ _MOST = 10_000
 
 
 class WireError(ValueError):
-    """A datagram that is not what it says; `reason` is a word to count it by."""
+    """A malformed datagram; `reason` is a word to count it by."""
 
     def __init__(self, reason: str) -> None:
         super().__init__(reason)
@@ -32,7 +32,7 @@ class WireError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Server:
-    """Who answers: its name, the version of its stream, ticks per second of its stamps, and where it sends frames.
+    """A server: its name, the version of its stream, ticks per second of its stamps, and where it sends frames.
 
     group: the multicast address, "" for frames to each client's own port.
     """
@@ -58,7 +58,7 @@ class Body:
 class Frame:
     """All rigid bodies of one exposure; exposed, sent: the server's ticks at the middle of the exposure, at sending.
 
-    changed: other bodies are described since the frame before.
+    changed: the descriptions have changed since the frame before.
     """
 
     number: int
@@ -69,7 +69,7 @@ class Frame:
 
 
 def message_of(datagram: bytes) -> tuple[int, bytes]:
-    """Return message id and payload; raises WireError for what is cut short."""
+    """Return message id and payload; raises WireError if cut short."""
     if len(datagram) < _HEAD.size:
         raise WireError("short")
     kind, size = _HEAD.unpack_from(datagram)
@@ -84,7 +84,7 @@ def encode(kind: int, payload: bytes = b"") -> bytes:
 
 
 def connect_request(version: Version = (4, 1)) -> bytes:
-    """Return the datagram that asks for frames in a version of the stream; the server may answer with another one."""
+    """Return the request for frames in a version of the stream; the server may answer with another version."""
     payload = bytearray(271)
     payload[:4] = b"Ping"
     payload[265:267] = bytes(version)
@@ -92,7 +92,7 @@ def connect_request(version: Version = (4, 1)) -> bytes:
 
 
 def decode_server(payload: bytes) -> Server:
-    """Return what a server says of itself; raises WireError for what is cut short, and for versions before 3.0."""
+    """Return a server's description of itself; raises WireError if cut short, and for versions before 3.0."""
     if len(payload) < _SERVER.size:
         raise WireError("short")
     name, *rest = _SERVER.unpack_from(payload)
@@ -114,13 +114,13 @@ def encode_server(server: Server) -> bytes:
 
 
 class _Reader:
-    """Walks through a payload; everything beyond its end is a WireError."""
+    """Reads a payload in order; reading beyond its end raises WireError."""
 
     def __init__(self, payload: bytes, version: Version) -> None:
         self.payload, self.version, self.at = payload, version, 0
 
     def count(self) -> int:
-        """Return the next whole number, which counts something."""
+        """Return the next integer, a count."""
         (value,) = self.take(_COUNT)
         if not 0 <= value <= _MOST:
             raise WireError("count")
@@ -150,7 +150,7 @@ class _Reader:
         return text
 
     def section(self) -> int:
-        """Return how many entries a section of a frame has; its size is left out."""
+        """Return the number of entries of a frame's section, skipping its size."""
         entries = self.count()
         if self.version >= _SIZED:
             self.take(_COUNT)
@@ -158,7 +158,7 @@ class _Reader:
 
 
 def decode_frame(payload: bytes, version: Version) -> Frame:
-    """Return the rigid bodies of a frame; raises WireError for what is cut short, or ends otherwise than frames do."""
+    """Return the rigid bodies of a frame; raises WireError if cut short, or without the proper end."""
     reader = _Reader(payload, version)
     (number,) = reader.take(_COUNT)
     for _ in range(reader.section()):
@@ -169,7 +169,7 @@ def decode_frame(payload: bytes, version: Version) -> Frame:
     tail = _TAIL[version >= _SIZED]
     if len(payload) - reader.at < tail.size:
         raise WireError("short")
-    # What lies between (skeletons, labelled markers, devices) differs by version; the end is the same.
+    # The part in between (skeletons, labelled markers, devices) differs by version; the end is the same.
     *_, end = values = tail.unpack_from(payload, len(payload) - tail.size)
     if end != 0:
         raise WireError("end")
@@ -202,7 +202,7 @@ def encode_frame(frame: Frame, version: Version) -> bytes:
 def decode_descriptions(payload: bytes, version: Version) -> dict[int, str]:
     """Return the name of each rigid body by its streaming id.
 
-    Before 4.1 nothing behind a kind of description other than marker set and rigid body can be read, and is left out.
+    Before 4.1 only marker sets and rigid bodies can be read: descriptions from the first other kind on are left out.
     """
     reader, names = _Reader(payload, version), dict[int, str]()
     for _ in range(reader.count()):

@@ -24,7 +24,7 @@ def expression(domain: int, prefix: str) -> str:
 
 
 def body_of(key: str) -> tuple[str, str]:
-    """Return body and DDS type of a key; raises WireError for another one."""
+    """Return body and DDS type of a key; raises WireError for any other key."""
     parts = key.split("/")
     if len(parts) < 5 or parts[-3] != "pose":
         raise WireError("key")
@@ -40,7 +40,7 @@ class StampedPose(NamedTuple):
 
 
 def decode_pose(dds_type: str, payload: bytes) -> StampedPose:
-    """Return what a message says; raises WireError for another type and what is cut short."""
+    """Return the pose in a message; raises WireError for another type, and if cut short."""
     if dds_type not in _TEXTS:
         raise WireError("type")
     reader = CdrReader(payload)

@@ -11,7 +11,7 @@ ASK = b'{"ranges": 1}'
 
 
 class WireError(Exception):
-    """A datagram that is none of ours; reason: in a word or two, for counting."""
+    """An invalid datagram; reason: in a word or two, for counting."""
 
     def __init__(self, reason: str) -> None:
         super().__init__(reason)
@@ -35,7 +35,7 @@ def encode(told: Round) -> bytes:
 
 
 def decode(datagram: bytes) -> Round:
-    """Return the round in a datagram; raises WireError. Keys that are not known are passed over."""
+    """Return the round in a datagram; raises WireError. Unknown keys are ignored."""
     if len(datagram) > LARGEST:
         raise WireError("too long")
     try:

@@ -12,7 +12,7 @@ _LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 
 
 class WireError(ValueError):
-    """Bytes that are no message; reason: a word to count them by."""
+    """Bytes that are no valid message; reason: a word to count them by."""
 
     def __init__(self, reason: str) -> None:
         super().__init__(reason)
@@ -42,7 +42,7 @@ class CdrReader:
         return values
 
     def text(self) -> str:
-        """Return a text; what is no UTF-8 is replaced."""
+        """Return a text; bytes that are not UTF-8 are replaced."""
         return self.blob().rstrip(b"\0").decode("utf-8", "replace")
 
     def blob(self) -> bytes:
@@ -54,7 +54,7 @@ class CdrReader:
         return bytes(self._content[begin : self._at])
 
     def header(self) -> tuple[int, str]:
-        """Return what a std_msgs/Header says: Unix time [ns] and frame."""
+        """Return Unix time [ns] and frame of a std_msgs/Header."""
         seconds, nanoseconds = *self.numbers("i"), *self.numbers("I")
         return seconds * 1_000_000_000 + nanoseconds, self.text()
 

@@ -7,7 +7,7 @@ import struct
 
 _ADMIN_SPACE = "@ros2_lv"
 _NODE, _PUBLISHER = "NN", "MP"
-# reliable, volatile, keep the last 10; all else as the system likes it
+# reliable, volatile, keep the last 10; all else by default
 _QOS = "::,10:,:,:,,"
 _ENCLAVE = _NAMESPACE = "%"
 
@@ -24,7 +24,7 @@ def topic_key(domain: int, topic: str, kind: str, type_hash: str) -> str:
 
 
 def heard_key(domain: int, topic: str, kind: str = "*") -> str:
-    """Return the key expression of what is published under a topic, whatever the type's hash; kind "*": any type."""
+    """Return the key expression of a topic with any type hash; kind "*": with any type."""
     return f"{domain}/{topic.strip('/')}/{kind if kind == '*' else dds_type(kind)}/*"
 
 
@@ -41,10 +41,10 @@ def publisher_token(domain: int, session: str, node: str, number: int, topic: st
 
 
 def publisher_of(attached: bytes) -> bytes:
-    """Return the 16 bytes that name the publisher of a message, or nothing where a message does not say it."""
+    """Return the 16 bytes that name the publisher of a message, or nothing if the message does not name it."""
     return attached[17:33] if len(attached) == 33 else b""
 
 
 def attachment(sequence: int, stamp_ns: int, publisher: bytes) -> bytes:
-    """Return what goes with each message: its number, its Unix time and the 16 bytes of its publisher."""
+    """Return the attachment of a message: its number, its Unix time and the 16 bytes of its publisher."""
     return struct.pack("<qqB", sequence, stamp_ns, len(publisher)) + publisher

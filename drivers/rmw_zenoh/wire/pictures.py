@@ -1,4 +1,4 @@
-"""The messages of cameras: CompressedImage and Image, as they are; pixels are not looked at.
+"""The messages of cameras: CompressedImage and Image, as they are; pixels are not interpreted.
 
 WIRE (docs/reference/ros2.md 6): fields and encodings.
 """
@@ -35,7 +35,7 @@ class RawPicture:
 
 
 def decode_compressed(payload: bytes) -> CompressedPicture:
-    """Return a CompressedImage; raises WireError for what is cut short or empty."""
+    """Return a CompressedImage; raises WireError if cut short or empty."""
     reader = CdrReader(payload)
     stamp_ns, _ = reader.header()
     picture = CompressedPicture(stamp_ns, reader.text(), reader.blob())
@@ -45,12 +45,12 @@ def decode_compressed(payload: bytes) -> CompressedPicture:
 
 
 def decode_raw(payload: bytes) -> RawPicture:
-    """Return an Image; raises WireError for what is cut short, empty, or whose sizes contradict each other."""
+    """Return an Image; raises WireError if cut short, empty, or with contradicting sizes."""
     reader = CdrReader(payload)
     stamp_ns, _ = reader.header()
     height, width = reader.numbers("I", 2)
     encoding = reader.text()
-    reader.numbers("B")  # the order of bytes, where a pixel's value has several
+    reader.numbers("B")  # the byte order, for pixel values of several bytes
     (step,) = reader.numbers("I")
     picture = RawPicture(stamp_ns, width, height, encoding, step, reader.blob())
     if not picture.data or not width or not height:

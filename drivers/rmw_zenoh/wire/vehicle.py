@@ -11,7 +11,7 @@ from drivers.rmw_zenoh.wire.cdr import CdrReader, CdrWriter, WireError
 Vector3 = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
-# The same in every distribution that has type hashes; a test asks rosbags, which knows no services.
+# The same in every distribution with type hashes; a test checks them with rosbags, which knows no services.
 HASHES = {
     "geometry_msgs/msg/Twist": "RIHS01_9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a",
     "geometry_msgs/msg/TwistStamped": "RIHS01_5f0fcd4f81d5d06ad9b4c4c63e3ea51b82d6ae4d0558f1d475229b1121db6f64",
@@ -24,14 +24,14 @@ TWIST, TWIST_STAMPED, EMPTY, TRIGGER = HASHES
 NOTHING = CdrWriter().numbers("B", 0).payload
 _COVARIANCE = 36
 _QUATERNION_ERROR = 0.1
-# No vehicle is so high [m], moves or turns so fast [m/s, rad/s]; a larger number, though finite, can become none.
+# No vehicle is this high [m], moves or turns this fast [m/s, rad/s]; a larger finite number can overflow.
 _ABSURD_M, _ABSURD_PER_S = 1e4, 1e3
 _CHARGE_AT = 6  # voltage, temperature, current, charge, capacity, design capacity stand before it
 
 
 @dataclass(frozen=True, slots=True)
 class OdometryMessage:
-    """What an Odometry says.
+    """The content of an Odometry.
 
     stamp_ns: on the sender's clock; position [m], quaternion (x, y, z, w) in its frame; velocity [m/s] and turn [rad/s]
     in the vehicle's own.
@@ -45,10 +45,10 @@ class OdometryMessage:
 
 
 def decode_odometry(payload: bytes) -> OdometryMessage:
-    """Return an Odometry; raises WireError for bytes that are none, and for values that are no motion of a vehicle.
+    """Return an Odometry; raises WireError for invalid bytes, and for values that are no motion of a vehicle.
 
-    Those are what is no number or no rotation, absurd heights and velocities, and a twist in the axes of the room,
-    which one frame for both says.
+    Such values are NaN, invalid rotations, absurd heights and velocities, and a twist in the axes of the room, shown by
+    equal names of both frames.
     """
     reader = CdrReader(payload)
     stamp_ns, frame = reader.header()
@@ -87,7 +87,7 @@ def decode_charge(payload: bytes) -> float:
 
 
 def encode_battery(stamp_ns: int, share: float) -> bytes:
-    """Return the bytes of a BatteryState that knows its charge and nothing else."""
+    """Return the bytes of a BatteryState with a charge and nothing else."""
     unknown = math.nan
     writer = CdrWriter().header(stamp_ns, "").numbers("f", 11.1, *(unknown,) * 5, share)
     return writer.numbers("B", 2, 1, 3, 1).blob(b"").blob(b"").text("").text("").payload
@@ -111,7 +111,7 @@ def decode_twist(payload: bytes, stamped: bool) -> tuple[Vector3, float]:
 
 
 def decode_answer(payload: bytes) -> tuple[bool, str]:
-    """Return whether a Trigger succeeded, and what was said about it; raises WireError."""
+    """Return whether a Trigger succeeded, and its message; raises WireError."""
     reader = CdrReader(payload)
     return bool(reader.numbers("B")[0]), reader.text()
 

@@ -12,13 +12,13 @@ VIDEO_PORT = 11111
 SDK, TAKE_OFF, LAND, EMERGENCY = b"command", b"takeoff", b"land", b"emergency"
 STREAM_ON = b"streamon"
 OK, ERROR = b"ok", b"error"
-# WIRE (docs/reference/tello.md 3): `tof` where nothing echoes, as over the floor that it stands on.
+# WIRE (docs/reference/tello.md 3): `tof` without an echo, as over the floor that it stands on.
 NO_ECHO_CM = 6553
 _LARGEST = 1024
 
 
 class WireError(ValueError):
-    """Text that is no state; `reason` is a word to count it by."""
+    """A text that is no valid state; `reason` is a word to count it by."""
 
     def __init__(self, reason: str) -> None:
         super().__init__(reason)

@@ -22,7 +22,7 @@ class Ros2Voice:
         self._landed_s = float("-inf")
 
     def say(self, datagram: bytes, addresses: Sequence[tuple[str, int]]) -> None:
-        """Send HOVER, a velocity of zero, or LAND, at most twice a second; raises OSError without a router."""
+        """Send HOVER (zero velocity) or LAND (at most twice a second); raises OSError without a router."""
         if datagram == HOVER:
             said = self._link.fly((0.0, 0.0, 0.0), 0.0)
         elif time.monotonic() - self._landed_s < _PAUSE_S:

@@ -15,7 +15,7 @@ from groundstation.sensing.visibility import SPREAD
 def most_information(
     problem: CostProblem, e: int, i: int, reach: Vector, low: Vector, high: Vector, turn_rad2: float
 ) -> float:
-    """Return the most information that an edge can bring in step i, whatever is flown until then."""
+    """Return an upper bound of the information of an edge in step i, whatever is flown until then."""
     edge, n = problem.edges[e], problem.poses.shape[0]
     camera, steps, markers = problem.cameras[edge.camera], i + 1.0, problem.markers
     bottom = top = markers[edge.subject]
@@ -51,11 +51,11 @@ def most_information(
 
 @kernel()
 def lower_bound(problem: CostProblem, reach: Vector, low: Vector, high: Vector) -> float:
-    """Return what no topology and no controls can get below, for a problem whose edges are all pairs.
+    """Return a lower bound of the cost of all topologies and controls, for a problem whose edges are all pairs.
 
-    The cost falls with every information, and an information is at most that of the smallest distance that two
+    The cost decreases with every information, and an information is at most that at the smallest distance that two
     entities can reach; reach (n): of each robot per step [m], along the diagonal of its controls' box; low, high (n):
-    between which heights it stays [m]. Penalties are at least 0. docs/explanation/planning.md 5.
+    limits of its height [m]. Penalties are at least 0. docs/explanation/planning.md 5.
     """
     n, k, h, m = problem.poses.shape[0], problem.targets.shape[0], problem.options.steps, problem.edges.shape[0]
     options, P, cameras, cost, discount = problem.options, room_for(problem.prior), problem.cameras, 0.0, 1.0

@@ -44,7 +44,7 @@ def predict_adjoint(W: Matrix, n: int, d: int, dt: float) -> None:
 
 @kernel()
 def room_for(P: Matrix) -> Matrix:
-    """Return a copy of P in a matrix that `dense` can work on: of whole vectors, an identity in what is added."""
+    """Return a copy of P padded for `dense` to whole vectors, with an identity in the padding."""
     d = P.shape[0]
     m = padded(d)
     wide = np.zeros((m, m))
@@ -58,7 +58,7 @@ def room_for(P: Matrix) -> Matrix:
 
 @kernel()
 def invert(A: Matrix) -> None:
-    """A <- A^-1 for a matrix as `room_for` returns it; NaN on the diagonal where it is not positive definite."""
+    """A <- A^-1 for a matrix as `room_for` returns it; NaN on the diagonal if it is not positive definite."""
     m = A.shape[0]
     sound = negative_inverse(A, np.empty((2 * PIVOTS, m)))
     for i in range(m):

@@ -40,9 +40,10 @@ def lever(problem: CostProblem, tape: Tape, i: int, e: int) -> tuple[float, floa
 def undo_weights(
     M: Matrix, problem: CostProblem, tape: Tape, i: int, state: Matrix, yaws: Vector, work: Vector
 ) -> None:
-    """Take M = -dc/d(information) and dc/d(variance of yaw) back over one step's sightings.
+    """Propagate M = -dc/d(information) and dc/d(variance of yaw) back over one step's sightings.
 
-    Adds to dc/d(x, y, yaw, z) `state` (n, 4). yaws (n): by the variances after the step, then before it; work (n).
+    Adds to dc/d(x, y, yaw, z) `state` (n, 4). yaws (n): derivatives by the variances after the step, on return before
+    it; work (n).
     """
     edges, cameras, sightings, readings = problem.edges, problem.cameras, tape.sightings, problem.options.readings
     before, after = tape.yaws_before[i], tape.yaws_after[i]
@@ -95,7 +96,7 @@ def undo_weights(
 
 @kernel(inlined=True)
 def undo_move(state: Matrix, motion: Matrix, dt: float, gradient: Vector) -> None:
-    """Take dc/d(x, y, yaw, z) back over one motion step; adds to dc/du. Heights do not depend on those before."""
+    """Propagate dc/d(x, y, yaw, z) back over one motion step; adds to dc/du. Heights do not depend on earlier ones."""
     for r in range(state.shape[0]):
         ax, ay = state[r, X], state[r, Y]
         c, s = math.cos(motion[r, YAW]), math.sin(motion[r, YAW])

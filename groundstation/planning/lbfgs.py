@@ -1,6 +1,6 @@
 """Compiled projected L-BFGS in the box [-1, 1]^m, point by point: the caller computes cost and gradient of each.
 
-Both planners minimise with it: that which flies, and that of the plane (`experiments/planar`).
+Both planners minimise with it: the one that flies, and the planar one (`experiments/planar`).
 """
 
 from typing import Any, NamedTuple
@@ -12,17 +12,17 @@ from groundstation.kernel import Record, Rows, kernel
 
 MEMORY = 6
 _ARMIJO = 1e-4
-_SHORTER, _SHORTEST = 0.3, 1e-4  # a step that does not help, and one after which its direction is given up
-_FIRST = 0.5  # of the largest entry of a first step, when nothing is known of the curvature
-_FLAT = 1e-10  # a pair of step and change that curves less tells nothing
+_SHORTER, _SHORTEST = 0.3, 1e-4  # factor for a step that does not help; below the latter the direction is given up
+_FIRST = 0.5  # largest entry of a first step, when nothing is known of the curvature
+_FLAT = 1e-10  # a pair of step and change with less curvature is of no use
 
 
 class Progress(Record):
     """How far a descent has come.
 
-    cost: at x; size: by which costs and gradients are divided (0: the first cost); expected: by how much the cost of
-    the next point should change, over size; step: length along the direction; stored: rows of history; evaluations:
-    so far; over: 1 once x is a minimum, as far as can be told.
+    cost: at x; size: divisor of costs and gradients (0: the first cost); expected: predicted change of cost at the next
+    point, over size; step: length along the direction; stored: rows of history; evaluations: so far; over: 1 once x
+    counts as a minimum.
     """
 
     cost: float
@@ -38,10 +38,10 @@ _PROGRESS = Progress.dtype
 
 
 class Descent(NamedTuple):
-    """A search that can be continued: the best point x, the next one to look at, `trial`, and their gradients.
+    """A search that can be continued: the best point x, the next one to evaluate, `trial`, and their gradients.
 
-    free (m): 0 for entries that their bound holds, else 1; steps, changes (MEMORY, m): history of x and of its
-    gradient, newest first; progress (1).
+    free (m): 0 for entries held at their bound, else 1; steps, changes (MEMORY, m): history of x and of its gradient,
+    newest first; progress (1).
     """
 
     x: Vector
@@ -57,7 +57,7 @@ class Descent(NamedTuple):
 
 @kernel()
 def descent_from(start: Vector, size: float) -> Descent:
-    """Return the search that begins at a start, or where the box is nearest to it; size: see Progress."""
+    """Return the search that begins at the point of the box nearest to a start; size: see Progress."""
     m = start.shape[0]
     x, trial = np.empty(m), np.empty(m)
     progress: Any = np.zeros(1, _PROGRESS)
@@ -81,7 +81,7 @@ def projected_gradient(x: Vector, gradient: Vector) -> float:
 
 @kernel(contract=True, reassociate=True)
 def newton(d: Descent, stored: int) -> float:
-    """Write the quasi-Newton direction over the entries that are free to move; returns its slope (0: nothing is known).
+    """Write the quasi-Newton direction over the free entries; returns its slope (0: no history).
 
     Two-loop recursion with history projected onto them; a pair whose curvature vanishes there is skipped.
     """
@@ -127,7 +127,7 @@ def newton(d: Descent, stored: int) -> float:
 
 @kernel()
 def head(d: Descent, stored: int) -> int:
-    """Write where to go next: by the history, or else a bounded step downhill; returns how much history is of use."""
+    """Write the next direction: by the history, else a bounded step downhill; returns the used rows of history."""
     largest = 0.0
     if newton(d, stored) < 0.0:
         return stored
@@ -151,10 +151,10 @@ def push(history: Matrix, newest: Vector, before: Vector) -> None:
 
 @kernel()
 def move(d: Descent) -> int:
-    """Make the trial the best point; returns how much history there is now.
+    """Make the trial the best point; returns the rows of history.
 
-    A step along which the cost curves downwards is not remembered: on its own it would make the next one as short as
-    the gradient, which is least where the cost is flat, far from what is to be seen.
+    A step with negative curvature is not stored: alone it would make the next step as short as the gradient, which is
+    smallest where the cost is flat, far from the targets.
     """
     stored, along, square = int(d.progress[0].stored), 0.0, 0.0
     if d.progress[0].evaluations > 1:
@@ -183,10 +183,10 @@ def propose(d: Descent) -> None:
 
 @kernel()
 def take(d: Descent, cost: float, tolerance: float, least_gain: float) -> bool:
-    """Go on from the cost of the trial, whose gradient the caller has written; returns whether it is the best so far.
+    """Take the cost of the trial, whose gradient the caller has written; returns whether it is the best so far.
 
-    It is over when the projected gradient of cost / size is within the tolerance, when a step gains less than
-    least_gain of size, or when no step helps. A first cost that is not finite has no direction to go in: x stays.
+    The search is over when the projected gradient of cost / size is within the tolerance, when a step gains less than
+    least_gain of size, or when no step helps. A first cost that is not finite gives no direction: x stays.
     """
     progress = d.progress[0]
     progress.evaluations += 1

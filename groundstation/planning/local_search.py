@@ -13,7 +13,7 @@ from groundstation.planning.problem import PlanningProblem
 from groundstation.planning.records import CostProblem
 from groundstation.sensing.topology import Topology
 
-_LEAST_GAIN = 1e-2  # of the tolerance: a step that gains less is the last one
+_LEAST_GAIN = 1e-2  # as a share of the tolerance: a step that gains less is the last one
 
 
 class SearchState(NamedTuple):
@@ -33,9 +33,9 @@ def search_state(start: Vector, report_size: int) -> SearchState:
 
 @kernel()
 def solve(state: SearchState, problem: CostProblem, budget: int, limit: int, tolerance: float) -> bool:
-    """Minimise for `budget` further evaluations, and `limit` in all; returns whether it is over. x is always the best.
+    """Minimise for up to `budget` further evaluations, `limit` in all; returns whether it is over. x is the best point.
 
-    A first cost that is not finite has no direction to go in: x stays, and the cost is infinite.
+    A first cost that is not finite gives no direction: x stays, and the cost is infinite.
     """
     descent, u, scale, latest = state.descent, state.u, problem.scale, state.latest
     progress, gradient = descent.progress[0], descent.trial_gradient
@@ -74,7 +74,7 @@ class LocalSearch:
         self._limit, self._tolerance = limit, tolerance
 
     def advance(self, until: int) -> bool:
-        """Go on as far as may be without asking for the time, or to so many evaluations; returns whether it is over."""
+        """Continue for one time check's evaluations, or up to `until` of them in all; returns whether it is over."""
         budget = min(self.problem.evaluations_at_once, until - self.evaluations)
         return bool(solve(self._state, self.problem.cost, budget, self._limit, self._tolerance))
 
@@ -90,7 +90,7 @@ class LocalSearch:
 
     @property
     def evaluations(self) -> int:
-        """Return how many there were."""
+        """Return the number of evaluations so far."""
         return int(self._progress["evaluations"])
 
     def solution(self) -> Solution:

@@ -1,4 +1,4 @@
-"""Settings of the planner: horizon, limits, level heights, noise it counts on, weights."""
+"""Settings of the planner: horizon, limits, level heights, assumed noise, weights."""
 
 import math
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ NO_FENCE = Rectangle((-math.inf, math.inf), (-math.inf, math.inf))
 
 @dataclass(frozen=True, slots=True)
 class MotionLimits:
-    """What one robot is never asked to exceed."""
+    """Limits that no command to a robot exceeds."""
 
     max_speed_m_s: float = 0.6
     max_climb_m_s: float = 0.4
@@ -37,8 +37,8 @@ class Weights:
 
     PAPER (docs/explanation/method.md 7): the forms are ours.
 
-    robots: share of the robots' own position uncertainty; without it a robot that the target's estimate can spare
-    drifts out of every camera's view, and a drone that nobody can place has to land.
+    robots: share of the robots' own position uncertainty; without it a robot that the target's estimate does not need
+    drifts out of every camera's view, and a drone without a known place must land.
     """
 
     repulsion: float = 0.1
@@ -51,13 +51,13 @@ class Weights:
 class PlannerParameters:
     """Settings of the planner.
 
-    level_heights_m: row n-1 holds heights with which the search for a topology of n levels begins, top first; more
-    levels than rows are not considered, and heights are chosen between the lowest and the highest of all. hysteresis:
-    relative gain a new topology must bring; within min_dwell_s of the last switch it must bring urgent_gain. fence:
-    drones' box in the floor plan, kept fence_margin_m away from (softly).
-    evaluation_budget and tolerance: of one solve. Of the starts of all topologies, at most `starts` of each, the
-    `solves` cheapest get first_look evaluations, and the `finals` best of those go on to the end.
-    target_weights: what a target's uncertainty counts in the cost beside the others', 1 where nothing is said.
+    level_heights_m: row n-1 holds the heights, top first, from which the search for a topology of n levels begins;
+    topologies with more levels are not considered, and heights are chosen between the lowest and the highest of all.
+    hysteresis: relative gain required of a new topology; within min_dwell_s of the last switch it is urgent_gain.
+    fence: drones' box in the floor plan, kept fence_margin_m away from (softly). evaluation_budget and tolerance: of
+    one solve. Of the starts of all topologies, at most `starts` of each, the `solves` cheapest get first_look
+    evaluations, and the `finals` best of those go on to the end. target_weights: relative weights of targets'
+    uncertainties in the cost, 1 by default.
     """
 
     level_heights_m: tuple[tuple[float, ...], ...]
@@ -93,12 +93,12 @@ class PlannerParameters:
 
     @property
     def heights_m(self) -> tuple[float, float]:
-        """Return the lowest and the highest height that may be flown [m]."""
+        """Return the lowest and the highest permitted height [m]."""
         all_heights = [height for row in self.level_heights_m for height in row]
         return min(all_heights), max(all_heights)
 
     def level_heights(self, levels: int) -> tuple[float, ...] | None:
-        """Return the heights to begin with for so many levels [m], or None for more levels than may be flown."""
+        """Return the initial heights for a number of levels [m], or None for more levels than permitted."""
         return self.level_heights_m[levels - 1] if 0 < levels <= len(self.level_heights_m) else None
 
 
@@ -136,7 +136,7 @@ def _weight(target: Target) -> float:
 def _noise(field: ResolvedField) -> ProcessNoise:
     """Return densities for the worst of drones and targets; velocity errors last some 0.8 s, manoeuvres 0.5 s.
 
-    A plan looks ahead for seconds, over which pushes of 0.12 s (the filter's) add up to manoeuvres.
+    A plan looks seconds ahead, over which pushes of 0.12 s (the filter's) add up to manoeuvres.
     """
     odometry = [drone.odometry for drone in field.drones.values()]
     briskest = max(usual_acceleration_m_s2(target) for target in field.tracked.values())

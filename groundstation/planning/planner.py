@@ -1,4 +1,4 @@
-"""One planning step: optimise the current topology and its neighbours, choose one, say why."""
+"""One planning step: optimises the current topology and its neighbours, chooses one, and gives the reason."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -31,7 +31,7 @@ class PlanRequest:
     held: frozenset[str] = frozenset()
 
     def put_to(self, planner: Any, should_stop: Callable[[], bool], max_evaluations: int | None = None) -> "PlanResult":
-        """Return what a planner answers: `Planner`, or one of another package, which need not take `held`."""
+        """Return the answer of a planner: `Planner`, or one of another package, which need not accept `held`."""
         takes_held = "held" in signature(planner.plan).parameters
         more = {"held": self.held} if takes_held else {}
         scene = self.belief, self.topology, self.warm_start
@@ -44,9 +44,9 @@ class PlanResult:
     """The chosen topology with held controls.
 
     cost [m^2]: with penalties; uncertainty [m^2]: the discounted trace alone. controls: (vx, vy, yaw rate) per robot
-    [m/s, m/s, rad/s; base_stabilized]; heights: where each robot goes to [m]. solver.status: complete | stopped (out of
-    time or evaluations: the best so far) | idle (no robot or no target). solver.gap: against a bound of all topologies
-    and controls. solver.seconds is left 0: the core has no clock.
+    [m/s, m/s, rad/s; base_stabilized]; heights: the height each robot goes to [m]. solver.status: complete | stopped
+    (out of time or evaluations: the best so far) | idle (no robot or no target). solver.gap: to a lower bound over all
+    topologies and controls. solver.seconds is left 0: the core has no clock.
     """
 
     topology: Topology
@@ -62,7 +62,7 @@ class PlanResult:
 
     @property
     def warm_start(self) -> dict[str, Array]:
-        """Return the controls with the height after them (4 per robot), from which the next plan goes on."""
+        """Return the controls, each followed by the height (4 per robot), as the start of the next plan."""
         return {name: np.append(u, self.heights[name]) for name, u in self.controls.items()}
 
 
@@ -89,12 +89,12 @@ class _Search:
         return problem.value(start)
 
     def solve(self, problem: PlanningProblem, start: Array) -> None:
-        """Look for a local minimum until it is found, or the time is over: the best point so far counts."""
+        """Search for a local minimum until it is found or time is up; the best point so far counts."""
         p = self.parameters
         self.go_on(LocalSearch(problem, start, p.evaluation_budget, p.tolerance), p.evaluation_budget)
 
     def go_on(self, search: LocalSearch, until: int) -> None:
-        """Go on with a local search until it is over, had so many evaluations, or the time is over."""
+        """Continue a local search until it is over, has had `until` evaluations, or time is up."""
         while True:
             before = search.evaluations
             over = search.advance(until)
@@ -129,9 +129,9 @@ def choose(current: Topology, costs: Mapping[Topology, float], required_gain: fl
 
 
 class Planner:
-    """Plans on belief snapshots. Its only memory is since when it has been asked about the same current topology.
+    """Plans on belief snapshots. Its only memory is since when the current topology has been the same.
 
-    builder_of: makes the arrays of a problem; another one changes which sightings the cost counts on.
+    builder_of: makes the arrays of a problem; a different one changes the sightings that the cost assumes.
     """
 
     def __init__(
@@ -156,9 +156,9 @@ class Planner:
     ) -> PlanResult:
         """Return the best of the current topology and its neighbours; raises EstimatorFault for a broken belief.
 
-        current: over the robots to plan for (those missing in the belief are ignored); held: those of them that stay
-        where they are, and only look. `should_stop` is asked after every few evaluations, some 0.3 ms for ten robots.
-        A plan that was stopped is repeated exactly by giving its number of evaluations as `max_evaluations`.
+        current: over the robots to plan for (those missing in the belief are ignored); held: those of them that stay in
+        place, and only look. `should_stop` is called after every few evaluations, some 0.3 ms for ten robots. A stopped
+        plan is repeated exactly with its number of evaluations as `max_evaluations`.
         """
         current = current.reconciled(current.robots & frozenset(belief.layout.robots))
         scene = scene_from_belief(belief, current.robots, held)
@@ -177,7 +177,7 @@ class Planner:
     def _warm(
         self, scene: PlanningScene, warm_start: Mapping[str, Array] | None, rest: Array, starts: Starts, scale: Array
     ) -> Array:
-        """Return the start that goes on with the last plan, as far as it is known and finite."""
+        """Return the start that continues the last plan, as far as that is known and finite."""
         held = warm_start if warm_start and self.parameters.mode != "paper" else {}
         x = rest.copy().reshape(-1, ROBOT_CONTROLS)
         for i, name in enumerate(scene.robots):
@@ -195,7 +195,7 @@ class Planner:
         others: list[Topology],
         warm_start: Mapping[str, Array] | None,
     ) -> None:
-        """Solve the first topology, then the starts of all in the order of their costs, the likeliest first."""
+        """Solve the first topology, then the starts of all others in the order of their costs."""
         problem = self._builder.build(scene, first)
         search.least = self._builder.lower_bound(scene, problem)
         starts = Starts(scene, self.parameters, self.sensors, problem.scale, self._builder.height_m)

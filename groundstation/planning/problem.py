@@ -18,18 +18,18 @@ from groundstation.sensing.occlusion import box_rows
 from groundstation.sensing.topology import Topology
 from groundstation.sensing.visibility import camera_rows
 
-_HELD = 0.01  # of its limits, what one that stays where it is may do: the search divides by them
-_LEAST_BAND_M = 1e-3  # of heights to choose from, where the field names one only
-_FLOPS_PER_CHECK = 1.5e6  # some 0.3 ms: how much is computed between two questions for the time
+_HELD = 0.01  # share of its limits left to a robot that stays in place: the search divides by them
+_LEAST_BAND_M = 1e-3  # least range of heights, if the field names only one
+_FLOPS_PER_CHECK = 1.5e6  # some 0.3 ms: computation between two time checks
 _FLOPS_PER_EDGE = 300.0
 
 
 @dataclass(frozen=True, slots=True)
 class PlanningScene:
-    """What all topologies of one planning step share: robots and targets of the belief, in state order.
+    """The inputs common to all topologies of one planning step: robots and targets of the belief, in state order.
 
     poses (n, 4) x, y, z, yaw; moving (k, 4) x, y, vx, vy; prior (n + 2 k square): positions of robots, then position
-    and velocity of each target, per axis; yaw_variances (n) [rad^2]; held: robots that stay where they are.
+    and velocity of each target, per axis; yaw_variances (n) [rad^2]; held: robots that stay in place.
     """
 
     robots: tuple[str, ...]
@@ -44,8 +44,8 @@ class PlanningScene:
 def scene_from_belief(belief: JointBelief, robots: frozenset[str], held: frozenset[str] = frozenset()) -> PlanningScene:
     """Return the scene of the given robots and all targets; raises EstimatorFault for an indefinite covariance.
 
-    Both axes get the mean of their covariances, which is one as well. Heights and any calibration entries are
-    marginalised: the planner's noise is isotropic, so that they inform neither position nor heading.
+    Both axes get the mean of their covariances, which is a covariance too. Heights and calibration entries are
+    marginalised: the planner's noise is isotropic, so they inform neither position nor heading.
     """
     names = tuple(name for name in belief.layout.robots if name in robots)
     targets, block = belief.layout.targets, belief.layout.block
@@ -70,7 +70,7 @@ def scene_from_belief(belief: JointBelief, robots: frozenset[str], held: frozens
 class PlanningProblem:
     """One topology's optimisation: minimise over x in [-1, 1]^(4 n), u = x * scale.
 
-    wanted: how many of the edges, which come first, are the topology's.
+    wanted: number of edges of the topology; these come first.
     """
 
     topology: Topology
@@ -84,7 +84,7 @@ class PlanningProblem:
 
     @property
     def evaluations_at_once(self) -> int:
-        """Return how many evaluations may pass between two questions for the time."""
+        """Return the number of evaluations between two time checks."""
         steps, d = self.cost.options.steps, self.cost.prior.shape[0]
         flops = steps * (12.0 * d**3 + _FLOPS_PER_EDGE * len(self.cost.edges))
         return max(1, min(10, int(_FLOPS_PER_CHECK / flops)))
@@ -97,7 +97,7 @@ class PlanningProblem:
 
 @dataclass(frozen=True, slots=True)
 class _Pairs:
-    """All ordered pairs of a camera and a subject that it may see: rows of a table, and its columns."""
+    """All ordered pairs of a camera and a subject that it may see, as rows and columns of a table."""
 
     rows: Rows[EdgeRow]
     observer: IntArray
@@ -140,7 +140,7 @@ class ProblemBuilder:
         return PlanningProblem(topology, cost, wanted)
 
     def lower_bound(self, scene: PlanningScene, problem: PlanningProblem) -> float:
-        """Return what no topology and no controls can get below on this scene."""
+        """Return a lower bound of the cost over all topologies and controls on this scene."""
         held = problem.scale.reshape(-1, ROBOT_CONTROLS)
         reach = self._parameters.step_s * np.hypot(held[:, 0], held[:, 1])
         bottom, top = self._parameters.heights_m
@@ -154,7 +154,7 @@ class ProblemBuilder:
         return np.array(rows, dtype=np.float64).ravel()
 
     def _limits(self, scene: PlanningScene) -> list[MotionLimits]:
-        """Return what each robot of a scene may do; next to nothing, where it stays where it is."""
+        """Return the limits of each robot of a scene; next to nothing for one that stays in place."""
         limits = {name: self._parameters.limits_of(name) for name in scene.robots}
         for name in scene.held.intersection(scene.robots):
             own = limits[name]
@@ -174,7 +174,7 @@ class ProblemBuilder:
         return [(self.eyes[camera], names[subject]) for camera, subject in list(rows)[: problem.wanted]]
 
     def _share(self, scene: PlanningScene) -> None:
-        """Prepare what all topologies of a scene have in common."""
+        """Prepare the data common to all topologies of a scene."""
         self._of, self._scale = scene, self.scale(scene)
         self._markers = np.array([self._sensors.marker_height_m[name] for name in scene.robots + scene.targets])
         self._target_weights = np.array([self._parameters.target_weights.get(name, 1.0) for name in scene.targets])
@@ -206,7 +206,7 @@ class ProblemBuilder:
         return np.array([level[name] for name in scene.robots], dtype=np.int64)
 
     def _edges(self, scene: PlanningScene, topology: Topology) -> tuple[Rows[EdgeRow], int]:
-        """Return all edges from a level to any below it, those of the topology first; and how many these are."""
+        """Return all edges from a level to any below it, those of the topology first; and the number of these."""
         n, last, level = len(scene.robots), len(topology.levels) - 1, self._levels(scene, topology)
         a, b, pairs = self._pairs.observer, self._pairs.subject, self._pairs.rows
         fixed, robot = a < 0, b < n

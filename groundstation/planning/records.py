@@ -1,4 +1,4 @@
-"""What the planner's kernels share: one topology's problem, and the tape of a rollout.
+"""The data that the planner's kernels share: one topology's problem, and the tape of a rollout.
 
 State of the planner, the same for both axes of the floor plan: a position of each robot, then position and velocity of
 each target (2 each); d entries. Headings are variances of their own, beside it (docs/explanation/planning.md 1).
@@ -23,7 +23,7 @@ ROBOT_CONTROLS, TARGET_STATES = 4, 2
 class EdgeRow(Record):
     """An edge: row of its camera, number of its observer (-1: fixed in the world) and of its subject, robots first.
 
-    wanted: 1 for an edge of the topology, whose tail attracts; 0 for what may be seen besides. blur_m2, turn_rad2:
+    wanted: 1 for an edge of the topology, whose tail attracts; 0 for a possible sighting besides. blur_m2, turn_rad2:
     variances, as believed now, of the relative position per axis and of the observer's direction of view.
     """
 
@@ -39,8 +39,8 @@ class CostOptions(NamedTuple):
     """Settings of the cost that all topologies share.
 
     Noise densities: robot_position [m^2/s], robot_yaw [rad^2/s], target_acceleration [m^2/s^3]. The fence is where the
-    soft wall begins [m; world]. readings: sightings per step of what is in view. height_m: what heights among
-    the controls are counted from.
+    soft wall begins [m; world]. readings: sightings per step of a marker in view. height_m: origin of the heights among
+    the controls.
     """
 
     steps: int
@@ -63,8 +63,8 @@ class CostProblem(NamedTuple):
     """One topology's cost as a function of the held controls.
 
     scale (4 n): bounds of the controls, for the effort; poses (n, 4): x, y, z, yaw; targets (k, 4): x, y, vx, vy;
-    climbs (n): how fast each may climb [m/s]; prior (d, d), per axis; yaw_variances (n) [rad^2]; markers (n + k):
-    heights above the robot's centre or the floor [m]; target_weights (k), in state order; boxes: what hides markers.
+    climbs (n): climb limit of each [m/s]; prior (d, d), per axis; yaw_variances (n) [rad^2]; markers (n + k): heights
+    above the robot's centre or the floor [m]; target_weights (k), in state order; boxes: obstacles that hide markers.
     """
 
     scale: Vector
@@ -82,7 +82,7 @@ class CostProblem(NamedTuple):
 
 
 class EdgeTape(Record):
-    """What one edge saw in one step: availability, its derivatives by relative position [world] and observer's yaw.
+    """The view of one edge in one step: availability, its derivatives by relative position [world] and observer's yaw.
 
     x, y: relative position [m]; square, z: squared distance from the camera, and its vertical part [m]; variance of a
     position per axis and w, the information; v: information of the heading; along_x, along_y, along_z: derivatives of
@@ -107,12 +107,12 @@ class EdgeTape(Record):
 
 
 class Tape(NamedTuple):
-    """Everything that the adjoint needs of a rollout.
+    """The data of a rollout that the adjoint needs.
 
     path (h + 1, n, 6): x, y, yaw, its cosine and sine, z; motion (h, n, 4): displacement, direction, and the derivative
-    of z by the height that is gone to; sightings (h m): by step, then edge; informations (h, d, d) before and
-    covariances (h, d, d) after each correction, padded to whole vectors; yaws_before, yaws_after (h, n): variances;
-    penalties (h, n, 3): their derivatives by x, y.
+    of z by the commanded height; sightings (h m): by step, then edge; informations (h, d, d) before and covariances (h,
+    d, d) after each correction, padded to whole vectors; yaws_before, yaws_after (h, n): variances; penalties (h, n,
+    3): their derivatives by x, y.
     """
 
     path: MatrixStack

@@ -61,7 +61,7 @@ def move(u: Vector, before: Matrix, dt: float, after: Matrix, motion: Matrix) ->
 
 @kernel()
 def climb(u: Vector, problem: CostProblem, i: int, after: Matrix, motion: Matrix) -> None:
-    """Write the heights after step i of robots that go to those of their controls, ever slower as they get there."""
+    """Write the heights after step i of robots that approach those of their controls, ever more slowly."""
     for r in range(after.shape[0]):
         z = problem.poses[r, POSE_Z]
         most = problem.climbs[r] * problem.options.step_s * (i + 1.0)
@@ -99,7 +99,7 @@ def penalty(path: Matrix, options: CostOptions, gradient: Matrix) -> float:
 
 @kernel(inlined=True)
 def weigh(problem: CostProblem, tape: Tape, i: int) -> None:
-    """Turn availabilities into informations, headings first: who knows its heading well measures positions well."""
+    """Turn availabilities into informations, headings first: a well-known heading makes positions precise."""
     edges, cameras, sightings, readings = problem.edges, problem.cameras, tape.sightings, problem.options.readings
     before, after = tape.yaws_before[i], tape.yaws_after[i]
     n, m = before.shape[0], edges.shape[0]

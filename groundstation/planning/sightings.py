@@ -1,4 +1,4 @@
-"""Compiled: what all edges see in one step of a rollout, for the tape."""
+"""Compiled sightings of all edges in one step of a rollout, for the tape."""
 
 import math
 
@@ -10,12 +10,12 @@ from groundstation.planning.records import COS, SIN, VX, VY, CostProblem, Tape, 
 from groundstation.sensing.occlusion import SOFT_M, sight
 from groundstation.sensing.visibility import SPREAD, available_at_once, limits_of
 
-_NOTHING = 1e-6  # an availability that boxes need not lessen
+_NOTHING = 1e-6  # a smaller availability is not reduced further by boxes
 
 
 @kernel(inlined=True)
 def views_of(problem: CostProblem) -> Matrix:
-    """Return how each edge sees (15, m), as `available_at_once` reads it; the same in all steps."""
+    """Return the view limits of each edge (15, m) for `available_at_once`; the same in all steps."""
     edges, cameras = problem.edges, problem.cameras
     views = np.empty((15, edges.shape[0]))
     for e in range(edges.shape[0]):
@@ -33,7 +33,7 @@ def views_of(problem: CostProblem) -> Matrix:
 
 @kernel(inlined=True)
 def place(problem: CostProblem, tape: Tape, i: int, points: Matrix) -> None:
-    """Record where each edge's subject stands from its observer, and write it as the camera sees it (3, m) [m]."""
+    """Record each edge's subject relative to its observer, and write it in the camera's frame (3, m) [m]."""
     edges, cameras, targets, markers, path, sightings = (
         problem.edges, problem.cameras, problem.targets, problem.markers, tape.path, tape.sightings
     )  # fmt: skip
@@ -59,7 +59,7 @@ def place(problem: CostProblem, tape: Tape, i: int, points: Matrix) -> None:
 
 @kernel(inlined=True)
 def record(problem: CostProblem, tape: Tape, i: int, found: Matrix) -> None:
-    """Record how likely each edge sees its subject, found (4, m), with derivatives turned back into the world."""
+    """Record the availability of each edge, found (4, m), with derivatives turned back into the world."""
     edges, cameras, path, m = problem.edges, problem.cameras, tape.path, problem.edges.shape[0]
     for e in range(m):
         edge, seen, R = edges[e], tape.sightings[i * m + e], cameras[edges[e].camera].rotation
@@ -76,7 +76,7 @@ def record(problem: CostProblem, tape: Tape, i: int, found: Matrix) -> None:
 
 @kernel()
 def hide(problem: CostProblem, tape: Tape, i: int, e: int) -> None:
-    """Count what boxes hide of one edge in one step: less is available, and it depends on where both are."""
+    """Reduce the availability of one edge in one step by boxes; it then depends on both positions."""
     edge, seen = problem.edges[e], tape.sightings[i * problem.edges.shape[0] + e]
     seen.along_x = seen.along_y = seen.along_z = 0.0
     if seen.a <= _NOTHING:
@@ -100,7 +100,10 @@ def hide(problem: CostProblem, tape: Tape, i: int, e: int) -> None:
 
 @kernel(inlined=True)
 def look_around(problem: CostProblem, tape: Tape, i: int, views: Matrix, points: Matrix, found: Matrix) -> None:
-    """Record in the tape what all edges see in one step; views: see `views_of`; points (3, m), found (4, m): work."""
+    """Record in the tape the views of all edges in one step; views: see `views_of`.
+
+    Points (3, m), found (4, m): work.
+    """
     place(problem, tape, i, points)
     available_at_once(views, points, found)
     record(problem, tape, i, found)

@@ -15,13 +15,16 @@ from groundstation.sensing.topology import Topology
 
 Point = tuple[float, float, float]
 SMALL_TEAM = 4
-"""Up to so many robots, all of them may start towards other places at once."""
+"""Up to this many robots, all may start towards other places at once."""
 
 _INSET_M = 0.2  # inside the edge of a world-fixed view
 
 
 class Starts:
-    """Starts in [-1, 1]^(4 n) on one scene; scale: what 1 stands for, height_m: what a height of 0 does."""
+    """Starts in [-1, 1]^(4 n) on one scene; scale: the control that 1 stands for.
+
+    height_m: the height that 0 stands for.
+    """
 
     def __init__(
         self, scene: PlanningScene, parameters: PlannerParameters, sensors: SensorSuite, scale: Array, height_m: float
@@ -38,7 +41,7 @@ class Starts:
         """Return starts of a topology: the known optimum of another one, which differs by the robots `moved`.
 
         Small teams: all stand still, go to the best stand (in the root's view, or not), or only turn. Larger ones:
-        those that were moved go to their stand, the others do what they did.
+        moved robots go to their stand, the others continue as before.
         """
         found = [] if known is None else [known]
         if len(self._scene.robots) > SMALL_TEAM:
@@ -59,13 +62,13 @@ class Starts:
         return x.ravel()
 
     def height(self, i: int, height_m: float) -> float:
-        """Return a robot's height as a part of a start; one that stays where it is keeps its own."""
+        """Return a robot's height as a part of a start; one that stays in place keeps its own."""
         height_m = self._poses[i][2] if self._scene.robots[i] in self._scene.held else height_m
         share = (height_m - self._height_m) / self._scale[ROBOT_CONTROLS * i + HEIGHT]
         return max(-1.0, min(1.0, share))
 
     def _towards(self, topology: Topology, base: Array, robots: Collection[str], keep_root: bool) -> Array:
-        """Return controls with which the robots go where each would look at the middle of the level below."""
+        """Return controls with which each robot goes to where it looks at the middle of the level below."""
         p, sensors, scene = self._parameters, self._sensors, self._scene
         heights, ahead, x = p.level_heights(len(topology.levels)) or (), p.horizon_s, base.copy()
         subjects: list[Point] = [
@@ -89,13 +92,13 @@ class Starts:
         return x
 
     def _root_views(self, above_m: float) -> list[Rectangle]:
-        """Return what world-fixed cameras see at a height, without its edge."""
+        """Return the views of world-fixed cameras at a height, without their edge."""
         if above_m not in self._views:
             self._views[above_m] = [view.shrunk(_INSET_M) for view in self._sensors.root_views(above_m)]
         return self._views[above_m]
 
     def _steer(self, x: Array, i: int, goal: Point) -> None:
-        """Write the controls with which a robot gets to (x, y, yaw) within the horizon, or as near as it can."""
+        """Write the controls that bring a robot to (x, y, yaw) within the horizon, or as near as possible."""
         px, py, yaw = goal
         at = ROBOT_CONTROLS * i
         (x_m, y_m, _, yaw_rad), horizon_s = self._poses[i], self._parameters.horizon_s

@@ -1,14 +1,14 @@
-"""When a planner must stop, so that it keeps its time though it asks only now and then."""
+"""Decides when a planner must stop to keep its time budget although it checks only now and then."""
 
 from collections.abc import Callable
 
-_FORGET = 0.9  # of the longest time between two questions, what is left of it at the next
+_FORGET = 0.9  # factor by which the longest time between two checks decays at each check
 
 
 class TimeBudget:
-    """Says stop as soon as the next question would come too late.
+    """Stops as soon as the next check would come too late.
 
-    A question is expected as late as the longest of the last few took: one evaluation for thirty robots takes
+    The next check is expected after the longest of the recent intervals: one evaluation for thirty robots takes
     milliseconds. clock: seconds, from any origin; the budget [s] begins now.
     """
 
@@ -18,7 +18,7 @@ class TimeBudget:
         self._longest = 0.0
 
     def must_stop(self) -> bool:
-        """Return whether a planner that is asked now has to end."""
+        """Return whether a planner that checks now must end."""
         now = self._clock()
         self._longest = max(now - self._last, _FORGET * self._longest)
         self._last = now

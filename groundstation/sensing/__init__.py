@@ -1,1 +1,1 @@
-"""Who may observe whom (topologies) and the information that the planner expects of each sensor."""
+"""Sensing topologies (who may observe whom), and the information that the planner expects of each sensor."""

@@ -1,4 +1,4 @@
-"""What a robot's camera sees of the floor from where it stands, in cells of a grid."""
+"""The part of the floor that a robot's camera sees from its place, in cells of a grid."""
 
 import math
 from dataclasses import dataclass
@@ -12,14 +12,14 @@ from groundstation.sensing.models import OnboardCameraModel, Softness
 from groundstation.sensing.visibility import camera_rows
 
 HEADINGS = 12
-_LEAST = 0.05  # a chance below it is not counted
+_LEAST = 0.05  # smaller chances are not counted
 
 
 @dataclass(frozen=True, slots=True)
 class Footprint:
     """The cells that a robot's camera sees from the centre of a cell, for each heading: row, column, chance.
 
-    first (HEADINGS + 1): where the cells of a heading begin; fresh: share of a view that the one beside it does not
+    first (HEADINGS + 1): where the cells of a heading begin; fresh: share of a view that the neighbouring one does not
     show, on average over a full turn.
     """
 
@@ -33,7 +33,7 @@ class Footprint:
 def footprint_of(
     camera_model: OnboardCameraModel, cell_m: float, height_m: float, marker_m: float, soft: Softness
 ) -> Footprint:
-    """Return what a robot at a height sees with its camera of markers at another."""
+    """Return the footprint of a robot's camera at one height, for markers at another."""
     camera = camera_rows([camera_model], soft)[0]
     half = math.ceil((camera_model.view.range_m + 0.5) / cell_m)
     around = np.arange(-half, half + 1, dtype=np.float64) * cell_m
@@ -53,7 +53,7 @@ def footprint_of(
 
 
 def turn_view(footprint: Footprint) -> float:
-    """Return how many cells a full turn shows, each by its chance at the best heading."""
+    """Return the number of cells that a full turn shows, each weighted by its chance at the best heading."""
     half = int(max(np.abs(footprint.rows).max(initial=0), np.abs(footprint.columns).max(initial=0)))
     best = np.zeros((2 * half + 1, 2 * half + 1))
     np.maximum.at(best, (footprint.rows + half, footprint.columns + half), footprint.chances)
@@ -83,10 +83,10 @@ def swept(
     chances: Matrix, at_row: IntMatrix, at_column: IntMatrix, headings: IntMatrix, worth: Vector,
     cells: IntMatrix, seen: Vector, first: IntVector,
 ) -> tuple[Matrix, Matrix]:  # fmt: skip
-    """Return what pictures show on each way (n, views: its cells) turned in each manner (m, views: headings): (n, m).
+    """Return the chances of sweeps (n, m): on each way (n, views: its cells) with each turn (m, views: headings).
 
-    First the sum of the chances to see the target, each times what its view is worth, then without that. What one view
-    shows counts as seen for the next. cells (2, k: row, column), seen, first: of a footprint.
+    First the sum of the chances to see the target, each times the worth of its view, then without worth. Cells that one
+    view shows count as seen for the next. cells (2, k: row, column), seen, first: of a footprint.
     """
     views, most = at_row.shape[1], 0
     for heading in range(first.shape[0] - 1):

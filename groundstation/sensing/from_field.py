@@ -1,4 +1,4 @@
-"""The sensor suite that follows from a resolved field."""
+"""Builds the sensor suite of a resolved field."""
 
 import math
 from collections.abc import Sequence
@@ -23,15 +23,15 @@ BORDER_SQUARES = 3.5
 """Half the diagonal of a board, in squares of it: the whole board must be in the picture."""
 
 FAR_M = 200.0
-"""How far above its box the eye of a motion capture system is thought."""
+"""Height of the assumed eye of a motion capture system above its box."""
 
 CAPTURE_BORDER_M = 0.1
-"""A body this near to the border of a motion capture system's box is counted on no more."""
+"""A body nearer to the border of a motion capture system's box is not relied upon."""
 
 HEIGHT_KNOWN = 0.5
-"""Deviation of a vehicle's own height beside that of one range."""
+"""Deviation of a vehicle's own height relative to that of one range."""
 
-_WORST_DILUTION = 10.0  # of ranges by anchors that stand in a line: such a system tells next to nothing
+_WORST_DILUTION = 10.0  # for anchors that stand in a line: such a system determines next to nothing
 
 DETECTION_PX = 10.0
 """A square must be this large to be found with certainty; bounds the range of world-fixed cameras."""
@@ -40,7 +40,7 @@ TAG_SQUARES = 3.8
 """A tag is found as far as a checkerboard with squares of this part of its side (measured: 168 mm like 44 mm)."""
 
 ATTITUDE_REPEATS = 2.0
-"""Attitude errors last for seconds: they are counted with this multiple, as if they were white."""
+"""Attitude errors last for seconds: they are counted with this factor, as if they were white."""
 
 
 def sensors_from_field(field: ResolvedField) -> SensorSuite:
@@ -61,7 +61,7 @@ def sensors_from_field(field: ResolvedField) -> SensorSuite:
 
 
 def square_m(marker: Marker) -> float:
-    """Return the square of the checkerboard that is seen as far as a marker is."""
+    """Return the square of a checkerboard that is seen as far as the marker."""
     return (marker.square_mm if marker.size_mm is None else marker.size_mm / TAG_SQUARES) / 1000
 
 
@@ -72,7 +72,7 @@ def _frustum(lens: LensCalibration, range_m: float, square_m: float) -> Frustum:
 def _world(camera: WorldCamera, carried: Sequence[float], tracked: Sequence[float]) -> WorldCameraModel:
     """Return the view of a camera; carried, tracked: squares of the markers on drones and targets [m].
 
-    It sees as far as the smallest of drones can be read, and a place counts where the largest is wholly in the picture.
+    Its range is that at which the smallest drone marker can be read; a place counts if the largest is wholly in view.
     """
     noise = Noise(math.hypot(0.015, camera.position_std_m), math.radians(camera.attitude_std_deg), 0.0, 0.035)
     reach = camera.calibration.fx_px * min(carried) / DETECTION_PX
@@ -91,9 +91,9 @@ def _captured(system: MotionCapture) -> WorldCameraModel:
 
 
 def _ranged(system: Ranging) -> WorldCameraModel:
-    """Return the view of a ranging system's box, with what its ranges tell at worst there of a place in the plane.
+    """Return the view of a ranging system's box, with the worst precision of a place in the plane by its ranges.
 
-    White noise counts by how often they come beside sightings; what lasts for seconds counts in full, once.
+    White noise is scaled by their rate relative to sightings; errors that last for seconds count once, in full.
     """
     box = system.volume_m
     middle = [sum(span) / 2 for span in (box.x_m, box.y_m, box.z_m)]
@@ -108,11 +108,11 @@ def _ranged(system: Ranging) -> WorldCameraModel:
 
 
 def _view_of(box: Volume, noise: Noise, targets: bool) -> WorldCameraModel:
-    """Return a box as the view of an eye so far above it that its sides are all but upright."""
+    """Return a box as the view of an eye so high above it that its sides are nearly upright."""
     middle = ((box.x_m[0] + box.x_m[1]) / 2, (box.y_m[0] + box.y_m[1]) / 2)
     half = ((box.x_m[1] - box.x_m[0]) / 2, (box.y_m[1] - box.y_m[0]) / 2)
     position = (*middle, box.z_m[1] + FAR_M)
-    # The top of the box is what the pyramid is cut to; at its foot it is wider by what lies between, over FAR_M.
+    # The pyramid is cut to the top of the box; at its foot it is wider by the box's height over FAR_M.
     view = Frustum(
         half[0] / FAR_M, half[1] / FAR_M, math.hypot(FAR_M + box.z_m[1] - box.z_m[0], *half), CAPTURE_BORDER_M
     )

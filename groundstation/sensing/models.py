@@ -1,4 +1,4 @@
-"""What is believed about each camera: where it sits, what it sees, how well it measures there."""
+"""The models of cameras: where each sits, what it sees, and how well it measures."""
 
 import math
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ OPTICAL_FROM_WORLD_LOOKING_DOWN.setflags(write=False)
 
 @dataclass(frozen=True, slots=True)
 class Frustum:
-    """A view pyramid: tangents of its half angles, and how far and how near its border a marker is counted on.
+    """A view pyramid: tangents of its half angles, range, and border within which a marker is not relied upon.
 
     border_m: a marker's centre must be this far inside the side planes (half the board's diagonal).
     """
@@ -45,7 +45,7 @@ class Frustum:
 class Noise:
     """Standard deviation of a relative position: hypot(base_m, per_m d, per_m2 d^2), isotropic; and of a heading.
 
-    What a plan counts on. A real sighting carries a covariance of its own (drivers/camera/pose.py).
+    It is for planning: a real sighting has a covariance of its own (drivers/camera/pose.py).
     """
 
     base_m: float = 0.02
@@ -62,7 +62,7 @@ class Noise:
 class Softness:
     """Shape of the smooth availability: docs/explanation/planning.md 3.
 
-    caution: so many standard deviations of a relative place inside its limits a view is counted on.
+    caution: number of standard deviations of a relative place by which the view's limits are moved inwards.
     """
 
     width_m: float = 0.08
@@ -149,14 +149,14 @@ class Box:
 
 
 SIGHTINGS_PER_S = 12.0
-"""Sightings of what is in view that a plan counts on."""
+"""Rate of sightings of a marker in view that plans assume."""
 
 
 @dataclass(frozen=True, slots=True)
 class SensorSuite:
-    """All cameras and marker heights of the team, and what is known to hide markers.
+    """All cameras and marker heights of the team, and the boxes known to hide markers.
 
-    marker_height_m: of robots above their centre, of targets above the floor. sightings_per_s: of what is in view.
+    marker_height_m: of robots above their centre, of targets above the floor. sightings_per_s: of a marker in view.
     """
 
     world: Mapping[str, WorldCameraModel]
@@ -172,7 +172,7 @@ class SensorSuite:
         return np.array([mean[0], mean[1], height])
 
     def eye(self, camera: str, mean: Array) -> Array:
-        """Return where a camera is [m; world]; mean: x, y, z, yaw of its carrier, of no account for a fixed one."""
+        """Return a camera's place [m; world]; mean: x, y, z, yaw of its carrier, unused for a fixed one."""
         if camera in self.world:
             return np.array(self.world[camera].position_m)
         return np.asarray(mean[:3] + rotation_z(float(mean[3])) @ np.array(self.onboard[camera].position_m))
@@ -188,9 +188,9 @@ class SensorSuite:
         return eye.view.margin(eye.optical(mean, point)) >= 0
 
     def root_views(self, height_m: float) -> tuple[Rectangle, ...]:
-        """Return where world-fixed cameras that look down count on seeing a marker at this height.
+        """Return the rectangles in which downward world-fixed cameras reliably see a marker at this height.
 
-        A tilt moves the rectangle as a whole, a turn about the vertical counts in quarters.
+        A tilt moves the whole rectangle; a turn about the vertical counts in quarters.
         """
         found = []
         for camera in self.world.values():

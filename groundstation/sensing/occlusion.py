@@ -11,7 +11,7 @@ from groundstation.kernel import Record, Rows, kernel
 from groundstation.sensing.models import Box
 
 SOFT_M = 0.05
-"""How gradually a box begins to hide what passes its edge."""
+"""Width of the transition at a box's edge."""
 
 _CLEAR = 20.0  # widths of a box's edge beyond which nothing is hidden
 
@@ -24,7 +24,7 @@ class BoxRow(Record):
 
 
 class Sight(NamedTuple):
-    """How likely nothing is in between, and the derivatives by the eye and by the point [1/m; world]."""
+    """The chance that nothing is in between, and its derivatives by the eye and by the point [1/m; world]."""
 
     a: float
     eye_x: float
@@ -52,9 +52,10 @@ def share_below(margin: float, width: float) -> float:
 
 @kernel(inlined=True)
 def passing(p: float, q: float, dp: float, dq: float, hp: float, hq: float) -> tuple[float, float, float, float, float]:
-    """Return how far a line passes a rectangle in its plane [m; negative: through it], and slopes by p, q, dp, dq.
+    """Return the distance at which a line passes a rectangle in its plane [m; negative: through it], and derivatives.
 
-    p, q: a point of the line, from the rectangle's middle; dp, dq: its direction; hp, hq: half of the sides.
+    Derivatives are by p, q, dp, dq. p, q: a point of the line, from the rectangle's middle; dp, dq: its direction; hp,
+    hq: half of the sides.
     """
     length = math.sqrt(dp * dp + dq * dq + 1e-12)
     side = 1.0 if p * dq > q * dp else -1.0
@@ -74,8 +75,8 @@ def passing(p: float, q: float, dp: float, dq: float, hp: float, hq: float) -> t
 def sight(boxes: Rows[BoxRow], width: float, ex: float, ey: float, ez: float, x: float, y: float, z: float) -> Sight:
     """Return the share of exposures in which no box hides a point from an eye [m; world].
 
-    A segment meets a box unless one of six directions parts them: those of the box's edges, and those across one of
-    them and the segment (separating axes). Each gap is a soft limit with the given width [m].
+    A segment meets a box unless one of six directions separates them: those of the box's edges, and those across an
+    edge and the segment (separating axes). Each gap is a soft limit with the given width [m].
     """
     a, mx, my, mz, dx, dy, dz = 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     hx, hy, hz = 0.5 * (x - ex), 0.5 * (y - ey), 0.5 * (z - ez)

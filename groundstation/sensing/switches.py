@@ -7,9 +7,9 @@ from groundstation.bus.messages import Plan
 
 @dataclass(frozen=True, slots=True)
 class Switch:
-    """When, from what to what, the cost of both as weighed then [m^2], and the reason in words.
+    """A switch: its time, both topologies, the costs of both at that time [m^2], and the reason in words.
 
-    stay_cost is None where the former topology was no alternative any more (a robot came or went).
+    stay_cost is None if the former topology was no longer possible (a robot came or went).
     """
 
     time_s: float
@@ -21,7 +21,7 @@ class Switch:
 
 
 def switch_between(before: Plan, now: Plan, time_s: float) -> Switch | None:
-    """Return how the topology of a plan of this time differs from that of the plan before; None where it does not."""
+    """Return the switch between the plan before and the plan of this time; None if the topology is the same."""
     if before.topology == now.topology:
         return None
     costs = {other.topology: other.cost for other in now.alternatives}

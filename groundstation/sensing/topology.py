@@ -40,7 +40,7 @@ class Topology:
 
     @classmethod
     def parse(cls, text: str) -> "Topology":
-        """Return the topology of a text form; raises ValueError when it is none."""
+        """Return the topology of a text form; raises ValueError if it is invalid."""
         if not text:
             return cls(())
         parts = [[name.strip() for name in level.split(",")] for level in text.split("/")]
@@ -57,7 +57,7 @@ class Topology:
         return frozenset().union(*self.levels)
 
     def level_of(self, name: str) -> int:
-        """Return a robot's level, 0 on top; raises KeyError for a stranger."""
+        """Return a robot's level, 0 on top; raises KeyError for an unknown name."""
         for index, level in enumerate(self.levels):
             if name in level:
                 return index
@@ -75,9 +75,9 @@ class Topology:
         return tuple((a, b) for upper, lower in pairwise(ends) for a in upper for b in lower)
 
     def neighbours(self) -> tuple["Topology", ...]:
-        """Return what one robot moved one level up or down leads to: at most 2n, no duplicates, in a fixed order.
+        """Return all topologies with one robot moved one level up or down: at most 2n, no duplicates, in a fixed order.
 
-        Moving beyond the top or bottom creates a level, an emptied level disappears. A level is never inserted between
+        A move beyond the top or bottom creates a level; an emptied level disappears. A level is never inserted between
         two others.
         """
         found: dict[Topology, None] = {}
@@ -95,7 +95,7 @@ class Topology:
         return Topology(tuple(frozenset(level) for level in levels if level))
 
     def reconciled(self, names: Iterable[str]) -> "Topology":
-        """Return the topology for exactly these robots: the missing taken out, new ones added to the top level."""
+        """Return the topology for exactly these robots: missing ones removed, new ones added to the top level."""
         present = frozenset(names)
         levels = [level & present for level in self.levels if level & present]
         joining = present - self.robots

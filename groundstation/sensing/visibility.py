@@ -13,7 +13,7 @@ STEEPEST_COS = math.cos(math.radians(70.0))
 """A flat marker is found up to this angle between its normal and the line of sight (docs/reference/vision.md 2)."""
 
 SPREAD = math.pi / 8.0
-"""What a Gaussian variance adds to the squared width of a logistic edge."""
+"""Factor with which a Gaussian variance adds to the squared width of a logistic edge."""
 
 
 class CameraRow(Record):
@@ -44,7 +44,7 @@ class CameraRow(Record):
 
 
 class ViewLimits(NamedTuple):
-    """What bounds a camera's view, as one value: fields of `CameraRow`, and upwards as the camera sees it."""
+    """The limits of a camera's view: fields of `CameraRow`, and the upward direction in the camera's frame."""
 
     half_width_tan: float
     half_height_tan: float
@@ -61,7 +61,7 @@ class ViewLimits(NamedTuple):
 
 
 class Availability(NamedTuple):
-    """In what share of exposures a marker counts as shown, and the derivatives by its optical position [1/m]."""
+    """The share of exposures in which a marker is shown, and its derivatives by optical position [1/m]."""
 
     a: float
     a_x: float
@@ -89,7 +89,7 @@ def camera_rows(cameras: Sequence[WorldCameraModel | OnboardCameraModel], soft: 
 
 @kernel()
 def limits_of(camera: CameraRow) -> ViewLimits:
-    """Return what bounds a camera's view."""
+    """Return the limits of a camera's view."""
     R = camera.rotation
     return ViewLimits(
         camera.half_width_tan, camera.half_height_tan, camera.across_cos, camera.along_cos, R[0, 2], R[1, 2], R[2, 2],
@@ -99,7 +99,7 @@ def limits_of(camera: CameraRow) -> ViewLimits:
 
 @kernel(inlined=True)
 def lesser(a: float, b: float) -> float:
-    """Return the lesser of two numbers, without the questions after NaN that keep `min` from being vectorised."""
+    """Return the lesser of two numbers, without the NaN checks that keep `min` from being vectorised."""
     return a if a < b else b
 
 
@@ -134,10 +134,10 @@ def margin(view: ViewLimits, x: float, y: float, z: float, distance: float) -> A
 def available(
     view: ViewLimits, x: float, y: float, z: float, blur_m2: float, turn_rad2: float, share: float
 ) -> Availability:
-    """Return the availability of a marker at an optical point [m] that is counted on if its place is in doubt.
+    """Return the availability of a marker at an uncertain optical point [m].
 
     blur_m2: variance of the relative position per axis; turn_rad2: of the direction of view; share: of the tail that
-    attracts. Expected under these variances, `view.caution` standard deviations farther out.
+    attracts. It is the expected value under these variances, `view.caution` standard deviations farther out.
     """
     square = x * x + y * y + z * z + 1e-6
     m = margin(view, x, y, z, math.sqrt(square))

@@ -10,11 +10,11 @@ from groundstation.estimation.measurement import OdometrySample
 from groundstation.geometry.angles import difference, wrap
 
 _FROZEN_COUNT, _FROZEN_S = 10, 0.1
-_MOST = 1e3  # neither turns nor accelerations that a vehicle survives are as large
+_MOST = 1e3  # no vehicle survives turns or accelerations this large
 
 
 class AttitudeIntake:
-    """The attitudes of robots; inertial: the names of those whose IMU is used, with their velocity scale."""
+    """The attitudes of robots; inertial: the names of robots whose IMU is used, with their velocity scale."""
 
     def __init__(self, inertial: Mapping[str, float]) -> None:
         self._inertial = {name: InertialAttitude(scale) for name, scale in inertial.items()}
@@ -22,7 +22,7 @@ class AttitudeIntake:
         self._frozen = FreezeWatch(_FROZEN_COUNT, _FROZEN_S)
 
     def imu(self, message: ImuSample, stamp_ns: int, standing: bool) -> Verdict:
-        """Take an IMU sample; standing: the vehicle says that it is on the ground."""
+        """Take an IMU sample; standing: whether the vehicle reports that it is on the ground."""
         name, rates, force = message.header.entity, message.angular_velocity_rad_s, message.specific_force_m_s2
         inertial = self._inertial.get(name)
         if inertial is None:
@@ -35,7 +35,7 @@ class AttitudeIntake:
         return Verdict.ACCEPTED
 
     def motion(self, message: Odometry, stamp_ns: int) -> OdometrySample:
-        """Return an odometry message as a sample, with the attitude that counts."""
+        """Return an odometry message as a sample, with the attitude to use."""
         name, attitude, reset = message.header.entity, None, message.reset
         yaw_rad, roll_rad, pitch_rad = message.yaw_rad, message.roll_rad, message.pitch_rad
         attitude_std_rad, yaw_std_rad = message.attitude_std_rad, 0.0
@@ -67,7 +67,7 @@ class AttitudeIntake:
     def tilt(self, robot: str, stamp_ns: int, reported: tuple[float, float]) -> tuple[float, float]:
         """Return (roll, pitch) of a robot at an exposure; reported: by the camera's driver.
 
-        The heading in a sighting was derived with the latter: of a level marker that is an error of second order.
+        The heading in a sighting was derived with the reported one: for a level marker that is a second-order error.
         """
         inertial = self._inertial.get(robot)
         tilt = None if inertial is None else inertial.tilt_at(stamp_ns)
@@ -75,10 +75,9 @@ class AttitudeIntake:
 
 
 class _Heading:
-    """A heading whose source changes: gyroscopes, the vehicle's own where they say nothing, gyroscopes begun again.
+    """A heading with changing sources: gyroscopes, the vehicle's own heading in their silence, restarted gyroscopes.
 
-    From one source to the next it goes on by what the vehicle's own heading did meanwhile; where that jumped, it is
-    reset.
+    Between sources it continues by the change of the vehicle's own heading meanwhile; if that jumped, it is reset.
     """
 
     def __init__(self) -> None:
@@ -89,7 +88,7 @@ class _Heading:
     def take(self, stamp_ns: int, own_rad: float, own_reset: int, attitude: Attitude | None) -> tuple[float, int]:
         """Return the heading, and how often it was reset until then.
 
-        What comes late changes nothing: it belongs to what its source last told.
+        Late samples change nothing.
         """
         source, read_rad = (False, own_reset), own_rad
         if attitude is not None:

@@ -1,11 +1,11 @@
-"""The beliefs of the last second, for pictures that arrive after the belief of their time."""
+"""The beliefs of the last second, for pictures that arrive later than the belief of their time."""
 
 from collections import deque
 
 from groundstation.estimation.belief import JointBelief
 from groundstation.time_units import NS_PER_S
 
-_KEPT_NS = NS_PER_S  # as old as a picture may be, at whatever rate beliefs come
+_KEPT_NS = NS_PER_S  # the largest age of a picture, at any rate of beliefs
 
 
 class BeliefHistory:
@@ -21,7 +21,7 @@ class BeliefHistory:
             self._beliefs.popleft()
 
     def at(self, stamp_ns: int) -> JointBelief | None:
-        """Return the belief nearest to a time within what is kept [ns], or None."""
+        """Return the kept belief nearest to a time [ns], or None."""
         if not self._beliefs or not self._beliefs[0].stamp_ns <= stamp_ns <= self._beliefs[-1].stamp_ns:
             return None
         return min(self._beliefs, key=lambda one: abs(one.stamp_ns - stamp_ns))

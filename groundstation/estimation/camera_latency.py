@@ -1,7 +1,7 @@
 """Error of each camera's calibrated delay, estimated in flight from the headings of the robots that it sees.
 
-Gyroscopes tell at once how far a robot turned within a second; a picture that is older than its stamp tells it of
-another second. Only headings: what is wrong with velocities lasts, and controls react to it. Nothing here acts on the
+Gyroscopes show without delay how far a robot turned within a second; a picture older than its stamp shows it for a
+different second. Only headings are used: velocity errors last, and controls react to them. Nothing here acts on the
 filter, and nothing is taken from it.
 """
 
@@ -15,17 +15,17 @@ from groundstation.arrays import Array
 from groundstation.geometry.parabola import least
 from groundstation.time_units import NS_PER_S
 
-# Lateness that is tried out [s], and about how far apart the two sightings are that are compared [s].
+# Lateness values that are tried [s], and the approximate distance in time of two compared sightings [s].
 _TRIED_S = np.arange(-0.10, 0.2001, 0.02)
 _WINDOW_S, _WIDEST_S = 1.0, 1.3
 _KEPT_S, _SPACING_S = 3.0, 0.01
-_GAP_S = 0.5  # how it turned in a longer one is not known
+_GAP_S = 0.5  # within a longer gap the turn is unknown
 _NEAR = 4
 _HALF_LIFE_S = 60.0
-# Deviation of such a difference, and from how many of them squared on a wild one must not decide.
+# Deviation of such a difference, and the number of them beyond which a wild one, squared, must not decide.
 _COARSE_STD_RAD, _WILD = 0.03, 8.0
 _LEAST_PAIRS, _UNTOLD_S = 60.0, 0.025
-# Subjects of one camera that are followed: more are not worth the time. One unseen for so long [s] makes room.
+# Number of subjects followed per camera: more are not worth the time. One unseen for this long [s] makes room.
 _FOLLOWED, _GONE_S = 4, 5.0
 
 
@@ -52,7 +52,7 @@ class _Turning:
             self.headings.clear()
             self.reset = reset
         if self.times and at - self.times[-1] < _SPACING_S:
-            return  # often enough, or an old one
+            return  # recent enough already, or an old sample
         last = self.headings[-1] if self.headings else yaw
         self.times.append(at)
         self.headings.append(last + math.remainder(yaw - last, math.tau))
@@ -61,7 +61,10 @@ class _Turning:
             self.headings.popleft()
 
     def between(self, first: float, second: float) -> Array | None:
-        """Return how far it turned between two times, either earlier by each lateness tried; None if not known."""
+        """Return how far it turned between two times, with both times earlier by each lateness tried.
+
+        None if unknown.
+        """
         if not self.times or self.times[0] > first - _TRIED_S[-1] or self.times[-1] < second - _TRIED_S[0]:
             return None
         times, headings = np.array(self.times), np.array(self.headings)
@@ -91,14 +94,15 @@ class _Sensor:
         found = least(_TRIED_S, self.chi, _NEAR) if self.pairs >= _LEAST_PAIRS else None
         if found is None or found.curvature <= 0.0:
             return None
-        # Pairs overlap: by the scatter over flights, those of half a window say the same. Scaled by the misfit left.
+        # Pairs overlap: by the scatter over flights, those of half a window count as one. Scaled by the remaining
+        # misfit.
         left = float(self.chi[found.nearest]) / self.pairs
         variance = max(1.0, 0.5 * self.overlapping / self.pairs) * left / found.curvature
         return found.place, math.sqrt(variance)
 
 
 class LatenessWatch:
-    """`turned` and `saw` take what arrives, by the stamps it came with; `told` says what it adds up to."""
+    """`turned` and `saw` take headings and sightings with their original stamps; `told` returns the result."""
 
     def __init__(self) -> None:
         self._robots: dict[str, _Turning] = {}
@@ -112,7 +116,7 @@ class LatenessWatch:
         self._robots.setdefault(robot, _Turning(reset)).take(stamp_ns / NS_PER_S, yaw_rad, reset)
 
     def saw(self, sensor: str, observer: str, subject: str, stamp_ns: int, yaw_rad: float | None) -> None:
-        """Take a sighting with the heading of its subject relative to its observer; others tell nothing here."""
+        """Take a sighting with the heading of its subject relative to its observer; others are ignored."""
         if yaw_rad is None or subject not in self._robots or not self._follows(sensor, subject, stamp_ns / NS_PER_S):
             return
         waiting = self._waiting.setdefault((sensor, subject), deque(maxlen=60))
@@ -123,7 +127,7 @@ class LatenessWatch:
             self._compare(sensor, observer, subject, *waiting.popleft())
 
     def told(self) -> tuple[Lateness, ...]:
-        """Return by how much cameras are late that is known to 25 ms or better."""
+        """Return the lateness of each camera for which it is known to 25 ms or better."""
         found = [(name, sensor.told()) for name, sensor in self._sensors.items()]
         return tuple(Lateness(name, *one) for name, one in found if one is not None and one[1] <= _UNTOLD_S)
 

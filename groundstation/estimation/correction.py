@@ -1,8 +1,8 @@
 """One correction of the joint belief by a measurement of up to four rows that touches two blocks of the state.
 
 P - (L^-1 H P)^T (L^-1 H P) with S = L L^T: Joseph's form less a square of rounding errors (see `apply`), made when P is
-needed (deferred.py). P stays symmetric to the bit, and positive definite because R is never below what double precision
-tells from an exact measurement; of several within one instant, as long as none is better than 1e-6 (1 um).
+needed (deferred.py). P stays exactly symmetric, and positive definite because R is never so small that double precision
+could not tell it from an exact measurement; with several at one instant, as long as none is better than 1e-6 (1 um).
 """
 
 import math
@@ -20,7 +20,7 @@ from groundstation.kernel import kernel
 
 
 class Jacobian(NamedTuple):
-    """The columns of a measurement's Jacobian that are not zero: F (4, count of them), and where they stand: `at`."""
+    """The non-zero columns of a measurement's Jacobian: F (4, their count), and their indices `at`."""
 
     F: Matrix
     at: IntVector
@@ -28,7 +28,7 @@ class Jacobian(NamedTuple):
 
 @kernel(inlined=True)
 def gather(block: EntityRow, H: Matrix, found: Jacobian, count: int) -> int:
-    """Add the columns of H (4, block) that are not zero to those that were found; returns how many there are."""
+    """Append the non-zero columns of H (4, block) to those found so far; returns their number."""
     for k in range(block.size):
         if H[0, k] != 0.0 or H[1, k] != 0.0 or H[2, k] != 0.0 or H[3, k] != 0.0:
             found.at[count] = block.start + k
@@ -50,7 +50,7 @@ def project(belief: Belief, deferred: Deferred, jacobian: Jacobian, count: int, 
 
 @kernel(inlined=True)
 def measured_covariance(W: Matrix, jacobian: Jacobian, count: int, rows: int, HPH: Matrix) -> None:
-    """Write H P H^T for W = H P: the covariance of what is measured, without noise."""
+    """Write H P H^T for W = H P: the covariance of the predicted measurement, without noise."""
     for i in range(rows):
         for j in range(rows):
             value = 0.0
@@ -59,13 +59,13 @@ def measured_covariance(W: Matrix, jacobian: Jacobian, count: int, rows: int, HP
             HPH[i, j] = value
 
 
-# Double precision cannot tell a measurement that is this much better than what was known from an exact one.
+# A measurement this much better than the prior is exact to double precision.
 RESOLUTION = 1e-10
 
 
 @kernel(inlined=True)
 def bound_precision(HPH: Matrix, R: Matrix, rows: int) -> None:
-    """Raise R to what double precision resolves beside H P H^T, so that P stays positive definite."""
+    """Raise R to the resolution of double precision relative to H P H^T, so that P stays positive definite."""
     for i in range(rows):
         R[i, i] += RESOLUTION * abs(HPH[i, i])
 
@@ -100,7 +100,7 @@ def log_determinant(factor: Matrix, rows: int) -> float:
 
 @kernel()
 def inflate(HPH: Matrix, R: Matrix, rows: int, factor: float) -> None:
-    """Raise R so that S becomes `factor` times what it was: the soft gate."""
+    """Raise R so that S grows by `factor`: the soft gate."""
     for i in range(rows):
         for j in range(rows):
             R[i, j] = factor * R[i, j] + (factor - 1.0) * 0.5 * (HPH[i, j] + HPH[j, i])
@@ -108,10 +108,10 @@ def inflate(HPH: Matrix, R: Matrix, rows: int, factor: float) -> None:
 
 @kernel(inlined=True)
 def apply(mean: Vector, P: Matrix, deferred: Deferred, rows: int, W: Matrix, factor: Matrix, y: Vector) -> None:
-    """Correct the mean, and put the correction of P off, given W = H P (4, n) and the Cholesky factor L of S.
+    """Correct the mean, and defer the correction of P, given W = H P (4, n) and the Cholesky factor L of S.
 
-    Joseph's form (I - K H) P (I - K H)^T + K R K^T, multiplied out with V = L^-1 W and U = L^T K, is
-    P - V^T V + (U - V)^T (U - V). U - V is what rounding did to the gain (1e-16 of V): its square is left out.
+    Joseph's form (I - K H) P (I - K H)^T + K R K^T, multiplied out with V = L^-1 W and U = L^T K, is P - V^T V + (U -
+    V)^T (U - V). U - V is the rounding error of the gain (1e-16 of V): its square is neglected.
     """
     n, first, u = P.shape[0], put_off(P, deferred, rows), np.empty(4)
     V = deferred.V[first : first + rows]
@@ -133,7 +133,7 @@ def apply(mean: Vector, P: Matrix, deferred: Deferred, rows: int, W: Matrix, fac
 
 @kernel()
 def apply_to_block(mean: Vector, P: Matrix, block: EntityRow, rows: int, W: Matrix, innovation: Innovation) -> None:
-    """Correct one entity's block and nothing else, given W = H P: the others' rows of the gain are taken as zero.
+    """Correct only one entity's block, given W = H P: all other rows of the gain are taken as zero.
 
     Schmidt's consider update: K H P is V^T V on the block and between it and the others, with V = L^-1 W.
     """

@@ -1,7 +1,7 @@
-"""Corrections of P that are put off until P itself is needed, so that many are made while P is read once.
+"""Corrections of P deferred until P itself is needed, so that many are made while P is read once.
 
-Sightings of one picture have one time: until time goes on, only the next of them asks for P, and for a few of its rows.
-Meanwhile the covariance is P - V^T V.
+Sightings of one picture have the same time: until time advances, only the next of them needs P, and only a few of its
+rows. Meanwhile the covariance is P - V^T V.
 """
 
 import numpy as np
@@ -16,7 +16,7 @@ MOST = 32  # rows of V that are kept
 
 @kernel()
 def make(P: Matrix, deferred: Deferred) -> None:
-    """Make the corrections that were put off."""
+    """Make the deferred corrections."""
     if deferred.used[0] > 0:
         subtract_square(P, deferred.V, deferred.used[0])
         deferred.used[0] = 0
@@ -24,14 +24,14 @@ def make(P: Matrix, deferred: Deferred) -> None:
 
 @kernel()
 def make_all(state: State) -> None:
-    """Make the corrections that were put off in all modes: P is then the covariance."""
+    """Make the deferred corrections in all modes: P is then the covariance."""
     for m in range(state.means.shape[0]):
         make(state.covariances[m], deferred_of(state, m))
 
 
 @kernel(inlined=True)
 def put_off(P: Matrix, deferred: Deferred, rows: int) -> int:
-    """Return from where on so many rows of V are to be written, which count from now on."""
+    """Return the first of the new rows of V to be written, which count from now on."""
     if deferred.used[0] + rows > deferred.V.shape[0]:
         make(P, deferred)
     first = deferred.used[0]
@@ -41,7 +41,7 @@ def put_off(P: Matrix, deferred: Deferred, rows: int) -> int:
 
 @kernel(inlined=True)
 def count_in(W: Matrix, F: Matrix, at: IntVector, count: int, deferred: Deferred) -> None:
-    """Take from W = F P (4, n) what the corrections that were put off do to it; F is zero but in the columns `at`."""
+    """Subtract the effect of the deferred corrections from W = F P (4, n); F is zero except in the columns `at`."""
     rows = deferred.used[0]
     if rows == 0:
         return

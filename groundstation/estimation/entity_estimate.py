@@ -1,11 +1,11 @@
-"""What is told of one entity of the joint belief."""
+"""The published estimate of one entity of the joint belief."""
 
 from groundstation.bus.messages import EntityEstimate
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.fixed_lag import FixedLagFilter
 from groundstation.estimation.layout import EntityKind
 
-_NEVER_S = 1e6  # what is told for never: a message holds finite numbers
+_NEVER_S = 1e6  # stands for never: a message holds finite numbers
 
 
 def entity_estimate(

@@ -1,4 +1,4 @@
-"""Which kernel lets each kind of event happen."""
+"""The kernel that executes each kind of event."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from groundstation.kernel import address_of
 
 
 def event_kernels() -> IntVector:
-    """Return where the kernel for each kind of event is: `replay` calls it there."""
+    """Return the addresses of the kernels by kind of event, for `replay`."""
     kernels = np.full(EVENT_KINDS, address_of(change, handle))
     kernels[OBSERVATION] = address_of(observe, handle)
     kernels[REPORTED] = kernels[COMPARED] = address_of(report, handle)

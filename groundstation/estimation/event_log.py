@@ -12,7 +12,7 @@ from groundstation.estimation import records as r
 from groundstation.estimation.measurement import Correction, Measurement, SensorReading
 
 FAR = "far beyond the gate"
-# Reason of a sighting for which a belief would have been given up, had not others been for the same observer.
+# Reason of a sighting that would have re-initialised a belief if the same observer had not just done so for others.
 HASTY = "far beyond the gate, but its observer lately had others given up"
 OTHER_POSE = "the other pose hypothesis is more likely"
 _VERDICTS = {
@@ -46,7 +46,7 @@ class EventLog:
         self._look()
 
     def add(self, stamp_ns: int, tie: str, values: Sequence[float]) -> int:
-        """Insert an event of which the first values are given (`event_values`); returns its row."""
+        """Insert an event from its first values (`event_values`); returns its row."""
         if not self._free:
             self._grow()
         row = self._free.pop()
@@ -68,7 +68,7 @@ class EventLog:
             del self._order[:count]
 
     def reached(self, rows: Iterable[int]) -> list[int]:
-        """Return those events, of some, whose verdict is known."""
+        """Return those of the events whose verdict is known."""
         verdicts = self._verdicts.tolist()
         return [row for row in rows if verdicts[row] != r.PENDING]
 
@@ -92,7 +92,7 @@ class EventLog:
         )
 
     def _look(self) -> None:
-        """Keep the tables as bytes, which Python reads and writes in half of numpy's time."""
+        """Keep views of the tables as bytes, which Python reads and writes in half of numpy's time."""
         self._event_bytes = np.asarray(self.events).view(np.uint8).data
         self._outcome_bytes = np.asarray(self.outcomes).view(np.uint8).data
         self._verdicts = self.outcomes["verdict"]
@@ -137,7 +137,7 @@ def _pose(pose: Measurement | PoseHypothesis) -> list[float]:
 
 
 def _padded(z: tuple[float, ...], covariance: tuple[float, ...]) -> list[float]:
-    """Return z (4) and its covariance (16), the rows that it lacks filled up with those of an identity."""
+    """Return z (4) and its covariance (16), missing rows filled up from an identity."""
     rows = len(z)
     if not 1 <= rows <= 4 or len(covariance) != rows * rows:
         raise ValueError(f"a reading has 1 to 4 rows and a square covariance (got {rows}, {len(covariance)})")

@@ -1,4 +1,4 @@
-"""How likely an observation is in each mode's belief, and which modes can use it; compiled."""
+"""The likelihood of an observation in each mode's belief, and which modes can use it; compiled."""
 
 import math
 
@@ -15,14 +15,14 @@ from groundstation.kernel import Rows, kernel
 
 @kernel(inlined=True)
 def set_noise(innovations: Rows[Innovation], R: Matrix) -> None:
-    """Let all modes begin with the noise of the reading."""
+    """Set the noise of the reading in all modes."""
     for m in range(innovations.shape[0]):
         copy_matrix(R, innovations[m].R)
 
 
 @kernel()
 def confront(state: State, tables: Tables, event: EventRow, rows: int, hypothesis: Hypothesis) -> float:
-    """Linearise in all modes, their R being given; returns the log evidence of the hypothesis."""
+    """Linearise in all modes with their given R; returns the log evidence of the hypothesis."""
     modes, sensor = state.means.shape[0], tables.sensors[event.sensor]
     scores, best = np.empty(modes), -math.inf
     for m in range(modes):
@@ -47,7 +47,7 @@ def confront(state: State, tables: Tables, event: EventRow, rows: int, hypothesi
 def weigh(weights: Vector, innovations: Rows[Innovation], rows: int, factor: float) -> None:
     """Multiply the modes' probabilities by the likelihood of the observation as it was used (S times factor).
 
-    At least one mode can use it. One whose S is not positive definite holds no distribution any more: its probability
+    At least one mode can use it. A mode whose S is not positive definite is no longer a distribution: its probability
     becomes 0, and the next mixing replaces it by the others.
     """
     modes = weights.shape[0]

@@ -1,6 +1,6 @@
 """Arguments of the compiled filter: tables, state and inputs, each a value of several arrays.
 
-m modes (joint beliefs that are kept side by side), n entries of the state, e entities, s sensors, r steps of the ring.
+m modes (joint beliefs kept in parallel), n entries of the state, e entities, s sensors, r steps of the ring.
 """
 
 from typing import NamedTuple
@@ -30,11 +30,11 @@ class Settings(NamedTuple):
 
 
 class Tables(NamedTuple):
-    """Everything that stays the same while the filter runs.
+    """The constant data of the filter.
 
     entities (m, e): a row per mode, since modes differ in parameters; priors (e); sensors (s); transition (m, m): the
-    chances of going from one mode to another within a step; headings: which entries of the state are headings (a row of
-    `entities` for each would be read at each correction, from 31 places with 30 robots).
+    chances of going from one mode to another within a step; headings: the entries of the state that are headings
+    (looking them up in `entities` at each correction would read 31 places with 30 robots).
     """
 
     entities: RowsStack[EntityRow]
@@ -64,7 +64,7 @@ class State(NamedTuple):
     """State of the filter: means (m, n), covariances (m, n, n), the modes' probabilities (m), memory (e).
 
     used_at (s, e): when a sensor's reading of a subject was last used; deferred (m, r, n) with its rows in use (m, 1):
-    corrections that the covariances lack (`Deferred`).
+    corrections still to be made in the covariances (`Deferred`).
     """
 
     means: Matrix
@@ -77,9 +77,9 @@ class State(NamedTuple):
 
 
 class Checkpoints(NamedTuple):
-    """The state at the beginning of each step, in a ring (r, ...); no correction is put off then.
+    """The state at the beginning of each step, in a ring (r, ...); without deferred corrections.
 
-    Of the covariances only what `copy_upper_blocks` copies is meant.
+    Of the covariances only the part that `copy_upper_blocks` copies is valid.
     """
 
     means: MatrixStack
@@ -99,7 +99,7 @@ class Inputs(NamedTuple):
 
 
 class Span(NamedTuple):
-    """The steps that are run, the time up to which the last one is, and from which step on observations wait."""
+    """The steps to run, the end of the last one, and the first step whose observations wait."""
 
     first: int
     last: int
@@ -115,7 +115,7 @@ class Moments(NamedTuple):
 
 
 class Belief(NamedTuple):
-    """One mode's belief with its table of entities (e) and what is remembered of them (e)."""
+    """One mode's belief with its table of entities (e) and their memory (e)."""
 
     mean: Vector
     P: Matrix
@@ -147,5 +147,5 @@ def belief_of(state: State, tables: Tables, m: int) -> Belief:
 
 @kernel(inlined=True)
 def deferred_of(state: State, m: int) -> Deferred:
-    """Return the corrections that one mode's covariance lacks, by reference."""
+    """Return the deferred corrections of one mode's covariance, by reference."""
     return Deferred(state.deferred[m], state.deferred_used[m])

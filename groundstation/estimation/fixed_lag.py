@@ -1,7 +1,7 @@
-"""The joint filter with an exact, bounded rewind: measurements in any order of arrival, belief as if in order.
+"""The joint filter with an exact, bounded rewind: measurements may arrive in any order, as if they were in order.
 
 Time is divided into steps. Odometry is condensed per step, events (observations, take-offs, landings) keep their exact
-time. Whatever arrives makes its step dirty; `advance` restarts from the checkpoint of the oldest dirty step.
+time. Each arrival marks its step dirty; `advance` restarts from the checkpoint of the oldest dirty step.
 """
 
 import math
@@ -26,7 +26,7 @@ from groundstation.estimation.replay import replay
 from groundstation.estimation.tables import checkpoints_of, empty_state, tables_from_parameters
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
-_FORGOTTEN_NS = 60 * NS_PER_S  # after a pause as long (a suspended host) nothing that was believed is worth predicting
+_FORGOTTEN_NS = 60 * NS_PER_S  # after such a pause (a suspended host) no belief is worth predicting
 FUTURE_NS = 100 * NS_PER_MS  # a measurement further ahead of now than this is an error of a clock
 _IDLE_STEPS = 10  # steps that may pass between two calls of `advance` before `add_*` advances by itself
 
@@ -35,7 +35,7 @@ class FixedLagFilter:
     """Joint EKF over all entities of the parameters that have joined.
 
     `add_motion`, `add_observation`, `set_airborne` take what arrives in any order (up to max_lateness_s late) and
-    answer with a verdict; `advance` brings the belief to a time; `take_corrections` says what the observations did.
+    return a verdict; `advance` brings the belief to a time; `take_corrections` returns the effects of observations.
     """
 
     def __init__(self, parameters: EstimatorParameters) -> None:
@@ -61,7 +61,7 @@ class FixedLagFilter:
         # Steps after and before now that a measurement may fall into; a command is followed after its stamp.
         self._ahead = (FUTURE_NS + max(0, *(-d for d in delays), 0)) // self._step_ns + 2 + _IDLE_STEPS
         self._behind = (self._lag_ns + max(0, *delays, 0)) // self._step_ns + 3
-        # Steps, the present one included, whose observations wait: the one before them ended as long ago.
+        # Steps, including the present one, whose observations wait: the step before them ended that long ago.
         self._wait_steps = math.ceil(parameters.wait_s / parameters.step_s) + 1 if parameters.wait_s > 0.0 else 0
         self._build_state([model.admitted for model in self._models])
 
@@ -82,16 +82,16 @@ class FixedLagFilter:
         return verdict
 
     def add_report(self, reading: SensorReading, tie: str, now_ns: int, *, used: bool) -> Verdict | None:
-        """Take what an entity says of its own motion, to be used or only compared; returns as `add_observation` does.
+        """Take an entity's report of its own motion, to be used or only compared; returns as `add_observation` does.
 
-        It is no sighting: it makes nobody join, is refused beyond the gate, and corrects nobody else.
+        It is no sighting: no entity joins by it, it is refused beyond the gate, and corrects no other entity.
         """
         return self._add(reading, REPORTED if used else COMPARED, tie, now_ns)
 
     def add_observation(self, m: Measurement | SensorReading, tie: str, now_ns: int) -> Verdict | None:
         """Take one observation; None: `take_corrections` has its effect after `advance`, else why it was refused.
 
-        tie: orders observations of the same instant, so that their arrival cannot.
+        tie: orders observations of the same instant, so that their order of arrival does not matter.
         """
         return self._add(m, OBSERVATION, tie, now_ns)
 
@@ -126,9 +126,9 @@ class FixedLagFilter:
         return self.set_present(robot, airborne, stamp_ns, now_ns)
 
     def set_present(self, name: str, present: bool, stamp_ns: int, now_ns: int) -> Verdict:
-        """Let an entity join, or take it out of the state; what has a prior (a fixed camera) joins at once by it.
+        """Let an entity join, or take it out of the state; an entity with a prior (a fixed camera) joins at once.
 
-        Robots and targets join with the next observation that can place them. What leaves takes its correlations along.
+        Robots and targets join with the next observation that can place them. A leaving entity loses its correlations.
         """
         kind = ADMITTED if present else DISMISSED
         return self._change(name, kind, (), f"{present:d}", stamp_ns, now_ns)
@@ -143,7 +143,7 @@ class FixedLagFilter:
         return self._change(name, PLACED, placed, "placed", stamp_ns, now_ns)
 
     def advance(self, now_ns: int) -> None:
-        """Bring the belief to `now_ns`, through everything that has arrived; time never runs backwards."""
+        """Bring the belief to `now_ns`, through all arrivals; time never runs backwards."""
         self._start(now_ns)
         now_ns = max(now_ns, self._now_ns)
         if now_ns - self._now_ns > _FORGOTTEN_NS:
@@ -169,7 +169,7 @@ class FixedLagFilter:
         return bool(is_distribution(Belief(*self._moments, self._tables.entities[0], self._state.memory)))
 
     def restart(self) -> None:
-        """Clear the belief and all inputs; which entities may join is kept."""
+        """Clear the belief and all inputs; permissions to join are kept."""
         now_ns = self._now_ns
         self._build_state(self._state.memory["admitted"].tolist())
         self._start(now_ns)
@@ -188,14 +188,16 @@ class FixedLagFilter:
         return self._seconds(self._now_ns) - float(memory["corrected_at"]) if memory["active"] else math.inf
 
     def sighting(self, name: str) -> tuple[float, float] | None:
-        """Return when an entity was last seen [s ago], and how well its place was known then [m]; None: never."""
+        """Return how long ago an entity was last seen [s], and the deviation of its place then [m]; None: never."""
         memory = self._state.memory[self._index[name]]
         seen = memory["active"] and memory["seen_variance"] > 0.0
         return (self.age_s(name), math.sqrt(float(memory["seen_variance"]))) if seen else None
 
     def contradicted(self, name: str) -> bool:
-        """Return whether sightings far from an entity's place are being weighed against it, for twice the time that
-        this takes: whatever then was not believed is not heeded any longer. One that moved the belief ends it."""
+        """Return whether sightings far from an entity's place are being weighed against it.
+
+        True for twice the time that the weighing takes; then sightings not believed are ignored. One that is ends it.
+        """
         memory, within_s = self._state.memory[self._index[name]], self.parameters.divergence_s
         now, wild = self._seconds(self._now_ns), memory["wild"]
         if memory["corrected_at"] > memory["wild_at"]:
@@ -208,7 +210,7 @@ class FixedLagFilter:
         return bool(self._state.memory["admitted"][self._index[robot]])
 
     def velocity_of(self, robot: str) -> tuple[float, float, float]:
-        """Return a joined robot's velocity [m/s; world] from its last odometry and what is known of its errors."""
+        """Return a joined robot's velocity [m/s; world] from its last odometry, corrected by its estimated errors."""
         if robot not in self._velocities:
             index = self._index[robot]
             own = self._moments.mean[self._tables.part(index)]

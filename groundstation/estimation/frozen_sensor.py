@@ -7,7 +7,7 @@ Values = tuple[object, ...]
 
 
 class Novelty(Enum):
-    """What a value is beside the ones before it; REPEATED: the same again, though not for long yet."""
+    """A value's novelty against earlier ones; REPEATED: the same again, but not yet for long."""
 
     NEW = auto()
     REPEATED = auto()
@@ -29,7 +29,7 @@ class FreezeWatch:
         self._spells: dict[object, _Spell] = {}
 
     def judge(self, source: object, values: Values, stamp_ns: int) -> Novelty:
-        """Take what a source says at a time of measurement; sources are few, and one spell is kept of each."""
+        """Take a source's values at a time of measurement; one spell is kept for each source."""
         spell = self._spells.get(source)
         if spell is None:
             self._spells[source] = _Spell(values, stamp_ns)
@@ -42,5 +42,5 @@ class FreezeWatch:
         return Novelty.FROZEN if frozen else Novelty.REPEATED
 
     def is_frozen(self, source: object, values: Values, stamp_ns: int) -> bool:
-        """Take likewise what a source says; returns whether it is frozen."""
+        """Take a source's values likewise; returns whether it is frozen."""
         return self.judge(source, values, stamp_ns) is Novelty.FROZEN

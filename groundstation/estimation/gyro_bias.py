@@ -6,20 +6,20 @@ from groundstation.bus.messages import Vector3
 from groundstation.geometry.angles import difference
 from groundstation.time_units import NS_PER_S
 
-_BLOCK_NS = NS_PER_S  # of standing still makes one measurement
-# What turns more than this was carried [rad/s]; a block is good to this, or to its own scatter.
+_BLOCK_NS = NS_PER_S  # of standing still give one measurement
+# A vehicle that turns faster was carried [rad/s]; a block is this precise, or as its own scatter.
 _STILL_RAD_S, _BLOCK_STD = 0.05, 2e-4
-_UNKNOWN_STD = math.radians(0.5)  # before anything was learnt [rad/s]
+_UNKNOWN_STD = math.radians(0.5)  # before anything is learnt [rad/s]
 _DRIFT_STD = 3e-5  # [rad/s per root second]
-# What a magnetic heading wanders, and what an integrated gyro does beside its bias [rad per root second].
+# Random walk of a magnetic heading, and of an integrated gyro beside its bias [rad per root second].
 _HEADING_WANDER, _GYRO_WANDER = math.radians(1.7), math.radians(0.1)
 _SPAN_NS = 2 * NS_PER_S  # between two uses of the heading
-_GATE = 9.0  # a heading that disagrees by more says nothing of the bias
-_HORIZON_S = 20.0  # the heading's error by the bias is claimed as a random walk that is right after so long
+_GATE = 9.0  # a heading with a larger disagreement says nothing of the bias
+_HORIZON_S = 20.0  # the bias's effect on the heading is modelled as a random walk that is right after this time
 
 
 class GyroBias:
-    """Bias of three gyroscopes [rad/s; base] and how well it is known: tilt_std_rad_s of the first two."""
+    """Bias of three gyroscopes [rad/s; base] and its deviation; tilt_std_rad_s: of the first two."""
 
     def __init__(self) -> None:
         self.rad_s: Vector3 = (0.0, 0.0, 0.0)
@@ -31,11 +31,11 @@ class GyroBias:
 
     @property
     def yaw_std_rad(self) -> float:
-        """Return what a heading by these gyroscopes wanders per root second."""
+        """Return the random walk of a heading by these gyroscopes [rad per root second]."""
         return math.sqrt(_GYRO_WANDER**2 + self._variance * _HORIZON_S)
 
     def take_standing(self, stamp_ns: int, rates_rad_s: Vector3) -> None:
-        """Take the rates of a vehicle on the ground: what it measures there is bias, unless somebody carries it."""
+        """Take the rates of a vehicle on the ground: these are bias, unless somebody carries it."""
         if not self._block:
             self._block_ns = stamp_ns
         self._block.append(rates_rad_s)
@@ -46,7 +46,7 @@ class GyroBias:
             self._block.clear()
 
     def leave_ground(self) -> None:
-        """Forget what was begun on the ground: it may have been lift-off already."""
+        """Discard the block begun on the ground: it may include the lift-off."""
         self._block.clear()
 
     def take_heading(self, stamp_ns: int, yaw_rad: float, own_yaw_rad: float, reset: int) -> None:

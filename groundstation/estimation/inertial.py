@@ -1,8 +1,8 @@
-"""How a vehicle leans and turns, by its gyroscopes and accelerometers; values in, values out.
+"""A vehicle's attitude from its gyroscopes and accelerometers; values in, values out.
 
-Rates are integrated; what the accelerometers say, less the acceleration that the reported velocity shows, draws roll
-and pitch back over seconds (a complementary filter). On a real AR.Drone in moving air the error is 0.5 degrees where
-that of its own attitude is 5 (docs/explanation/estimation.md 9.2).
+Rates are integrated; the accelerometers, less the acceleration of the reported velocity, draw roll and pitch back over
+seconds (a complementary filter). On a real AR.Drone in moving air the error is 0.5 degrees where that of its own
+attitude is 5 (docs/explanation/estimation.md 9.2).
 """
 
 import math
@@ -17,23 +17,23 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _LEVEL_S, _STANDING_S = 4.0, 0.5  # accelerometers draw the tilt back over this: in flight, on the ground
 _SMOOTH_S = 0.3  # velocities are smoothed over this before they are differentiated
-_SILENT_S = 0.3  # after so much silence the acceleration counts as none
+_SILENT_S = 0.3  # after this silence the acceleration counts as zero
 _GAP_S = 0.5  # nothing is integrated across a longer one
-_RESTARTED_S = 5.0  # silent for longer, a vehicle may have a new battery, and gyroscopes with another bias
-_FRESH_NS = 100 * NS_PER_MS  # how far a sample speaks for a time beside it
+_RESTARTED_S = 5.0  # after a longer silence a vehicle may have a new battery, and another gyro bias
+_FRESH_NS = 100 * NS_PER_MS  # largest time between a sample and a time that it stands for
 _KEPT = 256  # samples: more than a second
-# Of roll and pitch after a while; at the start, when one sample of a vehicle that may accelerate is all there is.
+# Deviation of roll and pitch after a while; and at the start, from one sample of a vehicle that may accelerate.
 _SETTLED_RAD, _FIRST_RAD = math.radians(0.5), math.radians(5.0)
-# A specific force beyond these is a blow, no gravity [m/s^2]; a gain of 8 % is usual.
+# A specific force beyond these is a blow, not gravity [m/s^2]; a gain error of 8 % is usual.
 _LEAST_FORCE, _MOST_FORCE = 0.6 * STANDARD_GRAVITY_M_S2, 1.4 * STANDARD_GRAVITY_M_S2
 
 
 @dataclass(frozen=True, slots=True)
 class Attitude:
-    """How a vehicle leans and where it points [rad; odom].
+    """Roll, pitch and heading of a vehicle [rad; odom].
 
-    resets: rises where the heading's increment is void; attitude_std_rad: of roll and of pitch; yaw_std_rad: what the
-    heading wanders per root second.
+    resets: rises where the heading's increment is void; attitude_std_rad: of roll and of pitch; yaw_std_rad: random
+    walk of the heading per root second.
     """
 
     roll_rad: float
@@ -61,7 +61,7 @@ class InertialAttitude:
         self._rate = (0.0, 0.0, 0.0)
 
     def take_imu(self, stamp_ns: int, rates_rad_s: Vector3, force_m_s2: Vector3, standing: bool) -> None:
-        """Take body rates and specific force [base, FLU]; standing: it is said to be on the ground."""
+        """Take body rates and specific force [base, FLU]; standing: whether it reports to be on the ground."""
         elapsed_s = math.inf if self._stamp_ns is None else (stamp_ns - self._stamp_ns) / NS_PER_S
         if elapsed_s <= 0.0:
             return
@@ -81,7 +81,7 @@ class InertialAttitude:
         self._kept.append((stamp_ns, self._roll, self._pitch, self._yaw))
 
     def take_velocity(self, stamp_ns: int, velocity_m_s: Vector3) -> None:
-        """Take a reported velocity [base_stabilized]: how it changes is no tilt."""
+        """Take a reported velocity [base_stabilized]: its change is not taken for tilt."""
         forward, left = self._scale * velocity_m_s[0], self._scale * velocity_m_s[1]
         elapsed_s = math.inf if self._velocity_ns is None else (stamp_ns - self._velocity_ns) / NS_PER_S
         if elapsed_s <= 0.0:
@@ -96,12 +96,12 @@ class InertialAttitude:
         self._acceleration = (forward - vx) / _SMOOTH_S - turn * vy, (left - vy) / _SMOOTH_S + turn * vx
 
     def take_heading(self, stamp_ns: int, yaw_rad: float, reset: int) -> None:
-        """Take the vehicle's own heading: a doubtful reference, from which only the gyro's bias learns, and slowly."""
+        """Take the vehicle's own heading: a doubtful reference, from which only the gyro's bias learns slowly."""
         if self._is_fresh(stamp_ns):
             self._bias.take_heading(stamp_ns, yaw_rad, self._yaw, reset + self._resets)
 
     def at(self, stamp_ns: int) -> Attitude | None:
-        """Return the attitude at a time; None where all samples are too far."""
+        """Return the attitude at a time; None if all samples are too far from it."""
         tilted = self._at(stamp_ns)
         if tilted is None:
             return None
@@ -145,7 +145,7 @@ class InertialAttitude:
         return self._stamp_ns is not None and abs(stamp_ns - self._stamp_ns) <= _FRESH_NS
 
     def _begin(self, force: Vector3) -> None:
-        """Begin (again) with what one sample says; the heading goes on, but not by an increment."""
+        """Begin (again) from one sample; the heading continues, but with a void increment."""
         self._roll, self._pitch = _tilt_of(force)
         self._variance = _FIRST_RAD**2
         self._resets += 1
@@ -164,7 +164,7 @@ class InertialAttitude:
         return wx + about_vertical * tangent, wy * cosine - wz * sine, about_vertical / math.cos(self._pitch)
 
     def _level(self, force: Vector3, stamp_ns: int, elapsed_s: float, within_s: float) -> None:
-        """Draw roll and pitch towards what the accelerometers say; what a gyro's bias does against it stays."""
+        """Draw roll and pitch towards the accelerometers' values; the effect of a gyro's bias remains."""
         if not _LEAST_FORCE < math.hypot(*force) < _MOST_FORCE:
             return
         roll, pitch = _tilt_of(force)

@@ -1,4 +1,4 @@
-"""From bus messages to the filter: clocks, and a verdict for each refusal."""
+"""Feeds bus messages to the filter: converts clocks, and returns a verdict for each refusal."""
 
 from collections.abc import Mapping
 
@@ -60,7 +60,7 @@ class Intake:
         self._joins_early = joint.parameters.joins_early
 
     def take(self, key: str, message: Message, now_ns: int) -> Verdict:
-        """Take one message that came under a key; ACCEPTED, or why not. Other kinds of messages are none of ours."""
+        """Take one message that came under a key; ACCEPTED, or why not. Other kinds of messages are ignored."""
         if not isinstance(message, _HEARD):
             return self._other(message, now_ns)
         stamp_ns = self._local_stamp(message)
@@ -83,7 +83,7 @@ class Intake:
         return self._status(message, stamp_ns, now_ns)
 
     def _other(self, message: Message, now_ns: int) -> Verdict:
-        """Take a message that says nothing of where anybody is."""
+        """Take a message without information on places."""
         if isinstance(message, ClockOffset) and message.header.clock == self._clock:
             self._offsets[message.of] = message.offset_ns
         if isinstance(message, SearchedPicture):
@@ -98,7 +98,7 @@ class Intake:
             airborne = True
         if airborne is None:
             return Verdict.ACCEPTED
-        # The newest word counts however late it comes; an older one must not undo it.
+        # The newest status counts however late it comes; an older one must not undo it.
         if stamp_ns < self._newest_status.get(entity, stamp_ns) and stamp_ns < now_ns - self._lag_ns:
             return Verdict.LATE
         verdict = self._filter.set_airborne(entity, airborne, stamp_ns, now_ns)
@@ -123,7 +123,7 @@ class Intake:
         return self._filter.add_observation(measurement, tie, now_ns) or Verdict.ACCEPTED
 
     def _camera_of(self, message: RelativeObservation) -> str:
-        """Return the camera by which an observer saw: never one that another carries, whatever the message calls it."""
+        """Return the camera by which an observer saw: never another carrier's, whatever the message calls it."""
         named = self._cameras.get(message.camera)
         return message.camera if named is not None and named.carrier == message.observer else message.observer
 

@@ -1,10 +1,10 @@
-"""How an entity joins (again): where one observation puts it, unless that contradicts its observer; compiled.
+"""Lets an entity join (again) where one observation puts it, unless that contradicts the observer; compiled.
 
-A measurement often has more rows than the subject has unknowns: three rows tell a target's place (x, y). The surplus
-says something of the observer, and is gated. With S = S_0 + H D H^T, D being the diffuse prior of `join`, the NIS
-y^T S^-1 y is the least of |y - H d|^2 (whitened by S_0) + d^T D^-1 d over all shifts d of the subject. D is so wide
-that this is the NIS of y projected on the null space of H^T: chi-square with as many degrees of freedom as there are
-surplus rows, to 0.01 for a shift of 1 m.
+A measurement often has more rows than the subject has unknowns: three rows determine a target's place (x, y). The
+surplus tests the observer, and is gated. With S = S_0 + H D H^T, D being the diffuse prior of `join`, the NIS y^T S^-1
+y is the least of |y - H d|^2 (whitened by S_0) + d^T D^-1 d over all shifts d of the subject. D is so wide that this is
+the NIS of y projected on the null space of H^T: chi-square with as many degrees of freedom as there are surplus rows,
+to 0.01 for a shift of 1 m.
 """
 
 import numpy as np
@@ -33,18 +33,21 @@ from groundstation.estimation.records import (
 )
 from groundstation.kernel import kernel
 
-_UNSEEN = 1e-6  # a derivative by a pose entry that is smaller tells nothing of it
+_UNSEEN = 1e-6  # a smaller derivative by a pose entry gives no information on it
 
 
 @kernel(inlined=True)
 def pose_entries(entity: EntityRow, at: IntVector) -> None:
-    """Write where x, y, z, yaw stand in a block (-1: nowhere): what joins with a diffuse prior."""
+    """Write the positions of x, y, z, yaw in a block (-1: none): the entries that join with a diffuse prior."""
     at[0], at[1], at[2], at[3] = X, Y, entity.at_z, entity.at_yaw
 
 
 @kernel()
 def surplus(entity: EntityRow, H: Matrix, rows: int) -> int:
-    """Return how many rows of a measurement are not needed to place its subject; H (rows, block): by the subject."""
+    """Return the number of rows of a measurement beyond those that place its subject.
+
+    H (rows, block): by the subject.
+    """
     at, left = np.empty(POSE, np.int64), rows
     pose_entries(entity, at)
     for k in at:
@@ -58,7 +61,7 @@ def surplus(entity: EntityRow, H: Matrix, rows: int) -> int:
 
 @kernel()
 def soften(P: Matrix, entity: EntityRow, innovation: Innovation, factor: float) -> None:
-    """Raise R so that S, less what the diffuse prior of the subject adds to it, becomes `factor` times what it was."""
+    """Raise R so that S, without the part from the subject's diffuse prior, grows by `factor`."""
     at, rows, H = np.empty(POSE, np.int64), innovation.prediction.size, innovation.prediction.H_subject
     pose_entries(entity, at)
     for i in range(rows):
@@ -72,7 +75,7 @@ def soften(P: Matrix, entity: EntityRow, innovation: Innovation, factor: float) 
 
 @kernel()
 def settle(state: State, tables: Tables, event: EventRow, z: Vector) -> bool:
-    """Put the subject where the measurement says in all modes, diffuse until the correction that follows."""
+    """Put the subject where the measurement has it, in all modes, diffuse until the following correction."""
     sensor, pose = tables.sensors[event.sensor], np.zeros(POSE)
     for m in range(state.means.shape[0]):
         belief = belief_of(state, tables, m)
@@ -84,7 +87,7 @@ def settle(state: State, tables: Tables, event: EventRow, z: Vector) -> bool:
 
 @kernel(inlined=True)
 def note_joining(memory: EntityMemory) -> None:
-    """Note that an entity joined: nothing is held against it, and nothing has confirmed it yet."""
+    """Note that an entity joined: without contradictions so far, and not yet confirmed."""
     memory.active = memory.unconfirmed = 1
     memory.wild.count = memory.refused.count = 0
 
@@ -93,9 +96,8 @@ def note_joining(memory: EntityMemory) -> None:
 def admit(state: State, tables: Tables, event: EventRow, rows: int, hypothesis: Hypothesis) -> int:
     """Let the subject join and prepare the innovations for `correct`; or return why not, the belief unchanged.
 
-    No correction is put off when it is called.
-    CONTRADICTED: the surplus lies beyond the gate. After enough of these in a row the subject joins all the same
-    (INFLATED), with R raised until the surplus lies on the gate.
+    No correction is deferred when it is called. CONTRADICTED: the surplus lies beyond the gate. After enough of these
+    in a row the subject joins all the same (INFLATED), with R raised until the surplus lies on the gate.
     """
     memory, settings = state.memory[event.subject], tables.settings
     trial = State(

@@ -6,7 +6,7 @@ from enum import StrEnum
 
 
 class EntityKind(StrEnum):
-    """What a block of the state describes."""
+    """The kind of entity that a block of the state describes."""
 
     ROBOT = "robot"
     TARGET = "target"
@@ -36,7 +36,7 @@ class Block:
 
     @property
     def slice(self) -> slice:
-        """Return where the block stands in the state."""
+        """Return the block's place in the state."""
         return slice(self.start, self.start + self.size)
 
 

@@ -1,4 +1,4 @@
-"""How far a mean over a few independent values may be from the truth: Student's interval."""
+"""The uncertainty of a mean over a few independent values: Student's interval."""
 
 import math
 from collections.abc import Sequence

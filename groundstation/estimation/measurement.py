@@ -25,7 +25,7 @@ class Measurement(msgspec.Struct, frozen=True, gc=False):
 class SensorReading(msgspec.Struct, frozen=True, gc=False):
     """One reading of any sensor: z (1 to 4 rows as its model says) with its covariance (row-major), of one subject.
 
-    subject: the carrier itself where the sensor looks at nothing else (a heading). roll, pitch: the carrier's, as
+    subject: the carrier itself if the sensor observes nothing else (a heading). roll, pitch: the carrier's, as
     reported.
     """
 
@@ -41,9 +41,9 @@ class SensorReading(msgspec.Struct, frozen=True, gc=False):
 class OdometrySample(msgspec.Struct, frozen=True, gc=False):
     """One odometry sample of a robot: velocity [base_stabilized], its own heading [odom], height above ground.
 
-    yaw_rate_rad_s: for vehicles that are commanded, or measure, a turn rate and no heading. roll, pitch: how it leans.
-    attitude_std [rad], yaw_std [rad per root second], velocity_std [m/s]: errors of roll and pitch, of the heading's
-    increments and of the velocity; 0: as the robot's model has them, which is also the least of the last.
+    yaw_rate_rad_s: for vehicles that have a commanded or measured turn rate but no heading. roll, pitch: of the
+    vehicle. attitude_std [rad], yaw_std [rad per root second], velocity_std [m/s]: errors of roll and pitch, of the
+    heading's increments and of the velocity; 0: as in the robot's model, which is also the minimum for the last.
     """
 
     stamp_ns: int
@@ -60,10 +60,10 @@ class OdometrySample(msgspec.Struct, frozen=True, gc=False):
 
 
 class Correction(msgspec.Struct, frozen=True, gc=False):
-    """What one measurement did: residual y, its covariance S (row-major), NIS and verdict.
+    """The effect of one measurement: residual y, its covariance S (row-major), NIS and verdict.
 
-    joined: the subject entered the state by it (again, where the verdict says so in `reason`). ahead: which way and how
-    far from its belief the subject was seen, in deviations [world]; zero for all but targets.
+    joined: the subject entered the state by it (again, where the verdict says so in `reason`). ahead: direction and
+    distance of the sighting from the belief of its subject, in deviations [world]; targets only.
     """
 
     observer: str
@@ -79,5 +79,5 @@ class Correction(msgspec.Struct, frozen=True, gc=False):
 
     @property
     def is_report(self) -> bool:
-        """Return whether it is no sighting, but what its subject said of its own motion."""
+        """Return whether it is not a sighting, but its subject's report of its own motion."""
         return self.observer == self.subject

@@ -1,4 +1,4 @@
-"""What a message must be before anybody computes with it: checks of shape and size, duplicates, sensors that hang."""
+"""Checks messages before any computation: shapes and sizes, duplicates, frozen sensors."""
 
 import math
 from collections.abc import Container
@@ -19,14 +19,14 @@ from groundstation.bus.messages import (
 from groundstation.estimation.fixed_lag import FUTURE_NS
 from groundstation.estimation.frozen_sensor import FreezeWatch, Novelty
 
-# No vehicle here moves so fast or so far [m/s, m, rad]; a number that is merely finite can still overflow the filter.
+# No vehicle here moves this fast or far [m/s, m, rad]; a number that is merely finite can still overflow the filter.
 _ABSURD = 1e3
-# Message identities per key against which duplicates are looked for: all that are not late yet, but no more than these.
+# Message identities kept per key to find duplicates: all that are not late yet, but no more than these.
 _REMEMBERED, _REMEMBERED_AT_MOST = 512, 8192
-# A sensor that still measures does not repeat itself so often for so long [s].
+# A working sensor does not repeat itself this often for this long [s].
 _FROZEN_ODOMETRY, _FROZEN_SIGHT = (10, 0.5), (4, 0.3)
-_SYMMETRY = 1e-6  # of covariances, beside the deviations of their rows
-# What takes the triangles out of row-major values, by rows: most covariances are symmetric to the bit.
+_SYMMETRY = 1e-6  # for covariances, relative to the deviations of their rows
+# Extracts the triangles of row-major values, by rows: most covariances are exactly symmetric.
 _TRIANGLES = {
     3: (itemgetter(1, 2, 5), itemgetter(3, 6, 7)),
     4: (itemgetter(1, 2, 3, 6, 7, 11), itemgetter(4, 8, 12, 9, 13, 14)),
@@ -35,9 +35,9 @@ _STALE = {Novelty.NEW: None, Novelty.REPEATED: Verdict.DUPLICATE, Novelty.FROZEN
 
 
 class MessageScreen:
-    """Judges messages one by one, each with what came before it.
+    """Judges messages one by one, each against earlier ones.
 
-    tells_steps: vehicles whose values repeat because they are rounded; lag_ns: messages older than this come too late.
+    tells_steps: vehicles whose rounded values may repeat; lag_ns: older messages are too late.
     """
 
     def __init__(self, tells_steps: Container[str], lag_ns: int) -> None:
@@ -47,7 +47,7 @@ class MessageScreen:
         self._standing: dict[str, tuple[int, bool]] = {}
 
     def stands(self, entity: str) -> bool:
-        """Return whether a vehicle said last that it is on the ground."""
+        """Return whether a vehicle's last report says that it is on the ground."""
         return self._standing.get(entity, (0, False))[1]
 
     def refusal(self, key: str, message: Message, stamp_ns: int, now_ns: int) -> Verdict | None:
@@ -86,7 +86,7 @@ class MessageScreen:
         values = (message.velocity_m_s, *attitude, message.height_m)
         entity = message.header.entity
         frozen = self._odometry_watch.is_frozen(entity, values, stamp_ns) and entity not in self._tells_steps
-        # A vehicle that tells whole numbers repeats them as long as it stands.
+        # A vehicle that reports whole numbers repeats them while it stands.
         return Verdict.FROZEN if frozen and not self.stands(entity) else None
 
     def _observation(self, message: RelativeObservation, stamp_ns: int) -> Verdict | None:
@@ -103,7 +103,7 @@ class MessageScreen:
         return self._stale((message.observer, message.camera, message.subject), values, stamp_ns)
 
     def _range(self, message: RangeObservation, stamp_ns: int, now_ns: int) -> Verdict | None:
-        # A round places a robot by itself, before the filter asks how old it is.
+        # A round of ranges places a robot by itself, before the filter checks its age.
         if stamp_ns < now_ns - self._lag_ns:
             return Verdict.LATE
         values = (*message.ranges_m.values(), *(message.position_m or ()), message.std_m)
@@ -118,7 +118,7 @@ class MessageScreen:
         return self._stale((message.observer, "", message.subject), told, stamp_ns) if len(told) > 1 else None
 
     def _stale(self, source: tuple[str, ...], values: tuple[object, ...], stamp_ns: int) -> Verdict | None:
-        """Return why a reading says nothing new, or None: no second picture measures the same to the last bit."""
+        """Return why a reading is not new, or None: no second picture measures exactly the same."""
         return _STALE[self._sight_watch.judge(source, values, stamp_ns)]
 
     def _is_duplicate(self, key: str, message: Message, stamp_ns: int, now_ns: int) -> bool:
@@ -130,7 +130,7 @@ class MessageScreen:
         elif identity in seen:
             return True
         seen[identity] = stamp_ns
-        # Beyond the rewind a message is late by itself; what could still count is remembered at any rate.
+        # Beyond the rewind a message is late anyway; all that could still count is remembered.
         while len(seen) > _REMEMBERED:
             oldest = next(iter(seen))
             if seen[oldest] >= now_ns - self._lag_ns and len(seen) <= _REMEMBERED_AT_MOST:
@@ -173,6 +173,6 @@ def _is_covariance(values: tuple[float, ...], rows: int) -> bool:
 
 def _plausible(*values: float) -> bool:
     for value in values:  # noqa: SIM110 - a third of the time of a generator, ten thousand times a second
-        if not -_ABSURD < value < _ABSURD:  # nan compares false
+        if not -_ABSURD < value < _ABSURD:  # false for nan
             return False
     return True

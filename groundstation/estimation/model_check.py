@@ -14,7 +14,7 @@ _STEP = 1e-6
 
 
 def jacobian_error(parameters: EstimatorParameters, sensor: str, subject: str, mean: Array, rows: int) -> float:
-    """Return by how much a model's Jacobians of so many rows differ from central differences at a mean (n), at most.
+    """Return the largest difference between a model's Jacobians (`rows` rows) and central differences at a mean (n).
 
     mean: of all entities of the parameters, in their order. Raises KeyError or ValueError for an unknown name.
     """

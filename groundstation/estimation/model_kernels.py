@@ -1,4 +1,4 @@
-"""The kernels that models provide, declared, and how the filter's loops call them through addresses."""
+"""Declarations of the kernels that models provide, and calls to them by address from the filter's loops."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -14,7 +14,10 @@ def predict(belief: Belief, e: int, dt: float) -> None:
 
 
 def begin(belief: Belief, deferred: Deferred, odometry: CondensedOdometry, e: int, step_s: float, gate: float) -> None:
-    """Take one step's condensed odometry of one entity; gate: of a single row; deferred: what P lacks so far."""
+    """Take one step's condensed odometry of one entity; gate: of a single row.
+
+    deferred: corrections not yet made in P.
+    """
 
 
 def measure(belief: Belief, sensor: SensorRow, event: EventRow, out: Prediction) -> None:
@@ -31,12 +34,12 @@ def prepare(belief: Belief, sensor: SensorRow, event: EventRow, z: Vector, R: Ma
 
 
 def locate(belief: Belief, sensor: SensorRow, event: EventRow, z: Vector, pose: Vector) -> bool:
-    """Write where z puts its subject (x, y, z, yaw) [world]; False where z alone is not enough."""
+    """Write the subject's pose (x, y, z, yaw) [world] by z; False if z alone is not enough."""
     raise NotImplementedError
 
 
 def handle(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> None:
-    """Let an event happen. No model's kernel, but called so as well: what is linked is compiled again."""
+    """Execute an event. It is no model's kernel, but is called by address too: linked code would be compiled again."""
 
 
 call_predict = caller(predict)
@@ -49,18 +52,18 @@ call_handle = caller(handle)
 
 @kernel()
 def as_measured(belief: Belief, sensor: SensorRow, event: EventRow, z: Vector, R: Matrix) -> int:
-    """All rows are used, and R is as it came."""
+    """Use all rows, and R as received."""
     return event.size
 
 
 @kernel()
 def places_nothing(belief: Belief, sensor: SensorRow, event: EventRow, z: Vector, pose: Vector) -> bool:
-    """A reading alone cannot place its subject."""
+    """Return False: a reading alone cannot place its subject."""
     return False
 
 
 class MotionKernels(NamedTuple):
-    """The kernels of a motion model; None where it does nothing."""
+    """The kernels of a motion model; None for one that does nothing."""
 
     predict: Callable[[Belief, int, float], None] | None = None
     begin: Callable[[Belief, Deferred, CondensedOdometry, int, float, float], None] | None = None

@@ -2,8 +2,8 @@
 
 Each mode has a joint mean and covariance of its own; modes differ in how one target moves. Mixing takes the moments of
 the mixture over the *whole* state, robots and cross-covariances included: every mixed P is a sum of positive definite
-matrices and of outer products, so that it is positive definite and its cross-covariances are those of the mixture.
-Bar-Shalom, Li, Kirubarajan (2001), section 11.6.6.
+matrices and of outer products, so it is positive definite, with the cross-covariances of the mixture. Bar-Shalom, Li,
+Kirubarajan (2001), section 11.6.6.
 """
 
 from groundstation.arrays import Matrix, MatrixStack, Vector
@@ -62,7 +62,7 @@ def write_moments(
 
 @kernel()
 def mix(state: State, tables: Tables) -> None:
-    """Let each mode's belief become the mixture of those from which it can have come in one step."""
+    """Replace each mode's belief by the mixture of those from which it can have come in one step."""
     modes, weights, transition = state.means.shape[0], state.weights, tables.transition
     if modes == 1:
         return

@@ -1,8 +1,8 @@
-"""What motion models are built from, and the loop that calls them; how an entity enters the state and leaves it.
+"""Parts of motion models, and the loop that calls them; how an entity enters and leaves the state.
 
 Each model predicts the rows of its own block of P, so a step costs O(dim) per entity. `predict` copies them into the
-columns, of several entities at once: a column of P is as many lines of memory as P has rows, however few entries of
-each are written.
+columns, of several entities at once: writing a column of P touches a cache line per row, however few entries of each
+are written.
 """
 
 import math
@@ -15,16 +15,16 @@ from groundstation.estimation.records import YAW, PriorRow, X, Y, Z
 from groundstation.estimation.register_blocks import LANES, add_to_row, add_two_to_row, copy_to_columns, scale_row
 from groundstation.kernel import kernel
 
-# Prior of what joins, about the place that its first measurement puts it at: wide against any measurement, yet so
-# that the correction which follows loses no more than eight digits.
+# Prior of a joining entity about the place by its first measurement: wide against any measurement, yet so that the
+# following correction loses no more than eight digits.
 DIFFUSE_M2 = 100.0
 DIFFUSE_RAD2 = 10.0
-_MOST_ROWS = 32  # that wait to be copied into columns
+_MOST_ROWS = 32  # rows that wait to be copied into columns
 
 
 @kernel(inlined=True)
 def mirror(P: Matrix, start: int, size: int, changed: int) -> None:
-    """Make a block symmetric to the bit of which the first `changed` rows and columns were moved."""
+    """Make a block exactly symmetric after its first `changed` rows and columns were changed."""
     for i in range(start, start + size):
         for j in range(start, min(i, start + changed)):
             mean = 0.5 * (P[i, j] + P[j, i])
@@ -47,7 +47,7 @@ def depend(P: Matrix, start: int, size: int, to: int, source: int, factor: float
 
 
 class Dependence(NamedTuple):
-    """How an entry of a block depends on two others: where they stand in the block, and by which factors."""
+    """The dependence of an entry of a block on two others: their places in the block, and the factors."""
 
     a: int
     by_a: float
@@ -89,7 +89,7 @@ def wander(P: Matrix, start: int, offset: int, variance: float) -> None:
 
 @kernel(inlined=True)
 def copy_out(P: Matrix, first: int, stop: int) -> None:
-    """Copy some rows into the columns of their numbers, but where the rows cross these."""
+    """Copy some rows into the columns with their numbers, except where both cross."""
     if first == stop:
         return
     copy_to_columns(P, first, stop - first, 0, first)
@@ -98,9 +98,9 @@ def copy_out(P: Matrix, first: int, stop: int) -> None:
 
 @kernel()
 def predict(belief: Belief, dt: float) -> None:
-    """Predict all entities that are in the state, each by its own model's kernel; P stays symmetric to the bit.
+    """Predict all entities that are in the state, each by its own model's kernel; P stays exactly symmetric.
 
-    Rows first..stop are those that the columns lack as yet, of neighbours whose blocks share lines of memory.
+    Rows first..stop are not yet copied to the columns; they belong to neighbours whose blocks share cache lines.
     """
     P, first, stop = belief.P, 0, 0
     for e in range(belief.entities.shape[0]):
@@ -133,7 +133,7 @@ def clear(belief: Belief, e: int) -> None:
 
 @kernel()
 def enter(belief: Belief, e: int, prior: PriorRow) -> None:
-    """Put an entity into the state as its prior says, independent of all others."""
+    """Put an entity into the state by its prior, independent of all others."""
     clear(belief, e)
     entity = belief.entities[e]
     for i in range(entity.size):
@@ -144,7 +144,7 @@ def enter(belief: Belief, e: int, prior: PriorRow) -> None:
 
 @kernel()
 def join(belief: Belief, e: int, prior: PriorRow, pose: Vector) -> None:
-    """Put an entity into the state at a pose (x, y, z, yaw) with a diffuse prior, for the correction that follows.
+    """Put an entity into the state at a pose (x, y, z, yaw) with a diffuse prior, for the following correction.
 
     The correction turns the diffuse prior into the right covariance and cross-covariances by itself.
     """

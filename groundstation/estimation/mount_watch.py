@@ -1,4 +1,4 @@
-"""Which fixed cameras were moved in flight: told, and not believed any more until everybody has landed. Pure."""
+"""Finds fixed cameras that were moved in flight: reported, and not believed until all robots have landed. Pure."""
 
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -18,7 +18,7 @@ from groundstation.geometry.camera_turn import CameraTurn
 from groundstation.time_units import NS_PER_S
 
 MOVED = "its camera was moved: what it sees counts for nothing until all have landed"
-# A camera that is off by less than this [m] is told of, and still believed: the rooms' margins are wider.
+# A camera with a smaller displacement [m] is reported, but still believed: the rooms' margins are wider.
 _HARMS_M = 0.15
 _REMEDY = (
     "land; fix the camera where the field file has it, or survey it anew (groundstation calibrate), then check again"
@@ -26,7 +26,7 @@ _REMEDY = (
 
 
 class MountWatch:
-    """Use: `see` each sighting, `advance` once a tick; ask `distrusts` and `is_rootless`. roots: what is fixed."""
+    """Call `see` with each sighting, `advance` once a tick; ask `distrusts` and `is_rootless`. roots: fixed sensors."""
 
     def __init__(self, parameters: EstimatorParameters) -> None:
         fixed: dict[str, Matrix] = {
@@ -44,7 +44,7 @@ class MountWatch:
 
     @property
     def is_rootless(self) -> bool:
-        """Return whether no fixed camera is left that tells where the team is in the room."""
+        """Return whether no trusted fixed sensor is left to tell where the team is in the room."""
         return bool(self._moved) and self._moved == self.roots
 
     def distrusts(self, observer: str) -> bool:
@@ -61,7 +61,7 @@ class MountWatch:
         self, now_ns: int, velocities: Mapping[str, Sequence[float]], corrections: Iterable[Correction],
         airborne: Collection[str],
     ) -> list[Notice]:  # fmt: skip
-        """Return what is to be told. velocities [m/s; world] of all robots that have joined."""
+        """Return the notices for the operator. velocities [m/s; world] of all robots that have joined."""
         now_s = now_ns / NS_PER_S
         if not airborne:
             self._moved.clear()

@@ -1,6 +1,6 @@
-"""What happens at one measurement time: an observation, or a change of who is in the state; compiled.
+"""Executes one event at its measurement time: an observation, or a change of the entities in the state; compiled.
 
-There is one belief per mode (modes.py). What is decided (gate, hypothesis, joining) is decided for all modes.
+There is one belief per mode (modes.py). Gate, hypothesis and joining are decided for all modes together.
 """
 
 import math
@@ -46,7 +46,7 @@ _INNOVATION = Innovation.dtype
 
 @kernel(inlined=True)
 def refusal(belief: Belief, event: EventRow, rows: int) -> int:
-    """Return why an observation cannot be used whatever it says, or PENDING."""
+    """Return why an observation cannot be used whatever its values are, or PENDING."""
     observer, subject = belief.memory[event.observer], belief.memory[event.subject]
     if observer.active == 0:
         return OBSERVER_UNKNOWN
@@ -76,7 +76,7 @@ def choose(
 
 @kernel(inlined=True)
 def note_place(belief: Belief, deferred: Deferred, e: int) -> None:
-    """Note how well a robot's or target's place is known right after an observation of it."""
+    """Note the variance of a robot's or target's place right after an observation of it."""
     entity = belief.entities[e]
     if entity.kind == KIND_ROBOT or entity.kind == KIND_TARGET:
         x, y = entity.start + X, entity.start + Y
@@ -86,7 +86,7 @@ def note_place(belief: Belief, deferred: Deferred, e: int) -> None:
 
 @kernel()
 def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> None:
-    """Correct by one observation, or say why not: gate, choice of hypothesis, joining, re-initialisation."""
+    """Correct by one observation, or record why not: gate, choice of hypothesis, joining, re-initialisation."""
     modes, sensor, settings = state.means.shape[0], tables.sensors[event.sensor], tables.settings
     subject, first = state.memory[event.subject], belief_of(state, tables, 0)
     # First axis: the pose as measured, and its alternative.
@@ -140,7 +140,7 @@ def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> N
             belief, deferred = belief_of(state, tables, m), deferred_of(state, m)
             correct(belief, deferred, tables.headings, used.innovations[m], used.HP[m], excess)
     if joins:
-        make_all(state)  # a diffuse prior is so wide that nothing may be put off beside it
+        make_all(state)  # a diffuse prior is too wide for deferred corrections beside it
     weigh(state.weights, used.innovations, rows, excess)
     forget_lie(subject, event.at)
     note_place(first, deferred_of(state, 0), event.subject)
@@ -149,7 +149,7 @@ def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> N
 
 @kernel()
 def place(belief: Belief, e: int, prior: PriorRow, event: EventRow) -> None:
-    """Put an entity where the event says (x, y, z, yaw) and as surely, independent of all others."""
+    """Put an entity at the event's pose (x, y, z, yaw) with its covariance, independent of all others."""
     index, pose, entity = np.empty(POSE, np.int64), np.empty(POSE), belief.entities[e]
     for i in range(POSE):
         pose[i] = event.measured.z[i]
@@ -165,7 +165,7 @@ def place(belief: Belief, e: int, prior: PriorRow, event: EventRow) -> None:
 
 @kernel()
 def change(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> None:
-    """Let an entity in, out, or put it somewhere."""
+    """Let an entity join or leave, or place it."""
     make_all(state)
     kind, memory, prior = event.kind, state.memory[event.subject], tables.priors[event.subject]
     out.verdict = ACCEPTED

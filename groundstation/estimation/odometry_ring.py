@@ -1,4 +1,4 @@
-"""Odometry condensed by step and robot, in a ring: what arrives for one step is added up in any order."""
+"""Odometry condensed by step and robot, in a ring: samples of one step are added in any order."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Whom to blame for an observation far beyond the gate: marker, observer, outlier, or the belief of the subject."""
+"""Finds the cause of an observation far beyond the gate: marker, observer, outlier, or the subject's belief."""
 
 import math
 
@@ -24,20 +24,21 @@ from groundstation.estimation.update import linearise
 from groundstation.kernel import kernel
 
 _INNOVATION = Innovation.dtype
-# What is seen farther than this from where another is believed is not that one: a belief that is wide fits all [m].
+# A sighting farther than this from another's believed place is not that one: a wide belief would fit anything [m].
 _SAME_M = 0.5
-# Contradictions that are so far apart are not in a row.
+# Contradictions farther apart than this are not in a row.
 _IN_A_ROW_S = 5.0
-# For one observer: between two robots whose beliefs are given up, and how many at most, one more every so often.
+# For one observer: the time between giving up two robots' beliefs, the largest number, and the time after which one
+# more is permitted.
 _BETWEEN_S, _AT_MOST, _FORGOTTEN_S = 3.0, 3.0, 10.0
-# A sighting stands for so much time at most.
+# A sighting stands for this time at most.
 _SEEN_S, _LIE_FORGOTTEN_S = 0.2, 1.0
 _FIRST_DOUBT_M_S, _DOUBT_GROWS, _MOST_DOUBT_M_S = 0.2, 2.0, 1.0
 
 
 @kernel(inlined=True)
 def apart_m(sensor: SensorRow, innovation: Innovation) -> float:
-    """Return how far what was seen is from where it was expected [m]; angles left out."""
+    """Return the distance between sighting and expectation [m], without angles."""
     square = 0.0
     for i in range(innovation.prediction.size):
         if sensor.is_angle[i] == 0:
@@ -50,7 +51,7 @@ def fits_another(
     belief: Belief, deferred: Deferred, sensor: SensorRow, settings: Settings, event: EventRow, rows: int,
     hypothesis: Hypothesis,
 ) -> bool:  # fmt: skip
-    """Return whether what was seen is where the belief has another robot or target: its marker was misread."""
+    """Return whether the sighting is where the belief has another robot or target: its marker was misread."""
     subject = event.subject
     work, HP = np.empty(1, _INNOVATION), np.empty((4, belief.mean.shape[0]))
     found = False
@@ -72,7 +73,7 @@ def fits_another(
 
 @kernel()
 def is_doubted(memory: EntityMemory, settings: Settings, at: float) -> bool:
-    """Return whether an entity was itself seen far from its place, more than once and until just now."""
+    """Return whether the entity itself was seen far from its place, more than once and until just now."""
     return memory.wild.count >= 2 and at - memory.wild_at <= settings.divergence_s
 
 
@@ -89,8 +90,8 @@ def insists(streak: Streak, settings: Settings, at: float) -> bool:
 def has_diverged(memory: EntityMemory, settings: Settings, at: float) -> bool:
     """Count a wild innovation of one entity; True when they last long enough to blame the belief.
 
-    `observe` ends the count when the entity is seen within the gate. What has joined by one observation and was never
-    confirmed since has nothing to set against another.
+    `observe` ends the count when the entity is seen within the gate. An entity that joined by one observation and was
+    never confirmed cannot outweigh another one.
     """
     if memory.unconfirmed != 0:
         return True
@@ -102,16 +103,16 @@ def has_diverged(memory: EntityMemory, settings: Settings, at: float) -> bool:
 
 @kernel()
 def given_up_lately(observer: EntityMemory, at: float) -> float:
-    """Return how many beliefs were given up for one observer, each forgotten after a while."""
+    """Return the number of beliefs recently given up for one observer."""
     return max(0.0, observer.gave_up - (at - observer.gave_up_at) / _FORGOTTEN_S)
 
 
 @kernel()
 def is_hasty(observer: EntityMemory, subject: int, at: float) -> bool:
-    """Return whether a robot's belief may not be given up yet: another one just was, or it were too many.
+    """Return whether it is too early to give up a robot's belief: another one just was, or there were too many.
 
     Several robots that one camera contradicts at once speak against the camera; one that is re-initialised again and
-    again is not mended by it. Whoever is refused so counts as unseen, and the robot flies back or lands.
+    again is not helped by it. A robot whose sightings are refused counts as unseen, and flies back or lands.
     """
     lately = given_up_lately(observer, at)
     if lately > 0.0 and observer.gave_up_whom != subject and at - observer.gave_up_at < _BETWEEN_S:
@@ -128,16 +129,16 @@ def note_given_up(observer: EntityMemory, subject: int, at: float) -> None:
 
 @kernel()
 def doubt_velocity(memory: EntityMemory) -> None:
-    """Doubt what a vehicle says of its velocity: a fixed camera saw it beyond the gate.
+    """Doubt a vehicle's reported velocity, after a fixed camera saw it beyond the gate.
 
-    One surprise says little, and one that is wild nothing of a velocity: such a jump has another cause.
+    A single surprise says little, and a wild one nothing, about a velocity: such a jump has another cause.
     """
     memory.velocity_doubt = min(_MOST_DOUBT_M_S, _FIRST_DOUBT_M_S + _DOUBT_GROWS * memory.velocity_doubt)
 
 
 @kernel()
 def forget_lie(memory: EntityMemory, at: float) -> None:
-    """Forget that a velocity was wrong, while the vehicle is seen: what is wrong still, is noted again."""
+    """Forget that a velocity was wrong while the vehicle is seen: if it is still wrong, it is noted again."""
     memory.velocity_lie *= math.exp(-min(at - memory.corrected_at, _SEEN_S) / _LIE_FORGOTTEN_S)
     memory.unseen_s = 0.0
 
@@ -147,7 +148,7 @@ def blame(
     belief: Belief, deferred: Deferred, sensor: SensorRow, settings: Settings, event: EventRow, rows: int,
     hypothesis: Hypothesis,
 ) -> int:  # fmt: skip
-    """Return why a wild observation is refused, or PENDING when the subject's belief has to be given up for it.
+    """Return why a wild observation is refused, or PENDING if the subject's belief must be given up for it.
 
     belief: of the first mode, as is the noise of the hypothesis that counts.
     """

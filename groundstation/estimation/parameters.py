@@ -1,4 +1,4 @@
-"""Settings of the estimator, and how they follow from a resolved field."""
+"""Settings of the estimator, derived from a resolved field."""
 
 import math
 from collections.abc import Collection, Mapping
@@ -34,25 +34,26 @@ from groundstation.vehicles import kind_named
 
 # `looking: down`: picture right is world x, picture down is world -y, optical axis is -z.
 WORLD_FROM_DOWN = WORLD_FROM_DOWNWARD_OPTICAL
-# Of the time of exposure about the calibrated delay of a video: +-20 ms, as the honest scenario has it [s].
+# Deviation of the exposure time about the calibrated delay of a video: +-20 ms, as in the honest scenario [s].
 STAMP_STD_S = 0.0115
-# Of a motion capture system's, which tells its own delay but for that of the network [s].
+# The same for a motion capture system, which reports its own delay except that of the network [s].
 CAPTURE_STAMP_STD_S = 0.002
-# The ranges of one round are taken one after the other, and stamped alike [s].
+# The ranges of one round are measured one after the other, and stamped alike [s].
 RANGE_STAMP_STD_S = 0.02
-# A calibrated velocity scale is good to this, and creeps by this in a second.
+# A calibrated velocity scale is this accurate, and creeps by this in a second.
 _SCALE_STD, _SCALE_DRIFT = 0.04, 0.002
 _VELOCITY_LABELS = ("velocity_bias_x", "velocity_bias_y")
-# Deviations of the velocity's error that lasts, and of what is quicker, over that of all of it.
+# Deviations of the velocity's lasting error, and of the quicker one, relative to the whole.
 _LASTING_SHARE, _QUICK_SHARE = 0.6, 0.1
-# A target does the most that it may do for this share of the time.
+# A target accelerates at its maximum for this share of the time.
 _MANOEUVRING_SHARE = 0.07
-# Deviation of a target's turn rate over its highest, and of each component of its velocity, before it is seen, over its
-# highest speed.
+# Deviation of a target's turn rate relative to its highest, and of each component of its velocity before it is seen,
+# relative to its highest speed.
 _TURN_SHARE, _SPEED_SHARE = 0.5 / math.pi, 0.4 / 0.7
-# From so many robots on observations wait for the odometry of their time, and what odometry takes to arrive [s].
+# From this team size on, observations wait for the odometry of their time; and the time that odometry takes to arrive
+# [s].
 _LARGE_TEAM, _ARRIVES_S = 12, 0.01
-# Of the acceleration of a target that turns, what is left to one that goes straight on.
+# Share of a turning target's acceleration that remains for one that drives straight.
 _STRAIGHT_SHARE = 0.5
 
 
@@ -60,15 +61,14 @@ _STRAIGHT_SHARE = 0.5
 class EstimatorParameters:
     """Entities and sensors by name, and the settings of the filter.
 
-    step_s: odometry is condensed and checkpoints are kept at this spacing; max_lateness_s: the rewind's bound;
-    wait_s: how long observations wait for the odometry of their time (0: each counts at once, and is computed again
-    whenever odometry of its time arrives);
-    wild_gates: beyond this many gates a measurement is not even used inflated; divergence_count of them in a row over
-    at least divergence_s re-initialise the entity. inertial: robots whose attitude is taken from their IMU where they
-    publish one (inertial.py), with their velocity scale. joins_early: robots that join as soon as they begin to take
-    off. tells_steps: robots whose odometry may repeat itself in flight. world_cameras: sensors that hang in the room,
-    and can be bumped. ranging: by system, who has a transponder. reporting: targets whose
-    own odometry is heard.
+    step_s: odometry is condensed and checkpoints are kept at this spacing; max_lateness_s: the rewind's bound; wait_s:
+    how long observations wait for the odometry of their time (0: each counts at once, and is computed again whenever
+    odometry of its time arrives); wild_gates: beyond this many gates a measurement is not even used inflated;
+    divergence_count of them in a row over at least divergence_s re-initialise the entity. inertial: robots whose
+    attitude is taken from their IMU where they publish one (inertial.py), with their velocity scale. joins_early:
+    robots that join as soon as they begin to take off. tells_steps: robots whose odometry may repeat itself in flight.
+    world_cameras: sensors mounted in the room that can be bumped. ranging: robots with a transponder, by system.
+    reporting: targets whose own odometry is heard.
     """
 
     entities: Mapping[str, MotionModel]
@@ -125,7 +125,7 @@ def parameters_from_field(resolved: ResolvedField) -> EstimatorParameters:
 
 
 def _wait_s(drones: Collection[FieldDrone]) -> float:
-    """Return how long observations of a team wait: a small one's are cheap to compute again."""
+    """Return how long observations of a team wait [s]: for a small team recomputing them is cheap."""
     if len(drones) < _LARGE_TEAM:
         return 0.0
     delays_ms = [delay for d in drones for delay in (d.odometry.velocity_delay_ms, d.odometry.height_delay_ms)]
@@ -157,7 +157,7 @@ def _robot(drone: FieldDrone) -> OdometryRobot:
 
 
 def usual_acceleration_m_s2(target: Target) -> float:
-    """Return the rms of one component of a target's acceleration over all the time."""
+    """Return the rms of one component of a target's acceleration over time."""
     return math.sqrt(_MANOEUVRING_SHARE) * target.acceleration_std_m_s2
 
 
@@ -183,8 +183,8 @@ def _target(target: Target) -> MotionModel:
 
 
 def _mount(sensor: WorldCamera | MotionCapture) -> FixedMount:
-    # The poses of a motion capture system come along the world's axes and from its origin; that these are off by
-    # something is one error for all of them.
+    # A motion capture system's poses are along the world's axes from its origin; an error of these is one error for
+    # all.
     return FixedMount(
         position_m=sensor.position_m if isinstance(sensor, WorldCamera) else (0.0, 0.0, 0.0),
         attitude_std_rad=math.radians(sensor.attitude_std_deg),

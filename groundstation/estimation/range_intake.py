@@ -1,8 +1,8 @@
-"""Ranges to the filter, and how a robot joins by them: placed where one round of ranges puts it.
+"""Feeds ranges to the filter, and lets a robot join at the place that one round of ranges gives.
 
-A single range places nothing, and ranges tell no heading to who stands. The heading is that of the pad until a robot
-has flown, then the last that was believed of it, each carried on by the vehicle's own; where that jumped (a reset) it
-is unknown, and something else has to see the robot first.
+A single range places nothing, and ranges give no heading of a standing robot. The heading is that of the pad until a
+robot has flown, then its last believed one, each continued by the vehicle's own; after a jump of that (a reset) it is
+unknown, and another sensor must see the robot first.
 """
 
 import math
@@ -21,17 +21,17 @@ from groundstation.field.room import ranging_link
 from groundstation.geometry.rotations import rotation_z
 from groundstation.time_units import NS_PER_S
 
-# A fix that is farther from the belief than so many deviations of both, and this [m], contradicts it: the belief is of
-# now, the fix of a little before.
+# A fix farther from the belief than this many deviations of both, and this distance [m], contradicts it: the belief is
+# of now, the fix of slightly earlier.
 _SIGMAS, _APART_M = 5.0, 0.2
-# A robot is placed this much less surely than its fix says (variance): the ranges that follow are off by the same
-# biases, which must not count twice.
+# A robot is placed with a larger variance than its fix, by this factor: the following ranges have the same biases,
+# which must not count twice.
 _LESS_SURE = 25.0
 
 
 @dataclass(slots=True)
 class _Heading:
-    """A vehicle's own heading, and the world's less it, as last known (None: unknown) with variance and time."""
+    """A vehicle's own heading, and the world's less it as last known (None: unknown), with variance and time."""
 
     own_rad: float = 0.0
     reset: int = 0
@@ -43,7 +43,7 @@ class _Heading:
 
 
 class RangeIntake:
-    """Feeds a filter with ranges; robots: who has a transponder, by system."""
+    """Feeds a filter with ranges; robots: those with a transponder, by system."""
 
     def __init__(self, joint: FixedLagFilter, robots: Mapping[str, Mapping[str, RangedRobot]]) -> None:
         self._filter, self._robots = joint, robots
@@ -53,7 +53,7 @@ class RangeIntake:
         self._joined: list[tuple[str, str, bool]] = []
 
     def take_joined(self) -> list[tuple[str, str, bool]]:
-        """Return and forget by which system who was placed, and whether it was believed elsewhere before."""
+        """Return and forget (system, robot, whether it was believed elsewhere before) of placed robots."""
         joined, self._joined = self._joined, []
         return joined
 
@@ -72,7 +72,7 @@ class RangeIntake:
             heading.variance, heading.known_ns = robot.pad_yaw_std_rad**2, stamp_ns
 
     def take(self, key: str, message: RangeObservation, stamp_ns: int, now_ns: int) -> Verdict:
-        """Take one round of ranges, whose shape and numbers were checked; ACCEPTED if any of it may count."""
+        """Take one round of ranges with checked shape and numbers; ACCEPTED if any of it may count."""
         robot = self._robots.get(message.observer, {}).get(message.subject)
         if robot is None or message.header.entity != message.observer:
             return Verdict.UNKNOWN_ENTITY
@@ -89,7 +89,7 @@ class RangeIntake:
         return refusals[0] if len(refusals) == len(message.ranges_m) else Verdict.ACCEPTED
 
     def _joins(self, message: RangeObservation, robot: RangedRobot, stamp_ns: int, now_ns: int) -> bool:
-        """Place a robot that flies and has no belief, or one that a round of ranges after the other contradicts."""
+        """Place a flying robot without a belief, or one that successive rounds of ranges contradict."""
         name, point = message.subject, message.position_m
         belief = self._filter.belief()
         known = name in belief.layout
@@ -117,7 +117,7 @@ class RangeIntake:
         heading.variance, heading.known_ns = float(belief.covariance_of(name)[3, 3]), belief.stamp_ns
 
     def _insists(self, message: RangeObservation, belief: JointBelief, robot: RangedRobot, stamp_ns: int) -> bool:
-        """Count rounds in a row that put a robot elsewhere; True when they are enough and last long enough."""
+        """Count successive rounds that put a robot elsewhere; True when they are enough and last long enough."""
         name, mean = message.subject, belief.mean_of(message.subject)
         there = mean[:3] + rotation_z(float(mean[3])) @ np.array(robot.transponder_m)
         both = _square(message.covariance) + belief.covariance_of(name)[:3, :3]

@@ -1,4 +1,4 @@
-"""What the estimator knows of a robot with a transponder."""
+"""Constant data of a robot with a transponder."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ from groundstation.bus.messages import Vector3
 
 @dataclass(frozen=True, slots=True)
 class RangedRobot:
-    """What joining by ranges needs: transponder [m; base], heading on the pad [rad] and how well it is kept there.
+    """Data for joining by ranges: transponder [m; base], heading on the pad [rad] and its deviation.
 
     yaw_drift: of the vehicle's own heading [rad per root second].
     """

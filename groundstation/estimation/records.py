@@ -13,8 +13,8 @@ from groundstation.kernel import Record, viewed_as
 Own = TypeVar("Own", bound=Record)
 
 MAX_BLOCK = 16
-MAX_ROWS = 4  # of a measurement
-OWN_WORDS = 30  # numbers that a model's own parameters may have
+MAX_ROWS = 4  # rows of a measurement
+OWN_WORDS = 30  # largest number of a model's own parameters
 
 KIND_ROBOT, KIND_TARGET, KIND_CAMERA, KIND_LANDMARK = range(4)
 
@@ -23,8 +23,8 @@ X, Y, Z, YAW = range(4)
 VX, VY = 2, 3
 POSE = 4  # entries of a pose
 
-# What an event is. ADMITTED: the subject may join, and does at once if it has a prior; DISMISSED: it leaves; PLACED: it
-# is put where the event says; REPORTED: what the subject says of its own motion; COMPARED: the same, not used.
+# Kinds of events. ADMITTED: the subject may join, and does at once if it has a prior; DISMISSED: it leaves; PLACED: it
+# is put at the event's pose; REPORTED: the subject's report of its own motion; COMPARED: the same, not used.
 OBSERVATION, ADMITTED, DISMISSED, PLACED, REPORTED, COMPARED = range(6)
 EVENT_KINDS = 6
 
@@ -34,16 +34,16 @@ EVENT_KINDS = 6
 )
 NOT_LOCATED, MISTAKEN, OBSERVER_DOUBTED, OBSERVER_UNCONFIRMED, CONTRADICTED, OBSERVER_HASTY = 9, 10, 11, 12, 13, 14
 
-# Entries of a block that the models of other entities may ask for: EntityRow has their places.
+# Entries of a block that other entities' models may need: EntityRow has their places.
 SHARED_LABELS = ("z", "yaw", "roll_error", "pitch_error", "yaw_offset", "range_bias", "range_scale", "bearing_bias")
 
 
 class EntityRow(Record):
-    """An entity: addresses of its model's kernels (0: none), its block, its place, and what only its model reads.
+    """An entity: addresses of its model's kernels (0: none), its block, its place, and its model's own parameters.
 
     start, size: of the block in the state; kind: KIND_ROBOT and so on; present: 1 if its prior alone puts it into the
-    state; at_*: where in the block an entry stands (-1: the block has none); place_*: the centre of its marker [m;
-    base] or, without a block, where it stands [m; world]; own: see `own_parameters`.
+    state; at_*: place of an entry in the block (-1: none); place_*: the centre of its marker [m; base] or, without a
+    block, where it stands [m; world]; own: see `own_parameters`.
     """
 
     predict: int
@@ -74,7 +74,7 @@ class PriorRow(Record):
 
 
 class SensorRow(Record):
-    """A sensor: addresses of its model's kernels, and what only its model reads.
+    """A sensor: addresses of its model's kernels, and its model's own parameters.
 
     is_angle: 1 for each row of a measurement that is an angle; repeats_s: for how long an error of one pair repeats;
     stamp_variance_s2: of the time of measurement; own: see `own_parameters`.
@@ -102,21 +102,20 @@ class Streak(Record):
 
 
 class EntityMemory(Record):
-    """What is remembered of an entity beside mean and covariance; part of every checkpoint.
+    """The memory of an entity beside mean and covariance; part of every checkpoint.
 
-    active: 1 if it is in the state; admitted: 1 if it may be; unconfirmed: 1 until a second observation agrees.
-    held_*, yaw_rate: inputs held during a step: velocity [m/s; base_stabilized], turn rate [rad/s], roll and pitch
-    [rad]; slow_v*: the velocity smoothed; commanded_*: what a CommandedRobot was last told; odometry_age_s: since the
-    last velocity; attitude_std [rad], yaw_std [rad per root second]: errors as the odometry states them (0: the model's
-    own count); last_yaw, last_reset, has_yaw: the vehicle's own heading [rad; odom] at the step before, told yaw_age_s
-    ago.
+    active: 1 if it is in the state; admitted: 1 if it may be; unconfirmed: 1 until a second observation agrees. held_*,
+    yaw_rate: inputs held during a step: velocity [m/s; base_stabilized], turn rate [rad/s], roll and pitch [rad];
+    slow_v*: the smoothed velocity; commanded_*: the last command of a CommandedRobot; odometry_age_s: since the last
+    velocity; attitude_std [rad], yaw_std [rad per root second]: errors as stated by the odometry (0: the model's own
+    count); last_yaw, last_reset, has_yaw: the vehicle's own heading [rad; odom] at the step before, told yaw_age_s ago.
     velocity_x, _y, _z: how they change [m/s; world], as last predicted; velocity_doubt [m/s]: deviation that a fixed
     camera's surprises add to the error of the reported velocity; velocity_lie [m/s]: by how much that error was lately
-    seen to be larger than that of a sound sensor; unseen_s: time predicted since the last sighting.
-    wild: observations far beyond the gate, the last of them at wild_at; refused: observations by which it would have
-    joined, had they not contradicted their observer; corrected_at: last use of an observation; seen_variance: of the
-    worse of x and y [m^2] right after it. gave_up, gave_up_at, gave_up_whom: how many robots were lately re-initialised
-    by what this one saw, when, and whom last.
+    seen to exceed that of a sound sensor; unseen_s: time predicted since the last sighting. wild: observations far
+    beyond the gate, the last of them at wild_at; refused: observations by which it would have joined if they had not
+    contradicted their observer; corrected_at: last use of an observation; seen_variance: of the worse of x and y [m^2]
+    right after it. gave_up, gave_up_at, gave_up_whom: number of robots recently re-initialised by this one's sightings,
+    the last time, and the last robot.
     """
 
     active: int
@@ -180,19 +179,19 @@ class CondensedOdometry(Record):
 
 
 class RawReading(Record):
-    """A measurement as it came; rows that it lacks are zero, in R those of an identity."""
+    """A measurement as received; missing rows are zero, in R those of an identity."""
 
     z: Annotated[Array, (MAX_ROWS,)]
     R: Annotated[Array, (MAX_ROWS, MAX_ROWS)]
 
 
 class EventRow(Record):
-    """One event at its time of measurement: an observation, or a change of who may be in the state.
+    """One event at its time of measurement: an observation, or a change of the entities in the state.
 
     at [s]; kind: OBSERVATION and so on; observer, subject, sensor: numbers in the tables; step: in which `at` lies;
     size: rows of the measurement; has_alternative: 1 if there is a second hypothesis; roll, pitch: the observer's as
     reported [rad]. A PLACED event has its pose and covariance in `measured`. The rest is written when the event is
-    reached: how the subject leans [rad], how fast the first entries of both blocks change.
+    reached: roll and pitch of the subject [rad], rates of the first entries of both blocks.
     """
 
     at: float
@@ -214,9 +213,9 @@ class EventRow(Record):
 
 
 class OutcomeRow(Record):
-    """What became of an event: verdict, and residual with its covariance (row-major) and NIS; size: their rows.
+    """The outcome of an event: verdict, and residual with its covariance (row-major) and NIS; size: their rows.
 
-    ahead_x, ahead_y: which way and how far from its belief a sighting has its subject, in deviations [world].
+    ahead_x, ahead_y: direction and distance of a sighting from its subject's belief, in deviations [world].
     """
 
     verdict: int
@@ -231,9 +230,9 @@ class OutcomeRow(Record):
 
 
 class Prediction(Record):
-    """What a sensor's model expects: h(x) and its Jacobians by the blocks of observer and subject.
+    """A sensor model's prediction: h(x) and its Jacobians by the blocks of observer and subject.
 
-    size: rows that are wanted. All the rest is zero when the model is asked: it writes what is not.
+    size: requested rows. All the rest is zero when the model is called: it writes only non-zero entries.
     """
 
     size: int

@@ -1,4 +1,4 @@
-"""Matrices in blocks that stay in vector registers: what predictions and corrections cost, in compiled code.
+"""Matrix operations in blocks that stay in vector registers, the bulk of predictions and corrections; compiled.
 
 Rows are as long as a multiple of 8 numbers. Products are added in one rounding (`contract`), one after the other in the
 order of the factors' rows.
@@ -17,7 +17,7 @@ from groundstation.arrays import IntVector, Matrix
 from groundstation.kernel import kernel
 
 LANES = 8
-ROWS = 4  # that `add_rows` and `subtract_rows` work on
+ROWS = 4  # rows that `add_rows` and `subtract_rows` work on
 _VECTOR = ir.VectorType(ir.DoubleType(), LANES)
 
 
@@ -37,7 +37,7 @@ class _Builder:
         return self.builder.add(value, ir.Constant(value.type, more))
 
     def place(self, argument: int, i: Any, j: Any, kind: Any = _VECTOR) -> Any:
-        """Return where entry (i, j) of a matrix stands."""
+        """Return the address of entry (i, j) of a matrix."""
         array, builder = self._arrays[argument], self.builder
         width = builder.extract_value(array.shape, 1)
         at = builder.gep(array.data, [builder.add(builder.mul(i, width), j)])
@@ -165,9 +165,9 @@ def _scaled(_typing: Any, P: Any, row: Any, factor: Any, column: Any) -> Any:
 
 
 def _columns(rows: int) -> Callable[..., Any]:
-    """Return what copies 8 entries of 2, 4 or 8 rows, from a column on, into the columns of the rows' numbers.
+    """Return a function that copies 8 entries of 2, 4 or 8 rows, from a column on, into the columns of their numbers.
 
-    Spelled out, since the compiler makes single stores of it: the columns are neighbours, and take one.
+    Written out, because otherwise the compiler emits single stores: the columns are neighbours, and take one store.
     """
 
     def copy(_typing: Any, P: Any, row: Any, column: Any) -> Any:

@@ -27,7 +27,7 @@ _MEMORY = EntityMemory.dtype
 
 @kernel()
 def begin_step(state: State, tables: Tables, odometry: Rows[CondensedOdometry]) -> None:
-    """Let all entities that are driven take the odometry of a step: inputs once, heights in every mode."""
+    """Apply a step's odometry to all driven entities: inputs once, heights in every mode."""
     step_s, gate = tables.settings.step_s, tables.settings.gates[1]
     before = np.empty(state.memory.shape[0], _MEMORY)
     copy_rows(state.memory, before)
@@ -42,7 +42,7 @@ def begin_step(state: State, tables: Tables, odometry: Rows[CondensedOdometry]) 
 
 @kernel()
 def copy_state(source: State, to: State) -> None:
-    """Copy all that a checkpoint holds: of the covariances the upper halves, since they are symmetric to the bit."""
+    """Copy the contents of a checkpoint: of the covariances, which are exactly symmetric, only the upper halves."""
     copy_matrix(source.means, to.means)
     for m in range(source.weights.shape[0]):
         copy_upper_blocks(source.covariances[m], to.covariances[m])
@@ -53,7 +53,7 @@ def copy_state(source: State, to: State) -> None:
 
 @kernel(inlined=True)
 def checkpoint(ring: Checkpoints, step: int, state: State) -> State:
-    """Return the state at the beginning of a step, by reference; nothing is put off in `state`, and so not there."""
+    """Return the state at the beginning of a step, by reference; like `state` it has no deferred corrections."""
     k = step % ring.means.shape[0]
     means, covariances, weights, memory = ring.means[k], ring.covariances[k], ring.weights[k], ring.memory[k]
     return State(means, covariances, weights, memory, ring.used_at[k], state.deferred, state.deferred_used)
@@ -61,13 +61,13 @@ def checkpoint(ring: Checkpoints, step: int, state: State) -> State:
 
 @kernel(inlined=True)
 def is_reading(event: EventRow) -> bool:
-    """Return whether an event is what a sensor says, and no change of who is in the state."""
+    """Return whether an event is a sensor's reading, not a change of the entities in the state."""
     return bool(event.kind == OBSERVATION or event.kind == REPORTED or event.kind == COMPARED)
 
 
 @kernel(inlined=True)
 def predict_modes(state: State, tables: Tables, dt: float) -> None:
-    """Predict all modes, after what was put off until then."""
+    """Predict all modes, after the deferred corrections."""
     make_all(state)
     for m in range(state.weights.shape[0]):
         predict(belief_of(state, tables, m), dt)
@@ -80,8 +80,8 @@ def replay(
     """Run the steps of a span from the checkpoint of the first, renewing checkpoints; leaves the belief at its end.
 
     Checkpoint k is the state at time k * step_s before anything of step k; rings are indexed modulo their length. No
-    event in `inputs.order` is before the first step; event_kernels: addresses by kind of event. What lies beyond the
-    first step whose observations wait is predicted only, and has no checkpoints.
+    event in `inputs.order` is before the first step; event_kernels: addresses by kind of event. Steps from the first
+    one whose observations wait are only predicted, and have no checkpoints.
     """
     step_s, order, events = tables.settings.step_s, inputs.order, inputs.events
     copy_state(checkpoint(ring, span.first, state), state)

@@ -1,9 +1,8 @@
-"""What targets say of their own motion, to the filter; and the watch that drops it where the cameras contradict it.
+"""Feeds targets' reports of their own motion to the filter, and drops reporters that cameras contradict.
 
-Wheels slip, a lifted robot drives on, a base tells another one's figures. A report beyond the gate is refused one by
-one; one that pulls the belief along shows in the sightings, which then lie ahead of the belief, always to the same
-side. Who is dropped is compared only, and used again once all that it says has agreed for a while, which is longer each
-time.
+Wheels slip, a lifted robot's wheels turn on, a base sends another one's figures. Reports beyond the gate are refused
+one by one; reports that pull the belief along show in the sightings, which then lie to one side of the belief. A
+dropped target's reports are only compared, and used again once all have agreed for a while, longer each time.
 """
 
 import math
@@ -20,17 +19,17 @@ from groundstation.estimation.records import VX, VY
 from groundstation.field.targets import odometry_name
 from groundstation.time_units import NS_PER_S
 
-# Without a sighting nobody contradicts a report: it is used no longer than this [s].
+# Without sightings nothing contradicts a report: it is used no longer than this [s].
 _UNSEEN_S = 1.0
-# Reports in a row beyond the gate, and how long they last [s], until the target is not believed.
+# Number of reports in a row beyond the gate, and their duration [s], after which the target is not believed.
 _REFUSED, _REFUSED_S = 5, 0.5
-# Share of the newest sighting in the mean of where they lie ahead, and the mean [deviations] that contradicts.
+# Weight of the newest sighting in the mean of their offsets, and the mean [deviations] that contradicts.
 _SHARE, _AHEAD = 0.1, 1.4
-# A comparison says something where the speed is known so well [m/s].
+# A comparison needs a speed known this well [m/s].
 _TELLING_M_S = 0.25
-# For how long all has to agree [s]: at first, and at most.
+# Time for which all reports must agree [s]: at first, and at most.
 _PROBATION_S, _LONGEST_S = 2.0, 64.0
-# A believed speed of so many deviations has a direction.
+# A believed speed of this many deviations has a direction.
 _MOVES = 3.0
 _REMEDY = (
     "look whether its wheels slip or it is lifted, and whether the topic is its own; cameras track it all the same"
@@ -39,8 +38,10 @@ _REMEDY = (
 
 @dataclass(slots=True)
 class _Trust:
-    """heeded: what it says is used; refused, since_ns: reports in a row beyond the gate, and the first; agreed_ns:
-    since when it agrees; ahead: mean of where sightings lie."""
+    """heeded: whether reports are used; refused, since_ns: reports in a row beyond the gate, and the first.
+
+    agreed_ns: since when they agree; ahead: mean offset of sightings.
+    """
 
     heeded: bool = True
     refused: int = 0
@@ -51,7 +52,7 @@ class _Trust:
 
 
 class ReportIntake:
-    """Use: `take` each report, `advance` once a tick with all that became of observations and reports."""
+    """Call `take` with each report, and `advance` once a tick with all corrections."""
 
     def __init__(self, joint: FixedLagFilter, targets: Collection[str]) -> None:
         self._filter = joint
@@ -59,16 +60,16 @@ class ReportIntake:
         self._notices: list[Notice] = []
 
     def take_notices(self) -> list[Notice]:
-        """Return and forget what the operator should know."""
+        """Return and forget the notices for the operator."""
         notices, self._notices = self._notices, []
         return notices
 
     def heeds(self, target: str) -> bool:
-        """Return whether what a target says of itself is used."""
+        """Return whether a target's reports are used."""
         return self._trust[target].heeded
 
     def take(self, key: str, message: ReportedMotion, stamp_ns: int, now_ns: int) -> Verdict:
-        """Take one report, whose numbers were checked; ACCEPTED if it may count."""
+        """Take one report with checked numbers; ACCEPTED if it may count."""
         name, variance = message.header.entity, message.std_m_s**2
         if name not in self._trust:
             return Verdict.UNKNOWN_ENTITY
@@ -78,7 +79,7 @@ class ReportIntake:
         return self._filter.add_report(reading, f"{key}#{message.header.seq}", now_ns, used=used) or Verdict.ACCEPTED
 
     def advance(self, now_ns: int, corrections: Iterable[Correction]) -> None:
-        """Judge the targets by what became of their reports and of sightings of them."""
+        """Judge the targets by the verdicts on their reports and on sightings of them."""
         for one in corrections:
             trust = self._trust.get(one.subject)
             if trust is None or one.nis is None:
@@ -107,7 +108,10 @@ class ReportIntake:
             self._believe(one.subject, trust)
 
     def _lag(self, name: str, trust: _Trust) -> float:
-        """Return how far ahead along its way a target is seen; who is believed to stand has no way, but all of it."""
+        """Return how far ahead along its direction a target is seen.
+
+        For a standing target, without a direction, the whole offset.
+        """
         belief = self._filter.belief()
         if name not in belief.layout:
             return 0.0

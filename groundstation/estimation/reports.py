@@ -1,7 +1,7 @@
-"""What an entity says of its own motion, at its time of measurement: used within the gate, or only compared; compiled.
+"""Applies an entity's report of its own motion at its measurement time: used within the gate, or compared; compiled.
 
-It is a claim, and no sighting. Nobody joins by it, no belief is given up for it, and it does not count as seen; it
-corrects its own entity's block and nothing else, so that a target that lies moves no robot.
+It is a claim, not a sighting. No entity joins by it, no belief is given up for it, and it does not count as seen; it
+corrects only its own entity's block, so that a target with false reports moves no robot.
 """
 
 import numpy as np
@@ -31,7 +31,7 @@ _INNOVATION = Innovation.dtype
 
 @kernel()
 def heed(state: State, tables: Tables, event: EventRow, rows: int, told: Hypothesis) -> None:
-    """Correct the subject's block in every mode that can use what it said, and weigh the modes by it."""
+    """Correct the subject's block in every mode that can use the report, and weigh the modes by it."""
     for m in range(state.means.shape[0]):
         belief = belief_of(state, tables, m)
         if told.innovations[m].nis >= 0.0:
@@ -44,7 +44,7 @@ def heed(state: State, tables: Tables, event: EventRow, rows: int, told: Hypothe
 
 @kernel()
 def report(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> None:
-    """Confront the belief with what an entity says of its motion; a REPORTED event within the gate is used."""
+    """Compare the belief with an entity's report of its motion; a REPORTED event within the gate is used."""
     make_all(state)
     modes, first = state.means.shape[0], belief_of(state, tables, 0)
     innovations = np.zeros((1, modes), _INNOVATION)

@@ -16,16 +16,16 @@ from groundstation.arrays import Array
 
 MOST_CELLS = 2400
 STANDS_SHARE = 0.3
-"""Prior of a target that is not seen: it stands."""
+"""Prior probability that an unseen target stands."""
 
 HIDDEN_S = 2.0
 """How long a person who passes hides a target from all cameras, on average (docs/decisions/0125)."""
 
-# Of a target that was seen just now and is not where it was predicted: it is there all the same, near, anywhere.
+# For a target seen just now and not where it was predicted: it is there all the same, near, anywhere.
 _THERE, _NEAR, _ANYWHERE = 0.6, 0.3, 0.1
 _NEAR_M = 1.2
 _HINTED = 0.5
-_HIDDEN = 0.5  # of one that is where it was predicted: somebody stands in the way
+_HIDDEN = 0.5  # share of a target that is where it was predicted: somebody stands in the way
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,7 @@
-"""Fixed cameras in whose pictures everything jumps from one picture to the next. Pure.
+"""Finds fixed cameras whose whole picture jumps from one picture to the next. Pure.
 
-A robot cannot jump. What it flew between two pictures is known from its own odometry, so a displacement that appears
-between two pictures, and stays, is the camera's. No belief of places is asked: it may have followed the jump already.
+A robot cannot jump. Its flight between two pictures is known from its own odometry, so a displacement that appears
+between two pictures, and stays, is the camera's. The belief is not used: it may have followed the jump already.
 """
 
 import math
@@ -17,19 +17,19 @@ from groundstation.bus.messages import RelativeObservation
 from groundstation.geometry.camera_turn import CameraTurn, Displacement, camera_turn
 from groundstation.time_units import NS_PER_S
 
-# Pictures before and after a jump; those of one side lie within so long, and the gap between is no longer [s].
+# Number of pictures before and after a jump; those of one side lie within this time, and the gap is no longer [s].
 _BEFORE, _AFTER, _SIDE_S, _GAP_S = 3, 4, 0.6, 0.4
-# What is told: displacements from so far on [m], and more by the speed [m/s] at which a robot may be wrong about its
-# velocity in the gap. One robot alone may be as wrong as a robot can; not two in the same manner.
+# Reported displacements: from this size [m], increased by the possible velocity error of a robot [m/s] over the gap.
+# One robot alone may err by as much as a robot can; two do not err alike.
 _LEAST_M, ALONE_M_S, _TOGETHER_M_S = 0.06, 1.2, 0.3
-# On each side of a jump sights stay within this share of it; of a robot that drifts off they do not.
+# On each side of a jump sightings stay within this share of it; those of a drifting robot do not.
 _STEADY = 0.3
-_PATH = 120  # moments
+_PATH = 120  # samples
 
 
 @dataclass(frozen=True, slots=True)
 class _Sight:
-    """A marker in one picture [m; camera_optical], and the same less what its robot flew since the path began."""
+    """A marker in one picture [m; camera_optical], and the same less its robot's flight since the path began."""
 
     at_s: float
     seen: Vector
@@ -37,7 +37,7 @@ class _Sight:
 
 
 class _Path:
-    """What a robot flew, by its velocities [m; world]."""
+    """A robot's path, integrated from its velocities [m; world]."""
 
     def __init__(self) -> None:
         self._times: deque[float] = deque(maxlen=_PATH)
@@ -50,7 +50,7 @@ class _Path:
         self._flown.append(last + elapsed_s * np.asarray(velocity))
 
     def at(self, at_s: float) -> Array | None:
-        """Return what was flown until a time; None if that is not known."""
+        """Return the displacement up to a time; None if unknown."""
         after = bisect_left(self._times, at_s)
         if not 0 < after < len(self._times):
             return None
@@ -60,7 +60,7 @@ class _Path:
 
 
 class SightJumps:
-    """Use: `see` sightings of robots, `fly` with their velocities, then take `turns`. mounts: world_from_optical."""
+    """Call `see` with sightings, `fly` with the robots' velocities, then take `turns`. mounts: world_from_optical."""
 
     def __init__(self, mounts: Mapping[str, Matrix]) -> None:
         self._mounts = mounts
@@ -76,7 +76,7 @@ class SightJumps:
             return
         seen = np.array(o.position_m)
         rows = self._sights[o.observer].setdefault(o.subject, deque(maxlen=_BEFORE + _AFTER))
-        # A picture that hangs for a moment shows the same once more, and nothing new.
+        # A momentarily frozen picture repeats, without news.
         if not rows or (at_s > rows[-1].at_s and not np.array_equal(seen, rows[-1].seen)):
             rows.append(_Sight(at_s, seen, seen - self._mounts[o.observer].T @ flown))
             self._fresh.add(o.observer)
@@ -89,7 +89,7 @@ class SightJumps:
             self._paths.setdefault(name, _Path()).step(now_s, velocity)
 
     def turns(self) -> Iterator[CameraTurn]:
-        """Yield the cameras that were turned lately, each once."""
+        """Yield the cameras turned recently, each once."""
         for camera in sorted(self._fresh):
             turn = self._turn(camera)
             if turn is not None:
@@ -114,7 +114,8 @@ class SightJumps:
             ]
             gap_s = began_s - rows[_BEFORE - 1].at_s
             together_m, alone_m = (_LEAST_M + gap_s * speed for speed in (_TOGETHER_M_S, ALONE_M_S))
-            # Who stays where he was beside one that jumps speaks for the camera: it hardly turned about his very sight.
+            # A robot that does not jump beside one that does exonerates the camera: it hardly turned about exactly that
+            # sight.
             together = len(displaced) > 1 and min(one.size_m for one in displaced) > together_m
             if together or (len(displaced) == 1 and jump > alone_m):
                 return camera_turn(camera, displaced)
@@ -122,7 +123,7 @@ class SightJumps:
 
 
 def _jump(rows: Sequence[_Sight]) -> float | None:
-    """Return by how much a sight jumped [m], if it did so between two pictures and stayed there."""
+    """Return the size of a sight's jump [m], if it jumped between two pictures and stayed."""
     before, after = list(rows)[:_BEFORE], list(rows)[_BEFORE:]
     gap_s = after[0].at_s - before[-1].at_s
     if gap_s > _GAP_S or after[-1].at_s - after[0].at_s > _SIDE_S or before[-1].at_s - before[0].at_s > _SIDE_S:
@@ -134,7 +135,7 @@ def _jump(rows: Sequence[_Sight]) -> float | None:
 
 
 def _across(rows: Sequence[_Sight], began_s: float) -> tuple[Vector, Vector] | None:
-    """Return where a sight was to be expected after a time, and where it is; None if it was not seen on both sides."""
+    """Return the expected and the actual place of a sight after a time; None if it was not seen on both sides."""
     before = [one for one in rows if 0.0 < began_s - one.at_s <= _SIDE_S]
     after = [one for one in rows if 0.0 <= one.at_s - began_s <= _SIDE_S]
     if min(len(before), len(after)) < _BEFORE:
@@ -145,5 +146,5 @@ def _across(rows: Sequence[_Sight], began_s: float) -> tuple[Vector, Vector] | N
 
 
 def _middle(side: Sequence[_Sight]) -> Vector:
-    """Return where a sight was on one side of a jump, less what its robot flew [m; camera_optical]."""
+    """Return the place of a sight on one side of a jump, less its robot's flight [m; camera_optical]."""
     return np.asarray(np.median([one.held for one in side], axis=0))

@@ -1,4 +1,4 @@
-"""From models to the flat tables that the compiled filter works on, and the arrays that hold its state."""
+"""Turns models into the flat tables of the compiled filter, and makes the arrays of its state."""
 
 import math
 from collections.abc import Sequence
@@ -40,7 +40,7 @@ _NEVER_S = -1e9
 
 
 def tables_from_parameters(parameters: EstimatorParameters) -> Tables:
-    """Return the tables; raises ValueError for models that do not fit together."""
+    """Return the tables; raises ValueError for incompatible models."""
     models = tuple(parameters.entities.values())
     sensors = tuple(parameters.sensors.values())
     for name, model in parameters.entities.items():
@@ -128,15 +128,18 @@ def _transition(models: tuple[MotionModel, ...], step_s: float) -> Array:
 
 
 def width_of(tables: Tables) -> int:
-    """Return the length of the arrays that hold the state: its dimension and entries that stay zero, in whole lines.
+    """Return the length of the arrays that hold the state: its dimension padded with zeros to whole cache lines.
 
-    Rows of P that begin on a line spare a quarter of a correction's time.
+    Aligned rows of P save a quarter of a correction's time.
     """
     return -(-tables.dim // LINE) * LINE
 
 
 def empty_state(tables: Tables, admitted: Sequence[bool]) -> State:
-    """Return the state before anything was measured; entities with a prior are in it; admitted: who may join."""
+    """Return the state before anything was measured; entities with a prior are in it.
+
+    admitted: which entities may join.
+    """
     modes, n, count = tables.modes, width_of(tables), len(tables.priors)
     state = State(
         zeros_on_a_line((modes, n)),
@@ -158,7 +161,7 @@ def empty_state(tables: Tables, admitted: Sequence[bool]) -> State:
 
 
 def checkpoints_of(state: State, steps: int) -> Checkpoints:
-    """Return a ring of so many copies of a state."""
+    """Return a ring of copies of a state."""
     ring = Checkpoints(
         zeros_on_a_line((steps, *state.means.shape)),
         zeros_on_a_line((steps, *state.covariances.shape)),

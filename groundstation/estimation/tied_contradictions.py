@@ -1,8 +1,8 @@
-"""Fixed cameras that contradict robots which agree among each other. Pure.
+"""Finds fixed cameras that contradict robots which agree with each other. Pure.
 
-A robot that nobody saw for a while may be lost, and is believed to be where the camera sees it. Two that see each
-other, or one target, where they should be, cannot be lost in the same manner: then the camera is. Nor can one that the
-camera saw where it should be a moment ago be lost by more than it can fly in that moment.
+A robot that nobody saw for a while may be lost, and is then believed to be where the camera sees it. Two robots that
+see each other, or one target, in the expected places cannot be lost by the same amount: then the camera has moved. Nor
+can a robot that the camera saw in the expected place a moment ago be lost by more than it can fly in that time.
 """
 
 import math
@@ -20,12 +20,13 @@ from groundstation.estimation.measurement import Correction
 from groundstation.estimation.sight_jumps import ALONE_M_S
 from groundstation.geometry.camera_turn import CameraTurn, Displacement, camera_turn
 
-# A contradiction counts for so long, so many at least over so long, all by the same amount but for a share of it.
+# A contradiction counts for this time; it needs this many sightings over this time, all with the same offset but for a
+# share of it.
 _COUNTS_S, _LEAST, _LASTS_S, _STEADY = 1.5, 4, 0.3, 0.3
 _TIED_S = 1.0
 _LEAST_M = 0.15
 _MOMENT_S = 0.4
-# Whichever of two poses was nearer to the belief: both have the marker in nearly one place.
+# Taken from whichever of two poses was nearer to the belief: both have the marker in nearly the same place.
 _CONTRADICTS = frozenset(f"{why}{also}" for why in (FAR, HASTY) for also in ("", f"; {OTHER_POSE}"))
 
 Pair = tuple[str, str]
@@ -33,14 +34,17 @@ Pair = tuple[str, str]
 
 @dataclass(frozen=True, slots=True)
 class _Contradiction:
-    """Of a robot's place by a camera: since when, for how long [s] they had not agreed then; times and residuals."""
+    """A camera's contradiction of a robot's place: its begin, time since they last agreed then [s].
+
+    Times and residuals.
+    """
 
     since_s: float
     after_s: float
     rows: deque[tuple[float, Vector]] = field(default_factory=lambda: deque(maxlen=15))
 
     def lasting(self, now_s: float) -> Vector | None:
-        """Return by how much [m; camera_optical], if lastingly and by one and the same amount."""
+        """Return its offset [m; camera_optical], if it is lasting and constant."""
         kept = [(at_s, gap) for at_s, gap in self.rows if now_s - at_s <= _COUNTS_S]
         if len(kept) < _LEAST or kept[-1][0] - kept[0][0] < _LASTS_S:
             return None
@@ -51,12 +55,12 @@ class _Contradiction:
         return middle if steady and size > _LEAST_M else None
 
     def is_jump(self, gap: Vector) -> bool:
-        """Return whether a robot would have had to fly faster than one can."""
+        """Return whether the robot would have had to fly faster than possible."""
         return self.after_s <= _MOMENT_S and math.hypot(*gap) > _LEAST_M + self.after_s * ALONE_M_S
 
 
 class TiedContradictions:
-    """Use: `take` corrections, then `turns`. cameras: the fixed ones; robots: all."""
+    """Call `take` with corrections, then `turns`. cameras: the fixed ones; robots: all."""
 
     def __init__(self, cameras: Collection[str], robots: Collection[str]) -> None:
         self._cameras, self._robots = frozenset(cameras), frozenset(robots)
@@ -64,7 +68,7 @@ class TiedContradictions:
         self._agreed_s: dict[Pair, float] = {}
 
     def take(self, corrections: Iterable[Correction], now_s: float) -> None:
-        """Take what became of sightings."""
+        """Take the corrections by sightings."""
         for c in corrections:
             pair = c.observer, c.subject
             if c.verdict is Verdict.ACCEPTED and not c.joined:
@@ -76,7 +80,10 @@ class TiedContradictions:
                 self._far[pair].rows.append((now_s, np.array(c.residual[:3])))
 
     def turns(self, now_s: float, seen: Mapping[Pair, Vector]) -> Iterator[CameraTurn]:
-        """Yield the cameras that were turned. seen: where each fixed camera saw each robot last [m; camera_optical]."""
+        """Yield the cameras that were turned. seen: the last place of each robot in each fixed camera [m.
+
+        Camera_optical].
+        """
         for camera in sorted({camera for camera, _ in self._far}):
             turn = self._turn(camera, now_s, seen)
             if turn is not None:
@@ -96,13 +103,13 @@ class TiedContradictions:
         return camera_turn(camera, [Displacement(n, seen[camera, n] - gap, seen[camera, n]) for n, gap in off.items()])
 
     def _is_witnessed(self, off: Collection[str], now_s: float) -> bool:
-        """Return whether two robots would have to be lost in the same manner."""
+        """Return whether two robots would have to be lost by the same amount."""
         if len(off) > 1:
             return True
         return any(self._are_tied(name, other, now_s) for name in off for other in self._robots if other != name)
 
     def _are_tied(self, one: str, other: str, now_s: float) -> bool:
-        """Return whether one robot lately saw the other, or both one target, where they should be."""
+        """Return whether one robot recently saw the other, or both saw one target, in the expected places."""
         seen_by = [
             {whom for who, whom in self._agreed_s if who == name and now_s - self._agreed((who, whom)) <= _TIED_S}
             for name in (one, other)

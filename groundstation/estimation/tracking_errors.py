@@ -1,4 +1,4 @@
-"""What errors of a tracked target at an even rate come to: when it was found, and its error and losses from then on."""
+"""Figures of a tracked target from its errors at an even rate: when it was found, and errors and losses since then."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ FOUND_M, LOST_M = 0.3, 0.5
 
 @dataclass(frozen=True, slots=True)
 class TrackingFigures:
-    """Of one target.
+    """Tracking figures of one target.
 
     found_s: when its error was first below 0.3 m, after the first value; the rest counts from then on. rmse_m, worst_m:
     its error, where nobody knows it 1 m; kept_rmse_m: rms of the errors that are no loss; lost_s, longest_loss_s: with

@@ -38,7 +38,7 @@ from groundstation.estimation.records import (
 )
 from groundstation.kernel import kernel
 
-_SHORTEST_S = 1e-3  # between two readings of one pair, as far as repeated errors are concerned
+_SHORTEST_S = 1e-3  # least time between two readings of one pair, for repeated errors
 
 
 @kernel(inlined=True)
@@ -47,8 +47,8 @@ def read(
 ) -> int:
     """Write z and R of one hypothesis of the event; returns its rows, or minus a verdict.
 
-    unused_s: since the same sensor's last reading of the same subject; a repeated error makes R larger by what that
-    falls short of the sensor's `repeats_s`, so that all readings within it share one reading's information.
+    unused_s: time since the same sensor's last reading of the same subject; if it is shorter than the sensor's
+    `repeats_s`, R is enlarged so that all readings within that share one reading's information.
     """
     factor = np.empty((MAX_ROWS, MAX_ROWS))
     for i in range(MAX_ROWS):
@@ -71,7 +71,7 @@ def read(
 
 @kernel(inlined=True)
 def note_rates(belief: Belief, e: int, rates: Vector) -> None:
-    """Write how fast the first four entries of one entity's block change."""
+    """Write the rates of change of the first four entries of one entity's block."""
     entity, memory = belief.entities[e], belief.memory[e]
     for i in range(POSE):
         rates[i] = 0.0
@@ -85,7 +85,7 @@ def note_rates(belief: Belief, e: int, rates: Vector) -> None:
 
 @kernel(inlined=True)
 def note_motion(belief: Belief, event: EventRow) -> None:
-    """Complete an event by what is known when it is reached: how its subject leans, how fast both move."""
+    """Complete an event by data known when it is reached: roll and pitch of its subject, rates of both blocks."""
     subject = belief.memory[event.subject]
     event.subject_roll, event.subject_pitch = subject.held_roll, subject.held_pitch
     note_rates(belief, event.observer, event.observer_rates)
@@ -94,7 +94,7 @@ def note_motion(belief: Belief, event: EventRow) -> None:
 
 @kernel(inlined=True)
 def add_timing_noise(sensor: SensorRow, event: EventRow, innovation: Innovation) -> None:
-    """Add to R what an uncertain time of measurement does while observer and subject move: var(t) h' h'^T."""
+    """Add to R the effect of an uncertain measurement time while observer and subject move: var(t) h' h'^T."""
     if sensor.stamp_variance_s2 == 0.0:
         return
     rows = innovation.prediction.size
@@ -113,7 +113,7 @@ def linearise(
     belief: Belief, deferred: Deferred, sensor: SensorRow, event: EventRow, rows: int, z: Vector,
     innovation: Innovation, HP: Matrix,
 ) -> None:  # fmt: skip
-    """Write HP = H P and the innovation of z, whose R is given; its R gains what the time of measurement adds."""
+    """Write HP = H P and the innovation of z, with its given R, enlarged by the timing noise."""
     observer, subject, out = belief.entities[event.observer], belief.entities[event.subject], innovation.prediction
     out.size = rows
     for i in range(MAX_ROWS):
@@ -138,7 +138,7 @@ def linearise(
 def correct(
     belief: Belief, deferred: Deferred, headings: IntVector, innovation: Innovation, HP: Matrix, factor: float
 ) -> None:
-    """Apply what `linearise` prepared, with S inflated by a factor >= 1; wraps all headings."""
+    """Apply a linearised correction, with S inflated by a factor >= 1; wraps all headings."""
     rows = innovation.prediction.size
     if factor > 1.0:
         inflate(innovation.HPH, innovation.R, rows, factor)
@@ -165,7 +165,7 @@ def write_outcome(out: OutcomeRow, innovation: Innovation) -> None:
 
 @kernel()
 def write_ahead(out: OutcomeRow, entity: EntityRow, innovation: Innovation) -> None:
-    """Record which way from its belief a target was seen: H^T S^-1 y over x and y, whitened by its own covariance."""
+    """Record how a target's sighting lies from its belief: H^T S^-1 y over x and y, whitened by its own covariance."""
     rows, H, factor = innovation.prediction.size, innovation.prediction.H_subject, innovation.factor
     if entity.kind != KIND_TARGET:
         return

@@ -1,4 +1,4 @@
-"""A camera on a robot or on a fixed mount measures where a marker is, and which way it points.
+"""A camera on a robot or a fixed mount: measures a marker's place and heading.
 
 z = (marker centre [camera_optical], heading of the subject relative to the observer's heading). Extrinsics are
 parameters: camera on its carrier, marker on the subject. The carrier's roll and pitch are as reported plus error
@@ -120,7 +120,7 @@ def measure_relative_pose(belief: Belief, sensor: SensorRow, event: EventRow, ou
 
 @kernel()
 def prepare_relative_pose(belief: Belief, sensor: SensorRow, event: EventRow, z: Vector, R: Matrix) -> int:
-    """Add the uncertainty of the camera's mounting to R: a turn moves a point at z sideways, a shift moves it as is."""
+    """Add the camera mounting's uncertainty to R: a rotation moves a point at z sideways, a shift directly."""
     if z[Z] <= 0.0:
         return -OUT_OF_VIEW
     rows = 4 if event.size > 3 and belief.entities[event.subject].at_yaw >= 0 else 3
@@ -158,11 +158,11 @@ def locate_relative_pose(belief: Belief, sensor: SensorRow, event: EventRow, z: 
 
 @dataclass(frozen=True, slots=True)
 class MountedCamera(SensorDefaults):
-    """A camera on a carrier (a robot or a fixed mount): extrinsics, and how well they are known on the carrier.
+    """A camera on a carrier (a robot or a fixed mount): extrinsics and their uncertainty.
 
     rotation (3, 3), translation (3): carrier_from_camera [m]. A mounting error is the same in every picture, so it
-    enters R `repeats` times over: it must not average out. stamp_std_s: of the time of exposure about the calibrated
-    delay; while observer or subject moves it displaces what is seen.
+    enters R `repeats` times: it must not average out. stamp_std_s: of the exposure time about the calibrated delay; it
+    displaces sightings while observer or subject moves.
     """
 
     kernels: ClassVar[SensorKernels] = SensorKernels(measure_relative_pose, prepare_relative_pose, locate_relative_pose)

@@ -1,8 +1,8 @@
 """A ground robot of which only the commanded speeds are known: it follows them late and never exactly.
 
 f: forward = (1 + forward_scale) v - turn_drag |w|, rate = (1 + turn_scale) w + turn_offset, on an arc during a step. It
-answers a command `response_s` late (its odometry delay is minus that) and approaches it within `lag_s`. What its range
-and bearing sensor is off by are states too.
+answers a command `response_s` late (its odometry delay is minus that) and approaches it within `lag_s`. The errors of
+its range and bearing sensor are states too.
 """
 
 import math
@@ -23,7 +23,7 @@ from groundstation.estimation.records import YAW, CondensedOdometry, EntityMemor
 from groundstation.kernel import Record, kernel
 
 FORWARD_SCALE, TURN_DRAG, TURN_SCALE, TURN_OFFSET, RANGE_BIAS, RANGE_SCALE, BEARING_BIAS = range(4, 11)
-STANDS = 1e-3  # commands below are none [m/s, rad/s]
+STANDS = 1e-3  # smaller commands count as zero [m/s, rad/s]
 
 
 class DriveParameters(Record):
@@ -31,7 +31,8 @@ class DriveParameters(Record):
 
     speed_density [m^2/s] at any speed, speed_noise and slip_density [m] per metre driven, along and across;
     rate_density [rad^2/s], turn_noise [rad] per radian turned, sway_noise [rad^2/m] of the heading; hold_s: how long a
-    command holds in silence; lag_s: within which the robot follows; drag_mean: speed lost per rate of turn [m].
+    command holds in silence; lag_s: time constant with which the robot follows; drag_mean: speed lost per rate of turn
+    [m].
     """
 
     speed_density: float
@@ -77,11 +78,11 @@ def add_drive_noise(
 
 @kernel()
 def predict_commanded_robot(belief: Belief, e: int, dt: float) -> None:
-    """Drive an arc at the commanded speeds, scaled; scales and offsets fade back to what the type is known for."""
+    """Drive an arc at the commanded speeds, scaled; scales and offsets decay to the values known for the type."""
     mean, P, entity, memory = belief.mean, belief.P, belief.entities[e], belief.memory[e]
     start, size, p = entity.start, entity.size, _own(entity)
     v, w = memory.held_vx, memory.yaw_rate
-    # A robot that is told to stand stands.
+    # A robot that is told to stand does stand.
     moving = 1.0 if abs(v) > STANDS or abs(w) > STANDS else 0.0
     rate = (1.0 + mean[start + TURN_SCALE]) * w + moving * mean[start + TURN_OFFSET]
     drag = (p.drag_mean + mean[start + TURN_DRAG]) * abs(w)
@@ -118,7 +119,7 @@ def predict_commanded_robot(belief: Belief, e: int, dt: float) -> None:
 def begin_commanded_robot(
     belief: Belief, deferred: Deferred, odometry: CondensedOdometry, e: int, step_s: float, gate: float
 ) -> None:
-    """Let the robot's speeds approach those that were commanded for this step."""
+    """Let the robot's speeds approach those commanded for this step."""
     memory, p = belief.memory[e], _own(belief.entities[e])
     forward, rate = memory.held_vx, memory.yaw_rate
     hold_velocity(odometry, memory, p.hold_s, step_s)
@@ -180,12 +181,12 @@ class CommandedRobot:
 
     @property
     def velocity_delay_s(self) -> float:
-        """Return how late a command's stamp is for what the robot does: it acts after it."""
+        """Return the delay of velocities: negative, because the robot follows a command after its stamp."""
         return -self.response_s
 
     @property
     def height_delay_s(self) -> float:
-        """Return nothing: there is no height sensor."""
+        """Return 0: there is no height sensor."""
         return 0.0
 
     @property

@@ -55,10 +55,11 @@ def predict_constant_velocity(belief: Belief, e: int, dt: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class ConstantVelocityTarget:
-    """A ground vehicle of which only a marker at a known height is seen; white acceleration moves it.
+    """A ground vehicle known only by a marker at a known height; white acceleration moves it.
 
-    acceleration_std_m_s2 lasts for correlation_s; speed_std_m_s is what is believed before it is first seen. heading:
-    its marker shows which way it points, and the heading is a state that wanders by turn_std_rad per root second.
+    acceleration_std_m_s2 lasts for correlation_s; speed_std_m_s: deviation of the speed before the first sighting.
+    heading: whether its marker shows its heading, which is then a state with a random walk of turn_std_rad per root
+    second.
     """
 
     kind: ClassVar[EntityKind] = EntityKind.TARGET

@@ -27,7 +27,7 @@ _SMALL_RAD = 1e-3  # below, series are more exact than quotients
 class TurnParameters(Record):
     """Densities of the noise of acceleration [m^2/s^3] and of heading [rad^2/s]; of the turn rate, deviation and time.
 
-    rate_std [rad/s], rate_tau_s: of the Gauss-Markov turn rate; rate_gain: 1, or 0 for a target that goes straight on.
+    rate_std [rad/s], rate_tau_s: of the Gauss-Markov turn rate; rate_gain: 1, or 0 for a target that drives straight.
     """
 
     acceleration_density: float
@@ -79,7 +79,7 @@ def rotate_velocity(P: Matrix, start: int, size: int, c: float, n: float) -> Non
 
 @kernel()
 def predict_coordinated_turn(belief: Belief, e: int, dt: float) -> None:
-    """Turn the velocity by its rate; with a gain of zero it goes straight on and the rate says nothing."""
+    """Turn the velocity by its rate; with a gain of zero it stays straight and the rate has no effect."""
     mean, P, entity = belief.mean, belief.P, belief.entities[e]
     start, size, yaw, p = entity.start, entity.size, entity.at_yaw, _own(entity)
     gain = p.rate_gain
@@ -113,7 +113,7 @@ def predict_coordinated_turn(belief: Belief, e: int, dt: float) -> None:
 class CoordinatedTurnTarget:
     """A ground vehicle that drives arcs: its velocity turns at `turn_rate`, a Gauss-Markov state [rad/s].
 
-    turning=False: it goes straight on, but keeps the state, so that it can be a mode beside a turning one.
+    turning=False: it drives straight, but keeps the state, so that it can be a mode beside a turning one.
     """
 
     kind: ClassVar[EntityKind] = EntityKind.TARGET
@@ -147,7 +147,7 @@ class CoordinatedTurnTarget:
             acceleration_density=self.acceleration_std_m_s2**2 * self.correlation_s,
             yaw_density=self.turn_std_rad**2,
             rate_std=self.turn_rate_std_rad_s,
-            # A mode that goes straight on knows nothing of the rate that the next turn will have.
+            # A straight mode knows nothing of the rate of the next turn.
             rate_tau_s=self.turn_rate_correlation_s if self.turning else 0.3,
             rate_gain=float(self.turning),
         )

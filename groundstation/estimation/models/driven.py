@@ -1,4 +1,4 @@
-"""What all driven vehicles share: turning a step's condensed odometry into inputs held during that step."""
+"""Turns a step's condensed odometry into inputs held during that step, for all driven vehicles."""
 
 import math
 
@@ -6,12 +6,12 @@ from groundstation.estimation.linear import wrap
 from groundstation.estimation.records import CondensedOdometry, EntityMemory
 from groundstation.kernel import kernel
 
-# Nothing is known of the speed of a vehicle that is silent: 0.3 m/s, constant over some 0.5 s [m^2/s].
+# The speed of a silent vehicle is unknown: 0.3 m/s, constant over some 0.5 s [m^2/s].
 SILENT_DENSITY = 0.09
-# Nor of its turn: 0.15 rad/s, likewise [rad^2/s]. It is told to hover, but may have turned when it was last heard.
+# So is its turn: 0.15 rad/s, likewise [rad^2/s]. It is told to hover, but may have been turning when last heard.
 SILENT_TURN_DENSITY = 0.0225
-_SILENT_S = 0.3  # a heading that is older than this at the next one was not told for a while
-# Velocity is smoothed over this for all that is learnt from it [s].
+_SILENT_S = 0.3  # after a longer pause between headings the vehicle was silent
+# Velocity is smoothed over this for all that is learnt about its errors [s].
 SLOW_S = 1.0
 
 
@@ -35,11 +35,10 @@ def hold_velocity(odometry: CondensedOdometry, memory: EntityMemory, hold_s: flo
 
 @kernel()
 def take_heading(odometry: CondensedOdometry, memory: EntityMemory, step: float) -> None:
-    """Turn the vehicle's own heading into the yaw rate of this step (and hold how it leans); an increment across a
-    reset is void.
+    """Turn the vehicle's own heading into the yaw rate of this step, and hold roll and pitch.
 
-    The heading jumped then, the vehicle did not. Of an increment across a silence counts what lies after the last
-    sighting of the vehicle, which saw the rest already: it turned evenly, as far as anybody knows.
+    An increment across a reset is void: the heading jumped, not the vehicle. Of an increment across a silence only the
+    part after the last sighting of the vehicle counts, which included the rest; the turn is assumed to be even.
     """
     memory.yaw_rate = 0.0
     memory.yaw_age_s += step

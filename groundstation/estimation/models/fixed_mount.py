@@ -28,7 +28,7 @@ _own = own_parameters(MountParameters)
 
 @kernel()
 def predict_fixed_mount(belief: Belief, e: int, dt: float) -> None:
-    """Let what is known of a mounting fade very slowly: mountings creep."""
+    """Increase the uncertainty of a mounting very slowly: mountings creep."""
     entity = belief.entities[e]
     P, p = belief.P, _own(entity)
     for i in range(entity.start, entity.start + _AXES):
@@ -38,10 +38,10 @@ def predict_fixed_mount(belief: Belief, e: int, dt: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class FixedMount:
-    """Where a world-fixed camera hangs [m; world], and how well that is known.
+    """The pose of a world-fixed camera [m; world], and its uncertainty.
 
-    Its errors are the same in every picture: as states they do not average out, and what robots learn from each other
-    about them is kept. Over `creep_s` the mounting may change by as much as its first uncertainty.
+    Its errors are the same in every picture: as states they do not average out, and knowledge of them from several
+    robots is combined. Over `creep_s` the mounting may change by as much as its first uncertainty.
     """
 
     kind: ClassVar[EntityKind] = EntityKind.CAMERA

@@ -1,4 +1,4 @@
-"""A vehicle's own heading (compass, gyroscope): z = yaw + yaw_offset, the offset a state where the vehicle has it."""
+"""A vehicle's own heading (compass, gyroscope): z = yaw + yaw_offset, the offset a state if the vehicle has it."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -26,7 +26,7 @@ def measure_heading(belief: Belief, sensor: SensorRow, event: EventRow, out: Pre
 
 @kernel()
 def prepare_heading(belief: Belief, sensor: SensorRow, event: EventRow, z: Vector, R: Matrix) -> int:
-    """Nothing to add: one row."""
+    """Use one row, with R unchanged."""
     return 1
 
 

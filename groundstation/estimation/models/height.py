@@ -1,7 +1,7 @@
-"""Height sensor: z + its slow error - the height of what is below, condensed to one value per step.
+"""Height sensor: z + its slow error - the height of the object below, condensed to one value per step.
 
-Over an object the height falls by the object's height while the vehicle does not move. A jump of this size that the
-belief cannot explain is the floor's: the floor entry forgets what it knew and takes the jump; the vehicle stays.
+Over an object the height falls by the object's height while the vehicle does not move. A jump of such a size that the
+belief cannot explain is attributed to the floor: the floor entry is reset and takes the jump; the vehicle stays.
 """
 
 import math
@@ -21,7 +21,7 @@ LEAST_OBJECT_M = 0.1
 
 
 class HeightEntries(NamedTuple):
-    """Where in the state z, the sensor's slow error and the floor stand; -1: the block lacks it (z it has)."""
+    """State indices of z, the sensor's slow error and the floor; -1: not in the block (z always is)."""
 
     z: int
     error: int
@@ -30,7 +30,7 @@ class HeightEntries(NamedTuple):
 
 @kernel()
 def forget(mean: Vector, P: Matrix, index: int, deviation: float) -> None:
-    """Replace what is known of one entry: zero mean, the given deviation, independent of all others."""
+    """Reset one entry: zero mean, the given deviation, independent of all others."""
     mean[index] = 0.0
     for j in range(P.shape[0]):
         P[index, j] = 0.0
@@ -40,7 +40,7 @@ def forget(mean: Vector, P: Matrix, index: int, deviation: float) -> None:
 
 @kernel()
 def height_of(x: Vector, at: HeightEntries) -> float:
-    """Return H x, that is z + error - floor (entries that the block lacks left out)."""
+    """Return H x, that is z + error - floor (without entries missing in the block)."""
     value = float(x[at.z])
     if at.error >= 0:
         value += x[at.error]
@@ -73,7 +73,7 @@ def project_height(P: Matrix, deferred: Deferred, at: HeightEntries, W: Vector) 
 def attribute_jump(
     belief: Belief, deferred: Deferred, at: HeightEntries, height: float, R: float, gate: float, W: Vector
 ) -> float:
-    """Let the floor take up a height that is beyond the gate: the even floor again, else an object; returns H P H^T."""
+    """Attribute a height beyond the gate to the floor: the even floor again, else an object; returns H P H^T."""
     mean, P = belief.mean, belief.P
     variance = project_height(P, deferred, at, W)
     y = height - height_of(mean, at)
@@ -93,7 +93,7 @@ def attribute_jump(
 def correct_height(belief: Belief, deferred: Deferred, at: HeightEntries, height: float, R: float, gate: float) -> None:
     """Correct by one height, softly gated.
 
-    As in correction.apply: P - W^T W / S, put off.
+    As in correction.apply: P - W^T W / S, deferred.
     """
     mean, n = belief.mean, belief.P.shape[0]
     W = np.empty(n)

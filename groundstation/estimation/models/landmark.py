@@ -29,7 +29,7 @@ class Landmark:
         return self.position_m
 
     def own(self) -> None:
-        """Return nothing: there is no kernel."""
+        """Return None: there is no kernel."""
 
     def prior(self) -> Array:
         """Return nothing: there is no block."""

@@ -1,4 +1,4 @@
-"""A target that goes straight on or turns, and switches between the two: interacting multiple models."""
+"""A target that switches between straight driving and turning: interacting multiple models."""
 
 from dataclasses import dataclass, field
 from typing import ClassVar
@@ -13,7 +13,7 @@ from groundstation.kernel import Record
 
 @dataclass(frozen=True, slots=True)
 class ManoeuvringTarget:
-    """Several models of one target with equal labels; it stays with each for `stay_s` on average.
+    """Several models of one target with equal labels; it stays in each for `stay_s` on average.
 
     The filter keeps one joint belief per mode and mixes them whole (modes.py).
     """
@@ -50,7 +50,7 @@ class ManoeuvringTarget:
 
     @property
     def place_m(self) -> Vector3:
-        """Return the marker's place, alike in all modes."""
+        """Return the marker's place, the same in all modes."""
         return self.modes[0].place_m
 
     def own(self) -> Record | None:
@@ -58,5 +58,5 @@ class ManoeuvringTarget:
         return self.modes[0].own()
 
     def prior(self) -> Array:
-        """Return what joins, alike in all modes."""
+        """Return mean and variances of what joins, the same in all modes."""
         return self.modes[0].prior()

@@ -22,9 +22,9 @@ from groundstation.kernel import kernel
 
 AERIAL = ("roll_error", "pitch_error", "climb", "velocity_scale", "height_error", "floor")
 SLOW_STATES = (*AERIAL, "velocity_bias_x", "velocity_bias_y", "yaw_offset")
-# The field file's figure is what a vehicle states while it does not doubt itself; the lasting part of it is 0.6.
+# The field file's figure is what a vehicle reports while it is sure; the lasting part of it is 0.6.
 _STATED_ROOM = 2.0
-_DOUBT_S = 1.0  # the doubt that surprises raise is forgotten over this
+_DOUBT_S = 1.0  # time constant with which doubt raised by surprises decays
 
 
 _OWN_STATES = ("climb", "velocity_scale", "height_error", "floor", "velocity_bias_x", "velocity_bias_y")
@@ -44,8 +44,8 @@ def turn_with_heading(P: Matrix, start: int, size: int, dx: float, dy: float) ->
 def predict_odometry_robot(belief: Belief, e: int, dt: float) -> None:
     """Move a robot by its held odometry: velocity [base_stabilized] less bias, times gain, and its yaw rate.
 
-    The scale state acts on the smoothed velocity: reported velocities are noisy, and a noisy regressor draws its
-    factor down (by 0.2 here, were it the instantaneous one: what explains quick differences is mostly noise).
+    The scale state acts on the smoothed velocity: reported velocities are noisy, and a noisy regressor biases its
+    factor downwards (here by 0.2 with the instantaneous one, whose quick differences are mostly noise).
 
     PAPER (docs/explanation/method.md 7): the authors' program leaves out the derivative of the rotated velocity by yaw.
     """
@@ -98,7 +98,7 @@ def begin_odometry_robot(
     memory.unseen_s += step_s
     memory.velocity_doubt *= math.exp(-step_s / _DOUBT_S)
     if odometry.newest_velocity_std > p.velocity_std:
-        # What the vehicle itself doubts is doubted for as long as it does.
+        # The vehicle's own doubt counts as long as it lasts.
         memory.velocity_doubt = max(memory.velocity_doubt, odometry.newest_velocity_std)
     if memory.active == 0 or memory.unconfirmed != 0 or odometry.height_count == 0.0:
         return
@@ -116,8 +116,8 @@ class OdometryRobot:
     velocity_scale: true speed over reported speed as calibrated, known to `scale_std` (a state follows the rest);
     velocity_std_m_s with its correlation time becomes white noise; heading wanders by yaw_std_rad per root second;
     attitude, height and velocity errors are Gauss-Markov states; velocity_walk: change of the latter while nobody sees
-    the vehicle [m/s per root second]; climb is a state where the vehicle reports none. floor is the height of what is
-    below; yaw_offset what the vehicle's own heading is off by, for the heading sensor.
+    the vehicle [m/s per root second]; climb is a state if the vehicle reports none. floor: height of the object below;
+    yaw_offset: error of the vehicle's own heading, for the heading sensor.
     """
 
     kind: ClassVar[EntityKind] = EntityKind.ROBOT
@@ -179,7 +179,7 @@ class OdometryRobot:
             walk_density=self.velocity_walk**2,
             velocity_std=_STATED_ROOM * max(self.velocity_std_m_s, self.velocity_bias_std_m_s * self.velocity_scale),
             has_climb_rate=float(self.reports_climb),
-            # The slow part of the error is a state; what is left is quick, and alike in neighbouring samples.
+            # The slow part of the error is a state; the rest is quick, and alike in neighbouring samples.
             height_variance=(0.5 * self.height_std_m) ** 2,
             hold_s=self.hold_s,
             **{f"at_{label}": place_of(self.labels, label) for label in _OWN_STATES},

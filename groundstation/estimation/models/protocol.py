@@ -1,7 +1,7 @@
 """Interface of a model: its parameters in Python, and its kernels.
 
 A new model is one file: a frozen dataclass of its figures with these members, its kernels as model_kernels.py declares
-them, and a Record of what they read. Nothing else has to know it (docs/how-to/add-a-sensor-model.md 1,
+them, and a Record of what they read. No other code needs to know it (docs/how-to/add-a-sensor-model.md 1,
 docs/how-to/add-a-model-of-motion.md 1).
 """
 
@@ -17,7 +17,7 @@ Vector3 = tuple[float, float, float]
 
 
 class MotionModel(Protocol):
-    """How one entity moves: x' = f(x), F and Q are in the kernel behind `kernels`."""
+    """A motion model of one entity: x' = f(x), F and Q are in the kernel behind `kernels`."""
 
     @property
     def kind(self) -> EntityKind:
@@ -37,7 +37,7 @@ class MotionModel(Protocol):
 
     @property
     def admitted(self) -> bool:
-        """Return whether it may be in the state before anybody says so (a vehicle that must fly may not)."""
+        """Return whether it may be in the state without permission (a vehicle that must fly first may not)."""
 
     @property
     def place_m(self) -> Vector3:
@@ -52,7 +52,7 @@ class MotionModel(Protocol):
 
 @runtime_checkable
 class DrivenModel(MotionModel, Protocol):
-    """An entity with odometry: what its samples are late by, and how fast its state says that it moves."""
+    """An entity with odometry: the delays of its samples, and its velocity by the state."""
 
     @property
     def velocity_delay_s(self) -> float:
@@ -63,7 +63,7 @@ class DrivenModel(MotionModel, Protocol):
         """How long before its stamp a height was true."""
 
     def velocity_m_s(self, block: Array, memory: EntityMemory) -> Vector3:
-        """Return the velocity [world] from the block's mean and the inputs that are held."""
+        """Return the velocity [world] from the block's mean and the held inputs."""
 
 
 @runtime_checkable
@@ -80,11 +80,11 @@ class SwitchingModel(MotionModel, Protocol):
 
 
 class ObservationModel(Protocol):
-    """How one sensor measures: z = h(x) + v with h and its Jacobians behind `kernels`."""
+    """The model of one sensor: z = h(x) + v with h and its Jacobians behind `kernels`."""
 
     @property
     def carrier(self) -> str:
-        """The entity that it is on: a robot, or what stands fixed in the world."""
+        """The entity that carries it: a robot, or one fixed in the world."""
 
     @property
     def observes_targets(self) -> bool:

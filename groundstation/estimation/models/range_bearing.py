@@ -1,8 +1,8 @@
 """Range, bearing, or both, from an entity to another or to a landmark, in the plane.
 
-range = (1 + range_scale) d + range_bias with d = |marker - (x, y)|, or, for a camera that tells distance by the size of
-a marker's picture, d = its depth, the way along the axis; bearing = atan2(marker - (x, y)) - yaw + bearing_bias. Scale
-and biases are states of the observer where it has them.
+range = (1 + range_scale) d + range_bias with d = |marker - (x, y)|, or, for a camera that measures distance by the size
+of a marker's image, d = its depth, along the optical axis; bearing = atan2(marker - (x, y)) - yaw + bearing_bias. Scale
+and biases are states of the observer if it has them.
 """
 
 import math
@@ -30,8 +30,8 @@ class RangeBearingParameters(Record):
 
 
 _own = own_parameters(RangeBearingParameters)
-_NEAREST_M = 0.01  # a bearing to what is nearer says nothing
-_LEAST_COS = 0.1  # further aside nothing has a depth
+_NEAREST_M = 0.01  # a bearing to a nearer marker says nothing
+_LEAST_COS = 0.1  # farther aside a depth is undefined
 
 
 @kernel()
@@ -77,7 +77,7 @@ def measure_range_bearing(belief: Belief, sensor: SensorRow, event: EventRow, ou
 
 @kernel()
 def prepare_range_bearing(belief: Belief, sensor: SensorRow, event: EventRow, z: Vector, R: Matrix) -> int:
-    """Refuse a range that is none; R is as it came."""
+    """Refuse an invalid range; R is unchanged."""
     p = _own(sensor)
     if p.range_row >= 0 and z[p.range_row] <= 0.0:
         return -OUT_OF_VIEW
@@ -108,8 +108,8 @@ def locate_range_bearing(belief: Belief, sensor: SensorRow, event: EventRow, z: 
 class RangeBearingSensor(SensorDefaults):
     """A sensor on a robot that measures range, bearing, or both, in the plane.
 
-    is_depth: the range is told by the size of a picture, which gives the way along the axis. Real ranges repeat their
-    error for the same pair at the same place: `repeats_s` is for how long.
+    is_depth: whether the range comes from the size of an image, which gives the distance along the axis. Real ranges
+    repeat their error for the same pair at the same place, for `repeats_s`.
     """
 
     kernels: ClassVar[SensorKernels] = SensorKernels(measure_range_bearing, prepare_range_bearing, locate_range_bearing)

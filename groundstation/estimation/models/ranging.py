@@ -1,7 +1,7 @@
-"""Ranges to anchors fixed in the world: z = |transponder - anchor| + range_bias, the bias a state of the pair.
+"""Ranges to anchors fixed in the world: z = |transponder - anchor| + range_bias, with the bias as a state of the pair.
 
-What a pair of an anchor and a robot errs by (survey, delays of both antennas, a reflection that lasts) is the same in
-its ranges for seconds: as a state it does not average out.
+The error of a pair of an anchor and a robot (survey, delays of both antennas, a lasting reflection) stays the same for
+seconds: as a state it does not average out.
 """
 
 import math
@@ -52,7 +52,7 @@ _anchor, _own = own_parameters(AnchorParameters), own_parameters(RangeParameters
 
 @kernel()
 def predict_anchor(belief: Belief, e: int, dt: float) -> None:
-    """Let what is known of the bias fade: reflections come and go."""
+    """Let the bias decay to its prior: reflections come and go."""
     entity = belief.entities[e]
     p = _anchor(entity)
     fade(belief.mean, belief.P, entity.start, entity.size, 0, p.bias_std, dt / p.correlation_s)
@@ -85,7 +85,7 @@ def measure_range(belief: Belief, sensor: SensorRow, event: EventRow, out: Predi
 
 @kernel()
 def prepare_range(belief: Belief, sensor: SensorRow, event: EventRow, z: Vector, R: Matrix) -> int:
-    """Refuse a range that is none or beyond the radio's reach; R is as it came."""
+    """Refuse a range that is invalid or beyond the radio's reach; R is unchanged."""
     if z[0] <= 0.0 or z[0] > _own(sensor).reach:
         return -OUT_OF_VIEW
     return 1
@@ -93,7 +93,7 @@ def prepare_range(belief: Belief, sensor: SensorRow, event: EventRow, z: Vector,
 
 @dataclass(frozen=True, slots=True)
 class Anchor:
-    """A radio at a surveyed place [m; world] as one robot hears it: its ranges are off by a bias that lasts."""
+    """A radio at a surveyed place [m; world] as one robot hears it: its ranges have a lasting bias."""
 
     kind: ClassVar[EntityKind] = EntityKind.LANDMARK
     labels: ClassVar[tuple[str, ...]] = ("range_bias",)
@@ -116,7 +116,7 @@ class Anchor:
 
 @dataclass(frozen=True, slots=True)
 class RangeSensor(SensorDefaults):
-    """The ranges between one anchor, its carrier, and the transponder of one robot; alone they place nothing."""
+    """The ranges between one anchor, its carrier, and the transponder of one robot; alone they place no entity."""
 
     kernels: ClassVar[SensorKernels] = SensorKernels(measure_range, prepare_range)
     observes_targets = False

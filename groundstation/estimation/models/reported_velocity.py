@@ -1,8 +1,8 @@
 """A target's own odometry: its velocity in its own frame, which has neither origin nor drift. A claim (reports.py).
 
-With a heading in the block z = (forward, left) = R(yaw)^T v. Without one only the size is told: z = |v|, linear along
-the believed direction, where the believed speed is well above its deviation. One that says it stands is taken at its
-word in both axes, z = v = 0; anything else cannot be used while nobody knows the direction.
+With a heading in the block z = (forward, left) = R(yaw)^T v. Without one only the speed counts: z = |v|, linear along
+the believed direction, if the believed speed is well above its deviation. A report of standing counts in both axes, z =
+v = 0; other reports cannot be used while the direction is unknown.
 """
 
 import math
@@ -16,9 +16,9 @@ from groundstation.estimation.models.protocol import SensorDefaults
 from groundstation.estimation.records import NOT_LOCATED, VX, VY, EventRow, Prediction, SensorRow
 from groundstation.kernel import kernel
 
-# A believed speed of so many deviations has a direction; a reported one of fewer is none.
+# A believed speed of this many deviations has a direction; a reported one of fewer counts as standing.
 _MOVES, _STANDS = 3.0, 2.0
-_SLOWEST_M_S = 1e-3  # a mode that believes less has no direction, and the derivative no size
+_SLOWEST_M_S = 1e-3  # a mode with a lower speed has no direction, and the derivative no size
 
 
 @kernel()
@@ -43,7 +43,7 @@ def measure_velocity(belief: Belief, sensor: SensorRow, event: EventRow, out: Pr
 
 @kernel()
 def prepare_velocity(belief: Belief, sensor: SensorRow, event: EventRow, z: Vector, R: Matrix) -> int:
-    """Turn (forward, left) into what the block can be confronted with."""
+    """Turn (forward, left) into rows that can be compared with the block."""
     entity, P = belief.entities[event.observer], belief.P
     if entity.at_yaw >= 0:
         return 2
@@ -60,7 +60,7 @@ def prepare_velocity(belief: Belief, sensor: SensorRow, event: EventRow, z: Vect
 
 @dataclass(frozen=True, slots=True)
 class ReportedVelocity(SensorDefaults):
-    """What a target says of its velocity (forward, left) [m/s; base]; carrier: the target itself."""
+    """A target's report of its velocity (forward, left) [m/s; base]; carrier: the target itself."""
 
     kernels: ClassVar[SensorKernels] = SensorKernels(measure_velocity, prepare_velocity)
 

@@ -1,4 +1,4 @@
-"""The errors of a vehicle's own sensors: how they grow, fade and last."""
+"""The errors of a vehicle's own sensors: how they grow, decay and last."""
 
 import math
 
@@ -9,9 +9,9 @@ from groundstation.estimation.records import YAW, EntityMemory, EntityRow, Z
 from groundstation.kernel import Record, kernel
 
 _TURN_SHARE = 0.02  # of each turn is in error
-_BELIEVABLE, _WRONG = 3.0, 5.0  # deviations beyond which an error lasts longer, and beyond which the sensor lies
-_LIE_S, _UNSEEN_LIE_S, _UNSEEN_S = 2.0, 8.0, 0.5  # how long a lie lasts, seen and unseen, and from when on it is unseen
-_WALKS_AFTER_S = 0.2  # sightings of a robot in view come sooner
+_BELIEVABLE, _WRONG = 3.0, 5.0  # deviations beyond which an error lasts longer, and the sensor counts as wrong
+_LIE_S, _UNSEEN_LIE_S, _UNSEEN_S = 2.0, 8.0, 0.5  # duration of a wrong velocity, seen and unseen; unseen from then on
+_WALKS_AFTER_S = 0.2  # a robot in view is seen more often
 
 
 class RobotParameters(Record):
@@ -19,9 +19,9 @@ class RobotParameters(Record):
 
     velocity_gain: true over reported speed; velocity_density [m^2/s], yaw_density and yaw_offset_density [rad^2/s],
     scale_density [1/s], floor_density [m^2/s]: white noise; *_std, *_tau_s: Gauss-Markov states; has_climb_rate: 1.0 if
-    the vehicle reports one; height_variance [m^2]: of one step's height; velocity_std [m/s]: what the vehicle states
-    beyond it is doubt; walk_density [m^2/s^3]: white noise of the velocity's error while nobody sees the vehicle;
-    hold_s: how long a velocity holds in silence; at_*: entries (-1: the block has none).
+    the vehicle reports one; height_variance [m^2]: of one step's height; velocity_std [m/s]: a larger stated deviation
+    is doubt; walk_density [m^2/s^3]: white noise of the velocity's error while nobody sees the vehicle; hold_s: how
+    long a velocity holds in silence; at_*: entries (-1: the block has none).
     """
 
     velocity_gain: float
@@ -76,11 +76,12 @@ def add_robot_noise(
 def fade_velocity_bias(
     mean: Vector, P: Matrix, entity: EntityRow, p: RobotParameters, memory: EntityMemory, dt: float
 ) -> None:
-    """Let the velocity's error decay over dt; one that no sound sensor has is given room, and stays longer.
+    """Let the velocity's error decay over dt.
 
-    A heavy tail of its prior (0078): where sightings have drawn the error out of it, the deviation follows the error,
-    so that the next ones count for more; surprises of fixed cameras add to it. Not so of an unseen robot (0143), whose
-    error walks, where its kind's does.
+    An error too large for a sound sensor gets more variance, and stays longer. A heavy tail of its prior (0078): once
+    sightings have moved the error beyond its prior, the deviation follows the error, so that the next sightings weigh
+    more; surprises of fixed cameras add to it. Not for an unseen robot (0143), whose error is a random walk if its
+    kind's is.
     """
     start, size = entity.start, entity.size
     x, y = mean[start + p.at_velocity_bias_x], mean[start + p.at_velocity_bias_y]

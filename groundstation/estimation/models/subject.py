@@ -1,4 +1,4 @@
-"""Where the marker of any entity is, and how that depends on the entity's block: for all sensors that look at one."""
+"""The place of an entity's marker, with derivatives by the entity's block: for all sensors that observe one."""
 
 import math
 from typing import NamedTuple
@@ -12,7 +12,7 @@ BY_YAW, BY_ROLL, BY_PITCH = range(3)  # rows of derivatives
 
 
 class Lean(NamedTuple):
-    """How a body leans [rad]."""
+    """Roll and pitch of a body [rad]."""
 
     roll: float
     pitch: float
@@ -20,7 +20,7 @@ class Lean(NamedTuple):
 
 @kernel(inlined=True)
 def lean_of(mean: Vector, entity: EntityRow, event: EventRow) -> Lean:
-    """Return how the subject leans: as its vehicle says, plus the error states."""
+    """Return the subject's roll and pitch: as reported by its vehicle, plus the error states."""
     roll, pitch = event.subject_roll, event.subject_pitch
     if entity.at_roll_error >= 0:
         roll += mean[entity.start + entity.at_roll_error]
@@ -30,7 +30,7 @@ def lean_of(mean: Vector, entity: EntityRow, event: EventRow) -> Lean:
 
 @kernel(inlined=True)
 def offset_in_world(x: float, y: float, z: float, lean: Lean, yaw: float, offset: Vector) -> None:
-    """Write where a point (x, y, z) of the subject [base] is from its centre [world's axes]: what accelerates leans."""
+    """Write the offset [world's axes] of a point (x, y, z) of the (leaning) subject [base] from its centre."""
     cr, sr, cp, sp = math.cos(lean.roll), math.sin(lean.roll), math.cos(lean.pitch), math.sin(lean.pitch)
     c, n = math.cos(yaw), math.sin(yaw)
     left, up = cr * y - sr * z, sr * y + cr * z
@@ -51,7 +51,7 @@ def write_slopes(offset: Vector, pitch: float, yaw: float, slopes: Matrix) -> No
 
 @kernel(inlined=True)
 def marker_offset(mean: Vector, entity: EntityRow, event: EventRow, yaw: float, offset: Vector) -> None:
-    """Write where the marker is from the entity's centre [world's axes] for a given heading."""
+    """Write the offset of the marker from the entity's centre [world's axes] for a given heading."""
     if entity.at_yaw < 0:
         offset[X], offset[Y], offset[Z] = entity.place_x, entity.place_y, entity.place_z
         return
@@ -63,7 +63,7 @@ def marker_point(belief: Belief, event: EventRow, point: Vector, slopes: Matrix)
     """Write the subject's marker's centre [world] and its derivatives (3, 3) by the subject's yaw, roll and pitch.
 
     Without z in the block the marker is at a known height; without yaw it is over the centre; without a block the
-    entity stands where its parameters say.
+    entity is where its parameters say.
     """
     mean, entity = belief.mean, belief.entities[event.subject]
     start = entity.start

@@ -1,7 +1,7 @@
-"""Certificates: an authority signs each member of a run once and is then forgotten; that of a site is kept.
+"""Certificates: an authority signs each member of a run once and is then discarded; a site's authority is kept.
 
-Nobody, not even the owner of the run, can make another member later. The certificates hold for as long as anybody
-cares: a clock that is set right during a flight must not part a driver from its run.
+Afterwards nobody, not even the owner of the run, can make another member. The certificates practically never expire:
+correcting a clock during a flight must not separate a driver from its run.
 """
 
 import os
@@ -49,7 +49,7 @@ class Authority:
 
     @classmethod
     def load(cls, certificate: bytes, key: bytes) -> Self:
-        """Return the authority that was kept in PEM; raises ValueError when it is none."""
+        """Return the authority that was kept in PEM; raises ValueError if invalid."""
         loaded = load_pem_private_key(key, None)
         if not isinstance(loaded, EllipticCurvePrivateKey):
             raise ValueError("the key is of another kind")
@@ -62,7 +62,7 @@ class Authority:
 
     @property
     def trusted_pem(self) -> bytes:
-        """Its certificate and that of the authority above: whose members a router lets in."""
+        """Return its certificate and that of the authority above: a router admits members of both."""
         return self.pem + (self.above.pem if self.above else b"")
 
     def member(self, name: str, addresses: Sequence[str] = ()) -> tuple[bytes, bytes]:
@@ -86,12 +86,12 @@ def make_identities(
 ) -> None:
     """Make a folder that only its owner can read, with an authority and a certificate and key for each name.
 
-    addresses: where the router listens; the certificates are good for those only. site: whose hosts the router lets in
-    too, and who vouches for it to them. Raises GroundStationError when the folder cannot be made.
+    addresses: where the router listens; the certificates are good for those only. site: authority whose hosts the
+    router admits too, and which vouches for it to them. Raises GroundStationError when the folder cannot be made.
     """
     authority = Authority.make("run", site)
     try:
-        shutil.rmtree(folder, ignore_errors=True)  # of a dead process with the same number
+        shutil.rmtree(folder, ignore_errors=True)  # left by a dead process with the same number
         folder.mkdir(mode=0o700)
         write_private(folder / AUTHORITY, authority.trusted_pem)
         for name in names:

@@ -1,4 +1,4 @@
-"""What happens to processes, for the operator's terminal, the log and the bus."""
+"""Events of processes, for the operator's terminal, the log and the bus."""
 
 import logging
 
@@ -26,7 +26,7 @@ class ProcessEvents:
         self._terminal.say(f"  {process.spec.name:<12} {process.state.name.lower()}  {process.detail}".rstrip())
 
     def recovery(self, process: ManagedProcess) -> None:
-        """Show that a process is ready now, if it was degraded when it was shown last."""
+        """Show that a process is ready again, if it was last shown as degraded."""
         if process in self._degraded:
             self.state(process)
 

@@ -38,7 +38,7 @@ class _Speech:
 
 
 class FailsafeSender:
-    """Repeats the datagrams of each silent driver every 100 ms until they are called off."""
+    """Repeats the datagrams for each silent driver every 100 ms until ended."""
 
     def __init__(self, speaker: Speaker = Speaker.SUPERVISOR) -> None:
         self._speaker = speaker
@@ -59,9 +59,9 @@ class FailsafeSender:
     def begin(
         self, name: str, words: FailsafeDatagrams, since_ns: int, heard_at: Callable[[], Sequence[Address]] = tuple
     ) -> bool:
-        """Start to speak, at once, for a driver that is silent since then; returns whether that is news.
+        """Start at once to send for a driver that has been silent since a time; returns whether that is new.
 
-        heard_at: where the vehicles of a link that they call themselves were heard last.
+        heard_at: last addresses of vehicles that call their link.
         """
         if name in self._speaking:
             return False
@@ -74,11 +74,11 @@ class FailsafeSender:
         return True
 
     def end(self, name: str) -> bool:
-        """Leave the word to the driver again; returns whether that is news."""
+        """Stop sending for a driver; returns whether that is new."""
         return self._speaking.pop(name, None) is not None
 
     def began_ns(self, name: str) -> int:
-        """Return since when it has been speaking for a driver [ns], 0: it does not, or nothing carries its words."""
+        """Return since when it has been sending for a driver [ns]; 0: it does not, or has no working transport."""
         speech = self._speaking.get(name)
         return speech.began_ns if speech is not None and name in self._voices else 0
 
@@ -95,7 +95,7 @@ class FailsafeSender:
                     voice.say(words.land if too_long else words.hover, speech.addresses)
 
     def close(self) -> None:
-        """Fall silent; idempotent."""
+        """Stop sending; idempotent."""
         self._speaking.clear()
         for voice in self._voices.values():
             voice.close()

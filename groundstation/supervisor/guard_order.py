@@ -19,7 +19,7 @@ class Post(msgspec.Struct, frozen=True):
 
 
 class GuardOrder(msgspec.Struct, frozen=True):
-    """The guardian's section; landing_s: how long LAND is said before it may end; down from 3 m takes as long."""
+    """The guardian's section; landing_s: how long LAND is sent before it may end, the time of a descent from 3 m."""
 
     posts: tuple[Post, ...]
     landing_s: float = 10.0
@@ -35,7 +35,7 @@ def guarded(table: tuple[ProcessSpec, ...]) -> tuple[ProcessSpec, ...]:
     if not posts:
         return table
     order = GuardOrder(posts)
-    # A drone whose driver died during the stop is told to hover, and then to land, before the guardian ends.
+    # If its driver died during the stop, a drone is told to hover, and then to land, before the guardian ends.
     stop_limit_s = max(post.words.land_after_s for post in posts) + order.landing_s + _MARGIN_S
     section = msgspec.json.encode(order).decode()
     return (replace(GUARDIAN, section=section, stop_limit_s=stop_limit_s), *table)

@@ -1,7 +1,7 @@
 """The guardian process: stops and lands drones that have lost both their driver and the supervisor.
 
 It holds the prepared datagrams, reads the heartbeat block, and needs neither bus nor router. It starts first and stops
-last; without a supervisor it ends by itself once every drone was told to land for long enough.
+last; without a supervisor it ends by itself once every drone has been told to land for long enough.
 """
 
 import logging
@@ -37,7 +37,7 @@ class GuardedDriver:
         self._pid, self._pidfd = 0, -1
 
     def signs(self) -> DriverSigns:
-        """Return the present signs of life from block and kernel."""
+        """Return the present signs of life by heartbeat block and kernel."""
         slot, block = self.post.slot, self._block
         if block.pid(slot) != self._pid:
             self._follow(block.pid(slot))
@@ -54,7 +54,7 @@ class GuardedDriver:
                 self._pidfd = -1
 
     def kill(self) -> None:
-        """End a process that hangs, so that it cannot wake up and contradict."""
+        """Kill a hanging process, so that it cannot wake up and send contradicting orders."""
         if self._pidfd >= 0:
             with suppress(ProcessLookupError):  # it has ended meanwhile
                 signal.pidfd_send_signal(self._pidfd, signal.SIGKILL)
@@ -67,7 +67,7 @@ class GuardedDriver:
 
 
 class Guardian:
-    """Watches all drivers and sends where no other process does."""
+    """Watches all drivers and sends for a drone when no other process does."""
 
     def __init__(self, order: GuardOrder, block: HeartbeatBlock) -> None:
         self._block = block
@@ -82,7 +82,7 @@ class Guardian:
     def turn(self, now_ns: int, supervisor: SupervisorSigns) -> None:
         """Look after every drone once."""
         if now_ns - self._turn_ns > _OWN_DELAY_NS:
-            self._awake_since_ns = now_ns  # it was frozen itself: nobody's silence before now counts
+            self._awake_since_ns = now_ns  # the guardian was frozen itself: earlier silence of others does not count
         self._turn_ns = now_ns
         settled = [self._look_after(driver, now_ns, supervisor) for driver in self._drivers]
         self.settled = all(settled)
@@ -106,14 +106,14 @@ class Guardian:
         return decision.settled
 
     def close(self) -> None:
-        """Fall silent; idempotent."""
+        """Stop sending; idempotent."""
         self._sender.close()
         for driver in self._drivers:
             driver.close()
 
 
 def run(child: Child) -> int:
-    """Guard until the run ends and every drone is looked after; the process entry."""
+    """Guard until the run has ended and no drone needs a guardian; the process entry."""
     order = msgspec.json.decode(child.section, type=GuardOrder)
     block = HeartbeatBlock.attach(child.spec.heartbeat)
     guardian = Guardian(order, block)

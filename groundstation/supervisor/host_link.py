@@ -1,4 +1,4 @@
-"""Another host's end of the talk with the run's host: its order, its supervisor's silence, the offset of its clock."""
+"""Another host's side of the exchange with the run's host: order, silence of the supervisor, offset of the clock."""
 
 import os
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _PERIOD_NS = 40 * NS_PER_MS
 _CLOCK_PERIOD_NS = NS_PER_S
-# A lost packet of the link is sent again within this; the drivers' own patience begins afterwards.
+# A lost packet of the link is resent within this; after that the drivers' own limits of silence begin.
 _HEARD_NS = 200 * NS_PER_MS
 
 
@@ -59,15 +59,15 @@ class HostLink:
         return self._supervision is Supervision.ENDS
 
     def watches(self, now_ns: int) -> bool:
-        """Return whether the run's supervisor was heard just now, and does not stand still itself."""
+        """Return whether the run's supervisor was heard just now and is not frozen."""
         return self._supervision is not Supervision.SILENT and now_ns - self.heard_ns < _HEARD_NS
 
     def silent_s(self, now_ns: int) -> float:
-        """Return for how long nothing was heard of the run's host."""
+        """Return how long the run's host has not been heard [s]."""
         return (now_ns - self.heard_ns) / NS_PER_S
 
     def turn(self, now_ns: int, own: OwnState) -> None:
-        """Take in what came, and report; now_ns: this host's own boot clock."""
+        """Take in messages, and report; now_ns: this host's own boot clock."""
         for received in self._orders.drain():
             if isinstance(received.message, HostOrder):
                 self.order = received.message
@@ -86,7 +86,7 @@ class HostLink:
         answer = received.message
         if not isinstance(answer, HostAnswer) or answer.instance != self.instance:
             return
-        if answer.header.clock != self.run_clock:  # the run's host was started anew
+        if answer.header.clock != self.run_clock:  # the run's host was restarted
             self.run_clock, self._offsets = answer.header.clock, OffsetFilter()
             self._led_ns = self._next_clock_ns = 0
         self._supervision, self.heard_ns = answer.supervision, received.arrived_ns

@@ -11,15 +11,15 @@ from types import FrameType
 
 from groundstation.time_units import NS_PER_MS
 
-# `timeout` and some shells signal a process twice at once; a person needs longer for the second thought.
+# `timeout` and some shells signal a process twice at once; a person's second press takes longer.
 _SAME_WISH_NS = 500 * NS_PER_MS
 _WISHES = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
-# A reader of our output that has gone, Ctrl-Z, and what stops a program that is in the background of its terminal.
+# Ignored: a closed reader of our output, Ctrl-Z, and the stop of a background program of a terminal.
 _UNHEEDED = (signal.SIGPIPE, signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU)
 
 
 class Interrupts:
-    """Counts the operator's wishes to stop; `descriptor` becomes readable when one arrives."""
+    """Counts the operator's requests to stop; `descriptor` becomes readable when one arrives."""
 
     def __init__(self) -> None:
         self.descriptor, self._write = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
@@ -39,7 +39,7 @@ class Interrupts:
         now_ns = time.monotonic_ns()
         if not self.stop_requested:
             self.stop_requested, self._first_ns = True, now_ns
-        # A closing terminal may hang up several times, and is never a second thought of the operator.
+        # A closing terminal may hang up several times; that is never a second request.
         elif number != signal.SIGHUP and now_ns - self._first_ns > _SAME_WISH_NS:
             self.hurry = True
 
@@ -49,7 +49,7 @@ class Interrupts:
             os.read(self.descriptor, 512)
 
     def close(self) -> None:
-        """Release the descriptors; signals stay counted so that none kills the last steps."""
+        """Release the descriptors; signals are still only counted, so that none kills the last steps."""
         signal.set_wakeup_fd(-1)
         os.close(self.descriptor)
         os.close(self._write)

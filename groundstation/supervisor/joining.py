@@ -1,4 +1,4 @@
-"""How a program of another shell joins a run: as the role that its work needs, under a name of its own."""
+"""Joins a run from another shell, in the role that the work needs, under a name of its own."""
 
 import os
 from collections.abc import Mapping

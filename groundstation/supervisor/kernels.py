@@ -1,4 +1,4 @@
-"""Compiled kernels before a run's first process starts: beside all others, compiling takes several times as long."""
+"""Compiles kernels before a run's first process starts: beside running ones it takes several times as long."""
 
 import os
 import signal
@@ -29,10 +29,10 @@ def compile_first(
     command: Sequence[str] = COMMAND,
     limit_s: float = LIMIT_S,
 ) -> bool:
-    """Run a command that compiles all kernels, and tell how it goes; return whether it ended before `stopped` did.
+    """Run a command that compiles all kernels, and report progress; return whether it ended before `stopped` did.
 
-    Raises GroundStationError when it fails, takes longer than `limit_s`, or could not keep what it compiles; nothing of
-    it is left running.
+    Raises GroundStationError when it fails, takes longer than `limit_s`, or could not store its result; it is not left
+    running.
     """
     numba_cache.require_writable(numba_cache.place())
     say("  compiling kernels: once per version, a minute or two")

@@ -15,13 +15,13 @@ from groundstation.process.child import ChildSpec
 from groundstation.supervisor.process_spec import ProcessSpec
 from groundstation.supervisor.run import Run
 
-# 13 processes on 2 cores: a thread pool per process would only fight over them.
+# 13 processes on 2 cores: a thread pool per process would only compete.
 _TAIL_LINES = 8
 _SINGLE_THREADED = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
 class Launcher:
-    """Knows the run folder and the environment that children get; log files stay open across restarts."""
+    """Holds the run folder and the environment of children; log files stay open across restarts."""
 
     def __init__(self, run: Run, heartbeat: str, identities: Path | None = None) -> None:
         self._run = run
@@ -39,7 +39,7 @@ class Launcher:
         try:
             (self._run_dir / "log").mkdir(parents=True, exist_ok=True)
             for spec in specs:
-                # Unbuffered, and open from now on: a restart in flight must not need a free disk.
+                # Unbuffered, and open from now on: a restart in flight must not need free disk space.
                 self._logs[spec.name] = self.log_path(spec.name).open("ab", buffering=0)
         except OSError as error:
             raise GroundStationError(f"cannot write to the run folder {self._run_dir}: {error.strerror}") from error
@@ -47,7 +47,7 @@ class Launcher:
     def launch(self, spec: ProcessSpec, slot: int, life: int, spoken_since_ns: int = 0) -> subprocess.Popen[bytes]:
         """Start a process; `life` counts its starts and raises the epoch of a numbered one.
 
-        spoken_since_ns: since when its drone has been told to hover by others, 0: nobody does.
+        spoken_since_ns: since when others have told its drone to hover; 0: nobody does.
         """
         section = json.loads(spec.section)
         if spec.numbered:

@@ -1,4 +1,4 @@
-"""One process of the table while it lives: its handle, its lifecycle as the heartbeat block says, its restarts."""
+"""One live process of the table: its handle, its lifecycle by the heartbeat block, its restarts."""
 
 import os
 import signal
@@ -18,7 +18,7 @@ STORM_RESTARTS = 5
 
 
 class ManagedProcess:
-    """Everything that the supervisor remembers of one process."""
+    """The supervisor's state of one process."""
 
     def __init__(self, spec: ProcessSpec, slot: int, block: HeartbeatBlock) -> None:
         self.spec = spec
@@ -43,7 +43,7 @@ class ManagedProcess:
 
     @property
     def state(self) -> SlotState:
-        """Lifecycle as the process itself recorded it."""
+        """Return the lifecycle state that the process itself recorded."""
         return self._block.state(self.slot) if self.running else SlotState.EMPTY
 
     @property
@@ -73,7 +73,7 @@ class ManagedProcess:
         self.kill_reason = self.farewell = ""
 
     def heard(self, status: ProcessStatus) -> None:
-        """Keep what the process says of itself, and why it ends."""
+        """Keep the process's last status, and the reason of its end."""
         self.detail = status.detail
         self.farewell = status.detail if status.state is Lifecycle.STOPPING else ""
 
@@ -83,7 +83,7 @@ class ManagedProcess:
 
     @property
     def silent_since_ns(self) -> int:
-        """Since when others speak for it [ns], 0: it speaks itself; the guardian reads and may change it."""
+        """Since when others have sent for it [ns]; 0: nobody does. The guardian reads and may change it."""
         return self._block.silent_since_ns(self.slot)
 
     @silent_since_ns.setter
@@ -91,7 +91,10 @@ class ManagedProcess:
         self._block.set_silent_since(self.slot, since_ns)
 
     def judge_silence(self, now_ns: int, awake_since_ns: int, limit_ns: int, *, gone: bool = False) -> int:
-        """Return since when it is silent [ns], 0: it is not; awake_since_ns: since when silence could be heard."""
+        """Return since when it is silent [ns]; 0: it is not.
+
+        awake_since_ns: since when its silence could be noticed.
+        """
         signs = signs_of(self._block, self.slot, gone=gone)
         return silent_since(signs, self.silent_since_ns, now_ns, awake_since_ns, limit_ns)
 
@@ -100,8 +103,8 @@ class ManagedProcess:
         if self._handle is None or not _has_ended(self.pid):
             return None
         if self.is_up and not self.ready_ns:
-            self.ready_ns = self.started_ns  # it was up, between two looks
-        self.signal_group(signal.SIGKILL)  # whatever it started ends with it; its pid is still reserved here
+            self.ready_ns = self.started_ns  # it was up between two looks
+        self.signal_group(signal.SIGKILL)  # its children end with it; its pid is still reserved here
         code = self._handle.wait()
         os.close(self.pidfd)
         self._handle, self.pidfd = None, -1

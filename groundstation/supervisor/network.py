@@ -1,4 +1,4 @@
-"""A loopback network of its own for each simulated run, so that two runs at once never meet."""
+"""A separate loopback network for each simulated run, so that simultaneous runs never meet."""
 
 import fcntl
 import os
@@ -20,7 +20,7 @@ class Network:
     """127.a.b.0/24, held as long as the lock's descriptor is open here or in a child that inherited it.
 
     bus_port: of the router; stream_port: of all emulated network cameras. outside: first three numbers of the network
-    in which other hosts reach emulated devices, "" for none.
+    in which other hosts reach emulated devices, or "".
     """
 
     prefix: str
@@ -37,7 +37,7 @@ class Network:
 
     @property
     def endpoint(self) -> str:
-        """Where the router listens."""
+        """Return where the router listens."""
         return f"tls/{self.prefix}.1:{self.bus_port}"
 
     def drone_address(self, index: int) -> str:
@@ -49,7 +49,7 @@ class Network:
         return f"{self.prefix}.{_FIRST_CAMERA + index}", self.stream_port
 
     def release(self) -> None:
-        """Give the network up."""
+        """Release the network."""
         os.close(self.lock)
 
 
@@ -106,7 +106,7 @@ def _free_port(prefix: str, wanted: int) -> int:
 
 
 def require_free(endpoint: str) -> None:
-    """Raise GroundStationError naming who already listens where the router should."""
+    """Raise GroundStationError naming the program that already listens where the router should."""
     address, port = host_of(endpoint), port_of(endpoint)
     if not is_free(address, port):
         raise GroundStationError(

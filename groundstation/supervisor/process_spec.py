@@ -1,4 +1,4 @@
-"""One row per process: its entry, its permitted silence, and its place in the shut-down."""
+"""A row of the process table: entry, permitted silence, and place in the shut-down of one process."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -8,7 +8,7 @@ from groundstation.process.heartbeat import SUPERVISOR_SLOT
 
 
 class Restart(StrEnum):
-    """What the end of a process means to the run."""
+    """The consequence of a process's end for the run."""
 
     ALWAYS = "ALWAYS"
     ENDS_RUN = "ENDS_RUN"
@@ -33,8 +33,9 @@ class FailsafeDatagrams:
     """Datagrams of supervisor or guardian for a drone whose driver died or hangs, in the drone's own protocol.
 
     hover is repeated until the driver is READY again; land_after_s after its last beat it is land instead. voice:
-    "module:function" that makes what carries them from way and a speaker's number, "" for UDP. called: vehicles call
-    the driver, so that they are where they were heard last. interface: network adapter of plain UDP, "" for any.
+    "module:function" that makes their transport from `way` and a speaker's number, "" for UDP. called: whether vehicles
+    call the driver, so that their address is where they were last heard. interface: network adapter of plain UDP, ""
+    for any.
     """
 
     address: str
@@ -52,15 +53,14 @@ class FailsafeDatagrams:
 class ProcessSpec:
     """One process of the table.
 
-    entry: "module:function" run with a Child, or else command: an argument list in which "{spec}" becomes the path of
-    a JSON file holding section plus "child". numbered: each start gets a higher "epoch" in its section.
-    silence_limit_s: heartbeat older than this starts its failsafe datagrams; hang_limit_s: it is killed (both after
-    READY). restart_delay_s: pause before even the first restart. required: the run cannot start without it. awaited: a
-    start waits for it, if only for a moment. on_terminal: it writes to the operator's terminal. entities: the vehicles
-    or the camera that a device speaks of.
-    kernels: it computes with compiled kernels, which are made before anything starts. nice: its share of the processor,
-    beside that of others (docs/decisions/0137). shows_end: it stays until the run is judged (docs/decisions/0152).
-    at_most_hz: by key, how many samples a second are enough for it (docs/decisions/0169).
+    entry: "module:function" run with a Child, or else command: an argument list in which "{spec}" becomes the path of a
+    JSON file holding section plus "child". numbered: each start gets a higher "epoch" in its section. silence_limit_s:
+    an older heartbeat starts its failsafe datagrams; hang_limit_s: then it is killed (both after READY).
+    restart_delay_s: pause before even the first restart. required: the run cannot start without it. awaited: a start
+    waits for it, if only for a moment. on_terminal: it writes to the operator's terminal. entities: the vehicles or
+    camera of a device. kernels: it uses compiled kernels, which are made before anything starts. nice: its share of the
+    processor (docs/decisions/0137). shows_end: it stays until the run is judged (docs/decisions/0152). at_most_hz: by
+    key, how many samples a second are enough for it (docs/decisions/0169).
     """
 
     name: str
@@ -90,7 +90,7 @@ class ProcessSpec:
 
     @property
     def is_router(self) -> bool:
-        """Return whether the bus is its own."""
+        """Return whether it is the router."""
         return self.stop_order is StopOrder.CONNECTS
 
 

@@ -1,4 +1,4 @@
-"""What a run is called and where it happens, as its supervisor is told."""
+"""A run's name and place, as given to its supervisor."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,8 +12,8 @@ SOURCE = "supervisor"
 class Run:
     """A run. real: the drones that exist.
 
-    listen: address at which the router is there for other hosts of the site, "" for none. source, identity, clock:
-    what the supervisor of another host's devices is called, shows the router, and takes its time from.
+    listen: address at which the router serves other hosts of the site, "" for none. source, identity, clock: name,
+    certificate and clock of the supervisor of another host's devices.
     """
 
     site: str
@@ -29,12 +29,12 @@ class Run:
 
     @property
     def name(self) -> str:
-        """What orders and leases call it."""
+        """Return the run's name in orders and leases."""
         return self.run_dir.name
 
     @property
     def guarded(self) -> bool:
-        """Return whether its bus belongs to it alone."""
+        """Return whether its bus admits only its own members."""
         return self.endpoint.startswith("tls/")
 
     @property

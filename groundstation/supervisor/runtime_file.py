@@ -1,8 +1,8 @@
 """The runtime file: where `groundstation land` and friends find a run's router and processes.
 
 Lives in $XDG_RUNTIME_DIR, or /tmp/skein-<uid>, as SITE-PID.json, readable by its owner only, beside SITE-PID, the
-folder of the run's certificates. A pid counts only with its start time, so a file left by a crash never points at a
-stranger.
+folder of the run's certificates. A pid counts only with its start time, so a file left by a crash never points at
+another process.
 """
 
 import os
@@ -34,9 +34,9 @@ class ProcessRecord(msgspec.Struct, frozen=True):
 
 
 class RuntimeRecord(msgspec.Struct, frozen=True):
-    """A run as others see it; real: those of its drones that exist.
+    """A run as recorded for other shells; real: its real drones.
 
-    host: what this host is called at the site, where the run is on another one; then run_dir is the run's name.
+    host: name of this host at the site, if the run is on another host; run_dir is then the run's name.
     """
 
     site: str
@@ -63,13 +63,13 @@ class RuntimeRecord(msgspec.Struct, frozen=True):
         return any(process.alive for process in (self.supervisor, *self.processes))
 
     def identity(self, role: Role) -> Identity | None:
-        """Return the identity with which a program of another shell joins the bus."""
+        """Return the identity for joining the bus from another shell."""
         name = certificate_name(self.host) if self.host else shell(role)
         return Identity(self.identities, name, Path(self.run_dir).name) if self.identities else None
 
     @property
     def has_truth(self) -> bool:
-        """Return whether a simulator runs in it, which tells the true states of what it emulates."""
+        """Return whether it has a simulator, which publishes true states."""
         return any(process.role == "sim_bridge" for process in self.processes)
 
     @property
@@ -107,7 +107,7 @@ def folder() -> Path:
 
 
 def write(record: RuntimeRecord) -> Path:
-    """Write a record in one step, so that no reader sees half of it; returns its path. Raises OSError."""
+    """Write a record atomically; returns its path. Raises OSError."""
     try:
         path = folder() / f"{record.name}.json"
     except GroundStationError as error:  # the folder is gone, at a logout e.g.
@@ -140,14 +140,14 @@ def live_records() -> list[RuntimeRecord]:
 
 
 def _is_of_a_live_run(content: bytes) -> bool:
-    """Return whether a record that this version cannot read, as it is another's, has a supervisor that lives."""
+    """Return whether a record of another version, which this one cannot read, has a live supervisor."""
     with suppress(msgspec.DecodeError):
         return msgspec.json.decode(content, type=_AnyRecord).supervisor.alive
     return False
 
 
 def identities_of(site: str, pid: int) -> Path:
-    """Return where the certificates of a run are, or are to be."""
+    """Return the folder for the certificates of a run."""
     return folder() / f"{site}-{pid}"
 
 

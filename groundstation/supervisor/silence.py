@@ -1,7 +1,7 @@
-"""Who sends to a drone whose driver is silent, and which command. Pure: signs of life in, commands out.
+"""Decides who sends to a drone whose driver is silent, and which command. Pure: signs of life in, commands out.
 
-Precedence: the driver; the supervisor; the guardian. Both substitutes derive their words from one time alone, the
-last beat of the driver, so that they agree whenever they overlap. Proof: tests/property/test_somebody_speaks.py.
+Precedence: the driver; the supervisor; the guardian. Both substitutes derive their commands from the driver's last beat
+alone, so that they agree whenever they overlap. Proof: tests/property/test_somebody_speaks.py.
 """
 
 from dataclasses import dataclass
@@ -10,13 +10,13 @@ from enum import Enum
 from groundstation.process.heartbeat import HeartbeatBlock, SlotState
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
-# Of driver and supervisor alike. Shorter than the supervisor's own patience: after this the guardian has no time left.
+# For driver and supervisor alike. Shorter than the supervisor's own limit: after this the guardian has no time left.
 SILENCE_NS = 300 * NS_PER_MS
-# After this the supervisor would have spoken (0.4 s, and its turn), had it not just woken up itself.
+# By then the supervisor would have sent (0.4 s, and its turn), had it not just woken up itself.
 OVERDUE_NS = 450 * NS_PER_MS
-# As the supervisor's limit for drivers: who was replaced for so long must not come back and contradict.
+# As the supervisor's limit for drivers: one that was replaced for this long must not come back and contradict.
 HANG_NS = 800 * NS_PER_MS
-# As the watchdog's: without a supervisor that could take over again, there is nothing to hover for.
+# As the watchdog's: without a supervisor that could take over again, hovering has no purpose.
 BRAKE_NS = NS_PER_S
 
 
@@ -29,7 +29,7 @@ class Word(Enum):
 
 
 class SupervisorState(Enum):
-    """Whether the supervisor speaks for drivers: it does, not while it stops the run, or it is frozen or dead."""
+    """Whether the supervisor sends for drivers: it does; not while it stops the run; or it is frozen or dead."""
 
     SPEAKS = 0
     STOPS = 1
@@ -39,7 +39,7 @@ class SupervisorState(Enum):
 
 @dataclass(frozen=True, slots=True)
 class SupervisorSigns:
-    """What is known of the supervisor: its last beat, whether it lives, whether it stops the run."""
+    """Signs of life of the supervisor: its last beat, whether it lives, whether it stops the run."""
 
     beat_ns: int
     alive: bool = True
@@ -56,9 +56,9 @@ class SupervisorSigns:
 
 @dataclass(frozen=True, slots=True)
 class DriverSigns:
-    """What is known of a driver's process: its slot of the heartbeat block, and whether the kernel has it still.
+    """Signs of life of a driver's process: its slot of the heartbeat block, and whether the kernel still has it.
 
-    worked: it finished its start once; ended: it said that its work is done; gone: it is dead.
+    worked: it finished its start once; ended: it reported that its work is done; gone: it is dead.
     """
 
     state: SlotState = SlotState.EMPTY
@@ -69,11 +69,11 @@ class DriverSigns:
 
     @property
     def driving(self) -> bool:
-        """Return whether it has the drone: it finished its start, and is neither ending nor dead."""
+        """Return whether it controls the drone: it finished its start, and is neither ending nor dead."""
         return self.state in (SlotState.READY, SlotState.DEGRADED) and not self.ended and not self.gone
 
     def heard_silent_ns(self, now_ns: int, awake_since_ns: int) -> int:
-        """Return for how long it was silent while the listener was awake [ns]."""
+        """Return how long it was silent while the listener was awake [ns]."""
         return max(0, now_ns - max(self.beat_ns, awake_since_ns))
 
 
@@ -83,9 +83,9 @@ def signs_of(block: HeartbeatBlock, slot: int, *, gone: bool = False) -> DriverS
 
 
 def silent_since(signs: DriverSigns, before_ns: int, now_ns: int, awake_since_ns: int, limit_ns: int) -> int:
-    """Return since when a drone is without its driver [ns], 0: it has one, or never had, or does not need one any more.
+    """Return since when a drone is without its driver [ns]; 0: it has one, never had one, or no longer needs one.
 
-    before_ns: the same as recorded last; only a driver that finished its start resets it.
+    before_ns: the same as last recorded; only a driver that finished its start resets it.
     """
     if not signs.worked:
         return before_ns
@@ -100,7 +100,7 @@ def silent_since(signs: DriverSigns, before_ns: int, now_ns: int, awake_since_ns
 
 
 def word_at(since_ns: int, now_ns: int, land_after_s: float) -> Word:
-    """Return the command for a drone that has had no driver since then (0: it has one)."""
+    """Return the command for a drone without a driver since a time (0: it has one)."""
     if not since_ns:
         return Word.NONE
     return Word.LAND if now_ns - since_ns >= land_after_s * NS_PER_S else Word.HOVER
@@ -108,10 +108,10 @@ def word_at(since_ns: int, now_ns: int, land_after_s: float) -> Word:
 
 @dataclass(frozen=True, slots=True)
 class GuardDecision:
-    """What the guardian does about one drone.
+    """The guardian's decision for one drone.
 
-    since_ns: to be recorded, if the guardian speaks; kill: the driver hangs, and nobody else ends it; settled: the
-    drone needs no guardian any more.
+    since_ns: to be recorded, if the guardian sends; kill: the driver hangs, and nobody else kills it; settled: the
+    drone no longer needs a guardian.
     """
 
     word: Word
@@ -121,11 +121,11 @@ class GuardDecision:
 
 
 class Guard:
-    """The guardian's rule for one drone; remembers only since when LAND is said, by whomever."""
+    """The guardian's rule for one drone; remembers only since when anybody has sent LAND."""
 
     def __init__(self, land_after_s: float, landing_s: float) -> None:
         self._land_after_s, self._landing_s = land_after_s, landing_s
-        # LAND comes earlier by this where a driver that lives would land earlier, too.
+        # LAND comes earlier by this when a live driver would also land earlier.
         self._earlier_ns = max(0, round(land_after_s * NS_PER_S) - BRAKE_NS)
         self._land_since_ns = 0
 
@@ -144,7 +144,7 @@ class Guard:
         word = word_at(since_ns, now_ns, self._land_after_s)
         self._land_since_ns = (self._land_since_ns or now_ns) if word is Word.LAND else 0
         landed = word is Word.LAND and now_ns - self._land_since_ns >= self._landing_s * NS_PER_S
-        # Before LAND is said, who hangs is ended: it might wake up and take LAND back.
+        # Before LAND is sent, a hanging driver is killed: it might wake up and take LAND back.
         hangs = heard_silent_ns >= HANG_NS or word is Word.LAND
         lost = state in (SupervisorState.FROZEN, SupervisorState.DEAD)
         return GuardDecision(
@@ -155,9 +155,9 @@ class Guard:
         )
 
     def _as_driver_would(self, since_ns: int, before_ns: int, supervisor_ns: int, state: SupervisorState) -> int:
-        """Return the time that leads to LAND when a living driver would have landed: it heeds the supervisor's silence.
+        """Return the time that leads to LAND when a live driver would have landed because of the supervisor's silence.
 
-        A driver that dies while it lands for that reason is so not followed by hover.
+        So a driver that dies while it lands for that reason is not followed by hover.
         """
         match state:
             case SupervisorState.DEAD:

@@ -1,4 +1,4 @@
-"""A site beyond one run: its authority, kept on the ground station's host, and the other hosts that it has admitted.
+"""A site across runs: its authority, kept on the ground station's host, and the other hosts that it has admitted.
 
 Kept in $XDG_CONFIG_HOME/skein, else ~/.config/skein: sites/SITE on the ground station's host, joined/SITE elsewhere.
 """
@@ -28,7 +28,7 @@ _CONNECT_S, _LEASE_S, _STATUS_S = 1.0, 1.5, 0.5
 
 
 class Admission(msgspec.Struct, frozen=True):
-    """What a host needs to take part in the runs of a site; a secret."""
+    """The data that a host needs to take part in a site's runs; secret."""
 
     site: str
     host: str
@@ -39,7 +39,7 @@ class Admission(msgspec.Struct, frozen=True):
 
 
 def folder(kind: str, site: str) -> Path:
-    """Return where the files of a site are, or are to be; kind: "sites" or "joined"."""
+    """Return the folder for the files of a site; kind: "sites" or "joined"."""
     base = os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config"
     return Path(base) / "skein" / kind / site
 
@@ -58,7 +58,7 @@ def found(site: str) -> Path:
 
 
 def authority_of(site: str) -> Authority:
-    """Return the authority of a site; raises OperatorMistake when there is none."""
+    """Return the authority of a site; raises OperatorMistake if there is none."""
     place = folder("sites", site)
     try:
         return Authority.load((place / AUTHORITY).read_bytes(), (place / f"authority{KEY}").read_bytes())
@@ -69,7 +69,7 @@ def authority_of(site: str) -> Authority:
 
 
 def certify(run: Path, site: str, address: str, listen: str, names: Iterable[str]) -> None:
-    """Make the certificates of a run in its folder; one that listens for other hosts is vouched for by the site."""
+    """Make the certificates of a run in its folder; if it listens for other hosts, the site vouches for it."""
     above = authority_of(site) if listen else None
     make_identities(run, [address, listen] if listen else [address], names, above)
 
@@ -82,7 +82,7 @@ def _names(site: str) -> list[str]:
 
 
 def hosts(site: str) -> tuple[Member, ...]:
-    """Return the hosts that a site has admitted: each may order as the operator's shells may, under its own name."""
+    """Return the hosts that a site has admitted: each may order as the operator's shells may, by its own name."""
     return tuple(_member(host) for host in _names(site))
 
 
@@ -91,7 +91,7 @@ def _member(host: str) -> Member:
 
 
 def admit(site: str, host: str, endpoint: str, file: Path) -> None:
-    """Write a new host's admission; from the next run on it is let in. Raises OperatorMistake."""
+    """Write a new host's admission, valid from the next run on. Raises OperatorMistake."""
     if not _HOST.fullmatch(host):
         raise OperatorMistake(f"{host}: a host is called by small letters, digits and _, 16 at most")
     authority, names = authority_of(site), _names(site)
@@ -107,7 +107,7 @@ def admit(site: str, host: str, endpoint: str, file: Path) -> None:
 
 
 def expel(site: str, host: str) -> None:
-    """Let a host in no more, from the next run on."""
+    """Withdraw a host's admission from the next run on."""
     names = _names(site)
     if host not in names:
         raise OperatorMistake(f"{site} has admitted {', '.join(names) or 'nobody'}")
@@ -122,7 +122,7 @@ def _write_names(site: str, names: list[str]) -> None:
 
 
 def join(file: Path) -> Admission:
-    """Make this host a member of the site that admitted it; raises OperatorMistake when the file is none."""
+    """Make this host a member of the site that admitted it; raises OperatorMistake if the file is invalid."""
     try:
         admission = msgspec.json.decode(file.read_bytes(), type=Admission)
     except (OSError, msgspec.DecodeError) as error:
@@ -140,7 +140,7 @@ def join(file: Path) -> Admission:
 
 
 def membership(site: str | None) -> tuple[Admission, Identity]:
-    """Return what this host was admitted with, and its identity; raises OperatorMistake where that is not one site."""
+    """Return this host's admission and identity; raises OperatorMistake unless it has joined exactly one site."""
     paths = sorted(folder("joined", "").glob(f"{site or '*'}/admission.json"))
     if len(paths) != 1:
         known = ", ".join(path.parent.name for path in paths) or "none"
@@ -159,7 +159,7 @@ def runs() -> Iterator[RuntimeRecord]:
 
 
 def closed_doors() -> Iterator[str]:
-    """Yield why runs that listen there do not let this host in, with the remedy."""
+    """Yield why runs of the joined sites do not admit this host, with the remedy."""
     for path in sorted(folder("joined", "").glob("*/admission.json")):
         admission = msgspec.json.decode(path.read_bytes(), type=Admission)
         if why := why_closed(admission.endpoint, Identity(str(path.parent), certificate_name(admission.host), "")):

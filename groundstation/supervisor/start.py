@@ -1,4 +1,4 @@
-"""The start of a run: guardian and router, then what it cannot do without, then the devices."""
+"""The start of a run: guardian and router, then required processes, then the devices."""
 
 import time
 
@@ -14,17 +14,20 @@ _OPTIONAL_GRACE_S = 5.0
 
 
 class Interrupted(GroundStationError):
-    """The operator asked to stop while the run was starting."""
+    """Raised when the operator asked to stop during the start."""
 
 
 class Start:
-    """Starts what a supervisor watches from then on; `Supervisor.close` stops it, finished or not."""
+    """Starts the processes that a supervisor then watches.
+
+    `Supervisor.close` stops them, even if the start did not finish.
+    """
 
     def __init__(self, supervisor: Supervisor) -> None:
         self._supervisor = supervisor
 
     def run(self) -> None:
-        """Compile kernels where they lack, start one rank after the other; returns when the run can begin.
+        """Compile missing kernels, start one rank after the other; returns when the run can begin.
 
         Devices come last: emulated ones answer once the simulator is up, and would be told of as silent before.
 
@@ -69,7 +72,7 @@ class Start:
             self._raise_failure()
 
     def _wait_for(self, processes: list[ManagedProcess], grace_s: float | None = None) -> None:
-        """Wait until all are up, or their time is over; go on without those that have a grace only."""
+        """Wait until all are up or out of time; continue without processes that have only a grace period."""
         supervisor = self._supervisor
         waiting = Waiting(processes, time.monotonic(), grace_s)
         while waiting.processes:

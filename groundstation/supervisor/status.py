@@ -1,4 +1,4 @@
-"""The supervisor's own words on the bus: its status, and that of processes that cannot speak for themselves."""
+"""Publishes the supervisor's status, and that of processes that cannot publish their own."""
 
 import os
 import time
@@ -33,7 +33,7 @@ class StatusPublisher:
         for process in processes:
             name, pid = process.spec.name, process.pid
             if process.life == 0:
-                continue  # its turn to be started has not come: nothing ended
+                continue  # it is not due to start yet: nothing ended
             if not process.running:
                 text = "restarting" if process.restart_due_ns is not None else "ended"
                 self._publish(name, Lifecycle.STOPPING, pid, 0.0, text)

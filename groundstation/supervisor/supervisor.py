@@ -32,7 +32,7 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 _TURN_S = 0.05
 _OWN_DELAY_NS = 200 * NS_PER_MS
 _HURRY_S = 1.0
-# A process that is killed and still there hangs in the kernel, on a device or a network disk.
+# A process that remains after a kill hangs in the kernel, on a device or a network disk.
 _KERNEL_S = 3.0
 _log = logging.getLogger(__name__)
 
@@ -40,8 +40,8 @@ _log = logging.getLogger(__name__)
 class Supervisor:
     """Owns all processes of a run, which `Start` starts.
 
-    `step` must be called 10 times a second or more; it sleeps by itself. watched: asked in each step whether it is to
-    beat; on another host than the run's it speaks for the run's supervisor, and is silent when that is.
+    `step` must be called 10 times a second or more; it sleeps by itself. watched: called in each step to decide whether
+    to beat; on another host it stands for the run's supervisor, and is silent when that is.
     """
 
     def __init__(
@@ -80,7 +80,7 @@ class Supervisor:
         self._block.set_state(SUPERVISOR_SLOT, SlotState.READY)
 
     def _find_words(self) -> None:
-        """Open the transports of failsafe datagrams; a link whose driver cannot use it either fails its start."""
+        """Open the transports of failsafe datagrams; an unusable link makes its driver's start fail anyway."""
         for process in self.processes:
             words = process.spec.failsafe_datagrams
             if words is not None and (why := self._last_words.prepare(process.spec.name, words)):
@@ -96,7 +96,7 @@ class Supervisor:
         certify(self._identities, self.run.site, ports.host_of(self.run.endpoint), self.run.listen, names)
 
     def connect(self) -> None:
-        """Join the bus, whose router is up, and go first from now on: drones hover that hear nothing of this loop."""
+        """Join the bus, whose router is up, and take priority from now on: drones that do not hear this loop hover."""
         run = self.run
         take_share()  # for the threads of its bus
         self.bus = self.events.bus = open_bus(run.endpoint, run.site, run.source, identity=self._identity())
@@ -109,7 +109,7 @@ class Supervisor:
         return own or self.run.identity
 
     def launch(self, process: ManagedProcess) -> None:
-        """Start a process; one that cannot be executed is tried again, or is the failure of a run that needs it."""
+        """Start a process; one that cannot be executed is retried, or fails the run if required."""
         try:
             spoken_since_ns = self._last_words.began_ns(process.spec.name)
             handle = self._launcher.launch(process.spec, process.slot, process.life, spoken_since_ns)
@@ -123,7 +123,7 @@ class Supervisor:
             self.events.event(Severity.ERROR, process, why)
 
     def write_runtime_file(self) -> None:
-        """Write where other commands find this run and its processes."""
+        """Write the runtime file, by which other commands find this run and its processes."""
 
         def record(process: ManagedProcess) -> runtime_file.ProcessRecord:
             return runtime_file.ProcessRecord(process.spec.name, process.spec.role, process.pid, process.start_time)
@@ -143,19 +143,19 @@ class Supervisor:
         )
         try:
             runtime_file.write(self._record)
-        except OSError as error:  # the run is worth more than its signpost
+        except OSError as error:  # the run matters more than this file
             _log.error("cannot write the runtime file: %s", error)
 
     # -- watch ---------------------------------------------------------------------------------------------------
 
     def step(self, timeout_s: float = _TURN_S) -> None:
-        """Sleep until something happens or the time-out, then look after every process once."""
+        """Sleep until an event or the time-out, then check every process once."""
         self._beat()
         self._sleep(timeout_s)
         self._beat()
         now_ns = time.monotonic_ns()
         if now_ns - self._turn_ns > _OWN_DELAY_NS + int(timeout_s * NS_PER_S):
-            self._awake_since_ns = now_ns  # it was frozen itself: nobody's silence before now counts
+            self._awake_since_ns = now_ns  # the supervisor was frozen itself: earlier silence of others does not count
         self._turn_ns = now_ns
         self._read_statuses()
         for process in self.processes:
@@ -170,7 +170,7 @@ class Supervisor:
 
     @property
     def unwell(self) -> list[str]:
-        """Names of what was started and does not work (yet), but for what begins and is not awaited."""
+        """Return the processes that were started and do not work (yet), except starting ones that are not awaited."""
         started = [p for p in self.processes if p.life and not p.spec.on_terminal and p.state is not SlotState.READY]
         return [p.spec.name for p in started if p.spec.awaited or not p.begins]
 
@@ -218,7 +218,7 @@ class Supervisor:
 
     def _watch_heartbeat(self, process: ManagedProcess, now_ns: int) -> None:
         process.ready_ns = process.ready_ns or now_ns
-        # Silence counts only while this loop was awake to hear, unless the guardian has heard it meanwhile.
+        # Silence counts only while this loop was awake, unless the guardian has noticed it meanwhile.
         heard_s = min(process.heartbeat_age_ns(now_ns), now_ns - self._awake_since_ns) / NS_PER_S
         limit_ns = int(process.spec.silence_limit_s * NS_PER_S)
         process.silent_since_ns = process.judge_silence(now_ns, self._awake_since_ns, limit_ns)
@@ -258,7 +258,7 @@ class Supervisor:
         self.events.event(severity, process, f"{why}; restarting{soon}", "see its log")
 
     def fail(self, process: ManagedProcess, why: str) -> None:
-        """End the run: a process that it needs has failed."""
+        """End the run because a required process has failed."""
         name = process.spec.name
         self.failure = f"{name} {why}; its log {self._launcher.log_path(name)} ends:\n{self._launcher.log_tail(name)}"
         self.events.event(Severity.ERROR, process, why, "the run ends; see its log")
@@ -266,9 +266,9 @@ class Supervisor:
     # -- stop ----------------------------------------------------------------------------------------------------
 
     def stop(self) -> None:
-        """Stop all but what shows the end, in order, each with its deadline; a hurrying operator gets all at once."""
+        """Stop all processes but those that show the end, in order, each with its deadline (hurried: all at once)."""
         self._stopping = True
-        self._block.set_state(SUPERVISOR_SLOT, SlotState.STOPPING)  # from now on the guardian speaks for who dies
+        self._block.set_state(SUPERVISOR_SLOT, SlotState.STOPPING)  # from now on the guardian speaks for dead drivers
         for order in StopOrder:
             running = [p for p in self.processes if p.running]
             group = [p for p in running if p.spec.stop_order is order and not p.spec.shows_end]
@@ -280,12 +280,12 @@ class Supervisor:
     def _stop_group(self, group: list[ManagedProcess]) -> None:
         for process in group:
             process.signal(signal.SIGTERM)
-            process.signal(signal.SIGCONT)  # a frozen one could not hear it
+            process.signal(signal.SIGCONT)  # a frozen one would not receive it
         began = time.monotonic()
         while alive := [p for p in group if p.running]:
             self.step()
             for process in alive:
-                # Who waits for the guardian waits for a drone to land.
+                # Waiting for the guardian means waiting for a drone to land.
                 hurry = self.interrupts.hurry and process.spec.stop_order is not StopOrder.GUARDS
                 late_s = time.monotonic() - began - (_HURRY_S if hurry else process.spec.stop_limit_s)
                 self._end_late(process, late_s)
@@ -299,7 +299,7 @@ class Supervisor:
             self.events.event(Severity.ERROR, process, f"cannot be killed (pid {process.pid}): left behind")
 
     def end_run(self) -> None:
-        """Stop all but what shows the end, and leave the bus: the run can be judged; idempotent."""
+        """Stop all processes but those that show the end, and leave the bus, for the run's verdict; idempotent."""
         self.stop()
         if self.bus is not None:
             self.bus.close()

@@ -20,7 +20,7 @@ class Terminal:
         self._thread.start()
 
     def say(self, text: str) -> None:
-        """Show a line; drops it when the terminal takes none."""
+        """Show a line; drops it if the terminal accepts none."""
         if self.muted:
             self._kept = [*self._kept[-200:], text]
             return
@@ -30,14 +30,14 @@ class Terminal:
             return
 
     def unmute(self) -> None:
-        """Take the screen back and show what was kept."""
+        """Take the screen back and show the lines kept."""
         self.muted = False
         kept, self._kept = self._kept, []
         for text in kept:
             self.say(text)
 
     def flush(self, limit_s: float = 1.0) -> None:
-        """Give the terminal a moment to take what is waiting."""
+        """Give the terminal a moment to accept waiting lines."""
         deadline = time.monotonic() + limit_s
         while self._lines.unfinished_tasks and self._thread.is_alive() and time.monotonic() < deadline:
             time.sleep(0.01)

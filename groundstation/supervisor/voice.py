@@ -10,7 +10,7 @@ from groundstation.supervisor.process_spec import FailsafeDatagrams
 
 
 class Voice(Protocol):
-    """Says datagrams to all addresses of a link; `say` raises OSError where that fails."""
+    """Sends datagrams to all addresses of a link; `say` raises OSError on failure."""
 
     def say(self, datagram: bytes, addresses: Sequence[Address]) -> None:
         """Send a datagram to each address."""
@@ -40,6 +40,6 @@ def open_voice(words: FailsafeDatagrams, speaker: int) -> Voice:
     """Return the transport of one link; raises the driver package's error for an unusable link."""
     if not words.voice:
         return UdpVoice(words.interface)
-    # By name, as drivers are started: the supervisor knows no protocol.
+    # By name, as drivers are started: the supervisor knows no protocols.
     make: Callable[[str, int], Voice] = resolve_name(words.voice)
     return make(words.way, speaker)

@@ -11,10 +11,10 @@ _TO_BEGIN = 8.0
 class Waiting:
     """Processes that are not up yet.
 
-    Each may take as long as its own start limit from `began_s` on, over all of its restarts. grace_s: the start can do
-    without them, and waits for so long, from when each has come up or failed for the first time, until it is READY: a
-    device may answer a moment after its driver has begun. One that does not begin at all has eight times as long: on a
-    full machine the imports of a second run take 10 s and more.
+    Each may take its own start limit from `began_s` on, over all restarts. grace_s: for processes not required; from
+    when each first came up or failed, the start waits this long for READY, as a device may answer a moment after its
+    driver begins. A process that does not begin at all has eight times as long: on a full machine the imports of a
+    second run take 10 s and more.
     """
 
     def __init__(self, processes: list[ManagedProcess], began_s: float, grace_s: float | None = None) -> None:
@@ -26,17 +26,17 @@ class Waiting:
         self._seen_up: list[tuple[ManagedProcess, int]] = []
 
     def take_up(self) -> list[ManagedProcess]:
-        """Return those that have come up, and were so at the last call too: who dies of its first work is not up."""
+        """Return the processes up now and at the last call: one that dies of its first work is not up."""
         before = self._seen_up
         self._seen_up = [(process, process.life) for process in self.processes if self._is_up(process)]
         return self._take([process for process, life in self._seen_up if (process, life) in before])
 
     def take_late(self, now_s: float) -> list[ManagedProcess]:
-        """Return those whose time is up; nobody waits for them any longer."""
+        """Return the processes out of time; they are no longer waited for."""
         return self._take([process for process in self.processes if self._is_late(process, now_s)])
 
     def note(self, now_s: float) -> str:
-        """Return whom the start waits for when the operator should read it (again), else nothing."""
+        """Return a note of the awaited processes when the operator should read it (again), else ""."""
         note = ", ".join(_in_words(process) for process in self.processes)
         if now_s - self._noted_s <= (_SAME_NOTE_PERIOD_S if note == self._noted else _NOTE_PERIOD_S):
             return ""

@@ -1,1 +1,1 @@
-"""What every child process shares: heartbeat, parent watch, signals, log, and the `Child` that bundles them."""
+"""Common parts of all child processes: heartbeat, parent watch, signals, log, and the `Child` that bundles them."""

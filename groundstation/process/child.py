@@ -1,4 +1,4 @@
-"""What a child process has in hand: its bus, its heartbeat, its lifecycle, and whether it should go on."""
+"""The means of a child process: its bus, heartbeat, lifecycle, and requests to stop."""
 
 import logging
 import os
@@ -31,12 +31,13 @@ _log = logging.getLogger(__name__)
 class ChildSpec:
     """Settings of a child, read at its start.
 
-    name: its source name on the bus; endpoint: the router ("" = no bus); heartbeat: path of the block ("" = none),
-    with the child's slot in it; section: its settings as JSON; parent_pid: who started it (0 = whoever did); identity:
-    what it shows the router, or the router shows others (None: nobody asks); clock: id of the run's clock where that is
+    name: its source name on the bus; endpoint: the router ("" = no bus); heartbeat: path of the block ("" = none), with
+    the child's slot in it; section: its settings as JSON; parent_pid: pid of its starter (0 = any); identity: its
+    certificate for the router, or the router's for others (None: not needed); clock: id of the run's clock if that is
     another host's ("": this host's own); nice: below 0 for a larger share of the processor (docs/decisions/0137);
-    spoken_since_ns: since when others have spoken in its place (0: nobody does); at_most_hz: by key, how many samples a
-    second its bus lets in. Whoever thins only looks, and is woken as seldom as can be (docs/decisions/0169).
+    spoken_since_ns: since when others have sent in its place (0: nobody does); at_most_hz: by key, largest rate of
+    samples that its bus accepts. A process that thins only displays, and is woken as seldom as possible
+    (docs/decisions/0169).
     """
 
     name: str
@@ -77,9 +78,9 @@ class Child:
 
     def __enter__(self) -> Self:
         with suppress(PermissionError):  # already the leader of a group
-            os.setsid()  # keeps the terminal's Ctrl-C and hang-up away from what has to land first
+            os.setsid()  # keeps the terminal's Ctrl-C and hang-up away from processes that must land first
         log.configure(self.name)
-        take_share(self.spec.nice)  # not its parent's; before its bus threads begin, and before it imports much
+        take_share(self.spec.nice)  # not its parent's; before its bus threads begin, and before heavy imports
         self._parent = ParentWatch(self.spec.parent_pid)
         self._stop = StopSignal(self._parent)
         self._stop.install()
@@ -112,7 +113,7 @@ class Child:
         if self._block is not None:
             if self.spec.clock:
                 last_ns = self._block.clock_offset_ns()
-                clock.follow(self.spec.clock, lambda: last_ns)  # threads of a driver may still read it
+                clock.follow(self.spec.clock, lambda: last_ns)  # threads of a driver may still read the clock
             self._block.close()
             self._block = None
 
@@ -130,7 +131,7 @@ class Child:
 
     @property
     def stop_requested(self) -> bool:
-        """SIGTERM or SIGHUP came: a driver lands and exits, others finish and exit."""
+        """Return whether SIGTERM or SIGHUP came: a driver lands and exits, others finish and exit."""
         return self._stop.requested
 
     @property
@@ -152,7 +153,7 @@ class Child:
 
     @property
     def spoken_for_ns(self) -> int:
-        """For how long others have been speaking in this process's place [ns], 0: nobody does."""
+        """Return how long others have been sending in this process's place [ns]; 0: nobody does."""
         since_ns = self.spec.spoken_since_ns
         return time.monotonic_ns() - since_ns if since_ns else 0
 
@@ -161,7 +162,7 @@ class Child:
         self._stop.wake()
 
     def sleep_until(self, deadline_ns: int) -> bool:
-        """Sleep until then or until `wake`; False when a stop, or the supervisor's death, ended it (each once)."""
+        """Sleep until a time or `wake`; False when a stop, or the supervisor's death, ended it (each once)."""
         return self._stop.sleep_until(deadline_ns)
 
     def turns(self, period_ns: int) -> Iterator[int]:
@@ -175,12 +176,12 @@ class Child:
             self.sleep_until(due_ns)
 
     def beat(self) -> None:
-        """Say "my main loop turns"; about a microsecond."""
+        """Signal that the main loop turns; takes about a microsecond."""
         if self._block is not None:
             self._block.beat(self.spec.heartbeat_index)
 
     def note_addresses(self, addresses: Sequence[tuple[str, int]]) -> None:
-        """Record where vehicles that call us were heard last, for whoever speaks to them after this process."""
+        """Record the last addresses of vehicles that call us, for a process that sends to them after this one."""
         if self._block is not None and tuple(addresses) != self._addresses:
             self._addresses = tuple(addresses)
             self._block.set_addresses(self.spec.heartbeat_index, self._addresses)

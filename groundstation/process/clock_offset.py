@@ -1,7 +1,7 @@
-"""The offset of another host's clock from round trips, by the quickest of them. Pure; times in ns.
+"""Measures the offset of another host's clock by the quickest round trips. Pure; times in ns.
 
 A round trip bounds the offset by half of its delay whatever the network did, and the quickest of each second is nearly
-free of queues. What stays is half of the difference between the two ways: nobody can measure that.
+free of queues. The remaining error, half of the difference between the two ways, cannot be measured.
 """
 
 from collections import deque
@@ -9,19 +9,19 @@ from dataclasses import dataclass
 
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
-# Clocks of two computers run apart by 50 us in a second at most; the line through half a minute follows that.
+# Clocks of two computers diverge by at most 50 us in a second; the line through half a minute follows that.
 _SECONDS, _LINE_S = 32, 8
 _TRIPS_TO_START = 10
 _STEADIEST_NS = 200_000.0
 _DRIFT_LIMIT = 200e-6
 _MARGIN_NS = NS_PER_MS  # stamps are taken beside the bus, not in it
-# Corrections by which a clock that is followed is led to its offset; more than _STEP_NS is a clock that was set.
+# Corrections by which a followed clock is led to its offset; beyond _STEP_NS the clock was set.
 _SLEW_PER_S, _STEP_NS = 500e-6, 20 * NS_PER_MS
 
 
 @dataclass(frozen=True, slots=True)
 class RoundTrip:
-    """A question and its answer: sent and heard by our clock, received and answered by the other one."""
+    """A request and its answer: sent and received by our clock, received and answered by the other one."""
 
     sent_ns: int
     received_ns: int
@@ -30,24 +30,24 @@ class RoundTrip:
 
     @property
     def offset_ns(self) -> int:
-        """What is to be added to our clock to read the other one, if both ways took as long."""
+        """Return the offset to add to our clock to read the other one, if both ways took equally long."""
         return (self.received_ns - self.sent_ns + self.answered_ns - self.heard_ns) // 2
 
     @property
     def delay_ns(self) -> int:
-        """Both ways together, without the time at the other end."""
+        """Return the delay of both ways together, without the time at the other end."""
         return self.heard_ns - self.sent_ns - (self.answered_ns - self.received_ns)
 
 
 class OffsetFilter:
-    """Keeps the quickest round trip of each second, and the line through them, since a clock was set last."""
+    """Keeps the quickest round trip of each second, and the line through them, since a clock was last set."""
 
     def __init__(self) -> None:
         self._trips = 0
         self._quickest: deque[RoundTrip] = deque(maxlen=_SECONDS)
 
     def take(self, trip: RoundTrip) -> None:
-        """Take one round trip; an impossible one (a clock was set meanwhile, or somebody lies) is left out."""
+        """Take one round trip; an impossible one (a clock was set meanwhile, or an answer is false) is ignored."""
         if trip.delay_ns < 0 or trip.answered_ns < trip.received_ns:
             return
         self._trips += 1
@@ -61,16 +61,16 @@ class OffsetFilter:
 
     @property
     def known(self) -> bool:
-        """Return whether there were round trips enough."""
+        """Return whether there were enough round trips."""
         return self._trips >= _TRIPS_TO_START
 
     @property
     def error_ns(self) -> int:
-        """Most by which the offset can be wrong: half of the quickest round trip."""
+        """Return the largest error of the offset: half of the quickest round trip."""
         return min(trip.delay_ns for trip in self._quickest) // 2
 
     def offset_ns(self, now_ns: int) -> int:
-        """Return what is to be added to our clock now; only once `known`."""
+        """Return the offset to add to our clock now; only once `known`."""
         trips = self._quickest
         quickest_ns = min(trip.delay_ns for trip in trips)
         weights = [(_STEADIEST_NS / (_STEADIEST_NS + trip.delay_ns - quickest_ns)) ** 2 for trip in trips]
@@ -89,7 +89,7 @@ class OffsetFilter:
 
 
 def _contradict(one: RoundTrip, other: RoundTrip) -> bool:
-    """Return whether no offset can explain both: each is right to half of its delay, and clocks run apart slowly."""
+    """Return whether no offset explains both: each is accurate to half its delay, and clocks diverge slowly."""
     apart_ns = abs(one.offset_ns - other.offset_ns)
     drifted_ns = _DRIFT_LIMIT * abs(one.sent_ns - other.sent_ns)
     return apart_ns > (one.delay_ns + other.delay_ns) / 2 + drifted_ns + _MARGIN_NS

@@ -1,6 +1,6 @@
 """First code of a child: `python -m groundstation.process.entry NAME MODULE:FUNCTION`, its ChildSpec on stdin.
 
-The specification comes through a memory file and not through the disk: a restart in flight must work on a full one.
+The specification comes through a memory file, not the disk: a restart in flight must work with a full disk.
 """
 
 import logging

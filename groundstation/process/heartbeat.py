@@ -50,9 +50,9 @@ class HeartbeatBlock:
 
     @classmethod
     def create(cls, name: str, slots: int) -> "HeartbeatBlock":
-        """Return a new zeroed block in memory-backed storage where the host has it.
+        """Return a new zeroed block, in memory-backed storage if the host has it.
 
-        A block of that name that nobody beats any more is replaced; raises GroundStationError for any other.
+        An abandoned block of that name is replaced; raises GroundStationError for one in use.
         """
         folder = Path("/dev/shm") if Path("/dev/shm").is_dir() else Path(tempfile.gettempdir())
         path = folder / name
@@ -67,7 +67,7 @@ class HeartbeatBlock:
 
     @classmethod
     def attach(cls, path: str) -> "HeartbeatBlock":
-        """Return the block that the supervisor made; raises OSError when it is gone."""
+        """Return the block that the supervisor made; raises OSError if it is gone."""
         return cls(Path(path), 0, create=False)
 
     def beat(self, slot: int) -> None:
@@ -84,15 +84,15 @@ class HeartbeatBlock:
             self._words[base + _WORKED] = 1
 
     def end(self, slot: int) -> None:
-        """Record that the work of this process is done: whatever it drives stands, or could not be heard any more."""
+        """Record that the work of this process is done: its vehicle stands, or could no longer be heard."""
         self._words[slot * _WORDS_PER_SLOT + _ENDED] = 1
 
     def set_silent_since(self, slot: int, since_ns: int) -> None:
-        """Record since when others speak for the holder of a slot [ns]; 0: it speaks itself."""
+        """Record since when others have sent for the holder of a slot [ns]; 0: nobody does."""
         self._words[slot * _WORDS_PER_SLOT + _SILENT_SINCE] = since_ns
 
     def set_addresses(self, slot: int, addresses: Sequence[tuple[str, int]]) -> None:
-        """Record where vehicles of a slot's holder were heard last (IPv4, port): the first MOST_ADDRESSES of them."""
+        """Record the last addresses (IPv4, port) of a slot holder's vehicles: the first MOST_ADDRESSES of them."""
         base = slot * _WORDS_PER_SLOT + _ADDRESSES
         for index in range(MOST_ADDRESSES):
             address = addresses[index] if index < len(addresses) else ("0.0.0.0", 0)
@@ -100,7 +100,7 @@ class HeartbeatBlock:
             self._words[base + index] = int.from_bytes(socket.inet_aton(address[0]), "big") << 16 | address[1]
 
     def addresses(self, slot: int) -> tuple[tuple[str, int], ...]:
-        """Return the same; a restart of the holder does not erase them."""
+        """Return the recorded addresses; a restart of the holder does not erase them."""
         base = slot * _WORDS_PER_SLOT + _ADDRESSES
         words = [self._words[base + index] for index in range(MOST_ADDRESSES)]
         return tuple((socket.inet_ntoa((word >> 16).to_bytes(4, "big")), word & 0xFFFF) for word in words if word)

@@ -8,9 +8,9 @@ _PERIOD_NS = 10 * NS_PER_S
 
 
 class Refusals:
-    """Compares counts of refused things, by reason, with those that were told of.
+    """Compares counts of refusals, by reason, with those already reported.
 
-    words: what the operator reads of a reason; others are nobody's attack and stay untold.
+    words: texts of reasons for the operator; other reasons are harmless and not reported.
     """
 
     def __init__(self, words: Mapping[str, str]) -> None:
@@ -19,7 +19,7 @@ class Refusals:
         self._next_ns = 0
 
     def news(self, now_ns: int, counts: Mapping[str, int]) -> str:
-        """Return how much was refused since the last time that this said so, "" if nothing; at most once in 10 s."""
+        """Return the refusals since the last report in words, "" if none; at most once in 10 s."""
         fresh = {reason: counts.get(reason, 0) - self._told.get(reason, 0) for reason in self._words}
         fresh = {reason: count for reason, count in fresh.items() if count > 0}
         if not fresh or now_ns < self._next_ns:

@@ -10,9 +10,9 @@ from groundstation.process.parent import ParentWatch
 
 
 class StopSignal:
-    """The wish to stop, and a sleep that ends early when it (or the parent's death) arrives, or somebody calls `wake`.
+    """The request to stop, and a sleep that ends early at the request, the parent's death, or `wake`.
 
-    Each of them wakes one sleep only: a driver that still has to land after a stop keeps its loop rate.
+    Each of them ends only one sleep: a driver that must still land after a stop keeps its loop rate.
     """
 
     def __init__(self, parent: ParentWatch) -> None:
@@ -27,7 +27,7 @@ class StopSignal:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         for number in (signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, self._request)
-        # The kernel may hand the signal to a network thread; the wake-up descriptor ends the sleep all the same.
+        # The kernel may deliver the signal to a network thread; the wake-up descriptor ends the sleep all the same.
         signal.set_wakeup_fd(self._write, warn_on_full_buffer=False)
 
     def _request(self, _number: int, _frame: object) -> None:
@@ -66,7 +66,7 @@ class StopSignal:
         return woken
 
     def close(self) -> None:
-        """Give the signals back; idempotent."""
+        """Restore the signal handlers; idempotent."""
         if self._read >= 0:
             signal.set_wakeup_fd(-1)
             os.close(self._read)

@@ -1,13 +1,13 @@
-"""Whether this computer slept: all its processes stood still with their clock, so that none of them noticed."""
+"""Detects that this computer slept: all its processes stood still with their clock, so that none noticed."""
 
 import time
 from collections.abc import Callable
 
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
-# Both clocks are read in less, unless this process stood still between the two.
+# Both clocks are read within this, unless this process stood still in between.
 _READ_NS = 5 * NS_PER_MS
-# Waking takes longer; clocks are not led apart as far.
+# Waking takes longer; clock corrections are smaller.
 _LEAST_S = 0.3
 
 
@@ -25,10 +25,10 @@ class SleepWatch:
         self._apart_ns: int | None = None
 
     def slept_s(self) -> float:
-        """Return for how long it slept since the last call; 0.0 for less than a moment."""
+        """Return how long it slept since the last call [s]; 0.0 for a brief moment."""
         before_ns, boot_ns = self._awake_ns(), self._since_boot_ns()
         if self._awake_ns() - before_ns > _READ_NS:
-            return 0.0  # the next call tells
+            return 0.0  # the next call decides
         apart_ns = boot_ns - before_ns
         slept_s = 0.0 if self._apart_ns is None else (apart_ns - self._apart_ns) / NS_PER_S
         self._apart_ns = apart_ns

@@ -1,4 +1,4 @@
-"""Standard input and output as a program may count on them, whatever started it."""
+"""Makes standard input and output reliable for a program, whatever started it."""
 
 import os
 import sys
@@ -7,9 +7,9 @@ from io import TextIOWrapper
 
 
 def make_usable() -> None:
-    """Open what was closed, and let the output show what its encoding cannot; first in a process.
+    """Open closed streams, and let output escape signs that its encoding lacks; call it first in a process.
 
-    The number of a closed stream would go to the next file that is opened: lines for the operator would end in it.
+    The next opened file would get the number of a closed stream, and lines for the operator would end up in it.
     """
     for descriptor, name in enumerate(("stdin", "stdout", "stderr")):
         with suppress(OSError):
@@ -22,6 +22,6 @@ def make_usable() -> None:
 
 
 def show_all_signs() -> None:
-    """Write a name or a sign that the terminal cannot show as Python writes it on stderr; it is no fault."""
+    """Let the terminal's output escape names and signs that it cannot show, as on stderr; that is no fault."""
     if isinstance(sys.stdout, TextIOWrapper) and sys.stdout.errors == "strict":
         sys.stdout.reconfigure(errors="backslashreplace")

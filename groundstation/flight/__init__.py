@@ -1,1 +1,1 @@
-"""One run: which processes it consists of, its folder, and the flight from start to landing."""
+"""One run: its processes, its folder, and the flight from start to landing."""

@@ -1,4 +1,4 @@
-"""From a resolved field to the process table: the one place that knows which processes a run consists of."""
+"""Makes the process table of a resolved field: the one place that knows the processes of a run."""
 
 import json
 import time
@@ -50,9 +50,9 @@ _SENSOR_DRIVERS = {
 
 @dataclass(frozen=True, slots=True)
 class Simulation:
-    """What makes a run a simulated one: its network, scenario and seed, and what of it is real all the same.
+    """The simulated part of a run: its network, scenario and seed, and the parts that are real all the same.
 
-    The scenario is as its file has it: only the simulator, which judges it, knows its keys.
+    The scenario is kept as in its file: only the simulator, which checks it, knows its keys.
     """
 
     network: Network
@@ -67,7 +67,7 @@ def fly_endpoint(field: Field) -> str:
 
 
 def simulated(field: Field, network: Network, real: RealParts = ALL_EMULATED) -> Field:
-    """Return the field with the addresses of its emulated devices; what is real keeps those of the file."""
+    """Return the field with the addresses of its emulated devices; real parts keep those of the file."""
     addresses = {
         name: network.of(drone.host).drone_address(index)
         for index, (name, drone) in enumerate(field.drones.items())
@@ -78,7 +78,7 @@ def simulated(field: Field, network: Network, real: RealParts = ALL_EMULATED) ->
 
 
 def _captures(field: Field, network: Network, real: RealParts) -> dict[str, tuple[str, int]]:
-    """Return where emulated motion capture and ranging systems, and routers of targets, listen: behind the cameras."""
+    """Return addresses of emulated motion capture, ranging and routers of targets, numbered after the cameras."""
     first = len(field.cameras) + len(field.drones)
     hosts = {name: one.host for name, one in field.motion_capture.items()}
     hosts |= {name: one.host for name, one in field.ranging.items()}
@@ -95,7 +95,8 @@ def _streams(field: Field, network: Network, real: RealParts) -> dict[str, tuple
     streams = {name: network.of(host).stream(index) for index, (name, host) in enumerate(hosts.items())}
     for index, (name, drone) in enumerate(field.drones.items()):
         source = parse_source(drone.camera.source)
-        # A drone sends its own video from its own address; a real one is none of ours, so its emulated camera is apart.
+        # A drone sends its own video from its own address; a real drone's is not ours, so its emulated camera is
+        # separate.
         if source.vehicle and source.vehicle == kind_named(drone.kind).camera and name not in real.drones:
             streams[name] = (network.of(drone.host).drone_address(index), source.port)
     return {name: stream for name, stream in streams.items() if name not in real.cameras}
@@ -104,7 +105,7 @@ def _streams(field: Field, network: Network, real: RealParts) -> dict[str, tuple
 def process_table(
     field: Field, endpoint: str, run_dir: Path, *, simulation: Simulation | None, monitor: bool
 ) -> tuple[ProcessSpec, ...]:
-    """Return all processes of a run; `field` already has the addresses that it is to use."""
+    """Return all processes of a run; `field` already has its final addresses."""
     core = core_section(field, str(run_dir), int(time.time()))
     table = [rows.ROUTER]
     if simulation is not None:
@@ -133,12 +134,12 @@ def hosts_of(field: Field) -> tuple[str, ...]:
 
 
 def device_rows(field: Field, host: str = "") -> list[ProcessSpec]:
-    """Return the drivers of one host: of the run's own, or of another one."""
+    """Return the drivers of one host: the run's own ("") or another one."""
     return [_driver(section, field) for section in driver_sections(field) if section.host == host]
 
 
 def members_on(host: str, field: Field) -> list[Member]:
-    """Return who another host may speak as: itself, and the devices that it runs; raises OperatorMistake."""
+    """Return the members that another host may act as: itself, and the devices that it runs; raises OperatorMistake."""
     certificate = certificate_name(host)
     if certificate not in {member.name for member in hosts(field.site)}:
         raise OperatorMistake(
@@ -157,7 +158,7 @@ def _liaison(host: str, field: Field) -> ProcessSpec:
 def router_section(
     endpoint: str, site: str, table: Iterable[ProcessSpec], bus: Bus, elsewhere: Iterable[Member] = ()
 ) -> str:
-    """Return what a router is handed: where it listens, and whom it lets speak as whom, here and on other hosts."""
+    """Return the router's section: where it listens, and the members it admits, here and on other hosts."""
     members = [
         Member(spec.name, Role(spec.role), (spec.name,), spec.entities or (spec.name,)) for spec in table if spec.on_bus
     ]

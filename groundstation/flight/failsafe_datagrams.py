@@ -1,4 +1,4 @@
-"""The bytes with which supervisor or guardian stop and land the drones of a dead driver, as their kind says."""
+"""The datagrams by which supervisor or guardian stop and land the drones of a dead driver, by their kind."""
 
 from groundstation.settings.schema import Field
 from groundstation.settings.sections import DriverSection, vehicle_order
@@ -8,10 +8,10 @@ from groundstation.vehicles.registry import ask
 
 
 def failsafe_datagrams(field: Field, section: DriverSection) -> FailsafeDatagrams:
-    """Return what the vehicles of a driver are sent."""
+    """Return the failsafe datagrams for a driver's vehicles."""
     drone = field.drones[section.entity]
     stop: StopDatagrams = ask(kind_named(drone.kind), "stop", [vehicle_order(field, name) for name in section.entities])
-    # Who cannot hover for so long without its driver is landed sooner.
+    # A vehicle that cannot hover for so long without its driver is landed sooner.
     land_after_s = min(field.safety.land_after_s, stop.hovers_s)
     return FailsafeDatagrams(
         drone.address,

@@ -1,4 +1,4 @@
-"""What is asked of a flight, and what a field says of it."""
+"""The requests for a flight, and the settings of its field."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -11,19 +11,19 @@ from groundstation.runtime.take_off import TakeOffLimits
 from groundstation.settings.cautions import OF_A_FIELD, Caution
 from groundstation.settings.schema import Field
 
-# What tells positions in the world.
+# Sensors that give positions in the world.
 _IN_WORLD = FixedCamera(0.0, (0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True, slots=True)
 class FlightPlan:
-    """What is asked of a flight.
+    """The requests for a flight.
 
-    duration_s: tracking time, None = until stopped; asks: take off only when the operator says so at the prompt or
-    from another shell; cameras: those fixed in the world; landing_limit_s: how long a landing may take before the
-    processes are stopped anyway; field: what the checks before the take-off go by (none: no checks); cautions: what
-    they say of the field file; anyway: take off whatever they say; look_only: nobody takes off, the checks are all
-    that is wanted.
+    duration_s: tracking time, None = until stopped; asks: take off only when the operator orders it at the prompt or
+    from another shell; cameras: those fixed in the world; landing_limit_s: largest duration of a landing before the
+    processes are stopped anyway; field: the field for the checks before the take-off (none: no checks); cautions:
+    warnings about the field file; anyway: take off whatever the checks find; look_only: only make the checks, without a
+    take-off.
     """
 
     duration_s: float | None
@@ -41,7 +41,7 @@ class FlightPlan:
 def plan_of(
     field: Field, duration_s: float | None, *, asks: bool, checks: Iterable[Caution] = OF_A_FIELD
 ) -> FlightPlan:
-    """Return the plan of a flight in this field; checks: what its file is warned about."""
+    """Return the plan of a flight in this field; checks: the sources of warnings about its file."""
     cameras = {}
     for name, camera in field.cameras.items():
         right, down, forward = world_from_downward_optical(camera.rotation_deg)[2].tolist()

@@ -1,7 +1,7 @@
-"""The devices of a field on another host than the run's: its order awaited, its drivers started, watched and stopped.
+"""Runs devices of a field on another host than the run's: awaits the order, starts, watches and stops the drivers.
 
-What flies there is supervised there, by the run's own supervisor class and a guardian of its own; the run's supervisor
-is heard over the bus, and its silence is passed on to the drivers as that of this process.
+These vehicles are supervised there, by the same supervisor class and a guardian of its own; the run's supervisor is
+heard over the bus, and its silence is passed on to the drivers as that of this process.
 """
 
 import math
@@ -30,10 +30,10 @@ from groundstation.supervisor.supervisor import Supervisor
 from groundstation.supervisor.terminal import Terminal
 
 _CONNECT_S, _TURN_S = 1.0, 0.05
-# A run that loads slowly has its order for this host by then.
+# By then even a slowly loading run has sent its order.
 _IDLE_S = 30.0
 _GUARDIAN_S = 10.0
-# Drivers land long before; what is left then is a run that nobody will come back to.
+# Drivers land long before; after this nobody will come back to the run.
 _LOST_S = 20.0
 _FAREWELLS = 5
 
@@ -121,7 +121,7 @@ class Hosting:
             self._leave()
 
     def _why_over(self, supervisor: Supervisor, run: str) -> str:
-        """Run the devices, and return why no longer; a run that ended meanwhile is no reason not to serve the next."""
+        """Run the devices and return why they stopped; a failure ends only this run, and the next one is served."""
         try:
             self._start(supervisor)
             return self._watch(supervisor, run)
@@ -135,7 +135,7 @@ class Hosting:
         return link.watches(now_ns)
 
     def _start(self, supervisor: Supervisor) -> None:
-        """Start the guardian, then the drivers: who dies from then on is spoken for."""
+        """Start the guardian, then the drivers, so that it covers any that die."""
         self._own = OwnState(supervisor.run.name)
         supervisor.prepare()
         guards = [one for one in supervisor.processes if one.spec.stop_order is StopOrder.GUARDS]
@@ -150,7 +150,7 @@ class Hosting:
                 supervisor.launch(process)
 
     def _watch(self, supervisor: Supervisor, run: str) -> str:
-        """Go on until there is a reason to stop, and return it."""
+        """Continue until there is a reason to stop, and return it."""
         link = self._link
         while True:
             supervisor.step()
@@ -169,7 +169,7 @@ class Hosting:
                 return f"nothing was heard of it for {_LOST_S:.0f} s"
 
     def _leave(self) -> None:
-        """Say that nothing of the run is left here."""
+        """Report that nothing of the run is left here."""
         self._own = OwnState()
         for _ in range(_FAREWELLS):
             self._link.turn(clock.own_ns(), self._own)

@@ -9,7 +9,7 @@ _STDIN = 0
 
 
 class Keyboard:
-    """What is typed into a terminal, or comes out of a pipe. gone: nothing more will."""
+    """Input typed into a terminal, or from a pipe. gone: whether it has ended."""
 
     def __init__(self, descriptor: int = _STDIN) -> None:
         self._descriptor = descriptor
@@ -17,7 +17,7 @@ class Keyboard:
         self.gone = False
 
     def forget(self) -> None:
-        """Drop what was typed into a terminal before it was asked for: nobody knew then what it would answer."""
+        """Drop input typed into a terminal before the prompt: it was not an answer to it."""
         self._typed = b""
         with suppress(OSError, termios.error):  # no terminal: a pipe was filled on purpose
             termios.tcflush(self._descriptor, termios.TCIFLUSH)

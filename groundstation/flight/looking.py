@@ -1,4 +1,4 @@
-"""The checks before a take-off, from the first picture to what the operator reads."""
+"""The checks before a take-off, from the first picture to the operator's list."""
 
 from collections.abc import Collection, Iterator
 
@@ -7,13 +7,13 @@ from groundstation.preflight.judge import lines
 from groundstation.runtime.before_take_off import BeforeTakeOff
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
-# Two pictures a second, which is the least that was met on a busy machine, make a median in this time.
+# Two pictures a second, the lowest rate met on a busy machine, make a median in this time.
 _LONGEST_NS = 8 * NS_PER_S
 _AGAIN_NS = 200 * NS_PER_MS
 
 
 class Looking:
-    """One look before a take-off. forbidden: whether something must be mended; nobody: whether it would leave all out.
+    """One run of the checks. forbidden: whether something must be mended; nobody: whether all drones would be left out.
 
     drones: the names of the team.
     """
@@ -26,7 +26,7 @@ class Looking:
         self.forbidden = self.nobody = False
 
     def finished(self, now_ns: int) -> bool:
-        """Return whether everything that can be judged has been seen, or it was waited for long enough."""
+        """Return whether all evidence has been seen, or the wait was long enough."""
         if now_ns < self._next_ns:
             return False
         self._next_ns = now_ns + _AGAIN_NS
@@ -39,7 +39,7 @@ class Looking:
         return True
 
     def tell(self, *, whole: bool) -> Iterator[str]:
-        """Publish what was found and return it as lines; whole: also what is well."""
+        """Publish the findings and return them as lines; whole: including those that are OK."""
         self._checks.publish(self._findings, self._found_ns)
         yield from lines(one for one in self._findings if whole or one.level is not Level.OK)
         musts = sum(one.level is Level.MUST for one in self._findings)

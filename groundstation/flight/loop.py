@@ -1,4 +1,4 @@
-"""One flight from start to landing: supervisor and operator in one loop, until the time is up or someone stops it."""
+"""One flight from start to landing: supervisor and operator in one loop, until time is up or somebody stops it."""
 
 import time
 from dataclasses import dataclass
@@ -23,9 +23,9 @@ _FAILED_LANDING_S = 2.0
 
 @dataclass(frozen=True, slots=True)
 class FlightOutcome:
-    """How a flight ended. failure: why it could not go on, or ""; interrupted: by the operator; landed: all said so.
+    """The end of a flight. failure: why it could not continue, or ""; interrupted: by the operator.
 
-    forbidden: whether nobody may take off, where that was the question.
+    landed: all reported it. forbidden: whether the take-off was forbidden, if that was asked.
     """
 
     failure: str
@@ -78,7 +78,7 @@ class Flight:
         return FlightOutcome(failure, supervisor.interrupts.stop_requested, landed)
 
     def _announce(self, severity: Severity, how: str) -> None:
-        """Say on the bus that the run ends, and how, while there is still somebody to hear it."""
+        """Publish that the run ends, and how, while others still listen."""
         if self._supervisor.bus is not None:
             header = self._supervisor.bus.header(RUN)
             self._supervisor.bus.publish(EVENT, Event(header=header, severity=severity, text=f"{RUN_ENDED}{how}"))
@@ -94,7 +94,7 @@ class Flight:
         return now_ns
 
     def _breaks_off(self) -> bool:
-        """Return whether a failure, or Ctrl-C, ends what is under way."""
+        """Return whether a failure, or Ctrl-C, ends the present step."""
         return bool(self._supervisor.failure) or self._supervisor.interrupts.stop_requested
 
     def _state(self) -> str:
@@ -104,7 +104,7 @@ class Flight:
     # -- look ----------------------------------------------------------------------------------------------------
 
     def _look(self, operator: Operator, checks: BeforeTakeOff) -> bool:
-        """Wait for what the checks before the take-off judge, and say what they find; return whether that is all."""
+        """Wait for the evidence of the checks, and report the findings; return whether nothing more is to be done."""
         looking = Looking(checks, self._supervisor.run.drones, self._turn(operator))
         while not self._breaks_off():
             if looking.finished(self._turn(operator)):
@@ -117,10 +117,10 @@ class Flight:
     # -- fly -----------------------------------------------------------------------------------------------------
 
     def _fly(self, operator: Operator) -> str:
-        """Go on until there is a reason to land; returns the reason if it is a failure."""
+        """Continue until there is a reason to land; returns the reason if it is a failure."""
         now_ns = self._turn(operator)
         if self._plan.look_only or self._breaks_off():
-            return self._supervisor.failure  # what broke the look off must not be answered by a take-off
+            return self._supervisor.failure  # a failure during the checks must not be answered by a take-off
         if self._plan.asks:
             self._prompting = True
             self._keyboard.forget()
@@ -150,11 +150,11 @@ class Flight:
                 return failure
 
     def _tell_grounded(self, operator: Operator, now_ns: int) -> None:
-        """Say what a run waits for whose drones landed though nobody ordered all to: watchdogs, or one order each."""
+        """Tell what the run waits for if drones landed without an order for all: by watchdogs, or one order each."""
         if operator.phase not in (TeamPhase.UP, TeamPhase.TRACKING, TeamPhase.HELD):
             self._grounded = False
         elif operator.landed(now_ns) and not self._grounded:
-            self._grounded = True  # until the next take-off: a drone that is not heard for a while counts as in the air
+            self._grounded = True  # until the next take-off: a drone not heard for a while counts as airborne
             self._say(
                 "all drones have landed without an order to all (why: see the events). Ctrl-C ends the run; to fly "
                 "again: groundstation takeoff, then groundstation track"
@@ -187,7 +187,7 @@ class Flight:
             self._start.show_screen()
 
     def _answer(self, operator: Operator, now_ns: int) -> None:
-        """Take what was typed: Enter alone takes off, and so does the word anyway; nothing else does."""
+        """Take typed input: Enter alone, or the word "anyway", takes off; nothing else does."""
         word = self._keyboard.line()
         if self._keyboard.gone:
             self._prompting = False
@@ -203,13 +203,13 @@ class Flight:
     # -- land ----------------------------------------------------------------------------------------------------
 
     def _land(self, operator: Operator) -> bool:
-        """Land everybody and wait; returns whether all said that they have landed."""
+        """Land all drones and wait; returns whether all reported that they have landed."""
         supervisor = self._supervisor
         now_ns = time.monotonic_ns()
         if not operator.landed(now_ns):
             self._say("landing")
         operator.land(now_ns)
-        # When the simulator is gone there is nobody left to report a landing, unless a drone is real.
+        # Without the simulator nobody can report a landing, unless a drone is real.
         patient = self._plan.asks or not supervisor.failure
         limit_s = self._plan.landing_limit_s if patient else _FAILED_LANDING_S
         deadline_ns = now_ns + int(limit_s * NS_PER_S)
@@ -224,7 +224,7 @@ class Flight:
 
 
 def end_of(outcome: FlightOutcome) -> tuple[Severity, str]:
-    """Return how loud the end of a run is, and how it ended."""
+    """Return severity and text of the end of a run."""
     landing = "all drones are on the ground" if outcome.landed else "not every drone reported a landing"
     if outcome.failure:
         return Severity.ERROR, f"{outcome.failure.splitlines()[0]}; {landing}"

@@ -1,4 +1,4 @@
-"""Which parts of a simulated run are real (`--real drone_2=autopilot:19410`, `--real ceiling`), and what that takes."""
+"""Which parts of a simulated run are real (`--real drone_2=autopilot:19410`, `--real ceiling`), and their needs."""
 
 import ipaddress
 from collections.abc import Iterable, Mapping
@@ -16,7 +16,8 @@ _LOOPBACK = "127.0.0.1"
 
 @dataclass(frozen=True, slots=True)
 class RealBody:
-    """A real drone or target; source: who says where it is; address: where its firmware's simulator sends that;
+    """A real drone or target; source: provider of its place; address: where its firmware's simulator sends that.
+
     system: the motion capture system that follows it.
     """
 
@@ -27,7 +28,7 @@ class RealBody:
 
 @dataclass(frozen=True, slots=True)
 class RealParts:
-    """What of a field is not emulated: drones and targets by name, cameras by the names that their streams have.
+    """The parts of a field that are not emulated: drones and targets by name, cameras by the names of their streams.
 
     A world-fixed camera has its own name, one that a drone carries the drone's. systems: of motion capture and ranging.
     """
@@ -39,7 +40,7 @@ class RealParts:
 
     @property
     def bodies(self) -> dict[str, RealBody]:
-        """Return the real drones and targets; nobody says where a target is."""
+        """Return the real drones and targets; targets have no provider of their place."""
         return {**self.drones, **{name: RealBody(NONE) for name in sorted(self.targets)}}
 
     @property
@@ -52,7 +53,7 @@ ALL_EMULATED = RealParts()
 
 
 def parse_real(field: Field, options: Iterable[str]) -> RealParts:
-    """Return what `--real` names; raises OperatorMistake for what is unknown, contradictory or not safe."""
+    """Return the parts that `--real` names; raises OperatorMistake for unknown, contradictory or unsafe ones."""
     drones: dict[str, RealBody] = {}
     cameras: set[str] = set()
     targets: set[str] = set()
@@ -114,7 +115,7 @@ def _require_sense(field: Field, parts: RealParts) -> None:
     fixed = parts.cameras & set(field.cameras) | parts.systems - set(field.truth.values())
     for name, body in parts.drones.items():
         if body.source == ESTIMATE and not fixed:
-            # A fence judged by emulated cameras alone is no fence: they would show the drone where it is believed.
+            # A fence judged by emulated cameras alone is useless: they would show the drone where it is believed.
             sensor = next(iter((*field.cameras, *field.volumes)))
             raise OperatorMistake(
                 f"--real {name}: nothing real says where it is, so nothing would hold it inside of the fence: make a "
@@ -135,7 +136,7 @@ def _require_sense(field: Field, parts: RealParts) -> None:
 
 
 def notes(field: Field, parts: RealParts) -> list[str]:
-    """Return what the operator should know of a mixed run, a sentence each."""
+    """Return notes on a mixed run for the operator, a sentence each."""
     lines = []
     emulated = [name for name in field.drones if name not in parts.drones]
     for name, body in parts.drones.items():

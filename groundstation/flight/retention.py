@@ -1,4 +1,4 @@
-"""Which recorded runs make room for the next: the oldest, once they take more than the field allows."""
+"""Removes the oldest recorded runs once they take more space than the field allows."""
 
 import re
 import shutil
@@ -54,10 +54,10 @@ def _runs(parent: Path) -> Iterator[RecordedRun]:
     for folder in parent.iterdir() if parent.is_dir() else ():
         if _NAME.fullmatch(folder.name) and folder.is_dir() and not folder.is_symlink():
             if is_stretch(part_path(folder, STATE, 1)):
-                continue  # somebody chose what is in it
+                continue  # somebody chose its contents
             try:
                 status = [path.lstat() for path in (folder, *folder.rglob("*"))]
-            except OSError:  # another flight removes it
+            except OSError:  # another flight is removing it
                 continue
             newest_s = max(one.st_mtime for one in status[1:] or status)
             yield RecordedRun(folder, sum(one.st_size for one in status[1:]), newest_s)

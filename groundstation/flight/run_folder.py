@@ -1,4 +1,7 @@
-"""The folder of a run: made and tried before anything starts; what the command knows of the run is written to it."""
+"""The folder of a run: created and tested before anything starts.
+
+The command's facts about the run are written to it.
+"""
 
 import logging
 import os
@@ -34,7 +37,7 @@ def make_run_dir(parent: Path, field_name: str) -> Path:
                 break
             path = parent / f"{stamp}-{field_name}-{number}"
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.mkdir(mode=0o700)  # there are pictures of people in it
+        path.mkdir(mode=0o700)  # it holds pictures of people
         probe = path / ".probe"
         probe.write_bytes(b"x" * 4096)
         probe.unlink()
@@ -49,7 +52,7 @@ def make_run_dir(parent: Path, field_name: str) -> Path:
 
 
 def write_facts(run_dir: Path, facts: run_facts.RunFacts) -> None:
-    """Write how the run was asked for, and when this process was started: the operator waits from then on."""
+    """Write how the run was requested, and when this process started: from then on the operator waits."""
     command_ns, lacked = time.time_ns() - _age_ns(), not kernels.are_compiled()
     typed = without_passwords(shlex.join(["groundstation", *sys.argv[1:]]))
     known = msgspec.structs.replace(facts, command_unix_ns=command_ns, kernels_lacked=lacked, command=typed)

@@ -1,4 +1,4 @@
-"""What a process sees of the bus: publish, and subscriptions that never block the network."""
+"""The interface of the bus: publishing, and subscriptions that never block the network."""
 
 import threading
 from collections import Counter, deque
@@ -15,9 +15,9 @@ from groundstation.errors import MessageError
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """Bytes under a key as they came, decoded later by the process's own loop.
+    """Bytes received under a key, decoded later by the process's own loop.
 
-    arrived_ns: when the network had them, on this host's boot clock; 0 where nobody looked.
+    arrived_ns: arrival at the network, on this host's boot clock; 0 if not noted.
     """
 
     key: str
@@ -49,8 +49,8 @@ def decode_sample(sample: Sample) -> Received:
 class Subscription:
     """A bounded queue between the network thread (which only enqueues) and the loop that drains it.
 
-    With `newest=True` it keeps the newest sample per key instead. What overflows or is refused is counted.
-    on_arrival: called by the network thread after each sample; it must not block.
+    With `newest=True` it keeps the newest sample per key instead. Overflows and refusals are counted. on_arrival:
+    called by the network thread after each sample; it must not block.
     """
 
     def __init__(self, capacity: int = 4096, newest: bool = False) -> None:
@@ -81,7 +81,7 @@ class Subscription:
 
     def drain_samples(self) -> list[Sample]:
         """Return and forget all waiting samples, undecoded."""
-        if not self._arrived.is_set():  # as most often, and each turn of a driver asks five
+        if not self._arrived.is_set():  # usually so, and each turn of a driver checks five
             return []
         with self._lock:
             self._arrived.clear()
@@ -111,7 +111,7 @@ class Subscription:
 class Bus(Protocol):
     """One process's end of the star. `source` is the process's own name and goes into every key it publishes.
 
-    run: name of the run that the process takes part in, "" where nobody said.
+    run: name of the run that the process takes part in, "" if unknown.
     """
 
     site: str

@@ -15,7 +15,7 @@ class _Followed:
         self._last_ns = 0
 
     def now_ns(self) -> int:
-        # Two threads that read at once may differ by the microseconds by which an offset is corrected; no matter.
+        # Two threads that read at once may differ by the microseconds of an offset correction; that is harmless.
         self._last_ns = max(self._last_ns, time.monotonic_ns() + self._offset_ns())
         return self._last_ns
 
@@ -26,7 +26,7 @@ _followed: _Followed | None = None
 def follow(clock: str, offset_ns: Callable[[], int]) -> None:
     """Read the clock of the run's host from now on, in this process.
 
-    offset_ns: returns what is to be added to this host's boot clock [ns].
+    offset_ns: returns the offset to add to this host's boot clock [ns].
     """
     global _followed
     _followed = _Followed(clock, offset_ns)
@@ -55,7 +55,7 @@ def clock_id() -> str:
 
 @cache
 def own_id() -> str:
-    """Return the id of this host's boot clock; that of a time namespace has its shift [s] besides."""
+    """Return the id of this host's boot clock; in a time namespace it includes the shift [s]."""
     try:
         boot = Path("/proc/sys/kernel/random/boot_id").read_text().strip()[:8]
     except OSError:

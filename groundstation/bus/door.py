@@ -1,6 +1,6 @@
-"""Why a guarded router that is there lets this member not in: a TLS handshake of our own, for the reason.
+"""Finds why a guarded router refuses this member, by a TLS handshake of our own.
 
-Zenoh says of every failure alike that it cannot open a session.
+Zenoh reports every failure alike: it cannot open a session.
 """
 
 import socket
@@ -18,7 +18,7 @@ _OUT_OF_DATE, _ELSEWHERE = (9, 10), (62, 64)
 def why_closed(endpoint: str, identity: Identity) -> str:
     """Return why the router at an endpoint and this member do not trust each other, with the remedy.
 
-    "": nobody is there, or the door is open.
+    "": nobody is there, or the member is admitted.
     """
     host, _, port = endpoint.rpartition("/")[2].rpartition(":")
     try:
@@ -41,7 +41,7 @@ def _context(identity: Identity) -> ssl.SSLContext:
 def _knock(context: ssl.SSLContext, raw: socket.socket, host: str) -> str:
     try:
         with context.wrap_socket(raw, server_hostname=host) as guarded:
-            guarded.recv(1)  # of TLS 1.3 a refusal comes behind the handshake; who is let in hears nothing yet
+            guarded.recv(1)  # in TLS 1.3 a refusal follows the handshake; an admitted member hears nothing yet
     except ssl.SSLCertVerificationError as error:
         return _mistrust(error, host)
     except ssl.SSLError as error:

@@ -27,7 +27,7 @@ def _segments(data: bytes) -> Iterator[tuple[int, int]]:
 
 
 def stated_size(data: bytes) -> tuple[int, int] | None:
-    """Return (width, height) [px] as the frame header states them, 0 included; None where there is no such header."""
+    """Return (width, height) [px] as the frame header states them, 0 included; None if there is no such header."""
     for marker, place in _segments(data):
         if marker in _FRAME_MARKERS and len(data) >= place + 9:
             return int.from_bytes(data[place + 7 : place + 9]), int.from_bytes(data[place + 5 : place + 7])
@@ -35,7 +35,7 @@ def stated_size(data: bytes) -> tuple[int, int] | None:
 
 
 def has_ended(data: bytes) -> bool:
-    """Return whether a JPEG that is still coming is whole: it ends, and not with a thumbnail in its head.
+    """Return whether a JPEG received so far is whole: it ends, and not just with a thumbnail in its head.
 
     WIRE: ITU-T T.81 B.1.1.5: behind the first scan the end marker stands at the end only.
     """

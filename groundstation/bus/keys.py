@@ -30,15 +30,15 @@ def expression(site: str, topic: Topic, entity: str = "*", source: str = "*") ->
 
 
 def plane_expression(site: str, plane: Plane) -> str:
-    """Return the expression of everything in one plane of a site, and of nothing in the others."""
+    """Return the expression of all keys in one plane of a site, and none in others."""
     return "/".join((_ROOT, site, *([plane.value] if plane else []), "**"))
 
 
 def parse(text: str) -> Key:
     """Return the parts of a concrete key.
 
-    Raises MessageError for wildcards, keys outside the table and names that are none: any peer may put on a wildcard
-    (docs/reference/zenoh.md 3), and a name may end on the operator's terminal.
+    Raises MessageError for wildcards, keys outside the table and invalid names: any peer may put on a wildcard
+    (docs/reference/zenoh.md 3), and a name may appear on the operator's terminal.
     """
     if "*" in text:
         raise MessageError("wildcard_key", text)

@@ -47,4 +47,4 @@ class MemoryBus(Sender):
         self._exchange.deliver(Sample(self.key(topic, entity), payload, attachment, clock.own_ns()))
 
     def close(self) -> None:
-        """Nothing to release."""
+        """Do nothing: there is nothing to release."""

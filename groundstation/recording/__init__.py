@@ -1,1 +1,1 @@
-"""MCAP recordings of a run: schemas, files that survive a crash, and a reader that takes what is left of them."""
+"""MCAP recordings of a run: schemas, files that survive a crash, and a reader that recovers damaged ones."""

@@ -1,4 +1,4 @@
-"""Pictures in which nobody can be recognised: an eighth of the resolution, drawn large again."""
+"""Makes pictures in which nobody can be recognised: an eighth of the resolution, enlarged again."""
 
 import cv2
 import numpy as np
@@ -10,7 +10,10 @@ _MOST_PX = 1 << 20
 
 
 def blurred(jpeg: bytes) -> bytes | None:
-    """Return a JPEG of the same size with an eighth of the detail; None for what is no picture, or no size of one."""
+    """Return a JPEG of the same size with an eighth of the detail.
+
+    None for data that is no picture, or has no plausible size.
+    """
     try:
         coarse = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_REDUCED_COLOR_8) if jpeg else None
     except cv2.error:  # one that claims to be huge

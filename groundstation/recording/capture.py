@@ -32,7 +32,7 @@ _clock_offset = msgspec.json.Decoder(ClockOffset)
 class Entry:
     """One message on its way into a file, times in UNIX ns; `facts` go to its channel's metadata.
 
-    derived: says for viewers what another entry says already; it counts neither as written nor as lost.
+    derived: repeats another entry for viewers; it counts neither as written nor as lost.
     """
 
     channel: str
@@ -61,7 +61,7 @@ class Capture:
         self.refused: Counter[str] = Counter()
 
     def entry(self, sample: Sample, arrival_ns: int) -> Entry | None:
-        """Return what to write for a sample that arrived at a boot-clock time; None if it is refused."""
+        """Return the entry for a sample with its arrival on the boot clock; None if it is refused."""
         try:
             channel = self._channels.get(sample.key) or self._parse(sample.key)
             key = channel.key

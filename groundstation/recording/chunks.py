@@ -1,4 +1,4 @@
-"""The records inside an MCAP file of ours: framing, chunks and messages, each taken as far as it is sound."""
+"""The records inside an MCAP file of ours: framing, chunks and messages, each read as far as it is sound."""
 
 import os
 import struct
@@ -24,14 +24,14 @@ from groundstation.recording.viewers import is_for_viewers
 
 RECORD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
-# Nothing we write is longer; a longer length field is damage, not a reason to reserve the memory.
+# We write nothing longer; a longer length field is damage, no reason to reserve memory.
 _MAX_RECORD_BYTES = 1 << 30
 _MAX_CHUNK_BYTES = 1 << 28
 # WIRE (MCAP specification): a chunk's record from its opcode to the length of its records, compressed as ours are.
 _CHUNK = struct.Struct("<BQQQQII4sQ")
 _MARK, _MARK_AT = struct.pack("<I4s", 4, b"zstd"), struct.calcsize("<BQQQQI")
 _BLOCK_BYTES = 1 << 20
-# What a damaged body of a record makes its parser raise.
+# The errors that a parser raises for a damaged record body.
 UNREADABLE = (ValueError, EOFError, struct.error, zstandard.ZstdError, McapError)
 
 Channels = dict[int, Key | None]
@@ -39,12 +39,12 @@ Wanted = Callable[[Topic], bool]
 
 
 def every_topic(_topic: Topic) -> bool:
-    """Want everything."""
+    """Accept every topic."""
     return True
 
 
 def among(topics: Iterable[Topic]) -> Wanted:
-    """Return a question for topics; by identity, since there is one of each and it is asked of every message."""
+    """Return a filter for topics; by identity, because there is one object for each and every message is tested."""
     known = frozenset(map(id, topics))
     return lambda topic: id(topic) in known
 
@@ -63,7 +63,7 @@ class RawRecord:
 def frames(stream: IO[bytes], damage: list[str]) -> Iterator[tuple[int, bytes]]:
     """Yield whole records as (opcode, body) until the footer, or until the file ends early.
 
-    Behind a record that cannot be one it goes on with the next whole chunk.
+    After an invalid record it continues with the next whole chunk.
     """
     stream.seek(len(MCAP0_MAGIC))
     while True:
@@ -86,7 +86,7 @@ def is_record(opcode: int) -> bool:
 
 
 def skip_damage(stream: IO[bytes], at: int, damage: list[str]) -> bool:
-    """Go to the next whole chunk behind a record that cannot be one, and say what is lost; False: nothing follows."""
+    """Go to the next whole chunk after an invalid record, and note the loss; False: nothing follows."""
     found = _next_chunk(stream, at + 1)
     damage.append(f"cut off at byte {at}" if found is None else f"unreadable from byte {at} to {found}")
     if found is not None:
@@ -138,7 +138,7 @@ def chunk_data(body: bytes, damage: list[str]) -> bytes:
 
 
 def inner_records(data: bytes) -> Iterator[tuple[int, int, int]]:
-    """Yield (opcode, begin, end of the body) of the records in a chunk's data; what is cut short ends it."""
+    """Yield (opcode, begin, end of the body) of the records in a chunk's data, up to the first that is cut short."""
     at, size = 0, len(data)
     while at + RECORD.size <= size:
         opcode, length = RECORD.unpack_from(data, at)
@@ -155,7 +155,7 @@ def message_of(data: bytes, begin: int, end: int) -> tuple[int, int, int, int, b
 
 
 def chunk_records(data: bytes, channels: Channels, wanted: Wanted, damage: list[str]) -> Iterator[RawRecord]:
-    """Yield the messages of a chunk whose channel leads to a key; `channels` learns what the chunk declares."""
+    """Yield the messages of a chunk whose channel leads to a key; adds the chunk's declarations to `channels`."""
     for opcode, begin, end in inner_records(data):
         if opcode == Opcode.MESSAGE:
             channel, sequence, logged, published = _MESSAGE.unpack_from(data, begin)
@@ -193,7 +193,7 @@ def _learn_channel(body: bytes, channels: Channels, wanted: Wanted, damage: list
         return
     channels[channel.id] = None
     if is_for_viewers(channel.topic):
-        return  # said once more for viewers; the messages themselves are on their own channels
+        return  # a copy for viewers; the messages themselves are on their own channels
     try:
         key = keys.parse(channel.topic)
     except MessageError:

@@ -1,4 +1,4 @@
-"""Valid files from recordings: all that is sound of a cut one, or a stretch of a run."""
+"""Makes valid files from recordings: the sound part of a damaged one, or a stretch of a run."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -38,7 +38,7 @@ class Copied:
 
 
 def messages_of(index: FileIndex, from_ns: int = 0, until_ns: int = _FOR_EVER) -> Iterator[Copied]:
-    """Yield everything sound in a file with from <= log time < until, viewer channels included, in file order."""
+    """Yield all sound messages of a file with from <= log time < until, viewer channels included, in file order."""
     for chunk in index.chunks:
         if chunk.end_ns < from_ns or chunk.start_ns >= until_ns:
             continue
@@ -48,7 +48,7 @@ def messages_of(index: FileIndex, from_ns: int = 0, until_ns: int = _FOR_EVER) -
                 continue
             number, sequence, logged, published, payload = message_of(data, begin, end)
             channel = index.declared.get(number)
-            if channel is not None and from_ns <= logged < until_ns:  # else declared in a chunk that is damaged
+            if channel is not None and from_ns <= logged < until_ns:  # else it was declared in a damaged chunk
                 yield Copied(channel, index.schemas.get(channel.schema_id), sequence, logged, published, payload)
 
 
@@ -99,9 +99,9 @@ def new_copy(path: Path, preamble: Preamble) -> Iterator[CopyWriter]:
 
 
 def recover(path: Path, target: Path) -> tuple[int, list[str]]:
-    """Write all that is sound of a file into a new one; returns the number of messages and what was wrong.
+    """Write all sound messages of a file into a new one; returns their number and the damage.
 
-    Raises RecordingError when the file is none of ours, or when not a single message is left of it.
+    Raises RecordingError if the file is not ours, or not a single message is left.
     """
     opened, index = open_recording(path), FileIndex(path)
     with new_copy(target, preamble_copy(opened, {})) as writer:
@@ -115,9 +115,9 @@ def recover(path: Path, target: Path) -> tuple[int, list[str]]:
 
 
 def cut(run: RecordedRun, stem: str, from_ns: int, until_ns: int, target: Path) -> int:
-    """Write the messages with from <= log time < until of one stem's parts into a new file; returns how many.
+    """Write the messages with from <= log time < until of one stem's parts into a new file; returns their number.
 
-    It begins with the latched values: what was said last before `from`, logged at `from` and published when it was.
+    It begins with the latched values: the last messages before `from`, logged at `from` with their own publish time.
     """
     indexes = [index for index in run.indexes if index.stem == stem]
     latched = run.latest_before(from_ns, LATCHED_TOPICS.__contains__)
@@ -132,7 +132,7 @@ def cut(run: RecordedRun, stem: str, from_ns: int, until_ns: int, target: Path) 
 
 
 def preamble_copy(opened: Recording, note: Mapping[str, Mapping[str, str]]) -> Preamble:
-    """Return the preamble of a recording for a copy of it, with a note on what the copy is."""
+    """Return the preamble of a recording for a copy of it, with a note about the copy."""
     written = opened.metadata.get("run", {}).get("created_unix_ns", "")
     created = int(written) if re.fullmatch("[0-9]{1,19}", written) else 0  # metadata has no checksum
     typed = {name: (opened.media_types[name], data) for name, data in opened.attachments.items()}

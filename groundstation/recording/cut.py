@@ -1,4 +1,4 @@
-"""A stretch of a run as a new run: a folder for a folder, a file for a file."""
+"""Cuts a stretch of a run out as a new run: a folder from a folder, a file from a file."""
 
 import shutil
 from pathlib import Path
@@ -9,15 +9,15 @@ from groundstation.recording.outputs import new_folder, require_absent
 from groundstation.recording.run import RecordedRun
 from groundstation.time_units import NS_PER_S
 
-# What reports and replays look for beside the files of a run.
+# Files that reports and replays need beside those of a run.
 _COMPANIONS = ("run.json", "resolved.yaml")
 
 
 def cut_run(run: RecordedRun, path: Path, from_s: float, to_s: float | None, output: Path | None) -> dict[Path, int]:
-    """Write what happened in a run between two times [s since the start]; returns the new files with their messages.
+    """Write a run's messages between two times [s since the start]; returns the new files with their message counts.
 
-    path: where the run was opened. Afterwards `run.damage` says what could not be read of it.
-    Raises RecordingError when nothing lies between them or the output exists; leaves nothing half done behind.
+    path: where the run was opened. Afterwards `run.damage` names unreadable parts. Raises RecordingError if nothing
+    lies between them or the output exists; leaves no partial output.
     """
     end_s = run.duration_s if to_s is None else to_s
     if not from_s < end_s:

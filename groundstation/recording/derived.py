@@ -82,13 +82,13 @@ def camera_frames(field: ResolvedField) -> tuple[Transform, ...]:
 
 
 class ViewerChannels:
-    """Makes the entries of viewers' channels from entries that are recorded anyway."""
+    """Makes the entries of viewers' channels from recorded entries."""
 
     def __init__(self, field: ResolvedField | None = None) -> None:
         self._cameras = camera_frames(field) if field else ()
         self._lenses = field.calibrations if field else {}
         self._colours = colours_of(field.drones, field.tracked) if field else {}
-        # Of the newest picture of each camera: its time, and the places of what it shows.
+        # For the newest picture of each camera: its time, and the places of markers in it.
         self._seen: dict[str, tuple[int, dict[str, Vector3]]] = {}
         self._next_ns = 0
         self._trajectories = Trajectories()
@@ -100,14 +100,17 @@ class ViewerChannels:
         }
 
     def derived(self, entry: Entry) -> tuple[Entry, ...]:
-        """Return the viewers' extra messages for an entry; none where there is nothing to add, or nothing readable."""
+        """Return the viewers' extra messages for an entry.
+
+        None if there is nothing to add or the entry is unreadable.
+        """
         make = self._makers.get(entry.facts["topic"])
         if make is None:
             return ()
         try:
             return make(entry)
         except (msgspec.DecodeError, ValueError, RecursionError):
-            return ()  # malformed inside; the entry itself is recorded as it came
+            return ()  # malformed inside; the entry itself is recorded as received
 
     def _places(self, entry: Entry) -> tuple[Entry, ...]:
         now_ns = entry.publish_time_ns

@@ -1,4 +1,4 @@
-"""How much room is left on the disk, and what to leave out when it runs low."""
+"""The space left on the disk, and what to omit when it runs low."""
 
 import os
 from enum import IntEnum
@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 class Space(IntEnum):
-    """What still may be written, from best to worst."""
+    """What may still be written, from best to worst."""
 
     AMPLE = 0
     LOW = 1
@@ -16,12 +16,12 @@ class Space(IntEnum):
 
 # LOW only warns; below FULL no new file is begun (an open one goes on until the kernel refuses).
 LIMITS_BYTES = {Space.LOW: 1_000_000_000, Space.NO_IMAGES: 200_000_000, Space.FULL: 20_000_000}
-# A level is left only when this much more is free, so that it does not flap at its border.
+# A level is left only when this much more is free, so that it does not flap at the border.
 _HYSTERESIS = 1.1
 
 
 def assess(free: int, before: Space = Space.AMPLE) -> Space:
-    """Return the level for so many free bytes, given the level before."""
+    """Return the level for a number of free bytes, given the previous level."""
     level = Space.AMPLE
     for candidate, limit in LIMITS_BYTES.items():
         if free < limit * (_HYSTERESIS if before >= candidate else 1.0):
@@ -30,6 +30,6 @@ def assess(free: int, before: Space = Space.AMPLE) -> Space:
 
 
 def free_bytes(folder: Path) -> int:
-    """Return what an ordinary user may still write there; raises OSError when the folder is gone."""
+    """Return the bytes that an ordinary user may still write there; raises OSError if the folder is gone."""
     facts = os.statvfs(folder)
     return facts.f_bavail * facts.f_frsize

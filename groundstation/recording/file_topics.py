@@ -1,4 +1,4 @@
-"""Which topics go into which file of a run. Cheap to import: a recorder that starts again subscribes first."""
+"""The file of a run for each topic. Cheap to import: a restarted recorder subscribes first."""
 
 from groundstation.bus.topics import INNOVATION, LEASE, TOPICS, Quality, Topic
 
@@ -11,13 +11,13 @@ def is_picture(topic: Topic) -> bool:
     return topic.type is None and topic.encoding.startswith(("image/", "video/"))
 
 
-# Typed messages are small and tell the whole story; pictures and datagrams are bulky and lie beside them.
+# Typed messages are small and hold the whole story; pictures and datagrams are bulky and go to a separate file.
 STATE_TOPICS: tuple[Topic, ...] = tuple(topic for topic in TOPICS.values() if topic.type is not None)
 IMAGE_TOPICS: tuple[Topic, ...] = tuple(topic for topic in TOPICS.values() if is_picture(topic))
 DATAGRAM_TOPICS: tuple[Topic, ...] = tuple(
     topic for topic in TOPICS.values() if topic.type is None and topic not in IMAGE_TOPICS
 )
-# What holds until it is said anew: a cut, or a viewer that joins at any moment, needs the last of each.
+# Topics whose last message stays valid: a cut, or a viewer that joins at any time, needs the last of each.
 LATCHED_TOPICS: frozenset[Topic] = frozenset(
     topic
     for topic in STATE_TOPICS

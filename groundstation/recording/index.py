@@ -1,4 +1,4 @@
-"""Where in a file each time and each channel lies, found in one pass that decompresses next to nothing."""
+"""Indexes a file by time and channel, in one pass that decompresses next to nothing."""
 
 import re
 import struct
@@ -48,7 +48,7 @@ class Chunk:
 
 
 class FileIndex:
-    """The chunks and channels of one file, whole or cut anywhere; `damage` says what was wrong with it.
+    """The chunks and channels of one file, whole or cut anywhere; `damage` names its faults.
 
     chunks: in file order, which is the order in which their messages arrived.
     """
@@ -66,7 +66,7 @@ class FileIndex:
         self.chunks = [chunk for chunk in self.chunks if chunk.counts]
         self._by_time = sorted(self.chunks, key=lambda chunk: chunk.start_ns)
         self._starts_ns = [chunk.start_ns for chunk in self._by_time]
-        # Chunks overlap a little in time: how far all up to here reach.
+        # Chunks overlap slightly in time: the latest time of all chunks up to each.
         self._reach_ns = list(accumulate((chunk.end_ns for chunk in self._by_time), max))
         self._places: dict[int, list[int]] = {}
         for number, chunk in enumerate(self._by_time):
@@ -95,7 +95,7 @@ class FileIndex:
             at += RECORD.size + length
 
     def _complete(self, stream: IO[bytes]) -> None:
-        """Learn the channels, which stand in the chunk that first uses them, and count where no index says it."""
+        """Learn the channels, which are in the chunk that first uses them, and count messages without an index."""
         for chunk in self.chunks:
             counted = chunk.counts and not (self.damage and chunk is self.chunks[-1])
             if not counted or any(channel not in self.declared for channel in chunk.counts):
@@ -114,11 +114,11 @@ class FileIndex:
 
     @property
     def stem(self) -> str:
-        """Return the name that all parts of this file share."""
+        """Return the common name of all parts of this file."""
         return re.sub(r"-[0-9]+$", "", self.path.stem)
 
     def data(self, chunk: Chunk) -> bytes:
-        """Return the records of a chunk, or nothing when it is damaged, which is noted once."""
+        """Return the records of a chunk, or nothing if it is damaged, which is noted once."""
         noted: list[str] = []
         with self.path.open("rb") as stream:
             data = self._data(stream, chunk, noted)
@@ -127,13 +127,16 @@ class FileIndex:
         return data
 
     def checked_damage(self) -> list[str]:
-        """Return the damage after every chunk's checksum was compared."""
+        """Return the damage after comparing every chunk's checksum."""
         for chunk in self.chunks:
             self.data(chunk)
         return self.damage
 
     def read(self, chunk: Chunk, wanted: Wanted = every_topic) -> list[RawRecord]:
-        """Return the messages of the wanted topics in one chunk, in file order; damage is noted and costs the chunk."""
+        """Return the messages of the wanted topics in one chunk, in file order.
+
+        A damaged chunk is noted and skipped.
+        """
         channels = {id_: key for id_, key in self.channels.items() if key is None or wanted(key.topic)}
         hidden: Channels = {id_: None for id_ in self.channels if id_ not in channels}
         records = list(chunk_records(self.data(chunk), channels | hidden, wanted, self.damage))
@@ -178,7 +181,7 @@ class FileIndex:
         return any((key := self.channels.get(id_)) is not None and wanted(key.topic) for id_ in chunk.counts)
 
     def counts(self) -> dict[Key, int]:
-        """Return how many messages each key has."""
+        """Return the number of messages of each key."""
         total: Counter[Key] = Counter()
         for chunk in self.chunks:
             for id_, count in chunk.counts.items():

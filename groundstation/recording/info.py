@@ -1,4 +1,4 @@
-"""What is in a recording: its parts, topics with counts and rates, versions, holes and damage."""
+"""Describes a recording: its parts, topics with counts and rates, versions, holes and damage."""
 
 import json
 from array import array
@@ -20,12 +20,12 @@ from groundstation.recording.run import RecordedRun
 from groundstation.recording.schemas import description_of
 from groundstation.time_units import NS_PER_S
 
-_RATED_S = 1.0  # messages that span less have no rate
-# A topic that comes regularly has a hole where it is silent for this long and for this many of its periods.
+_RATED_S = 1.0  # messages over a shorter time have no rate
+# A regular topic has a hole if it is silent for this long and for this many periods.
 _HOLE_S = 1.0
 _HOLE_PERIODS = 5.0
 _MAX_HOLES = 20
-# Told while somebody is seen, searched for, or on the ground.
+# Published only while somebody is seen, searched for, or on the ground.
 _NOW_AND_THEN = (OBSERVATION, INNOVATION, SEARCHED_PICTURE, SEARCH_MAP, PREFLIGHT)
 _LATEST_NS = (1 << 63) - 1
 
@@ -43,7 +43,7 @@ class Hole:
 class ChannelInfo:
     """One channel over all parts: schema, messages, mean rate [Hz], first and last message [s since the start].
 
-    The rate is 0 where the messages span less than a second: two that came together have none.
+    The rate is 0 if the messages span less than a second: two that came together have none.
     """
 
     channel: str
@@ -67,7 +67,7 @@ class PartInfo:
 
 @dataclass(frozen=True, slots=True)
 class RecordingInfo:
-    """All of it, ready to be printed or encoded."""
+    """The whole description, ready to be printed or encoded."""
 
     parts: tuple[PartInfo, ...]
     start_unix_ns: int
@@ -92,7 +92,7 @@ class _Times:
 
 
 def info_of(run: RecordedRun) -> RecordingInfo:
-    """Return what is in a run; every chunk is read and its checksum compared."""
+    """Return the description of a run; every chunk is read and its checksum compared."""
     channels: dict[str, _Times] = {}
     counts = [_gather(index, channels) for index in run.indexes]
     regular = _regular(channels)
@@ -119,7 +119,7 @@ def _part(index: FileIndex, messages: int) -> PartInfo:
 
 
 def _gather(index: FileIndex, channels: dict[str, _Times]) -> int:
-    """Add the log times of a file's messages by channel; return how many there were."""
+    """Add the log times of a file's messages by channel; return their number."""
     by_id: dict[int, array[int]] = {}
     for id_, channel in index.declared.items():
         schema = index.schemas.get(channel.schema_id)
@@ -154,8 +154,8 @@ def _channel(name: str, held: _Times, run: RecordedRun, is_regular: bool) -> tup
 def _regular(channels: Iterable[str]) -> set[str]:
     """Return the channels whose silence is a hole.
 
-    What nobody sees is not observed, and that is no fault of a recording; nor is the silence of somebody who tells a
-    process' state where that process speaks for itself.
+    Missing observations of an unseen entity are no fault of a recording; nor is silence of a reporter of another
+    process's state while that process reports itself.
     """
     parsed = {}
     for name in channels:
@@ -172,7 +172,7 @@ def _regular(channels: Iterable[str]) -> set[str]:
 
 
 def _missing(run: RecordedRun) -> list[str]:
-    """Return the names of parts that must have been there; only those of whole folders are known to be missing."""
+    """Return the names of missing parts, which are known for whole folders only."""
     missing = []
     for folder, stem in sorted({(index.path.parent, index.stem) for index in run.indexes}):
         there = dict(numbered_parts(folder, stem))
@@ -183,7 +183,7 @@ def _missing(run: RecordedRun) -> list[str]:
 
 
 def _changed(run: RecordedRun) -> list[str]:
-    """Return a line for each message type that was another when it was recorded."""
+    """Return a line for each message type that has changed since the recording."""
     lines: dict[str, None] = {}
     for index in run.indexes:
         for id_, channel in index.declared.items():

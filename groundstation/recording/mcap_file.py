@@ -61,13 +61,13 @@ class McapFile:
 
     @property
     def size(self) -> int:
-        """Return how many bytes are safe on the disk, as of the last flush."""
+        """Return the number of bytes safe on the disk, as of the last flush."""
         return self._sound_bytes
 
     def flush(self) -> None:
-        """Close the chunk and hand everything to the kernel: what was written so far survives a kill -9.
+        """Close the chunk and pass everything to the kernel: it then survives a kill -9.
 
-        A file that somebody has removed is an error: the kernel would take everything, and nothing would be left.
+        A removed file is an error: the kernel would accept everything, and nothing would be left.
         """
         self._writer.flush()
         pack_indices(self._writer)
@@ -93,7 +93,7 @@ class McapFile:
 
 
 def write_preamble(writer: Writer, preamble: Preamble) -> None:
-    """Write the metadata records and attachments that stand before the first message."""
+    """Write the metadata records and attachments before the first message."""
     for name, entries in preamble.metadata.items():
         writer.add_metadata(name, dict(entries))
     created = preamble.created_unix_ns

@@ -1,4 +1,4 @@
-"""Where output goes: never over what is there, never half of it left behind, and errors that name the place."""
+"""Safe output: never overwrites, never leaves partial results, and errors name the place."""
 
 import errno
 import shutil
@@ -36,8 +36,8 @@ def errors_named(path: Path) -> Iterator[None]:
 
 @contextmanager
 def replaced_file(path: Path) -> Iterator[Path]:
-    """Yield the path to write to; it takes the place of `path`, and of what was there, when all went well."""
-    partial = path.with_name(f".partial-{path.name}")  # many a library goes by the ending
+    """Yield the path to write to; it replaces `path` when all went well."""
+    partial = path.with_name(f".partial-{path.name}")  # many libraries go by the file name's ending
     with errors_named(path):
         try:
             yield partial
@@ -48,7 +48,7 @@ def replaced_file(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def new_folder(path: Path) -> Iterator[None]:
-    """Make a folder to be filled; what was written is removed again when that fails.
+    """Make a folder to be filled; it is removed again on failure.
 
     Raises OperatorMistake when there is something already or nothing can be, OutputError when the disk refuses.
     """
@@ -61,7 +61,7 @@ def new_folder(path: Path) -> Iterator[None]:
 
 @contextmanager
 def unmade_folder(path: Path) -> Iterator[None]:
-    """Do the same for a folder that somebody else's library makes, and refuses where it exists."""
+    """Do the same for a folder made by a library that refuses an existing one."""
     require_absent(path)
     with errors_named(path), removed_if_unfinished(path):
         yield
@@ -69,7 +69,7 @@ def unmade_folder(path: Path) -> Iterator[None]:
 
 @contextmanager
 def removed_if_unfinished(path: Path) -> Iterator[None]:
-    """Remove a folder, where there is one by then, when what fills it fails or is interrupted."""
+    """Remove a folder, if it exists by then, when filling it fails or is interrupted."""
     try:
         yield
     except BaseException:
@@ -79,7 +79,7 @@ def removed_if_unfinished(path: Path) -> Iterator[None]:
 
 @contextmanager
 def new_file(path: Path) -> Iterator[Path]:
-    """Yield the path to write to; it becomes `path` when all went well, and is removed when not.
+    """Yield the path to write to; it becomes `path` when all went well, and is removed otherwise.
 
     Raises OperatorMistake when there is something already or nothing can be, OutputError when the disk refuses.
     """

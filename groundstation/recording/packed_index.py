@@ -5,7 +5,7 @@ from mcap.writer import Writer
 
 
 class PackedIndex:
-    """One chunk's index as the bytes that stand for it in the summary."""
+    """One chunk's index as its bytes in the summary."""
 
     __slots__ = ("_record",)
 
@@ -18,7 +18,7 @@ class PackedIndex:
 
 
 def pack_indices(writer: Writer) -> None:
-    """Pack what a writer has indexed since the last call; does nothing for a library that keeps it elsewhere."""
+    """Pack the index entries since the last call; does nothing if the library keeps them elsewhere."""
     # The list is private; the file is right without this, and the process only grows by 1.4 MB a minute.
     indices = getattr(writer, "_Writer__chunk_indices", None)
     if not isinstance(indices, list):

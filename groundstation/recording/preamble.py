@@ -1,4 +1,4 @@
-"""What stands at the head of every file of a run, so that each part can be understood alone."""
+"""The head of every file of a run, by which each part can be understood alone."""
 
 import json
 import platform
@@ -39,7 +39,7 @@ class Preamble:
 
 
 def preamble_of_run(field: bytes, epoch: int, timeline: Timeline, folder: Path) -> Preamble:
-    """Return the preamble for a resolved field (JSON) and what lies in the run folder."""
+    """Return the preamble for a resolved field (JSON) and the contents of the run folder."""
     created = clock.now_ns() + timeline.unix_offset_ns
     resolved = field_from_json(field)
     run = {
@@ -73,7 +73,7 @@ def processor() -> str:
 
 
 def _seeds(attachments: Mapping[str, tuple[str, bytes]]) -> dict[str, str]:
-    """Return what the noise of a simulated run came from; empty for a real flight."""
+    """Return the seeds of a simulated run; empty for a real flight."""
     _, text = attachments.get(COMMAND_NAME, ("", b"{}"))
     try:
         facts = json.loads(text)

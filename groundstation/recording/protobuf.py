@@ -1,4 +1,4 @@
-"""As much of the protobuf wire format as well-known viewer types need: write messages and their descriptors, read back.
+"""The part of the protobuf wire format that viewer types need: writing messages and descriptors, and reading them.
 
 WIRE (protobuf.dev, encoding; descriptor.proto): a field is a varint tag (number << 3 | wire type) and its value.
 A library for this would be a dependency of every flight for some forty lines.

@@ -1,4 +1,4 @@
-"""Reads recordings, whole or cut anywhere: what was flushed before a crash is there, the rest is named as damage."""
+"""Reads recordings, whole or cut anywhere: data flushed before a crash is returned, the rest is named as damage."""
 
 import re
 import zlib
@@ -55,7 +55,7 @@ class Record:
 
 @dataclass(slots=True)
 class Recording:
-    """One file. Iterate with `raw_records` or `records`; then `damage` says what was wrong with it.
+    """One file. Iterate with `raw_records` or `records`; then `damage` names its faults.
 
     attachments and metadata are filled by `open_recording`, as far as they stand before the first message.
     """
@@ -68,7 +68,7 @@ class Recording:
     preamble_damage: list[str] = field(default_factory=list)
 
     def raw_records(self, wanted: Wanted = every_topic) -> Iterator[RawRecord]:
-        """Yield the messages of the wanted topics in file order; foreign channels are passed over."""
+        """Yield the messages of the wanted topics in file order; foreign channels are skipped."""
         self.damage[:] = self.preamble_damage
         channels: dict[int, Key | None] = {}
         with self.path.open("rb") as stream:
@@ -78,7 +78,7 @@ class Recording:
                     yield from chunk_records(data, channels, wanted, self.damage)
 
     def records(self, wanted: Wanted = every_topic) -> Iterator[Record]:
-        """Yield decoded messages of the wanted typed topics; what does not decode is named in `damage`."""
+        """Yield decoded messages of the wanted typed topics; undecodable ones are named in `damage`."""
         for raw in self.raw_records(lambda topic: topic.type is not None and wanted(topic)):
             if (record := self.decoded(raw)) is not None:
                 yield record
@@ -121,14 +121,14 @@ def payload(raw: RawRecord) -> tuple[Header, bytes]:
 
 
 def parts(run_dir: Path, stem: str) -> list[Path]:
-    """Return the files of one stem in a run folder, in order; parts that were taken away are passed over."""
+    """Return the files of one stem in a run folder, in order; removed parts are skipped."""
     return [path for _, path in numbered_parts(run_dir, stem)]
 
 
 def open_recording(path: Path) -> Recording:
-    """Return a recording with its attachments and metadata; raises RecordingError if it is none of ours."""
+    """Return a recording with its attachments and metadata; raises RecordingError if it is not ours."""
     recording = Recording(path)
-    if path.is_fifo():  # it is read more than once; opening one that nobody writes to would wait for ever
+    if path.is_fifo():  # it is read more than once; opening one without a writer would wait forever
         raise RecordingError(f"{path}: is a pipe, not a file")
     try:
         with path.open("rb") as stream:
@@ -143,7 +143,7 @@ def open_recording(path: Path) -> Recording:
 
 
 def open_parts(paths: Iterable[Path]) -> tuple[list[Recording], dict[Path, str]]:
-    """Return the parts that are recordings, and why each other is none (killed before its first byte).
+    """Return the parts that are recordings, and for each other one why it is not (killed before its first byte).
 
     Raises the RecordingError of the first of them when none can be read.
     """
@@ -160,7 +160,7 @@ def open_parts(paths: Iterable[Path]) -> tuple[list[Recording], dict[Path, str]]
 
 
 def attached_field(run_dir: Path) -> bytes:
-    """Return the resolved field (JSON) that a run is recorded with, or `{}` where no part of it says so (yet)."""
+    """Return the resolved field (JSON) that a run is recorded with, or `{}` if no part has it (yet)."""
     try:
         opened, _ = open_parts(parts(run_dir, STATE))
     except RecordingError:
@@ -169,7 +169,7 @@ def attached_field(run_dir: Path) -> bytes:
 
 
 def recorded_offset_ns(run_dir: Path, clock: str) -> int | None:
-    """Return UNIX time minus a boot clock [ns] as a run is recorded with it; None where no part of it says so (yet)."""
+    """Return UNIX time minus a boot clock [ns] as a run is recorded with it; None if no part has it (yet)."""
     for path in (*parts(run_dir, STATE), *parts(run_dir, RAW)):
         with suppress(RecordingError):  # killed before its first byte
             noted = open_recording(path).metadata.get("run", {})

@@ -1,4 +1,4 @@
-"""A recorded flight that a tracker has processed once more: nothing flew, so nothing is judged."""
+"""Marks recordings that are re-runs: a tracker processed a flight again; nothing flew, so nothing is judged."""
 
 from collections.abc import Mapping
 
@@ -8,7 +8,7 @@ _RECORD = "replay"
 
 
 class Rerun(msgspec.Struct, frozen=True):
-    """What a re-run repeats. changes: what was set otherwise, in words ("": nothing but the tracker's version)."""
+    """The origin of a re-run. changes: changed settings, in words ("": only the tracker's version)."""
 
     of: str
     changes: str = ""
@@ -20,7 +20,7 @@ class Rerun(msgspec.Struct, frozen=True):
 
     @property
     def mark(self) -> str:
-        """Return what stands over every view of it."""
+        """Return the mark over every view of it."""
         return f"{self.kind.upper()}, not flown"
 
     @property
@@ -31,7 +31,7 @@ class Rerun(msgspec.Struct, frozen=True):
 
     @property
     def sentence(self) -> str:
-        """Return what it is and what its figures are worth."""
+        """Return a sentence on what it is and how far its figures count."""
         return (
             f"{self.subject}: no flight, so nothing is judged; estimates and plans were computed, "
             "vehicles, safety and processes are those of the recorded flight"
@@ -43,6 +43,6 @@ class Rerun(msgspec.Struct, frozen=True):
 
 
 def rerun_of(metadata: Mapping[str, Mapping[str, str]]) -> Rerun | None:
-    """Return which re-run a recording is, by its metadata; None for a flight."""
+    """Return the re-run that a recording is, by its metadata; None for a flight."""
     record = metadata.get(_RECORD)
     return None if record is None else Rerun(record.get("of", "a recording"), record.get("changes", ""))

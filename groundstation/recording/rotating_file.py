@@ -1,4 +1,4 @@
-"""A file that never gives up: after a write error it goes on in a new one as soon as there is room for it."""
+"""A file series that survives write errors: it continues in a new file as soon as there is room."""
 
 import errno
 from collections.abc import Callable
@@ -28,7 +28,7 @@ class Trouble:
 
 @dataclass(frozen=True, slots=True)
 class Rotation:
-    """When a part is full: size [bytes] and age [ns]; 0 is never. No part is younger than a second."""
+    """Limits of a part: size [bytes] and age [ns]; 0: no limit. No part is younger than a second."""
 
     size_bytes: int = 0
     age_ns: int = 0
@@ -42,9 +42,9 @@ NO_ROTATION = Rotation()
 
 
 class FileSeries:
-    """The parts of one recording in a run folder. Never raises; what could not be written is counted in `lost`.
+    """The parts of one recording in a run folder. Never raises; unwritten entries are counted in `lost`.
 
-    has_room: asked before a part is begun, so that a full disk is not littered with fragments.
+    has_room: called before a part is begun, so that a full disk is not littered with fragments.
     """
 
     def __init__(
@@ -100,7 +100,7 @@ class FileSeries:
             self._file = None
 
     def take_troubles(self) -> list[Trouble]:
-        """Return and forget what happened since the last call."""
+        """Return and forget the troubles since the last call."""
         troubles, self._troubles = self._troubles, []
         return troubles
 
@@ -114,7 +114,7 @@ class FileSeries:
             self._pending = 0
 
     def _rotate(self, now_ns: int) -> None:
-        """Begin the next part when this one is full; where that is impossible, go on in this one."""
+        """Begin the next part when this one is full; if that is impossible, continue in this one."""
         full = self._file
         if full is None or not self._rotation.due(full.size, now_ns - self._begun_ns):
             return
@@ -162,6 +162,6 @@ class FileSeries:
         self._retry_ns = now_ns + RETRY_PERIOD_NS
         self.lost += self._pending
         self._pending = 0
-        if not self.failing:  # loud once, not at every retry
+        if not self.failing:  # reported once, not at every retry
             self.failing = True
             self._troubles.append(Trouble(f"cannot write the {self._stem} recording: {error.strerror or error}"))

@@ -20,10 +20,10 @@ class _Place:
 
 
 class RecordedRun:
-    """The files of a run by time [UNIX ns]; cut files are taken as far as they are sound.
+    """The files of a run by time [UNIX ns]; cut files are read as far as they are sound.
 
-    metadata and attachments are those of the first part that has any. `unread` says why a part among others is no
-    recording at all (begun and killed before its first byte); where none is readable, RecordingError is raised.
+    metadata and attachments are those of the first part that has any. `unread` says why a part is no recording at all
+    (killed before its first byte); if none is readable, RecordingError is raised.
     """
 
     def __init__(self, paths: list[Path]) -> None:
@@ -50,7 +50,7 @@ class RecordedRun:
 
     @property
     def damage(self) -> list[str]:
-        """Return what was wrong so far, file by file; reading on may find more."""
+        """Return the faults found so far, file by file; further reading may find more."""
         unread = [f"{path.name}: {text}" for path, text in self.unread.items()]
         return unread + [f"{index.path.name}: {text}" for index in self.indexes for text in index.damage]
 
@@ -60,7 +60,7 @@ class RecordedRun:
         return (self.end_ns - self.start_ns) / NS_PER_S
 
     def counts(self) -> dict[Key, int]:
-        """Return how many messages each key has in all files."""
+        """Return the number of messages of each key in all files."""
         total: dict[Key, int] = {}
         for index in self.indexes:
             for key, count in index.counts().items():
@@ -89,7 +89,7 @@ class RecordedRun:
             yield heapq.heappop(waiting)[2]
 
     def latest_before(self, time_ns: int, wanted: Wanted = every_topic) -> dict[Key, RawRecord]:
-        """Return for each wanted key its last message with log time < time: what was known at that moment."""
+        """Return for each wanted key its last message with log time < time: the knowledge at that time."""
         found: dict[Key, RawRecord] = {}
         for index in self.indexes:
             for key, record in index.latest(time_ns, wanted).items():

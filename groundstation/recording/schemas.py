@@ -34,7 +34,7 @@ RecordedType = type[Message] | type[Datagram]
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """How a channel's messages are written, in the words of MCAP."""
+    """The encoding of a channel's messages, in MCAP's terms."""
 
     message_encoding: str
     schema_name: str
@@ -43,13 +43,13 @@ class Description:
 
 
 def recorded_type(topic: Topic) -> RecordedType:
-    """Return what the JSON entries of a topic are in a recording (pictures are no JSON)."""
+    """Return the type of a topic's JSON entries in a recording (pictures are not JSON)."""
     return topic.type or Datagram
 
 
 @cache
 def description_of(topic: Topic) -> Description:
-    """Return how a topic of the bus is written."""
+    """Return the encoding of a topic of the bus."""
     if is_picture(topic):
         return well_known(
             "foxglove.CompressedVideo" if topic.encoding.startswith("video/") else "foxglove.CompressedImage"
@@ -60,7 +60,7 @@ def description_of(topic: Topic) -> Description:
 
 @cache
 def well_known(name: str) -> Description:
-    """Return how a Foxglove type is written."""
+    """Return the encoding of a Foxglove type."""
     return Description("protobuf", name, "protobuf", viewer_descriptor(name))
 
 

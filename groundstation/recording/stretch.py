@@ -1,4 +1,4 @@
-"""A stretch that was cut out of a recording: a part of a flight, so it is not judged as one."""
+"""Marks recordings that are stretches cut out of another one: a part of a flight is not judged as a flight."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,7 +12,7 @@ _RECORD = "cut"
 
 
 class Stretch(msgspec.Struct, frozen=True):
-    """From when to when it reaches [UNIX ns]."""
+    """Begin and end of the stretch [UNIX ns]."""
 
     from_unix_ns: int
     until_unix_ns: int
@@ -24,7 +24,7 @@ class Stretch(msgspec.Struct, frozen=True):
 
     @property
     def sentence(self) -> str:
-        """Return what it is and what its figures are worth."""
+        """Return a sentence on what it is and how far its figures count."""
         duration_s = (self.until_unix_ns - self.from_unix_ns) / NS_PER_S
         return f"cut of {duration_s:.1f} s from a recording: a part of a flight, so nothing is judged"
 
@@ -34,7 +34,7 @@ class Stretch(msgspec.Struct, frozen=True):
 
 
 def stretch_of(metadata: Mapping[str, Mapping[str, str]]) -> Stretch | None:
-    """Return which stretch a recording is, by its metadata; None for a whole one."""
+    """Return the stretch that a recording is, by its metadata; None for a whole one."""
     record = metadata.get(_RECORD)
     if record is None:
         return None

@@ -1,6 +1,6 @@
 """A made-up run of two drones with the topics, rates and sizes of the demo's: for benches and tests of recordings.
 
-No simulator is behind it: bodies go round in circles, estimates are those circles with noise of full precision.
+It uses no simulator: bodies move in circles, estimates are those circles with noise of full precision.
 """
 
 import heapq
@@ -26,7 +26,7 @@ UNIX_OFFSET_NS = 1_700_000_000 * NS_PER_S
 DRONES = ("drone_1", "drone_2")
 _TARGET = "turtlebot"
 _TURN_NS = 66 * NS_PER_MS
-# Different ones, or the compression of a chunk would find them again.
+# Several different ones, because compression would recognise repetitions.
 _JPEGS = [b"\xff\xd8" + Random(number).randbytes(28_000) + b"\xff\xd9" for number in range(16)]
 _DATAGRAMS = [Random(number).randbytes(6000) for number in range(16)]
 
@@ -254,7 +254,7 @@ def write_run(folder: Path, field: bytes, duration_s: float, rotation: Rotation 
 
 
 def write_turn(writer: RunWriter, samples: list[Sample], now_ns: int) -> None:
-    """Write what arrived in a turn, as the recorder does."""
+    """Write the samples of a turn, as the recorder does."""
     writer.write((one for one in samples if not one.attachment), writer.state, now_ns)
     writer.write((one for one in samples if one.attachment), writer.raw, now_ns)
     writer.tick(now_ns)

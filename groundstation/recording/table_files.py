@@ -1,4 +1,4 @@
-"""Tables of a run as CSV or Parquet files, and which column has which unit in `columns.csv`."""
+"""Tables of a run as CSV or Parquet files, with the units of their columns in `columns.csv`."""
 
 import csv
 import json
@@ -29,7 +29,7 @@ class TableFile(Protocol):
 
 
 class CsvFile:
-    """Comma-separated, a header line, empty cells for what is unknown, lists of numbers as JSON."""
+    """Comma-separated, a header line, empty cells for unknown values, lists of numbers as JSON."""
 
     SUFFIX = ".csv"
 
@@ -102,7 +102,7 @@ class ParquetFile:
             self._stream.close()
 
 
-# What raw topics leave in a table: when, and how much.
+# The columns of raw topics: time and size.
 _SIZES = (column("payload_bytes", Cell.WHOLE),)
 
 
@@ -142,7 +142,7 @@ class _Writer:
 def write_tables(
     run: RecordedRun, folder: Path, kind: type[CsvFile] | type[ParquetFile]
 ) -> tuple[dict[str, int], list[str]]:
-    """Write all topics of a run into a new folder; returns rows by table, and what could not be decoded.
+    """Write all topics of a run into a new folder; returns rows by table, and decoding errors.
 
     Raises OperatorMistake when the folder exists or cannot be there, OutputError when the disk is full.
     Nothing is left behind then.

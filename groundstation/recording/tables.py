@@ -1,4 +1,4 @@
-"""Messages as rows of tables: one table for each topic, and one more for each list of things inside its messages.
+"""Messages as rows of tables: one table for each topic, and one more for each list inside its messages.
 
 Columns are named as the fields, vectors by axis, the unit last (`velocity_x_m_s`). Lists of numbers without names
 stay lists.
@@ -47,7 +47,7 @@ _XYZ = "xyz"
 
 
 class Cell(Enum):
-    """What a column holds."""
+    """The type of a column's values."""
 
     REAL = "real"
     WHOLE = "whole"
@@ -67,7 +67,7 @@ class Column:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A table of one topic: `rows` turns a message into its rows, without the columns that all tables begin with."""
+    """A table of one topic: `rows` turns a message into its rows, without the common first columns."""
 
     name: str
     columns: tuple[Column, ...]
@@ -80,7 +80,7 @@ def column(name: str, cell: Cell) -> Column:
     return Column(name, unit, cell)
 
 
-# Every table begins with these: seconds since the start of the run, UNIX time, whom it is about, who says so.
+# Every table begins with these: seconds since the start of the run, UNIX time, entity, source.
 COMMON = (
     column("time_s", Cell.REAL),
     column("unix_ns", Cell.WHOLE),
@@ -122,7 +122,7 @@ def _inner_table(name: str, element: type, items: Getter) -> Table:
 
 
 def _element(kind: Any) -> type | None:
-    """Return the struct that a field lists, if that is what it does."""
+    """Return the struct type in a field's list, or None."""
     arguments = get_args(kind)
     if get_origin(kind) is tuple and len(arguments) == 2 and arguments[1] is Ellipsis and _is_struct(arguments[0]):
         found: type = arguments[0]

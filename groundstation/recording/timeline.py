@@ -1,17 +1,17 @@
-"""Boot-clock stamps to UNIX time, by one mapping that stays the same for a whole recording."""
+"""Maps boot-clock stamps to UNIX time, by one mapping for a whole recording."""
 
 from groundstation.bus.messages import ClockOffset
 from groundstation.time_units import NS_PER_S
 
-# A stamp further than this from the time of arrival is a defect of its sender: it must not stretch the time axis.
+# A stamp farther from its arrival is a sender's defect: it must not stretch the time axis.
 _PLAUSIBLE_NS = 10 * NS_PER_S
 
 
 class Timeline:
     """Maps stamps of this host's clock, and of others once their offset is known.
 
-    clock: id of this host's boot clock; unix_offset_ns: UNIX minus boot time, read once. A later step of the
-    system's clock therefore bends no recording.
+    clock: id of this host's boot clock; unix_offset_ns: UNIX minus boot time, read once. So later steps of the system's
+    clock do not affect a recording.
     """
 
     def __init__(self, clock: str, unix_offset_ns: int) -> None:
@@ -20,7 +20,7 @@ class Timeline:
         self._offsets = {clock: 0}
 
     def learn(self, offset: ClockOffset) -> None:
-        """Take in the measured offset of another host's clock, if it leads to ours."""
+        """Take the measured offset of another host's clock, if it is to ours."""
         if offset.header.clock == self.clock and offset.of != self.clock:
             self._offsets[offset.of] = offset.offset_ns
 

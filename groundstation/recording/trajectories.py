@@ -1,4 +1,4 @@
-"""Where each body was in the last seconds, as its estimates said then."""
+"""The trajectory of each body over the last seconds, by its estimates at the time."""
 
 from collections import deque
 from collections.abc import Iterable
@@ -12,7 +12,7 @@ _PERIOD_NS = NS_PER_S
 
 
 class Trajectories:
-    """Keeps the poses of the last 10 s, five a second, and hands them out once a second."""
+    """Keeps the poses of the last 10 s, five a second, and returns them once a second."""
 
     def __init__(self) -> None:
         self._poses: dict[str, deque[tuple[int, Transform]]] = {}
@@ -21,7 +21,7 @@ class Trajectories:
     def take(self, now_ns: int, bodies: Iterable[Transform]) -> dict[str, list[Transform]]:
         """Return the trajectory of each body, oldest pose first, where it is time for it; else nothing.
 
-        A body that is estimated no more has a shorter one each time, and an empty one at last. A clock that went back
+        The trajectory of a body without estimates becomes shorter each time, and at last empty. A clock that goes back
         begins anew.
         """
         if now_ns < self._pose_due_ns - _POSE_PERIOD_NS:

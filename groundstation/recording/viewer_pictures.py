@@ -1,4 +1,4 @@
-"""What viewers need to draw in a camera's pictures: its lens, and a mark for each body it saw; pure.
+"""Annotations of camera pictures for viewers: the lens, and a mark for each body seen. Pure.
 
 WIRE (foxglove/schemas, proto): names and numbers of the fields of CameraCalibration and ImageAnnotations.
 """

@@ -1,4 +1,4 @@
-"""What viewers understand without knowing us: well-known Foxglove types, in protobuf as all of them read it.
+"""Messages that viewers understand without knowing us: well-known Foxglove types, in protobuf.
 
 WIRE (foxglove/schemas, proto): names and numbers of the fields below. Pictures carry our header in a field of our own.
 """
@@ -16,7 +16,7 @@ TF_CHANNEL = "/tf"
 LOG_CHANNEL = "/log"
 SCENE_CHANNEL = "/scene"
 TRAJECTORY_PREFIX = "/trajectory/"
-# Derived from messages that are recorded on their own channels too; our reader passes them over.
+# Derived from messages that are recorded on their own channels too; our reader skips them.
 _CHANNELS = frozenset((TF_CHANNEL, LOG_CHANNEL, SCENE_CHANNEL))
 
 _HEADER_FIELD = 1000
@@ -112,7 +112,7 @@ class Transform:
 
 
 def is_for_viewers(channel: str) -> bool:
-    """Return whether a channel says for viewers what another one says already."""
+    """Return whether a channel repeats another one for viewers."""
     return channel in _CHANNELS or channel.startswith((*PICTURE_PREFIXES, TRAJECTORY_PREFIX))
 
 

@@ -1,4 +1,4 @@
-"""From samples of the bus to the files of a run: state in one series, pictures and datagrams in the other."""
+"""Writes samples of the bus to the files of a run: state in one series, pictures and datagrams in the other."""
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -16,7 +16,7 @@ from groundstation.recording.timeline import Timeline
 class RunWriter:
     """Writes one run: `state` and `raw` are its two series of files.
 
-    field: the resolved field as JSON; has_room: asked before a file is begun.
+    field: the resolved field as JSON; has_room: called before a file is begun.
     """
 
     def __init__(
@@ -36,11 +36,11 @@ class RunWriter:
 
     @property
     def refused(self) -> int:
-        """Return how many samples no reader could have used."""
+        """Return the number of unusable samples."""
         return sum(self._capture.refused.values())
 
     def write(self, samples: Iterable[Sample], series: FileSeries, now_ns: int) -> None:
-        """Add samples that arrived by now [ns, boot clock] to one of the series, and beside them what viewers need."""
+        """Add samples that arrived by now [ns, boot clock] to one of the series, and derived entries for viewers."""
         entry_of, derived, write = self._capture.entry, self._viewers.derived, series.write
         for sample in samples:
             entry = entry_of(sample, now_ns)

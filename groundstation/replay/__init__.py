@@ -1,1 +1,1 @@
-"""Recordings come alive again: through the console as it was, and through today's tracker to see what differs."""
+"""Replays recordings: in the console as they were, and through today's tracker to see differences."""

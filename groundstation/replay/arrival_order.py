@@ -1,7 +1,7 @@
 """Iterates a recording in arrival order from any time; also the last message of each key before it.
 
-A message is recorded at its time of measurement, and came later. The recorder wrote in order of arrival: what stands
-before it in the file had come before it, so it came at the latest time that any message had until then.
+A message is recorded at its time of measurement, but arrived later. The recorder wrote in order of arrival: earlier
+messages in the file had arrived before, so its arrival is the latest time of any message so far.
 """
 
 import heapq
@@ -20,13 +20,13 @@ from groundstation.time_units import NS_PER_S
 
 Arrival = tuple[int, RawRecord]
 _MILESTONES = (EVENT, COMMAND, COMMAND_ACK)
-# So many small chunks hold the two minutes that a seek looks back over; those with pictures are large.
+# This many small chunks hold the two minutes that a seek looks back over; those with pictures are large.
 _KEPT_SMALL, _KEPT_LARGE = 1000, 6
 _LARGE_BYTES = 200_000
 _STEP_REACH_NS = 30 * NS_PER_S
 
 
-is_shown = among(TOPICS)  # the console shows something of it
+is_shown = among(TOPICS)  # topics that the console shows
 
 
 class _File:
@@ -36,7 +36,7 @@ class _File:
         self._index = index
         self.ends = list(accumulate((chunk.end_ns for chunk in index.chunks), max))
         self.begins = [chunk.start_ns for chunk in index.chunks[:1]] + self.ends[:-1]
-        # Estimates come 50 times a second and tell the time well enough; a file of pictures needs its datagrams for it.
+        # Estimates come 50 times a second and give the time well enough; a file of pictures needs its datagrams for it.
         known = {key.topic for key in index.channels.values() if key is not None}
         self._timed: Wanted = is_shown if ESTIMATE in known else lambda _topic: True
         self._read: OrderedDict[int, list[Arrival]] = OrderedDict()
@@ -82,12 +82,12 @@ class Reel:
 
     @property
     def duration_s(self) -> float:
-        """Return how long it is."""
+        """Return its length [s]."""
         return (self.end_ns - self.start_ns) / 1e9
 
     @property
     def damage(self) -> list[str]:
-        """Return what was wrong with the files."""
+        """Return the faults of the files."""
         return [*self._source_damage, *self._run.damage]
 
     def between(self, after_ns: int, until_ns: int, wanted: Wanted = is_shown) -> Iterator[Arrival]:
@@ -100,12 +100,12 @@ class Reel:
         return list(self._run.latest_before(at_ns + 1, wanted).values())
 
     def tick_after(self, at_ns: int) -> int:
-        """Return when the next tick of the tracker is, or the end."""
+        """Return the time of the next tick of the tracker, or of the end."""
         ticks = self.between(at_ns, min(at_ns + _STEP_REACH_NS, self.end_ns), among((ESTIMATE,)))
         return next((tick_ns for tick_ns, _ in ticks), self.end_ns)
 
     def tick_before(self, at_ns: int) -> int:
-        """Return when the tick of the tracker before a time is, or the start."""
+        """Return the time of the tracker's last tick before a time, or of the start."""
         for reach_ns in (_STEP_REACH_NS // 30, _STEP_REACH_NS):
             since_ns = max(self.start_ns - 1, at_ns - reach_ns)
             ticks = [tick_ns for tick_ns, _ in self.between(since_ns, at_ns - 1, among((ESTIMATE,)))]

@@ -1,6 +1,6 @@
-"""What would have been believed and planned with other settings, beside what was; the truth is for judging only.
+"""Compares belief and plans under other settings with the recorded ones; the truth is for judging only.
 
-The vehicles flew as they flew: a plan that is other than the recorded one moved nobody.
+The vehicles flew as recorded: a plan that differs from the recorded one moved nobody.
 """
 
 from dataclasses import asdict, dataclass, field
@@ -21,7 +21,7 @@ _OVERALL = {"tracked_s": "tracked [s]", "target_lost_s": "target lost [s]", "top
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One figure before and after a change; None where there is nothing to measure."""
+    """One figure before and after a change; None if it cannot be measured."""
 
     name: str
     before: float | None
@@ -30,7 +30,7 @@ class Row:
 
 @dataclass(slots=True)
 class Changes:
-    """Where two runs part: the greatest distance between the estimates of each entity, and other topologies.
+    """The differences of two runs: the greatest distance between the estimates of each entity, and other topologies.
 
     topologies: (from [s], to [s], before, after) of each stretch on which the chosen topologies differ.
     """
@@ -41,7 +41,7 @@ class Changes:
 
 
 def rows_of(before: RunData, after: RunData) -> list[Row]:
-    """Return all figures of two runs beside each other."""
+    """Return all figures of two runs side by side."""
     first, second = _figures(figures_of(before)), _figures(figures_of(after))
     names = [*first, *(name for name in second if name not in first)]
     return [Row(name, first.get(name), second.get(name)) for name in names]
@@ -64,7 +64,7 @@ def _figures(figures: RunFigures) -> dict[str, float | None]:
 
 
 def changes_of(before: RunData, after: RunData) -> Changes:
-    """Return where the two part."""
+    """Return the differences of two runs."""
     changes = Changes()
     for name in sorted(set(before.estimates) & set(after.estimates)):
         one, other = before.estimates[name], after.estimates[name]

@@ -1,4 +1,4 @@
-"""Where two messages differ first, and by how much."""
+"""The first difference of two messages, and its size."""
 
 import math
 from dataclasses import dataclass
@@ -6,13 +6,13 @@ from typing import Any
 
 import msgspec
 
-# Wall time is no part of what is repeated; headers count messages that a replay does not send.
+# Wall time is not repeated; headers count messages that a replay does not send.
 _NOT_COMPARED = frozenset({"header", "seconds"})
 
 
 @dataclass(frozen=True, slots=True)
 class MessageDifference:
-    """A place inside a message, what stood there and what stands there now; by: now minus then, for numbers."""
+    """A place inside a message, its recorded and its present value; by: present minus recorded, for numbers."""
 
     place: str
     recorded: Any
@@ -20,7 +20,7 @@ class MessageDifference:
 
     @property
     def by(self) -> float | None:
-        """Return how much was added, None where these are no numbers."""
+        """Return the difference, None if these are not numbers."""
         if isinstance(self.recorded, int | float) and isinstance(self.now, int | float):
             return float(self.now) - float(self.recorded)
         return None
@@ -36,7 +36,7 @@ def _short(value: Any) -> str:
 
 
 def first_difference(recorded: Any, now: Any, place: str = "") -> MessageDifference | None:
-    """Return the first place where two messages or values differ, None when they are the same to the bit."""
+    """Return the first place where two messages or values differ, None if they are identical."""
     if isinstance(recorded, msgspec.Struct) and type(recorded) is type(now):
         for name in recorded.__struct_fields__:
             if name in _NOT_COMPARED:

@@ -1,4 +1,4 @@
-"""The clock of a replay: where it is, how fast it goes, and where a page wants it to be."""
+"""The clock of a replay: its position, speed, and the jumps that pages request."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -7,7 +7,7 @@ from groundstation.replay.arrival_order import Reel
 from groundstation.replay.source import Source
 from groundstation.time_units import NS_PER_MS
 
-# Trails are kept at 5 Hz: a fast replay takes so much at a time, and loses no point of them.
+# Trails are kept at 5 Hz: a fast replay takes steps of this size, and loses no point of them.
 _STRETCH_NS = 200 * NS_PER_MS
 _LONGEST_TURN_S = 0.25
 
@@ -28,7 +28,7 @@ class Playback:
 
     @property
     def ended(self) -> bool:
-        """Return whether there is nothing more to come."""
+        """Return whether the replay is at its end."""
         return self.at_ns >= self.reel.end_ns
 
     def boot_ns(self, unix_ns: int) -> int:
@@ -36,11 +36,11 @@ class Playback:
         return unix_ns - self.source.unix_offset_ns
 
     def now_ns(self) -> int:
-        """Return how far it has come [boot clock]."""
+        """Return its position [boot clock]."""
         return self.boot_ns(self.at_ns)
 
     def section(self) -> dict[str, Any]:
-        """Return what pages show of it."""
+        """Return its state for pages."""
         return {
             "at_ms": round(self.now_ns() / 1e6, 3),
             "playing": self.playing,
@@ -49,21 +49,21 @@ class Playback:
         }
 
     def play(self, playing: bool) -> None:
-        """Go on, or stop; at the end, from the start again."""
+        """Play or pause; at the end, play from the start again."""
         if playing and self.ended:
             self._go(self.reel.start_ns)
         self.playing = playing
 
     def set_speed(self, factor: float) -> None:
-        """Go so many times as fast as it was."""
+        """Set the speed relative to real time."""
         self.speed = factor
 
     def seek(self, at_ns: int) -> None:
-        """Go to a time of the boot clock, as far as it is recorded."""
+        """Go to a time of the boot clock, within the recording."""
         self._go(at_ns + self.source.unix_offset_ns)
 
     def step(self, ticks: int) -> None:
-        """Go so many ticks of the tracker on or back, and stop there."""
+        """Go a number of the tracker's ticks forwards or back, and pause there."""
         self.playing = False
         at_ns = self.at_ns
         for _ in range(abs(ticks)):
@@ -81,10 +81,10 @@ class Playback:
         return sought
 
     def advance(self, elapsed_s: float) -> Iterator[tuple[int, int]]:
-        """Let time go on; yields (after, until) in stretches, each when the one before has been shown."""
+        """Advance time; yields (after, until) in stretches, each when the one before has been shown."""
         if not self.playing:
             return
-        # A turn that was slept through is not made up for: nobody would see what passed.
+        # A missed turn is not made up for: nobody would see it.
         goal_ns = min(self.reel.end_ns, self.at_ns + round(min(elapsed_s, _LONGEST_TURN_S) * self.speed * 1e9))
         while self.at_ns < goal_ns:
             after_ns, self.at_ns = self.at_ns, min(goal_ns, self.at_ns + _STRETCH_NS)

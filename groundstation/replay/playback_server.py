@@ -21,18 +21,18 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _LATCHED = (*STATES, LEASE)
 _TRACED = (ESTIMATE, PLAN, TRUTH, INNOVATION)
-# What the page looks back on: two minutes of curves, and longer than any detection or sighting is shown.
+# The time that the page looks back on: two minutes of curves, and longer than any detection or sighting is shown.
 _LOOK_BACK_NS, _SEEN_NS = 122 * NS_PER_S, 5 * NS_PER_S
-# The first look after a jump, which is shown before two minutes could be read.
+# The first, shorter look back after a jump, shown before two minutes can be read.
 _GLANCE_NS = 5 * NS_PER_S
-# Trails go on at 5 Hz, curves at 2 Hz (console.history).
+# Trails continue at 5 Hz, curves at 2 Hz (console.history).
 _TRACE_NS, _CURVE_NS = 200 * NS_PER_MS, 500 * NS_PER_MS
 _MARKS = 400
 _MS = 1e6
 
 
 class Show:
-    """One replay in front of any number of viewers, who all see the same and may all turn the knobs."""
+    """One replay in front of any number of viewers, who all see the same and may all control it."""
 
     def __init__(self, playback: Playback, port: int | None) -> None:
         source = playback.source
@@ -60,12 +60,12 @@ class Show:
         return {"name": name, "what": what, "note": note, "start_ms": start, "end_ms": end, "marks": self._marks()}
 
     def _marks(self) -> list[dict[str, Any]]:
-        """Return what happened when: events, and the first saying of each command."""
+        """Return the marks of the time line: events, and the first sending of each command."""
         marks: list[dict[str, Any]] = []
         said: set[tuple[str, ...]] = set()
         for at_ns, record in self._reel.milestones:
             message = _received(record)
-            # Never before the event, or a jump to the mark would not show it.
+            # Not before the event, or a jump to the mark would not show it.
             at_ms = math.ceil(self.playback.boot_ns(at_ns) / _MS)
             match message and message.message:
                 case Event() as event:
@@ -76,13 +76,13 @@ class Show:
                         said.add(name)
                         whom = ", ".join(name for name in command.scope if name != OPERATOR) or "all"
                         marks.append({"at_ms": at_ms, "kind": "COMMAND", "text": f"{command.verb} {whom}"})
-        if len(marks) > _MARKS:  # the quiet ones go first
+        if len(marks) > _MARKS:  # minor ones are dropped first
             loud = [mark for mark in marks if mark["kind"] != Severity.INFO]
             marks = loud[:_MARKS]
         return marks
 
     def turn(self) -> None:
-        """Bring the server's board to where the replay is now; the server's own turn updates the viewers."""
+        """Bring the server's board to the replay's position; the server's own turn updates the viewers."""
         now_s = time.monotonic()
         elapsed_s, self._at_s = now_s - self._at_s, now_s
         sought = self.playback.take_sought()
@@ -108,7 +108,7 @@ class Show:
         self._exchange.deliver(Sample(str(record.key), content, codec.encode(header)))
 
     def _refill(self, look_back_ns: int) -> None:
-        """Remember what had been seen until now: the newest of everything, what happened, trails and curves."""
+        """Rebuild the past up to now: the newest of everything, events, trails and curves."""
         server, reel, at_ns = self.server, self._reel, self.playback.at_ns
         now_ns = self.playback.now_ns()
         server.begin_anew()
@@ -126,13 +126,13 @@ class Show:
         server.show_anew(now_ns)
 
     def _newest(self, at_ns: int, topics: tuple[Topic, ...]) -> list[RawRecord]:
-        """Return what had come last of each key: what was measured shortly before may not have been there yet."""
+        """Return the last arrived message of each key: one measured shortly before may not have arrived yet."""
         found = {str(record.key): record for record in self._reel.newest(at_ns - _SEEN_NS, among(topics))}
         found |= {str(record.key): record for _, record in self._reel.between(at_ns - _SEEN_NS, at_ns, among(topics))}
         return list(found.values())
 
     def _trace(self, after_ns: int, at_ns: int) -> None:
-        """Let trails, curves and NIS go through the past as they did, with the newest of each key at each step."""
+        """Rebuild trails, curves and NIS through the past, with the newest message of each key at each step."""
         step: dict[str, RawRecord] = {}
         innovations: list[RawRecord] = []
         due_ns = after_ns + _TRACE_NS

@@ -1,4 +1,4 @@
-"""Today's tracker in the loop that flies, fed by a journal: same inputs, same ticks, plans where they were adopted."""
+"""Runs today's tracker in the flight loop from a journal: same inputs, same ticks, plans adopted at the same ticks."""
 
 import logging
 from collections import Counter
@@ -21,7 +21,7 @@ Words = list[tuple[Topic, Message]]
 
 
 class JournalBus(Sender):
-    """Collects what a tracker publishes in a tick; its clock is the recorded one."""
+    """Collects the messages that a tracker publishes in a tick; its clock is the recorded one."""
 
     def __init__(self, site: str, source: str, clock: str) -> None:
         super().__init__(site, source)
@@ -35,11 +35,11 @@ class JournalBus(Sender):
         return Header(stamp, self._clock, entity, self.source, next(self._sequence[entity]))
 
     def publish(self, topic: Topic, message: Message) -> None:
-        """Keep what was said."""
+        """Keep the message."""
         self.said.append((topic, message))
 
     def publish_bytes(self, topic: Topic, header: Header, payload: bytes) -> None:
-        """Nothing: a tracker sends no raw bytes."""
+        """Do nothing: a tracker sends no raw bytes."""
 
     def subscribe(
         self, topics: Iterable[Topic], entity: str = "*", source: str = "*", capacity: int = 4096, newest: bool = False
@@ -48,11 +48,11 @@ class JournalBus(Sender):
         return Subscription(capacity, newest)
 
     def close(self) -> None:
-        """Nothing to release."""
+        """Do nothing: there is nothing to release."""
 
 
 class JournalArrivals:
-    """Hands out what the journal says has arrived."""
+    """Returns the messages that arrived by the journal."""
 
     def __init__(self) -> None:
         self.refused: Counter[str] = Counter()
@@ -60,7 +60,7 @@ class JournalArrivals:
 
     @property
     def overflowed(self) -> int:
-        """Return 0: what overflowed then is in no journal."""
+        """Return 0: overflows are not in the journal."""
         return 0
 
     def pop_ready(self) -> list[tuple[str, Message]]:
@@ -70,9 +70,9 @@ class JournalArrivals:
 
 
 class JournalWorker:
-    """Plans when the recorded plan came back, with as many evaluations as that one had time for.
+    """Plans at the recorded times of return, with as many evaluations as the recorded plan had.
 
-    Where settings differ and the journal knows no plan of a pending request, it comes back with the next recorded one.
+    If settings differ and the journal has no plan for a pending request, its plan returns with the next recorded one.
     """
 
     def __init__(self, planner: Planner) -> None:
@@ -106,7 +106,7 @@ class JournalWorker:
         return Adoption(tick, plan)
 
     def close(self) -> None:
-        """Nothing to stop."""
+        """Do nothing: there is nothing to stop."""
 
 
 class Rerun:
@@ -124,7 +124,7 @@ class Rerun:
         return self._workers[-1]
 
     def tick(self, tick: Tick) -> Words:
-        """Live one tick; returns what was published in it, in order."""
+        """Run one tick; returns its published messages, in order."""
         self._arrivals.ready = tick.inputs
         self._bus.now_ns = tick.entry.now_ns
         for worker in self._workers:

@@ -1,4 +1,4 @@
-"""A re-run as a run folder of its own: what was recorded, with what the tracker says now in place of what it said."""
+"""Writes a re-run as a new run folder: the recording, with the tracker's present messages in place of its old ones."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -27,7 +27,7 @@ _is_replaced = among((*OUTPUTS, JOURNAL))
 
 
 def require_new(folder: Path) -> None:
-    """Raise RecordingError when a folder holds something already."""
+    """Raise RecordingError if a folder is not empty."""
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise RecordingError(f"{folder}: exists already; name a new folder")
 
@@ -35,7 +35,7 @@ def require_new(folder: Path) -> None:
 def live_again(source: Source, repetition: Repetition, folder: Path, field: bytes, changes: str) -> None:
     """Run a repetition to its end and write it to a new run folder.
 
-    field: the resolved field (JSON) that it runs with; changes: what is not as it was recorded, in words.
+    field: the resolved field (JSON) that it runs with; changes: differences from the recording, in words.
     """
     require_new(folder)
     opened = open_recording(source.state[0])

@@ -1,4 +1,4 @@
-"""A re-run from beginning to end: the run, its verdict in words and in JSON."""
+"""A complete re-run: the run, and its verdict in words and in JSON."""
 
 import hashlib
 import tempfile
@@ -23,7 +23,7 @@ _SHOWN = 5
 
 
 class Again:
-    """Re-runs a source. With changes it is run twice, without and with them, so that only they make a difference.
+    """Re-runs a source. With changes it is run twice, without and with them, so that only they differ.
 
     field: the resolved field as recorded; changed: the one to run with; changes: in words, none: only verify.
     """
@@ -48,10 +48,10 @@ class Again:
             require_new(output)
 
     def run(self) -> Comparison:
-        """Live all ticks again as recorded, then with the changes; returns how the first went.
+        """Run all ticks as recorded, then with the changes; returns the comparison of the first run.
 
-        Raises RecordingError when the recording holds nothing to do it with. An output that was not finished is
-        removed: half of it would look like a whole flight.
+        Raises RecordingError if the recording cannot be re-run. An unfinished output is removed: it would look like a
+        whole flight.
         """
         with removed_if_unfinished(self._output) if self._output else nullcontext():
             return self._run()
@@ -87,7 +87,7 @@ class Again:
 
     @property
     def digest(self) -> str:
-        """Return a hash of all that was said now: equal for equal re-runs, to the bit."""
+        """Return a hash of all present messages: equal for identical re-runs."""
         return self._digest.hexdigest()[:16]
 
     def lines(self, result: Comparison) -> Iterator[str]:

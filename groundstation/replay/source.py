@@ -1,4 +1,4 @@
-"""What a RECORDING on the command line is: which files it has, whose field was flown, and what made it."""
+"""The RECORDING on a command line: its files, its field, and the programs that made it."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -21,10 +21,10 @@ _TYPICAL = "a run folder holds state.mcap"
 class Source:
     """One recorded run.
 
-    state, raw: files in order of time, of the state those that can be read; field: the resolved field as JSON;
-    run, versions: what the recorder noted of the run and of the programs; began_ns: UNIX time of the first message;
-    unix_offset_ns: UNIX time minus the run's boot clock; damage: which state files are no recording at all, and why;
-    rerun: what it repeats, where it is no recorded flight.
+    state, raw: files in order of time (of state, the readable ones); field: the resolved field as JSON; run, versions:
+    the recorder's notes on the run and the programs; began_ns: UNIX time of the first message; unix_offset_ns: UNIX
+    time minus the run's boot clock; damage: state files that are no recording at all, and why; rerun: its origin if it
+    is a re-run.
     """
 
     name: str
@@ -40,12 +40,12 @@ class Source:
 
     @property
     def resolved(self) -> ResolvedField:
-        """Return the resolved field; raises msgspec.DecodeError for one that this program does not know."""
+        """Return the resolved field; raises msgspec.DecodeError for one unknown to this program."""
         return field_from_json(self.field)
 
 
 def open_source(paths: Sequence[Path]) -> Source:
-    """Return the run of a folder, or of one or several parts; raises RecordingError that says what is wrong."""
+    """Return the run of a folder, or of one or several parts; raises RecordingError that names the fault."""
     if len(paths) == 1 and paths[0].is_dir():
         folder = paths[0]
         state, raw = parts(folder, STATE), parts(folder, RAW)

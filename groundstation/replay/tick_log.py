@@ -1,4 +1,4 @@
-"""A recording as the tracker lived it: tick by tick, with what it took in and what it said."""
+"""A recording from the tracker's view: tick by tick, with its inputs and its messages."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
@@ -15,7 +15,7 @@ from groundstation.runtime.inbox import TOPICS as INPUTS
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 OUTPUTS = (ESTIMATE, BELIEF, PLAN, SETPOINT, INNOVATION)
-# Senders reach the recorder in no fixed order; after so much recorded time nothing that belongs to a tick is to come.
+# Senders reach the recorder in no fixed order; after this much recorded time a tick is complete.
 _PATIENCE_NS = 1_500 * NS_PER_MS
 _FORGET_NS = 20 * NS_PER_S
 _TIDY_EVERY = 500
@@ -26,9 +26,9 @@ Said = tuple[str, str, int]
 
 @dataclass(slots=True)
 class Tick:
-    """One tick of the journal; `first`: a life of the tracker, or what is left of one, begins here.
+    """One tick of the journal; `first`: a life of the tracker, or its remaining part, begins here.
 
-    inputs: what it ingested, as far as it is recorded; missing: (key, seq) of the rest; at_ns: UNIX time.
+    inputs: its recorded inputs; missing: (key, seq) of the rest; at_ns: UNIX time.
     """
 
     entry: JournalEntry
@@ -41,7 +41,7 @@ class Tick:
 class Tape:
     """Reads the files of a run once, in order, holding a few seconds at a time.
 
-    `said` collects what the tracker published, by (topic, entity, publish time), until somebody takes it out.
+    `said` collects what the tracker published, by (topic, entity, publish time), until it is taken.
     """
 
     def __init__(self, files: Iterable[Path]) -> None:
@@ -92,7 +92,7 @@ class Tape:
     def _filled(self, tick: Tick) -> Tick:
         for key, seq in tick.entry.ingested:
             candidates = self._held.get((key, seq & 0xFFFF_FFFF), [])
-            # A restarted driver counts from zero again: the one that is nearest in time is meant.
+            # A restarted driver counts from zero again: the nearest one in time is meant.
             candidates.sort(key=lambda record: abs(record.log_time_ns - tick.at_ns))
             message = self._decoded(candidates.pop(0)) if candidates else None
             if message is None:
@@ -109,7 +109,7 @@ class Tape:
             return None
 
     def _tidy(self, now_ns: int) -> None:
-        """Forget what nobody asked for: messages that came while no tracker lived."""
+        """Drop unused messages: those that came while no tracker lived."""
         old = [n for n, held in self._held.items() if not held or held[-1].log_time_ns < now_ns - _FORGET_NS]
         for name in old:
             del self._held[name]

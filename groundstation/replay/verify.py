@@ -1,4 +1,4 @@
-"""The recorded run in, what the tracker said out, message by message to the bit."""
+"""Re-runs a recording and compares the tracker's messages with the recorded ones, to the bit."""
 
 import time
 from collections import Counter
@@ -19,14 +19,14 @@ from groundstation.runtime.tracker_loop import EPOCHS_PER_LIFE
 from groundstation.time_units import NS_PER_S
 
 _KEPT_DIFFERENCES = 200
-# A plan is stamped when it was begun; one that was begun shortly before the end may never have been adopted.
+# A plan is stamped with its begin; one begun shortly before the end may never have been adopted.
 _PLANNING_NS = NS_PER_S
 _NAMES = frozenset(topic.name for topic in OUTPUTS)
 
 
 @dataclass(frozen=True, slots=True)
 class RerunFinding:
-    """A difference and where in the run it is: tick of the tracker's life, seconds since the recording began."""
+    """A difference and its place in the run: tick of the tracker's life, seconds since the recording began."""
 
     tick: int
     time_s: float
@@ -49,11 +49,11 @@ class Lived:
 
 @dataclass(slots=True)
 class Comparison:
-    """How a re-run went.
+    """The result of a re-run.
 
-    same, unrecorded: messages by topic that were the same to the bit, or that the recording lacks; fragments: lives of
-    the tracker whose beginning is not in the journal, which nothing can repeat exactly; missing: inputs that the
-    journal names and the recording lacks; differing: number of differing messages, the first ones in `findings`.
+    same, unrecorded: messages by topic that were identical, or missing in the recording; fragments: lives of the
+    tracker without their begin in the journal, which cannot be repeated exactly; missing: inputs in the journal that
+    the recording lacks; differing: number of differing messages, the first ones in `findings`.
     """
 
     ticks: int = 0
@@ -72,7 +72,7 @@ class Comparison:
 
     @property
     def identical(self) -> bool:
-        """Return whether every recorded word of the tracker was repeated, and there were any."""
+        """Return whether every recorded message of the tracker was repeated, and there were any."""
         return not (self.differing or self.fragments or self.missing_count) and bool(self.same)
 
     @property
@@ -82,9 +82,9 @@ class Comparison:
 
 
 class Repetition:
-    """Lives a recording again, tick by tick, and compares; `comparison` is complete when the ticks are through.
+    """Re-runs a recording, tick by tick, and compares; `comparison` is complete after the last tick.
 
-    hear: is given every message that is said now, encoded.
+    hear: called with every present message, encoded.
     """
 
     def __init__(
@@ -99,7 +99,7 @@ class Repetition:
         self._life: Rerun | None = None
 
     def ticks(self) -> Iterator[Lived]:
-        """Yield every tick with what was said in it now."""
+        """Yield every tick with its present messages."""
         comparison = self.comparison
         began_s, first_ns, last_ns = time.process_time(), 0, 0
         for tick in self.tape.ticks():
@@ -146,7 +146,7 @@ class Repetition:
             self.comparison.missing.append(f"tick {tick.entry.tick}: {key} number {seq}")
 
     def _compare(self, lived: Lived) -> None:
-        """Compare what was said with what was recorded, group by group in the order in which they were said."""
+        """Compare present messages with recorded ones, group by group in the order of sending."""
         groups: dict[tuple[str, str, int], list[Message]] = {}
         for topic, message in lived.said:
             if topic.name in _NAMES:
@@ -185,7 +185,7 @@ class Repetition:
             self.comparison.findings.append(finding)
 
     def _find_unsaid(self, first_ns: int, last_ns: int) -> None:
-        """What was recorded in a tick that is over, and was not said now, is a difference too."""
+        """Count recorded messages of a finished tick that were not sent now as differences too."""
         for (topic, entity, stamp_ns), records in sorted(self.tape.said.items(), key=lambda item: item[0][2]):
             if not first_ns <= stamp_ns <= last_ns - _PLANNING_NS:
                 continue

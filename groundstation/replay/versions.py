@@ -1,4 +1,4 @@
-"""Which libraries decide about the last bit, and whether they are the recorded ones."""
+"""The libraries that affect the last bit, compared with the recorded ones."""
 
 from collections.abc import Mapping
 from importlib.metadata import version
@@ -12,12 +12,12 @@ KERNELS, PROCESSOR = "kernels", "processor"
 
 
 def current() -> dict[str, str]:
-    """Return what a re-run is computed with, as a recorder notes it."""
+    """Return the libraries of a re-run, in the recorder's form."""
     return {name: version(name) for name in DECIDING} | {KERNELS: sources_hash(), PROCESSOR: processor()}
 
 
 def foreign(recorded: Mapping[str, str]) -> list[str]:
-    """Return a line for each library, and for the kernels' sources, that are not those of the recording."""
+    """Return a line for each library, or the kernels' sources, that differs from the recording."""
     lines = []
     for name in DECIDING:
         then, now = recorded.get(name), version(name)

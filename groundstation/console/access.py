@@ -22,7 +22,7 @@ Asgi = Callable[[Any, Any, Any], Awaitable[None]]
 
 
 def refusal(scope: Mapping[str, Any], names: frozenset[str] = _LOOPBACK_NAMES) -> str:
-    """Return "" for a request that may come in, else the reason; names: those that this server goes by."""
+    """Return "" for a permitted request, else the reason; names: the names of this server."""
     headers = {name: value.decode("latin-1") for name, value in scope["headers"]}
     host = headers.get(b"host", "")
     # A foreign name that resolves to this host (DNS rebinding) would make a foreign page "same origin".
@@ -62,9 +62,9 @@ def security_headers(host: str) -> list[tuple[bytes, bytes]]:
 
 
 class Door:
-    """Tells the programs of the user who runs this server from those of others, who have to show a code.
+    """Distinguishes programs of the user who runs this server from those of others, who must show a code.
 
-    code: what others show, once as `/?code=`, then as a cookie; code_file: where its owner finds it.
+    code: shown by others, once as `/?code=`, then as a cookie; code_file: where its owner finds it.
     """
 
     names = _LOOPBACK_NAMES
@@ -73,13 +73,13 @@ class Door:
         self._code, self._file = code, code_file
 
     def admits(self, scope: Mapping[str, Any]) -> DeviceRole | None:
-        """Return that a request from our own user, or with the code, may do everything; None for others."""
+        """Return full rights for a request from our own user, or with the code; None for others."""
         shown = cookie_of(scope, self._cookie_name(scope)).encode()
         known = self._is_own(scope) or hmac.compare_digest(shown, self._code.encode())
         return DeviceRole.COMMAND if known else None
 
     def welcome(self, scope: Mapping[str, Any]) -> bytes:
-        """Return the cookie that stands for the code from then on, if the address of a request holds it; else b""."""
+        """Return the cookie that replaces the code from then on, if the request's address has the code; else b""."""
         query = parse_qs(scope["query_string"].decode("latin-1"))
         if not hmac.compare_digest(query.get("code", [""])[0].encode(), self._code.encode()):
             return b""
@@ -87,7 +87,7 @@ class Door:
 
     @property
     def reason(self) -> str:
-        """Return what somebody is told who is not let in."""
+        """Return the message for a refused user."""
         place = f" It is in {self._file}." if self._file else ""
         return f"another user of this machine runs this console; ask for its code and open /?code=CODE.{place}"
 
@@ -103,29 +103,29 @@ class Door:
 
 
 class DeviceDoor:
-    """Lets invited devices in, by a code and then by a cookie; address: where they come to."""
+    """Admits invited devices, by a code and then by a cookie; address: where they connect."""
 
     def __init__(self, devices: Devices, address: str) -> None:
         self._devices, self.names = devices, frozenset({address})
 
     def admits(self, scope: Mapping[str, Any]) -> DeviceRole | None:
-        """Return what the device that sent a request may do, None if it may not come in."""
+        """Return the role of the device that sent a request, None if it is not admitted."""
         return self._devices.role_of(scope)
 
     def welcome(self, scope: Mapping[str, Any]) -> bytes:
-        """Return the cookie for a request that shows a code that holds, else b""."""
+        """Return the cookie for a request with a valid code, else b""."""
         return self._devices.welcome(scope)
 
     @property
     def reason(self) -> str:
-        """Return what a device is told that is not let in."""
+        """Return the message for a refused device."""
         return "this console lets invited devices in: groundstation console --invite stop"
 
 
 class Gate:
-    """ASGI middleware that answers 403 to whom it does not let in.
+    """ASGI middleware that answers 403 to requests that are not permitted.
 
-    refused: how many, as "other_site" (`refusal` has a reason) and "other_user" (the door does not admit them).
+    refused: counts of "other_site" (`refusal` has a reason) and "other_user" (the door does not admit them).
     """
 
     def __init__(self, app: Asgi, door: Door | DeviceDoor) -> None:
@@ -133,7 +133,7 @@ class Gate:
         self.refused: Counter[str] = Counter()
 
     async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
-        """Let a request in, or not."""
+        """Pass a request on, or refuse it."""
         if scope["type"] not in ("http", "websocket"):
             return
         kind, reason = "other_site", refusal(scope, self._door.names)

@@ -1,4 +1,4 @@
-"""Past alarms: what was wrong, from when to when; pure."""
+"""Past alarms, with begin and end. Pure."""
 
 from collections import deque
 from collections.abc import Iterable
@@ -9,14 +9,15 @@ from groundstation.monitor.alarms import Alarm
 from groundstation.time_units import NS_PER_S
 
 _KEPT = 50
-# What comes back within this time was not over: a figure that wavers about its limit is one alarm.
+# An alarm that returns within this time was not over: a figure that wavers about its limit is one alarm.
 _BREAK_NS = 2 * NS_PER_S
 
 
 @dataclass(slots=True)
 class _Episode:
-    """One alarm from its begin to its end, by the clock of `note`; text: as it was worded last;
-    asks: whether it asked for an act at any time.
+    """One alarm from its begin to its end, by the clock of `note`; text: its latest wording.
+
+    asks: whether it ever required an action.
     """
 
     about: str
@@ -30,13 +31,13 @@ class _Episode:
 
 
 class AlarmLog:
-    """The newest alarms of a run, those that last included."""
+    """The newest alarms of a run, including present ones."""
 
     def __init__(self) -> None:
         self._episodes: deque[_Episode] = deque(maxlen=_KEPT)
 
     def note(self, alarms: Iterable[Alarm], now_ns: int) -> None:
-        """Begin, carry on and end alarms, from all that stand now."""
+        """Begin, continue and end alarms, from all present ones."""
         standing: dict[str, Alarm] = {}
         for alarm in alarms:
             standing.setdefault(alarm.about, alarm)
@@ -50,7 +51,7 @@ class AlarmLog:
         self._episodes.extendleft(_Episode(one.about, one.text, one.asks, now_ns) for one in standing.values())
 
     def as_json(self) -> list[dict[str, Any]]:
-        """Return the alarms that are over, the last one to begin first; times in milliseconds."""
+        """Return the ended alarms, the latest begin first; times in milliseconds."""
         return [
             {"text": one.text, "asks": one.asks, "began": one.began_ns / 1e6, "ended": one.ended_ns / 1e6}
             for one in self._episodes

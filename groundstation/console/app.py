@@ -32,7 +32,7 @@ _GONE = (WebSocketDisconnect, ConnectionError, RuntimeError)
 class ConsoleApp:
     """Builds the ASGI applications: one for loopback, one for the network if it has a door.
 
-    seed: gets a frame's number and returns everything a new viewer must know.
+    seed: takes a frame's number and returns all data for a new viewer.
     """
 
     def __init__(
@@ -67,7 +67,7 @@ class ConsoleApp:
         return Response(file.content, media_type=file.media_type)
 
     async def _give_token(self, _request: Request) -> Response:
-        # For a page that outlived the process that served it. Other sites cannot read the answer.
+        # For a page that outlived its server process. Other sites cannot read the answer.
         return PlainTextResponse(self._token)
 
     async def _socket(self, socket: WebSocket) -> None:
@@ -95,7 +95,7 @@ class ConsoleApp:
             await self._farewell(socket, viewer, results[0])
 
     async def _operators_hello(self, socket: WebSocket) -> Hello | None:
-        """Return what a page says first where that shows it to be the operator's, who is let in even if it is full."""
+        """Return a page's first message if it is the operator's, who is admitted even when all places are taken."""
         if self._asked >= _ASKED or len(self._sessions.viewers) >= MAX_VIEWERS + _OPERATORS_PLACES:
             return None
         self._asked += 1
@@ -108,12 +108,12 @@ class ConsoleApp:
         return message if isinstance(message, Hello) and self._sessions.is_operators(message) else None
 
     async def _listen(self, socket: WebSocket, viewer: PageConnection) -> str:
-        """Obey the page until it goes; returns why it must go, if it must."""
+        """Serve the page until it leaves; returns the reason if it must leave."""
         while True:
             try:
                 text = await socket.receive_text()
             except KeyError:
-                return self._bad("binary")  # pages say nothing in binary
+                return self._bad("binary")  # pages send no binary messages
             if not viewer.may_speak():
                 return self._bad("too_fast")
             try:
@@ -133,4 +133,4 @@ class ConsoleApp:
             elif viewer.too_slow:
                 await socket.close(_CLOSE_SLOW, "too slow")
         except _GONE:
-            pass  # it was gone already
+            pass  # it had left already

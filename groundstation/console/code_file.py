@@ -1,4 +1,4 @@
-"""Where the user who runs a console finds the code that other users of the machine have to show."""
+"""The file in which a console's user finds the code that other users of the machine must show."""
 
 import os
 import secrets

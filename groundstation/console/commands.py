@@ -1,4 +1,4 @@
-"""Commands of the page: given as the command line gives them, repeated until heard, followed until confirmed."""
+"""Commands of the page: sent as by the command line, repeated until heard, followed until confirmed."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -12,10 +12,10 @@ from groundstation.runtime.acknowledgements import AwaitedAnswers
 from groundstation.runtime.asking import command_of, patience_s
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
-# An order that lay in a page without a connection, or in a frozen server's queue, must not surprise anybody later.
+# An order that waited in a page without connection, or in a frozen server's queue, must not be executed late.
 _START_LIVES_MS = 2000.0
 _STOP_LIVES_MS = 5000.0
-# How many are followed: newer ones displace those that need no repeating first, the others only in a flood.
+# Number of followed commands: newer ones displace first those that need no repetition, the others only in a flood.
 _KEPT, _MOST = 8, 32
 _NOBODY: Mapping[str, str] = MappingProxyType({})
 
@@ -37,7 +37,7 @@ class Followed:
 
     @property
     def is_repeated(self) -> bool:
-        """Return whether it was given here, and an answer is still waited for."""
+        """Return whether it was given here and still awaits an answer."""
         return bool(self.by) and not self.closed
 
 
@@ -52,7 +52,7 @@ class Given:
 
 
 class CommandDesk:
-    """Gives commands and follows these and everybody else's.
+    """Sends commands, and follows these and everybody else's.
 
     Stops go to the drones at once. Starts go to the run's operator, who holds the lease and takes off one by one.
     """
@@ -80,7 +80,7 @@ class CommandDesk:
         if strangers:
             return f"there is no drone {', '.join(strangers)}"
         if given.ref and any(order.ref == given.ref for order in self._orders.values()):
-            return ""  # its page lost the connection before it saw that the command had come, and gave it again
+            return ""  # its page lost the connection before it saw the command accepted, and sent it again
         stop = verb.stops
         if given.age_ms > (_STOP_LIVES_MS if stop else _START_LIVES_MS):
             late = f"{verb} came too late ({given.age_ms / 1e3:.1f} s) and was dropped"
@@ -94,7 +94,7 @@ class CommandDesk:
         return ""
 
     def hear(self, message: Command | CommandAck, now_ns: int) -> None:
-        """Follow a command that somebody gave, and every answer."""
+        """Follow a command of anybody, and every answer."""
         if isinstance(message, CommandAck):
             followed = self._orders.get(message.command_id)
             if followed is not None:
@@ -122,11 +122,11 @@ class CommandDesk:
                 self._bus.publish(COMMAND, order.book.command)
 
     def summary(self) -> list[dict[str, Any]]:
-        """Return the newest commands first, each with how far it came at each drone."""
+        """Return the commands, newest first, each with its stage at each drone."""
         return [_summary(order) for order in reversed(self._orders.values())]
 
     def _book(self, command: Command) -> AwaitedAnswers:
-        # The operator answers for what is asked of it; drones answer for themselves.
+        # The operator answers requests to it; drones answer for themselves.
         asked: Iterable[str] = (OPERATOR,) if OPERATOR in command.scope else command.scope or self._drones
         return AwaitedAnswers(command, tuple(asked))
 
@@ -171,7 +171,7 @@ def _summary(order: Followed) -> dict[str, Any]:
 
 
 def _state(order: Followed) -> str:
-    """Return sent, heard, confirmed, refused or not_confirmed: how the order as a whole stands."""
+    """Return sent, heard, confirmed, refused or not_confirmed: the state of the whole order."""
     book = order.book
     if book.confirmed:
         return "confirmed"

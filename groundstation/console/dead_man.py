@@ -1,4 +1,4 @@
-"""A dead man's handle: while it is held all goes on; let go, and the team holds, then lands. No web server involved."""
+"""A dead man's handle: while it is held all continues; released, the team holds, then lands. No web server involved."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -20,9 +20,9 @@ class Grip(StrEnum):
 
 @dataclass(slots=True)
 class DeadMan:
-    """Pure: `press` when the handle is felt, `step` often; it answers with the stop that is due, if one is.
+    """Pure: call `press` when the handle is felt, `step` often; they return the due stop, if any.
 
-    patience_ns: how long the handle may not be felt. A keyboard repeats a held key, but only after some 0.5 s.
+    patience_ns: permitted time without feeling the handle. A keyboard repeats a held key, but only after some 0.5 s.
     """
 
     patience_ns: int
@@ -31,12 +31,12 @@ class DeadMan:
     _loose_ns: int = 0
 
     def press(self, now_ns: int) -> None:
-        """The handle is held. What was stopped stays stopped: going on is the operator's RESUME."""
+        """Note that the handle is held. Stopped drones stay stopped until the operator's RESUME."""
         self._felt_ns = now_ns
         self.grip = Grip.HELD
 
     def release(self, now_ns: int) -> Verb | None:
-        """The handle is known to be let go (a gamepad says so, or is gone)."""
+        """Note that the handle is released (as a gamepad reports, or when it is gone)."""
         if self.grip is not Grip.HELD:
             return None
         self.grip, self._loose_ns = Grip.LOOSE, now_ns

@@ -1,8 +1,8 @@
-"""Tablets and phones in the network: each comes in by a code that works once, and may do what its role says.
+"""Tablets and phones in the network: each is admitted by a one-time code, with the rights of its role.
 
-What is kept lies in a folder that only the owner of the run can read, and goes with the run: an invitation is a file
-named after the digest of its code, a device one named after the digest of its cookie. So a console that is restarted
-knows its devices, and another shell invites without asking the console.
+The data are in a folder that only the owner of the run can read, and are removed with the run: an invitation is a file
+named after the digest of its code, a device one named after the digest of its cookie. So a restarted console knows its
+devices, and another shell can invite without the console.
 """
 
 import hashlib
@@ -45,7 +45,7 @@ class Devices:
         folder.mkdir(mode=0o700, exist_ok=True)
 
     def open(self, address: str, port: int) -> tuple[Path, Path]:
-        """Note where the console is; returns the files of its certificate and key, made at its first start."""
+        """Note the console's address; returns the files of its certificate and key, made at its first start."""
         certificate, key = self._folder / "console.pem", self._folder / "console.key"
         if not key.exists():
             made = Authority.make("console").member("console", [address])
@@ -69,17 +69,17 @@ class Devices:
         return certificate.fingerprint(hashes.SHA256()).hex(":").upper()
 
     def invite(self, role: DeviceRole) -> str:
-        """Return an address that lets one device in, within 10 minutes."""
+        """Return an address that admits one device, within 10 minutes."""
         code = secrets.token_urlsafe(12)
         write_private(self._folder / f"{_INVITED}{_digest(code)}", role.encode())
         return f"{self.url}?code={code}"
 
     def welcome(self, scope: Mapping[str, Any]) -> bytes:
-        """Return the cookie for a request that shows a fresh code, which is used up by that; else b""."""
+        """Return the cookie for a request with a fresh code, which is thereby used up; else b""."""
         query = parse_qs(scope["query_string"].decode("latin-1"))
         path = self._folder / f"{_INVITED}{_digest(query.get('code', [''])[0])}"
         try:
-            # Both ways: a clock that was set back must not keep an invitation alive.
+            # In both directions: a clock that was set back must not keep an invitation alive.
             fresh = abs(time.time() - path.stat().st_mtime) < _INVITATION_LIVES_S
             role = path.read_bytes()
             path.unlink()  # of two who show it at once, one finds it gone
@@ -92,7 +92,7 @@ class Devices:
         return f"{_COOKIE}={token}; Secure; HttpOnly; SameSite=Strict; Path=/".encode()
 
     def role_of(self, scope: Mapping[str, Any]) -> DeviceRole | None:
-        """Return the role of the device that sent a request, None if it is not known."""
+        """Return the role of the device that sent a request, None if unknown."""
         with suppress(OSError, ValueError):
             return DeviceRole((self._folder / f"{_KNOWN}{_digest(cookie_of(scope, _COOKIE))}").read_text())
         return None

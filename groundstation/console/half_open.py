@@ -1,7 +1,7 @@
-"""Connections that do not say what they want: each has 5 s, and when there are too many the oldest one goes.
+"""Limits connections without a request: each has 5 s, and when there are too many the oldest one is closed.
 
 A browser sends its request at once, so the oldest is never somebody's page; without this, a few hundred silent
-connections keep everybody else out. From the network, one address has so many connections at most, silent or not.
+connections keep everybody else out. From the network, the connections of one address are limited, silent or not.
 """
 
 import asyncio
@@ -12,11 +12,11 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 PATIENCE_S = 5.0
 MOST = 64
 MOST_OF_A_PEER = 24
-"""A page has one connection that stays, and a browser opens six at most to load it."""
+"""A page has one lasting connection, and a browser opens at most six to load it."""
 
 
 class HalfOpen:
-    """The connections of one server that have no request under way; `ended` counts those that were shown out."""
+    """The connections of one server without a request in progress; `ended` counts those that were closed for it."""
 
     def __init__(self, patience_s: float = PATIENCE_S, most: int = MOST) -> None:
         self._patience_s, self._most = patience_s, most
@@ -24,7 +24,7 @@ class HalfOpen:
         self.ended = 0
 
     def enter(self, transport: asyncio.Transport) -> None:
-        """Begin to wait for a request; the time runs from the first byte or silence on, and is not renewed."""
+        """Begin to wait for a request; the time counts from the connection on, and is not renewed."""
         if transport in self._waiting:
             return
         loop = asyncio.get_running_loop()
@@ -53,7 +53,7 @@ class PeerLimit:
         self.refused = 0
 
     def enter(self, transport: asyncio.Transport) -> None:
-        """Take a connection, or end it."""
+        """Accept a connection, or close it."""
         for address in [each for each, theirs in self._open.items() if all(one.is_closing() for one in theirs)]:
             del self._open[address]
         theirs = self._open.setdefault(transport.get_extra_info("peername")[0], [])
@@ -66,7 +66,7 @@ class PeerLimit:
 
 
 def protocol(waiting: HalfOpen, peers: PeerLimit | None = None) -> type[H11Protocol]:
-    """Return uvicorn's HTTP protocol, with impatience and, where peers are given, with their limit."""
+    """Return uvicorn's HTTP protocol with the limit on silence and, if peers are given, with theirs."""
 
     class Impatient(H11Protocol):
         def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]

@@ -1,4 +1,4 @@
-"""What lies behind: trails of all entities and the curves of the charts, for viewers that come later."""
+"""The recent past for late viewers: trails of all entities and the curves of the charts."""
 
 import math
 from collections import deque
@@ -30,7 +30,7 @@ class History:
         self._next_trail_ns = self._next_sample_ns = 0
 
     def due(self, now_ns: int) -> bool:
-        """Return whether there is something to take."""
+        """Return whether a sample is due."""
         return now_ns >= self._next_trail_ns or self.sample_due(now_ns)
 
     def sample_due(self, now_ns: int) -> bool:
@@ -45,7 +45,7 @@ class History:
         nis: float | None,
         truth: Mapping[str, TruthState],
     ) -> dict[str, Any] | None:
-        """Take what is due; returns a new sample of the curves, if one was taken."""
+        """Take due samples; returns a new sample of the curves, if any."""
         if estimate is not None and now_ns >= self._next_trail_ns:
             self._next_trail_ns = now_ns + _TRAIL_NS
             for entity in estimate.entities:
@@ -61,7 +61,7 @@ class History:
         return sample
 
     def take_passed(self) -> dict[str, Any]:
-        """Return and forget what was taken since the last call: a fast replay takes more than one of each at a time."""
+        """Return and forget the samples since the last call: a fast replay takes several of each at a time."""
         passed = {"points": list(self._passed), "samples": list(self._passed_samples)}
         self._passed.clear()
         self._passed_samples.clear()
@@ -87,7 +87,7 @@ class History:
         # Of several targets the curves show the worst.
         axis = round(max(axes), 4) if axes else None
         error = round(max(errors), 4) if errors else None
-        # A plan of nobody costs nothing, which is no figure for a curve.
+        # A plan without robots has no cost to show in a curve.
         flown = plan if plan is not None and plan.topology else None
         cost = None if flown is None else round(cost_cm2(flown.cost), 2)
         topology = "" if flown is None else topology_words(flown.topology)

@@ -1,4 +1,4 @@
-"""Is the estimator honest? Normalised innovations over a window, per edge, against their 95 % bounds."""
+"""The estimator's consistency: normalised innovations over a window, per edge, against their 95 % bounds."""
 
 import math
 from collections import deque
@@ -50,7 +50,7 @@ class InnovationStatistics:
         self._edges: dict[tuple[str, str], _Edge] = {}
 
     def take(self, innovation: Innovation) -> None:
-        """Take one in; only what entered the filter counts towards the NIS."""
+        """Take an innovation; only fused ones count towards the NIS."""
         edge = self._edges.setdefault((innovation.observer, innovation.subject), _Edge())
         edge.verdicts.append(innovation.verdict)
         if innovation.verdict not in _COUNTED:

@@ -1,4 +1,4 @@
-"""Where devices in the network come in: one more socket, over TLS, beside the console's own on loopback."""
+"""The access for devices in the network: one more socket, over TLS, beside the console's own on loopback."""
 
 import asyncio.constants
 import socket
@@ -13,7 +13,7 @@ from groundstation.console.half_open import PATIENCE_S
 
 @dataclass(frozen=True, slots=True)
 class Network:
-    """A listening socket, certificate and key of its server, and who is let in."""
+    """A listening socket, its server's certificate and key, and the admitted devices."""
 
     listener: socket.socket
     certificate: Path
@@ -22,7 +22,7 @@ class Network:
 
     @classmethod
     def over(cls, listener: socket.socket, devices: Devices) -> Self:
-        """Let devices in at a listening socket."""
+        """Return the access of devices at a listening socket."""
         # uvicorn hands no time-out on, and 60 s of silence before TLS would let few strangers use all descriptors up.
         vars(asyncio.constants)["SSL_HANDSHAKE_TIMEOUT"] = PATIENCE_S
         address, port = listener.getsockname()

@@ -8,20 +8,20 @@ from groundstation.time_units import NS_PER_S
 
 # A page that reconnects within this time is still the operator.
 _GRACE_NS = 15 * NS_PER_S
-# Before the name of another console: no page here is it.
+# Prefix of another console's name: no page here has it.
 _ELSEWHERE = "elsewhere: "
 
 
 @dataclass(slots=True)
 class OperatorLock:
-    """Who of the viewers is the operator: `client` survives a reconnection, `name` is what the others see."""
+    """The viewer who is the operator: `client` survives a reconnection, `name` is shown to others."""
 
     client: str = ""
     name: str = ""
     _left_ns: int = 0
 
     def may_start(self, client: str) -> bool:
-        """Return whether a viewer may give starting orders: as the operator, or where there is none."""
+        """Return whether a viewer may give starting orders: as the operator, or if there is none."""
         return self.client in ("", client)
 
     def take(self, client: str, name: str) -> str:
@@ -33,24 +33,24 @@ class OperatorLock:
     def passed_to(self, console: str) -> bool:
         """Note that a start was given at another console of the run; returns whether a viewer here was the operator.
 
-        It stays there until somebody here takes over: nobody hears when the other page is closed.
+        It stays there until somebody here takes over: the closing of the other page is not noticed here.
         """
         replaced = bool(self.client) and not self.client.startswith(_ELSEWHERE)
         self.client, self.name, self._left_ns = f"{_ELSEWHERE}{console}", console, 0
         return replaced
 
     def release(self, client: str) -> None:
-        """Give the lock back, if it is that viewer's."""
+        """Release the lock, if it is that viewer's."""
         if client == self.client:
             self.client = self.name = ""
 
     def arrived(self, client: str, name: str) -> None:
-        """A viewer came (back)."""
+        """Note that a viewer came (back)."""
         if client == self.client:
             self.name, self._left_ns = name, 0
 
     def left(self, client: str, now_ns: int) -> None:
-        """A viewer's connection ended."""
+        """Note that a viewer's connection ended."""
         if client == self.client:
             self._left_ns = now_ns
 

@@ -1,4 +1,4 @@
-"""The page's files, read once from the package: what is not in this table does not exist, whatever the path says."""
+"""The page's files, read once from the package: other paths do not exist."""
 
 from dataclasses import dataclass
 from importlib import resources

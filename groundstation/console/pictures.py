@@ -12,14 +12,14 @@ from groundstation.bus.messages import Header, RelativeObservation
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.time_units import NS_PER_MS
 
-# Half of the board's long side, quiet zone included [m]: the ring that is drawn around a detection.
+# Half of the board's long side, quiet zone included [m]: radius of the ring around a detection.
 _RING_M = 0.16
 _REMEMBERED = 8
-# Pictures come at 5 a second at most; a sender that does not keep to it is held to it here, on the average: what comes
-# is looked at in turns of 50 ms.
+# Pictures come at 5 a second at most; faster senders are limited to this on average: arrivals are checked in turns of
+# 50 ms.
 _PERIOD_NS = 200 * NS_PER_MS
 _EARLY_NS = 60 * NS_PER_MS
-# A browser decodes what it is sent: 20 megapixels are 80 MB there.
+# A browser decodes whatever it gets: 20 megapixels are 80 MB there.
 _MAX_BYTES = 4_000_000
 _MAX_PIXELS = 20_000_000
 
@@ -39,7 +39,7 @@ class PictureDesk:
     def take_picture(self, camera: str, header: Header, jpeg: bytes, now_ns: int) -> bool:
         """Keep a picture; returns whether to show it. Its frame for viewers is in `frames`.
 
-        Why the newest of a camera is not shown, if it is not, is in `refused`.
+        `refused` has the reason if the newest of a camera is not shown.
         """
         due_ns = self._due.get(camera, 0)
         if now_ns < due_ns - _EARLY_NS:
@@ -57,7 +57,7 @@ class PictureDesk:
         return True
 
     def take_detection(self, observation: RelativeObservation) -> None:
-        """Keep where in the picture a marker was."""
+        """Keep a marker's place in the picture."""
         camera, stamp_ns = observation.camera, observation.header.stamp_ns
         if camera not in self._lenses:
             return
@@ -101,7 +101,7 @@ class PictureDesk:
 
 
 def problem_of(jpeg: bytes) -> str:
-    """Return "" for a JPEG that a browser may be given, else what is wrong with it; looks at its head only."""
+    """Return "" for a JPEG fit for a browser, else its fault; checks its head only."""
     if len(jpeg) > _MAX_BYTES:
         return f"picture of {len(jpeg) / 1e6:.0f} MB, at most {_MAX_BYTES / 1e6:.0f} MB are shown"
     size = stated_size(jpeg)

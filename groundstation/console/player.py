@@ -1,4 +1,4 @@
-"""What a console needs of whatever replays a recording into it (groundstation.replay.playback)."""
+"""The interface of a replay to the console (groundstation.replay.playback)."""
 
 from typing import Any, Protocol
 
@@ -7,19 +7,19 @@ class Player(Protocol):
     """A replay that pages control together; all times are of the run's boot clock."""
 
     def now_ns(self) -> int:
-        """Return how far it has come."""
+        """Return its position."""
 
     def section(self) -> dict[str, Any]:
-        """Return what pages show of it."""
+        """Return its state for pages."""
 
     def play(self, playing: bool) -> None:
-        """Go on, or stop."""
+        """Play or pause."""
 
     def set_speed(self, factor: float) -> None:
-        """Go so many times as fast as it was."""
+        """Set the speed relative to real time."""
 
     def seek(self, at_ns: int) -> None:
         """Go to a time."""
 
     def step(self, ticks: int) -> None:
-        """Go so many ticks of the tracker on or back, and stop there."""
+        """Go a number of the tracker's ticks forwards or back, and pause there."""

@@ -65,7 +65,7 @@ def run(child: Child) -> int:
 
 
 def _network(child: Child, values: ConsoleValues) -> Network | None:
-    """Return where devices come in, if the field has them come in; without it the page on loopback is served."""
+    """Return the access of devices, if the field has one; without it only the page on loopback is served."""
     if not values.listen or child.spec.identity is None:
         return None
     devices = Devices(devices_of(child.spec.identity.folder))

@@ -1,4 +1,4 @@
-"""What a page may say: small tagged JSON messages, checked before anything is done with them."""
+"""The messages from pages: small tagged JSON, checked before use."""
 
 from typing import Annotated
 
@@ -14,7 +14,7 @@ Metres = Annotated[float, msgspec.Meta(ge=-100, le=100)]
 
 
 class FromPage(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="type", tag=str.lower):
-    """Base of what a page may say."""
+    """Base of messages from pages."""
 
 
 class Hello(FromPage, frozen=True):
@@ -27,8 +27,8 @@ class Hello(FromPage, frozen=True):
 class CommandRequest(FromPage, frozen=True, tag="order"):
     """A command to the drones named (none: all), given for the run that the page then showed.
 
-    at_ms: the server's time when it was given, as the page reckons it; age_ms: for how long the page has kept it;
-    ref: the page's own id; anyway: of TAKEOFF, although the checks before it forbid it.
+    at_ms: the server's time when it was given, as estimated by the page; age_ms: how long the page has kept it; ref:
+    the page's own id; anyway: of TAKEOFF, although the checks before it forbid it.
     """
 
     verb: Verb
@@ -41,11 +41,11 @@ class CommandRequest(FromPage, frozen=True, tag="order"):
 
 
 class TakeOver(FromPage, frozen=True):
-    """I am the operator now."""
+    """The viewer becomes the operator."""
 
 
 class Release(FromPage, frozen=True):
-    """I am not the operator any more."""
+    """The viewer is no longer the operator."""
 
 
 class FramesHandled(FromPage, frozen=True, tag="seen"):
@@ -55,7 +55,7 @@ class FramesHandled(FromPage, frozen=True, tag="seen"):
 
 
 class EndKept(FromPage, frozen=True, tag="kept"):
-    """The page holds all that it shows of a run that is over."""
+    """The page holds all data that it shows of an ended run."""
 
 
 class Watch(FromPage, frozen=True):
@@ -87,13 +87,13 @@ class FollowPath(FromPage, frozen=True):
 
 
 class Play(FromPage, frozen=True):
-    """Lets a replay go on, or stops it."""
+    """Plays or pauses a replay."""
 
     playing: bool
 
 
 class Speed(FromPage, frozen=True):
-    """How many times as fast as it was a replay goes."""
+    """Speed of a replay relative to real time."""
 
     factor: Annotated[float, msgspec.Meta(ge=0.1, le=20)]
 
@@ -105,7 +105,7 @@ class Seek(FromPage, frozen=True):
 
 
 class StepReplay(FromPage, frozen=True, tag="step"):
-    """Takes a replay so many ticks of the tracker forwards, or backwards if negative, and stops it there."""
+    """Moves a replay by a number of the tracker's ticks, backwards if negative, and pauses it there."""
 
     ticks: Annotated[int, msgspec.Meta(ge=-50, le=50)]
 
@@ -117,7 +117,7 @@ _decoder: msgspec.json.Decoder[PageMessage] = msgspec.json.Decoder(PageMessage)
 
 
 def decode(text: str | bytes) -> PageMessage:
-    """Return what a page said; raises MessageError (too_long, malformed)."""
+    """Return a page's message; raises MessageError (too_long, malformed)."""
     if len(text) > MAX_BYTES:
         raise MessageError("too_long", f"{len(text)} bytes")
     try:

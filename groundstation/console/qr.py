@@ -145,7 +145,7 @@ def _draw_format(matrix: list[list[bool | None]], mask: int) -> None:
 
 
 def _penalty(matrix: Matrix) -> int:
-    """Return how hard a code is to read (7.8.3): long runs, blocks, what looks like a finder, unequal shares."""
+    """Return how hard a code is to read (7.8.3): long runs, blocks, finder-like patterns, unequal shares."""
     lines = [*matrix, *map(list, zip(*matrix, strict=True))]
     total = 0
     for line in lines:

@@ -1,4 +1,4 @@
-"""What does not move: the room, who is in it, and how each camera looks, in the form that the page draws."""
+"""The static scene for the page: the room, the entities in it, and each camera's view."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -40,7 +40,7 @@ def scene_from_field(field: ResolvedField, truth: bool) -> Json:
 
 
 def bare_scene(site: str, drones: tuple[str, ...], truth: bool) -> Json:
-    """Return a scene for a run whose field is not known: names only, in a room of the usual size."""
+    """Return a scene for a run with an unknown field: names only, in a room of the usual size."""
     return {
         "site": site,
         "truth": truth,
@@ -96,7 +96,7 @@ def _volume(name: str, box: Volume, is_truth: bool) -> Json:
 
 
 def _rays(lens: CameraIntrinsics, rotation: Array) -> list[list[float]]:
-    """Return directions along the border of the picture, distortion undone, in the frame that `rotation` leads to."""
+    """Return directions along the border of the picture, distortion undone, in the frame to which `rotation` leads."""
     along = np.linspace(0.0, 1.0, _EDGE_POINTS, endpoint=False)
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]) * [lens.width_px, lens.height_px] - 0.5
     edges = [a + along[:, None] * (b - a) for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True)]

@@ -1,4 +1,4 @@
-"""What a run came to, as its folder has it once it is judged, and the report for the pages that are open."""
+"""The result of a run, from its folder once judged, and the report for open pages."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,9 +21,9 @@ class _Judged(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class RunEnd:
-    """The end of a run. verdict: passed, failed or invalid, "" where nothing was judged; command: what flies it again.
+    """The end of a run. verdict: passed, failed or invalid, "" if not judged; command: the command that flies it again.
 
-    report: the page to keep, None where there is none.
+    report: the page to keep, None if there is none.
     """
 
     folder: Path
@@ -45,7 +45,7 @@ class RunEnd:
 
 
 def read_end(folder: Path) -> RunEnd | None:
-    """Return what a run came to; None where its folder says nothing of it."""
+    """Return the result of a run; None if its folder has none."""
     facts, judged = run_facts.read(folder), _judged(folder)
     if not facts.command and not judged.verdict:
         return None

@@ -1,4 +1,4 @@
-"""What the console is handed at its start."""
+"""The settings that the console gets at its start."""
 
 import hashlib
 from collections.abc import Iterable, Mapping
@@ -10,7 +10,7 @@ from groundstation.bus.thinning import rates_by_key
 from groundstation.bus.topics import SETPOINT, TRUTH
 from groundstation.field.resolved import ResolvedField
 
-# A little more than the ten a second that are looked at, or one would be missing now and then.
+# Slightly more than the ten a second that are shown, or one would be missing now and then.
 _MOTION_HZ = 12.5
 
 
@@ -28,13 +28,13 @@ def devices_of(identities: str) -> Path:
 
 
 def enough_hz(site: str, drones: Iterable[str], targets: Iterable[str]) -> Mapping[str, float]:
-    """Return how many samples a second [Hz] are enough, by the keys of what comes more often."""
+    """Return the sufficient rates of samples [Hz], by the keys of faster ones."""
     drones = tuple(drones)
     return rates_by_key(site, ((SETPOINT, drones, _MOTION_HZ), (TRUTH, (*drones, *targets), _MOTION_HZ)))
 
 
 def run_id(run_dir: str) -> str:
-    """Return the identity of a run: a console that is restarted in it has the same one, no other run does.
+    """Return the identity of a run: a restarted console of the run has the same one, no other run does.
 
     Each run makes a folder of its own, and the supervisor hands that folder to every start of a process.
     """

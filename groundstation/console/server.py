@@ -57,7 +57,7 @@ _PORTS_TRIED = 10
 _FAREWELL_S = 0.5
 # For devices behind a slow radio; pages on this host hold a report within a tenth of a second.
 _KEEPING_S = 3.0
-# Small, so that frames wait here, where the newest wins, and not in the kernel.
+# Small, so that frames wait here, where the newest wins, not in the kernel.
 _SEND_BUFFER_BYTES = 64 * 1024
 _NEWEST = (ESTIMATE,)
 # Looked at in every other turn: arrows and crosses at 10 Hz are enough, and decoding is most of what this process does.
@@ -95,10 +95,10 @@ def claim_port(port: int, address: str = HOST) -> socket.socket:
 
 
 class ConsoleServer:
-    """Serves one run. `scene`: what does not move; `field`: the resolved field, or None if it is not known.
+    """Serves one run. `scene`: the static scene; `field`: the resolved field, or None if unknown.
 
-    run: its identity (`section.run_id`), which pages name in their orders; player: what replays a recording on the bus,
-    where this is no live run; network: where devices come in, if they may.
+    run: its identity (`section.run_id`), which pages name in their orders; player: the replay of a recording on the
+    bus, if this is no live run; network: access for devices, if any.
     """
 
     def __init__(
@@ -158,14 +158,14 @@ class ConsoleServer:
 
     @property
     def refused(self) -> dict[str, int]:
-        """How many requests and connections were not let in, by reason."""
+        """Return the counts of refused requests and connections, by reason."""
         devices = self.app.network.refused if self.app.network else Counter[str]()
         refused = {"silent": self.half_open.ended, "crowd": self.peers.refused, "device": devices["other_user"]}
         return {**refused, **self.app.asgi.refused, "other_site": (self.app.asgi.refused + devices)["other_site"]}
 
     @property
     def overflowed(self) -> int:
-        """Messages that came faster than they were taken."""
+        """Return the number of messages lost because they came too fast."""
         return self._each.overflowed
 
     async def serve(self, go_on: Callable[[int, int], bool], end: Callable[[], RunEnd | None] = lambda: None) -> None:
@@ -196,7 +196,7 @@ class ConsoleServer:
             await asyncio.sleep(due_s - loop.time())
 
     async def _say_farewell(self, end: RunEnd | None) -> None:
-        """Let the viewers know how the run ended, and keep its report, before their connections close."""
+        """Tell the viewers how the run ended, and let them keep its report, before their connections close."""
         self._result = end
         if end is not None and end.report is not None:
             self._pages[REPORT_PATH] = end.report
@@ -219,7 +219,7 @@ class ConsoleServer:
             viewer.notice()
 
     def take_in(self, now_ns: int) -> None:
-        """Take in what has arrived until a time."""
+        """Take in messages that arrived up to a time."""
         self.ingest(self._newest.drain(), now_ns)
         if self._player is not None or self.board.turn % 2:
             self.ingest(self._less_often.drain(), now_ns)
@@ -237,7 +237,7 @@ class ConsoleServer:
             self._hear(item.message, now_ns)
 
     def begin_anew(self) -> None:
-        """Forget what was seen: a replay has gone to another time. `show_anew` updates the viewers."""
+        """Forget the past: a replay has jumped to another time. `show_anew` updates the viewers."""
         for subscription in (self._newest, self._less_often, self._each, self._images):
             subscription.drain_samples()
         self.state = ConsoleState(self._cast, self._now_ns(), self._cameras)

@@ -1,4 +1,4 @@
-"""What a viewer's messages do: the one place where a page's words become commands."""
+"""Executes viewers' messages: the one place where pages' messages become commands."""
 
 import hmac
 from collections import Counter
@@ -49,17 +49,17 @@ def _ref_of(message: PageMessage) -> str:
 
 
 def _may(role: DeviceRole, message: PageMessage) -> bool:
-    """Return whether a device of a role may say something; frames, hello and cameras are everybody's."""
+    """Return whether a device of a role may send a message; frames, hello and cameras are permitted to all."""
     stops = isinstance(message, CommandRequest) and message.verb.stops
     return role is DeviceRole.COMMAND or (role is DeviceRole.STOP and stops)
 
 
 class Sessions:
-    """All viewers, the operator among them, and what their pages may do.
+    """All viewers, including the operator, and the rights of their pages.
 
     run: the identity of the run, which each order must name; simulated_targets: the bodies that pages may steer, none
-    outside of simulation; pictures: the newest frame of each camera; player: what replays, where this is a replay: then
-    nothing can be commanded.
+    outside of simulation; pictures: the newest frame of each camera; player: the replay, if this is one: then nothing
+    can be commanded.
     """
 
     def __init__(
@@ -85,21 +85,21 @@ class Sessions:
         self.refused: Counter[str] = Counter()
 
     def add(self, viewer: PageConnection) -> None:
-        """A viewer came."""
+        """Add a viewer."""
         self.viewers[viewer.number] = viewer
 
     def remove(self, viewer: PageConnection) -> None:
-        """A viewer went."""
+        """Remove a viewer."""
         self.viewers.pop(viewer.number, None)
         if viewer.client and not any(other.client == viewer.client for other in self.viewers.values()):
             self.operator_lock.left(viewer.client, clock.now_ns())
 
     def is_operators(self, hello: Hello) -> bool:
-        """Return whether this is said by a page of the operator."""
+        """Return whether this comes from a page of the operator."""
         return self.operator_lock.client == hello.client and self._has_token(hello)
 
     def summary(self, now_ns: int) -> dict[str, Any]:
-        """Return who is here and who is in command."""
+        """Return the viewers and the operator."""
         return {
             "operator": self.operator_lock.client,
             "operator_name": self.operator_lock.name,
@@ -108,7 +108,7 @@ class Sessions:
         }
 
     def hear(self, order: Command) -> None:
-        """Let the place of the operator go to another console at which a start was given; what is repeated is one."""
+        """Pass the operator's place to another console at which a start was given; repetitions count once."""
         source, stamp_ns = order.header.source, order.header.stamp_ns
         foreign = source.split("_")[0] == Role.CONSOLE and source != self._bus.source
         if order.verb.stops or not foreign or self._player is not None or stamp_ns <= self._starts_ns.get(source, 0):
@@ -118,7 +118,7 @@ class Sessions:
             self._tell(f"{order.verb} was given at {source}, another console: who did that is the operator now")
 
     def handle(self, viewer: PageConnection, message: PageMessage) -> None:
-        """Do what a page asks for; what it may not is answered with the reason."""
+        """Execute a page's request; one without the right to it is answered with the reason."""
         match message:
             case FramesHandled(seq=seq):
                 viewer.saw(seq)
@@ -190,7 +190,7 @@ class Sessions:
                 return
             self.operator_lock.take(viewer.client, viewer.name)
         now_ns = clock.now_ns()
-        # A page that slept may reckon the server's time wrongly, and cannot know how long an order waited here.
+        # A page that slept may estimate the server's time wrongly, and cannot know how long an order waited here.
         age_ms = max(order.age_ms, now_ns / NS_PER_MS - order.at_ms)
         given = Given(viewer.name, age_ms, order.ref, order.anyway)
         problem = self.desk.give(order.verb, order.drones, given, now_ns)

@@ -10,7 +10,7 @@ _encoder = msgspec.json.Encoder(decimal_format="number")
 class Snapshot:
     """Sections are encoded once for all viewers; a viewer gets those that changed since its last frame.
 
-    That is why a slow viewer costs nothing and misses nothing but what a newer value has replaced.
+    So a slow viewer costs nothing, and misses only values that newer ones have replaced.
     """
 
     def __init__(self) -> None:

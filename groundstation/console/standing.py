@@ -1,4 +1,4 @@
-"""Drones that stand, where fixed cameras see them: the filter knows them only once they fly. Pure."""
+"""Places of standing drones by fixed cameras: the filter knows drones only once they fly. Pure."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ _SEEN_NS = 3 * NS_PER_S
 
 @dataclass(frozen=True, slots=True)
 class StandingDrone:
-    """Where its marker was seen: x, y [m; world], heading [rad; world] or None; at_ns: when."""
+    """Place of its marker: x, y [m; world], heading [rad; world] or None; at_ns: time of the sighting."""
 
     name: str
     place_m: tuple[float, float]
@@ -36,7 +36,7 @@ class StandingDrones:
         self._seen: dict[str, StandingDrone] = {}
 
     def see(self, sighting: RelativeObservation) -> None:
-        """Take a sighting; those by drones, and those of targets, are passed over."""
+        """Take a sighting; those by drones, and those of targets, are ignored."""
         if sighting.observer not in self._poses or sighting.subject not in self._drones:
             return
         rotation, position = self._poses[sighting.observer]
@@ -47,11 +47,11 @@ class StandingDrones:
     def now(
         self, now_ns: int, flight_states: Mapping[str, FlightState], known: Collection[str]
     ) -> tuple[StandingDrone, ...]:
-        """Return who was seen within 3 s, is not in the air and not in the filter's belief (`known`)."""
+        """Return the drones seen within 3 s, not airborne and not in the filter's belief (`known`)."""
         return tuple(
             seen
             for name, seen in self._seen.items()
             if name not in known
             and now_ns - seen.at_ns < _SEEN_NS
-            and flight_states.get(name) not in AIRBORNE  # one that is not connected yet may stand there as well
+            and flight_states.get(name) not in AIRBORNE  # an unconnected one may stand there as well
         )

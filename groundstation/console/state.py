@@ -1,4 +1,4 @@
-"""What the console knows, and how it is said to the page; the newest of everything is shared with the monitor."""
+"""The console's state and its sections for the page; the newest of everything is shared with the monitor."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict
@@ -24,7 +24,7 @@ from groundstation.sensing.switches import Switch, switch_between
 _EVENTS = 40
 # Sections that change slowly are looked at every so many turns.
 _OFTEN, _SELDOM = 2, 5
-# What trails and curves go on with is no older: a line that runs on would look as if it were measured.
+# Trails and curves continue only with data no older than this: a line that runs on would look measured.
 _CURRENT_S = 1.0
 _T = TypeVar("_T")
 NO_CAMERAS: Mapping[str, WorldCamera] = MappingProxyType({})
@@ -73,7 +73,7 @@ class ConsoleState:
                     self.monitor.ingest((item,))
 
     def note(self, now_ns: int) -> None:
-        """Let trails and curves go on, where it is time for it."""
+        """Extend trails and curves when due."""
         if not self.history.due(now_ns):
             return
         truth = {name: seen.message for name, seen in self.truth.items()}
@@ -117,7 +117,7 @@ class ConsoleState:
         board.put("safety", asdict(safety_of(known, alarms)))
 
     def _flight(self) -> dict[str, Any]:
-        """Return since when somebody is in the air, and whether anybody ever was."""
+        """Return since when a drone is in the air, and whether any ever was."""
         seen, take_offs = self.monitor.vehicles.items(), self.monitor.take_offs
         airborne = [status.stamp_ns for name, status in seen if flies(status.message, take_offs.get(name))]
         self._flown |= bool(airborne)
@@ -139,13 +139,13 @@ class ConsoleState:
         ]
 
     def _search_maps(self) -> dict[str, dict[str, Any]]:
-        """Return where each target may be that is searched for now."""
+        """Return the map of each target that is searched for now."""
         seen = self.monitor.estimate
         wanted = {search.target for search in seen.message.searches} if seen else set()
         return {name: told.search_map(one) for name, one in self.search_maps.items() if name in wanted}
 
     def put_seldom(self, board: Snapshot, now_ns: int) -> None:
-        """Put what may be a quarter of a second old."""
+        """Put the sections that may be a quarter of a second old."""
         known = self.monitor
         board.put("cameras", {name: told.camera(seen) for name, seen in known.cameras.items()})
         board.put("processes", {name: told.process(seen) for name, seen in known.processes.items()})

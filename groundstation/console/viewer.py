@@ -1,4 +1,4 @@
-"""One viewer: its frames, newest wins, never more on the way than it has handled."""
+"""One viewer: sends its frames, newest first, with a limit on unacknowledged ones."""
 
 import asyncio
 import time
@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable
 from groundstation.console.devices import DeviceRole
 from groundstation.console.snapshot import Snapshot
 
-# Frames that may be on the way unanswered; the page answers each fourth. 12 frames are 0.6 s.
+# Number of unacknowledged frames on the way; the page answers each fourth. 12 frames are 0.6 s.
 WINDOW = 12
 _URGENT = 64
 _RATE_PER_S = 60.0
@@ -16,7 +16,7 @@ _BURST = 120.0
 
 
 class PageConnection:
-    """What is waiting for one page. `run` sends; the others only say that there is something to send.
+    """The data waiting for one page. `run` sends; the other methods only add data.
 
     Telemetry and pictures wait as "newest" and replace each other; notices and answers wait in order, and a viewer
     with too many of these is too slow to be helped.
@@ -51,11 +51,11 @@ class PageConnection:
 
     @property
     def is_behind(self) -> bool:
-        """Return whether the board holds what was not sent yet."""
+        """Return whether the board has unsent sections."""
         return self._turn < self._board.turn
 
     def notice(self) -> None:
-        """Say that the board has changed."""
+        """Note that the board has changed."""
         self._wake.set()
 
     def reseed(self) -> None:
@@ -77,12 +77,12 @@ class PageConnection:
             self._wake.set()
 
     def saw(self, seq: int) -> None:
-        """The page has handled frames up to this one."""
+        """Note that the page has handled frames up to this one."""
         self._seen = max(self._seen, min(seq, self._seq))
         self._wake.set()
 
     def may_speak(self) -> bool:
-        """Return whether the page keeps to the rate at which pages may speak."""
+        """Return whether the page keeps to the permitted rate of messages."""
         now = time.monotonic()
         self._allowance = min(_BURST, self._allowance + (now - self._allowance_at) * _RATE_PER_S)
         self._allowance_at = now
@@ -90,7 +90,7 @@ class PageConnection:
         return self._allowance >= 0.0
 
     async def run(self, seed: Callable[[int], str]) -> None:
-        """Send a seed, then what changes, until cancelled; `seed` gets the frame's number."""
+        """Send a seed, then changes, until cancelled; `seed` takes the frame's number."""
         await self._send_newest(seed)
         while not self.too_slow:
             await self._wake.wait()
@@ -119,7 +119,7 @@ class PageConnection:
 
 
 def delta(seq: int, now_ns: int, sections: bytes) -> str:
-    """Return a frame of what changed, with the server's time."""
+    """Return a frame of the changed sections, with the server's time."""
     return f'{{"type":"delta","seq":{seq},"now":{now_ns / 1e6:.3f},"s":{sections.decode()}}}'
 
 

@@ -13,20 +13,20 @@ from groundstation.console.network import Network
 
 
 class WebServer(uvicorn.Server):
-    """Leaves the signals to its process, which says when to stop."""
+    """A server that leaves signals to its process, which stops it."""
 
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
-        """Let the process have its signals."""
+        """Leave the signals to the process."""
         yield
 
 
 def serve(
     app: Asgi, listener: socket.socket, http: type[Any], network: Network | None = None
 ) -> tuple[WebServer, "asyncio.Task[None]"]:
-    """Start to serve and return the server, which ends by its `should_exit`, and its task.
+    """Start to serve; returns the server, which ends by its `should_exit`, and its task.
 
-    http: uvicorn's protocol class of a connection; network: whose TLS certificate is shown, where devices come in.
+    http: uvicorn's protocol class of a connection; network: its TLS certificate is used, for devices.
     """
     config = uvicorn.Config(
         app,

@@ -1,4 +1,4 @@
-"""What the form asks, and what it is told: a drawing of the room, the field file, mistakes and warnings."""
+"""The form's messages and their replies: a drawing of the room, the field file, mistakes and warnings."""
 
 import tempfile
 from pathlib import Path
@@ -14,7 +14,7 @@ from groundstation.settings.shipped_copies import write_field
 
 
 class Answers(msgspec.Struct, forbid_unknown_fields=True):
-    """The form as it stands; `order`: only draw, or write the field file as well."""
+    """The present form; `order`: only draw, or write the field file as well."""
 
     number: int
     order: Literal["draw", "write"]
@@ -24,7 +24,10 @@ class Answers(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class Reply(msgspec.Struct):
-    """What the page shows. `number`: of the answers; `problem`: why there is no drawing; `written`: the file, if so."""
+    """The reply that the page shows. `number`: of the answers; `problem`: why there is no drawing.
+
+    `written`: the file, if so.
+    """
 
     number: int
     svg: str = ""

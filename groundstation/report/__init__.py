@@ -1,1 +1,1 @@
-"""What a recorded run was worth: figures, criteria, a plot and a summary."""
+"""The evaluation of a recorded run: figures, criteria, a plot and a summary."""

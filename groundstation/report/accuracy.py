@@ -1,4 +1,4 @@
-"""How far the estimates were from the truth, and whether they knew it."""
+"""Errors of the estimates against the truth, and the belief's uncertainty at the same times."""
 
 import msgspec
 import numpy as np

@@ -1,4 +1,4 @@
-"""From a run folder to report.json, report.html and trajectories.png."""
+"""Builds report.json, report.html and trajectories.png from a run folder."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Whether the filter knew how wrong it was: NEES against the truth, NIS of what was fused, with chi-square bounds."""
+"""The filter's consistency: NEES against the truth, NIS of fused observations, with chi-square bounds."""
 
 from collections import defaultdict
 

@@ -1,4 +1,4 @@
-"""What the planner decided and why: each change of topology with its costs, and who was slowed by safety."""
+"""The planner's decisions: each change of topology with its costs, and the robots slowed by safety limits."""
 
 from itertools import pairwise
 

@@ -1,4 +1,4 @@
-"""What a report's files in a run folder are called."""
+"""Names of a report's files in a run folder."""
 
 HTML_NAME = "report.html"
 JSON_NAME = "report.json"

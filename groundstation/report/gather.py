@@ -1,4 +1,4 @@
-"""From the files of a run to arrays, in one pass over the topics that matter."""
+"""Gathers the files of a run into arrays, in one pass over the relevant topics."""
 
 from collections import defaultdict
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Which part of a run counts: from the first drone that may track to the command that ends it."""
+"""The part of a run that counts: from the first drone that may track to the command that ends it."""
 
 from groundstation.bus.messages import AckStage, Verb
 from groundstation.report.tracks import RunData

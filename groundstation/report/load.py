@@ -1,4 +1,4 @@
-"""What the run cost: CPU, deadlines, planner time, lost messages."""
+"""The load of a run: CPU, deadlines, planner time, lost messages."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""What only the command that started a run knows of it; written to `run.json` beside the recording."""
+"""Facts known only to the command that started a run; written to `run.json` beside the recording."""
 
 from pathlib import Path
 from typing import Any

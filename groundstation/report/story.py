@@ -1,4 +1,4 @@
-"""What happened in a run, by time: orders, flights, topologies, warnings, faults and failsafes; pure."""
+"""The events of a run, by time: orders, flights, topologies, warnings, faults and failsafes. Pure."""
 
 from collections.abc import Iterator
 

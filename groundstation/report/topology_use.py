@@ -1,4 +1,4 @@
-"""How long which sensing topology was flown."""
+"""The time for which each sensing topology was flown."""
 
 from collections import defaultdict
 from itertools import pairwise

@@ -1,4 +1,4 @@
-"""What must hold of vehicles and the network adapters that lead to them."""
+"""Checks of vehicles and the network adapters that lead to them."""
 
 from collections.abc import Iterator, Mapping
 from itertools import combinations

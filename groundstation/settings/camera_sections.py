@@ -1,4 +1,4 @@
-"""From the field to what each camera driver is handed."""
+"""Makes each camera driver's section from the field."""
 
 from drivers.camera.settings import (
     SEARCH_RATE_HZ,

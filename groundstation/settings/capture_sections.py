@@ -1,4 +1,4 @@
-"""From the field to what each motion capture driver is handed."""
+"""Makes each motion capture driver's section from the field."""
 
 from drivers.motion_capture.settings import BodySection, MotionCaptureSection
 from groundstation.settings.motion_capture import MotionCaptureSettings, RigidBodySettings

@@ -1,4 +1,4 @@
-"""What is legal in a field and foolish all the same: each check yields the path and what is likely to come of it."""
+"""Warnings about settings that are permitted but unwise: each check yields the path and the likely consequence."""
 
 import ipaddress
 import math

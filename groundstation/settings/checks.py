@@ -1,4 +1,4 @@
-"""What must hold between settings: each check yields the path at fault and what is wrong with it."""
+"""Checks between settings: each yields the path at fault and the fault."""
 
 from collections.abc import Callable, Iterator
 

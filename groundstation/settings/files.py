@@ -1,4 +1,4 @@
-"""Where field files and scenarios are looked for, and the ones that come with the program."""
+"""Places of field files and scenarios, including those shipped with the program."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What must hold of devices that another host runs."""
+"""Checks of devices that another host runs."""
 
 from collections.abc import Iterator, Mapping
 from typing import Protocol

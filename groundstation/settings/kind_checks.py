@@ -1,4 +1,4 @@
-"""What must hold of the sections that only one kind of vehicle has."""
+"""Checks of the sections that only one kind of vehicle has."""
 
 from collections.abc import Iterator, Mapping
 

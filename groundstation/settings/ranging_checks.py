@@ -1,4 +1,4 @@
-"""What must hold of ranging systems beside the team and the room."""
+"""Checks of ranging systems against the team and the room."""
 
 from collections.abc import Container, Iterable, Iterator, Mapping
 

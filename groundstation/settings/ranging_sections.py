@@ -1,4 +1,4 @@
-"""From the field to what each ranging driver is handed."""
+"""Makes each ranging driver's section from the field."""
 
 from drivers.ranging.settings import RangingSection, TransponderSection
 from groundstation.settings.ranging import TransponderSettings

@@ -1,4 +1,4 @@
-"""What must hold of places and heights: fence, obstacles, cameras, pads and levels."""
+"""Checks of places and heights: fence, obstacles, cameras, pads and levels."""
 
 import math
 from collections.abc import Iterator

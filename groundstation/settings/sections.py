@@ -1,4 +1,4 @@
-"""From the field to what each process is handed: its own part, as JSON, and nothing else."""
+"""Makes each process's section from the field: its own part, as JSON, and nothing else."""
 
 import json
 from collections.abc import Collection, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""What validation found, in the operator's words: place, path, allowed range, and what was probably meant."""
+"""Validation errors in the operator's words: place, path, allowed range, and the probable intention."""
 
 import json
 import re

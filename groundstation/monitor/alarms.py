@@ -109,7 +109,9 @@ def _is_heard_in_vain(status: VehicleStatus) -> bool:
 
 def _not_believed(status: VehicleStatus) -> tuple[str, str]:
     does = "it lands" if _lands(status) else "it hovers, then lands"
-    return "what it says is not believed", f"Nothing to do: {does}. Check its sensors then."
+    told = status.mode == "LANDING" and status.detail and not status.detail.startswith("land")
+    words = status.detail if told else "what it says is not believed"
+    return words, f"Nothing to do: {does}. Check its sensors then."
 
 
 def _lands(status: VehicleStatus) -> bool:
@@ -147,7 +149,7 @@ def _battery(name: str, status: VehicleStatus, battery: Battery) -> Iterator[Ala
     if _lands(status) or (below and status.lands_in_s is not None):
         yield Alarm(about, f"{held}, it lands", False, "Nothing to do.")
     elif battery.charge is Charge.EMPTY:
-        yield Alarm(about, f"{held}{battery.good_for}", below, f"{_TO_DO}LAND it while you can choose where; {lands}.")
+        yield Alarm(about, f"{held}{battery.good_for}", below, f"{_TO_DO}LAND it; {lands}, wherever it is then.")
     else:
         yield Alarm(about, f"{held}{battery.good_for}", False, f"Nothing to do yet: {lands}.")
 

@@ -36,11 +36,11 @@ def safety_of(state: MonitorState, alarms: Sequence[Alarm]) -> Safety:
     up = [name for name, seen in state.vehicles.items() if seen.message.flight_state in AIRBORNE]
     if not up:
         return Safety(Level.SAFE, "No alarms. Nobody flies.")
-    return Safety(Level.SAFE, f"No alarms. All who fly are heard and seen{_lasting(state, up)}.")
+    return Safety(Level.SAFE, f"No alarms. All who fly are heard, nobody is lost{_lasting(state, up)}.")
 
 
 def _lasting(state: MonitorState, up: Sequence[str]) -> str:
     known = [left for name in up if (left := battery_of(state, name).endurance) is not None]
     if len(known) < len(up):
         return ""
-    return f"; batteries are good for {min(known, key=lambda left: left.minutes).words} or more"
+    return f"; the worst battery in the air lasts {min(known, key=lambda left: left.minutes).words}"

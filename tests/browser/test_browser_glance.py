@@ -19,7 +19,7 @@ def test_a_landing_for_a_battery_is_told_alike_everywhere(stage: Any) -> None:
     page.wait(lambda s: page.there("safety").inner_text() == "ACT")
     assert page.there("team-mode").inner_text() == "TRACK" and page.page.evaluate(colour) != calm
     SITUATIONS["one_lands_for_its_battery"](stage.flight)
-    page.wait(lambda s: page.there("battery-lasts").inner_text() == "worst battery, landing reserve")
-    assert "landing reserve" in page.there("card-drone_2").inner_text()
+    page.wait(lambda s: page.there("battery-lasts").inner_text() == "worst battery, enough to land")
+    assert "enough to land" in page.there("card-drone_2").inner_text()
     page.wait(lambda s: "drone_1 lands;\ndrone_2 lands already" in page.there("land-all").inner_text())
     assert clipped(page.page) == [] and covered(page.page) == []

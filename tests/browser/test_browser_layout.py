@@ -163,10 +163,10 @@ def test_one_sentence_says_what_the_team_does_and_what_may_be_done(stage: Any) -
     stage.flight.battery["drone_2"] = 0.6
     page.wait(lambda s: verdict.inner_text() == "drone_1 and drone_2 track the target. Nobody is lost.")
     page.wait(lambda s: page.there("safety").inner_text() == "SAFE")
-    lasting = "No alarms. All who fly are heard and seen; batteries are good for ~5 min or more."
+    lasting = "No alarms. All who fly are heard, nobody is lost; the worst battery in the air lasts ~5 min."
     assert page.there("banner-none").inner_text() == lasting
     stage.flight.modes = {"drone_1": "HOLD", "drone_2": "TRACK"}
-    said = "drone_2 tracks the target; drone_1 holds. Nobody is lost. RESUME lets drone_1 go on."
+    said = "drone_2 tracks the target; drone_1 holds. Nobody is lost. RESUME lets drone_1 go on with the task."
     page.wait(lambda s: verdict.inner_text() == said)
     stage.flight.battery["drone_2"] = 0.42
     low = "drone_2: battery 42%, good for ~1 min\nNothing to do yet: at 15% it lands by itself."
@@ -183,7 +183,7 @@ def test_one_sentence_says_what_the_team_does_and_what_may_be_done(stage: Any) -
 def test_each_drone_says_what_it_does_and_why(stage: Any) -> None:
     page = stage.open()
     duty = page.there("drone_1-duty")
-    page.wait(lambda s: duty.inner_text().startswith("Tracks turtlebot, ordered by operator: watches turtlebot"))
+    page.wait(lambda s: duty.inner_text().startswith("Tracks turtlebot, ordered at the terminal: watches turtlebot"))
     assert "Itself seen by ceiling." in duty.inner_text()
     stage.flight.fenced = True
     page.wait(lambda s: "Slowed by the fence." in page.there("drone_2-duty").inner_text())
@@ -201,7 +201,7 @@ def test_each_drone_says_what_it_does_and_why(stage: Any) -> None:
     stage.flight.lands_in_s.clear()
     stage.flight.braked.clear()
     stage.flight.modes["drone_1"] = "HOLD"
-    page.wait(lambda s: duty.inner_text() == "Hovers in place: HOLD ordered by operator.")
+    page.wait(lambda s: duty.inner_text() == "Hovers in place: HOLD ordered at the terminal.")
     assert page.there("hold").inner_text().startswith("HOLD 2")
     stage.flight.modes = {"drone_1": "LANDED", "drone_2": "LANDED"}
     page.wait(lambda s: page.there("hold").inner_text() == "HOLD\nnobody flies")
@@ -215,13 +215,13 @@ TOLD = {
         *("WATCH", "battery 13%, it lands", "drone_1 tracks the target; drone_2 lands."),
         *("drone_1 hovers;\ndrone_2 lands anyway", "track", "landing"),
     ),
-    "all_are_held": ("SAFE", "No alarms", "RESUME lets them go on.", "hovering already", "hold", "hold"),
+    "all_are_held": ("SAFE", "No alarms", "RESUME lets them go on with the task.", "hovering already", "hold", "hold"),
     "one_is_unseen_and_will_land": (
         *("WATCH", "drone_1 lands in 6 s", "Lost: drone_1, not seen for 4 s"),
         *("drone_2 hovers;\ndrone_1 lands anyway", "lands in 6 s", "track"),
     ),
     "the_tracker_is_silent": (
-        *("WATCH", "TRACKER SILENT", "land by themselves in 1 s. Nobody knows who is lost."),
+        *("WATCH", "TRACKER SILENT", "land by themselves in 1 s. Who is lost is not known: the tracker is silent."),
         *("all land anyway", "lands in 1 s", "lands in 1 s"),
     ),
     "one_has_a_stuck_sensor": (

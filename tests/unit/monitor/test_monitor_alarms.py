@@ -176,13 +176,17 @@ def test_a_dark_camera_is_an_alarm_unless_its_drone_stands(world: World) -> None
 
 
 @pytest.mark.parametrize(
-    ("rate_hz", "words", "asks"),
-    [(0.0, "its driver no longer hears it", True), (199.7, "what it says is not believed", False)],
+    ("rate_hz", "detail", "words", "asks"),
+    [
+        (0.0, "its velocity is stuck", "its driver no longer hears it", True),
+        (199.7, "landing for operator", "what it says is not believed", False),
+        (199.7, "its velocity is stuck", "its velocity is stuck", False),
+    ],
 )
 def test_a_drone_that_is_heard_and_not_believed_is_not_called_silent(
-    world: World, rate_hz: float, words: str, asks: bool
+    world: World, rate_hz: float, detail: str, words: str, asks: bool
 ) -> None:
-    world.vehicle("drone_1", "LANDING", flight_state=m.FlightState.LOST, rate_hz=rate_hz)
+    world.vehicle("drone_1", "LANDING", flight_state=m.FlightState.LOST, rate_hz=rate_hz, detail=detail)
     world.text()
     (alarm,) = alarms_of(world.state, NOW)
     assert (alarm.text, alarm.grave, alarm.asks) == (f"drone_1: {words}", True, asks)

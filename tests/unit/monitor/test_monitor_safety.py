@@ -24,14 +24,14 @@ def test_it_is_safe_while_nothing_is_wrong_and_the_reason_says_how_long(world: W
     both(world)
     world.vehicle("drone_2", battery=0.65)
     world.estimate()
-    reason = "No alarms. All who fly are heard and seen; batteries are good for ~6 min or more."
+    reason = "No alarms. All who fly are heard, nobody is lost; the worst battery in the air lasts ~6 min."
     assert judged(world) == Safety(Level.SAFE, reason)
 
 
 def test_how_long_batteries_last_is_left_out_where_it_is_not_known(world: World) -> None:
     both(world)
     world.state.cast = replace(CAST, flight_times_s={"drone_1": 720.0})
-    assert judged(world).reason == "No alarms. All who fly are heard and seen."
+    assert judged(world).reason == "No alarms. All who fly are heard, nobody is lost."
 
 
 def test_it_is_safe_while_nobody_flies(world: World) -> None:

@@ -8,7 +8,7 @@ const LEVELS = { empty: "bad", unknown: "warn", low: "warn", good: "good" };
 
 // Until it lands its drone by itself, in the same words in the bar and on the cards; "" where nobody knows.
 export function lastsWords({ battery, good_for: time, battery_min: limit }) {
-  return time && (battery < limit ? "landing reserve" : `${time} of flight`);
+  return time && (battery < limit ? "enough to land" : `${time} of flight`);
 }
 
 const share = ({ battery }) => (battery === null ? "unknown" : `${(100 * battery).toFixed(0)} %`);

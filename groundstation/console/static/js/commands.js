@@ -8,6 +8,7 @@ import { me, send } from "./link.js";
 import { give, mayGive, OVER, ownOrders, roleText, startOwnOrders } from "./own_orders.js";
 import { forbidden } from "./preflight.js";
 import { ageS, droneNames, replaying, runOver, store } from "./store.js";
+import { giver } from "./who.js";
 
 const SHOWN = 5, PRESS_MS = 1000, ASLEEP_MS = 1000;
 const WORDS = { TAKEOFF: "TAKE OFF", CUT_MOTORS: "CUT MOTORS" };
@@ -154,7 +155,7 @@ function line(order) {
   const scope = order.team ? "all" : order.rows.map((row) => row.name).join(", ");
   return el("li", { class: "order", data: { state: order.state, verb: order.verb, testid: "order" } },
     el("div", { class: "head" },
-      el("span", {}, `${WORDS[order.verb] ?? order.verb} `, el("small", {}, `${scope} · ${order.by === me.name ? "you" : order.by} · `, el("span", { class: "ago num", "aria-hidden": "true" }))),
+      el("span", {}, `${WORDS[order.verb] ?? order.verb} `, el("small", {}, `${scope} · ${giver(order.by)} · `, el("span", { class: "ago num", "aria-hidden": "true" }))),
       el("span", { class: "state" }, STATES[order.state] ?? order.state)),
     el("div", { class: "rows" }, ...order.rows.map((row) => el("span", {}, el("b", {}, `${row.name} `), el("span", { class: row.stage && row.stage !== "REFUSED" ? "" : "missing" }, stage(row, order)))),
       order.note ? el("span", { class: "missing" }, order.note) : null));

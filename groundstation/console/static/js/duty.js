@@ -2,8 +2,8 @@
 
 import { joined, seconds } from "./dom.js";
 import { isLost } from "./glance.js";
-import { me } from "./link.js";
 import { ageS, SEEN_S, seenBy, store, unseenS } from "./store.js";
+import { ordered } from "./who.js";
 
 const FRESH_S = 1;
 // Information [1/m²] from which a plan relies on a link, as in the report's doubts.
@@ -29,11 +29,13 @@ function tracked(name, plan) {
   const relied = (plan.edges ?? []).filter(([, , information]) => information >= RELIED_ON);
   const watchers = seenBy(name);
   const targets = store.scene.targets.map((target) => target.name), sought = targets.filter(isLost);
-  const watched = relied.filter(([observer, subject]) => observer === name && !sought.includes(subject)).map(([, subject]) => subject);
+  const planned = relied.filter(([observer, subject]) => observer === name && !sought.includes(subject)).map(([, subject]) => subject);
+  const inView = targets.filter((target) => !sought.includes(target) && seenBy(target).includes(name));
+  const watched = [...new Set([...planned, ...inView])];
   const limits = limitsOf(plan.controls.find(({ robot }) => robot === name));
   const [, who] = store.s.vehicles[name].detail.match(/^tracking for (.+)$/) ?? [];
   const task = sought.length ? `Looks for ${joined(sought)}` : `Tracks ${joined(targets)}${who ? `, ${orderedBy(who, name, "tracking")}` : ""}`;
-  const does = watched.length ? `${task}: watches ${joined(watched)}` : sought.length ? task : `${task}: moves to where it will see it`;
+  const does = watched.length ? `${task}: watches ${joined(watched)}${watched.some((one) => targets.includes(one)) ? "" : ", so that the team knows where that is"}` : sought.length ? task : `${task}: moves to where it will see it`;
   const known = watchers.length ? `Itself seen by ${joined(watchers)}` : unseen(name);
   return [`${does}.`, `${known}.`, limits && `Slowed by ${limits}.`].filter(Boolean).join(" ");
 }
@@ -41,7 +43,7 @@ function tracked(name, plan) {
 // One that nobody sees may be known by whom it sees itself; who stays lost lands.
 function unseen(name) {
   const age = unseenS(name), { lost_after_s, unseen_land_s } = store.scene;
-  if (age <= SEEN_S) return `Nobody sees ${name}, known by what it sees`;
+  if (age <= SEEN_S) return `Seen by nobody: where it is follows from what it sees`;
   const left = Math.max(0, unseen_land_s - age);
   return isLost(name) ? `Itself lost: lands by itself within ${left.toFixed(0)}\u00a0s, unless it is seen` : `Not seen for ${seconds(age)}; it is lost from ${seconds(lost_after_s)} on`;
 }
@@ -54,7 +56,7 @@ const VERBS = { landing: ["LAND"], "taking off": ["TAKEOFF"], held: ["HOLD"], tr
 // Drivers name the program that an order came from; of a page's it is known who gave the last one of its kind.
 function orderedBy(who, name, doing) {
   const last = (store.s.orders ?? []).find((order) => VERBS[doing].includes(order.verb) && order.rows.some((row) => row.name === name));
-  return `ordered by ${who !== "console" ? who : last?.by === me.name ? "you" : last?.by ?? "a page"}`;
+  return ordered(who !== "console" ? who : last?.by ?? "a page");
 }
 
 // What it does until a failsafe lands it.

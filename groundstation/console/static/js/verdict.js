@@ -47,7 +47,7 @@ function since(name) {
 const isUnplaced = (name) => !entity(name) && unseenS(name) <= store.scene.lost_after_s;
 
 function lost() {
-  if (trackerSilent()) return "Nobody knows who is lost.";
+  if (trackerSilent()) return "Who is lost is not known: the tracker is silent.";
   const gone = sought().filter(isLost), unplaced = gone.filter(isUnplaced), unseen = gone.filter((name) => !isUnplaced(name)), spells = [...new Set(unseen.map(since))];
   const words = spells.map((spell) => `${joined(unseen.filter((name) => since(name) === spell))}, ${spell}`);
   const yet = unplaced.length ? ` It is not known yet where ${joined(unplaced)} ${unplaced.length > 1 ? "are" : "is"}.` : "";
@@ -57,7 +57,7 @@ function lost() {
 // What lets those go on that wait for it.
 function start() {
   const stay = waiting().filter((name) => !landsIn(name));
-  if (stay.length && !refusalOf("RESUME")) return `RESUME lets ${stay.length > 1 ? "them" : stay[0]} go on.`;
+  if (stay.length && !refusalOf("RESUME")) return `RESUME lets ${stay.length > 1 ? "them" : stay[0]} go on with the task.`;
   return refusalOf("TRACK") ? "" : "TRACK begins the task.";
 }
 

@@ -20,7 +20,7 @@ _LATELY_S = 0.6
 # the belief's own climb rate, which is mostly the autopilot's; sought faster than this, it would be their noise.
 _CLIMB_PER_S, _MOST_CLIMB_M_S = 6.0, 0.3
 _GAP_S, _HEIGHT_JUMP_M, _STEP_S = 0.3, 0.3, 0.1
-# The measured velocity error of an estimator is constant for that long; then this share of it is replaced each second
+# A velocity error that is no longer seen counts in full for this long, then fades with this time constant. Measured
 # (docs/reference/mavlink.md 2.1): 0.73 of it is left half a second after it was seen, 0.33 after a second.
 _LASTS_S, _FORGETS_S = 0.35, 0.6
 _FRESH_NS = 300 * NS_PER_MS
@@ -184,11 +184,11 @@ class DriftFeedback:
         self._at_ns = now_ns
 
     def drift(self, now_ns: int) -> Vector3:
-        """Return reported less true velocity [m/s; base_stabilized], as last seen."""
+        """Return reported less true velocity [m/s; base_stabilized]: limited, fading unseen, 0 while doubted."""
         return self._corrected(now_ns, self._drift)
 
     def correction(self, now_ns: int) -> Vector3:
-        """Return the correction of a commanded velocity [m/s; base_stabilized]: the drift, extrapolated to now."""
+        """Return what to add to a commanded velocity [m/s; base_stabilized]: the drift, extrapolated to now."""
         x, y = (2.0 * seen - before for seen, before in zip(self._drift, self._lately, strict=True))
         return self._corrected(now_ns, (x, y))
 
@@ -207,7 +207,7 @@ class DriftFeedback:
 
     @property
     def size_m_s(self) -> float:
-        """Return the last difference between reported and seen velocity [m/s], whether corrected or not."""
+        """Return the smoothed difference between reported and seen velocity [m/s], whether corrected or not."""
         return math.hypot(*self._drift)
 
     def place(self, now_ns: int) -> Vector3 | None:
@@ -225,7 +225,7 @@ class DriftFeedback:
         self._held = place
 
     def hold(self, now_ns: int, height_m: float | None = None) -> Vector3:
-        """Return the velocity [base_stabilized] back to the place held, zero without a fresh belief.
+        """Return the velocity [base_stabilized] back to the place held, 0.2 m/s at most; zero without a fresh belief.
 
         height_m: the height to hold, None for that of the place.
         """

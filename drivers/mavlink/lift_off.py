@@ -1,7 +1,7 @@
 """Judges whether a vehicle that reports flight has left the floor, where it stood, and how far its reports count. Pure.
 
 WIRE (docs/reference/mavlink.md 2.1): PX4 reports flight up to 3.5 s before it leaves the floor. The height that cameras
-see decides, and its own reports where they do not see it.
+see decides; its own reports count where they do not see it, or beyond a height by which they never err.
 """
 
 from drivers.mavlink.wire.names import Landed
@@ -15,12 +15,12 @@ _SEEN_RISEN_M = 0.1
 # While cameras see it, its own report alone counts only beyond a height by which it is never wrong on the floor.
 _SEEN_NS, _SURELY_RISEN_M = 500 * NS_PER_MS, 0.4
 _STANDING = 25  # number of estimates whose mean is the place where it stands
-# It is requested five times a second, and anew after 3 s without it (`session.py`).
+# EXTENDED_SYS_STATE is requested five times a second, and anew after 3 s without it (`session.py`).
 _OLD_NS = 6 * NS_PER_S
 
 
 def credible(landed: int, age_ns: int, motors_flew: bool) -> int:
-    """Return the MAV_LANDED_STATE to believe, given the reported one and its age.
+    """Return the MAV_LANDED_STATE to believe, given the reported one and its age; UNDEFINED if that is too old.
 
     motors_flew: it has lifted off, and its motors turn. ON_GROUND then counts as landing, until it disarms: its
     detector may err, and a vehicle in the air must not be taken for a standing one.
@@ -31,9 +31,10 @@ def credible(landed: int, age_ns: int, motors_flew: bool) -> int:
 
 
 class LiftOff:
-    """lifted: it is off the floor. A vehicle that was not ordered to take off flies when it reports so.
+    """Finds the moment of lift-off; a vehicle that was not ordered to take off has lifted when it reports so.
 
-    stood: its place by the tracker before it lifted off [world], None if it was not seen then.
+    lifted: it is off the floor; stood: mean of its first places by the tracker, where it stood [world], None if the
+    tracker told none.
     """
 
     def __init__(self) -> None:
@@ -45,7 +46,7 @@ class LiftOff:
         self._climbing_since_ns: int | None = None
 
     def see(self, now_ns: int, place: Vector3, age_s: float) -> None:
-        """Take its place by the tracker [world] while it has not lifted; age_s: of the last sighting."""
+        """Take its place by the tracker [world] while it has not lifted; age_s: time since its last sighting."""
         if age_s * NS_PER_S < _SEEN_NS:
             self._seen_ns = now_ns
         stood = self.stood or place
@@ -57,7 +58,7 @@ class LiftOff:
         self.lifted = self.lifted or place[2] - stood[2] >= _SEEN_RISEN_M
 
     def hear(self, now_ns: int, starting: bool, landed: int, height_m: float, climb_m_s: float) -> float:
-        """Take its reports, and whether it was ordered to take off; return its height above the floor [m]."""
+        """Take its reports, and whether it was ordered to take off; return its height above the floor by them [m]."""
         if landed == Landed.ON_GROUND or self._floor_m is None:
             self._floor_m = height_m
         risen_m = height_m - self._floor_m

@@ -38,7 +38,7 @@ class Passage:
 
 
 def view_around(place: Array, views: Sequence[Rectangle]) -> Rectangle | None:
-    """Return the view in which a place (2) [m] lies deepest, or else the nearest one; None without views."""
+    """Return the view in which a place (2) [m] lies deepest, outside of all the nearest one; None without views."""
     return max(views, key=lambda view: _depth_m(place, view), default=None)
 
 
@@ -50,7 +50,7 @@ def is_inside(place: Array, views: Sequence[Rectangle]) -> bool:
 def passage(place: Array, velocity: Array, views: Sequence[Rectangle]) -> Passage | None:
     """Return the passage from the view about a place (2) [m] into the next one along a velocity (2); None if none.
 
-    Where the way misses the other view, that along the greater part of the velocity counts: straight across.
+    If the way misses all other views, that along the larger component of the velocity counts, else the smaller one.
     """
     home = view_around(place, views)
     if home is None or _depth_m(place, home) < 0.0:
@@ -74,7 +74,7 @@ def _passage(
 
 
 def gap_about_m(place: Array, views: Sequence[Rectangle]) -> float:
-    """Return the width [m] of the gap between the two views nearest to a place (2) [m]; infinite with fewer views."""
+    """Return the distances [m] from a place (2) between two views to both of them, added; infinite with fewer views."""
     ways = sorted(math.dist(place, view.nearest(*place.tolist())) for view in views)
     return ways[0] + ways[1] if len(ways) > 1 else math.inf
 
@@ -106,7 +106,7 @@ def hold(view: Rectangle, place: Array, velocity: Array, most: float) -> Array:
 def into(view: Rectangle, place: Array, velocity: Array, most: float) -> Array:
     """Return the velocity (2) [m/s] with which a robot outside a view flies straight into it.
 
-    Its speed is the wanted one, or at most `most`.
+    Inwards it is as fast as wanted, or where that is slower, up to `most`; along the border it moves little.
     """
     low, high = (np.array(side) for side in np.transpose((view.x_m, view.y_m)))
     inner = view.shrunk(_INSET_M)

@@ -13,7 +13,7 @@ from groundstation.control.view import VIEW_INSET_M, spread_m, view_of, way_back
 from groundstation.estimation.belief import JointBelief
 from groundstation.sensing.models import Rectangle, SensorSuite
 
-# Of the distance left to the border of the permitted area [1/s]; and of the way back of a robot whose time is up.
+# Speed per distance [1/s] of a robot that has no time left, on its way back; of all others: HOLD_GAIN.
 _BACK_GAIN = 3.0
 
 
@@ -39,7 +39,7 @@ class Excursions:
         return time_left_s(spread_m(belief, name), unseen_s, p, error_m_s)
 
     def allowed_s(self, name: str, belief: JointBelief, places: Array) -> Array:
-        """Return the latest time [s] to be at each place (n, 2) and get back in view in time; inf inside a view."""
+        """Return the latest time [s] to be at each place (n, 2) and be back in time; inf inside or without views."""
         p = self.parameters
         mean = belief.mean_of(name)
         view = view_of(float(mean[0]), float(mean[1]), name, p, self.sensors)

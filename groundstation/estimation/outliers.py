@@ -31,14 +31,14 @@ _IN_A_ROW_S = 5.0
 # For one observer: the time between giving up two robots' beliefs, the largest number, and the time after which one
 # more is permitted.
 _BETWEEN_S, _AT_MOST, _FORGOTTEN_S = 3.0, 3.0, 10.0
-# A sighting stands for this time at most.
+# A sighting counts for this time at most; while seen, a wrong velocity is forgotten with this time constant.
 _SEEN_S, _LIE_FORGOTTEN_S = 0.2, 1.0
 _FIRST_DOUBT_M_S, _DOUBT_GROWS, _MOST_DOUBT_M_S = 0.2, 2.0, 1.0
 
 
 @kernel(inlined=True)
 def apart_m(sensor: SensorRow, innovation: Innovation) -> float:
-    """Return the distance between sighting and expectation [m], without angles."""
+    """Return the distance between a sighting and its prediction [m]; angles do not count."""
     square = 0.0
     for i in range(innovation.prediction.size):
         if sensor.is_angle[i] == 0:
@@ -103,7 +103,7 @@ def has_diverged(memory: EntityMemory, settings: Settings, at: float) -> bool:
 
 @kernel()
 def given_up_lately(observer: EntityMemory, at: float) -> float:
-    """Return the number of beliefs recently given up for one observer."""
+    """Return the number of beliefs recently given up for one observer; it sinks by one in 10 s."""
     return max(0.0, observer.gave_up - (at - observer.gave_up_at) / _FORGOTTEN_S)
 
 
@@ -150,7 +150,7 @@ def blame(
 ) -> int:  # fmt: skip
     """Return why a wild observation is refused, or PENDING if the subject's belief must be given up for it.
 
-    belief: of the first mode, as is the noise of the hypothesis that counts.
+    belief: that of the first mode; hypothesis: its z and the first mode's noise count.
     """
     if is_doubted(belief.memory[event.observer], settings, event.at):
         return OBSERVER_DOUBTED

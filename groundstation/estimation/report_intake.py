@@ -19,13 +19,13 @@ from groundstation.estimation.records import VX, VY
 from groundstation.field.targets import odometry_name
 from groundstation.time_units import NS_PER_S
 
-# Without sightings nothing contradicts a report: it is used no longer than this [s].
+# Without sightings nothing contradicts a report: none is used later than this after the last sighting [s].
 _UNSEEN_S = 1.0
 # Number of reports in a row beyond the gate, and their duration [s], after which the target is not believed.
 _REFUSED, _REFUSED_S = 5, 0.5
 # Weight of the newest sighting in the mean of their offsets, and the mean [deviations] that contradicts.
 _SHARE, _AHEAD = 0.1, 1.4
-# A comparison needs a speed known this well [m/s].
+# A comparison needs an innovation of no larger deviation [m/s].
 _TELLING_M_S = 0.25
 # Time for which all reports must agree [s]: at first, and at most.
 _PROBATION_S, _LONGEST_S = 2.0, 64.0
@@ -40,7 +40,8 @@ _REMEDY = (
 class _Trust:
     """heeded: whether reports are used; refused, since_ns: reports in a row beyond the gate, and the first.
 
-    agreed_ns: since when they agree; ahead: mean offset of sightings.
+    agreed_ns: since when they agree; probation_s: for how long they must; ahead: mean offset of the sightings from the
+    belief [deviations; world].
     """
 
     heeded: bool = True
@@ -79,7 +80,7 @@ class ReportIntake:
         return self._filter.add_report(reading, f"{key}#{message.header.seq}", now_ns, used=used) or Verdict.ACCEPTED
 
     def advance(self, now_ns: int, corrections: Iterable[Correction]) -> None:
-        """Judge the targets by the verdicts on their reports and on sightings of them."""
+        """Judge the targets by the verdicts on their reports and the offsets of their sightings."""
         for one in corrections:
             trust = self._trust.get(one.subject)
             if trust is None or one.nis is None:
@@ -108,9 +109,9 @@ class ReportIntake:
             self._believe(one.subject, trust)
 
     def _lag(self, name: str, trust: _Trust) -> float:
-        """Return how far ahead along its direction a target is seen.
+        """Return how far ahead of the belief or behind it a target is seen along its direction [deviations].
 
-        For a standing target, without a direction, the whole offset.
+        A standing target has no direction: the whole offset counts.
         """
         belief = self._filter.belief()
         if name not in belief.layout:

@@ -10,13 +10,14 @@ from enum import Enum
 from groundstation.process.heartbeat import HeartbeatBlock, SlotState
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
-# For driver and supervisor alike. Shorter than the supervisor's own limit: after this the guardian has no time left.
+# Driver and supervisor count as silent after this. It is shorter than the supervisor's limit for drivers (0.4 s), else
+# the guardian would come too late.
 SILENCE_NS = 300 * NS_PER_MS
-# By then the supervisor would have sent (0.4 s, and its turn), had it not just woken up itself.
+# By then the supervisor has sent (0.4 s, and its turn), unless it has just woken up itself.
 OVERDUE_NS = 450 * NS_PER_MS
-# As the supervisor's limit for drivers: one that was replaced for this long must not come back and contradict.
+# The supervisor's limit for a hanging driver: one replaced for this long must not come back and contradict.
 HANG_NS = 800 * NS_PER_MS
-# As the watchdog's: without a supervisor that could take over again, hovering has no purpose.
+# The watchdog's limit: without a supervisor that could take over again, hovering has no purpose.
 BRAKE_NS = NS_PER_S
 
 
@@ -29,7 +30,7 @@ class Word(Enum):
 
 
 class SupervisorState(Enum):
-    """Whether the supervisor sends for drivers: it does; not while it stops the run; or it is frozen or dead."""
+    """Whether the supervisor sends for silent drivers: SPEAKS does; not while it STOPS the run, nor FROZEN or DEAD."""
 
     SPEAKS = 0
     STOPS = 1
@@ -78,7 +79,7 @@ class DriverSigns:
 
 
 def signs_of(block: HeartbeatBlock, slot: int, *, gone: bool = False) -> DriverSigns:
-    """Return the sign of life in a slot; gone: the holder is dead by the kernel."""
+    """Return the signs of life in a slot; gone: the kernel says that its process is dead."""
     return DriverSigns(block.state(slot), block.beat_ns(slot), block.has_worked(slot), block.has_ended(slot), gone)
 
 

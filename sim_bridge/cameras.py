@@ -1,4 +1,4 @@
-"""The emulated cameras: one render process each, with its view and its address."""
+"""Starts, watches and ends the emulated cameras: one render process each."""
 
 import multiprocessing
 import os
@@ -132,7 +132,7 @@ def _camera_scenario(scenario: Scenario, name: str) -> PictureQuality:
 def _render(spec: RenderSpec, modes: Connection | None, tally: MutableSequence[int]) -> None:
     # Linux shares the processor out by session first (autogroup): drawing must not use up what the bridge's loop gets.
     os.setsid()
-    take_share(-10)  # it stands for a camera, which waits for nothing on this machine
+    take_share(-10)  # a real camera waits for nothing on this machine
     from sim_bridge.render.process import run
 
     raise SystemExit(run(spec, modes, tally))
@@ -161,7 +161,7 @@ class Cameras:
             process.start()
             self._processes[spec.camera] = process
             if told is not None:
-                told.close()  # the process has its own end: ours would hide that it is gone
+                told.close()  # the process has its own end: ours, kept open, would hide that it is gone
 
     def wait_until_serving(self, should_stop: Callable[[], bool]) -> None:
         """Return when every stream accepts connections; raises GroundStationError naming the one that does not."""
@@ -176,7 +176,7 @@ class Cameras:
 
     @property
     def configurable(self) -> tuple[str, ...]:
-        """Return the drones whose own video is served."""
+        """Return the drones that serve their own video."""
         return tuple(self._modes)
 
     def set_mode(self, drone: str, mode: tuple[object, ...]) -> None:
@@ -189,7 +189,7 @@ class Cameras:
 
     @property
     def pictures(self) -> tuple[int, int]:
-        """Return how many pictures were drawn, and how many of them were not ready when they should have arrived."""
+        """Return the number of pictures drawn, and of those that were not ready when they should have arrived."""
         return sum(tally[0] for tally in self._tallies), sum(tally[1] for tally in self._tallies)
 
     def ended(self) -> list[str]:

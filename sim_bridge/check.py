@@ -2,7 +2,7 @@
 
 The order holds `scenario`, and for a field `field` (resolved), `cameras` (the emulated ones) and `real` (bodies).
 Prints a JSON list with an object for each fault (type, loc, msg, ctx, input as pydantic has them; known: the keys that
-exist where an unknown one was given; "misfit" is the type of what the field does not have). The ground station, which
+exist where an unknown one was given; type "misfit": the field has no such thing). The ground station, which
 knows the lines of the file, words them. Exit codes: 0 good, 2 faults.
 """
 

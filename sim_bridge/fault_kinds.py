@@ -1,4 +1,4 @@
-"""What a scenario can break, and in what: the table of kinds, and one fault of a scenario."""
+"""The table of fault kinds, with the parts that each can break; one fault of a scenario."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -67,9 +67,9 @@ class Part(Enum):
 
 @dataclass(frozen=True, slots=True)
 class KindRules:
-    """What a kind of fault is about; value: its least and greatest figure, None where it has none.
+    """The part that a kind of fault breaks; value: its least and greatest figure, None if it has none.
 
-    usual: the figure where none is told, None: it must be. other: a second entity is named.
+    usual: the default figure, None: the scenario must give one. other: the fault names a second entity.
     """
 
     part: Part
@@ -155,12 +155,12 @@ class Fault(Section):
 
     @property
     def amount(self) -> float:
-        """Return the value, or the usual one where none is told."""
+        """Return the value, or the usual one if none is given."""
         usual = RULES[self.kind].usual
         return self.value if self.value is not None else 0.0 if usual is None else usual
 
     def covers(self, now_s: float) -> bool:
-        """Return whether it is broken at a time."""
+        """Return whether it is active at a time."""
         return self.start_s <= now_s and (self.end_s is None or now_s < self.end_s)
 
     @model_validator(mode="after")
@@ -189,12 +189,12 @@ def of_part(faults: Iterable[Fault], *parts: Part) -> tuple[Fault, ...]:
 
 
 def standing(faults: Iterable[Fault], kind: FaultKind, now_s: float, entity: str | None = None) -> Fault | None:
-    """Return the first fault of a kind that stands at a time, of an entity or of any."""
+    """Return the first fault of a kind that is active at a time, of one entity or of any."""
     found = (f for f in faults if f.kind is kind and entity in (None, f.entity) and f.covers(now_s))
     return next(found, None)
 
 
 def exchanged(faults: Iterable[Fault]) -> dict[str, str]:
-    """Return whose body each vehicle's address leads to, where that is another one's."""
+    """Return, for each vehicle whose address leads to another one's body, the name of that body."""
     pairs = [(f.entity, f.other) for f in faults if f.kind is FaultKind.IDS_SWAPPED and f.other is not None]
     return {a: b for pair in pairs for a, b in (pair, pair[::-1])}

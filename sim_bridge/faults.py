@@ -1,4 +1,4 @@
-"""Faults of a scenario, with their begin and end."""
+"""Begins and ends a scenario's faults in the world and on links."""
 
 from collections import deque
 from collections.abc import Iterable, Mapping
@@ -9,7 +9,7 @@ from sim_bridge.world.world import World
 
 
 class Emulator(Protocol):
-    """What a fault can switch in an emulated vehicle."""
+    """The switches of an emulated vehicle that faults set."""
 
     silent: bool
     deaf: bool
@@ -20,13 +20,13 @@ class Sufferer(Protocol):
     """A body or an emulator with faults that only its kind can have."""
 
     def suffer(self, fault: Fault, begins: bool) -> None:
-        """Break, or heal; a fault that is another part's is left to it."""
+        """Break, or heal; faults of other parts are ignored."""
 
 
 class FaultSchedule:
     """Applies faults to the world and to links as time passes, and reports each.
 
-    Wrong values are applied by the vehicles' edges, those of cameras by the render processes, at the same times.
+    Wrong values are applied by the vehicles' edges, faults of cameras by the render processes, at the same times.
     """
 
     def __init__(self, faults: Iterable[Fault], world: World, emulators: Mapping[str, Emulator]) -> None:
@@ -41,9 +41,9 @@ class FaultSchedule:
         self._flew = False
 
     def apply(self, now_s: float, flies: bool = False) -> list[tuple[str, str]]:
-        """Break and heal what is due at this time of the world [s]; returns (entity, line) for each.
+        """Begin and end the faults that are due at this time of the world [s]; returns (entity, line) for each.
 
-        flies: whether a drone is in the air. With the first one all that is broken is named once more, because the
+        flies: whether a drone is in the air. With the first one all active faults are reported again, because the
         recording may have begun after it broke.
         """
         lines = []
@@ -68,7 +68,7 @@ class FaultSchedule:
             case FaultKind.WIND:
                 self._world.blow(fault.entity, fault.amount if begins else 0.0, fault.direction_deg)
             case kind if RULES[kind].part is Part.ABLE_VEHICLE:
-                # Where ids are swapped the body is another's than the emulator: each has what it can have.
+                # If ids are swapped, body and emulator are of different vehicles: each takes the faults of its own.
                 for one in (self._emulators[fault.entity], self._world.drones[fault.entity]):
                     if isinstance(one, Sufferer):
                         one.suffer(fault, begins)

@@ -1,4 +1,4 @@
-"""The bridge's one loop: sockets, a step of the world, navdata, truth; 200 times a second in real time."""
+"""The bridge's loop: sockets, a step of the world, telemetry, truth; 200 times a second in real time."""
 
 import gc
 import math
@@ -68,11 +68,11 @@ class Harness:
                 self._child.event(Severity.WARNING, "rendered pictures do not show obstacles")
 
     def run(self) -> None:
-        """Turn until told to stop; without a supervisor, until every drone has landed (20 s at most)."""
+        """Run until told to stop; after the supervisor's end, until every drone has landed (20 s at most)."""
         self._child.ready(self._inventory)
         gc.collect()
-        go_first()  # it stands for drones, which do not wait for this machine
-        gc.freeze()  # the start's objects live as long as the process: never look at them again
+        go_first()  # real drones do not wait for this machine
+        gc.freeze()  # objects of the start live as long as the process: not collected
         self._clock = Clockwork(time.monotonic_ns())
         orphaned_ns = 0
         while not self._child.stop_requested:
@@ -84,11 +84,11 @@ class Harness:
             if self._clock.ticks % _COMMAND_TICKS == 0 and not self._child.supervisor_alive:
                 orphaned_ns = orphaned_ns or now_ns
                 if self._all_landed() or now_ns - orphaned_ns > _LANDING_LIMIT_S * 1e9:
-                    self._publish_truth(self._clock.deadline_ns)  # the last one may be from before the touch-down
+                    self._publish_truth(self._clock.deadline_ns)  # the last state may be from before the touch-down
                     return
 
     def tick(self, stamp_ns: int) -> None:
-        """Advance by 5 ms; stamp_ns: the boot-clock time that the new states are true at."""
+        """Advance by 5 ms; stamp_ns: boot-clock time of the new states."""
         if self._followers is not None:
             self._followers.move(stamp_ns)
         self._stage.tick(stamp_ns)
@@ -166,7 +166,7 @@ class Harness:
         bus, unseen = self._child.bus, self._order.unseen
         for name, row in zip(self.world.bodies, self.world.states().tolist(), strict=True):
             if name in unseen or math.isnan(row[0]):
-                continue  # what only the tracker says is no truth
+                continue  # the tracker's estimate is no truth
             x, y, z, vx, vy, vz, roll, pitch, yaw, _, _, _, on_ground = row
             bus.publish(
                 TRUTH,
@@ -192,7 +192,7 @@ class Harness:
         bus.publish(SIM_STATUS, status)
 
     def _judge(self) -> None:
-        """Say once what spoils this run, and when it no longer does."""
+        """Report once what makes this run invalid, and once when that is over."""
         faults = self._clock.faults
         cameras = self._stage.cameras
         ended = cameras.ended() if cameras is not None else []

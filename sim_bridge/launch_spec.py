@@ -1,4 +1,4 @@
-"""What the bridge is started with: `python -m sim_bridge --spec FILE`."""
+"""The bridge's start order: `python -m sim_bridge --spec FILE`."""
 
 import json
 from collections.abc import Mapping
@@ -18,7 +18,7 @@ from sim_bridge.site import Site, parse_site
 
 
 class PoseSource(StrEnum):
-    """From whom the room learns where a real body is: its firmware's simulator, motion capture, the tracker, nobody."""
+    """Source of a real body's pose: its firmware's simulator, motion capture, the tracker, or none."""
 
     AUTOPILOT = "autopilot"
     CAPTURE = "capture"
@@ -30,7 +30,7 @@ _UNSEEN = frozenset({PoseSource.ESTIMATE, PoseSource.NONE})
 
 
 class RealBody(BaseModel):
-    """A body that exists; address: where its firmware's simulator sends its true state; system: that follows it."""
+    """A real body; address: receives its firmware's simulated true state; system: motion capture that follows it."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -40,7 +40,7 @@ class RealBody(BaseModel):
 
 
 class _Envelope(BaseModel):
-    """The parts of an order; the field's and the scenario's own models judge what is in theirs."""
+    """The parts of an order; field and scenario are validated by their own models."""
 
     model_config = ConfigDict(frozen=True, extra="ignore")
 
@@ -74,12 +74,12 @@ class LaunchSpec:
 
     @property
     def unseen(self) -> frozenset[str]:
-        """Return the bodies that emulated cameras must not show: their places are the tracker's, or nobody's."""
+        """Return the bodies that emulated cameras must not show: their places are estimates, or unknown."""
         return frozenset(name for name, body in self.real.items() if body.source in _UNSEEN)
 
 
 def read_order(path: Path) -> LaunchSpec:
-    """Return the order in a file; raises SettingsError with every problem of the part that is wrong."""
+    """Return the order in a file; raises SettingsError with all problems of the first part that is wrong."""
     try:
         envelope = _Envelope.model_validate_json(path.read_bytes())
     except OSError as error:

@@ -1,4 +1,4 @@
-"""Random bursts without a link, drawn as faults, so that all faults are in one table."""
+"""Draws random losses of links as faults, so that all faults are in one table."""
 
 from collections.abc import Iterable
 
@@ -10,7 +10,7 @@ _HORIZON_S = 900.0
 
 
 def with_bursts(scenario: Scenario, drones: Iterable[str], cameras: Iterable[str], seed: int) -> Scenario:
-    """Return a scenario whose faults hold its link bursts too, those of the first 15 minutes.
+    """Return a scenario whose faults include its link bursts of the first 15 minutes.
 
     cameras: the drones whose pictures come over the same radio; each vehicle's bursts are its own.
     """

@@ -1,4 +1,4 @@
-"""Ports that the simulator listens on, and the one sentence about those that it cannot have."""
+"""Opens ports of the simulator, and words the error for ports that it cannot have."""
 
 import socket
 
@@ -7,7 +7,7 @@ from groundstation.process.ports import why_refused
 
 
 def refused(owner: str, address: str, port: int, kind: socket.SocketKind, error: OSError) -> GroundStationError:
-    """Return the error of a port that somebody of the simulator cannot have; owner: who, as the sentence begins."""
+    """Return the error for a port that the simulator cannot have; owner: its part, as the sentence begins."""
     protocol = "TCP" if kind is socket.SOCK_STREAM else "UDP"
     why = why_refused(error, address, port, kind)
     return GroundStationError(f"{owner}: cannot listen on {address}:{port} ({protocol}): {why}")

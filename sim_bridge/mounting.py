@@ -1,4 +1,4 @@
-"""True mountings and lenses of cameras: a little off the field file, like real ones; a camera after a bump."""
+"""True mountings and lenses of cameras, a little off the field file like real ones; mountings after a bump."""
 
 import math
 from dataclasses import replace
@@ -13,12 +13,12 @@ from sim_bridge.world.noise import generator_of
 
 
 def generator_of_eye(seed: int, name: str) -> np.random.Generator:
-    """Return a camera's random generator: it draws mounting, then lens first, so study and SITL have the same."""
+    """Return a camera's random generator; study and SITL both draw mounting, then lens first, and get the same."""
     return generator_of(seed, f"{name}/eye")
 
 
 def mounted(camera: SiteCamera, errors: bool, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Return world_from_optical (3, 3) and position [m; world] of a camera, off by its deviations if it has errors."""
+    """Return world_from_optical (3, 3) and position [m; world] of a camera; errors: off by its deviations."""
     turn, shift = math.radians(camera.attitude_std_deg), camera.position_std_m
     error, off = turn * rng.standard_normal(3), shift * rng.standard_normal(3)
     known, place = world_from_downward_optical(camera.rotation_deg), np.array(camera.position_m, dtype=np.float64)
@@ -26,7 +26,7 @@ def mounted(camera: SiteCamera, errors: bool, rng: np.random.Generator) -> tuple
 
 
 def on_drone(camera: EmulatedCamera, errors: bool, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Return base_from_optical (3, 3) and position [m; base] of a drone's camera, off by its deviations if said."""
+    """Return base_from_optical (3, 3) and position [m; base] of a drone's camera; errors: off by its deviations."""
     known, place = told_on_drone(camera), np.array(camera.position_m, dtype=np.float64)
     turn, shift = math.radians(camera.attitude_std_deg), camera.position_std_m
     if not errors or (turn == 0.0 and shift == 0.0):
@@ -36,12 +36,12 @@ def on_drone(camera: EmulatedCamera, errors: bool, rng: np.random.Generator) -> 
 
 
 def told_on_drone(camera: EmulatedCamera) -> Array:
-    """Return base_from_optical (3, 3) of a drone's camera as the field says."""
+    """Return base_from_optical (3, 3) of a drone's camera by the field."""
     return base_from_tilted_optical(math.radians(camera.tilt_down_deg), math.radians(camera.pan_left_deg))
 
 
 def true_lens(told: Lens, errors: bool, rng: np.random.Generator) -> CameraIntrinsics:
-    """Return a camera's lens, off the field's figures by their deviations if said."""
+    """Return a camera's lens; errors: off the field's figures by their deviations."""
     lens, std = told.intrinsics, told.std
     if not errors or std is None:
         return lens
@@ -51,7 +51,7 @@ def true_lens(told: Lens, errors: bool, rng: np.random.Generator) -> CameraIntri
 
 
 def as_measured(point: Array, true: CameraIntrinsics, told: CameraIntrinsics) -> Array:
-    """Return a marker's place (3) [m; optical] as a detector finds it that believes another lens than the true one."""
+    """Return a marker's place (3) [m; optical] as a detector computes it with the lens `told`, not the true one."""
     if true == told:
         return point
     across = told.normalised_from_pixels(true.project(point))

@@ -1,4 +1,4 @@
-"""The video of a vehicle's own, where its kind has one: what draws and serves it."""
+"""Describes what draws and serves a vehicle's own video, if its kind has one."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True, slots=True)
 class OwnVideo:
-    """What serves the pictures of a vehicle's own camera; picklable.
+    """The server of a vehicle's own video; picklable.
 
     output: "module:class" of a `sim_bridge.render.outputs.Output`, made from the camera's RenderSpec and the connection
-    by which the emulator's `video_settings` come, as they change. options: what it is told besides; repeats: what is
+    by which the emulator's `video_settings` come, as they change. options: its other arguments; repeats: what is
     lost of it is sent again, and comes late (TCP). listens: it waits for clients at its port;
-    else it sends to who has asked the vehicle.
+    else it sends to the client that asked the vehicle.
     """
 
     output: str

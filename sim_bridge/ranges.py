@@ -1,4 +1,4 @@
-"""Ranges as radios tell them: true distances with noise, errors that last, reflections and silence."""
+"""Simulates measured ranges: true distances with noise, lasting errors, reflections and silence."""
 
 import math
 
@@ -9,7 +9,7 @@ from groundstation.geometry.rotations import rotation_from_euler
 from sim_bridge.site import SiteRanging, SiteTransponder
 from sim_bridge.world.noise import GaussMarkov, standard_normals
 
-# Half of what lasts is the anchor's, for all robots and for good; half is a pair's, and goes as reflections do.
+# Half of the lasting error is the anchor's, constant for all robots; half is the pair's, and changes as reflections do.
 _SHARE = math.sqrt(0.5)
 _REFLECTIONS_LAST_S = 10.0
 # By how much a reflection is longer [m], and how often an anchor does not answer.
@@ -19,7 +19,7 @@ _DETOUR_LEAST_M, _DETOUR_M, _SILENT_SHARE = 0.2, 0.5, 0.03
 class Radios:
     """The radios of one system; `ranges_m` is one round with one robot.
 
-    errors: whether anything lasts; all else is noise of each round.
+    errors: whether there are lasting errors; all else is noise of each round.
     """
 
     def __init__(self, system: SiteRanging, errors: bool, rng: np.random.Generator) -> None:

@@ -1,4 +1,4 @@
-"""What a scenario names that its field does not have, or that cannot have what it says."""
+"""Finds parts of a scenario that do not fit its field: missing entities, and faults that an entity cannot have."""
 
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
@@ -11,14 +11,14 @@ from sim_bridge.site import Site, SiteDrone
 
 @dataclass(frozen=True, slots=True)
 class Misfit:
-    """Where in the scenario it stands, and what is wrong."""
+    """One misfit: its path in the scenario, and what is wrong."""
 
     path: tuple[str | int, ...]
     text: str
 
 
 def misfits(scenario: Scenario, site: Site, cameras: Collection[str], real: Collection[str] = ()) -> list[Misfit]:
-    """Return everything that a field does not have, or that is real; cameras: the emulated ones."""
+    """Return all misfits: entities that the field lacks or that are real; cameras: the emulated ones."""
     found = list(_of_faults(scenario, site, cameras, real))
     for name in sorted(set(scenario.drones.firmware_by_drone) - set(site.drones)):
         path = ("drones", "firmware_by_drone", name)

@@ -1,4 +1,4 @@
-"""The part of a resolved field that the simulator builds its room from.
+"""The part of a resolved field from which the simulator builds its room.
 
 The field's full model belongs to the settings of the ground station; a simulator that read all of it would break with
 every new key, so what is not named here is ignored.
@@ -28,7 +28,7 @@ class SimulatedObstacle(_Part):
 
 
 class SimulatedRoom(_Part):
-    """Size along x, y, z, the origin on the floor in the middle, and what stands there, by name."""
+    """Size along x, y, z (origin on the floor in the middle), and obstacles by name."""
 
     size_m: tuple[float, float, float]
     obstacles: dict[str, SimulatedObstacle] = {}
@@ -49,7 +49,7 @@ class LensStd(_Part):
 
 
 class Lens(_Part):
-    """Pinhole with plumb-bob distortion k1 k2 p1 p2 k3, and how well its figures are known, if that is said."""
+    """Pinhole with plumb-bob distortion k1 k2 p1 p2 k3, and standard deviations of its figures, if given."""
 
     width_px: int
     height_px: int
@@ -69,7 +69,7 @@ class Lens(_Part):
 
 
 class MarkerPrint(_Part):
-    """What is printed on a marker: a checkerboard, or (kind aruco) a tag."""
+    """The print of a marker: a checkerboard, or (kind aruco) a tag."""
 
     kind: Literal["checkerboard", "aruco"] = "checkerboard"
     code: int | None = None
@@ -105,7 +105,7 @@ class EmulatedCamera(_Part):
 
 
 class SiteDrone(_Part):
-    """One drone: kind, place and heading of its pad, what it carries; sections of its kind are kept as they came."""
+    """One drone: kind, place and heading of its pad, camera, marker; sections of its kind are kept unread."""
 
     model_config = ConfigDict(frozen=True, extra="allow", allow_inf_nan=False)
 
@@ -121,7 +121,7 @@ class SiteDrone(_Part):
         return math.radians(self.pad_yaw_deg)
 
     def section(self, key: str) -> dict[str, Any]:
-        """Return the section that only its kind has; empty where it is not given."""
+        """Return the section that only its kind has; empty if it is not given."""
         extra = self.model_extra or {}
         return extra.get(key) or extra.get("sections", {}).get(key) or {}
 
@@ -199,7 +199,7 @@ class TargetMarker(MarkerPrint):
 
 
 class SiteOdometry(_Part):
-    """The odometry that a target publishes: topic and domain stand in the source."""
+    """The odometry that a target publishes; `source` has its topic and domain."""
 
     source: str
     delay_ms: float = 20.0
@@ -214,7 +214,7 @@ class SiteTarget(_Part):
 
 
 class SingleTarget(SiteTarget):
-    """The only one, with its name."""
+    """The only target, with its name."""
 
     name: str
 
@@ -245,7 +245,7 @@ class Site(_Part):
 
     @property
     def bodies(self) -> tuple[str, ...]:
-        """Return the names of all that moves: drones in the field's order, then the targets."""
+        """Return the names of all moving bodies: drones in the field's order, then the targets."""
         return (*self.drones, *self.tracked)
 
 

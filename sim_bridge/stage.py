@@ -1,4 +1,4 @@
-"""What every loop of emulated devices turns: world, devices at their sockets, shared truth, pictures."""
+"""The parts that all loops of emulated devices share: world, devices at their sockets, truth, pictures."""
 
 import select
 from collections.abc import Callable, Iterable
@@ -22,7 +22,7 @@ class Stage:
         self._readers: dict[int, Callable[[], None]] = {}
 
     def add(self, name: str, emulator: Emulator, descriptor: int) -> None:
-        """Take a device in, and read from it whenever its descriptor has something."""
+        """Add a device, and read from it whenever its descriptor is readable."""
         self.emulators[name] = emulator
         self._poll.register(descriptor, select.POLLIN)
         self._readers[descriptor] = emulator.receive
@@ -38,7 +38,7 @@ class Stage:
         self.cameras.wait_until_serving(should_stop)
 
     def tick(self, stamp_ns: int) -> None:
-        """Advance by 5 ms; stamp_ns: the boot-clock time that the new states are true at."""
+        """Advance by 5 ms; stamp_ns: boot-clock time of the new states."""
         for descriptor, _ in self._poll.poll(0):
             self._readers[descriptor]()
         self.world.step()

@@ -48,7 +48,7 @@ _FRONT = {
 
 
 def site_of(names: Sequence[str]) -> Site:
-    """Return a room with a drone for each name, in a row along y, all looking along x at a parked TurtleBot."""
+    """Return a room with a drone for each name, in a row along y, all facing a parked TurtleBot along x."""
     middle = (len(names) - 1) / 2
     drones: dict[str, dict[str, object]] = {}
     for index, name in enumerate(names):
@@ -74,10 +74,10 @@ def site_of(names: Sequence[str]) -> Site:
 
 @dataclass(frozen=True, slots=True)
 class MavlinkChoice:
-    """How MAVLink vehicles are opened.
+    """Options of MAVLink vehicles.
 
-    indoor: set up for flight on poses from outside, which whoever flies them must send, else with satellites; calls:
-    where each of them speaks to unasked; truth: where the first sends its true state.
+    indoor: set up for flight on poses from outside, which their ground station must send, else with satellites; calls:
+    address that each of them speaks to unasked; truth: address to which the first sends its true state.
     """
 
     indoor: bool = False
@@ -130,7 +130,7 @@ class Hangar:
         self._stage.open_cameras(specs, should_stop)
 
     def tick(self, stamp_ns: int) -> None:
-        """Advance by 5 ms; stamp_ns: the boot-clock time that the new states are true at."""
+        """Advance by 5 ms; stamp_ns: boot-clock time of the new states."""
         self._stage.tick(stamp_ns)
         for teller in self._tellers:
             teller.send()
@@ -138,7 +138,7 @@ class Hangar:
             self._stage.tell_cameras()
 
     def truth(self) -> str:
-        """Return where each drone really is [m, m/s, rad; world] and what it does, as a line of JSON."""
+        """Return the true state [m, m/s, rad; world] and action of each drone, as a line of JSON."""
         drones = {}
         for name, drone in self.world.drones.items():
             body = drone.airframe
@@ -165,7 +165,7 @@ class Hangar:
 
 
 def serve(hangar: Hangar, seconds: float, tell_truth: bool, should_stop: Callable[[], bool]) -> None:
-    """Turn in real time."""
+    """Run in real time until stopped."""
     clock = Clockwork(time.monotonic_ns())
     while not should_stop() and clock.ticks * TICK_NS < seconds * 1e9:
         deadline_ns = clock.next_deadline()

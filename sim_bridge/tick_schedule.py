@@ -1,10 +1,10 @@
-"""Ticks on an absolute schedule of the boot clock, and the count of those that came late."""
+"""Schedules ticks on the boot clock, and counts late ones."""
 
 from groundstation.time_units import NS_PER_MS
 from sim_bridge.world.world import TICK_NS
 
 LATE_NS = 10 * NS_PER_MS
-# After a longer pause (SIGSTOP, a suspended laptop) the world has stood still; running after it would be a burst.
+# After a longer pause (SIGSTOP, a suspended laptop) the world has stood still; making up for it would be a burst.
 _GIVE_UP_NS = 250 * NS_PER_MS
 TOLERATED_SHARE = 0.01
 
@@ -12,7 +12,7 @@ TOLERATED_SHARE = 0.01
 class Clockwork:
     """Hands out the deadline of each tick; a tick that begins > 10 ms after its deadline is an overrun.
 
-    Only ticks that matter are judged: while nothing flies yet, kernels are compiled and processes start.
+    Only ticks that matter are judged: before the flight kernels are compiled and processes start.
     """
 
     def __init__(self, now_ns: int) -> None:
@@ -29,7 +29,7 @@ class Clockwork:
         return self.deadline_ns
 
     def begin(self, now_ns: int, matters: bool = True) -> None:
-        """Note when the tick really began; a schedule that is hopelessly behind starts anew."""
+        """Note the tick's actual begin; a schedule that is far behind starts anew."""
         late_ns = now_ns - self.deadline_ns
         self.judged += matters
         self.overruns += matters and late_ns > LATE_NS
@@ -37,7 +37,7 @@ class Clockwork:
             self.deadline_ns = now_ns
 
     def count_pictures(self, drawn: int, late: int, matters: bool = True) -> None:
-        """Take how many pictures there were so far in all, and how many of them came late."""
+        """Take the number of pictures so far, and of the late ones among them."""
         if matters:
             self.pictures += drawn - self._drawn[0]
             self.late_pictures += late - self._drawn[1]
@@ -45,7 +45,7 @@ class Clockwork:
 
     @property
     def faults(self) -> list[str]:
-        """Return why the run is invalid: more than 1 % of the judged ticks, or of the pictures, were late."""
+        """Return reasons why the run is invalid: more than 1 % of the judged ticks, or of the pictures, were late."""
         found = []
         if self.overruns > max(1.0, TOLERATED_SHARE * self.judged):
             found.append("more than 1 % of the ticks late by > 10 ms: this run is invalid")

@@ -31,7 +31,7 @@ def _path(name: str) -> Path:
 class TruthBoard:
     """One row per body: x y z [m; world] | vx vy vz [m/s; world] | roll pitch yaw [rad; FLU] | wx wy wz | on_ground.
 
-    One writer, any number of readers. `stamp_ns` is the boot-clock time that the states are true at.
+    One writer, any number of readers. `stamp_ns`: boot-clock time of the states.
     """
 
     def __init__(self, path: Path, bodies: tuple[str, ...], owner: bool) -> None:
@@ -61,7 +61,7 @@ class TruthBoard:
         return cls(_path(name), bodies, owner=False)
 
     def write(self, stamp_ns: int, states: Array) -> None:
-        """Publish states (n, 13) that are true at `stamp_ns`."""
+        """Publish the states (n, 13) of the time `stamp_ns`."""
         memory = self._memory
         counter = _COUNTER.unpack_from(memory, 0)[0]
         _HEADER.pack_into(memory, 0, counter + 1, stamp_ns)
@@ -76,7 +76,7 @@ class TruthBoard:
             if before % 2 == 0 and _COUNTER.unpack_from(self._memory, 0)[0] == before:
                 break
             time.sleep(0.0 if attempt < 10 else 1e-5)
-        # A writer that died half-way leaves the counter odd for ever: the last bytes are better than none.
+        # A writer that died half-way leaves the counter odd for good: the last bytes are better than none.
         return stamp_ns, np.frombuffer(payload, dtype=np.float64).reshape(len(self.bodies), WIDTH)
 
     def close(self) -> None:

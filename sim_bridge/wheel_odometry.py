@@ -1,4 +1,4 @@
-"""What the wheels of a Kobuki tell of its motion: their turning, by encoders of a finite step and a wrong radius.
+"""Odometry of a Kobuki base from its wheels: encoders of a finite step, and a wrong radius.
 
 Slip is in the motion, not here: the wheels turn, and the base does not follow (world/unicycle.py).
 """
@@ -8,10 +8,10 @@ import numpy as np
 from sim_bridge.world.unicycle import Unicycle
 
 PERIOD_S = 0.05
-# A tick of the encoder [m], of which so many are told in the 20 ms between two packets of the base (kobuki_driver,
+# Length of an encoder tick [m]; the base reports their number every 20 ms (kobuki_driver,
 # "Kobuki Parameters": 11 724.4 ticks a metre).
 _TICK_M, _PACKET_S = 1.0 / 11724.4, 0.02
-# A wheel that is worn or filled otherwise: its radius of 35 mm is off by 0.35 mm.
+# Of the radius of 35 mm: a worn or otherwise filled wheel is off by 0.35 mm.
 _RADIUS_STD = 0.01
 
 
@@ -23,7 +23,7 @@ class WheelOdometry:
         self._scale = 1.0 + (_RADIUS_STD * float(rng.standard_normal()) if errors else 0.0)
 
     def read(self) -> tuple[float, float]:
-        """Return forward speed [m/s] and turn rate [rad/s] as the base tells them."""
+        """Return forward speed [m/s] and turn rate [rad/s] as the base reports them."""
         speed, turn_rate = self._base.wheels
         ticks = round(self._scale * speed * _PACKET_S / _TICK_M)
         return ticks * _TICK_M / _PACKET_S, turn_rate

@@ -1,4 +1,4 @@
-"""Wrong values at a device's edge: each kind a pure function of what the device would honestly report."""
+"""Wrong values at a device's edge: each kind is a pure function of the correct readings."""
 
 import math
 from collections import deque
@@ -30,7 +30,7 @@ def _turned(r: Readings, degrees: float) -> Readings:
 
 
 def _above(r: Readings, obstacle_m: float) -> Readings:
-    # On the floor, and below what the ultrasound can tell, there is no height to be wrong.
+    # On the floor, and below the ultrasound's range, there is no height to be wrong.
     height = max(0.01, r.height - obstacle_m) if r.height > 0.0 else 0.0
     return replace(r, height=height, echo=max(0.0, r.echo - obstacle_m) if height else r.echo)
 
@@ -51,7 +51,7 @@ WRONG_VALUES = frozenset(CHANGES) | _OF_TIME
 
 
 class WrongValues:
-    """The edge of one vehicle: honest readings in, reported ones out. Call `report` once per tick."""
+    """The edge of one vehicle: correct readings in, reported ones out. Call `report` once per tick."""
 
     def __init__(self, faults: Iterable[Fault]) -> None:
         self._faults = tuple(fault for fault in faults if fault.kind in WRONG_VALUES)
@@ -64,7 +64,7 @@ class WrongValues:
         return bool(self._faults)
 
     def report(self, now_s: float, honest: Readings) -> Readings:
-        """Return what is reported at a time of the world [s] instead of an honest reading."""
+        """Return the readings to report at a time of the world [s] in place of the correct ones."""
         active = [fault for fault in self._faults if fault.covers(now_s)]
         reported = honest
         for fault in active:

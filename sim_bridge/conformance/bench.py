@@ -1,4 +1,4 @@
-"""One flight of the kit: room, bus, heartbeat, driver and those above it, and the verbs that a script flies with."""
+"""One flight of the kit: room, bus, driver and all that talk to it, with the verbs that scripts use."""
 
 import importlib
 import os
@@ -31,11 +31,11 @@ _SLOT = 1
 
 
 class FlightFailed(Exception):
-    """A flight did not come to where its checks begin."""
+    """A flight ended before the point where its checks begin."""
 
 
 class Bench:
-    """A context in which one vehicle of the kit flies; what is seen goes into `record`."""
+    """A context in which one vehicle of the kit flies; its messages and motion go into `record`."""
 
     def __init__(self, subject: Subject, faults: Iterable[Fault] = ()) -> None:
         self.subject, self.record = subject, Record()
@@ -74,7 +74,7 @@ class Bench:
     # -- the driver's process -----------------------------------------------------------------------------------------
 
     def start_driver(self) -> DriverLife:
-        """Start the driver, anew if it ran before; what may have to speak for it is prepared first, as in a run."""
+        """Start the driver, or start it again; its stop datagrams are prepared first, as in a run."""
         if self._voice is None:
             self._voice = _open(self.subject.kind.stop([self.subject.order()]))
         kind, process = self.subject.kind, self.subject.kind.processes([self.subject.order()])[0]
@@ -85,17 +85,17 @@ class Bench:
 
     @property
     def driver(self) -> DriverLife:
-        """Return the present life of the driver."""
+        """Return the driver's present process."""
         return self._lives[-1]
 
     def await_exit(self, limit_s: float) -> None:
-        """Wait for the driver's end and note its exit code; a late one is noted as none."""
+        """Wait for the driver's end and note its exit code; None if it does not end in time."""
         ended = self.wait(lambda: not self.driver.alive, limit_s, must=False)
         self.record.exits.append(self.driver.exit_code if ended else None)
 
     @contextmanager
     def voice(self) -> Iterator[Callable[[str], None]]:
-        """Speak for a dead driver as supervisor and guardian do: with "hover" or "land"."""
+        """Yield a function that sends "hover" or "land" for a dead driver, as supervisor and guardian do."""
         stop = self.subject.kind.stop([self.subject.order()])
         addresses = self._block.addresses(_SLOT) if stop.called else ((self.subject.address, stop.port),)
 
@@ -106,7 +106,7 @@ class Bench:
         yield say
 
     def speak(self, word: str, seconds: float) -> None:
-        """Say one word for a dead driver, ten times a second for a while."""
+        """Send one stop word for a dead driver, ten times a second for a while."""
         with self.voice() as say, self.mark(f"told to {word}"):
             for _ in range(round(10 * seconds)):
                 say(word)
@@ -125,7 +125,7 @@ class Bench:
         return self.room.emulator
 
     def wait(self, condition: Callable[[], bool], limit_s: float, must: bool = True, what: str = "") -> bool:
-        """Wait until something holds; raises FlightFailed in time unless it need not."""
+        """Wait until a condition holds; raises FlightFailed after limit_s, unless it need not hold."""
         deadline = time.monotonic() + limit_s
         while not condition():
             if time.monotonic() > deadline:
@@ -137,7 +137,7 @@ class Bench:
         return True
 
     def last_words(self) -> str:
-        """Return what the driver said last."""
+        """Return the driver's last status and events as text."""
         status = self.newest(VEHICLE_STATUS)
         said = f"{status.flight_state}, {status.mode}: {status.detail}" if status else "no status"
         events = [one.message.text for one in self.record.heard(EVENT)[-3:]]
@@ -161,7 +161,7 @@ class Bench:
             time.sleep(seconds)
 
     def mode(self, *modes: str) -> bool:
-        """Return whether the driver says that it is in one of these modes."""
+        """Return whether the driver reports one of these modes."""
         status = self.newest(VEHICLE_STATUS)
         return status is not None and status.mode in modes
 
@@ -182,7 +182,7 @@ class Bench:
     # -- common parts of scripts --------------------------------------------------------------------------------------
 
     def newest_after_start(self) -> bool:
-        """Return whether this life of the driver has spoken."""
+        """Return whether the driver has sent a status since its last start."""
         heard = self.record.heard(VEHICLE_STATUS)
         return bool(heard) and heard[-1].at_ns > self.driver.started_ns
 
@@ -197,7 +197,7 @@ class Bench:
         return process is not None and process.state == "READY" and status is not None and status.mode == "LANDED"
 
     def take_off(self, name: str = "take off") -> None:
-        """Take off, patiently: some vehicles need a while until they may."""
+        """Take off; some vehicles need a while until they may."""
         deadline = time.monotonic() + 25.0
         while self.order(name, Verb.TAKEOFF) != AckStage.ACCEPTED:
             if time.monotonic() > deadline:
@@ -208,7 +208,7 @@ class Bench:
             self.wait(lambda: abs(self.now.velocity[2]) < 0.1 and self.now.position[2] > 0.4, 6.0, must=False)
 
     def track(self, name: str = "track") -> None:
-        """Take off and let the setpoints move it; they say to stand still."""
+        """Take off and let setpoints of zero velocity control it."""
         self.connect()
         self.take_off()
         self.spend("hover", 1.0)
@@ -227,7 +227,7 @@ class Bench:
         self.up.wanted = ((0.0, 0.0, 0.0), 0.0)
 
     def await_landing(self, mark: str, limit_s: float = 20.0) -> None:
-        """Wait until it stands with motors off, or until the time is over; how long that took is a fact."""
+        """Wait until it stands with motors off, or until the time is over; the record keeps how long that took."""
         with self.mark(mark):
             begin = time.monotonic()
             landed = self.wait(lambda: self.now.on_ground and not self.now.motors, limit_s, must=False)

@@ -1,4 +1,4 @@
-"""One check: a sentence that holds for every kind of vehicle, the flight it is seen in, and the function that looks."""
+"""One check: a sentence that must hold for every kind of vehicle, its flight, and the function that judges it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,12 +8,12 @@ from sim_bridge.conformance.subject import Subject
 
 
 class NotApplicable(Exception):
-    """The kind does not have what a check is about, such as a height of its own."""
+    """The kind lacks the subject of a check, such as a height sensor."""
 
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """What a check looks at; the record is empty for those of the kind's object alone."""
+    """The input of a check; the record is empty for checks of the kind's object alone."""
 
     subject: Subject
     record: Record
@@ -23,7 +23,7 @@ class Case:
 class Check:
     """name: its identifier; text: what must hold; flight: its script, "" for the kind's object alone.
 
-    judge raises AssertionError with what was seen instead, or NotApplicable.
+    judge: raises AssertionError with what was seen instead, or NotApplicable.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Checks of everything that stops a vehicle without an order, and of what must not start it again."""
+"""Checks of all failsafes, and that nothing but an order moves a stopped vehicle again."""
 
 import numpy as np
 

@@ -13,13 +13,13 @@ from sim_bridge.conformance.record import Moment, turned
 from sim_bridge.conformance.subject import LIMITS
 
 _LEGS = {"forward": (1, 0), "left": (0, 1), "back": (-1, 0), "right": (0, -1)}
-# Of the way that an ideal vehicle makes: what gain and gusts may take or add.
+# Shares of an ideal vehicle's way: gain errors and gusts may take or add as much.
 _LEAST, _MOST, _ASIDE = 0.6, 1.35, 0.35
 _DONE = [AckStage.RECEIVED, AckStage.ACCEPTED, AckStage.EFFECTIVE]
 
 
 def _ends(case: Case, mark: str, coasts_s: float) -> tuple[Moment, Moment]:
-    """Return the states before a span and after it, when the vehicle has come to rest: its lag then counts no more."""
+    """Return the states before a span and after it, when the vehicle is at rest and its lag no longer counts."""
     begin, end = case.record.span(mark)
     return case.record.at(begin), case.record.at(end + round(coasts_s * NS_PER_S))
 

@@ -1,4 +1,4 @@
-"""Checks of a vehicle that stands: the start of its driver, what it says, and that nothing lifts it unasked."""
+"""Checks of a standing vehicle: the start of its driver, its messages, and that nothing lifts it unasked."""
 
 import itertools
 import math

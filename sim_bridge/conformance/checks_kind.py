@@ -1,4 +1,4 @@
-"""Checks of the kind's object: what settings, supervisor, estimator and simulator read of it."""
+"""Checks of the kind's object, which settings, supervisor, estimator and simulator read."""
 
 import importlib
 import inspect

@@ -1,4 +1,4 @@
-"""The flight whose field file allows less than what is asked, and its checks: limits are flown, not compared."""
+"""The flight whose setpoints exceed the limits of its field file, and its checks."""
 
 import math
 
@@ -13,7 +13,7 @@ from sim_bridge.conformance.script import script
 # About half of the default limits, and twice that is asked.
 NARROW = DroneLimits(max_speed_m_s=0.3, max_climb_m_s=0.2, max_yaw_rate_deg_s=30.0)
 _ASKED_TURN_RAD_S = 2.0 * math.radians(NARROW.max_yaw_rate_deg_s)
-# What gusts and gain may add, and the least that shows that the limit is meant and not something lower.
+# What gusts and gain may add, and the least share of the limit that must be reached.
 _MOST, _LEAST = 1.25, 0.5
 _SETTLES_S = 1.2
 

@@ -1,4 +1,4 @@
-"""Checks of what a vehicle measures of its flight, against the truth: signs, units, rates, deviations."""
+"""Checks of a vehicle's measurements against the truth: signs, units, rates, deviations."""
 
 import itertools
 import math
@@ -184,14 +184,14 @@ def _true_rate(case: Case, at_ns: int, axis: int) -> float:
 
 
 def _agrees(told: Sequence[float], true: Sequence[float]) -> float:
-    """Return the correlation of what is told with the truth."""
+    """Return the correlation of reported values with true ones."""
     if float(np.std(true)) < _HARDLY:
         raise NotApplicable("it hardly leans")
     return float(np.corrcoef(told, true)[0, 1])
 
 
 def _rate(case: Case, axis: int, marks: Sequence[str]) -> float:
-    """Return the correlation of the told rate of roll (0) or pitch (1) with the true one over spans."""
+    """Return the correlation of the reported rate of roll (0) or pitch (1) with the true one over spans."""
     heard = [one for mark in marks for one in _imu(case, mark)]
     true = [_true_rate(case, one.message.header.stamp_ns, axis) for one in heard]
     return _agrees([one.message.angular_velocity_rad_s[axis] for one in heard], true)

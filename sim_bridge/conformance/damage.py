@@ -1,4 +1,4 @@
-"""How the kit damages a datagram."""
+"""Damages datagrams at random."""
 
 import random
 

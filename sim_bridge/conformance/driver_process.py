@@ -14,7 +14,7 @@ from groundstation.process.child import ChildSpec
 from groundstation.process.stat_file import stat_of
 from groundstation.vehicles import DriverProcess
 
-# Between kit and driver stands a parent of its own, so that the driver can lose it.
+# The driver has a parent process of its own, which a check can kill.
 _PARENT = (
     "import subprocess, sys\n"
     "child = subprocess.Popen(sys.argv[1:], stdout=sys.stderr)\n"
@@ -25,7 +25,7 @@ _SINGLE_THREADED = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"
 
 
 class DriverLife:
-    """One life of a driver; log: where its standard error goes."""
+    """One process of the driver; log: file of its standard error."""
 
     def __init__(self, entry: str, process: DriverProcess, spec: ChildSpec, log: Path) -> None:
         document = json.dumps(asdict(spec) | {"section": process.section}).encode()
@@ -54,7 +54,7 @@ class DriverLife:
         return fields is not None and fields[0] != "Z"
 
     def send(self, number: signal.Signals) -> None:
-        """Send the driver a signal; nothing happens to one that has ended."""
+        """Send the driver a signal, if it has not ended."""
         with suppress(ProcessLookupError):
             signal.pidfd_send_signal(self._watch, number)
 
@@ -65,13 +65,13 @@ class DriverLife:
 
     @property
     def exit_code(self) -> int | None:
-        """Return the exit code of a driver whose parent lived to see its end, else None."""
+        """Return the driver's exit code; None while it runs, or if its parent died first."""
         with suppress(subprocess.TimeoutExpired):
             return self._parent.wait(timeout=2.0)
         return None
 
     def close(self) -> None:
-        """End what still runs; idempotent."""
+        """End driver and parent if they still run; idempotent."""
         if self._watch < 0:
             return
         self.send(signal.SIGKILL)

@@ -1,4 +1,4 @@
-"""The kit's flights: scripts that bring a vehicle to where checks look. A script judges nothing."""
+"""The kit's flights: scripts that produce the situations of the checks. A script judges nothing."""
 
 import signal
 import time
@@ -11,7 +11,7 @@ from sim_bridge.conformance.subject import LIMITS, NAME
 from sim_bridge.fault_kinds import Fault, FaultKind
 
 SPEED_M_S, CLIMB_M_S, TURN_RAD_S, LEG_S, CLIMB_S = 0.4, 0.25, 0.6, 2.5, 2.0
-# Faults of what a vehicle says begin when it has long been flying; the world's clock starts with the room.
+# Faults of a vehicle's reports begin when it has long been flying; the world's clock starts with the room.
 FAULT_S = 22.0
 LOW_BATTERY = 0.05
 _DAMAGED_S = 6.0
@@ -63,7 +63,7 @@ def _square(bench: Bench) -> None:
     time.sleep(0.8)
     bench.fly("turn", (0.0, 0.0, 0.0), TURN_RAD_S, 2.0)
     time.sleep(0.8)
-    # The forward of a vehicle turns with it.
+    # A vehicle's forward axis turns with it.
     bench.fly("forward after the turn", (SPEED_M_S, 0.0, 0.0), 0.0, LEG_S)
     time.sleep(0.5)
     bench.fly("too fast", (0.0, -1.5 * LIMITS.max_speed_m_s, 0.0), 0.0, 2.0)
@@ -129,7 +129,7 @@ def _epochs(bench: Bench) -> None:
     bench.track()
     odd = ((SPEED_M_S, 0.0, 0.0), 0.0)
     up = bench.up
-    up.epoch = 2  # of a new tracker, after which the first one is the old
+    up.epoch = 2  # of a new tracker: from now on that of the first one is old
     up.wanted = odd
     bench.spend("new epoch without RESUME", 1.5)
     bench.order("track a new epoch", Verb.TRACK)

@@ -26,7 +26,7 @@ SOURCES = (checks_kind, checks_ground, checks_flight, checks_limits, checks_meas
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """One check and its end: "passed", "failed" or "does not apply"; why: what was seen."""
+    """One check and its result: "passed", "failed" or "does not apply"; why: what was seen."""
 
     check: Check
     end: str
@@ -45,7 +45,7 @@ class Kit:
         self._records: dict[str, Record] = {"": Record()}
 
     def record(self, flight: str) -> Record:
-        """Return what a flight left behind, flying it now if nobody asked before."""
+        """Return the record of a flight; it is flown when first asked for."""
         if flight not in self._records:
             self._records[flight] = fly(SCRIPTS[flight], self.subject, self._damaged)
         return self._records[flight]
@@ -58,7 +58,7 @@ class Kit:
             return Verdict(check, "does not apply", str(reason))
         except AssertionError as error:
             return Verdict(check, "failed", str(error).partition("\nassert")[0])
-        except Exception as error:  # noqa: BLE001 - a kind's own functions are anybody's: their failure is the verdict
+        except Exception as error:  # noqa: BLE001 - a kind's functions may raise anything: their failure is the verdict
             return Verdict(check, "failed", f"{type(error).__name__}: {error}")
         return Verdict(check, "passed")
 
@@ -69,9 +69,9 @@ class Kit:
 
 
 def chosen(words: str = "") -> list[Check]:
-    """Return the checks whose name or flight is one of some words by commas; all without any.
+    """Return the checks whose name or flight is among words separated by commas; all without words.
 
-    Raises SettingsError, with all words that there are, for one that is neither.
+    Raises SettingsError, with all valid words, for one that is neither.
     """
     wanted = {word.strip() for word in words.split(",") if word.strip()}
     flights = dict.fromkeys(one.flight or _OBJECT for one in CHECKS.values())

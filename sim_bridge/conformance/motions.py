@@ -1,4 +1,4 @@
-"""What several checks ask of a vehicle's motion: that it brakes, stands, lands. They raise AssertionError."""
+"""Conditions on a vehicle's motion that several checks share: it brakes, stands, lands. They raise AssertionError."""
 
 import math
 from collections.abc import Sequence
@@ -43,9 +43,9 @@ def lands(case: Case, mark: str, limit_s: float = _LANDED_S) -> None:
 
 
 def stops_without_positions(case: Case, mark: str) -> None:
-    """The vehicle stands within 1.5 s, and then gathers no more speed than its level's error explains.
+    """The vehicle stands within 1.5 s, and then gathers no more speed than the error of its tilt explains.
 
-    Its positions ended with its driver, and nothing that it is told replaces them: it obeys by accelerometers alone.
+    Its positions ended with its driver, and nothing replaces them: it obeys by accelerometers alone.
     """
     begin, _ = case.record.span(mark)
     motion = case.record.motion(mark, 0.9)

@@ -1,6 +1,6 @@
 """The kit as a pytest plug-in: `pytest --skein-vehicle NAME` makes a test of each check.
 
-Loaded by every pytest of an environment: nothing of the simulator is imported before it is asked for.
+Every pytest of an environment loads it, so nothing of the simulator is imported before the kit is asked for.
 """
 
 from pathlib import Path
@@ -21,13 +21,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Collect the kit instead of the tests here, unless places are named."""
+    """Collect the kit instead of this project's tests, unless paths are named."""
     if config.getoption("--skein-vehicle") and config.args_source is not pytest.Config.ArgsSource.ARGS:
         config.args = [str(TESTS)]
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Let time-outs of the project at hand spare the kit's flights."""
+    """Exempt the kit's flights from this project's test time-outs."""
     for item in items:
         if item.path == TESTS and config.pluginmanager.hasplugin("timeout"):
             item.add_marker(pytest.mark.timeout(0))

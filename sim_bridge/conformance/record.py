@@ -1,4 +1,4 @@
-"""What one flight of the kit left behind: true motion, messages, marked spans of time. Times are monotonic ns."""
+"""The record of one flight of the kit: true motion, messages, marked spans of time. Times are monotonic ns."""
 
 import bisect
 import itertools
@@ -72,7 +72,7 @@ class Record:
     log: str = ""
 
     def span(self, mark: str) -> tuple[int, int]:
-        """Return begin and end of a marked span; raises AssertionError for one that the flight did not reach."""
+        """Return begin and end of a marked span; raises AssertionError if the flight did not reach it."""
         assert mark in self.marks, self.failure or f"the flight never came to: {mark}"
         return self.marks[mark]
 
@@ -97,6 +97,6 @@ class Record:
         return [one for one in everything if begin <= one.at_ns <= end]
 
     def stages(self, command: str, topic: Topic) -> list[str]:
-        """Return the stages that were answered to a command of this name, in order."""
+        """Return the stages of the answers to a command of this name, in order."""
         assert command in self.commands, self.failure or f"the flight never came to the order {command}"
         return [one.message.stage for one in self.heard(topic) if one.message.command_id == self.commands[command]]

@@ -1,4 +1,4 @@
-"""The emulated vehicle in its room, turned in real time by a thread; its true motion is written down."""
+"""The emulated vehicle in its room, run in real time by a thread that records its true motion."""
 
 import threading
 import time
@@ -19,7 +19,7 @@ _STOOD_NS = 60 * NS_PER_MS
 
 
 class Room:
-    """One vehicle at its sockets. Use it as a context; calls from other threads go through `do`."""
+    """One vehicle at its sockets. Use it as a context; other threads call it through `do`."""
 
     def __init__(self, launch: LaunchSpec, record: Record) -> None:
         self.world = World(launch.site, launch.scenario, launch.seed)
@@ -45,7 +45,7 @@ class Room:
         self._stage.close()
 
     def do(self, wish: Callable[[], None]) -> None:
-        """Have something done between two ticks."""
+        """Call a function between two ticks, in the room's thread."""
         self._wishes.append(wish)
 
     def _turn(self) -> None:

@@ -1,4 +1,4 @@
-"""What a flight of the kit is, the list of all, and how one is flown."""
+"""Flights of the kit: their type, their list, and how one is flown."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -15,7 +15,7 @@ _STOOD_MS = 150.0
 
 @dataclass(frozen=True, slots=True)
 class Script:
-    """One flight: what is done, the faults of the vehicle's own reports in it, and the limits of its field file."""
+    """One flight: its script, the faults of the vehicle's reports in it, and the limits of its field file."""
 
     name: str
     run: Callable[[Bench], None]
@@ -40,9 +40,9 @@ def script(
 
 
 def fly(script: Script, subject: Subject, damaged: int) -> Record:
-    """Return what a flight left behind; one in which this machine stood still is flown again, three times at most.
+    """Return the record of a flight; one in which this machine stood still is flown again, three times at most.
 
-    damaged: datagrams that are damaged for it, in all.
+    damaged: number of datagrams to damage in all.
     """
     record = Record()
     for _ in range(_TRIES):

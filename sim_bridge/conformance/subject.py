@@ -1,4 +1,4 @@
-"""What is judged: one vehicle of a kind, as a field file would describe it."""
+"""The vehicle under test: one of a kind, as a field file would describe it."""
 
 import json
 import os
@@ -47,7 +47,7 @@ class Subject:
         return self.address.rpartition(".")[0] + ".1"
 
     def order(self, name: str = NAME, index: int = 0) -> VehicleOrder:
-        """Return what the kind is told of the vehicle; others of a team have other names and numbers."""
+        """Return the order that the kind gets for the vehicle; others of a team have other names and numbers."""
         drone = FieldDrone(
             kind=self.kind.name,
             address=self.address,
@@ -84,7 +84,7 @@ class Subject:
 def subject_of(name: str, options: Iterable[str] = (), number: int = 0) -> Subject:
     """Return a vehicle of a kind, described as the kind's own example with some keys set otherwise (A.B=C).
 
-    number: tells apart those that are judged at the same time. Raises SettingsError for an unknown kind or key.
+    number: distinguishes vehicles that are judged at the same time. Raises SettingsError for an unknown kind or key.
     """
     kind = kind_named(name)
     written: dict[str, Any] = {key: dict(values) for key, values in kind.example.items()}
@@ -105,7 +105,7 @@ def subject_of(name: str, options: Iterable[str] = (), number: int = 0) -> Subje
 
 
 def stranger_to(address: str) -> str:
-    """Return an address in a vehicle's network at which nobody is."""
+    """Return an unused address in a vehicle's network."""
     network, _, host = address.rpartition(".")
     return f"{network}.{int(host) + 100}"
 

@@ -1,4 +1,4 @@
-"""Those above the driver, played by the kit: a supervisor that beats, an operator, a tracker that knows the truth."""
+"""Plays supervisor, operator and tracker for the driver; this tracker knows the truth."""
 
 import itertools
 import math
@@ -37,10 +37,10 @@ _STILL = (0.0, 0.0, 0.0)
 
 
 class Upstream:
-    """Speaks every 20 ms, by a thread. What is set here is what is said next.
+    """Publishes every 20 ms from a thread, by its present attributes.
 
-    leases, beats, sees, speaks: whether there are leases, beats of the supervisor, estimates, setpoints; wanted:
-    velocity [m/s; base_stabilized] and turn [rad/s] of the setpoints; converged, epoch: as they say.
+    leases, beats, sees, speaks: whether leases, beats of the supervisor, estimates, setpoints are sent; wanted:
+    velocity [m/s; base_stabilized] and turn [rad/s] of the setpoints; converged, epoch: their fields.
     """
 
     def __init__(self, bus: Bus, stranger: Bus, beats: HeartbeatBlock, record: Record) -> None:
@@ -55,11 +55,11 @@ class Upstream:
         self._thread = threading.Thread(target=self._turn, name="upstream", daemon=True)
 
     def start(self) -> None:
-        """Begin to speak."""
+        """Begin to publish."""
         self._thread.start()
 
     def close(self) -> None:
-        """Fall silent."""
+        """Stop publishing."""
         self._ended.set()
         self._thread.join()
 
@@ -115,7 +115,7 @@ class Upstream:
             heard.extend(Heard(time.monotonic_ns(), received) for received in subscription.drain())
 
     def say(self, name: str, setpoint: VelocitySetpoint, seq: int | None = None) -> None:
-        """Publish one odd setpoint, of the tracker or, by name "stranger", of somebody else."""
+        """Publish one unusual setpoint as the tracker or, by name "stranger", as somebody else."""
         if seq is not None:
             setpoint = msgspec.structs.replace(setpoint, header=msgspec.structs.replace(setpoint.header, seq=seq))
         with self._lock:
@@ -128,7 +128,7 @@ class Upstream:
     def order(
         self, name: str, verb: Verb, *, scope: tuple[str, ...] = (NAME,), issuer: str = "kit", lives_s: float = 5.0
     ) -> Command:
-        """Give a command, and remember its id under a name of the record."""
+        """Give a command, and keep its id in the record under a name."""
         with self._lock:
             bus = self.bus_of("stranger" if issuer == "stranger" else "kit")
             expires_ns = time.monotonic_ns() + round(lives_s * NS_PER_S)
@@ -145,6 +145,6 @@ class Upstream:
         return made
 
     def repeat(self, command: Command) -> None:
-        """Give a command once more, its id included."""
+        """Give a command once more, with the same id."""
         with self._lock:
             self._bus.publish(COMMAND, command)

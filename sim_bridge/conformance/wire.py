@@ -1,6 +1,6 @@
-"""The wire between driver and emulated vehicle, and what may be wrong with it: damage, loss, disorder, a stranger.
+"""The wire between driver and emulated vehicle, with faults: damage, loss, disorder, a stranger's address.
 
-Each way in which Python sends or receives a datagram ends in a method of `socket.socket`, that of asyncio too; there
+Each way in which Python sends or receives a datagram, asyncio's too, ends in a method of `socket.socket`; there
 the sockets at the vehicle's address are watched, of whatever thread. Streams are left alone.
 """
 
@@ -16,7 +16,7 @@ from sim_bridge.conformance.damage import damaged
 
 _SENDING = ("send", "sendto", "sendmsg")
 _RECEIVING = ("recv", "recvfrom", "recvmsg", "recv_into", "recvfrom_into", "recvmsg_into")
-# What was read into the caller's own buffer cannot be handed out later.
+# A datagram that was read into the caller's own buffer cannot be handed out later.
 _HOLDABLE = frozenset(("recv", "recvfrom", "recvmsg"))
 _KEPT = 100
 
@@ -61,13 +61,13 @@ class Wire:
             one.close()
 
     def repeat_as_stranger(self) -> None:
-        """Say once more what the vehicle said first, from the stranger's address."""
+        """Send the vehicle's first datagrams once more, from the stranger's address."""
         with self._lock:
             for port, to, data in self._kept:
                 self._say_as_stranger(port, to, data)
 
     def told_to_stranger(self) -> int:
-        """Count the datagrams that were sent to the stranger since the last call."""
+        """Return the number of datagrams sent to the stranger since the last call."""
         count = 0
         for one in self._strangers.values():
             with suppress(BlockingIOError):
@@ -76,7 +76,7 @@ class Wire:
         return count
 
     def _port(self, one: socket.socket) -> int | None:
-        """Return the port of the vehicle that a socket is; None for sockets of anybody else."""
+        """Return the vehicle's port that a socket is bound to; None for other sockets."""
         if one.family != socket.AF_INET or one.type != socket.SOCK_DGRAM:
             return None
         address, port = one.getsockname()

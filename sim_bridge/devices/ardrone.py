@@ -30,7 +30,7 @@ _RECEIVE_BUFFER = 1 << 20
 
 
 class ArDroneEmulator:
-    """Sockets around one drone of the world: `receive`, then a step of the world, then `send`, once per tick.
+    """The sockets of one drone of the world: `receive`, then a step of the world, then `send`, once per tick.
 
     `silent` stops the navdata, `deaf` drops what arrives, `wrong` changes what is reported (faults). Times are
     the world's, so a bridge that was frozen does not see 2 s of silence that nobody kept.
@@ -67,17 +67,17 @@ class ArDroneEmulator:
             raise
 
     def suffer(self, fault: Fault, begins: bool) -> None:
-        """Have something hold a propeller, or let it go."""
+        """Begin or end a fault of this device: something holds a propeller."""
         if fault.kind is FaultKind.PROPELLER_BLOCKED:
             self.control.blocked = begins
 
     @property
     def video_settings(self) -> VideoMode:
-        """Return what its configuration says of its video."""
+        """Return the video settings of its configuration."""
         return VideoMode.configured(self.control.configuration.integer)
 
     def fileno(self) -> int:
-        """Return a descriptor that can be read from when something waits to be received."""
+        """Return a descriptor that is readable when input waits."""
         return self._selector.fileno()
 
     def receive(self) -> None:
@@ -131,7 +131,7 @@ class ArDroneEmulator:
         return udp
 
     def _take_requests(self, _mask: int) -> None:
-        """Take navdata requests: any bytes ask for packets to where they came from."""
+        """Take navdata requests: any bytes request packets for their sender."""
         for _, client in _waiting(self._navdata):
             if not self.deaf:
                 listener = self.control.audience.request(client, self._now_ns)
@@ -146,7 +146,7 @@ class ArDroneEmulator:
                 self.control.obey_datagram(datagram, now_ns)
 
     def _dump(self) -> None:
-        """Answer CTRL 4 and 6, once somebody has connected to hear it."""
+        """Answer CTRL 4 and 6, once a client has connected to the control port."""
         control, ports = self.control, self._ports
         if ports is None or not ports.control.connected:
             return
@@ -156,7 +156,7 @@ class ArDroneEmulator:
             ports.control.custom_dump(control.configuration)
         control.dump_wanted = control.custom_dump_wanted = False
         if not control.session.answering_config:
-            control.session.clear_ack()  # WIRE: the bit stands for the time of the transfer
+            control.session.clear_ack()  # WIRE: the bit is set during the transfer
 
     def _send_status(self, listener: Listener) -> None:
         word = state_word(self._drone, self.control, self._now_ns, listener.bootstrap)

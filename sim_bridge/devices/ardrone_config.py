@@ -1,4 +1,4 @@
-"""The configuration of an emulated AR.Drone: values, who may write them, sets of sessions, users and applications."""
+"""The configuration of an emulated AR.Drone: values, write access, sets of sessions, users and applications."""
 
 from collections.abc import Mapping
 
@@ -19,12 +19,12 @@ _DESCRIPTIONS = {
     Category.USER: "custom:profile_desc",
     Category.SESSION: "custom:session_desc",
 }
-# A drone's flash is finite, and so is our memory: the oldest set makes room.
+# A drone's flash is finite, and so is our memory: the oldest set is dropped.
 _MOST_SETS = 32
 
 
 class Configuration:
-    """Keys and values of one drone: one set that is common to all, and sets by id for the other categories."""
+    """Keys and values of one drone: one common set, and sets by id for the other categories."""
 
     def __init__(self, firmware: ArdroneFirmware = FIRMWARES[DEFAULT]) -> None:
         self._firmware = firmware
@@ -37,7 +37,7 @@ class Configuration:
 
     @property
     def active_ids(self) -> Ids:
-        """Return the ids (session, user, application) that CONFIG_IDS has to name."""
+        """Return the active ids (session, user, application), which CONFIG_IDS has to name."""
         active = self._active
         return active[Category.SESSION], active[Category.USER], active[Category.APPLICATION]
 

@@ -1,4 +1,4 @@
-"""What AT commands do to an emulated AR.Drone. No sockets."""
+"""Carries out AT commands on an emulated AR.Drone. No sockets."""
 
 import math
 
@@ -22,7 +22,7 @@ _COMBINED_YAW_ALLOWED = 1
 
 
 class FlightControl:
-    """Obeys the commands that reach one drone; `blocked` is a propeller that something holds (a fault)."""
+    """Obeys the commands that reach one drone; `blocked`: something holds a propeller (a fault)."""
 
     def __init__(self, drone: Quadrotor, onboard: Onboard, firmware: ArdroneFirmware = FIRMWARES[DEFAULT]) -> None:
         self.firmware = firmware
@@ -149,7 +149,7 @@ class FlightControl:
         )
 
     def _turned_from_controller(self, forward: float, right: float, psi: float) -> tuple[float, float]:
-        """Return a motion relative to the controller's heading as one relative to the drone's.
+        """Turn a motion relative to the controller's heading into one relative to the drone's.
 
         WIRE: psi -1..1 is -180..180 deg clockwise from north; the drone compares it with the heading that it reports.
         """

@@ -28,10 +28,10 @@ class ArDroneEmulation:
         return Onboard(scenario.drones, tick_s, body.airframe, rng, magnetometer)
 
     def sense(self, body: Quadrotor, onboard: Onboard, around: Around) -> None:
-        """Measure; floor and bodies below mislead its optical flow and its ultrasound."""
+        """Take its readings; floor and bodies below mislead its optical flow and its ultrasound."""
         if around.flow_bias is not None:
             onboard.flow_bias = around.flow_bias
-        # A height that a fault puts there stays until another one comes.
+        # A height that a fault sets lasts until the next one.
         if around.below_m is not None and around.below_m != onboard.below_m:
             onboard.below_m = body.autopilot.floor_m = around.below_m
         onboard.step(body, body.autopilot.motors_on, around.crosstalk, body.air)

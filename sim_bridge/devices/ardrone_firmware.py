@@ -15,7 +15,7 @@ _LONG_HEADER, _FIRST_WITH_IT = 68, (2, 3)
 class ArdroneFirmware:
     """One firmware: generation 1 or 2 of the drone, version as in version.txt, sizes of the navdata options by tag.
 
-    values: what its configuration says that differs from an AR.Drone 2 with 2.3.3.
+    values: settings that differ from those of an AR.Drone 2 with 2.3.3.
     """
 
     name: str
@@ -33,7 +33,7 @@ class ArdroneFirmware:
         return _LONG_HEADER if (major, minor) >= _FIRST_WITH_IT else HEADER_SIZE
 
     def without(self, tags: tuple[int, ...]) -> "ArdroneFirmware":
-        """Return it with some options left out of navdata."""
+        """Return the same firmware with some options left out of navdata."""
         sizes = {tag: size for tag, size in self.sizes.items() if tag not in tags or tag == Tag.DEMO}
         return ArdroneFirmware(self.name, self.generation, self.version, sizes, self.multi_configuration, self.values)
 

@@ -1,4 +1,4 @@
-"""FTP as far as clients of an AR.Drone go: anonymous, passive, reading `version.txt`.
+"""The part of FTP that clients of an AR.Drone use: anonymous, passive, reading `version.txt`.
 
 WIRE: port 5551 serves `version.txt` ("2.3.3"), by which the SDK tells the generations apart; port 21 the data
 partition, which PS-Drone only wants to see open (docs/reference/ardrone.md 1). A server of a library would want a
@@ -142,7 +142,7 @@ class _Dialogue:
             self._passive = None
 
     def _close_listener(self) -> None:
-        # Only the listening end: what is still on its way out closes by itself.
+        # Only the listening end: a transfer in progress closes by itself.
         if self._passive is not None:
             self._passive.stop_listening()
             self._passive = None

@@ -45,7 +45,7 @@ _PICTURES_PER_SECOND = 30
 
 @dataclass(slots=True)
 class NavdataState:
-    """The packet's contents besides the sensor readings.
+    """Contents of a packet other than sensor readings.
 
     pcmd_sequence: of the last PCMD obeyed; pwm: of the four motors; at_gap_ms: between the last two AT datagrams.
     """
@@ -89,7 +89,7 @@ class _Packet:
         return self.buffer
 
 
-# What never changes in these emulated drones; values of the real landed packet.
+# Constant in these emulated drones; values of a real landed drone's packet.
 _CONSTANTS: tuple[tuple[int, int, str, tuple[float, ...]], ...] = (
     (_DEMO, 96, "<I", (3,)),
     (_DEMO, 100, "<9f", (1, 0, 0, 0, 1, 0, 0, 0, 1)),
@@ -130,7 +130,7 @@ class NavdataWriter:
         return self._fill(self._full, state, onboard, ticks, sequence)
 
     def again(self, sequence: int) -> bytearray:
-        """Return the last packet that was not a status with another number, for the next client."""
+        """Return the last packet that was no status packet, with another number, for the next client."""
         return self._last.finish(self._word, sequence)
 
     def _fill(self, packet: _Packet, state: NavdataState, onboard: Readable, ticks: int, sequence: int) -> bytearray:

@@ -19,14 +19,14 @@ _PAIRING_DATAGRAMS = 8
 
 
 class ControlPort:
-    """TCP 5559: sends the configuration to everybody connected when it is asked for by CTRL."""
+    """TCP 5559: sends the configuration to all clients when CTRL requests it."""
 
     def __init__(self, name: str, address: str, selector: Selector) -> None:
         self._port = TcpPort(name, address, CONTROL_PORT, selector, _Deaf)
 
     @property
     def connected(self) -> bool:
-        """Return whether somebody would get a dump."""
+        """Return whether a client is connected."""
         return any(connection.open for connection in self._port.connections)
 
     def dump(self, configuration: Configuration) -> None:
@@ -81,7 +81,7 @@ class Pairing:
 
 
 class Ports:
-    """All of them; port 21 only where the operating system lets us have it."""
+    """All lesser ports; port 21 only where the operating system permits it."""
 
     def __init__(self, name: str, address: str, selector: Selector, version: str) -> None:
         self._opened: list[ControlPort | FtpServer | Pairing] = []
@@ -107,7 +107,7 @@ class Ports:
 def open_shared_udp(name: str, address: str, port: int) -> socket.socket:
     """Return a bound datagram socket that never blocks; raises GroundStationError naming a port that is taken."""
     udp = open_udp(f"emulated {name}", address, port)
-    # Set after binding: nobody else gets this address, but old clients, which want the same port on all addresses of
-    # the host, get theirs if they ask for sharing, too.
+    # Set after binding: nobody else gets this address, but old clients, which bind the same port on all addresses of
+    # the host, get it if they ask for sharing, too.
     udp.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     return udp

@@ -12,7 +12,7 @@ ACK_PACKETS = 2
 
 
 class CommandLink(Enum):
-    """How long the client has been silent."""
+    """State of the command link, by the silence of its client."""
 
     ALIVE = auto()
     LATE = auto()
@@ -20,7 +20,7 @@ class CommandLink(Enum):
 
 
 class CommandSession:
-    """Whoever sends commands; times are of the emulator's clock [ns]."""
+    """The session of whoever sends commands; times are of the emulator's clock [ns]."""
 
     def __init__(self) -> None:
         self.at_sequence = 0
@@ -33,7 +33,7 @@ class CommandSession:
         self._ack_cleared = False
 
     def hear(self, now_ns: int) -> None:
-        """Note an AT datagram, whatever it holds: any traffic feeds the watchdogs."""
+        """Note an AT datagram of any content: any traffic feeds the watchdogs."""
         if self._last_at_ns is not None:
             self.mean_gap_ms = (now_ns - self._last_at_ns) // 1_000_000
         self._last_at_ns = now_ns
@@ -47,14 +47,14 @@ class CommandSession:
         return True
 
     def link(self, now_ns: int) -> CommandLink:
-        """Return how long the client has been silent."""
+        """Return the state of the link."""
         silence = self.silence_ns(now_ns)
         if silence > COM_LOST_NS:
             return CommandLink.LOST
         return CommandLink.LATE if silence > COM_WATCHDOG_NS else CommandLink.ALIVE
 
     def silence_ns(self, now_ns: int) -> int:
-        """Return the time since the last AT datagram; for ever if there was none."""
+        """Return the time since the last AT datagram [ns]; endless if there was none."""
         return COM_LOST_NS * 1000 if self._last_at_ns is None else now_ns - self._last_at_ns
 
     def forget_silent(self, now_ns: int) -> None:
@@ -70,7 +70,7 @@ class CommandSession:
         self._ack_cleared = False
 
     def clear_ack(self) -> None:
-        """Obey CTRL 5: clear the command bit once it has been seen in two packets."""
+        """Obey CTRL 5: clear the command bit once two packets have carried it."""
         self._ack_cleared = True
         self._settle_ack()
 
@@ -79,7 +79,7 @@ class CommandSession:
         self.ack = self._ack_cleared = False
 
     def sent(self) -> None:
-        """Note that a packet has gone out to everybody who listens."""
+        """Note that a packet was sent to all listeners."""
         self._ack_packets += self.ack
         self._settle_ack()
 

@@ -1,4 +1,4 @@
-"""What the state word and the control state of an emulated AR.Drone say of it."""
+"""State word and control state of an emulated AR.Drone."""
 
 from drivers.ardrone.wire.state import (
     FLYING_COMBINED_YAW,

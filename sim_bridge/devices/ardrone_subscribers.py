@@ -1,4 +1,4 @@
-"""Who listens to the navdata of an emulated AR.Drone: each asker is served at its own port, counted from 1. Pure."""
+"""Clients of an emulated AR.Drone's navdata: each is served at its own port, with numbers from 1. Pure."""
 
 from collections.abc import Iterator
 
@@ -7,7 +7,7 @@ from sim_bridge.devices.ardrone_session import COM_LOST_NS
 
 Address = tuple[str, int]
 _PATIENCE_NS = NS_PER_S
-# Programs that restart ask from a new port each time and never say goodbye: the one that asked longest ago leaves.
+# Programs that restart ask from a new port each time and never say goodbye: the one silent for longest is dropped.
 _MOST_LISTENERS = 4
 
 
@@ -58,13 +58,13 @@ class Audience:
         return listener
 
     def configured(self, now_ns: int) -> None:
-        """Note that somebody has chosen the navdata mode."""
+        """Note that a client has chosen the navdata mode."""
         self._configured_ns = now_ns
 
     def leave_bootstrap(self, now_ns: int, ack: bool) -> None:
-        """End the bootstrap of those who asked before the mode was chosen, once that is acknowledged.
+        """End the bootstrap of clients from before the choice of the mode, once that is acknowledged.
 
-        Clients that never acknowledge wait for a second, and so does who asks after the mode was chosen.
+        Clients that never acknowledge wait for a second, and so do those that come after the choice.
         """
         chosen_ns = self._configured_ns
         if chosen_ns is None:
@@ -76,7 +76,7 @@ class Audience:
                 listener.bootstrap = not answered and now_ns - since_ns < _PATIENCE_NS
 
     def forget_silent(self, now_ns: int) -> None:
-        """Drop who has not asked for 2 s: call it while no commands come either."""
+        """Drop clients that have not asked for 2 s; call it while no commands come either."""
         for listener in self:
             if now_ns - listener.asked_ns > COM_LOST_NS:
                 del self._listeners[listener.address]

@@ -16,7 +16,7 @@ Selector = selectors.BaseSelector
 
 
 class Conversation(Protocol):
-    """What one connection talks about."""
+    """The protocol of one connection."""
 
     def hear(self, data: bytes) -> None:
         """Take the client's bytes."""
@@ -39,7 +39,7 @@ class Connection:
         selector.register(stream, selectors.EVENT_READ, self._serve)
 
     def send(self, data: bytes) -> None:
-        """Send as the client takes it; one that takes nothing while much waits is dropped."""
+        """Send at the client's pace; a client that takes nothing while much waits is dropped."""
         if not self.open:
             return
         self._pending += data
@@ -96,7 +96,7 @@ class Connection:
 
 
 class TcpPort:
-    """A listening port; each accepted connection is handed to `greet`, which gives it its conversation."""
+    """A listening port; `greet` returns the conversation of each accepted connection."""
 
     def __init__(
         self, name: str, address: str, port: int, selector: Selector, greet: Callable[[Connection], Conversation]

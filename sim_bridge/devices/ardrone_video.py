@@ -58,7 +58,7 @@ class VideoMode(NamedTuple):
 
     @property
     def bits_per_picture(self) -> float:
-        """Return the mean size of a picture: with fewer pictures a second than configured, each is no better."""
+        """Return the mean size of a picture; it does not grow when fewer pictures a second are sent than configured."""
         kbits = self.bitrate if self.bitrate_mode == _MANUAL_BITRATE else self.max_bitrate
         return min(max(kbits, 250), 4000) * 1000 / min(max(self.codec_fps, 1), 30)
 
@@ -72,7 +72,7 @@ class EncodedPicture:
 
 
 class VideoEncoder:
-    """Grey pictures of one mode to PaVE frames; `number` and `position` go on from one encoder to the next."""
+    """Encodes grey pictures of one mode as PaVE frames; `number` and `position` continue in the next encoder."""
 
     def __init__(self, mode: VideoMode, fps: float, header_bytes: int, number: int = 0, position: int = 0) -> None:
         self.mode, self.number, self.position = mode, number, position
@@ -124,7 +124,7 @@ class ArDroneVideoServer(StreamServer):
         self._hand_over(release_ns, picture.data, stands_alone=picture.is_idr)
 
     def take_newcomers(self) -> bool:
-        """Return whether somebody has connected since the last call: the next picture had better be an IDR."""
+        """Return whether a client has connected since the last call: the next picture should be an IDR."""
         came, self._newcomers = self._newcomers, False
         return came
 

@@ -1,4 +1,4 @@
-"""What a motion capture system sees of all bodies: their true poses with its noise, and its faults, at any wire."""
+"""Frames of an emulated motion capture system, for any wire: true poses with its noise and its faults."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -18,7 +18,7 @@ TICK_S = 0.005
 
 @dataclass(frozen=True, slots=True)
 class SeenBody:
-    """A body's pose in the system's axes: its name there, place [m], quaternion (x, y, z, w), whether it is tracked."""
+    """One body of a frame, in the system's axes: name, place [m], quaternion (x, y, z, w), whether it is tracked."""
 
     name: str
     place: tuple[float, float, float]
@@ -50,11 +50,11 @@ class CapturedBodies:
         return [self._body(entity).name or entity for entity in self._bodies]
 
     def is_silent(self, now_s: float) -> bool:
-        """Return whether a fault keeps its frames back."""
+        """Return whether a fault withholds its frames."""
         return standing(self._faults, FaultKind.CAPTURE_SILENT, now_s, self._name) is not None
 
     def frame(self, now_s: float) -> tuple[SeenBody, ...]:
-        """Return what it sees now; a frozen one its last frame."""
+        """Return the present frame; under the fault "frozen" the last one."""
         if self._last is not None and standing(self._faults, FaultKind.CAPTURE_FROZEN, now_s, self._name) is not None:
             return self._last
         at = dict(zip(self._bodies, self._states(), strict=True))
@@ -65,7 +65,7 @@ class CapturedBodies:
         return self._last
 
     def _seen(self, entity: str, row: Array, now_s: float) -> SeenBody:
-        """Return the body on an entity, given the entity's true state."""
+        """Return the rigid body on an entity from the entity's true state."""
         body, noise = self._body(entity), self._rng.standard_normal(6)
         place_std, turn_std = self.system.pose_std_m, math.radians(self.system.heading_std_deg)
         base = rotation_from_euler(*(row[6:9] + turn_std * noise[3:]).tolist())

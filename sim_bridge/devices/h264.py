@@ -1,4 +1,4 @@
-"""Grey pictures to H.264, as the small encoders of drones make it: baseline, without delay."""
+"""Encodes grey pictures as H.264 the way drones do: baseline, without delay."""
 
 from fractions import Fraction
 

@@ -1,4 +1,4 @@
-"""A MAVLink vehicle at the wire: one UDP port of its own loopback address, PX4 or ArduPilot behind it."""
+"""A MAVLink vehicle (PX4 or ArduPilot) at the wire: one UDP port of its own loopback address."""
 
 from collections import Counter
 from contextlib import suppress
@@ -43,9 +43,9 @@ class LinkHabits:
 
 
 class MavlinkEmulator:
-    """Socket and firmware around one body of the world: `receive`, a step of the world, then `send`, once per tick.
+    """Socket and firmware of one body of the world: `receive`, a step of the world, then `send`, once per tick.
 
-    calls: an address that it speaks to without being spoken to; video: what it says of its camera. `silent` stops what
+    calls: an address that it speaks to unasked; video: its description of its camera. `silent` stops what
     it sends, `deaf` drops what arrives, `wrong` changes what is reported (faults), `habits` are those of its link.
     signing: only rightly signed frames count, and all of ours are signed. Times are the world's.
     """
@@ -75,7 +75,7 @@ class MavlinkEmulator:
         self.socket = open_udp(f"emulated {name}", *address)
 
     def equip(self, satellites: Satellites) -> None:
-        """Give it a satellite receiver, before anybody is served."""
+        """Give it a satellite receiver; call it before the first tick."""
         self.firmware.equip(satellites)
         self.services.stream_global_position()
 
@@ -114,7 +114,7 @@ class MavlinkEmulator:
     def _take(self, frame: ReceivedFrame, source: Address) -> None:
         self._greeted = True
         if self.habits.one_partner and self._clients and source not in self._clients:
-            source = next(iter(self._clients))  # it obeys whoever speaks, and answers its partner
+            source = next(iter(self._clients))  # it obeys every sender, and answers its partner
         if source not in self._clients:
             if len(self._clients) >= _CLIENTS:
                 del self._clients[min(self._clients, key=lambda address: self._clients[address])]

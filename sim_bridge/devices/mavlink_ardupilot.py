@@ -1,4 +1,4 @@
-"""ArduCopter 4.6 as far as a ground station meets it (docs/reference/mavlink.md 1, 5.3)."""
+"""ArduCopter 4.6 as a ground station sees it (docs/reference/mavlink.md 1, 5.3)."""
 
 from drivers.mavlink.wire.flight import SetPositionTargetLocalNed
 from drivers.mavlink.wire.names import CopterMode as Mode
@@ -43,7 +43,7 @@ class ArduCopter(AutopilotFirmware):
         return mode in list(Mode)
 
     def arming_fault(self) -> str:
-        """Return why it does not arm now, or ""."""
+        """Return its reason not to arm now, or ""."""
         fault = self.health_fault()
         if fault:
             return f"Arm: {fault.capitalize()}"
@@ -70,14 +70,14 @@ class ArduCopter(AutopilotFirmware):
             self.copter.steer(Steering.HOLD)
 
     def obey(self, velocity_m_s: tuple[float, float, float], turn: float) -> None:
-        """Fly; a velocity ends a take-off, and moves nothing that stands or is paused."""
+        """Fly a velocity; it ends a take-off, and does not move a standing or paused vehicle."""
         if self.copter.airborne and not self._paused:
             self._climb_to_m = None
             self._braked = False
             super().obey(velocity_m_s, turn)
 
     def pause(self, goes_on: bool) -> Answer:
-        """Stand still in GUIDED until the mode is entered anew; WIRE (docs/reference/mavlink.md 5.11)."""
+        """Hover in GUIDED until the mode is entered anew; WIRE (docs/reference/mavlink.md 5.11)."""
         if self.mode != Mode.GUIDED:
             return MavResult.FAILED, "not in GUIDED"
         self._paused = not goes_on
@@ -150,5 +150,5 @@ class ArduCopter(AutopilotFirmware):
             self.say(4, "EKF3 IMU0 stopped aiding")
 
     def disarm_after_s(self) -> float:
-        """Return after how long on the floor the motors stop."""
+        """Return the time on the floor after which the motors stop [s]."""
         return 1.0 if self.mode == Mode.LAND else self.parameters["DISARM_DELAY"]

@@ -1,4 +1,4 @@
-"""Shared parts of both emulated autopilots: arming, mode, setpoints, landing, telemetry. No sockets.
+"""The parts that both emulated autopilots share: arming, mode, setpoints, landing, telemetry. No sockets.
 
 Times are seconds of the world. Setpoints arrive in MAVLink's frames and are turned into the world's here, by this
 file's own signs.
@@ -53,7 +53,7 @@ class AutopilotFirmware:
     # -- requests -----------------------------------------------------------------------------------------------------
 
     def arm(self, force: bool = False) -> Answer:
-        """Start the motors, if nothing forbids it."""
+        """Start the motors, unless something forbids it."""
         if self.armed:
             return _OK
         fault = "" if force else self.arming_fault()
@@ -89,11 +89,11 @@ class AutopilotFirmware:
         raise NotImplementedError
 
     def reposition(self, parameters: tuple[float, ...]) -> Answer:
-        """Fly to a place, or stop here where none is named; parameters: the seven of the command."""
+        """Fly to a place, or stop here if none is named; parameters: the seven of the command."""
         return MavResult.UNSUPPORTED, ""
 
     def pause(self, goes_on: bool) -> Answer:
-        """Stop what the mode does, or go on with it."""
+        """Pause the mode's motion, or resume it."""
         return MavResult.UNSUPPORTED, ""
 
     def fly(self, setpoint: SetPositionTargetLocalNed) -> None:
@@ -134,7 +134,7 @@ class AutopilotFirmware:
             return _YAW_GAIN * math.remainder(-setpoint.yaw - self.copter.estimate.yaw, math.tau)
         return 0.0
 
-    # -- what happens by itself ---------------------------------------------------------------------------------------
+    # -- without a request ---------------------------------------------------------------------------------------------
 
     def obey(self, velocity_m_s: tuple[float, float, float], turn: float) -> None:
         """Fly a velocity [heading frame, FLU]."""
@@ -189,7 +189,7 @@ class AutopilotFirmware:
 
     @property
     def global_position(self) -> bool:
-        """Return whether it finds its own way, by satellites."""
+        """Return whether it has a position by satellites."""
         return self.satellites is not None and not self.parameters.indoor
 
     def equip(self, satellites: Satellites) -> None:
@@ -212,7 +212,7 @@ class AutopilotFirmware:
     disarmed_text = "Disarmed"
 
     def arming_fault(self) -> str:
-        """Return why it does not arm now, in its own words, or ""."""
+        """Return its reason not to arm now, in its own words, or ""."""
         raise NotImplementedError
 
     def knows(self, mode: int) -> bool:
@@ -228,5 +228,5 @@ class AutopilotFirmware:
         raise NotImplementedError
 
     def disarm_after_s(self) -> float:
-        """Return after how long on the floor the motors stop."""
+        """Return the time on the floor after which the motors stop [s]."""
         raise NotImplementedError

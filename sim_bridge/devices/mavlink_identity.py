@@ -1,4 +1,4 @@
-"""Who an emulated MAVLink vehicle is."""
+"""The identity of an emulated MAVLink vehicle."""
 
 from typing import Any, Literal
 
@@ -9,7 +9,7 @@ from sim_bridge.site import SiteDrone
 
 
 class MavlinkIdentity(BaseModel):
-    """Who a MAVLink vehicle is, and the port that it listens on or calls."""
+    """Flavour and system id of a MAVLink vehicle, and the port that it listens on or calls."""
 
     model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False)
 
@@ -21,7 +21,7 @@ class MavlinkIdentity(BaseModel):
 
 
 def identity_of(drone: SiteDrone) -> MavlinkIdentity:
-    """Return who a MAVLink vehicle is; raises SettingsError where nothing says so."""
+    """Return the identity of a MAVLink vehicle; raises SettingsError if its settings do not tell it."""
     section: dict[str, Any] = drone.section("mavlink")
     if not section:
         raise SettingsError([f"kind: {drone.kind} has no mavlink section"])

@@ -1,4 +1,4 @@
-"""Telemetry of an emulated autopilot in MAVLink's units and frames, with signs of this file's own.
+"""Telemetry of an emulated autopilot in MAVLink's units and frames, independent of the driver's conversions.
 
 World and body are x forward, y left, z up; MAVLink wants north-east-down and forward-right-down, yaw clockwise.
 """
@@ -90,7 +90,7 @@ class Speaker:
         return self.boot_us // 1000 % (1 << 32)
 
     def heartbeat(self) -> Message:
-        """Return who it is and in which mode."""
+        """Return its type, flavour and mode."""
         armed, mode, _, airborne = self._status
         base = 1 | (128 if armed else 0)
         return t.Heartbeat(QUADROTOR, self._firmware.flavour, base, mode, 4 if airborne else 3)
@@ -107,7 +107,7 @@ class Speaker:
             healthy |= SensorBits.PREARM_CHECK
         present = healthy | SensorBits.VISION_POSITION | SensorBits.PREARM_CHECK
         if ardupilot:
-            # WIRE (ArduPilot, GCS.cpp): a fence that there is none of is healthy; MAVProxy tells a breach else.
+            # WIRE (ArduPilot, GCS.cpp): a fence that does not exist is healthy; else MAVProxy reports a breach.
             healthy |= SensorBits.GEOFENCE
         return t.SysStatus(present, present, healthy, 300, self._millivolts, 500, self._percent)
 
@@ -164,7 +164,7 @@ class Speaker:
         if not self._honest.has_position:
             return None
         (x, y, z), (vx, vy, vz) = self._estimate.position, self._estimate.velocity
-        # As confident as a real one, whatever it errs by (docs/reference/mavlink.md 2.1): 0.3 degrees, 0.05 m/s.
+        # As confident as a real one, however wrong it is (docs/reference/mavlink.md 2.1): 0.3 degrees, 0.05 m/s.
         pose = _diagonal(*(_POSITION_VARIANCE,) * 3, 2.7e-5, 2.7e-5, 0.003)
         velocity = _diagonal(0.0025, 0.0025, 0.0025, 0.0, 0.0, 0.0)
         q = self._quaternion()
@@ -194,7 +194,7 @@ class Speaker:
         return t.EstimatorStatus(self.boot_us, self._solution, 0.0, ratio, ratio, 0.0, 0.0, 0.0, accuracy, accuracy)
 
     def home(self) -> Message | None:
-        """Return where it took off, once it has an origin."""
+        """Return its place of take-off, once it has an origin."""
         origin = self._firmware.origin
         return origin and t.HomePosition(*origin, 0.0, 0.0, 0.0, (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0, self.boot_us)
 

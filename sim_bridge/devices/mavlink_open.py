@@ -1,4 +1,4 @@
-"""From a drone of the site to its emulator."""
+"""Opens the emulator of a MAVLink drone of the site."""
 
 import math
 
@@ -43,9 +43,9 @@ def open_at(
     address: str, name: str, drone: SiteDrone, copter: MavlinkCopter, scenario: Scenario, *,
     calls: Address | None = None, video: VideoStreamInformation | None = None, wrong: WrongValues | None = None,
 ) -> MavlinkEmulator:  # fmt: skip
-    """Return the emulator of a MAVLink vehicle that listens at an address, with what a scenario says of its kind.
+    """Return the emulator of a MAVLink vehicle that listens at an address, under the scenario's section of its kind.
 
-    calls: whom it speaks to unasked; None: the field's driver, where that one waits for its vehicles (`listen`).
+    calls: the address that it speaks to unasked; None: the field's driver, if that waits for its vehicles (`listen`).
     """
     identity, section = identity_of(drone), scenario.of_kind("mavlink", CopterScenario)
     if calls is None and identity.listen:

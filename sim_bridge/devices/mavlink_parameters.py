@@ -116,7 +116,7 @@ class Parameters:
         return self.values[name]
 
     def kind(self, name: str) -> int:
-        """Return how a parameter travels."""
+        """Return the type by which a parameter is transmitted."""
         return REAL32 if name in self._reals else INT32
 
     @property

@@ -1,4 +1,4 @@
-"""PX4 1.16 as far as a ground station meets it (docs/reference/mavlink.md 2, 5.2)."""
+"""PX4 1.16 as a ground station sees it (docs/reference/mavlink.md 2, 5.2)."""
 
 import math
 
@@ -41,14 +41,14 @@ class Px4(AutopilotFirmware):
         return mode in (HOLD, LAND, OFFBOARD, POSITION, TAKE_OFF, *_LEVEL)
 
     def arming_fault(self) -> str:
-        """Return why it does not arm now, or ""."""
+        """Return its reason not to arm now, or ""."""
         fault = self.health_fault()
         if fault:
             return f"Arming denied: {fault}"
         if self.mode != OFFBOARD and self.global_position:
             return ""
         if self.mode != OFFBOARD:
-            # WIRE (docs/reference/mavlink.md 2): Hold needs a global position, which there is none of indoors.
+            # WIRE (docs/reference/mavlink.md 2): Hold needs a global position, and indoors there is none.
             return "Arming denied: Resolve system health failures first"
         return "" if self.streams else "Arming denied: no offboard signal"
 
@@ -66,13 +66,13 @@ class Px4(AutopilotFirmware):
         return MavResult.ACCEPTED, ""
 
     def reposition(self, parameters: tuple[float, ...]) -> Answer:
-        """Hold here where no place is named; WIRE (docs/reference/mavlink.md 5.11): QGroundControl's Pause."""
+        """Hold here if no place is named; WIRE (docs/reference/mavlink.md 5.11): QGroundControl's Pause."""
         if parameters[1] != 1.0 or not all(map(math.isnan, parameters[3:])):
             return super().reposition(parameters)
         return self.set_mode(HOLD)
 
     def enter(self, mode: int) -> None:
-        """Change the mode; a take-off belongs to its own, and AUTO.TAKEOFF without a height takes the parameter's."""
+        """Change the mode, which ends a take-off; AUTO.TAKEOFF without a height climbs to that of the parameter."""
         self._climb_to_m = self.parameters["MIS_TAKEOFF_ALT"] if mode == TAKE_OFF else None
         super().enter(mode)
 
@@ -118,5 +118,5 @@ class Px4(AutopilotFirmware):
         self.enter(mode)
 
     def disarm_after_s(self) -> float:
-        """Return after how long on the floor the motors stop."""
+        """Return the time on the floor after which the motors stop [s]."""
         return self.parameters["COM_DISARM_LAND" if self.mode == LAND else "COM_DISARM_PRFLT"]

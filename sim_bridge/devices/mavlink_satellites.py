@@ -1,4 +1,4 @@
-"""A satellite receiver of an emulated vehicle: where its room lies on Earth, and what its filter gets from it.
+"""A satellite receiver of an emulated vehicle: the room's place on Earth, and the fixes that its filter gets.
 
 Written from docs/reference/mavlink.md 1: with GPS ArduCopter's filter is wrong by 3 cm on average.
 """

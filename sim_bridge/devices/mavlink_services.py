@@ -1,7 +1,7 @@
-"""What an emulated autopilot answers: commands, parameters, rates, clocks, and the poses that it is fed. No sockets.
+"""Answers requests to an emulated autopilot: commands, parameters, rates, clocks, fed poses. No sockets.
 
 WIRE (docs/reference/mavlink.md 4): an unknown command is answered UNSUPPORTED, never with silence; a request for
-another vehicle is none of ours; the answer names who asked.
+another vehicle is ignored; the answer names the sender of the request.
 """
 
 import math
@@ -26,7 +26,7 @@ _PX4_RATES: dict[type[Message], float] = {
     t.SysStatus: 5, t.ExtendedSysState: 5, t.EstimatorStatus: 1, t.BatteryStatus: 0.5, t.HomePosition: 0.5,
 }  # fmt: skip
 _GLOBAL_RATES: dict[type[Message], float] = {GlobalPositionInt: 50, GpsRawInt: 8}
-# WIRE (REQUEST_DATA_STREAM): what ArduPilot sends by each number of a stream; 0 is all of them.
+# WIRE (REQUEST_DATA_STREAM): messages that ArduPilot sends for each number of a stream; 0 is all of them.
 _OLD_STREAMS: dict[int, tuple[type[Message], ...]] = {
     2: (t.SysStatus, t.ExtendedSysState, GpsRawInt),
     6: (t.LocalPositionNed, GlobalPositionInt),
@@ -151,7 +151,7 @@ class Services:
     # -- parameters and the rest --------------------------------------------------------------------------------------
 
     def parameter(self, name: str) -> Message:
-        """Return one parameter as it is carried."""
+        """Return one parameter as it is transmitted."""
         parameters = self._firmware.parameters
         kind = parameters.kind(name)
         carried = carried_from_value(self._firmware.flavour, parameters[name], kind)
@@ -194,7 +194,7 @@ class Services:
         parameters.values[message.param_id] = value
 
     def _old_rates(self, stream: int, rate_hz: int) -> None:
-        """Send a stream at a rate from now on, whatever was asked for before, or no more (0)."""
+        """Send a stream at a rate from now on, in place of earlier requests; 0: no more."""
         for number, kinds in _OLD_STREAMS.items():
             for kind in kinds if stream in (0, number) else ():
                 if rate_hz:

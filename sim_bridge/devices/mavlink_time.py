@@ -1,4 +1,4 @@
-"""How an emulated autopilot maps the times of a sender to its own."""
+"""Maps a sender's times to an emulated autopilot's clock."""
 
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
@@ -10,7 +10,7 @@ _SHARE = 0.1
 class SenderClock:
     """PX4 requests TIMESYNC answers and follows them; ArduPilot learns the least lag of arrivals (`learns`).
 
-    Without either a time means: now.
+    Without either, every time counts as now.
     """
 
     def __init__(self, learns: bool) -> None:
@@ -26,7 +26,7 @@ class SenderClock:
         if self._offset_ns is None:
             self._offset_ns = offset
         elif abs(offset - self._offset_ns) > _JUMP_NS:
-            # A clock that jumped is believed only when it insists.
+            # A clock that jumped is believed only after several answers in a row.
             self._odd += 1
             if self._odd >= _STUBBORN:
                 self._offset_ns, self._odd = offset, 0

@@ -1,6 +1,6 @@
-"""An emulated motion capture system: a NatNet server that streams what it sees of all bodies.
+"""An emulated motion capture system: a NatNet server that streams the poses of all bodies.
 
-WIRE (docs/reference/natnet.md 2): who asked to connect is sent frames for as long as it is heard.
+WIRE (docs/reference/natnet.md 2): a client that asked to connect is sent frames for as long as it is heard.
 """
 
 from contextlib import suppress
@@ -14,12 +14,12 @@ VERSION = (4, 1)
 _TICKS_PER_S = 10_000_000
 _DATAGRAMS_PER_TICK = 64
 _FORGOTTEN_TICKS = 2000  # a client that is silent for 10 s is gone
-# What the system itself needs before it sends a frame, and says of it [s].
+# The system's own delay before it sends a frame, which it states in it [s].
 _PROCESSING_S = 0.005
 
 
 class NatnetEmulator:
-    """Sockets around what a system sees; `sim_bridge.world.emulation.Emulator`."""
+    """Sockets of one system; `sim_bridge.world.emulation.Emulator`."""
 
     def __init__(self, name: str, place: Address, seen: CapturedBodies) -> None:
         self.silent = self.deaf = False
@@ -57,7 +57,7 @@ class NatnetEmulator:
                 self._heard[sender] = self._ticks
 
     def send(self) -> None:
-        """End a tick: take a frame when one is due, and send those whose time on the way is over."""
+        """End a tick: take a frame when one is due, and send those whose delay is over."""
         self._ticks += 1
         now_s = self._ticks * TICK_S
         if self._ticks % FRAME_TICKS == 0:

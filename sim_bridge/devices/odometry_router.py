@@ -1,6 +1,6 @@
 """An emulated TurtleBot's node and its Zenoh router: nav_msgs/Odometry from its wheels, as rmw_zenoh publishes it.
 
-Pose and heading are what the wheels add up to, in a frame of their own.
+Pose and heading are integrated from the wheels, in a frame of their own.
 """
 
 import math
@@ -18,7 +18,7 @@ _EVERY = round(PERIOD_S / TICK_S)
 
 
 class OdometryRouter(PublishingRouter):
-    """Router and publisher around one base; `sim_bridge.world.emulation.Emulator`.
+    """Router and publisher of one base; `sim_bridge.world.emulation.Emulator`.
 
     source: topic and domain; faults: those of this target's odometry.
     """
@@ -46,7 +46,7 @@ class OdometryRouter(PublishingRouter):
         self.publish(self._publisher, vehicle.encode_odometry(message, "odom", "base_footprint"))
 
     def _measured(self, now_s: float) -> vehicle.OdometryMessage:
-        """Return what it has to say, without a stamp."""
+        """Return the present message without a stamp."""
         speed, turn_rate = self._wheels.read()
         scaled = standing(self._faults, FaultKind.ODOMETRY_SCALED, now_s)
         speed *= scaled.amount if scaled else 1.0

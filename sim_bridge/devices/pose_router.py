@@ -1,4 +1,4 @@
-"""An emulated node that publishes what a motion capture system sees as PoseStamped, and its Zenoh router."""
+"""An emulated node that publishes a motion capture system's poses as PoseStamped, and its Zenoh router."""
 
 import time
 
@@ -9,7 +9,7 @@ from sim_bridge.devices.ros2_router import ANY_HASH, PublishingRouter, topic_of
 
 
 class PoseRouter(PublishingRouter):
-    """Router and publishers around what a system sees; `sim_bridge.world.emulation.Emulator`.
+    """Router and publishers of one system; `sim_bridge.world.emulation.Emulator`.
 
     Topics and domain stand in the system's source. A body that is not tracked is not published.
     """
@@ -25,7 +25,7 @@ class PoseRouter(PublishingRouter):
         self._waiting: list[tuple[int, str, bytes]] = []
 
     def send(self) -> None:
-        """End a tick: look when a frame is due, and publish the poses whose time on the way is over."""
+        """End a tick: take a frame when one is due, and publish the poses whose delay is over."""
         self._ticks += 1
         now_s = self._ticks * TICK_S
         if self._ticks % FRAME_TICKS == 0:

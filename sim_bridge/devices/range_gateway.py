@@ -1,6 +1,6 @@
-"""An emulated gateway of ranges: measures every drone in turn against all anchors, and tells who asked.
+"""An emulated gateway of ranges: measures every drone in turn against all anchors, and sends to its clients.
 
-WIRE (docs/reference/ranges.md 2): who asks is told for as long as it is heard.
+WIRE (docs/reference/ranges.md 2): a client that asks is sent ranges for as long as it is heard.
 """
 
 from collections.abc import Callable, Iterable
@@ -22,7 +22,7 @@ _FORGOTTEN_TICKS = 2000  # a client that is silent for 10 s is gone
 
 
 class RangeGateway:
-    """A socket and radios around the states of all bodies; `sim_bridge.world.emulation.Emulator`.
+    """Socket and radios of one system; `sim_bridge.world.emulation.Emulator`.
 
     states: returns a row for each body, as `World.states` has them.
     """
@@ -48,7 +48,7 @@ class RangeGateway:
         return self._socket.fileno()
 
     def receive(self) -> None:
-        """Hear all who ask."""
+        """Take the requests of clients."""
         for _ in range(_DATAGRAMS_PER_TICK):
             try:
                 _, sender = self._socket.recvfrom(LARGEST)
@@ -58,7 +58,7 @@ class RangeGateway:
                 self._heard[sender] = self._ticks
 
     def send(self) -> None:
-        """End a tick: measure who is due, and send what has been on its way long enough."""
+        """End a tick: measure the drones that are due, and send the rounds whose delay is over."""
         self._ticks += 1
         now_s = self._ticks * _TICK_S
         late = round(self._system.delay_ms / 1000 / _TICK_S)
@@ -76,7 +76,7 @@ class RangeGateway:
                     self._socket.sendto(datagram, client)
 
     def _round(self, drone: str, now_s: float) -> dict[str, float]:
-        """Return what is told of a drone [m, to the millimetre]."""
+        """Return a drone's distances to all anchors as they are sent [m, to the millimetre]."""
         if drone in self._last_m and standing(self._faults, FaultKind.RANGES_FROZEN, now_s, self._name):
             return self._last_m[drone]
         row = self._states()[self._rows[drone]]

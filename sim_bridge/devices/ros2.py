@@ -1,6 +1,6 @@
 """An emulated vehicle behind a ROS 2 node, and the node's Zenoh router; it moves as the emulated Tello does.
 
-The node is strict where drivers are: it flies only after its take-off order, and stops when no velocity has come for
+The node is strict, as drivers are: it flies only after its take-off order, and stops when no velocity has come for
 0.5 s.
 """
 
@@ -39,7 +39,7 @@ _DEFAULTS: dict[str, Any] = {
 
 
 class Ros2Emulator:
-    """Router, topics and services around one body; `sim_bridge.world.emulation.Emulator`."""
+    """Router, topics and services of one body; `sim_bridge.world.emulation.Emulator`."""
 
     def __init__(
         self, name: str, address: str, section: dict[str, Any], body: TelloBody, wrong: WrongValues | None = None
@@ -89,7 +89,7 @@ class Ros2Emulator:
         return serve
 
     def _ring(self, what: str, payload: bytes) -> None:
-        """Leave a message for the loop; on the network's thread."""
+        """Queue a message for the loop; called on the network's thread."""
         self._waiting.append((what, payload))
         with suppress(OSError):
             os.eventfd_write(self._bell, 1)
@@ -99,7 +99,7 @@ class Ros2Emulator:
         return self._bell
 
     def receive(self) -> None:
-        """Obey all that waits."""
+        """Obey all waiting messages."""
         with suppress(BlockingIOError):
             os.eventfd_read(self._bell)
         while self._waiting:
@@ -121,7 +121,7 @@ class Ros2Emulator:
                 self._heard_tick = self._ticks
 
     def send(self) -> None:
-        """End a tick: go on with what was ordered, and publish what is due."""
+        """End a tick: continue the present order, and publish what is due."""
         self._ticks += 1
         if self._body.motors_on:
             self._go_on()
@@ -195,7 +195,7 @@ class Ros2Emulation:
     """Vehicles behind ROS 2 nodes; `sim_bridge.world.emulation.Emulation`."""
 
     def body(self, drone: SiteDrone, scenario: Scenario, tick_s: float, rng: np.random.Generator) -> TelloBody:
-        """Return one on its pad."""
+        """Return a vehicle on its pad."""
         return TelloBody(drone, scenario, tick_s, rng)
 
     def open(self, name: str, body: TelloBody, onboard: None, order: LaunchSpec) -> Ros2Emulator:

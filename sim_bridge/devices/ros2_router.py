@@ -60,7 +60,7 @@ class PublishingRouter(Ros2Router):
         return self._bell
 
     def receive(self) -> None:
-        """Hear nothing."""
+        """Ignore input: the node only publishes."""
 
     def close(self) -> None:
         """End node and router."""

@@ -1,6 +1,6 @@
 """A TCP server that sends pictures to several clients at set times; a slow client delays no other.
 
-What is said to a client that comes, and what is made of its words, is up to the kinds of streams built on it.
+The greeting of clients, and the meaning of their bytes, are up to the kinds of streams built on it.
 """
 
 import errno
@@ -17,7 +17,7 @@ _POLL_S = 0.25
 
 
 class Client:
-    """One connection; `starved` clients wait for a picture that needs none before it."""
+    """One connection; `starved`: it waits for a picture that can be decoded alone."""
 
     def __init__(self, connection: socket.socket) -> None:
         self.connection = connection

@@ -1,4 +1,4 @@
-"""An emulated Tello: how it moves, and its text over UDP 8889 and 8890.
+"""An emulated Tello: its motion, and its text protocol over UDP 8889 and 8890.
 
 WIRE (docs/reference/tello.md 2): sticks are kept until others come; 15 s without a command land it; answers go to the
 sender, the state to port 8890 of the one that said `command`, ten times a second.
@@ -39,7 +39,7 @@ _TICK_S = 0.005
 _QUIET_S = 15.0
 _TAKE_OFF_M, _DESCENT_M_S = 0.8, 0.4
 _RESPONSE_S, _CLIMB_S, _TURN_S, _TILT_S, _MOST_M_S2 = 0.35, 0.25, 0.15, 0.12, 2.5
-# What lasts (wind, a tilt that it takes for level) is trimmed away in a second or so.
+# Constant disturbances (wind, a tilt that it takes for level) are trimmed away in a second or so.
 _TRIM_PER_S2, _MOST_TRIM_M_S2 = 2.0, 2.0
 _DATAGRAMS_PER_TICK = 64
 _STILL: Vector3 = (0.0, 0.0, 0.0)
@@ -50,7 +50,7 @@ _WORDS = (TAKE_OFF, LAND, EMERGENCY, STOP, STREAM_ON, STREAM_OFF)
 
 
 class TelloBody:
-    """A quadrotor that holds the velocity it is told by its own, wrong, optical flow and tilt."""
+    """A quadrotor that follows commanded velocities by its own, wrong, optical flow and tilt."""
 
     def __init__(self, drone: SiteDrone, scenario: Scenario, tick_s: float, rng: np.random.Generator) -> None:
         draw = standard_normals(rng)
@@ -112,7 +112,7 @@ class TelloBody:
         return c * a - s * b + push[0], s * a + c * b + push[1], (up - body.vz) / _CLIMB_S + wake[2]
 
     def _pull(self, axis: int, wanted_m_s: float, felt_m_s: float) -> float:
-        """Return the acceleration towards a velocity, with what was trimmed against the one expected by now."""
+        """Return the acceleration towards a velocity, including the trim by the velocity expected by now."""
         expected, trim = self._expected, self._trim
         expected[axis] += (wanted_m_s - expected[axis]) * self._tick_s / _RESPONSE_S
         trim[axis] += _TRIM_PER_S2 * (expected[axis] - felt_m_s) * self._tick_s
@@ -121,16 +121,16 @@ class TelloBody:
         return max(-_MOST_M_S2, min(_MOST_M_S2, pull))
 
     def sense(self) -> None:
-        """Let its sensors see the motion of this tick."""
+        """Let its sensors measure the motion of this tick."""
         self.senses.step(self.airframe, self.motors_on)
 
     def wake_on(self, other: Airframe) -> Vector3 | None:
-        """Return how its downwash accelerates another one below it, None when out of its reach."""
+        """Return the acceleration of a body below by its downwash, None out of its reach."""
         return wake_between(self.airframe, other)
 
 
 class TelloEmulator:
-    """Socket and orders around one body; `sim_bridge.world.emulation.Emulator`."""
+    """Socket and orders of one body; `sim_bridge.world.emulation.Emulator`."""
 
     def __init__(self, name: str, address: str, body: TelloBody, wrong: WrongValues | None = None) -> None:
         self.silent = self.deaf = False
@@ -143,7 +143,7 @@ class TelloEmulator:
 
     @property
     def video_settings(self) -> tuple[str, ...]:
-        """Return who gets its video: the address that said `command`, once `streamon` was said."""
+        """Return the receiver of its video: the address that sent `command`, once `streamon` was sent."""
         return (self._partner[0],) if self._streams and self._partner is not None else ()
 
     def fileno(self) -> int:
@@ -191,7 +191,7 @@ class TelloEmulator:
             self._body.wanted = ((forward * _FULL_M_S, -right * _FULL_M_S, up * _FULL_M_S), turn)
 
     def send(self) -> None:
-        """End a tick: go on with what was ordered, and send the state when it is due."""
+        """End a tick: continue the present order, and send the state when it is due."""
         self._ticks += 1
         self._quiet_ticks += 1
         body = self._body

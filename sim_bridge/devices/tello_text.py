@@ -1,4 +1,4 @@
-"""The emulated Tello's half of its text: states out, sticks in."""
+"""The emulated Tello's side of the text protocol: states out, sticks in."""
 
 from drivers.tello.wire.text import State
 

@@ -1,1 +1,1 @@
-"""Real bodies in the emulated room: where they are, from whom that is known."""
+"""Real bodies in the emulated room, and the sources of their poses."""

@@ -9,14 +9,14 @@ from groundstation.geometry.angles import euler_from_quaternion
 from groundstation.time_units import NS_PER_S
 from sim_bridge.world.puppet import OutsidePose
 
-# A velocity is that between two frames at most so far apart [s]; a frame is carried on by it, for no longer than this.
+# Longest time between two frames that tell a velocity, and longest time for which a frame is extrapolated by it [s].
 _APART_S, _CARRIED_S = 0.2, 0.1
 
 _Stamped = tuple[int, BodyPose]
 
 
 class CaptureFeed:
-    """`latest` returns where a body was in the newest frame, carried on to now; refused ones do not count."""
+    """The pose of a body in the newest frame, extrapolated to now; refused frames do not count."""
 
     def __init__(self, name: str, system: str, bus: Bus) -> None:
         self._name, self._system = name, system
@@ -33,7 +33,7 @@ class CaptureFeed:
         return pose
 
     def close(self) -> None:
-        """Hold nothing: the bus ends its subscriptions."""
+        """Do nothing: the bus ends its subscriptions."""
 
     def _follow(self, frame: BodyPoses, now_ns: int) -> OutsidePose | None:
         body = next((one for one in frame.bodies if one.name == self._name), None)

@@ -1,4 +1,4 @@
-"""Keeps the puppets of a world where the real bodies are, and says when that is not known."""
+"""Moves the puppets of a world with the real bodies, and reports when their places are unknown."""
 
 from collections.abc import Mapping
 from pkgutil import resolve_name
@@ -15,17 +15,17 @@ from sim_bridge.world.puppet import OutsidePose, Puppet
 
 
 class PoseFeed(Protocol):
-    """Where the pose of one real body comes from."""
+    """A source of poses of one real body."""
 
     def latest(self, now_ns: int) -> OutsidePose | None:
-        """Return the newest pose, None where nothing new arrived."""
+        """Return the newest pose, None if nothing new arrived."""
 
     def close(self) -> None:
         """Release what it holds."""
 
 
 class EstimateFeed:
-    """The tracker's estimate of one robot: nothing that the emulated cameras show can correct it."""
+    """The tracker's estimate of one robot; emulated cameras cannot correct it, for they do not show the robot."""
 
     def __init__(self, name: str, bus: Bus) -> None:
         self._name = name
@@ -40,7 +40,7 @@ class EstimateFeed:
         return pose
 
     def close(self) -> None:
-        """Hold nothing: the bus ends its subscriptions."""
+        """Do nothing: the bus ends its subscriptions."""
 
 
 def _pose_in(estimate: Estimate, name: str) -> OutsidePose | None:
@@ -67,7 +67,7 @@ class Followers:
             raise
 
     def move(self, now_ns: int) -> None:
-        """Put each puppet where its real body is."""
+        """Move each puppet to its real body's pose."""
         for name, feed in self._feeds.items():
             pose = feed.latest(now_ns)
             if pose is not None:

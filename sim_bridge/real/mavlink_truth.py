@@ -1,7 +1,7 @@
-"""The true pose of a vehicle from the simulator behind its firmware: a UDP port that it sends MAVLink to.
+"""Receives the true pose of a vehicle over MAVLink from the simulator behind its firmware.
 
 SIM_STATE (ArduPilot, asked for) and HIL_STATE_QUATERNION (PX4's SIH) are exact; until one of them arrives,
-LOCAL_POSITION_NED with ATTITUDE counts, which a vehicle that finds its own way sends as well, and PX4's SIH before it
+LOCAL_POSITION_NED with ATTITUDE counts, which any vehicle with a position sends, PX4's SIH even before it
 has been placed on its globe. The vehicle does not move when its source changes.
 """
 
@@ -23,7 +23,7 @@ from sim_bridge.site import SiteDrone
 from sim_bridge.world.puppet import OutsidePose, Vector3
 
 Address = tuple[str, int]
-# Of a system that is neither a vehicle nor a ground station: no failsafe of a vehicle waits for it.
+# The id of a system that is neither vehicle nor ground station: no failsafe of a vehicle depends on it.
 _SYSTEM, _COMPONENT = 254, 191
 _ASK_NS, _INTERVAL_US = 2 * NS_PER_S, 20_000.0
 # Each simulator has a globe of its own [m per degree]: 0.1 % apart.
@@ -34,7 +34,7 @@ _DATAGRAMS = 64
 
 
 class AutopilotTruth:
-    """Listens at an address; `latest` drains it and returns the newest pose in the room, None without a new one."""
+    """Listens at an address; `latest` empties the port and returns the newest pose in the room."""
 
     def __init__(self, name: str, address: Address, system: int, placement: Placement) -> None:
         self._system, self._placement = system, placement
@@ -47,7 +47,7 @@ class AutopilotTruth:
         self._socket = open_udp(f"the true pose of {name}", *address)
 
     def latest(self, now_ns: int) -> OutsidePose | None:
-        """Return where the vehicle is now, if something new says so; now_ns: of any steady clock."""
+        """Return the vehicle's pose, None without a new one; now_ns: of any steady clock."""
         newest: TrueState | None = None
         for _ in range(_DATAGRAMS):
             try:
@@ -59,7 +59,7 @@ class AutopilotTruth:
         return None if newest is None else self._placement.pose(newest)
 
     def hear(self, data: bytes) -> TrueState | None:
-        """Return the newest true state in a datagram; what is no frame, or another vehicle's, is counted."""
+        """Return the newest true state in a datagram; other bytes and frames of other vehicles are counted."""
         newest: TrueState | None = None
         try:
             for raw in split(data):
@@ -128,7 +128,7 @@ class AutopilotTruth:
 
 
 def of_drone(name: str, address: Address, drone: SiteDrone) -> AutopilotTruth:
-    """Return what hears, at an address, where a drone of the field is."""
+    """Return the receiver of a field drone's true pose at an address."""
     return AutopilotTruth(name, address, identity_of(drone).system_id, Placement(drone.pad_m, drone.pad_yaw_rad))
 
 

@@ -1,4 +1,4 @@
-"""From the local frame of a firmware's simulator to the room: it starts on the vehicle's pad, as the field says."""
+"""Maps the local frame of a firmware's simulator to the room: the vehicle starts on its pad."""
 
 import math
 from dataclasses import dataclass, replace
@@ -11,7 +11,7 @@ _WANDERS_M = 0.5
 
 @dataclass(frozen=True, slots=True)
 class TrueState:
-    """What a simulator says: position [m], velocity [m/s; north-east-down], roll, pitch, yaw [rad; FRD], rates.
+    """A simulator's true state: position [m], velocity [m/s; north-east-down], roll, pitch, yaw [rad; FRD], rates.
 
     grain_m: step of its horizontal position.
     """
@@ -24,7 +24,7 @@ class TrueState:
 
 
 class Placement:
-    """Maps true states to poses in the room. The first one is where the vehicle stands on its pad, heading included."""
+    """Maps true states to poses in the room; the first one is that of the vehicle on its pad, heading included."""
 
     def __init__(self, pad_m: tuple[float, float], pad_yaw_rad: float) -> None:
         self._pad_m, self._pad_yaw = pad_m, pad_yaw_rad
@@ -32,9 +32,9 @@ class Placement:
         self._last: TrueState | None = None
 
     def go_on_from(self, state: TrueState) -> None:
-        """Take a state in another frame, such as that of a globe: the vehicle is still where it was last.
+        """Continue with a state in another frame, such as a globe's: the vehicle is still at its last pose.
 
-        One that seems to have moved a little still stands on its pad: its own estimate wandered.
+        A vehicle that seems to have moved a little still stands on its pad: its own estimate wandered.
         """
         if self._first is None or self._last is None:
             return

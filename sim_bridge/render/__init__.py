@@ -1,1 +1,1 @@
-"""Renders what each emulated camera sees: floor, bodies and boards, with honest errors."""
+"""Renders the pictures of emulated cameras: floor, bodies and boards, with realistic errors."""

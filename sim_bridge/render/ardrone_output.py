@@ -1,4 +1,4 @@
-"""The video of an AR.Drone's own, drawn and served at its video port."""
+"""Draws an AR.Drone's own video and serves it at its video port."""
 
 import math
 from dataclasses import replace
@@ -17,7 +17,7 @@ from sim_bridge.render.outputs import scaled
 from sim_bridge.render.spec import Mount, RenderSpec
 from sim_bridge.render.wrong_pictures import WrongPictures
 
-# The drone was switched on a little before the world began.
+# The drone was switched on a little before the simulation began.
 _POWER_ON_MS = 20_000
 # WIRE (docs/reference/ardrone.md 6): calibration of a real bottom camera, 320x240 enlarged to 640x360.
 _BOTTOM_LENS = CameraIntrinsics(640, 360, 700.5, 701.7, 319.5, 218.7)
@@ -32,7 +32,7 @@ def header_bytes_of(own: OwnVideo | None) -> int:
 
 
 class ArDroneOutput:
-    """H.264 over TCP, of the camera and in the size that the drone's configuration asks for."""
+    """H.264 over TCP, of the camera and size that the drone's configuration selects."""
 
     def __init__(self, spec: RenderSpec, modes: Connection | None) -> None:
         self._spec, self._modes = spec, modes
@@ -47,7 +47,7 @@ class ArDroneOutput:
 
     @property
     def clients(self) -> int:
-        """Return how many are looking."""
+        """Return the number of clients."""
         return self._server.clients
 
     def show(self, states: Array, exposure_ns: int, release_ns: int, now_s: float) -> None:

@@ -1,4 +1,4 @@
-"""Draws one board: every pixel of its window looks along its own ray, so corners are exact to hundredths of a pixel."""
+"""Draws one board with a ray for each pixel of its window, so corners are exact to hundredths of a pixel."""
 
 import math
 from dataclasses import dataclass
@@ -21,17 +21,17 @@ _OVERSAMPLING = 2
 _WINDOW_MARGIN_PX = 4
 _NEAREST_M = 0.12
 _SPACING_BEYOND_LENS_PX = 30.0
-# Measured: cornerSubPix then sees the demanded rms (interpolation and its window average).
+# Measured: with it cornerSubPix finds the demanded rms (interpolation and its window average the error).
 _FIELD_GAIN = 1.046
 # A card has four layers, grey thrice and its coverage: OpenCV draws four of them in a third of the time of two.
 _GREY, _COVERAGE = 0, 3
-# Smooth between the nodes of the corner error on a grid so many times finer; straight from there to the pixels.
+# The corner error is smooth on a grid this many times finer than its nodes, and linear from there to the pixels.
 _STEPS = 5
 
 
 @dataclass(frozen=True, slots=True)
 class Flaws:
-    """What keeps a board's picture from being ideal: corner error [px rms], defocus [px sigma], smear [px, (2)]."""
+    """Errors of a board's picture: of its corners [px rms], defocus [px sigma], smear [px, (2)]."""
 
     corner_px: float = 0.0
     blur_px: float = 0.0
@@ -39,7 +39,7 @@ class Flaws:
 
 
 class BoardPainter:
-    """The printed card of one marker at several resolutions, and how to lay it into a picture."""
+    """Draws the printed card of one marker into pictures, from several resolutions."""
 
     def __init__(self, card: Card, intrinsics: CameraIntrinsics, table: LensTable) -> None:
         self._unit_m = card.unit_m
@@ -61,9 +61,9 @@ class BoardPainter:
         random: np.random.Generator,
         rolling: tuple[Pose, Pose] | None = None,
     ) -> None:
-        """Lay the board into the picture; nothing happens when it is behind, beyond the border or turned away.
+        """Draw the board into the picture, unless it is behind the camera, beyond the border or turned away.
 
-        rolling: where it is when the first and the last row of the picture are exposed.
+        rolling: its poses when the first and the last row of the picture are exposed.
         """
         poses = rolling or (optical_from_marker,)
         rim = [point for pose in poses for point in pose.apply(self._rim).tolist()]
@@ -102,7 +102,7 @@ class BoardPainter:
     def _sample(self, x: Float32, y: Float32, poses: tuple[Pose, ...], spacing: float, top: int) -> Float32:
         """Return the window's grey times coverage, and coverage (h, w, 2), for the widened window.
 
-        top: its first row in the picture, of which rolling rows depend.
+        top: its first row in the picture, for the rolling shutter.
         """
         level = next((i for i, n in enumerate(_MIP_TEXELS) if n <= 1.3 * _OVERSAMPLING * spacing), len(_MIP_TEXELS) - 1)
         texture, texel_from_unit = self._mips[level]
@@ -122,7 +122,7 @@ class BoardPainter:
         return cv2.merge((grey, coverage)).astype(np.float32)
 
     def _texels(self, x: Float32, y: Float32, pose: Pose, texel_from_unit: Array) -> tuple[Float32, Float32]:
-        """Return where the rays of a window meet the card, in texels."""
+        """Return the points [texels] at which the rays of a window meet the card."""
         unit_from_marker = np.diag((1 / self._unit_m, 1 / self._unit_m, 1.0))
         optical_from_plane = np.column_stack((pose.rotation[:, 0], pose.rotation[:, 1], pose.translation))
         h = (texel_from_unit @ unit_from_marker @ np.linalg.inv(optical_from_plane)).astype(np.float32)

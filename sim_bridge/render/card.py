@@ -1,4 +1,4 @@
-"""What is printed on the card of a marker, checkerboard or tag, as pictures at any resolution."""
+"""The print of a marker's card, checkerboard or tag, as a picture at any resolution."""
 
 from typing import Protocol
 
@@ -57,5 +57,5 @@ class TagCard:
 
 
 def card_of(spec: BoardSpec) -> Card:
-    """Return what a board of the scene looks like."""
+    """Return the print of a board of the scene."""
     return BoardCard(spec.code, spec.square_mm) if spec.tag is None else TagCard(spec.tag)

@@ -16,7 +16,7 @@ _FARTHEST_M = 40.0
 
 
 def texture(kind: FloorKind, size_m: tuple[float, float], seed: int) -> Image:
-    """Return a floor (8 mm per texel) that reaches 1 m beyond the room; row 0 is the +y edge."""
+    """Return the picture of a floor (8 mm per texel), 1 m wider than the room on all sides; row 0 is the +y edge."""
     random = np.random.default_rng(seed)
     width, height = (round((side + 2 * _BEYOND_M) / _TEXEL_M) for side in size_m)
     tone = np.full((height, width), 125.0, dtype=np.float32)
@@ -38,7 +38,7 @@ def texture(kind: FloorKind, size_m: tuple[float, float], seed: int) -> Image:
 def _roughen(
     tone: NDArray[np.float32], random: np.random.Generator, waves: tuple[tuple[int, float], ...], grain: float
 ) -> None:
-    """Add smooth shades of so many cells across, and grain [rms grey levels]."""
+    """Add smooth shades with `waves` cells across, and grain [rms grey levels]."""
     height, width = tone.shape
     for cells, amplitude in waves:
         coarse = random.normal(0.0, amplitude, (max(2, cells * height // width), cells)).astype(np.float32)
@@ -71,7 +71,7 @@ def _lay_tiles(tone: NDArray[np.float32]) -> None:
 
 
 def _strew(floor: Image, random: np.random.Generator, joints: bool) -> None:
-    """Draw what lies about in a lab: joints of carpet tiles, cables, tape, stains."""
+    """Draw clutter of a lab: joints of carpet tiles, cables, tape, stains."""
     height, width = floor.shape
     if joints:
         joint = round(0.6 / _TEXEL_M)
@@ -101,9 +101,9 @@ class Floor:
         self._table = table
 
     def draw(self, world_from_optical: Pose, rolling: tuple[Pose, Pose] | None = None) -> Image:
-        """Return the picture of the bare floor; what lies beyond its edge is wall.
+        """Return the picture of the bare floor; beyond its edge there is wall.
 
-        rolling: the camera's pose when the first and the last row are exposed.
+        rolling: the camera's poses when the first and the last row are exposed.
         """
         columns, rows = self._texels(world_from_optical if rolling is None else rolling[0])
         if rolling is not None:
@@ -121,12 +121,12 @@ class Floor:
         return np.asarray(picture, dtype=np.uint8)
 
     def _texels(self, world_from_optical: Pose) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Return where the coarse rays meet the floor, in texels (columns, rows)."""
+        """Return the points at which the coarse rays meet the floor, in texels (columns, rows)."""
         r = world_from_optical.rotation.astype(np.float32)
         centre = world_from_optical.translation
         x, y = self._table.coarse_x, self._table.coarse_y
         down = -(r[2, 0] * x + r[2, 1] * y + r[2, 2])
-        # Rays that do not come down meet the floor "very far away", where it is no longer floor.
+        # Rays that do not point down get a point very far away, beyond the floor's edge.
         distance = np.minimum(np.float32(centre[2]) / np.maximum(down, 1e-4), np.float32(_FARTHEST_M))
         floor_x = np.float32(centre[0]) + distance * (r[0, 0] * x + r[0, 1] * y + r[0, 2])
         floor_y = np.float32(centre[1]) + distance * (r[1, 0] * x + r[1, 1] * y + r[1, 2])

@@ -1,4 +1,4 @@
-"""Where the pictures of a camera go: MJPEG over HTTP, or as the vehicle that carries it sends its own."""
+"""Outputs of a camera's pictures: MJPEG over HTTP, or the own video of the vehicle that carries it."""
 
 from multiprocessing.connection import Connection
 from pkgutil import resolve_name
@@ -14,14 +14,14 @@ from sim_bridge.render.wrong_pictures import WrongPictures
 
 
 class Output(Protocol):
-    """What a camera's loop needs of its output."""
+    """The interface of an output to a camera's loop."""
 
     @property
     def clients(self) -> int:
         """Return how many are looking."""
 
     def set_accepting(self, accepting: bool) -> None:
-        """Cut all clients and refuse new ones (False), or serve (True)."""
+        """Disconnect all clients and refuse new ones (False), or serve (True)."""
 
     def show(self, states: Array, exposure_ns: int, release_ns: int, now_s: float) -> None:
         """Draw the true states and send the picture at a time [ns]; now_s: since the first true state."""
@@ -31,7 +31,7 @@ class Output(Protocol):
 
 
 def open_output(spec: RenderSpec, modes: Connection | None) -> Output:
-    """Return the output of a camera; modes: what a vehicle is told of its own video, as it comes."""
+    """Return the output of a camera; modes: settings of a vehicle's own video, as they change."""
     if spec.own is None:
         return MjpegOutput(spec)
     output: Output = resolve_name(spec.own.output)(spec, modes)

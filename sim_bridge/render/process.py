@@ -27,7 +27,7 @@ _REPEATED_AFTER_MS = 200.0
 def run(spec: RenderSpec, modes: Connection | None = None, tally: MutableSequence[int] | None = None) -> int:
     """Render and serve until SIGTERM or until the parent has gone; returns the exit code.
 
-    modes: what a vehicle's configuration says of its own video, as it changes; tally: see _Exposures.
+    modes: the vehicle's settings of its own video, as they change; tally: see _Exposures.
     """
     stop: list[int] = []
     _obey_signals(stop)
@@ -54,9 +54,9 @@ def _obey_signals(stop: list[int]) -> None:
 
 
 class FrameDelay:
-    """What the network does to frames: a delay with jitter that keeps their order, and loss.
+    """Delay, jitter and loss of frames on the network; their order is kept.
 
-    A frame that is sent again is never missing: what is lost comes late, and so does what waits behind it.
+    Where lost frames are sent again, none is missing: they come late, and so do those that wait behind them.
     """
 
     def __init__(self, spec: RenderSpec) -> None:
@@ -77,7 +77,7 @@ class FrameDelay:
 
 
 def active_outage(outages: tuple[Outage, ...], seconds: float) -> OutageKind | None:
-    """Return how the stream fails at a time since the first true state, if it does; a cut outdoes a stall."""
+    """Return the stream's failure at a time since the first true state, if any; a cut goes before a stall."""
     kinds = [o.kind for o in outages if o.start_s <= seconds and (o.end_s is None or seconds < o.end_s)]
     return min(kinds, default=None)
 
@@ -105,7 +105,7 @@ class _Exposures:
                 continue
             self._expose()
             next_ns += period_ns
-            if time.monotonic_ns() - next_ns > NS_PER_S:  # frozen for a while: never make up for it
+            if time.monotonic_ns() - next_ns > NS_PER_S:  # frozen for a while: missed exposures are not repeated
                 next_ns = time.monotonic_ns()
 
     def _parent_lives(self) -> bool:

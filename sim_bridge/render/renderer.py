@@ -35,7 +35,7 @@ class Renderer:
 
     @property
     def spec(self) -> RenderSpec:
-        """Return what is drawn."""
+        """Return the spec that is drawn."""
         return self._spec
 
     def render(self, states: NDArray[np.float64]) -> Image:
@@ -56,7 +56,7 @@ class Renderer:
         return floor if kernel is None else np.asarray(cv2.filter2D(floor, -1, kernel), dtype=np.uint8)
 
     def _floor_smear(self, begin: Pose, end: Pose) -> tuple[float, float]:
-        """Return by how much the floor in the middle of the picture moves during the exposure [px]."""
+        """Return the motion of the floor in the middle of the picture during the exposure [px]."""
         axis = begin.rotation[:, 2]
         distance = begin.translation[2] / max(-axis[2], 0.1)
         seen = (begin.translation + distance * axis - end.translation) @ end.rotation
@@ -72,6 +72,6 @@ class Renderer:
         return Flaws(scenario.corner_noise_px, scenario.blur_px, smear)
 
     def _way(self, begin_m: Sequence[float], end_m: Sequence[float]) -> tuple[float, float]:
-        """Return the way in the picture from one point [optical] to another [px]; none where one is beyond the lens."""
+        """Return the vector in the picture from one point [optical] to another [px]; 0 if one is beyond the lens."""
         begin, end = (self._spec.intrinsics.pixel(*point) for point in (begin_m, end_m))
         return (0.0, 0.0) if begin is None or end is None else (end[0] - begin[0], end[1] - begin[1])

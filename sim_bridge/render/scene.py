@@ -1,4 +1,4 @@
-"""From the true states of all bodies to what one camera has before it."""
+"""Turns the true states of all bodies into the scene before one camera."""
 
 import math
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ def world_from_base(state: Array) -> Pose:
 
 
 def moved(base: Pose, state: Array, seconds: float) -> Pose:
-    """Return the pose that a body (world_from_base, row) has a moment later, at constant velocity and body rates."""
+    """Return the pose of a body (world_from_base, row) some seconds later, at constant velocity and body rates."""
     turn = state[_RATES] * seconds
     small = np.array([[1.0, -turn[2], turn[1]], [turn[2], 1.0, -turn[0]], [-turn[1], turn[0], 1.0]])
     return Pose(base.rotation @ small, base.translation + state[_VELOCITY] * seconds)
@@ -56,7 +56,7 @@ class CameraScene:
 
 
 def compose_scene(spec: RenderSpec, states: Array) -> CameraScene:
-    """Return what the camera has before it; a camera never sees its own carrier, nor what is nowhere (NaN)."""
+    """Return the scene before the camera, without its own carrier and without bodies of unknown place (NaN)."""
     half_s, readout_s = spec.scenario.exposure_ms / 2000.0, spec.scenario.rolling_shutter_ms / 2000.0
     camera, *smear = _camera_poses(spec, states, (0.0, -half_s, half_s))
     rolling = None

@@ -1,4 +1,4 @@
-"""The image sensor: how much light it gets, and noise from a stored tile, laid at another place for each frame."""
+"""The image sensor: its light, and its noise from a stored tile at another offset for each frame."""
 
 import cv2
 import numpy as np
@@ -12,7 +12,7 @@ _TILE_RMS = 24.0
 
 
 class ImageSensor:
-    """Turns what falls onto it into grey levels, without drawing random numbers per pixel and frame."""
+    """Turns light into grey levels, without drawing random numbers for each pixel and frame."""
 
     def __init__(self, width: int, height: int, scenario: PictureQuality, random: np.random.Generator) -> None:
         self._size = (height, width)
@@ -34,7 +34,7 @@ class ImageSensor:
         self._down = np.clip(-noise, 0, 255).astype(np.uint8)
 
     def expose(self, picture: Image, random: np.random.Generator) -> Image:
-        """Return the picture as the sensor gives it; the noise is laid over the given one in place."""
+        """Return the sensor's picture; noise is added to the given one in place."""
         if self._light is not None:
             picture = np.asarray(cv2.LUT(picture, self._light), dtype=np.uint8)
         if not self._active:

@@ -41,7 +41,7 @@ _RINGS = {drum: _ring(drum) for drums in DRUMS.values() for drum in drums}
 def draw_body(
     picture: NDArray[np.uint8], shape: BodyShape, optical_from_base: Pose, intrinsics: CameraIntrinsics
 ) -> None:
-    """Draw a body's silhouette; nothing happens when part of it is behind the camera."""
+    """Draw a body's silhouette, unless part of it is behind the camera."""
     for drum in DRUMS[shape]:
         points = optical_from_base.apply(_RINGS[drum])
         if points[:, 2].min() < 0.1:

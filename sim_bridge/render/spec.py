@@ -1,4 +1,4 @@
-"""What a render process is told: one camera, what it can see, how bad the picture is, where to serve it."""
+"""Settings of a render process: one camera, the bodies before it, picture quality, address of its stream."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -11,7 +11,7 @@ from sim_bridge.own_video import OwnVideo
 
 
 class BodyShape(StrEnum):
-    """What a body looks like under its board."""
+    """The shape of a body under its board."""
 
     DRONE = "drone"
     TURTLEBOT = "turtlebot"
@@ -19,7 +19,7 @@ class BodyShape(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Mount:
-    """Where the camera sits: `body` "" means the world.
+    """Mounting of a camera; `body` "" means the world.
 
     parent_from_optical: base_from_camera_optical on a body, world_from_camera_optical for a world-fixed camera.
     """
@@ -32,7 +32,7 @@ class Mount:
 class BoardSpec:
     """A marker lying flat on a body: its code, square size, and its place on the body [m; base].
 
-    tag: it is this tag instead of a checkerboard; code and square size mean nothing then.
+    tag: the marker is this tag instead of a checkerboard; code and square size then mean nothing.
     """
 
     body: str
@@ -44,7 +44,7 @@ class BoardSpec:
 
 
 class FloorKind(StrEnum):
-    """What the cameras look down on; `TILES` is a checkerboard of its own and means trouble."""
+    """Kind of floor; `TILES` is itself a checkerboard and hard for detectors."""
 
     CARPET = "carpet"
     WOOD = "wood"

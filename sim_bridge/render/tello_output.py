@@ -1,4 +1,4 @@
-"""The video of a Tello's own, drawn and sent to who asked for it."""
+"""Draws a Tello's own video and sends it to the client that asked for it."""
 
 import heapq
 import socket
@@ -37,7 +37,7 @@ class TelloOutput:
 
     @property
     def clients(self) -> int:
-        """Return 1 once somebody has asked for the video."""
+        """Return 1 once a client has asked for the video, else 0."""
         while self._modes is not None and self._modes.poll():
             try:
                 told = self._modes.recv()
@@ -48,7 +48,7 @@ class TelloOutput:
         return int(bool(self._peer) and self._accepting)
 
     def set_accepting(self, accepting: bool) -> None:
-        """Send nothing (False), or go on (True)."""
+        """Send nothing (False), or send again (True)."""
         self._accepting = accepting
 
     def show(self, states: Array, exposure_ns: int, release_ns: int, now_s: float) -> None:
@@ -81,6 +81,6 @@ class TelloOutput:
 
 
 def cut(data: bytes) -> list[bytes]:
-    """Return the datagrams of a picture; a zero, which a stream may have, ends one that fills them all."""
+    """Return the datagrams of a picture; if the last is full a zero byte, which a stream may have, makes one more."""
     data += b"" if len(data) % _WHOLE_BYTES else b"\x00"
     return [data[place : place + _WHOLE_BYTES] for place in range(0, len(data), _WHOLE_BYTES)]

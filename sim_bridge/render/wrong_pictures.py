@@ -1,4 +1,4 @@
-"""Pictures that arrive and are wrong: frozen, black, of a camera that was turned, with a board that is another's."""
+"""Wrong pictures that arrive: frozen, black, of a turned camera, with exchanged boards."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -16,7 +16,7 @@ _SCENE = frozenset({FaultKind.CAMERA_BUMPED, FaultKind.WRONG_BOARD})
 
 
 def spec_under(spec: RenderSpec, faults: Iterable[Fault]) -> RenderSpec:
-    """Return what a camera sees under faults of its mounting and of boards."""
+    """Return the spec of a camera under faults of its mounting and of boards."""
     for fault in faults:
         if fault.kind is FaultKind.CAMERA_BUMPED:
             pose = spec.mount.parent_from_optical
@@ -34,7 +34,7 @@ def _reprinted(board: BoardSpec, other: BoardSpec) -> BoardSpec:
 
 
 class WrongPictures:
-    """Draws what one camera delivers. All that it will need is prepared at the start."""
+    """Draws the pictures of one camera under its faults. Everything is prepared at the start."""
 
     def __init__(self, spec: RenderSpec) -> None:
         self._spec, self._faults = spec, spec.scenario.faults

@@ -1,4 +1,4 @@
-"""What a driver does with setpoints, in short: velocity in, tilt out; hover when told nothing. Not its code."""
+"""A short model of an AR.Drone's driver, not its code: velocity in, tilt out; hover without setpoints."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Where a camera's driver would look in each picture: all over, or where the belief has a marker; by its own law."""
+"""Decides by the camera driver's own rules where it searches a picture: all over, or where it expects markers."""
 
 from collections import Counter
 from collections.abc import Collection, Sequence
@@ -19,12 +19,12 @@ from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.tag import SquareTag
 from sim_bridge.site import Site, SiteCamera, SiteDrone
 
-# What a search costs in the middle [s of CPU], tags aside (docs/reference/vision.md 8): there is no picture to try.
+# Median cost of a search [s of CPU], without tags (docs/reference/vision.md 8): there is no picture to measure.
 _COST_S = 0.01
 
 
 def mount_of(name: str, mount: SiteDrone | SiteCamera) -> MountSettings:
-    """Return where a camera is, as its driver is told; name: of the drone that carries it."""
+    """Return a camera's mounting as in its driver's settings; name: the drone that carries it."""
     if isinstance(mount, SiteCamera):
         return MountSettings(position_m=mount.position_m, looking="down", rotation_deg=mount.rotation_deg)
     assert mount.camera is not None
@@ -37,7 +37,7 @@ def mount_of(name: str, mount: SiteDrone | SiteCamera) -> MountSettings:
 def marker_of(
     entity: str, printed: Checkerboard | SquareTag, position_m: tuple[float, float, float], robots: Collection[str]
 ) -> MarkerSettings:
-    """Return a marker as a driver is told of it."""
+    """Return a marker as in a driver's settings."""
     kind = MarkerKind.ROBOT if entity in robots else MarkerKind.TARGET
     if isinstance(printed, SquareTag):
         tag = TagSettings(dictionary=printed.dictionary, id=printed.id, size_mm=printed.size_mm)
@@ -47,13 +47,13 @@ def marker_of(
 
 
 def phase_s(name: str, site: Site) -> float:
-    """Return by how much a camera's searches are later than the first one's, as the drivers are told."""
+    """Return the delay of a camera's searches after the first camera's [s], as in the drivers' settings."""
     cameras = (*site.cameras, *site.drones)
     return cameras.index(name) / (len(cameras) * SEARCH_RATE_HZ)
 
 
 class Attention:
-    """What one camera's driver looks for in its pictures. Use: `hear` estimates; for each picture `begin`, then `end`.
+    """The searches of one camera's driver. Use: `hear` estimates; for each picture `begin`, then `end`.
 
     searching: whether the picture is searched all over.
     """
@@ -72,11 +72,11 @@ class Attention:
         self.searching = False
 
     def hear(self, estimate: Estimate) -> None:
-        """Take what the tracker believes."""
+        """Take an estimate of the tracker."""
         self._foresight.add(estimate)
 
     def begin(self, stamp_ns: int, attitude: Attitude, tracked: Collection[str]) -> None:
-        """Begin with a picture; attitude: the carrier's as it is measured; tracked: whom the last pictures showed."""
+        """Begin a picture; attitude: the carrier's measured one; tracked: entities that the last pictures showed."""
         tracked = self._names.intersection(tracked)
         lost, self._tracked, self._stamp_ns = self._tracked - tracked, tracked, stamp_ns
         unseen = self._names - tracked
@@ -90,7 +90,7 @@ class Attention:
         self.searching = bool(self._names) and self._searches.is_due(stamp_ns, bool(tracked), sought)
 
     def expects(self, name: str, pixel: tuple[float, float] | None) -> bool:
-        """Return whether a marker that is not tracked is looked for where it is [px]: the belief has it about there."""
+        """Return whether a marker that is not tracked is searched for at its true place [px]: the belief is near it."""
         prediction = self._predictions.get(name)
         if prediction is None or pixel is None or not is_looked_for(self._missing[name]):
             return False
@@ -98,7 +98,7 @@ class Attention:
         return off_px + prediction.radius_px <= prediction.reach_px
 
     def end(self, found: Collection[str]) -> None:
-        """End with a picture that showed these."""
+        """End a picture; found: the entities that it showed."""
         if not self.searching:
             return
         missing = {name for name in self._names if self._predictions.get(name, ...) is not None}

@@ -1,4 +1,4 @@
-"""A camera without pictures: geometry in, relative observations out, with the errors a detector would have."""
+"""A camera without pictures: geometry in, relative observations with a detector's errors out."""
 
 import math
 from collections.abc import Sequence
@@ -28,7 +28,7 @@ from sim_bridge.world.mavlink_copter import MavlinkCopter
 from sim_bridge.world.world import World
 
 _BORDER_PX = 6.0
-# Pixels per square that the detector needs: in the window of the last sighting or of the belief, and without
+# Pixels per square that the detector needs: in a window about the last sighting or the belief, and without one
 # (docs/reference/vision.md 2).
 _WINDOW_PX, _SEARCH_PX = 5.5, 8.5
 _FORGET_S = 0.4
@@ -42,7 +42,7 @@ _FREEDOM = 18  # of the residuals of twelve corners about a pose
 
 @dataclass(frozen=True, slots=True)
 class Carried:
-    """A board on a body: where its centre is [base], its corners and the outline of its card [marker]."""
+    """A board on a body: its centre [base], its corners and the outline of its card [marker]."""
 
     body: str
     board: Checkerboard | SquareTag
@@ -57,7 +57,7 @@ class Carried:
 
 
 def _square_m(printed: Checkerboard | SquareTag) -> float:
-    """Return the square of the checkerboard that is seen as far as a marker is (a tag of 168 mm: 44 mm)."""
+    """Return the square [m] of a checkerboard with the same range as a marker (tag of 168 mm: 44 mm)."""
     return printed.square_m if isinstance(printed, Checkerboard) else printed.size_mm / 3800.0
 
 
@@ -78,10 +78,10 @@ def _hidden(world: World, carried: Carried, state: Array, eye: Array) -> bool:
 
 
 class Eye:
-    """One camera, on a drone or in the world: looks at all boards but its carrier's own.
+    """One camera, on a drone or in the world; it observes all boards but its carrier's own.
 
-    outliers: share of sightings with a gross error, beside what the scenario says. Mounting and lens are a little off
-    what the ground station knows, unless the scenario says otherwise.
+    outliers: share of sightings with a gross error, besides the scenario's. Mounting and lens are a little off
+    the field's figures, unless the scenario says otherwise.
     """
 
     def __init__(
@@ -113,20 +113,20 @@ class Eye:
         self._looked = False
 
     def hear(self, estimate: Estimate) -> None:
-        """Take what the tracker believes, by which its driver knows where to look."""
+        """Take an estimate of the tracker, by which the camera's driver chooses its windows."""
         self._attention.hear(estimate)
 
     @property
     def truth(self) -> tuple[Array, Array, CameraIntrinsics]:
-        """Return how the camera sits when nothing has bumped it (rotation, place [m]), and its lens."""
+        """Return the true mounting of the camera before any bump (rotation, place [m]), and its true lens."""
         return self._mounted, self._position, self._lens
 
     def bump(self, angle_deg: float, axis_deg: float) -> None:
-        """Turn the camera away from its mounting, which the ground station does not know; 0: back to it."""
+        """Turn the camera away from its mounting, unknown to the ground station; 0: back to it."""
         self._rotation = self._mounted @ turned_about(angle_deg, axis_deg) if angle_deg else self._mounted
 
     def look(self, world: World, stamp_ns: int, clock: str) -> list[RelativeObservation]:
-        """Return what one exposure shows; stamps carry the error of a delay that is known as a mean only."""
+        """Return the sightings of one exposure; stamps have the error of a delay of which only the mean is known."""
         self._looked = bool(self._rng.random() >= self._scenario.frame_loss)
         if not self._looked:
             return []
@@ -150,7 +150,7 @@ class Eye:
             sighting = self._sight(carried, states[carried.body], rotation, position, world.time_s)
             if sighting is not None:
                 place, unit, facing = sighting
-                # As a detector finds it, which knows the mounting as it was told, and the attitude as it is reported.
+                # As a detector computes it, with the mounting of its settings and the reported attitude.
                 yaw = euler_from_rotation(told @ facing)[2]
                 stamp = stamp_ns + round(jitter * 1e6)
                 seen.append(self._message(carried.body, (place, unit), yaw, stamp, clock, reported))
@@ -158,7 +158,7 @@ class Eye:
         return seen
 
     def searched(self, seen: Sequence[RelativeObservation], stamp_ns: int, clock: str) -> SearchedPicture | None:
-        """Return that the last picture was searched all over, and what it shows; None if only known boards were."""
+        """Return the message that the last picture was searched all over; None if only windows were searched."""
         if not (self._looked and self._attention.searching):
             return None
         self._seq += 1
@@ -192,7 +192,7 @@ class Eye:
         return place, self._covariance(carried.corners @ facing.T, centre, rotation.T[:, 2]), facing
 
     def _least_px(self, body: str, centre: Array, now_s: float) -> float:
-        """Return how large a marker's squares must be for the detector to find it; infinite where it does not look."""
+        """Return the least size [px] of a marker's squares for the detector; infinite where it does not search."""
         if now_s - self._last_seen[body] < _FORGET_S:
             return _WINDOW_PX
         if self._attention.expects(body, self._lens.pixel(*centre.tolist())):
@@ -200,7 +200,7 @@ class Eye:
         return _SEARCH_PX if self._attention.searching else math.inf
 
     def _is_framed(self, points: Array) -> bool:
-        """Return whether all points (n, 3) [optical] are in the picture, the border aside."""
+        """Return whether all points (n, 3) [optical] are in the picture, inside its border."""
         right, low = self._lens.width_px - _BORDER_PX, self._lens.height_px - _BORDER_PX
         pixels = (self._lens.pixel(*point) for point in points.tolist())
         return all(at is not None and _BORDER_PX < at[0] < right and _BORDER_PX < at[1] < low for at in pixels)

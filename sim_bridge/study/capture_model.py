@@ -1,4 +1,4 @@
-"""A motion capture system without a wire: true poses in, relative observations out, with the system's noise."""
+"""A motion capture system without a wire: true poses in, relative observations with its noise out."""
 
 import math
 
@@ -28,7 +28,7 @@ class CaptureEye:
         self._covariance = tuple(np.diag([place, place, place, heading]).ravel().tolist())
 
     def look(self, world: World, stamp_ns: int, clock: str) -> list[RelativeObservation]:
-        """Return what one exposure shows."""
+        """Return the observations of one exposure."""
         states = dict(zip(world.bodies, world.states(), strict=True))
         box = self._system.volume_m
         seen = []
@@ -58,11 +58,11 @@ class CaptureEye:
         return seen
 
     def searched(self, _seen: object, _stamp_ns: int, _clock: str) -> SearchedPicture | None:
-        """Return nothing: that a system does not track a body says little of where it is not."""
+        """Return nothing: a body that the system does not track may still be in its volume."""
         return None
 
 
 def captures_of(site: Site, errors: bool, seed: int) -> list[CaptureEye]:
-    """Return the motion capture systems of a site that the tracker hears."""
+    """Return the motion capture systems of a site that are sensors of the tracker."""
     names = (name for name in site.motion_capture if name != site.truth.get("from"))
     return [CaptureEye(name, site, errors, generator_of_eye(seed, name)) for name in names]

@@ -1,4 +1,4 @@
-"""When the cameras of a study expose: each at its own rate, one after the other."""
+"""Exposure times of a study's cameras: each at its own rate, their phases spread."""
 
 from collections.abc import Sequence
 from typing import Generic, Protocol, TypeVar
@@ -16,7 +16,7 @@ Camera = TypeVar("Camera", bound=Exposing)
 
 
 class Exposures(Generic[Camera]):
-    """Phases of some cameras, spread evenly."""
+    """Exposure schedule of several cameras, with phases spread evenly."""
 
     def __init__(self, cameras: Sequence[Camera]) -> None:
         self._phased = [

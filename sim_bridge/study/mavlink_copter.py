@@ -1,7 +1,7 @@
 """A MAVLink vehicle with driver and autopilot at message level: odometry, setpoints, poses fed back.
 
-The loop is closed as in flight: what the tracker believes aids the vehicle's estimate, whose velocity comes back as
-odometry. Of the driver's code only the feedback of the drift is used here, and what it makes of the attitude's doubt.
+The loop is closed as in flight: the tracker's belief aids the vehicle's estimate, whose velocity comes back as
+odometry. Of the driver's code only its drift feedback and its deviations of the attitude are used.
 """
 
 import math
@@ -24,7 +24,7 @@ _ATTITUDE_STD_RAD = math.radians(0.3)
 
 
 class CopterLink:
-    """One vehicle's driver in short; call `step` once per tick. landed: it came down because no camera saw it."""
+    """A short model of one vehicle's driver; call `step` once per tick. landed: it landed because no camera saw it."""
 
     def __init__(self, name: str, copter: MavlinkCopter, clock: str, lifetime_s: float) -> None:
         self._name, self._copter, self._clock, self._lifetime_s = name, copter, clock, lifetime_s
@@ -48,7 +48,7 @@ class CopterLink:
             self._until_s = now_s + self._lifetime_s
 
     def step(self, now_s: float, estimates: tuple[EntityEstimate, ...]) -> None:
-        """Start, hover when told nothing, feed poses."""
+        """Start, hover without setpoints, feed poses."""
         self._ticks += 1
         copter = self._copter
         self._heading = math.remainder(self._heading + copter.estimate.yaw_rate * TICK_S, math.tau)

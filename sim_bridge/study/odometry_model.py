@@ -1,4 +1,4 @@
-"""A target's own odometry without a wire: its wheels in, reports out, as its driver publishes them."""
+"""A target's odometry without a wire: its wheels in, reports as its driver publishes them out."""
 
 from groundstation.bus.messages import Header, ReportedMotion
 from groundstation.field.targets import odometry_name
@@ -9,7 +9,7 @@ from sim_bridge.world.world import World
 
 
 class OdometryEar:
-    """Hears one target."""
+    """The reports of one target."""
 
     period_s = PERIOD_S
 
@@ -19,7 +19,7 @@ class OdometryEar:
         self._wheels = WheelOdometry(world.targets[target], errors, generator_of_eye(seed, self.name))
 
     def look(self, world: World, stamp_ns: int, clock: str) -> list[ReportedMotion]:
-        """Return what the target says now."""
+        """Return the target's present report."""
         self._seq += 1
         speed, _ = self._wheels.read()
         header = Header(stamp_ns, clock, self._target, self.name, self._seq)
@@ -27,6 +27,6 @@ class OdometryEar:
 
 
 def odometry_of(site: Site, world: World, errors: bool, seed: int) -> list[OdometryEar]:
-    """Return who hears the targets of a site that tell their odometry."""
+    """Return the models of those targets of a site that report their odometry."""
     told = {name: target.odometry for name, target in site.tracked.items()}
     return [OdometryEar(name, one, world, errors, seed) for name, one in told.items() if one is not None]

@@ -1,4 +1,4 @@
-"""A ranging system without a wire: true distances in, rounds of ranges out, as its driver publishes them."""
+"""A ranging system without a wire: true distances in, rounds of ranges as its driver publishes them out."""
 
 import math
 

@@ -43,7 +43,7 @@ _SCORE_TICKS = 20
 @dataclass(frozen=True, slots=True)
 class StudyOptions:
     """duration_s: tracking after take-off; outliers: share of grossly wrong sightings; plan: False leaves the drones
-    hovering; detector_ms: what the camera process adds to the video delay; take_off_s: simulated time until the
+    hovering; detector_ms: added to the video delay by the camera process; take_off_s: simulated time until the
     drones hover and tracking begins; stand_s: before that; inertia: AR.Drones publish gyroscopes and accelerometers."""
 
     seed: int = 1
@@ -57,7 +57,7 @@ class StudyOptions:
 
 
 class FlownLink(Protocol):
-    """What a study needs of the driver of one drone."""
+    """A study's interface to the driver of one drone."""
 
     def obey(self, velocity: tuple[float, float, float], yaw_rate: float, now_s: float) -> None:
         """Take a setpoint [base_stabilized]."""
@@ -75,8 +75,8 @@ class FlownLink(Protocol):
 class Study:
     """A run in progress; `run` flies it to its end and returns the figures.
 
-    real: drones whose bodies are moved from outside (`world.puppets`); `attach` gives each a driver. wrong: what the
-    field is told wrongly; none: only delays of videos, where the scenario has others.
+    real: drones whose bodies are moved from outside (`world.puppets`); `attach` gives each a driver. wrong: wrong
+    figures of the field; None: only video delays, if the scenario's differ.
     """
 
     def __init__(
@@ -150,7 +150,7 @@ class Study:
         report = self.score.report()
         report["max_fence_violation_m"] = round(self.fence_violation_m, 3)
         total_s = time.process_time() - cpu
-        # Of the parts the wall clock is read, and scaled by what the whole took.
+        # Parts are timed by the wall clock, and scaled by the CPU time of the whole.
         share = total_s / (time.perf_counter() - wall)
         report["cpu_s"] = {name: round(share * value, 2) for name, value in self.spent_s.items()}
         report["cpu_s"]["total"] = round(total_s, 2)
@@ -197,7 +197,7 @@ class Study:
                 delay_ms = self._scenario.cameras.video_delay_ms + self._rng.uniform(*self.options.detector_ms)
             seen = eye.look(world, now_ns, CLOCK)
             for sighting in seen:
-                # A later frame arrives with the delay that its stamp was corrupted by.
+                # A later frame arrives with the delay by which its stamp is off.
                 arrival_ns = sighting.header.stamp_ns + round(delay_ms * 1e6)
                 self._send(arrival_ns, f"observation/{eye.name}", self._wrong.reported(sighting))
             if (searched := eye.searched(seen, now_ns, CLOCK)) is not None:
@@ -207,7 +207,7 @@ class Study:
             self._tell(ear, now_ns)
 
     def _estimate(self) -> Estimate:
-        """Return what the tracker tells its cameras."""
+        """Return the tracker's estimates for its cameras."""
         tracker = self.tracker
         header = Header(tracker.belief.stamp_ns, CLOCK, "team", "tracker", self.world.ticks)
         searches = tracker.lookout.searches(self.now_ns)
@@ -221,7 +221,7 @@ class Study:
         self._arriving.send(arrival_ns, (key, message))
 
     def _arrived(self) -> tuple[tuple[str, Message], ...]:
-        """Return what has reached the tracker since it was last asked."""
+        """Return the messages that reached the tracker since the last call."""
         return tuple(self._arriving.due(self.now_ns))
 
     def _tick(self, tracking: bool) -> None:

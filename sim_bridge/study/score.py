@@ -1,4 +1,4 @@
-"""How a run is judged: the figures of report.json, and the consistency of the belief."""
+"""Judges a run: the figures of report.json, and the consistency of the belief."""
 
 import math
 from collections import defaultdict
@@ -114,7 +114,7 @@ class FlightScore:
 
 
 def _figures(errors: Array, period_s: float) -> dict[str, float]:
-    """Return what is said of a target's errors, a missing estimate counted as 1 m."""
+    """Return the figures of a target's errors; a missing estimate counts as 1 m."""
     return {
         "rmse_m": round(float(np.sqrt(np.mean(errors**2))), 4),
         "lost_s": round(float(np.sum(errors > _LOST_M)) * period_s, 2),

@@ -1,4 +1,4 @@
-"""Several flights together: means over flights with their confidence, since errors within a flight last."""
+"""Summarises several flights: means over flights with confidence intervals, since errors within a flight correlate."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -30,20 +30,20 @@ def interval(values: Iterable[float]) -> Interval:
 
 
 def anees(report: Mapping[str, Any], names: Iterable[str], suffix: str = "") -> float:
-    """Return a flight's mean NEES per degree of freedom over the entities that were ever believed in; NaN for none."""
+    """Return a flight's mean NEES per degree of freedom over all entities ever in the belief; NaN for none."""
     found = [report["anees"][name + suffix] for name in names if name + suffix in report["anees"]]
     return float(np.mean(found)) if found else math.nan
 
 
 def nis(report: Mapping[str, Any], observers: Iterable[str]) -> float:
-    """Return a flight's mean NIS per degree of freedom over what these observers saw; NaN for nothing."""
+    """Return a flight's mean NIS per degree of freedom over these observers' sightings; NaN without any."""
     among = frozenset(observers)
     found = [value for edge, value in report["nis"].items() if edge.split(">")[0] in among]
     return float(np.mean(found)) if found else math.nan
 
 
 def summary(reports: Sequence[Mapping[str, Any]], field: ResolvedField) -> dict[str, Interval]:
-    """Return what decides whether the belief is good and as good as it says, over the flights of one field."""
+    """Return the figures that tell whether the belief is accurate and consistent, over the flights of one field."""
     robots, targets, cameras = tuple(field.drones), tuple(field.tracked), tuple(field.cameras)
     values = {
         "target_rmse_m": [report["target_rmse_m"] for report in reports],

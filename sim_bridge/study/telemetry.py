@@ -46,7 +46,7 @@ class TelemetryPublisher:
         )
 
     def inertia(self, stamp_ns: int) -> ImuSample:
-        """Return what gyroscopes and accelerometers say at this tick."""
+        """Return the readings of gyroscopes and accelerometers at this tick."""
         return ImuSample(
             header=self._header(stamp_ns),
             angular_velocity_rad_s=self._onboard.gyros,

@@ -1,4 +1,4 @@
-"""A lab whose field file is wrong: the world is built with other figures than the ground station is told."""
+"""A lab whose field file is wrong: the world is built with other figures than the ground station gets."""
 
 import math
 from collections.abc import Mapping
@@ -19,11 +19,11 @@ _PAD = ("pad_x", "pad_y", "pad_yaw")
 
 @dataclass(frozen=True, slots=True)
 class WrongFigures:
-    """True minus told, by (who, part): m, deg, ms, shares.
+    """True minus told figures, by (entity, part): m, deg, ms, shares.
 
     Parts: x, y, z, roll, pitch, yaw of a fixed camera; pan, tilt, ahead, left, up of a drone's; focal and delay of any;
     print of a drone or target; pad_x, pad_y, pad_yaw of where a drone stands. exchanged: who carries whose marker;
-    covariance_share: how much of their covariance sightings state.
+    covariance_share: stated share of the sightings' covariance.
     """
 
     errors: Mapping[tuple[str, str], float]
@@ -46,7 +46,7 @@ class WrongFigures:
         return msgspec.structs.replace(told, cameras=cameras, drones=drones)
 
     def reported(self, o: RelativeObservation) -> RelativeObservation:
-        """Return a sighting as a detector reports it that believes the field."""
+        """Return a sighting as a detector with the field's figures reports it."""
         printed, focal, late_ms = (
             self._of(o.subject, "print"),
             self._of(o.observer, "focal"),
@@ -71,7 +71,7 @@ class WrongFigures:
 
 
 def misdated(told: ResolvedField, video_delay_ms: float) -> WrongFigures:
-    """Return what is wrong of a field whose cameras' videos are not as late as it says, as at the wire."""
+    """Return the wrong figures of a field whose video delays differ from the true ones, as at the wire."""
     delays = {name: camera.video_delay_ms for name, camera in told.cameras.items()}
     delays |= {name: drone.camera.video_delay_ms for name, drone in told.drones.items()}
     return WrongFigures({(n, "delay"): video_delay_ms - ms for n, ms in delays.items() if ms != video_delay_ms})

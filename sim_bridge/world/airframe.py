@@ -107,7 +107,7 @@ class Airframe:
         self.yaw = math.remainder(self.yaw + self.yaw_rate * tick_s, math.tau)
 
     def tumble(self, tick_s: float, roll_rate: float, pitch_rate: float) -> None:
-        """Turn over in free fall for one tick [rad/s]; a drone that meets the floor so stands on it again."""
+        """Turn over in free fall for one tick [rad/s]; a drone that reaches the floor stands on it again."""
         self.roll_rate, self.pitch_rate, self.yaw_rate = roll_rate, pitch_rate, 0.0
         self.roll = math.remainder(self.roll + roll_rate * tick_s, math.tau)
         self.pitch = math.remainder(self.pitch + pitch_rate * tick_s, math.tau)

@@ -18,7 +18,7 @@ class Quadrotor:
     """A drone standing on its pad. `autopilot` takes the requests, `airframe` holds the true state.
 
     ultrasound_code: rate of its ultrasound as configured (7: 22.22 Hz, 8: 25 Hz); those of one rate disturb each other.
-    wind: acceleration by the air that a fault moves [m/s^2; world]; air: that, and the moving air of the room.
+    wind: acceleration by a fault's wind [m/s^2; world]; air: that and the room's moving air.
     """
 
     def __init__(
@@ -73,12 +73,12 @@ class Quadrotor:
         return self.wind[0] + share * x, self.wind[1] + share * y
 
     def suffer(self, fault: Fault, begins: bool) -> None:
-        """Break what looks at the floor, or heal it."""
+        """Begin or end a fault of the sensors that look at the floor."""
         if fault.kind is FaultKind.UNIFORM_FLOOR:
             self.autopilot.blind = begins
         elif fault.kind is FaultKind.OBSTACLE_BELOW:
             self.autopilot.floor_m = fault.amount if begins else 0.0
 
     def wake_on(self, other: Airframe) -> tuple[float, float, float] | None:
-        """Return how this drone's downwash accelerates another one below it, None when out of its reach."""
+        """Return the acceleration of a body below by this drone's downwash, None out of its reach."""
         return wake_between(self.airframe, other)

@@ -11,7 +11,7 @@ _DANCE_RAD, _DANCE_M_S = math.radians(20.0), 0.5
 
 
 class Animation(IntEnum):
-    """Numbers of AT*ANIM and control:flight_anim."""
+    """Animations, by their numbers in AT*ANIM and control:flight_anim."""
 
     PHI_M30 = 0
     PHI_30 = 1
@@ -55,7 +55,7 @@ def default_duration_s(animation: Animation) -> float:
 
 
 def motion_at(animation: Animation, elapsed_s: float) -> tuple[float, float, float, float]:
-    """Return (roll, pitch, climb, yaw rate) at a time of an animation that is no flip [rad, m/s, rad/s; FLU]."""
+    """Return (roll, pitch, climb, yaw rate) at a time of an animation other than a flip [rad, m/s, rad/s; FLU]."""
     tilt, swing = math.radians(30.0), math.tau * elapsed_s
     match animation:
         case Animation.PHI_M30 | Animation.PHI_30:

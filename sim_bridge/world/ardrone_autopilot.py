@@ -1,4 +1,4 @@
-"""The firmware of an AR.Drone as far as it flies: phases, take-off and landing profiles, hover by optical flow."""
+"""Flight control of an AR.Drone's firmware: phases, take-off and landing profiles, hover by optical flow."""
 
 import math
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ _CLIMB_RATE = 1.4  # 1/s: first order (tum_ardrone's identified model)
 _HEIGHT_GAIN = 0.8
 _BRAKE_GAIN, _HOLD_GAIN = 2.2, 1.0
 _BRAKED_M_S = 0.1
-# How fast a drone that holds its place finds out how far to lean against steady air.
+# How fast a drone that holds its place learns its tilt against steady air.
 _BRACE_S = 1.0
 _DESCENT_M_S, _TOUCH_DOWN_M_S, _FLARE_M = 0.5, 0.3, 0.8
 # The magnetometer is calibrated by one turn on the spot.
@@ -29,7 +29,7 @@ _CALIBRATION_RAD_S, _CALIBRATION_S = -math.tau / 4.0, 4.1
 
 
 class Phase(Enum):
-    """What the firmware is doing; CUT is the emergency state with the motors off."""
+    """Flight phases; CUT is the emergency state with the motors off."""
 
     LANDED = auto()
     TAKING_OFF = auto()
@@ -46,7 +46,7 @@ _STEERED = frozenset({Phase.HOVERING, Phase.FLYING, Phase.BRAKING})
 
 @dataclass(frozen=True, slots=True)
 class FlightLimits:
-    """What the firmware allows; factory values."""
+    """Limits of the firmware; factory values."""
 
     tilt_rad: float = 0.20943999
     climb_m_s: float = 0.7
@@ -68,7 +68,7 @@ class MotionReferences:
 class Autopilot:
     """Turns requests into references for the airframe. Motion commands take effect after `COMMAND_DELAY_S`.
 
-    blind: optical flow finds nothing; floor_m: how high what the ultrasound looks at stands; braced: the acceleration
+    blind: optical flow finds nothing; floor_m: height of the surface below the ultrasound; braced: the acceleration
     by the air that it leans against [m/s^2; world].
     """
 
@@ -102,7 +102,7 @@ class Autopilot:
 
     @property
     def calibrating(self) -> bool:
-        """Return whether it turns to calibrate the magnetometer."""
+        """Return whether it is turning to calibrate the magnetometer."""
         return self._calibration_s > 0.0 and self.phase is Phase.HOVERING
 
     def take_off(self) -> None:
@@ -156,7 +156,7 @@ class Autopilot:
             self._calibration_s = _CALIBRATION_S
 
     def brace(self, air: tuple[float, float]) -> None:
-        """Learn from one tick how the air pushes [m/s^2; world]."""
+        """Learn the push of the air from one tick [m/s^2; world]."""
         share, (x, y) = self._tick_s / _BRACE_S, self.braced
         self.braced = (x + share * (air[0] - x), y + share * (air[1] - y))
 
@@ -276,7 +276,7 @@ class Autopilot:
         if self.blind:
             return 0.0, 0.0
         x, y = self._drift
-        if math.hypot(forward, left) < 0.5:  # holds a place only once it has slowed down
+        if math.hypot(forward, left) < 0.5:  # it holds a place only once it has slowed down
             x, y = x + forward * self._tick_s, y + left * self._tick_s
             self._drift = (x, y)
         limit = self.limits.tilt_rad

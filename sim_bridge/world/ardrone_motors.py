@@ -15,7 +15,7 @@ _RAMP = ((0.0, 70.0), (0.8, 72.0), (1.7, 80.0), (3.1, 185.0))
 
 
 def ramp_pwm(since_s: float) -> int:
-    """Return the PWM (0..255) so long after the motors started, before lift-off."""
+    """Return the PWM (0..255) before lift-off; since_s: time since the motors started."""
     after = bisect.bisect_right(_RAMP, (since_s, math.inf))
     if after == len(_RAMP):
         return round(_RAMP[-1][1])
@@ -24,7 +24,7 @@ def ramp_pwm(since_s: float) -> int:
 
 
 def flight_pwm(climb_acceleration_m_s2: float, tilt_rad: float) -> int:
-    """Return the PWM (0..255) that accelerates the drone upwards so, tilted so [from level]."""
+    """Return the PWM (0..255) for an upward acceleration at a tilt from level."""
     upright = max(0.5, math.cos(tilt_rad))
     thrust = max(0.0, _MASS_KG * (GRAVITY_M_S2 + climb_acceleration_m_s2) / upright / 4)
     a, b, c = _THRUST

@@ -1,7 +1,7 @@
 """The motion sensors of an AR.Drone: true state in, navdata-like readings out.
 
 Figures of a real flight against motion capture (docs/explanation/estimation.md 9.2). Units and frames are SI and FLU;
-the emulator turns them into what stands on the wire.
+the emulator converts them for the wire.
 """
 
 import math
@@ -23,13 +23,13 @@ from sim_bridge.world.recorded_errors import (
 
 LIFT_OFF_SEEN_M = 0.25  # the ultrasound reads nothing below
 _MAGNETOMETER_SEEN_M = 0.22  # switched in a moment before
-GROUND_ECHO_M = 0.243  # what it still says on the floor
-# Echoes of a neighbour's ultrasound: how often they come, and how far from the height one may be to be believed.
+GROUND_ECHO_M = 0.243  # its reading on the floor
+# Echoes of a neighbour's ultrasound: their share, and the largest difference from the height of one that is believed.
 _FOREIGN_ECHOES, _BELIEVED_M = 0.25, 0.15
 
 
 class Senses(Protocol):
-    """What the onboard sensors look at."""
+    """Inputs of the onboard sensors."""
 
     airframe: Airframe
     battery: float
@@ -40,8 +40,8 @@ class Onboard:
 
     vx, vy [m/s; base_stabilized, FLU], vz; height [m], 0 on the floor; roll, pitch [rad; FLU];
     yaw [rad, counter-clockwise, from power-on, jumps once at lift-off if there is a magnetometer]; gyros [rad/s],
-    accelerometers [m/s^2; base]; echo [m], what the ultrasound alone says; rejected, echoes not believed in a row;
-    battery 0..1. Until `trim` the attitude is off by what the factory left.
+    accelerometers [m/s^2; base]; echo [m], of the ultrasound alone; rejected, number of refused echoes in a row;
+    battery 0..1. Until `trim` the attitude has the factory's error.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class Onboard:
         self.velocity_delay_s = float(rng.uniform(*scenario.velocity_delay_ms)) / 1000
         jump = math.radians(float(rng.uniform(*scenario.yaw_jump_at_lift_off_deg)))
         self.yaw_jump_rad = jump if rng.random() < 0.5 else -jump
-        # A generator of its own: what is drawn for one thing does not change the others.
+        # A generator of its own: draws for one thing do not change the others.
         (aside,) = rng.spawn(1)
         bias = math.radians(scenario.attitude_bias_deg)
         self._level = (float(aside.normal(0.0, bias)), float(aside.normal(0.0, bias)))
@@ -96,7 +96,7 @@ class Onboard:
     ) -> None:
         """Measure the true state once; call it once per tick.
 
-        crosstalk: another drone's ultrasound of the same rate is in reach. air: how moving air pushes [m/s^2; world];
+        crosstalk: another drone's ultrasound of the same rate is in reach. air: push of moving air [m/s^2; world];
         the tilt that balances it is taken for level, as in a recorded flight, where navdata said 0 at 5 to 10 degrees.
         """
         body = drone.airframe

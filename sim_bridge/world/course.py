@@ -10,7 +10,7 @@ from sim_bridge.world.legs import GoalCourse, Pose, corner_goals, sprint_goals, 
 from sim_bridge.world.noise import GaussMarkov, standard_normals
 from sim_bridge.world.path import EightPath
 
-# Path follower: aims at a point of the path's tangent this far ahead; gains along it [1/s] and on the heading [1/s].
+# Path follower: distance to the point of the path's tangent that it aims at; gains along it and on the heading [1/s].
 _LOOK_AHEAD_M = 0.4
 _ALONG, _ABOUT = 1.0, 2.5
 _LARGEST_ERROR_M = 0.5
@@ -19,7 +19,7 @@ _BACK_RAD_S = 1.2
 
 
 class Course(Protocol):
-    """Drives a target; `start` is where it begins."""
+    """Drives a target from its pose `start` on."""
 
     start: Pose
 
@@ -31,7 +31,7 @@ class Course(Protocol):
 
 
 def course_of(path: Path, tick_s: float, half_room_m: tuple[float, float], rng: np.random.Generator) -> Course | None:
-    """Return who drives along a path; None for a target that stands still."""
+    """Return the course along a path; None for a target that stands still."""
     match path:
         case Standstill() | Anywhere():
             return None

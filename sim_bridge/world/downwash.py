@@ -13,7 +13,7 @@ _NEAR_M = 1.2
 
 
 def wake_between(body: Airframe, other: Airframe) -> tuple[float, float, float] | None:
-    """Return how the downwash of a body accelerates another one below it, None when out of its reach."""
+    """Return the acceleration of `other` by the downwash of `body` above it, None out of its reach."""
     dx, dy, below = other.x - body.x, other.y - body.y, body.z - other.z
     if body.on_ground or below < 0.1 or abs(dx) > _REACH_M or abs(dy) > _REACH_M:
         return None

@@ -1,4 +1,4 @@
-"""What a kind of vehicle brings to the simulator: how it moves, and how it speaks at the wire."""
+"""Interfaces of a kind of vehicle to the simulator: its body, its sensors, its emulator at the wire."""
 
 from collections.abc import Callable
 from pkgutil import resolve_name
@@ -18,7 +18,7 @@ Vector3 = tuple[float, float, float]
 
 
 class Motors(Protocol):
-    """What turns the propellers."""
+    """The part that turns the propellers."""
 
     @property
     def motors_on(self) -> bool:
@@ -26,10 +26,10 @@ class Motors(Protocol):
 
 
 class Body(Protocol):
-    """A vehicle of the room. battery: share of the full charge; wind: push of the air by a fault [m/s^2; world].
+    """A vehicle of the room. battery: share of the full charge; wind: push of a fault's wind [m/s^2; world].
 
-    One that has a method `sense` is told after each step, when walls have had their say, to take its readings. Those
-    that have the same `ultrasound_code` disturb each other's ultrasound.
+    A method `sense`, if it has one, is called after each step, with walls applied, to take its readings. Bodies
+    with the same `ultrasound_code` disturb each other's ultrasound.
     """
 
     airframe: Airframe
@@ -38,7 +38,7 @@ class Body(Protocol):
 
     @property
     def autopilot(self) -> Motors:
-        """Return what turns its propellers."""
+        """Return the part that turns its propellers."""
 
     @property
     def airborne(self) -> bool:
@@ -48,7 +48,7 @@ class Body(Protocol):
         """Advance by one tick under the wake of the others [m/s^2; world]."""
 
     def wake_on(self, other: Airframe) -> Vector3 | None:
-        """Return how its downwash accelerates another one below it, None when out of its reach."""
+        """Return the acceleration of a body below by its downwash, None out of its reach."""
 
 
 class Emulator(Protocol):
@@ -61,13 +61,13 @@ class Emulator(Protocol):
     deaf: bool
 
     def fileno(self) -> int:
-        """Return the descriptor that becomes readable when something arrives."""
+        """Return the descriptor that becomes readable when input arrives."""
 
     def receive(self) -> None:
-        """Take all that waits, without waiting for any."""
+        """Take all waiting input, without blocking."""
 
     def send(self) -> None:
-        """End a tick: send what is due."""
+        """End a tick: send due output."""
 
     def close(self) -> None:
         """Close the ports."""
@@ -76,8 +76,8 @@ class Emulator(Protocol):
 class Emulation(Protocol):
     """How one kind of vehicle is emulated; `groundstation.vehicles.VehicleKind.emulator` names it.
 
-    It may have more: `video(name, scenario)`, the `sim_bridge.own_video.OwnVideo` of a kind that has its own (its
-    emulators then have `video_settings`, a tuple of what its configuration says of it), and the methods of
+    Optional: `video(name, scenario)`, the `sim_bridge.own_video.OwnVideo` of a kind that has its own (its
+    emulators then have `video_settings`, a tuple of its configuration's settings), and the methods of
     `KeepsSensors`.
     """
 
@@ -87,12 +87,12 @@ class Emulation(Protocol):
     def open(self, name: str, body: Any, onboard: Any, order: LaunchSpec) -> Emulator:
         """Return the listening emulator of a body that `body` made; raises GroundStationError for a taken port.
 
-        onboard: its sensors, where the world keeps them, else None.
+        onboard: its sensors, if the world keeps them, else None.
         """
 
 
 def emulation_of(kind: str) -> Emulation:
-    """Return how a kind of vehicle is emulated; raises SettingsError naming a kind that nobody emulates."""
+    """Return the emulation of a kind of vehicle; raises SettingsError naming a kind without one."""
     reference = kind_named(kind).emulator
     if not reference:
         raise SettingsError([f"kind: {kind} has no emulator: it cannot be simulated"])
@@ -104,10 +104,10 @@ def emulation_of(kind: str) -> Emulation:
 
 
 class Around(NamedTuple):
-    """What misleads the sensors of a vehicle in this tick.
+    """Disturbances of a vehicle's sensors in this tick.
 
-    crosstalk: another one's ultrasound of the same rate is in reach; flow_bias: by the floor below [m/s; world], and
-    below_m: height of what stands there, None where the scenario has no such thing.
+    crosstalk: another vehicle's ultrasound of this rate is in reach; flow_bias: by the floor below [m/s; world], and
+    below_m: height of the surface there; None if the scenario has no such thing.
     """
 
     crosstalk: bool = False
@@ -127,17 +127,17 @@ class KeepsSensors(Protocol):
 
 
 def video_of(kind: str, name: str, scenario: Scenario) -> OwnVideo | None:
-    """Return the own video of one vehicle, None where its emulation has none."""
+    """Return the own video of one vehicle, None if its emulation has none."""
     video: Callable[[str, Scenario], OwnVideo] | None = getattr(emulation_of(kind), "video", None)
     return None if video is None else video(name, scenario)
 
 
 def video_settings_of(emulator: Emulator) -> tuple[object, ...] | None:
-    """Return what a vehicle's configuration says of its own video, None where there is nothing to say."""
+    """Return the settings of a vehicle's own video by its configuration, None if there are none."""
     settings: tuple[object, ...] | None = getattr(emulator, "video_settings", None)
     return settings
 
 
 def senses_of(body: Body) -> Callable[[], None] | None:
-    """Return how a body takes its readings, None for one whose sensors the world keeps."""
+    """Return the method by which a body takes its readings, None if the world keeps its sensors."""
     return getattr(body, "sense", None)

@@ -1,7 +1,7 @@
 """The sensors of a vehicle that flies by its own optical flow (Tello, robots of ROS 2): true state in, readings out.
 
-Nobody measured these kinds against motion capture. They err as AR.Drones do, by the scenario's same figures, but for
-what only AR.Drones have: the jump of the heading, the ultrasound, and a velocity that all of them tell too small.
+Nobody measured these kinds against motion capture. They have the errors of AR.Drones, by the same figures of the
+scenario, but for those of AR.Drones only: the jump of the heading, the ultrasound, and a velocity reported too small.
 """
 
 import math
@@ -26,10 +26,10 @@ _CLIMB_WHITE_M_S = 0.05
 
 
 class FlowSensors:
-    """Readings of one vehicle after each `step`; never the true values. Those of the floor are about zero, too.
+    """Readings of one vehicle after each `step`; never the true values, on the floor neither.
 
-    velocity [m/s; base_stabilized, FLU], late; roll, pitch [rad; FLU]; yaw [rad] and position [m] of odom, which begins
-    where it stands and drifts with heading and velocity; height [m] of the base above the floor, late.
+    velocity [m/s; base_stabilized, FLU], delayed; roll, pitch [rad; FLU]; yaw [rad] and position [m] in odom, which
+    begins at its pad and drifts with heading and velocity; height [m] of the base above the floor, delayed.
     """
 
     def __init__(self, figures: DroneScenario, tick_s: float, start: Airframe, rng: np.random.Generator) -> None:
@@ -81,7 +81,7 @@ class FlowSensors:
         self._ticks += 1
 
     def readings(self, ticks: int, battery: float) -> Readings:
-        """Return what it measured last, at a time of its own clock."""
+        """Return its last measurements, at a time of its own clock."""
         return Readings(
             ticks, self.velocity, self.roll, self.pitch, self.yaw, self.gyros, self.accelerometers, battery,
             self.height, position=(*self.position, self.height),

@@ -12,8 +12,8 @@ _ACCELEROMETER_GAIN = 0.92
 _STILL = ((7.5e-4, 7.5e-4, 7.5e-4), (0.031, 0.001, 0.017))
 _IDLING = ((0.016, 0.016, 0.048), (0.13, 0.10, 0.07))
 _FLYING = ((0.031, 0.032, 0.044), (0.045, 0.045, 0.045))
-# In flight it is vibration: means over 40 ms are about as sure as those of white noise, over 200 ms twice as sure, and
-# the heading that gyros tell wanders by the white share only: 0.2 deg after 10 s.
+# In flight it is vibration: means over 40 ms are as accurate as with white noise, over 200 ms twice as accurate, and
+# the integrated heading wanders by the white share only: 0.2 deg after 10 s.
 _VIBRATION_TICKS, _WHITE_SHARE = 4, 0.28
 
 

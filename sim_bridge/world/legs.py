@@ -1,4 +1,4 @@
-"""Paths of straight legs: goals one after the other, and who drives to them."""
+"""Paths of straight legs: goals one after the other, and the course that drives to them."""
 
 import itertools
 import math
@@ -10,9 +10,9 @@ import numpy as np
 from sim_bridge.target_paths import AlongWalls, Sprint, Waypoints
 
 Point = tuple[float, float]
-# The target turns on the spot until it points to its goal as well as this [rad], and arrives within this [m].
+# Errors at which a target that turns on the spot points to its goal [rad], and at which it has arrived [m].
 _AIM_RAD, _ARRIVED_M = 0.15, 0.06
-# Gains: of the heading [1/s], and of the speed on the distance that is left [1/s].
+# Gains: of the heading [1/s], and of the speed on the remaining distance [1/s].
 _ABOUT, _BRAKE = 4.0, 2.0
 _TURN_RAD_S = 3.0
 
@@ -26,7 +26,7 @@ class Pose(NamedTuple):
 
 
 class Goal(NamedTuple):
-    """Where to, how fast, backwards or not, and how long to stand there."""
+    """Goal of a leg: place, speed, direction of travel, and time to stand there."""
 
     x: float
     y: float
@@ -49,7 +49,7 @@ def waypoint_goals(path: Waypoints) -> Iterator[Goal]:
 
 
 def corner_goals(path: AlongWalls, half_room_m: Point) -> tuple[Point, Iterator[Goal]]:
-    """Return the corner where a target starts that goes along the walls, and its goals from then on."""
+    """Return the corner where a target along the walls starts, and its goals from then on."""
     x, y = (max(0.1, half - path.from_wall_m) for half in half_room_m)
     corners = [(x, y), (-x, y), (-x, -y), (x, -y)]
     turned = corners[path.start_corner :] + corners[: path.start_corner]
@@ -91,7 +91,7 @@ def _inside(value: float, side: tuple[float, float]) -> float:
 
 
 class GoalCourse:
-    """Drives to one goal after the other; stands where there is none left."""
+    """Drives to one goal after the other; stands when none is left."""
 
     def __init__(self, start: Point, goals: Iterator[Goal], tick_s: float) -> None:
         self._goals, self._tick_s = goals, tick_s

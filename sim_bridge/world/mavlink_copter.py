@@ -27,11 +27,11 @@ _HOLD_GAIN, _HOLD_M_S = 0.9, 0.5
 _TILT_TIME_S = 0.12
 _DESCENT_M_S, _TOUCH_DOWN_M_S, _FLARE_M = 0.5, 0.3, 0.8
 _DRAG = 0.25  # 1/s, when only the attitude is held
-_BRACE_S = 1.0  # until it leans against steady air as far as it takes
+_BRACE_S = 1.0  # until it leans fully against steady air
 
 
 class Steering(Enum):
-    """What the motors are doing."""
+    """Actions of the motors."""
 
     OFF = auto()
     IDLE = auto()
@@ -43,9 +43,9 @@ class Steering(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Response:
-    """How one firmware answers a velocity step: dead time, natural frequency [rad/s], damping, final gain.
+    """Response of one firmware to a velocity step: dead time, natural frequency [rad/s], damping, final gain.
 
-    lift_off: share that it has of the error that a scenario gives velocities at lift-off.
+    lift_off: its share of the scenario's velocity error at lift-off.
     """
 
     dead_s: float
@@ -63,7 +63,7 @@ ARDUPILOT_RESPONSE = Response(dead_s=0.13, rate=3.5, damping=1.0, gain=1.0, lift
 class MavlinkCopter:
     """A drone standing on its pad. `steering` and the methods take the requests, `airframe` holds the true state.
 
-    wind: acceleration by the air that a fault moves [m/s^2; world].
+    wind: acceleration by a fault's wind [m/s^2; world].
     """
 
     def __init__(
@@ -94,7 +94,7 @@ class MavlinkCopter:
 
     @property
     def autopilot(self) -> "MavlinkCopter":
-        """Return itself, so that callers can ask for the motors of any firmware."""
+        """Return itself: the part that turns its propellers."""
         return self
 
     @property
@@ -176,7 +176,7 @@ class MavlinkCopter:
         return limited[0], limited[1], limited[2]
 
     def _pursue(self, wanted: Vector3, turn: float, wake: Vector3) -> None:
-        # The autopilot knows its velocity and heading by its estimate only.
+        # The autopilot knows its velocity and heading only by its estimate.
         response, estimate = self._response, self.estimate
         c, s = math.cos(estimate.yaw), math.sin(estimate.yaw)
         vx, vy, vz = estimate.velocity
@@ -198,7 +198,7 @@ class MavlinkCopter:
         forward, left, up = acceleration
         body.ax, body.ay, body.az = c * forward - s * left + push[0], s * forward + c * left + push[1], up + push[2]
         x, y = self._braced
-        forward, left = forward - c * x - s * y, left - c * y + s * x  # what is left of it as tilt
+        forward, left = forward - c * x - s * y, left - c * y + s * x  # the part of it that tilts
         share = dt / _TILT_TIME_S
         body.roll_rate = (math.atan(-left / GRAVITY_M_S2) - body.roll) / _TILT_TIME_S
         body.pitch_rate = (math.atan(forward / GRAVITY_M_S2) - body.pitch) / _TILT_TIME_S
@@ -214,5 +214,5 @@ class MavlinkCopter:
             self._acceleration = [0.0, 0.0, 0.0]
 
     def wake_on(self, other: Airframe) -> Vector3 | None:
-        """Return how this drone's downwash accelerates another one below it, None when out of its reach."""
+        """Return the acceleration of a body below by this drone's downwash, None out of its reach."""
         return wake_between(self.airframe, other)

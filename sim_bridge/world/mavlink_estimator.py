@@ -1,6 +1,6 @@
-"""The state estimated by a modern autopilot: inertial sensors, aided by poses from outside.
+"""State estimate of a modern autopilot: inertial sensors, aided by poses from outside.
 
-Without them it knows nothing of its position; when they stop, it coasts on its accelerometers and drifts. The frame is
+Without them it has no position; when they stop, it integrates its accelerometers and drifts. The frame is
 that of the poses. Gains stand for those of the firmwares' filters: 1-3 cm of error for 1 cm of noise
 (docs/reference/mavlink.md 1.1).
 """
@@ -26,8 +26,8 @@ _GYRO_NOISE_RAD_S, _ACCELEROMETER_NOISE_M_S2 = 0.006, 0.08
 
 class InertialEstimate:
     """Readings after each `step`: position, velocity [fed frame], yaw, roll, pitch [rad; FLU], gyros and
-    accelerometers [base]. aided_s: since the last pose that was used; poses: used in all; rejected: not used;
-    test_ratio: of the last pose, how far from the estimate it was as a share of the gate, beyond 1 refused.
+    accelerometers [base]. aided_s: since the last pose that was used; poses: number used; rejected: number not used;
+    test_ratio: distance of the last pose from the estimate, as a share of the gate; beyond 1 it is refused.
     """
 
     def __init__(
@@ -60,11 +60,11 @@ class InertialEstimate:
 
     @property
     def has_position(self) -> bool:
-        """Return whether enough poses came to know where it is."""
+        """Return whether enough poses came to have a position."""
         return self.poses >= _TRUSTED_AFTER
 
     def step(self, body: Airframe, motors_on: bool) -> None:
-        """Measure the true state once and carry the estimate on; call it once per tick."""
+        """Measure the true state once and predict the estimate; call it once per tick."""
         dt, draw = self._tick_s, self._draw
         self._time_s += dt
         self.aided_s += dt
@@ -81,17 +81,17 @@ class InertialEstimate:
         self.yaw = math.remainder(self.yaw + self.yaw_rate * dt, math.tau)
         if not self.has_position:
             return
-        # An attitude error tips gravity into the horizontal axes.
+        # An attitude error adds a part of gravity to the horizontal axes.
         c, s = math.cos(body.yaw), math.sin(body.yaw)
         forward = c * body.ax + s * body.ay + GRAVITY_M_S2 * pitch_error + shake * draw()
         left = c * body.ay - s * body.ax - GRAVITY_M_S2 * roll_error + shake * draw()
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         accelerations = (c * forward - s * left, s * forward + c * left, body.az + self._up_bias + shake * draw())
         vx, vy, vz = _sum(self.velocity, _sum(accelerations, self._bias, 1.0), dt)
-        # The barometer keeps the climb rate from drifting; nothing does so for the horizontal ones.
+        # The barometer keeps the climb rate from drifting; nothing does so for horizontal velocities.
         self.velocity = (vx, vy, vz + _BAROMETER_GAIN * dt * (body.vz + 0.1 * draw() - vz))
         if body.on_ground:
-            self.velocity = (0.0, 0.0, 0.0)  # the landing detector tells the filter so
+            self.velocity = (0.0, 0.0, 0.0)  # known by the landing detector
         elif self._stood and self._lift_off_m_s:
             vx, vy, vz = self.velocity
             self.velocity = (vx + self._lift_off_m_s * draw(), vy + self._lift_off_m_s * draw(), vz)
@@ -99,7 +99,7 @@ class InertialEstimate:
         self.position = _sum(self.position, self.velocity, dt)
 
     def aid(self, position: Vector3, yaw: float, resets: int) -> bool:
-        """Take a pose [its own frame defines ours]; returns whether it was used.
+        """Take a pose (its frame becomes the estimate's); returns whether it was used.
 
         A pose beyond the gate is refused, unless its reset counter rose: then the estimate jumps there.
         """

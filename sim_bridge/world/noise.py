@@ -14,7 +14,7 @@ _BLOCK = 1024
 
 
 def generator_of(seed: int, name: str) -> np.random.Generator:
-    """Return the generator of one body: another body more or less does not change its draws."""
+    """Return the generator of one body; other bodies do not change its draws."""
     return np.random.default_rng([seed, zlib.crc32(name.encode())])
 
 
@@ -46,9 +46,9 @@ class GaussMarkov:
 
 
 class Vibration:
-    """Noise of unit variance that swings about zero, so that its integral does not wander, and a share of white noise.
+    """Noise of unit variance: a swing about zero, whose integral does not wander, and a share of white noise.
 
-    half_ticks: how long it stays on one side; white_share: deviation of the white part, which does wander.
+    half_ticks: time on one side; white_share: deviation of the white part, whose integral wanders.
     """
 
     __slots__ = ("_before", "_draw", "_gain", "_line", "_since", "_white")

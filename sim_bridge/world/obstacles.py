@@ -32,7 +32,7 @@ class Box:
 
     @property
     def footprint(self) -> Footprint:
-        """Return where it is on the floor."""
+        """Return its place on the floor."""
         return Footprint(self.body.x, self.body.y, *self.size_m[:2])
 
     def step(self) -> None:
@@ -40,7 +40,7 @@ class Box:
         self.body.step()
 
     def hides(self, eye: Array, point: Array) -> bool:
-        """Return whether it is in the way between two points [world]."""
+        """Return whether it lies between two points [world]."""
         width, depth, height = self.size_m
         low = (self.body.x - width / 2, self.body.y - depth / 2, 0.0)
         high = (self.body.x + width / 2, self.body.y + depth / 2, height)
@@ -57,7 +57,7 @@ class Box:
 
 
 def all_obstacles(scenario: Iterable[Obstacle], room: Iterable[SimulatedObstacle]) -> tuple[Obstacle, ...]:
-    """Return the obstacles of a scenario, then those that the field says stand in the room."""
+    """Return the obstacles of a scenario, then those of the field's room."""
     standing = (Obstacle(size_m=one.size_m, path=Standstill(position_m=one.centre_m)) for one in room)
     return (*scenario, *standing)
 
@@ -65,7 +65,7 @@ def all_obstacles(scenario: Iterable[Obstacle], room: Iterable[SimulatedObstacle
 def boxes_of(
     obstacles: Iterable[Obstacle], tick_s: float, seed: int, half_room: tuple[float, float]
 ) -> tuple[Box, ...]:
-    """Return boxes, each with chance of its own."""
+    """Return boxes, each with a random generator of its own."""
     return tuple(
         Box(one, tick_s, generator_of(seed, f"obstacle {index}"), half_room) for index, one in enumerate(obstacles)
     )
@@ -74,7 +74,7 @@ def boxes_of(
 def floor_below(x: float, y: float, z: float, tops: Iterable[tuple[float, float, float, float]]) -> float:
     """Return the height [m] of the surface under an ultrasound sensor: the highest top below it, else the floor.
 
-    tops: x, y, radius and height of what stands about [m]; an echo within 15 degrees of straight down counts.
+    tops: x, y, radius and height of bodies and obstacles [m]; an echo within 15 degrees of straight down counts.
     """
     heard = 0.0
     for top_x, top_y, radius, height in tops:

@@ -1,4 +1,4 @@
-"""Where the target drives: a point that runs along a closed curve at constant speed."""
+"""Closed curves for targets, and a point that runs along them at constant speed."""
 
 import math
 from typing import NamedTuple
@@ -25,7 +25,7 @@ class EightPath:
         self._centre = figure.centre_m
 
     def point(self) -> PathPoint:
-        """Return where the running point is."""
+        """Return the running point."""
         return self._at(self.phase)
 
     def advance(self, distance_m: float) -> None:

@@ -1,4 +1,4 @@
-"""Places on the floor that a scenario leaves to chance."""
+"""Draws the places of targets that a scenario leaves to chance."""
 
 import math
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ _TRIES = 1000
 
 
 class Footprint(NamedTuple):
-    """What stands on the floor, along the room's axes: centre and size [m; world]."""
+    """Rectangle of something that stands on the floor, along the room's axes: centre and size [m; world]."""
 
     x: float
     y: float
@@ -21,14 +21,14 @@ class Footprint(NamedTuple):
     depth_m: float = 0.0
 
     def distance_m(self, x: float, y: float) -> float:
-        """Return how far a point is from it; 0 within."""
+        """Return the distance of a point [m]; 0 inside."""
         return math.hypot(max(0.0, abs(x - self.x) - self.width_m / 2), max(0.0, abs(y - self.y) - self.depth_m / 2))
 
 
 def settled(
     path: Path, half_room_m: tuple[float, float], standing: Sequence[Footprint], rng: np.random.Generator
 ) -> Path:
-    """Return a path whose place is drawn if it is left to chance; raises SettingsError where nothing is clear."""
+    """Return a path, its place drawn if it is left to chance; raises SettingsError if no place is free."""
     if not isinstance(path, Anywhere):
         return path
     most = np.array(half_room_m) - path.clear_m

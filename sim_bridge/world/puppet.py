@@ -1,4 +1,4 @@
-"""A body that somebody else moves: it follows the poses of a real vehicle, and is nowhere when they stop."""
+"""A body that is moved from outside: it follows the poses of a real vehicle; when they stop its place is unknown."""
 
 import math
 from dataclasses import dataclass
@@ -8,16 +8,16 @@ from sim_bridge.world.downwash import wake_between
 
 Vector3 = tuple[float, float, float]
 STALE_S = 0.5
-_AIRBORNE_M = 0.05  # above where it stands
+_AIRBORNE_M = 0.05  # above its standing height
 _TINY_M = 1e-9
 _NOWHERE = (math.nan,) * 13
 
 
 @dataclass(frozen=True, slots=True)
 class OutsidePose:
-    """Where a real body is: position [m], velocity [m/s; world], roll, pitch, yaw [rad; FLU] and body rates [rad/s].
+    """Pose of a real body: position [m], velocity [m/s; world], roll, pitch, yaw [rad; FLU] and body rates [rad/s].
 
-    grain_m: step in which the horizontal position is told; within one it is unknown.
+    grain_m: step of the horizontal position; within one it is unknown.
     """
 
     position: Vector3
@@ -28,10 +28,10 @@ class OutsidePose:
 
 
 class Puppet:
-    """Follows poses from outside, between them at their velocity. It has no motors and no sensors here.
+    """Follows poses from outside, extrapolated by their velocity. It has no motors and no sensors here.
 
-    room_m: half length, half width, height; beyond it, and `STALE_S` after the last pose, it is nowhere. pad: where it
-    stands until the first pose, None: nowhere.
+    room_m: half length, half width, height; beyond it, and `STALE_S` after the last pose, its place is unknown.
+    pad: its place until the first pose, None: unknown.
     """
 
     def __init__(self, room_m: Vector3, tick_s: float, pad: tuple[tuple[float, float], float] | None = None) -> None:
@@ -43,7 +43,7 @@ class Puppet:
         self.poses = 0
 
     def follow(self, pose: OutsidePose) -> None:
-        """Be where the real body is now."""
+        """Take a pose of the real body."""
         body, z = self.airframe, pose.position[2]
         body.x, body.y, body.z = (*self._within_grain(pose), z)
         body.vx, body.vy, body.vz = pose.velocity
@@ -53,9 +53,9 @@ class Puppet:
         self.poses += 1
 
     def _within_grain(self, pose: OutsidePose) -> tuple[float, float]:
-        """Return the horizontal place nearest to where it has got to that the pose does not exclude.
+        """Return the horizontal place nearest to its present one that the pose does not exclude.
 
-        It moves evenly then, as a real body does, and not by a grain now and then.
+        So it moves evenly, as a real body does, and not by a grain at a time.
         """
         (told_x, told_y, _), body = pose.position, self.airframe
         away_x, away_y = body.x - told_x, body.y - told_y
@@ -74,7 +74,7 @@ class Puppet:
 
     @property
     def stale(self) -> bool:
-        """Return whether its last pose is too old to say where it is."""
+        """Return whether its last pose is too old."""
         return self.age_s > STALE_S and not self._waits
 
     @property
@@ -85,7 +85,7 @@ class Puppet:
 
     @property
     def nowhere(self) -> str:
-        """Return why it is not visible, or ""."""
+        """Return the reason why its place is unknown, or ""."""
         if self.stale:
             return f"no pose of the real one for {STALE_S:g} s" if self.poses else "no pose of the real one yet"
         return "the pose of the real one lies outside of the room" if self.outside else ""
@@ -102,5 +102,5 @@ class Puppet:
         return (*self.airframe.row()[:9], *self._rates, float(self.airframe.on_ground))
 
     def wake_on(self, other: Airframe) -> Vector3 | None:
-        """Return how its downwash accelerates a body below it, None when out of its reach."""
+        """Return the acceleration of a body below by its downwash, None out of its reach."""
         return wake_between(self.airframe, other) if self.airborne else None

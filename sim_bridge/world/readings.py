@@ -1,4 +1,4 @@
-"""What a vehicle reports of itself at one tick, of whichever kind it is: a value."""
+"""The readings that a vehicle of any kind reports at one tick, as a value."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -10,8 +10,8 @@ Vector3 = tuple[float, float, float]
 class Readings:
     """Readings in SI units and FLU, as `Onboard` and `InertialEstimate` have them.
 
-    ticks: the vehicle's own clock. velocity [m/s]: in the frame in which the vehicle reports it.
-    height, echo, rejected: of the ultrasound. status: what the vehicle says of its state, by its kind.
+    ticks: the vehicle's own clock. velocity [m/s]: in the frame of its reports.
+    height, echo, rejected: of the ultrasound. status: its reported state, by its kind.
     """
 
     ticks: int

@@ -1,6 +1,6 @@
-"""How slowly the errors of small drones' sensors change, as recorded (docs/explanation/estimation.md 9.2).
+"""Time constants of the errors of small drones' sensors, as recorded (docs/explanation/estimation.md 9.2).
 
-How large they are stands in the scenario.
+Their sizes stand in the scenario.
 """
 
 import math

@@ -20,7 +20,7 @@ _SLIP_CORRELATION_S = 1.5
 
 
 class BaseLimits(NamedTuple):
-    """What a base can do at most: speed [m/s], acceleration [m/s^2], turn rate [rad/s], turn acceleration [rad/s^2]."""
+    """Limits of a base: speed [m/s], acceleration [m/s^2], turn rate [rad/s], turn acceleration [rad/s^2]."""
 
     speed_m_s: float
     acceleration_m_s2: float
@@ -46,7 +46,7 @@ class Unicycle:
         rng: np.random.Generator,
         half_room_m: tuple[float, float] = (50.0, 50.0),
     ) -> None:
-        # Their own streams: what drives it does not change how its wheels slip.
+        # Streams of their own: its path does not change the slip of its wheels.
         on_course, self._rng = rng.spawn(2)
         draw = standard_normals(rng)
         self._tick_s = tick_s
@@ -68,7 +68,7 @@ class Unicycle:
         self._steered = (speed_m_s, turn_rate_rad_s)
 
     def follow_path(self) -> None:
-        """Go on along the path, an eight from its nearest point; without a path, stop."""
+        """Continue along the path, an eight from its nearest point; without a path, stop."""
         if self._course is None:
             self._steered = (0.0, 0.0)
         else:
@@ -76,7 +76,7 @@ class Unicycle:
             self._steered = None
 
     def place(self, x_m: float, y_m: float) -> None:
-        """Be somewhere else, at rest."""
+        """Move to another place at once, at rest."""
         self.x, self.y = x_m, y_m
         self.speed = self.turn_rate = 0.0
         self._wheels = (0.0, 0.0)
@@ -96,7 +96,7 @@ class Unicycle:
                 limits.turn_acceleration_rad_s2 * self._tick_s,
             ),
         )
-        # Wheels that slip cover less than they turn, never more than the base can do.
+        # Slipping wheels cover less than they turn, and turn no faster than the base's limits.
         self.speed = _clamp(self._wheels[0] * (1.0 + self._slip.step()), limits.speed_m_s)
         self.turn_rate = _clamp(self._wheels[1] * (1.0 + self._turn_slip.step()), limits.turn_rate_rad_s)
         self.yaw = math.remainder(self.yaw + self.turn_rate * self._tick_s, math.tau)
@@ -109,7 +109,7 @@ class Unicycle:
 
     @property
     def wheels(self) -> tuple[float, float]:
-        """Return speed [m/s] and turn rate [rad/s] as the wheels turn, which slip."""
+        """Return speed [m/s] and turn rate [rad/s] by the turning of the wheels, before slip."""
         return self._wheels
 
     def row(self) -> tuple[float, ...]:
@@ -124,7 +124,7 @@ class Unicycle:
         return self._course.drive(self.x, self.y, self.yaw)
 
     def _kidnap(self) -> None:
-        """Be carried away when it is time for it."""
+        """Move the target elsewhere when a kidnap is due."""
         self._driven_ticks += 1
         while self._kidnaps and self._driven_ticks * self._tick_s >= self._kidnaps[0].at_s:
             kidnap = self._kidnaps.popleft()
@@ -137,7 +137,7 @@ class Unicycle:
 def _away(
     x: float, y: float, distance_m: float, half_room_m: tuple[float, float], rng: np.random.Generator
 ) -> tuple[float, float]:
-    """Return a place that far away in a random direction, not near a wall; the farthest tried where none is."""
+    """Return a place at a distance in a random direction, not near a wall; if there is none, the farthest tried."""
     tried = []
     for angle in rng.uniform(-math.pi, math.pi, 32).tolist():
         there = x + distance_m * math.cos(angle), y + distance_m * math.sin(angle)

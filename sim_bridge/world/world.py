@@ -1,4 +1,4 @@
-"""The room with everything that moves in it, advanced in fixed steps of 5 ms; no clock of its own."""
+"""The room with all its moving bodies, advanced in fixed steps of 5 ms; no clock of its own."""
 
 import itertools
 import math
@@ -23,7 +23,7 @@ TICK_S = 0.005
 TICK_NS = 5 * NS_PER_MS
 _TARGET_RADIUS_M = 0.18
 _STILL_AIR = (0.0, 0.0, 0.0)
-# How far a drone's ultrasound disturbs another's, and how often that is looked at.
+# Range at which a drone's ultrasound disturbs another's, and how often that is computed.
 CROSSTALK_M = 2.0
 _CROSSTALK_TICKS = 8
 _NOWHERE = (math.nan,) * WIDTH
@@ -34,9 +34,9 @@ _Body = TypeVar("_Body")
 class World:
     """Drones, targets, and the onboard sensors of each drone.
 
-    `bodies` names the rows of `states()`: the drones, then the targets. real: those of them that exist, and are only
-    followed (drones: `puppets`) or not known of (targets); waiting: real drones that stand on their pads until they
-    are heard of.
+    `bodies` names the rows of `states()`: the drones, then the targets. real: the real ones among them, which are only
+    followed (drones: `puppets`) or unknown (targets); waiting: real drones that stand on their pads until their first
+    pose.
     """
 
     def __init__(
@@ -124,7 +124,7 @@ class World:
         self.ticks += 1
 
     def _around(self, name: str, drone: Body) -> Around:
-        """Return what floor, bodies below and neighbours do to a drone's optical flow and ultrasound."""
+        """Return the disturbances of a drone's optical flow and ultrasound by floor, bodies below and neighbours."""
         crosstalk, body = name in self._disturbed, drone.airframe
         if not self._zones and not self._echoes:
             return _TROUBLED if crosstalk else _UNTROUBLED
@@ -161,7 +161,7 @@ class World:
                 target.parked = target.parked and self._together_s < self._depart_after_s[name]
 
     def blow(self, name: str, push_m_s2: float, direction_deg: float) -> None:
-        """Let the air push one drone [m/s^2], towards a direction [deg; world], counter-clockwise from x."""
+        """Push one drone by wind [m/s^2] towards a direction [deg; world], counter-clockwise from x."""
         angle = math.radians(direction_deg)
         wind = (push_m_s2 * math.cos(angle), push_m_s2 * math.sin(angle)) if push_m_s2 else (0.0, 0.0)
         self.drones[name].wind = wind
@@ -178,7 +178,7 @@ class World:
         others: list[tuple[str, Body | Puppet]] = [*self.drones.items(), *self.puppets.items()]
         for other, drone in others:
             if other != name and (push := drone.wake_on(below)) and push[2] < strongest[2]:
-                strongest = push  # wakes do not add
+                strongest = push  # wakes do not add up
         return strongest
 
 

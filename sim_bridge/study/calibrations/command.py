@@ -1,6 +1,6 @@
 """`python -m sim_bridge.study calibrations < order.json`: fly with wrong figures, and calibrate by that.
 
-The order's own: errors as [who, part, true minus told]; stand_s: seconds on the pads; calibrate: whether settings are
+Its own keys: errors as [entity, part, true minus told]; stand_s: seconds on the pads; calibrate: whether settings are
 asked for.
 """
 

@@ -1,4 +1,4 @@
-"""One flight with wrong figures, kept as a recording would keep it, and judged by the truth."""
+"""One flight with wrong figures, kept like a recording and judged by the truth."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -27,7 +27,7 @@ _TAKEN = (ODOMETRY, IMU, OBSERVATION, VEHICLE_STATUS)
 
 
 class CalibrationFlight(ScenarioFlight):
-    """A flight whose team stands on its pads for a while; `fly` returns rmse, ANEES and what is left wrong."""
+    """A flight whose team first stands on its pads; `fly` returns rmse, ANEES and the figures' remaining errors."""
 
     def __init__(
         self, drawn: Drawn, sections: Sequence[Section], seconds: float, wrong: WrongFigures, stand_s: float
@@ -42,14 +42,14 @@ class CalibrationFlight(ScenarioFlight):
         return bool(self.world.time_s >= self._stand_s)
 
     def step(self) -> None:
-        """Advance by a tick, and keep what arrived."""
+        """Advance by a tick, and keep the messages that arrived."""
         super().step()
         found = [(str(one.key), one.message) for one in self._inputs.drain() if one.message is not None]
         if found:
             self._ticks.append((self.now_ns, tuple(found)))
 
     def watch(self) -> None:
-        """Compare what is believed with the truth."""
+        """Compare the belief with the truth."""
         super().watch()
         tracker = self.tracking.tracker
         truth = dict(zip(self.world.bodies, self.world.states(), strict=True))
@@ -57,7 +57,7 @@ class CalibrationFlight(ScenarioFlight):
         self._score.take(tracker.belief, truth, tuple(self.world.targets), str(tracker.topology), ages_s)
 
     def settings(self) -> list[tuple[list[str], Any]]:
-        """Return what `calibrate team` would change, as (path, value); none where it has too little to go by."""
+        """Return the settings that `calibrate team` would change, as (path, value); none if its data are too few."""
         with manual_clock(lambda: self.now_ns):
             flown = Flown(tuple(self._ticks), clock.clock_id())
         try:
@@ -76,7 +76,7 @@ class CalibrationFlight(ScenarioFlight):
 
 
 def left_wrong(told: ResolvedField, wrong: WrongFigures, eyes: Mapping[str, Eye]) -> dict[str, dict[str, float]]:
-    """Return true against told, drawn errors and all: of cameras turn [deg], place [m], focal [share], delay [ms].
+    """Return true minus told figures, with drawn errors: of cameras turn [deg], place [m], focal [share], delay [ms].
 
     Of markers: print [share].
     """

@@ -1,1 +1,1 @@
-"""Flights of a lab whose field file is wrong: what the operator is told before the take-off and after."""
+"""Flights of a lab whose field file is wrong, with all notices to the operator before and after take-off."""

@@ -1,7 +1,7 @@
 """`python -m sim_bridge.study culprits < order.json`: fly some seeds with wrong figures.
 
-The order's own: errors as [who, part, true minus told], exchanged as [drone, whose marker it carries], stand_s: seconds
-on the pads; diagnosed_from_s: when the diagnosis comes up.
+Its own keys: errors as [entity, part, true minus told], exchanged as [drone, owner of its marker], stand_s: seconds
+on the pads; diagnosed_from_s: start of the diagnosis.
 """
 
 from typing import Any

@@ -1,4 +1,4 @@
-"""One flight with wrong figures: the team stands on its pads and is judged, then takes off all the same."""
+"""One flight with wrong figures: the team is judged on its pads, then takes off whatever the findings."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -18,9 +18,9 @@ from sim_bridge.study.wrong_figures import WrongFigures
 
 
 class CulpritFlight(ScenarioFlight):
-    """A flight that notes what is told; `fly` returns it with the figures of tracking.
+    """A flight that keeps findings and notices; `fly` returns them with the figures of tracking.
 
-    on_pads: findings that are not well as [level, text]; told: [s after the order to take off, severity, entity, text,
+    on_pads: findings other than OK as [level, text]; told: [s after the order to take off, severity, entity, text,
     remedy] of each notice.
     """
 
@@ -42,7 +42,7 @@ class CulpritFlight(ScenarioFlight):
         self._diagnosis: Diagnosis | None = None
 
     def may_start(self) -> bool:
-        """Judge the pads once the team has stood for a while; then it may."""
+        """Return whether the team may take off: once it has stood for a while and its pads are judged."""
         if self.on_pads is not None:
             return True
         for received in self._sightings.drain():
@@ -68,7 +68,7 @@ class CulpritFlight(ScenarioFlight):
         self._diagnosis.notices.clear()
 
     def note(self, now_s: float, notice: Notice) -> None:
-        """Keep what is told, with its time."""
+        """Keep a notice with its time."""
         super().note(now_s, notice)
         if self.on_pads is not None:
             row = (str(notice.severity), notice.entity, notice.text, notice.remedy)

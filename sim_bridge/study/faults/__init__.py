@@ -1,1 +1,1 @@
-"""The fault campaign: tracker, drivers and watchdogs as they fly, in a simulated world where things go wrong."""
+"""The fault campaign: the real tracker, drivers and watchdogs, in a simulated world with faults."""

@@ -14,19 +14,19 @@ from sim_bridge.world.world import TICK_NS
 from sim_bridge.wrong_values import WrongValues
 
 _EVERY_TICKS = 2  # 100 Hz: as often as odometry is published
-# What the driver reads; the other options of a full packet would cost half of a flight's time.
+# The options that the driver reads; the others of a full packet would take half of a flight's computing time.
 _SENT = frozenset({0, 1, 3, 10, 16, 21})
 _LARGEST = 2048
 
 
 def slim(firmware: str) -> ArdroneFirmware:
-    """Return a firmware that sends few options."""
+    """Return the firmware with only the options that the driver reads."""
     full = FIRMWARES[firmware]
     return full.without(tuple(tag for tag in full.sizes if tag not in _SENT))
 
 
 class MemoryArDrone:
-    """`receive`, a step of the world, `send`, once per tick, as the emulator at real sockets."""
+    """An AR.Drone: `receive`, a step of the world, `send`, once per tick, like the emulator at real sockets."""
 
     def __init__(
         self, address: str, drone: Quadrotor, onboard: Onboard, firmware: str, wrong: WrongValues,
@@ -44,12 +44,12 @@ class MemoryArDrone:
             udp.bind((address, port))
 
     def suffer(self, fault: Fault, begins: bool) -> None:
-        """Have something hold a propeller, or let it go."""
+        """Begin or end a fault of this device: something holds a propeller."""
         if fault.kind is FaultKind.PROPELLER_BLOCKED:
             self.control.blocked = begins
 
     def receive(self) -> None:
-        """Take what waits at both ports."""
+        """Take the waiting datagrams of both ports."""
         now_ns = self._ticks * TICK_NS
         for udp in (self._navdata, self._at):
             while udp.waiting:
@@ -62,7 +62,7 @@ class MemoryArDrone:
                     self.control.audience.request(source, now_ns)
 
     def send(self) -> None:
-        """End a tick: watch the link, and send what is due."""
+        """End a tick: watch the link, and send due output."""
         self._ticks += 1
         now_ns, control = self._ticks * TICK_NS, self.control
         control.watch(now_ns)

@@ -1,6 +1,6 @@
 """`python -m sim_bridge.study faults < order.json`: fly some seeds of the campaign.
 
-The order's own: kinds, an empty list for all that are drawn, "none" for healthy flights only.
+Its own key: kinds of faults; an empty list: all that are drawn; "none": healthy flights only.
 """
 
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from sim_bridge.study.faults.draw import KINDS, draw
 from sim_bridge.study.faults.flight_order import FlightOrder, WrongOrder, fly_seeds
 from sim_bridge.study.faults.hosted_kinds import UP_AFTER_S
 
-# Faults begin when the team has found the target, and early enough for what must follow to be seen.
+# Faults begin when the team has found the target, and early enough that their consequences are seen.
 _SETTLED_S, _LEFT_S = 3.0, 6.0
 _HEALTHY = "none"
 
@@ -22,7 +22,7 @@ def main() -> int:
 
 
 def fly(order: FlightOrder, seed: int) -> dict[str, Any]:
-    """Return the verdict on one seed; of the only seed of an order, with what happened as "events"."""
+    """Return the verdict on one seed; if the order has only this one, with its events as "events"."""
     from sim_bridge.study.faults.flight import FaultFlight
 
     kinds = _kinds(order.own.get("kinds") or ())

@@ -1,4 +1,4 @@
-"""How far drones fly on that hear no command, until their own link watchdogs stop them: by truth alone."""
+"""Measures, by truth alone, how far drones that hear no command fly on until their own link watchdogs stop them."""
 
 import math
 from collections.abc import Collection, Mapping
@@ -10,10 +10,10 @@ from groundstation.arrays import Array
 
 @dataclass(slots=True)
 class DeafSpell:
-    """One drone that heard nothing in flight.
+    """One spell in which a flying drone heard no command.
 
-    speed_m_s, tilt_deg: as it began, which is what the last command had brought; fastest_m_s, flown_m: until it stood
-    or heard again, flown_m from the place where it began.
+    speed_m_s, tilt_deg: at its begin, by the last command; fastest_m_s, flown_m: until the drone stood
+    or heard again, flown_m from its place at the begin.
     """
 
     drone: str
@@ -25,7 +25,7 @@ class DeafSpell:
 
 
 class DeafSpells:
-    """Call `see` at an even rate. Nobody on the ground reaches those in `out_of_reach`."""
+    """Collects the spells; call `see` at an even rate."""
 
     def __init__(self) -> None:
         self._spells: list[DeafSpell] = []
@@ -33,11 +33,11 @@ class DeafSpells:
 
     @property
     def out_of_reach(self) -> Collection[str]:
-        """Return who flies and hears nothing."""
+        """Return the drones that fly and hear no command: nobody on the ground can stop them."""
         return self._lasting.keys()
 
     def see(self, now_s: float, aloft: Mapping[str, Array], deaf: Collection[str]) -> None:
-        """Take one moment. aloft: rows of the truth board of those that fly; deaf: who hears nothing."""
+        """Take one moment. aloft: rows of the truth board of flying drones; deaf: drones that hear nothing."""
         self._lasting = {name: kept for name, kept in self._lasting.items() if name in deaf and name in aloft}
         for name in deaf:
             if (row := aloft.get(name)) is None:

@@ -1,4 +1,4 @@
-"""What a seed of the campaign stands for: a field, a path of the target, and faults."""
+"""Draws the flight of a seed of the campaign: a field, a path of the target, and faults."""
 
 import math
 from dataclasses import dataclass
@@ -16,10 +16,10 @@ _HEALTHY_SHARE = 0.1
 # Pads lie where the ceiling camera of the shipped fields sees a drone at the height to which it takes off.
 _PADS_X_M, _PADS_Y_M = 1.4, 0.75
 _LEAST_PADS_M, _TARGET_M = 1.1, 0.6
-# Two pads may leave no room for a third: then all are drawn anew. As long as they fit, a seed's are what they were.
+# Two pads may leave no room for a third: then all are drawn anew. If they fit, a seed's pads are those of old.
 _MISSES, _BEGINNINGS = 20_000, 60
 
-# How each kind is drawn: least and greatest figure, None: it has none. Both signs where a sign makes sense.
+# For each kind of fault: least and greatest figure, None: it has none. Both signs where a sign makes sense.
 _FIGURES: dict[FaultKind, tuple[float, float] | None] = {
     FaultKind.NAVDATA_SILENT: None,
     FaultKind.AT_DEAF: None,
@@ -64,7 +64,7 @@ def draw(
     window_s: tuple[float, float],
     kinds: tuple[FaultKind, ...] = KINDS,
 ) -> Drawn:
-    """Return the flight of a seed; window_s: between which times of the world faults begin [s]."""
+    """Return the flight of a seed; window_s: span of the world's time in which faults begin [s]."""
     rng = generator_of(seed, "campaign")
     drones = random_pads(field, rng)
     target = base.target.model_copy(update={"path": random_eight(field, rng)})
@@ -83,7 +83,7 @@ def random_pads(field: dict[str, Any], rng: np.random.Generator) -> dict[str, An
 
 
 def _pads(field: dict[str, Any], rng: np.random.Generator) -> list[tuple[float, float]]:
-    """Return places before the ceiling camera, none near another or the target's start; WrongOrder for too many."""
+    """Return places in the ceiling camera's view, apart from each other and the target; WrongOrder for too many."""
     wanted = len(field["drones"])
     for _ in range(_BEGINNINGS):
         pads = _some_pads(wanted, rng)
@@ -93,7 +93,7 @@ def _pads(field: dict[str, Any], rng: np.random.Generator) -> list[tuple[float, 
 
 
 def _some_pads(wanted: int, rng: np.random.Generator) -> list[tuple[float, float]]:
-    """Return so many places, or those after which no room was found for another one."""
+    """Return `wanted` places, or fewer if there was no room for another one."""
     pads: list[tuple[float, float]] = []
     missed = 0
     while len(pads) < wanted and missed < _MISSES:
@@ -130,7 +130,7 @@ def _fault(field: dict[str, Any], rng: np.random.Generator, window_s: tuple[floa
     figures = _FIGURES[kind]
     value = None if figures is None else float(rng.uniform(*figures))
     if kind is FaultKind.VELOCITY_STUCK and rng.random() < 0.5:
-        value = 0.0  # what an AR.Drone says that sees no floor
+        value = 0.0  # reported by an AR.Drone that sees no floor
     start_s = float(rng.uniform(*window_s))
     lasts_s = float(rng.uniform(1.0, 8.0)) if rng.random() < 0.25 and kind is not FaultKind.BATTERY_DROP else None
     return Fault(

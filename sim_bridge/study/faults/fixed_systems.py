@@ -1,4 +1,4 @@
-"""What is fixed in the room besides cameras: motion capture and ranging, each exposing on a schedule of its own."""
+"""Sensors fixed in the room other than cameras, and targets' odometry, each on a schedule of its own."""
 
 from collections.abc import Iterator
 
@@ -15,9 +15,9 @@ from sim_bridge.world.world import World
 
 
 class FixedSystems:
-    """Motion capture and ranging systems that the tracker hears, and what targets say of their own motion.
+    """Motion capture and ranging systems that the tracker hears, and targets that report their motion.
 
-    They do not shift when cameras expose, nor each other: a flight without one of them is the same flight.
+    They shift neither the cameras' exposures nor each other's: a flight without one of them is otherwise the same.
     """
 
     def __init__(self, site: Site, world: World, scenario: Scenario, seed: int) -> None:
@@ -28,7 +28,7 @@ class FixedSystems:
         self._frames = Exposures[CaptureEye](captures_of(site, errors, seed))
 
     def due(self, now_ns: int, clock: str) -> Iterator[tuple[int, Topic, Message]]:
-        """Yield what is measured in this tick: when it arrives [ns], its topic and message."""
+        """Yield the measurements of this tick: time of arrival [ns], topic and message."""
         for topic, sensors in ((REPORTED_MOTION, self._reports), (RANGE, self._rounds), (OBSERVATION, self._frames)):
             for sensor in sensors.due(self._world.time_s):
                 for told in sensor.look(self._world, now_ns, clock):

@@ -1,4 +1,4 @@
-"""One flight of the campaign: world, emulated vehicles, drivers with watchdogs, tracker; one thread, a manual clock."""
+"""One flight of the campaign: world, emulated vehicles, drivers, tracker; in one thread, by a manual clock."""
 
 import time
 from collections import Counter, defaultdict
@@ -49,12 +49,12 @@ _DETECTOR_MS = (10.0, 50.0)
 _JUDGE_TICKS = 10
 JUDGE_S = _JUDGE_TICKS * TICK_NS / 1e9
 _ORDER_TICKS = 20
-# By when the team must track: AR.Drones take 8 s, MAVLink vehicles longer.
+# Deadline for the team to track: AR.Drones take 8 s, MAVLink vehicles longer.
 TRACKING_BY_S = 30.0
 
 
 class Arrivals:
-    """What the tracker takes in at each tick, of what it heeds."""
+    """The tracker's inbox: the messages that have arrived and that it heeds."""
 
     def __init__(self, bus: LocalBus, heeds: Callable[[Message], bool]) -> None:
         self._heeds = heeds
@@ -64,7 +64,7 @@ class Arrivals:
         self.overflowed = 0
 
     def pop_ready(self) -> list[tuple[str, Message]]:
-        """Return (key, message) of all that has arrived, in order."""
+        """Return (key, message) of all that have arrived, in order."""
         keys = self._keys
         ready = []
         for received in self._subscription.drain():
@@ -77,7 +77,7 @@ class Arrivals:
 
 
 class InlineWorker:
-    """Plans at once on what it is given; the plan is adopted a tick later."""
+    """Plans at once when a request is submitted; the plan is adopted a tick later."""
 
     def __init__(self, planner: Planner) -> None:
         self._planner = planner
@@ -109,7 +109,7 @@ class InlineWorker:
 class FaultFlight:
     """A flight in progress. `run` flies it to its end and returns the verdict, with the time spent on each part.
 
-    wrong: what the field is told wrongly; none: only delays of videos, where the scenario has others.
+    wrong: wrong figures of the field; None: only video delays, if the scenario's differ.
     """
 
     def __init__(
@@ -174,7 +174,7 @@ class FaultFlight:
         return self._report()
 
     def is_over(self) -> bool:
-        """Return whether the flight ends: after its time of tracking, or where it never began to track."""
+        """Return whether the flight ends: after its time of tracking, or if tracking did not begin in time."""
         since_s, now_s = self.tracking_since_s, self.world.time_s
         return now_s >= TRACKING_BY_S if since_s is None else now_s - since_s >= self._seconds
 
@@ -225,7 +225,7 @@ class FaultFlight:
                 self._send(searched.header.stamp_ns + round(delay_ms * 1e6), SEARCHED_PICTURE, searched)
 
     def _hear(self) -> None:
-        """Send on what is measured without a camera."""
+        """Send the measurements of sensors other than cameras."""
         for arrival_ns, topic, told in self._systems.due(self.now_ns, clock.clock_id()):
             self._send(arrival_ns, topic, told)
 
@@ -258,19 +258,19 @@ class FaultFlight:
         self.watch()
 
     def heeds(self, message: Message) -> bool:
-        """Return whether the tracker takes a message in: all of them, but in studies of other methods."""
+        """Return whether the tracker takes a message; studies of other methods override it."""
         return True
 
     def may_start(self) -> bool:
-        """Return whether the team is ordered to take off: at once, but in studies of what comes before."""
+        """Return whether the team may be ordered to take off; studies of the time before it override it."""
         return True
 
     def note(self, now_s: float, notice: Notice) -> None:
-        """Take what the tracker tells the operator."""
+        """Take a notice of the tracker to the operator."""
         self.events.append((now_s, notice.text))
 
     def watch(self) -> None:
-        """Look on as the team tracks, each time that it is judged: for other studies."""
+        """Do nothing; other studies override it, called each time that the tracking team is judged."""
 
     @property
     def scenario(self) -> Scenario:
@@ -278,7 +278,7 @@ class FaultFlight:
         return self._drawn.scenario
 
     def believed(self, name: str) -> Array | None:
-        """Return where a body is believed to be [x, y in m]; None where nothing is known."""
+        """Return the believed place of a body [x, y in m]; None if unknown."""
         belief = self.tracking.tracker.belief
         return np.asarray(belief.mean_of(name)[:2]) if name in belief.layout else None
 

@@ -1,4 +1,4 @@
-"""The order of a campaign on standard input, and what each study does with it: fly its seeds, a JSON line for each."""
+"""The order of a study on standard input, and the loop that flies its seeds and prints a JSON line for each."""
 
 import json
 import sys
@@ -14,14 +14,14 @@ _SHARED = ("field", "sections", "scenario", "seeds", "seconds")
 
 
 class WrongOrder(ValueError):
-    """Something that cannot be flown as ordered."""
+    """An order that cannot be flown."""
 
 
 @dataclass(frozen=True, slots=True)
 class FlightOrder:
-    """What is to be flown.
+    """Order of a study.
 
-    field: resolved, plain values; sections: of its drivers as (kind, section); own: what one study asks for besides.
+    field: resolved, plain values; sections: of its drivers as (kind, section); own: keys of one study only.
     """
 
     field: dict[str, Any]
@@ -33,7 +33,7 @@ class FlightOrder:
 
 
 def fly_seeds(fly: Callable[[FlightOrder, int], dict[str, Any]]) -> int:
-    """Fly each seed of the order; WRONG_ORDER for what cannot be flown here, and where `fly` says so."""
+    """Fly each seed of the order; return WRONG_ORDER if it cannot be flown here or `fly` refuses it."""
     numba_cache.activate()
     try:
         order = order_of(json.load(sys.stdin))

@@ -1,4 +1,4 @@
-"""What can be flown in one thread, with sockets in memory: kinds of vehicles (`vehicles.py`), and kinds of faults."""
+"""Kinds of vehicles (`vehicles.py`) and of faults that can be flown in one thread, with sockets in memory."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -16,7 +16,7 @@ _AT_THE_WIRE = "at the wire: groundstation sitl --scenario FILE"
 
 
 def unhosted(drones: Mapping[str, Mapping[str, Any]]) -> str:
-    """Return which drones of a resolved field cannot be flown here, and what can; "" if all can."""
+    """Return a sentence on the drones of a resolved field that cannot be flown here; "" if all can."""
     others = [f"{name} is of kind {drone['kind']}" for name, drone in drones.items() if drone["kind"] not in UP_AFTER_S]
     if not others:
         return ""
@@ -27,7 +27,7 @@ def unhosted(drones: Mapping[str, Mapping[str, Any]]) -> str:
 
 
 def unbroken(faults: Iterable[Fault], entities: Iterable[str]) -> str:
-    """Return which faults would be announced here and break nothing; "" if all do what they say.
+    """Return a sentence naming faults that would have no effect here; "" if all have one.
 
     entities: names of the drones and cameras of the field.
     """

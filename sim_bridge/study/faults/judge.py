@@ -1,4 +1,4 @@
-"""How a flight with faults is judged, by truth alone."""
+"""Judges a flight with faults, by truth alone."""
 
 import math
 from collections.abc import Collection, Iterable, Mapping
@@ -15,12 +15,12 @@ from sim_bridge.study.faults.deafness import DeafSpells
 SEPARATION_M = 0.6
 HOVER_S, REST_S = 1.0, 3.5
 REST_M_S = 0.1
-FASTER_M_S = 0.3  # than the drone's limit: what a gust, or a correction, may add
+FASTER_M_S = 0.3  # above the drone's limit: a gust, or a correction, may add this
 LOST_M, LOST_S = 0.5, 1.0
 _MEAN_S = 0.5
-# What tells a stopped drone from one that pauses.
+# Distinguishes a stopped drone from one that pauses.
 _STAYS_S = 1.0
-# After these nobody may fly on: the vehicle cannot be steered by what it says.
+# After these faults the drone must stop: its reports cannot steer it.
 MUST_STOP = frozenset(
     {
         FaultKind.NAVDATA_SILENT,
@@ -33,7 +33,7 @@ MUST_STOP = frozenset(
 
 @dataclass(slots=True)
 class _Flown:
-    """One drone's history: times [s], smoothed speed [m/s], whether it stands, whether it is told a velocity."""
+    """One drone's history: times [s], smoothed speed [m/s], whether it stands, whether it gets a velocity."""
 
     times: list[float] = field(default_factory=list)
     places: list[tuple[float, float]] = field(default_factory=list)
@@ -42,9 +42,9 @@ class _Flown:
 
 
 class Judge:
-    """Call `see` at an even rate while the team tracks; `verdict` says what came of it.
+    """Call `see` at an even rate while the team tracks; `verdict` returns the figures.
 
-    root: the only camera that hangs in the room, if there is but one: when its picture freezes, nobody may fly on.
+    root: the world-fixed camera, if there is only one: when its picture freezes, all drones must stop.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class Judge:
         self.separation_m, self.fence_m, self.speed_m_s, self.lost_s = math.inf, 0.0, 0.0, 0.0
         self.first: dict[str, float] = {}
         self._deafness = DeafSpells()
-        # Bounds that only drones had broken first which heard nothing.
+        # Bounds that were first broken by drones that heard no command.
         self._unreached: set[str] = set()
 
     def see(
@@ -70,7 +70,7 @@ class Judge:
     ) -> None:
         """Take one moment.
 
-        truth: rows of the truth board; told: who is told a velocity; believed: x, y of each; deaf: who hears nothing.
+        truth: rows of the truth board; told: drones that get a velocity; believed: x, y of each; deaf: those unreached.
         """
         aloft = {name: row for name, row in truth.items() if name in self._flown and not row[12]}
         self._deafness.see(now_s, aloft, deaf)
@@ -111,7 +111,7 @@ class Judge:
     def verdict(self, faults: tuple[Fault, ...], observable_s: tuple[float | None, ...]) -> dict[str, Any]:
         """Return the figures; unsafe: what was violated, with the time at which [s].
 
-        unreached: of these, what a drone did that heard nothing, while nothing else had gone wrong yet: nobody on the
+        unreached: of these, those by a drone that heard nothing, while nothing else had gone wrong yet: nobody on the
         ground could stop it. Of two drones that came together both must have heard nothing: one could have given way.
         """
         hover, rest = 0.0, 0.0
@@ -137,7 +137,7 @@ class Judge:
         return all(fault.kind is FaultKind.AT_DEAF for fault in faults if fault.start_s <= until_s)
 
     def _due(self, faults: Iterable[tuple[Fault, float | None]]) -> Iterable[tuple[_Flown, float]]:
-        """Return who had to stop, and since when [s], of faults that lasted until it was due."""
+        """Return the drones that had to stop and from when on [s], for faults that lasted that long."""
         for fault, since_s in faults:
             if since_s is None or (fault.end_s is not None and fault.end_s - since_s < REST_S):
                 continue
@@ -152,7 +152,7 @@ class Judge:
 
 
 def _until_hover(flown: _Flown, since_s: float) -> float:
-    """Return the time until the drone is no longer told to move, or stands [s]."""
+    """Return the time until the drone no longer gets a velocity, or stands [s]."""
     for time_s, told, grounded in zip(flown.times, flown.told, flown.grounded, strict=True):
         if time_s >= since_s and (grounded or not told):
             return time_s - since_s

@@ -1,4 +1,4 @@
-"""A bus inside one thread that hands messages over as they are: nothing is encoded."""
+"""A bus inside one thread that passes message objects on without encoding them."""
 
 from collections import deque
 from collections.abc import Iterable
@@ -32,11 +32,11 @@ class LocalSubscription(Subscription):
 
     @property
     def waiting(self) -> bool:
-        """Return whether something came since the last drain."""
+        """Return whether messages came since the last drain."""
         return bool(self._kept or self._latest)
 
     def drain(self) -> list[Received]:
-        """Return and forget what came."""
+        """Return and forget the messages."""
         if self._latest is not None:
             found = list(self._latest.values())
             self._latest.clear()
@@ -47,7 +47,7 @@ class LocalSubscription(Subscription):
 
 
 class LocalExchange:
-    """Connects the buses that share it; what nobody subscribed to is dropped."""
+    """Connects the buses that share it; messages without a subscriber are dropped."""
 
     def __init__(self) -> None:
         self._by_topic: dict[str, list[LocalSubscription]] = {}
@@ -57,7 +57,7 @@ class LocalExchange:
         self._by_topic.setdefault(topic.name, []).append(subscription)
 
     def deliver(self, received: Received) -> None:
-        """Hand a message to all who want it."""
+        """Hand a message to all its subscribers."""
         for subscription in self._by_topic.get(received.key.topic.name, ()):
             if subscription.entity in ("*", received.key.entity):
                 subscription.put(received)

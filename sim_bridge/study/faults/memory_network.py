@@ -11,7 +11,7 @@ class NothingWaits(BaseException):
 
 
 class MemoryNetwork:
-    """Datagrams arrive at once, in the queue of whoever is bound to an address."""
+    """Datagrams arrive at once, in the queue of the socket that is bound to their address."""
 
     def __init__(self) -> None:
         self._bound: dict[Address, MemorySocket] = {}
@@ -30,17 +30,17 @@ class MemoryNetwork:
         return taken
 
     def deliver(self, data: bytes, source: Address, target: Address) -> None:
-        """Hand over a datagram; one to nobody is lost."""
+        """Deliver a datagram; one to an unbound address is lost."""
         if (udp := self._bound.get(target)) is not None:
             udp.waiting.append((data, source))
 
     def release(self, address: Address) -> None:
-        """Forget who had an address."""
+        """Free an address."""
         self._bound.pop(address, None)
 
 
 class MemorySocket:
-    """The part of a UDP socket that links use. One that may wait says so by `NothingWaits` when it would."""
+    """The part of a UDP socket that links use; where a blocking one would wait it raises `NothingWaits`."""
 
     def __init__(self, network: MemoryNetwork) -> None:
         self.waiting: deque[tuple[bytes, Address]] = deque(maxlen=4096)
@@ -56,24 +56,24 @@ class MemorySocket:
         self._blocking = blocking
 
     def settimeout(self, _seconds: float) -> None:
-        """Wait for a time, so as a reader thread does."""
+        """Make it blocking, as the socket of a reader thread is."""
         self._blocking = True
 
     def setsockopt(self, *_: object) -> None:
         """Nothing to set."""
 
     def fileno(self) -> int:
-        """Return that the system knows nothing of it."""
+        """Return -1: the operating system does not know it."""
         return -1
 
     def waits(self) -> bool:
-        """Return that a datagram is there; raises NothingWaits where there is none, as a reader's thread would wait."""
+        """Return True if a datagram waits; else raises NothingWaits, where a reader thread would wait."""
         if self.waiting:
             return True
         raise NothingWaits
 
     def recvfrom(self, _size: int) -> tuple[bytes, Address]:
-        """Return the oldest datagram and where it came from."""
+        """Return the oldest datagram and its source."""
         if self.waiting:
             return self.waiting.popleft()
         if self._blocking:

@@ -1,4 +1,4 @@
-"""From when on a wrong value could be told from what the vehicle does: the first report that is clearly not honest."""
+"""Finds when a wrong value became observable: the first report that clearly differs from the correct one."""
 
 import math
 from collections.abc import Iterable
@@ -8,12 +8,12 @@ from sim_bridge.world.readings import Readings
 from sim_bridge.wrong_values import WRONG_VALUES, WrongValues
 
 _VELOCITY_M_S, _HEIGHT_M, _HEADING_RAD = 0.15, 0.15, math.radians(8.0)
-# Contents that repeat show that they do: noise never repeats.
+# Repeated contents are observable at once: noise never repeats.
 _AT_ONCE = frozenset({FaultKind.TELEMETRY_FROZEN})
 
 
 class ObservedValues(WrongValues):
-    """Wrong values of one vehicle that note when they differ from the honest ones by more than noise explains."""
+    """Wrong values of one vehicle; notes when they differ from the correct ones by more than noise explains."""
 
     def __init__(self, faults: Iterable[Fault]) -> None:
         kept = tuple(faults)
@@ -22,7 +22,7 @@ class ObservedValues(WrongValues):
         self._own = tuple(fault for fault in kept if fault.kind in WRONG_VALUES - _AT_ONCE)
 
     def report(self, now_s: float, honest: Readings) -> Readings:
-        """Return what is reported, as WrongValues does."""
+        """Return the readings to report, as WrongValues does."""
         reported = super().report(now_s, honest)
         waiting = [fault for fault in self._own if fault not in self._shown_s and fault.covers(now_s)]
         if waiting and _differs(honest, reported):
@@ -30,7 +30,7 @@ class ObservedValues(WrongValues):
         return reported
 
     def observable_s(self, fault: Fault) -> float | None:
-        """Return from when on a fault shows in what is reported [s]; None: it never did."""
+        """Return the time from which a fault shows in the reports [s]; None if it never did."""
         return self._shown_s.get(fault) if fault in self._own else fault.start_s
 
 

@@ -1,4 +1,4 @@
-"""Who orders a hosted team to take off and to track: the operator's part, without the checks."""
+"""Orders a hosted team to take off and to track, in place of the operator and without its checks."""
 
 from collections.abc import Mapping
 
@@ -14,14 +14,14 @@ _PERIOD_NS, _LIFE_NS = 500 * NS_PER_MS, 1_500 * NS_PER_MS
 
 
 class TeamOrders:
-    """Renews the lease; orders TAKEOFF until all are up, then TRACK once. tracking: whether it has."""
+    """Renews the lease; orders TAKEOFF until all fly, then TRACK once. tracking: whether TRACK was ordered."""
 
     def __init__(self, bus: LocalBus) -> None:
         self.tracking = False
         self._bus, self._next_ns = bus, 0
 
     def step(self, now_ns: int, hosts: Mapping[str, VehicleHost]) -> None:
-        """Say what is due."""
+        """Send what is due."""
         if now_ns < self._next_ns:
             return
         self._next_ns = now_ns + _PERIOD_NS

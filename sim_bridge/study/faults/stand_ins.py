@@ -15,7 +15,7 @@ from sim_bridge.study.faults.memory_network import MemoryNetwork, NothingWaits
 class HostedThread:
     """Stands in for a reader thread: `started` of them run when `read_all` calls them."""
 
-    started: list["HostedThread"] = []  # noqa: RUF012 - emptied by whoever hosts them
+    started: list["HostedThread"] = []  # noqa: RUF012 - its host empties it
 
     def __init__(self, target: Callable[[], None], name: str = "", daemon: bool = True) -> None:
         self.target, self.name, self.daemon = target, name, daemon
@@ -44,7 +44,7 @@ class NoTcp:
 
 
 def read_all(readers: list[HostedThread]) -> None:
-    """Let each reader take what waits for it."""
+    """Let each reader take its waiting datagrams."""
     with patch.object(vehicle_socket, "waits", lambda udp, _seconds: udp.waits()):
         for reader in readers:
             with suppress(NothingWaits):
@@ -53,14 +53,14 @@ def read_all(readers: list[HostedThread]) -> None:
 
 @contextmanager
 def manual_clock(now_ns: Callable[[], int]) -> Iterator[None]:
-    """Let everybody in this process read another clock than the host's."""
+    """Replace the host's clock in this process."""
     with patch.object(clock, "now_ns", now_ns):
         yield
 
 
 @contextmanager
 def in_memory(network: MemoryNetwork) -> Iterator[list[HostedThread]]:
-    """Let drivers and emulators that are built inside use the network in memory; yields the drivers' readers."""
+    """Give drivers and emulators that are built inside the network in memory; yields the drivers' readers."""
     readers: list[HostedThread] = []
     HostedThread.started = readers
     with (

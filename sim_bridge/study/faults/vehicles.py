@@ -1,4 +1,4 @@
-"""The drivers of a field, as they fly, with their watchdogs: hosted in one thread, at the emulated vehicles' wire."""
+"""Hosts the real drivers of a field, with their watchdogs, in one thread at the emulated vehicles' wire."""
 
 import json
 import math
@@ -27,13 +27,13 @@ from sim_bridge.world.world import TICK_NS, World
 from sim_bridge.wrong_values import WrongValues
 
 Device = MemoryArDrone | MavlinkEmulator
-# One order of a driver process: its kind, and its section of the settings as the supervisor would hand it over.
+# One driver process: its kind, and its section of the settings as from the supervisor.
 Section = tuple[str, str]
 BusOf = Callable[[str], Bus]
 
 
 class HostedProcess:
-    """The process interface of a driver; `said` keeps its events."""
+    """A driver's interface to its process; `said` keeps its events."""
 
     def __init__(self, name: str, bus: Bus, said: list[tuple[str, str]]) -> None:
         self.name, self.section = name, "{}"
@@ -53,7 +53,7 @@ class HostedProcess:
         """Nobody waits."""
 
     def note_addresses(self, addresses: Sequence[tuple[str, int]]) -> None:
-        """Keep no addresses: nobody dies here."""
+        """Keep no addresses: no process dies here."""
 
     def tick_status(self, ticks: int = 0, overruns: int = 0, overflowed: int = 0) -> None:
         """Nobody watches."""
@@ -63,10 +63,10 @@ class HostedProcess:
         return True
 
     def wake(self) -> None:
-        """Turns are given by the study."""
+        """Do nothing: the study calls each turn."""
 
     def event(self, severity: Severity | str, text: str, remedy: str = "", entity: str | None = None) -> None:
-        """Keep what is said."""
+        """Keep an event."""
         self._said.append((str(severity), text))
 
 
@@ -74,7 +74,7 @@ def devices_of(
     site: Site, world: World, scenario: Scenario, wrong: Mapping[str, WrongValues], addresses: Mapping[str, str],
     network: MemoryNetwork,
 ) -> dict[str, Device]:  # fmt: skip
-    """Return the emulated vehicles; call it where sockets are in memory."""
+    """Return the emulated vehicles; call it while sockets are in memory."""
     devices: dict[str, Device] = {}
     for name, drone in world.of(Quadrotor).items():
         firmware = scenario.drones.firmware_of(name)
@@ -86,14 +86,14 @@ def devices_of(
 
 
 def on_pads(sections: Iterable[Section], drones: Mapping[str, Mapping[str, Any]]) -> list[Section]:
-    """Return the sections with the pads of these drones (plain values), by which drivers judge whether to start."""
+    """Return the sections with the pads of these drones (plain values), which drivers check before a start."""
     return [(kind, json.dumps(_on_pads(json.loads(section), drones))) for kind, section in sections]
 
 
 def _on_pads(section: dict[str, Any], drones: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     for vehicle in section.get("vehicles") or [section]:
         if (drone := drones.get(vehicle["name"])) is None:
-            continue  # what places the team, or a target's own word
+            continue  # sensors of the team, or a target's odometry
         vehicle["pad_m"] = drone["pad_m"]
         if "pad_yaw_rad" in vehicle:
             vehicle["pad_yaw_rad"] = math.radians(drone["pad_yaw_deg"])
@@ -101,7 +101,7 @@ def _on_pads(section: dict[str, Any], drones: Mapping[str, Mapping[str, Any]]) -
 
 
 class Drivers:
-    """All drivers of a field. Build it where threads and sockets are stood in for; call `turn` once per tick."""
+    """All drivers of a field. Build it under the stand-ins for threads and sockets; call `turn` once per tick."""
 
     def __init__(self, sections: Sequence[Section], bus_of: BusOf, said: list[tuple[str, str]]) -> None:
         self.hosts: dict[str, VehicleHost] = {}
@@ -128,7 +128,7 @@ class Drivers:
         self._fleets.append((fleet, list(hosts_of(process, fleet, settings))))
 
     def turn(self, now_ns: int, tick: int) -> None:
-        """Let each driver turn that is due, or that an order wakes."""
+        """Run a turn of each driver that is due or woken by an order."""
         if tick % round(1e9 / ARDRONE_HZ / TICK_NS) == 0:
             for host in self._alone:
                 self.decisions[host.vehicle.name] = host.turn(now_ns)

@@ -14,7 +14,7 @@ _NOTHING = frozenset({FaultKind.CAMERA_CUT, FaultKind.CAMERA_STALL, FaultKind.PI
 
 
 class WrongEye:
-    """An eye whose faults come and go; `look` and `searched` as the eye's."""
+    """An eye with faults that begin and end; `look` and `searched` as the eye's."""
 
     def __init__(self, eye: Eye, faults: Iterable[Fault]) -> None:
         self.eye, self.name, self.period_s = eye, eye.name, eye.period_s
@@ -25,7 +25,7 @@ class WrongEye:
         self._numbers = itertools.count(1_000_000)  # beyond those of the eye
 
     def look(self, world: World, stamp_ns: int, clock: str) -> list[RelativeObservation]:
-        """Return what one exposure shows, or seems to."""
+        """Return the sightings of one exposure under its faults."""
         active = [fault for fault in self._faults if fault.covers(world.time_s)]
         bumped = [fault for fault in active if fault.kind is FaultKind.CAMERA_BUMPED]
         self.eye.bump(bumped[0].amount, bumped[0].direction_deg) if bumped else self.eye.bump(0.0, 0.0)
@@ -42,11 +42,11 @@ class WrongEye:
         return [self._again(old, stamp_ns) for old in self._frozen]
 
     def observable_s(self, fault: Fault) -> float | None:
-        """Return from when on a fault shows [s]; a frozen picture does once it repeats somebody; None: it never did."""
+        """Return when a fault first shows [s], a frozen picture when it repeats a sighting; None if it never did."""
         return self._repeats_s.get(fault) if fault.kind is FaultKind.PICTURE_FROZEN else fault.start_s
 
     def searched(self, seen: Sequence[RelativeObservation], stamp_ns: int, clock: str) -> SearchedPicture | None:
-        """Return that the last picture, if there was one, was searched all over, and what it shows."""
+        """Return the message that the last picture, if there was one, was searched all over."""
         return self.eye.searched(seen, stamp_ns, clock) if self._shows else None
 
     def _again(self, old: RelativeObservation, stamp_ns: int) -> RelativeObservation:

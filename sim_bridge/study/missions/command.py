@@ -1,6 +1,6 @@
 """`python -m sim_bridge.study missions < order.json`: fly some seeds to the floor.
 
-The order's own: understated, by how much the covariance of sightings is too small in every third flight.
+Its own key: understated, the factor by which the covariance of sightings is too small in every third flight.
 """
 
 from typing import Any

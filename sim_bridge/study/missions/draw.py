@@ -1,4 +1,4 @@
-"""What a seed of the missions stands for: a room, the pads, and what the target does."""
+"""Draws the flight of a seed of the missions: a room, the pads, and the target's path."""
 
 from typing import Any
 
@@ -36,7 +36,7 @@ def _room(room: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
 
 
 def _path(field: dict[str, Any], rng: np.random.Generator) -> Path:
-    """Return one of the ways to drive that a scenario can name, somewhere in the room."""
+    """Return a path of one of the kinds that a scenario can name, somewhere in the room."""
     length_m, width_m, _ = field["room"]["size_m"]
     x, y = length_m / 2 - _TARGET_INSET_M, width_m / 2 - _TARGET_INSET_M
     speed_m_s = float(rng.uniform(*_SPEED_M_S))

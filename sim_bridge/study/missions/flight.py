@@ -13,7 +13,7 @@ _STANDS, _LANDS = "LANDED", "LANDING"
 
 
 class MissionFlight(FaultFlight):
-    """A flight that ends with LAND. covariance_share: what sightings state of their true covariance."""
+    """A flight that ends with LAND. covariance_share: stated share of the sightings' true covariance."""
 
     def __init__(self, drawn: Drawn, sections: Sequence[Section], seconds: float, covariance_share: float) -> None:
         super().__init__(drawn, sections, seconds)
@@ -22,7 +22,7 @@ class MissionFlight(FaultFlight):
         self._landed_before: list[str] = []
 
     def is_over(self) -> bool:
-        """Return whether all stand again, or should; orders LAND when the time of tracking is over."""
+        """Return whether all stand again, or should by now; orders LAND when the time of tracking is over."""
         over = super().is_over()
         if not over or self.tracking_since_s is None:
             return over
@@ -34,7 +34,7 @@ class MissionFlight(FaultFlight):
         return stand or self.world.time_s - self._landing_since_s >= _DOWN_BY_S
 
     def fly(self) -> dict[str, Any]:
-        """Fly to the end; landed_before: who landed without the order; landed: whether all stand at the end."""
+        """Fly to the end; landed_before: drones that landed without the order; landed: whether all stand at the end."""
         report = self.run()
         judged = ("separation_m", "fence_m", "unsafe", "unlocalised_s")
         return {

@@ -1,1 +1,1 @@
-"""Scenarios flown at message level: drivers, watchdogs and tracker as they fly, judged by what each file expects."""
+"""Scenarios flown at message level by the real drivers, watchdogs and tracker, judged by each file's expectations."""

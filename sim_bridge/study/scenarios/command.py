@@ -1,4 +1,4 @@
-"""`python -m sim_bridge.study scenarios < order.json`: fly some seeds of a scenario. The order's own: strategy."""
+"""`python -m sim_bridge.study scenarios < order.json`: fly some seeds of a scenario. Its own key: strategy."""
 
 from typing import Any
 

@@ -17,19 +17,19 @@ SEPARATION_M = 0.6
 
 @dataclass(slots=True)
 class TrackingErrors:
-    """Errors of all targets at an even rate from when the team tracks; unknown: inf."""
+    """Errors of all targets at an even rate while the team tracks; inf for an unknown place."""
 
     period_s: float
     errors: defaultdict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
 
     def take(self, truth: Mapping[str, Array], believed: Mapping[str, Array | None]) -> None:
-        """Take one moment: rows of the truth board, and where each target is believed."""
+        """Take one moment: rows of the truth board, and the believed place of each target."""
         for name, place in believed.items():
             off = math.inf if place is None else float(np.hypot(*(place[:2] - truth[name][:2])))
             self.errors[name].append(off)
 
     def figures(self) -> dict[str, Any]:
-        """Return those of the worst target: when it was found, then its errors [m] and losses [s]."""
+        """Return the figures of the worst target: time until it was found, then its errors [m] and losses [s]."""
         found = [self._of(np.array(errors)) for errors in self.errors.values()]
         return max(found, key=lambda one: (one["found_s"] is None, one["rmse_m"] or 0.0))
 
@@ -47,7 +47,7 @@ class TrackingErrors:
 
 
 def shortfalls(figures: Mapping[str, Any], expected: ScenarioExpectation) -> list[str]:
-    """Return what a flight did not do that its scenario expects of it; empty: all was as expected."""
+    """Return the expectations of its scenario that a flight did not meet; empty if all are met."""
     missed = []
     for key in ("found_s", "rmse_m", "lost_s"):
         limit, value = getattr(expected, key), figures[key]

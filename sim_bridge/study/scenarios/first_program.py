@@ -1,4 +1,4 @@
-"""The method as its authors' first program had it: discs with a hard edge, neighbours from rest, edges only."""
+"""The method as in its authors' first program: discs with a hard edge, neighbours from rest, edges only."""
 
 import math
 from collections.abc import Mapping
@@ -37,7 +37,7 @@ class DiscProblems(ProblemBuilder):
 
 
 def _disc(camera: OnboardCameraModel) -> OnboardCameraModel:
-    """Return a camera that looks straight down at the middle of what a tilted one sees, as far as a disc reaches."""
+    """Return a camera that looks straight down at the middle of a tilted one's view, and sees a disc about it."""
     tilt, above = camera.tilt_down_rad, 1.2
     ahead = min(above / max(math.tan(tilt), 0.3), camera.view.range_m)
     x, y, z = camera.position_m
@@ -46,7 +46,7 @@ def _disc(camera: OnboardCameraModel) -> OnboardCameraModel:
 
 
 class FirstProgram(Planner):
-    """Every neighbour is solved from rest, the cheapest wins, and robots count only for what they tell of targets."""
+    """Every neighbour is solved from rest, the cheapest wins, and only the targets' uncertainty costs."""
 
     def __init__(self, planner: Planner) -> None:
         own = planner.parameters
@@ -56,7 +56,7 @@ class FirstProgram(Planner):
 
 
 def along_an_edge(message: Message, topology: Topology, targets: Mapping[str, object]) -> bool:
-    """Return whether the first program fuses a message: no sightings but those along the topology's edges."""
+    """Return whether the first program fuses a message: of sightings only those along the topology's edges."""
     if not isinstance(message, RelativeObservation):
         return True
     observer = message.observer if message.observer in topology.robots else ROOT

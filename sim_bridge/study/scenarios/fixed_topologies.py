@@ -1,4 +1,4 @@
-"""Planners that optimise the motion of one topology and never change it, to compare ours with."""
+"""Planners for comparison that optimise the motion of one topology and never change it."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -15,7 +15,7 @@ from groundstation.sensing.topology import Topology
 
 
 class FixedPlanner(Planner):
-    """Optimises the motion of one topology only: flat, string (also reversed), or two levels, over whoever flies."""
+    """Optimises the motion of one topology of the flying robots only: flat, string (also reversed), or two levels."""
 
     def __init__(
         self,
@@ -58,7 +58,7 @@ class FixedPlanner(Planner):
 
 
 class EveryPair(ProblemBuilder):
-    """Problems without a topology: whoever may see something counts, and draws its camera there."""
+    """Problems without a topology: every pair of a camera and a subject counts, and attracts the camera."""
 
     def _edges(self, scene: PlanningScene, topology: Topology) -> tuple[Any, int]:
         edges: Any = np.array(self._pairs.rows)

@@ -1,4 +1,4 @@
-"""One flight of a scenario: the campaign's, with the file's own target, things about and faults, and other figures."""
+"""One flight of a scenario: the campaign's, with the file's target, surroundings and faults, and other figures."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -21,7 +21,7 @@ _DOWN = ("LANDING", "LANDED")
 
 
 def as_drawn(field: dict[str, Any], scenario: Scenario, seed: int) -> Drawn:
-    """Return the flight of a seed; raises WrongOrder for faults that would break nothing here."""
+    """Return the flight of a seed; raises WrongOrder for faults that would have no effect here."""
     drones = field["drones"]
     if refusal := unbroken(scenario.faults, (*drones, *field["cameras"])):
         raise WrongOrder(refusal)
@@ -46,13 +46,13 @@ class ScenarioFlight(FaultFlight):
         self._switches, self._topology = 0, ""
 
     def heeds(self, message: Message) -> bool:
-        """Return whether the strategy fuses a message; until the team tracks, all."""
+        """Return whether the strategy fuses a message; until the team tracks, all are."""
         if not (self._edges_only and self._topology):
             return True
         return along_an_edge(message, self.tracking.tracker.topology, self.world.targets)
 
     def watch(self) -> None:
-        """Compare what is believed of the targets with the truth."""
+        """Compare the believed places of the targets with the truth."""
         world = self.world
         truth = dict(zip(world.bodies, world.states(), strict=True))
         self._errors.take(truth, {name: self.believed(name) for name in world.targets})
@@ -61,7 +61,7 @@ class ScenarioFlight(FaultFlight):
         self._topology = topology
 
     def figures(self) -> dict[str, Any]:
-        """Return what the flight came to."""
+        """Return the flight's figures."""
         judge = self.judge
         violations = [f"fence {judge.fence_m:.2f} m"] * (judge.fence_m > 0.0)
         violations += [f"separation {judge.separation_m:.2f} m"] * (judge.separation_m < SEPARATION_M)

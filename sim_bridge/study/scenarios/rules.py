@@ -1,4 +1,4 @@
-"""Planners without an optimiser, to compare ours with: the relay rule and the chase."""
+"""Planners for comparison without an optimiser: the relay rule and the chase."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -14,7 +14,7 @@ from groundstation.planning.planner import Planner, PlanResult
 from groundstation.sensing.topology import Topology
 
 Point = tuple[float, float]
-# The relay rule: where the nearest drone stays, and the heights of it and of those that see it.
+# The relay rule: offset of the nearest drone from the target, and the heights of it and of the drones that see it.
 STAND_OFF_M, LOW_M, HIGH_M = 0.9, 1.1, 1.8
 _APART_M, _INSET_M = 1.3, 0.3
 _GAIN, _TURN_GAIN, _FASTEST_M_S = 0.8, 1.5, 0.6
@@ -40,7 +40,7 @@ class RulePlanner(Planner):
         max_evaluations: int | None = None,
         held: frozenset[str] = frozenset(),
     ) -> PlanResult:
-        """Return what the rule says."""
+        """Return the plan of the rule."""
         robots = [name for name in belief.layout.robots if name in current.robots]
         if not robots or not belief.layout.targets:
             return super().plan(belief, current, warm_start, should_stop, max_evaluations, held)
@@ -63,7 +63,7 @@ class RulePlanner(Planner):
         return PlanResult(topology, 0.0, 0.0, controls, heights, (), (), report, mode, belief.stamp_ns)
 
     def _stand(self, target: Point, place: Point) -> Point:
-        """Return where the nearest drone stays."""
+        """Return the place of the nearest drone."""
         home = self._home(target)
         side = home if self._relay and home is not None and math.dist(home, target) > STAND_OFF_M / 2 else place
         way = math.dist(side, target)
@@ -73,7 +73,7 @@ class RulePlanner(Planner):
         return target[0] + share * (side[0] - target[0]), target[1] + share * (side[1] - target[1])
 
     def _post(self, places: Mapping[str, Point], name: str, near: str, rank: int) -> Point:
-        """Return where another drone stays; several spread out by rank."""
+        """Return the place of another drone; several spread out by rank."""
         if not self._relay:
             return places[name]
         home = self._home(places[near])
@@ -95,7 +95,7 @@ def _place(mean: Array) -> Point:
 
 
 def _control(mean: Array, stand: Point, looked_at: Point, ahead: Array) -> Array:
-    """Return velocity and yaw rate (3) [base_stabilized] towards a stand, turning to what is looked at."""
+    """Return velocity and yaw rate (3) [base_stabilized] towards a stand, turning to the point `looked_at`."""
     velocity = np.array([*(_GAIN * (np.array(stand) - mean[:2]) + ahead), 0.0])
     velocity *= min(1.0, _FASTEST_M_S / max(float(np.linalg.norm(velocity)), 1e-9))
     yaw = math.atan2(looked_at[1] - mean[1], looked_at[0] - mean[0])

@@ -1,4 +1,4 @@
-"""Planners that try controls in place of following a gradient, as later work on the method compares itself with."""
+"""Planners that sample controls instead of following a gradient: the comparison of later work on the method."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping
@@ -25,7 +25,7 @@ PRIMITIVES = np.array([(*way, turn, height) for way in _WAYS for turn in (-1, 0,
 
 
 class TryingPlanner(FixedPlanner):
-    """Takes the best of the controls that it tries, by the cost of ours over all pairs, without a topology."""
+    """Takes the best of the controls that it tries, by our planner's cost over all pairs, without a topology."""
 
     def __init__(self, planner: Planner) -> None:
         super().__init__(planner, "string", EveryPair)
@@ -39,7 +39,7 @@ class TryingPlanner(FixedPlanner):
         max_evaluations: int | None = None,
         held: frozenset[str] = frozenset(),
     ) -> PlanResult:
-        """Return the best of what was tried; what it last did is tried first."""
+        """Return the best of the tried controls; the last plan's are tried first."""
         topology = self.fixed(sorted(current.robots & frozenset(belief.layout.robots)))
         scene = scene_from_belief(belief, topology.robots, held)
         if not scene.robots or not scene.targets:

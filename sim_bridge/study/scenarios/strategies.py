@@ -1,4 +1,4 @@
-"""How a team decides in a study of scenarios: the planner that flies, fixed topologies, rules, and rivals."""
+"""Strategies of a study of scenarios: our planner, fixed topologies, rules, and other methods."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from sim_bridge.study.scenarios.samplers import LatticePlanner, SamplingPlanner
 
 @dataclass(frozen=True, slots=True)
 class Strategy:
-    """A planner in place of ours.
+    """A strategy: the planner to use in place of ours.
 
     edges_only: sightings along the topology's edges alone are fused, as the method's first program did; all other
     strategies differ from ours in the planner only.

@@ -1,1 +1,1 @@
-"""The bench of markers and detector: rendered pictures in, detection rates, errors, honesty and cost out."""
+"""The bench of markers and detector: rendered pictures in, detection rates, errors, consistency and cost out."""

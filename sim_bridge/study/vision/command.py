@@ -28,7 +28,7 @@ Row = dict[str, Any]
 
 
 def run(pictures: int, seed: int, tell: Callable[[str], object]) -> dict[str, Any]:
-    """Return all figures, from so many pictures per cell of the tables."""
+    """Return all figures; pictures: number of them for each cell of the tables."""
     cv2.setNumThreads(1)
     result: dict[str, Any] = {"pictures": pictures, "seed": seed}
     for name, condition in (("clean", _CLEAN), ("realistic", _REAL)):
@@ -63,7 +63,7 @@ def _at(range_m: float, condition: Condition, pictures: int, seed: int, searchin
 
 
 def _identities(readings: int, seed: int) -> Row:
-    """Return how many of so many bars, of all codes from 1 to 4 m, were read for certain, and how many wrongly."""
+    """Return the numbers of bars (all codes, from 1 to 4 m), of certain readings, and of wrong ones."""
     total = DetectionTally()
     for range_m in (1.0, 2.0, 3.0, 4.0):
         tally = measured(shots(readings // 4, range_m, _REAL, seed + 2, VALID_CODES), seed, searching=False)
@@ -102,7 +102,7 @@ def _peer(pictures: int, seed: int) -> Row:
 
 
 def targets(result: dict[str, Any]) -> list[Row]:
-    """Return each figure that is asked for (640x360, f 460 px), whether it is met, and its value."""
+    """Return each required figure (640x360, f 460 px), whether it is met, and its value."""
     clean, real = ({row["range_m"]: row for row in result[name]} for name in ("clean", "realistic"))
     near = [row for r, row in clean.items() if r <= 4.0]
     anees = {name: _mean_anees(rows) for name, rows in (("clean", clean), ("realistic", real))}
@@ -137,7 +137,7 @@ def _holds(value: float, relation: str, limit: float) -> bool:
 
 
 def main(arguments: list[str]) -> int:
-    """Run the bench; exit code 0 when every figure that is asked for is met, 1 otherwise."""
+    """Run the bench; exit code 0 when every required figure is met, 1 otherwise."""
     from sim_bridge.study.vision.page import page_of, plot
 
     parser = argparse.ArgumentParser(prog="python -m sim_bridge.study vision", description=__doc__)

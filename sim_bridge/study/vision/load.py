@@ -1,4 +1,4 @@
-"""A whole team's cameras: rendered, coded, decoded and detected, and what all of it costs per second of flight."""
+"""Measures the CPU load of a whole team's cameras: pictures are rendered and coded, then decoded and detected."""
 
 import math
 from functools import partial
@@ -26,7 +26,7 @@ _DRONES = ("drone_1", "drone_2", "drone_3")
 _BODIES = (*_DRONES, "bot")
 _FPS = 15.0
 _TOP_M = 0.08
-# Of the belief's errors from one picture to the next: they live for a second.
+# Correlation of the belief's errors from one picture to the next: they last for a second.
 _MEMORY = 0.935
 
 

@@ -1,4 +1,4 @@
-"""The detector on pictures with known truth: detection rate, pose error, consistency, identity errors, CPU time."""
+"""Measures the detector on pictures with known truth: detection rate, pose error, consistency, identity, CPU time."""
 
 import math
 import time
@@ -32,14 +32,14 @@ _DETECTOR = DetectorSettings()
 
 
 def cpu_ms(work: Callable[[], Any]) -> tuple[float, Any]:
-    """Return the CPU time of one call [ms], and what it returned."""
+    """Return the CPU time of one call [ms], and its result."""
     begin = time.process_time()
     result = work()
     return 1000.0 * (time.process_time() - begin), result
 
 
 def predicted(shot: TestPicture, random: np.random.Generator) -> tuple[Prediction | None, tuple[float, float]]:
-    """Return where a noisy belief expects the board, and the observer's measured roll and pitch."""
+    """Return the board's place expected by a noisy belief, and the observer's measured roll and pitch."""
     robot, centre = shot.states[0], shot.centre
     # The bench lifts boards off the floor to keep their distance: their height is known, their place is not.
     place = (0.0, 0.0, float(centre[2]))
@@ -116,7 +116,7 @@ def _of(values: list[float], statistic: Callable[[list[float]], Any]) -> float |
 
 
 def measured(shots: Iterable[TestPicture], seed: int, searching: bool = True) -> DetectionTally:
-    """Return what the detector makes of the pictures: in a track's window, in a cold belief's, and searching all."""
+    """Return the detector's results on pictures: in a track's window, in a cold belief's, and searching all."""
     random, tally = np.random.default_rng(seed), DetectionTally()
     for shot in shots:
         tally.pictures += 1
@@ -138,7 +138,7 @@ def measured(shots: Iterable[TestPicture], seed: int, searching: bool = True) ->
 def _follow(
     tally: DetectionTally, shot: TestPicture, random: np.random.Generator, attitude: tuple[float, float]
 ) -> None:
-    """Look where a track of the last picture expects the board: a few pixels off, its size 15 % wrong."""
+    """Search where a track of the last picture expects the board: a few pixels off, its size 15 % wrong."""
     centre = shot.corners.mean(axis=0)
     last = centre + (shot.corners - centre) * random.uniform(0.87, 1.15) + random.uniform(-6.0, 6.0, 2)
     track = Track(last, -_FRAME_NS)

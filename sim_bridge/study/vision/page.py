@@ -61,7 +61,7 @@ def _cell(value: float | None, scale: float, form: str) -> str:
 
 
 def plot(result: dict[str, Any], folder: Path) -> None:
-    """Write vision.png: rates, errors, honesty and cost by distance, and rates by steepness and picture quality."""
+    """Write vision.png: rates, errors, consistency and cost by distance, and rates by steepness and picture quality."""
     import matplotlib as mpl
 
     mpl.use("Agg")

@@ -1,4 +1,4 @@
-"""`groundstation ardrone`: what an AR.Drone at an address is, and which network and owner it has, without flying it."""
+"""`groundstation ardrone`: identifies an AR.Drone and sets its network and owner, without flying it."""
 
 import ipaddress
 import json

@@ -58,13 +58,13 @@ def full_packet() -> bytes:
 
 
 def read_everything(packet: bytes) -> int:
-    """Decode a packet, its checksum and the values of all its options; returns how many there were."""
+    """Decode a packet, its checksum and the values of all its options; returns the number of options."""
     decoded = navdata.decode(packet)
     return sum(decoded.read(layout) is not None for layout in options.LAYOUTS)
 
 
 def bare_loop(packet: bytes) -> int:
-    """Do the least that could be called decoding: walk the options by their sizes and check the sum."""
+    """Decode the least possible: walk the options by their sizes and check the sum."""
     _HEAD.unpack_from(packet)
     offset, count = _HEAD.size, 0
     while True:
@@ -88,7 +88,7 @@ def microseconds(work: Callable[[], object], count: int, rounds: int) -> dict[st
 
 
 def peer_microseconds(packet: bytes, count: int, rounds: int, what: str) -> dict[str, float] | None:
-    """Return the same of pyardrone's decoder, or None without its environment (`make interop`).
+    """Return the CPU time of pyardrone's decoder [us], or None without its environment (`make interop`).
 
     what: `options` as it decodes them, or `fields`: each read once.
     """
@@ -105,7 +105,7 @@ def peer_microseconds(packet: bytes, count: int, rounds: int, what: str) -> dict
 
 
 def measure(count: int, rounds: int) -> dict[str, Any]:
-    """Return the figures of everything that is timed."""
+    """Return the figures of all timed work."""
     packet = full_packet()
     decoded = navdata.decode(packet)
     motion = at.ProgressiveMotion(1, 0.1, -0.2, 0.3, -0.4)

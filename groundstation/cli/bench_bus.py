@@ -1,4 +1,4 @@
-"""`groundstation bench bus`: what certificates and access list cost a round trip."""
+"""`groundstation bench bus`: the cost of certificates and access list for a round trip."""
 
 import os
 from typing import Any

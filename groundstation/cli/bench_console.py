@@ -1,4 +1,4 @@
-"""`groundstation bench console`: what the page's server costs, and how old an estimate is when it is sent and drawn."""
+"""`groundstation bench console`: cost of the page's server, and age of an estimate when it is sent and drawn."""
 
 import shutil
 from typing import Any
@@ -38,7 +38,7 @@ def console(seconds: float, drones: int, no_browser: bool, as_json: bool) -> int
 
 
 def _pictures() -> list[bytes]:
-    """Return eight pictures of coarse noise as a camera's driver makes them of what it decodes, some 50 kB each."""
+    """Return eight JPEGs of coarse noise like those that a camera's driver publishes, some 50 kB each."""
     import numpy as np
 
     from drivers.camera.sources.frames import Matrix

@@ -38,7 +38,7 @@ _COLUMNS = (
 
 @dataclass(frozen=True, slots=True)
 class DemoOutcome:
-    """One demo: its exit code, its report (None when it left none that can be read), and how long it took."""
+    """One demo: its exit code, its report (None if it left none that can be read), and its duration."""
 
     seed: int
     exit_code: int
@@ -48,12 +48,12 @@ class DemoOutcome:
 
     @property
     def passed(self) -> bool:
-        """Return whether both the exit code and the report say so."""
+        """Return whether exit code and report both say that it passed."""
         return self.exit_code == 0 and self.report is not None and self.report.get("passed") is True
 
     @property
     def verdict(self) -> str:
-        """Return passed, or in a few words what was wrong."""
+        """Return "passed", or the reason of the failure in a few words."""
         if self.passed:
             return "passed"
         if self.report is None:
@@ -99,7 +99,7 @@ def demo(seeds: int, first: int, duration: float | None, out: Path | None, as_js
 def fly_all(
     seeds: range, duration_s: float | None, folder: Path, say: Callable[[str], object]
 ) -> Iterator[DemoOutcome]:
-    """Yield the outcome of each seed; after Ctrl-C the flight in progress lands and nothing follows."""
+    """Yield the outcome of each seed; after Ctrl-C the present flight lands and no other follows."""
     for number, seed in enumerate(seeds, start=1):
         outcome, interrupted = fly_one(seed, duration_s, folder / f"seed-{seed}")
         say(f"{number}/{len(seeds)}  seed {seed}: {outcome.verdict}  ({outcome.seconds:.0f} s)")
@@ -137,7 +137,7 @@ def fly_one(seed: int, duration_s: float | None, folder: Path) -> tuple[DemoOutc
 
 
 def _wait(process: subprocess.Popen[bytes], limit_s: float) -> bool:
-    """Wait for the end; too long or Ctrl-C: let it land; twice: stop at once. Returns whether Ctrl-C came."""
+    """Wait for the end; after limit_s or Ctrl-C let it land, then stop it at once; return whether Ctrl-C came."""
     interrupted = False
     for patience_s in (limit_s, _LANDING_S, _STOPPING_S):
         try:
@@ -176,7 +176,7 @@ def _value(report: dict[str, Any] | None, path: str) -> Any:
 
 
 def as_builtins(outcomes: list[DemoOutcome]) -> dict[str, Any]:
-    """Return what --json prints."""
+    """Return the outcomes as --json prints them."""
     runs = [
         {
             "seed": outcome.seed,

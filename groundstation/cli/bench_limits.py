@@ -1,4 +1,4 @@
-"""Figures of a bench held against their limits, for people or for programs."""
+"""Compares figures of a bench with their limits, and prints them for people or programs."""
 
 import json
 from collections.abc import Mapping
@@ -12,7 +12,7 @@ from groundstation.cli.exits import ExitCode
 def judge(figures: Mapping[str, Any], limits: Mapping[str, float], measure: str, as_json: bool) -> ExitCode:
     """Print the figures and which limits they miss; a figure that is a mapping is judged by its entry `measure`.
 
-    A limit without its figure is not judged, and named: what it needs is not on this machine.
+    A limit without its figure is named and not judged: this machine lacks something that the figure needs.
     """
 
     def value(name: str) -> float:

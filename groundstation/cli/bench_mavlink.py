@@ -1,4 +1,4 @@
-"""`groundstation bench mavlink`: what driving many vehicles costs, and how late telemetry and setpoints are."""
+"""`groundstation bench mavlink`: cost of driving many vehicles, and delays of telemetry and setpoints."""
 
 import os
 from typing import Any

@@ -88,7 +88,7 @@ def planner(
 
 
 def _of_the_planner_that_flies(layouts: list[str], peers: list[str]) -> list[str]:
-    """Return the layouts that it is timed in; raises UsageError where none is left, or where peers are named."""
+    """Return the layouts to time the planner that flies in; raises UsageError for none, or if peers are named."""
     if peers:
         raise click.UsageError("--peer: the planner that flies (--model frustum) has no peers")
     chosen = [one for one in layouts if one != "random"]

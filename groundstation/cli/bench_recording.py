@@ -1,4 +1,4 @@
-"""`groundstation bench recording`: what writing, opening and seeking cost, beside a plain MCAP library."""
+"""`groundstation bench recording`: cost of writing, opening and seeking, compared with a plain MCAP library."""
 
 import json
 import tempfile
@@ -150,7 +150,7 @@ def _peer_read(path: Path) -> dict[str, Any]:
         opened = median(_cpu(lambda: reader().get_summary()) for _ in range(3))
         facts = reader().get_summary().statistics
         at_ns = (facts.message_start_time + facts.message_end_time) // 2
-        # Only the next message: what was known before it, which our seek includes, is left to the reader's user.
+        # Only the next message; our seek also includes the latest value of each key before it.
         seek = median(_cpu(lambda: next(reader().iter_messages(starting_at=at_ns))) for _ in range(3))
     return {"peer_open_s": round(opened, 4), "peer_seek_s": round(seek, 4)}
 

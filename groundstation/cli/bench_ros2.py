@@ -1,4 +1,4 @@
-"""`groundstation bench ros2`: what showing a flight to ROS 2 costs."""
+"""`groundstation bench ros2`: the cost of showing a flight to ROS 2."""
 
 import os
 

@@ -1,4 +1,4 @@
-"""`groundstation bench study`: how much faster than real time the study flies, and where its time goes."""
+"""`groundstation bench study`: speed of the study relative to real time, and CPU time of its parts."""
 
 import json
 import os

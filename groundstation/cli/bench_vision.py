@@ -1,4 +1,4 @@
-"""`groundstation bench vision`: starts the simulator's study of markers and detector, as a process of its own."""
+"""`groundstation bench vision`: runs the simulator's study of markers and detector in a process of its own."""
 
 import os
 import subprocess

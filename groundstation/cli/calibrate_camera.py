@@ -83,7 +83,7 @@ def _require_output(path: Path, force: bool) -> Path:
 
 
 class CalibrationSession:
-    """Looking at pictures of one source until they suffice; names to the operator what is still missing."""
+    """Collects views of one source until they suffice; tells the operator which views are still missing."""
 
     def __init__(self, pattern: "Pattern", enough: int, judged: Path | None) -> None:
         self._pattern, self._enough, self._judged = pattern, enough, judged
@@ -104,14 +104,14 @@ class CalibrationSession:
 
     @property
     def judge(self) -> "Judge":
-        """Return what was made of the pictures; raises OperatorMistake when there was none."""
+        """Return the views of the pictures; raises OperatorMistake without any picture."""
         if self._judge is None:
             raise OperatorMistake("no picture was looked at: nothing was written")
         return self._judge
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """Return what the views do not show yet."""
+        """Return the views that are still missing."""
         from drivers.camera.calibration.coverage import coverage_of
 
         return coverage_of(self.judge.views, self._pattern, self._size).missing
@@ -197,7 +197,7 @@ class ProgressLine:
         self._told_s = 0.0
 
     def show(self, name: str, flaw: "Flaw | None", count: int, enough: int, missing: tuple[str, ...]) -> None:
-        """Report what became of a picture, and what is missing now."""
+        """Report the result of a picture, and the views that are missing now."""
         verdict = str(flaw) if flaw is not None else "kept"
         wanted = ", ".join(missing[:_SHOWN_MISSING]) + (
             f" and {len(missing) - _SHOWN_MISSING} more" * (len(missing) > 3)

@@ -1,4 +1,4 @@
-"""`groundstation calibrate check`: do calibration and mounting of a camera still hold?"""
+"""`groundstation calibrate check`: checks whether calibration and mounting of a camera still hold."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -30,7 +30,7 @@ _PLACE_SIGMAS, _SAME_PLACE_M = 4.0, 0.03
 
 @dataclass(frozen=True, slots=True)
 class CheckFinding:
-    """One thing that was looked at: what, whether it holds (None: unknown), and what to do if it does not."""
+    """One result: its subject, whether it holds (None: unknown), and the remedy if it does not."""
 
     what: str
     holds: bool | None
@@ -38,7 +38,7 @@ class CheckFinding:
 
     @property
     def text(self) -> str:
-        """Return it in a line."""
+        """Return the result as a line."""
         word = {True: "holds", False: "DOES NOT HOLD", None: "is unknown"}[self.holds]
         return f"{word}: {self.what}" + (f"; {self.remedy}" if self.remedy and not self.holds else "")
 
@@ -97,7 +97,7 @@ def _is_recording(path: Path) -> bool:
 
 
 def _recorded(path: Path) -> "tuple[Field, Pictures]":
-    """Return the field that was flown, and what gives the pictures of its cameras."""
+    """Return the flown field, and a function that returns the pictures of its cameras."""
     from groundstation.cli.recorded_pictures import recorded_pictures
     from groundstation.recording.preamble import FIELD_NAME
     from groundstation.recording.reader import RecordingError
@@ -195,7 +195,7 @@ def _field_findings(
 
 
 def _placed(camera: Any, lens: "CameraIntrinsics", steady: "Steady", square_mm: float) -> tuple[Any, float] | None:
-    """Return where a camera has a marker [m; world], and one sigma of that by its mounting and its corners."""
+    """Return a marker's place by a camera [m; world], and its standard deviation by mounting and corners."""
     from drivers.camera.calibration.static_markers import flat_points
     from drivers.camera.pose import planar_poses, pose_covariance
     from groundstation.geometry.rotations import world_from_downward_optical

@@ -1,4 +1,4 @@
-"""`groundstation calibrate delay`: how late each sensor is, from a recorded flight."""
+"""`groundstation calibrate delay`: measures the delay of each sensor from a recorded flight."""
 
 import json
 from dataclasses import asdict

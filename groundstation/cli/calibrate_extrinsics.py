@@ -1,4 +1,4 @@
-"""`groundstation calibrate extrinsics`: where a camera is, from markers at known places."""
+"""`groundstation calibrate extrinsics`: measures a camera's place from markers at known places."""
 
 import math
 from pathlib import Path

@@ -58,7 +58,7 @@ def team(recording: tuple[Path, ...], field: Path | None, output: Path | None, a
     from groundstation.settings.resolved import resolved_field
 
     if field is not None:
-        load_field(field)  # a minute of computing later is late to say that it cannot be read
+        load_field(field)  # a field that cannot be read is reported before a minute of computing
     name, flown_with, flown = recorded_flight(recording)
     from groundstation.calibration.team import calibrate_team
 

@@ -1,4 +1,4 @@
-"""`groundstation camera view`: what a camera sees and what the detector finds in it, without flying."""
+"""`groundstation camera view`: shows a camera's pictures with the detector's findings, without flying."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -86,13 +86,13 @@ def view(
 
 
 class PictureCounter:
-    """Says each picture in a line, and counts."""
+    """Prints a line for each picture, and counts."""
 
     def __init__(self) -> None:
         self.pictures, self._found, self._cpu_ms = 0, 0, 0.0
 
     def add(self, look: "Look") -> None:
-        """Take in a picture."""
+        """Take a picture's result."""
         click.echo(look.text)
         self.pictures += 1
         self._found += bool(look.marked)
@@ -100,6 +100,6 @@ class PictureCounter:
 
     @property
     def text(self) -> str:
-        """Return how it went."""
+        """Return a summary of all pictures."""
         mean_ms = self._cpu_ms / max(1, self.pictures)
         return f"{self.pictures} pictures, markers in {self._found} of them, {mean_ms:.1f} ms of CPU each"

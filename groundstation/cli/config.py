@@ -61,7 +61,7 @@ def _targets(names: tuple[str, ...]) -> str:
 
 
 def _check(name: str, options: tuple[str, ...], scenario: str | None) -> list[str]:
-    """Return the warnings about a sound field; raises SettingsError with all mistakes."""
+    """Return the warnings about a field without mistakes; raises SettingsError with all mistakes."""
     from groundstation.settings import drawing, parked
     from groundstation.settings.files import find_field, find_scenario
     from groundstation.settings.load import cautions_of, load_field

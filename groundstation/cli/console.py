@@ -1,4 +1,4 @@
-"""`groundstation console`: the web page of a run that goes on, from any terminal."""
+"""`groundstation console`: the web page of a present run, from any terminal."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -77,7 +77,7 @@ def _invite(record: "RuntimeRecord", role: str) -> None:
 
 
 def _field_of(record: "RuntimeRecord") -> "ResolvedField | None":
-    """Return the resolved field from the recording that is being written, or None."""
+    """Return the resolved field from the present recording, or None."""
     from groundstation.field.resolved import field_from_json
     from groundstation.recording.reader import attached_field
 

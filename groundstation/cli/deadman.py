@@ -34,7 +34,7 @@ _ME = "deadman"
 _TURN_S = 0.02
 _FAREWELL_NS = 2 * NS_PER_S
 _KEYBOARD_PATIENCE_NS = 900 * NS_PER_MS
-_GAMEPAD_PATIENCE_NS = NEVER_NS  # it says itself when it is let go
+_GAMEPAD_PATIENCE_NS = NEVER_NS  # it reports itself when it is let go
 # WIRE: linux/joystick.h js_event: time u32, value s16, type u8 (1 = button, 0x80 = initial state), number u8.
 _EVENT = struct.Struct("<IhBB")
 _BUTTON = 1
@@ -43,9 +43,9 @@ _LAND_BUTTON = 1
 
 @dataclass(slots=True)
 class Handle:
-    """Where the grip is felt: a terminal (any repeating space) or a gamepad (any button but the second).
+    """Source of the grip: a terminal (any repeating space) or a gamepad (any button but the second).
 
-    gone: nobody will hold it again, the drones land; left: its user leaves, the drones hold.
+    gone: it can no longer be held, the drones land; left: its user leaves, the drones hold.
     """
 
     descriptor: int
@@ -54,7 +54,7 @@ class Handle:
     left: bool = False
 
     def feel(self, man: DeadMan, now_ns: int) -> tuple[Verb | None, bool]:
-        """Read what there is; returns the stop that it asks for, and whether nothing more is to come of it."""
+        """Read the input; return the stop that it asks for, and whether the input has ended."""
         if self.gone or self.left:
             time.sleep(_TURN_S)
             asked = man.release(now_ns)
@@ -119,7 +119,7 @@ def deadman(name: str | None, gamepad: str | None) -> int:
 def heed_signals(handle: Handle) -> None:
     """Let Ctrl-C leave as `q` does, and a closed terminal or the end of this process let go; main thread only.
 
-    Ctrl-Z and Ctrl-\\ leave as well: who is stopped, or dead, orders nothing when the handle is let go.
+    Ctrl-Z and Ctrl-\\ leave as well: a stopped or dead process orders nothing when the handle is let go.
     """
 
     def leave(_number: int, _frame: object) -> None:
@@ -136,7 +136,7 @@ def heed_signals(handle: Handle) -> None:
 
 
 def watch(bus: "Bus", drones: tuple[str, ...], handle: Handle, man: DeadMan, go_on: Callable[[], bool]) -> None:
-    """Obey the handle until the user leaves and the last wish is settled, or until `go_on` says no."""
+    """Obey the handle until the user leaves and the last order is settled, or until `go_on` returns False."""
     desk, answers = CommandDesk(bus, drones), bus.subscribe([COMMAND_ACK])
     shown, left_ns = "", 0
     while go_on():
@@ -163,7 +163,7 @@ def watch(bus: "Bus", drones: tuple[str, ...], handle: Handle, man: DeadMan, go_
 
 
 def _show(text: str) -> None:
-    with suppress(OSError):  # the terminal is gone; what is due is ordered all the same
+    with suppress(OSError):  # the terminal is gone; due orders are sent all the same
         click.echo(text, nl=False)
 
 
@@ -179,7 +179,7 @@ def _line(desk: CommandDesk, man: DeadMan) -> str:
 
 
 def _joystick(path: str) -> int:
-    """Return the open device; raises GroundStationError where it cannot be one."""
+    """Return the open device; raises GroundStationError if it cannot be opened as one."""
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
     except OSError as error:

@@ -1,4 +1,4 @@
-"""`groundstation doctor`: what this machine lacks for flying."""
+"""`groundstation doctor`: checks what this machine needs for a flight."""
 
 import json
 from pathlib import Path
@@ -36,7 +36,7 @@ def doctor(field: str, as_json: bool) -> int:
 
 
 def _awaited(field: "Field") -> dict[str, tuple[str, int]]:
-    """Return at which UDP ports drivers of this host wait for their vehicles to call, by the drivers' names."""
+    """Return the UDP ports at which drivers of this host wait for their vehicles, by the drivers' names."""
     from groundstation.settings.sections import driver_sections
 
     links = {one.name: json.loads(one.section).get("link") for one in driver_sections(field) if not one.host}

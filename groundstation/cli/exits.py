@@ -8,7 +8,7 @@ from groundstation.errors import GroundStationError, OperatorMistake, SettingsEr
 
 
 class ExitCode(IntEnum):
-    """What became of a command."""
+    """Result of a command."""
 
     OK = 0
     FAILED = 1
@@ -40,7 +40,7 @@ class UnreachableError(GroundStationError):
 
 
 def exit_code_of(error: BaseException) -> ExitCode:
-    """Return the code that a failed command ends with."""
+    """Return the exit code of a failed command."""
     match error:
         case SettingsError() | OperatorMistake() | click.UsageError():
             return ExitCode.SETTINGS

@@ -219,7 +219,7 @@ def _finish(name: str, tasks: "list[Task]", world: dict[str, Any], scheduler: st
 
 
 def _folder(name: str, world: dict[str, Any]) -> Path:
-    """Return the folder of the results, and make it: one that cannot be made must not end hours of computing."""
+    """Make the folder of the results and return it; done first, so that it cannot fail after hours of computing."""
     folder = Path(world["out"] or Path("runs") / f"experiment-{name}")
     folder.mkdir(parents=True, exist_ok=True)
     return folder

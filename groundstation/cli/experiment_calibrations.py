@@ -68,7 +68,7 @@ def calibrations(
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """The field as the operator has it, and how it is flown."""
+    """The operator's field, and the options of its flights."""
 
     field: str
     options: tuple[str, ...]
@@ -94,7 +94,7 @@ def _chosen(told: Told, only: str) -> "list[WrongLab]":
 
 
 def _order(told: Told, errors: "tuple[WrongFigure, ...]", mended: Path | None = None) -> str:
-    """Return what the simulator is told besides the seeds; mended: the field's file with the new settings."""
+    """Return the simulator's order without the seeds; mended: the field's file with the new settings."""
     from groundstation.experiments.culprit_rows import STAND_S
 
     base = flown_scenario(told.scenario, told.path)
@@ -115,7 +115,7 @@ def _flights(rows: list[dict[str, Any]]) -> list[Flight]:
 
 
 def _mended(told: Told, lab: "WrongLab", flight: Flight, out: Path) -> str:
-    """Return the order of the same flight once the proposed settings stand in the field file's text."""
+    """Return the order of the same flight with the proposed settings in the field file's text."""
     from groundstation.calibration.team_left import errors_left
     from groundstation.settings.load import load_field
     from groundstation.settings.patched import write_patched

@@ -80,9 +80,9 @@ PICTURES_ONLY = (
 
 @cache
 def flown_scenario(name: str, field: Path) -> dict[str, Any]:
-    """Return a scenario for flights at message level; says what of it changes nothing there.
+    """Return a scenario for flights at message level; prints which of its settings have no effect there.
 
-    field: the field file beside which it is looked for.
+    field: the field file beside which the scenario is searched.
     """
     from groundstation.settings.document import read
     from groundstation.settings.files import SHIPPED, find_scenario
@@ -98,7 +98,7 @@ def flown_scenario(name: str, field: Path) -> dict[str, Any]:
 
 
 def order_of(name: str, scenario: str, options: Sequence[str], seconds: float, **own: Any) -> str:
-    """Return the simulator's order besides the seeds, by names of field and scenario; own: what one study asks for."""
+    """Return the simulator's order without the seeds, by names of field and scenario; own: keys of one study only."""
     from groundstation.settings.files import find_field
 
     path = find_field(name)
@@ -111,12 +111,12 @@ def fly_all(
 ) -> list[dict[str, Any]]:
     """Return the row of each batch; single: too little work for a local cluster. Raises GroundStationError.
 
-    Each row is kept in a folder of `out`: a campaign that was ended goes on where it was.
+    Each row is kept in a folder of `out`, so that an interrupted campaign can be continued.
     """
     from groundstation.experiments.faults import fly
     from groundstation.experiments.runner import SweepError, dask_is_there, run_tasks
 
-    (out / "flights").mkdir(parents=True, exist_ok=True)  # before hours were flown for nothing
+    (out / "flights").mkdir(parents=True, exist_ok=True)  # fails before hours of flights, not after
     serial = scheduler == "none" or (scheduler == "local" and (single or not dask_is_there()))
     try:
         return run_tasks(batches, out / "flights", "" if serial else scheduler, workers, progress, fly)

@@ -66,7 +66,7 @@ def culprits(
 def _planned(
     only: str, seeds: int, seed: int, seconds: float, field: str, scenario: str, options: tuple[str, ...]
 ) -> "list[tuple[WrongLab, list[FlightBatch]]]":
-    """Return the batches of flights of each row that was asked for."""
+    """Return the batches of flights of each chosen row."""
     from groundstation.experiments.culprit_rows import chosen, labs_of
     from groundstation.experiments.faults import batches
     from groundstation.settings.files import find_field
@@ -83,7 +83,7 @@ def _planned(
 
 
 def _order(order: dict[str, Any], base: dict[str, Any], lab: "WrongLab") -> str:
-    """Return what the simulator is told besides the seeds."""
+    """Return the simulator's order without the seeds."""
     cameras = {**(base.get("cameras") or {}), **(lab.cameras or {})}
     scenario = {**base, "cameras": cameras, "faults": list(lab.faults)}
     from groundstation.experiments.culprit_rows import STAND_S

@@ -1,4 +1,4 @@
-"""`groundstation experiment faults`: many short flights in which something goes wrong, judged by truth."""
+"""`groundstation experiment faults`: many short flights with random faults, judged by truth."""
 
 import json
 import time

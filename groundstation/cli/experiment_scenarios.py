@@ -111,14 +111,14 @@ def _planned(
 
 
 def _labelled(names: Sequence[str]) -> dict[str, str]:
-    """Return what each scenario is called in the table: its file's name, or as it was given where two share that."""
+    """Return each scenario's name in the table: its file's name, or its path as given if two share that."""
     short = {name: Path(name).name.removesuffix(".yaml") for name in names}
     shared = Counter(short.values())
     return {name: one if shared[one] == 1 else name for name, one in short.items()}
 
 
 def _shipped() -> list[str]:
-    """Return the names of the shipped scenarios that say what they expect."""
+    """Return the names of the shipped scenarios with expectations."""
     from groundstation.settings.document import read
     from groundstation.settings.files import SHIPPED
 
@@ -127,7 +127,7 @@ def _shipped() -> list[str]:
 
 
 def _order(name: str, seconds: float | None, field: str | None, options: tuple[str, ...]) -> dict[str, Any]:
-    """Return what the simulator is told besides strategy and seeds."""
+    """Return the simulator's order without strategy and seeds."""
     from groundstation.settings.files import find_field
 
     scenario = flown_scenario(name, find_field(field or "lab"))

@@ -115,7 +115,7 @@ _WRITERS: "dict[str, Callable[[RecordedRun, Path, Path | None], None]]" = {
 
 
 def _beside(recording: Path, suffix: str, *, is_folder: bool = False) -> Path:
-    """Return the usual place: inside a run folder, beside a file."""
+    """Return the default output path: inside a run folder, beside a file."""
     if recording.is_dir():
         return recording / (suffix if is_folder else f"{recording.resolve().name}.{suffix}")
     return recording.with_name(f"{recording.stem}-{suffix}" if is_folder else f"{recording.stem}.{suffix}")

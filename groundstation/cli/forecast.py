@@ -1,4 +1,4 @@
-"""`groundstation forecast`: how well a field will do, where it is blind, and what failures cost; nobody flies."""
+"""`groundstation forecast`: predicted accuracy over a field, blind places, and the cost of failures; no flight."""
 
 import json
 import math
@@ -82,7 +82,7 @@ def _target(settings: "Field", named: str | None) -> str:
 
 
 def _paths(settings: "Field", path: Path, target: str, drawn: str | None, scenario: str | None) -> "Paths":
-    """Return each target's path, as far as it is known."""
+    """Return the known paths of the targets."""
     from groundstation.settings import drawing
     from groundstation.settings.files import find_scenario
     from groundstation.settings.scenario import load_scenario

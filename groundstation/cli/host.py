@@ -38,6 +38,6 @@ def host(site: str | None, logs: Path, once: bool) -> int:
     interrupted = hosting.serve(hosting.wait())
     terminal.flush()
     if not interrupted and not once:
-        # The next run has another clock and other processes: nothing of this one may be left in the way.
+        # The next run has another clock and other processes: nothing of this run may remain.
         os.execv(sys.executable, [sys.executable, *sys.orig_argv[1:]])
     return ExitCode.INTERRUPTED if interrupted else ExitCode.OK

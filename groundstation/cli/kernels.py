@@ -1,4 +1,4 @@
-"""Compiled kernels before a command needs them: where they are kept, and that compiling takes a while."""
+"""Prepares compiled kernels for commands: chooses their cache, and tells that compiling takes a while."""
 
 import click
 
@@ -8,7 +8,7 @@ _TOLD = "compiling kernels (once per version, a minute or two)"
 
 
 def use_flying_kernels() -> None:
-    """Let the kernels that fly be found, and compile what lacks; raises GroundStationError where none can be kept."""
+    """Use the cache of the kernels that fly, and compile missing ones; raises GroundStationError without a cache."""
     cache = numba_cache.activate()
     if numba_cache.is_complete(cache):
         return
@@ -20,7 +20,7 @@ def use_flying_kernels() -> None:
 
 
 def use_all_kernels() -> None:
-    """Let those of experiments and benches be found as well, which are compiled where they are imported."""
+    """Use the cache for kernels of experiments and benches too, which compile at import."""
     cache = numba_cache.activate(numba_cache.EVERYTHING)
     if not cache.exists():
         numba_cache.require_writable(cache)

@@ -61,13 +61,13 @@ class VerbGroup(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Return the command for the first argument; an unknown one fails with the verb that was probably meant."""
+        """Return the command for the first argument; an unknown one fails with the likeliest verb."""
         if args and not args[0].startswith("-") and _row(args[0]) is None:
             raise click.UsageError(f"There is no command {args[0]!r}.{_meant(args[0])}", ctx)
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the table by families, without importing any command: the first page, or all of it."""
+        """Write the table of verbs by families (first page, or all), without importing any command."""
         verbs = all_verbs()
         shown = {name: verb for name, verb in verbs.items() if verb.first or ctx.obj == "all"}
         for family in dict.fromkeys(verb.family for verb in shown.values()):
@@ -102,7 +102,7 @@ def groundstation() -> None:
 
 
 def check_installation() -> None:
-    """Raise GroundStationError when the packages come from different places: two versions would be mixed."""
+    """Raise GroundStationError if the packages come from different places: two versions would be mixed."""
     places = {}
     for package in ("groundstation", "drivers", "sim_bridge"):
         spec = find_spec(package)
@@ -115,7 +115,7 @@ def check_installation() -> None:
 
 
 def run(arguments: Sequence[str] | None = None) -> int:
-    """Return the exit code of one command; what went wrong is on stderr, without a traceback unless it is a bug."""
+    """Run one command and return its exit code; errors go to stderr, with a traceback only for bugs."""
     try:
         check_installation()
         result = groundstation.main(
@@ -131,7 +131,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
 
 
 def _with_new_spelling(error: click.NoSuchOption) -> click.NoSuchOption:
-    """Answer an old spelling with the new one, in place of those whose letters are alike."""
+    """Suggest the new spelling for an old one, instead of options with similar letters."""
     command = error.ctx.command_path.removeprefix("groundstation ") if error.ctx else ""
     new = RENAMED.get(command, {}).get(error.option_name)
     return click.NoSuchOption(error.option_name, f"{error.option_name} is {new} here.", ctx=error.ctx) if new else error
@@ -155,7 +155,7 @@ def _tell(error: BaseException) -> None:
 
 
 def main() -> None:
-    """Carry out the command of this process, and end it."""
+    """Run the command of this process, and end it."""
     make_usable()
     try:
         code = run()

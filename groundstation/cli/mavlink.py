@@ -1,4 +1,4 @@
-"""`groundstation mavlink`: who is on a link, and whether a vehicle is set for indoor flight."""
+"""`groundstation mavlink`: lists vehicles on a link, and checks parameters for indoor flight."""
 
 from pathlib import Path
 from typing import Any

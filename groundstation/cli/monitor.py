@@ -38,7 +38,7 @@ def monitor(name: str | None, once: bool, as_json: bool) -> None:
 
 
 def choose(name: str | None) -> "RuntimeRecord":
-    """Return the run of that name, or the only one; raises UnreachableError naming the choice."""
+    """Return the run of that name, or the only one; raises UnreachableError naming all runs."""
     from groundstation.supervisor.runtime_file import live_records
 
     records = [record for record in live_records() if name in (None, record.name)]
@@ -50,7 +50,7 @@ def choose(name: str | None) -> "RuntimeRecord":
 
 
 def cast_of(record: "RuntimeRecord") -> "Cast":
-    """Return who takes part, as far as the recording that is being written says it."""
+    """Return drones and targets of a run, as far as its present recording tells them."""
     from groundstation.field.resolved import field_from_json
     from groundstation.monitor.state import Cast, cast_from_field
     from groundstation.recording.reader import attached_field

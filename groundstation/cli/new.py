@@ -19,7 +19,7 @@ _Answer = TypeVar("_Answer")
 
 
 def _checked(check: Callable[[str], object]) -> Callable[[str], str]:
-    """Return what takes an answer; one for which `check` raises ValueError with the reason is asked for again."""
+    """Return a converter of answers; if `check` raises ValueError with a reason, the question is asked again."""
 
     def answer(text: str) -> str:
         try:
@@ -51,7 +51,7 @@ def new(directory: Path, page: bool) -> None:
 
 
 def _require_place(folder: Path) -> None:
-    """Raise OperatorMistake where nothing can be written, before anything is asked; the folder is not made yet."""
+    """Raise OperatorMistake before the first question if nothing can be written; the folder is not made yet."""
     nearest = next(place for place in (folder, *folder.parents) if place.exists())
     if not (nearest.is_dir() and os.access(nearest, os.W_OK)):
         raise OperatorMistake(f"{folder}: cannot be written: {nearest} is not a folder of yours")
@@ -74,7 +74,7 @@ def _ask(path: Path) -> None:
 
 
 def _require_good(text: str, name: str) -> None:
-    """Raise SettingsError with what is wrong between the answers, such as one address for two drones."""
+    """Raise SettingsError for conflicts between answers, such as one address for two drones."""
     from groundstation.settings.load import load_field
     from groundstation.settings.shipped_copies import write_field
 
@@ -87,7 +87,7 @@ def _require_good(text: str, name: str) -> None:
 
 
 def _until_possible(ask: Callable[[], _Answer]) -> _Answer:
-    """Ask again what cannot be, with all answers before it kept."""
+    """Ask impossible answers again, and keep all earlier ones."""
     while True:
         try:
             return ask()

@@ -1,4 +1,4 @@
-"""`groundstation preflight`: everything is started, looked at and stopped again; nobody takes off."""
+"""`groundstation preflight`: starts everything, checks it and stops it again; no drone takes off."""
 
 import click
 

@@ -1,4 +1,4 @@
-"""The shared part of commands that calibrate by a recorded flight: its name, its field, and what was taken in."""
+"""The shared part of commands that calibrate by a recorded flight: its name, its field, the tracker's inputs."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 class RecordedFlight(NamedTuple):
-    """A recording's name, the field file that was flown, and what the tracker took in."""
+    """A recording's name, the flown field, and the tracker's inputs."""
 
     name: str
     field: "Field"
@@ -19,7 +19,7 @@ class RecordedFlight(NamedTuple):
 
 
 def recorded_flight(recording: tuple[Path, ...]) -> RecordedFlight:
-    """Return the flight of a recording; raises UsageError where none can be read of it."""
+    """Return the flight of a recording; raises UsageError if it holds none that can be read."""
     from groundstation.cli.kernels import use_flying_kernels
     from groundstation.recording.reader import RecordingError
     from groundstation.replay.source import open_source

@@ -1,4 +1,4 @@
-"""Pictures of a recorded camera, as commands take them that look through one."""
+"""Pictures of a recorded camera, for commands that look through cameras."""
 
 from collections.abc import Iterator
 
@@ -11,7 +11,7 @@ from groundstation.time_units import NS_PER_S
 
 
 def recorded_pictures(run: RecordedRun, camera: str) -> Iterator[SourcePicture]:
-    """Yield each picture of a camera, oldest first; raises GroundStationError where none is in the recording."""
+    """Yield each picture of a camera, oldest first; raises GroundStationError if the recording has none."""
     count = 0
     for record in run.records_from(0, lambda topic: topic is IMAGE):
         if record.key.entity != camera:

@@ -1,4 +1,4 @@
-"""`groundstation recording`: what is in a recording, and how to get it out."""
+"""`groundstation recording`: inspects, repairs, cuts and exports recordings."""
 
 import importlib
 import json
@@ -23,7 +23,7 @@ class RecordingGroup(click.Group):
     """The commands below, and `export`, which is the verb of that name."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the names in the order in which one needs them."""
+        """Return the names in the order of their use."""
         return ["info", "recover", "cut", "export"]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:

@@ -1,4 +1,4 @@
-"""`groundstation replay`: a recorded run in the console as it was, or once more through today's tracker."""
+"""`groundstation replay`: plays a recorded run in the console, or re-runs it with today's tracker."""
 
 from contextlib import suppress
 from pathlib import Path
@@ -17,7 +17,7 @@ _RERUN_ONLY = {"as_json": "--json", "output": "--output"}
 
 
 class _Recording(click.Path):
-    """The path of a recording; the file that `--json` took once is answered with what it does now."""
+    """The path of a recording; a file after `--json`, an old spelling, is answered with the present one."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         if ctx is not None and ctx.params.get("as_json") and Path(value).suffix == ".json":

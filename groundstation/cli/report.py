@@ -1,4 +1,4 @@
-"""`groundstation report`: judge a recorded run once more, or set two side by side."""
+"""`groundstation report`: judges a recorded run again, or compares runs."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -111,7 +111,7 @@ def _trend(folder: Path, as_json: bool) -> None:
 
 
 def _run_dir(path: Path) -> Path:
-    """Return the run folder that is meant by a folder or by a recording in it."""
+    """Return the run folder for a folder or a recording in it."""
     if not path.exists():
         raise OperatorMistake(f"{path}: there is no such run")
     if path.is_dir():
@@ -122,7 +122,7 @@ def _run_dir(path: Path) -> Path:
 
 
 def newest_run(folder: Path) -> Path:
-    """Return the folder with the newest recording that was not cut from another; raises OperatorMistake for none."""
+    """Return the folder with the newest recording that is no cut of another; raises OperatorMistake for none."""
     from groundstation.recording.stretch import is_stretch
 
     recordings = sorted(folder.glob("*/state*.mcap"), key=lambda path: path.stat().st_mtime, reverse=True)

@@ -127,9 +127,9 @@ def run_real(
 
 @dataclass(frozen=True, slots=True)
 class Rehearsal:
-    """What the options of `sitl` and `demo` ask for; real: what is not emulated; look_only: nobody takes off.
+    """The options of `sitl` and `demo`; real: parts that are not emulated; look_only: no drone takes off.
 
-    network: where other hosts reach emulated devices.
+    network: address at which other hosts reach emulated devices.
     """
 
     scenario: str
@@ -225,7 +225,7 @@ def _run(
         judged = field.recording.enabled and not plan.look_only
         passed = _judge(run_dir, output) if judged else None
     finally:
-        supervisor.close()  # the page has shown by then what the run came to
+        supervisor.close()  # by then the page has shown the result of the run
     require_outcome(outcome)
     return _exit_code(outcome, plan, passed, judged_by_landing=facts.mode == "fly")
 
@@ -250,13 +250,13 @@ def _build(run_dir: Path) -> "RunReport":
 
     try:
         return build_report(run_dir)
-    except OSError as error:  # the disk is full: what was recorded can still be judged and shown
+    except OSError as error:  # the disk is full: the recording can still be judged and shown
         click.echo(f"the report cannot be written to {run_dir}: {error.strerror}", err=True)
         return judge(gather(run_dir), run_dir)
 
 
 def _judge(run_dir: Path, copy_to: Path | None) -> bool | None:
-    """Write and print the report; None when there is nothing to judge. Never lets a closed terminal hide it."""
+    """Write and print the report; None if there is nothing to judge. It is written even if the terminal is closed."""
     from groundstation.errors import GroundStationError
     from groundstation.report.file_names import HTML_NAME, JSON_NAME, PLOT_NAME
 

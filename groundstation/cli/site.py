@@ -1,4 +1,4 @@
-"""`groundstation site`: other hosts that may stop and order."""
+"""`groundstation site`: admits other hosts that may stop and order."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What commands that look through a camera share: its address, its lens, and where they write."""
+"""The shared part of commands that look through a camera: its address, its lens, their output folder."""
 
 import os
 from collections.abc import Iterator
@@ -39,7 +39,7 @@ def source_of(_context: click.Context, _parameter: click.Parameter, value: str) 
 
 
 def lens_of(path: Path) -> "CameraIntrinsics":
-    """Return the lens of a calibration file; raises SettingsError with what is wrong in it."""
+    """Return the lens of a calibration file; raises SettingsError with its mistakes."""
     from groundstation.geometry.lens import intrinsics_of
     from groundstation.settings.calibration_file import load_calibration
 
@@ -47,7 +47,7 @@ def lens_of(path: Path) -> "CameraIntrinsics":
 
 
 def require_size(shot: "SourcePicture", lens: "CameraIntrinsics", calibration: str) -> None:
-    """Raise OperatorMistake when a picture is not of the size that a calibration is for."""
+    """Raise OperatorMistake if a picture's size is not that of its calibration."""
     if shot.size != (lens.width_px, lens.height_px):
         width, height = shot.size
         raise OperatorMistake(
@@ -57,7 +57,7 @@ def require_size(shot: "SourcePicture", lens: "CameraIntrinsics", calibration: s
 
 
 def require_folder(folder: Path) -> None:
-    """Make a folder to write into; raises OperatorMistake when nothing can be written there."""
+    """Make an output folder; raises OperatorMistake if nothing can be written there."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -68,6 +68,6 @@ def require_folder(folder: Path) -> None:
 
 @contextmanager
 def until_interrupted() -> Iterator[None]:
-    """Let Ctrl-C end the looking, not the command."""
+    """Let Ctrl-C end the block, not the command."""
     with suppress(KeyboardInterrupt):
         yield

@@ -1,4 +1,4 @@
-"""`hold`, `land`, `cut-motors`, and the operator's `takeoff`, `track`, `resume`, to a ground station that runs.
+"""`hold`, `land`, `cut-motors`, and the operator's `takeoff`, `track`, `resume`, to a running ground station.
 
 These must act within 0.3 s of their start: nothing but click, msgspec and zenoh may be imported here.
 """
@@ -24,15 +24,15 @@ from groundstation.supervisor import runtime_file
 from groundstation.supervisor.joining import join
 from groundstation.supervisor.runtime_file import RuntimeRecord
 
-# A router that died is back by then; drones hover without one. One that lives may be busy, and a signal is the last
-# resort: drivers that get it land and exit, whatever was asked.
+# A router that died is back by then; drones hover without one. A living one may be busy, and a signal is the last
+# resort: drivers that get it land and exit, whatever the order was.
 _CONNECT_S = 2.0
 
 
 def choose_run(name: str | None, stops: bool = False) -> RuntimeRecord:
     """Return the running ground station, or the named one of several; raises UnreachableError.
 
-    stops: without a name the real drones are meant, whatever is rehearsed beside them.
+    stops: without a name the run with real drones is meant, even if simulated ones run beside it.
     """
     records = runtime_file.live_records() or _elsewhere()
     if name is not None:
@@ -51,7 +51,7 @@ def choose_run(name: str | None, stops: bool = False) -> RuntimeRecord:
 
 
 def _elsewhere() -> list[RuntimeRecord]:
-    """Return the runs on other hosts, where this one has joined a site."""
+    """Return the runs on other hosts whose sites this host has joined."""
     from groundstation.supervisor import site
 
     return list(site.runs())
@@ -64,7 +64,7 @@ def _closed_doors() -> list[str]:
 
 
 def deliver(bus: ZenohBus, book: AwaitedAnswers, patience_s: float, on_news: Callable[[str], None]) -> None:
-    """Send the book's command, again to whoever does not answer, until all answers are final or patience ends."""
+    """Send the book's command, repeated where no answer comes, until all answers are final or patience_s is over."""
     answers = bus.subscribe([COMMAND_ACK])
     bus.publish(COMMAND, book.command)
     began = repeated = time.monotonic()

@@ -32,6 +32,6 @@ def progress(done: int, total: int) -> None:
 
 
 def write_over(text: str) -> None:
-    """Write over the last line, if standard error is a terminal; nothing leaves it empty."""
+    """Overwrite the last line if standard error is a terminal; an empty text clears it."""
     if sys.stderr.isatty():
         click.echo(f"\r\033[K{text}", err=True, nl=False)

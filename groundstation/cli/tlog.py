@@ -23,13 +23,13 @@ _STAMP = struct.Struct(">Q")
 
 @dataclass(slots=True)
 class Log:
-    """The verified frames of one vehicle with their UNIX times [ns]; refused: what else was recorded, by reason."""
+    """The verified frames of one vehicle with their UNIX times [ns]; refused: counts of all other bytes, by reason."""
 
     frames: list[tuple[int, bytes]] = field(default_factory=list)
     refused: Counter[str] = field(default_factory=Counter)
 
     def add(self, stamp_ns: int, datagram: bytes, verifier: Verifier) -> None:
-        """Take the frames of a datagram; what cannot be verified is counted."""
+        """Take the frames of a datagram; those that cannot be verified are counted."""
         try:
             for frame in split(datagram, old=True):
                 try:
@@ -45,10 +45,10 @@ class Log:
 
 
 def write_tlogs(run: RecordedRun, folder: Path) -> dict[Path, Log]:
-    """Write one new .tlog for each MAVLink vehicle of a run; returns the files, and what each holds, or would hold.
+    """Write one new .tlog for each MAVLink vehicle of a run; returns their paths and logs.
 
     Only frames with the right checksum are written, those of MAVLink 1 as well; signatures are not checked, because
-    keys are not recorded. Raises RecordingError when there is nothing to write, or a file exists.
+    keys are not recorded. An empty log gets no file. Raises RecordingError if all are empty, or a file exists.
     WIRE (.tlog, as pymavlink reads it): UNIX time [us], 8 bytes, big-endian, before each frame.
     """
     logs = _logs(run)
@@ -76,7 +76,7 @@ def _logs(run: RecordedRun) -> dict[str, Log]:
         try:
             batch = unpack(payload(record)[1])
         except (MessageError, ValueError):
-            continue  # damaged inside: nothing of it can be told from noise
+            continue  # damaged inside: its content cannot be distinguished from noise
         if not any(datagram[:1] in _MAGICS for _, datagram in batch):
             continue  # another kind of vehicle
         # The message is stamped as its first datagram; the others follow on the same boot clock.

@@ -1,4 +1,4 @@
-"""`groundstation vehicle`: which kinds of vehicles there are, and whether one keeps the contract of a driver."""
+"""`groundstation vehicle`: lists kinds of vehicles, and checks whether one keeps the driver's contract."""
 
 import subprocess
 import sys

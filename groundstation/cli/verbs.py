@@ -1,4 +1,4 @@
-"""The table of verbs: where each command is, and its line in the help."""
+"""The table of verbs: module and function of each command, and its line in the help."""
 
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -87,7 +87,7 @@ VERBS: dict[str, CommandRow] = {
 
 
 def of_kinds() -> dict[str, CommandRow]:
-    """Return the rows of what kinds of vehicles bring; a name that is ours already stays ours."""
+    """Return the rows that kinds of vehicles add; a name of this table stays with this table."""
     rows = {}
     for name, commands in _commands_of_kinds().items():
         if name not in VERBS:
@@ -96,18 +96,18 @@ def of_kinds() -> dict[str, CommandRow]:
 
 
 def all_verbs() -> dict[str, CommandRow]:
-    """Return every row: the table's, then those of kinds of vehicles, whose objects it imports."""
+    """Return all rows: the table's, then those of kinds of vehicles, whose objects are imported for it."""
     return VERBS | of_kinds()
 
 
 def meant(word: str) -> str:
-    """Return the commands that a word of another ground station, or of one level down, leads to, or ""."""
+    """Return the commands meant by a word of another ground station or by a sub-command's name, or ""."""
     below = [f"'{name} {word}'" for name, commands in _commands_of_kinds().items() if word in commands.words]
     return ELSEWHERE.get(word) or " or ".join(below)
 
 
 def _commands_of_kinds() -> "dict[str, KindCommands]":
-    # Only where it is asked for: what stops drones must not wait for it.
+    # Imported here only: commands that stop drones must not wait for it.
     from groundstation.vehicles import all_kinds
 
     return {name: kind.commands for name, kind in all_kinds().items() if kind.commands is not None}

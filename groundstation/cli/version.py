@@ -1,4 +1,4 @@
-"""`groundstation version`: what is installed, for a bug report."""
+"""`groundstation version`: versions of program and libraries, for a bug report."""
 
 import json
 import platform
@@ -12,7 +12,7 @@ _LIBRARIES = ("eclipse-zenoh", "msgspec", "numpy", "numba", "scipy", "opencv-pyt
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of this program, Python and the libraries that matter, without importing them."""
+    """Return the versions of this program, Python and the main libraries, without importing them."""
     found = {"skein-groundstation": _installed("skein-groundstation"), "python": platform.python_version()}
     return found | {name: _installed(name) for name in _LIBRARIES}
 

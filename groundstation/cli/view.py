@@ -21,7 +21,7 @@ _RERUN_PAGE_PORT = 9090
 _ROS_ROUTER = "tcp/127.0.0.1:7447"
 _ROS_DISTRIBUTIONS = ("humble", "jazzy", "lyrical")
 _PORT = click.IntRange(1024, 65535)
-# What a viewer takes for its own last words (2 s each, two of them) fits in.
+# Longer than a viewer needs for its own end (two steps of 2 s).
 _GOODBYE_S = 8.0
 
 
@@ -133,7 +133,7 @@ def _thinned(record: "RuntimeRecord") -> "Mapping[str, float]":
 
 
 def _field_of(record: "RuntimeRecord") -> "ResolvedField | None":
-    """Return the resolved field from the recording that is being written, or None."""
+    """Return the resolved field from the present recording, or None."""
     from groundstation.engineering_views.field import field_of
     from groundstation.recording.preamble import FIELD_NAME
     from groundstation.recording.reader import attached_field

@@ -13,11 +13,11 @@ MISSING_ERROR_M = 1.0
 
 
 class Accuracy(msgspec.Struct, frozen=True):
-    """Of one entity over an interval.
+    """Accuracy of one entity's estimates over an interval.
 
     rmse_m, max_error_m, lost_s (error > 0.5 m) count a missing or stale estimate as 1 m; covered: share of time with
     an estimate; anees: mean normalised squared error over its dimension (1 = honest covariance, > 1 = overconfident);
-    judged: share of the interval for which the truth is known, the part that all else is about.
+    judged: share of the interval for which the truth is known; all other figures are of that part.
     """
 
     rmse_m: float
@@ -30,7 +30,7 @@ class Accuracy(msgspec.Struct, frozen=True):
 
 
 def time_grid(start_s: float, end_s: float) -> Array:
-    """Return the times at which errors are looked at (10 Hz); at least one."""
+    """Return the times at which errors are computed (10 Hz); at least one."""
     return start_s + np.arange(max(1, int(np.floor((end_s - start_s) * RATE_HZ + 1e-6)))) / RATE_HZ
 
 
@@ -48,7 +48,7 @@ def errors_at(time_s: Array, truth: TruthTrack, estimate: EstimateTrack | None, 
 def accuracy(time_s: Array, truth: TruthTrack, estimate: EstimateTrack | None, dim: int) -> Accuracy | None:
     """Return the figures over the given times; dim is 2 for targets on the floor, 3 for robots.
 
-    None where the truth is known at none of them.
+    None if the truth is known at none of them.
     """
     asked, time_s = len(time_s), time_s[truth.known_at(time_s)]
     if not len(time_s):

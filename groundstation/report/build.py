@@ -22,7 +22,7 @@ def build_report(run_dir: Path, *, plot: bool = True) -> RunReport:
 
 
 def title(report: RunReport) -> str:
-    """Return what stands above the picture of the paths."""
+    """Return the title of the picture of the paths."""
     figures = report.figures
     error = "no tracking" if figures.target_rmse_m is None else f"target error {figures.target_rmse_m:.3f} m rms"
     verdict = "passed" if report.passed else report.verdict.upper()

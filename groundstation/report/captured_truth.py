@@ -1,4 +1,4 @@
-"""Where bodies really were on a flight that a motion capture system judges (`truth: {from: ...}` in the field)."""
+"""True paths of bodies from a motion capture system that judges flights (`truth: {from: ...}` in the field)."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -9,7 +9,7 @@ from groundstation.arrays import Array
 from groundstation.bus.messages import AIRBORNE, UNHEARD, BodyPoses, VehicleStatus
 from groundstation.report.tracks import TimedMessage, TruthTrack
 
-# Without a pose for so long, or for some of its periods, nobody knows where a body was.
+# Without a pose for this long, or for this many periods, a body's place is unknown.
 _MAX_GAP_S, _PERIODS = 0.5, 4.0
 
 
@@ -18,10 +18,10 @@ def captured_tracks(
     vehicles: Mapping[str, Sequence[TimedMessage[VehicleStatus]]],
     rate_hz: float = 30.0,
 ) -> dict[str, TruthTrack]:
-    """Return the track of each body: where the system had it, but for poses that cannot be true; rate_hz: the system's.
+    """Return the track of each body from the system's poses, without those that cannot be true; rate_hz: the system's.
 
-    A drone is on the ground as long as it says so, and one that is not heard is as it was; a body without a driver
-    always is on the ground.
+    A drone is on the ground as long as it reports so, and unchanged while it is silent; a body without a driver
+    is always on the ground.
     """
     rows: dict[str, list[tuple[float, ...]]] = {}
     for item in poses:

@@ -23,7 +23,7 @@ class FigureDifference(msgspec.Struct, frozen=True):
 
     @property
     def change(self) -> float | None:
-        """Return second minus first, where both are known."""
+        """Return second minus first, None unless both are known."""
         return None if self.first is None or self.second is None else self.second - self.first
 
 
@@ -35,7 +35,7 @@ def differences(first: RunReport, second: RunReport) -> list[FigureDifference]:
 
 
 def labels(first: RunReport, second: RunReport) -> tuple[str, str]:
-    """Return what the two are called in a comparison: what is no flight says so."""
+    """Return the names of two runs in a comparison; one that is no flight is marked."""
     marks = [f" ({report.verdict})" if report.no_flight else "" for report in (first, second)]
     return f"first{marks[0]}", f"second{marks[1]}"
 

@@ -17,9 +17,9 @@ _FUSED = (Verdict.ACCEPTED, Verdict.INFLATED)
 
 
 class EdgeConsistency(msgspec.Struct, frozen=True):
-    """Of one observer and subject: NIS per degree of freedom and its two-sided bounds, and what became of the rest.
+    """Of one observer and subject: NIS per degree of freedom with two-sided bounds, and counts of other verdicts.
 
-    The bounds hold for independent innovations: errors that repeat widen the scatter of the mean.
+    The bounds hold for independent innovations; correlated errors widen the scatter of the mean.
     """
 
     observer: str
@@ -41,7 +41,7 @@ def bounds(dof: int) -> tuple[float, float]:
 
 
 def edges(data: RunData) -> list[EdgeConsistency]:
-    """Return each observer-subject pair that delivered anything, in order of names."""
+    """Return each observer-subject pair with observations, in order of names."""
     pairs: defaultdict[tuple[str, str], list[Innovation]] = defaultdict(list)
     for item in data.innovations:
         pairs[item.message.observer, item.message.subject].append(item.message)
@@ -74,7 +74,7 @@ def _edge(observer: str, subject: str, found: list[Innovation]) -> EdgeConsisten
 
 
 def _counts(innovation: Innovation) -> bool:
-    """Return whether its NIS speaks of the filter: outliers, which were fused inflated, are counted on their own."""
+    """Return whether its NIS counts; outliers, which were fused with inflated noise, are counted separately."""
     return innovation.nis is not None and innovation.verdict is Verdict.ACCEPTED
 
 

@@ -1,4 +1,4 @@
-"""What a run must reach to pass: the usual limits, which stand here alone, or those that its scenario expects."""
+"""Criteria of a run: the usual limits, defined only here, or those that its scenario expects."""
 
 from collections.abc import Iterator, Mapping
 
@@ -26,9 +26,9 @@ Value = float | bool | None
 
 
 class Criterion(msgspec.Struct, frozen=True, omit_defaults=True):
-    """One requirement: value relation limit. A value of None was not measured, and fails.
+    """One requirement: value, relation, limit. A value of None was not measured, and fails.
 
-    why: what it failed by; by: who asks for this limit, "" for the usual one.
+    why: cause of its failure; by: source of the limit, "" for the usual one.
     """
 
     name: str
@@ -61,7 +61,7 @@ def criteria_of(figures: RunFigures, field: ResolvedField, facts: RunFacts) -> l
 
 
 def is_valid(figures: RunFigures) -> bool:
-    """Return whether the simulator kept real time, so that the figures mean anything."""
+    """Return whether the simulator kept real time: else the figures mean nothing."""
     return figures.sim_overrun_percent is None or figures.sim_overrun_percent <= MAX_SIM_OVERRUN_PERCENT
 
 
@@ -77,9 +77,9 @@ def _against_truth(figures: RunFigures, field: ResolvedField, expected: Expectat
 
 
 def _of_the_target(figures: RunFigures, expected: Expectation) -> Iterator[Criterion]:
-    """Judge the errors of the worst target, from when it was found where a search for it is expected.
+    """Judge the errors of the worst target; if a search for it is expected, from the time when it was found.
 
-    Where a search or a loss is expected and no error with it, that of the time without losses is judged.
+    If a search or a loss is expected, but no error, the error of the time without losses is judged.
     """
     rmse_m, lost_s, kept_m = figures.target_rmse_m, figures.target_lost_s, None
     found = [one for one in figures.found.values() if one is not None]
@@ -101,7 +101,7 @@ def _of_the_target(figures: RunFigures, expected: Expectation) -> Iterator[Crite
 
 
 def _whose(figures: RunFigures, of_targets: Mapping[str, float]) -> str:
-    """Return which target is the worst by a figure, where there are several, and whether it was never found."""
+    """Return the name of the worst target by a figure, if there are several, and whether it was never found."""
     worst = max(of_targets, key=lambda name: of_targets[name], default="")
     never = "never found" if worst and figures.targets[worst].covered == 0.0 else ""
     return ": ".join(part for part in (worst if len(of_targets) > 1 else "", never) if part)
@@ -112,7 +112,7 @@ def _landed(figures: RunFigures) -> Criterion:
 
 
 def _of_the_demo(figures: RunFigures, facts: RunFacts) -> Iterator[Criterion]:
-    """Its path leaves the ceiling camera's view at both ends, so that both topologies must occur, once it was there.
+    """Judge the demo's topologies: the path leaves the ceiling camera's view at both ends, so both must occur.
 
     Reason: docs/decisions/0046-topologies-judged-in-the-demo-only.md.
     """
@@ -131,7 +131,7 @@ def _promises(figures: RunFigures, facts: RunFacts) -> Iterator[Criterion]:
 
 
 def _of_failsafes(figures: RunFigures, expected: Expectation) -> Criterion:
-    """A flight that a failsafe ended may be a good test of the failsafe; unless it was expected, it is no good one."""
+    """A flight that a failsafe ended may be a good test of it; unless that was expected, the flight fails."""
     found, most, why = figures.failsafe_landings, expected.landings, "; ".join(figures.failsafe_landings)
     if most:
         ok = len(found) <= most
@@ -142,7 +142,7 @@ def _of_failsafes(figures: RunFigures, expected: Expectation) -> Criterion:
 def _expected(
     name: str, value: float | None, usual: float, expected: float | None, by: str, why: str = ""
 ) -> Criterion:
-    """Judge by the larger one of the usual limit and what is expected: never stricter than without a scenario."""
+    """Judge by the larger of the usual and the expected limit: never stricter than without a scenario."""
     limit = usual if expected is None else max(usual, expected)
     ok = value is not None and value <= limit
     return Criterion(name, value, "<=", limit, ok, "" if ok else why, by if limit > usual else "")

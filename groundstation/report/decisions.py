@@ -11,7 +11,7 @@ _EPISODE_GAP_S = 0.5
 
 
 class Intervention(msgspec.Struct, frozen=True):
-    """Safety changed one robot's velocity for one reason: episodes, plans concerned, the longest one, the most cut."""
+    """Interventions of safety in one robot's velocity for one reason: episodes, plans, longest episode, largest cut."""
 
     robot: str
     cause: str
@@ -28,7 +28,7 @@ def switches(data: RunData) -> list[Switch]:
 
 
 def interventions(data: RunData) -> list[Intervention]:
-    """Return what safety cut, by robot and cause, the most frequent first."""
+    """Return the interventions by robot and cause, the most frequent first."""
     times: dict[tuple[str, str], list[float]] = {}
     cuts: dict[tuple[str, str], float] = {}
     for plan in data.plans:
@@ -48,7 +48,7 @@ def interventions(data: RunData) -> list[Intervention]:
 
 
 def _episodes(times: list[float]) -> tuple[int, int, float]:
-    """Return how many episodes (split by gaps of half a second), how many plans, and the longest episode [s]."""
+    """Return the numbers of episodes (split by gaps of half a second) and of plans, and the longest episode [s]."""
     starts = [times[0]]
     longest = 0.0
     for before, now in pairwise(times):

@@ -1,4 +1,4 @@
-"""What the scenario of a simulated flight expects of it, as its file said when it was flown."""
+"""Expectations of a simulated flight's scenario, by its file at the time of the flight."""
 
 from typing import Annotated, Any
 
@@ -10,7 +10,7 @@ _Bound = Annotated[float, msgspec.Meta(ge=0.0)] | None
 
 
 class Expectation(msgspec.Struct, frozen=True):
-    """Bounds on a flight, each None where any will do: see `expected` of scenario files. by: what says so, in words."""
+    """Bounds on a flight, None for no bound: see `expected` of scenario files. by: their source, in words."""
 
     rmse_m: _Bound = None
     lost_s: _Bound = None
@@ -23,7 +23,7 @@ NOTHING_SPECIAL = Expectation()
 
 
 def expectation_of(facts: RunFacts) -> tuple[Expectation, str]:
-    """Return what is expected of a run, and why that could not be read, "" where it could or nothing was recorded."""
+    """Return a run's expectations, and why they could not be read; "" if they could or none were recorded."""
     if facts.expected is None:
         return NOTHING_SPECIAL, ""
     by = f"scenario {facts.scenario}" if facts.scenario else "its scenario"

@@ -1,4 +1,4 @@
-"""Everything a report finds beyond the figures: consistency, decisions, interventions, links, failsafes, doubts."""
+"""The findings of a report beyond its figures: consistency, decisions, interventions, links, failsafes, doubts."""
 
 import msgspec
 
@@ -12,7 +12,7 @@ from groundstation.sensing.switches import Switch
 
 
 class Findings(msgspec.Struct, frozen=True):
-    """Lists for people and programs to read; each type says what it holds."""
+    """Lists of findings, for people and programs; their types explain them."""
 
     edges: list[EdgeConsistency]
     switches: list[Switch]

@@ -60,7 +60,7 @@ class _Rows:
         self._data = data
         self._truth: defaultdict[str, list[tuple[float, ...]]] = defaultdict(list)
         self._estimates: defaultdict[str, list[tuple[float, m.EntityEstimate]]] = defaultdict(list)
-        # By who says it: the supervisor speaks for a process that is not there, or never speaks.
+        # By sender: the supervisor reports for a process that is absent, or never reports itself.
         self._processes: defaultdict[str, defaultdict[str, list[tuple[float, ...]]]]
         self._processes = defaultdict(lambda: defaultdict(list))
         self._heard: defaultdict[str, list[int]] = defaultdict(list)
@@ -68,7 +68,7 @@ class _Rows:
         self._captured: list[TimedMessage[m.BodyPoses]] = []
 
     def take(self, recording: Recording) -> None:
-        """Sort a recording's records into rows. Of telemetry it counts when it was measured: that needs no decoding."""
+        """Sort a recording's records into rows. Of telemetry only the time counts, which needs no decoding."""
         data = self._data
         for raw in recording.raw_records(among((*_WANTED, t.ODOMETRY))):
             if raw.key.topic is t.ODOMETRY:
@@ -132,7 +132,7 @@ class _Rows:
         for name, entries in self._estimates.items():
             data.estimates[name] = _estimate_track(entries)
         for name, said in self._processes.items():
-            # Never both: what the supervisor says of an absent one (no pid yet, no ticks, no CPU) is no figure of it.
+            # Never both: the supervisor's status of an absent process (no pid, ticks or CPU) is no figure of it.
             table = np.array(sorted(said.get(name) or (row for rows in said.values() for row in rows)))
             data.processes[name] = ProcessTrack(table[:, 0], table[:, 1], table[:, 2:])
         for name, times_ns in self._heard.items():

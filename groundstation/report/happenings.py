@@ -1,4 +1,4 @@
-"""What was broken and what reacted: faults of the scenario and rows of the table of failsafes, by time; pure."""
+"""Faults of the scenario and reactions of failsafes (rows of their table), by time; pure."""
 
 from collections.abc import Iterator
 
@@ -13,9 +13,9 @@ UNEXPLAINED = "unordered"
 
 
 class Happening(msgspec.Struct, frozen=True):
-    """One line of what happened to an entity.
+    """One fault of an entity, or one reaction to it.
 
-    cause: the condition of the table of failsafes, "fault" for what a scenario broke, "unordered" for a drone that came
+    cause: the condition of the table of failsafes, "fault" for one of the scenario, "unordered" for a drone that came
     down without an order and without its driver; text: in words.
     """
 
@@ -40,7 +40,7 @@ def happenings(data: RunData) -> list[Happening]:
 
 
 def landings(found: list[Happening]) -> list[Happening]:
-    """Return what ended a flight though nobody ordered it, the first of each drone."""
+    """Return the first landing of each drone that nobody ordered."""
     first: dict[str, Happening] = {}
     for item in found:
         if item.ended_flight:
@@ -64,7 +64,7 @@ def _faults(data: RunData) -> Iterator[Happening]:
 
 
 def _reactions(data: RunData, drone: str) -> Iterator[Happening]:
-    """Yield each entry into a mode by a failsafe, and each end of a flight that nobody explains."""
+    """Yield each entry into a mode by a failsafe, and each unexplained end of a flight."""
     before, up_since_s, explained = ("", ""), None, False
     for item in sorted(data.vehicles[drone], key=lambda item: item.time_s):
         status, now = item.message, (item.message.mode, item.message.failsafe)

@@ -1,4 +1,4 @@
-"""The judgement of a run: its figures against the criteria, and what else was found."""
+"""The judgement of a run: its figures against the criteria, and its findings."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -43,24 +43,24 @@ class RunReport:
 
     @property
     def no_flight(self) -> Rerun | Stretch | None:
-        """Return what it is where it is no whole flight, so that there is nothing to judge."""
+        """Return the run that it repeats or the part that it is, if it is no whole flight; else None."""
         return self.rerun or self.stretch
 
     @property
     def name(self) -> str:
-        """Return what the run is called: the name of its folder."""
+        """Return the name of the run: that of its folder."""
         return shown(self.run_dir.resolve().name)
 
     @property
     def passed(self) -> bool | None:
-        """Whether it was what it should be: valid, recorded until the landing, all criteria met; None for no flight."""
+        """Whether it is valid, recorded until the landing, and meets all criteria; None for no flight."""
         if self.no_flight is not None:
             return None
         return self.valid and self.recorded_s is None and all(criterion.ok for criterion in self.criteria)
 
     @property
     def reasons(self) -> tuple[str, ...]:
-        """Return why it did not pass, in words; nothing where it did, or where there is nothing to judge."""
+        """Return the reasons for its failure, in words; empty if it passed or there is nothing to judge."""
         if self.passed is not False:
             return ()
         if not self.valid:
@@ -74,13 +74,13 @@ class RunReport:
 
     @property
     def verdict(self) -> str:
-        """Return passed, failed or invalid; re-run, what-if or cut where there is nothing to judge."""
+        """Return passed, failed or invalid; re-run, what-if or cut if there is nothing to judge."""
         if self.no_flight is not None:
             return self.no_flight.kind
         return "passed" if self.passed else "failed" if self.valid else "invalid"
 
     def as_json(self) -> bytes:
-        """Return report.json: the figures at the top level, beside verdict, criteria and findings."""
+        """Return the content of report.json: figures at the top level, beside verdict, criteria and findings."""
         content: dict[str, Any] = {
             "schema_version": SCHEMA_VERSION,
             "passed": self.passed,
@@ -120,7 +120,7 @@ def judge(data: RunData, run_dir: Path) -> RunReport:
 
 
 def _broken_off(data: RunData) -> str:
-    """Return the failure that the run said it ended with."""
+    """Return the failure that ended the run, as it reported it."""
     events = [timed.message for timed in data.events]
     failures = [one.text for one in events if one.header.entity == RUN and one.severity is Severity.ERROR]
     return next((text.removeprefix(RUN_ENDED) for text in failures if text.startswith(RUN_ENDED)), "")

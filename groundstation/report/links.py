@@ -1,4 +1,4 @@
-"""How the links held: per vehicle, rates of telemetry, its longest gap, link quality, battery, refused datagrams."""
+"""Quality of the links: rates of telemetry, longest gap, link quality, battery, refused datagrams of each vehicle."""
 
 import msgspec
 import numpy as np
@@ -7,9 +7,9 @@ from groundstation.report.tracks import RunData
 
 
 class VehicleLink(msgspec.Struct, frozen=True):
-    """Of one vehicle over the whole run; None where it never said so. battery: first and last value, 0..1.
+    """Link of one vehicle over the whole run; None: never reported. battery: first and last value, 0..1.
 
-    longest_silence_s: the longest time between two measurements that it sent (its driver speaks all the while).
+    longest_silence_s: longest time between two of its measurements (its driver sends status all the while).
     """
 
     vehicle: str

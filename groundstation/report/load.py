@@ -18,7 +18,7 @@ def cpu_cores(data: RunData) -> dict[str, float]:
     first = min(float(track.time_s[0]) for track in data.processes.values())
     last = max(float(track.time_s[-1]) for track in data.processes.values())
     span = max(last - first, 1e-9)
-    # Each status covers the time since the one before.
+    # Each status covers the time since the previous one.
     return {
         name: float(np.sum(track.cpu[1:] * np.diff(track.time_s)) / span)
         for name, track in sorted(data.processes.items())
@@ -26,7 +26,7 @@ def cpu_cores(data: RunData) -> dict[str, float]:
 
 
 def _rise(counters: Array, column: int) -> float:
-    """Return how much a counter rose, across restarts (where it begins at zero again)."""
+    """Return the total rise of a counter, which begins at zero again at restarts."""
     if len(counters) == 0:
         return 0.0
     values, pids = counters[:, column], counters[:, _PID]
@@ -35,7 +35,7 @@ def _rise(counters: Array, column: int) -> float:
 
 
 def tracker_deadlines(data: RunData) -> tuple[int, int, float | None]:
-    """Return ticks, missed deadlines, and the tick rate [Hz] while it ticked (None if it never did)."""
+    """Return the tracker's ticks, missed deadlines, and tick rate [Hz] while it ticked (None if it never did)."""
     track = data.processes.get(TRACKER)
     if track is None:
         return 0, 0, None
@@ -58,7 +58,7 @@ def overflowed(data: RunData) -> dict[str, int]:
 
 
 def sim_overrun_percent(data: RunData) -> float | None:
-    """Return late ticks of the simulator in percent, or late pictures if that is more; None where there was none."""
+    """Return late ticks of the simulator in percent, or late pictures if that is more; None without a simulator."""
     if data.sim_counters is None:
         return None
     ticks, overruns, pictures, late = data.sim_counters[-1]

@@ -15,10 +15,10 @@ from groundstation.report.tracks import RunData
 
 
 class RunFigures(msgspec.Struct, frozen=True, kw_only=True):
-    """What report.json says of a run; None where there was nothing to measure.
+    """The figures of report.json; None where there was nothing to measure.
 
     target_*: of several targets, those of the worst; target: all figures of the one with the largest error; found: of
-    each target from when it was found, None where it never was.
+    each target from when it was found, None if it never was.
     failsafe_landings: which drones a failsafe landed or cut, when and why. truth: what the errors are measured against,
     a motion capture system of the field or the simulator, "" for nothing.
     """
@@ -63,7 +63,7 @@ def figures_of(data: RunData) -> RunFigures:
     start, end = interval or (0.0, 0.0)
     targets, robots = _accuracies(data, interval)
     target = max(targets.values(), key=lambda one: one.rmse_m, default=None)
-    planner = None if data.rerun else load.planner_ms(data)  # a re-run's plans wait for no clock
+    planner = None if data.rerun else load.planner_ms(data)  # a re-run's plans have no real time
     ticks, missed, rate = load.tracker_deadlines(data)
     cores = load.cpu_cores(data)
     return RunFigures(
@@ -143,7 +143,7 @@ def _mean_nis(data: RunData) -> dict[str, float]:
 
 
 def _loud(data: RunData) -> list[str]:
-    # What a scenario breaks stands among the happenings.
+    # Faults of the scenario are among the happenings.
     loud = [e for e in data.events if e.message.severity is not Severity.INFO and not e.message.injected]
     return [
         f"{event.time_s:.1f} s {event.message.severity} {event.message.header.entity}: {event.message.text}"

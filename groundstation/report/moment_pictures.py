@@ -1,4 +1,4 @@
-"""What a camera saw when something happened: pictures for the gravest moments of the story."""
+"""Pictures of cameras for the gravest moments of a run's story."""
 
 import base64
 from collections.abc import Mapping, Sequence
@@ -31,7 +31,7 @@ class MomentPicture:
 
 
 def moment_pictures(run_dir: Path, data: RunData, moments: Sequence[Moment]) -> list[MomentPicture]:
-    """Return pictures of at most eight moments, in order of time; none where the run has no pictures."""
+    """Return pictures of at most eight moments, in order of time; none if the run has no pictures."""
     try:
         run = open_run(run_dir)
     except (RecordingError, OSError):
@@ -42,7 +42,7 @@ def moment_pictures(run_dir: Path, data: RunData, moments: Sequence[Moment]) -> 
     for moment in shown:
         picture = _picture(run, data, moment) if len(found) < _MOST else None
         if picture is not None:
-            found.setdefault(picture.uri, picture)  # one picture tells of several things at once
+            found.setdefault(picture.uri, picture)  # one picture may show several moments
     return sorted(found.values(), key=lambda picture: picture.moment.time_s)
 
 
@@ -61,7 +61,7 @@ def _picture(run: RecordedRun, data: RunData, moment: Moment) -> MomentPicture |
 
 
 def _rank(key: Key, data: RunData, moment: Moment) -> tuple[bool, bool, str]:
-    """Put a camera that is named in the moment first, then those that see the room."""
+    """Rank a camera that the moment names first, then world-fixed ones."""
     fixed: Mapping[str, object] = data.resolved.cameras
     return key.entity not in moment.text, key.entity not in fixed, key.entity
 

@@ -1,4 +1,4 @@
-"""trajectories.png: the room from above, and under it what happened over time. Imports matplotlib; import it late."""
+"""trajectories.png: the room from above, and below it curves over time. Imports matplotlib; import it late."""
 
 from pathlib import Path
 
@@ -21,7 +21,7 @@ from groundstation.report.wording import KIND_WORDS
 
 _SIZE_IN = (11.4, 13.0)
 _DPI = 110
-# Of the width of the axes, for one letter of a topology.
+# Share of the axes' width for one letter of a topology.
 _LETTER_SHARE = 0.007
 
 

@@ -1,4 +1,4 @@
-"""The room from above, to scale: fence, what the ceiling camera sees, truth, estimates with 95 % ellipses."""
+"""The room from above, to scale: fence, the ceiling camera's view, truth, estimates with 95 % ellipses."""
 
 import math
 
@@ -67,7 +67,7 @@ def _draw_room(axes: Axes, data: RunData) -> None:
 
 
 def _footprint_half_m(camera: WorldCamera, height_m: float) -> tuple[float, float]:
-    """Return half the width and depth of what a camera sees at a height [m along world x, y]."""
+    """Return half the width and depth of a camera's view at a height [m along world x, y]."""
     below, lens = max(0.0, camera.position_m[2] - height_m), camera.calibration
     return below * lens.width_px / (2 * lens.fx_px), below * lens.height_px / (2 * lens.fy_px)
 
@@ -77,7 +77,7 @@ def _draw_entity(axes: Axes, data: RunData, name: str, start: float, end: float)
     truth, estimate = data.truth.get(name), data.estimates.get(name)
     if truth is not None:
         stretches = [truth.position_m[part, :2] for part in truth.stretches(start, end) if len(part)]
-        for path in stretches:  # where it was in between nobody knows
+        for path in stretches:  # in between its place is unknown
             axes.plot(path[:, 0], path[:, 1], color=color, lw=1.8, zorder=4, solid_capstyle="round")
         if stretches:
             axes.plot(*stretches[0][0], "o", ms=7, mfc="white", mec=color, mew=1.8, zorder=6)
@@ -119,7 +119,7 @@ def _legend(data: RunData) -> list[Line2D | Patch]:
 
 
 def _world_view(data: RunData) -> str:
-    """Return what the dotted boxes show."""
+    """Return the legend of the dotted boxes."""
     cameras = ["ceiling view\nat slot heights"] if data.resolved.cameras else []
     systems = {"motion capture": data.resolved.motion_capture, "ranging": data.resolved.ranging}
     return "\n".join([*cameras, *(name for name, given in systems.items() if given)])

@@ -1,4 +1,4 @@
-"""Searches from above: where the target was believed to be, where it was, and where the drones looked from."""
+"""Maps of searches: believed places of the target, its true place, and the places of the drones."""
 
 import numpy as np
 from matplotlib.axes import Axes

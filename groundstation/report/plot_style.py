@@ -1,4 +1,4 @@
-"""The look of all plots and charts; who has which colour is said in `groundstation.appearance`."""
+"""The style of all plots and charts; colours of robots and targets are those of `groundstation.appearance`."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ from groundstation.report.tracks import RunData
 INK = "#1b2733"
 MUTED = "#8795a1"
 MUTED_CURVE = Colour(MUTED, MUTED)
-# Lines that stand for no robot and no target, such as runs and processes.
+# Lines of neither robots nor targets, such as runs and processes.
 SERIES_COLORS = ROBOT_COLOURS
 KIND_COLORS = {"flat": "#56a3d9", "string": "#e08a1e", "other": "#aab4bd"}
 

@@ -9,12 +9,12 @@ NAME = "run.json"
 
 
 class RunFacts(msgspec.Struct, frozen=True, omit_defaults=True):
-    """How a run was asked for.
+    """The command that started a run.
 
     mode: demo, sitl or fly; command_unix_ns: when the operator gave the command (0 = unknown); tracking_s: time of
-    tracking asked for; kernels_lacked: whether they had to be compiled first, once per version; real: what of a
-    simulated run was not emulated; command: what was typed, without passwords; expected: what the scenario's file said
-    of it, as it stood there (`report/expectation.py` reads it).
+    ordered tracking; kernels_lacked: whether they had to be compiled first, once per version; real: real parts of a
+    simulated run; command: as typed, without passwords; expected: the section of the scenario's
+    file, verbatim (`report/expectation.py` reads it).
     """
 
     mode: str = ""
@@ -35,7 +35,7 @@ def write(run_dir: Path, facts: RunFacts) -> None:
 
 
 def read(run_dir: Path) -> RunFacts:
-    """Return the facts of a run, or empty ones when there are none that can be read."""
+    """Return the facts of a run, or empty ones if there are none that can be read."""
     try:
         return msgspec.json.decode((run_dir / NAME).read_bytes(), type=RunFacts)
     except (OSError, msgspec.DecodeError):

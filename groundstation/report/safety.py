@@ -1,4 +1,4 @@
-"""What the drones really did: fence, separation, landing, time to get airborne. From the truth, where there is one."""
+"""Figures of the drones' safety: fence, separation, landing, time to get airborne; from the truth, if there is one."""
 
 from itertools import combinations
 
@@ -13,7 +13,7 @@ _TOUCH_M = 1e-3
 
 
 def fence_violation_m(track: TruthTrack, fence: Fence) -> float:
-    """Return how far outside the fence a body got while it flew [m]; 0 if never (by 1 mm)."""
+    """Return the largest distance outside the fence of a flying body [m]; 0 if below 1 mm."""
     position = track.position_m[~track.on_ground]
     if len(position) == 0:
         return 0.0
@@ -48,8 +48,8 @@ def _closest(first: TruthTrack, second: TruthTrack) -> float | None:
 def landed(data: RunData) -> bool | None:
     """Return whether every drone stood on the ground at the end.
 
-    Without a simulator: by what those said last that flew, as motion capture may have lost sight of one long before;
-    None where nobody did, and where the recording breaks off while somebody flies.
+    Without a simulator: by the last reports of those that flew, since motion capture may have lost one long before;
+    None if none flew, or if the recording breaks off while one flies.
     """
     down = _down_at_last(data)
     return None if down is False and data.breaks_off else down
@@ -65,7 +65,7 @@ def _down_at_last(data: RunData) -> bool | None:
 
 
 def _said_down(data: RunData, name: str) -> bool | None:
-    """Return whether the last that a drone said of its flight was that it stands; None where it never flew."""
+    """Return whether a drone's last report was that it stands; None if it never flew."""
     reported = sorted(data.vehicles[name], key=lambda item: item.time_s)
     states = [item.message.flight_state for item in reported if item.message.flight_state not in UNHEARD]
     return None if STANDING.issuperset(states) else states[-1] in STANDING

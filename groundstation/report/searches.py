@@ -1,4 +1,4 @@
-"""Searches for a lost target: when each began and ended, and where the target was believed to be meanwhile."""
+"""Searches for a lost target: begin and end of each, and maps of the target's believed place."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -24,7 +24,7 @@ class Moment(msgspec.Struct, frozen=True):
 
 
 def story(data: RunData) -> list[Moment]:
-    """Return the moments of a run in order of time; what is said again of the same thing within it stands once."""
+    """Return the moments of a run in order of time; repetitions of the same event are left out."""
     found = [*_orders(data), *_flights(data), *_tracking(data), *_topologies(data), *_reactions(data), *_warnings(data)]
     kept: dict[tuple[str, str], Moment] = {}
     for moment in sorted(found, key=lambda item: item.time_s):

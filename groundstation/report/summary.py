@@ -1,4 +1,4 @@
-"""The report as it is printed at the end of a run."""
+"""The report as printed at the end of a run."""
 
 from rich.console import Group, JustifyMethod, RenderableType
 from rich.table import Table
@@ -15,12 +15,12 @@ from groundstation.report.wording import KIND_WORDS, bound, quantity, title
 
 _HAPPENINGS_SHOWN = 12
 _DOUBTS_SHOWN = 3
-# Healthy flights come to 0.4 to 2.9.
+# Healthy flights have 0.4 to 2.9.
 _FAR_TOO_SURE = 4.0
 
 
 def summary(report: RunReport) -> RenderableType:
-    """Return verdict, criteria and what else matters, for rich to print."""
+    """Return verdict, criteria and main findings, for rich to print."""
     parts: list[RenderableType] = [_verdict(report)]
     if report.criteria:
         parts.append(_criteria(report.criteria))
@@ -101,7 +101,7 @@ def _details(report: RunReport) -> Text:
 
 
 def _happenings(found: list[Happening]) -> list[RenderableType]:
-    """Return the first of what was broken and what reacted, and how many more there are."""
+    """Return the first faults and reactions, and the number of further ones."""
     lines: list[RenderableType] = [
         Text(f"  {item.line}", style="red" if item.ended_flight else "yellow") for item in found[:_HAPPENINGS_SHOWN]
     ]

@@ -54,7 +54,7 @@ def topology_seconds(data: RunData, start_s: float, end_s: float) -> dict[str, f
 
 
 def switches(data: RunData, start_s: float, end_s: float) -> int:
-    """Return how often the topology of the same robots changed; a robot that comes or goes is no switch."""
+    """Return the number of changes of the same robots' topology; a robot that comes or goes is no switch."""
     texts = [text for _, _, text in segments(data, start_s, end_s)]
     return sum(before != after and _robots(before) == _robots(after) for before, after in pairwise(texts))
 

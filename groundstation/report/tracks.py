@@ -34,10 +34,10 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class TruthTrack:
-    """Where a body really was: time (n), position (n, 3), yaw (n), on_ground (n).
+    """True path of a body: time (n), position (n, 3), yaw (n), on_ground (n).
 
-    max_gap_s: nobody knows where it was between two samples that are farther apart, nor before the first and after the
-    last; inf: of a simulator, which always knows. on_ground of any other truth is what the drone itself said.
+    max_gap_s: between two samples that are farther apart its place is unknown, as before the first and after the last;
+    inf: of a simulator, which always knows it. on_ground of any other truth is the drone's own report.
     """
 
     time_s: Array
@@ -48,11 +48,11 @@ class TruthTrack:
 
     @property
     def is_simulated(self) -> bool:
-        """Return whether a simulator tells it, which knows all of it."""
+        """Return whether it is a simulator's, and so without gaps."""
         return math.isinf(self.max_gap_s)
 
     def known_at(self, time_s: Array) -> BoolArray:
-        """Return at which times it is known (m)."""
+        """Return for each time whether the place is known (m)."""
         if self.is_simulated:
             return np.ones(len(time_s), dtype=bool)
         after = np.searchsorted(self.time_s, time_s, side="left")
@@ -64,21 +64,21 @@ class TruthTrack:
         return known
 
     def stretches(self, start_s: float, end_s: float) -> list[NDArray[np.int64]]:
-        """Return the indices of the samples between two times, by stretches without a gap."""
+        """Return the indices of the samples between two times, as stretches without gaps."""
         inside = np.flatnonzero((self.time_s >= start_s) & (self.time_s <= end_s))
         return np.split(inside, np.flatnonzero(np.diff(self.time_s[inside]) > self.max_gap_s) + 1)
 
     def position_at(self, time_s: Array) -> Array:
-        """Return interpolated positions (m, 3); NaN where it is not known, a simulator's are held at both ends."""
+        """Return interpolated positions (m, 3); NaN where unknown, a simulator's are held at both ends."""
         columns = [np.interp(time_s, self.time_s, self.position_m[:, axis]) for axis in range(3)]
         return np.where(self.known_at(time_s)[:, None], np.column_stack(columns), np.nan)
 
     def yaw_at(self, time_s: Array) -> Array:
-        """Return interpolated yaw (m), unwrapped; NaN where it is not known."""
+        """Return interpolated yaw (m), unwrapped; NaN where unknown."""
         return np.where(self.known_at(time_s), np.interp(time_s, self.time_s, np.unwrap(self.yaw_rad)), np.nan)
 
     def airborne_at(self, time_s: Array) -> BoolArray:
-        """Return whether the body flew (m); False outside the track, and where it is not known."""
+        """Return whether the body flew (m); False outside the track and where unknown."""
         index = np.searchsorted(self.time_s, time_s, side="right") - 1
         inside = (index >= 0) & (time_s <= self.time_s[-1] + 0.5)
         flying: BoolArray = inside & ~self.on_ground[np.clip(index, 0, len(self.time_s) - 1)]
@@ -87,7 +87,7 @@ class TruthTrack:
 
 @dataclass(frozen=True, slots=True)
 class EstimateTrack:
-    """What was believed of an entity: time (n), mean (n, k), covariance (n, k, k)."""
+    """Estimates of an entity: time (n), mean (n, k), covariance (n, k, k)."""
 
     kind: str
     time_s: Array
@@ -95,7 +95,7 @@ class EstimateTrack:
     covariance: Array
 
     def latest_at(self, time_s: Array, stale_s: float) -> NDArray[np.int64]:
-        """Return the index (m) of the newest estimate at each time, -1 where there is none younger than stale_s."""
+        """Return the index (m) of the newest estimate at each time, -1 if there is none younger than stale_s."""
         index = np.searchsorted(self.time_s, time_s, side="right") - 1
         age = time_s - self.time_s[np.clip(index, 0, None)]
         return np.where((index >= 0) & (age <= stale_s), index, -1).astype(np.int64)
@@ -103,7 +103,7 @@ class EstimateTrack:
 
 @dataclass(frozen=True, slots=True)
 class TimedMessage(Generic[T]):
-    """A message and when it was."""
+    """A message and its time [s]."""
 
     time_s: float
     message: T
@@ -133,10 +133,10 @@ UNKNOWN_FIELD = ResolvedField(
 
 @dataclass(slots=True)
 class RunData:
-    """Everything the report looks at. `start_unix_ns` is the time of the first message, `end_s` of the last.
+    """The input of the report. `start_unix_ns` is the time of the first message, `end_s` of the last.
 
     belief: the last one. suspicions: at least one for each verdict of the diagnosis. rerun, stretch: what
-    it repeats or is a part of, where it is no whole flight. heard_s: when the telemetry of each vehicle was measured.
+    it repeats or is a part of, if it is no whole flight. heard_s: times of each vehicle's telemetry.
     """
 
     resolved: ResolvedField

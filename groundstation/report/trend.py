@@ -1,4 +1,4 @@
-"""Many runs of a folder beside each other, by time: what each reached, from its report.json."""
+"""The runs of a folder beside each other, by time, from their report.json."""
 
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ from groundstation.report.criteria import Criterion
 from groundstation.report.file_names import JSON_NAME
 from groundstation.report.run_facts import RunFacts
 
-# Figures that a lab watches from flight to flight, in the order of the page.
+# Figures to compare from flight to flight, in the order of the page.
 FIGURES = (
     "target_rmse_m",
     "target_lost_s",
@@ -24,7 +24,7 @@ FIGURES = (
 
 
 class JudgedRun(msgspec.Struct, frozen=True):
-    """A run with its verdict, its figures by name, and the criteria that it missed."""
+    """A run with its verdict, its figures by name, and its missed criteria."""
 
     name: str
     facts: RunFacts
@@ -43,7 +43,7 @@ class _Report(msgspec.Struct):
 
 
 def judged_runs(folder: Path) -> tuple[list[JudgedRun], list[str]]:
-    """Return the runs of a folder in order of their names, which begin with their times, and what cannot be read.
+    """Return the runs of a folder in order of their names, which begin with their times, and unreadable reports.
 
     Re-runs and cuts are left out: they are no flights.
     """

@@ -1,4 +1,4 @@
-"""Is a run to be trusted? Each sensor against its claims, each camera against its survey, plans against sightings."""
+"""Judges whether a run can be trusted, by its sensors' claims, its cameras' survey and its plans' sightings."""
 
 import math
 from collections import defaultdict
@@ -12,19 +12,19 @@ from groundstation.estimation.mean_interval import half_width
 from groundstation.report.interval import tracking_interval
 from groundstation.report.tracks import RunData, TimedMessage
 
-# Errors of a sensor repeat from picture to picture: what is two seconds apart counts as independent.
+# Errors of a sensor correlate from picture to picture: observations two seconds apart count as independent.
 _BLOCK_S, _LEAST_BLOCKS = 2.0, 4
 _TOO_SURE, _TOO_CAUTIOUS = 2.0, 0.4
 _REFUSED_PERCENT = 10.0
 _MOVED_SIGMAS = 3.0
 _LATE_MS, _LATE_SIGMAS = 20.0, 3.0
-# A plan counts on a link for so long at least, and sees what is younger than this.
+# Least time for which a plan counts on a link, and largest age of an observation of it.
 _PLANNED_S, _SEEN_S, _SEEN_PERCENT = 5.0, 0.5, 50.0
-# A plan lists all that its topology permits; it counts on what would tell a place to 0.1 m [1/m^2].
+# A plan lists all permitted edges; it counts on those that would tell a place to 0.1 m [1/m^2].
 _COUNTED_ON = 100.0
 _PLAN_LASTS_S = 1.0
 _TRACKER, _DIAGNOSIS = "tracker", "diagnosis"
-# By then the diagnosis has reached a verdict, unless it got no share of the processor.
+# By then the diagnosis has a verdict, unless it got no share of the processor.
 _JUDGED_BY_S = 30.0
 
 
@@ -44,7 +44,7 @@ class SensorTrust(msgspec.Struct, frozen=True):
 
 
 class SurveyShift(msgspec.Struct, frozen=True):
-    """By how much a fixed camera hangs elsewhere than the field file says, as the filter believes at the end.
+    """Difference of a fixed camera's mounting from the field file, by the filter's belief at the end.
 
     what: position or attitude; by, survey_std: [m] or [deg]; sigmas: by / survey_std of the worst axis.
     """
@@ -65,7 +65,7 @@ class DelayShift(msgspec.Struct, frozen=True):
 
 
 class LinkForecast(msgspec.Struct, frozen=True):
-    """For how long plans counted on a link [s], and in which share of that time it saw anything [%]."""
+    """Time for which plans counted on a link [s], and share of that time with observations [%]."""
 
     observer: str
     subject: str
@@ -84,7 +84,7 @@ class Trust(msgspec.Struct, frozen=True):
 
 
 def trust_of(data: RunData) -> Trust:
-    """Return what speaks for and against a run."""
+    """Return the evidence for and against a run."""
     belief = data.belief
     sensors, shifts = _sensors(data), [] if belief is None else list(_shifts(data, belief))
     delays = [] if belief is None else [DelayShift(one.sensor, one.offset_ms, one.std_ms) for one in belief.lateness]
@@ -170,7 +170,7 @@ def _link(observer: str, subject: str, found: list[tuple[float, bool]]) -> LinkF
 
 
 def _told(data: RunData) -> Iterator[str]:
-    """Yield what tracker and diagnosis warned of in flight and have a remedy for, once each."""
+    """Yield the warnings of tracker and diagnosis in flight that have a remedy, once each."""
     said: dict[str, str] = {}
     for item in data.events:
         event = item.message
@@ -180,7 +180,7 @@ def _told(data: RunData) -> Iterator[str]:
 
 
 def _unjudged(data: RunData) -> Iterator[str]:
-    """Yield that nobody looked for a wrong figure of the field, where one would have."""
+    """Yield a doubt if the diagnosis, which should have run, never judged the field's figures."""
     start_s, end_s = tracking_interval(data) or (0.0, 0.0)
     if _DIAGNOSIS in data.processes and end_s - start_s >= _JUDGED_BY_S and not data.suspicions:
         yield (

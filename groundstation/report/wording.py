@@ -1,11 +1,11 @@
-"""Figures and criteria of a run in words and units: terminal, page and comparison say the same."""
+"""Words and units of figures and criteria, shared by terminal, page and comparison."""
 
 from groundstation.appearance.topology import NOBODY, topology_words
 from groundstation.report.criteria import Criterion, Value
 from groundstation.report.topology_use import FLAT, NONE, OTHER, STRING
 
 _BOUNDS = {"<=": "at most", "<": "below", ">=": "at least", ">": "more than"}
-# Name of a figure in report.json: what it is called, and its unit.
+# Name of a figure in report.json: its title and its unit.
 _TITLES = {
     "target_rmse_m": ("target error (rms)", "m"),
     "target_lost_s": ("target lost", "s"),
@@ -37,7 +37,7 @@ _SECONDS_OF = "topology_seconds."
 
 
 def title(name: str) -> str:
-    """Return what a figure of report.json is called; its own name where it has no other."""
+    """Return the title of a figure of report.json; its name if it has no title."""
     topology = name.removeprefix(_SECONDS_OF)
     if topology != name:
         return f"time with {KIND_WORDS.get(topology) or topology_words(topology)}"
@@ -45,7 +45,7 @@ def title(name: str) -> str:
 
 
 def unit(name: str) -> str:
-    """Return the unit of a figure, "" where it has none."""
+    """Return the unit of a figure, "" if it has none."""
     return "s" if name.startswith(_SECONDS_OF) else _TITLES.get(name, (name, ""))[1]
 
 
@@ -59,12 +59,12 @@ def quantity(name: str, value: Value) -> str:
 
 
 def bound(criterion: Criterion) -> str:
-    """Return what a criterion asks for, and who does unless it always does: "at most 0.2 m", "0" or "yes"."""
+    """Return a criterion's limit in words ("at most 0.2 m", "0", "yes"), with its source if it is not the usual one."""
     limit = quantity(criterion.name, criterion.limit)
     return f"{_BOUNDS.get(criterion.relation, '')} {limit}{f' by {criterion.by}' if criterion.by else ''}".strip()
 
 
 def missed(criterion: Criterion) -> str:
-    """Return why a criterion was missed, in a sentence's part."""
+    """Return the reason for a missed criterion, as part of a sentence."""
     found = f"{title(criterion.name)} {quantity(criterion.name, criterion.value)}, asked for {bound(criterion)}"
     return f"{found} ({criterion.why})" if criterion.why else found

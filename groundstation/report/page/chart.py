@@ -1,4 +1,4 @@
-"""Charts over time as values: what the page draws, and nothing about how."""
+"""Charts over time as values, without their drawing."""
 
 from collections.abc import Sequence
 
@@ -12,7 +12,7 @@ _MOST_POINTS = 3000
 
 
 class Curve(msgspec.Struct, frozen=True):
-    """One line of a chart; `values` has a None where there is nothing to draw."""
+    """One line of a chart; `values` has None where nothing is drawn."""
 
     label: str
     color: Colour
@@ -21,7 +21,7 @@ class Curve(msgspec.Struct, frozen=True):
 
 
 class Span(msgspec.Struct, frozen=True):
-    """A coloured stretch of time behind the curves, or a mark where both ends are the same."""
+    """A coloured stretch of time behind the curves, or a mark if both ends are the same."""
 
     begin_s: float
     end_s: float
@@ -51,7 +51,7 @@ def thin(count: int) -> slice:
 
 
 def points(values: Array | Sequence[float], digits: int = 4) -> list[float | None]:
-    """Return values rounded for the page; what is not finite becomes None."""
+    """Return values rounded for the page; values that are not finite become None."""
     return [round(float(value), digits) if np.isfinite(value) else None for value in values]
 
 
@@ -61,7 +61,7 @@ def times(values: Array) -> list[float]:
 
 
 def held(time_s: Array, own_s: Sequence[float], values: Sequence[float], stale_s: float) -> Array:
-    """Return the newest of `values` (at times own_s) at each time; NaN where it is older than stale_s."""
+    """Return the newest of `values` (of times own_s) at each time; NaN if it is older than stale_s."""
     if not len(own_s):
         return np.full(len(time_s), np.nan)
     own, series = np.asarray(own_s, dtype=np.float64), np.asarray(values, dtype=np.float64)

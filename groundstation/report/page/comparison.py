@@ -43,7 +43,7 @@ def write_comparison(runs: tuple[tuple[RunData, RunReport], tuple[RunData, RunRe
 
 
 def _grids(runs: tuple[tuple[RunData, RunReport], ...]) -> tuple[Array, list[float]]:
-    """Return the common time axis [s since tracking began] and where it begins in each recording."""
+    """Return the common time axis [s since tracking began] and its begin in each recording."""
     spans = [tracking_interval(data) or (0.0, max(data.end_s, 1.0)) for data, _ in runs]
     grid = time_grid(0.0, max(end - start for start, end in spans))
     return grid[thin(len(grid))], [start for start, _ in spans]

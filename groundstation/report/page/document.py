@@ -1,4 +1,4 @@
-"""report.html: verdict, room, charts and tables of one run in one file that needs nothing else, not even a network."""
+"""report.html: verdict, room, charts and tables of one run in one file that needs no network."""
 
 import re
 from html import escape
@@ -53,7 +53,7 @@ def write_page(data: RunData, report: RunReport, path: Path) -> None:
 
 
 def page(title: str, lead: str, sections: list[tuple[str, str]], charts: list[Chart]) -> str:
-    """Return a whole page; `lead` and the sections are HTML, charts fill the holders that name their number."""
+    """Return a whole page; `lead` and the sections are HTML, each chart is drawn in the holder with its number."""
     # Inside a script element only this sequence can end it.
     data = msgspec.json.encode(charts).decode().replace("</", "<\\/")
     links = "".join(f'<a href="#s{index}">{escape(name)}</a>' for index, (name, _) in enumerate(sections))
@@ -70,7 +70,7 @@ def page(title: str, lead: str, sections: list[tuple[str, str]], charts: list[Ch
 
 
 def holders(charts: list[Chart], first: int) -> str:
-    """Return the places that charts number `first` and on are drawn in."""
+    """Return the HTML elements in which charts are drawn, numbered from `first` on."""
     return "".join(
         f"<figure><figcaption><b>{escape(chart.title)}</b> {escape(f'[{chart.unit}]' if chart.unit else '')} "
         f'<span class="dim">{escape(chart.note)}</span></figcaption>'
@@ -95,7 +95,7 @@ def _lead(report: RunReport) -> str:
 
 
 def _reasons(report: RunReport) -> str:
-    """Return why a run failed, in words, "" where it did not."""
+    """Return the reasons for a run's failure, in words, "" if it passed."""
     if report.no_flight or report.passed:
         return ""
     return "".join(f"<p>{escape(missed(one))}.</p>" for one in report.criteria if not one.ok)
@@ -113,7 +113,7 @@ def _pictures(pictures: list[MomentPicture]) -> str:
 
 
 def no_flight_note(report: RunReport) -> str:
-    """Return what marks a re-run or a cut as such, "" for a flight."""
+    """Return the note that marks a re-run or a cut, "" for a flight."""
     if report.no_flight is None:
         return ""
     return f'<p class="rerun"><b>{escape(report.name)}</b> is a {escape(report.no_flight.sentence)}.</p>'
@@ -127,7 +127,7 @@ def _room(data: RunData) -> str:
 
 
 def _searches(data: RunData) -> str:
-    """Return the maps of the longest searches, each with what it shows, "" without any."""
+    """Return the maps of the longest searches with their captions, "" without any."""
     if not data.search_maps:
         return ""
     found = searches(data.search_maps)
@@ -141,7 +141,7 @@ def _searches(data: RunData) -> str:
 
 
 def _damage(report: RunReport) -> str:
-    """Return what could not be read of the recording, "" where all could."""
+    """Return the parts of the recording that could not be read, "" if there are none."""
     lines = "".join(f"<li>{escape(line)}</li>" for line in report.damage)
     return f"<ul>{lines}</ul>" if lines else ""
 
@@ -154,7 +154,7 @@ def _svg(figure: Figure) -> str:
 
 
 def _without_styles(svg: str) -> str:
-    """Return a drawing whose styles are attributes: the console, which shows reports, permits no other inline style."""
+    """Return a drawing with attributes instead of inline styles, which the console forbids in reports."""
     svg = re.sub(r"<style[^>]*>.*?</style>", "", svg, flags=re.DOTALL)
     svg = svg.replace("<svg ", '<svg stroke-linejoin="round" stroke-linecap="butt" ', 1)  # as that style had it
     return re.sub(r' style="([^"]*)"', lambda found: _attributes(found[1]), svg)

@@ -1,4 +1,4 @@
-"""Charts of what was flown: errors against the truth, what the filter believed of them, topology, heights, speeds."""
+"""Charts of the flight: errors against the truth with the filter's deviations, topology, heights, speeds."""
 
 import numpy as np
 
@@ -61,7 +61,7 @@ def _beliefs(data: RunData, grid: Array) -> Chart:
 
 
 def semi_axis_m(estimate: EstimateTrack, grid: Array) -> Array:
-    """Return the larger semi-axis [m] of the 95 % ellipse in the plane at each time; NaN where there is no estimate."""
+    """Return the larger semi-axis [m] of the 95 % ellipse in the plane at each time; NaN without an estimate."""
     result = np.full(len(grid), np.nan)
     for row, index in enumerate(estimate.latest_at(grid, STALE_S)):
         if index >= 0:

@@ -1,4 +1,4 @@
-"""Charts of whether everything worked as it should: NIS, NEES, latency, telemetry, processor."""
+"""Charts of the system's health: NIS, NEES, latency, telemetry, processor."""
 
 from itertools import cycle
 

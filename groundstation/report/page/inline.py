@@ -1,4 +1,4 @@
-"""Style and script of a report: the same in each, so that the console can permit just these two, by their hashes."""
+"""Style and script of reports, always the same, so that the console can permit just these two by their hashes."""
 
 import base64
 import hashlib
@@ -19,5 +19,5 @@ def script() -> str:
 
 
 def source_of(content: str) -> str:
-    """Return what permits an inline element of this content in a content security policy."""
+    """Return the source expression that permits an inline element of this content in a content security policy."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()}'"

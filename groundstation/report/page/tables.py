@@ -30,7 +30,7 @@ def table(head: Sequence[str], rows: Iterable[Sequence[object]], empty: str) -> 
 
 
 def number(value: Value, digits: int = 3) -> str:
-    """Return a value as it is read: yes and no, a dash for what was not measured."""
+    """Return a value as text: yes and no, a dash if it was not measured."""
     if value is None:
         return "–"
     if isinstance(value, bool):
@@ -87,7 +87,7 @@ def switches_table(findings: Findings) -> str:
 
 
 def interventions_table(findings: Findings) -> str:
-    """Return what safety cut, by robot and cause."""
+    """Return the interventions of safety by robot and cause."""
     rows = [
         (item.robot, item.cause, item.episodes, item.plans, number(item.longest_s, 1), number(item.most_cut_m_s, 2))
         for item in findings.interventions
@@ -97,7 +97,7 @@ def interventions_table(findings: Findings) -> str:
 
 
 def happenings_table(findings: Findings) -> str:
-    """Return what a scenario broke and which failsafes reacted, beside each other in order of time."""
+    """Return faults of the scenario and reactions of failsafes, beside each other in order of time."""
     rows = [(f"{item.time_s:.1f}", item.entity, item.cause, item.text) for item in findings.happenings]
     return table(("time [s]", "about", "cause", "what"), rows, "No fault was injected, and no failsafe acted.")
 
@@ -109,7 +109,7 @@ def story_table(moments: Sequence[Moment]) -> str:
 
 
 def links_table(findings: Findings) -> str:
-    """Return how the links to the vehicles held."""
+    """Return the quality of the links to the vehicles."""
     rows = [
         (item.vehicle, number(item.rate_hz_p50, 1), number(item.rate_hz_min, 1), number(item.longest_silence_s, 2),
          number(item.link_quality_min, 2), _battery(item.battery),
@@ -160,7 +160,7 @@ def events_table(data: RunData) -> str:
 
 
 def _left_out(rows: Sequence[object]) -> str:
-    """Return how many rows of a long table are not shown, "" where all are."""
+    """Return the note on rows of a long table that are not shown, "" if all are."""
     more = len(rows) - _EVENTS_SHOWN
     return f'<p class="dim">{more} more are in the recording.</p>' if more > 0 else ""
 

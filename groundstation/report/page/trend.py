@@ -1,4 +1,4 @@
-"""trend.html: the figures of many runs, one after the other, and why those failed that did."""
+"""trend.html: the figures of many runs, one after the other, and the reasons of failures."""
 
 from collections.abc import Sequence
 from html import escape

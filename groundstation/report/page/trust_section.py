@@ -1,4 +1,4 @@
-"""The section of a run's page that says whether its figures can be believed."""
+"""The section of a run's page on the trustworthiness of its figures."""
 
 from html import escape
 
@@ -13,7 +13,7 @@ _NOTE = (
 
 
 def trust_section(trust: Trust) -> str:
-    """Return the doubts with their remedies, and the tables that they come from."""
+    """Return the doubts with their remedies, and the tables from which they follow."""
     if trust.doubts:
         verdict = "<ul>" + "".join(f"<li>{escape(doubt)}</li>" for doubt in trust.doubts) + "</ul>"
     else:

@@ -1,4 +1,4 @@
-"""How many samples of a key are let in by a process that only looks."""
+"""Rates at which a process that only shows samples takes them, by key."""
 
 from collections.abc import Iterable, Mapping
 

@@ -1,4 +1,4 @@
-"""How a program that only looks on leaves: at one Ctrl-C, whatever it is waiting for."""
+"""Ends a program that only observes a run at one Ctrl-C, even while it waits."""
 
 import os
 import signal

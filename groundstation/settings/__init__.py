@@ -1,1 +1,1 @@
-"""The field file: its model, how it is read, and which part of it each process is handed."""
+"""The field file: its model, its reading and checks, and the section that each process gets."""

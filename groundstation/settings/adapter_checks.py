@@ -11,7 +11,7 @@ from groundstation.vehicles import kind_named
 
 
 def findings_of_adapters(drones: Mapping[str, Drone]) -> Iterator[tuple[KeyPath, str]]:
-    """Return vehicles that cannot be told apart, and videos that would not be taken through their vehicle's adapter."""
+    """Return vehicles that cannot be distinguished, and videos that would not come through their vehicle's adapter."""
     for (first, one), (second, other) in combinations(drones.items(), 2):
         apart = one.interface and other.interface and one.interface != other.interface
         together = one.kind == other.kind and kind_named(one.kind).shares_address
@@ -27,7 +27,7 @@ def _video(name: str, drone: Drone) -> Iterator[tuple[KeyPath, str]]:
     source, path = parse_source(drone.camera.source), ("drones", name, "camera", "source")
     if source.host == drone.address and source.interface not in ("", drone.interface):
         yield path, f"must come through the vehicle's interface {drone.interface} (got {source.interface})"
-    # A library or a plug-in opens the connection, and would take any adapter: another vehicle's pictures.
+    # A library or a plug-in opens the connection, and may use another adapter: pictures of another vehicle.
     opened_elsewhere = source.kind in (SourceKind.RTSP, SourceKind.ROS2, SourceKind.PLUG_IN)
     if opened_elsewhere and urlsplit(drone.camera.source).hostname == drone.address:
         scheme = drone.camera.source.partition(":")[0]

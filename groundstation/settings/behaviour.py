@@ -62,7 +62,7 @@ def _known_planner(name: str) -> str:
 
 
 def _as_named_now(mode: object) -> object:
-    """Accept the name of older field files, which promised a proof that there is not in four degrees of freedom."""
+    """Accept the name of older field files, which promised a proof that does not exist in four degrees of freedom."""
     return "multistart" if mode == "certified" else mode
 
 

@@ -27,12 +27,12 @@ _LEAST_STD_M = 0.1
 _ABOVE_OBSTACLE_M = 0.3
 _LEAST_TILT_DEG = 5.0
 Caution = Callable[[Field], Iterator[Finding]]
-# Cosine of the angle between the optical axis and straight down from which on a camera looks at walls.
+# Cosine of the angle between the optical axis and straight down beyond which a camera looks at walls.
 _AT_WALLS = math.cos(math.radians(75.0))
 
 
 def cautions(field: Field) -> Iterator[Finding]:
-    """Yield everything about a sound field that somebody should think over."""
+    """Yield the warnings about a field without mistakes."""
     for check in ALL:
         yield from check(field)
 
@@ -148,7 +148,7 @@ _FOLDED = "folds the picture before its corners: no lens does that; calibrate it
 
 
 def _folds(lens: CalibrationSettings) -> bool:
-    """Return whether the distorted radius falls anywhere out to half the way from the middle to a corner, or beyond."""
+    """Return whether the distorted radius decreases anywhere up to nine tenths of the way to a corner."""
     corner = math.hypot(lens.width_px / (2 * lens.fx_px), lens.height_px / (2 * lens.fy_px))
     r2 = np.linspace(0.0, 0.9 * corner, 40) ** 2
     k1, k2, _, _, k3 = lens.distortion

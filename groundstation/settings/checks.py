@@ -17,7 +17,7 @@ from groundstation.vehicles import kind_named
 
 
 def findings(parts: Parts) -> Iterator[Finding]:
-    """Return everything that is wrong between the given sections."""
+    """Return all faults between the given sections."""
     for check in _CHECKS:
         yield from check(parts)
 
@@ -28,7 +28,7 @@ def _team(parts: Parts) -> Iterator[Finding]:
 
 
 def _root(parts: Parts) -> Iterator[Finding]:
-    """Every sensing topology starts from what is fixed in the world."""
+    """Require a sensor fixed in the world, the root of every sensing topology."""
     if parts.truth is not None and (parts.truth not in parts.given or parts.truth in {*parts.cameras, *parts.ranging}):
         known = ", ".join(parts.motion_capture) or "there is none"
         yield ("truth", "from"), f"must name a motion capture system of the field: {known} (got {parts.truth})"
@@ -55,7 +55,7 @@ def _hosts(parts: Parts) -> Iterator[Finding]:
 
 
 def _own_video(parts: Parts) -> Iterator[Finding]:
-    """A vehicle's video is taken from that very vehicle."""
+    """Require that a vehicle's own video comes from that vehicle."""
     for name, camera in parts.cameras.items():
         if parse_source(camera.source).vehicle:
             yield ("cameras", name, "source"), "must not be a vehicle's own video: drones carry their cameras"

@@ -1,4 +1,4 @@
-"""YAML 1.2 documents as trees whose every node knows the line it was written on."""
+"""YAML 1.2 documents as trees whose nodes all know their line in the file."""
 
 import os
 from collections.abc import Iterator
@@ -18,7 +18,7 @@ KeyPath = tuple[str | int, ...]
 
 @dataclass(frozen=True, slots=True)
 class SourceLine:
-    """Where something was written: a file and line (or an option, then line is 0), and its path there."""
+    """Origin of a node: a file and line (or an option, then line is 0), and its path there."""
 
     place: str
     line: int
@@ -28,13 +28,13 @@ class SourceLine:
         return f"{self.place}:{self.line}" if self.line else self.place
 
     def below(self, key: str | int) -> "SourceLine":
-        """Return the origin of something that is missing below this."""
+        """Return the origin for a key that is missing below this node."""
         return SourceLine(self.place, self.line, (*self.path, key))
 
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """A mapping or list of nodes, or a scalar, with where it came from."""
+    """A mapping or list of nodes, or a scalar, with its origin."""
 
     value: Any
     origin: SourceLine
@@ -59,7 +59,7 @@ class Node:
         return node
 
     def origin_of(self, path: KeyPath) -> SourceLine:
-        """Return where the value at a path was written; for one that is missing, where its parent was."""
+        """Return the origin of the value at a path; of a missing one, that of its parent."""
         node = self
         for depth, key in enumerate(path):
             inner = _entry(node.value, key)
@@ -90,7 +90,7 @@ def dotted(path: KeyPath) -> str:
 
 
 def read(path: Path, name: str = "") -> Node:
-    """Return a file's content; raises SettingsError naming file and line of all that makes it unreadable."""
+    """Return a file's content; raises SettingsError naming file and line of every fault that makes it unreadable."""
     name = name or str(path)
     try:
         with open(path, "rb", opener=_without_waiting) as stream:
@@ -109,7 +109,7 @@ def read(path: Path, name: str = "") -> Node:
 
 
 def _without_waiting(path: str, flags: int) -> int:
-    """Open a file; a pipe that nobody writes to reads as empty, where opening it would wait for ever."""
+    """Open a file without waiting: a pipe without a writer reads as empty."""
     descriptor = os.open(path, flags | os.O_NONBLOCK)
     os.set_blocking(descriptor, True)
     return descriptor

@@ -1,4 +1,4 @@
-"""A field to scale, from above and from the side: what fixed cameras see at each level height, and how drones look."""
+"""Draws a field to scale from above and from the side: views of fixed cameras by level height, and of drones."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -26,7 +26,7 @@ _OBSTACLE_COLOUR = "dimgrey"
 
 @dataclass(frozen=True, slots=True)
 class Shade:
-    """Figures over the floor: middles of cells along x and y [m; world], values (rows: y, columns: x), and what of.
+    """Figures over the floor: middles of cells along x and y [m; world], values (rows: y, columns: x), their title.
 
     nan: none, which is hatched.
     """
@@ -69,7 +69,7 @@ def _figure(field: Field, paths: Paths, shade: Shade | None) -> "Figure":
 
 
 def _draw_shade(figure: "Figure", axes: "Axes", shade: Shade) -> None:
-    """Draw figures as colours under all else, and hatch where there are none."""
+    """Draw figures as colours under all else, and hatch cells without one."""
     mesh = axes.pcolormesh(shade.xs, shade.ys, shade.values, cmap="viridis_r", shading="nearest", alpha=0.6)
     figure.colorbar(mesh, ax=axes, label=shade.label, fraction=0.04, pad=0.01)
     dx, dy = shade.xs[1] - shade.xs[0], shade.ys[1] - shade.ys[0]
@@ -88,7 +88,7 @@ def _hatch(axes: "Axes", x: tuple[float, float], y: tuple[float, float], label: 
 
 
 def paths_of(scenario: Mapping[str, Any], targets: Iterable[str]) -> Paths:
-    """Return points of each target's path in a scenario [m; world]: none for one that waits or wanders."""
+    """Return points of each target's path in a scenario [m; world]; none for a target that waits or wanders."""
     own, common = scenario.get("targets", {}), scenario.get("target", {})
     return {name: _points(own.get(name, common).get("path", {})) for name in targets}
 
@@ -126,7 +126,7 @@ def level_heights(field: Field) -> list[float]:
 
 
 def footprint(camera: WorldCameraSettings, height_m: float) -> tuple[float, float]:
-    """Return half the length (x) and width (y) of what a camera that looks down sees at a height, undistorted [m]."""
+    """Return half the length (x) and width (y) of a downward camera's view at a height, undistorted [m]."""
     distance = max(0.0, camera.position_m[2] - height_m)
     lens = camera.calibration
     return (
@@ -136,7 +136,7 @@ def footprint(camera: WorldCameraSettings, height_m: float) -> tuple[float, floa
 
 
 def marker_height(field: Field, level_m: float) -> float:
-    """Return how high a drone's marker is when the drone flies at a height [m; world], the highest of the team."""
+    """Return the height of a drone's marker at a flight height [m; world], the highest of the team."""
     return level_m + max(drone.marker.position_m[2] for drone in field.drones.values())
 
 
@@ -189,7 +189,7 @@ def _draw_side(axes: "Axes", field: Field, paths: Paths) -> None:
 
 
 def _draw_view(axes: "Axes", field: Field, board_m: float) -> None:
-    """Draw the first drone at its lowest level, looking at the (highest) target: as far behind as its tilt asks."""
+    """Draw the first drone at its lowest level, behind the (highest) target at the distance that its tilt needs."""
     drone = next(iter(field.drones.values()))
     camera, level = drone.camera, level_heights(field)[-1]
     height = level + camera.position_m[2] - board_m

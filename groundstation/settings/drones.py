@@ -174,14 +174,14 @@ class DroneOfAnyKind(SettingsSection):
 
     @property
     def video_source(self) -> str:
-        """Return the source of its camera, through the vehicle's adapter where it is at the vehicle's own address."""
+        """Return the source of its camera, through the vehicle's adapter if it has the vehicle's own address."""
         source = parse_source(self.camera.source)
         same = source.host == self.address and not source.interface
         return behind_adapter(self.camera.source, self.interface) if self.interface and same else self.camera.source
 
     @property
     def sections(self) -> dict[str, KindSection]:
-        """Return those of the sections that only its kind has, by their keys; what is not given is left out."""
+        """Return the given sections that only its kind has, by their keys."""
         keys = kind_named(self.kind).sections
         return {key: section for key in keys if isinstance(section := getattr(self, key, None), KindSection)}
 
@@ -200,5 +200,5 @@ def _with_sections_of_kinds() -> type[DroneOfAnyKind]:
 if TYPE_CHECKING:
     Drone = DroneOfAnyKind
 else:
-    # Which kinds there are is known when the program runs: each brings its own sections.
+    # Kinds are known only at run time: each brings its own sections.
     Drone = _with_sections_of_kinds()

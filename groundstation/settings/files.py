@@ -22,7 +22,7 @@ def _find(name: str, what: str, folders: tuple[Path, ...]) -> Path:
         path = Path(name)
         _require_text(name)
         _refuse_folder(path, what)
-        return path  # read() names a missing file and what was probably meant
+        return path  # read() reports a missing file with the likeliest name
     known: list[str] = []
     for folder in folders:
         candidate = folder / f"{name}.yaml"

@@ -48,7 +48,7 @@ def load_floor_markers(path: Path) -> FloorMarkers:
 def floor_marker_of(text: str) -> FloorMarker:
     """Return the marker of `3=0.5,1.0`, `3=0.5,1.0,0` or `3=0.5,1.0,0,90` (code = x, y, z [m], heading [deg]).
 
-    Raises SettingsError that says what is wrong.
+    Raises SettingsError with the fault.
     """
     code, equals, place = text.partition("=")
     try:

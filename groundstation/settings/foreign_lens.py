@@ -1,4 +1,4 @@
-"""Lens calibrations as ROS, OpenCV and Kalibr write them, turned into ours."""
+"""Converts lens calibrations of ROS, OpenCV and Kalibr into ours."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -8,13 +8,13 @@ from groundstation.errors import SettingsError
 from groundstation.settings.document import Node, read
 from groundstation.settings.wording import problem
 
-# What the programs call our model: k1 k2 p1 p2 k3, further coefficients 0.
+# Names of our model in these programs: k1 k2 p1 p2 k3, further coefficients 0.
 _OUR_MODEL = ("plumb_bob", "radtan", "rational_polynomial")
 _REMEDY = "measure this lens with `groundstation calibrate camera`"
 
 
 class _Keys(NamedTuple):
-    """Where a program's file has what; "" where it has no such thing."""
+    """Keys of a program's file; "" for figures that it lacks."""
 
     matrix: str
     distortion: str
@@ -43,12 +43,12 @@ _KNOWN = (
 
 
 def read_calibration(path: Path, name: str = "") -> Node:
-    """Return the content of a calibration file with our keys, whoever wrote it; raises SettingsError as `read` does."""
+    """Return the content of any program's calibration file with our keys; raises SettingsError as `read` does."""
     return _ours(read(path, name))
 
 
 def _ours(tree: Node) -> Node:
-    """Return a calibration with our keys; raises SettingsError for a foreign one of which no sound one can be made."""
+    """Return a calibration with our keys; raises SettingsError for a foreign one that cannot be converted."""
     if isinstance(tree.value, str) and tree.value.startswith("<?xml"):
         raise _refused(tree, f"is XML: let OpenCV write it as YAML (a name that ends in .yml), or {_REMEDY}")
     tree = _only_camera(tree)
@@ -117,7 +117,7 @@ def _distortion(tree: Node, keys: _Keys) -> Node:
 
 
 def _require_our_model(tree: Node, keys: _Keys, held: Node, items: Sequence[Node]) -> None:
-    """Refuse any other model: its coefficients would pass for ours, and put everything seen in a wrong place."""
+    """Refuse any other lens model: its coefficients would pass for ours, and all sightings would be wrong."""
     model = tree.get(keys.model)
     if model is not None and model.value not in _OUR_MODEL:
         raise _refused(model, f"{model.value} is another model of a lens than plumb_bob: {_REMEDY}")

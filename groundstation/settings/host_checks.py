@@ -25,7 +25,7 @@ def findings_of_hosts(
     systems: Mapping[str, Mapping[str, OnHost]],
     bus: Bus | None,
 ) -> Iterator[tuple[KeyPath, str]]:
-    """Return hosts that cannot reach the run, are called as a device, or would need a password that stays here."""
+    """Return hosts that cannot reach the run, have a device's name, or would need a password that stays here."""
     hosts: dict[KeyPath, str] = {("drones", name, "host"): drone.host for name, drone in drones.items()}
     hosts |= {("cameras", name, "host"): camera.host for name, camera in cameras.items()}
     hosts |= {(kind, name, "host"): one.host for kind, own in systems.items() for name, one in own.items()}

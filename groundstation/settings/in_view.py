@@ -1,4 +1,4 @@
-"""Whether a camera that is fixed in the world has a place in its picture."""
+"""Tells whether a point is in a world-fixed camera's picture."""
 
 import numpy as np
 

@@ -20,7 +20,7 @@ def field_file_schema() -> dict[str, Any]:
             "description": "Name of a calibration file beside the field file, or its content.",
             "anyOf": [{"type": "string"}, {"$ref": f"#/$defs/{_CALIBRATION}"}],
         }
-    # Any part of a drone may stand at any level, so nothing is required of one level alone.
+    # Any part of a drone may stand at any level, so no level alone has required keys.
     for name in _parts_of_drone(definitions, Drone.__name__):
         definitions[name].pop("required", None)
     drone = definitions[Drone.__name__]
@@ -45,7 +45,7 @@ def field_file_schema() -> dict[str, Any]:
 
 
 def _parts_of_drone(definitions: dict[str, Any], name: str) -> set[str]:
-    """Return the definitions that stand below one, but for Calibration, which is a file of its own."""
+    """Return the definitions below one, without Calibration, which is a file of its own."""
     found = {name}
     for inner in _references(definitions[name]):
         if inner not in (_CALIBRATION, *found):

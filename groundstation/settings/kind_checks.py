@@ -11,7 +11,7 @@ from groundstation.vehicles.registry import ask
 
 
 def findings_of_kinds(drones: Mapping[str, Drone]) -> Iterator[tuple[KeyPath, str]]:
-    """Return each section at a drone of another kind, each one missing, and what the kinds find wrong in theirs."""
+    """Return sections at drones of another kind, missing sections, and the findings of the kinds on their own."""
     teams: dict[str, list[VehicleOrder]] = {}
     for index, (name, drone) in enumerate(drones.items()):
         yield from _misplaced(name, drone)

@@ -1,4 +1,4 @@
-"""From a field file as written to a field as resolved: options, calibrations, then defaults < type < robot."""
+"""Resolves a field file: options, calibrations, then defaults < type < robot."""
 
 import json
 from collections.abc import Collection
@@ -10,7 +10,7 @@ from groundstation.settings.document import KeyPath, Node, SourceLine, dotted, p
 from groundstation.settings.foreign_lens import read_calibration
 from groundstation.settings.wording import problem
 
-# Sections of what is fixed in the world, and all that are mappings of names.
+# Sections of sensors fixed in the world, and all sections that are mappings of names.
 FIXED = ("cameras", "motion_capture", "ranging")
 NAMED = ("drones", *FIXED, "targets", "types")
 
@@ -70,7 +70,7 @@ def _moved(node: Node, base: KeyPath) -> Node:
 
 
 def merged(lower: Node, upper: Node) -> Node:
-    """Return a mapping in which entries of `upper` win over those of `lower`, level by level."""
+    """Return a mapping in which entries of `upper` replace those of `lower`, level by level."""
     if not isinstance(lower.value, dict) or not isinstance(upper.value, dict):
         return upper
     entries = dict(lower.value)
@@ -80,7 +80,7 @@ def merged(lower: Node, upper: Node) -> Node:
 
 
 class Calibrations:
-    """Reads calibration files beside the field file, each once; notes what is wrong and at which entries."""
+    """Reads calibration files beside the field file, each once; notes faults and the entries that have them."""
 
     def __init__(self, directory: Path, name: str) -> None:
         self._directory = directory

@@ -1,4 +1,4 @@
-"""Reading a field file: every problem at once, each with the file and line to mend."""
+"""Reads a field file, and reports all problems at once, each with file and line."""
 
 import json
 from collections.abc import Collection, Iterable, Sequence
@@ -46,7 +46,7 @@ def field_of_tree(tree: Node, options: Sequence[str], path: Path) -> Field:
 
 
 def cautions_of(path: Path | str, options: Sequence[str] = ()) -> list[str]:
-    """Return a line for each thing in a sound field file that is legal and foolish; raises SettingsError as above."""
+    """Return the warnings about a field file without mistakes, a line each; raises SettingsError as above."""
     path = Path(path)
     field = load_field(path, options)
     tree, _ = _with_options(read(path), options)
@@ -77,7 +77,7 @@ def _require_version(tree: Node, problems: list[str]) -> None:
 
 
 def _target_or_targets(tree: Node) -> list[str]:
-    """Return what is wrong with a field that says in no way, or in two, what is tracked."""
+    """Return the fault of a field with neither `target` nor `targets`, or with both."""
     single, several = (_given(tree.get(key)) for key in ("target", "targets"))
     if single is None and several is None:
         return [f"{tree.origin}: target: is required (or targets, for several)"]
@@ -99,14 +99,14 @@ def _errors(model: type[Any], tree: Node) -> list[Any]:
 
 
 def _partial_errors(fragment: Node) -> list[Any]:
-    """Return what is wrong with a part of a drone, whatever may be missing from it."""
+    """Return the errors in a part of a drone; missing keys are none."""
     return [error for error in _errors(Drone, fragment) if error["type"] != "missing"]
 
 
 def _worded(
     errors: Iterable[Any], tree: Node, model: type[Any], failed: Collection[SourceLine], untyped: Collection[str] = ()
 ) -> list[str]:
-    """Return a line for each error but those that only follow from a missing calibration or an unknown type."""
+    """Return a line for each error, without those that follow from a missing calibration or an unknown type."""
 
     def follows(error: Any) -> bool:
         lacks_type = error["type"] == "missing" and error["loc"][:2] in {("drones", name) for name in untyped}
@@ -116,7 +116,7 @@ def _worded(
 
 
 def _sound_parts(plain: dict[str, Any], faults: Collection[KeyPath]) -> Parts:
-    """Return the sections without an error of their own, and drones and cameras but for their faulty entries."""
+    """Return the sections without an error of their own, and drones and cameras without their faulty entries."""
 
     def sound(model: Any, *path: str) -> Any:
         value: Any = plain
@@ -136,7 +136,7 @@ def _sound_parts(plain: dict[str, Any], faults: Collection[KeyPath]) -> Parts:
         below = [fault[1:] for fault in faults if fault[:1] == (section,)]
         return {name: value for name, entry in _without(entries, below).items() if (value := _valid(model, entry))}
 
-    # The defaults of Field stand in for sections that are left out; one that is required is a fault of its own.
+    # Defaults of Field replace sections that are left out; a missing required one is a fault of its own.
     single = ("room", "target", "estimator", "planner", "safety", "bus")
     return Parts(
         cameras=named("cameras"),

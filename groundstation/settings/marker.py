@@ -56,7 +56,7 @@ class MarkerSettings(SettingsSection):
 
     @property
     def identity(self) -> str:
-        """Return what no two markers of a field may share."""
+        """Return the identity, which no two markers of a field may share."""
         return str(self.code) if self.kind == "checkerboard" else f"{self.dictionary} {self.id}"
 
     @property

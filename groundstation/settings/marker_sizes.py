@@ -1,4 +1,4 @@
-"""Checkerboards that are too small in a picture to be read from where the field counts on it."""
+"""Finds checkerboards too small in a picture to be read at the distances that the field plans."""
 
 import math
 from collections.abc import Iterator
@@ -11,8 +11,8 @@ from groundstation.settings.parts import Finding
 from groundstation.settings.room import CalibrationSettings
 from groundstation.settings.schema import Field
 
-# Measured (docs/reference/vision.md 8): of boards whose squares are 4 px large 9 in 10 are found and 5 to 7 tell whose
-# they are; with 5 px nearly all.
+# Measured (docs/reference/vision.md 8): of boards with squares of 4 px 9 in 10 are found and 5 to 7 identified;
+# with 5 px nearly all.
 _LEAST_PX = 4.0
 
 
@@ -52,5 +52,5 @@ def _planned_range(field: Field) -> Iterator[Finding]:
 
 
 def _pixels(lens: CalibrationSettings, square_mm: float, distance_m: float) -> float:
-    """Return how large a square is in the middle of a picture, face on [px]."""
+    """Return the side of a square in the middle of a picture, face on [px]."""
     return lens.fx_px * square_mm / 1000 / distance_m

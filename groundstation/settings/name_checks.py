@@ -1,4 +1,4 @@
-"""What must hold of names, and of what tells one from another: markers, bodies, sources of pictures."""
+"""Checks of names and of other identifiers: markers, bodies, sources of pictures."""
 
 from collections.abc import Iterable, Iterator
 
@@ -13,12 +13,12 @@ from groundstation.settings.parts import Finding, Parts
 _RESERVED = frozenset(
     {"team", "operator", "router", "tracker", "diagnosis", "recorder", "console", "monitor", "supervisor"}
 )
-# What the bus takes, and what the ground station itself adds to a name: _camera of a drone, _odometry of a target.
+# Longest name on the bus, and suffixes that the ground station adds: _camera of a drone, _odometry of a target.
 _LONGEST_NAME, _ADDED = 48, {"drones": 7, "target": 9, "targets": 9}
 
 
 def findings_of_names(parts: Parts) -> Iterator[Finding]:
-    """Return names that are taken or too long, and what two have in common that must tell them apart."""
+    """Return names that are taken or too long, and identifiers that two entities share."""
     for check in (_names, _distinct, _captured):
         yield from check(parts)
 
@@ -46,7 +46,7 @@ def _names(parts: Parts) -> Iterator[Finding]:
 
 
 def _kind_of(path: KeyPath) -> str:
-    """Return what kind of thing a path of the field file names."""
+    """Return the kind of entity that a path of the field file names."""
     kinds = {"drones": "a drone", "cameras": "a camera", "targets": "a target"}
     return (kinds | {"motion_capture": "a motion capture system", "ranging": "a ranging system"}).get(
         str(path[0]), "the target"
@@ -77,7 +77,7 @@ def _key_of(marker: MarkerSettings) -> str:
 
 
 def _placed(source: str, host: str) -> str:
-    """Return a source as the operator may read it; each host has its own devices and networks."""
+    """Return a source without passwords and with its host: each host has its own devices and networks."""
     return without_password(source) + (f" on {host}" if host else "")
 
 

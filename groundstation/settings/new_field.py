@@ -21,7 +21,7 @@ _PAD_GAP_M = 1.0
 _TARGET_CODE = 5
 _LONGEST_SITE = 40
 _PLAIN = re.compile(r"[a-z0-9][\w.:/@?=&%+-]*[\w/]", re.ASCII)
-# Drones fly in a band below the fence's top, this high at least, and this far above the target's board.
+# Drones fly in a band below the fence's top: its least height, and its distance above the target's board.
 _TOP_MARGIN_M, _BAND_M, _LEAST_BAND_M, _LOWEST_FLIGHT_M, _ABOVE_BOARD_M = 0.3, 1.4, 0.2, 0.8, 0.4
 
 BASES = {"turtlebot_2": 0.4, "person": 1.4, "rc_car": 0.2}
@@ -62,13 +62,13 @@ class NewRoom(NamedTuple):
         return round(self.height_m - _CEILING_M, 2)
 
     def half_view_m(self, height_m: float) -> Place:
-        """Return half the length and width of what the ceiling camera sees at a height [m]."""
+        """Return half the length and width of the ceiling camera's view at a height [m]."""
         below = self.camera_height_m - height_m
         return below * _HALF_VIEW[0], below * _HALF_VIEW[1]
 
 
 def site_of(folder: str) -> str:
-    """Return a site's name that is like that of a folder: of small letters, digits and _, a letter first."""
+    """Return a site's name like that of a folder: small letters, digits and _, a letter first."""
     plain = unicodedata.normalize("NFKD", folder).encode("ascii", "ignore").decode().lower()
     name = re.sub(r"[^a-z0-9]+", "_", plain).strip("_")[:_LONGEST_SITE].rstrip("_")
     return name if name[:1].isalpha() else f"lab_{name}".rstrip("_")
@@ -99,7 +99,7 @@ def check_room(room: NewRoom) -> None:
 
 
 def pads(room: NewRoom, count: int) -> list[Place]:
-    """Return pads [m; world], one metre apart, inside what the ceiling camera sees; raises OperatorMistake."""
+    """Return pads [m; world], one metre apart, in the ceiling camera's view; raises OperatorMistake."""
     half = [length - RISEN_ROOM_M for length in room.half_view_m(RISEN_MARKER_M)]
     columns, rows = (1 + int(2 * side / _PAD_GAP_M) for side in half)
     if count > columns * rows:
@@ -113,7 +113,7 @@ def pads(room: NewRoom, count: int) -> list[Place]:
 
 
 def offers() -> dict[str, tuple[str, Offer]]:
-    """Return what a new drone may be, by name: its kind of vehicle, and the texts of its type."""
+    """Return the types of new drones by name: kind of vehicle, and the texts of the type."""
     return {name: (kind.name, offer) for kind in all_kinds().values() for name, offer in _offers_of(kind).items()}
 
 
@@ -138,7 +138,7 @@ def field_text(site: str, room: NewRoom, drones: list[NewDrone], target: NewTarg
 
 
 def _text(answer: str) -> str:
-    """Return an answer as YAML, which an address is as it stands, and nothing else for sure."""
+    """Return an answer as YAML: an address as it is, all else in quotes."""
     return answer if _PLAIN.fullmatch(answer) else json.dumps(answer)
 
 

@@ -1,4 +1,4 @@
-"""From the field to what the driver of a target's odometry is handed, and to an emulated one."""
+"""Makes the section of a target's odometry driver from the field, also for an emulated router."""
 
 from collections.abc import Mapping
 from typing import TypeVar
@@ -20,7 +20,7 @@ def odometry_section(name: str, target: TrackedBody, odometry: TargetOdometrySet
 
 
 def with_emulated_odometry(field: Field, places: Mapping[str, tuple[str, int]]) -> Field:
-    """Return the field with the odometry of targets heard where an emulated router listens, by the odometry's name."""
+    """Return the field with targets' odometry at the places of emulated routers, by the odometry's name."""
     target = field.target and _emulated(field.target.name, field.target, places)
     targets = {name: _emulated(name, one, places) for name, one in field.targets.items()}
     return field.model_copy(update={"target": target, "targets": targets})

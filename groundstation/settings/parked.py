@@ -6,7 +6,7 @@ from typing import Any
 
 from groundstation.settings.schema import Field
 
-_APART_M = 0.35  # half of a drone and half of a small robot: the one marker hides the other from above
+_APART_M = 0.35  # half of a drone and half of a small robot: one marker hides the other from above
 
 
 def on_pads(field: Field, scenario: Mapping[str, Any]) -> list[str]:
@@ -24,7 +24,7 @@ def on_pads(field: Field, scenario: Mapping[str, Any]) -> list[str]:
 
 
 def _starts(scenario: Mapping[str, Any], targets: list[str]) -> dict[str, tuple[float, float]]:
-    """Return where targets stand at first, as far as the scenario says so: of those told for all, the first one."""
+    """Return the first places of targets, as far as the scenario tells them; of a path for all, the first target's."""
     own, common = scenario.get("targets", {}), scenario.get("target", {})
     paths = {name: own[name].get("path", {}) for name in targets if name in own}
     if targets[0] not in own:

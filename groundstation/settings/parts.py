@@ -1,4 +1,4 @@
-"""The sections of a field file that are sound in themselves, and what is found wrong between them."""
+"""The sections of a field file without errors of their own, and the findings of checks between them."""
 
 from dataclasses import dataclass, field
 
@@ -16,9 +16,9 @@ Finding = tuple[KeyPath, str]
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """The sections that are sound in themselves; a check is left out where one that it needs is missing.
+    """The sections without errors of their own; a check is left out if one that it needs is missing.
 
-    truth: the sensor that judges; given: the names of all that is fixed in the world, also where its entry is faulty.
+    truth: the sensor that judges; given: the names of all sensors fixed in the world, faulty entries included.
     """
 
     room: RoomSettings | None = None

@@ -1,4 +1,4 @@
-"""A field file with some settings changed and all else, comments included, as it was written."""
+"""Changes some settings in a field file's text and keeps all else, comments included."""
 
 import copy
 import io
@@ -37,7 +37,7 @@ def patched(text: str, changes: Changes, resolved: Mapping[str, Any]) -> str:
 
 
 def write_patched(target: Path, text: str, changes: Changes, resolved: Mapping[str, Any]) -> None:
-    """Write a patched field file; raises OperatorMistake, and leaves what stands there, where it could not be read."""
+    """Write a patched field file; raises OperatorMistake, and leaves the old file, if the result could not be read."""
     tried = target.with_name(f".{target.name}.{os.getpid()}")
     try:
         tried.write_text(patched(text, changes, resolved), encoding="utf-8")
@@ -61,13 +61,13 @@ def _placed(tree: Any, path: tuple[str, ...], value: Any, resolved: Any) -> None
         if not isinstance(tree.get(name), dict):
             tree[name] = dict(resolved) if isinstance(tree.get(name), str) else {}
         elif _has_anchor(tree[name]):
-            tree[name] = copy.deepcopy(tree[name])  # an alias of it elsewhere in the file keeps what it says
+            tree[name] = copy.deepcopy(tree[name])  # an alias of it elsewhere in the file keeps its content
         tree = tree[name]
     tree[last] = value
 
 
 def _has_anchor(node: Any) -> bool:
-    anchor = getattr(node, "yaml_anchor", None)  # what the file did not hold has none
+    anchor = getattr(node, "yaml_anchor", None)  # a new node has none
     return anchor is not None and anchor() is not None
 
 

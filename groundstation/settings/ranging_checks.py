@@ -10,9 +10,9 @@ from groundstation.settings.room import RoomSettings
 def findings_of_ranging(
     systems: Mapping[str, RangingSettings], drones: Container[str], flying: Iterable[str], room: RoomSettings | None
 ) -> Iterator[tuple[KeyPath, str]]:
-    """Return transponders that nobody carries or two do, and anchors outside of the room."""
+    """Return transponders that no drone or two drones carry, and anchors outside of the room."""
     for name, system in systems.items():
-        holders = {drone: drone for drone in flying if drone not in system.transponders}  # called as they are
+        holders = {drone: drone for drone in flying if drone not in system.transponders}  # named as their drones
         for drone, one in system.transponders.items():
             path, called = ("ranging", name, "transponders", drone), one.name or drone
             if drone not in drones:

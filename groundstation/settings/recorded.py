@@ -1,4 +1,4 @@
-"""The field that a recording was flown with, as today's program understands it, and what if it had been another."""
+"""Reads the field of a recording in today's form, also with changed settings for a re-run."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -17,7 +17,7 @@ def recorded_field(content: bytes, options: Sequence[str] = (), estimator: Path 
     """Return a recorded field (JSON) with `a.b=c` options applied; raises SettingsError with all problems.
 
     estimator: a field file, or a file with an `estimator:` section alone; that section then replaces the recorded one,
-    and what it leaves out has its default. Options come last. Keys that are younger than the recording have defaults.
+    and keys that it leaves out have their defaults. Options come last. Keys newer than the recording have defaults.
     """
     tree = _with_kinds_sections(parse(content.decode("utf-8", "replace"), _NAME))
     if estimator is not None:
@@ -47,5 +47,5 @@ def _with_section(tree: Node, other: Node, path: Path) -> Node:
     if section is None:
         raise SettingsError([f"{path}: has no `{_SECTION}:` section"])
     if not isinstance(tree.value, dict):
-        return tree  # the loader says what is wrong with it
+        return tree  # the loader reports its faults
     return replace(tree, value={**tree.value, _SECTION: section})

@@ -8,17 +8,17 @@ from groundstation.settings.drones import Drone
 from groundstation.settings.schema import Field
 from groundstation.settings.target import OneOfTargets, TrackedBody
 
-# Printed so that nobody has to guess what wins; drivers.watchdog is where it is enforced.
+# Printed so that the operator knows the precedence; drivers.watchdog enforces it.
 STOP_PRIORITY = "CUT_MOTORS > LAND > HOLD > setpoint > TAKEOFF"
 
 
 def resolved_field(field: Field) -> ResolvedField:
-    """Return the field as the values that all other packages read, without passwords."""
+    """Return the field as the values for all other packages, without passwords."""
     return field_from_values(field.model_dump(mode="json"))
 
 
 def yaml_of(field: Field) -> str:
-    """Return the field as YAML: a valid field file with nothing left to merge or to look up, but without passwords."""
+    """Return the field as YAML: a valid, fully merged field file, but without passwords."""
     from ruamel.yaml import YAML
 
     yaml = YAML(typ="safe", pure=True)
@@ -31,7 +31,7 @@ def yaml_of(field: Field) -> str:
 
 
 def summary_of(field: Field) -> str:
-    """Return a page for the operator: who is in the team, what each may do, and what happens when something fails."""
+    """Return a page for the operator: the team, the limits of each drone, and reactions to failures."""
     x, y, z = field.room.size_m
     fence = field.room.fence
     lines = [

@@ -157,5 +157,5 @@ class WorldCameraSettings(SettingsSection):
 
     @property
     def attitude_std_rad(self) -> float:
-        """Return how well the mounting's attitude is known [rad]."""
+        """Return the standard deviation of the mounting's attitude [rad]."""
         return math.radians(self.attitude_std_deg)

@@ -10,7 +10,7 @@ _ROBOT_HEIGHT_M = 0.3
 
 
 def findings_in_room(parts: Parts) -> Iterator[Finding]:
-    """Return what does not lie where it must."""
+    """Return places and heights outside of their permitted ranges."""
     for check in (_fence_in_room, _obstacles, _cameras_above_fence, _pads, _heights):
         yield from check(parts)
 

@@ -1,4 +1,4 @@
-"""Scenario files: read here, for their lines; judged by the simulator alone, which runs as a process of its own."""
+"""Reads scenario files with their lines; the simulator, a process of its own, judges them."""
 
 import json
 import subprocess
@@ -14,19 +14,19 @@ from groundstation.settings.levels import with_option
 from groundstation.settings.schema import Field
 from groundstation.settings.wording import closest, ordered, problem, text_of_error
 
-_CHECK_LIMIT_S = 120.0  # two seconds of work, on a machine that does much else
+_CHECK_LIMIT_S = 120.0  # two seconds of work, on a busy machine
 
 
 @dataclass(frozen=True, slots=True)
 class Room:
-    """For what a scenario is to be: a field, and the bodies and cameras of it that are real."""
+    """The setting of a scenario: a field, and its real bodies and cameras."""
 
     field: Field
     real: Collection[str] = ()
     real_cameras: Collection[str] = ()
 
     def asked(self) -> dict[str, Any]:
-        """Return what the simulator is asked about besides the scenario; a drone's camera has the drone's name."""
+        """Return the rest of the simulator's order besides the scenario; a drone's camera has the drone's name."""
         cameras = [name for name in (*self.field.cameras, *self.field.drones) if name not in self.real_cameras]
         return {"field": self.field.model_dump(mode="json"), "cameras": cameras, "real": list(self.real)}
 
@@ -34,7 +34,7 @@ class Room:
 def load_scenario(path: Path, options: Sequence[str] = (), room: Room | None = None) -> dict[str, Any]:
     """Return a scenario as plain values with `a.b=c` options applied; raises SettingsError with all problems.
 
-    room: where it names what that does not have, that is a problem too.
+    room: entities that the scenario names must exist there.
     """
     tree = read(path)
     if not isinstance(tree.value, dict):
@@ -74,7 +74,7 @@ def _worded(fault: dict[str, Any], tree: Node) -> str:
 
 
 def _without_variants(location: Sequence[str | int], tree: Node) -> KeyPath:
-    """Return a path without the names of variants that pydantic puts into it: those are values in the file, no keys."""
+    """Return a path without pydantic's names of variants, which are values in the file, not keys."""
     path: KeyPath = ()
     for key in location:
         here = tree.at(path)

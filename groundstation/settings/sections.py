@@ -23,15 +23,15 @@ from groundstation.settings.schema import Field
 from groundstation.vehicles import VehicleOrder, kind_named
 from groundstation.vehicles.registry import ask
 
-# What a driver process talks to: one of these, or a kind of vehicle.
+# Kinds of driver processes other than kinds of vehicles.
 CAMERA, MOTION_CAPTURE, RANGING, ODOMETRY = "camera", "motion_capture", "ranging", "odometry"
 
 
 @dataclass(frozen=True, slots=True)
 class DriverSection:
-    """One driver process: its name, its kind, what it drives (a drone or a sensor of the field), and its section.
+    """One driver process: its name, its kind, the drone or sensor that it drives, and its section.
 
-    entities: all that it speaks of. host: the other host that it runs on, "" for the run's own.
+    entities: all entities of its messages. host: the other host that it runs on, "" for the run's own.
     """
 
     name: str
@@ -111,7 +111,7 @@ def _source(source: str, stream: tuple[str, int] | None, own: str = "") -> str:
 
 
 def core_section(field: Field, run_dir: str, epoch: int) -> str:
-    """Return what tracker, recorder and monitor are handed."""
+    """Return the section of tracker, recorder and monitor."""
     return json.dumps({"field": field.model_dump(mode="json"), "run_dir": run_dir, "epoch": epoch})
 
 
@@ -159,7 +159,7 @@ def _text(section: BaseModel) -> str:
 
 
 def vehicle_order(field: Field, name: str) -> VehicleOrder:
-    """Return what the kind of a drone is told of it."""
+    """Return a drone's order for its kind."""
     values = resolved_field(field)
     return VehicleOrder(
         name,

@@ -1,4 +1,4 @@
-"""A folder of a field's own: copies of the shipped lenses and scenarios beside its field file."""
+"""Copies shipped lenses and scenarios beside a new field file."""
 
 import shutil
 from pathlib import Path
@@ -17,12 +17,12 @@ def write_field(path: Path, text: str) -> None:
 
 
 def shipped() -> list[Path]:
-    """Return the shipped lenses and scenarios, which field files refer to by their place beside them."""
+    """Return the shipped lenses and scenarios; field files refer to them by relative paths."""
     return [*sorted(SHIPPED.glob("cameras/*.yaml")), *sorted(SHIPPED.glob("scenarios/*.yaml"))]
 
 
 def copy(source: Path, target: Path) -> None:
-    """Copy one shipped file, with the folders that it needs; no half of it stays where there is no room."""
+    """Copy one shipped file, with its folders; if the disk is full, no partial copy remains."""
     target.parent.mkdir(parents=True, exist_ok=True)
     try:
         shutil.copyfile(source, target)

@@ -9,7 +9,7 @@ from drivers.target_odometry.settings import parse_source
 from groundstation.settings.marker import MarkerSettings
 from groundstation.settings.values import Name, SettingsSection, Vector3, read_by
 
-# Which of the models of motion each of these keys belongs to.
+# The motion models to which each of these keys belongs.
 _TURNING, _SWITCHING = ("coordinated_turn", "manoeuvring"), ("manoeuvring",)
 _BELONGS_TO = {
     "turn_rate_std_deg_s": _TURNING,
@@ -19,7 +19,7 @@ _BELONGS_TO = {
 }
 Duration = Annotated[float, Field(ge=0.1, le=600)]
 Base = Literal["turtlebot_2", "person", "rc_car"]
-# What each base does at most: speed [m/s], acceleration [m/s^2], turn rate [deg/s]. A Kobuki's own figures; people walk
+# Limits of each base: speed [m/s], acceleration [m/s^2], turn rate [deg/s]. A Kobuki's own figures; people walk
 # briskly, and turn about within half a second; a model car of 1:10, indoors.
 _MEANS: dict[str, tuple[float, float, float]] = {
     "turtlebot_2": (0.7, 0.5, 180.0),
@@ -27,7 +27,7 @@ _MEANS: dict[str, tuple[float, float, float]] = {
     "rc_car": (3.0, 4.0, 180.0),
 }
 _MEANS_KEYS = ("max_speed_m_s", "max_acceleration_m_s2", "max_turn_rate_deg_s")
-# Deviation of the acceleration in a manoeuvre over what the base keeps up.
+# Deviation of the acceleration in a manoeuvre, as a multiple of the base's limit.
 _BRISK = 2.4
 
 
@@ -95,7 +95,7 @@ class TrackedBody(SettingsSection):
     @model_validator(mode="before")
     @classmethod
     def _by_its_base(cls, given: Any) -> Any:
-        """Fill in what the base can do."""
+        """Fill in the limits of the base."""
         base = given.get("base", "turtlebot_2") if isinstance(given, dict) else None
         if base not in get_args(Base):
             return given

@@ -1,4 +1,4 @@
-"""Figures that are legal and hardly meant: of another unit, or so small or large that nothing comes of a flight."""
+"""Finds figures that are permitted but unlikely: of another unit, or too small or large for a flight."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from groundstation.settings.schema import Field
 
 @dataclass(frozen=True, slots=True)
 class Likely:
-    """What a setting is likely to lie in, and what is meant or follows where it does not; 0 is always meant."""
+    """Likely range of a setting, and the likely mistake or consequence outside of it; 0 is always accepted."""
 
     least: float
     most: float
@@ -46,7 +46,7 @@ _LEAST_HORIZON_S = 0.3
 
 
 def unlikely(field: Field) -> Iterator[Finding]:
-    """Yield each setting with such a figure, and what is likely to be wrong with it."""
+    """Yield each setting with such a figure, and its likely mistake."""
     for name, camera in field.cameras.items():
         yield from _outside(("cameras", name), camera, _CAMERA)
     for name, drone in field.drones.items():

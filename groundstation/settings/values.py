@@ -23,7 +23,7 @@ class SettingsSection(BaseModel):
 
 
 def of_length(length: int) -> BeforeValidator:
-    """Return a check that a list holds so many numbers."""
+    """Return a check that a list has a length."""
 
     def check(value: Any) -> Any:
         if isinstance(value, list | tuple) and len(value) != length:
@@ -63,6 +63,6 @@ VideoDelay = Annotated[float, Field(ge=0, le=2000)]
 Readout = Annotated[float, Field(ge=0, le=100)]
 SquareSize = Annotated[float, Field(ge=5, le=200)]
 MarkerCode = Annotated[int, Field(ge=0, le=15)]  # geometry.board.VALID_CODES
-# Only the driver gets the password, from the attribute: a field that is written, recorded or shown is a dump.
+# Only the driver gets the password, from the attribute: written, recorded and shown fields are dumps.
 Source = Annotated[str, read_by(parse_source), PlainSerializer(without_password)]
 AddressOrNone = Annotated[str, AfterValidator(lambda value: value and is_address(value))]

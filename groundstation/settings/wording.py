@@ -32,7 +32,7 @@ _PLAIN = {
     "date_parsing": "must be a date such as 2026-11-20",
     "date_type": "must be a date such as 2026-11-20",
 }
-# Keys that a field file has and a resolved field has not.
+# Keys of a field file that a resolved field lacks.
 _ONLY_IN_FILES = {"Field": ("defaults", "types"), "Drone": ("type",)}
 _BOUNDS = {
     "greater_than": (">", "gt"),
@@ -52,7 +52,7 @@ def problem_of_error(error: Mapping[str, Any], tree: Node, model: type[BaseModel
     path = tuple(key for key in error["loc"] if key != "[key]")
     origin = tree.origin_of(path)
     if error["type"] == "missing" and origin.path[:1] != path[:1] and "calibration" not in path[:-1]:
-        # Missing from what three levels gave together: it is the robot's entry that lacks it.
+        # Missing in all three levels together: reported at the robot's entry.
         origin = SourceLine(tree.origin_of(path[:2]).place, tree.origin_of(path[:2]).line, path)
     if error["type"] == "extra_forbidden":
         return problem(origin, f"unknown key{_meant(str(path[-1]), model, path[:-1])}")
@@ -60,7 +60,7 @@ def problem_of_error(error: Mapping[str, Any], tree: Node, model: type[BaseModel
 
 
 def text_of_error(error: Mapping[str, Any]) -> str:
-    """Return what is wrong, without where."""
+    """Return the text of an error without its place."""
     kind, context, got = error["type"], error.get("ctx", {}), _shown(error["input"])
     if kind == "missing":
         return _PLAIN[kind]
@@ -108,7 +108,7 @@ def _meant(key: str, model: type[BaseModel], path: tuple[str | int, ...]) -> str
 
 
 def closest(key: str, known: Collection[str], deeper: Mapping[str, str] | None = None) -> str:
-    """Return the end of a sentence about an unknown key: what was probably meant, or what is known here.
+    """Return the end of a sentence about an unknown key: the likeliest key, or all keys known here.
 
     deeper: keys further down, with their paths.
     """
@@ -151,7 +151,7 @@ _LINE = re.compile(r"(?:--set \S+|(?P<file>.+?):(?P<line>\d+)): (?:(?P<path>[\w.
 
 
 class Told(NamedTuple):
-    """A problem taken apart: where it was written, at which key ("": of the whole), how grave, and what is wrong."""
+    """A problem in parts: its origin, its key ("": the whole file), its gravity, and its text."""
 
     file: str
     line: int
@@ -161,7 +161,7 @@ class Told(NamedTuple):
 
 
 def told(line: str, level: str) -> Told:
-    """Return the parts of one line of `problem`; what has no file and line is all text."""
+    """Return the parts of one line of `problem`; a line without file and line number is all text."""
     match = _LINE.fullmatch(line)
     if match is None:
         return Told("", 0, "", level, line)

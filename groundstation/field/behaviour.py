@@ -1,4 +1,4 @@
-"""What the estimator, the planner, safety, the recorder, the console and the bus are set to."""
+"""Values of the settings of estimator, planner, safety, recorder, console and bus."""
 
 from typing import Literal
 
@@ -19,7 +19,7 @@ PlannerMode = Literal["multistart", "paper", "certified"]
 
 
 class PlannerValues(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The search over topologies; row n of level_heights_m: where it begins with n levels [m]."""
+    """The search over topologies; row n of level_heights_m: its initial heights with n levels [m]."""
 
     rate_hz: int = 10
     mode: PlannerMode = "multistart"
@@ -50,7 +50,7 @@ class SafetyValues(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
 
 
 class RecordingValues(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What is recorded of a run, and where."""
+    """Content and place of a run's recording."""
 
     enabled: bool = True
     directory: str = "runs"

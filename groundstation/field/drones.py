@@ -15,7 +15,7 @@ def camera_name(drone: str) -> str:
 
 
 class DroneLimits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What a drone is never commanded to exceed, and when its battery makes it land."""
+    """Limits of a drone's commands, and charges of its battery at which it may not start, or lands."""
 
     max_speed_m_s: float = 0.6
     max_climb_m_s: float = 0.4
@@ -59,8 +59,8 @@ class OdometryErrors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
 class FieldDrone(msgspec.Struct, frozen=True, kw_only=True):
     """One drone of the team; pad_m, pad_yaw_deg: where it takes off [world].
 
-    sections: those that only its kind has, by key, as they are written; its driver and its emulator read them. Where a
-    drone is decoded without `gathered`, as in the processes that do not need them, they are left out.
+    sections: those that only its kind has, by key, unread; its driver and its emulator read them. In a
+    drone decoded without `gathered`, as in processes that do not need them, they are left out.
     """
 
     kind: str
@@ -92,7 +92,7 @@ def drone_from_values(values: Any) -> FieldDrone:
 
 
 def gathered(values: Any) -> Any:
-    """Return a drone's values with the sections that only its kind has under one key."""
+    """Return a drone's values with the sections of its kind gathered under one key."""
     if not isinstance(values, dict):
         return values
     common = {key: value for key, value in values.items() if key in _COMMON}

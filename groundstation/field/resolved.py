@@ -19,7 +19,7 @@ from groundstation.field.targets import SingleTarget, Target, WeightedTarget
 
 
 class ResolvedField(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A field with nothing left to merge or to look up: all its drones fly; it has a `target` or `targets`."""
+    """A fully merged field: all its drones fly; it has a `target` or `targets`."""
 
     schema_version: Literal[1] = 1
     site: str
@@ -45,7 +45,7 @@ class ResolvedField(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
     @property
     def sensing_capture(self) -> Mapping[str, MotionCapture]:
-        """Return the motion capture systems that the tracker hears: all but the truth."""
+        """Return the motion capture systems that are sensors of the tracker: all but the truth."""
         return {name: one for name, one in self.motion_capture.items() if name != self.truth.get("from")}
 
     @property
@@ -66,7 +66,7 @@ class ResolvedField(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
     @property
     def world_sensors(self) -> tuple[str, ...]:
-        """Return the names of what is fixed in the world and observes: cameras, motion capture, ranging."""
+        """Return the names of the sensors fixed in the world: cameras, motion capture, ranging."""
         return (*self.cameras, *self.sensing_capture, *self.ranging)
 
     @property
@@ -77,7 +77,7 @@ class ResolvedField(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
 
 def field_from_json(content: bytes) -> ResolvedField:
-    """Return a resolved field from JSON; keys that are younger than the text have their defaults.
+    """Return a resolved field from JSON; keys newer than the text have their defaults.
 
     Raises msgspec.DecodeError that names the key at fault.
     """

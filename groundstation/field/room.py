@@ -26,7 +26,7 @@ class RoomObstacle(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
 
 
 class Room(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Size along x, y, z, the origin on the floor in the middle, the fence, and what hides markers, by name."""
+    """Size along x, y, z (origin on the floor in the middle), the fence, and obstacles by name."""
 
     size_m: Vector3
     fence: Fence
@@ -66,7 +66,7 @@ class LensCalibration(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
 
     @property
     def focal_std(self) -> float:
-        """Return how well its focal length is known, as a share; 0: the file does not say."""
+        """Return the deviation of its focal length as a share; 0 if the file does not tell it."""
         if self.std is None:
             return 0.0
         return max(self.std.fx_px / self.fx_px, self.std.fy_px / self.fy_px)
@@ -105,14 +105,14 @@ class Volume(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 
 class Transponder(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A ranging system's name of the transponder on a robot ("": the robot's), and where it sits [m; base]."""
+    """A ranging system's name of the transponder on a robot ("": the robot's), and its place [m; base]."""
 
     name: str = ""
     position_m: Vector3 = (0.0, 0.0, 0.0)
 
 
 class Ranging(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A ranging system: its anchors' places [m; world], where it reaches, and how well it measures."""
+    """A ranging system: its anchors' places [m; world], its volume, and its deviations."""
 
     source: str
     anchors: dict[str, Vector3]
@@ -133,12 +133,12 @@ class Ranging(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
 
 
 def ranging_link(system: str, anchor: str, robot: str) -> str:
-    """Return the name by which the estimator knows the ranges between an anchor and a robot, and their bias."""
+    """Return the estimator's name of the pair of an anchor and a robot, for their ranges and bias."""
     return f"{system}_{anchor}_{robot}"
 
 
 class MotionCapture(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A motion capture system, fixed in the world: place [m; world] and heading of its axes, what it sees, how well."""
+    """A motion capture system, fixed in the world: place [m; world] and heading of its axes, bodies, deviations."""
 
     source: str
     volume_m: Volume

@@ -8,7 +8,7 @@ from groundstation.field.room import Vector3
 
 
 def odometry_name(target: str) -> str:
-    """Return the name on the bus of what hears a target's own odometry."""
+    """Return the name on the bus of the driver of a target's odometry."""
     return f"{target}_odometry"
 
 
@@ -36,7 +36,7 @@ class TargetMarker(Marker, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 class TargetOdometry(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Where a target publishes its own odometry, and how good its velocity is."""
+    """Source of a target's own odometry, and the deviation of its velocity."""
 
     source: str
     speed_std_m_s: float = 0.05

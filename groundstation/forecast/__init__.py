@@ -1,1 +1,1 @@
-"""What a field will be worth before anybody flies: how well, where not, and what a failure costs."""
+"""Forecast of tracking in a field before a flight: accuracy, blind places, and the cost of failures."""

@@ -1,4 +1,4 @@
-"""How long each drone's battery lasts, as far as its kind tells."""
+"""Flight time of each drone's battery, as far as its kind tells it."""
 
 from dataclasses import dataclass
 
@@ -17,7 +17,7 @@ class Endurance:
 
 
 def endurance_of(field: ResolvedField) -> list[Endurance]:
-    """Return each drone's."""
+    """Return the endurance of each drone."""
     found = []
     for name, drone in field.drones.items():
         whole, lands_at = kind_named(drone.kind).flight_time_s, drone.limits.battery_min

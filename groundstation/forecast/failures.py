@@ -1,4 +1,4 @@
-"""What is left of a team's view of the floor when one of its cameras or drones fails."""
+"""Forecasts of the same places when one camera or drone of the team fails."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from groundstation.forecast.team import Place, Team
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """What fails, what is expected then at the same places, and whom nobody can place in the room any more."""
+    """One failure, the forecasts of the same places with it, and the drones that can no longer be located."""
 
     what: str
     without: Spread
@@ -18,7 +18,7 @@ class Failure:
 
 
 def teams_without_one(team: Team) -> list[tuple[str, Team]]:
-    """Return the team without each one fixed sensor, drone's camera and drone, with its name for people."""
+    """Return the team without each fixed sensor, drone's camera or drone in turn, with its name for people."""
     fixed = [(name, team.without_sensor(name)) for name in team.sensors.world]
     onboard = [(f"{name}'s camera", team.without_sensor(name)) for name in team.sensors.onboard if name in team.robots]
     return [*fixed, *onboard, *((name, team.without_robot(name)) for name in team.robots)]
@@ -27,7 +27,7 @@ def teams_without_one(team: Team) -> list[tuple[str, Team]]:
 def failures(
     field: ResolvedField, team: Team, places: Sequence[Place], told: Callable[[], None] = lambda: None
 ) -> list[Failure]:
-    """Return what each single failure leaves at some places; told: called after each place."""
+    """Return the forecasts of some places under each single failure; told: called after each place."""
     found = []
     for what, left in teams_without_one(team):
         if not left.robots:
@@ -46,6 +46,6 @@ def _told(forecaster: PlaceForecaster, place: Place, told: Callable[[], None]) -
 
 
 def _unlocalised(team: Team, seen: Iterable[PlaceForecast]) -> tuple[str, ...]:
-    """Return whom no stand at any place lets a fixed sensor place, directly or through drones."""
+    """Return the drones that no stand at any place lets a fixed sensor locate, directly or through drones."""
     placed = frozenset[str]().union(*(one.stand.placed for one in seen if one.stand is not None))
     return tuple(name for name in (*team.robots, team.target) if name not in placed)

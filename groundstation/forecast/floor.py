@@ -1,4 +1,4 @@
-"""How well a target would be known all over the floor, and why not where it would not be."""
+"""Forecasts a target's uncertainty all over the floor, and the reasons for blind places."""
 
 import math
 from collections.abc import Callable, Iterable, Sequence
@@ -14,8 +14,8 @@ from groundstation.forecast.stands import StandSearch, TeamStand
 from groundstation.forecast.team import Place, Team
 from groundstation.forecast.views import Obstruction
 
-_SETTLED_S = 1.5  # after which the filter's covariance stays, from about what it will be
-_BEFORE = (0.05**2, 0.05**2, 0.04**2, 0.05**2)  # variances of x, y, z, yaw then
+_SETTLED_S = 1.5  # time until the filter's covariance, begun near its final value, is constant
+_BEFORE = (0.05**2, 0.05**2, 0.04**2, 0.05**2)  # initial variances of x, y, z, yaw
 OBSTACLE = "an obstacle stands there"
 
 _WORDS = {
@@ -28,9 +28,9 @@ _WORDS = {
 
 @dataclass(frozen=True, slots=True)
 class PlaceForecast:
-    """What is expected of a target at a place.
+    """Forecast of a target at a place.
 
-    std_m: of its place in the floor plan, root of the trace, in the filter; None where it is not seen, for the reason
+    std_m: of its place in the floor plan, root of the trace, in the filter; None if it is not seen, for the reason
     in words. stand: the team's.
     """
 
@@ -69,12 +69,12 @@ class FloorMap:
 
     @property
     def places(self) -> list[PlaceForecast]:
-        """Return the places that a target can be at."""
+        """Return the places at which a target can be."""
         return [one for row in self.rows for one in row if one.reason != OBSTACLE]
 
     @property
     def std_m(self) -> Array:
-        """Return the deviations (rows, columns), nan where a target is not seen."""
+        """Return the deviations (rows, columns), NaN where a target is not seen."""
         return np.array([[math.nan if one.std_m is None else one.std_m for one in row] for row in self.rows])
 
     def every_second(self) -> list[Place]:
@@ -113,7 +113,7 @@ class PlaceForecaster:
         self.search, self._filter, self.team = StandSearch(team), FlownFilter(field, team), team
 
     def at(self, place: Place) -> PlaceForecast:
-        """Return what is expected of a target at a place; raises EstimatorFault for what is not finite."""
+        """Return the forecast of a target at a place; raises EstimatorFault if it is not finite."""
         views = self.search.views
         if views.in_box(place):
             return PlaceForecast(place, None, OBSTACLE)
@@ -134,7 +134,7 @@ class PlaceForecaster:
 def floor_map(
     field: ResolvedField, forecaster: PlaceForecaster, cells: int, told: Callable[[], None] = lambda: None
 ) -> FloorMap:
-    """Return the map of a field's floor with about so many square cells; told: called after each."""
+    """Return the map of a field's floor; cells: about the number of its square cells; told: called after each."""
     width, depth, _ = field.room.size_m
     side = math.sqrt(width * depth / cells)
     xs, ys = _middles(width, side), _middles(depth, side)
@@ -160,7 +160,7 @@ def _middles(length: float, side: float) -> Array:
 
 
 def _taken(left: dict[tuple[int, int], str]) -> tuple[list[tuple[int, int]], str]:
-    """Take the cells of one region out of those that are left; returns them with their reason."""
+    """Remove the cells of one region from those left; return them with their reason."""
     first = next(iter(left))
     reason, queue, cells = left.pop(first), [first], []
     while queue:

@@ -1,4 +1,4 @@
-"""What the filter that flies would know of a team at its stand: fed with what it would see, were all as believed."""
+"""The filter that flies, fed with error-free sightings of a team at its stand: its covariance is the forecast."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,12 +22,12 @@ from groundstation.forecast.views import Views
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _ODOMETRY_NS, _BEGIN_NS = 40 * NS_PER_MS, 10 * NS_PER_S
-_CIRCLE_M, _ROUND_S = 0.25, 8.0  # the circle that all go along to show what only motion shows
+_CIRCLE_M, _ROUND_S = 0.25, 8.0  # circle of all bodies, which reveals states observable only in motion
 
 
 @dataclass(frozen=True, slots=True)
 class _Range:
-    """A pair of an anchor and a robot: its system, and how well one range is measured [m]."""
+    """A pair of an anchor and a robot: its system, and the deviation of one range [m]."""
 
     system: str
     robot: str
@@ -35,7 +35,7 @@ class _Range:
 
 
 class FlownFilter:
-    """The estimator of a field for one team, with what it would see of a target that all of it watches."""
+    """The estimator of a field for one team, with its sightings of a target that the whole team tracks."""
 
     def __init__(self, field: ResolvedField, team: Team) -> None:
         self.team, self._views = team, Views(team)
@@ -62,8 +62,8 @@ class FlownFilter:
     ) -> JointBelief:  # fmt: skip
         """Return the belief after some time at a stand; variances: of x, y, z, yaw of each robot before.
 
-        circling: all go along equal circles, the target too, so that the stand moves as a whole. Who is never seen by
-        somebody who is known is missing in the belief, as in flight.
+        circling: all move along equal circles, the target too, so that the stand moves as a whole. A body that no
+        known observer sees is missing in the belief, as in flight.
         """
         joint, begin = self._joint, self._joint.stamp_ns
         joint.restart()
@@ -86,7 +86,7 @@ class FlownFilter:
     def _moved(
         self, poses: Mapping[str, Array], place: Sequence[float], at_s: float, circling: bool
     ) -> tuple[dict[str, Array], Array]:
-        """Return where all are at a time: robots (x, y, z, yaw), target (x, y, vx, vy)."""
+        """Return all states at a time: robots (x, y, z, yaw), target (x, y, vx, vy)."""
         turn = math.tau / _ROUND_S
         x, y = (
             (_CIRCLE_M * math.sin(turn * at_s), _CIRCLE_M * (1.0 - math.cos(turn * at_s))) if circling else (0.0, 0.0)
@@ -111,7 +111,7 @@ class FlownFilter:
     def _seen(
         self, poses: Mapping[str, Array], place: Sequence[float], at_s: float, circling: bool
     ) -> list[SensorReading]:
-        """Return what all sensors show at a time, without noise."""
+        """Return the measurements of all sensors at a time, without noise."""
         stands, target = self._moved(poses, place, at_s, circling)
         mean = self._mean(stands, target)
         return [
@@ -123,7 +123,7 @@ class FlownFilter:
         ]  # fmt: skip
 
     def _sightings(self, poses: Mapping[str, Array], target: Array) -> Iterator[tuple[str, str, list[float]]]:
-        """Return who sees whom, with deviations of place and, of robots, heading."""
+        """Return observer and subject of all sightings, with deviations of place and, of robots, heading."""
         team = self.team
         points = {name: self._views.marker(name, pose) for name, pose in poses.items()}
         points[team.target] = self._views.ground((float(target[0]), float(target[1])))
@@ -164,7 +164,7 @@ class FlownFilter:
 
 
 def _of_team(parameters: EstimatorParameters, team: Team, ranges: Mapping[str, _Range]) -> EstimatorParameters:
-    """Return the parameters without whom and what the team lacks."""
+    """Return the parameters without the entities and sensors that the team lacks."""
     kept = {*team.sensors.world, *team.sensors.onboard, *ranges}
     sensors = {name: model for name, model in parameters.sensors.items() if name in kept}
     known = {*team.robots, team.target, *(model.carrier for model in sensors.values())}

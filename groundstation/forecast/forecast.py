@@ -1,4 +1,4 @@
-"""The whole forecast of a field: the order in which its parts are computed, and how much work that is."""
+"""The whole forecast of a field: its parts in the order of their computation, with progress."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -16,9 +16,9 @@ _CELLS, _PATH_PLACES = 110, 24
 
 @dataclass(frozen=True, slots=True)
 class Forecast:
-    """What a field is worth: places along the path (none: no path is known) and over the floor, and what it rests on.
+    """The forecast of a field: places along the path (none: no path is known) and over the floor, and its basis.
 
-    watched: where the target is for the observability; base: of the places at which failures are judged, with
+    watched: place of the target for the observability; base: of the places at which failures are judged, with
     everything in order.
     """
 
@@ -38,8 +38,8 @@ def forecast(
 ) -> Forecast:  # fmt: skip
     """Return the forecast of a field for one target on a path (points in order; none: anywhere on the floor).
 
-    told: called with the places done, and about how many there are; target: "" for the first. Raises EstimatorFault for
-    what is not finite.
+    told: called with the number of places done and about all; target: "" for the first. Raises EstimatorFault for
+    results that are not finite.
     """
     team, points = team_of(field, target), spaced(path, _PATH_PLACES)
     total, done = _CELLS + len(points) + len(teams_without_one(team)) * _CELLS // 4, 0
@@ -69,6 +69,6 @@ def forecast(
 
 
 def _hardest(places: Sequence[PlaceForecast]) -> PlaceForecast | None:
-    """Return the seen place that is known worst: there topologies differ most."""
+    """Return the seen place with the largest deviation: there topologies differ most."""
     seen = [one for one in places if one.std_m is not None]
     return max(seen, key=lambda one: one.std_m or 0.0, default=None)

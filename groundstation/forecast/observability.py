@@ -1,4 +1,4 @@
-"""Which entries of the filter's state its sensors tell, and which direction is known worst, for a sensing topology."""
+"""Observable entries of the filter's state, and its least certain direction, for a sensing topology."""
 
 import math
 from collections.abc import Iterable
@@ -18,10 +18,10 @@ from groundstation.forecast.team import Place, Team
 from groundstation.sensing.topology import Topology
 
 FLOWN_S = 10.0
-_LEARNED = 0.25  # of its variance before: a direction whose deviation is at least halved counts as told
-_NAMED = 0.35  # entries of a direction with at least this part of it are named
+_LEARNED = 0.25  # of its variance before: a direction whose deviation is at least halved counts as observed
+_NAMED = 0.35  # least part of a direction with which an entry is named
 _BEFORE = (DIFFUSE_M2, DIFFUSE_M2, DIFFUSE_M2, DIFFUSE_RAD2)
-_LARGEST_TEAM = 3  # of which all topologies are looked at
+_LARGEST_TEAM = 3  # largest team of which all topologies are computed
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +40,7 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class Direction:
-    """A direction of the state: its deviation, and the entries that make it up with their parts."""
+    """A direction of the state: its deviation, and its entries with their parts."""
 
     std: float
     parts: tuple[tuple[str, float], ...]
@@ -48,10 +48,10 @@ class Direction:
 
 @dataclass(frozen=True, slots=True)
 class Observability:
-    """What a team in one topology learns in FLOWN_S of flight.
+    """What a team in one topology can observe in FLOWN_S of flight.
 
-    rank: directions of the state whose deviation is at least halved; missing: who never enters the state; worst_m: the
-    direction of all places known worst; worst_yaw: likewise of the drones' headings [rad]. Both None where none is in
+    rank: directions of the state whose deviation is at least halved; missing: entities never in it; worst_m: the
+    least certain direction of all places; worst_yaw: likewise of the drones' headings [rad]. Both None if none is in
     the state.
     """
 
@@ -64,12 +64,12 @@ class Observability:
 
     @property
     def untold(self) -> tuple[str, ...]:
-        """Return the entries that stay about as they were before."""
+        """Return the entries whose deviation is not halved."""
         return tuple(entry.name for entry in self.entries if not entry.is_told)
 
 
 def topologies_of(team: Team, chosen: Iterable[Topology]) -> list[Topology]:
-    """Return the topologies to look at: all of a small team, else flat, string and those chosen."""
+    """Return the topologies to compute: all of a small team, else flat, string and those chosen."""
     flat = Topology.flat(team.robots)
     if len(team.robots) <= _LARGEST_TEAM:
         found = dict.fromkeys((flat,))
@@ -81,7 +81,7 @@ def topologies_of(team: Team, chosen: Iterable[Topology]) -> list[Topology]:
 
 
 def observe(field: ResolvedField, team: Team, place: Place, topologies: Iterable[Topology]) -> list[Observability]:
-    """Return what each topology's stand for a target at a place tells, all moving along a small circle."""
+    """Return the observability of each topology's stand for a target at a place, all moving along a small circle."""
     search, joint = StandSearch(team), FlownFilter(field, team)
     found = []
     for topology in topologies:
@@ -129,7 +129,7 @@ def _worst(belief: JointBelief, chosen: list[int], labels: tuple[str, ...]) -> D
 
 
 def _variances_before(joint: FlownFilter) -> dict[str, float]:
-    """Return the variance of each entry before anything is seen: surveys and habits, nothing of places."""
+    """Return the initial variance of each entry: from surveys and error habits, unknown for places."""
     tables = tables_from_parameters(joint.parameters)
     found: dict[str, float] = {}
     for row, (name, model) in enumerate(joint.parameters.entities.items()):

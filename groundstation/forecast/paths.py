@@ -10,7 +10,7 @@ from groundstation.forecast.team import Place
 
 
 def spaced(path: Sequence[Place], most: int) -> list[Place]:
-    """Return places along a line through the points of a path, from its first to its last, at most so many."""
+    """Return at most `most` places along the line through a path's points, from the first to the last."""
     if len(path) < 2:
         return list(path)
     lengths = np.cumsum([0.0, *(math.dist(a, b) for a, b in pairwise(path))])

@@ -9,7 +9,7 @@ from groundstation.forecast.observability import Direction, Observability
 
 
 def plain(forecast: Forecast) -> dict[str, Any]:
-    """Return all figures; lengths in m, angles in rad, shares from 0 to 1; std_m: null where it is not seen."""
+    """Return all figures; lengths in m, angles in rad, shares from 0 to 1; std_m: null where the target is not seen."""
     floor = forecast.floor
     return {
         "target": forecast.team.target,

@@ -1,4 +1,4 @@
-"""How a team would stand for a target at one place, and how well it would know the target there."""
+"""Finds a team's stand for a target at one place, and the target's deviation there."""
 
 import math
 from collections.abc import Mapping
@@ -17,17 +17,17 @@ from groundstation.planning.records import HEIGHT, ROBOT_CONTROLS, YAW, X, Y, Z
 from groundstation.planning.rollout import empty_tape, roll_out
 from groundstation.sensing.topology import Topology
 
-_ROUNDS, _SETTLED_M = 3, 0.2  # plans until the team stands; one that moves it less than this is the last
-_RESTS = 3  # horizons that it stands there, after which the covariance is as it stays
-_BEHIND_M, _APART_RAD = 1.0, math.radians(80.0)  # where it starts: towards the room's middle, side by side
+_ROUNDS, _SETTLED_M = 3, 0.2  # most plans until the team stands; the last one moves it less than this
+_RESTS = 3  # horizons at the stand after which the covariance is constant
+_BEHIND_M, _APART_RAD = 1.0, math.radians(80.0)  # first places: towards the room's middle, side by side
 _ROBOT_STD_M, _YAW_STD, _TARGET_STD_M, _SPEED_STD_M_S = 0.05, 0.05, 0.1, 0.2
 
 
 @dataclass(frozen=True, slots=True)
 class TeamStand:
-    """Where the team stands: poses (x, y, z, yaw) [m, rad; world], and what it knows there.
+    """The team's stand: poses (x, y, z, yaw) [m, rad; world], and its knowledge there.
 
-    std_m: of the target's place in the floor plan, root of the trace; placed: whom fixed cameras show, directly or
+    std_m: of the target's place in the floor plan, root of the trace; placed: those that fixed cameras see, directly or
     through drones that they show.
     """
 
@@ -39,10 +39,10 @@ class TeamStand:
 
 
 class _Held(Planner):
-    """A planner that looks at no other topology than the present one."""
+    """A planner that considers only the present topology."""
 
     def options(self, current: Topology) -> tuple[Topology, ...]:
-        """Return none."""
+        """Return no other topology."""
         return ()
 
 
@@ -52,12 +52,12 @@ class StandSearch:
     def __init__(self, team: Team) -> None:
         self.team, self.views = team, Views(team)
         self._parameters = replace(team.planner, min_dwell_s=0.0, hysteresis=0.0)
-        # Without the tail that attracts: it is no information.
+        # Without the attraction's tail, which is no information.
         soft = replace(team.sensors.softness, tail_share=0.0)
         self._judge = ProblemBuilder(team.planner, replace(team.sensors, softness=soft))
 
     def at(self, place: Place) -> TeamStand | Obstruction:
-        """Return the team's best stand for a target that stands at a place, or what leaves the place unseen.
+        """Return the team's best stand for a standing target at a place, or the obstruction that leaves it unseen.
 
         Raises EstimatorFault when the expected uncertainty is not finite.
         """
@@ -73,7 +73,7 @@ class StandSearch:
     def held(self, place: Place, topology: Topology) -> TeamStand:
         """Return the team's stand in a topology that may not change, whether or not it sees the target there.
 
-        A chain to the place is where it starts from if it has as many drones as the topology has levels.
+        It starts from a chain to the place, if that has as many drones as the topology has levels.
         """
         chain = self.views.chain_to(place)
         if isinstance(chain, Obstruction) or len(chain) != len(topology.levels):
@@ -84,7 +84,7 @@ class StandSearch:
         return self._planned(place, scene, topology, _Held(self._parameters, self.team.sensors))
 
     def _planned(self, place: Place, scene: PlanningScene, topology: Topology, planner: Planner) -> TeamStand:
-        """Return the stand that the planner leads to."""
+        """Return the stand to which the planner leads."""
         warm = None
         for _ in range(_ROUNDS):
             plan = planner.plan(_belief_of(scene), topology, warm, lambda: False)
@@ -97,7 +97,7 @@ class StandSearch:
         return self._rested(place, scene, topology)
 
     def _rested(self, place: Place, scene: PlanningScene, topology: Topology) -> TeamStand:
-        """Return what the team knows once it has stood for a while."""
+        """Return the stand with its deviations after the team has stood for a while."""
         rest = np.zeros((len(scene.robots), ROBOT_CONTROLS))
         rest[:, HEIGHT] = scene.poses[:, 2] - self._judge.height_m
         for _ in range(_RESTS):
@@ -137,7 +137,7 @@ class StandSearch:
 
 
 def _belief_of(scene: PlanningScene) -> JointBelief:
-    """Return the belief whose scene this is, heights known."""
+    """Return the belief of a scene, with known heights."""
     layout, n = StateLayout(), len(scene.robots)
     for names, kind, core in (
         (scene.robots, EntityKind.ROBOT, ROBOT_CORE),

@@ -1,4 +1,4 @@
-"""The team of a forecast: who flies with which cameras, and who is missing when something fails."""
+"""The team of a forecast: its drones and cameras, also without those that fail."""
 
 from dataclasses import dataclass, replace
 
@@ -12,7 +12,7 @@ Place = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Team:
-    """Who flies with which cameras, and whom all of them track; others: the field's other targets."""
+    """Drones with their cameras, and the target that all track; others: the field's other targets."""
 
     robots: tuple[str, ...]
     target: str

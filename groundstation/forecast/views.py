@@ -1,4 +1,4 @@
-"""Who could see a place from where: stands inside the fence, and chains of drones down from a fixed camera."""
+"""Finds stands inside the fence that see a place, and chains of drones down from a fixed camera."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -17,12 +17,12 @@ from groundstation.sensing.visibility import camera_rows
 Point = tuple[float, float, float]
 
 _BEARINGS, _DISTANCES, _NEAREST_M = 12, 5, 0.3
-_TRIED = 6  # stands of a drone that another one is looked for above
+_TRIED = 6  # stands of a drone above which another drone is tried
 _NOWHERE = np.zeros(4)
 
 
 class Obstruction(IntEnum):
-    """What leaves a place unseen, in the order in which it is met."""
+    """Causes that leave a place unseen, in the order of their checks."""
 
     NO_CAMERA = 0
     OUT_OF_SIGHT = 1
@@ -44,7 +44,7 @@ Chain = tuple[Link, ...]
 
 
 class Views:
-    """The views of a team's cameras, with hard limits: in view is what a full search of a picture finds."""
+    """The views of a team's cameras, with hard limits: those of a full search of a picture."""
 
     def __init__(self, team: Team) -> None:
         self._team = team
@@ -58,7 +58,7 @@ class Views:
         self._reaches: dict[tuple[str, float], list[tuple[float, float]]] = {}
 
     def sees(self, camera: str, pose: Array, point: Point) -> float:
-        """Return how surely a camera shows a marker at a point [m; world], 0 where it does not; pose: of its robot."""
+        """Return the probability that a camera shows a marker at a point [m; world]; pose: of its robot."""
         share = detection(self._rows[camera], pose, 0.0, *point) / FOUND_SHARE
         if share < 0.5 or not len(self._boxes):
             return share if share >= 0.5 else 0.0
@@ -67,7 +67,7 @@ class Views:
         return share * free if free >= 0.5 else 0.0
 
     def placed_by(self, point: Point, is_target: bool) -> float:
-        """Return how surely a fixed camera shows a marker at a point, by the one that does best."""
+        """Return the probability that a fixed camera, the best one, shows a marker at a point."""
         world = self._team.sensors.world
         return max(
             (self.sees(name, _NOWHERE, point) for name, one in world.items() if one.observes_targets or not is_target),
@@ -75,7 +75,7 @@ class Views:
         )
 
     def marker(self, robot: str, pose: Array) -> Point:
-        """Return where a robot's marker is."""
+        """Return the place of a robot's marker."""
         return float(pose[0]), float(pose[1]), float(pose[2]) + self._team.sensors.marker_height_m[robot]
 
     def placed(self, poses: Mapping[str, Array], place: Place) -> frozenset[str]:
@@ -96,11 +96,11 @@ class Views:
         return frozenset(found)
 
     def ground(self, place: Place) -> Point:
-        """Return where the target's marker is when it stands at a place."""
+        """Return the place of the target's marker when it stands at a place."""
         return (*place, self._team.sensors.marker_height_m[self._team.target])
 
     def chain_to(self, place: Place) -> Chain | Obstruction:
-        """Return a chain that shows the target at a place, the shortest that is found, or what is in its way."""
+        """Return the shortest chain found that shows the target at a place, or the obstruction."""
         point = self.ground(place)
         if self.placed_by(point, is_target=True):
             return ()
@@ -113,7 +113,7 @@ class Views:
         return worst
 
     def why_unplaced(self, place: Place) -> str:
-        """Return why no fixed camera shows a drone that stands nearest to the room's middle and sees a place."""
+        """Return why no fixed camera shows the drone that sees a place from nearest to the room's middle."""
         world, (mx, my) = self._team.sensors.world, self._team.planner.fence.center
         stands = [
             self.marker(robot, pose)
@@ -160,7 +160,7 @@ class Views:
         return Obstruction.NOBODY_PLACES
 
     def _stands(self, robot: str, point: Point) -> list[tuple[float, Array]] | Obstruction:
-        """Return where a robot may hover and sees a point, with how surely."""
+        """Return the places where a robot may hover and sees a point, with probabilities."""
         camera, fence = self._team.sensors.onboard.get(robot), self._team.planner.fence
         if camera is None:
             return Obstruction.NO_CAMERA
@@ -182,7 +182,7 @@ class Views:
         return seeing or Obstruction.HIDDEN
 
     def in_box(self, place: Place, height_m: float = 0.0) -> bool:
-        """Return whether a point lies in something that stands in the room."""
+        """Return whether a point lies in an obstacle of the room."""
         return any(
             abs(place[0] - box.centre_m[0]) <= box.size_m[0] / 2
             and abs(place[1] - box.centre_m[1]) <= box.size_m[1] / 2
@@ -191,7 +191,7 @@ class Views:
         )
 
     def _reach(self, robot: str, camera: OnboardCameraModel, marker_m: float) -> list[tuple[float, float]]:
-        """Return pairs of a distance and a height from which a camera that is turned to a marker shows it."""
+        """Return distances and heights from which a camera turned to a marker shows it."""
         key = robot, round(marker_m, 3)
         if key not in self._reaches:
             self._reaches[key] = [

@@ -26,7 +26,7 @@ class Section:
 
 
 def sections_of(forecast: Forecast) -> list[Section]:
-    """Return all sections of a forecast, what an operator asks first on top."""
+    """Return all sections of a forecast, the most important ones first."""
     return [
         _accuracy(forecast),
         _blind(forecast),
@@ -73,7 +73,7 @@ def _blind(forecast: Forecast) -> Section:
 
 
 def _span(span: tuple[float, float]) -> str:
-    # -0.0 would be written with its sign.
+    # Else -0.0 would be written with its sign.
     return f"{span[0] + 0.0:.1f} to {span[1] + 0.0:.1f}"
 
 
@@ -134,7 +134,7 @@ def _missing(seen: Iterable[Observability]) -> Iterator[str]:
 
 
 def _by_labels(entries: Sequence[str]) -> Iterator[str]:
-    """Return entries by those who share them: "drone_1, drone_2: roll_error, climb"."""
+    """Return entries grouped by the entities that share them: "drone_1, drone_2: roll_error, climb"."""
     pairs, owners = [name.rsplit(".", 1) for name in entries], dict[tuple[str, ...], list[str]]()
     for entity, own in groupby(pairs, key=lambda pair: pair[0]):
         owners.setdefault(tuple(label for _, label in own), []).append(entity)

@@ -33,7 +33,7 @@ EXTENT = (-SQUARES_X / 2 - MARGIN_X, _BAR_X + BAR_WIDTH + MARGIN_X, -SQUARES_Y /
 BLACK, WHITE = 25, 230
 
 
-# Without it, blank paper and a solid dark strip would be words of the code; with it each is two cells away from four
+# Unmasked, blank paper and a solid dark strip would be words of the code; masked, each is two cells away from four
 # words at once, so neither can be read as an identity. Of all masks and orders of the cells these keep the words
 # farthest apart when small cells run into each other (docs/decisions/0051-masked-code-words.md).
 _MASK = np.array([1, 0, 0, 1, 0, 0, 0, 0], dtype=np.int8)
@@ -112,7 +112,7 @@ def cell_centres() -> Array:
 
 
 def dark_rectangles(code: int) -> list[tuple[float, float, float, float]]:
-    """Return x0, x1, y0, y1 in squares of everything printed black."""
+    """Return x0, x1, y0, y1 in squares of all black rectangles."""
     centres, black = square_centres()
     rectangles = [(x - 0.5, x + 0.5, y - 0.5, y + 0.5) for x, y in centres[black]]
     half = SQUARES_Y / CELLS / 2
@@ -123,7 +123,7 @@ def dark_rectangles(code: int) -> list[tuple[float, float, float, float]]:
 
 
 def _coverage(edges: Array, low: float, high: float) -> Array:
-    """Return which share of each interval between successive edges lies in [low, high]."""
+    """Return the share of each interval between successive edges that lies in [low, high]."""
     return np.asarray(np.clip(np.minimum(edges[1:], high) - np.maximum(edges[:-1], low), 0.0, None) / np.diff(edges))
 
 

@@ -1,4 +1,4 @@
-"""Was a fixed camera turned? The one rotation that explains how far all that it sees was displaced at once. Pure.
+"""Finds the one rotation of a fixed camera that explains the displacements of all its sightings. Pure.
 
 A camera that turns by an angle a about an axis n displaces a point that it saw at p to q, with q - p = (p + q) x g and
 g = n tan(a / 2) (Cayley), in its own old axes: linear in g, however far it turns. Noise of detection and what a belief
@@ -13,15 +13,15 @@ import numpy as np
 
 from groundstation.arrays import Matrix, Vector
 
-# How well two sights of a drone that did not move agree [m]; and the share of a displacement that may stay unexplained.
+# Deviation between two sightings of an unmoved drone [m]; share of a displacement that may stay unexplained.
 _SIGHT_M, _SHARE = 0.04, 0.25
-# A priori: about no axis more than this [rad]. It decides where one sight leaves an axis open.
+# A priori deviation about each axis [rad]. It decides if one sighting leaves an axis open.
 _LIKELY_RAD = math.radians(20.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Displacement:
-    """What one camera saw of one robot, against what was to be expected [m; camera_optical]."""
+    """One camera's sighting of one robot, and the expected one [m; camera_optical]."""
 
     robot: str
     expected_m: Vector
@@ -29,13 +29,13 @@ class Displacement:
 
     @property
     def size_m(self) -> float:
-        """Return how far it is [m]."""
+        """Return the distance between both [m]."""
         return float(np.linalg.norm(self.seen_m - self.expected_m))
 
 
 @dataclass(frozen=True, slots=True)
 class CameraTurn:
-    """By how much a camera was turned, with one sigma [rad]; how far that displaces what it saw, at most [m]."""
+    """The turn of a camera with its deviation [rad]; the largest displacement of a sighting by it [m]."""
 
     camera: str
     angle_rad: float
@@ -44,7 +44,7 @@ class CameraTurn:
 
 
 def camera_turn(camera: str, displaced: Sequence[Displacement]) -> CameraTurn | None:
-    """Return the rotation that explains all displacements of one camera, or None where none does."""
+    """Return the rotation that explains all displacements of one camera, or None if none does."""
     most_m = max(one.size_m for one in displaced)
     A = np.vstack([_cross(one.expected_m + one.seen_m) for one in displaced])
     b = np.concatenate([one.seen_m - one.expected_m for one in displaced])

@@ -17,7 +17,7 @@ Scalars = TypeVar("Scalars", float, Array)
 
 # Newton converges quadratically from the distorted point; 12 steps are ample even for k1 = -0.5 at the corners.
 _NEWTON_STEPS = 12
-# The error that is left is of the order of the last step's square.
+# The remaining error is of the order of the last step's square.
 _NEWTON_TOLERANCE = 1e-8
 _MAX_RADIUS = 4.0
 
@@ -52,7 +52,7 @@ class CameraIntrinsics:
 
     @property
     def max_radius(self) -> float:
-        """Return the undistorted radius up to which the distortion grows with the radius, so that it can be undone."""
+        """Return the undistorted radius up to which the distorted radius grows, so that distortion can be inverted."""
         return _fold_radius(self.distortion)
 
     def project(self, points: Array) -> Array:
@@ -64,7 +64,7 @@ class CameraIntrinsics:
         return self.pixels_from_normalised(normalised)
 
     def pixel(self, x: float, y: float, z: float) -> tuple[float, float] | None:
-        """Return the pixel of one point [optical] as `project` does, in a tenth of its time; None where it has NaN."""
+        """Return the pixel of one point [optical] like `project`, in a tenth of its time; None instead of NaN."""
         if not z > 1e-9:
             return None
         x, y = x / z, y / z
@@ -177,7 +177,7 @@ def _undistort(x_d: Array, y_d: Array, distortion: tuple[float, ...]) -> tuple[A
 
 
 class LensFigures(Protocol):
-    """A lens calibration as the settings, the resolved field and a camera driver's section hold it."""
+    """A lens calibration in the form of settings, resolved field and camera driver's section."""
 
     @property
     def width_px(self) -> int:

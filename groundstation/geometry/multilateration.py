@@ -1,4 +1,4 @@
-"""Where the ranges of one transponder to anchors at known places put it, by themselves."""
+"""Locates a transponder by its ranges to anchors at known places alone."""
 
 import math
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from groundstation.arrays import Array
 
 _LEAST_RANGES = 4
 _STEPS, _SETTLED_M = 12, 1e-4
-# A residual beyond so many deviations tells of a reflection: then the ranges together place nothing.
+# A residual beyond this many deviations means a reflection: the ranges together then yield no place.
 _MOST_SIGMAS = 3.5
 
 Vector3 = tuple[float, float, float]
@@ -30,8 +30,8 @@ def fix_from_ranges(
 ) -> Fix | None:
     """Return the position that fits ranges to anchors best, in the least squares of Gauss and Newton.
 
-    anchors_m [m; world], ranges_m [m], std_m of each; about_m, about_std_m: where the transponder is likely at all: it
-    decides between a place and its mirror image behind a plane of anchors. None: fewer than four ranges, or some that
+    anchors_m [m; world], ranges_m [m], std_m of each; about_m, about_std_m: a priori place of the transponder: it
+    decides between a place and its mirror image behind a plane of anchors. None: fewer than four ranges, or ranges that
     contradict the others.
     """
     if len(ranges_m) < _LEAST_RANGES:
@@ -58,7 +58,7 @@ def fix_from_ranges(
 
 
 def likely_in(volume_m: tuple[Span, Span, Span]) -> tuple[Vector3, Vector3]:
-    """Return where a transponder is likely that is in a box or a little outside: place and deviation [m; world]."""
+    """Return the a priori place of a transponder in a box or a little outside, with its deviation [m; world]."""
     x, y, z = (sum(span) / 2 for span in volume_m)
     wide, deep, high = (max(1.0, span[1] - span[0]) for span in volume_m)
     return (x, y, z), (wide, deep, high / 2)
@@ -67,7 +67,7 @@ def likely_in(volume_m: tuple[Span, Span, Span]) -> tuple[Vector3, Vector3]:
 def horizontal_std_m(anchors_m: Sequence[Vector3], point_m: Vector3, std_m: float, height_std_m: float) -> float:
     """Return the larger standard deviation in the plane [m] that one range to each anchor leaves at a point.
 
-    height_std_m: how well the height is known without them. Infinite where they do not place anything.
+    height_std_m: deviation of the height without them. Infinite if they do not determine a place.
     """
     away = np.array(point_m) - np.array(anchors_m).reshape(-1, 3)
     H = away / np.maximum(np.sqrt((away**2).sum(axis=1)), 1e-3)[:, None]

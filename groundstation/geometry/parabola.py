@@ -1,4 +1,4 @@
-"""Where a cost that was tried at a few places is least: by a parabola, wide enough that noise makes small dents."""
+"""Finds the minimum of a noisy cost evaluated at a few places, by a parabola wider than its noise."""
 
 from typing import NamedTuple
 
@@ -8,7 +8,7 @@ from groundstation.arrays import Array
 
 
 class Least(NamedTuple):
-    """A minimum: the tried place nearest to it, where it is, and half of the cost's second derivative there."""
+    """A minimum: the tried place nearest to it, its place, and half of the cost's second derivative there."""
 
     nearest: int
     place: float
@@ -16,9 +16,9 @@ class Least(NamedTuple):
 
 
 def least(places: Array, costs: Array, reach: int) -> Least | None:
-    """Return the minimum of costs tried at places, fitted to so many to each side of the best; None at the edge.
+    """Return the minimum of costs at places, fitted to `reach` places to each side of the best; None at the edge.
 
-    A curvature of 0 or less says that the costs tell no minimum; `place` is nan then.
+    A curvature of 0 or less means that the costs have no minimum; `place` is then NaN.
     """
     best = int(np.argmin(costs))
     if best in (0, len(costs) - 1):

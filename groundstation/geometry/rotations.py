@@ -32,7 +32,7 @@ def rotation_from_euler(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Ar
 
 
 def rotations_from_euler(roll_rad: Array, pitch_rad: Array, yaw_rad: Array) -> Array:
-    """Return the same for angles (...) as rotations (..., 3, 3)."""
+    """Return the rotations (..., 3, 3) of angles (...), as `rotation_from_euler` does."""
     (cr, cp, cy), (sr, sp, sy) = (tuple(f(a) for a in (roll_rad, pitch_rad, yaw_rad)) for f in (np.cos, np.sin))
     rows = (
         (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
@@ -59,9 +59,9 @@ WORLD_FROM_DOWNWARD_OPTICAL.setflags(write=False)
 
 
 def world_from_downward_optical(rotation_deg: Sequence[float]) -> Array:
-    """Return world_from_camera_optical (3, 3) of a camera that looks down but for a turn (roll, pitch, yaw) [deg].
+    """Return world_from_camera_optical (3, 3) of a camera turned from looking down by (roll, pitch, yaw) [deg].
 
-    The turn is about the world's axes, as `rotation_from_euler` has it.
+    The turn is about the world's axes, as in `rotation_from_euler`.
     """
     roll, pitch, yaw = (math.radians(angle) for angle in rotation_deg)
     return np.asarray(rotation_from_euler(roll, pitch, yaw) @ WORLD_FROM_DOWNWARD_OPTICAL)

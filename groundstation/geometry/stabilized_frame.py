@@ -1,4 +1,4 @@
-"""Gravity, and velocities between the world and a robot's yaw-only frame, which stands upright against it."""
+"""Gravity, and velocities between the world and a robot's upright, yaw-only frame."""
 
 import math
 

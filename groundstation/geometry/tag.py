@@ -31,7 +31,7 @@ class TagFamily(Protocol):
     """A dictionary of square tags: OpenCV's, or that of another package (entry point `skein.markers`).
 
     count: ids are below that; bits: along the side of a tag without its black border of one module; corner_std_px:
-    standard deviation of a corner that its finder finds [px].
+    standard deviation of its finder's corners [px].
     """
 
     count: int
@@ -39,7 +39,7 @@ class TagFamily(Protocol):
     corner_std_px: float
 
     def finder(self) -> Finder:
-        """Return what finds tags in a grey picture (h, w): ids and corners (4, 2) [px].
+        """Return a function that finds tags in a grey picture (h, w): ids and corners (4, 2) [px].
 
         In the order of `SquareTag.corners`; the centre of the first pixel is (0, 0).
         """
@@ -75,7 +75,7 @@ class SquareTag:
 
     @property
     def family(self) -> TagFamily | None:
-        """Return the plug-in that its dictionary belongs to, None for those of OpenCV."""
+        """Return the plug-in of its dictionary, None for those of OpenCV."""
         if self.dictionary in DICTIONARIES:
             return None
         family: TagFamily = plug_ins.tag_family(self.dictionary)
@@ -101,7 +101,7 @@ class SquareTag:
 
 
 def tag_fault(dictionary: str, number: int) -> str:
-    """Return what is wrong with a dictionary or an id in it; "" when nothing is."""
+    """Return the fault of a dictionary or of an id in it; "" if there is none."""
     if dictionary in DICTIONARIES:
         count = DICTIONARIES[dictionary][0]
     elif dictionary in (installed := plug_ins.names(plug_ins.MARKERS)):
@@ -116,7 +116,7 @@ def tag_fault(dictionary: str, number: int) -> str:
 
 
 def _meant(dictionary: str, known: Sequence[str]) -> str:
-    """Return which dictionary was probably meant: OpenCV itself writes 36h11 in C++, and both in Python."""
+    """Return the likeliest dictionary for a name: OpenCV itself writes 36h11 in C++, and both forms in Python."""
     by_capitals = {name.upper(): name for name in known}
     near = get_close_matches(dictionary.upper(), by_capitals, 1, 0.8)
     return f"; did you mean {by_capitals[near[0]]}?" if near else ""

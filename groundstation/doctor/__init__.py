@@ -1,1 +1,1 @@
-"""What this machine lacks for flying, and the remedy."""
+"""Checks whether this machine meets the requirements of a flight, with remedies."""

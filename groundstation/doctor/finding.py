@@ -1,11 +1,11 @@
-"""One answer of the doctor."""
+"""One finding of the doctor."""
 
 from enum import StrEnum
 from typing import NamedTuple
 
 
 class Level(StrEnum):
-    """How much a finding matters: MUST is mended before a flight, SHOULD makes flights worse, OK needs nothing."""
+    """Level of a finding: MUST is to be mended before a flight, SHOULD makes flights worse, OK needs nothing."""
 
     MUST = "MUST"
     SHOULD = "SHOULD"
@@ -13,7 +13,7 @@ class Level(StrEnum):
 
 
 class Finding(NamedTuple):
-    """What was looked at, what was found, and what to do about it; `remedy` is empty where nothing is to do."""
+    """A finding: its subject, its text, and its remedy, "" if none is needed."""
 
     level: Level
     subject: str

@@ -1,4 +1,4 @@
-"""Ports that a run wants, and Wi-Fi that sleeps."""
+"""Checks of the ports that a run needs, and of Wi-Fi power saving."""
 
 import shutil
 import socket
@@ -11,14 +11,14 @@ _NETWORKS = Path("/sys/class/net")
 
 
 def port(number: int, purpose: str) -> Finding:
-    """Return whether a TCP port is free on loopback."""
+    """Return a finding on whether a TCP port is free on loopback."""
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         return _bound(probe, ("127.0.0.1", number), f"port of the {purpose}", "ltnp")
 
 
 def datagram_port(place: tuple[str, int], purpose: str) -> Finding:
-    """Return whether a UDP port at which a driver waits for its vehicle is free."""
+    """Return a finding on whether a UDP port at which a driver waits for its vehicle is free."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         return _bound(probe, place, f"port of {purpose}", "lunp")
 
@@ -34,7 +34,7 @@ def _bound(probe: socket.socket, place: tuple[str, int], subject: str, listed: s
 
 
 def power_saving(networks: Path = _NETWORKS, program: str = "iw") -> list[Finding]:
-    """Return, for each Wi-Fi adapter, whether it sleeps between packets: that delays datagrams by 100 ms and more."""
+    """Return a finding for each Wi-Fi adapter: power saving delays datagrams by 100 ms and more."""
     adapters = sorted(path.parent.name for path in networks.glob("*/wireless"))
     return [_adapter(name, program) for name in adapters]
 

@@ -1,4 +1,4 @@
-"""Which plug-ins of other packages there are, and which of them cannot be used."""
+"""Lists plug-ins of other packages, and those that cannot be used."""
 
 from groundstation import plug_ins
 from groundstation.doctor.finding import Finding, Level
@@ -8,7 +8,7 @@ _GROUPS = (plug_ins.CAMERAS, plug_ins.PLANNERS, plug_ins.WORLD_SENSORS, plug_ins
 
 
 def plug_in_findings() -> list[Finding]:
-    """Return a finding for each plug-in; each is loaded, none is made."""
+    """Return a finding for each plug-in; each is loaded, but not instantiated."""
     refused = refused_kinds()
     found = [_finding(plug_ins.VEHICLES, name, refused.get(name, "")) for name in plug_ins.names(plug_ins.VEHICLES)]
     return found + [_finding(group, name, _why_not(group, name)) for group in _GROUPS for name in plug_ins.names(group)]

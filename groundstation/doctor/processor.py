@@ -1,4 +1,4 @@
-"""Cores, clock and the right to run in real time."""
+"""Checks of cores, clock, frequency and the right to run in real time."""
 
 import os
 import threading
@@ -10,12 +10,12 @@ from groundstation.process.priority import go_first
 _CORES_MUST, _CORES_SHOULD = 2, 4
 _CLOCK = Path("/sys/devices/system/clocksource/clocksource0/current_clocksource")
 _GOVERNOR = Path("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor")
-# Clocks that are read without a system call; the others cost microseconds, or jump when the host moves the guest.
+# Clocks that are read without a system call; others take microseconds, or jump when a virtual machine is moved.
 _FAST_CLOCKS = frozenset({"tsc", "kvm-clock", "hyperv_clocksource_tsc_page", "arch_sys_counter"})
 
 
 def cores() -> Finding:
-    """Return how many cores this process may use: a team of two and its emulation need two."""
+    """Return a finding on the cores that this process may use: a team of two and its emulation need two."""
     count = len(os.sched_getaffinity(0))
     remedy = "use a machine with more cores, or give the container more (--cpus)"
     level = Level.MUST if count < _CORES_MUST else Level.SHOULD
@@ -23,7 +23,7 @@ def cores() -> Finding:
 
 
 def real_time_right() -> Finding:
-    """Return whether loops with deadlines may run ahead of ordinary programs; tried in a thread that then ends."""
+    """Return a finding on real-time priority for loops with deadlines; tried in a thread that then ends."""
     allowed: list[bool] = []
     thread = threading.Thread(target=lambda: allowed.append(go_first()))
     thread.start()
@@ -37,7 +37,7 @@ def real_time_right() -> Finding:
 
 
 def clock_source(path: Path = _CLOCK) -> Finding | None:
-    """Return which clock the kernel reads, or None where it does not say."""
+    """Return a finding on the kernel's clock source, or None if it does not tell it."""
     if not path.exists():
         return None
     name = path.read_text().strip()
@@ -46,7 +46,7 @@ def clock_source(path: Path = _CLOCK) -> Finding | None:
 
 
 def governor(path: Path = _GOVERNOR) -> Finding | None:
-    """Return how the kernel chooses the processor's frequency, or None where it does not."""
+    """Return a finding on the kernel's frequency governor, or None without one."""
     if not path.exists():
         return None
     name = path.read_text().strip()

@@ -1,4 +1,4 @@
-"""Room and speed of the disk that recordings go to, memory, open files."""
+"""Checks of the recordings' disk (free space, speed), of memory and open files."""
 
 import os
 import resource
@@ -18,7 +18,7 @@ _BLOCK, _BLOCKS = 1 << 20, 16
 
 
 def room(folder: Path) -> Finding:
-    """Return how much may still be written to the folder of recordings, or to the nearest parent that exists."""
+    """Return a finding on the free space of the recordings' folder, or of its nearest existing parent."""
     try:
         free = free_bytes(_nearest(folder))
     except OSError as error:
@@ -32,7 +32,7 @@ def room(folder: Path) -> Finding:
 
 
 def speed(folder: Path) -> Finding:
-    """Return how fast 16 MB reach the disk [bytes/s], written beside the recordings and removed again."""
+    """Return a finding on the speed of the disk, by 16 MB written beside the recordings and removed again."""
     path = _nearest(folder) / f".skein-doctor-{os.getpid()}"
     try:
         took_s = _write(path)
@@ -66,7 +66,7 @@ def _nearest(folder: Path) -> Path:
 
 
 def memory() -> Finding:
-    """Return how much memory the machine has."""
+    """Return a finding on the machine's memory."""
     total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     return judged(
         total >= _MEMORY_SHOULD, Level.SHOULD, "memory", f"{total / 1e9:.1f} GB", "4 GB are needed with cameras"
@@ -74,7 +74,7 @@ def memory() -> Finding:
 
 
 def open_files() -> Finding:
-    """Return how many files a process may hold open."""
+    """Return a finding on the number of files that a process may hold open."""
     soft, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     unlimited = soft == resource.RLIM_INFINITY
     found = "unlimited" if unlimited else f"{soft}"

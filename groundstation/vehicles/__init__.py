@@ -1,4 +1,4 @@
-"""Kinds of vehicles: what one is made of (`kind`), and which there are (`registry`)."""
+"""Kinds of vehicles: their description (`kind`) and their registry (`registry`)."""
 
 from groundstation.vehicles.kind import (
     DriverProcess,

@@ -1,4 +1,4 @@
-"""What a kind of vehicle is made of: one object says it to settings, supervisor, estimator and simulator.
+"""The description of a kind of vehicle: one object for settings, supervisor, estimator and simulator.
 
 The object is light: drivers and emulators are named as "module:attribute" and loaded by the process that runs them.
 """
@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict
 from groundstation.field.behaviour import SafetyValues
 from groundstation.field.drones import FieldDrone
 
-# Path of keys below the drone in the field file, and what is wrong there.
+# Path of keys below the drone in the field file, and the fault there.
 Finding = tuple[tuple[str | int, ...], str]
 
 
@@ -32,12 +32,12 @@ _NONE: Mapping[str, KindSection] = MappingProxyType({})
 
 @dataclass(frozen=True, slots=True)
 class ErrorHabits:
-    """How long a kind's errors last [s], and the error of its climb rate [m/s; of its highest: share].
+    """Time constants of a kind's errors [s], and the error of its climb rate [m/s; of its highest: share].
 
-    tells_attitude: its own attitude is better than what we could make of its IMU. flies_on_estimate: it is told where
-    it is, so that the tracker has to know it before it lifts off. tells_steps: its velocities and angles come in steps
-    so coarse that they repeat while it hovers; a frozen one is its driver's to find. velocity_walk: by how much the
-    error of its velocity changes while nobody sees it [m/s per root second].
+    tells_attitude: its own attitude is better than ours from its IMU. flies_on_estimate: it flies on our
+    estimate, which the tracker must have before it lifts off. tells_steps: its velocities and angles come in steps
+    so coarse that they repeat while it hovers; its driver must find frozen ones. velocity_walk: by how much the
+    error of its velocity changes while no camera sees it [m/s per root second].
     """
 
     velocity_s: float
@@ -54,7 +54,7 @@ class ErrorHabits:
 
 @dataclass(frozen=True, slots=True)
 class VehicleOrder:
-    """What a kind is told of one drone of a field.
+    """The order that a kind gets for one drone of a field.
 
     index: its place among all drones; sections: those keys of the field file that only its kind has, None left out;
     top_m: of the fence; raw_datagrams: whether they are recorded.
@@ -69,14 +69,14 @@ class VehicleOrder:
     sections: Mapping[str, KindSection] = field(default_factory=lambda: _NONE)
 
     def section(self, key: str, default: _Section) -> _Section:
-        """Return a section of the kind's own, or what holds where the field file has none."""
+        """Return a section of the kind's own, or the default if the field file has none."""
         own = self.sections.get(key)
         return own if isinstance(own, type(default)) else default
 
 
 @dataclass(frozen=True, slots=True)
 class DriverProcess:
-    """A driver process: the vehicles that it flies, the first of which it is named after, and its section as JSON."""
+    """A driver process: its vehicles, of which the first gives it its name, and its section as JSON."""
 
     vehicles: tuple[str, ...]
     section: str
@@ -84,10 +84,10 @@ class DriverProcess:
 
 @dataclass(frozen=True, slots=True)
 class StopDatagrams:
-    """What stops and lands vehicles whose driver is dead, in their own protocol, and the port that it is sent to.
+    """Datagrams that stop and land vehicles whose driver is dead, in their own protocol, and their port.
 
-    hover must never lift a vehicle that stands. voice, way, called: as in supervisor.process_spec.FailsafeDatagrams.
-    hovers_s: for how long it can hover without its driver [s]; land is said after that at the latest.
+    hover must never lift a standing vehicle. voice, way, called: as in supervisor.process_spec.FailsafeDatagrams.
+    hovers_s: for how long it can hover without its driver [s]; land is sent after that at the latest.
     """
 
     port: int
@@ -101,9 +101,9 @@ class StopDatagrams:
 
 @dataclass(frozen=True, slots=True)
 class Offer:
-    """What `groundstation new` writes of a type of this kind, and of each drone of it, beside what all have.
+    """Text of `groundstation new` for a type of this kind and for each drone of it, beside the keys of all drones.
 
-    title: its name for people, "" where the word is one. of_type, of_drone: YAML, indented by four; pictures: the
+    title: its name for people, "" if its word is one. of_type, of_drone: YAML, indented by four; pictures: the
     address of its camera's. {address} is the drone's own, {id} a number that no other drone has.
     """
 
@@ -117,7 +117,7 @@ class Offer:
 class KindCommands:
     """A kind's own commands, `groundstation NAME ...`: "module:attribute" of a click group, and its line in the help.
 
-    words: those of its commands that people look for one level up.
+    words: names of its commands that people look for one level up.
     """
 
     target: str
@@ -139,21 +139,21 @@ class VehicleKind:
 
     name: the word for `kind` in the field file. summary: a line for people. driver: "module:function" of the driver
     process. sections: keys of the field file that only this kind has; required: those that must be given.
-    processes: who shares a driver process, with its settings; stop: what vehicles of one process are sent when it
-    is dead. check: (drone, finding) for what is wrong between the sections of this kind. standing_m: height of the
-    base above the floor before take-off, and its deviation; the default is usual of small vehicles. camera: scheme
-    of the vehicle's own video, "" if it has none; camera_port: its usual port; reader: "module:attribute" of what
-    is called with address and interface and reads it, as the sources of `drivers.camera` do. has_serial_number: the
+    processes: vehicles that share a driver process, with its settings; stop: datagrams to vehicles of one process if it
+    is dead. check: (drone, finding) for each fault between the sections of this kind. standing_m: height of the
+    base above the floor before take-off, and its deviation; the default suits small vehicles. camera: scheme
+    of the vehicle's own video, "" if it has none; camera_port: its usual port; reader: "module:attribute" of its
+    source, called with address and interface like the sources of `drivers.camera`. has_serial_number: the
     driver knows the vehicle's own. has_interface: driver and failsafe datagrams use the drone's network adapter
     and no other. shares_address: its vehicles may have one address, and `check` tells them apart. moved: changes of
     sections in a simulated network, where this computer has the local address. emulator: "module:attribute" of a
-    sim_bridge.world.emulation.Emulation, "" if there is none. example: what a field file may say of one in its
+    sim_bridge.world.emulation.Emulation, "" if there is none. example: content of a field file for one in its
     sections; the conformance kit flies that one. offers: types of it by name for `groundstation new`; none: one
     with the sections of the example. commands: its own part of the command line. emulated_faults: faults of a
     scenario that its emulator can have and others cannot; emulated_firmwares: names that a scenario may give its
     firmware; scenario: sections of a scenario file that only its emulator reads, each as "module:class" of a
-    sim_bridge.section.Section. true_pose: "module:function" of what hears from the simulator behind a real firmware
-    where the vehicle is (a sim_bridge.real.followers.PoseFeed), "" if none tells. blink: "module:function" that
+    sim_bridge.section.Section. true_pose: "module:function" of a receiver of true poses from the simulator behind a
+    real firmware (a sim_bridge.real.followers.PoseFeed), "" if there is none. blink: "module:function" that
     lets a standing vehicle be seen or heard, called with its driver's section and its name, returns what it did and
     raises DriverError; "" if it cannot. flight_time_s: what a new
     battery of the usual size lasts at most, None where vehicles of one kind differ or nobody tells.

@@ -1,4 +1,4 @@
-"""Which kinds of vehicles there are: ours by their place, those of others by entry point."""
+"""Finds the kinds of vehicles: ours by their place, those of others by entry point."""
 
 import pkgutil
 from collections.abc import Callable, Iterator
@@ -14,7 +14,7 @@ _OURS = "drivers"
 
 
 def kind_named(name: str) -> VehicleKind:
-    """Return a kind of vehicle; raises SettingsError naming the kinds there are, or why this one is refused."""
+    """Return a kind of vehicle; raises SettingsError naming all kinds, or the reason why this one is refused."""
     kinds, refused = _found()
     if name in kinds:
         return kinds[name]
@@ -49,7 +49,7 @@ def _found() -> tuple[dict[str, VehicleKind], dict[str, str]]:
 
 
 def ask(kind: VehicleKind, part: str, *arguments: object) -> Any:
-    """Return what a function of a kind answers, an iterator's items as a list; raises SettingsError where it fails."""
+    """Return the result of a kind's function, an iterator's items as a list; raises SettingsError if it fails."""
     try:
         answer = getattr(kind, part)(*arguments)
         return list(answer) if isinstance(answer, Iterator) else answer

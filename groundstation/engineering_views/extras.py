@@ -1,4 +1,4 @@
-"""Optional libraries: missing ones are an operator's matter, with the command that installs them."""
+"""Requires optional libraries: the error for a missing one names the command that installs it."""
 
 from importlib.util import find_spec
 

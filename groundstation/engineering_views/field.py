@@ -1,4 +1,4 @@
-"""The resolved field that a recording carries."""
+"""The resolved field in a recording's attachments."""
 
 from collections.abc import Mapping
 
@@ -9,7 +9,7 @@ from groundstation.recording.preamble import FIELD_NAME
 
 
 def field_of(attachments: Mapping[str, bytes]) -> ResolvedField | None:
-    """Return the resolved field among attachments; None where none can be read, so that the rest can be shown."""
+    """Return the resolved field among attachments; None if it cannot be read, so that the rest is still shown."""
     try:
         return field_from_json(attachments.get(FIELD_NAME, b"{}"))
     except msgspec.DecodeError:

@@ -16,9 +16,9 @@ from groundstation.recording.viewers import SCENE_CHANNEL
 
 
 def write_with_scene(run: RecordedRun, path: Path) -> tuple[int, list[str]]:
-    """Write all parts of a run into one new file, with a scene ten times a second; returns how many scenes.
+    """Write all parts of a run into one new file, with a scene ten times a second; returns the number of scenes.
 
-    The second value says what could not be decoded. Raises OperatorMistake when the extra is missing or the place
+    The second value names data that could not be decoded. Raises OperatorMistake if the extra is missing or the path
     is wrong or taken, OutputError when the disk refuses.
     """
     require_foxglove()

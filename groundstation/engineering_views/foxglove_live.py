@@ -1,4 +1,4 @@
-"""A Foxglove WebSocket server on loopback that says what a recording would hold, and the scene. Extra [foxglove]."""
+"""A Foxglove WebSocket server on loopback with a recording's channels and the scene. Extra [foxglove]."""
 
 import foxglove
 
@@ -15,7 +15,7 @@ from groundstation.recording.timeline import Timeline
 from groundstation.recording.viewers import SCENE_CHANNEL
 
 HOST = "127.0.0.1"
-# Messages that wait for one slow viewer before the oldest are dropped for it alone.
+# Largest number of messages that wait for one slow viewer; beyond it the oldest are dropped for this viewer.
 _BACKLOG = 512
 _DRAWN = frozenset(topic.name for topic in DRAWN)
 
@@ -43,7 +43,7 @@ class FoxgloveView:
 
     @property
     def address(self) -> str:
-        """Return what to enter in the viewer's connection dialogue."""
+        """Return the address for the viewer's connection dialogue."""
         return f"ws://{HOST}:{self._server.port}"
 
     @property
@@ -52,11 +52,11 @@ class FoxgloveView:
         return True
 
     def subscribe(self, bus: Bus) -> tuple[Subscription, ...]:
-        """Return the queues of what it shows."""
+        """Return the queues of the topics that it shows."""
         return everything(bus)
 
     def take(self, sample: Sample, now_ns: int) -> None:
-        """Say on what arrived at a boot-clock time."""
+        """Forward a sample that arrived at a boot-clock time."""
         entry = self._capture.entry(sample, now_ns)
         if entry is None:
             return
@@ -91,5 +91,5 @@ class FoxgloveView:
             self._scene_channel.log(update, log_time=entry.log_time_ns)
 
     def close(self) -> None:
-        """Let all viewers go."""
+        """Disconnect all viewers."""
         self._server.stop()

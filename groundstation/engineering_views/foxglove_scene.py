@@ -37,7 +37,7 @@ def scene_schema() -> Schema:
 
 
 class FoxgloveScene:
-    """Follows the messages and gives a new scene at most ten times a second; mark: what stands over the room."""
+    """Follows the messages and makes a new scene at most ten times a second; mark: text over the room."""
 
     def __init__(self, field: ResolvedField | None, mark: str = "") -> None:
         self._scene = ViewScene(field)
@@ -50,7 +50,7 @@ class FoxgloveScene:
         self._next_ns = 0
 
     def take(self, time_ns: int, message: m.Message) -> bytes | None:
-        """Return an encoded SceneUpdate when an estimate asks for a new picture."""
+        """Return an encoded SceneUpdate if the message is an estimate and a scene is due, else None."""
         match message:
             case m.SearchMap():
                 self._searched[message.header.entity] = self._scene.cells(message)

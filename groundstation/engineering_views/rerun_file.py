@@ -16,7 +16,7 @@ APPLICATION = "skein"
 
 
 def write_rrd(run: RecordedRun, path: Path) -> tuple[int, list[str]]:
-    """Write a new .rrd file; returns how many messages it was made of, and what could not be decoded.
+    """Write a new .rrd file; returns the number of messages shown, and data that could not be decoded.
 
     Raises OperatorMistake when the extra is not installed or the place is wrong or taken, OutputError when the disk
     refuses.
@@ -54,7 +54,7 @@ def _write(run: RecordedRun, path: Path) -> tuple[int, list[str]]:
         count += 1
     try:
         stream.flush()
-    except RuntimeError as error:  # the library says neither where nor why
+    except RuntimeError as error:  # the library tells neither path nor cause
         raise OutputError(f"{path.parent}: the file cannot be written ({error}); is the disk full?") from error
     finally:
         stream.disconnect()

@@ -1,4 +1,4 @@
-"""Rerun's viewer fed from the bus: its server runs as a child of ours, bound to loopback. Extra [rerun]."""
+"""Feeds Rerun's viewer from the bus: its server runs as a child process, bound to loopback. Extra [rerun]."""
 
 import subprocess
 from importlib.util import find_spec
@@ -18,18 +18,18 @@ from groundstation.recording.file_topics import is_picture
 from groundstation.recording.timeline import Timeline
 
 HOST = "127.0.0.1"
-# Without limits server and viewer keep everything they ever got.
+# Without limits server and viewer keep all data.
 _MEMORY = "512MB"
 _LAST_WORDS_S = 2.0
 
 
 class RerunServer:
-    """The viewer's own server. The SDK could serve too, but only on all interfaces: it has no host to give."""
+    """The viewer's own server. The SDK could serve too, but only on all interfaces."""
 
     def __init__(self, port: int, web_port: int) -> None:
         found = find_spec("rerun_cli")
         assert found is not None and found.origin is not None
-        # The `rerun` script is a wrapper: ended, it would leave the real program running.
+        # The `rerun` script is a wrapper: ending it would leave the real program running.
         program = Path(found.origin).with_name("rerun")
         places = ["--bind", HOST, "--port", str(port), "--web-viewer-port", str(web_port)]
         self._process = subprocess.Popen(
@@ -48,7 +48,7 @@ class RerunServer:
         return self._process.poll() is None
 
     def close(self) -> None:
-        """End it."""
+        """End the server."""
         self._process.terminate()
         try:
             self._process.wait(_LAST_WORDS_S)
@@ -83,15 +83,15 @@ class RerunView:
 
     @property
     def alive(self) -> bool:
-        """Return whether somebody listens."""
+        """Return whether its server or file can still be written to."""
         return self._server is None or self._server.alive
 
     def subscribe(self, bus: Bus) -> tuple[Subscription, ...]:
-        """Return the queues of what it shows."""
+        """Return the queues of the topics that it shows."""
         return everything(bus)
 
     def take(self, sample: Sample, now_ns: int) -> None:
-        """Show what arrived at a boot-clock time; what does not decode is passed over."""
+        """Show a sample that arrived at a boot-clock time; samples that cannot be decoded are ignored."""
         try:
             key = self._keys.get(sample.key) or self._keys.setdefault(sample.key, keys.parse(sample.key))
             if is_picture(key.topic):
@@ -106,7 +106,7 @@ class RerunView:
             return
 
     def close(self) -> None:
-        """Hand over what is left, but never wait for a viewer that does not answer."""
+        """Send remaining data, without waiting for a viewer that does not answer."""
         try:
             self._stream.flush(timeout_sec=_LAST_WORDS_S)
         except (RuntimeError, ValueError) as error:

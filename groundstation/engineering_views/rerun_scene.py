@@ -1,4 +1,4 @@
-"""Our messages in Rerun's words: a room with drones, ellipses, links and arrows, pictures, plots and a log.
+"""Turns our messages into Rerun's: a room with drones, ellipses, links and arrows, pictures, plots and a log.
 
 Needs the extra [rerun]. Nothing here talks to a network: the stream's sink is the caller's choice.
 """
@@ -23,7 +23,7 @@ from groundstation.geometry.angles import quaternion_from_euler
 from groundstation.recording.viewers import Transform
 from groundstation.time_units import NS_PER_S
 
-# Faster than this nobody looks, and each log call costs tens of microseconds.
+# Viewers need no higher rate, and each log call takes tens of microseconds.
 _PERIOD_NS = NS_PER_S // 10
 _ARM_M = 0.25
 _PICTURE_DISTANCE_M = 0.4
@@ -31,7 +31,7 @@ _LEVELS = {"INFO": "INFO", "WARNING": "WARN", "ERROR": "ERROR"}
 
 
 class RerunScene:
-    """Feeds one recording stream, message by message, in order of time; mark: what stands over the room."""
+    """Feeds one recording stream, message by message, in order of time; mark: text over the room."""
 
     def __init__(self, stream: rr.RecordingStream, field: ResolvedField | None, start_ns: int, mark: str = "") -> None:
         self._stream = stream
@@ -57,7 +57,7 @@ class RerunScene:
             self._log("world/mark", rr.Points3D([self._scene.top_m], labels=[mark], show_labels=True), static=True)
 
     def take(self, time_ns: int, message: m.Message) -> None:
-        """Show a message; kinds that are not drawn are passed over."""
+        """Show a message; kinds that are not drawn are ignored."""
         taker = self._takers.get(type(message))
         if taker is None or not self._due(time_ns, message):
             return

@@ -1,4 +1,4 @@
-"""What there is to draw, without saying with what: bodies, 95 % ellipses, links, arrows, in the world frame."""
+"""The scene, independent of any viewer: bodies, 95 % ellipses, links, arrows, in the world frame."""
 
 import math
 from dataclasses import dataclass
@@ -24,15 +24,15 @@ VOLUME_COLOUR: Rgb = (140, 150, 110)
 FENCE: Rgb = rgb(FENCE_COLOUR.dark)
 _LIKELY_AT_ALL = 0.03
 _USUAL_HEIGHT_M = 4.0
-# All that bodies, links, arrows and cells are made of.
+# Messages from which bodies, links, arrows and cells are made.
 DRAWN = (ESTIMATE, PLAN, SEARCH_MAP, SETPOINT)
-# An arrow is as long as the way in this time.
+# An arrow is as long as the way flown in this time.
 ARROW_S = 2.0
 
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """A robot or a target: position [m; world], yaw [rad] (0 where there is none), covariance of x and y (2, 2)."""
+    """A robot or a target: position [m; world], yaw [rad] (0 without one), covariance of x and y (2, 2)."""
 
     name: str
     is_target: bool
@@ -79,8 +79,8 @@ class SearchCell:
 
 
 class ViewScene:
-    """Where everything is, as far as the messages so far say; volumes: the boxes of motion capture and ranging
-    systems [m; world]; top_m: where words about the whole scene stand.
+    """The scene by the messages so far; volumes: the boxes of motion capture and ranging
+    systems [m; world]; top_m: height of texts about the whole scene.
     """
 
     def __init__(self, field: ResolvedField | None) -> None:
@@ -114,7 +114,7 @@ class ViewScene:
         return Body(entity.name, not has_pose, position, mean[3] if has_pose else 0.0, covariance[:2, :2])
 
     def cells(self, message: m.SearchMap) -> list[SearchCell]:
-        """Return the cells of a map that a target is likely in at all."""
+        """Return the cells of a map with a relevant probability of a target."""
         (x, y), side = message.first_m, message.cell_m
         height = self._target_heights_m.get(message.header.entity, 0.0)
         found = [(divmod(index, message.columns), chance / 255) for index, chance in enumerate(message.chances)]
@@ -125,7 +125,7 @@ class ViewScene:
         ]
 
     def links(self, plan: m.Plan) -> list[SensingLink]:
-        """Return the edges of a plan between what has a known place."""
+        """Return the edges of a plan whose ends have a known place."""
         found = []
         for edge in plan.edges:
             begin, end = self._place(edge.observer), self._place(edge.subject)
@@ -139,7 +139,7 @@ class ViewScene:
         return body.position_m if body is not None else self._places.get(name)
 
     def arrow(self, setpoint: m.VelocitySetpoint) -> tuple[Array, Array] | None:
-        """Return (origin, vector) [m; world] of a commanded velocity, or None where the robot is not known."""
+        """Return (origin, vector) [m; world] of a commanded velocity, or None if the robot's place is unknown."""
         body = self.bodies.get(setpoint.header.entity)
         if body is None:
             return None

@@ -1,4 +1,4 @@
-"""Which topics a flight of a field will have, to be advertised before the first message of each."""
+"""Topics of a field's flight, to be advertised before their first messages."""
 
 from collections.abc import Mapping
 
@@ -11,7 +11,7 @@ from groundstation.field.resolved import ResolvedField
 
 
 def advertised(field: ResolvedField | None, truth: bool) -> Mapping[str, str]:
-    """Return the type of each topic by its name; truth: with true states. None: what every field has."""
+    """Return the type of each topic by its name; field None: topics of every field; truth: with true states."""
     found = {
         "/tf": FRAMES.type,
         "/tf_static": FRAMES.type,

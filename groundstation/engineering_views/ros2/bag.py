@@ -36,12 +36,12 @@ _VOLATILE = Qos(
     _FOR_EVER,
     avoid_ros_namespace_conventions=False,
 )
-# WIRE: tf2 takes static frames of no other publisher (ros2/rviz issue 916); `ros2 bag play` offers what stands here.
+# WIRE: tf2 takes static frames of no other publisher (ros2/rviz issue 916); `ros2 bag play` offers these QoS.
 _OFFERED = {"/tf_static": _VOLATILE._replace(depth=1, durability=QosDurability.TRANSIENT_LOCAL)}
 
 
 def write_bag(run: RecordedRun, folder: Path, distribution: str = "jazzy") -> tuple[int, list[str]]:
-    """Write a new folder; returns how many ROS 2 messages it holds, and what could not be decoded.
+    """Write a new folder; returns its number of ROS 2 messages, and data that could not be decoded.
 
     Raises OperatorMistake when the folder exists or cannot be there, OutputError when the disk refuses.
     """

@@ -37,5 +37,5 @@ class Ros2Codec:
         return bytes(self.store.serialize_cdr(content, kind))
 
     def hash_of(self, kind: str) -> str:
-        """Return the type hash of a type, or what stands for it."""
+        """Return the type hash of a type, or its placeholder."""
         return self.store.hash_rihs01(kind) if self._hashed else _NO_HASH

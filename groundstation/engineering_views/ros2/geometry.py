@@ -1,4 +1,4 @@
-"""Poses, twists and their covariances as ROS 2 wants them: (x, y, z, rotations about x, y, z), row by row."""
+"""Poses, twists and their covariances in ROS 2's order: (x, y, z, rotations about x, y, z), row by row."""
 
 import math
 from typing import Any
@@ -7,11 +7,11 @@ from groundstation.bus.messages import EntityEstimate, Vector3
 from groundstation.engineering_views.ros2.codec import Ros2Codec
 from groundstation.time_units import NS_PER_S
 
-# Nobody says how sure the missing axes are: as large as to say nothing.
+# Variance of axes without an estimate: so large that it carries no information.
 _UNKNOWN = 1e6
 _ALL_UNKNOWN = [_UNKNOWN if index % 7 == 0 else 0.0 for index in range(36)]
 _POSE = (0, 1, 2, 5)
-# By the size of a mean: where its covariance, row by row, stands in that of six axes.
+# By the size of a mean: indices of its covariance, row by row, in that of six axes.
 _PLACES = {size: [6 * row + column for row in _POSE[:size] for column in _POSE[:size]] for size in (2, 4)}
 
 
@@ -29,7 +29,7 @@ def heading_xyzw(yaw_rad: float) -> tuple[float, float, float, float]:
 
 
 def velocity_ahead(entity: EntityEstimate) -> Vector3:
-    """Return an entity's velocity [m/s] along its own heading (x where it has none), to the left, and up."""
+    """Return an entity's velocity [m/s] along its own heading (x without one), to the left, and up."""
     vx, vy, *up = entity.velocity_m_s
     yaw_rad = entity.mean[3] if len(entity.mean) > 3 else 0.0
     c, s = math.cos(yaw_rad), math.sin(yaw_rad)

@@ -1,4 +1,4 @@
-"""Vehicles, cameras, processes and events as ROS 2 tools show them: batteries, diagnostics, /rosout."""
+"""Health of vehicles, cameras and processes, and events, for ROS 2 tools: batteries, diagnostics, /rosout."""
 
 import math
 
@@ -20,7 +20,7 @@ LOG = "rcl_interfaces/msg/Log"
 
 
 class HealthMaker:
-    """Makes the messages that say how somebody is."""
+    """Makes the messages on the health of vehicles, cameras and processes."""
 
     def __init__(self, codec: Ros2Codec) -> None:
         self._codec, self._build, self._make = codec, Builder(codec), codec.make
@@ -47,7 +47,7 @@ class HealthMaker:
         """Return the diagnostics of a process."""
         level = _WARN if status.state is m.Lifecycle.DEGRADED else _OK
         facts = {"cpu": f"{status.cpu:.2f}", "overruns": f"{status.overruns} of {status.ticks}"}
-        name = f"process {status.header.entity}"  # the supervisor speaks for those that do not yet, or no longer
+        name = f"process {status.header.entity}"  # the supervisor reports for those that are not up
         return self._diagnostics(stamp_ns, name, level, f"{status.state} {status.detail}".strip(), facts)
 
     def event(self, stamp_ns: int, event: m.Event) -> RosMessage:

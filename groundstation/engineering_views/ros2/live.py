@@ -1,4 +1,4 @@
-"""A bridge to a ROS 2 Zenoh router: a client there, that publishes what the flight says and reads nothing."""
+"""A bridge to a ROS 2 Zenoh router: a client that publishes the flight's messages and reads nothing."""
 
 import json
 import os
@@ -29,9 +29,9 @@ _MOTION_HZ, _HEALTH_HZ = 12.5, 2.0
 
 
 def enough_hz(site: str, field: ResolvedField | None) -> Mapping[str, float]:
-    """Return how many samples a second are enough, by the keys of what comes more often.
+    """Return the rates of samples that are enough [Hz], for keys that come more often.
 
-    States of motion: a little more than there are turns, or one would find none now and then.
+    States of motion: a little above the rate of turns, else some turns would find none.
     """
     if field is None:
         return {}
@@ -48,7 +48,7 @@ def enough_hz(site: str, field: ResolvedField | None) -> Mapping[str, float]:
 class Ros2View:
     """Publishes until closed. It subscribes to nothing: no ROS 2 program can move a drone through it.
 
-    truth: whether it shows true states, which only a simulator tells: they are a third of all that would come.
+    truth: whether it shows true states, which only a simulator tells: they are a third of all messages.
     """
 
     PERIOD_S = 0.1
@@ -65,7 +65,7 @@ class Ros2View:
         self._codec, self._timeline, self._domain = Ros2Codec(distribution), timeline, domain
         self._scene = Ros2Scene(self._codec, field)
         self._states = tuple(topic for topic in STATES if truth or topic is not TRUTH)
-        # A peer would not be brokered by the router, and scouting would find other people's.
+        # A peer's messages would bypass the router, and scouting would find routers of others.
         settings = {
             "mode": "client",
             "connect": {"endpoints": [router], "timeout_ms": 3000, "exit_on_failure": True},
@@ -87,15 +87,15 @@ class Ros2View:
 
     @property
     def alive(self) -> bool:
-        """Return whether it still can publish."""
+        """Return whether it can still publish."""
         return not self._session.is_closed()
 
     def subscribe(self, bus: Bus) -> tuple[Subscription, ...]:
-        """Return the queues of what it shows: each turn the newest state and picture, and all events."""
+        """Return the queues of its topics: each turn takes the newest state and picture, and all events."""
         return bus.subscribe((*self._states, IMAGE), newest=True), bus.subscribe((EVENT,))
 
     def take(self, sample: Sample, now_ns: int) -> None:
-        """Say on what arrived at a boot-clock time; what does not decode is passed over."""
+        """Forward a sample that arrived at a boot-clock time; samples that cannot be decoded are ignored."""
         if now_ns >= self._next_static_ns:
             self._next_static_ns = now_ns + _STATIC_NS
             self._publish(self._scene.static(now_ns + self._timeline.unix_offset_ns))

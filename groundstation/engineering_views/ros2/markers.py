@@ -23,7 +23,7 @@ MARKERS = "visualization_msgs/msg/MarkerArray"
 
 
 class MarkerScene:
-    """Collects what there is to draw; each marker vanishes after a second, so that nothing old is left standing."""
+    """Collects drawings; each marker vanishes after a second, so that no old one remains."""
 
     def __init__(self, codec: Ros2Codec, view: ViewScene) -> None:
         self._codec, self._build, self._view = codec, Builder(codec), view
@@ -34,14 +34,14 @@ class MarkerScene:
         self._next_ns = 0
 
     def take(self, message: m.Plan | m.VelocitySetpoint) -> None:
-        """Keep what the next picture shows."""
+        """Keep a message for the next picture."""
         if isinstance(message, m.Plan):
             self._plan = message
         else:
             self._setpoints[message.header.entity] = message
 
     def drawn(self, stamp_ns: int, bodies: Iterable[Body]) -> list[RosMessage]:
-        """Return a picture of the bodies and of what came since the last one, or nothing while that one is young."""
+        """Return a picture of the bodies and of messages since the last one, or nothing until one is due."""
         if self._next_ns - _PERIOD_NS <= stamp_ns < self._next_ns:
             return []
         self._next_ns = stamp_ns + _PERIOD_NS
@@ -87,7 +87,7 @@ class MarkerScene:
 
 
 def _blank(build: Builder) -> dict[str, Any]:
-    """Return what most markers do not say, and all of them share."""
+    """Return the fields that all markers share, most of them empty."""
     make, nothing = build.make, np.zeros(0, np.uint8)
     return {
         "action": 0,

@@ -1,6 +1,6 @@
-"""Names of the topics that are Skein's own: under /skein, where no robot's or camera's node publishes.
+"""Names of Skein's own topics: under /skein, where no robot's or camera's node publishes.
 
-A robot's own node says /drone_1/odom: an estimate of ours beside it would be taken for the robot's, by our own driver
+A robot's own node publishes /drone_1/odom: an estimate of ours there would be taken for the robot's, by our own driver
 as by others.
 """
 

@@ -1,4 +1,4 @@
-"""Pictures of the cameras, and the lenses that took them, as ROS 2 tools want them."""
+"""Pictures of the cameras and their lenses, in the form of ROS 2 tools."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -14,14 +14,14 @@ PICTURE, LENS = "sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/CameraInfo"
 
 
 class PictureMaker:
-    """Makes a message of each picture; lenses: by camera, of those that are known."""
+    """Makes a message of each picture; lenses: the known ones, by camera."""
 
     def __init__(self, codec: Ros2Codec, lenses: Mapping[str, LensCalibration]) -> None:
         self._codec, self._build = codec, Builder(codec)
         self._lenses = {camera: self._lens(lens) for camera, lens in lenses.items()}
 
     def picture(self, stamp_ns: int, camera: str, jpeg: bytes) -> list[RosMessage]:
-        """Return a picture, and its lens where that is known."""
+        """Return a picture, and its lens if it is known."""
         header = self._build.header(stamp_ns, camera)
         data = np.frombuffer(jpeg, np.uint8)
         name = own(f"{camera}/image/compressed")

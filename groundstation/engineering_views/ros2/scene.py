@@ -1,4 +1,4 @@
-"""What each of our messages says to ROS 2 tools."""
+"""Turns our messages into those of ROS 2 tools."""
 
 from groundstation.bus import messages as m
 from groundstation.bus import topics as t
@@ -13,7 +13,7 @@ from groundstation.engineering_views.ros2.stencils import FRAMES, ODOMETRY, POSE
 from groundstation.engineering_views.scene import ViewScene
 from groundstation.field.resolved import ResolvedField
 
-# Each of these says all that there is to say of its entity, so the newest is enough. Of events one needs all.
+# Each of these has the whole state of its entity, so the newest is enough. Of events all are needed.
 STATES: tuple[Topic, ...] = (
     t.ESTIMATE, t.PLAN, t.SETPOINT, t.TRUTH, t.VEHICLE_STATUS, t.CAMERA_STATUS, t.PROCESS_STATUS
 )  # fmt: skip
@@ -31,7 +31,7 @@ class Ros2Scene:
         self._pictures = PictureMaker(codec, field.calibrations if field is not None else {})
 
     def static(self, stamp_ns: int) -> RosMessage:
-        """Return the frames that do not move; to be said again for those who join later."""
+        """Return the frames that do not move; to be repeated for later subscribers."""
         frames = [
             self._build.transform(
                 stamp_ns, (frame.parent, frame.child), frame.position_m, self._build.quaternion(frame.rotation_wxyz)
@@ -41,7 +41,7 @@ class Ros2Scene:
         return self._codec.message("/tf_static", FRAMES.type, transforms=frames)
 
     def take(self, stamp_ns: int, message: m.Message) -> list[RosMessage]:
-        """Return what a message of SHOWN becomes; a plan is drawn with the next estimate."""
+        """Return the ROS 2 messages for a message of SHOWN; a plan is drawn with the next estimate."""
         match message:
             case m.Estimate():
                 return self._estimate(stamp_ns, message)
@@ -64,7 +64,7 @@ class Ros2Scene:
                 return []
 
     def take_picture(self, stamp_ns: int, camera: str, jpeg: bytes) -> list[RosMessage]:
-        """Return a picture, and the lens that took it where the field is known."""
+        """Return a picture, and its lens if the field is known."""
         return self._pictures.picture(stamp_ns, camera, jpeg)
 
     def _estimate(self, stamp_ns: int, estimate: m.Estimate) -> list[RosMessage]:

@@ -1,7 +1,7 @@
-"""Messages that change in their stamp and numbers only: their bytes are made once, and filled in after that.
+"""Messages of which only stamp and numbers change: their bytes are made once, then filled in.
 
 Each type here, or each element of its sequence, begins with a header and ends with all its numbers. Stencils are cut
-from what the type store encodes, so that the layout is the store's.
+from bytes that the type store encodes, so that the layout is the store's.
 """
 
 import struct
@@ -20,7 +20,7 @@ _ORIGIN = (0.0, 0.0, 0.0)
 
 
 class Form(NamedTuple):
-    """A type, one of its messages for entities with all numbers 0, and where its first stamp stands."""
+    """A type, one of its messages for entities with all numbers 0, and the place of its first stamp."""
 
     type: str
     blank: Callable[[Builder, tuple[str, ...]], dict[str, Any]]
@@ -35,7 +35,7 @@ class Stencils:
         self._cut: dict[tuple[str, tuple[str, ...]], tuple[bytes, list[bytes]]] = {}
 
     def filled(self, topic: str, form: Form, stamp_ns: int, numbers: Mapping[str, tuple[float, ...]]) -> RosMessage:
-        """Return the message of a topic; numbers: by entity, all that the type has for it, in its order."""
+        """Return the message of a topic; numbers: by entity, all numbers of the type, in its order."""
         names = tuple(numbers)
         begin, texts = self._cut.get((topic, names)) or self._cut_out(topic, form, numbers)
         stamp, parts = _STAMP.pack(*divmod(stamp_ns, NS_PER_S)), [begin]

@@ -1,1 +1,1 @@
-"""How a team is shown: one colour for each robot and target, one form of a topology, one unit of cost."""
+"""The appearance of a team: one colour for each robot and target, one form of a topology, one unit of cost."""

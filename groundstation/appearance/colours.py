@@ -35,7 +35,7 @@ NEUTRAL_COLOUR = Colour("#16202a", "#e7edf3")
 
 
 def colours_of(robots: Iterable[str], targets: Iterable[str]) -> dict[str, Colour]:
-    """Return the colour of each name; names in the order of the field, which is the same wherever a run is shown."""
+    """Return the colour of each name; names in the order of the field, so that all views agree."""
     return dict([*zip(robots, cycle(ROBOT_COLOURS), strict=False), *zip(targets, cycle(TARGET_COLOURS), strict=False)])
 
 

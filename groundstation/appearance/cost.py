@@ -1,4 +1,4 @@
-"""The cost of a plan as it is shown: always in cm². Messages and files keep m²."""
+"""Costs of plans for display, always in cm². Messages and files keep m²."""
 
 COST_UNIT = "cm²"
 _CM2_PER_M2 = 1e4

@@ -28,7 +28,7 @@ Rectangle = tuple[float, float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Sheet:
-    """What one page shows, about the marker's origin [mm; x right, y up]: rectangles x0 x1 y0 y1."""
+    """Content of one page about the marker's origin [mm; x right, y up]: rectangles x0 x1 y0 y1."""
 
     label: str
     check: str
@@ -73,7 +73,7 @@ def page(item: Sheet, paper: tuple[float, float]) -> Page:
         )
     sheet = Page(*ways[0])
     x0, x1, y0, y1 = item.card
-    # Origin of the marker on the page, so that its card is in the middle.
+    # Place of the marker's origin that centres its card on the page.
     at = ((sheet.width_mm - x0 - x1) / 2, (sheet.height_mm - y0 - y1) / 2)
     for left, right, low, high in item.black:
         sheet.rectangle(at[0] + left, at[1] + low, right - left, high - low)
@@ -148,7 +148,7 @@ def _cutting_marks(sheet: Page, left: float, low: float, right: float, high: flo
 
 
 def _fits(item: Sheet, way: tuple[float, float]) -> bool:
-    """Return whether the card is no larger than the paper and nothing black lies where printers do not print."""
+    """Return whether the card fits on the paper with nothing black in the margins that printers leave white."""
     width, height = _size(item.card)
     if width > way[0] + 0.05 or height > way[1] + 0.05:
         return False
@@ -169,7 +169,7 @@ def _scaled(rectangle: Rectangle, by: float) -> Rectangle:
 
 
 def _joined(rectangles: list[Rectangle]) -> list[Rectangle]:
-    """Return the same area with rectangles that share a full side made one: no hairline where cells meet."""
+    """Return the same area with rectangles that share a full side merged, so that no hairlines show."""
     joined: list[Rectangle] = []
     for x0, x1, y0, y1 in sorted(rectangles):
         if joined and joined[-1][:2] == (x0, x1) and abs(joined[-1][3] - y0) < 1e-9:

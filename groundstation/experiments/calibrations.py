@@ -1,4 +1,4 @@
-"""Does `calibrate team` mend a wrong field file? What is left wrong once its settings are taken over. Pure."""
+"""Judges whether `calibrate team` mends wrong field files, by the errors that remain with its settings. Pure."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -16,16 +16,16 @@ _KINDS = dict.fromkeys(("roll", "pitch", "yaw", "pan", "tilt"), "turn") | dict.f
 
 
 def calibrated_labs(labs: Iterable[WrongLab]) -> list[WrongLab]:
-    """Return the rows in which the field file alone is wrong, in figures that are no pad's, and the healthy one."""
+    """Return the rows in which only the field file is wrong, in other figures than pads, and the healthy one."""
     own = [lab for lab in labs if lab.errors and not lab.exchanged and not lab.faults]
     kept = [lab for lab in own if not any(part.startswith("pad") for _, part, _ in lab.errors)]
     return [WrongLab("nothing"), *kept]
 
 
 def verdict_on(lab: WrongLab, before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what became of one flight and its settings.
+    """Return the verdict on one flight and its settings.
 
-    left: of each figure that was wrong, by "WHO KIND", what is left; missed: those beyond their limits; mended: whether
+    left: remaining error of each wrong figure, by "WHO KIND"; missed: those beyond their limits; mended: whether
     the same flight with the new settings keeps the limits of rmse and ANEES.
     """
     wrong = dict.fromkeys((who, _KINDS.get(part, part)) for who, part, _ in lab.errors)

@@ -22,7 +22,7 @@ def save_teams(path: Path, entries: Sequence[dict[str, Any]]) -> None:
         for k, (label, own) in enumerate(lines.items()):
             robots = [entry["robots"] for entry in own]
             colour = LEVEL_COLOURS[k % len(LEVEL_COLOURS)]
-            # Lines that lie on each other stay visible: later ones are thinner, dashed, with hollow markers.
+            # Later lines are thinner, dashed, with hollow markers, so that lines below them stay visible.
             looks = {"color": colour, "marker": "osD^v<>p"[k % 8], "linewidth": max(3.0 - 0.6 * k, 1.0), "label": label}
             looks |= {"markersize": max(9.0 - k, 4.0), "markerfacecolor": "white", "linestyle": "-" if k < 2 else "--"}
             left.plot(robots, [1e3 * np.sqrt(e["mean_trace_m2"]) for e in own], **looks)

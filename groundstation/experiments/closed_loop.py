@@ -15,7 +15,7 @@ from groundstation.experiments.strategies import Strategy
 
 @dataclass(frozen=True, slots=True)
 class SimulationSettings:
-    """What the world and the filter do besides the planner's parameters.
+    """Settings of world and filter besides the planner's parameters.
 
     range_m: beyond it a reading does not exist; noise_growth: reading variance sigma^2 (1 + growth d^4) [1/m^4];
     dropout: share of readings lost; kidnap: chance per step that the target jumps by up to kidnap_m; target_q: variance
@@ -36,7 +36,7 @@ class SimulationSettings:
 
 
 class SimulatedStep(NamedTuple):
-    """One step of a run: truth and mean of robots and target (n + 1, 2), covariance, decision, what it cost."""
+    """One step of a run: truth and mean of robots and target (n + 1, 2), covariance, decision, its cost."""
 
     truth: Array
     mean: Array
@@ -127,7 +127,7 @@ def observe(
     settings: SimulationSettings,
     generator: np.random.Generator,
 ) -> tuple[PlanarBelief, int]:
-    """Fuse one reading for every edge of the topology whose ends are within range; return how many there were.
+    """Fuse one reading for every edge of the topology whose ends are within range; return their number.
 
     PAPER (docs/explanation/method.md 7): the filter uses edges of the selected topology; with `fuse_all` all readings.
     """

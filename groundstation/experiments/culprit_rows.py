@@ -1,4 +1,4 @@
-"""What can be wrong in a lab, and what the operator must read of it."""
+"""Labs with one fault each, and the accusation that the operator must read."""
 
 import re
 from collections.abc import Iterable, Mapping
@@ -16,12 +16,12 @@ WrongFigure = tuple[str, str, float]
 
 @dataclass(frozen=True, slots=True)
 class WrongLab:
-    """One thing that is wrong.
+    """A lab with one fault.
 
-    errors, exchanged, faults: what it is; cameras: how bad their pictures are besides. says: what must be told first,
-    as a regular expression of `SUBJECT: TEXT` whose group is the size; none: no figure is wrong, none may be blamed.
-    size: in the unit of that text; None: it has none. on_pads: it must be found before anybody takes off.
-    diagnosed_from_s: when the diagnosis comes up, in seconds after the start; the order to take off comes at STAND_S.
+    errors, exchanged, faults: the fault; cameras: quality of their pictures besides. says: the first accusation,
+    as a regular expression of `SUBJECT: TEXT` whose group is the size; none: no figure is wrong, none may be accused.
+    size: in the unit of that text; None: it has none. on_pads: it must be found before take-off.
+    diagnosed_from_s: start of the diagnosis, in seconds after the start; the order to take off comes at STAND_S.
     """
 
     name: str
@@ -36,7 +36,7 @@ class WrongLab:
 
     @property
     def since_s(self) -> float:
-        """When it begins to be wrong, in seconds after the order to take off; 0: it always was."""
+        """Begin of the fault, in seconds after the order to take off; 0: from the start."""
         starts = [float(fault["start_s"]) for fault in self.faults]
         return max([STAND_S, *starts]) - STAND_S
 
@@ -49,7 +49,7 @@ _ALL_FLY_S = 18.0
 
 
 def labs_of(field: Mapping[str, Any]) -> tuple[WrongLab, ...]:
-    """Return all rows for a resolved field with a fixed camera, two drones and a target: its first ones."""
+    """Return all rows for a resolved field, with its first fixed camera, two drones and target."""
     ceiling, target = next(iter(field["cameras"])), (field["target"] or {}).get("name") or next(iter(field["targets"]))
     one, other = list(field["drones"])[:2]
     return (
@@ -125,7 +125,7 @@ def _places(one: str, other: str) -> Iterable[WrongLab]:
 
 
 def _failures(ceiling: str, one: str) -> Iterable[WrongLab]:
-    """Yield labs in which every figure is right and a device fails."""
+    """Yield labs with correct figures in which a device fails."""
 
     def fails(name: str, kind: str, entity: str, value: float | None = None) -> WrongLab:
         fault = {"kind": kind, "entity": entity, "start_s": _FAILS_AT_S} | ({} if value is None else {"value": value})
@@ -138,7 +138,7 @@ def _failures(ceiling: str, one: str) -> Iterable[WrongLab]:
 
 
 def chosen(only: str, labs: Iterable[WrongLab]) -> list[WrongLab]:
-    """Return the rows of these names, by commas ("": all); raises SettingsError for a name that there is not."""
+    """Return the rows of names separated by commas ("": all); raises SettingsError for an unknown name."""
     names, known = [name.strip() for name in only.split(",") if name.strip()], {lab.name: lab for lab in labs}
     if strangers := [name for name in names if name not in known]:
         raise SettingsError([f"--rows: no row {', '.join(map(repr, strangers))}; there are {', '.join(known)}"])
@@ -146,7 +146,7 @@ def chosen(only: str, labs: Iterable[WrongLab]) -> list[WrongLab]:
 
 
 def size_told(lab: WrongLab, line: str) -> float | None:
-    """Return the size that a line tells if it names the right culprit first, NaN where it tells none; None: another."""
+    """Return the size told by a line that accuses the right culprit, NaN if it tells none; None for another culprit."""
     found = re.match(lab.says, line) if lab.says else None
     if found is None:
         return None

@@ -1,4 +1,4 @@
-"""Is the right thing blamed? Verdicts on flights of wrong labs, and their table. Pure."""
+"""Judges whether the right culprit is accused in flights of wrong labs; verdicts and their table. Pure."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -8,14 +8,14 @@ from groundstation.experiments.culprit_rows import WrongLab, size_told
 
 WITHIN_S = 20.0
 SIZE_SHARE = 0.25
-# What accuses somebody or something; other warnings tell what follows from it.
+# Texts that accuse an entity; other warnings tell consequences.
 _ACCUSES = ("explains best", "contradicts the belief", "its pictures seem", "was bumped")
 _EXCUSED = "probably not its fault"
 _REFUTED = "no longer suspected"
 
 
 def accusations(flight: Mapping[str, Any]) -> list[tuple[float, str]]:
-    """Return what was said to be wrong, as (seconds after the order to take off, "SUBJECT: TEXT"); 0 s: on the pads."""
+    """Return the accusations as (seconds after the order to take off, "SUBJECT: TEXT"); 0 s: on the pads."""
     found = [(0.0, line) for _, line in flight["on_pads"] or ()]
     for at_s, severity, entity, text, remedy in flight["told"]:
         accused = any(words in text for words in _ACCUSES) and not remedy.startswith(_EXCUSED)
@@ -25,11 +25,11 @@ def accusations(flight: Mapping[str, Any]) -> list[tuple[float, str]]:
 
 
 def verdict_on(lab: WrongLab, flight: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what became of one flight.
+    """Return the verdict on one flight.
 
     end: "refused" (rightly, before the take-off), "right" (told in flight, in time), "late", "wrong" (another one was
-    blamed first, or this one before it was wrong), "silent"; of a healthy lab "silent" or "false alarm". size_error:
-    share by which the size told is wrong; said: the first accusation.
+    accused first, or this one before it was wrong), "silent"; of a healthy lab "silent" or "false alarm". size_error:
+    relative error of the told size; said: the first accusation.
     """
     said, on_pads = accusations(flight), flight["on_pads"]
     first = said[0] if said else None
@@ -60,7 +60,7 @@ def _end(lab: WrongLab, first: tuple[float, str] | None, size: float | None, ref
 
 
 def row_of(lab: WrongLab, verdicts: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return one row of the table: how many flights ended how, the latest time, the median size error, the rmse."""
+    """Return one row of the table: number of flights by end, latest time, median size error, rmse."""
     ends = [one["end"] for one in verdicts]
     good = [one for one in verdicts if one["end"] in ("refused", "right")]
     errors = sorted(one["size_error"] for one in good if one["size_error"] is not None)
@@ -85,7 +85,7 @@ def _as_wanted(lab: WrongLab, ends: Sequence[str]) -> int:
 
 
 def table(rows: Iterable[Mapping[str, Any]]) -> list[str]:
-    """Return the rows as lines of text, below each what was said otherwise."""
+    """Return the rows as lines of text, below each its other accusations."""
     head = ("wrong", "as wanted", "latest", "size", "rmse")
     lines = ["{:27s} {:>9s} {:>8s} {:>6s} {:>8s}  ends".format(*head)]
     for row in rows:

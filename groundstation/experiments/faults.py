@@ -26,7 +26,7 @@ _WORST = (
 
 @dataclass(frozen=True, slots=True)
 class FlightBatch:
-    """Some flights of one campaign. order: the simulator's settings besides the seeds, as JSON; study: which."""
+    """Some flights of one campaign. order: the simulator's order without the seeds, as JSON; study: its name."""
 
     order: str
     seeds: tuple[int, ...]
@@ -34,7 +34,7 @@ class FlightBatch:
 
     @property
     def key(self) -> str:
-        """Return a name that is the same for equal batches of the same program only."""
+        """Return a name that only equal batches of the same program share."""
         digest = hashlib.sha256((self.order + program_digest()).encode()).hexdigest()[:12]
         return f"{self.study}-{digest}-{self.seeds[0]:06d}-{len(self.seeds)}"
 
@@ -50,7 +50,7 @@ def batches(order: str, first_seed: int, flights: int, size: int = BATCH, study:
 
 
 def fly(batch: FlightBatch) -> dict[str, Any]:
-    """Fly a batch in a process of its own; raises CampaignError, or OperatorMistake, with what it said."""
+    """Fly a batch in a process of its own; raises CampaignError or OperatorMistake with its message."""
     order = json.loads(batch.order) | {"seeds": list(batch.seeds)}
     command = [sys.executable, "-m", "sim_bridge.study", batch.study]
     result = subprocess.run(command, input=json.dumps(order), capture_output=True, text=True, check=False)
@@ -75,7 +75,7 @@ def flights_of(rows: Iterable[Mapping[str, Any]]) -> tuple[list[dict[str, Any]],
 def by_kind(flights: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Return one row for each kind of fault, then one for flights with none; a flight with two faults counts in both.
 
-    flights: how many flew; unsafe: how many of them ended so, alone: those with this fault only; worst figures; why:
+    flights: number flown; unsafe: number that ended so, alone: those with this fault only; worst figures; why:
     how often each bound was broken first; seeds: of unsafe ends, those with this fault only first.
     """
     rows = []
@@ -108,7 +108,7 @@ def by_kind(flights: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 
 def totals(flights: Sequence[Mapping[str, Any]], timing: Sequence[Mapping[str, float]]) -> dict[str, Any]:
-    """Return what the campaign comes to, and where its time went (shares of the loop)."""
+    """Return the figures of the whole campaign, and its time by parts (shares of the loop)."""
     flown = [flight for flight in flights if flight["tracking_since_s"] is not None]
     parts = {name: sum(t.get(name, 0.0) for t in timing) for name in (timing[0] if timing else ()) if name != "cpu"}
     spent = sum(parts.values())
@@ -126,7 +126,7 @@ def totals(flights: Sequence[Mapping[str, Any]], timing: Sequence[Mapping[str, f
 
 
 def _deaf(spells: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return how often a drone heard nothing in flight, and how far and fast it flew on by itself: median and most."""
+    """Return the number of spells in which a drone heard nothing, and its way and speed in them: median and most."""
     figures: dict[str, Any] = {"spells": len(spells)}
     for key in ("flown_m", "fastest_m_s") if spells else ():
         values = [spell[key] for spell in spells]
@@ -135,7 +135,7 @@ def _deaf(spells: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 
 def ends_told(summary: Mapping[str, Any]) -> list[str]:
-    """Return what the campaign came to as lines of text; summary: of `totals`."""
+    """Return the campaign's result as lines of text; summary: of `totals`."""
     lines = [
         f"{summary['unsafe']} of {summary['flights']} flights ended unsafe; healthy flights stopped: "
         f"{summary['false_alarms'] or 'none'}; did not take off: {summary['not_flown'] or 'none'}"

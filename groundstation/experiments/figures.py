@@ -1,6 +1,6 @@
 """Pictures of planar runs: topology with its information, trajectories with ellipses, teams, sensors, an animation.
 
-matplotlib is imported by this module, and this module only when a picture is drawn.
+This module imports matplotlib, and is itself imported only to draw a picture.
 """
 
 from collections.abc import Sequence
@@ -40,7 +40,7 @@ def level_colour(level: int) -> str:
 
 
 def information(step: SimulatedStep, parameters: PlanarParameters, observer: int, subject: int) -> float:
-    """Return what an edge's reading would carry at the mean [1/m^2]; the global sensor is observer -1."""
+    """Return the information of an edge's reading at the mean [1/m^2]; the global sensor is observer -1."""
     offset = step.mean[subject] - (step.mean[observer] if observer >= 0 else 0.0)
     exponent = min((float(np.hypot(*offset)) - parameters.range_m) / parameters.softness_m, 40.0)
     return float(1.0 / (parameters.sigma_m**2 * (1.0 + np.exp(exponent))))
@@ -145,7 +145,7 @@ def save_topologies(path: Path, steps: Sequence[SimulatedStep], parameters: Plan
 
 
 def save_trajectories(path: Path, steps: Sequence[SimulatedStep], title: str) -> None:
-    """Save where everything went: truth, estimate with ellipses, robots, and levels, error and trace over time."""
+    """Save trajectories: truth, estimate with ellipses, robots; and levels, error and trace over time."""
     truth = np.array([step.truth[-1] for step in steps])
     mean = np.array([step.mean[-1] for step in steps])
     with plt.rc_context(STYLE):

@@ -30,7 +30,7 @@ class PlanarBelief:
 
     @property
     def target_velocity(self) -> Array:
-        """Return the mean velocity of the target (2) [m/s], zero where it is not modelled."""
+        """Return the mean velocity of the target (2) [m/s], zero if it is not modelled."""
         return self.mean[self.robots + 1] if len(self.mean) > self.robots + 1 else np.zeros(2)
 
     @property
@@ -49,7 +49,7 @@ def initial_belief(positions: Array, variance: float, target_velocity: bool) -> 
 def predict(belief: PlanarBelief, velocity: Array, step_s: float, robot_q: float, target_q: float) -> PlanarBelief:
     """Move robots by their commanded velocity (n, 2) and the target by its own.
 
-    robot_q, target_q: variances added per step, the latter to the target's velocity where it is modelled
+    robot_q, target_q: variances added per step, the latter to the target's velocity if it is modelled
     [m^2 or m^2/s^2].
     """
     mean, covariance = belief.mean.copy(), belief.covariance.copy()

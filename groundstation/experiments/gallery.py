@@ -1,4 +1,4 @@
-"""Which pictures belong to which experiment."""
+"""Draws the pictures of each experiment."""
 
 from collections.abc import Sequence
 from pathlib import Path

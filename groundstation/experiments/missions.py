@@ -1,4 +1,4 @@
-"""Healthy missions in random rooms: what their flights come to, and the table of it."""
+"""Results of healthy missions in random rooms, and their table."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -10,10 +10,10 @@ _SHOWN_SEEDS = 8
 
 
 def rows_of(flights: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Return one row for flights with covariances as they are, and one for those that state too little of them.
+    """Return one row for flights with correct covariances of sightings, and one for those with understated ones.
 
-    flights: how many flew; violations: seeds that left the fence or came too close, to when they first did [s];
-    landed_before: seeds where a drone landed without the order; standing: seeds where one still flew at the end.
+    flights: number flown; violations: seeds that left the fence or came too close, with the time [s];
+    landed_before: seeds in which a drone landed without the order; standing: seeds in which one still flew at the end.
     """
     rows = []
     for share in sorted({flight["covariance_share"] for flight in flights}, reverse=True):

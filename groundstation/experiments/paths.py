@@ -1,4 +1,4 @@
-"""Where the target goes, as functions of time."""
+"""Paths of the target as functions of time."""
 
 import math
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Which program made a result: results of another one are not taken for its own."""
+"""A digest of the program, so that results of another version are not taken for its own."""
 
 import hashlib
 from functools import cache

@@ -16,7 +16,7 @@ class Keyed(Protocol):
 
     @property
     def key(self) -> str:
-        """Return a name that is the same for equal tasks only."""
+        """Return a name that only equal tasks share."""
 
     def __hash__(self) -> int:
         """Return the hash: tasks are looked up."""
@@ -31,12 +31,12 @@ class SweepError(RuntimeError):
 
 
 def result_file(folder: Path, task: Keyed) -> Path:
-    """Return where the result of a task is kept."""
+    """Return the path of a task's result."""
     return folder / f"{task.key}.json"
 
 
 def read_result(path: Path) -> dict[str, Any] | None:
-    """Return a finished result; None where there is none or it is not whole."""
+    """Return a finished result; None if there is none or it is not whole."""
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -63,7 +63,7 @@ def run_tasks(
     """Return the rows of all tasks, in their order; those whose result is in `folder` are read instead of run.
 
     scheduler: address of a dask cluster, `local` for one of our own with `workers` processes, empty for none.
-    run: what turns a task into its row, {"task", "merits", "timing"}; None: as the planar experiments do.
+    run: function from a task to its row, {"task", "merits", "timing"}; None: that of the planar experiments.
     Raises SweepError when a cluster cannot be reached or a task fails.
     """
     run = run or _planar_run()
@@ -109,7 +109,7 @@ def _on_cluster(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # dask warns of its own ports and of workers that leave
         if scheduler == "local":
-            # Silent: its log would fill the terminal with every worker that leaves.
+            # Silent: its log would fill the terminal with workers that leave.
             cluster = LocalCluster(
                 n_workers=workers or os.cpu_count() or 1,
                 threads_per_worker=1,

@@ -16,7 +16,7 @@ _SUMS = ("landings", "switches")
 
 
 def rows_of(flights: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Return a row for each scenario and strategy, in their order: flights and how many were as expected, then figures.
+    """Return a row for each scenario and strategy, in their order: flights, those as expected, then figures.
 
     rmse_m: mean, median, worst over the flights that found the target; lost_s: mean; longest_s, found_s: worst;
     against: how much larger the rmse is than that of the first strategy for the same seeds, mean and half width of the
@@ -59,7 +59,7 @@ def paired(own: Iterable[Mapping[str, Any]], other: Iterable[Mapping[str, Any]])
 
 
 def against_best_fixed(flights: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Return how each other strategy compares with the best fixed topology of its scenario.
+    """Return the comparison of each other strategy with the best fixed topology of its scenario.
 
     Best: least mean rmse over the seeds that found the target, chosen afterwards, which favours it. Entries: scenario,
     strategy, best, share (mean rmse over that of the best, less 1, over the seeds of both), gap_m (mean difference and
@@ -92,7 +92,7 @@ def _as_flights(errors: Mapping[int, float]) -> list[dict[str, float]]:
 
 
 def comparison(entries: Iterable[Mapping[str, Any]]) -> list[str]:
-    """Return what `against_best_fixed` found as lines of text."""
+    """Return the entries of `against_best_fixed` as lines of text."""
     lines = []
     for one in entries:
         interval = "" if one["gap_m"] is None else " ({:+.3f} +- {:.3f} m)".format(*one["gap_m"])

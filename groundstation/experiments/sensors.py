@@ -1,7 +1,7 @@
-"""Which topology wins with which sensor: closed loops of fixed topologies under six models of the robots' eyes.
+"""Finds the best topology for each sensor: closed loops of fixed topologies under six sensor models.
 
-Readings need not be isotropic here, so the filter is a full EKF over both axes. The robots move as the planar planner
-says for the fixed topology at hand; where it cannot model the sensor it plans with the nearest disc.
+Readings need not be isotropic here, so the filter is a full EKF over both axes. The planar planner moves the robots
+in the fixed topology; if it cannot model the sensor, it plans with the nearest disc.
 """
 
 import math
@@ -23,7 +23,7 @@ class PlanarSensor:
     """A robot's sensor: `kind` is position, bearing or range; the global sensor always reads positions.
 
     noise: std of a reading [m; rad for bearings]; growth: variance grows by 1 + growth d^4; ahead_m: the disc of view
-    lies that far in front of the robot, away from the global sensor; planned_range_m: what the planner is told.
+    lies that far in front of the robot, away from the global sensor; planned_range_m: range for the planner.
     """
 
     name: str
@@ -35,7 +35,7 @@ class PlanarSensor:
 
     @property
     def planned_range_m(self) -> float:
-        """Return the reach the planner counts on, with a tenth as margin."""
+        """Return the range for the planner, with a tenth as margin."""
         return 0.9 * min(self.range_m, 100.0)
 
 
@@ -111,7 +111,7 @@ def run_sensor(sensor: PlanarSensor, level: IntArray, seed: int) -> dict[str, An
 def _fuse(
     sensor: PlanarSensor, level: IntArray, truth: Array, mean: Array, covariance: Array, generator: np.random.Generator
 ) -> tuple[Array, Array, int]:
-    """Fuse one reading per edge in view; whether it is in view, and its noise, is decided by the truth."""
+    """Fuse one reading for each edge in view; the truth decides on the view and the noise."""
     gps = replace(sensor, kind="position", range_m=_GPS_RANGE_M, noise=FIGURE_1.sigma_m, growth=0.0, ahead_m=0.0)
     seen = 0
     for observer, subject in edges_of(level):
@@ -145,7 +145,7 @@ def _fuse(
 def _curvature(sensor: PlanarSensor, offset: Array, relative: Array) -> float:
     """Return the variance that the second derivative of a bearing or range adds where the offset is uncertain.
 
-    Without it, robots that come close to what they see make the filter certain of a wrong position.
+    Without it, robots close to their subjects make the filter certain of a wrong position.
     """
     if sensor.kind == "position":
         return 0.0

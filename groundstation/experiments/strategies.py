@@ -1,4 +1,4 @@
-"""How the team decides: the paper's search, ours, and fixed or random topologies to compare with."""
+"""Strategies of the team: the paper's search, ours, and fixed or random topologies for comparison."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -50,7 +50,7 @@ class Strategy:
         self._planner = PlanarPlanner(robots, parameters, replace(options, mode=SearchMode.FIXED) if fixed else options)
 
     def decide(self, belief: PlanarBelief) -> TeamDecision:
-        """Return what to do for this belief."""
+        """Return the decision for this belief."""
         if self.name == "random":
             self.level = layout_levels("random", belief.robots, self._generator)
         plan = self._planner.plan(belief.positions, belief.position_covariance, self.level, belief.target_velocity)

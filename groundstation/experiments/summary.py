@@ -43,7 +43,7 @@ def _merits(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
 def add_ratios(entries: Sequence[dict[str, Any]], reference: str = "paper") -> None:
     """Add to each entry its mean trace over that of the reference strategy with equal team and start.
 
-    A fixed topology has no start of its own: it is held against the reference's string start.
+    A fixed topology has no start of its own: it is compared with the reference's string start.
     """
     for entry in entries:
         for other in entries:
@@ -68,6 +68,6 @@ def timings(rows: Sequence[dict[str, Any]], by: Sequence[str] = GROUP) -> list[d
 
 
 def worst(flights: Iterable[Mapping[str, Any]], key: str, pick: Any) -> float | None:
-    """Return the least or largest (pick: min or max) of what flights have under a key, None where none has any."""
+    """Return the least or largest (pick: min or max) value of flights under a key, None if no flight has one."""
     found = [flight[key] for flight in flights if flight[key] is not None]
     return pick(found) if found else None

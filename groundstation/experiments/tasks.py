@@ -1,4 +1,4 @@
-"""One run of a planar experiment as a value: what to simulate, and the figures of merit it ends in."""
+"""One run of a planar experiment as a value: its set-up, and its figures of merit."""
 
 import csv
 import hashlib
@@ -57,7 +57,7 @@ class Task:
 
     @property
     def key(self) -> str:
-        """Return a name that is the same for equal tasks of the same program only."""
+        """Return a name that only equal tasks of the same program share."""
         text = json.dumps(asdict(self), sort_keys=True) + program_digest()
         digest = hashlib.sha256(text.encode()).hexdigest()[:12]
         return f"{self.experiment}-{self.robots:03d}-{self.strategy}-{self.seed:04d}-{digest}"
@@ -65,7 +65,7 @@ class Task:
 
 @dataclass(frozen=True, slots=True)
 class ExperimentSetup:
-    """What an experiment fixes: planner's parameters, world, length, where the target goes and the robots begin."""
+    """Set-up of an experiment: planner's parameters, world, length, the target's path, the robots' first places."""
 
     parameters: PlanarParameters
     settings: SimulationSettings
@@ -154,7 +154,7 @@ def row_of(task: Task, steps: Sequence[SimulatedStep]) -> dict[str, Any]:
 
 
 def figure1_merits(steps: Sequence[SimulatedStep], levels: NDArray[np.int64]) -> dict[str, Any]:
-    """Return after how many decisions there were two levels, and the share of steps beyond 1.5 m with three."""
+    """Return the number of decisions until there were two levels, and the share of steps beyond 1.5 m with three."""
     distance = np.array([float(np.hypot(*step.truth[-1])) for step in steps])
     two = np.flatnonzero(levels == 2)
     far = levels[distance > 1.5]

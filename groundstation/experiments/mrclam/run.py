@@ -21,14 +21,14 @@ LOST_M = 1.5
 _CAMERA_HEIGHT_M = 3.0
 _JUDGED_S = 0.2
 _START_STD_M, _START_STD_RAD = 0.01, 0.02
-_ORIGIN_S = 1000.0  # of the filter's clock, which must not begin at zero: a lag is subtracted from it
+_ORIGIN_S = 1000.0  # of the filter's clock: not zero, because a lag is subtracted from it
 
 
 @dataclass(frozen=True, slots=True)
 class ModelFigures:
-    """What readings are worth and how robots drive: one set for all scenarios and all sets.
+    """Deviations of readings and of the robots' motion, the same for all scenarios and all sets.
 
-    A distance told by the size of a barcode's picture is good to a share of itself; both errors repeat for about
+    A range by the size of a barcode's picture has an error proportional to itself; both errors repeat for about
     repeats_s at the same place.
     """
 
@@ -58,7 +58,7 @@ class ScenarioErrors:
 
     @property
     def lost(self) -> bool:
-        """Return whether some robot was ever further off than LOST_M."""
+        """Return whether any robot's error ever exceeded LOST_M."""
         return self.largest_m > LOST_M
 
 
@@ -90,26 +90,26 @@ class DatasetFeed:
         return round((t - self._start_s + _ORIGIN_S) * NS_PER_S)
 
     def place(self, number: int, pose: Array, t: float) -> None:
-        """Put a robot where it starts."""
+        """Place a robot at its start."""
         x, y, yaw = pose.tolist()
         variances = (_START_STD_M**2, _START_STD_M**2, 1e-6, _START_STD_RAD**2)
         self.joint.place(_name(number), (x, y, 0.0, math.remainder(yaw, math.tau)), variances, self.ns(t), self.ns(t))
 
     def command(self, number: int, t: float, values: tuple[float, ...]) -> None:
-        """Pass on what a robot was commanded: forward speed, turn rate."""
+        """Pass on a robot's commands: forward speed, turn rate."""
         forward, rate = values
         motion = OdometrySample(self.ns(t), (forward, 0.0, 0.0), yaw_rate_rad_s=rate)
         self.joint.add_motion(_name(number), motion, self.ns(t))
 
     def reading(self, number: int, t: float, values: tuple[float, ...]) -> None:
-        """Pass on what a robot read: subject, range, bearing."""
+        """Pass on a robot's reading: subject, range, bearing."""
         subject, distance, bearing = values
         covariance = self._figures.covariance(distance)
         reading = SensorReading(self.ns(t), _name(number), _name(int(subject)), (distance, bearing), covariance)
         self.joint.add_observation(reading, f"{number}/{subject:.0f}", self.ns(t))
 
     def sighting(self, number: int, t: float, values: tuple[float, ...]) -> None:
-        """Pass on where the ceiling camera saw a robot: x, y, yaw."""
+        """Pass on the ceiling camera's sighting of a robot: x, y, yaw."""
         x, y, yaw = values
         optical = WORLD_FROM_DOWN.T @ np.array([x, y, -_CAMERA_HEIGHT_M])
         covariance = np.diag([CAMERA_STD_M**2, CAMERA_STD_M**2, 0.01**2, CAMERA_STD_RAD**2]).ravel().tolist()
@@ -127,7 +127,7 @@ Item = tuple[float, str, int, tuple[float, ...]]
 
 
 def stream(dataset: Dataset, scenario: SensingScenario, robot_readings: bool, seed: int) -> list[Item]:
-    """Return all that arrives as (t, method of Feed, robot, values), by time."""
+    """Return all inputs as (t, method of Feed, robot, values), by time."""
     items: list[Item] = []
     for number, robot in dataset.robots.items():
         items += [(t, "command", number, (v, w)) for t, v, w in robot.odometry.tolist()]
@@ -145,10 +145,10 @@ def run_scenario(
     dataset: Dataset, scenario: SensingScenario, robot_readings: bool, figures: ModelFigures | None = None,
     seed: int = 1, span: tuple[float, float] = (0.0, 1.0),
 ) -> ScenarioErrors:  # fmt: skip
-    """Return how well the filter did over a share of the set's time; seed: of the emulated camera's noise.
+    """Return the filter's errors over a share of the set's time; seed: of the emulated camera's noise.
 
-    Causal: a belief is judged with nothing that came after it. It starts at the true poses; nothing of the truth is
-    told after that.
+    Causal: no belief uses later data. It starts at the true poses; no other truth is
+    given to it.
     """
     feed, score = DatasetFeed(dataset, figures or ModelFigures()), ScenarioScore(dataset)
     length = dataset.end_s - dataset.start_s
@@ -190,7 +190,7 @@ class ScenarioScore:
         self._errors.append(errors)
 
     def result(self, scenario: str, robot_readings: bool) -> ScenarioErrors:
-        """Return the figures; raises DatasetError where nothing was compared."""
+        """Return the figures; raises DatasetError if nothing was compared."""
         if not self._errors:
             raise DatasetError(f"nothing can be judged in less than {_JUDGED_S:g} s of the set: take a longer --span")
         errors = np.array(self._errors)

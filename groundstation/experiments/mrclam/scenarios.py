@@ -1,4 +1,4 @@
-"""Who sees what: the scenarios, and what the emulated ceiling camera saw."""
+"""Sensing scenarios, and sightings of an emulated ceiling camera."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ DARK_S = 120.0
 
 @dataclass(frozen=True, slots=True)
 class SensingScenario:
-    """landmark_robots: who reads landmarks; camera: over which share of the room; dark: with two spells of DARK_S."""
+    """landmark_robots: robots that read landmarks; camera: its share of the room; dark: with two spells of DARK_S."""
 
     name: str
     landmark_robots: tuple[int, ...] = ()

@@ -1,4 +1,4 @@
-"""Rigorous lower bounds on what a topology can cost, from one rollout at the reach of the controls.
+"""Rigorous lower bounds on a topology's cost, from one rollout at the reach of the controls.
 
 The cost is convex and decreasing in the edge informations w. With w^R the information at the smallest distance
 that two entities can reach by each step, min_u c_T(u) >= c_T(w^R), and the tangent at the current topology gives

@@ -67,7 +67,7 @@ def radial_cuts(mean: Matrix, most: int, out: IntMatrix) -> int:
 
 @kernel()
 def merges(level: IntVector, out: IntMatrix) -> int:
-    """Write the topologies in which two adjacent levels have become one, into out (n - 1, n); return how many."""
+    """Write the topologies with two adjacent levels merged into out (n - 1, n); return their number."""
     last = 0
     for own in level:
         last = max(last, int(own))

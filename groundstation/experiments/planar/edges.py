@@ -1,7 +1,7 @@
 """Edges of a team sorted by level, and the information they carry at predicted positions.
 
-Entities are sorted so that each level is contiguous (robots 0..n-1, target n): what one observer sees is then a range
-of subjects, and every loop over it runs on contiguous memory. Row 0 is the global sensor at the origin, row a + 1
+Entities are sorted so that each level is contiguous (robots 0..n-1, target n): an observer's subjects are then a range
+and every loop over them runs on contiguous memory. Row 0 is the global sensor at the origin, row a + 1
 robot a. Ranges are unsigned: signed indices are tested for counting from the end, and nothing is vectorised.
 """
 
@@ -14,12 +14,12 @@ from groundstation.experiments.planar.records import Observers, PlanarProblem, W
 from groundstation.kernel import kernel
 
 MAGIC = 6755399441055744.0  # 1.5 * 2^52: adding it leaves the nearest integer in the low bits of a float64
-FARTHEST = 40.0  # exponent beyond which a reading carries no, below the negative of which all information there is
+FARTHEST = 40.0  # exponent beyond which a reading carries no information; below its negative, all
 
 
 @kernel()
 def sort_team(level: IntVector, order: IntVector, observers: Observers) -> None:
-    """Write the entities sorted by level into `order` (n + 1), and what each observer sees."""
+    """Write the entities sorted by level into `order` (n + 1), and each observer's subjects."""
     first, end, edge = observers.first, observers.end, observers.edge
     n = level.shape[0]
     start = np.zeros(n + 2, np.int64)
@@ -95,7 +95,7 @@ def edge_information(i: int, problem: PlanarProblem, work: Workspace) -> None:
 
 @kernel(contract=True, reassociate=True)
 def add_laplacian(matrix: Matrix, observers: Observers, information: Matrix, i: int) -> None:
-    """Add sum_e w_e a_e a_e^T of step i to the upper triangle; observers come before what they see."""
+    """Add sum_e w_e a_e a_e^T of step i to the upper triangle; observers come before their subjects."""
     for row in range(observers.edge.shape[0] - 1):
         first, end, shift = observers.first[row], observers.end[row], observers.edge[row] - observers.first[row]
         for b in range(first, end):

@@ -13,12 +13,12 @@ from groundstation.experiments.planar.records import PlanarConstants
 class PlanarParameters:
     """Sensor, motion and cost constants; defaults are the bench scenario of the planning study.
 
-    sigma_m: std of a relative position reading; range_m, softness_m: where and how softly readings end;
+    sigma_m: std of a relative position reading; range_m, softness_m: limit of readings and its width;
     epsilon_m: rounds the distance at zero, where it has no gradient otherwise;
     robot_noise_m2_s, target_noise_m2_s: process variance rates;
     step_s, steps, discount: the horizon; max_speed_m_s: bound per axis; target_velocity_m_s: predicted mean motion.
-    tail: share of a reading's information that is pretended to decay slowly, as r^2 / (r^2 + d^2), so that what is
-    out of range still attracts.
+    tail: share of a reading's information that is pretended to decay slowly, as r^2 / (r^2 + d^2), so that entities
+    out of range still attract.
     PAPER (docs/explanation/method.md 7): no tail; with 0 a lost target or robot gives no gradient.
     Raises ValueError for values without meaning.
     """
@@ -48,7 +48,7 @@ class PlanarParameters:
             raise ValueError(f"steps must be at least 1 (got {self.steps})")
 
     def constants(self) -> PlanarConstants:
-        """Return what the kernels read."""
+        """Return the constants for the kernels."""
         vx, vy = self.target_velocity_m_s
         return PlanarConstants(
             float(self.sigma_m), float(self.range_m), float(self.softness_m), float(self.epsilon_m), float(self.step_s),

@@ -24,7 +24,7 @@ from groundstation.experiments.planar.search import (
 
 
 class SearchMode(StrEnum):
-    """How candidates are chosen and judged (docs/explanation/planning.md 8.3).
+    """Choice and judgement of candidates (docs/explanation/planning.md 8.3).
 
     PAPER: plain neighbours, each solved, cheapest wins, no hysteresis. CERTIFIED: neighbours, radial cuts and merges,
     dropped with proof where possible. GLOBAL: all topologies with proof, at most 6 robots. FIXED: the current one only.
@@ -37,7 +37,7 @@ class SearchMode(StrEnum):
 
 
 class Fate(StrEnum):
-    """What became of a candidate: solved, proved unable to win by its tangent or reach bound, or not finished."""
+    """Fate of a candidate: solved, proved unable to win by its tangent or reach bound, or not finished."""
 
     SOLVED = "solved"
     TANGENT_BOUND = "tangent bound"
@@ -59,7 +59,7 @@ class Considered:
 
 
 class Certificate(Sequence[Considered]):
-    """All candidates of one decision, the current topology first; rows are made when they are asked for."""
+    """All candidates of one decision, the current topology first; rows are made on access."""
 
     def __init__(self, levels: IntArray, costs: Array, bounds: Array, fates: IntArray) -> None:
         self._levels, self._costs, self._bounds, self._fates = levels, costs, bounds, fates
@@ -90,7 +90,7 @@ class Certificate(Sequence[Considered]):
 
 @dataclass(frozen=True, slots=True)
 class PlanarPlan:
-    """A decision: level vector (n), velocities (segments, n, 2) [m/s], cost [m^2], and why.
+    """A decision: level vector (n), velocities (segments, n, 2) [m/s], cost [m^2], and its certificate.
 
     `switched` says that the topology differs from the current one; certificate[0] is the current topology.
     """
@@ -110,7 +110,7 @@ class PlanarPlan:
 
 @dataclass(frozen=True, slots=True)
 class SearchOptions:
-    """How long and how widely to search; raises ValueError for values without meaning.
+    """Effort and width of the search; raises ValueError for values without meaning.
 
     hysteresis: share of the current cost that a switch must save (not in PAPER mode); tolerance: scaled projected
     gradient; budget: cost evaluations; segments: piecewise-constant controls over the horizon; starts: random

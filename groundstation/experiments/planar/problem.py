@@ -67,7 +67,7 @@ FINE, NOT_FINITE, NOT_SYMMETRIC, NOT_PSD = 0, 1, 2, 3
 
 @kernel()
 def _judge(mean: Matrix, covariance: Matrix, scratch: Matrix) -> int:
-    """Return what is wrong with a belief; positive semidefinite means to 1e-9 of the trace."""
+    """Return the fault of a belief; positive semidefinite means to 1e-9 of the trace."""
     size, trace, largest = mean.shape[0], 0.0, 0.0
     for a in range(size):
         trace += covariance[a, a]

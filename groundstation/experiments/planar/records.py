@@ -1,4 +1,4 @@
-"""What the planar planner's kernels share: one control step's problem, its scratch memory, and its candidates.
+"""Records of the planar planner's kernels: one control step's problem, its scratch memory, and its candidates.
 
 n robots, h steps; m: n + 1 padded to the vector width; entities are the robots, then the target.
 """
@@ -11,7 +11,7 @@ X, Y = 0, 1
 
 
 class PlanarConstants(NamedTuple):
-    """What PlanarParameters holds of sensor, motion and cost, target_velocity (x, y) [m/s] by its components."""
+    """Constants of PlanarParameters on sensor, motion and cost; target_velocity (x, y) [m/s] by its components."""
 
     sigma_m: float
     range_m: float
@@ -42,7 +42,7 @@ class PlanarProblem(NamedTuple):
 
 
 class Observers(NamedTuple):
-    """What each observer sees, by row (n + 2): first subject and one past the last, in sorted order, and first edge.
+    """Subjects of each observer, by row (n + 2): first subject and one past the last, in sorted order, and first edge.
 
     Row 0 is the global sensor, row a + 1 the robot at sorted place a; the last edge[n + 1] is the number of edges.
     """
@@ -55,7 +55,7 @@ class Observers(NamedTuple):
 class Workspace(NamedTuple):
     """Scratch arrays of the kernels, and the topology at hand, its team sorted by level.
 
-    order (n + 1): which entity stands at each sorted place; mean (2, m) and variance (n + 1) in sorted order; prior and
+    order (n + 1): the entity at each sorted place; mean (2, m) and variance (n + 1) in sorted order; prior and
     factor (h, m, m); square (m, m) and panel (8, m); columns (h, h + 3, m); distance and weights (h, edges): of each
     edge in each step [m, 1/m^2]; position and gradient (h, 2, m).
     """
@@ -77,7 +77,7 @@ class Workspace(NamedTuple):
 
 
 class Limits(NamedTuple):
-    """When a minimisation ends: scaled projected gradient, cost evaluations, or stop[0] != 0 (set by a thread)."""
+    """Ends of a minimisation: scaled projected gradient, cost evaluations, or stop[0] != 0 (set by a thread)."""
 
     tolerance: float
     budget: int
@@ -85,7 +85,7 @@ class Limits(NamedTuple):
 
 
 class Candidates(NamedTuple):
-    """Topologies with what the search finds of each, one per row.
+    """Candidate topologies with the search's results, one per row.
 
     levels (., n); bounds and costs [m^2], NaN where not begun; fates; controls (., segments * n * 2), scaled.
     """

@@ -74,7 +74,7 @@ def bench_belief(
 def scattered_belief(
     robots: int, generator: np.random.Generator, parameters: PlanarParameters
 ) -> tuple[Array, Array, NDArray[np.int64]]:
-    """Return (mean, per-axis covariance, level vector) of a team without order: what a planner must bear as well.
+    """Return (mean, per-axis covariance, level vector) of a team without order, which a planner must handle too.
 
     Positions fill a disc of random size, levels are random, and variances span six decades with random correlation.
     """

@@ -16,7 +16,7 @@ DROPPED_BY_TANGENT, DROPPED_BY_REACH, SOLVED, SKIPPED = 0, 1, 2, 3
 # A bound must beat the incumbent by more than rounding before a topology is dropped with it.
 _ROUNDING = 1.0 + 1e-9
 
-# Where a topology is solved with so few evaluations, a reach bound to avoid the next one costs as much.
+# If a topology is solved with this few evaluations, a reach bound costs as much as solving the next one.
 _CHEAP = 2
 
 

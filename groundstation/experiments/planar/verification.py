@@ -1,4 +1,4 @@
-"""Holds the certified search against its claim: the same answer as brute force, and no bound above a cost."""
+"""Tests the claim of the certified search: the same answer as brute force, and no bound above a cost."""
 
 from dataclasses import replace
 from typing import NamedTuple

@@ -1,6 +1,6 @@
 """The other processes of `groundstation bench bus`: `router ENDPOINT FOLDER`, or `echo` with both for each bus.
 
-FOLDER holds the certificates; "-" for a plain bus. Each says "ready" and ends with its standard input.
+FOLDER holds the certificates; "-" for a plain bus. Each prints "ready" and ends with its standard input.
 """
 
 import os
@@ -23,12 +23,12 @@ _TURN_S = 0.05
 
 
 def identity(folder: str, name: str) -> Identity | None:
-    """Return what a member joins with, None for a plain bus."""
+    """Return a member's identity, None for a plain bus."""
     return None if folder == "-" else Identity(folder, name, "bench")
 
 
 def route(endpoint: str, folder: str) -> None:
-    """Be a router until standard input ends, as in a run: a guarded one traces, and reads what it traced."""
+    """Run a router until standard input ends, as in a run: a guarded one traces refusals, and reads its trace."""
     access = None if folder == "-" else AccessList(SITE, (TRACKER, DRIVER))
     ready = os.fdopen(os.dup(1), "w")
     refusals = RouterRefusals()
@@ -41,7 +41,7 @@ def route(endpoint: str, folder: str) -> None:
 
 
 def echo(ways: list[tuple[str, str]]) -> None:
-    """Answer each setpoint with an odometry of the same size as in flight, at once, on every bus."""
+    """Answer each setpoint at once, on every bus, with an odometry message of the size in flight."""
     buses = [open_bus(endpoint, SITE, DRONE, 5.0, identity(folder, DRONE)) for endpoint, folder in ways]
     for bus in buses:
         threading.Thread(target=_answer, args=(bus,), daemon=True).start()

@@ -1,4 +1,4 @@
-"""What the console costs and how late it is: its real process, fed over a real router, seen by a client of its own."""
+"""Cost and delay of the console: its real process, fed over a real router, with a client of the bench."""
 
 import contextlib
 import json
@@ -39,7 +39,7 @@ _ORDERS, _BETWEEN_ORDERS_S = 60, 0.1
 
 @dataclass
 class Viewed:
-    """What one viewer got: frames with the time at which they came [ns], and how old each estimate was then [ms]."""
+    """Frames of one viewer with their times of arrival [ns], and the age of each estimate then [ms]."""
 
     frames: list[tuple[int, str | bytes]] = field(default_factory=list)
     latencies_ms: list[float] = field(default_factory=list)
@@ -115,7 +115,7 @@ def _served(drones: tuple[str, ...]) -> Iterator[tuple["subprocess.Popen[bytes]"
 
 
 def field_of(drones: tuple[str, ...], port: int) -> ResolvedField:
-    """Return the lab with so many drones, all like its last."""
+    """Return the lab with a number of drones, further ones like its last."""
     from groundstation.settings.files import find_field
     from groundstation.settings.load import load_field
     from groundstation.settings.resolved import resolved_field
@@ -145,7 +145,7 @@ def _page_of(url: str, cameras: list[str]) -> Iterator[ClientConnection]:
 
 
 def watch(page: ClientConnection, seconds: float) -> Viewed:
-    """Receive for so long, answering as the page does."""
+    """Receive for some seconds, answering as the page does."""
     viewed, deadline_s = Viewed(), time.monotonic() + seconds
     while (left_s := deadline_s - time.monotonic()) > 0.0:
         try:
@@ -165,7 +165,7 @@ def watch(page: ClientConnection, seconds: float) -> Viewed:
 
 
 def order_often(page: ClientConnection, bus: Bus) -> dict[str, Any]:
-    """Return how long an order of the page takes to arrive at another member of the bus."""
+    """Return the delays of the page's orders until they arrive at another member of the bus [ms]."""
     commands, arrivals_ns = bus.subscribe([COMMAND], capacity=256), list[int]()
     commands.on_arrival = lambda: arrivals_ns.append(clock.now_ns())
     known, late_ms = set[str](), list[float]()
@@ -186,7 +186,7 @@ def order_often(page: ClientConnection, bus: Bus) -> dict[str, Any]:
 
 
 def echo(viewed: Viewed, seconds: float) -> dict[str, Any]:
-    """Return what a bare echo of the same frames at the same times costs; it also takes them in, which we do not."""
+    """Return the cost of a bare echo of the same frames at the same times; it also receives them, as ours does not."""
     listener = claim_port(free_port())
     port = listener.getsockname()[1]
     command = [sys.executable, "-m", "groundstation.bench.console_peer", str(listener.fileno())]
@@ -209,7 +209,7 @@ def echo(viewed: Viewed, seconds: float) -> dict[str, Any]:
 
 
 def drawn(browser: str, url: str, seconds: float) -> dict[str, Any]:
-    """Return how old estimates are when the page has drawn them, by the page's own clock; {} without playwright."""
+    """Return the ages of estimates when the page has drawn them, by its own clock; {} without playwright."""
     try:
         from playwright.sync_api import sync_playwright
     except ImportError:
@@ -237,12 +237,12 @@ def cpu_s(pid: int) -> float:
 
 
 def free_port() -> int:
-    """Return a TCP port of loopback that nobody has."""
+    """Return a free TCP port of loopback."""
     with contextlib.closing(socket.socket()) as probe:
         probe.bind((HOST, 0))
         return int(probe.getsockname()[1])
 
 
 def load_average() -> float:
-    """Return how many tasks wanted a core in the last minute."""
+    """Return the mean number of tasks that wanted a core in the last minute."""
     return round(os.getloadavg()[0], 1)

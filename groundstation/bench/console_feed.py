@@ -1,4 +1,4 @@
-"""A team that only talks: the topics, rates and sizes of a flight, stamped as they are sent, for `bench console`."""
+"""A team that only sends: topics, rates and sizes of a flight, stamped when sent, for `bench console`."""
 
 import math
 import threading
@@ -29,7 +29,7 @@ class TalkingTeam(threading.Thread):
         self._random = Random(1)
 
     def run(self) -> None:
-        """Talk, on a grid of time; what was missed is not made up for."""
+        """Publish on a grid of time; missed messages are not sent later."""
         tick, due_s = 0, time.monotonic()
         while not self.over.is_set():
             self._turn(tick, time.monotonic())

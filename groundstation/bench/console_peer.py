@@ -1,4 +1,4 @@
-"""The least that a WebSocket server of the same framework can do: it sends back what it is sent.
+"""The smallest WebSocket server of the same framework: it echoes each message.
 
 Run as `python -m groundstation.bench.console_peer DESCRIPTOR` with a listening socket inherited under that number.
 """

@@ -46,7 +46,7 @@ _OURS = "ours"
 
 @dataclass(slots=True)
 class LeastTime:
-    """The least CPU time seen of one filter [us]."""
+    """The least CPU time of one filter [us]."""
 
     predict_us: float = np.inf
     correct_us: float = np.inf
@@ -96,7 +96,7 @@ def run_bench(
 
 
 def same_belief(team: BenchTeam, seed: int) -> dict[str, float]:
-    """Return how far each peer is from ours after two frames and the ticks before them; raises if ours took not all.
+    """Return each peer's difference from ours after two frames and the ticks before them; raises if ours refused any.
 
     `numpy-batch` linearises a whole frame at one point and so differs by more than rounding.
     """

@@ -1,6 +1,6 @@
-"""The product's path of an observation, timed: bytes, codec, intake, filter, `Innovation`, bytes; as in flight.
+"""Times the product's path of an observation as in flight: bytes, codec, intake, filter, `Innovation`, bytes.
 
-A second of a flying team is made up beforehand as payloads with their times of arrival.
+A second of a flying team is generated beforehand as payloads with their times of arrival.
 """
 
 import math
@@ -31,15 +31,15 @@ TICK_MS = 20  # the tracker's
 JOIN_MS = 400  # flown before the clock runs: all have joined then
 _START_NS = 10**12
 _CLOCK, _SITE = "bench", "lab"
-_DETECTION_LATE_MS = 4  # what a wire and a decoder take
+_DETECTION_LATE_MS = 4  # delay of wire and decoder
 
 Arrival = tuple[int, keys.Key, str, bytes]
 
 
 def flight(team: BenchTeam, duration_ms: int, late_ms: int, heights: bool, rng: np.random.Generator) -> list[Arrival]:
-    """Return what arrives in a flight as (time, key, its text, payload), in order; cameras have phases of their own.
+    """Return a flight's arrivals as (time, key, its text, payload), in order; cameras have phases of their own.
 
-    late_ms: of the observations, odometry is in time; heights: whether odometry carries one.
+    late_ms: delay of observations, odometry has none; heights: whether odometry carries heights.
     """
     end_ns = _START_NS + (JOIN_MS + duration_ms) * MS
     found = [_packed(_START_NS, VEHICLE_STATUS, _status(name, 0), 0) for name in team.robots]
@@ -102,7 +102,7 @@ def _observation(
 
 
 class _Kept(MemoryBus):
-    """A bus that keeps what was put on it."""
+    """A bus that keeps published messages."""
 
     def __init__(self) -> None:
         super().__init__(MemoryExchange(), _SITE, "tracker")
@@ -123,11 +123,11 @@ class Path:
 
     @property
     def innovations(self) -> list[bytes]:
-        """Return what the last tick said of each observation."""
+        """Return the last tick's verdict on each observation."""
         return self._bus.payloads
 
     def tick(self, arrived: list[Arrival], now_ns: int) -> None:
-        """Take what has arrived, advance, and say what became of each observation."""
+        """Take the arrivals, advance, and publish the verdict on each observation."""
         self._bus.payloads = []
         for _, key, text, payload in arrived:
             self._intake.take(text, codec.decode(key, payload), now_ns)
@@ -136,7 +136,7 @@ class Path:
 
 
 def fly(team: BenchTeam, duration_ms: int, late_ms: int, heights: bool, seed: int) -> dict[str, Any]:
-    """Return CPU time per observation [us], odometry and all else included, and what the run was."""
+    """Return CPU time per observation [us], odometry and all else included, and counts of the run."""
     path, explained, before = Path(team), 0, time.process_time()
     for now_ns, arrived in ticks(flight(team, duration_ms, late_ms, heights, np.random.default_rng(seed))):
         if now_ns <= _START_NS + (JOIN_MS + late_ms) * MS:
@@ -165,7 +165,7 @@ def _worst_error(team: BenchTeam, joint: FixedLagFilter) -> float:
 
 
 def ticks(arrivals: list[Arrival]) -> Iterator[tuple[int, list[Arrival]]]:
-    """Return (now, what has arrived since the last tick) for each tick of the tracker."""
+    """Return (now, arrivals since the last tick) for each tick of the tracker."""
     now_ns, first = _START_NS, 0
     while first < len(arrivals):
         now_ns += TICK_MS * MS

@@ -1,6 +1,6 @@
-"""What `bench estimator` compares: the product's kernels, filterpy's EKF, and dense numpy, behind one interface.
+"""The filters of `bench estimator`: the product's kernels, filterpy's EKF, and dense numpy, behind one interface.
 
-All are given the same h, H, F and Q: what differs is the filter around them.
+All use the same h, H, F and Q; only the filter around them differs.
 """
 
 import math
@@ -39,7 +39,7 @@ class Contestant(Protocol):
         """Predict the whole team, several times over."""
 
     def correct(self, events: Rows[EventRow]) -> None:
-        """Take all observations of a frame (edges), one after the other unless it says otherwise."""
+        """Take all observations of a frame (edges), one after the other in most filters."""
 
 
 class Ours:
@@ -122,7 +122,7 @@ class TeamModel:
         return mean
 
     def measured(self, mean: Array, events: Rows[EventRow], row: int) -> tuple[Array, Array, Array, IntArray]:
-        """Return y, R, H (rows, columns) and the columns of the state that H stands for."""
+        """Return y, R, H (rows, columns) and the state's columns of H."""
         event, out = events[row], self._expected[0]
         expect(self._belief._replace(mean=mean), self.tables.sensors, events, row, self._expected)
         rows, a, b = int(event["size"]), self.parts[event["observer"]], self.parts[event["subject"]]

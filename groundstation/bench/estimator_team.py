@@ -1,4 +1,4 @@
-"""The team that `bench estimator` runs on: two levels of robots, a ceiling camera, a target, every edge between levels.
+"""The team of `bench estimator`: two levels of robots, a ceiling camera, a target, every edge between levels.
 
 30 robots: the camera sees the upper 15, each of these sees the lower 15, each of those sees the target: 255 edges.
 """
@@ -31,7 +31,7 @@ from groundstation.kernel import Rows
 
 CEILING, TARGET = "ceiling", "target"
 ODOMETRY_HZ, CAMERA_HZ = 200, 30
-SPEED_M_S, TURN_RAD_S = 0.1, 0.05  # what the robots' odometry says in the runs of the bare kernels
+SPEED_M_S, TURN_RAD_S = 0.1, 0.05  # of the robots' odometry in the runs of the bare kernels
 POSITION_STD_M, YAW_STD_RAD = 0.02, 0.03  # of a sighting
 _PRIOR_STD = 0.05
 _GATE = 1.0 - 1e-9  # the peers have none
@@ -39,7 +39,7 @@ _GATE = 1.0 - 1e-9  # the peers have none
 
 @dataclass(frozen=True, slots=True)
 class BenchTeam:
-    """Parameters and tables, where everything truly is (mean, n), and who sees whom."""
+    """Parameters and tables, true states (mean, n), and edges."""
 
     parameters: EstimatorParameters
     tables: Tables
@@ -53,7 +53,7 @@ class BenchTeam:
 
 
 def minimal_parameters(robots: int) -> EstimatorParameters:
-    """Return a team whose robots are no more than (x, y, z, yaw), as the paper's, with odometry that is in time."""
+    """Return a team whose robots have only (x, y, z, yaw), as the paper's, with odometry without delay."""
     tilted = base_from_tilted_optical(math.radians(45.0))
     names = robot_names(robots)
     robot = OdometryRobot(slow_states=(), reports_climb=True, velocity_delay_s=0.0, height_delay_s=0.0)
@@ -65,7 +65,7 @@ def minimal_parameters(robots: int) -> EstimatorParameters:
 
 
 def product_parameters(robots: int, resolved: ResolvedField) -> EstimatorParameters:
-    """Return a team of copies of the first drone and the first camera of a resolved field, as they are flown."""
+    """Return a team of copies of the first drone and the first camera of a resolved field, as in flight."""
     drone, camera = next(iter(resolved.drones.values())), next(iter(resolved.cameras.values()))
     drones = dict.fromkeys(robot_names(robots), drone)
     flown = parameters_from_field(msgspec.structs.replace(resolved, drones=drones, cameras={CEILING: camera}))
@@ -98,7 +98,7 @@ def team_of(parameters: EstimatorParameters) -> BenchTeam:
 
 
 def sighting(team: BenchTeam, edge: tuple[str, str], stamp_ns: int, rng: np.random.Generator) -> Measurement:
-    """Return what an observer sees of a subject, with noise; a heading only of robots."""
+    """Return an observer's sighting of a subject, with noise; a heading only of robots."""
     observer, subject = map(team.index, edge)
     rows = 3 if edge[1] == TARGET else 4
     event, prediction = EventRow.row(observer=observer, subject=subject), Prediction.row(size=rows)
@@ -113,7 +113,7 @@ def sighting(team: BenchTeam, edge: tuple[str, str], stamp_ns: int, rng: np.rand
 
 
 def belief_at(tables: Tables, mean: Array) -> Belief:
-    """Return a belief of one mean, for what needs no covariance."""
+    """Return a belief of one mean, for uses without covariance."""
     return Belief(mean, np.zeros((0, 0)), tables.entities[0], EntityMemory.rows(len(tables.priors)))
 
 
@@ -129,7 +129,7 @@ def frame_of(team: BenchTeam, rng: np.random.Generator) -> Rows[EventRow]:
 
 
 def joined_state(team: BenchTeam, rng: np.random.Generator) -> State:
-    """Return a state in which all have joined, are correlated with each other, and move as their odometry says."""
+    """Return a state in which all entities have joined, are correlated, and move by their odometry."""
     tables, n = team.tables, team.tables.dim
     state = empty_state(tables, [True] * len(team.parameters.entities))
     root = rng.normal(size=(n, n)) / math.sqrt(n)

@@ -17,7 +17,7 @@ from groundstation.sensing.topology import Topology
 
 @dataclass(frozen=True, slots=True)
 class _Moment:
-    """What a step is planned on; a planner of its own, so that none remembers another's topology."""
+    """Input of a step, with a planner of its own, so that none remembers another's topology."""
 
     planner: Planner
     belief: JointBelief
@@ -37,7 +37,7 @@ def run_frustum_bench(
     """Return {"rows": [...]}: a row for each team, layout and kind of belief.
 
     Each repeat is another moment: of another fresh team, or the next step of one that has flown for running_s.
-    cpu_ms: of complete steps; over_ms: by how much wall time a step with the budget exceeded it at most.
+    cpu_ms: of complete steps; over_ms: largest excess of a step's wall time over its budget.
     """
     rows = []
     for layout, n, belief in itertools.product(layouts, robots, ("fresh", "running")):
@@ -75,7 +75,7 @@ def _row(n: int, layout: str, running_s: float, repeats: int, seed: int, budget_
 
 
 def _over(moment: _Moment, budget_ms: float) -> float:
-    """Return how much longer than the budget a step took [ms]."""
+    """Return the excess of a step's time over the budget [ms]."""
     budget = TimeBudget(1e-3 * budget_ms, time.perf_counter)
     moment.planner.plan(moment.belief, moment.topology, moment.warm_start, budget.must_stop)
     return 1e3 * (time.perf_counter() - budget.deadline)

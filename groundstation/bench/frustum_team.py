@@ -1,4 +1,4 @@
-"""A team in a hall that flies what the planner plans: its beliefs are what a planner meets in flight."""
+"""A team in a hall that flies the planner's plans, for beliefs as in flight."""
 
 import math
 from dataclasses import replace
@@ -66,16 +66,16 @@ class FrustumTeam:
 
     @property
     def belief(self) -> JointBelief:
-        """Return what is believed now."""
+        """Return the present belief."""
         return JointBelief(self._mean.copy(), self._P.copy(), self._layout, round(self._now_s * 1e9))
 
     @property
     def warm_start(self) -> dict[str, Array] | None:
-        """Return the controls that are flown, with the heights."""
+        """Return the present controls, with the heights."""
         return None if self.plan is None else self.plan.warm_start
 
     def fly(self, plan: PlanResult) -> None:
-        """Follow a plan for one step, and see what can be seen."""
+        """Follow a plan for one step, and fuse all sightings."""
         self.plan, self.topology = plan, plan.topology
         self._move(plan)
         self._now_s += STEP_S
@@ -134,7 +134,7 @@ class FrustumTeam:
 
 
 def settled(robots: int, layout: str, seed: int, seconds: float) -> FrustumTeam:
-    """Return a team that has flown for so long; each plan has a few hundred evaluations, so that this ends soon."""
+    """Return a team that has flown for some seconds; each plan has a few hundred evaluations, to be quick."""
     team = FrustumTeam(robots, layout, seed)
     hasty = Planner(replace(team.planner.parameters, solves=2, finals=1), team.planner.sensors)
     for _ in range(round(seconds / STEP_S)):

@@ -1,4 +1,4 @@
-"""What driving many vehicles costs and how late it is, beside pymavlink's own receiver on the same frames."""
+"""Cost and delays of driving many vehicles, compared with pymavlink's own receiver on the same frames."""
 
 import math
 import os
@@ -32,7 +32,7 @@ _STANDING = (1e-4, *(0.0,) * 4, 1e-4, *(0.0,) * 4, 1e-4, *(0.0,) * 4, 1e-4)
 
 
 class _Host:
-    """The process around the driver, reduced to what the driver asks of it."""
+    """The process around the driver, reduced to the interface that the driver uses."""
 
     name, section = "mavlink", "{}"
     stop_requested, supervisor_alive, supervisor_fresh, spoken_for_ns = False, True, True, 0
@@ -59,7 +59,7 @@ class _Host:
 
 
 class _TimedBus(MemoryBus):
-    """Notes when IMU samples are published; `sent_ns` knows when the frame of a receipt was sent."""
+    """Notes when IMU samples are published; `sent_ns` returns the time of sending of a received frame."""
 
     def __init__(self, exchange: MemoryExchange) -> None:
         super().__init__(exchange, "lab", "mavlink")
@@ -73,7 +73,7 @@ class _TimedBus(MemoryBus):
 
 
 class _TimedLink:
-    """A link that notes when frames were sent, and how old a setpoint is when it goes out."""
+    """A link that notes when frames were sent, and the age of each setpoint when it is sent."""
 
     def __init__(self, link: MavlinkLink, bus: _TimedBus) -> None:
         self.link, self.rejected, self._bus = link, link.rejected, bus
@@ -83,7 +83,7 @@ class _TimedLink:
 
     @property
     def called_from(self) -> tuple[tuple[str, int], ...]:
-        """Where the vehicles were heard last."""
+        """Addresses at which the vehicles were last heard."""
         return self.link.called_from
 
     def receive(self) -> list[Heard]:
@@ -214,7 +214,7 @@ def _flown(
 
 
 def peer(count: int, seconds: float) -> dict[str, float]:
-    """Return what pymavlink's mavutil takes to receive the same frames, and do nothing with them."""
+    """Return the CPU time of pymavlink's mavutil to receive the same frames without using them."""
     os.environ["MAVLINK20"] = "1"
     from pymavlink import mavutil
 
@@ -235,13 +235,13 @@ def peer(count: int, seconds: float) -> dict[str, float]:
 
 
 def talk(port: int, count: int, seconds: float) -> "subprocess.Popen[bytes]":
-    """Start the vehicles that talk."""
+    """Start the sending vehicles."""
     module = [sys.executable, "-m", "groundstation.bench.mavlink_vehicles"]
     return subprocess.Popen([*module, str(port), str(count), str(seconds)])
 
 
 def free_port() -> int:
-    """Return a UDP port of loopback that nobody has."""
+    """Return a free UDP port of loopback."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
         udp.bind(("127.0.0.1", 0))
         return int(udp.getsockname()[1])

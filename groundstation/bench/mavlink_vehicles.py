@@ -1,8 +1,8 @@
-"""Vehicles that only talk, for the bench: `python -m groundstation.bench.mavlink_vehicles PORT COUNT SECONDS`.
+"""Vehicles that only send, for the bench: `python -m groundstation.bench.mavlink_vehicles PORT COUNT SECONDS`.
 
-Each says yes to everything and streams 50 LOCAL_POSITION_NED, 50 ATTITUDE_QUATERNION and 100 HIGHRES_IMU a second;
-the IMU's time is the host's monotonic clock at sending. Its physics is one trembling drift, so that the host's share is
-what is measured and no sensor counts as frozen.
+Each accepts every request and streams 50 LOCAL_POSITION_NED, 50 ATTITUDE_QUATERNION and 100 HIGHRES_IMU a second;
+the IMU's time is the host's monotonic clock at sending. Its physics is one trembling drift, so that only the host is
+measured and no sensor counts as frozen.
 """
 
 import math
@@ -26,7 +26,7 @@ AHEAD_M_S = 0.1
 
 
 class TalkingVehicle:
-    """A PX4 that rises by 1 m once it is armed, then flies ahead at AHEAD_M_S, whatever else it is told."""
+    """A PX4 that rises by 1 m once it is armed, then flies ahead at AHEAD_M_S, whatever its commands."""
 
     def __init__(self, system: int, port: int) -> None:
         self._encoder, self._decoder = FrameEncoder(system, AUTOPILOT_COMPONENT), FrameDecoder()
@@ -42,7 +42,7 @@ class TalkingVehicle:
             self._socket.sendto(self._encoder.encode(message), self._host)
 
     def turn(self, tick: int) -> None:
-        """Send what a hundredth of a second brings."""
+        """Send the messages of a hundredth of a second."""
         self._answer()
         now_ns = time.monotonic_ns()
         self._send(telemetry.HighresImu(now_ns // 1000, _TREMOR * math.sin(tick), 0.0, -9.8, 0.0, 0.0, 0.0))
@@ -92,7 +92,7 @@ class TalkingVehicle:
 
 
 def main(port: int, count: int, seconds: float) -> None:
-    """Talk for some seconds, at an even rate."""
+    """Send for some seconds, at an even rate."""
     vehicles = [TalkingVehicle(FIRST_SYSTEM + n, port) for n in range(count)]
     due = begin = time.monotonic()
     tick = 0

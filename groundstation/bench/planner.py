@@ -20,12 +20,12 @@ OURS = {
     "brute-force": SearchOptions(wide=False, prune=False),
 }
 SAME_COST = 0.01  # peers solve from rest and may end in another local optimum: theirs counts as the same within 1 %
-_FIRST_ROBOTS = 10  # exponents are fitted from here on: below, constant overheads rule
+_FIRST_ROBOTS = 10  # exponents are fitted from here on: below, constant overheads dominate
 
 
 @dataclass(slots=True)
 class Case:
-    """One row in the making: a method on a belief."""
+    """One unfinished row: a method on a belief."""
 
     robots: int
     layout: str
@@ -100,7 +100,7 @@ def _ours(plan: PlanarPlan) -> dict[str, Any]:
 
 
 def _time_peer(case: Case, process: PeerProcess, turn: int, seed: int, parameters: PlanarParameters) -> None:
-    """Slow, extrapolated and failed cases are not repeated: more rounds would not make them truer."""
+    """Time one step; slow, extrapolated and failed cases are not repeated, which would not improve them."""
     slow = case.cpu_ms and max(case.cpu_ms) > 1e3 * process.limit_s / 4
     if turn > 0 and (slow or case.row.get("extrapolated") or case.row.get("failure")):
         return

@@ -1,4 +1,4 @@
-"""What a JAX user would write: reduced state, jit + grad, all topologies solved in lockstep under vmap.
+"""A planner as a JAX user would write it: reduced state, jit + grad, all topologies in lockstep under vmap.
 
 Needs the optional extra `jax`. Known to dead-lock now and then at 30 robots (batched LAPACK inside a jitted loop):
 run it in a process of its own, with a time-out.

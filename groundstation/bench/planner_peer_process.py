@@ -1,4 +1,4 @@
-"""Runs a peer of the planner in a process of its own, so that one that hangs or grows costs nothing but its row."""
+"""Runs a peer of the planner in a process of its own, so that one that hangs or grows loses only its row."""
 
 import multiprocessing
 import time
@@ -16,7 +16,7 @@ _SHARE = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """One control step of a peer: CPU time, what it found, and whether the time is partly extrapolated."""
+    """One control step of a peer: CPU time, result, and whether the time is partly extrapolated."""
 
     cpu_ms: float
     evaluations: int
@@ -42,7 +42,7 @@ class PeerProcess:
         self._end()
 
     def measure(self, robots: int, layout: str, seed: int, parameters: PlanarParameters) -> Measured | None:
-        """Return one timed step on the bench belief; `failure` says why there is none."""
+        """Return one timed step on the bench belief; None: see `failure`."""
         if self._pipe is None:
             self._pipe, other = self._context.Pipe()
             self._process = self._context.Process(target=_serve, args=(self.name, other, self.limit_s), daemon=True)
@@ -72,7 +72,7 @@ class PeerProcess:
 
 
 def _serve(name: str, pipe: Connection, limit_s: float) -> None:
-    """Answer requests until the pipe closes; errors travel as text."""
+    """Answer requests until the pipe closes; errors are sent as text."""
     while True:
         try:
             robots, layout, seed, parameters = pipe.recv()
@@ -146,7 +146,7 @@ def naive_calls(robots: int, evaluations: float) -> float:
 
 
 def peak_memory_mb() -> float:
-    """Return the largest resident size this process has had [MB]; 0 where the system does not tell.
+    """Return the largest resident size of this process so far [MB]; 0 if the system does not tell it.
 
     Not ru_maxrss, which a child inherits from the process that started it.
     """

@@ -1,4 +1,4 @@
-"""What showing a flight to ROS 2 costs: the real `view --ros2` between the router of a made-up run and a second one."""
+"""Cost of showing a flight to ROS 2: the real `view --ros2` between the router of a made-up run and a second one."""
 
 import contextlib
 import os
@@ -69,7 +69,7 @@ def _play(router: Any, over: threading.Event) -> None:
 
 
 def python_loop_s() -> float:
-    """Return how long 10 million turns of an empty loop take: how fast this machine is, and how busy."""
+    """Return the time of 10 million turns of an empty loop [s]: a measure of this machine's speed and load."""
     begin_s = time.process_time()
     for _ in range(_TURNS):
         pass
@@ -92,7 +92,7 @@ def _shown(heard: Counter[str]) -> Iterator[tuple["subprocess.Popen[str]", Any]]
 
 
 def _noted(folder: Path, endpoint: str) -> str:
-    """Write the runtime file and the recording by which a view finds a run, which this process stands for."""
+    """Write the runtime file and the recording of a run that this process plays, by which a view finds it."""
     field = field_of(DRONES, free_port())
     write_run(folder / "run", msgspec.json.encode(field), 0.1)
     here = ProcessRecord("supervisor", "supervisor", os.getpid(), runtime_file.start_time(os.getpid()) or 0)

@@ -1,1 +1,1 @@
-"""The planar planner as others would write it: oracles for the tests, denominators for the benchmark."""
+"""The planar planner as others would write it: oracles for the tests, references for the benchmark."""

@@ -1,4 +1,4 @@
-"""What a lab would write first: a textbook EKF rollout over all 2(n + 1) coordinates, finite differences, SciPy."""
+"""The planner that a lab would write first: an EKF rollout over all 2(n + 1) coordinates, finite differences, SciPy."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""What every peer shares: optimise the current topology and each neighbour with SciPy, take the cheapest."""
+"""Shared part of the peers: optimises the current topology and each neighbour with SciPy, takes the cheapest."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -12,7 +12,7 @@ Objective = Callable[[Array], Any]
 
 
 class PeerStep(NamedTuple):
-    """The winner's levels and cost [m^2], and what it took; solved < topologies when the peer was stopped."""
+    """The winner's levels and cost [m^2], and the effort; solved < topologies if the peer was stopped."""
 
     level: tuple[int, ...]
     cost: float
@@ -22,7 +22,7 @@ class PeerStep(NamedTuple):
 
 
 def never() -> bool:
-    """Return that there is no hurry."""
+    """Return False: never stop."""
     return False
 
 
@@ -35,7 +35,7 @@ def edges_of(level: tuple[int, ...]) -> list[tuple[int, int]]:
 
 
 def neighbours_of(level: tuple[int, ...]) -> list[tuple[int, ...]]:
-    """Return each topology that one robot moved one level up or down makes, once."""
+    """Return each topology that differs by one robot moved one level up or down, once."""
     found: dict[tuple[int, ...], None] = {}
     for robot, own in enumerate(level):
         for to in (own - 1, own + 1):
@@ -54,7 +54,7 @@ def brute_force(
     gradient: bool,
     should_stop: Callable[[], bool] = never,
 ) -> PeerStep:
-    """Return the cheapest of a topology and its neighbours, or of those solved before `should_stop` says so.
+    """Return the cheapest of a topology and its neighbours, or of those solved before `should_stop` returns True.
 
     Objectives take controls scaled to [-1, 1] and return the cost, or (cost, gradient) with `gradient`.
     """

@@ -1,11 +1,11 @@
-"""The program `groundstation`: a stop goes ahead of all other programs before anything is imported for it."""
+"""The program `groundstation`: for a stop it raises its priority before it imports anything."""
 
 import sys
 
 from groundstation.process.priority import go_first
 
-# An ordinary process of a shell gets a thirtieth of a full machine (docs/decisions/0137). A dead man's switch stays
-# one: drones hold when it is late, and it lasts.
+# An ordinary process of a shell gets a thirtieth of a busy machine (docs/decisions/0137). A dead man's switch stays
+# an ordinary one: it runs for long, and if it is late, drones hold.
 STOPS = ("hold", "land", "cut-motors")
 
 

@@ -1,6 +1,6 @@
-"""Sockets that use one network adapter only: vehicles that all have the same address are told apart by their adapters.
+"""Sockets bound to one network adapter, to distinguish vehicles that all have the same address.
 
-Without that the routes of this computer decide, and of two equal ones only the first is ever used.
+Without it this computer's routes decide, and of two equal ones only the first is ever used.
 """
 
 import errno
@@ -20,12 +20,12 @@ Address = tuple[str, int]
 def bind_to_adapter(one: socket.socket, interface: str) -> None:
     """Let a new socket send and receive through one network adapter only ("": through any).
 
-    Raises DriverError, which names the adapters there are, or the right that is missing; the socket is closed then.
+    Raises DriverError, which names all adapters or the missing right; the socket is then closed.
     """
     if not interface:
         return
     try:
-        # From Linux 5.7 on everybody may, once for each socket (socket(7), SO_BINDTODEVICE).
+        # From Linux 5.7 on every user may, once for each socket (socket(7), SO_BINDTODEVICE).
         one.setsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, interface.encode())
     except OSError as error:
         one.close()
@@ -33,7 +33,7 @@ def bind_to_adapter(one: socket.socket, interface: str) -> None:
 
 
 def send_to_all(udp: socket.socket, datagrams: Sequence[bytes], addresses: Sequence[Address]) -> None:
-    """Send datagrams to each address; raises the last OSError, once the others have theirs."""
+    """Send datagrams to each address; raises the last OSError after all have been tried."""
     failed: OSError | None = None
     for datagram, address in product(datagrams, addresses):
         try:
@@ -74,18 +74,18 @@ def connected(address: Address, timeout_s: float, interface: str = "") -> socket
 
 
 def split_zone(text: str) -> tuple[str, str]:
-    """Return address and adapter of "192.168.1.1%wlan1", as IPv6 writes it; the adapter is "" where none is given."""
+    """Return address and adapter of "192.168.1.1%wlan1", as IPv6 writes it; the adapter is "" if none is given."""
     address, _, interface = text.partition("%")
     return address, interface
 
 
 def with_zone(address: str, interface: str) -> str:
-    """Return an address with the adapter that it is behind, as `split_zone` reads it."""
+    """Return an address with its adapter, as `split_zone` reads it."""
     return f"{address}%{interface}" if interface else address
 
 
 def how_to_reach(address: str) -> str:
-    """Return what to try with a vehicle that does not answer, given its address with or without an adapter."""
+    """Return a remedy for a vehicle that does not answer, given its address with or without an adapter."""
     host, interface = split_zone(address)
     ping = f"ping -I {interface} {host}" if interface else f"ping {host}"
     return f"check that it is switched on and that this computer is in its network: {ping}"
@@ -97,7 +97,7 @@ def adapters() -> list[str]:
 
 
 def drops_strangers(interface: str, conf: Path = _CONF) -> bool:
-    """Return whether the kernel drops what comes through an adapter from an address that it reaches through another."""
+    """Return whether the kernel drops packets on an adapter from an address that it reaches through another one."""
     values = [int(_text(conf / name / "rp_filter") or 0) for name in ("all", interface)]
     return max(values) == _STRICT
 

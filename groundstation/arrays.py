@@ -1,4 +1,4 @@
-"""The array types of the project; shapes stand in brackets in docstrings."""
+"""The array types of the project; docstrings give shapes in brackets."""
 
 import math
 from typing import Annotated
@@ -22,12 +22,12 @@ IntMatrix = Annotated[IntArray, 2]
 BoolVector = Annotated[BoolArray, 1]
 WordVector = Annotated[NDArray[np.uint64], 1]
 
-# Numbers in one line of the cache.
+# Number of float64 in a cache line.
 LINE = 8
 
 
 def zeros_on_a_line(shape: tuple[int, ...]) -> Array:
-    """Return zeros that begin on a line of the cache: vectors of 8 numbers then never cross into another one."""
+    """Return zeros that begin on a cache line, so that vectors of 8 numbers never cross into another one."""
     size = math.prod(shape)
     room: Array = np.zeros(size + LINE)
     first = -room.ctypes.data // room.itemsize % LINE

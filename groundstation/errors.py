@@ -3,7 +3,7 @@
 import errno
 import re
 
-# A place that was named on the command line, and in which nothing can be read or written.
+# Errors of a path named on the command line that cannot be read or written.
 _WRONG_PLACE = frozenset(
     (
         errno.EACCES,
@@ -23,7 +23,7 @@ _PLACE = re.compile(r"(\[[^\]@]*\]|[^@:]*)(:\d{0,5})?")
 def without_password(source: str) -> str:
     """Return a source's address without the user and password that it may carry.
 
-    In what is no proper address, whatever stands before an @ may be part of a password and goes as well.
+    In a malformed address all text before an @ may be part of a password and is removed as well.
     """
     scheme, mark, rest = source.partition("://")
     if not mark:
@@ -50,11 +50,11 @@ class GroundStationError(Exception):
 
 
 class OperatorMistake(GroundStationError):
-    """Asked for what cannot be done as asked: a wrong file, a place that is taken, an extra that is missing."""
+    """A request that cannot be carried out: a wrong file, an existing output path, a missing extra."""
 
 
 def is_wrong_place(error: OSError) -> bool:
-    """Return whether an error of the disk is one of the place that was named; a full or broken disk is none."""
+    """Return whether a disk error is the fault of the named path; that of a full or broken disk is not."""
     return error.errno in _WRONG_PLACE
 
 
@@ -75,7 +75,7 @@ class MessageError(GroundStationError):
 
 
 class DriverError(GroundStationError):
-    """A vehicle or camera cannot be reached, or refuses what its driver needs."""
+    """A vehicle or camera cannot be reached, or refuses a request that its driver needs."""
 
 
 class EstimatorFault(GroundStationError):

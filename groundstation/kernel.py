@@ -1,4 +1,4 @@
-"""How every compiled function is declared: typed by its annotations, cached, without the GIL.
+"""Declares compiled functions: typed by their annotations, cached, without the GIL.
 
 `@kernel` derives the compiled signature from the annotations, so that it is written once and checked by mypy:
 
@@ -41,7 +41,7 @@ class Record:
     dtype: ClassVar[np.dtype[Any]]
 
     def __init_subclass__(cls) -> None:
-        """Derive the layout from the annotations, in their order; bases come first."""
+        """Derive the layout from the annotations, in their order; those of bases come first."""
         super().__init_subclass__()
         hints = get_type_hints(cls, include_extras=True)
         hints.pop("dtype")
@@ -60,7 +60,7 @@ class Record:
 
     @classmethod
     def row(cls, **fields: Any) -> Self:
-        """Return one row with the given fields; the others are zero. Raises ValueError for a field that it lacks."""
+        """Return one row with the given fields; the others are zero. Raises ValueError for an unknown field."""
         row = cls.rows(1)[0]
         for name, value in fields.items():
             row[name] = value
@@ -68,7 +68,7 @@ class Record:
 
     @classmethod
     def packing(cls) -> struct.Struct:
-        """Return how a row is packed: its numbers in order, those of arrays row by row."""
+        """Return the packing of a row: its numbers in order, those of arrays row by row."""
         return struct.Struct("".join(_codes(cls.dtype)))
 
     def __getitem__(self, field: str) -> Any:
@@ -81,7 +81,7 @@ class Record:
 
 
 def _as_array(_context: Any, _builder: Any, _own: Any, _array: Any, field: Any) -> Any:
-    """Hand an array within a row over as any other array."""
+    """Pass an array within a row like any other array."""
     return field
 
 
@@ -89,7 +89,7 @@ lower_cast(types.NestedArray, types.Array)(_as_array)
 
 
 def _element(array: Any) -> Any:
-    """Return the type of the numbers of an `NDArray`: from numpy 2.5 on it is an alias that is given nothing else."""
+    """Return the number type of an `NDArray`, which from numpy 2.5 on is an alias with this one argument."""
     arguments = get_args(array)
     return arguments[0] if len(arguments) == 1 else get_args(arguments[1])[0]
 
@@ -193,8 +193,8 @@ def kernel(
 ) -> Callable[[Function], Function]:
     """Compile a function for the signature of its annotations, with IEEE arithmetic, so that replays agree to the bit.
 
-    inlined: into every kernel that calls it, for what is short or called from one place. To hand over a dozen arrays
-    takes as long as a small kernel's work; but what is copied often makes compiling slow.
+    inlined: into every kernel that calls it, for functions that are short or called from one place. Passing 12 arrays
+    takes as long as a small kernel's work; but frequent copies make compiling slow.
     contract: multiply and add in one rounding, where that is worth more than agreeing with numpy.
     reassociate: sum in another order, so that sums are vectorised.
 
@@ -214,9 +214,9 @@ def kernel(
 
 
 def address_of(compiled: Callable[..., Any], declaration: Callable[..., Any] | None = None) -> int:
-    """Return where the machine code of a kernel starts, as a C function; valid in this process only.
+    """Return the address of a kernel's machine code, a C function; valid in this process only.
 
-    declaration: whose signature the kernel must have, as `caller` calls it; raises TypeError where it has not.
+    declaration: its signature must be the kernel's, as for `caller`; else raises TypeError.
     """
     (result,) = cast(Any, compiled).overloads.values()
     if declaration is not None and result.signature != signature_of(declaration):
@@ -228,7 +228,7 @@ def caller(declaration: Function) -> Callable[[int, tuple[Any, ...]], Any]:
     """Return a function for use inside kernels: called with an address and arguments, it calls the kernel there.
 
     declaration: a function without a body whose annotations are the signature. The address is data, not part of the
-    compiled code, so that what calls it can be cached.
+    compiled code, so that callers can be cached.
     """
     signature = signature_of(declaration)
     arguments, result = signature.args, signature.return_type
@@ -255,7 +255,7 @@ def caller(declaration: Function) -> Callable[[int, tuple[Any, ...]], Any]:
 def viewed_as(record: type[Row], field: str) -> Callable[[Record], Row]:
     """Return a function for use inside kernels: a field of a row, an array of words, as another record, by reference.
 
-    For what rows of one table do not have in common.
+    For parts in which the rows of one table differ.
     """
     result = numba.from_dtype(record.dtype)
 

@@ -1,6 +1,6 @@
 """Skein from a script or a notebook: fields, beliefs, one step of planning, the judgement of a recording.
 
-What stands in `__all__` is the public interface: it changes with an entry in the change log only. Everything else may
+The names in `__all__` are the public interface: it changes with an entry in the change log only. Everything else may
 change at any time. Examples that run: docs/notebooks.
 """
 

@@ -1,4 +1,4 @@
-"""Plug-ins of other packages by entry point: found by name, loaded when asked for; one that fails is named.
+"""Plug-ins of other packages by entry point: found by name, loaded on request; errors name those that fail.
 
 Groups: `skein.vehicles` (kinds of vehicles), `skein.cameras` (schemes of camera sources), `skein.planners`,
 `skein.world_sensors` (schemes of motion capture sources), `skein.markers` (dictionaries of square tags).
@@ -32,9 +32,9 @@ def names(group: str) -> tuple[str, ...]:
 
 
 def planner(name: str, parameters: object, sensors: object) -> Any:
-    """Return what plans instead of `groundstation.planning.planner.Planner`; raises SettingsError naming the plug-in.
+    """Return a plug-in's replacement for `groundstation.planning.planner.Planner`; raises SettingsError naming it.
 
-    Made as that one is, from its parameters and the team's sensors, and used by its `plan`.
+    It is constructed in the same way, from parameters and the team's sensors, and used by its `plan`.
     """
     try:
         return made(PLANNERS, name, ("plan",), parameters, sensors)
@@ -55,7 +55,7 @@ def tag_family(name: str) -> Any:
 
 
 def made(group: str, name: str, uses: Sequence[str], *arguments: object) -> Any:
-    """Return what a plug-in makes of arguments; raises PlugInError, also where that lacks one of `uses`."""
+    """Return a plug-in's result for arguments; raises PlugInError, also if it lacks an attribute of `uses`."""
     source, make = _loaded(group, name)
     try:
         one = make(*arguments)
@@ -72,12 +72,12 @@ def load(group: str, name: str) -> Any:
 
 
 def reason(error: BaseException) -> str:
-    """Return what an operator is told of somebody's exception."""
+    """Return a plug-in's exception as text for the operator."""
     return f"{type(error).__name__}: {error}"
 
 
 def doubles(group: str) -> dict[str, str]:
-    """Return the names that several plug-ins of a group have, with all of these: which one was meant is not known."""
+    """Return the ambiguous names of a group, each with all plug-ins of that name."""
     sources: dict[str, list[str]] = {}
     for name, source, _ in entries(group):
         sources.setdefault(name, []).append(source)
@@ -93,7 +93,7 @@ def _loaded(group: str, name: str) -> tuple[str, Any]:
                 if not callable(make := entry.load()):
                     raise TypeError(f"is of type {type(make).__name__}, nothing that can be called")
                 return source, make
-            except (Exception, SystemExit) as error:  # whoever ends the program at import ends nothing here
+            except (Exception, SystemExit) as error:  # a plug-in that exits at import must not end this program
                 raise PlugInError(f"{name} cannot be used: {source}: {reason(error)}") from error
     known = ", ".join(names(group)) or "none is installed"
     raise PlugInError(f"{name} is not known; known in {group}: {known}")

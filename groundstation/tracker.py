@@ -1,4 +1,4 @@
-"""The tracker as a value machine: messages in, belief, plan and setpoints out; no I/O and no clock."""
+"""The tracker without I/O and clock: messages in; belief, plan and setpoints out."""
 
 import math
 from collections import Counter, defaultdict
@@ -68,7 +68,7 @@ def tracker_from_field(field: ResolvedField, clock: str, epoch: int) -> "Tracker
 class Tracker:
     """Holds the joint filter, the current topology and the plan in force.
 
-    Use: `ingest` what arrived, `advance` to now, read `belief`, `estimates`, `setpoints`; plan with `plan`, or with
+    Use: `ingest` messages, `advance` to now, read `belief`, `estimates`, `setpoints`; plan with `plan`, or with
     `request`, `planner.plan` on another thread, and `adopt`. clock: id of the boot clock that `now_ns` is read from.
     """
 
@@ -104,7 +104,7 @@ class Tracker:
 
     @property
     def airborne(self) -> tuple[str, ...]:
-        """Return the robots that fly, as their vehicles say."""
+        """Return the robots that fly, by their vehicles' status."""
         return tuple(name for name in self._robots if self.filter.airborne(name))
 
     @property
@@ -118,9 +118,9 @@ class Tracker:
         return self._topology
 
     def ingest(self, key: str, message: Message, now_ns: int) -> Verdict | None:
-        """Take one message that came under a key; returns why it was refused, or None when it may count.
+        """Take one message that came under a key; return why it was refused, or None if it may count.
 
-        Never raises for what a message holds. Refused observations are also among `take_corrections`.
+        Never raises for the content of a message. Refused observations are also among `take_corrections`.
         """
         moved = self._mounts.distrusts(message.header.entity)
         refused = moved and isinstance(message, RelativeObservation)
@@ -145,7 +145,7 @@ class Tracker:
         return verdict
 
     def advance(self, now_ns: int) -> JointBelief:
-        """Bring the belief to `now_ns`; a belief that is no distribution any more is dropped, loudly."""
+        """Advance the belief to `now_ns`; one that is no longer a distribution is dropped, with a notice."""
         self.filter.advance(now_ns)
         if not self.filter.is_sound():
             self._fault("the belief is not a distribution any more")
@@ -167,39 +167,39 @@ class Tracker:
         return self._belief
 
     def take_corrections(self) -> list[Correction]:
-        """Return and forget what became of the observations since the last call."""
+        """Return and forget the results of the observations since the last call."""
         corrections, self._corrections = self._corrections, []
         return corrections
 
     def take_notices(self) -> list[Notice]:
-        """Return and forget what the operator should know."""
+        """Return and forget the notices for the operator."""
         notices, self._notices = self._notices, []
         return notices
 
     def converged(self, name: str) -> bool:
-        """Return whether an entity is known well enough to fly on; without a camera to root the team nobody is."""
+        """Return whether an entity is known well enough to fly on; without a world-fixed sensor none is."""
         if name not in self._belief.layout or self._mounts.is_rootless or self._roots.is_silent:
             return False
-        # The deviation of who flies on our estimate tells how wrong its velocity becomes unseen (0214).
+        # For a robot that flies on our estimate the deviation tells how wrong its velocity becomes unseen (0214).
         fed = name in self.parameters.control.fed
         settled = fed or not self._joinings.is_unsettled(name)
         return settled and self._localisation.holds(self._belief, name, 0.0 if fed else self._tied_age_s(name))
 
     def estimates(self) -> tuple[EntityEstimate, ...]:
-        """Return what is believed of each entity that has joined."""
+        """Return the estimate of each entity that has joined."""
         names, ages_s = self._belief.layout.robots + self._belief.layout.targets, self.unlocalised_s()
         told = {name: (self.converged(name), self._tied_age_s(name), ages_s.get(name, 0.0)) for name in names}
         return tuple(entity_estimate(self.filter, self._belief, name, *known) for name, known in told.items())
 
     def target_age_s(self) -> float | None:
-        """Return the time since any target was last observed; None if none is believed anywhere."""
+        """Return the time since any target was last observed [s]; None if none is in the belief."""
         age = min((self.filter.age_s(name) for name in self._targets), default=math.inf)
         return age if math.isfinite(age) else None
 
     def unlocalised_s(self) -> dict[str, float]:
-        """Return for how long each airborne robot may not have been where it is believed [s]; infinite: never seen.
+        """Return for how long each airborne robot may have been elsewhere than believed [s]; infinite: never seen.
 
-        Who is known well enough and missed by no camera is localised, though it was seen long ago; but odometry is
+        A robot known well enough and missed by no camera is localised, even if seen long ago; but odometry is
         trusted no longer than for twice the time within which a robot flies back.
         """
         missed, trusted_s = self.lookout.missed_s, 2.0 * self.parameters.control.return_within_s
@@ -212,15 +212,15 @@ class Tracker:
         }
 
     def _tied_age_s(self, name: str) -> float:
-        """Return since when an entity was not seen, nor saw one that something fixed in the room knows; or infinity."""
+        """Return the time [s] since an entity was seen, or saw one that a world-fixed sensor knows; or infinity."""
         return min(self.filter.age_s(name), self._roots.age_s(name))
 
     def _rooted_age_s(self, robot: str) -> float:
-        """Return since when nothing fixed in the room has told where a robot is; infinite if it has not joined."""
+        """Return the time [s] since a sensor fixed in the room last located a robot; infinite if it has not joined."""
         return max(self.filter.age_s(robot), self._roots.age_s(robot))
 
     def _heed_absence(self, now_ns: int) -> None:
-        """Take account of what pictures do not show; what is not where it was believed leaves the belief."""
+        """Use pictures that do not show entities: an entity missing at its believed place leaves the belief."""
         ages_s = {name: self.filter.age_s(name) for name in (*self.airborne, *self._targets)}
         rooted_s = {name: self._rooted_age_s(name) for name in self.airborne}
         gone = self.lookout.advance(self._belief, ages_s, rooted_s)
@@ -233,7 +233,7 @@ class Tracker:
             self._belief = self.filter.belief()
 
     def _hopeless(self) -> tuple[str, ...]:
-        """Return the missing targets that no plan can go by: a scout looks for them while others are tracked."""
+        """Return the missing targets that no plan can use: a scout looks for them while others are tracked."""
         missing = self.lookout.missing
         if len(missing) == len(self._targets):
             return ()
@@ -246,7 +246,7 @@ class Tracker:
         return PlanRequest(self._belief.core(without=self._hopeless()), self._topology, warm, self.lookout.held)
 
     def adopt(self, plan: PlanResult) -> None:
-        """Put a finished plan in force, as far as its robots still fly."""
+        """Put a finished plan in force, for those of its robots that still fly."""
         self.current = plan
         self._topology = plan.topology
         self._topology = self._topology_now()
@@ -265,7 +265,7 @@ class Tracker:
         return plan
 
     def setpoints(self, now_ns: int) -> dict[str, Limited]:
-        """Return each airborne robot's setpoint, limited last on the newest belief; unknown robots hover."""
+        """Return each airborne robot's setpoint, limited by the newest belief; robots of unknown place hover."""
         p, airborne = self.parameters, self.airborne
         if self.holding or self._is_plan_stale(now_ns):
             return {name: Limited(HOVER, ("hold" if self.holding else "stale plan",)) for name in airborne}
@@ -293,7 +293,7 @@ class Tracker:
         return limited
 
     def _is_plan_stale(self, now_ns: int) -> bool:
-        """Return whether the planner has been silent for too long; its held controls must not be flown for ever."""
+        """Return whether the last plan is too old: its controls must no longer be flown."""
         limit_ns = self.parameters.control.max_plan_age_s * 1e9
         return self.current is not None and now_ns - self.current.stamp_ns > limit_ns
 

@@ -1,4 +1,4 @@
-"""The interface that a vehicle driver implements (the host does the rest), and what a driver process is given."""
+"""The interface that a vehicle driver implements (the host does the rest), and the input of a driver process."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field

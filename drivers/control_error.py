@@ -40,7 +40,7 @@ SEEN = Tolerance(deviation_m_s=0.4, excess_m=0.4)
 
 
 class Envelope:
-    """The interval, along one axis, between the command and what a slow vehicle still does of earlier ones."""
+    """The interval, along one axis, between the command and a slow vehicle's remaining response to earlier ones."""
 
     def __init__(self, start_m_s: float) -> None:
         self.low = self.high = start_m_s

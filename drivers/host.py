@@ -151,7 +151,7 @@ class VehicleHost:
         self._announcements.tell_intrusions(now_ns, status.rejected)
 
     def _detail(self, of_link: str) -> str:
-        """Return why a vehicle does what it does; if no failsafe acts, what its link waits for comes first."""
+        """Return the reason for a vehicle's present action; if no failsafe acts, a wait of its link comes first."""
         stopped = self.watchdog.braked or (self.watchdog.failsafe and self.watchdog.mode is not DriverMode.LANDED)
         return self.watchdog.explanation if stopped else of_link or self.watchdog.explanation
 

@@ -12,7 +12,7 @@ TOLERATED_SHARE = 0.01
 class Clockwork:
     """Hands out the deadline of each tick; a tick that begins > 10 ms after its deadline is an overrun.
 
-    Only ticks that matter are judged: before the flight kernels are compiled and processes start.
+    Only ticks that matter are judged: while nothing flies yet, kernels are compiled and processes start.
     """
 
     def __init__(self, now_ns: int) -> None:

@@ -61,7 +61,7 @@ class SourceAddress:
 
 
 def parse_source(text: str) -> SourceAddress:
-    """Return what a source's address says; raises ValueError that names the forms there are."""
+    """Return the parts of a source's address; raises ValueError that names all forms."""
     if text.startswith("/dev/"):
         return SourceAddress(SourceKind.DEVICE, path=text)
     if text.startswith(("/", "file:///")):
@@ -186,7 +186,7 @@ class MarkerSettings(_Section):
 
     @property
     def label(self) -> str:
-        """Return what an operator calls it."""
+        """Return its name for the operator."""
         return f"marker {self.code}" if self.tag is None else f"tag {self.tag.dictionary} {self.tag.id}"
 
     @property
@@ -265,7 +265,7 @@ class CameraDriverSettings(_Section):
 
     @property
     def observer(self) -> str:
-        """Return whom the sightings are attributed to."""
+        """Return the observer of its sightings: the camera, or the drone that carries it."""
         return self.name if self.mount.in_world else self.mount.parent
 
     @property

@@ -71,7 +71,7 @@ class WholeSearches:
 
     @property
     def _eager_ns(self) -> int:
-        """Return the least time between two searches for what is sought [ns]."""
+        """Return the least time between two full searches while a marker is sought [ns]."""
         rates = self._rates
         within_cost_s = max(1.0 / rates.sought_hz, self._cost_s / rates.share)
         return round(NS_PER_S * min(1.0 / rates.idle_hz, within_cost_s))

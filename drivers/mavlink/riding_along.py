@@ -1,4 +1,4 @@
-"""Decides what a second ground station may send to a vehicle: queries and stops, nothing that flies it. Pure."""
+"""Filters a second ground station's frames to a vehicle: queries and stops pass, nothing that flies it. Pure."""
 
 import math
 from collections.abc import Collection

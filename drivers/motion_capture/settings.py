@@ -48,7 +48,7 @@ OURS: Mapping[str, PoseProtocol] = {
 
 @dataclass(frozen=True, slots=True)
 class SystemAddress:
-    """Where a system listens, and what it speaks: an address scheme://host:port/path?query, taken apart.
+    """A system's address and protocol: scheme://host:port/path?query in parts.
 
     port: 0 where neither the address nor the protocol has one.
     """
@@ -66,7 +66,7 @@ class SystemAddress:
 
 
 def parse_source(text: str) -> SystemAddress:
-    """Return what a system's address says; raises ValueError that names the forms there are."""
+    """Return the parts of a system's address; raises ValueError that names all forms."""
     scheme, mark, rest = text.partition("://")
     others = [name for name in plug_ins.names(plug_ins.WORLD_SENSORS) if name not in OURS]
     if not mark or scheme not in (*OURS, *others) or not rest or any(character.isspace() for character in text):

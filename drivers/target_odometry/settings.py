@@ -23,7 +23,7 @@ class OdometryAddress:
 
 
 def parse_source(text: str) -> OdometryAddress:
-    """Return what the address of an odometry says; raises ValueError that shows the form."""
+    """Return the parts of an odometry's address; raises ValueError that shows the form."""
     wrong = ValueError("must be a topic behind a ROS 2 Zenoh router, as in ros2://192.168.1.20/odom?domain=0")
     parts = urlsplit(text)
     try:

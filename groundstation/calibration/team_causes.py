@@ -143,7 +143,7 @@ def causes(
 
 
 def spread(s: Suspicion) -> Array:
-    """Return what a suspicion adds to the covariance (n, n) of the figures' errors."""
+    """Return the part (n, n) of a suspicion in the covariance of the figures' errors."""
     return np.asarray((s.directions * s.sigma**2) @ s.directions.T)
 
 

@@ -137,7 +137,7 @@ def fly_one(seed: int, duration_s: float | None, folder: Path) -> tuple[DemoOutc
 
 
 def _wait(process: subprocess.Popen[bytes], limit_s: float) -> bool:
-    """Wait for the end; after limit_s or Ctrl-C let it land, then stop it at once; return whether Ctrl-C came."""
+    """Wait for the end; after limit_s or Ctrl-C let it land, at the second stop it; return whether Ctrl-C came."""
     interrupted = False
     for patience_s in (limit_s, _LANDING_S, _STOPPING_S):
         try:

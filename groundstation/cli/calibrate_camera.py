@@ -104,7 +104,7 @@ class CalibrationSession:
 
     @property
     def judge(self) -> "Judge":
-        """Return the views of the pictures; raises OperatorMistake without any picture."""
+        """Return the judge with its views of all pictures; raises OperatorMistake without any picture."""
         if self._judge is None:
             raise OperatorMistake("no picture was looked at: nothing was written")
         return self._judge

@@ -54,7 +54,7 @@ class Handle:
     left: bool = False
 
     def feel(self, man: DeadMan, now_ns: int) -> tuple[Verb | None, bool]:
-        """Read the input; return the stop that it asks for, and whether the input has ended."""
+        """Read the input; return the stop that it asks for, and whether no further one will follow."""
         if self.gone or self.left:
             time.sleep(_TURN_S)
             asked = man.release(now_ns)

@@ -8,7 +8,7 @@ _TOLD = "compiling kernels (once per version, a minute or two)"
 
 
 def use_flying_kernels() -> None:
-    """Use the cache of the kernels that fly, and compile missing ones; raises GroundStationError without a cache."""
+    """Use the cache of the kernels that fly, and compile missing ones; raises GroundStationError if it is read-only."""
     cache = numba_cache.activate()
     if numba_cache.is_complete(cache):
         return

@@ -1,4 +1,4 @@
-"""The newest picture of each camera, and what was detected in exactly that picture."""
+"""The newest picture of each camera, with the detections of exactly that picture."""
 
 import math
 from collections.abc import Mapping

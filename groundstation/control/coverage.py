@@ -39,7 +39,7 @@ class _Searcher:
         return self.footprint.chances
 
     def compare(self, left: Array, free: BoolArray, worth: Array) -> Compared:
-        """Return what the free stands promise: on average over a turn at the stands on the way."""
+        """Return the promise of the free stands: on average over a turn at the stands on the way."""
         footprint, lattice = self.footprint, self.lattice
         cells = (footprint.rows, footprint.columns, footprint.chances, footprint.first)
         seen = footprint.fresh * seen_from(left, lattice.rows, lattice.columns, *cells)

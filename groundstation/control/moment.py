@@ -1,4 +1,4 @@
-"""The inputs of a step's setpoints: the belief, and who has not been seen for how long."""
+"""The inputs of a step's setpoints: the belief, and the times since robots and targets were seen."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -23,13 +23,13 @@ Stands = Callable[[Sequence[str], Collection[str]], Mapping[str, Stand]]
 
 @dataclass(frozen=True, slots=True)
 class Sight:
-    """Who is not seen and for how long, and where robots search.
+    """Times since robots and targets were seen, and the places where robots search.
 
     target_age_s: time since any target was last observed where it is believed, None if never; unseen_s: time since a
     camera last saw each robot; missed_s: for how long a camera should have seen a robot and did not; missing: targets
     to be searched for, by one robot while others are tracked; velocity_errors_m_s: rms error of each robot's odometry;
     drifts_m_s: motion of each robot beyond its commands (3) [m/s; world]; unsteered: robots that follow no setpoints:
-    they wait or land; untied_s: time since a sensor fixed in the room last located each robot, or somebody saw it;
+    they wait or land; untied_s: time since a sensor fixed in the room last located each robot, or another one saw it;
     velocities_m_s: of each robot (3) [m/s; world]; helped_s: time since others than the sensors fixed in the room last
     told where each robot is.
     """

@@ -38,7 +38,7 @@ class _Searcher:
     kept: Sweep | None
 
     def compare(self, left: Array, free: BoolArray, worth: Array) -> Compared:
-        """Return what the free stands about it promise, view by view; of all free ones if none about it is free."""
+        """Return the promise of the free stands about it, view by view; of all free ones if none about it is free."""
         near = free & self.near
         stands = np.flatnonzero(near if near.any() else free)
         footprint = self.footprint

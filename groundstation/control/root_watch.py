@@ -65,7 +65,7 @@ class RootWatch:
                 self._renew(message.observer, now_ns)
 
     def hear_frozen(self, message: Message) -> None:
-        """Take a message that was refused because its sensor hangs; what is new in the same picture comes with it."""
+        """Take a message that was refused because its sensor hangs; new sightings of the same picture come with it."""
         if isinstance(message, RelativeObservation | RangeObservation) and message.observer in self._roots:
             self._hanging.add(message.observer)
 

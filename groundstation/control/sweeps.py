@@ -124,7 +124,7 @@ class Searcher(Protocol):
         """Return its sweep so far."""
 
     def compare(self, left: Array, free: BoolArray, worth: Array) -> Compared:
-        """Return what the stands still free promise; left: remaining chances of the cells; worth: of each view."""
+        """Return the promise of the stands still free; left: remaining chances of the cells; worth: of each view."""
 
     def views(self, stand: int, turn: int) -> Iterable[tuple[int, int, int]]:
         """Return the views of a sweep: row and column of the robot's cell, and its heading as a number."""

@@ -40,7 +40,7 @@ def velocity_error_m_s(belief: JointBelief, name: str) -> float:
 
 
 def known_velocity_error_m_s(belief: JointBelief, name: str) -> float:
-    """Return the mean alone: what the filter has learnt of that error, the larger of both axes [m/s]."""
+    """Return the mean alone of a reported velocity's error, as learnt by the filter: the larger of both axes [m/s]."""
     return max((abs(float(belief.mean_of(name)[i])) for i in _velocity_errors(belief, name)), default=0.0)
 
 

@@ -62,7 +62,7 @@ class _Builder:
         return self.builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(ir.IntType(32), len(places)), places))
 
     def gain(self, held: Any, factor: Any, value: Any, subtract: bool) -> None:
-        """Add a product to what is held, or subtract it."""
+        """Add a product to the held block, or subtract it."""
         product = self.builder.fmul(factor, value, flags=["contract"])
         operation = self.builder.fsub if subtract else self.builder.fadd
         self.builder.store(operation(self.builder.load(held), product, flags=["contract"]), held)

@@ -15,7 +15,7 @@ def camera_name(drone: str) -> str:
 
 
 class DroneLimits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Limits of a drone's commands, and charges of its battery at which it may not start, or lands."""
+    """Limits of a drone's commands; charge (0..1) below which it may not start, and lands after battery_hold_s."""
 
     max_speed_m_s: float = 0.6
     max_climb_m_s: float = 0.4

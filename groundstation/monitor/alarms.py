@@ -1,4 +1,4 @@
-"""Alarms: what the operator must not overlook, from the state. Pure."""
+"""Alarms for the operator, derived from the state. Pure."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

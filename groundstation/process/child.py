@@ -187,7 +187,7 @@ class Child:
             self._block.set_addresses(self.spec.heartbeat_index, self._addresses)
 
     def starting(self, detail: str) -> None:
-        """Report what the start waits for; shown to the operator."""
+        """Report the reason for which the start waits; shown to the operator."""
         self._announce(Lifecycle.STARTING, detail)
 
     def ready(self, detail: str = "") -> None:

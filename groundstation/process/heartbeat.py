@@ -132,11 +132,11 @@ class HeartbeatBlock:
         return self._words[slot * _WORDS_PER_SLOT + _SILENT_SINCE]
 
     def set_clock_offset(self, offset_ns: int) -> None:
-        """Record what is to be added to this host's boot clock to read that of the run [ns]."""
+        """Record the offset of the run's boot clock from this host's [ns], to be added to this host's."""
         self._words[SUPERVISOR_SLOT * _WORDS_PER_SLOT + _CLOCK_OFFSET] = offset_ns
 
     def clock_offset_ns(self) -> int:
-        """Return the same; 0 on the run's own host."""
+        """Return the offset of the run's boot clock from this host's [ns]; 0 on the run's own host."""
         return self._words[SUPERVISOR_SLOT * _WORDS_PER_SLOT + _CLOCK_OFFSET]
 
     def beat_ns(self, slot: int) -> int:

@@ -61,7 +61,7 @@ def holder_of(address: str, port: int, kind: socket.SocketKind = socket.SOCK_STR
 
 
 def why_refused(error: OSError, address: str, port: int, kind: socket.SocketKind = socket.SOCK_STREAM) -> str:
-    """Return why an address and port cannot be bound: who holds them, or else what the system says."""
+    """Return why an address and port cannot be bound: the program that holds them, or else the system's error."""
     if error.errno == errno.EADDRINUSE:
         return f"the port is taken by {holder_of(address, port, kind)}"
     return os.strerror(error.errno or 0)

@@ -11,7 +11,7 @@ def part_path(folder: Path, stem: str, number: int) -> Path:
 
 
 def shown(place: Path | str) -> str:
-    """Return a path as text for files and pages, with a sign for what is no UTF-8 in it."""
+    """Return a path as text for files and pages, with a sign for bytes that are no UTF-8."""
     return os.fsencode(place).decode(errors="replace")
 
 

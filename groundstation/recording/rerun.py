@@ -25,13 +25,13 @@ class Rerun(msgspec.Struct, frozen=True):
 
     @property
     def subject(self) -> str:
-        """Return what it repeats and how."""
+        """Return the recording that it repeats, and with which settings, in words."""
         how = f"with {self.changes}" if self.changes else "with its own settings"
         return f"{self.kind} of {self.of} {how}"
 
     @property
     def sentence(self) -> str:
-        """Return a sentence on what it is and how far its figures count."""
+        """Return a sentence that tells a re-run from a flight, and how far its figures count."""
         return (
             f"{self.subject}: no flight, so nothing is judged; estimates and plans were computed, "
             "vehicles, safety and processes are those of the recorded flight"

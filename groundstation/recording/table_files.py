@@ -25,7 +25,7 @@ class TableFile(Protocol):
         """Add a row, with the common columns first."""
 
     def close(self) -> None:
-        """Write what is left; raises OSError when the disk is full."""
+        """Write the remaining rows; raises OSError when the disk is full."""
 
 
 class CsvFile:
@@ -94,7 +94,7 @@ class ParquetFile:
             self._rows.clear()
 
     def close(self) -> None:
-        """Write what is left and the footer."""
+        """Write the remaining rows and the footer."""
         try:
             self._flush()
             self._writer.close()

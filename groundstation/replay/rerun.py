@@ -64,7 +64,7 @@ class JournalArrivals:
         return 0
 
     def pop_ready(self) -> list[tuple[str, Message]]:
-        """Return and forget what is ready."""
+        """Return and forget the messages that are ready."""
         ready, self.ready = self.ready, []
         return ready
 

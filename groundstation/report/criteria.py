@@ -112,7 +112,7 @@ def _landed(figures: RunFigures) -> Criterion:
 
 
 def _of_the_demo(figures: RunFigures, facts: RunFacts) -> Iterator[Criterion]:
-    """Judge the demo's topologies: the path leaves the ceiling camera's view at both ends, so both must occur.
+    """Judge the demo's topologies: both must occur if the run lasted until the path had left the ceiling view.
 
     Reason: docs/decisions/0046-topologies-judged-in-the-demo-only.md.
     """

@@ -34,7 +34,7 @@ class Announcer:
         self._lifetime_ms = lifetime_ms
 
     def estimate(self, tracker: Tracker, now_ns: int) -> None:
-        """Publish what is believed of each entity."""
+        """Publish the estimate of each entity."""
         header = self._bus.header(TEAM, now_ns)
         searches = tracker.lookout.searches(now_ns)
         message = Estimate(header=header, entities=tracker.estimates(), epoch=tracker.epoch, searches=searches)

@@ -49,7 +49,7 @@ class BeforeTakeOff:
         self._next_ns: int | None = None
 
     def update(self, now_ns: int) -> None:
-        """Take in what has arrived."""
+        """Take the messages that have arrived."""
         for received in self._inbox.drain():
             match received.message:
                 case RelativeObservation() | RangeObservation() as sighting if sighting.subject not in self._flew:

@@ -86,7 +86,7 @@ class Recorder:
         self._series = (self._writer.state, self._writer.raw)
 
     def turn(self) -> None:
-        """Write what has arrived, flush when due, watch the disk."""
+        """Write the samples that have arrived, flush when due, watch the disk."""
         now_ns = clock.now_ns()
         self._check_space(now_ns)
         writer = self._writer
@@ -129,7 +129,7 @@ class Recorder:
         return sum(series.written for series in self._series)
 
     def close(self) -> None:
-        """Write what is left and finish the files; reports what fails."""
+        """Write remaining samples and finish the files; reports failures."""
         self.turn()
         self._writer.close()
         for series in self._series:

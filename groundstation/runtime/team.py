@@ -114,7 +114,7 @@ class TeamStatus:
         self._odometry = bus.subscribe([ODOMETRY], newest=True)
 
     def update(self, now_ns: int) -> None:
-        """Take in what has arrived."""
+        """Take the messages that have arrived."""
         for received in (*self._events.drain(), *self._odometry.drain()):
             match received.message:
                 case VehicleStatus() as status:

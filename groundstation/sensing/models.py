@@ -1,4 +1,4 @@
-"""The models of cameras: where each sits, what it sees, and how well it measures."""
+"""The models of cameras: mounting, view, and noise of measurements."""
 
 import math
 from collections.abc import Mapping
@@ -73,7 +73,7 @@ class Softness:
 
 @dataclass(frozen=True, slots=True)
 class WorldCameraModel:
-    """A camera fixed in the world: position [m; world], optical_from_world (3, 3), what it sees and how well."""
+    """A camera fixed in the world: position [m; world], optical_from_world (3, 3), its view and its noise."""
 
     position_m: tuple[float, float, float]
     view: Frustum
@@ -88,7 +88,7 @@ class WorldCameraModel:
 
 @dataclass(frozen=True, slots=True)
 class OnboardCameraModel:
-    """A robot's forward camera: position [m; base], tilted down and panned left, what it sees and how well."""
+    """A robot's forward camera: position [m; base], tilted down and panned left, its view and its noise."""
 
     position_m: tuple[float, float, float]
     view: Frustum

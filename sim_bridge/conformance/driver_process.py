@@ -65,7 +65,7 @@ class DriverLife:
 
     @property
     def exit_code(self) -> int | None:
-        """Return the driver's exit code; None while it runs, or if its parent died first."""
+        """Return the driver's exit code, which its parent passes on; None if that has not ended within 2 s."""
         with suppress(subprocess.TimeoutExpired):
             return self._parent.wait(timeout=2.0)
         return None

@@ -1,4 +1,4 @@
-"""Draws what was found into pictures, for people."""
+"""Draws detections into pictures, for people."""
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What the kept views cover so far, and what is still missing: regions, distances, tilts. Pure."""
+"""Coverage of the kept views, and views still missing: regions, distances, tilts. Pure."""
 
 import math
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ class Coverage:
 
 
 def coverage_of(views: list[KeptView], pattern: Pattern, size: tuple[int, int]) -> Coverage:
-    """Return what the views of a board cover in pictures of (width, height)."""
+    """Return the coverage of a board's views in pictures of (width, height)."""
     regions = np.zeros((3, 3), dtype=np.int64)
     shares: list[float] = []
     tilts: set[str] = set()

@@ -68,7 +68,7 @@ class Pattern:
 
 
 def pattern_of(text: str, square_mm: float, as_opencv: bool = False) -> Pattern:
-    """Return the pattern that `9x6` (inner corners) or `skein` names; raises ValueError that says what is wrong."""
+    """Return the pattern that `9x6` (inner corners) or `skein` names; raises ValueError with the fault."""
     if not 1.0 <= square_mm <= 1000.0:
         raise ValueError(f"the side of a square must be 1 to 1000 mm (got {square_mm:g})")
     if text == MARKER:

@@ -39,7 +39,7 @@ class Marked:
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """Results for one picture: what was found, the CPU time [ms], and the picture with all results drawn in."""
+    """Results for one picture: markers, CPU time [ms], and the picture with all results drawn in."""
 
     shot: SourcePicture
     marked: tuple[Marked, ...]
@@ -73,7 +73,7 @@ class DetectorPreview:
         self._pipeline = Pipeline(self._lens, tuple(expected), settings, _SEARCH_RATE_HZ)
 
     def look(self, shot: SourcePicture) -> Look:
-        """Return what is in a picture."""
+        """Return the results for a picture."""
         stamp_ns = round(shot.at_s * NS_PER_S)
         windows = self._pipeline.windows(stamp_ns, shot.grey.shape)
         began_s = time.process_time()

@@ -59,7 +59,7 @@ class Gathering:
         self.doubled: set[int] = set()
 
     def take(self, picture: Image) -> list[MarkerReading]:
-        """Take in a picture; returns what is in it."""
+        """Take a picture; return the markers in it."""
         seen = markers_in(picture, self._lens)
         self.pictures += 1
         codes = [one.code for one in seen if one.code is not None]

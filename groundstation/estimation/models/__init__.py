@@ -1,4 +1,4 @@
-"""Motion and observation models, one file each; `protocol.py` says what a new one has to provide."""
+"""Motion and observation models, one file each; `protocol.py` is their interface."""
 
 from groundstation.estimation.models.camera import MountedCamera
 from groundstation.estimation.models.commanded_robot import CommandedRobot

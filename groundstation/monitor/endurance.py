@@ -7,6 +7,7 @@ from groundstation.bus.messages import AIRBORNE, FlightState, VehicleStatus
 # What has to be spent before a drain is believed that nothing is known of, and for how long.
 _LEAST_DRAIN, _LEAST_MIN = 0.02, 0.5
 # Minutes of this flight that the usual drain of a kind weighs as much as: a battery says its charge in whole points.
+# Until _LEAST_MIN the usual drain counts alone, from twice that on a flight counts in full.
 _USUAL_MIN = 1.0
 _NS_PER_MIN = 60e9
 
@@ -59,7 +60,7 @@ def endurance(
     if take_off is not None:
         minutes, spent = (stamp_ns - take_off.stamp_ns) / _NS_PER_MIN, take_off.battery - battery
     if flight_time_s is not None:
-        usual = _USUAL_MIN / (flight_time_s / 60.0)
-        return Endurance(left * (_USUAL_MIN + minutes) / (usual + spent))
+        usual, counts = _USUAL_MIN / (flight_time_s / 60.0), min(1.0, max(0.0, minutes / _LEAST_MIN - 1.0))
+        return Endurance(left * (_USUAL_MIN + counts * minutes) / (usual + counts * spent))
     believed = minutes >= _LEAST_MIN and spent >= _LEAST_DRAIN
     return Endurance(left * minutes / spent) if believed else None

@@ -70,7 +70,10 @@ def test_past_alarms_outlive_a_reload_and_give_way_to_those_that_last(stage: Any
     page.page.reload()
     page.wait(lambda s: s["frames"] > 2 and weak_links(s))
     page.there("past-alarms").click()
-    stage.flight.link = {"drone_1": 0.08, "drone_2": 0.08}
+    stage.flight.link, stage.flight.battery["drone_2"] = (
+        {"drone_1": 0.08},
+        0.28,
+    )  # with the same advice they share a line
     page.wait(lambda s: page.there("more-alarms").is_visible())
     page.there("more-alarms").click()
     assert page.there("alarm-log").is_hidden() and page.page.locator(".banner:visible").count() >= 2

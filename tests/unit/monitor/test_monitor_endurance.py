@@ -24,6 +24,12 @@ def test_a_drain_counts_for_as_much_as_has_been_flown() -> None:
     assert said is not None and said.minutes == pytest.approx(0.5 * 51.0 / (1.0 / 12.0 + 0.1))
 
 
+def test_a_charge_that_drops_at_once_is_no_drain_before_half_a_minute_has_passed() -> None:
+    for seconds, minutes in ((1, 1.56), (30, 1.56), (60, 0.13 * 2.0 / (1.0 / 12.0 + 0.32))):
+        said = endurance(seconds * MIN // 60, 0.28, 0.15, TakeOff(0, 0.6), 720.0)
+        assert said is not None and said.minutes == pytest.approx(minutes)
+
+
 @pytest.mark.parametrize("drain_per_min", [0.04, 0.0833, 0.2])
 def test_a_figure_never_jumps(drain_per_min: float) -> None:
     """A battery says its charge in whole points, twice a second here: the figure goes by an eighth at most at once."""

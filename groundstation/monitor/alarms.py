@@ -1,7 +1,9 @@
 """Alarms for the operator, derived from the state. Pure."""
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 from groundstation.bus.messages import (
     AIRBORNE,
@@ -74,6 +76,7 @@ def alarms_of(state: MonitorState, now_ns: int) -> list[Alarm]:
     alarms = [
         *_vehicles(state, now_ns),
         *_tracker(state, now_ns),
+        *_near(state, now_ns),
         *_cameras(state, now_ns),
         *_lost(state),
         *_processes(state, now_ns),
@@ -167,6 +170,27 @@ def _tracker(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
     if age > ESTIMATE_SILENT_S:
         advice = "Nothing to do: drones hover, then land."
         yield Alarm("tracker silent", f"tracker: no estimate for {age:.1f} s", advice=advice)
+
+
+def _near(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
+    """Yield pairs of flying drones that are nearer than allowed: only a drone that tracks is moved away by itself."""
+    if state.estimate is None or state.estimate.age_s(now_ns) > ESTIMATE_SILENT_S:
+        return
+    modes = {n: seen.message.mode for n, seen in state.vehicles.items() if seen.message.flight_state in AIRBORNE}
+    places = {one.name: one.mean[:3] for one in state.estimate.message.entities if one.name in modes}
+    for pair in combinations(places, 2):
+        apart_m, least_m = math.dist(*(places[name] for name in pair)), state.cast.min_separation_m
+        if apart_m < least_m:
+            text = f"{pair[0]} and {pair[1]} are {apart_m:.2f} m apart, at least {least_m:g} m is allowed"
+            yield Alarm(f"{' '.join(pair)} near", text, False, _apart({modes[name] for name in pair}))
+
+
+def _apart(modes: set[str]) -> str:
+    if "TRACK" in modes:
+        return "Nothing to do: the tracker moves them apart."
+    if "LANDING" in modes:
+        return "Nothing to do: it lands."
+    return f"{_TO_DO}LAND one of them, or TRACK: drones that hover drift."
 
 
 def _lost(state: MonitorState) -> Iterator[Alarm]:

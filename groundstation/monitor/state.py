@@ -23,7 +23,8 @@ class Cast:
     """The expected entities: drones with their battery limit, targets, world-fixed cameras.
 
     flight_times_s: what a full battery of a drone usually lasts, where its kind says so. lost_after_s: unseen for so
-    long, a robot or target is lost. unseen_land_s: after so long a robot lands at the latest.
+    long, a robot or target is lost. unseen_land_s: after so long a robot lands at the latest. min_separation_m: the
+    least distance of flying drones.
     """
 
     site: str = ""
@@ -33,6 +34,7 @@ class Cast:
     flight_times_s: dict[str, float] = field(default_factory=dict)
     lost_after_s: float = 3.0
     unseen_land_s: float = 30.0
+    min_separation_m: float = 0.6
 
 
 def cast_from_field(resolved: ResolvedField) -> Cast:
@@ -41,8 +43,9 @@ def cast_from_field(resolved: ResolvedField) -> Cast:
     usual = {name: kind_named(drone.kind).flight_time_s for name, drone in resolved.drones.items()}
     flight_times_s = {name: time_s for name, time_s in usual.items() if time_s is not None}
     lost_after_s = resolved.estimator.lost_after_s
-    targets, cameras, land_s = tuple(resolved.tracked), tuple(resolved.cameras), resolved.safety.unseen_land_at_last_s
-    return Cast(resolved.site, drones, targets, cameras, flight_times_s, lost_after_s, land_s)
+    targets, cameras, safety = tuple(resolved.tracked), tuple(resolved.cameras), resolved.safety
+    limits = safety.unseen_land_at_last_s, safety.min_separation_m
+    return Cast(resolved.site, drones, targets, cameras, flight_times_s, lost_after_s, *limits)
 
 
 @dataclass(frozen=True, slots=True)

@@ -225,3 +225,26 @@ def test_two_figures_that_are_suspected_at_once_are_two_alarms(world: World) -> 
     world.say(t.SUSPICION, m.Suspicion(header=world.header("diagnosis"), cause="x", figures=figures))
     world.text()
     assert len({alarm.about for alarm in alarms_of(world.state, NOW)}) == 2
+
+
+@pytest.mark.parametrize(
+    ("modes", "to_do"),
+    [
+        (("TRACK", "HOVER"), "Nothing to do: the tracker moves them apart."),
+        (("HOVER", "HOLD"), "To do: LAND one of them, or TRACK: drones that hover drift."),
+        (("HOVER", "LANDING"), "Nothing to do: it lands."),
+    ],
+)
+def test_drones_that_fly_nearer_than_allowed_are_told(world: World, modes: tuple[str, str], to_do: str) -> None:
+    for name, mode in zip(("drone_1", "drone_2"), modes, strict=True):
+        world.vehicle(name, mode)
+    for x_m, told in ((0.61, False), (0.55, True)):
+        places = {"drone_1": (0.0, 0.0, 1.0, 0.0), "drone_2": (x_m, 0.0, 1.0, 1.0)}
+        still = ((0.0,) * 16, (0.0,) * 3, True, 0.2)
+        entities = tuple(m.EntityEstimate(name, "robot", mean, *still) for name, mean in places.items())
+        world.say(t.ESTIMATE, m.Estimate(header=world.header("team"), entities=entities, epoch=1))
+        world.text()
+        near = [(one.text, one.advice) for one in alarms_of(world.state, NOW)]
+        assert near == ([("drone_1 and drone_2 are 0.55 m apart, at least 0.6 m is allowed", to_do)] if told else [])
+    world.vehicle("drone_2", "LANDED", flight_state=m.FlightState.LANDED)
+    assert _alarms(world) == []

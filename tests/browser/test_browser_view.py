@@ -169,8 +169,7 @@ def test_killed_console_comes_back_with_everything(stage: Any) -> None:
 def test_battery_colours_at_their_thresholds(stage: Any) -> None:
     page = stage.open()
     levels = {}
-    # What is spent so fast lasts for less than three minutes, then for less than one.
-    for value, level in ((0.82, "good"), (0.55, "low"), (0.18, "empty")):
+    for value, level in ((0.82, "good"), (0.29, "low"), (0.18, "empty")):
         stage.flight.battery["drone_1"] = value
         levels[level] = becomes(page, "drone_1-battery", "data-battery", level)
     assert all(level == shown for level, shown in levels.items()), levels

@@ -80,9 +80,10 @@ def gap_about_m(place: Array, views: Sequence[Rectangle]) -> float:
 
 
 def unseen_way_m(leaves_m: float, speed: float, most: float, follows_s: float, unseen_s: float) -> float:
-    """Return how far a vehicle gets beyond a border in a time, which it comes to after a way, at a speed [m/s] now.
+    """Return how far [m] a vehicle gets beyond a border in `unseen_s` after it has passed it.
 
-    Told to fly at its most it follows with a lag.
+    The border is `leaves_m` ahead. The vehicle has a speed [m/s] now, is told to fly at its maximum `most` [m/s], and
+    follows with a lag `follows_s`.
     """
     lacks = max(0.0, most - speed)
     low, high = 0.0, follows_s + leaves_m / max(most, _STANDS_M_S)
@@ -95,9 +96,10 @@ def unseen_way_m(leaves_m: float, speed: float, most: float, follows_s: float, u
 
 
 def hold(view: Rectangle, place: Array, velocity: Array, most: float) -> Array:
-    """Return the part of a velocity (2) [m/s] with which who is in a view stays there, at most so fast inwards.
+    """Return the part of a velocity (2) [m/s] that keeps a robot in its view.
 
-    place (2) [m]: where it would come to rest; held from where it is, a vehicle that follows late leaves the view.
+    place (2) [m]: where it would come to rest: held by its present place, a vehicle that follows late leaves the view.
+    Outside of the view it flies back at up to `most` [m/s].
     """
     low, high = (HOLD_GAIN * (side - place) for side in np.transpose((view.x_m, view.y_m)))
     return np.asarray(np.clip(velocity, np.minimum(low, most), np.maximum(high, -most)))

@@ -113,10 +113,14 @@ def _points(path: Mapping[str, Any]) -> list[tuple[float, float]]:
         return [*points, points[0]] if path.get("after_last", "first") == "first" else points
     if path.get("shape") != "figure_eight":
         return []
-    phases = [math.tau * n / 200 for n in range(201)]
-    x, y = path.get("centre_m", (0.0, 0.0))
+    return [on_figure_eight(path, n / 200) for n in range(201)]
+
+
+def on_figure_eight(path: Mapping[str, Any], turns: float) -> tuple[float, float]:
+    """Return the point of a figure of eight after some turns from its middle [m; world]."""
+    phase, (x, y) = math.tau * turns, path.get("centre_m", (0.0, 0.0))
     length, width = path.get("half_length_m", 0.0), path.get("half_width_m", 0.0)
-    return [(x + length * math.sin(phase), y + width * math.sin(2 * phase)) for phase in phases]
+    return x + length * math.sin(phase), y + width * math.sin(2 * phase)
 
 
 def level_heights(field: Field) -> list[float]:

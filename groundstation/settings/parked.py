@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from groundstation.settings.drawing import on_figure_eight
 from groundstation.settings.schema import Field
 
 _APART_M = 0.35  # half of a drone and half of a small robot: one marker hides the other from above
@@ -36,9 +37,7 @@ def _starts(scenario: Mapping[str, Any], targets: list[str]) -> dict[str, tuple[
 def _start(path: Mapping[str, Any]) -> tuple[float, float] | None:
     shape = path.get("shape", "figure_eight")
     if shape == "figure_eight":
-        phase, (x, y) = math.tau * path.get("start_phase", 0.0), path.get("centre_m", (0.0, 0.0))
-        along, across = path.get("half_length_m", 0.0), path.get("half_width_m", 0.0)
-        return x + along * math.sin(phase), y + across * math.sin(2 * phase)
+        return on_figure_eight(path, path.get("start_phase", 0.0))
     if shape == "waypoints":
         x, y = path["points_m"][0]
         return x, y

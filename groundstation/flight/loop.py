@@ -35,15 +35,17 @@ class FlightOutcome:
 
 
 class Flight:
-    """Runs one flight; call `run` once."""
+    """Runs one flight; call `run` once. keyboard: where the operator answers the prompt (default: standard input)."""
 
-    def __init__(self, supervisor: Supervisor, plan: FlightPlan, terminal: Terminal) -> None:
+    def __init__(
+        self, supervisor: Supervisor, plan: FlightPlan, terminal: Terminal, keyboard: Keyboard | None = None
+    ) -> None:
         self._supervisor = supervisor
         self._start = Start(supervisor)
         self._plan = plan
         self._terminal = terminal
         self._began_ns = time.monotonic_ns()
-        self._keyboard, self._sleep = Keyboard(), SleepWatch()
+        self._keyboard, self._sleep = keyboard or Keyboard(), SleepWatch()
         self._prompting = False
         self._grounded = False
         self._forbidden = False

@@ -5,16 +5,16 @@ import pty
 import time
 from collections.abc import Iterator
 from types import SimpleNamespace
-from typing import cast
+from typing import NamedTuple, cast
 
 import pytest
 
 from groundstation.bus import messages as m
 from groundstation.bus import topics as t
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
-from groundstation.flight import keyboard as keyboards
 from groundstation.flight import loop
 from groundstation.flight.flight_plan import FlightPlan
+from groundstation.flight.keyboard import Keyboard
 from groundstation.process.sleep_watch import SleepWatch
 from groundstation.runtime.operator import Operator
 from groundstation.runtime.take_off import TakeOffLimits
@@ -26,10 +26,17 @@ from groundstation.supervisor.terminal import Terminal
 _LONGEST_S = 2.0
 
 
+class Ends(NamedTuple):
+    """The two ends of a keyboard: what the run reads, and where a test types (descriptors)."""
+
+    read: int
+    typed: int
+
+
 class Waiting:
     """A run whose drone stands; a page presses a button at the first turn, the keyboard Enter at the fifth."""
 
-    def __init__(self, keyboard: int, pressed: m.Verb, typed: bytes = b"\n") -> None:
+    def __init__(self, keyboard: Ends, pressed: m.Verb, typed: bytes = b"\n") -> None:
         exchange = MemoryExchange()
         self.bus, self._drone = MemoryBus(exchange, "lab", "supervisor"), MemoryBus(exchange, "lab", "drone_1")
         self._page = MemoryBus(exchange, "lab", "console")
@@ -40,7 +47,7 @@ class Waiting:
         self.said: list[str] = []
         self.heard: list[m.Verb] = []
         self._pressed, self._typed = pressed, typed
-        self._keyboard, self._turns, self._began = keyboard, 0, time.monotonic()
+        self.keyboard, self._turns, self._began = keyboard, 0, time.monotonic()
 
     def step(self) -> None:
         self._turns += 1
@@ -53,7 +60,7 @@ class Waiting:
             order = m.Command(header=header, id="page-1", verb=self._pressed, scope=scope, issuer="console")
             self._page.publish(t.COMMAND, order)
         if self._turns == 5:
-            os.write(self._keyboard, self._typed)
+            os.write(self.keyboard.typed, self._typed)
         late = time.monotonic() - self._began > _LONGEST_S
         self.interrupts.stop_requested = late or m.Verb.TAKEOFF in self.heard
         time.sleep(0.002)
@@ -63,21 +70,20 @@ class Waiting:
 
 
 @pytest.fixture
-def keyboard(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
-    yield from typed_into(monkeypatch, *os.pipe())
+def keyboard() -> Iterator[Ends]:
+    yield from closed_after(Ends(*os.pipe()))
 
 
 @pytest.fixture
-def terminal(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+def terminal() -> Iterator[Ends]:
     operator, run = pty.openpty()
-    yield from typed_into(monkeypatch, run, operator)
+    yield from closed_after(Ends(run, operator))
 
 
-def typed_into(monkeypatch: pytest.MonkeyPatch, read: int, write: int) -> Iterator[int]:
-    monkeypatch.setattr(keyboards.Keyboard.__init__, "__defaults__", (read,))
-    yield write
-    os.close(read)
-    os.close(write)
+def closed_after(ends: Ends) -> Iterator[Ends]:
+    yield ends
+    os.close(ends.read)
+    os.close(ends.typed)
 
 
 def flown(waiting: Waiting, *, asks: bool) -> loop.FlightOutcome:
@@ -87,12 +93,12 @@ def flown(waiting: Waiting, *, asks: bool) -> loop.FlightOutcome:
 def flight_of(waiting: Waiting, *, asks: bool) -> loop.Flight:
     terminal = cast(Terminal, SimpleNamespace(say=waiting.said.append, unmute=lambda: None))
     plan = FlightPlan(None, asks=asks, cameras={}, limits=TakeOffLimits(unseen_s=10.0), landing_limit_s=0.1)
-    flight = loop.Flight(cast(Supervisor, waiting), plan, terminal)
+    flight = loop.Flight(cast(Supervisor, waiting), plan, terminal, Keyboard(waiting.keyboard.read))
     flight._start = cast(Start, SimpleNamespace(run=lambda: None, show_screen=lambda: None))
     return flight
 
 
-def test_hold_before_the_take_off_ends_neither_the_prompt_nor_a_flight_that_was_none(keyboard: int) -> None:
+def test_hold_before_the_take_off_ends_neither_the_prompt_nor_a_flight_that_was_none(keyboard: Ends) -> None:
     waiting = Waiting(keyboard, m.Verb.HOLD)
     flown(waiting, asks=True)
     assert m.Verb.TAKEOFF in waiting.heard, "Enter takes off after HOLD as before it"
@@ -101,7 +107,7 @@ def test_hold_before_the_take_off_ends_neither_the_prompt_nor_a_flight_that_was_
 
 
 @pytest.mark.parametrize("stop", [m.Verb.HOLD, m.Verb.LAND, m.Verb.CUT_MOTORS])
-def test_a_run_that_asks_nobody_does_not_take_off_after_a_stop(keyboard: int, stop: m.Verb) -> None:
+def test_a_run_that_asks_nobody_does_not_take_off_after_a_stop(keyboard: Ends, stop: m.Verb) -> None:
     waiting = Waiting(keyboard, stop)
     outcome = flown(waiting, asks=False)
     assert outcome.failure == f"nobody took off: {stop} by console came after it"
@@ -109,28 +115,28 @@ def test_a_run_that_asks_nobody_does_not_take_off_after_a_stop(keyboard: int, st
 
 
 @pytest.mark.parametrize("start", [m.Verb.TRACK, m.Verb.RESUME])
-def test_a_start_that_nobody_can_obey_before_the_take_off_does_not_end_the_prompt(keyboard: int, start: m.Verb) -> None:
+def test_a_start_that_nobody_can_obey_before_take_off_does_not_end_the_prompt(keyboard: Ends, start: m.Verb) -> None:
     waiting = Waiting(keyboard, start)
     flown(waiting, asks=True)
     assert m.Verb.TAKEOFF in waiting.heard, "Enter takes off after it as before it"
     assert not any("without an order to all" in line for line in waiting.said)
 
 
-def test_enter_pressed_before_it_is_asked_for_takes_nobody_off(terminal: int) -> None:
-    os.write(terminal, b"\n")  # while the processes start
+def test_enter_pressed_before_it_is_asked_for_takes_nobody_off(terminal: Ends) -> None:
+    os.write(terminal.typed, b"\n")  # while the processes start
     waiting = Waiting(terminal, m.Verb.HOLD, typed=b"")
     flown(waiting, asks=True)
     assert m.Verb.TAKEOFF not in waiting.heard
 
 
-def test_enter_in_a_terminal_takes_off(terminal: int) -> None:
+def test_enter_in_a_terminal_takes_off(terminal: Ends) -> None:
     waiting = Waiting(terminal, m.Verb.HOLD)
     flown(waiting, asks=True)
     assert m.Verb.TAKEOFF in waiting.heard
 
 
 @pytest.mark.parametrize("typed", [b"exit\n", b"groundstation land\n", b"no"])
-def test_no_other_word_takes_off(keyboard: int, typed: bytes) -> None:
+def test_no_other_word_takes_off(keyboard: Ends, typed: bytes) -> None:
     waiting = Waiting(keyboard, m.Verb.HOLD, typed)
     flown(waiting, asks=True)
     assert m.Verb.TAKEOFF not in waiting.heard
@@ -138,13 +144,13 @@ def test_no_other_word_takes_off(keyboard: int, typed: bytes) -> None:
 
 
 @pytest.mark.parametrize("typed", [b"anyway\n", b"\r\n", b" \n"])
-def test_enter_and_anyway_take_off(keyboard: int, typed: bytes) -> None:
+def test_enter_and_anyway_take_off(keyboard: Ends, typed: bytes) -> None:
     waiting = Waiting(keyboard, m.Verb.HOLD, typed)
     flown(waiting, asks=True)
     assert m.Verb.TAKEOFF in waiting.heard
 
 
-def test_a_keyboard_that_is_another_programs_is_left_alone(monkeypatch: pytest.MonkeyPatch, keyboard: int) -> None:
+def test_a_keyboard_that_is_another_programs_is_left_alone(monkeypatch: pytest.MonkeyPatch, keyboard: Ends) -> None:
     waiting = Waiting(keyboard, m.Verb.HOLD)
     monkeypatch.setattr(os, "read", refused)
     flown(waiting, asks=True)
@@ -157,7 +163,7 @@ def refused(*_: object) -> bytes:
 
 
 @pytest.mark.parametrize("asks", [True, False], ids=["real", "emulated"])
-def test_a_computer_that_slept_in_flight_lands_real_drones(keyboard: int, asks: bool) -> None:
+def test_a_computer_that_slept_in_flight_lands_real_drones(keyboard: Ends, asks: bool) -> None:
     waiting = Waiting(keyboard, m.Verb.HOLD, typed=b"")
     flight = flight_of(waiting, asks=asks)
     flight._sleep = cast(SleepWatch, SimpleNamespace(slept_s=lambda: 12.3))

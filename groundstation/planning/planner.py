@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from inspect import signature
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -31,9 +31,8 @@ class PlanRequest:
     held: frozenset[str] = frozenset()
 
     def put_to(self, planner: Any, should_stop: Callable[[], bool], max_evaluations: int | None = None) -> "PlanResult":
-        """Return the answer of a planner: `Planner`, or one of another package, which need not accept `held`."""
-        takes_held = "held" in signature(planner.plan).parameters
-        more = {"held": self.held} if takes_held else {}
+        """Return the answer of a planner: `Planner`, or one of another package, told of `held` if it `takes_held`."""
+        more = {"held": self.held} if getattr(planner, "takes_held", False) else {}
         scene = self.belief, self.topology, self.warm_start
         answer: PlanResult = planner.plan(*scene, should_stop, max_evaluations, **more)
         return answer
@@ -131,8 +130,15 @@ def choose(current: Topology, costs: Mapping[Topology, float], required_gain: fl
 class Planner:
     """Plans on belief snapshots. Its only memory is since when the current topology has been the same.
 
-    builder_of: makes the arrays of a problem; a different one changes the sightings that the cost assumes.
+    builder_of: makes the arrays of a problem; a different one changes the sightings that the cost assumes. takes_held:
+    whether `plan` has the argument `held`.
     """
+
+    takes_held: ClassVar[bool] = True
+
+    def __init_subclass__(cls) -> None:
+        # Subclasses in other packages may have a `plan` without `held`.
+        cls.takes_held = "held" in signature(cls.plan).parameters
 
     def __init__(
         self,

@@ -74,7 +74,7 @@ def test_heights_are_chosen_between_the_lowest_and_the_highest() -> None:
 
 
 class OfAnotherPackage:
-    """Plans as `Planner`s did before they were told who is held."""
+    """Plans without the argument `held`, and does not say that it takes it."""
 
     def plan(self, at: JointBelief, current: Topology, *_: Any) -> PlanResult:
         return plan(at, current)
@@ -85,6 +85,27 @@ def test_a_planner_of_another_package_need_not_ask_who_is_held() -> None:
     told = request.put_to(Planner(PARAMETERS, SENSORS), lambda: False)
     untold = request.put_to(OfAnotherPackage(), lambda: False)
     assert told.cost > untold.cost == plan(NEAR, FLAT).cost
+
+
+class Unaware(Planner):
+    """Overrides `plan` without the argument `held`."""
+
+    def plan(self, at: JointBelief, current: Topology, *_: Any) -> PlanResult:
+        return plan(at, current)
+
+
+class Aware(Planner):
+    """Shows who it is told is held."""
+
+    def plan(self, *_: Any, held: frozenset[str] = frozenset()) -> PlanResult:
+        raise ValueError(held)
+
+
+def test_a_subclass_is_told_who_is_held_if_its_plan_asks() -> None:
+    request = PlanRequest(NEAR, FLAT, {}, frozenset({"drone_2"}))
+    assert request.put_to(Unaware(PARAMETERS, SENSORS), lambda: False).cost == plan(NEAR, FLAT).cost
+    with pytest.raises(ValueError, match="drone_2"):
+        request.put_to(Aware(PARAMETERS, SENSORS), lambda: False)
 
 
 def test_one_that_follows_no_plan_stays_where_it_is_and_still_looks() -> None:

@@ -13,9 +13,8 @@ _KNOWN_PPM = 100.0  # a less certain drift is not reported
 
 @dataclass(frozen=True, slots=True)
 class ClockFigures:
-    """drift_ppm: by how much the vehicle's clock runs faster than ours; late_ms: delay of the most delayed packet.
-
-    Delay against the freshest packet of its half second, over the last 30 s.
+    """drift_ppm: by how much the vehicle's clock runs faster than ours; late_ms: largest delay of
+    a packet in the last 30 s, against the freshest of its half second [ms].
     """
 
     drift_ppm: float | None

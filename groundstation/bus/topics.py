@@ -65,15 +65,15 @@ IMU = Topic("imu", m.ImuSample, 25, Quality.SENSOR, _DRIVER)
 ODOMETRY = Topic("odometry", m.Odometry, 100, Quality.SENSOR, _DRIVER)
 """Driver to tracker: velocity, attitude and height as the vehicle measured them."""
 OBSERVATION = Topic("observation", m.RelativeObservation, 15, Quality.SENSOR, _CAMERA)
-"""Camera or motion capture driver to tracker: one marker that a camera saw, one body that was captured."""
+"""Camera or motion capture driver to tracker: a marker that a camera saw, or a body that was captured."""
 RANGE = Topic("range", m.RangeObservation, 10, Quality.SENSOR, _CAMERA)
 """Ranging driver to tracker: one robot's distances to the anchors."""
 REPORTED_MOTION = Topic("reported_motion", m.ReportedMotion, 20, Quality.SENSOR, _TARGET)
-"""Driver of a target's odometry to tracker: how it says that it moves."""
+"""Driver of a target's odometry to tracker: the motion that it reports."""
 SEARCHED_PICTURE = Topic("searched_picture", m.SearchedPicture, 2, Quality.SENSOR, _CAMERA)
 """Camera driver to tracker: a completely searched picture, and the owners of the markers in it."""
 BODY_POSES = Topic("body_poses", m.BodyPoses, 30, Quality.SENSOR, _CAMERA)
-"""Motion capture driver: where its system has each body, in each frame that it uses."""
+"""Motion capture driver: the pose of each body in each frame that is used."""
 VEHICLE_STATUS = Topic("vehicle_status", m.VehicleStatus, 5, Quality.STATE, _DRIVER)
 """Driver: flight state, battery, link."""
 CAMERA_STATUS = Topic("camera_status", m.CameraStatus, 2, Quality.STATE, _CAMERA | _TARGET)
@@ -83,7 +83,7 @@ ESTIMATE = Topic("estimate", m.Estimate, 50, Quality.STATE, _TRACKER)
 BELIEF = Topic("belief", m.Belief, 5, Quality.STATE, _TRACKER)
 """Tracker: the whole joint belief."""
 SEARCH_MAP = Topic("search_map", m.SearchMap, 2, Quality.STATE, _TRACKER)
-"""Tracker: where a target may be that is searched for."""
+"""Tracker: where a missing target may be."""
 SETPOINT = Topic("setpoint", m.VelocitySetpoint, 50, Quality.CONTROL, _TRACKER)
 """Tracker to driver: velocity of one drone."""
 COMMAND = Topic("command", m.Command, 0, Quality.CONTROL, _ORDERING)
@@ -98,7 +98,7 @@ PLAN = Topic("plan", m.Plan, 10, Quality.STATE, _TRACKER)
 INNOVATION = Topic("innovation", m.Innovation, 60, Quality.STATE, _TRACKER)
 """Tracker: the result of each observation."""
 SUSPICION = Topic("suspicion", m.Suspicion, 0.2, Quality.STATE, _DIAGNOSIS)
-"""Diagnosis to tracker and operator: which figures of the field are suspected now."""
+"""Diagnosis to tracker and operator: which figures of the field are suspected."""
 EVENT = Topic("event", m.Event, 0, Quality.STATE, PROCESSES)
 """Any process: something that the operator should know."""
 PROCESS_STATUS = Topic("process_status", m.ProcessStatus, 1, Quality.STATE, PROCESSES)
@@ -110,9 +110,9 @@ CLOCK = Topic("clock", m.ClockOffset, 1, Quality.STATE, _HOST)
 HOST_ORDER = Topic("host_order", m.HostOrder, 0, Quality.STATE, _LIAISON)
 """Liaison to another host: the run, and the field with that host's devices."""
 HOST_REPORT = Topic("host_report", m.HostReport, 20, Quality.SENSOR, _HOST)
-"""Another host to its liaison: what it does, and what its clock reads."""
+"""Another host to its liaison: its state and its clock."""
 HOST_ANSWER = Topic("host_answer", m.HostAnswer, 20, Quality.SENSOR, _LIAISON)
-"""Liaison to another host: what the run's supervisor does, and what the run's clock reads."""
+"""Liaison to another host: state of the run's supervisor, and the run's clock."""
 JOURNAL = Topic("journal", m.JournalEntry, 50, Quality.BULK, _TRACKER)
 """Tracker: inputs and adopted plan of each tick."""
 IMAGE = Topic("image", None, 5, Quality.BULK, _CAMERA, encoding="image/jpeg")

@@ -27,19 +27,19 @@ class EntityEstimate(msgspec.Struct, frozen=True):
     unlocalised_s: float = 0.0
     """For how long a flying robot may not have been where it is believed [s]; 0 while it is known."""
     contradicted: bool = False
-    """Whether sightings far from this place are being weighed against it: nothing should be told by it meanwhile."""
+    """Whether sightings far from this place contradict it; until that is settled, nothing should rely on it."""
     sighting: tuple[float, float] | None = None
-    """Time since it was last seen itself [s], and how well its place was known right after that, the worse of x and y
-    [m]: where nothing tells how it moves, the covariance has grown since."""
+    """Time since the entity itself was last seen [s], and the standard deviation of its position right after that, the
+    larger one of x and y [m]."""
 
 
 class TargetSearch(msgspec.Struct, frozen=True):
-    """The search for a target that is not seen where it was expected."""
+    """The search for a target that was not seen where it was expected."""
 
     target: str
     """The target."""
     mode: str
-    """`SEARCH`, or `LOST` when most of the room was searched: a person is asked."""
+    """`SEARCH`, or `LOST` once most of the room was searched: a person is asked."""
     since_s: float
     """For how long it has lasted [s]."""
     place_m: tuple[float, float]
@@ -47,13 +47,13 @@ class TargetSearch(msgspec.Struct, frozen=True):
     searched: float
     """Share of the room that was searched."""
     expected_s: float | None
-    """Estimated remaining time [s]; none: no robot can search now."""
+    """Estimated remaining time [s]; none: no robot can search."""
     text: str
     """The same in words."""
 
 
 class SearchMap(Message, frozen=True, kw_only=True):
-    """Where in the room a target is that is searched for, in square cells over the floor (2 Hz during a search)."""
+    """Where in the room a missing target may be, in square cells over the floor (2 Hz during a search)."""
 
     first_m: tuple[float, float]
     """Centre of the first cell, that with the least x and y [m; world]."""
@@ -84,7 +84,7 @@ class Estimate(Message, frozen=True, kw_only=True):
 
 
 class SensorLateness(msgspec.Struct, frozen=True):
-    """Estimated error of a camera's configured delay; for the operator, nothing acts on it."""
+    """Estimated error of a camera's configured delay, for the operator only."""
 
     sensor: str
     """The camera."""
@@ -108,31 +108,31 @@ class Belief(Message, frozen=True, kw_only=True):
 
 
 class SuspectedFigure(msgspec.Struct, frozen=True):
-    """A figure of the field that is suspected now, or those that cannot be told apart."""
+    """A suspected figure of the field, or several that cannot be told apart."""
 
     entity: str
-    """Whose figure it is, the likeliest; empty: of all."""
+    """The likeliest entity whose figure it is; empty: all."""
     text: str
-    """What is wrong with it, by how much, in a few words."""
+    """What is wrong, and by how much, in a few words."""
     remedy: str
     """What a person can do about it."""
     told_ns: int
-    """When it was told first, on the clock of the header."""
+    """When it was first reported [ns], on the header's clock."""
     about: str = ""
-    """Which figure it is: the same from when it is told until it is withdrawn, while its text changes."""
+    """Which figure it is: stays the same until it is withdrawn, while the text may change."""
 
 
 class Suspicion(Message, frozen=True, kw_only=True):
-    """Which figures of the field are suspected in flight; nothing acts on it."""
+    """Which figures of the field are suspected in flight, for the operator only."""
 
     cause: str
-    """What explains best why the team's sightings do not meet, in a few words; empty: no figure is suspected."""
+    """The best explanation for sightings that disagree, in a few words; empty: no figure is suspected."""
     figures: tuple[SuspectedFigure, ...] = ()
-    """Each of them, until it is withdrawn."""
+    """All that are suspected, each until it is withdrawn."""
 
 
 class Verdict(StrEnum):
-    """What became of a measurement."""
+    """The estimator's treatment of a measurement."""
 
     ACCEPTED = "ACCEPTED"
     """Fused as it is."""
@@ -161,14 +161,14 @@ class Verdict(StrEnum):
 
 
 class Innovation(Message, frozen=True, kw_only=True):
-    """What the estimator made of one observation, and why."""
+    """The estimator's result for one observation."""
 
     observer: str
     """Entity that observed."""
     subject: str
     """Entity that was observed."""
     verdict: Verdict
-    """What became of the observation."""
+    """The estimator's treatment of the observation."""
     residual: tuple[float, ...] = ()
     """Residual y = z - h(x), in the units of the measurement."""
     covariance: tuple[float, ...] = ()
@@ -178,7 +178,7 @@ class Innovation(Message, frozen=True, kw_only=True):
     latency_ms: float = 0.0
     """Time from the measurement to its arrival [ms]."""
     reason: str = ""
-    """Words for a verdict other than ACCEPTED."""
+    """Reason for a verdict other than ACCEPTED, in words."""
 
 
 class JournalEntry(Message, frozen=True, kw_only=True):

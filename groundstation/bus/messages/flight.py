@@ -26,7 +26,7 @@ class FlightState(StrEnum):
     EMERGENCY = "EMERGENCY"
     """Motors cut by the vehicle's own emergency stop."""
     LOST = "LOST"
-    """Nothing is heard of the vehicle any more."""
+    """The driver no longer hears the vehicle."""
 
 
 UP = frozenset({FlightState.FLYING, FlightState.HOVERING})
@@ -36,17 +36,17 @@ UNHEARD = frozenset({FlightState.UNKNOWN, FlightState.LOST})
 
 
 def known_state(before: FlightState, said: FlightState) -> FlightState:
-    """Return what is known of a drone whose driver says a state, by what was known before.
+    """Return the state of a drone from the one that its driver reports and the one known before.
 
-    A driver that is started anew in flight says UNKNOWN until it hears the drone, which flies on all the same.
+    A driver restarted in flight reports UNKNOWN until it hears the drone, which may still fly: LOST.
     """
     return FlightState.LOST if said is FlightState.UNKNOWN and before in AIRBORNE | {FlightState.LOST} else said
 
 
 def stood_last(state: FlightState, mode: str) -> bool:
-    """Return whether a drone that is not heard any more stood until then, by state and mode of its VehicleStatus.
+    """Return whether a lost drone stood when it was last heard, by state and mode of its VehicleStatus.
 
-    Its driver has it on the floor still: no take-off was ordered since. Its battery is out, most often.
+    No take-off was ordered since. Most often its battery is empty.
     """
     return state is FlightState.LOST and mode == "LANDED"
 
@@ -59,7 +59,7 @@ class VehicleStatus(Message, frozen=True, kw_only=True):
     mode: str
     """Mode of the driver's watchdog: CONNECTING, LANDED, TAKING_OFF, HOVER, TRACK, HOLD, LANDING or CUT."""
     failsafe: str = ""
-    """Condition of the table of failsafes that acts or led to this mode; empty: an order or the vehicle itself did."""
+    """Failsafe that acts or led to this mode, by its condition; empty: a command or the vehicle itself led to it."""
     battery: float | None = None
     """Charge, 0 to 1; none: unknown."""
     link_quality: float | None = None
@@ -71,19 +71,20 @@ class VehicleStatus(Message, frozen=True, kw_only=True):
     detail: str = ""
     """What the operator should know, in words."""
     not_ready: str = ""
-    """Why it may not take off now, by its own report and its driver's preparation, in words; empty: it may."""
+    """Why it may not take off, by its own report and its driver's preparation, in words; empty: it may."""
     firmware: str = ""
     """Its firmware with the version; empty: unknown."""
     braked: bool = False
-    """In TRACK: a failsafe keeps it hovering for now; it follows setpoints again once that is over."""
+    """In TRACK: whether a failsafe keeps it hovering; once that is over, it follows setpoints again."""
     lands_in_s: float | None = None
-    """Time until a failsafe lands it if nothing changes [s]; none: none is near."""
+    """Time until a failsafe lands it if nothing changes [s]; none: no landing is due."""
     clock_drift_ppm: float | None = None
-    """How much faster the vehicle's clock goes than ours [1e-6]; none: not known (yet)."""
+    """How much faster the vehicle's clock runs than ours [1e-6]; none: unknown."""
     telemetry_late_ms: float | None = None
-    """How late the latest telemetry of the last 30 s came, by the freshest of its half second [ms]; none: unknown."""
+    """Largest delay of a packet in the last 30 s, against the freshest of its half second [ms]; none: unknown.
+    """
     asks_time: bool | None = None
-    """Whether it asks for our time, without which it does not know how old what we tell it is; none: it need not."""
+    """Whether it asks for our time, which it needs to date our messages; none: it does not need it."""
 
 
 class VelocitySetpoint(Message, frozen=True, kw_only=True):
@@ -119,16 +120,16 @@ class Verb(StrEnum):
 
     @property
     def stops(self) -> bool:
-        """Return whether everybody may give it, and drivers obey at once."""
+        """Return whether it is a stop: anybody may give it, and drivers obey at once."""
         return self in (Verb.HOLD, Verb.LAND, Verb.CUT_MOTORS)
 
 
 STOP_LIVES_NS = 30 * NS_PER_S
-"""Whoever repeats a stop gives up before that: an older one is the ghost of a queue that stood still."""
+"""Lifetime of a stop [ns]. Senders stop repeating earlier, so an older one comes from a stalled queue."""
 
 
 OPERATOR = "operator"
-"""In a command's scope: it asks the run's operator to see to the drones that are named beside it."""
+"""In a command's scope: the run's operator is asked to carry it out for the drones named beside it."""
 
 
 class Command(Message, frozen=True, kw_only=True):
@@ -147,7 +148,7 @@ class Command(Message, frozen=True, kw_only=True):
     run: str = ""
     """Run that it was given for: drivers of another refuse it."""
     anyway: bool = False
-    """Of a TAKEOFF: it is wanted although the preflight checks forbid it."""
+    """Of a TAKEOFF: take off although the preflight checks forbid it."""
 
 
 class AckStage(StrEnum):
@@ -184,4 +185,4 @@ class Lease(Message, frozen=True, kw_only=True):
     expires_ns: int
     """Time until which the lease holds [ns; boot clock]."""
     run: str = ""
-    """Run that it is the lease of: what another host has to name in its orders."""
+    """Run that the lease belongs to; commands of other hosts have to name it."""

@@ -1,4 +1,4 @@
-"""What the run's host and the other hosts of its devices say to each other."""
+"""Messages between a run's host and the other hosts of its devices."""
 
 from enum import StrEnum
 
@@ -7,10 +7,10 @@ from groundstation.bus.messages.process import Lifecycle
 
 
 class Supervision(StrEnum):
-    """What the supervisor of the run does, as other hosts are told."""
+    """State of the run's supervisor, as other hosts are told."""
 
     WATCHES = "WATCHES"
-    """It looks after the run."""
+    """It watches over the run."""
     SILENT = "SILENT"
     """It is frozen: drivers hover, and land after a while."""
     ENDS = "ENDS"
@@ -47,7 +47,7 @@ class HostAnswer(Message, frozen=True, kw_only=True):
     """Answer to a host's report: the run's clock and supervisor. `header.stamp_ns` says when it was sent."""
 
     supervision: Supervision
-    """What the supervisor does."""
+    """State of the run's supervisor."""
     sent_ns: Whole
     """Of the report: when it was sent [ns; that host's own boot clock]."""
     received_ns: Whole
@@ -64,4 +64,4 @@ class ClockOffset(Message, frozen=True, kw_only=True):
     offset_ns: int
     """To be added to its stamps to read them on `header.clock` [ns]."""
     error_ns: int = 0
-    """Most by which the offset can be wrong [ns]: half of the quickest round trip."""
+    """Largest possible error of the offset [ns]: half of the quickest round trip."""

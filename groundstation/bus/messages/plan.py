@@ -13,7 +13,7 @@ class Alternative(msgspec.Struct, frozen=True):
     cost: float
     """Its cost [m^2], or its lower bound."""
     bound_only: bool = False
-    """Whether `cost` is a lower bound with which it was ruled out."""
+    """Whether `cost` is the lower bound by which it was ruled out."""
 
 
 class Control(msgspec.Struct, frozen=True):
@@ -56,7 +56,8 @@ class SolverReport(msgspec.Struct, frozen=True):
     survivors: int
     """Those of them that were optimised."""
     gap: float | None = None
-    """By how large a share of its cost the plan may be dearer than the best of all plans; it is mostly much less."""
+    """Upper bound of the share of the plan's cost that the best of all plans could save; mostly far above the true one.
+    """
 
 
 class Plan(Message, frozen=True, kw_only=True):

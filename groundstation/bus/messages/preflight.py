@@ -1,4 +1,4 @@
-"""What the checks before a take-off find."""
+"""Findings of the checks before a take-off."""
 
 import msgspec
 
@@ -19,7 +19,7 @@ class PreflightFinding(msgspec.Struct, frozen=True):
 
 
 class Preflight(Message, frozen=True, kw_only=True):
-    """Everything that the checks find, the grave first; while nobody flies."""
+    """All findings of the checks, the gravest first; sent while no drone flies."""
 
     findings: tuple[PreflightFinding, ...]
     """The whole list; it replaces the one before."""

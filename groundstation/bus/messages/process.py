@@ -30,7 +30,7 @@ class Event(Message, frozen=True, kw_only=True):
     remedy: str = ""
     """What the operator can do about it."""
     injected: bool = False
-    """Whether a scenario of the simulator does it: a fault that begins, lasts or ends."""
+    """Whether a scenario of the simulator causes it: a fault that begins, lasts or ends."""
 
     @property
     def sentence(self) -> str:

@@ -94,9 +94,9 @@ class RangeObservation(Message, frozen=True, kw_only=True):
     ranges_m: dict[str, float]
     """Distance of the transponder to each anchor that answered, by the anchor's name [m]."""
     std_m: float
-    """Standard deviation of one of them [m], what lasts for seconds left out."""
+    """Standard deviation of each [m], without errors that last for seconds."""
     position_m: Vector3 | None = None
-    """Where they put the transponder by themselves [m; world]; none: too few, or they contradict each other."""
+    """Position of the transponder by these ranges alone [m; world]; none: too few, or they contradict each other."""
     covariance: tuple[float, ...] = (0.0,) * 9
     """Covariance of that position [m^2], 3x3 row-major."""
 
@@ -106,7 +106,7 @@ class RangeObservation(Message, frozen=True, kw_only=True):
 
 
 class ReportedMotion(Message, frozen=True, kw_only=True):
-    """What a target says of its own motion: a claim, which what cameras see overrules."""
+    """A target's report of its own motion: a claim, overruled by what cameras see."""
 
     velocity_m_s: tuple[float, float]
     """Velocity forward and to the left [m/s; base]."""
@@ -115,7 +115,7 @@ class ReportedMotion(Message, frozen=True, kw_only=True):
 
 
 class SearchedPicture(Message, frozen=True, kw_only=True):
-    """A picture that a camera searched all over for markers, also when it shows none; stamped with the exposure."""
+    """A picture that was searched all over for markers, even if it shows none; stamped with the exposure."""
 
     observer: str
     """A drone, or the name of a world-fixed camera."""
@@ -131,7 +131,7 @@ class BodyPose(msgspec.Struct, frozen=True):
     name: str
     """The robot or target."""
     position_m: Vector3
-    """Its centre [m; world], of a target the point of the floor below its centre."""
+    """Its centre [m; world]; of a target, the point of the floor below its centre."""
     attitude: Quaternion
     """world_from_base as quaternion (w, x, y, z)."""
 
@@ -142,7 +142,7 @@ class BodyPoses(Message, frozen=True, kw_only=True):
     bodies: tuple[BodyPose, ...]
     """The bodies."""
     refused: dict[str, str] = msgspec.field(default_factory=dict)
-    """Of these, the bodies whose poses cannot be true, and why."""
+    """Those of the bodies whose poses cannot be true, and why."""
 
 
 class CameraStatus(Message, frozen=True, kw_only=True):

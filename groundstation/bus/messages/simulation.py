@@ -30,7 +30,7 @@ class SimCommand(Message, frozen=True, kw_only=True):
 
 
 class SimStatus(Message, frozen=True, kw_only=True):
-    """How well the simulator keeps real time, counted since something flew."""
+    """How well the simulator keeps real time, counted from the first take-off on."""
 
     ticks: int
     """Ticks of the simulator."""

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     epilog="\b\nExamples:\n  groundstation ardrone probe 192.168.1.1\n  groundstation ardrone join 192.168.1.1 LAB"
 )
 def ardrone() -> None:
-    """Meet AR.Drones."""
+    """Inspect and set AR.Drones."""
 
 
 def _address(_context: click.Context, _parameter: click.Parameter, value: str) -> str:
@@ -44,7 +44,7 @@ def _address(_context: click.Context, _parameter: click.Parameter, value: str) -
 def probe(address: str, as_json: bool) -> int:
     """Print model, firmware, battery, navdata, link and configuration of the drone at ADDRESS.
 
-    Safe at any time: nothing is sent that starts, moves or ends a flight, and to a drone in the air no command at all.
+    Safe at any time: it sends nothing that starts, moves or ends a flight, and no command at all to a drone in the air.
     """
     from drivers.ardrone.probe import probe as look
 
@@ -65,9 +65,9 @@ def probe(address: str, as_json: bool) -> int:
 )
 @click.argument("address", callback=_address)
 @click.argument("network", default="")
-@click.option("--access-point", is_flag=True, help="Let it be an access point of its own again.")
+@click.option("--access-point", is_flag=True, help="Make it an access point of its own again.")
 def join(address: str, network: str, access_point: bool) -> int:
-    """Let the drone at ADDRESS join the open network NETWORK each time it starts; it takes a free address."""
+    """Make the drone at ADDRESS join the open network NETWORK, with a free address, each time it starts."""
     from drivers.ardrone.network_setup import membership
 
     if access_point == bool(network):
@@ -91,7 +91,10 @@ def join(address: str, network: str, access_point: bool) -> int:
 @click.option("--owner", metavar="MAC", help="Obey the computer with this hardware address only.")
 @click.option("--unpair", is_flag=True, help="Obey anybody in its network, as when new.")
 def setup(address: str, pair: bool, owner: str | None, unpair: bool) -> int:
-    """Say whom the drone at ADDRESS obeys. That prevents mistakes, not attacks: such an address can be imitated."""
+    """Set which computer the drone at ADDRESS obeys.
+
+    That prevents mistakes, not attacks: hardware addresses can be forged.
+    """
     from drivers.ardrone.network_setup import UNPAIRED, own_hardware_address, pairing
 
     if pair + unpair + (owner is not None) != 1:
@@ -105,7 +108,7 @@ def setup(address: str, pair: bool, owner: str | None, unpair: bool) -> int:
 )
 @click.argument("address", callback=_address)
 def trim(address: str) -> int:
-    """Let the drone at ADDRESS take its present attitude for level, until it is switched off.
+    """Make the drone at ADDRESS take its present attitude as level, until it is switched off.
 
     For fields with `ardrone.flat_trim: on_order`: put it on something level, trim it, then start the ground station.
     """

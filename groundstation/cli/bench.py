@@ -44,4 +44,4 @@ class BenchGroup(click.Group):
 
 @click.group(cls=BenchGroup, epilog="Example: groundstation bench demo --seeds 10")
 def bench() -> None:
-    """Measure again and again, and judge each time."""
+    """Measure performance, and judge it."""

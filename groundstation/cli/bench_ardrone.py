@@ -137,8 +137,8 @@ def measure(count: int, rounds: int) -> dict[str, Any]:
 def ardrone(count: int, rounds: int, as_json: bool) -> int:
     """Time the AR.Drone codec in CPU time of one core.
 
-    Exit code 1 when a full packet with all its options takes more than 60 us. pyardrone is timed where `make interop`
-    has installed it.
+    Exit code 1 if a full packet with all its options takes more than 60 us. pyardrone is timed if `make interop` has
+    installed it.
     """
     result = measure(count, rounds)
     click.echo(json.dumps(result, indent=1) if as_json else _table(result))

@@ -31,8 +31,8 @@ from groundstation.cli.terminal import write_over
 def estimator(robots: str, rounds: int, flight_ms: int, field_name: str, seed: int, as_json: bool) -> int:
     """Time the joint filter: a prediction of the team, a correction per edge, and an observation from bytes to bytes.
 
-    CPU time of one core, least of all rounds; a busy machine adds to it. Exit code 1 when 30 robots were timed and a
-    figure that is asked for is missed, or when the filters do not agree.
+    CPU time of one core, the least of all rounds; a busy machine adds to it. Exit code 1 if 30 robots were timed and a
+    required figure is missed, or if the filters do not agree.
     """
     sizes = numbers(robots, "--robots", 2, 40)
     for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS"):

@@ -23,7 +23,7 @@ _LIMITS = {"discovery_s": 2.0, "cores": 0.6, "telemetry_to_bus_ms": 3.0, "setpoi
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON.")
 def mavlink(vehicles: int, seconds: float, link: str, as_json: bool) -> int:
-    """Drive talking vehicles (each 50 Hz odometry, 100 Hz IMU, on one port) in TRACK with setpoints at 20 Hz.
+    """Drive emulated vehicles (each sends odometry at 50 Hz and IMU at 100 Hz, all on one port) in TRACK at 20 Hz.
 
     Cores are CPU time of the driver alone. Delays are wall time: a busy machine shows in them, so its load is printed.
     Exit code 0 when all limits are kept, 1 when one is not.

@@ -25,7 +25,7 @@ _LIMITS = {"write_percent_of_core": 8.0, "open_s": 1.0, "seek_s": 0.2}
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the made-up run.")
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON.")
 def recording(minutes: float, seed: int, as_json: bool) -> int:
-    """Make up a run with the topics and rates of the demo's; write, open and seek it. All figures are CPU time.
+    """Write, open and seek a synthetic run with the topics and rates of the demo's. All figures are CPU time.
 
     Exit code 0 when all limits are kept, 1 when one is not.
     """

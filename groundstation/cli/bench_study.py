@@ -23,7 +23,7 @@ _LIMITS = {"cpu_ms_per_flight_s": 25.0}
 def study(duration: float, runs: int, as_json: bool) -> int:
     """Time flights of two drones at message level, one after the other: CPU time of world, filter, planner, setpoints.
 
-    Compiled kernels are in their cache before the first one counts. Exit code 0 when the limit is kept, 1 when it is
+    Kernels are compiled before the first flight counts. Exit code 0 when the limit is kept, 1 when it is
     not.
     """
     _fly(1.0)

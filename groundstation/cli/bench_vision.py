@@ -31,9 +31,10 @@ import click
 )
 @click.option("--json", "as_json", is_flag=True, help="Print all figures as JSON.")
 def vision(pictures: int, seed: int, out: Path | None, as_json: bool) -> int:
-    """Measure the detector on rendered pictures: rates, pose errors, honesty, identities, CPU, beside OpenCV's finder.
+    """Measure the detector on rendered pictures, beside OpenCV's: detection rates, pose errors, their covariance,
+    identities, CPU.
 
-    Exit code 0 only if every figure that is asked for is met. Takes some minutes.
+    Exit code 0 only if every required figure is met. Takes some minutes.
     """
     folder = out or Path("runs") / f"vision-{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
     command = [sys.executable, "-m", "sim_bridge.study", "vision", "--pictures", str(pictures), "--seed", str(seed)]

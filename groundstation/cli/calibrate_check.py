@@ -48,9 +48,9 @@ class CheckFinding:
     "  groundstation calibrate check lab.yaml --marker 1=1.0,1.0 --marker 2=-1.0,1.0\n"
     "  groundstation calibrate check http://192.168.1.50:8080/video.mjpg --calibration cameras/ceiling.yaml\n"
     "  groundstation calibrate check runs/20261120T101500Z-lab --marker 8=1.0,1.0\n\n"
-    "With a field file its fixed cameras are looked through, which need markers on the floor; a marker that two of "
-    "them see must be in one place for both. --marker says where one lies. Of a recording (a run's folder, or one with "
-    "pictures) the first pictures of its fixed cameras are looked at, by the field that was flown.\n\n"
+    "A field file: its fixed cameras are checked by markers on the floor; two that see one marker must agree on its "
+    "place. --marker says where one lies. A recording (a run's folder, or one with pictures): the first pictures of "
+    "its fixed cameras are checked against the field that was flown.\n\n"
     "Exit codes: 0 all that is known holds, 1 something does not or nothing is known, 2 wrong usage, 4 no pictures."
 )
 @click.argument("what")
@@ -61,7 +61,7 @@ class CheckFinding:
 @click.option("--square-mm", type=FiniteRange(5, 200), default=44.0, show_default=True, help="Side of a square.")
 @click.option("--frames", type=click.IntRange(1, 1000), default=10, show_default=True, help="Pictures to look at.")
 def check(what: str, calibration: Path | None, given: tuple[str, ...], square_mm: float, frames: int) -> int:
-    """Look through the cameras of WHAT (a field file, a recording, a source) at markers that lie still, and judge."""
+    """Check the calibration of the cameras of WHAT (a field file, a recording, a source) by markers that lie still."""
     from groundstation.settings.floor_markers import floor_marker_of
 
     said = [floor_marker_of(text) for text in given]

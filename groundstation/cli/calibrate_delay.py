@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 @click.argument("recording", nargs=-1, required=True, type=click.Path(exists=True, path_type=Path))
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def delay(recording: tuple[Path, ...], as_json: bool) -> int:
-    """Measure the delays of cameras, velocities and heights in RECORDING; prints the settings to change.
+    """Measure the delays of cameras, velocities and heights in RECORDING, and print the settings to change.
 
-    Sensors are compared with each other: delays are measured against what gyroscopes say, which is taken as immediate.
+    Sensors are compared with each other: delays are measured against gyroscopes, whose delay is taken as zero.
     The same recording gives the same figures.
     """
     from groundstation.cli.recorded_flight import recorded_flight

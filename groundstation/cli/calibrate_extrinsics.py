@@ -54,7 +54,7 @@ _ROLLED_DEG = 1.0
     "-o", "--output", type=click.Path(path_type=Path, file_okay=False), help="Write the last picture here, annotated."
 )
 def extrinsics(source: str, calibration: Path, **options: Any) -> int:
-    """Measure where the camera at SOURCE is and how it is turned; prints the lines for the field file."""
+    """Measure position and orientation of the camera at SOURCE, and print the lines for the field file."""
     from drivers.camera.calibration.extrinsics import Mark, place_camera
 
     layout = _layout_of(options)

@@ -49,7 +49,7 @@ _WORDS = {
 )
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def team(recording: tuple[Path, ...], field: Path | None, output: Path | None, as_json: bool) -> int:
-    """Measure mountings, delays, markers, lenses and odometry of a team in RECORDING; prints a patch of the field.
+    """Measure mountings, delays, markers, lenses and odometry of a team in RECORDING, and print a patch of the field.
 
     One least-squares fit over all sightings, odometry and inertial readings. The same recording gives the same figures.
     """

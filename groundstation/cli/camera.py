@@ -17,7 +17,7 @@ _PORT = 8770
 
 @click.group(epilog="Example: groundstation camera view http://192.168.1.50:8080/video.mjpg --stream")
 def camera() -> None:
-    """Look through cameras."""
+    """Show what cameras see."""
 
 
 @camera.command(
@@ -38,7 +38,7 @@ def camera() -> None:
 @click.option(
     "--port", type=click.IntRange(0, 65535), default=_PORT, show_default=True, help="Port to serve on; 0: any free one."
 )
-@click.option("--frames", type=click.IntRange(1), help="End after so many pictures.")
+@click.option("--frames", type=click.IntRange(1), help="End after this many pictures.")
 def view(
     source: str,
     calibration: Path | None,
@@ -48,7 +48,7 @@ def view(
     port: int,
     frames: int | None,
 ) -> int:
-    """Find markers in the pictures of SOURCE; say, draw and show what was found. Ctrl-C ends it.
+    """Find markers in the pictures of SOURCE; list, draw and show them. Ctrl-C ends it.
 
     Drawn are corners (a ring on the first), axes, code, distance, residual, age, and the windows searched.
     """

@@ -8,14 +8,12 @@ import click
 from groundstation.cli.exits import ExitCode
 from groundstation.errors import SettingsError
 
-_OPTION = click.option(
-    "--set", "options", multiple=True, metavar="A.B=C", help="Override one setting; may be given often."
-)
+_OPTION = click.option("--set", "options", multiple=True, metavar="A.B=C", help="Override one setting; repeatable.")
 
 
 @click.group(epilog="\b\nExamples:\n  groundstation config check lab.yaml\n  groundstation config init my_lab")
 def config() -> None:
-    """Check, show, draw, describe or start a field file."""
+    """Check, show, draw, describe or create a field file."""
 
 
 @config.command(
@@ -32,9 +30,10 @@ def config() -> None:
     help='Print JSON: {"ok", "problems", "findings": [{file, line, path, level, text}]}.',
 )
 def check(field: str, options: tuple[str, ...], scenario: str | None, as_json: bool) -> int:
-    """Name every mistake in a field file (a path, or `lab`), each with its line, and what is legal but foolish.
+    """Name every mistake in a field file (a path, or `lab`), each with its line, and warn of settings that are legal
+    but unwise.
 
-    Exit code 0 when there is no mistake, 2 otherwise; a WARNING is none.
+    Exit code 0 if there is no mistake, 2 otherwise; a WARNING is no mistake.
     """
     from groundstation.settings.wording import told
 
@@ -115,7 +114,7 @@ def show(field: str, options: tuple[str, ...], resolved: bool, as_json: bool) ->
 @config.command(epilog="\b\nExample:\n  groundstation config scenario unkind-autopilots > unkind.json")
 @click.argument("scenario")
 def scenario(scenario: str) -> None:
-    """Check a scenario (a name or a path) and print it as JSON, as programs of the simulator take it."""
+    """Check a scenario (a name or a path) and print it as JSON, the simulator's input."""
     from groundstation.settings.files import find_scenario
     from groundstation.settings.scenario import load_scenario
 
@@ -127,7 +126,7 @@ def scenario(scenario: str) -> None:
     "  (then, as first line of lab.yaml: # yaml-language-server: $schema=field.schema.json)"
 )
 def schema() -> None:
-    """Print the JSON Schema of a field file, with which editors complete and check it."""
+    """Print the JSON Schema of a field file, for completion and checks in an editor."""
     from groundstation.settings.json_schema import field_file_schema
 
     click.echo(json.dumps(field_file_schema(), indent=2))
@@ -146,7 +145,7 @@ def schema() -> None:
     help="PNG, SVG or PDF.",
 )
 def draw(field: str, options: tuple[str, ...], scenario: str | None, output: Path) -> None:
-    """Draw the room to scale: fence, pads, level heights, and what the fixed cameras see of drones at each of them."""
+    """Draw the room to scale: fence, pads, level heights, and where the fixed cameras see drones at each of them."""
     from groundstation.recording.outputs import replaced_file
     from groundstation.settings import drawing
     from groundstation.settings.files import find_field, find_scenario
@@ -176,7 +175,7 @@ def draw(field: str, options: tuple[str, ...], scenario: str | None, output: Pat
     help="lab: two AR.Drones, one ceiling camera; mixed-team: AR.Drone, PX4 and ArduPilot vehicle, two cameras.",
 )
 def init(directory: Path, like: str) -> None:
-    """Write a commented field file, its camera calibrations and the shipped scenarios into DIRECTORY, to start from."""
+    """Write a commented field file to start from, its calibrations and the shipped scenarios into DIRECTORY."""
     from groundstation.recording.outputs import errors_named
     from groundstation.settings.files import SHIPPED
     from groundstation.settings.shipped_copies import copy, refuse_existing, shipped

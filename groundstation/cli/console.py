@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     epilog="\b\nExamples:\n  groundstation console\n  groundstation console --port 9000 --run lab-4711\n"
     "  groundstation console --invite stop"
 )
-@click.option("--run", "name", metavar="NAME", help="The run to show, where there are several.")
+@click.option("--run", "name", metavar="NAME", help="The run to show, if there are several.")
 @click.option(
     "--invite",
     metavar="ROLE",
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 def console(name: str | None, invite: str | None, port: int | None) -> None:
     """Serve the operator's page for a running ground station, on loopback. Leaving it stops nothing.
 
-    With --invite: print an address, as a QR code too, at which one device finds the run's own page.
+    With --invite: print an address (also as a QR code) at which one device may open the run's own page.
     """
     import asyncio
 

@@ -94,12 +94,13 @@ class Handle:
 
 
 @click.command(epilog="\b\nExamples:\n  groundstation deadman\n  groundstation deadman --gamepad /dev/input/js0")
-@click.option("--run", "name", metavar="NAME", help="Which ground station, if several run here.")
-@click.option("--gamepad", type=click.Path(exists=True), help="A joystick device; without it the space bar is held.")
+@click.option("--run", "name", metavar="NAME", help="The run to address, if there are several.")
+@click.option("--gamepad", type=click.Path(exists=True), help="A joystick device (default: the space bar).")
 def deadman(name: str | None, gamepad: str | None) -> int:
-    """Hold on, and the flight goes on; let go, and the drones hold (space bar: after 0.9 s), and land 5 s later.
+    """Dead man's handle: while it is held, the drones fly on. Let go, and they hold (space bar: after 0.9 s); 5 s later
+    they land.
 
-    A gamepad that is pulled out, or a closed terminal, lets go; Ctrl-C and Ctrl-Z hold and leave, as q. No
+    An unplugged gamepad or a closed terminal counts as letting go; Ctrl-C, Ctrl-Z and q hold and leave. It is no
     emergency stop.
     """
     record = choose_run(name)

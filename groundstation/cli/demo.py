@@ -17,7 +17,7 @@ DEFAULT_DURATION_S = 60.0
 def demo(**arguments: Any) -> int:
     """Two emulated AR.Drones track a TurtleBot for 60 s, and the run is judged. Needs no hardware.
 
-    From 30 s on both topologies must be needed: before, the target stays within the ceiling camera's reach.
+    The run needs both topologies only from 30 s on: before, the target stays within the ceiling camera's reach.
     """
     if arguments["duration"] is None:
         arguments["duration"] = DEFAULT_DURATION_S

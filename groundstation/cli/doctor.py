@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 @click.argument("field", default="lab")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON: [{level, subject, found, remedy}].")
 def doctor(field: str, as_json: bool) -> int:
-    """Say what this machine lacks for flying a field file, and the remedy; nothing is started.
+    """Check what this machine lacks for flying a field file, and name the remedy; nothing is started.
 
-    Exit code 1 when something must be mended before a flight.
+    Exit code 1 if something must be mended before a flight.
     """
     from groundstation.doctor.finding import Level
 

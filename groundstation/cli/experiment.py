@@ -41,10 +41,10 @@ def _world(command: Callable[..., None]) -> Callable[..., None]:
             "out",
             type=click.Path(path_type=Path),
             default=None,
-            help="Folder; default runs/experiment-NAME.",
+            help="Folder of the results (default: runs/experiment-NAME).",
         ),
-        _option("--kidnap", type=FiniteRange(0, 1), default=0.0, help="Chance per step that the target jumps."),
-        _option("--dropout", type=FiniteRange(0, 1), default=0.0, help="Share of readings that are lost."),
+        _option("--kidnap", type=FiniteRange(0, 1), default=0.0, help="Probability per step that the target jumps."),
+        _option("--dropout", type=FiniteRange(0, 1), default=0.0, help="Share of readings lost."),
         _option("--first-seed", type=click.IntRange(0), default=1, help="First seed; the others count up from it."),
     ):
         command = option(command)
@@ -143,13 +143,13 @@ def sensors(robots: int, seeds: int, **world: Any) -> None:
     "name",
     type=click.Choice(["figure1", "teams", "figure-eight"]),
     default="teams",
-    help="Which experiment.",
+    help="The experiment.",
 )
 @_option("--robots", default="2,5,10,20", help="Team sizes.")
 @_option("--strategies", default="paper,certified", help=f"Strategies, of {', '.join(_STRATEGIES)}.")
 @_option("--starts", default="string,two-level,random", help=f"First topologies, of {', '.join(_STARTS)}.")
 @_option("--seeds", type=click.IntRange(1), default=20, help="Number of runs of each.")
-@_option("--scheduler", default="local", help="tcp://host:8786 of a dask cluster, `local` for one here, `none`.")
+@_option("--scheduler", default="local", help="tcp://host:8786 of a dask cluster, `local`, or `none`.")
 @_option("--workers", type=click.IntRange(0), default=0, help="Processes of the local cluster; 0: one per core.")
 @_world
 def sweep(

@@ -26,7 +26,9 @@ Flight = dict[str, Any]
 )
 @click.option("--seeds", type=click.IntRange(1, 1000), default=1, show_default=True, help="Flights of each row.")
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the first flight.")
-@click.option("--rows", "only", default="", metavar="NAMES", help="Only these rows, by commas (default: all).")
+@click.option(
+    "--rows", "only", default="", metavar="NAMES", help="Only these rows, separated by commas (default: all)."
+)
 @click.option(
     "--duration", "seconds", type=FiniteRange(20, 600), default=60.0, show_default=True, help="Seconds of tracking."
 )
@@ -36,10 +38,9 @@ Flight = dict[str, Any]
 def calibrations(
     seeds: int, seed: int, only: str, scheduler: str, workers: int, out: Path, as_json: bool, **flown: Any
 ) -> int:
-    """Fly labs whose field file is wrong, take over what `calibrate team` proposes, and fly them again.
+    """Fly labs whose field file is wrong, apply what `calibrate team` proposes, and fly them again.
 
-    The second flight has the same seed, and the settings in the field file's text: the target's error and ANEES, and
-    what is left wrong.
+    Prints for both flights, of the same seed, the target's error and ANEES, and the errors left in the field file.
     """
     from groundstation.experiments.calibrations import row_of, table, verdict_on
     from groundstation.experiments.runner import write_atomically

@@ -26,7 +26,9 @@ _BATCH = 5
 )
 @click.option("--seeds", type=click.IntRange(1, 1000), default=5, show_default=True, help="Flights of each row.")
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the first flight.")
-@click.option("--rows", "only", default="", metavar="NAMES", help="Only these rows, by commas (default: all).")
+@click.option(
+    "--rows", "only", default="", metavar="NAMES", help="Only these rows, separated by commas (default: all)."
+)
 @click.option(
     "--duration", "seconds", type=FiniteRange(5, 600), default=25.0, show_default=True, help="Seconds of tracking."
 )
@@ -36,11 +38,11 @@ _BATCH = 5
 def culprits(
     seeds: int, seed: int, only: str, scheduler: str, workers: int, out: Path, as_json: bool, **flown: Any
 ) -> int:
-    """Fly labs that are not as their field file says, and judge what the operator is told.
+    """Fly labs that differ from their field file, and judge whether the operator is told what is wrong.
 
     In each row one thing is wrong: a delay, a camera's mounting, a marker's size, a lens, a pad, exchanged markers. The
-    team stands on its pads for 4 s and is judged, then takes off whatever was found. Named in time is what a finding
-    refuses before the take-off, or the first accusation within 20 s of the order to take off, of the right thing.
+    team stands on its pads for 4 s, is checked, and takes off whatever was found. The fault counts as named in time if
+    a finding forbids the take-off for it, or if it is the first suspicion within 20 s of the command to take off.
     """
     from groundstation.experiments.culprits import row_of, table, verdict_on
     from groundstation.experiments.faults import flights_of

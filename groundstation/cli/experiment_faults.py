@@ -19,7 +19,11 @@ from groundstation.cli.numbers import FiniteRange
     "Exit codes: 0 no unsafe end, 1 unsafe ends, 2 wrong settings."
 )
 @click.option(
-    "--flights", type=click.IntRange(1), default=100, show_default=True, help="Number of flights, one for each seed."
+    "--flights",
+    type=click.IntRange(1),
+    default=100,
+    show_default=True,
+    help="Number of flights, each with a seed of its own.",
 )
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the first flight.")
 @click.option(
@@ -35,17 +39,19 @@ from groundstation.cli.numbers import FiniteRange
 @click.option(
     "--kinds",
     default="",
-    help="Only these kinds of faults, by commas (default: all that are drawn); none: healthy flights only.",
+    help="Only these kinds of faults, separated by commas (default: all that are drawn at random); none: healthy "
+    "flights.",
 )
 @campaign_options("faults")
 def faults(
     flights: int, seed: int, scheduler: str, workers: int, out: Path, as_json: bool, kinds: str, **flown: Any
 ) -> int:
-    """Fly random fields with one or two random faults; the drivers, watchdogs and tracker are those that fly.
+    """Fly random fields with one or two random faults, with the real drivers, watchdogs and tracker.
 
-    Message level: no processes, no pictures. Each seed is one flight and gives the same end again. Unsafe is a
-    separation below 0.6 m, a broken fence, 0.3 m/s above the drone's limit, more than a second of motion with a belief
-    that is 0.5 m off, and after a vehicle's words became useless a hover later than 1 s, or rest later than 3.5 s.
+    At message level: no processes, no pictures. Each seed is one flight, and always ends in the same way. Unsafe are: a
+    separation below 0.6 m; a drone outside the fence, 0.3 m/s above its speed limit, or in motion for more than a
+    second with a belief that is 0.5 m off; and, once a vehicle's telemetry is useless, no hover within 1 s or no rest
+    within 3.5 s.
     """
     from groundstation.experiments.faults import batches, by_kind, ends_told, flights_of, table, totals
     from groundstation.experiments.runner import write_atomically

@@ -19,7 +19,11 @@ _BATCH = 10
     "Exit codes: 0 all flew, within the fence and apart, and stand; 1 some did not; 2 wrong settings."
 )
 @click.option(
-    "--flights", type=click.IntRange(1), default=30, show_default=True, help="Number of flights, one for each seed."
+    "--flights",
+    type=click.IntRange(1),
+    default=30,
+    show_default=True,
+    help="Number of flights, each with a seed of its own.",
 )
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the first flight.")
 @click.option(
@@ -27,7 +31,7 @@ _BATCH = 10
     type=FiniteRange(1, 100),
     default=4.0,
     show_default=True,
-    help="Factor by which every third flight states the covariance of its sightings too small; 1: none does.",
+    help="Factor by which every third flight understates the covariance of its sightings; 1: no flight does.",
 )
 @click.option(
     "--duration", "seconds", type=FiniteRange(5, 600), default=30.0, show_default=True, help="Seconds of tracking."
@@ -38,11 +42,11 @@ _BATCH = 10
 def missions(
     flights: int, seed: int, scheduler: str, workers: int, out: Path, as_json: bool, understated: float, **flown: Any
 ) -> int:
-    """Fly random rooms, pads and targets to the end: take-off, tracking, the order to land, the floor.
+    """Fly complete flights in random rooms, with random pads and targets: take-off, tracking, landing.
 
-    Rooms of 6 to 12 m by 5 to 8 m; targets stand, or drive on one of the paths of scenarios at 0.15 to 0.6 m/s. Nothing
-    is wrong but what the scenario says, and in every third flight the covariance that sightings state. Judged by truth,
-    landing included: the fence, and a separation of 0.6 m.
+    Rooms of 6 to 12 m by 5 to 8 m; targets stand, or drive on one of the scenarios' paths at 0.15 to 0.6 m/s. Nothing
+    is wrong but the scenario's errors and, in every third flight, the stated covariance of sightings. By ground truth,
+    from take-off to landing, the drones must stay within the fence and 0.6 m apart.
     """
     from groundstation.experiments.faults import batches, flights_of
     from groundstation.experiments.missions import rows_of, table

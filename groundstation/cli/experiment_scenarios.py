@@ -46,7 +46,7 @@ _BATCH = 5
 def scenarios(
     names: tuple[str, ...], strategies: str, scheduler: str, workers: int, out: Path, as_json: bool, **flown: Any
 ) -> int:
-    """Fly scenario files at message level and compare what comes of them with what each file expects.
+    """Fly scenario files at message level, and compare the results with what each file expects.
 
     NAMES: files, or names of shipped ones; none: all shipped ones that say what they expect. Drivers, watchdogs,
     estimator and planner are those that fly. Strategies beside ours: fixed topologies (string, the same reversed, flat,

@@ -32,9 +32,14 @@ _MAX_LINES = 5
 )
 @click.option("--tlog", "formats", flag_value="tlog", multiple=True, help="Logs of autopilots, one for each vehicle.")
 @click.option("--rosbag2", "formats", flag_value="rosbag2", multiple=True, help="A bag for ROS 2 tools; extra [ros2].")
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="Where to (default: beside the recording).")
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="File or folder to write (default: beside the recording)."
+)
 def export(recording: Path, formats: tuple[str, ...], output: Path | None) -> int:
-    """Write RECORDING, a run folder or one file of it, in other formats. Cut recordings are read as far as they go."""
+    """Write RECORDING, a run folder or one file of it, in other formats.
+
+    Recordings that were cut off are read as far as they go.
+    """
     from groundstation.recording.run import open_run
 
     if not formats:

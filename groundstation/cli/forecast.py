@@ -26,10 +26,10 @@ _SHOWN = "a path looks like '-2,0 2,0 2,1': places x,y [m; world]"
     "  groundstation forecast lab.yaml --path '-2,0 2,0 2,1' --json | jq .path.worst_m"
 )
 @click.argument("field")
-@click.option("--set", "options", multiple=True, metavar="A.B=C", help="Override one setting; may be given often.")
-@click.option("--target", metavar="NAME", help="The target, if the field has several; without it the first.")
+@click.option("--set", "options", multiple=True, metavar="A.B=C", help="Override one setting; repeatable.")
+@click.option("--target", metavar="NAME", help="The target, if the field has several (default: the first).")
 @click.option("--path", "drawn", metavar="'X,Y X,Y ..'", help="The target's path: corners [m; world].")
-@click.option("--scenario", metavar="S", help="The target's path is that of a scenario (a name or a path).")
+@click.option("--scenario", metavar="S", help="Take the target's path from a scenario (a name or a path).")
 @click.option(
     "-o", "--output", type=click.Path(path_type=Path, dir_okay=False), help="Write the map as SVG, PNG, PDF or HTML."
 )
@@ -38,10 +38,10 @@ def forecast(
     field: str, options: tuple[str, ...], target: str | None, drawn: str | None, scenario: str | None,
     output: Path | None, as_json: bool,
 ) -> None:  # fmt: skip
-    """Say before a flight how well the target will be known: over the floor, on its path, and when something fails.
+    """Predict how well the target will be known in a flight: over the floor, on its path, and when a device fails.
 
-    Figures are deviations of the target's place in the floor plan by the filter that flies, at the best stand that the
-    planner finds for a target at each place. Errors of simulated flights were 0.7 to 0.8 of them.
+    Figures are standard deviations of the target's position, by the filter that flies, with the drones where the
+    planner puts them for a target at each place. Errors of simulated flights were 0.7 to 0.8 of them.
     """
     from groundstation.cli.kernels import use_flying_kernels
     from groundstation.settings.files import find_field

@@ -11,7 +11,7 @@ import click
     epilog="\b\nExamples:\n  groundstation host\n  groundstation host --site lab --output /var/log/skein\n\n"
     "Ctrl-C lands the drones of this host. Exit codes: 130 interrupted, 2 not a member of one site."
 )
-@click.option("--site", help="The site to serve, where this host has joined several.")
+@click.option("--site", help="The site to serve, if this host has joined several.")
 @click.option(
     "-o",
     "--output",

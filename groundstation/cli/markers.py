@@ -23,9 +23,7 @@ def markers() -> None:
     "  groundstation markers print --id 1 --id 2 --id 5 --square-mm 60 --size A3 -o team.pdf\n"
     "  groundstation markers print --dictionary DICT_APRILTAG_36H11 --id 7 --size-mm 168 -o tag.pdf",
 )
-@click.option(
-    "--id", "ids", type=int, multiple=True, required=True, help="Code (0..15), or id of a tag; may be given often."
-)
+@click.option("--id", "ids", type=int, multiple=True, required=True, help="Code (0..15), or id of a tag; repeatable.")
 @click.option(
     "--size", "paper", default="A4", show_default=True, help="Paper: A5..A0, Letter, Tabloid, or 300x400 (mm)."
 )

@@ -25,7 +25,7 @@ _OLD = (
     "  groundstation mavlink setup --check lab.yaml drone_2"
 )
 def mavlink() -> None:
-    """Meet MAVLink vehicles: probe a link, check and set their parameters."""
+    """Inspect MAVLink vehicles: probe a link, check and set parameters."""
 
 
 @mavlink.command(
@@ -37,7 +37,7 @@ def mavlink() -> None:
 @click.argument("link")
 @click.option("--seconds", type=FiniteRange(0.5, 60), default=3.0, show_default=True, help="How long to listen [s].")
 @click.option("--key-file", default="", help="Signing key, for a signed link.")
-@click.option("--mavsdk", "with_mavsdk", is_flag=True, help="Look through MAVSDK instead of pymavlink.")
+@click.option("--mavsdk", "with_mavsdk", is_flag=True, help="Use MAVSDK instead of pymavlink.")
 def probe(link: str, seconds: float, key_file: str, with_mavsdk: bool) -> int:
     """List the vehicles that answer on LINK, without changing anything on them.
 

@@ -18,11 +18,11 @@ _ONCE_S = 1.5  # every status is published at least once a second
 
 
 @click.command(epilog="\b\nExamples:\n  groundstation monitor\n  groundstation monitor --once --json")
-@click.option("--run", "name", metavar="NAME", help="The run to show, where there are several.")
+@click.option("--run", "name", metavar="NAME", help="The run to show, if there are several.")
 @click.option("--once", is_flag=True, help="Print the state once and exit.")
 @click.option("--json", "as_json", is_flag=True, help="Print the state as JSON and exit.")
 def monitor(name: str | None, once: bool, as_json: bool) -> None:
-    """Watch a running ground station. It only looks: leaving it stops nothing."""
+    """Show a live table of a running ground station. Leaving it stops nothing."""
     from groundstation.bus.roles import Role
     from groundstation.supervisor.joining import join
 

@@ -11,13 +11,13 @@ from groundstation.cli.run import SETTINGS, Rehearsal, run_real, run_simulated
     "4 a process failed, 130 it was broken off."
 )
 @click.argument("field")
-@click.option("--scenario", metavar="S", help="Look at emulated devices under a scenario, not at the real ones.")
+@click.option("--scenario", metavar="S", help="Check emulated devices under a scenario instead of the real ones.")
 @click.option("--seed", type=click.IntRange(0), help="Seed of all noise of emulated devices.")
 @SETTINGS
 def preflight(field: str, scenario: str | None, seed: int | None, options: tuple[str, ...]) -> int:
-    """Say what forbids a take-off: links, batteries, cameras, and who stands where by the fixed cameras.
+    """Check what forbids a take-off: links, batteries, cameras, and which drone stands on which pad.
 
-    Drivers and cameras of the field are started and stopped again. MUST forbids a take-off, SHOULD makes flights worse.
+    Starts the field's drivers and cameras, and stops them again. MUST forbids a take-off, SHOULD makes flights worse.
     """
     if scenario is None:
         return run_real("preflight", field, options, headless=True, look_only=True)

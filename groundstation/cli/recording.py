@@ -42,14 +42,14 @@ class RecordingGroup(click.Group):
     "  groundstation recording export --csv runs/20261120T101500Z-lab",
 )
 def recording() -> None:
-    """Look into, repair, cut and convert recordings: a run folder, or one .mcap file of it."""
+    """Inspect, repair, cut and convert recordings: a run folder, or one .mcap file of it."""
 
 
 @recording.command()
 @click.argument("recording", type=EXISTING)
 @click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")
 def info(recording: Path, as_json: bool) -> int:
-    """Parts, duration, topics with counts and rates, versions, holes and damage. Reads and checks everything."""
+    """Show parts, duration, topics with counts and rates, versions, gaps and damage. Reads and checks everything."""
     from groundstation.recording.info import info_of
     from groundstation.recording.run import open_run
 
@@ -67,9 +67,9 @@ def info(recording: Path, as_json: bool) -> int:
     "-o", "--output", type=click.Path(path_type=Path), help="New file (default: NAME-recovered.mcap beside it)."
 )
 def recover(recording: Path, output: Path | None) -> int:
-    """Make a valid file of one that was cut off, for programs that refuse such files; the original stays.
+    """Write a valid copy of a file that was cut off, for programs that refuse such files.
 
-    Commands of this program need no such step: they read what is sound of a cut file by themselves.
+    Skein's own commands do not need it: they read a cut file as far as it is sound.
     """
     from groundstation.recording.copies import recover as make_valid
     from groundstation.recording.run import open_run
@@ -98,7 +98,7 @@ def recover(recording: Path, output: Path | None) -> int:
     "-o", "--output", type=click.Path(path_type=Path), help="New folder, or file for a file (default: beside it)."
 )
 def cut(recording: Path, from_s: float, to_s: float | None, output: Path | None) -> int:
-    """Write a stretch of a recording to a new one, with all attachments and with what was known when it begins."""
+    """Copy a section of a recording to a new one, with all attachments and the state at its beginning."""
     from groundstation.recording.cut import cut_run
     from groundstation.recording.run import open_run
 

@@ -47,12 +47,12 @@ class _Recording(click.Path):
     "-o", "--output", type=click.Path(path_type=Path), help="Write a re-run as a run folder, for report and replay."
 )
 @click.option("--port", type=click.IntRange(1024, 65535), help="Port to serve on (default: the field's console.port).")
-@click.option("--from", "from_s", type=FiniteRange(0), help="Begin so many seconds after the recording's start.")
+@click.option("--from", "from_s", type=FiniteRange(0), help="Begin this many seconds after the recording's start.")
 @click.option("--speed", type=FiniteRange(0.1, 20), help="Speed relative to the recorded one (default: 1).")
-@click.option("--paused", is_flag=True, help="Wait for the page to press play.")
-@click.option("--until-end", is_flag=True, help="End when the recording does, instead of waiting for the page.")
+@click.option("--paused", is_flag=True, help="Wait until play is pressed on the page.")
+@click.option("--until-end", is_flag=True, help="End with the recording, instead of waiting for the page.")
 def replay(recording: tuple[Path, ...], recompute: bool, rerun: str | None, **options: Any) -> int:
-    """Play a recorded run in the console as if it were live; or re-run it, and compare.
+    """Play a recorded run in the console as if it were live, or re-run its tracker and compare.
 
     RECORDING is a run folder, or the .mcap files of one (default: the newest run in ./runs).
     """

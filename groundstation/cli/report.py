@@ -28,8 +28,8 @@ _RUNS = Path("runs")
 def report(recording: Path | None, as_json: bool, no_plot: bool, other: Path | None, trend: bool) -> int:
     """Rebuild report.html, report.json and trajectories.png of a run folder (default: the newest in ./runs).
 
-    Exit code 0 when the run passed, 1 when it did not. A comparison, and the report of a re-run (`replay --output`)
-    or of a cut, judge nothing: 0 when they could be made.
+    Exit code 0 if the run passed, 1 if it did not. A comparison, and the report of a re-run (`replay --output`) or of a
+    cut, judge nothing and end with 0.
     """
     from groundstation.report.build import build_report
 

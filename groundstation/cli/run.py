@@ -26,24 +26,24 @@ if TYPE_CHECKING:
 Option = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 
-_ANYWAY = click.option("--anyway", is_flag=True, help="Take off although a check forbids it; that is recorded.")
+_ANYWAY = click.option("--anyway", is_flag=True, help="Take off even if a check forbids it; this is recorded.")
 SETTINGS = click.option("--set", "options", multiple=True, metavar="A.B=C", help="Override one setting; repeatable.")
 _HEADLESS = click.option("--headless", is_flag=True, help="Plain lines instead of the live table.")
 _SIMULATED: tuple[Option, ...] = (
     click.option(
-        "--scenario", default="realistic", show_default=True, help="A scenario file, or a shipped one's name."
+        "--scenario", default="realistic", show_default=True, help="A scenario file, or the name of a shipped one."
     ),
     click.option(
         "--duration",
         type=FiniteRange(1, 86_400),
-        help="Seconds of tracking, then it lands (default: until Ctrl-C; demo: 60).",
+        help="Seconds of tracking before the landing (default: until Ctrl-C; demo: 60).",
     ),
     click.option("--seed", type=click.IntRange(0), help="Seed of all noise (default: the scenario's)."),
     click.option(
         "-o",
         "--output",
         type=click.Path(file_okay=False, path_type=Path),
-        help="Folder for the run's folder and a copy of the report (default: runs/, no copy).",
+        help="Where to put the run folder and a copy of the report (default: runs/, without a copy).",
     ),
     _HEADLESS,
     _ANYWAY,
@@ -76,14 +76,14 @@ def simulated_options(command: Callable[..., Any]) -> Callable[..., Any]:
     "--real",
     multiple=True,
     metavar="PART[=POSE]",
-    help="A drone, camera, target, motion capture or ranging system of the field that is real; repeatable. POSE of a "
-    "drone: autopilot:PORT (its true pose, from its firmware's simulator), the name of a motion capture system, or "
-    "estimate (default).",
+    help="A real device: a drone, camera, target, motion capture or ranging system of the field; repeatable. POSE is "
+    "where a drone's true pose comes from: autopilot:PORT (its firmware's simulator), the name of a motion capture "
+    "system, or estimate (default).",
 )
 def sitl(field: str, **arguments: Any) -> int:
     """Fly a field file against emulated drones and cameras. Ctrl-C lands; a second one stops at once.
 
-    With a real drone nobody takes off before Enter, or `groundstation takeoff`.
+    With a real drone no drone takes off before Enter, or `groundstation takeoff`.
     """
     return run_simulated("sitl", field, Rehearsal(**arguments))
 

@@ -10,13 +10,13 @@ import click
     "  groundstation site join laptop.admission   (on the laptop)"
 )
 def site() -> None:
-    """Let other hosts stop and order the drones of a site."""
+    """Admit other hosts to the runs of a site, whose drones they may then command."""
 
 
 @site.command()
 @click.argument("name", metavar="SITE")
 def init(name: str) -> None:
-    """Make the authority of SITE (the field's `site`), on the host of its ground station. Once."""
+    """Create the authority of SITE (the field's `site`), once, on the host of its ground station."""
     from groundstation.supervisor.site import found
 
     click.echo(f"{found(name)}: whoever can read this can make a drone move")
@@ -31,9 +31,9 @@ def init(name: str) -> None:
 )
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="Where to (default: HOST.admission).")
 def admit(name: str, host: str, address: str, port: int, output: Path | None) -> None:
-    """Admit HOST to SITE: write the file with which it joins. ADDRESS: the ground station's, as in `bus.listen`.
+    """Admit HOST to SITE: write the file with which it joins. ADDRESS is the ground station's, as in `bus.listen`.
 
-    HOST may stop, and ask the run's operator to start. Carry the file by a way that nobody reads, and remove it.
+    HOST may then stop drones, and ask the run's operator to start. Carry the file over in secret, then delete it.
     """
     from groundstation.supervisor.site import admit as write_admission
 
@@ -46,7 +46,7 @@ def admit(name: str, host: str, address: str, port: int, output: Path | None) ->
 @click.argument("name", metavar="SITE")
 @click.argument("host", metavar="HOST")
 def expel(name: str, host: str) -> None:
-    """Let HOST in no more, from the next run on."""
+    """Exclude HOST, from the next run on."""
     from groundstation.supervisor.site import expel as strike
 
     strike(name, host)
@@ -56,7 +56,7 @@ def expel(name: str, host: str) -> None:
 @site.command()
 @click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
 def join(file: Path) -> None:
-    """Make this host a member of the site that admitted it. Then `land` and the other orders go to its runs."""
+    """Make this host a member of the site that admitted it; `land` and the other commands then reach its runs."""
     from groundstation.supervisor.site import join as take_part
 
     admission = take_part(file)

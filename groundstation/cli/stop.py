@@ -142,7 +142,7 @@ def _verb(verb: Verb, text: str) -> click.Command:
     @click.option(
         "--run",
         metavar="NAME",
-        help="The run to address. Without it, if several run here, a stop goes to the one with real drones.",
+        help="The run to address, if there are several; without it, a stop goes to the run with real drones.",
     )
     @click.option("--json", "as_json", is_flag=True, help="Print one JSON document.")
     def callback(drones: tuple[str, ...], run: str | None, as_json: bool, **more: Any) -> int:
@@ -154,9 +154,9 @@ def _verb(verb: Verb, text: str) -> click.Command:
     if verb is Verb.CUT_MOTORS:
         callback = click.option("--yes", is_flag=True, help="Do not ask for confirmation.")(callback)
     if verb is Verb.TAKEOFF:
-        insist = click.option("--anyway", is_flag=True, help="Take off although a check forbids it; that is recorded.")
+        insist = click.option("--anyway", is_flag=True, help="Take off even if a check forbids it; this is recorded.")
         callback = insist(callback)
-    example = f"\n\n\b\nExample:\n  groundstation {name}\n  groundstation {name} drone_1 --json"
+    example = f"\n\n\b\nExamples:\n  groundstation {name}\n  groundstation {name} drone_1 --json"
     codes = "\n\nExit codes: 0 confirmed, 3 nothing is running, 4 not confirmed."
     return click.command(name=name, help=text + example + codes)(callback)
 

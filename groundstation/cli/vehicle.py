@@ -16,12 +16,12 @@ from groundstation.errors import DriverError, OperatorMistake
     "  groundstation vehicle check tello"
 )
 def vehicle() -> None:
-    """Vehicles of a field, and their kinds: let one blink, list kinds, judge one."""
+    """Vehicles of a field and their kinds: identify a vehicle, list the kinds, check one."""
 
 
 @vehicle.command("list", epilog="\b\nExamples:\n  groundstation vehicle list\n\nExit codes: 0.")
 def list_() -> None:
-    """List the kinds that can be flown, and those that are installed and cannot be loaded, with the reason."""
+    """List the kinds that can be flown, and those that are installed but cannot be loaded, with the reason."""
     from groundstation.vehicles import all_kinds, refused_kinds
 
     for name, kind in all_kinds().items():
@@ -39,15 +39,19 @@ def list_() -> None:
 )
 @click.argument("kind")
 @click.option(
-    "--with", "options", multiple=True, metavar="SECTION.KEY=VALUE", help="A key of its own section; repeatable."
+    "--with",
+    "options",
+    multiple=True,
+    metavar="SECTION.KEY=VALUE",
+    help="A setting of the kind's own section; repeatable.",
 )
-@click.option("--only", default="", metavar="WORDS", help="Only these checks or flights, by commas.")
+@click.option("--only", default="", metavar="WORDS", help="Only these checks or flights, separated by commas.")
 @click.option(
-    "--damaged", type=click.IntRange(1), default=2000, show_default=True, help="How many damaged datagrams are sent."
+    "--damaged", type=click.IntRange(1), default=2000, show_default=True, help="Number of damaged datagrams to send."
 )
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def check(kind: str, options: tuple[str, ...], only: str, damaged: int, as_json: bool) -> int:
-    """Judge KIND: its driver flies its emulator, in real time on loopback addresses, for six minutes or so."""
+    """Check KIND: its driver flies its emulator in real time on loopback addresses, for about six minutes."""
     # The simulator is never imported by what flies.
     command = [sys.executable, "-m", "sim_bridge.conformance", kind, "--only", only, "--damaged", str(damaged)]
     for option in options:

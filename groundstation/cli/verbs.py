@@ -23,17 +23,19 @@ VERBS: dict[str, CommandRow] = {
         "Fly", "groundstation.cli.run:sitl", "Fly a field file against emulated drones and cameras.", first=True
     ),
     "fly": CommandRow("Fly", "groundstation.cli.run:fly", "Fly a field file with the real drones.", first=True),
-    "host": CommandRow("Fly", "groundstation.cli.host:host", "Run the devices that a field gives to this host."),
+    "host": CommandRow("Fly", "groundstation.cli.host:host", "Run the devices of this host in the runs of its site."),
     "takeoff": CommandRow("Fly", "groundstation.cli.stop:takeoff", "Take off, one drone after the other."),
     "track": CommandRow("Fly", "groundstation.cli.stop:track", "Let the tracker move the drones."),
-    "resume": CommandRow("Fly", "groundstation.cli.stop:resume", "Go on after a hold or a restarted tracker."),
-    "hold": CommandRow("Stop", "groundstation.cli.stop:hold", "Hover where they are.", first=True),
+    "resume": CommandRow(
+        "Fly", "groundstation.cli.stop:resume", "Track again after a hold or a restart of the tracker."
+    ),
+    "hold": CommandRow("Stop", "groundstation.cli.stop:hold", "Let all drones hover, or the named ones.", first=True),
     "land": CommandRow("Stop", "groundstation.cli.stop:land", "Land all drones, or the named ones.", first=True),
     "cut-motors": CommandRow(
         "Stop", "groundstation.cli.stop:cut_motors", "Stop the motors at once: the drones fall.", first=True
     ),
     "deadman": CommandRow(
-        "Stop", "groundstation.cli.deadman:deadman", "Hold a key or button; let go: they hold, then land."
+        "Stop", "groundstation.cli.deadman:deadman", "Dead man's handle: let go, and all drones hold, then land."
     ),
     "monitor": CommandRow(
         "Look", "groundstation.cli.monitor:monitor", "Live table of a running ground station.", first=True
@@ -42,38 +44,38 @@ VERBS: dict[str, CommandRow] = {
         "Look", "groundstation.cli.console:console", "The operator's web page of a running ground station.", first=True
     ),
     "report": CommandRow(
-        "Look", "groundstation.cli.report:report", "Summary, report.json and plot of a recorded run.", first=True
+        "Look", "groundstation.cli.report:report", "Rebuild the report of a recorded run, or compare runs.", first=True
     ),
     "replay": CommandRow(
-        "Look", "groundstation.cli.replay:replay", "Show a recorded run, or compute it again.", first=True
+        "Look", "groundstation.cli.replay:replay", "Play a recorded run in the console, or recompute it.", first=True
     ),
     "view": CommandRow("Look", "groundstation.cli.view:view", "Live engineering view in Rerun, Foxglove or ROS 2."),
     "recording": CommandRow(
-        "Look", "groundstation.cli.recording:recording", "Look into, repair, cut and convert recordings."
+        "Look", "groundstation.cli.recording:recording", "Inspect, repair, cut and convert recordings."
     ),
-    "export": CommandRow("Look", "groundstation.cli.export:export", "A recorded run in the formats of other programs."),
+    "export": CommandRow(
+        "Look", "groundstation.cli.export:export", "Write a recorded run in the formats of other programs."
+    ),
     "new": CommandRow("Prepare", "groundstation.cli.new:new", "Write a field file from a few questions.", first=True),
     "config": CommandRow(
-        "Prepare", "groundstation.cli.config:config", "Check, show or start a field file.", first=True
+        "Prepare", "groundstation.cli.config:config", "Check, show, draw or create a field file.", first=True
     ),
-    "doctor": CommandRow(
-        "Prepare", "groundstation.cli.doctor:doctor", "What this machine lacks for flying, and the remedy."
-    ),
+    "doctor": CommandRow("Prepare", "groundstation.cli.doctor:doctor", "Check what this machine lacks for flying."),
     "forecast": CommandRow(
-        "Prepare", "groundstation.cli.forecast:forecast", "How well the target will be known, before anybody flies."
+        "Prepare", "groundstation.cli.forecast:forecast", "Predict how well the target will be known in a flight."
     ),
     "preflight": CommandRow(
-        "Prepare", "groundstation.cli.preflight:preflight", "What forbids a take-off, and the remedy; nobody flies."
+        "Prepare", "groundstation.cli.preflight:preflight", "Check, without flying, what forbids a take-off."
     ),
     "calibrate": CommandRow(
         "Prepare", "groundstation.cli.calibrate:calibrate", "Measure lenses, mountings and delays."
     ),
     "camera": CommandRow(
-        "Prepare", "groundstation.cli.camera:camera", "See what a camera sees, and what is found in it."
+        "Prepare", "groundstation.cli.camera:camera", "Show a camera's pictures and the markers found in them."
     ),
     "markers": CommandRow("Prepare", "groundstation.cli.markers:markers", "Print the markers of robots and targets."),
-    "vehicle": CommandRow("Prepare", "groundstation.cli.vehicle:vehicle", "List, judge and identify vehicles."),
-    "site": CommandRow("Prepare", "groundstation.cli.site:site", "Let other hosts stop and order."),
+    "vehicle": CommandRow("Prepare", "groundstation.cli.vehicle:vehicle", "List, check and identify vehicles."),
+    "site": CommandRow("Prepare", "groundstation.cli.site:site", "Admit other hosts to the runs of a site."),
     "experiment": CommandRow(
         "Study", "groundstation.cli.experiment:experiment", "Seeded experiments: planar, flights, recorded data."
     ),

@@ -34,20 +34,22 @@ _GOODBYE_S = 8.0
 @click.option("--rerun", "viewer", flag_value="rerun", help="Serve Rerun's web viewer; extra [rerun].")
 @click.option("--foxglove", "viewer", flag_value="foxglove", help="Serve Foxglove and Lichtblick; extra [foxglove].")
 @click.option("--ros2", "viewer", flag_value="ros2", help="Publish to a ROS 2 Zenoh router; extra [ros2].")
-@click.option("--run", "name", metavar="NAME", help="Which run, where several are going on.")
+@click.option("--run", "name", metavar="NAME", help="The run to show, if there are several.")
 @click.option("--port", type=_PORT, help=f"Port to serve on (Foxglove: {_FOXGLOVE_PORT}, Rerun: {_RERUN_PORT}).")
-@click.option("--page-port", type=_PORT, default=_RERUN_PAGE_PORT, show_default=True, help="Rerun's page.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="Rerun: new file to write instead of serving.")
-@click.option("--router", default=_ROS_ROUTER, show_default=True, metavar="ENDPOINT", help="ROS 2: its Zenoh router.")
-@click.option("--domain", type=click.IntRange(0, 232), default=0, show_default=True, help="ROS 2: its domain.")
+@click.option("--page-port", type=_PORT, default=_RERUN_PAGE_PORT, show_default=True, help="Port of Rerun's page.")
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="Rerun: write a new file instead of serving.")
 @click.option(
-    "--distro", type=click.Choice(_ROS_DISTRIBUTIONS), default="jazzy", show_default=True, help="ROS 2: which."
+    "--router", default=_ROS_ROUTER, show_default=True, metavar="ENDPOINT", help="ROS 2: endpoint of its Zenoh router."
 )
-@click.option("--truth", is_flag=True, help="ROS 2: show true states too; a simulation has them.")
+@click.option("--domain", type=click.IntRange(0, 232), default=0, show_default=True, help="ROS 2: domain.")
+@click.option(
+    "--distro", type=click.Choice(_ROS_DISTRIBUTIONS), default="jazzy", show_default=True, help="ROS 2: distribution."
+)
+@click.option("--truth", is_flag=True, help="ROS 2: show the true states of a simulation too.")
 def view(
     viewer: str | None, name: str | None, port: int | None, page_port: int, output: Path | None, **ros2: Any
 ) -> int:
-    """Show a running ground station to an engineer's viewer, on loopback. It takes no orders and stops nothing."""
+    """Show a running ground station in an engineering viewer, on loopback. It takes no commands and stops nothing."""
     from groundstation.bus.roles import Role
     from groundstation.engineering_views.watch import watch
     from groundstation.process.leaving import LeavingSignal, leave_within

@@ -144,9 +144,9 @@ class Orders:
 
     @property
     def _floor_m(self) -> float:
-        """Return the height at which the tracker had it standing [m.
+        """Return the height [m; world] at which the tracker had it standing.
 
-        World]: its own origin is some centimetres higher.
+        Its own origin is some centimetres higher.
         """
         return self.lift.stood[2] if self.lift.stood is not None else 0.0
 

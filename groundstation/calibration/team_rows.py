@@ -171,9 +171,9 @@ def target_rows(rows: Rows, path: TargetPath, acceleration_m_s2: float, columns:
 def stand_rows(
     rows: Rows, path: RobotPath, columns: Columns, span: tuple[float, float], pose: Array, std: Array
 ) -> None:
-    """Add the rows of a drone standing still over a span; pose, std (4): x, y, z, heading [m, rad.
+    """Add the rows of a drone standing still over a span.
 
-    World] of its pad.
+    pose, std (4): x, y, z, heading [m, rad; world] of its pad.
     """
     knots = np.flatnonzero((path.grid.times >= span[0]) & (path.grid.times <= span[1]))
     if len(knots) < 2:

@@ -136,7 +136,10 @@ class FixedLagFilter:
     def place(
         self, name: str, pose: Sequence[float], variances: Sequence[float], stamp_ns: int, now_ns: int
     ) -> Verdict:
-        """Put an entity at a known pose (x, y, z, yaw) with the given variances, independent of all others."""
+        """Put an entity at a pose (x, y, z, yaw) [m, rad; world] with these variances, independent of all others.
+
+        Raises ValueError unless all are finite and the variances positive.
+        """
         placed = [*map(float, pose), *np.diag(np.asarray(variances, dtype=np.float64)).ravel().tolist()]
         if len(placed) != 20 or not np.isfinite(placed).all() or min(variances) <= 0.0:
             raise ValueError("a pose has 4 finite numbers and 4 positive variances")

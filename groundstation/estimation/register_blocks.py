@@ -236,7 +236,7 @@ def scale_row(P: Matrix, row: int, factor: float) -> None:
 
 @kernel()
 def copy_to_columns(P: Matrix, row: int, rows: int, first: int, last: int) -> None:
-    """Copy columns first..last of some rows of P (n, n) into the columns of the rows' numbers."""
+    """Copy columns first to last - 1 of some rows of P (n, n) into the columns of the rows' numbers."""
     whole = last - LANES + 1
     while rows > 0:
         # As many as stand within one line of each row that is written.

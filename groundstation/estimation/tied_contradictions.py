@@ -80,9 +80,9 @@ class TiedContradictions:
                 self._far[pair].rows.append((now_s, np.array(c.residual[:3])))
 
     def turns(self, now_s: float, seen: Mapping[Pair, Vector]) -> Iterator[CameraTurn]:
-        """Yield the cameras that were turned. seen: the last place of each robot in each fixed camera [m.
+        """Yield the cameras that were turned.
 
-        Camera_optical].
+        seen: the last place of each robot in each fixed camera [m; camera_optical].
         """
         for camera in sorted({camera for camera, _ in self._far}):
             turn = self._turn(camera, now_s, seen)

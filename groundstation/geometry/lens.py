@@ -56,7 +56,10 @@ class CameraIntrinsics:
         return _fold_radius(self.distortion)
 
     def project(self, points: Array) -> Array:
-        """Return pixels (..., 2) of points (..., 3) [optical]; NaN behind the camera and beyond the lens model."""
+        """Return pixels (..., 2) of points (..., 3) [camera_optical].
+
+        NaN behind the camera and beyond the lens model.
+        """
         points = np.asarray(points, dtype=np.float64)
         depth = points[..., 2]
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -64,7 +67,7 @@ class CameraIntrinsics:
         return self.pixels_from_normalised(normalised)
 
     def pixel(self, x: float, y: float, z: float) -> tuple[float, float] | None:
-        """Return the pixel of one point [optical] like `project`, in a tenth of its time; None instead of NaN."""
+        """Return the pixel of one point [camera_optical] as `project` does, ten times as fast; None instead of NaN."""
         if not z > 1e-9:
             return None
         x, y = x / z, y / z

@@ -122,9 +122,9 @@ class UdpLink:
                         self._sniffer(system, now_ns, raw, True)
 
     def _greet(self, now_ns: int, source: tuple[str, int]) -> None:
-        """Send a MAVLink 1 vehicle a frame of version 2, after which it uses version 2.
+        """Send a MAVLink 1 vehicle a frame of version 2, or our time to a vehicle whose signing time is old.
 
-        Or send our time to one whose signing time is old because it stood still while the vehicle was off. WIRE
+        The former then uses version 2; the time of the latter stood still while it was off. WIRE
         (docs/reference/mavlink.md 5.10): PX4 with MAV_PROTO_VER 0. No address is bound by it.
         """
         if now_ns - self._greeted.get(source, -_GREETED_NS) < _GREETED_NS or len(self._greeted) >= _MOST_GREETED:

@@ -120,7 +120,10 @@ def measure_relative_pose(belief: Belief, sensor: SensorRow, event: EventRow, ou
 
 @kernel()
 def prepare_relative_pose(belief: Belief, sensor: SensorRow, event: EventRow, z: Vector, R: Matrix) -> int:
-    """Add the camera mounting's uncertainty to R: a rotation moves a point at z sideways, a shift directly."""
+    """Add the camera mounting's uncertainty to R: a rotation moves a point at z sideways, a shift directly.
+
+    Return the number of rows that count, or minus OUT_OF_VIEW.
+    """
     if z[Z] <= 0.0:
         return -OUT_OF_VIEW
     rows = 4 if event.size > 3 and belief.entities[event.subject].at_yaw >= 0 else 3

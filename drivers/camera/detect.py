@@ -147,7 +147,7 @@ def _least_distance(corners: Array, columns: int) -> float:
 
 
 def ordered(picture: Image, corners: Array) -> Find | None:
-    """Return the corners in marker order, black end first; None if they bound no checkerboard or no white rim."""
+    """Return the corners in marker order, black end first; None unless they bound a checkerboard with a white rim."""
     grid = corners.reshape(marker.CORNERS_Y, marker.CORNERS_X, 2)
     along, across = grid[0, -1] - grid[0, 0], grid[-1, 0] - grid[0, 0]
     if along[0] * across[1] - along[1] * across[0] < 0.0:

@@ -1,7 +1,6 @@
-"""The operator: holds the lease, gives orders, and follows each of them until it is confirmed or given up."""
+"""The operator: holds the lease, gives orders, takes off, and serves the requests of other shells."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 from groundstation.bus import clock
 from groundstation.bus.api import Bus
@@ -18,31 +17,20 @@ from groundstation.bus.messages import (
 from groundstation.bus.stop_mark import StopMark, why_another_runs, why_too_old
 from groundstation.bus.topics import COMMAND, COMMAND_ACK, EVENT, LEASE
 from groundstation.runtime.acknowledgements import AwaitedAnswers
-from groundstation.runtime.asking import START_LIVES_NS, TEAM
+from groundstation.runtime.asking import TEAM
 from groundstation.runtime.before_take_off import BeforeTakeOff
+from groundstation.runtime.given_orders import GivenOrders
 from groundstation.runtime.lift_off import Mistake
 from groundstation.runtime.marker_height import FixedCamera
-from groundstation.runtime.requests import Requests, asked_ns, is_request
+from groundstation.runtime.requests import Requests, is_request
 from groundstation.runtime.take_off import TakeOff, TakeOffCommand, TakeOffLimits
 from groundstation.runtime.team import TeamPhase, TeamStatus
-from groundstation.time_units import NS_PER_MS, NS_PER_S
+from groundstation.time_units import NS_PER_MS
 
 _LEASE_PERIOD_NS = 500 * NS_PER_MS
 _LEASE_LIFE_NS = 1_500 * NS_PER_MS
-_CONFIRM_NS = {Verb.LAND: 20 * NS_PER_S, Verb.TAKEOFF: 20 * NS_PER_S}
-_CONFIRM_DEFAULT_NS = 6 * NS_PER_S
 _OBEYED = (AckStage.ACCEPTED, AckStage.EFFECTIVE)
 _IN_THE_AIR = (TeamPhase.UP, TeamPhase.TRACKING, TeamPhase.HELD)
-
-
-@dataclass(slots=True)
-class _Dialogue:
-    """An order that is still being followed, and the request of another shell that it answers."""
-
-    book: AwaitedAnswers
-    given_ns: int
-    repeated_ns: int
-    request: Command | None = None
 
 
 class Operator:
@@ -71,14 +59,12 @@ class Operator:
         self.tracking_since_ns = 0
         self._inbox = bus.subscribe([COMMAND, COMMAND_ACK])
         self._requests = Requests(bus, drones)
-        self._dialogues: list[_Dialogue] = []
+        self._given = GivenOrders(bus, self._requests, say)
         self._sequence: TakeOff | None = None
         self._sequence_request: Command | None = None
         self._take_off_book: AwaitedAnswers | None = None
         self._then_track = False
-        self._said: dict[str, str] = {}
         self._next_lease_ns = 0
-        self._count = 0
 
     # -- orders --------------------------------------------------------------------------------------------------
 
@@ -114,10 +100,9 @@ class Operator:
 
     def land(self, now_ns: int) -> None:
         """Land all drones; whatever else is in progress ends."""
-        given = [dialogue.book.command for dialogue in self._dialogues]
         # Not judged by the phase: another shell's LAND sets it as well, and may have been lost on its way to the
         # drones.
-        if not any(order.verb is Verb.LAND and not order.scope for order in given):
+        if not self._given.lands_all:
             self.phase = TeamPhase.LANDING
             stop = self._give(Verb.LAND, (), now_ns).command
             self._requests.hear_stop(now_ns, stop)
@@ -130,32 +115,14 @@ class Operator:
     def _end_starts(self, stop: Command, now_ns: int) -> None:
         """Cancel starts for a stop of the whole team, and tell the shells that requested them."""
         why = StopMark.of(stop, now_ns, clock.clock_id()).words
-        starts = [dialogue for dialogue in self._dialogues if not dialogue.book.command.verb.stops]
-        for request in (self._sequence_request, *(dialogue.request for dialogue in starts)):
-            if request is not None:
-                self._requests.answer(request, AckStage.REFUSED, why)
+        if self._sequence_request is not None:
+            self._requests.answer(self._sequence_request, AckStage.REFUSED, why)
         self._sequence, self._sequence_request = None, None
-        self._dialogues = [dialogue for dialogue in self._dialogues if dialogue not in starts]
+        self._given.end_starts(why)
 
     def _give(self, verb: Verb, scope: tuple[str, ...], now_ns: int, request: Command | None = None) -> AwaitedAnswers:
-        self._count += 1
-        header = self._bus.header(TEAM, asked_ns(request))
-        expires_ns = 0 if verb.stops else header.stamp_ns + START_LIVES_NS
-        identity = f"{OPERATOR}-{header.stamp_ns}-{self._count}"
-        command = Command(
-            header=header,
-            id=identity,
-            verb=verb,
-            scope=scope,
-            issuer=OPERATOR,
-            expires_ns=expires_ns,
-            run=self._bus.run,
-        )
-        met = tuple(name for name, member in self.team.members.items() if member.heard_ns)
-        book = AwaitedAnswers(command, scope or met)
-        self._dialogues.append(_Dialogue(book, now_ns, now_ns, request))
-        self._bus.publish(COMMAND, command)
-        return book
+        met = (name for name, member in self.team.members.items() if member.heard_ns)
+        return self._given.give(verb, scope, met, now_ns, request)
 
     # -- turn ----------------------------------------------------------------------------------------------------
 
@@ -176,21 +143,14 @@ class Operator:
                     self._hear_ack(ack, now_ns)
                 case Command() as command if command.header.source != self._bus.source:
                     self._hear_command(command, now_ns)
-        self._follow(now_ns)
+        self._given.follow(now_ns)
         if self._sequence is not None:
             self._go_on(self._sequence, now_ns)
 
     def _hear_ack(self, ack: CommandAck, now_ns: int) -> None:
-        for dialogue in self._dialogues:
-            if not dialogue.book.note(ack):
-                continue
-            progress = dialogue.book.progress[ack.header.entity]
-            if not ack.verb.stops and ack.verb is not Verb.TAKEOFF and ack.stage in _OBEYED:
-                self.phase, self.tracking_since_ns = TeamPhase.TRACKING, self.tracking_since_ns or now_ns
-            line = f"{ack.header.entity}: {ack.verb} {progress.text()}"
-            if progress.settled and line != self._said.get(ack.header.entity):
-                self._said[ack.header.entity] = line  # the same refusal comes several times a second
-                self._say(line)
+        starts = not ack.verb.stops and ack.verb is not Verb.TAKEOFF and ack.stage in _OBEYED
+        if self._given.hear(ack) and starts:
+            self.phase, self.tracking_since_ns = TeamPhase.TRACKING, self.tracking_since_ns or now_ns
 
     def _hear_command(self, command: Command, now_ns: int) -> None:
         if OPERATOR in command.scope:
@@ -245,34 +205,7 @@ class Operator:
             case verb:
                 self._give(verb, names, now_ns, request)
 
-    # -- what is under way ---------------------------------------------------------------------------------------
-
-    def _follow(self, now_ns: int) -> None:
-        """Repeat orders that were not answered; close those that are settled or timed out."""
-        for dialogue in list(self._dialogues):
-            book, verb = dialogue.book, dialogue.book.command.verb
-            late = now_ns - dialogue.given_ns > _CONFIRM_NS.get(verb, _CONFIRM_DEFAULT_NS)
-            if book.settled or late:
-                self._dialogues.remove(dialogue)
-                self._close(dialogue)
-            elif now_ns - dialogue.repeated_ns > book.repeat_after_s * NS_PER_S:
-                dialogue.repeated_ns = now_ns
-                self._bus.publish(COMMAND, book.command)
-
-    def _close(self, dialogue: _Dialogue) -> None:
-        book = dialogue.book
-        open_ends = {name: p.text(final=True) for name, p in book.progress.items() if not p.settled}
-        for name, text in open_ends.items():
-            self._say(f"{name}: {book.command.verb} {text}")
-        if dialogue.request is None:
-            return
-        if book.confirmed:
-            self._requests.answer(dialogue.request, AckStage.EFFECTIVE)
-        else:
-            failed = [
-                f"{n}: {p.text(final=True)}" for n, p in book.progress.items() if p.stage is not AckStage.EFFECTIVE
-            ]
-            self._requests.answer(dialogue.request, AckStage.REFUSED, "; ".join(failed) or "no drone is up")
+    # -- take-off ------------------------------------------------------------------------------------------------
 
     def _go_on(self, sequence: TakeOff, now_ns: int) -> None:
         progress = self._take_off_book.progress.get(sequence.current) if self._take_off_book else None

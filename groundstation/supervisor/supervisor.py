@@ -25,6 +25,7 @@ from groundstation.supervisor.launcher import Launcher
 from groundstation.supervisor.managed_process import ManagedProcess, exit_text
 from groundstation.supervisor.process_spec import ProcessSpec, Restart, StopOrder, slot_of
 from groundstation.supervisor.run import SOURCE, Run
+from groundstation.supervisor.run_entry import RunEntry
 from groundstation.supervisor.status import StatusPublisher
 from groundstation.supervisor.terminal import Terminal
 from groundstation.time_units import NS_PER_MS, NS_PER_S
@@ -65,7 +66,7 @@ class Supervisor:
         self._statuses: Subscription | None = None
         self._publisher: StatusPublisher | None = None
         self.failure = ""
-        self._record: runtime_file.RuntimeRecord | None = None
+        self._entry = RunEntry(run, self._block.path, self._identities)
         self._turn_ns = self._awake_since_ns = time.monotonic_ns()
         self._stopping = False
 
@@ -124,27 +125,7 @@ class Supervisor:
 
     def write_runtime_file(self) -> None:
         """Write the runtime file, by which other commands find this run and its processes."""
-
-        def record(process: ManagedProcess) -> runtime_file.ProcessRecord:
-            return runtime_file.ProcessRecord(process.spec.name, process.spec.role, process.pid, process.start_time)
-
-        own = runtime_file.ProcessRecord(SOURCE, SOURCE, os.getpid(), runtime_file.start_time(os.getpid()) or 0)
-        self._record = runtime_file.RuntimeRecord(
-            site=self.run.site,
-            field=self.run.field,
-            endpoint=self.run.endpoint,
-            run_dir=str(self.run.run_dir.absolute()),
-            heartbeat=str(self._block.path),
-            drones=self.run.drones,
-            real=self.run.real,
-            supervisor=own,
-            processes=tuple(record(process) for process in self.processes if process.running),
-            identities=str(self._identities or ""),
-        )
-        try:
-            runtime_file.write(self._record)
-        except OSError as error:  # the run matters more than this file
-            _log.error("cannot write the runtime file: %s", error)
+        self._entry.write(self.processes)
 
     # -- watch ---------------------------------------------------------------------------------------------------
 
@@ -199,8 +180,7 @@ class Supervisor:
         if not process.running:
             if process.restart_due_ns is not None and now_ns >= process.restart_due_ns and not self._stopping:
                 self.launch(process)
-                if self._record is not None:
-                    self.write_runtime_file()
+                self._entry.update(self.processes)
             return
         code = process.reap()
         if code is not None:
@@ -304,9 +284,7 @@ class Supervisor:
         if self.bus is not None:
             self.bus.close()
             self.bus = self.events.bus = self._statuses = self._publisher = None
-        if self._record is not None:
-            runtime_file.remove(self._record)
-            self._record = None
+        self._entry.remove()
         go_back()
 
     def close(self) -> None:

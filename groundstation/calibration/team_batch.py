@@ -22,19 +22,16 @@ from groundstation.calibration.team_paths import (
     robot_start,
     target_start,
 )
-from groundstation.calibration.team_record import Sightings, TeamRecord
+from groundstation.calibration.team_record import TeamRecord
 from groundstation.calibration.team_rows import Columns, Rows, robot_rows, stand_rows, target_rows
 from groundstation.calibration.team_sight import Scene, looks_of, noise, off, predicted, slopes
+from groundstation.calibration.team_sightings import LEAST_SEEN, only, seen_from_above, usable
 from groundstation.errors import OperatorMistake
 from groundstation.estimation.parameters import STAMP_STD_S
 from groundstation.field.resolved import ResolvedField
 from groundstation.preflight.stand import PLACED_M, PLACED_RAD, stand_of
 
-LEAST_SEEN = 60
-"""Least numbers of sightings of a drone by fixed cameras, for its path, and of a target by drones."""
 _FREEDOM = 8.0
-# Sightings this near to a jump of the drone's own heading are left out [s].
-_JUMP_S = 0.4
 # The first rounds weigh outliers more, so that distant ones still attract.
 _FORGIVING = (30.0, 10.0, 4.0, 2.0)
 _ROUNDS, _SETTLED = 14, 0.02
@@ -73,17 +70,13 @@ class TeamBatch:
 
     def __init__(self, record: TeamRecord, field: ResolvedField) -> None:
         grid = grid_of(record.duration_s)
-        drones = [name for name in field.drones if name in record.own and _seen(record.sightings, field, name)]
+        drones = [
+            name for name in field.drones if name in record.own and seen_from_above(record.sightings, field, name)
+        ]
         if not drones:
             raise OperatorMistake("no fixed camera saw any drone often enough: nothing to calibrate by")
         self.field, self.figures, self._record = field, Figures(field, drones), record
-        known = {*drones, *field.cameras}
-        kept = [
-            i
-            for i, (o, s) in enumerate(zip(record.sightings.observers, record.sightings.subjects, strict=True))
-            if o in known and (s in drones or s in field.tracked) and _calm(record, (o, s), record.sightings.times[i])
-        ]
-        self._sightings = _only(record.sightings, kept)
+        self._sightings = usable(record, field, drones)
         self.robots = {
             name: RobotPath(
                 record.own[name],
@@ -107,7 +100,7 @@ class TeamBatch:
 
     def _keep_tracked(self) -> None:
         kept = [i for i, s in enumerate(self._sightings.subjects) if s in self._first]
-        self._sightings = _only(self._sightings, kept)
+        self._sightings = only(self._sightings, kept)
         self._looks = looks_of(self.field, self._sightings.observers, self._sightings.subjects)
 
     def _target_start(self, name: str) -> TargetPath | None:
@@ -291,27 +284,6 @@ class TeamBatch:
 
 def _figure(rows: Rows, at: IntArray, columns: IntArray, values: Array) -> None:
     rows.by_figures(at.ravel(), np.repeat(columns, 4), values.ravel())
-
-
-def _seen(sightings: Sightings, field: ResolvedField, name: str) -> bool:
-    found = sum(s == name and o in field.cameras for o, s in zip(sightings.observers, sightings.subjects, strict=True))
-    return found >= LEAST_SEEN
-
-
-def _calm(record: TeamRecord, names: tuple[str, str], at_s: float) -> bool:
-    """Return whether no heading of the two entities jumps about that time."""
-    for name in names:
-        if name in record.own:
-            own = record.own[name]
-            first, last = np.searchsorted(own.times, (at_s - _JUMP_S, at_s + _JUMP_S))
-            if first < last and own.resets[first] != own.resets[min(last, len(own.times) - 1)]:
-                return False
-    return True
-
-
-def _only(s: Sightings, kept: list[int]) -> Sightings:
-    names = tuple(s.observers[i] for i in kept), tuple(s.subjects[i] for i in kept)
-    return Sightings(s.times[kept], *names, s.seen[kept], s.covariance[kept], s.other[kept])
 
 
 def _pad(field: ResolvedField, name: str) -> tuple[Array, Array]:

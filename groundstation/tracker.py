@@ -3,7 +3,6 @@
 import math
 from collections import Counter, defaultdict
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,13 +13,10 @@ from groundstation.control.joinings import Joinings
 from groundstation.control.lookout import Lookout
 from groundstation.control.moment import Sight
 from groundstation.control.output_limiter import Limited, limit_setpoint
-from groundstation.control.parameters import ControlParameters, SafetyParameters, control_from_field, safety_from_field
 from groundstation.control.root_watch import RootWatch
-from groundstation.control.search_parameters import SearchParameters, search_from_field
 from groundstation.control.setpoints import HOVER, setpoints_from_plan
 from groundstation.control.view import Localisation, spread_m
 from groundstation.errors import EstimatorFault
-from groundstation.estimation import parameters as estimation
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.entity_estimate import entity_estimate
 from groundstation.estimation.fixed_lag import FixedLagFilter
@@ -31,38 +27,14 @@ from groundstation.estimation.models.ranging import RangeSensor
 from groundstation.estimation.mount_watch import MOVED, MountWatch
 from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.stabilized_frame import world_from_stabilized
-from groundstation.planning import parameters as planning
 from groundstation.planning.planner import Planner, PlanRequest, PlanResult
-from groundstation.sensing.from_field import sensors_from_field
-from groundstation.sensing.models import SensorSuite
 from groundstation.sensing.topology import Topology
-
-
-@dataclass(frozen=True, slots=True)
-class TrackerParameters:
-    """Settings of the tracker; `string_first`: first topology has one robot per level."""
-
-    estimator: estimation.EstimatorParameters
-    planner: planning.PlannerParameters
-    sensors: SensorSuite
-    control: ControlParameters
-    safety: SafetyParameters
-    search: SearchParameters
-    string_first: bool = False
+from groundstation.tracker_parameters import TrackerParameters, parameters_from_field
 
 
 def tracker_from_field(field: ResolvedField, clock: str, epoch: int) -> "Tracker":
     """Return the tracker for a resolved field."""
-    parameters = TrackerParameters(
-        estimation.parameters_from_field(field),
-        planning.parameters_from_field(field),
-        sensors_from_field(field),
-        control_from_field(field),
-        safety_from_field(field),
-        search_from_field(field),
-        field.planner.initial_topology == "string",
-    )
-    return Tracker(parameters, clock, epoch)
+    return Tracker(parameters_from_field(field), clock, epoch)
 
 
 class Tracker:

@@ -15,7 +15,8 @@ ROOT = Path(__file__).parents[2]
 PACKAGES = ("groundstation", "drivers", "sim_bridge")
 
 CORE = tuple(
-    f"groundstation.{n}" for n in ("geometry", "estimation", "sensing", "planning", "control", "tracker", "forecast")
+    f"groundstation.{n}"
+    for n in ("geometry", "estimation", "sensing", "planning", "control", "tracker", "tracker_parameters", "forecast")
 )
 NO_EFFECTS = {"socket", "asyncio", "threading", "time", "logging", "multiprocessing", "subprocess", "select"}
 NUMERICS = {"numpy", "numba", "scipy", "llvmlite"}

@@ -27,7 +27,8 @@ PER_DRONE = ("aside_x", "aside_y", "turned", "higher", "print")
 TEAM_PRINT = ("", "print")
 _SCATTER_M, _SCATTER_SHARE, _SCATTER_RAD = 0.003, 0.002, math.radians(0.5)
 # Few pixels a square (docs/reference/vision.md 8): where the board lies in their grid shifts its distance, by this
-# share at 4 px, and however long one looks.
+# share at 4 px, and however long one looks. 4 px is where the share was measured; that boards are read from 4 px on
+# (settings/marker_sizes.py) is another figure.
 _COARSE_SHARE, _COARSE_PX, _COARSE_POWER = 0.0035, 4.0, 10
 _STEPS, _DIFFERENCE = 8, 1e-6
 

@@ -12,7 +12,7 @@ from groundstation.settings.room import CalibrationSettings
 from groundstation.settings.schema import Field
 
 # Measured (docs/reference/vision.md 8): of boards with squares of 4 px 9 in 10 are found and 5 to 7 identified;
-# with 5 px nearly all.
+# with 5 px nearly all. How far such a board's distance can be trusted is pad_fit.py's own figure.
 _LEAST_PX = 4.0
 
 

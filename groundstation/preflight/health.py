@@ -63,10 +63,10 @@ def _clock(name: str, status: VehicleStatus) -> Iterator[Finding]:
     if drift is not None:
         found = f"its clock goes {abs(drift):.0f} ppm {'fast' if drift > 0.0 else 'slow'}"
         bad = abs(drift) > _DRIFT_PPM
-        remedy = "start it again; if that stays, its rates are wrong by as much: exchange it" if bad else ""
+        remedy = "restart it; if that does not help, its rates are wrong by as much: replace it" if bad else ""
         yield Finding(Level.SHOULD if bad else Level.OK, name, found, remedy)
     if status.asks_time is False:
-        found = "it does not ask for our time (TIMESYNC): it cannot tell how old the positions are that it is told"
+        found = "it does not ask for our time (TIMESYNC), so it cannot date the positions that it is sent"
         remedy = "send TIMESYNC on this link: set its MAV_n_MODE to Onboard, and restart it"
         yield Finding(Level.SHOULD, name, found, remedy)
     if late_ms is not None and late_ms > _LATE_MS:
@@ -94,8 +94,8 @@ def camera_findings(
     fixed = field.world_sensors
     dark = [name for name in fixed if name not in statuses or not statuses[name].connected]
     if len(dark) == len(fixed):
-        remedy = "check power, source and network of one at least: without it nobody knows where the drones are"
-        yield Finding(Level.MUST, "cameras", "no sensor that is fixed in the world sends anything", remedy)
+        remedy = "check power, source and network of at least one: without it nobody knows where the drones are"
+        yield Finding(Level.MUST, "cameras", "no sensor fixed in the world sends anything", remedy)
     for name in (*field.cameras, *field.motion_capture, *field.ranging, *map(camera_name, field.drones)):
         status = statuses.get(name)
         if status is None or not status.connected:
@@ -117,7 +117,7 @@ def _picture(name: str, status: CameraStatus) -> Iterator[Finding]:
     if light is not None and not DARK <= light <= _BRIGHT:
         too = "dark" if light < DARK else "bright"
         yield Finding(Level.SHOULD, name, f"its picture is too {too} (mean {light:.0%} of white)",
-                      "more light, or none into the lens; set its exposure")  # fmt: skip
+                      "add light, keep light out of the lens, or set its exposure")  # fmt: skip
     if edge_px is not None and edge_px > _BLURRED_PX:
         yield Finding(Level.SHOULD, name, f"its picture is blurred: the sharpest edges are {edge_px:.0f} pixels wide",
                       "focus and clean its lens, fasten it, or shorten its exposure")  # fmt: skip

@@ -35,7 +35,7 @@ def finding(field: ResolvedField, opinion: Opinion) -> Finding:
     either = ", or ".join(text for _, text, _ in told)
     survey = _SURVEY if any(remedy.endswith(_SURVEY) for _, _, remedy in told) else ""
     checks = "; or ".join(remedy.removesuffix(_SURVEY) for _, _, remedy in told) + survey
-    return Finding(level, SUBJECT, f"{either}: which of these cannot be told from here, the first is likeliest", checks)
+    return Finding(level, SUBJECT, f"{either}: these cannot be told apart here; the first is the likeliest", checks)
 
 
 def _unexplained(opinion: Opinion) -> Finding:

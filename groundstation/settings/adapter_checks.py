@@ -31,6 +31,6 @@ def _video(name: str, drone: Drone) -> Iterator[tuple[KeyPath, str]]:
     opened_elsewhere = source.kind in (SourceKind.RTSP, SourceKind.ROS2, SourceKind.PLUG_IN)
     if opened_elsewhere and urlsplit(drone.camera.source).hostname == drone.address:
         scheme = drone.camera.source.partition(":")[0]
-        remedy = f"; a plug-in that can is told %{drone.interface} after the address"
+        remedy = f"; a plug-in that chooses one takes %{drone.interface} after the address"
         hint = remedy if source.kind is SourceKind.PLUG_IN else ""
         yield path, f"cannot be used with interface: what opens {scheme}:// chooses no adapter{hint}"

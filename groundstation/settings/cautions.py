@@ -108,7 +108,7 @@ def _obstacles(field: Field) -> Iterator[Finding]:
 def _uncertainty(field: Field) -> Iterator[Finding]:
     limit = field.safety.max_position_std_m
     if limit < _LEAST_STD_M:
-        text = f"is less than what flights have (0.02 to 0.1 m; got {limit:g}): drones would hover all the time"
+        text = f"is less than flights reach (0.02 to 0.1 m; got {limit:g}): drones would hover all the time"
         yield ("safety", "max_position_std_m"), text
 
 
@@ -119,7 +119,9 @@ def _addresses(field: Field) -> Iterator[Finding]:
         except ValueError:
             continue
         if address.is_multicast or address.is_unspecified or int(address) & 0xFF == 0xFF:
-            text = f"is no address of one vehicle (got {drone.address}): orders would go to all, or to nobody"
+            text = (
+                f"is not the address of a single vehicle (got {drone.address}): commands would go to all, or to nobody"
+            )
             yield ("drones", name, "address"), text
 
 

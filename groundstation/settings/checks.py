@@ -35,7 +35,7 @@ def _root(parts: Parts) -> Iterator[Finding]:
     if not parts.given - {parts.truth}:
         yield (
             ("cameras",),
-            ("one camera at least, or a motion capture system that is not the truth, or ranging, must be given"),
+            ("at least one camera, or a motion capture system that is not the truth, or ranging, must be given"),
         )
 
 

@@ -33,7 +33,7 @@ def section(path: Path, options: tuple[str, ...] = ()) -> MotionCaptureSection:
     ("options", "told"),
     [
         (("truth.from=vicon",), "truth.from: must name a motion capture system of the field: mocap (got vicon)"),
-        (("truth.from=mocap",), "one camera at least, or a motion capture system that is not the truth"),
+        (("truth.from=mocap",), "at least one camera, or a motion capture system that is not the truth"),
         (("motion_capture.mocap.source=http://1.2.3.4",), "must be an address such as natnet://"),
         (("motion_capture.mocap.source=vicon://1.2.3.4:802",), "must have no port: vicon:// is heard at port 801 only"),
         (("motion_capture.mocap.source=vrpn://1.2.3.4:3884",), "must have no port: vrpn:// is heard at port 3883 only"),

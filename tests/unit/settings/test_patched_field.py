@@ -27,7 +27,7 @@ def test_changed_settings_are_read_back_and_comments_stay(tmp_path: Path) -> Non
     assert field.drones["drone_2"].camera.tilt_down_deg == 45.0
     assert field.cameras["ceiling"].calibration.fx_px == 1000.0
     assert field.cameras["ceiling"].position_m == (0.2, 0.0, 4.2)
-    assert "# toward the parked target" in written.read_text(encoding="utf-8")
+    assert "# towards the parked target" in written.read_text(encoding="utf-8")
 
 
 def test_a_patch_that_loses_its_calibrations_is_told_with_the_remedy(tmp_path: Path) -> None:

@@ -19,7 +19,6 @@ MatrixStack = Annotated[Array, 3]
 MatrixStacks = Annotated[Array, 4]
 IntVector = Annotated[IntArray, 1]
 IntMatrix = Annotated[IntArray, 2]
-BoolVector = Annotated[BoolArray, 1]
 WordVector = Annotated[NDArray[np.uint64], 1]
 
 # Number of float64 in a cache line.

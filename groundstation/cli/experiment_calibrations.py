@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from groundstation.cli.exits import ExitCode
-from groundstation.cli.experiment_campaign import campaign_options, flown_field, flown_scenario, fly_all
-from groundstation.cli.numbers import FiniteRange
+from groundstation.cli.experiment_campaign import flown_field, flown_scenario, fly_all, labs_options
 from groundstation.errors import SettingsError
 
 if TYPE_CHECKING:
@@ -24,17 +23,7 @@ Flight = dict[str, Any]
     '  groundstation experiment calibrations --rows "pan of both,all markers" --seeds 3\n\n'
     "Exit codes: 0 all flights keep their limits with the new settings, 1 one does not, 2 wrong settings."
 )
-@click.option("--seeds", type=click.IntRange(1, 1000), default=1, show_default=True, help="Flights of each row.")
-@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the first flight.")
-@click.option(
-    "--rows", "only", default="", metavar="NAMES", help="Only these rows, separated by commas (default: all)."
-)
-@click.option(
-    "--duration", "seconds", type=FiniteRange(20, 600), default=60.0, show_default=True, help="Seconds of tracking."
-)
-@click.option("--field", default="lab", show_default=True, help="Field file, or a shipped one's name.")
-@click.option("--scenario", default="realistic", show_default=True, help="Scenario: sensor errors, the target's path.")
-@campaign_options("calibrations")
+@labs_options("calibrations", seeds=1, seconds=60.0, least_s=20)
 def calibrations(
     seeds: int, seed: int, only: str, scheduler: str, workers: int, out: Path, as_json: bool, **flown: Any
 ) -> int:

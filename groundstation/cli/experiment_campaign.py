@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from groundstation.cli.numbers import FiniteRange
 from groundstation.cli.terminal import progress
 from groundstation.errors import GroundStationError
 
@@ -44,6 +45,39 @@ def campaign_options(name: str) -> Callable[[Command], Command]:
         click.option("--json", "as_json", is_flag=True, help="Print all flights as JSON."),
     )
 
+    return _all_of(*options)
+
+
+def labs_options(name: str, seeds: int, seconds: float, least_s: float) -> Callable[[Command], Command]:
+    """Return a decorator with the options of a campaign over rows of wrong labs.
+
+    seeds, seconds: the defaults of flights in a row and of their tracking [s], which takes least_s or more.
+    """
+    return _all_of(
+        click.option(
+            "--seeds", type=click.IntRange(1, 1000), default=seeds, show_default=True, help="Flights of each row."
+        ),
+        click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the first flight."),
+        click.option(
+            "--rows", "only", default="", metavar="NAMES", help="Only these rows, separated by commas (default: all)."
+        ),
+        click.option(
+            "--duration",
+            "seconds",
+            type=FiniteRange(least_s, 600),
+            default=seconds,
+            show_default=True,
+            help="Seconds of tracking.",
+        ),
+        click.option("--field", default="lab", show_default=True, help="Field file, or a shipped one's name."),
+        click.option(
+            "--scenario", default="realistic", show_default=True, help="Scenario: sensor errors, the target's path."
+        ),
+        campaign_options(name),
+    )
+
+
+def _all_of(*options: Callable[[Command], Command]) -> Callable[[Command], Command]:
     def decorated(command: Command) -> Command:
         for option in reversed(options):
             command = option(command)

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from groundstation.cli.exits import ExitCode
-from groundstation.cli.experiment_campaign import campaign_options, flown_field, flown_scenario, fly_all
-from groundstation.cli.numbers import FiniteRange
+from groundstation.cli.experiment_campaign import flown_field, flown_scenario, fly_all, labs_options
 from groundstation.errors import SettingsError
 
 if TYPE_CHECKING:
@@ -24,17 +23,7 @@ _BATCH = 5
     '  groundstation experiment culprits --rows "pan of one,all markers" --seeds 1 --json\n\n'
     "Exit codes: 0 in 9 of 10 flights of each row what is wrong was named, 1 it was not, 2 wrong settings."
 )
-@click.option("--seeds", type=click.IntRange(1, 1000), default=5, show_default=True, help="Flights of each row.")
-@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the first flight.")
-@click.option(
-    "--rows", "only", default="", metavar="NAMES", help="Only these rows, separated by commas (default: all)."
-)
-@click.option(
-    "--duration", "seconds", type=FiniteRange(5, 600), default=25.0, show_default=True, help="Seconds of tracking."
-)
-@click.option("--field", default="lab", show_default=True, help="Field file, or a shipped one's name.")
-@click.option("--scenario", default="realistic", show_default=True, help="Scenario: sensor errors, the target's path.")
-@campaign_options("culprits")
+@labs_options("culprits", seeds=5, seconds=25.0, least_s=5)
 def culprits(
     seeds: int, seed: int, only: str, scheduler: str, workers: int, out: Path, as_json: bool, **flown: Any
 ) -> int:

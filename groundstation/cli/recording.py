@@ -49,7 +49,7 @@ def recording() -> None:
 @click.argument("recording", type=EXISTING)
 @click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")
 def info(recording: Path, as_json: bool) -> int:
-    """Show parts, duration, topics with counts and rates, versions, gaps and damage. Reads and checks everything."""
+    """Show parts, duration, topics with counts and rates, versions, holes and damage. Reads and checks everything."""
     from groundstation.recording.info import info_of
     from groundstation.recording.run import open_run
 

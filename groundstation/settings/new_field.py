@@ -186,7 +186,7 @@ def _target(target: NewTarget) -> str:
     return f"""\
 target:
   name: {target.base}
-  base: {target.base}            # what it can do at most; max_speed_m_s and its like for any other
+  base: {target.base}            # its limits of motion; for another target: max_speed_m_s and its like
   marker: {{code: {_TARGET_CODE}, height_m: {target.board_m:g}, square_mm: 44}}
 """
 
@@ -197,7 +197,7 @@ def _planner(room: NewRoom, drones: int, board_m: float) -> str:
     rows = "".join(f"    - [{_heights(top, low, levels)}]\n" for levels in range(1, max(3, drones) + 1))
     return f"""\
 planner:
-  level_heights_m:               # heights by number of levels, top level first
+  level_heights_m:               # where the search for heights begins, by number of levels, top level first
 {rows}  planned_range_m: 1.9           # onboard cameras: range that the planner counts on
 """
 
@@ -209,7 +209,7 @@ def _heights(top: float, low: float, levels: int) -> str:
 
 
 _DEFAULTS = """\
-defaults:                        # every drone, unless its type or its own entry says otherwise
+defaults:                        # for every drone; its type and its own entry override them
   limits: {max_speed_m_s: 0.6, max_climb_m_s: 0.4, max_yaw_rate_deg_s: 60, battery_min: 0.15}
   marker: {position_m: [0.0, 0.0, 0.08], square_mm: 44}
   camera:

@@ -1,6 +1,6 @@
 # make demo, make test: each creates .venv if needed, installs what it uses (an extra of pyproject.toml), and runs.
 # Only files with a known hash are installed (requirements/), and nothing is built but the product itself.
-# make alone only installs the product.
+# make alone only installs the product; make help lists the targets.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -20,17 +20,20 @@ WAITING := $(wildcard tests/contract/test_*.py) tests/contract/ardrone_driver te
 	tests/replay/test_replay_playback.py tests/sitl tests/unit/console tests/unit/supervisor \
 	tests/unit/cli/test_cli_stop.py tests/unit/cli/test_cli_bench_report.py
 
-.PHONY: install demo test test-waiting test-units test-others raise-floors test-slow slow-flights slow-pages slow-scenarios slow-studies slow-largest test-exhaustive fuzz test-firmware mutants limiter-states wire-faults soak check format docs hashes sbom audit interop clean
+.PHONY: help install demo test test-waiting test-units test-others raise-floors test-slow slow-flights slow-pages slow-scenarios slow-studies slow-largest test-exhaustive fuzz test-firmware mutants limiter-states wire-faults soak check format docs hashes sbom audit interop clean
 
-install: $(STAMP)
+install: $(STAMP)  ## the product, in .venv, with compiled kernels (also: make alone)
 
-demo: $(STAMP)
+help:  ## this list
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-16s %s\n", $$1, $$2 }' Makefile
+
+demo: $(STAMP)  ## one flight in the simulator; DEMO_ARGS=...
 	$(BIN)/groundstation demo $(DEMO_ARGS)
 
 # Tests that wait (for sockets, processes, time) run in one pytest, those that compute beside them in two others, printed
 # at their ends. What runs is measured, and each package has a floor (tests/coverage/floors.toml); make raise-floors
 # raises them.
-test: $(STAMP)-test
+test: $(STAMP)-test  ## the fast tests
 	$(MAKE) --jobs 3 --keep-going --output-sync=none $(PARTS:%=test-%)
 	$(BIN)/python tests/coverage/floors.py $(COVERAGE)
 
@@ -45,12 +48,12 @@ test-units test-others: test-%: $(STAMP)-test
 		$(addprefix --ignore=,$(WAITING)) $(COMPUTED) >.pytest_cache/$*/log 2>&1 || code=$$?; \
 	cat .pytest_cache/$*/log; exit $$code
 
-raise-floors: $(STAMP)-test
+raise-floors: $(STAMP)-test  ## set the coverage floors to the last run's figures
 	$(BIN)/python tests/coverage/floors.py $(COVERAGE) --raise
 
 # Flights are judged by the clock; pages, and what only computes, run beside them, where they leave time, and are printed
 # at their ends. The largest flights fill two slow cores and have them to themselves.
-test-slow: $(STAMP)-test-slow
+test-slow: $(STAMP)-test-slow  ## flights in real time, browser, programs of other projects; make interop first
 	code=0; $(MAKE) --jobs 4 --keep-going --output-sync=none slow-flights slow-pages slow-scenarios slow-studies || code=$$?; \
 	$(MAKE) slow-largest && exit $$code
 
@@ -70,64 +73,63 @@ slow-pages slow-scenarios slow-studies: slow-%: $(STAMP)-test-slow
 	cat .pytest_cache/$*/log; exit $$code
 
 # More cases of what test-slow shows, e.g. every flight of each kind of vehicle, and the long recordings: an hour.
-test-exhaustive: $(STAMP)-test-slow
+test-exhaustive: $(STAMP)-test-slow  ## more cases of these: an hour
 	$(PYTEST) -m "exhaustive and not firmware" --timeout 3000 tests
 
 # Real firmware: the SITL binaries that $$SKEIN_PX4 and $$SKEIN_ARDUCOPTER name. Stand-ins for them fly in test-slow.
-test-firmware: $(STAMP)-test-slow
+test-firmware: $(STAMP)-test-slow  ## flights of real firmware (SKEIN_PX4, SKEIN_ARDUCOPTER)
 	$(PYTEST) -m firmware --timeout 900 tests
 
 # Damaged inputs for every decoder: COUNT of each (test-slow: 30 000; field files 6000). DECODER=navdata, at, pave, ... takes one.
-fuzz: $(STAMP)-test
+fuzz: $(STAMP)-test  ## damaged inputs for every decoder; COUNT=N DECODER=NAME
 	FUZZ_INPUTS=$(or $(COUNT),1000000) nice $(PYTEST) -m fuzz --timeout 7200 -k "many_damaged $(if $(DECODER),and $(DECODER))" tests/property
 
-# Who judges the judges: MODULES names parts of paths in tests/mutation/targets.toml, e.g. make mutants MODULES="watchdog lease".
+# Whether tests notice changed code. MODULES names parts of paths in tests/mutation/targets.toml, e.g. make mutants MODULES="watchdog lease".
 # All take hours: PART=K/N judges every N-th mutant, for 20 minutes at most.
-mutants: $(STAMP)-test
+mutants: $(STAMP)-test  ## whether tests notice changed code; MODULES=... PART=K/N
 	nice $(BIN)/python tests/mutation/run.py $(MODULES) --part $(or $(PART),1/1) --seconds 1200 $(MUTANTS_ARGS)
 
-# Every single kill and freeze of a process, and every pair, in flight: 200 flights of some 35 s. PART=K/N flies a part, e.g. PART=1/6.
-wire-faults: $(STAMP)-test
+# Kills and freezes of each process and of each pair of processes in flight: 200 flights of some 35 s. PART=K/N flies a part, e.g. PART=1/6.
+wire-faults: $(STAMP)-test  ## kills and freezes of processes in flight; PART=K/N
 	$(BIN)/python tests/sitl/wire_campaign.py --part $(or $(PART),1/1) $(WIRE_ARGS)
 
 # The output limiter in random states: ten million take 35 minutes of a core. STATES=N, SEED=N.
-limiter-states: $(STAMP)-test
+limiter-states: $(STAMP)-test  ## the output limiter in random states; STATES=N SEED=N
 	nice $(BIN)/python tests/property/limiter_states.py --states $(or $(STATES),10000000) --seed $(or $(SEED),2)
 
 # Memory of every process over a long flight.
-soak: $(STAMP)-test
+soak: $(STAMP)-test  ## memory of every process over a long flight; MINUTES=N
 	$(BIN)/python tests/sitl/soak.py --minutes $(or $(MINUTES),30)
 
-check: $(STAMP)-check
+check: $(STAMP)-check  ## ruff, mypy, import contracts
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-format: $(STAMP)-check
+format: $(STAMP)-check  ## format the sources
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-docs: $(STAMP)-docs
+docs: $(STAMP)-docs  ## the documentation as a site
 	$(BIN)/python -m sphinx -W --keep-going -b html docs docs/_build/html
 
 # After a change of a pin: the hashes of all files of each pinned release, from the registry; needs uv.
-hashes:
+hashes:  ## hashes of all pinned libraries
 	$(PYTHON) .ci/pin_hashes.py
 
 # The bill of materials of what is installed and needed to run.
-sbom: $(STAMP)
+sbom: $(STAMP)  ## bill of materials
 	$(BIN)/python .ci/supply_chain.py build/sbom.cdx.json
 
 # Known faults of the pinned libraries; needs pip-audit and a database in reach, and says so where they are missing.
-audit: $(STAMP)
+audit: $(STAMP)  ## known faults of the pinned libraries
 	@command -v pip-audit >/dev/null || { echo "audit skipped: pip-audit is not installed (pipx install pip-audit)"; exit 0; }; \
 	pip-audit --no-deps --disable-pip --requirement constraints.txt; code=$$?; \
 	test $$code -ne 2 || { echo "audit skipped: no database of vulnerabilities is in reach"; exit 0; }; exit $$code
 
-# Clients of others for the interoperability tests, each in an environment of its own.
-interop: $(INTEROP)/node/.installed $(INTEROP)/pyardrone/.installed $(INTEROP)/mavproxy/.installed $(INTEROP)/dronekit/.installed \
-	$(INTEROP)/zenoh_ros2/.installed
+# Clients by other projects for the interoperability tests, each in an environment of its own.
+interop: $(patsubst %,$(INTEROP)/%/.installed,node pyardrone mavproxy dronekit zenoh_ros2)  ## clients by other projects, for test-slow
 
 $(INTEROP)/node/.installed: tests/interop/package.json
 	@command -v npm >/dev/null || { echo "npm is missing: the tests with npm ar-drone are skipped without it"; exit 1; }
@@ -155,5 +157,5 @@ $(STAMP)-%: $(STAMP) requirements/%.txt
 	$(INSTALL) --only-binary :all: $(HASHED) requirements/$*.txt
 	@touch $@
 
-clean:
+clean:  ## remove the environments and all that was built
 	rm -rf $(VENV) $(INTEROP) docs/_build .mypy_cache .ruff_cache .pytest_cache .numba_cache

@@ -139,8 +139,8 @@ class DroneScenario(Section):
     air_unrest_m_s2: Annotated[float, Field(ge=0, le=5)] = 0.08
     """Random acceleration of a hovering drone by the air of the room, one sigma [m/s^2]."""
     moving_air_lean_deg: Annotated[float, Field(ge=0, le=20)] = 0.0
-    """How far the moving air of the room makes a drone lean that holds its place, at most [deg]; the reported tilt does
-    not say so, as on a real one."""
+    """Largest lean of a drone that holds its place in the room's moving air [deg]; as on a real one, its reported tilt
+    does not show it."""
     moving_air_correlation_s: Annotated[float, Field(gt=0, le=1000)] = 10.0
     """Correlation time of that air's speed and direction [s]."""
     downwash: bool = True
@@ -165,8 +165,9 @@ class CameraScenario(Section):
     video_jitter_ms: Annotated[float, Field(ge=0, le=500)] = 20.0
     """Half width of the uniform spread about that delay [ms]."""
     mounting_errors: bool = True
-    """Whether cameras, in the room and on drones, are off by what the field says of their mounting (attitude_std_deg,
-    position_std_m) and lens (the calibration's std), drawn from the seed; false: each is exactly as the field says."""
+    """Whether cameras, in the room and on drones, have errors of mounting (attitude_std_deg, position_std_m) and lens
+    (the calibration's std) with the field's deviations, drawn from the seed; false: each is exactly as the field
+    says."""
     frame_loss: Annotated[float, Field(ge=0, le=1)] = 0.05
     """Share of pictures that are lost; over TCP, that come 200 ms late."""
     corner_noise_px: Annotated[float, Field(ge=0, le=5)] = 0.2
@@ -202,7 +203,8 @@ class CommonScenario(Section):
     targets: dict[str, TargetScenario] = Field(default={})
     """What single targets do, by name."""
     drones: DroneScenario = DroneScenario()
-    """Every emulated AR.Drone; what all vehicles have that fly by optical flow, of Tellos and ROS 2's as well."""
+    """Every emulated AR.Drone. What all vehicles with optical flow have counts for Tellos and ROS 2 vehicles as
+    well."""
     cameras: CameraScenario = CameraScenario()
     """Every emulated camera."""
     faults: tuple[Fault, ...] = ()
@@ -214,7 +216,8 @@ class CommonScenario(Section):
     link_bursts: LinkBursts = LinkBursts()
     """Random times without a radio link, for each vehicle."""
     expected: ScenarioExpectation | None = None
-    """How `groundstation experiment scenarios` flies it, and what must come of it; the simulator does not read it."""
+    """How `groundstation experiment scenarios` flies it, and the results it must have; the simulator does not read
+    it."""
 
     def of_targets(self, names: Iterable[str]) -> dict[str, TargetScenario]:
         """Return what each target of a field does."""

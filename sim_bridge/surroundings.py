@@ -46,7 +46,7 @@ class LinkBursts(Section):
 
 
 class ScenarioExpectation(Section):
-    """How a scenario is flown by `groundstation experiment scenarios`, and what must come of it in each flight."""
+    """How a scenario is flown by `groundstation experiment scenarios`, and the results that each flight must have."""
 
     field: str = "lab"
     """The field that it is made for."""
@@ -59,6 +59,6 @@ class ScenarioExpectation(Section):
     lost_s: Annotated[float, Field(ge=0, le=3600)] | None = None
     """Longest time with an error above 0.5 m [s] after it was found; none: any."""
     found_s: Annotated[float, Field(ge=0, le=3600)] | None = None
-    """Latest time of finding it [s after the team tracks]; none: any."""
+    """Latest time at which the target is found [s after the team tracks]; none: any."""
     landings: Annotated[int, Field(ge=0, le=99)] = 0
     """How many drones may land."""

@@ -146,7 +146,7 @@ class Kidnap(Section):
     to_m: tuple[Place, Place] | None = None
     """Where to [x, y in m; world]; none: `distance_m` in a random direction."""
     distance_m: Annotated[float, Field(gt=0, le=100)] = 2.0
-    """How far where `to_m` is not told [m]; never beyond 0.5 m from a wall."""
+    """How far without `to_m` [m]; it stays 0.5 m or more from walls."""
 
 
 Path = FigureEight | Standstill | Anywhere | Waypoints | RandomWalk | Sprint | AlongWalls

@@ -12,7 +12,7 @@ class TelloSection(KindSection):
     """A Tello or RoboMaster TT in SDK mode."""
 
     local_address: Address = "0.0.0.0"
-    """IPv4 address of this computer that the state is received at (UDP 8890)."""
+    """IPv4 address of this computer at which the state is received (UDP 8890)."""
     video: bool = True
     """Ask it for the pictures of its own camera (`camera.source: tello://ADDRESS`), over and over while it stands."""
     full_speed_m_s: Annotated[float, Field(gt=0, le=8)] = 1.0

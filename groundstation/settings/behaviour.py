@@ -100,7 +100,7 @@ class SafetySettings(SettingsSection):
     """Safety limits and communication time-outs."""
 
     min_separation_m: Annotated[float, Field(ge=0.3, le=10)] = 0.6
-    """Least distance [m] between the centres of two drones; the velocity that would close it is cut before."""
+    """Least distance [m] between the centres of two drones; velocities that would go below it are limited before."""
     setpoint_lifetime_ms: Annotated[int, Field(ge=100, le=1000)] = 300
     """Time [ms] after which a setpoint expires; a drone without a fresh one hovers."""
     land_after_s: Annotated[float, Field(ge=0.5, le=30)] = 3.0

@@ -55,9 +55,10 @@ class MotionCaptureSettings(SettingsSection):
     yaw_deg: Heading = 0.0
     """Heading [deg; world] of its x axis, counter-clockwise."""
     delay_ms: Annotated[float, Field(ge=0, le=500)] = 5.0
-    """Time [ms] from exposure to arrival; with NatNet, of that only the network, since it tells its own processing."""
+    """Time [ms] from exposure to arrival; with NatNet only that of the network, since it reports its own processing
+    time."""
     rate_hz: Annotated[float, Field(ge=1, le=200)] = 30.0
-    """Poses per second that are used of it."""
+    """Poses per second that are used."""
     pose_std_m: Annotated[float, Field(gt=0, le=0.5)] = 0.003
     """Standard deviation [m] of a position, per axis."""
     heading_std_deg: Annotated[float, Field(gt=0, le=30)] = 1.0

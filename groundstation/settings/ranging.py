@@ -37,13 +37,13 @@ class RangingSettings(SettingsSection):
     delay_ms: Annotated[float, Field(ge=0, le=500)] = 20.0
     """Time [ms] from a measurement to the arrival of its datagram; an age in the datagram comes on top."""
     range_std_m: Annotated[float, Field(gt=0, le=2)] = 0.08
-    """Standard deviation [m] of one range, what lasts for seconds left out."""
+    """Standard deviation [m] of one range, without errors that last for seconds."""
     bias_std_m: Annotated[float, Field(gt=0, le=2)] = 0.05
-    """Standard deviation [m] of what an anchor's ranges are off by for seconds: survey, antenna, reflections."""
+    """Standard deviation [m] of errors of an anchor's ranges that last for seconds: survey, antenna, reflections."""
     outlier_share: Annotated[float, Field(ge=0, le=0.5)] = 0.02
-    """Share of ranges that come by a reflection, too long; simulation makes them, plans count so many less."""
+    """Share of ranges that are too long because of reflections; simulations have them, plans count on fewer ranges."""
     reach_m: Annotated[float, Field(gt=0, le=500)] = 30.0
     """Longest range [m]; a longer one is not used."""
     pad_heading_std_deg: Annotated[float, Field(gt=0, le=30)] = 10.0
-    """Standard deviation [deg] of the heading of a drone that was put on its pad. Ranges tell no heading to who stands:
-    it is that of the pad until the drone moves, or something else sees it."""
+    """Standard deviation [deg] of the heading of a drone that was put on its pad. Ranges show no heading of a standing
+    drone: it is that of the pad until the drone moves, or something else sees it."""

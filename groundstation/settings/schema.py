@@ -43,8 +43,8 @@ class Field(SettingsSection):
     ranging: dict[Name, RangingSettings] = Constraint(default_factory=dict)
     """Ranging systems (UWB and other radios), by name."""
     truth: dict[Literal["from"], Name] = Constraint(default_factory=dict)
-    """What judges a flight: `from`, the name of a motion capture system. It is recorded, every report has the errors of
-    the estimate against it, and the tracker does not hear it."""
+    """The truth that judges a flight: `from`, the name of a motion capture system. It is recorded, reports have the
+    estimate's errors against it, and the tracker does not receive it."""
     drones: Annotated[dict[Name, Drone], Constraint(min_length=1)]
     """The drones, by name."""
     target: TargetSettings | None = None

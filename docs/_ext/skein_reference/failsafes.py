@@ -9,8 +9,8 @@ Everything that stops a vehicle without an order, or keeps it from starting. Of 
 an order of a person (CUT_MOTORS, LAND, HOLD) needs no row. Times are those of the default settings; where a setting
 gives them it stands behind.
 
-A condition that is over is forgotten at once, or by so many seconds for each second without it: what comes and goes
-adds up. What needs TRACK or RESUME begins anew with it."""
+A condition that is over is forgotten at once, or by so many seconds for each second without it, so that conditions
+which come and go add up. TRACK and RESUME reset those that need them."""
 
 EVIDENCE: dict[Condition, str] = {
     Condition.EMERGENCY: "the vehicle says EMERGENCY, and no take-off is clearing one (2 s)",

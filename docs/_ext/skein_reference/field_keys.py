@@ -55,7 +55,8 @@ def _sections(tables: KeyTables, schema: Schema) -> Iterator[str]:
 
 
 def _section(heading: str, text: str, keys: Iterable[Key]) -> str:
-    return "\n\n".join([f"## {heading}", *([prose(text)] if text else []), keys_table(keys)])
+    rows = tuple(keys)  # none: the text says it all
+    return "\n\n".join([f"## {heading}", *([prose(text)] if text else []), *([keys_table(rows)] if rows else [])])
 
 
 _FIELD_INTRODUCTION = """\

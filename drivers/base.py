@@ -57,7 +57,7 @@ class Vehicle(Protocol):
 
 
 class HostProcess(Protocol):
-    """What a driver needs of its process; `groundstation.process.child.Child` is one."""
+    """The process as a driver needs it; `groundstation.process.child.Child` is one."""
 
     name: str
     section: str

@@ -20,7 +20,7 @@ class Reaction(StrEnum):
 
 
 class Latch(StrEnum):
-    """What ends a reaction."""
+    """The end of a reaction."""
 
     TAKEOFF = "a new TAKEOFF"
     RESUME = "TRACK or RESUME"

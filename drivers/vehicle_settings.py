@@ -41,7 +41,7 @@ class DriverSection(BaseModel):
 
 
 class VehicleLimits(DriverSection):
-    """What a vehicle is never asked to exceed."""
+    """Limits that no command to a vehicle exceeds."""
 
     max_speed_m_s: Positive = 0.6
     max_climb_m_s: Annotated[float, Field(gt=0, le=2)] = 0.4
@@ -110,7 +110,7 @@ def vehicle_limits(limits: DroneLimits) -> VehicleLimits:
 
 
 class VehicleDriverSettings(DriverSection):
-    """What the driver of one vehicle of any kind is told; a kind adds its own.
+    """The settings of the driver of one vehicle of any kind; a kind adds its own.
 
     interface: network adapter that the vehicle is behind ("": any); pad_m: where it takes off [x, y; world], None:
     unknown; velocity_scale: true velocity / reported velocity; raw_datagrams: whether they are recorded.

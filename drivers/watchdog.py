@@ -1,4 +1,4 @@
-"""Who may move a vehicle, and its present action: one state machine for all kinds of vehicles.
+"""Decides who may move a vehicle, and on its present action: one state machine for all kinds of vehicles.
 
 Pure: `now_ns` and inputs in, a decision out. Priority: CUT_MOTORS > LAND > HOLD > setpoint > TAKEOFF. LAND latches
 until a new TAKEOFF. Stops without an order follow the table of `failsafe_table.py`. Tables:

@@ -12,7 +12,7 @@ from sim_bridge.section import Section
 
 
 class FaultKind(StrEnum):
-    """What a scenario can break; `Fault.kind` explains each."""
+    """Faults that a scenario can have; `Fault.kind` explains each."""
 
     NAVDATA_SILENT = "navdata_silent"
     AT_DEAF = "at_deaf"

@@ -32,7 +32,7 @@ class FlightConfiguration(DriverSection):
 
 
 class Video(DriverSection):
-    """What the drone sends over TCP 5555 to whoever connects; bitrate [kbit/s], constant; none: the drone's own."""
+    """The video that the drone sends over TCP 5555 to any client; bitrate [kbit/s], constant; none: the drone's own."""
 
     codec: VideoCodec = "h264_360p"
     channel: Literal["front", "bottom"] = "front"

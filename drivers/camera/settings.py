@@ -25,7 +25,7 @@ SEARCH_RATE_HZ = 2.0
 
 
 class SourceKind(StrEnum):
-    """What pictures can come from."""
+    """Kinds of sources of pictures."""
 
     HTTP = "http"
     RTSP = "rtsp"
@@ -138,7 +138,7 @@ class CalibrationSettings(_Section):
 
 
 class MarkerKind(StrEnum):
-    """What carries a marker."""
+    """Kinds of carriers of a marker."""
 
     ROBOT = "robot"
     TARGET = "target"

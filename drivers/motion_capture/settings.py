@@ -21,7 +21,7 @@ Span = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class PoseProtocol:
-    """What poses come by: its usual port (0: none), what reads it, and what its address may have beside a host.
+    """A protocol for poses: its usual port (0: none), what reads it, and what its address may have beside a host.
 
     reader: "module:class", made from a SystemAddress, a `drivers.motion_capture.sources.Source`; paths: a path and a
     query; any_port: another port than the usual one.

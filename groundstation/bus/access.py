@@ -17,7 +17,7 @@ _ABOUT_OTHERS = frozenset({EVENT, PROCESS_STATUS})
 
 @dataclass(frozen=True, slots=True)
 class AccessList:
-    """What a router grants: the site, and everybody who may join."""
+    """The access that a router grants: the site, and all members that may join."""
 
     site: str
     members: tuple[Member, ...]

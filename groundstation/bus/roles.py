@@ -1,11 +1,11 @@
-"""Who takes part in a run: the roles that the table of topics and the access control speak of."""
+"""The roles of a run's members, as the table of topics and the access control name them."""
 
 from dataclasses import dataclass
 from enum import StrEnum
 
 
 class Role(StrEnum):
-    """What a member of the bus is there for."""
+    """Purpose of a member of the bus."""
 
     SUPERVISOR = "supervisor"
     """The run's main process: watches the others, and is the operator's hands."""
@@ -79,7 +79,7 @@ SHELLS = (
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """What a process joins with: the folder of its run's certificates, and the name in its own.
+    """The means to join: the folder of the run's certificates, and the name in the process's own.
 
     run: name of the run; an order carries it.
     """

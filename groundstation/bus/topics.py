@@ -21,7 +21,7 @@ class Quality(StrEnum):
 
 
 class Plane(StrEnum):
-    """Which key space a topic lives in; production wildcards match neither `@truth` nor `@sim`."""
+    """The key space of a topic; production wildcards match neither `@truth` nor `@sim`."""
 
     PRODUCTION = ""
     """Everything that flies."""

@@ -1,4 +1,4 @@
-"""Which sightings of a recording a team can be fitted to."""
+"""Selects the sightings of a recording that a team is fitted to."""
 
 from collections.abc import Collection
 

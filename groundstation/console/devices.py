@@ -27,7 +27,7 @@ _COOKIE = "__Host-skein"
 
 
 class DeviceRole(StrEnum):
-    """What a device may do."""
+    """Rights of a device."""
 
     WATCH = "watch"
     """Look."""

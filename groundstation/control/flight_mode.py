@@ -5,7 +5,7 @@ from enum import StrEnum
 
 
 class FlightMode(StrEnum):
-    """What determines a robot's setpoint."""
+    """The rule that determines a robot's setpoint."""
 
     UNKNOWN = "UNKNOWN"  # not in the belief: hover until a camera sees it
     RETURN = "RETURN"  # badly localised, or unseen for too long: back to the middle of the world-fixed cameras' view

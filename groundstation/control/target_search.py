@@ -33,7 +33,7 @@ _TIPPED_M = 0.08  # error of a picture at the distance of a target, since the ro
 
 
 class SearchMode(StrEnum):
-    """What the team does about one target."""
+    """State of the search for one target."""
 
     TRACK = "TRACK"  # it is seen, or was a moment ago
     SEARCH = "SEARCH"  # the team looks for it where it may be

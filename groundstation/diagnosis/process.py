@@ -16,7 +16,7 @@ _PERIOD_NS = 100 * NS_PER_MS
 
 
 class DiagnosisSection(msgspec.Struct, frozen=True):
-    """What the supervisor hands to the diagnosis: the resolved field."""
+    """The diagnosis's section: the resolved field."""
 
     field: ResolvedField
 

@@ -1,4 +1,4 @@
-"""Which parts of a simulated run are real (`--real drone_2=autopilot:19410`, `--real ceiling`), and their needs."""
+"""The real parts of a simulated run (`--real drone_2=autopilot:19410`, `--real ceiling`), and their needs."""
 
 import ipaddress
 from collections.abc import Iterable, Mapping

@@ -1,4 +1,4 @@
-"""Who holds a port of this machine: the kernel's tables of sockets, and the descriptors of processes."""
+"""Finds who holds a port of this machine, by the kernel's tables of sockets and the descriptors of processes."""
 
 import errno
 import os

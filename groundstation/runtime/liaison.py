@@ -33,7 +33,7 @@ _START_NS = 15 * NS_PER_S
 
 
 class LiaisonSection(msgspec.Struct, frozen=True):
-    """What the supervisor hands to a liaison: the other host, the version of the program, the field as JSON."""
+    """A liaison's section: the other host, the version of the program, the field as JSON."""
 
     host: str
     version: str

@@ -17,7 +17,7 @@ _PERIOD_NS = 84 * NS_PER_MS
 
 
 class MonitorSection(msgspec.Struct, frozen=True):
-    """What the supervisor hands to the monitor: the resolved field."""
+    """The monitor's section: the resolved field."""
 
     field: ResolvedField
 

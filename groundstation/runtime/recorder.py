@@ -36,7 +36,7 @@ _CONSEQUENCE = {
 
 
 class RecorderSection(msgspec.Struct, frozen=True):
-    """What the supervisor hands to the recorder: the resolved field as JSON, the run folder, the tracker's epoch."""
+    """The recorder's section: the resolved field as JSON, the run folder, the tracker's epoch."""
 
     field: msgspec.Raw
     run_dir: str

@@ -20,7 +20,7 @@ _LINGER_NS = 25 * NS_PER_S
 
 
 class RouterSection(msgspec.Struct, frozen=True):
-    """What the supervisor hands to the router: where to listen, and whom to let in (None: everybody).
+    """The router's section: where to listen, and whom to let in (None: everybody).
 
     also: further endpoints, for other hosts. name_refusals: whether events name members that publish without the right
     to.

@@ -35,7 +35,7 @@ EPOCHS_PER_LIFE = 1000  # the tracker begins a new epoch itself when its belief 
 
 
 class TrackerSection(msgspec.Struct, frozen=True):
-    """What the supervisor hands to the tracker: the resolved field, the life's number."""
+    """The tracker's section: the resolved field, the life's number."""
 
     field: ResolvedField
     epoch: int = 0

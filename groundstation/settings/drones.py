@@ -26,7 +26,7 @@ Delay = Annotated[float, Field(ge=0, le=1000)]
 
 
 class LimitSettings(SettingsSection):
-    """What a drone is never commanded to exceed, and when its battery makes it land."""
+    """Limits that no command to a drone exceeds, and the charge at which it lands."""
 
     max_speed_m_s: Annotated[float, Field(gt=0, le=3)] = 0.6
     """Largest horizontal speed [m/s] that is commanded."""

@@ -11,7 +11,7 @@ Heading = Annotated[float, Field(ge=-180, le=180)]
 
 
 class RigidBodySettings(SettingsSection):
-    """What a motion capture system calls the body on a drone or target, and how the body sits on it."""
+    """A motion capture system's body on a drone or target: its name in the system, and where it sits."""
 
     name: Annotated[str, Field(max_length=100)] = ""
     """The body's name in the system; empty: that of the drone or target."""

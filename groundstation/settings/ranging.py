@@ -10,7 +10,7 @@ from groundstation.settings.values import HostName, Name, OnVehicle, SettingsSec
 
 
 class TransponderSettings(SettingsSection):
-    """What a ranging system calls the transponder on a drone, and where it sits."""
+    """The transponder of a ranging system on a drone: its name there, and its place on the drone."""
 
     name: Annotated[str, Field(max_length=100)] = ""
     """The transponder's name in the system; empty: that of the drone."""

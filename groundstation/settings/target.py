@@ -44,7 +44,7 @@ class TargetMarkerSettings(MarkerSettings):
 
 
 class TargetOdometrySettings(SettingsSection):
-    """What a target says of its own motion: a sensor besides the cameras, which overrule it."""
+    """A target's report of its own motion: a sensor besides the cameras, which overrule it."""
 
     source: Annotated[str, read_by(parse_source)]
     """The topic of its nav_msgs/Odometry behind a ROS 2 Zenoh router: ros2://192.168.1.20/odom?domain=0 (port 7447 and

@@ -25,7 +25,7 @@ _HEARD_NS = 200 * NS_PER_MS
 
 @dataclass(frozen=True, slots=True)
 class OwnState:
-    """What this host reports; run: the run that it serves, "" for none."""
+    """Report of this host; run: the run that it serves, "" for none."""
 
     run: str = ""
     state: Lifecycle = Lifecycle.STARTING

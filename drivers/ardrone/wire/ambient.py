@@ -88,7 +88,7 @@ class Wifi(NamedTuple):
 
 
 class Zimmu3000(NamedTuple):
-    """What option 27 was before it became GPS."""
+    """Option 27 as it was before it became GPS."""
 
     vz_lsb: int = 0
     vz: float = 0.0

@@ -13,7 +13,7 @@ Scalar = bool | int | float | str
 
 
 class Category(StrEnum):
-    """Which set a key is stored in; all but COMMON may differ between multi-configuration ids."""
+    """The set that a key is stored in; all but COMMON may differ between multi-configuration ids."""
 
     COMMON = "common"
     APPLICATION = "applis"
@@ -22,7 +22,7 @@ class Category(StrEnum):
 
 
 class Access(StrEnum):
-    """Who may write: nobody, everybody, or only a custom (non-zero) set of ids."""
+    """Right to write: of nobody, everybody, or only a custom (non-zero) set of ids."""
 
     READ = "R"
     WRITE = "RW"

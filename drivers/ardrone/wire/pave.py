@@ -21,7 +21,7 @@ _LARGEST_PAYLOAD = 4_000_000
 
 
 class FrameType(IntEnum):
-    """What a frame holds; a decoder can start at an IDR."""
+    """Kind of a frame; a decoder can start at an IDR."""
 
     UNKNOWN = 0
     IDR = 1

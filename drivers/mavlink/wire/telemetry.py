@@ -206,7 +206,7 @@ class Statustext(NamedTuple):
 
 
 class AutopilotVersion(NamedTuple):
-    """What it is and can."""
+    """Firmware and capabilities of an autopilot."""
 
     capabilities: int
     flight_sw_version: int

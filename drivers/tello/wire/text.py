@@ -27,7 +27,7 @@ class WireError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """What the vehicle reports, in its own units.
+    """The vehicle's report, in its own units.
 
     pitch, roll, yaw: degrees, yaw clockwise; velocity: dm/s along north-east-down axes in which yaw is 0; tof: distance
     to the floor [cm], or NO_ECHO_CM; height: above the take-off [cm]; battery [%]; time: of the motors [s];

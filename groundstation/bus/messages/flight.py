@@ -9,7 +9,7 @@ from groundstation.time_units import NS_PER_S
 
 
 class FlightState(StrEnum):
-    """What the vehicle reports of its flight."""
+    """State of the flight, as the vehicle reports it."""
 
     UNKNOWN = "UNKNOWN"
     """Not reported yet."""
@@ -178,7 +178,7 @@ class CommandAck(Message, frozen=True, kw_only=True):
 
 
 class Lease(Message, frozen=True, kw_only=True):
-    """Who is the operator: drivers accept TAKEOFF, TRACK and RESUME from the holder only."""
+    """The operator's lease: drivers accept TAKEOFF, TRACK and RESUME from its holder only."""
 
     holder: str
     """The operator's process."""

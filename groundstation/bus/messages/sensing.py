@@ -17,7 +17,7 @@ class ImuSample(Message, frozen=True, kw_only=True):
 
 
 class Odometry(Message, frozen=True, kw_only=True):
-    """What a vehicle measured of its own motion; never an integral of ours."""
+    """A vehicle's measurement of its own motion; never an integral of ours."""
 
     velocity_m_s: Vector3
     """Velocity [m/s; base_stabilized, FLU]."""

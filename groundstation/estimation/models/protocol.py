@@ -21,7 +21,7 @@ class MotionModel(Protocol):
 
     @property
     def kind(self) -> EntityKind:
-        """What the block describes."""
+        """Kind of entity that the block describes."""
 
     @property
     def labels(self) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""Which neighbours are best where the current topology is: no step of theirs helps, as far as the tolerance asks.
+"""Finds the neighbours that are best where the current topology is: no step of theirs helps, within the tolerance.
 
 In a large team that is what most survivors of the bounds are found to be, each with one evaluation. `moved` says the
 same within the square of a robot's share; how far it is believed, it has shown on a move between the same levels.

@@ -8,7 +8,8 @@ import numpy as np
 
 from groundstation.arrays import Matrix
 from groundstation.kernel import kernel
-from groundstation.planning.dense import PIVOTS, copy_upper, negative_inverse, padded, subtract_products
+from groundstation.planning.dense import PIVOTS, copy_upper, padded, subtract_products
+from groundstation.planning.elimination import negative_inverse
 from groundstation.planning.records import TARGET_STATES, CostOptions
 
 

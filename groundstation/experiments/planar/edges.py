@@ -5,15 +5,16 @@ and every loop over them runs on contiguous memory. Row 0 is the global sensor a
 robot a. Ranges are unsigned: signed indices are tested for counting from the end, and nothing is vectorised.
 """
 
-import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from groundstation.arrays import IntVector, Matrix, Vector
 from groundstation.experiments.planar.records import Observers, PlanarProblem, Workspace, X, Y
 from groundstation.kernel import kernel
+from groundstation.planning.lanes import LANES, MAGIC, Lanes, eights, in_lanes, index, nothing, repeated
 
-MAGIC = 6755399441055744.0  # 1.5 * 2^52: adding it leaves the nearest integer in the low bits of a float64
 FARTHEST = 40.0  # exponent beyond which a reading carries no information; below its negative, all
 
 
@@ -63,98 +64,162 @@ def exponentials(x: Vector, out: Vector, count: int) -> None:
         out[e] *= x[e]
 
 
-@kernel(contract=True)
-def edge_information(i: int, problem: PlanarProblem, work: Workspace) -> None:
-    """Write step i's distance d [m] and information w [1/m^2] of each edge."""
-    constants, observers = problem.constants, work.observers
-    position, distance, information, exponent = work.position, work.distance, work.weights, work.scratch
-    sigma, reach, epsilon, tail = constants.sigma_m, constants.range_m, constants.epsilon_m, constants.tail
-    steepness, rounding = 1.0 / constants.softness_m, epsilon * epsilon
-    rows = observers.edge.shape[0] - 1
-    count = observers.edge[rows]
-    for row in range(rows):
-        x = position[i, X, row - 1] if row > 0 else 0.0
-        y = position[i, Y, row - 1] if row > 0 else 0.0
-        first, end, shift = observers.first[row], observers.end[row], observers.edge[row] - observers.first[row]
-        for b in range(first, end):
-            dx, dy = position[i, X, b] - x, position[i, Y, b] - y
-            distance[i, b + shift] = dx * dx + dy * dy
-    for e in range(count):
-        d = math.sqrt(distance[i, e] + rounding)
-        distance[i, e] = d
-        exponent[e] = min(max((d - reach) * steepness, -FARTHEST), FARTHEST)
-    exponentials(exponent, information[i], int(np.int64(count)))
-    weight, square = 1.0 / (sigma * sigma), reach * reach
-    for e in range(count):
-        information[i, e] = weight / (1.0 + information[i, e])
-    if tail > 0.0:
-        for e in range(count):
-            d = distance[i, e]
-            information[i, e] += weight * tail * square / (square + d * d)
+class Edges(NamedTuple):
+    """One observer's edges: place of the observer, subjects, first edge, and its position [m]; seen: 0 for the sensor.
 
-
-@kernel(contract=True, reassociate=True)
-def add_laplacian(matrix: Matrix, observers: Observers, information: Matrix, i: int) -> None:
-    """Add sum_e w_e a_e a_e^T of step i to the upper triangle; observers come before their subjects."""
-    for row in range(observers.edge.shape[0] - 1):
-        first, end, shift = observers.first[row], observers.end[row], observers.edge[row] - observers.first[row]
-        for b in range(first, end):
-            matrix[b, b] += information[i, b + shift]
-        if row > 0:
-            total = 0.0
-            for b in range(first, end):
-                total += information[i, b + shift]
-                matrix[row - 1, b] -= information[i, b + shift]
-            matrix[row - 1, row - 1] += total
-
-
-@kernel(contract=True, reassociate=True)
-def position_gradient(i: int, problem: PlanarProblem, work: Workspace) -> None:
-    """Write dc/dposition of step i (2, m): dc/dw = -sum_c (Y[c, b] - Y[c, a])^2.
-
-    With v the tail's part of w: dw/dd = -(w - v) (1 - sigma^2 (w - v)) / s - 2 v d / (r^2 + d^2).
+    The global sensor has no place among the entities: it is given the first one, and nothing is added there.
     """
-    constants, observers, gradient, columns = problem.constants, work.observers, work.gradient, work.columns
-    position, distance, information, slope = work.position, work.distance, work.weights, work.scratch
-    sigma2, steepness = constants.sigma_m * constants.sigma_m, 1.0 / constants.softness_m
-    square, scale = constants.range_m * constants.range_m, constants.step_s * constants.max_speed_m_s
-    tail = constants.tail * square / sigma2
-    used = position.shape[0] - i
+
+    place: int
+    first: int
+    end: int
+    edge: int
+    seen: float
+    x: float
+    y: float
+
+
+@kernel(inlined=True)
+def _edges(row: int, i: int, work: Workspace) -> Edges:
+    """Return an observer's edges in step i."""
+    observers, position, place, seen = work.observers, work.position, max(row - 1, 0), 1.0 if row > 0 else 0.0
+    first, end = int(np.int64(observers.first[row])), int(np.int64(observers.end[row]))
+    edge = int(np.int64(observers.edge[row]))
+    return Edges(place, first, end, edge, seen, seen * position[i, X, place], seen * position[i, Y, place])
+
+
+@in_lanes
+def _place(b: Any, position: Any, square: Any, i: Any, edges: Any, more: Any) -> None:
+    """Write the squared distances from an observer to its subjects, and `more`.
+
+    The last eight reach into the next observer's edges, which are written after these.
+    """
+
+    def eight(k: Any, carried: list[Lanes]) -> list[Lanes]:
+        done = b.mul(k, index(LANES))
+        at = b.add(edges.first, done)
+        dx, dy = position.read(i, index(X), at).minus(edges.x), position.read(i, index(Y), at).minus(edges.y)
+        square.write(dx.squared().plus(dy.squared().plus(more)), i, b.add(edges.edge, done))
+        return carried
+
+    repeated(b, eights(b, edges.first, edges.end), [], eight)
+
+
+class _Sensor(NamedTuple):
+    range_m: float
+    steepness: float
+    weight: float
+    tail: float
+
+
+def _informed(tailed: bool) -> Callable[..., None]:
+    """Return what writes information and slope of a step's edges, from the squared distances where the slope goes."""
+
+    def write(b: Any, slope: Any, information: Any, i: Any, count: Any, sensor: Any) -> None:
+        reach, steepness, weight = sensor.range_m, sensor.steepness, sensor.weight
+
+        def eight(k: Any, carried: list[Lanes]) -> list[Lanes]:
+            edge = b.mul(k, index(LANES))
+            square = slope.read(i, edge)
+            near = square.inverse_root()
+            exponent = square.times(near).minus(reach).times(steepness).within(-FARTHEST, FARTHEST)
+            seen = exponent.exponential().plus(1.0).inverse()
+            w = weight.times(seen)
+            falling = w.times(seen.subtracted_from(1.0)).times(steepness).times(near)
+            if tailed:
+                far = reach.squared()
+                beyond = square.plus(far).inverse()
+                lasting = weight.times(sensor.tail).times(far).times(beyond)
+                w, falling = w.plus(lasting), falling.plus(lasting.times(beyond).times(2.0))
+            information.write(w, i, edge)
+            slope.write(falling, i, edge)
+            return carried
+
+        repeated(b, eights(b, index(0), count), [], eight)
+
+    return in_lanes(write)
+
+
+_inform, _inform_with_tail = _informed(False), _informed(True)
+
+
+@kernel()
+def edge_information(i: int, problem: PlanarProblem, work: Workspace) -> None:
+    """Write information w [1/m^2] and slope -dw/dd / d [1/m^4] of each edge in step i, d being its length.
+
+    With v the tail's part of w: -dw/dd = (w - v) (1 - sigma^2 (w - v)) / s + 2 v d / (r^2 + d^2).
+    """
+    constants, observers, rows = problem.constants, work.observers, work.observers.edge.shape[0] - 1
+    weight, rounding = 1.0 / (constants.sigma_m * constants.sigma_m), constants.epsilon_m * constants.epsilon_m
+    sensor = _Sensor(constants.range_m, 1.0 / constants.softness_m, weight, constants.tail)
+    for row in range(rows):
+        _place(work.position, work.slopes, i, _edges(row, i, work), rounding)
+    if constants.tail > 0.0:
+        _inform_with_tail(work.slopes, work.weights, i, observers.edge[rows], sensor)
+    else:
+        _inform(work.slopes, work.weights, i, observers.edge[rows], sensor)
+
+
+@in_lanes
+def _spread(b: Any, matrix: Any, diagonal: Any, information: Any, i: Any, edges: Any) -> None:
+    """Subtract the information of one observer's edges from its row, and add it to the diagonal of both ends."""
+
+    def eight(k: Any, carried: list[Lanes]) -> list[Lanes]:
+        done = b.mul(k, index(LANES))
+        at = b.add(edges.first, done)
+        w = information.read(i, b.add(edges.edge, done)).first(b.sub(edges.end, at))
+        diagonal.write(diagonal.read(at).plus(w), at)
+        w = w.times(edges.seen)
+        matrix.write(matrix.read(edges.place, at).minus(w), edges.place, at)
+        return [carried[0].plus(w)]
+
+    (total,) = repeated(b, eights(b, edges.first, edges.end), [nothing(b)], eight)
+    diagonal.add_one(total.sum(), edges.place)
+
+
+@kernel()
+def add_laplacian(matrix: Matrix, i: int, work: Workspace) -> None:
+    """Add sum_e w_e a_e a_e^T of step i to the upper triangle; observers come before their subjects."""
+    diagonal = work.scratch
+    for a in range(diagonal.shape[0]):
+        diagonal[a] = 0.0
+    for row in range(work.observers.edge.shape[0] - 1):
+        _spread(matrix, diagonal, work.weights, i, _edges(row, i, work))
+    for a in range(matrix.shape[0]):
+        matrix[a, a] += diagonal[a]
+
+
+@in_lanes
+def _pull(b: Any, columns: Any, slope: Any, position: Any, gradient: Any, i: Any, edges: Any, scale: Any) -> None:
+    """Add one observer's edges to the gradient at both ends."""
+    used = b.sub(columns.shape(0), i)
+
+    def eight(k: Any, carried: list[Lanes]) -> list[Lanes]:
+        done = b.mul(k, index(LANES))
+        at = b.add(edges.first, done)
+
+        def column(c: Any, sums: list[Lanes]) -> list[Lanes]:
+            difference = columns.read(i, c, at).minus(columns.one(i, c, edges.place).times(edges.seen))
+            return [difference.squared().plus(sums[0])]
+
+        sensitivity = repeated(b, used, [nothing(b)], column)[0].times(scale)
+        factor = sensitivity.times(slope.read(i, b.add(edges.edge, done))).first(b.sub(edges.end, at))
+        totals = []
+        for axis, own, total in zip((X, Y), (edges.x, edges.y), carried, strict=True):
+            force = factor.times(position.read(i, index(axis), at).minus(own))
+            gradient.write(gradient.read(i, index(axis), at).plus(force), i, index(axis), at)
+            totals.append(total.minus(force.times(edges.seen)))
+        return totals
+
+    totals = repeated(b, eights(b, edges.first, edges.end), [nothing(b)] * 2, eight)
+    for axis, total in zip((X, Y), totals, strict=True):
+        gradient.add_one(total.sum(), i, index(axis), edges.place)
+
+
+@kernel()
+def position_gradient(i: int, problem: PlanarProblem, work: Workspace) -> None:
+    """Write dc/dposition of step i (2, m): dc/dw = -sum_c (Y[c, b] - Y[c, a])^2."""
+    gradient, scale = work.gradient, problem.constants.step_s * problem.constants.max_speed_m_s
     gradient[i, :, :] = 0.0
-    for row in range(observers.edge.shape[0] - 1):
-        first, end, shift = observers.first[row], observers.end[row], observers.edge[row] - observers.first[row]
-        x, y = 0.0, 0.0
-        if row > 0:
-            x, y = position[i, X, row - 1], position[i, Y, row - 1]
-        # Two columns at a time, the odd one first: levels are short, and each loop over one costs its start.
-        odd = used % 2
-        for b in range(first, end):
-            difference = columns[i, 0, b] - (columns[i, 0, row - 1] if row > 0 else 0.0)
-            slope[b] = odd * difference * difference
-        for c in range(odd, used, 2):
-            own = columns[i, c, row - 1] if row > 0 else 0.0
-            other = columns[i, c + 1, row - 1] if row > 0 else 0.0
-            for b in range(first, end):
-                difference = columns[i, c, b] - own
-                slope[b] += difference * difference + (columns[i, c + 1, b] - other) * (columns[i, c + 1, b] - other)
-        sum_x, sum_y = 0.0, 0.0
-        if tail > 0.0:
-            for b in range(first, end):
-                d = distance[i, b + shift]
-                beyond = 1.0 / (square + d * d)
-                w = information[i, b + shift] - tail * beyond
-                slope[b] *= w * (1.0 - sigma2 * w) * steepness / d + 2.0 * tail * beyond * beyond
-        else:
-            for b in range(first, end):
-                w = information[i, b + shift]
-                slope[b] *= w * (1.0 - sigma2 * w) * steepness / distance[i, b + shift]
-        for b in range(first, end):
-            factor = scale * slope[b]
-            fx, fy = factor * (position[i, X, b] - x), factor * (position[i, Y, b] - y)
-            gradient[i, X, b] += fx
-            gradient[i, Y, b] += fy
-            sum_x += fx
-            sum_y += fy
-        if row > 0:
-            gradient[i, X, row - 1] -= sum_x
-            gradient[i, Y, row - 1] -= sum_y
+    for row in range(work.observers.edge.shape[0] - 1):
+        _pull(work.columns, work.slopes, work.position, gradient, i, _edges(row, i, work), scale)

@@ -9,6 +9,7 @@ from groundstation.experiments.planar.records import Observers, PlanarProblem, W
 from groundstation.experiments.planar.rollout import predicted_information
 from groundstation.kernel import kernel
 from groundstation.planning.dense import cholesky_upper, padded
+from groundstation.planning.lanes import LANES
 
 # The information-form predict loses eps * max(D P) relative accuracy: beyond this the covariance form is used.
 STABLE_ABOVE = 1e6
@@ -17,7 +18,7 @@ STABLE_ABOVE = 1e6
 def make_workspace(robots: int, steps: int) -> Workspace:
     """Return scratch memory; edges of n robots never exceed those of two equal levels, n^2 / 4 + n + 1."""
     size = robots + 1
-    m, edges = padded(size), padded(robots * robots // 4 + robots + 2)
+    m, edges = padded(size), padded(robots * robots // 4 + robots + 2) + LANES
     prior = zeros_on_a_line((steps, m, m))
     prior[:] = np.eye(m)
     return Workspace(
@@ -30,11 +31,11 @@ def make_workspace(robots: int, steps: int) -> Workspace:
         square=zeros_on_a_line((m, m)),
         panel=zeros_on_a_line((8, m)),
         columns=zeros_on_a_line((steps, steps + 3, m)),
-        distance=zeros_on_a_line((steps, edges)),
+        slopes=zeros_on_a_line((steps, edges)),
         weights=zeros_on_a_line((steps, edges)),
-        scratch=zeros_on_a_line((max(edges, m),)),
-        position=zeros_on_a_line((steps, 2, m)),
-        gradient=zeros_on_a_line((steps, 2, m)),
+        scratch=zeros_on_a_line((m + LANES,)),
+        position=zeros_on_a_line((steps, 2, m + LANES)),
+        gradient=zeros_on_a_line((steps, 2, m + LANES)),
     )
 
 

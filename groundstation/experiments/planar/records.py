@@ -56,8 +56,8 @@ class Workspace(NamedTuple):
     """Scratch arrays of the kernels, and the topology at hand, its team sorted by level.
 
     order (n + 1): the entity at each sorted place; mean (2, m) and variance (n + 1) in sorted order; prior and
-    factor (h, m, m); square (m, m) and panel (8, m); columns (h, h + 3, m); distance and weights (h, edges): of each
-    edge in each step [m, 1/m^2]; position and gradient (h, 2, m).
+    factor (h, m, m); square (m, m) and panel (8, m); columns (h, h + 3, m); slopes and weights (h, edges): of each
+    edge in each step, see `edge_information`; position and gradient (h, 2, m).
     """
 
     order: IntVector
@@ -69,7 +69,7 @@ class Workspace(NamedTuple):
     square: Matrix
     panel: Matrix
     columns: MatrixStack
-    distance: Matrix
+    slopes: Matrix
     weights: Matrix
     scratch: Vector
     position: MatrixStack

@@ -10,7 +10,8 @@ from groundstation.arrays import Matrix, MatrixStack, Vector
 from groundstation.experiments.planar.edges import add_laplacian
 from groundstation.experiments.planar.records import PlanarProblem, Workspace
 from groundstation.kernel import kernel
-from groundstation.planning.dense import cholesky_upper, copy_upper, negative_inverse, subtract_products
+from groundstation.planning.dense import copy_upper, subtract_products
+from groundstation.planning.elimination import eliminate, eliminate_and_invert, negative_inverse, solve_for_columns
 
 
 @kernel()
@@ -36,12 +37,8 @@ def predicted_information(covariance: Matrix, variance: Vector, out: Matrix, pan
 
 
 @kernel(contract=True)
-def _predict(prior: MatrixStack, i: int, variance: Vector, size: int, square: Matrix, panel: Matrix) -> bool:
-    """Write Lm_{i+1} from L_i, which stands in `square`."""
-    for a in range(size):
-        square[a, a] += 1.0 / variance[a]
-    if not negative_inverse(square, panel):
-        return False
+def _predict(prior: MatrixStack, i: int, variance: Vector, size: int, square: Matrix, panel: Matrix) -> None:
+    """Write Lm_{i+1} from -(L_i + D)^-1, which stands in `square`."""
     for b in range(size):
         panel[0, b] = 1.0 / variance[b]
     for a in range(size):
@@ -49,7 +46,6 @@ def _predict(prior: MatrixStack, i: int, variance: Vector, size: int, square: Ma
         for b in range(np.uint64(a & ~7), np.uint64(size)):
             prior[i + 1, a, b] = da * square[a, b] * panel[0, b]
         prior[i + 1, a, a] += da
-    return True
 
 
 @kernel()
@@ -101,25 +97,28 @@ def rollout_cost(problem: PlanarProblem, work: Workspace) -> float:
     triangles).
     """
     prior, factor, variance, square, panel = work.prior, work.factor, work.variance, work.square, work.panel
-    observers, information, discount = work.observers, work.weights, problem.constants.discount
+    discount = problem.constants.discount
     steps, size = prior.shape[0], variance.shape[0]
     target = size - 1
     cost, weight = 0.0, 1.0
     for i in range(steps):
         _copy(prior, i, factor)
-        add_laplacian(factor[i], observers, information, i)
-        if i + 1 < steps:
+        add_laplacian(factor[i], i, work)
+        if i + 1 == steps:
+            sound = eliminate(factor[i], panel)
+        elif problem.stable:
             _copy_one(factor, i, square)
-        if not cholesky_upper(factor[i]):
+            sound = eliminate(factor[i], panel) and _predict_through_covariance(prior, i, variance, size, square, panel)
+        else:
+            _copy_one(factor, i, square)
+            for a in range(size):
+                square[a, a] += 1.0 / variance[a]
+            sound = eliminate_and_invert(factor[i], square, panel)
+            _predict(prior, i, variance, size, square, panel)
+        if not sound:
             return -1.0
         weight *= discount
-        cost += 2.0 * weight / (factor[i, target, target] * factor[i, target, target])
-        if i + 1 < steps:
-            if problem.stable:
-                if not _predict_through_covariance(prior, i, variance, size, square, panel):
-                    return -1.0
-            elif not _predict(prior, i, variance, size, square, panel):
-                return -1.0
+        cost += 2.0 * weight * factor[i, target, target]
     return cost
 
 
@@ -127,13 +126,14 @@ def rollout_cost(problem: PlanarProblem, work: Workspace) -> float:
 def adjoint_columns(discount: float, work: Workspace) -> None:
     """Write the rank-one adjoints: columns[i, 0..h-1-i] = Y_i, so that dc/dw_ab,i = -sum_c (Y[c, b] - Y[c, a])^2.
 
-    Each step adds L_i^-1 e_t; older columns go from step i to i - 1 by L_{i-1}^-1 Lm_i = 1 - Q Lm_i, which is cheaper
-    than a solve and needs nothing but Lm_i.
+    Each step adds L_i^-1 e_t, weighted; older columns go from step i to i - 1 by L_{i-1}^-1 Lm_i = 1 - Q Lm_i, which is
+    cheaper than a solve and needs nothing but Lm_i.
     """
     prior, factor, variance, columns = work.prior, work.factor, work.variance, work.columns
-    steps, m, target = prior.shape[0], prior.shape[1], variance.shape[0] - 1
+    steps, target = prior.shape[0], variance.shape[0] - 1
+    solve_for_columns(factor, columns, target)
     for i in range(steps - 1, -1, -1):
-        own = steps - 1 - i
+        own, weight = steps - 1 - i, np.sqrt(2.0 * discount ** (i + 1))
         if i + 1 < steps:
             copy_upper(prior[i + 1])
             columns[i, :own, :] = 0.0
@@ -141,11 +141,5 @@ def adjoint_columns(discount: float, work: Workspace) -> None:
             for c in range(own):
                 for a in range(target + 1):
                     columns[i, c, a] = columns[i + 1, c, a] + variance[a] * columns[i, c, a]
-        for a in range(m):
-            columns[i, own, a] = 0.0
-        columns[i, own, target] = np.sqrt(2.0 * discount ** (i + 1)) / factor[i, target, target] ** 2
-        for a in range(target - 1, -1, -1):
-            total = 0.0
-            for b in range(np.uint64(a + 1), np.uint64(target + 1)):
-                total += factor[i, a, b] * columns[i, own, b]
-            columns[i, own, a] = -total / factor[i, a, a]
+        for a in range(target + 1):
+            columns[i, own, a] *= weight

@@ -16,12 +16,7 @@ from groundstation.experiments.planar.parameters import FIGURE_1, PlanarParamete
 from groundstation.experiments.planar.planner import PlanarPlanner, SearchOptions
 from groundstation.experiments.planar.problem import load_topology, make_problem, make_workspace
 from groundstation.experiments.planar.scenarios import bench_belief
-from groundstation.planning.dense import (
-    cholesky_upper,
-    negative_inverse,
-    padded,
-    subtract_products,
-)
+from groundstation.planning.dense import subtract_products
 
 
 def evaluate(
@@ -37,30 +32,6 @@ def evaluate(
     value = cost_and_gradient(controls, problem, work, gradient)
     out[:, order] = gradient.reshape(segments, -1, 2)
     return value, out.ravel()
-
-
-@pytest.mark.parametrize("size", [1, 2, 7, 8, 9, 31, 32, 64, 101])
-def test_factor_and_inverse(size: int) -> None:
-    generator = np.random.default_rng(size)
-    m = padded(size)
-    factor = generator.normal(size=(size, size))
-    matrix = np.eye(m)
-    matrix[:size, :size] = factor @ factor.T + size * np.eye(size)
-    ours, panel = matrix.copy(), np.empty((8, m))
-    assert cholesky_upper(ours)
-    np.testing.assert_allclose(np.triu(ours), np.linalg.cholesky(matrix).T, rtol=1e-12, atol=1e-12)
-    ours = np.triu(matrix) + np.tril(generator.normal(size=(m, m)), -1)  # below the diagonal anything may stand
-    assert negative_inverse(ours, panel)
-    np.testing.assert_allclose(-np.triu(ours), np.triu(np.linalg.inv(matrix)), rtol=1e-11, atol=1e-14)
-
-
-def test_indefinite_matrices_are_refused() -> None:
-    for bad in (-1.0, 0.0, np.nan):
-        for place in range(8):
-            matrix = np.eye(8)
-            matrix[place, place] = bad
-            assert not cholesky_upper(matrix.copy())
-            assert not negative_inverse(matrix.copy(), np.empty((8, 8)))
 
 
 def test_products() -> None:

@@ -117,7 +117,11 @@ def _run_dir(path: Path) -> Path:
     if path.is_dir():
         return path
     if not any(path.parent.glob("state*.mcap")):
-        raise OperatorMistake(f"{path}: no recording of a run, and no state.mcap beside it: name a run's folder")
+        from groundstation.recording.foreign import kind_of_file
+
+        what = kind_of_file(path)
+        hint = f": this is {what}" if what else ", and no state.mcap beside it: name a run's folder"
+        raise OperatorMistake(f"{path}: no recording of a run{hint}")
     return path.parent
 
 

@@ -24,6 +24,7 @@ from groundstation.errors import MessageError
 from groundstation.recording.chunks import UNREADABLE, RawRecord, Wanted, chunk_data, chunk_records, every_topic, frames
 from groundstation.recording.compatibility import RecordingError, require_ours, require_readable
 from groundstation.recording.file_topics import RAW, STATE, is_picture
+from groundstation.recording.foreign import LONGEST, kind_of_content
 from groundstation.recording.part_names import numbered_parts
 from groundstation.recording.preamble import FIELD_NAME
 from groundstation.recording.viewers import picture_parts
@@ -134,12 +135,17 @@ def open_recording(path: Path) -> Recording:
         with path.open("rb") as stream:
             start = stream.read(len(MCAP0_MAGIC))
             if start != MCAP0_MAGIC:
-                raise RecordingError(f"{path}: not an MCAP recording{'' if start else ' (the file is empty)'}")
+                raise RecordingError(f"{path}: not an MCAP recording{_instead(start + stream.read(LONGEST))}")
             _read_preamble(stream, recording)
     except OSError as error:
         raise RecordingError(f"{path}: {error.strerror or error}") from error
     require_readable(str(path), recording.metadata)
     return recording
+
+
+def _instead(start: bytes) -> str:
+    what = kind_of_content(start)
+    return f": this is {what}" if what else "" if start else " (the file is empty)"
 
 
 def open_parts(paths: Iterable[Path]) -> tuple[list[Recording], dict[Path, str]]:

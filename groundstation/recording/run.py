@@ -8,6 +8,7 @@ from pathlib import Path
 from groundstation.bus.keys import Key
 from groundstation.recording.chunks import RawRecord, Wanted, every_topic
 from groundstation.recording.file_topics import RAW, STATE
+from groundstation.recording.foreign import kind_of_folder
 from groundstation.recording.index import Chunk, FileIndex
 from groundstation.recording.reader import RecordingError, open_parts, parts
 from groundstation.time_units import NS_PER_S
@@ -103,6 +104,8 @@ def open_run(path: Path) -> RecordedRun:
     if path.is_dir():
         paths = [part for stem in (STATE, RAW) for part in parts(path, stem)]
         if not paths:
-            raise RecordingError(f"{path}: no recording in this folder ({STATE}.mcap is missing); is it a run folder?")
+            what = kind_of_folder(path)
+            hint = f"this is {what}" if what else "is it a run folder?"
+            raise RecordingError(f"{path}: no recording in this folder ({STATE}.mcap is missing); {hint}")
         return RecordedRun(paths)
     return RecordedRun([path])

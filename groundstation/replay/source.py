@@ -9,6 +9,7 @@ import msgspec
 
 from groundstation.field.resolved import ResolvedField, field_from_json
 from groundstation.recording.file_topics import RAW, STATE
+from groundstation.recording.foreign import kind_of_folder
 from groundstation.recording.part_names import shown
 from groundstation.recording.preamble import COMMAND_NAME, FIELD_NAME
 from groundstation.recording.reader import Recording, RecordingError, open_parts, open_recording, parts
@@ -50,7 +51,7 @@ def open_source(paths: Sequence[Path]) -> Source:
         folder = paths[0]
         state, raw = parts(folder, STATE), parts(folder, RAW)
         if not state:
-            raise RecordingError(f"{folder}: there is no recording in this folder ({_TYPICAL}){_nearby(folder)}")
+            raise RecordingError(f"{folder}: there is no recording in this folder ({_TYPICAL}){_hint(folder)}")
         return _source(shown(folder.resolve().name), state, raw)
     folders = [path for path in paths if path.is_dir()]
     if folders:
@@ -62,7 +63,10 @@ def open_source(paths: Sequence[Path]) -> Source:
     return _source(state[0].stem, state, raw)
 
 
-def _nearby(folder: Path) -> str:
+def _hint(folder: Path) -> str:
+    what = kind_of_folder(folder)
+    if what:
+        return f"; this is {what}"
     inner = sorted(folder.glob("*/state*.mcap"), key=lambda path: path.stat().st_mtime)
     return f"; did you mean {inner[-1].parent}?" if inner else ""
 

@@ -30,6 +30,8 @@ def _find(name: str, what: str, folders: tuple[Path, ...]) -> Path:
             return candidate
         known += [path.stem for path in sorted(folder.glob("*.yaml"))]
     _refuse_folder(Path(name), what)
+    if Path(name).is_file():
+        raise SettingsError([f"{name}: is a file, but no {what}: those end in .yaml, .yml or .json"])
     from difflib import get_close_matches
 
     near = get_close_matches(name, known, 1, 0.5)

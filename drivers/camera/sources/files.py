@@ -80,5 +80,7 @@ class FileReader:
                     shown_s = frame.time if frame.time is not None else index / float(stream.average_rate or 25)
                     first_s = shown_s if first_s is None else first_s
                     yield shown_s - first_s, f"{shown_s - first_s:.2f} s", VideoPicture(frame)
+        except av.InvalidDataError:
+            raise DriverError("is no video, picture file or folder of pictures that can be read") from None
         except (av.FFmpegError, ValueError) as error:
             raise DriverError(getattr(error, "strerror", None) or str(error)) from None

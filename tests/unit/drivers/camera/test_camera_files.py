@@ -88,7 +88,7 @@ def test_a_folder_is_shown_by_name_without_what_is_no_picture(tmp_path):
     [
         (lambda path: None, "no such file"),
         (lambda path: path.mkdir(), "no picture in it"),
-        (lambda path: path.write_bytes(b"not a video at all" * 50), "Invalid data"),
+        (lambda path: path.write_bytes(b"not a video at all" * 50), "is no video, picture file or folder"),
         (lambda path: path.write_bytes(b""), ""),
         (os.mkfifo, "neither a file nor a folder"),
     ],

@@ -15,6 +15,11 @@ from groundstation.settings.schema import Field
 _IN_WORLD = FixedCamera(0.0, (0.0, 0.0, 1.0))
 
 
+# Beside the take-offs themselves: the time until all are localised and TRACK is accepted.
+_LOCALISING_S = 30.0
+_LEAST_TRACKING_LIMIT_S = 90.0
+
+
 @dataclass(frozen=True, slots=True)
 class FlightPlan:
     """The requests for a flight.
@@ -30,7 +35,7 @@ class FlightPlan:
     asks: bool
     cameras: Mapping[str, FixedCamera]
     limits: TakeOffLimits
-    start_tracking_limit_s: float = 90.0
+    start_tracking_limit_s: float = _LEAST_TRACKING_LIMIT_S
     landing_limit_s: float = 15.0
     field: ResolvedField | None = None
     cautions: tuple[Finding, ...] = ()
@@ -52,7 +57,8 @@ def plan_of(
     cameras |= dict.fromkeys(field.ranging, _IN_WORLD)
     limits = TakeOffLimits(unseen_s=field.safety.unseen_land_after_s)
     resolved = field_from_json(field.model_dump_json().encode())
-    return FlightPlan(duration_s, asks, cameras, limits, field=resolved, cautions=_cautions(field, checks))
+    late_s = max(_LEAST_TRACKING_LIMIT_S, _LOCALISING_S + len(field.drones) * limits.longest_s)
+    return FlightPlan(duration_s, asks, cameras, limits, late_s, field=resolved, cautions=_cautions(field, checks))
 
 
 def _cautions(field: Field, checks: Iterable[Caution]) -> tuple[Finding, ...]:

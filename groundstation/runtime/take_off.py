@@ -23,6 +23,11 @@ class TakeOffLimits:
     lift_off_s: float = 15.0
     unseen_s: float = 10.0
 
+    @property
+    def longest_s(self) -> float:
+        """Return how long one drone may hold up the next."""
+        return self.connect_s + self.lift_off_s + self.unseen_s
+
 
 @dataclass(frozen=True, slots=True)
 class TakeOffCommand:

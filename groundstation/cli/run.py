@@ -159,6 +159,9 @@ def run_simulated(mode: str, field: str, asked: Rehearsal) -> int:
     path, scenario, duration, seed = find_field(field), asked.scenario, asked.duration, asked.seed
     loaded = load_field(path, asked.options)
     parts = parse_real(loaded, asked.real)
+    for name, body in parts.drones.items():
+        if body.address is not None:
+            network.require_free_udp(f"the true pose of {name} (--real)", *body.address)
     for line in notes(loaded, parts):
         click.echo(line, err=True)
     plan = plan_of(loaded, duration, asks=bool(parts.drones) and not asked.look_only)

@@ -3,7 +3,7 @@
 import logging
 
 from groundstation.bus.api import Bus
-from groundstation.bus.messages import Event, Severity
+from groundstation.bus.messages import RUN, Event, Severity
 from groundstation.bus.topics import EVENT
 from groundstation.process.heartbeat import SlotState
 from groundstation.supervisor.managed_process import ManagedProcess
@@ -38,3 +38,11 @@ class ProcessEvents:
         if self.bus is not None:
             header = self.bus.header(process.spec.name)
             self.bus.publish(EVENT, Event(header=header, severity=severity, text=text, remedy=remedy))
+
+    def told(self, text: str) -> None:
+        """Tell the operator something about the run, here and in the events of its pages; "" tells nothing."""
+        if not text:
+            return
+        self._terminal.say(text)
+        if self.bus is not None:
+            self.bus.publish(EVENT, Event(header=self.bus.header(RUN), severity=Severity.INFO, text=text))

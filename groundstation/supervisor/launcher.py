@@ -12,6 +12,7 @@ from typing import BinaryIO
 from groundstation.bus.roles import Identity
 from groundstation.errors import GroundStationError
 from groundstation.process.child import ChildSpec
+from groundstation.supervisor.interrupts import put_aside_by_nobody
 from groundstation.supervisor.process_spec import ProcessSpec
 from groundstation.supervisor.run import Run
 
@@ -89,15 +90,16 @@ class Launcher:
 
     def _popen(self, spec: ProcessSpec, command: list[str], stdin: int) -> subprocess.Popen[bytes]:
         log = self._logs[spec.name]
-        return subprocess.Popen(
-            command,
-            stdin=stdin,
-            stdout=None if spec.on_terminal else log,
-            stderr=log,
-            start_new_session=True,
-            pass_fds=spec.keep_open,
-            env=os.environ | dict.fromkeys(_SINGLE_THREADED, "1"),
-        )
+        with put_aside_by_nobody():
+            return subprocess.Popen(
+                command,
+                stdin=stdin,
+                stdout=None if spec.on_terminal else log,
+                stderr=log,
+                start_new_session=True,
+                pass_fds=spec.keep_open,
+                env=os.environ | dict.fromkeys(_SINGLE_THREADED, "1"),
+            )
 
     def log_tail(self, name: str) -> str:
         """Return the last lines of a process's log, for an error message."""

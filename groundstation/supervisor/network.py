@@ -2,12 +2,13 @@
 
 import fcntl
 import os
+import socket
 from dataclasses import dataclass, replace
 from ipaddress import IPv4Network
 from pathlib import Path
 
 from groundstation.errors import GroundStationError, OperatorMistake
-from groundstation.process.ports import holder_of, host_of, is_free, networks_in_use, port_of
+from groundstation.process.ports import holder_of, host_of, is_free, networks_in_use, port_of, why_refused
 from groundstation.supervisor import runtime_file
 
 _FIRST_DRONE, _FIRST_CAMERA, _STREAM_PORT = 11, 50, 8080
@@ -112,6 +113,16 @@ def require_free(endpoint: str) -> None:
         raise GroundStationError(
             f"{_taken(address, port)}: end it, or give this ground station another port (--set bus.port=...)"
         )
+
+
+def require_free_udp(use: str, address: str, port: int) -> None:
+    """Raise GroundStationError if a UDP port cannot be had, naming who has it; use: of the port, as the text begins."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind((address, port))
+        except OSError as error:
+            why = why_refused(error, address, port, socket.SOCK_DGRAM)
+            raise GroundStationError(f"{use}: cannot listen on {address}:{port} (UDP): {why}") from None
 
 
 def _taken(address: str, port: int) -> str:

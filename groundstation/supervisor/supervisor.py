@@ -163,7 +163,7 @@ class Supervisor:
                 poll.register(process.pidfd, select.POLLIN)
         ready = poll.poll(timeout_s * 1000)
         if any(descriptor == self.interrupts.descriptor for descriptor, _ in ready):
-            self.interrupts.clear()
+            self.events.told(self.interrupts.clear())
 
     def _read_statuses(self) -> None:
         if self._statuses is None:

@@ -120,3 +120,14 @@ def test_holder_of_a_datagram_port_is_found() -> None:
         port = json.loads(other.stdout.readline())
         assert ports.holder_of("127.64.1.11", port, socket.SOCK_DGRAM).pid == other.pid
         other.communicate(b"\n")
+
+
+def test_a_port_that_a_simulator_of_firmware_would_have_is_named_before_anything_starts() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("127.0.0.1", 0))
+        port = other.getsockname()[1]
+        with pytest.raises(GroundStationError, match=rf"pose of drone_2: .*127.0.0.1:{port} .UDP.*pid {os.getpid()}"):
+            network.require_free_udp("the true pose of drone_2", "127.0.0.1", port)
+    network.require_free_udp("the true pose of drone_2", "127.0.0.1", port)
+    with pytest.raises(GroundStationError, match="Cannot assign requested address"):
+        network.require_free_udp("the true pose of drone_2", "192.0.2.1", port)

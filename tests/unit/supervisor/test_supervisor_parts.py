@@ -1,6 +1,7 @@
 """Runtime file, terminal, interrupts, fail-safe datagrams: each alone."""
 
 import os
+import select
 import signal
 import socket
 import subprocess
@@ -15,7 +16,7 @@ import pytest
 from groundstation.errors import GroundStationError
 from groundstation.supervisor import runtime_file
 from groundstation.supervisor.failsafe_sender import FailsafeSender
-from groundstation.supervisor.interrupts import _UNHEEDED, _WISHES, Interrupts
+from groundstation.supervisor.interrupts import _UNHEEDED, _WISHES, Interrupts, put_aside_by_nobody
 from groundstation.supervisor.process_spec import FailsafeDatagrams
 from groundstation.supervisor.runtime_file import ProcessRecord, RuntimeRecord
 from groundstation.supervisor.terminal import Terminal
@@ -144,7 +145,7 @@ def test_muted_lines_come_later() -> None:
 
 @pytest.fixture
 def interrupts() -> Iterator[Interrupts]:
-    kept = {n: signal.getsignal(n) for n in (*_WISHES, *_UNHEEDED)}
+    kept = {n: signal.getsignal(n) for n in (*_WISHES, *_UNHEEDED, signal.SIGTSTP)}
     made = Interrupts()
     made.install()
     yield made
@@ -164,12 +165,25 @@ def test_first_wish_lands_second_hurries(interrupts: Interrupts) -> None:
 
 
 def test_no_key_of_the_terminal_stops_or_kills_who_watches_over_drones(interrupts: Interrupts) -> None:
-    for number in (signal.SIGTSTP, signal.SIGTTIN, signal.SIGTTOU):
+    for number in (signal.SIGTTIN, signal.SIGTTOU):
         assert signal.getsignal(number) is signal.SIG_IGN
         os.kill(os.getpid(), number)
+    assert not interrupts.clear()
+    os.kill(os.getpid(), signal.SIGTSTP)
+    assert select.select([interrupts.descriptor], [], [], 5.0)[0], "it is told of at once"
+    assert "Ctrl-C lands all drones" in interrupts.clear()
+    assert not interrupts.clear(), "each press is told of once"
     assert not interrupts.stop_requested
     os.kill(os.getpid(), signal.SIGQUIT)
     assert interrupts.stop_requested
+
+
+def test_a_process_inherits_that_nobody_puts_it_aside(interrupts: Interrupts) -> None:
+    script = "import signal; print(signal.getsignal(signal.SIGTSTP) is signal.SIG_IGN)"
+    with put_aside_by_nobody():
+        said = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert said.stdout.strip() == "True"
+    assert callable(signal.getsignal(signal.SIGTSTP)), "this process answers again"
 
 
 def test_closing_terminal_never_hurries(interrupts: Interrupts) -> None:

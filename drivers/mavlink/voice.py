@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator, Sequence
 
 from drivers.mavlink.links.tty import open_raw
+from drivers.mavlink.signing_clock import SigningClock
 from drivers.mavlink.signing_key import read_key
 from drivers.mavlink.wire.signature import frame_size, signed_anew, stamp_at
 from groundstation.adapters import Address, bind_to_adapter, send_to_all
@@ -31,6 +32,7 @@ class MavlinkVoice:
         self._serial, key_file = str(told["serial"]), str(told["key_file"])
         self._key = read_key(key_file) if key_file else b""
         self._speaker, self._stamp, self._fd = speaker, 0, -1
+        self._clock = SigningClock()
         self._socket = None if self._serial else socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         if self._socket is not None:
             bind_to_adapter(self._socket, str(told.get("interface", "")))
@@ -40,8 +42,9 @@ class MavlinkVoice:
         """Send frames to every address, or into the line; raises OSError if that fails."""
         if self._key:
             # WIRE (docs/reference/mavlink.md 5.9): times must grow for each sender and link, and a new link may begin
-            # at most a minute before the newest time that the vehicle knows.
-            self._stamp = max(self._stamp, stamp_at(time.time()))
+            # at most a minute before the newest time that the vehicle knows. That is a driver's: of before the clock
+            # was put back, or, if the driver was started anew, of after it was put forward.
+            self._stamp = max(self._stamp, self._clock.stamp(), stamp_at(time.time()))
             datagram, self._stamp = signed_anew(datagram, self._key, self._speaker, self._stamp)
         if self._socket is None:
             self._write(datagram)

@@ -1,14 +1,13 @@
 """Opens the link that the settings describe, with its signing key."""
 
-import time
 from collections.abc import Callable
 
 from drivers.mavlink.links.seam import MavlinkLink, Sniffer, Transport, ignore_bytes
 from drivers.mavlink.links.serial import SerialLink
 from drivers.mavlink.links.udp import UdpLink
 from drivers.mavlink.settings import LinkSettings
+from drivers.mavlink.signing_clock import SigningClock
 from drivers.mavlink.signing_key import read_key
-from drivers.mavlink.wire.signature import stamp_at
 from drivers.mavlink.wire.verification import Signing
 
 
@@ -39,4 +38,4 @@ def signing_of(settings: LinkSettings) -> Signing | None:
     """Return the key of a signed link and the time from which we sign; raises DriverError without naming the key."""
     if not settings.key_file:
         return None
-    return Signing(read_key(settings.key_file), stamp_at(time.time()))
+    return Signing(read_key(settings.key_file), SigningClock().stamp())

@@ -10,6 +10,7 @@ from drivers.mavlink.links.seam import Heard, Sniffer, ignore_bytes
 from drivers.mavlink.links.signing_time import time_to_sign
 from drivers.mavlink.links.tty import open_raw
 from drivers.mavlink.settings import LinkSettings
+from drivers.mavlink.signing_clock import SigningClock
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder, Message
 from drivers.mavlink.wire.signature import frame_size
@@ -57,7 +58,7 @@ class SerialLink:
         self._decoder = FrameDecoder(signing)
         self._encoder = FrameEncoder(settings.system_id, settings.component_id, signing)
         self._cutter, self._lock, self._sniffer = StreamCutter(), threading.RLock(), sniffer
-        self._closed = False
+        self._closed, self._clock = False, SigningClock()
         self._device, self._baud = device, int(baud)
         self._fd = open_raw(self._device, self._baud)
 
@@ -114,7 +115,7 @@ class SerialLink:
     def send(self, system: int, message: Message) -> None:
         """Write one frame; a line that is too slow loses it."""
         with self._lock:  # signed frames must leave in the order of their times
-            self.send_raw(system, self._encoder.encode(message, not_before=time_to_sign(self._decoder)))
+            self.send_raw(system, self._encoder.encode(message, not_before=time_to_sign(self._clock, self._decoder)))
 
     def send_raw(self, system: int, data: bytes) -> None:
         """Write whole frames; a line that is too slow loses them."""

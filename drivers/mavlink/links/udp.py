@@ -11,6 +11,7 @@ from drivers import vehicle_socket
 from drivers.mavlink.links.seam import Heard, Sniffer, ignore_bytes
 from drivers.mavlink.links.signing_time import time_to_sign
 from drivers.mavlink.settings import LinkSettings
+from drivers.mavlink.signing_clock import SigningClock
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.frames import MAX_DATAGRAM, FrameDecoder, FrameEncoder, Message, ReceivedFrame, split
 from drivers.mavlink.wire.names import AUTOPILOT_COMPONENT
@@ -52,7 +53,7 @@ class UdpLink:
         self._addresses: dict[int, tuple[tuple[str, int], int]] = {}
         self._decoder = FrameDecoder(signing)
         self._encoder = FrameEncoder(settings.system_id, settings.component_id, signing)
-        self._lock = threading.Lock()
+        self._lock, self._clock = threading.Lock(), SigningClock()
         self._sniffer, self._signed = sniffer, signing is not None
         self._greeted: dict[tuple[str, int], int] = {}
         self._own = (settings.system_id, settings.component_id)
@@ -170,7 +171,7 @@ class UdpLink:
             self.send_raw(system, self._encode(message))
 
     def _encode(self, message: Message) -> bytes:
-        return self._encoder.encode(message, not_before=time_to_sign(self._decoder))
+        return self._encoder.encode(message, not_before=time_to_sign(self._clock, self._decoder))
 
     def _address_of(self, system: int) -> tuple[str, int] | None:
         known = self._addresses.get(system)

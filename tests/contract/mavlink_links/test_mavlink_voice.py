@@ -98,6 +98,41 @@ def test_a_signed_vehicle_obeys_driver_supervisor_and_guardian_in_any_order(vehi
                      for kind in (Heartbeat, *words)]  # fmt: skip
 
 
+@pytest.mark.parametrize(
+    ("flying", "restarted", "speaking"),
+    [
+        (-3600, -3600, -3600),  # put back in flight
+        (3600, 3600, 3600),  # put forward, and the driver started anew since
+        (3600, 0, 0),  # put forward and back
+    ],
+)
+def test_who_speaks_for_a_driver_is_heard_though_the_clock_was_set_in_flight(
+    vehicle, key_file, tmp_path, monkeypatch, flying, restarted, speaking
+):
+    (words, *_), _ = words_of(tmp_path, key_file=key_file, link="pymavlink")
+    words, real, verifier = at(words, vehicle), time.time, Verifier(Signing(KEY, 0))
+    guardian = FailsafeSender(Speaker.GUARDIAN)
+    assert not guardian.prepare("px4", words)
+    target = LinkSettings(target=f"udpout:127.0.0.1:{words.port}", key_file=key_file)
+    for seconds in (0, flying), (restarted, restarted):
+        monkeypatch.setattr(time, "time", lambda seconds=seconds: real() + seconds[0])
+        link = open_link(target)
+        monkeypatch.setattr(time, "time", lambda seconds=seconds: real() + seconds[1])
+        for _ in range(3):
+            link.send(11, HEARTBEAT)
+            heard = vehicle.recv(2048)
+            # A vehicle hears a driver that was started anew once that has heard it: see the test of its own.
+            if int.from_bytes(heard[-12:-6], "little") > verifier.newest:
+                verifier.verify(heard)
+        link.close()
+    monkeypatch.setattr(time, "time", lambda: real() + speaking)
+    guardian.begin("px4", words, 0)
+    guardian.send_due(S)
+    for frame in split(vehicle.recv(2048)):
+        verifier.verify(frame)
+    guardian.close()
+
+
 def test_a_driver_that_comes_back_is_heard_after_the_guardian(vehicle, key_file, tmp_path):
     (words, *_), _ = words_of(tmp_path, key_file=key_file, link="pymavlink")
     verifier = Verifier(Signing(KEY, 0))

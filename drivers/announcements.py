@@ -18,6 +18,7 @@ _INTRUSIONS = {
     "unsigned": "unsigned frames",
     "signature": "frames signed with another key",
     "duplicate_system": "frames with its number from a second address (another vehicle, or it was restarted there)",
+    "own_id": "heartbeats of another ground station with our system id (give that one another id, or end it)",
     "foreign_address": "datagrams from another address",
     "setpoint_other_source": "setpoints of another sender",
     "setpoint_epoch_leap": "setpoints of an epoch far ahead",

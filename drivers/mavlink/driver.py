@@ -11,6 +11,7 @@ from drivers.host import VehicleHost, run_hosts
 from drivers.mavlink.links.forwarding import with_riders
 from drivers.mavlink.links.opening import open_link
 from drivers.mavlink.links.seam import Heard, MavlinkLink
+from drivers.mavlink.other_stations import OtherStations
 from drivers.mavlink.settings import MavlinkDriverSettings
 from drivers.mavlink.vehicle import MavlinkVehicle
 from drivers.mavlink.wire import frames
@@ -49,6 +50,11 @@ class Fleet:
             settings.link, self._sniff, lambda transport: with_riders(transport, shown, self._tell)
         )
         self.vehicles = {v.system_id: MavlinkVehicle(settings, v, self.link, child.bus) for v in settings.vehicles}
+        self._stations = OtherStations(
+            settings.link.system_id,
+            {vehicle.system_id: vehicle.name for vehicle in settings.vehicles},
+            [vehicle.system_id for vehicle in settings.vehicles if vehicle.forward],
+        )
         self.strangers: Counter[int] = Counter()
         self._announced: dict[tuple[str, str], int] = {}
         self._closing = threading.Event()
@@ -75,6 +81,7 @@ class Fleet:
                 _log.exception("a frame could not be used")
 
     def _hand_on(self, heard: Heard) -> None:
+        self._stations.hear(heard.frame)
         vehicle = self.vehicles.get(heard.frame.system)
         if vehicle is not None:
             vehicle.hear(heard)
@@ -92,8 +99,9 @@ class Fleet:
                 for vehicle in self.vehicles.values():
                     vehicle.see(now_ns, received.message)
         self._child.note_addresses(self.link.called_from)
-        while self._news:
-            self._child.event(Severity.WARNING, *self._news.popleft())
+        for news in (self._news, self._stations.news):
+            while news:
+                self._child.event(Severity.WARNING, *news.popleft())
         for vehicle in self.vehicles.values():
             while vehicle.orders.events:
                 self._announce(now_ns, vehicle.name, *vehicle.orders.events.popleft())

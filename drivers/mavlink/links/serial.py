@@ -9,6 +9,7 @@ from contextlib import suppress
 from drivers.mavlink.links.seam import Heard, Sniffer, ignore_bytes
 from drivers.mavlink.links.signing_time import time_to_sign
 from drivers.mavlink.links.tty import open_raw
+from drivers.mavlink.other_stations import speaks_as_we
 from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.signing_clock import SigningClock
 from drivers.mavlink.wire.errors import WireError
@@ -92,7 +93,7 @@ class SerialLink:
             except WireError as error:
                 self.rejected[error.reason] += 1
                 continue
-            if (frame.system, frame.component) != self._own:
+            if not speaks_as_we(frame, self._own, self.rejected):
                 self._sniffer(frame.system, now_ns, raw, True)
                 heard.append((Heard(now_ns, frame), raw))
         return heard

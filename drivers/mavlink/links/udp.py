@@ -10,11 +10,13 @@ from contextlib import suppress
 from drivers import vehicle_socket
 from drivers.mavlink.links.seam import Heard, Sniffer, ignore_bytes
 from drivers.mavlink.links.signing_time import time_to_sign
+from drivers.mavlink.other_stations import speaks_as_we
 from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.signing_clock import SigningClock
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.frames import MAX_DATAGRAM, FrameDecoder, FrameEncoder, Message, ReceivedFrame, split
 from drivers.mavlink.wire.names import AUTOPILOT_COMPONENT
+from drivers.mavlink.wire.signature import MAGIC_1
 from drivers.mavlink.wire.telemetry import OUR_HEARTBEAT
 from drivers.mavlink.wire.verification import Signing, old_sender
 from groundstation.adapters import Address, bind_to_adapter, split_zone
@@ -97,30 +99,30 @@ class UdpLink:
             self._reject("foreign_address", f"{source[0]}:{source[1]}")
             return heard
         try:
-            for raw in split(data):
+            for raw in split(data, old=True):
+                if raw[0] == MAGIC_1:
+                    self._hear_old(now_ns, raw, source)
+                    continue
                 frame = self._decode(now_ns, raw, source)
-                if frame is None or (frame.system, frame.component) == self._own:
+                if frame is None or speaks_as_we(frame, self._own, self.rejected):
                     continue
                 if self._is_at(now_ns, frame, source):
                     self._sniffer(frame.system, now_ns, raw, True)
                     heard.append((Heard(now_ns, frame), raw))
         except WireError as error:
             self._reject(error.reason, str(error))
-            if error.reason == "mavlink_1":
-                self._note_old(now_ns, data, source)
-                self._greet(now_ns, source)
         return heard
 
-    def _note_old(self, now_ns: int, data: bytes, source: tuple[str, int]) -> None:
-        """Record a datagram's frames of MAVLink 1, unless the link is signed or their system is at another address."""
+    def _hear_old(self, now_ns: int, raw: bytes, source: tuple[str, int]) -> None:
+        """Record a frame of MAVLink 1, unless the link is signed or its system is at another address, and greet."""
+        self._reject("mavlink_1", f"{source[0]}:{source[1]}")
+        self._greet(now_ns, source)
         if self._signed:
             return
         with suppress(WireError):
-            for raw in split(data, old=True):
-                with suppress(WireError):
-                    system = old_sender(raw)
-                    if self._addresses.get(system, (source,))[0] == source:
-                        self._sniffer(system, now_ns, raw, True)
+            system = old_sender(raw)
+            if self._addresses.get(system, (source,))[0] == source:
+                self._sniffer(system, now_ns, raw, True)
 
     def _greet(self, now_ns: int, source: tuple[str, int]) -> None:
         """Send a MAVLink 1 vehicle a frame of version 2, or our time to a vehicle whose signing time is old.

@@ -69,3 +69,15 @@ def test_frames_of_mavlink_1_are_recorded_and_those_of_strangers_are_not(vehicle
     assert noted == [(7, bytes(old)), (7, bytes(new)), (7, bytes(old))]
     assert link.rejected["mavlink_1"] == 4
     link.close()
+
+
+def test_a_frame_of_mavlink_2_is_heard_behind_one_of_mavlink_1_in_one_datagram(vehicle):
+    """A router gathers frames of several senders; a gimbal's may be of MAVLink 1."""
+    port = free_port(kind=socket.SOCK_DGRAM)
+    link = UdpLink(LinkSettings(target=f"udpin:127.0.0.1:{port}"))
+    heartbeat = dialect.MAVLink_heartbeat_message(2, 12, 0, 0, 3, 3)
+    gimbal = dialect.MAVLink_heartbeat_message(26, 8, 0, 0, 4, 3).pack(dialect.MAVLink(None, 7, 154), True)
+    vehicle.sendto(gimbal + heartbeat.pack(dialect.MAVLink(None, 7, 1)) + gimbal, ("127.0.0.1", port))
+    assert [one.frame.system for one in link.receive()] == [7]
+    assert link.rejected == {"mavlink_1": 2}
+    link.close()

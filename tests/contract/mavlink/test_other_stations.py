@@ -1,0 +1,87 @@
+"""Another ground station that commands the vehicles of a link is noticed, and told once with a remedy."""
+
+from collections import Counter
+
+import pytest
+
+from drivers.mavlink.other_stations import REMEDY, OtherStations, speaks_as_we
+from drivers.mavlink.wire.flight import CommandAckMessage
+from drivers.mavlink.wire.frames import Message, ReceivedFrame
+from drivers.mavlink.wire.names import MavCmd
+from drivers.mavlink.wire.telemetry import OUR_HEARTBEAT, Heartbeat
+
+QGROUNDCONTROL = Heartbeat(6, 8, 192, 0, 4)
+US = (255, 190)
+
+
+def stations(*riders: int) -> OtherStations:
+    return OtherStations(255, {11: "drone_2", 12: "drone_3"}, riders)
+
+
+def frame(system: int, message: Message, component: int = 190) -> ReceivedFrame:
+    return ReceivedFrame(system, component, 0, message)
+
+
+def ack(command: int, to: int) -> CommandAckMessage:
+    return CommandAckMessage(command, 0, 0, 0, to, 190)
+
+
+def test_its_heartbeat_is_told_once() -> None:
+    heard = stations()
+    for _ in range(3):
+        heard.hear(frame(254, QGROUNDCONTROL))
+        heard.hear(frame(253, QGROUNDCONTROL))
+    assert list(heard.news) == [
+        (f"another ground station is on this link (system {system})", REMEDY) for system in (254, 253)
+    ]
+
+
+def test_an_answer_to_its_order_is_told() -> None:
+    heard = stations()
+    heard.hear(frame(11, ack(MavCmd.COMPONENT_ARM_DISARM, 254), 1))
+    heard.hear(frame(11, ack(MavCmd.NAV_LAND, 254), 1))
+    assert list(heard.news) == [("drone_2 answers orders of another ground station (system 254)", REMEDY)]
+
+
+@pytest.mark.parametrize(
+    ("system", "message"),
+    [
+        (1, Heartbeat(2, 12, 0, 0, 3)),  # a vehicle: told as one that is not in the field file
+        (11, Heartbeat(18, 8, 0, 0, 4)),  # its computer on board
+        (11, QGROUNDCONTROL),  # a companion that takes itself for a ground station, under the vehicle's id
+        (255, OUR_HEARTBEAT),
+        (11, ack(MavCmd.NAV_LAND, 255)),
+        (11, ack(MavCmd.NAV_LAND, 0)),
+        (11, ack(MavCmd.NAV_LAND, 11)),  # PX4 answers itself
+        (11, ack(MavCmd.REQUEST_MESSAGE, 254)),  # it only looks
+        (1, ack(MavCmd.NAV_LAND, 254)),  # a vehicle of somebody else
+    ],
+)
+def test_what_is_no_second_master_is_not_told(system: int, message: Message) -> None:
+    heard = stations()
+    heard.hear(frame(system, message))
+    assert not heard.news
+
+
+def test_who_rides_along_through_us_may_be_answered() -> None:
+    heard = stations(11)
+    heard.hear(frame(11, ack(MavCmd.NAV_LAND, 254), 1))
+    assert not heard.news
+    heard.hear(frame(12, ack(MavCmd.NAV_LAND, 254), 1))
+    assert len(heard.news) == 1
+
+
+def test_a_flood_of_numbers_is_told_within_bounds() -> None:
+    heard = stations()
+    for system in range(20, 250):
+        heard.hear(frame(system, QGROUNDCONTROL))
+    assert len(heard.news) == 16
+
+
+def test_our_own_ids_are_ours_and_a_heartbeat_that_we_do_not_send_is_not() -> None:
+    rejected: Counter[str] = Counter()
+    assert speaks_as_we(frame(255, OUR_HEARTBEAT), US, rejected) and not rejected  # a radio's echo
+    assert speaks_as_we(frame(255, ack(MavCmd.NAV_LAND, 11)), US, rejected) and not rejected
+    assert speaks_as_we(frame(255, QGROUNDCONTROL), US, rejected) and rejected == {"own_id": 1}
+    assert not speaks_as_we(frame(254, QGROUNDCONTROL), US, rejected)
+    assert not speaks_as_we(frame(255, QGROUNDCONTROL, 1), US, rejected)

@@ -63,8 +63,13 @@ class Start:
         needed = any(process.spec.kernels for process in supervisor.processes)
         if not needed or kernels.are_compiled():
             return
-        if not kernels.compile_first(supervisor.terminal.say, lambda: supervisor.interrupts.stop_requested):
+        if not kernels.compile_first(supervisor.terminal.say, self._stop_wished):
             raise Interrupted("stopped while starting")
+
+    def _stop_wished(self) -> bool:
+        """Return whether the operator asked to stop, and answer other keys meanwhile."""
+        self._supervisor.events.told(self._supervisor.interrupts.clear())
+        return self._supervisor.interrupts.stop_requested
 
     def _launch_all(self, processes: list[ManagedProcess]) -> None:
         for process in processes:

@@ -54,7 +54,7 @@ class Tracker:
         self.current: PlanResult | None = None
         self.rejected: Counter[str] = Counter()
         self._intake = Intake(self.filter, parameters.estimator.sensors, clock)
-        self._mounts = MountWatch(parameters.estimator)
+        self.mounts = MountWatch(parameters.estimator)
         self._joinings = Joinings()
         self._localisation = Localisation(parameters.safety)
         self._topology = Topology(())
@@ -67,7 +67,7 @@ class Tracker:
         self._targets = tuple(n for n, m in parameters.estimator.entities.items() if m.kind is EntityKind.TARGET)
         self.lookout = Lookout(parameters.search, parameters.control, parameters.sensors, self._robots, self._targets)
         links = [one.carrier for one in parameters.estimator.sensors.values() if isinstance(one, RangeSensor)]
-        self._roots = RootWatch(self._mounts.roots, self._robots + self._targets, links)
+        self._roots = RootWatch(self.mounts.roots, self._robots + self._targets, links)
 
     @property
     def robots(self) -> tuple[str, ...]:
@@ -94,7 +94,7 @@ class Tracker:
 
         Never raises for the content of a message. Refused observations are also among `take_corrections`.
         """
-        moved = self._mounts.distrusts(message.header.entity)
+        moved = self.mounts.distrusts(message.header.entity)
         refused = moved and isinstance(message, RelativeObservation)
         verdict = Verdict.IMPLAUSIBLE if refused else self._intake.take(key, message, now_ns)
         if not moved and verdict is not Verdict.IMPLAUSIBLE:
@@ -103,7 +103,7 @@ class Tracker:
             if not moved:
                 self._roots.hear(message, now_ns)
             if isinstance(message, RelativeObservation) and message.header.clock == self._clock:
-                self._mounts.see(message)
+                self.mounts.see(message)
                 self.lookout.see(message)
             return None
         self.rejected[f"{type(message).__name__} {verdict}"] += 1
@@ -128,7 +128,7 @@ class Tracker:
         self._corrections += corrections
         self._notices += self._joinings.take(now_ns, corrections, self._intake.ranges.take_joined())
         velocities = {name: self.filter.velocity_of(name) for name in self._belief.layout.robots}
-        self._notices += self._mounts.advance(now_ns, velocities, corrections, self.airborne)
+        self._notices += self.mounts.advance(now_ns, velocities, corrections, self.airborne)
         self._notices += self._roots.advance(now_ns, corrections, flying=bool(self.airborne))
         self._notices += self._intake.reports.take_notices()
         self._heed_absence(now_ns)
@@ -150,7 +150,7 @@ class Tracker:
 
     def converged(self, name: str) -> bool:
         """Return whether an entity is known well enough to fly on; without a world-fixed sensor none is."""
-        if name not in self._belief.layout or self._mounts.is_rootless or self._roots.is_silent:
+        if name not in self._belief.layout or self.mounts.is_rootless or self._roots.is_silent:
             return False
         # For a robot that flies on our estimate the deviation tells how wrong its velocity becomes unseen (0214).
         fed = name in self.parameters.control.fed

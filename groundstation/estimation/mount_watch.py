@@ -18,6 +18,8 @@ from groundstation.geometry.camera_turn import CameraTurn
 from groundstation.time_units import NS_PER_S
 
 MOVED = "its camera was moved: what it sees counts for nothing until all have landed"
+# A tracker that begins in flight hears by then who flies.
+_NOBODY_NS = 5 * NS_PER_S
 # A camera with a smaller displacement [m] is reported, but still believed: the rooms' margins are wider.
 _HARMS_M = 0.15
 _REMEDY = (
@@ -41,6 +43,27 @@ class MountWatch:
         self._jumps, self._ties = SightJumps(mounts), TiedContradictions(mounts, robots)
         self._seen: dict[Pair, Vector] = {}
         self._moved: set[str] = set()
+        self._recalled_ns: int | None = None
+
+    @property
+    def cameras(self) -> frozenset[str]:
+        """Return the cameras that are watched."""
+        return self._cameras
+
+    @property
+    def moved(self) -> frozenset[str]:
+        """Return the cameras whose sightings are refused."""
+        return frozenset(self._moved)
+
+    def recall(self, moved: Collection[str], now_ns: int) -> list[Notice]:
+        """Distrust cameras that were found to have moved before this watch began, in the same flight; returns notices.
+
+        Forgotten again if nobody flies within 5 s.
+        """
+        self._moved |= self._cameras & frozenset(moved)
+        self._recalled_ns = now_ns
+        what = "was bumped before the tracker was started anew; it is still not believed"
+        return [Notice(Severity.ERROR, what + self._rest(), _REMEDY, name) for name in sorted(self._moved)]
 
     @property
     def is_rootless(self) -> bool:
@@ -63,7 +86,9 @@ class MountWatch:
     ) -> list[Notice]:  # fmt: skip
         """Return the notices for the operator. velocities [m/s; world] of all robots that have joined."""
         now_s = now_ns / NS_PER_S
-        if not airborne:
+        if airborne:
+            self._recalled_ns = None
+        elif self._recalled_ns is None or now_ns - self._recalled_ns > _NOBODY_NS:
             self._moved.clear()
         self._jumps.fly(now_s, velocities)
         self._ties.take(corrections, now_s)
@@ -75,5 +100,7 @@ class MountWatch:
         if turn.displaced_m < _HARMS_M:
             return Notice(Severity.WARNING, what, _REMEDY, turn.camera)
         self._moved.add(turn.camera)
-        rest = "; no other camera tells where the team is, which hovers and lands" if self.is_rootless else ""
-        return Notice(Severity.ERROR, f"{what}; it is not believed any more{rest}", _REMEDY, turn.camera)
+        return Notice(Severity.ERROR, f"{what}; it is not believed any more{self._rest()}", _REMEDY, turn.camera)
+
+    def _rest(self) -> str:
+        return "; no other camera tells where the team is, which hovers and lands" if self.is_rootless else ""

@@ -186,6 +186,16 @@ class Child:
             self._addresses = tuple(addresses)
             self._block.set_addresses(self.spec.heartbeat_index, self._addresses)
 
+    def leave(self, number: int) -> None:
+        """Record a number (0 to 2^62) for the process that is started in place of this one."""
+        if self._block is not None:
+            self._block.leave(self.spec.heartbeat_index, number)
+
+    @property
+    def left(self) -> int:
+        """Return what the process before this one left, 0 for nothing."""
+        return 0 if self._block is None else self._block.left(self.spec.heartbeat_index)
+
     def starting(self, detail: str) -> None:
         """Report the reason for which the start waits; shown to the operator."""
         self._announce(Lifecycle.STARTING, detail)

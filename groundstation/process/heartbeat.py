@@ -18,7 +18,7 @@ from groundstation.time_units import NS_PER_S
 
 SUPERVISOR_SLOT = 0
 _WORDS_PER_SLOT = 64  # whole cache lines, so that two beating processes never share one
-_STAMP, _STATE, _PID, _WORKED, _ENDED, _SILENT_SINCE, _CLOCK_OFFSET = 0, 1, 2, 3, 4, 5, 6
+_STAMP, _STATE, _PID, _WORKED, _ENDED, _SILENT_SINCE, _CLOCK_OFFSET, _LEFT = 0, 1, 2, 3, 4, 5, 6, 7
 _ADDRESSES, MOST_ADDRESSES = 8, 56  # more than a team has
 _LEFT_BEHIND_NS = 10 * NS_PER_S
 
@@ -105,9 +105,17 @@ class HeartbeatBlock:
         words = [self._words[base + index] for index in range(MOST_ADDRESSES)]
         return tuple((socket.inet_ntoa((word >> 16).to_bytes(4, "big")), word & 0xFFFF) for word in words if word)
 
+    def leave(self, slot: int, number: int) -> None:
+        """Record a number (0 to 2^62) that the holder of a slot leaves to its successor."""
+        self._words[slot * _WORDS_PER_SLOT + _LEFT] = number
+
+    def left(self, slot: int) -> int:
+        """Return what the former holder of a slot left to this one, 0 for nothing."""
+        return self._words[slot * _WORDS_PER_SLOT + _LEFT]
+
     def clear(self, slot: int) -> None:
         """Forget the former holder of a slot, before its successor starts; not since when others speak for it,
-        nor where its vehicles are."""
+        nor where its vehicles are, nor what it left."""
         base = slot * _WORDS_PER_SLOT
         self._words[base : base + _SILENT_SINCE] = memoryview(bytes(_SILENT_SINCE * 8)).cast("q")
 

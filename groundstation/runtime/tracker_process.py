@@ -55,8 +55,12 @@ def run(child: Child) -> int:
 
 
 def _loop(child: Child, tracking: Tracking) -> None:
+    from groundstation.runtime.moved_cameras import MovedCameras
+
     period_ns = NS_PER_S // tracking.rate_hz
     deadlines = Deadlines(period_ns, clock.now_ns())
+    moved = MovedCameras(child, tracking.tracker.mounts)
+    tracking.notices += moved.recall(clock.now_ns())
     child.ready()
     go_first()
     while not child.stop_requested and child.supervisor_alive:
@@ -64,6 +68,7 @@ def _loop(child: Child, tracking: Tracking) -> None:
         deadlines.start_tick(now_ns)
         child.beat()
         tracking.tick(now_ns)
+        moved.note()
         for notice in tracking.notices:
             child.event(notice.severity, notice.text, notice.remedy, notice.entity or None)
         tracking.notices.clear()

@@ -1,0 +1,42 @@
+"""Hands on which cameras were moved, from a tracker to the one that is started in its place, in flight."""
+
+from typing import Protocol
+
+from groundstation.bus.notice import Notice
+from groundstation.estimation.mount_watch import MountWatch
+
+_MOST = 62
+
+
+class Heir(Protocol):
+    """The part of a child process that outlives it: one number."""
+
+    @property
+    def left(self) -> int:
+        """Return what the process before this one left, 0 for nothing."""
+
+    def leave(self, number: int) -> None:
+        """Record a number for the process that is started in place of this one."""
+
+
+class MovedCameras:
+    """One bit for each watched camera, by name; call `recall` once, and `note` after each tick."""
+
+    def __init__(self, heir: Heir, mounts: MountWatch) -> None:
+        self._heir, self._mounts = heir, mounts
+        self._names = sorted(mounts.cameras)[:_MOST]
+        self._noted = heir.left
+
+    def recall(self, now_ns: int) -> list[Notice]:
+        """Take over what the tracker before this one knew; returns the notices for the operator."""
+        if not self._noted:
+            return []
+        return self._mounts.recall([name for bit, name in enumerate(self._names) if self._noted >> bit & 1], now_ns)
+
+    def note(self) -> None:
+        """Record what this tracker knows."""
+        moved = self._mounts.moved
+        known = sum(1 << bit for bit, name in enumerate(self._names) if name in moved)
+        if known != self._noted:
+            self._noted = known
+            self._heir.leave(known)

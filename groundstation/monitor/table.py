@@ -46,20 +46,27 @@ _STATE_STYLES = {
 def render(state: MonitorState, now_ns: int) -> RenderableType:
     """Return the whole picture."""
     parts: list[RenderableType] = [_title(state, now_ns)]
-    for alarm in alarms_of(state, now_ns)[:_ALARMS]:
+    alarms = alarms_of(state, now_ns)
+    for alarm in alarms[:_ALARMS]:
         parts.append(Text(f" {alarm.text} ", style="bold white on red" if alarm.grave else "black on yellow"))
+    if more := alarms[_ALARMS:]:
+        grave = sum(alarm.grave for alarm in more)
+        parts.append(
+            Text(f" and {len(more)} more, {grave} of them grave: the console's page has all ", style="reverse")
+        )
     parts += [
         Text(),
         _Entities(state, now_ns),
         *_searches(state),
         *_unseen(state, now_ns),
         Text(),
-        _plan(state, now_ns),
     ]
-    if state.cameras:
-        parts.append(_cameras(state, now_ns))
+    # Above what grows with the team: a low window cuts the lines below.
     if state.command is not None and state.command.age_s(now_ns) < _COMMAND_SHOWN_S:
         parts.append(_command(state))
+    parts.append(_plan(state, now_ns))
+    if state.cameras:
+        parts.append(_cameras(state, now_ns))
     parts += [_processes(state, now_ns), Text(), *_events(state, now_ns)]
     return Group(*parts)
 

@@ -132,6 +132,22 @@ def test_what_is_asked_of_the_operator_waits_for_no_drone(world: World) -> None:
     assert "operator accepted" in text and "NOT CONFIRMED" not in text
 
 
+def test_alarms_beyond_the_room_are_counted(world: World) -> None:
+    for number in range(8):
+        world.vehicle(f"drone_{number}", battery=0.05)
+    text = world.text()
+    left = text.split(" and ")[1].split(" more")[0]
+    assert int(left) >= 3 and "the console's page has all" in text
+
+
+def test_an_order_is_shown_above_what_grows_with_the_team(world: World) -> None:
+    world.say(t.PLAN, plan(world))
+    world.camera("ceiling")
+    world.say(t.COMMAND, m.Command(header=world.header("team"), id="7", verb=m.Verb.LAND, scope=(), issuer="me"))
+    text = world.text()
+    assert text.index("NOT CONFIRMED") < min(text.index("topology"), text.index("cameras"))
+
+
 def test_processes_and_events_are_listed(world: World) -> None:
     world.status("tracker")
     event = m.Event(header=world.header("drone_2", 3.0), severity=m.Severity.WARNING, text="wind", remedy="land")

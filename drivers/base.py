@@ -100,6 +100,9 @@ class HostProcess(Protocol):
     def note_addresses(self, addresses: Sequence[tuple[str, int]]) -> None:
         """Record the last addresses of vehicles that call us, for the process that speaks to them after this one."""
 
+    def leave(self, number: int) -> None:
+        """Record a number (0 to 2^62) for who speaks to the vehicles after this process."""
+
     def event(self, severity: Severity | str, text: str, remedy: str = "", entity: str | None = None) -> None:
         """Publish an event."""
 

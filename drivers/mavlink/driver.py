@@ -99,6 +99,7 @@ class Fleet:
                 for vehicle in self.vehicles.values():
                     vehicle.see(now_ns, received.message)
         self._child.note_addresses(self.link.called_from)
+        self._child.leave(self.link.newest_stamp)
         for news in (self._news, self._stations.news):
             while news:
                 self._child.event(Severity.WARNING, *news.popleft())

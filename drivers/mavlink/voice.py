@@ -6,13 +6,12 @@ No pymavlink here: the guardian is small. Reason for all of it: docs/decisions/0
 import json
 import os
 import socket
-import time
 from collections.abc import Iterator, Sequence
 
 from drivers.mavlink.links.tty import open_raw
 from drivers.mavlink.signing_clock import SigningClock
 from drivers.mavlink.signing_key import read_key
-from drivers.mavlink.wire.signature import frame_size, signed_anew, stamp_at
+from drivers.mavlink.wire.signature import frame_size, signed_anew
 from groundstation.adapters import Address, bind_to_adapter, send_to_all
 from groundstation.errors import DriverError
 
@@ -38,13 +37,17 @@ class MavlinkVoice:
             bind_to_adapter(self._socket, str(told.get("interface", "")))
             self._socket.setblocking(False)
 
+    def go_on_from(self, left: int) -> None:
+        """Sign with times newer than the newest that the driver sent or heard (`MavlinkLink.newest_stamp`)."""
+        self._stamp = max(self._stamp, left + 1)
+
     def say(self, datagram: bytes, addresses: Sequence[Address]) -> None:
         """Send frames to every address, or into the line; raises OSError if that fails."""
         if self._key:
             # WIRE (docs/reference/mavlink.md 5.9): times must grow for each sender and link, and a new link may begin
-            # at most a minute before the newest time that the vehicle knows. That is a driver's: of before the clock
-            # was put back, or, if the driver was started anew, of after it was put forward.
-            self._stamp = max(self._stamp, self._clock.stamp(), stamp_at(time.time()))
+            # at most a minute before the newest time that the vehicle knows: one that its
+            # driver sent or heard. The clock is for a driver that left nothing.
+            self._stamp = max(self._stamp, self._clock.stamp())
             datagram, self._stamp = signed_anew(datagram, self._key, self._speaker, self._stamp)
         if self._socket is None:
             self._write(datagram)

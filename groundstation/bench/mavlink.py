@@ -46,6 +46,7 @@ class _Host:
     def degrade(self, detail: str) -> None: ...
     def tick_status(self, ticks: int = 0, overruns: int = 0, overflowed: int = 0) -> None: ...
     def note_addresses(self, addresses: Sequence[tuple[str, int]]) -> None: ...
+    def leave(self, number: int) -> None: ...
     def event(self, severity: Severity | str, text: str, remedy: str = "", entity: str | None = None) -> None: ...
     def sleep_until(self, deadline_ns: int) -> bool:
         """Sleep; never asked to stop."""
@@ -85,6 +86,11 @@ class _TimedLink:
     def called_from(self) -> tuple[tuple[str, int], ...]:
         """Addresses at which the vehicles were last heard."""
         return self.link.called_from
+
+    @property
+    def newest_stamp(self) -> int:
+        """Newest time of signing."""
+        return self.link.newest_stamp
 
     def receive(self) -> list[Heard]:
         heard = self.link.receive()

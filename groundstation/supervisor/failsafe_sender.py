@@ -10,7 +10,7 @@ from enum import IntEnum
 from groundstation.adapters import Address
 from groundstation.errors import GroundStationError
 from groundstation.supervisor.process_spec import FailsafeDatagrams
-from groundstation.supervisor.voice import Voice, open_voice
+from groundstation.supervisor.voice import Successor, Voice, open_voice
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _PERIOD_NS = 100 * NS_PER_MS
@@ -57,17 +57,25 @@ class FailsafeSender:
         return ""
 
     def begin(
-        self, name: str, words: FailsafeDatagrams, since_ns: int, heard_at: Callable[[], Sequence[Address]] = tuple
+        self,
+        name: str,
+        words: FailsafeDatagrams,
+        since_ns: int,
+        heard_at: Callable[[], Sequence[Address]] = tuple,
+        left: Callable[[], int] = int,
     ) -> bool:
         """Start at once to send for a driver that has been silent since a time; returns whether that is new.
 
-        heard_at: last addresses of vehicles that call their link.
+        heard_at: last addresses of vehicles that call their link; left: the number that the driver left.
         """
         if name in self._speaking:
             return False
         why = self.prepare(name, words)
         if why:
             _log.error(unreachable(name, why))
+        voice = self._voices.get(name)
+        if isinstance(voice, Successor):
+            voice.go_on_from(left())
         addresses = heard_at() if words.called else ((words.address, words.port),)
         self._speaking[name] = _Speech(words, since_ns, addresses, time.monotonic_ns())
         self._next_ns = 0

@@ -96,7 +96,13 @@ class Guardian:
         if decision.word is Word.NONE:
             if self._sender.end(post.name):
                 _log.info("%s: the word is %s", post.name, "the supervisor's" if supervised else "the driver's")
-        elif self._sender.begin(post.name, post.words, decision.since_ns, partial(self._block.addresses, slot)):
+        elif self._sender.begin(
+            post.name,
+            post.words,
+            decision.since_ns,
+            partial(self._block.addresses, slot),
+            partial(self._block.left, slot),
+        ):
             _log.warning("%s is silent, and so is the supervisor: its drone is told to hover, then to land", post.name)
         if decision.since_ns != before_ns:
             self._block.set_silent_since(slot, decision.since_ns)

@@ -213,8 +213,8 @@ class Supervisor:
         words = process.spec.failsafe_datagrams
         if words is None or self._stopping:
             return
-        heard_at = partial(self._block.addresses, process.slot)
-        if self._last_words.begin(process.spec.name, words, process.silent_since_ns or now_ns, heard_at):
+        known = partial(self._block.addresses, process.slot), partial(self._block.left, process.slot)
+        if self._last_words.begin(process.spec.name, words, process.silent_since_ns or now_ns, *known):
             self.events.event(Severity.WARNING, process, f"{why}: the supervisor tells its drone to hover")
 
     def _kill(self, process: ManagedProcess, reason: str, due: bool) -> None:

@@ -3,7 +3,7 @@
 import socket
 from collections.abc import Callable, Sequence
 from pkgutil import resolve_name
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from groundstation.adapters import Address, bind_to_adapter, send_to_all
 from groundstation.supervisor.process_spec import FailsafeDatagrams
@@ -17,6 +17,14 @@ class Voice(Protocol):
 
     def close(self) -> None:
         """Release its resources; idempotent."""
+
+
+@runtime_checkable
+class Successor(Voice, Protocol):
+    """A voice that goes on from what the driver left (`Child.leave`)."""
+
+    def go_on_from(self, left: int) -> None:
+        """Take the number that the driver left, 0 for nothing; called each time before it speaks for the driver."""
 
 
 class UdpVoice:

@@ -23,6 +23,9 @@ class FakeProcess:
     def degrade(self, detail):
         pass
 
+    def leave(self, number):
+        self.left = number
+
     def note_addresses(self, addresses):
         self.addresses = tuple(addresses)
 

@@ -65,6 +65,11 @@ class ForwardedLink:
         """Return the addresses from which the vehicles call."""
         return self._transport.called_from
 
+    @property
+    def newest_stamp(self) -> int:
+        """Return the newest time of signing of the transport."""
+        return self._transport.newest_stamp
+
     def receive(self) -> list[Heard]:
         """Wait up to 0.1 s; return what arrived."""
         return [heard for heard, _ in self.receive_raw()]

@@ -181,6 +181,11 @@ class MavsdkLink:
         """Return where the vehicles were last heard, if the link waits for them."""
         return self._transport.called_from
 
+    @property
+    def newest_stamp(self) -> int:
+        """Return the newest time of signing of the transport."""
+        return self._transport.newest_stamp
+
     def receive(self) -> list[Heard]:
         """Wait up to 0.1 s; return the messages received."""
         try:

@@ -26,6 +26,10 @@ class MavlinkLink(Protocol):
     def called_from(self) -> tuple[Address, ...]:
         """Return where the vehicles were last heard, on a link that they call themselves; empty on others."""
 
+    @property
+    def newest_stamp(self) -> int:
+        """Return the newest time of signing, heard or sent [10 us since 2015-01-01 UTC]; 0 on an unsigned link."""
+
     def receive(self) -> list[Heard]:
         """Wait up to 0.1 s; return the messages received."""
 

@@ -68,6 +68,11 @@ class SerialLink:
         """Return no address: nobody calls over a line."""
         return ()
 
+    @property
+    def newest_stamp(self) -> int:
+        """Return the newest time of signing, heard or sent; 0 without a key."""
+        return max(self._decoder.newest_stamp, self._encoder.newest_stamp)
+
     def receive(self) -> list[Heard]:
         """Wait up to 0.1 s for bytes; return the frames that are whole by now."""
         return [heard for heard, _ in self.receive_raw()]

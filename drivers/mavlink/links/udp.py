@@ -77,6 +77,11 @@ class UdpLink:
         """Return where the vehicles were last heard, if the link waits for them."""
         return () if self._peer else tuple(dict.fromkeys(address for address, _ in self._addresses.copy().values()))
 
+    @property
+    def newest_stamp(self) -> int:
+        """Return the newest time of signing, heard or sent; 0 without a key."""
+        return max(self._decoder.newest_stamp, self._encoder.newest_stamp)
+
     def receive(self) -> list[Heard]:
         """Wait up to 0.1 s for a datagram; return its frames."""
         return [heard for heard, _ in self.receive_raw()]

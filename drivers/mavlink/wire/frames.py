@@ -130,6 +130,12 @@ class FrameEncoder:
             self._mav.signing.link_id = signing.link_id
             self._mav.signing.timestamp = signing.timestamp
 
+    @property
+    def newest_stamp(self) -> int:
+        """Return the time from which the next frame is signed, 0 without a key."""
+        signing = self._mav.signing
+        return int(signing.timestamp) if signing.sign_outgoing else 0
+
     def encode(self, message: Message, old: bool = False, not_before: int = 0) -> bytes:
         """Return the frame of a message; raises WireError when a value does not fit its field.
 

@@ -55,6 +55,9 @@ class HostedProcess:
     def note_addresses(self, addresses: Sequence[tuple[str, int]]) -> None:
         """Keep no addresses: no process dies here."""
 
+    def leave(self, number: int) -> None:
+        """Leave nothing: no process dies here."""
+
     def tick_status(self, ticks: int = 0, overruns: int = 0, overflowed: int = 0) -> None:
         """Nobody watches."""
 

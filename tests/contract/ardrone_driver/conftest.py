@@ -58,6 +58,9 @@ class Process:
     def note_addresses(self, addresses: object) -> None:
         pass
 
+    def leave(self, number: int) -> None:
+        pass
+
     def tick_status(self, ticks: int = 0, overruns: int = 0, overflowed: int = 0) -> None:
         pass
 

@@ -66,7 +66,7 @@ class FakeSocket:
 class DirectLink:
     """A Link whose other end is an emulator in the same thread."""
 
-    called_from = ()
+    called_from, newest_stamp = (), 0
 
     def __init__(self, emulator, system=255):
         self.rejected = Counter[str]()

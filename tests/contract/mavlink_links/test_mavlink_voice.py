@@ -18,6 +18,7 @@ from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.voice import MavlinkVoice
 from drivers.mavlink.wire.flight import CommandLong, SetPositionTargetLocalNed
 from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder, split
+from drivers.mavlink.wire.signature import stamp_at
 from drivers.mavlink.wire.telemetry import Heartbeat
 from drivers.mavlink.wire.verification import Signing, Verifier
 from groundstation.flight.composition import process_table
@@ -104,6 +105,7 @@ def test_a_signed_vehicle_obeys_driver_supervisor_and_guardian_in_any_order(vehi
         (-3600, -3600, -3600),  # put back in flight
         (3600, 3600, 3600),  # put forward, and the driver started anew since
         (3600, 0, 0),  # put forward and back
+        (3600, 3600, 0),  # put forward, the driver started anew, put back
     ],
 )
 def test_who_speaks_for_a_driver_is_heard_though_the_clock_was_set_in_flight(
@@ -111,7 +113,7 @@ def test_who_speaks_for_a_driver_is_heard_though_the_clock_was_set_in_flight(
 ):
     (words, *_), _ = words_of(tmp_path, key_file=key_file, link="pymavlink")
     words, real, verifier = at(words, vehicle), time.time, Verifier(Signing(KEY, 0))
-    guardian = FailsafeSender(Speaker.GUARDIAN)
+    guardian, left = FailsafeSender(Speaker.GUARDIAN), 0
     assert not guardian.prepare("px4", words)
     target = LinkSettings(target=f"udpout:127.0.0.1:{words.port}", key_file=key_file)
     for seconds in (0, flying), (restarted, restarted):
@@ -124,13 +126,43 @@ def test_who_speaks_for_a_driver_is_heard_though_the_clock_was_set_in_flight(
             # A vehicle hears a driver that was started anew once that has heard it: see the test of its own.
             if int.from_bytes(heard[-12:-6], "little") > verifier.newest:
                 verifier.verify(heard)
+                left = link.newest_stamp
         link.close()
     monkeypatch.setattr(time, "time", lambda: real() + speaking)
-    guardian.begin("px4", words, 0)
+    guardian.begin("px4", words, 0, left=lambda: left)
     guardian.send_due(S)
     for frame in split(vehicle.recv(2048)):
         verifier.verify(frame)
     guardian.close()
+
+
+def test_who_speaks_for_a_driver_is_heard_though_the_computers_clock_is_slow(vehicle, port, key_file, tmp_path):
+    """The vehicle knows the time of another ground station, which flew it before; the driver has heard that."""
+    (words, *_), _ = words_of(tmp_path, key_file=key_file, link="pymavlink")
+    ahead = stamp_at(time.time()) + 360_000_000
+    verifier = Verifier(Signing(KEY, ahead))
+    link = open_link(LinkSettings(target=f"udpin:127.0.0.1:{port}", key_file=key_file))
+    vehicle.sendto(FrameEncoder(11, 1, Signing(KEY, ahead)).encode(HEARTBEAT), ("127.0.0.1", port))
+    assert link.receive() and link.newest_stamp >= ahead
+    guardian = FailsafeSender(Speaker.GUARDIAN)
+    guardian.begin("px4", at(words, vehicle), 0, left=lambda: link.newest_stamp)
+    guardian.send_due(S)
+    for frame in split(vehicle.recv(2048)):
+        verifier.verify(frame)
+    guardian.close()
+    link.close()
+
+
+def test_the_driver_leaves_its_time_to_who_speaks_after_it(key_file, tmp_path):
+    block = HeartbeatBlock.create(f"test-left-{os.getpid()}", 2)
+    stamp = stamp_at(time.time())
+    block.leave(1, stamp)
+    block.clear(1)
+    assert block.left(1) == stamp and block.left(0) == 0
+    block.close(remove=True)
+    link = open_link(LinkSettings(target="udpin:127.0.0.1:0"))
+    assert link.newest_stamp == 0, "an unsigned link has no time"
+    link.close()
 
 
 def test_a_driver_that_comes_back_is_heard_after_the_guardian(vehicle, key_file, tmp_path):

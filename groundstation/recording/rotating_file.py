@@ -68,6 +68,7 @@ class FileSeries:
         self._flush_ns = 0
         self._pending = 0
         self._troubles: list[Trouble] = []
+        self._removed = False
         self.failing = False
         self.written = 0
         self.lost = 0
@@ -151,12 +152,15 @@ class FileSeries:
             return None
         if self.failing:
             self.failing = False
-            text = f"recording goes on in {file.path.name}; {self.lost} messages are lost"
+            gone = ", and all that was in the file that was removed" * self._removed
+            self._removed = False
+            text = f"recording goes on in {file.path.name}; {self.lost} messages are lost{gone}"
             self._troubles.append(Trouble(text, recovered=True))
         return file
 
     def _fail(self, error: OSError, now_ns: int) -> None:
         if self._file is not None:
+            self._removed |= error.errno == errno.ENOENT
             self._file.abandon()
             self._file = None
         self._retry_ns = now_ns + RETRY_PERIOD_NS

@@ -238,7 +238,7 @@ def test_series_goes_on_in_a_new_file_after_a_write_error(tmp_path: Path) -> Non
     disk.full = False
     series.tick(S + RETRY_PERIOD_NS)
     (back,) = series.take_troubles()
-    assert back.recovered and "state-2.mcap" in back.text
+    assert back.recovered and "state-2.mcap" in back.text and "removed" not in back.text
     for entry in entries[20:]:
         series.write(entry, 4 * S)
     series.close()
@@ -269,6 +269,8 @@ def test_a_recording_goes_on_after_its_folder_was_removed(tmp_path: Path) -> Non
     (trouble,) = series.take_troubles()
     assert trouble.text == "cannot write the state recording: the file was removed"
     series.tick(S + RETRY_PERIOD_NS)
+    (back,) = series.take_troubles()
+    assert back.text.endswith("messages are lost, and all that was in the file that was removed")
     for entry in entries[10:]:
         series.write(entry, 4 * S)
     series.close()

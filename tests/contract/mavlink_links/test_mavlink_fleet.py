@@ -1,6 +1,7 @@
 """The driver as a process runs it, on real sockets: a fleet on one port, strangers, duplicates, a vehicle that goes."""
 
 import itertools
+import socket
 import sys
 import threading
 import time
@@ -11,9 +12,9 @@ import pytest
 from drivers.mavlink.driver import RATE_HZ, Fleet, hosts_of
 from drivers.mavlink.links.seam import Heard
 from drivers.mavlink.settings import MavlinkDriverSettings
-from drivers.mavlink.wire.frames import ReceivedFrame
+from drivers.mavlink.wire.frames import FrameEncoder, ReceivedFrame
 from drivers.mavlink.wire.names import AUTOPILOT_COMPONENT
-from drivers.mavlink.wire.telemetry import BatteryStatus
+from drivers.mavlink.wire.telemetry import BatteryStatus, Heartbeat
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import Command, Lease, Verb
 from groundstation.bus.topics import COMMAND, IMU, LEASE, ODOMETRY, VEHICLE_STATUS
@@ -92,6 +93,25 @@ def test_both_flavours_on_one_port_come_to_be_ready(hangar, port, kind):
         ]
     finally:
         flying.close()
+
+
+def test_another_ground_station_that_a_vehicle_passes_on_is_told_once(hangar, port, kind):
+    hangar.add("ardupilot", 21, calls=("127.0.0.1", port))
+    flying = Flying(f"udpin:127.0.0.1:{port}", {21: "ardupilot"}, kind)
+    others = [FrameEncoder(254, 190), FrameEncoder(255, 190)]  # the second has our own ids
+    told = lambda: [text for text in flying.process.texts if "another ground station" in text]  # noqa: E731
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as router:
+        try:
+            for _ in range(4):
+                for other in others:
+                    router.sendto(other.encode(Heartbeat(6, 8, 192, 0, 4)), ("127.0.0.1", port))
+                flying.turn(0.6)
+            assert flying.turn(8.0, lambda: len(told()) == 2), flying.process.texts
+            first, second = sorted(told())
+            assert first == "another ground station is on this link (system 254)"
+            assert second.startswith("v21 refused ") and "heartbeats of another ground station with our" in second
+        finally:
+            flying.close()
 
 
 def test_wrong_flavour_is_refused(hangar, kind):

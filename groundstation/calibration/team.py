@@ -64,7 +64,7 @@ class Measured:
     """One figure: its error against the field and one sigma [unit], and the same with all figures in doubt.
 
     shown: whether the recording alone determines it well enough for use; beside: the figure (who, part) from which it
-    is hardest to separate, None if no single one stands out.
+    is hardest to separate, None if no single one stands out; corrected: whether a found cause moves it.
     """
 
     who: str
@@ -75,6 +75,7 @@ class Measured:
     doubtful_std: float
     shown: bool
     beside: Key | None
+    corrected: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,14 +120,16 @@ def calibrate_team(flown: Flown, field: ResolvedField) -> TeamCalibration:
     error, covariance = posterior(final.information, final.pull, sigma)
     _, doubtful = posterior(free.information, free.pull, np.diag(figures.wide**2))
     std, doubtful_std = np.sqrt(np.diag(covariance)), np.sqrt(np.diag(doubtful))
+    kept = [one for one in told if _worth(one, figures.keys, error, std)]
+    moved = freed(kept) if kept else np.zeros(len(figures.keys), bool)
     rows = []
     for index, (who, part) in enumerate(figures.keys):
         factor, unit = unit_of(part)
         shown = bool(doubtful_std[index] <= _NEEDED[part])
         off, one, doubt = (float(factor * value[index]) for value in (error, std, doubtful_std))
-        rows.append(Measured(who, part, unit, off, one, doubt, shown, _beside(index, doubtful, figures.keys)))
-    kept = [one for one in told if _worth(one, figures.keys, error, std)]
-    settings = changes(figures, error, freed(kept)) if kept else {}
+        beside = _beside(index, doubtful, figures.keys)
+        rows.append(Measured(who, part, unit, off, one, doubt, shown, beside, bool(moved[index])))
+    settings = changes(figures, error, moved) if kept else {}
     better = gain(flown, field, with_changes(field, settings), batch.targets) if settings else None
     found = tuple(_found(one, figures.keys, error, std) for one in kept)
     return TeamCalibration(tuple(rows), found, settings, better, final.used, final.misfit)

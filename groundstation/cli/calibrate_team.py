@@ -121,6 +121,8 @@ def _row(one: "Measured") -> str:
     other = "" if one.beside is None else " ".join(one.beside)
     if one.shown:
         shown = f"+- {one.doubtful_std:.2f} {one.unit}" + (f", shared with {other}" if other else "")
+    elif one.corrected:
+        shown = f"+- {one.doubtful_std:.2f} {one.unit}: corrected below, because the others are surveyed"
     else:
         shown = f"not told apart from {other}" if other else "this flight tells too little of it"
     return f"{one.who + ' ' + one.part:26} {error:>26}   {shown}"

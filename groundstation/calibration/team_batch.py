@@ -66,10 +66,13 @@ class Fit:
 
 
 class TeamBatch:
-    """One recording, ready to be fitted; raises OperatorMistake if no fixed camera saw a drone long enough."""
+    """One recording, ready to be fitted; raises OperatorMistake if no fixed camera saw a drone long enough.
 
-    def __init__(self, record: TeamRecord, field: ResolvedField) -> None:
-        grid = grid_of(record.duration_s)
+    earlier: by which share of their spacing the knots begin before the recording.
+    """
+
+    def __init__(self, record: TeamRecord, field: ResolvedField, earlier: float = 0.0) -> None:
+        grid = grid_of(record.duration_s, earlier)
         drones = [
             name for name in field.drones if name in record.own and seen_from_above(record.sightings, field, name)
         ]
@@ -268,14 +271,11 @@ class TeamBatch:
         rows.by_figures(at.ravel(), np.full(at.size, self.figures.place[name, "own_delay"]), values.ravel())
 
     def _by_bulge(self, rows: Rows, at: IntArray, slopes_: Array, name: str, times: Array) -> None:
-        """Add the derivatives of the curved way between knots by the velocity's scale and delay, and by the heading."""
-        path, place = self.robots[name], self.figures.place
-        bulge, later = path.bulge(times)
+        """Add the derivatives of the curved way between knots by the heading."""
+        path = self.robots[name]
+        bulge = path.bulge(times)
         turned = np.column_stack((-bulge[:, 1], bulge[:, 0]))
         knot, _ = path.grid.between(times)
-        for part, change in (("scale", bulge), ("velocity_delay", later), ("own_delay", later)):
-            values = np.einsum("nic,nc->ni", slopes_[:, :, :2], change)
-            rows.by_figures(at.ravel(), np.full(at.size, place[name, part]), values.ravel())
         values = 0.5 * np.einsum("nic,nc->ni", slopes_[:, :, :2], turned)
         for step in (0, 1):
             columns = np.repeat(self._first[name] + 3 + self._stride * (knot + step), 4)

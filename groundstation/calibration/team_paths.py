@@ -13,7 +13,9 @@ from groundstation.geometry.rotations import world_from_downward_optical
 
 ROBOT, TARGET = 6, 3
 """Entries of a knot: (x, y, z, correction of the heading, errors of roll and pitch); (x, y, heading)."""
-_SPACING_S = 0.2
+# No multiple of the usual periods of pictures: they would all lie at the same places between knots, some of which fit
+# better than others, and a suspected delay would gain by moving them there.
+_SPACING_S = 0.19
 LATER_S = 0.04
 """Half of the step by which derivatives by delays are taken [s]: about the size of a wrong delay.
 
@@ -35,10 +37,10 @@ class Grid:
         return first, steps - first
 
 
-def grid_of(duration_s: float) -> Grid:
-    """Return the knots of a recording."""
-    count = max(3, math.ceil(duration_s / _SPACING_S) + 1)
-    return Grid(np.asarray(_SPACING_S * np.arange(count)), _SPACING_S)
+def grid_of(duration_s: float, earlier: float = 0.0) -> Grid:
+    """Return the knots of a recording; earlier: by which share of their spacing the first lies before its begin."""
+    count = max(3, math.ceil(duration_s / _SPACING_S + earlier) + 1)
+    return Grid(np.asarray(_SPACING_S * (np.arange(count) - earlier)), _SPACING_S)
 
 
 class RobotPath:
@@ -58,9 +60,13 @@ class RobotPath:
         self.height_delay_s = self._height_delay_s + height_later_s + own_later_s
         self._own_later_s = own_later_s
         later_s += own_later_s
-        self._now = self._way(scale, later_s)
-        self._later, self._earlier = self._way(scale, later_s + LATER_S), self._way(scale, later_s - LATER_S)
-        self.at_knots, self.later_at_knots = self._told(self.grid.times), self._told_later(self.grid.times)
+        times, after, before = self.grid.times, later_s + LATER_S, later_s - LATER_S
+        self.at_knots = _along(self._way(scale, later_s), times)
+        self.later_at_knots = (_along(self._way(scale, after), times) - _along(self._way(scale, before), times)) / (
+            2.0 * LATER_S
+        )
+        self._between_knots = self._way(0.0, 0.0)
+        self._between_at_knots = _along(self._between_knots, times)
 
     def _way(self, scale: float, later_s: float) -> tuple[Array, Array]:
         """Return times (n) and the way up to each (n, 2)."""
@@ -73,26 +79,20 @@ class RobotPath:
         steps = 0.5 * np.diff(times)[:, None] * (velocity[1:] + velocity[:-1])
         return times, np.vstack((np.zeros((1, 2)), np.cumsum(steps, axis=0)))
 
-    def _told(self, times: Array) -> Array:
-        return _along(self._now, times)
+    def bulge(self, times: Array) -> Array:
+        """Return the distance of the way between two knots from their line (n, 2), as the field has the odometry.
 
-    def _told_later(self, times: Array) -> Array:
-        """Return the derivative of the way by the delay of the velocity."""
-        return (_along(self._later, times) - _along(self._earlier, times)) / (2.0 * LATER_S)
-
-    def bulge(self, times: Array) -> tuple[Array, Array]:
-        """Return the distance of the way between two knots from their line (n, 2), and its derivative by the delay."""
+        Most of it is the velocities' noise, a millimetre. If it moved with suspected delays, each sighting would tell
+        of them what is none: of a flight at one phase of the knots e^9, of the same at another nothing.
+        """
         first, share = self.grid.between(times)
-        return (
-            self._told(times) - _between(self.at_knots, first, share),
-            self._told_later(times) - _between(self.later_at_knots, first, share),
-        )
+        return _along(self._between_knots, times) - _between(self._between_at_knots, first, share)
 
     def poses(self, times: Array) -> Array:
         """Return (x, y, z, yaw, roll, pitch) at times (n, 6)."""
         own, (first, share) = self.own, self.grid.between(times)
         poses = _between(self.knots, first, share)
-        poses[:, :2] += self.bulge(times)[0]
+        poses[:, :2] += self.bulge(times)
         for column, angle in ((3, own.yaw), (4, own.roll), (5, own.pitch)):
             poses[:, column] += self._angle(angle, times)
         return np.asarray(poses)

@@ -1,6 +1,6 @@
 """The data of a recording for the calibration of a team: own motion of each drone, sightings, and stands on pads."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +24,11 @@ _STANDING = frozenset({FlightState.LANDED})
 _UNKNOWN_YAW = 1e6
 # During a shorter stand somebody may still be placing the drone.
 _LEAST_STAND_S = 0.5
+# Sightings this near to a jump of a drone's own heading are left out, and those this near to an end of what is known
+# of a motion: a suspected delay would move them beyond it [s].
+_JUMP_S, _EDGE_S = 0.4, 0.15
+# A longer silence of a drone's odometry hides how it moved [s].
+_SILENT_S = 0.3
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +48,15 @@ class OwnMotion:
     resets: Array
     attitude_std: Array
     yaw_std: Array
+
+    def shows(self, at_s: float) -> bool:
+        """Return whether the motion about a time is known, without a jump of the heading."""
+        first, last = np.searchsorted(self.times, (at_s - _JUMP_S, at_s + _JUMP_S))
+        jumps = first < last and self.resets[first] != self.resets[min(last, len(self.times) - 1)]
+        if jumps or not self.times[0] + _EDGE_S <= at_s <= self.times[-1] - _EDGE_S:
+            return False
+        after = int(np.searchsorted(self.times, at_s, side="right"))
+        return bool(self.times[after] - self.times[after - 1] <= _SILENT_S)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +82,14 @@ class TeamRecord:
     sightings: Sightings
     stands: Mapping[str, tuple[float, float]]
     duration_s: float
+
+    def shows(self, names: Iterable[str], at_s: float) -> bool:
+        """Return whether the motion of all these entities is known about a time.
+
+        Sightings arrive late: those that come first are older than the first odometry, and than all paths.
+        """
+        within = _EDGE_S <= at_s <= self.duration_s - _EDGE_S
+        return within and all(self.own[name].shows(at_s) for name in names if name in self.own)
 
 
 def team_record(flown: Flown, field: ResolvedField) -> TeamRecord:

@@ -1,6 +1,7 @@
 """A stretch of flight names the figure that is wrong, with its size, and nothing where all are right."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,8 @@ from groundstation.calibration.team_batch import Fit, TeamBatch
 from groundstation.calibration.team_causes import evidence
 from groundstation.calibration.team_figures import Suspicion
 from groundstation.calibration.team_record import team_record
-from groundstation.diagnosis.suspects import verdict_on, weighed
+from groundstation.diagnosis import suspects
+from groundstation.diagnosis.suspects import Charge, Verdict, is_told, verdict_on, weighed
 from groundstation.field.resolved import ResolvedField
 from sim_bridge.study.wrong_figures import WrongFigures
 
@@ -23,6 +25,10 @@ def suspicions() -> tuple[Suspicion, ...]:
     single = [Suspicion(name, "print", columns[:, [i]], np.array([0.08])) for i, name in enumerate("ab")]
     both = Suspicion("", "print", columns[:, [0]] + columns[:, [1]], np.array([0.08]))
     return (*single, both, Suspicion("c", "delay", columns[:, [2]], np.array([0.08])))
+
+
+def told(verdict: Verdict) -> list[tuple[Charge, ...]]:
+    return [charges for charges in verdict.causes if is_told(charges[0])]
 
 
 SLOW = (pytest.mark.slow, pytest.mark.study)
@@ -55,9 +61,9 @@ def test_a_wrong_figure_is_likeliest_with_its_size(
 def test_two_causes_are_told_apart_and_what_is_too_small_is_not_told() -> None:
     H = np.diag([1e6, 1e6, 1e6])
     two = weighed(H, H @ np.array([0.05, 0.0, 0.06]), SURVEYED, suspicions())
-    assert {charges[0].suspect for charges in two.causes} == {("a", "print"), ("c", "delay")}
+    assert {charges[0].suspect for charges in told(two)} == {("a", "print"), ("c", "delay")}
     small = weighed(H, H @ np.array([0.015, 0.0, 0.02]), SURVEYED, suspicions())
-    assert small.causes == ()
+    assert told(small) == []
     assert small.leads[("a", "print")] > math.log(100.0), "sure, and yet not worth telling"
 
 
@@ -67,12 +73,12 @@ def test_a_late_velocity_is_told_on_the_evidence_that_a_calibration_asks_for(
 ) -> None:
     """42 ms lead by e^6.6 here, 60 ms by e^15: that of pictures is told, that of velocities not."""
     H, one = np.diag([1.5e4]), Suspicion("a", part, np.eye(1), np.array([0.06]))
-    told = []
+    found = []
     for size in (0.042, 0.06):
         verdict = weighed(H, H @ np.array([size]), np.array([0.006]), (one,))
         assert size == 0.06 or math.log(100.0) < verdict.leads["a", part] < math.log(1e4)
-        told += [size] if verdict.causes else []
-    assert tuple(told) == sizes
+        found += [size] if told(verdict) else []
+    assert tuple(found) == sizes
 
 
 def test_what_explains_it_as_well_is_named_beside_it() -> None:
@@ -98,6 +104,14 @@ def test_a_charge_stands_only_where_the_paths_that_fit_without_it_explain_the_fl
     assert verdict.causes == () and verdict.leads["ceiling", "delay"] < math.log(3.0), (
         "refuted where it was told before"
     )
+
+
+def test_a_charge_must_lead_with_knots_elsewhere_too(lab_field: ResolvedField, monkeypatch: pytest.MonkeyPatch) -> None:
+    flown = Lab(lab_field, WrongFigures({("drone_1", "delay"): -50.0})).flown()
+    monkeypatch.setattr(suspects, "_confirmed", lambda charges, *_: [replace(one, lead=1.0) for one in charges])
+    verdict = verdict_on(flown, lab_field)
+    assert verdict is not None and verdict.causes == ()
+    assert verdict.leads["drone_1", "delay"] == 1.0, "refuted, had it been told before"
 
 
 def test_of_small_errors_the_evidence_of_two_fits_is_that_of_their_linear_model(lab_field: ResolvedField) -> None:

@@ -260,7 +260,7 @@ class Watchdog:
         elif state is FlightState.LANDED and self.mode in FREE | {DriverMode.LANDING}:
             self._enter(now_ns, DriverMode.LANDED, f"landed ({self.reason})")
         elif state in UP and self.mode is DriverMode.TAKING_OFF:
-            self._enter(now_ns, DriverMode.HOVER, "airborne, waiting for TRACK")
+            self._enter(now_ns, DriverMode.HOVER, "hovers after its take-off, waiting for TRACK")
 
     def _heed_table(self, now_ns: int) -> Failsafe | None:
         """React by the first row of the table that applies; returns it if it only brakes for now, within the mode."""

@@ -34,7 +34,7 @@ def one_is_unseen_and_will_land(flight: FakeFlight) -> None:
 def the_tracker_is_silent(flight: FakeFlight) -> None:
     flight.frozen = True
     flight.braked = set(flight.drones)
-    flight.detail = dict.fromkeys(flight.drones, "hovers: no setpoint from the tracker")
+    flight.detail = dict.fromkeys(flight.drones, "hovers: the tracker sends it no velocity")
     flight.lands_in_s = dict.fromkeys(flight.drones, 1.4)
 
 

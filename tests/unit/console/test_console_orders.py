@@ -197,14 +197,14 @@ def test_an_order_that_is_not_confirmed_says_what_was_done_instead() -> None:
     room.desk.hear(command, room.now_ns)
     room.ack(command, "drone_1", m.AckStage.EFFECTIVE)
     room.ack(command, "drone_2", m.AckStage.ACCEPTED)
-    doing = {"drone_1": "tracking for cli_1", "drone_2": "hovers: no setpoint from the tracker"}
+    doing = {"drone_1": "tracking for cli_1", "drone_2": "hovers: the tracker sends it no velocity"}
     room.desk.step(room.now_ns, doing)
     assert [row["instead"] for row in room.desk.summary()[0]["rows"]] == ["", ""]
     room.desk.step(room.now_ns + 60 * NS_PER_S, doing)
     room.desk.step(room.now_ns + 61 * NS_PER_S, {"drone_2": "landed"})
     (given,) = room.desk.summary()
     assert given["state"] == "not_confirmed"
-    assert [row["instead"] for row in given["rows"]] == ["", "hovers: no setpoint from the tracker"]
+    assert [row["instead"] for row in given["rows"]] == ["", "hovers: the tracker sends it no velocity"]
 
 
 def test_a_stop_is_repeated_until_it_is_heard_whatever_is_ordered_after_it() -> None:

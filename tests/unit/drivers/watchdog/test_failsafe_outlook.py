@@ -26,7 +26,7 @@ def test_a_usual_take_off_expects_no_landing(new_bench):
     ("fault", "why"),
     [
         ({"fresh": False}, "no telemetry from the vehicle"),
-        ({"tracker_speaks": False}, "no setpoint from the tracker"),
+        ({"tracker_speaks": False}, "the tracker sends it no velocity"),
         ({"upstream": Upstream(supervisor_fresh=False)}, "the supervisor does not answer"),
         ({"unsound": "its velocity is stuck at 0.00 m/s"}, "its sensors cannot be believed: its velocity is stuck"),
     ],

@@ -95,8 +95,8 @@ def beats_orders(before, decision, said, silent_s, paused_s):
         (DriverMode.CUT, "the vehicle reports an emergency"): FlightState.EMERGENCY in said,
         (DriverMode.LANDING, "the vehicle lands by itself"): FlightState.LANDING in said,
         (DriverMode.HOVER, "the vehicle does not say what it does; RESUME is needed"): FlightState.UNKNOWN in said,
-        (DriverMode.LANDING, "no setpoint from the tracker"): silent_s >= 3.0,
-        (DriverMode.HOVER, "no setpoint from the tracker; RESUME is needed"): paused_s >= 0.5,
+        (DriverMode.LANDING, "the tracker sends it no velocity"): silent_s >= 3.0,
+        (DriverMode.HOVER, "the tracker sends it no velocity; RESUME is needed"): paused_s >= 0.5,
     }
     if (decision.mode, decision.reason) in grounds:
         return grounds[decision.mode, decision.reason]

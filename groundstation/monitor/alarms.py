@@ -34,7 +34,7 @@ _BEFORE_FLIGHT = {
     Charge.UNKNOWN: "until it is known it may not take off",
 }
 _AFTER_LANDING = "Nothing to do now: check its power and cable once all have landed."
-_DARK_ADVICE = "Nothing to do: who is not seen lands by itself. Light ends it."
+_DARK_ADVICE = "Nothing to do: who is not seen lands by itself, unless there is light again."
 _SWITCHED_OFF = "Nothing to do now: switch it on before it flies again."
 _SEARCH = "Nothing to do: the drones look for it."
 _RESTARTED = "Nothing to do: it is restarted if it hangs."
@@ -147,19 +147,19 @@ def _battery(name: str, status: VehicleStatus, battery: Battery) -> Iterator[Ala
     if battery.charge is Charge.GOOD:
         return
     about, held = f"{name} battery", f"{name}: {battery.words}"
-    lands = f"{'if that lasts' if battery.level is None else f'at {battery.limit:.0%}'} it lands by itself"
+    lands = f"{'if that lasts' if battery.level is None else f'at {battery.limit:.0%}'} a drone lands by itself"
     below = battery.level is not None and battery.level < battery.limit
     if _lands(status) or (below and status.lands_in_s is not None):
         yield Alarm(about, f"{held}, it lands", False, "Nothing to do.")
     elif battery.charge is Charge.EMPTY:
-        yield Alarm(about, f"{held}{battery.good_for}", below, f"{_TO_DO}LAND it; {lands}, wherever it is then.")
+        yield Alarm(about, f"{held}{battery.good_for}", below, f"{_TO_DO}press Land now; {lands}, wherever it is.")
     else:
         yield Alarm(about, f"{held}{battery.good_for}", False, f"Nothing to do yet: {lands}.")
 
 
 def _link(name: str, share: float | None) -> Iterator[Alarm]:
     if share is not None and share < WEAK_LINK:
-        advice = f"{_TO_DO}LAND it, or clear the way to it. Without a link it lands by itself."
+        advice = f"{_TO_DO}press Land, or clear the way to it. Without a link it lands by itself."
         yield Alarm(f"{name} link", f"{name}: weak link, {share:.0%} arrives", share < BAD_LINK, advice)
 
 
@@ -222,7 +222,7 @@ def _searched(search: TargetSearch) -> Alarm:
         return Alarm(
             about, f"{search.target} is not found: {search.searched:.0%} of the room was searched", False, _CALL
         )
-    text = f"{search.target} is lost: searched for {search.since_s:.0f} s, most likely near ({x:.1f}, {y:.1f})"
+    text = f"{search.target} is lost, most likely near ({x:.1f}, {y:.1f})"
     return Alarm(about, text, False, _SEARCH)
 
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from groundstation.bus.messages import AIRBORNE
+from groundstation.bus.messages import AIRBORNE, FlightState
 from groundstation.monitor.alarms import Alarm
 from groundstation.monitor.batteries import battery_of
 from groundstation.monitor.state import MonitorState
@@ -40,7 +40,8 @@ def safety_of(state: MonitorState, alarms: Sequence[Alarm]) -> Safety:
 
 
 def _lasting(state: MonitorState, up: Sequence[str]) -> str:
-    known = [left for name in up if (left := battery_of(state, name).endurance) is not None]
-    if len(known) < len(up):
+    stay = [name for name in up if state.vehicles[name].message.flight_state is not FlightState.LANDING]
+    known = [left for name in stay if (left := battery_of(state, name).endurance) is not None]
+    if not known or len(known) < len(stay):
         return ""
-    return f"; the worst battery in the air lasts {min(known, key=lambda left: left.minutes).words}"
+    return f"; the first must land for its battery in {min(known, key=lambda left: left.minutes).words}"

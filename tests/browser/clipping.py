@@ -65,6 +65,20 @@ def clipped(page: Any) -> list[str]:
     return list(page.evaluate(_MEASURE, [SCROLLS, OUT_OF_SIGHT]))
 
 
+# Words of a button that hang out of it, by more than a font's box: what does not clip them shows them on others.
+_OVERHANG = """() => [...document.querySelectorAll("button")].filter((one) => one.checkVisibility()).filter((one) => {
+  const words = document.createRange(), box = one.getBoundingClientRect();
+  words.selectNodeContents(one);
+  return [...words.getClientRects()].some(({left, right, top, bottom, width}) => width > 0
+    && (left < box.left || right > box.right || top < box.top - 3 || bottom > box.bottom + 3));
+}).map((one) => `out of its button: ${one.innerText}`)"""
+
+
+def overhanging(page: Any) -> list[str]:
+    """Return each button whose words do not fit into it."""
+    return list(page.evaluate(_OVERHANG))
+
+
 def covered(page: Any) -> list[str]:
     """Return what a button lies over in its part of the page: other buttons, and words."""
     return list(page.evaluate(_COVERED))

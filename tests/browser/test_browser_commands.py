@@ -118,7 +118,7 @@ def test_one_operator_at_a_time(stage: Any) -> None:
     second.wait(lambda s: verbs(stage) == ["TAKEOFF", "HOLD"])
     second.there("take-over").click()
     second.page.wait_for_timeout(600)
-    assert "starts: this page" in second.there("operator").inner_text()
+    assert "you may start" in second.there("operator").inner_text()
     assert first.there("track").is_disabled()
     stage.flight.modes = dict.fromkeys(stage.flight.modes, "HOVER")
     second.there("track").click()

@@ -3,7 +3,7 @@
 from typing import Any
 
 import pytest
-from clipping import clipped, covered
+from clipping import clipped, covered, overhanging
 from fake_flight import DRONES, TARGET, FakeFlight
 from fonts import REMEMBER, small
 from places import boxes, moved
@@ -68,7 +68,7 @@ def whole(page: Seen) -> list[str]:
     wide = page.page.evaluate(
         "() => document.documentElement.scrollWidth > innerWidth ? ['wider than the window'] : []"
     )
-    return [*clipped(page.page), *covered(page.page), *small(page.page), *wide]
+    return [*clipped(page.page), *overhanging(page.page), *covered(page.page), *small(page.page), *wide]
 
 
 @pytest.mark.parametrize("size", FLOWN)
@@ -131,16 +131,16 @@ def test_the_bar_says_how_long_the_worst_battery_lasts(stage: Any) -> None:
     page = stage.open()
     stage.flight.battery = {"drone_1": 0.9, "drone_2": 0.6}
     page.wait(lambda s: page.there("worst-battery").inner_text() == "60 % drone_2")
-    assert page.there("battery-lasts").inner_text() == "worst battery, ~5 min of flight"
+    assert page.there("battery-lasts").inner_text() == "worst battery, good for ~5 min"
     page.page.wait_for_timeout(61_000)
     stage.flight.battery["drone_2"] = 0.5
-    page.wait(lambda s: page.there("battery-lasts").inner_text() == "worst battery, ~3 min of flight")
+    page.wait(lambda s: page.there("battery-lasts").inner_text() == "worst battery, good for ~3 min")
     stage.flight.battery["drone_1"] = 0.52  # it has spent more
     page.wait(lambda s: page.there("worst-battery").inner_text() == "52 % drone_1")
-    assert page.there("battery-lasts").inner_text() == "worst battery, ~1 min of flight"
+    assert page.there("battery-lasts").inner_text() == "worst battery, good for ~1 min"
     stage.flight.modes["drone_2"] = "LANDED"
-    page.wait(lambda s: "~4 min of flight" in page.there("card-drone_2").inner_text())
-    assert "~1 min of flight" in page.there("card-drone_1").inner_text()
+    page.wait(lambda s: "good for ~4 min" in page.there("card-drone_2").inner_text())
+    assert "good for ~1 min" in page.there("card-drone_1").inner_text()
 
 
 def test_the_bar_says_what_the_team_does(stage: Any) -> None:
@@ -164,13 +164,13 @@ def test_one_sentence_says_what_the_team_does_and_what_may_be_done(stage: Any) -
     stage.flight.battery["drone_2"] = 0.6
     page.wait(lambda s: verdict.inner_text() == "drone_1 and drone_2 track the target. Nobody is lost.")
     page.wait(lambda s: page.there("safety").inner_text() == "SAFE")
-    lasting = "No alarms. All who fly are heard, nobody is lost; the worst battery in the air lasts ~5 min."
+    lasting = "No alarms. All who fly are heard, nobody is lost; the first must land for its battery in ~5 min."
     assert page.there("banner-none").inner_text() == lasting
     stage.flight.modes = {"drone_1": "HOLD", "drone_2": "TRACK"}
-    said = "drone_2 tracks the target; drone_1 holds. Nobody is lost. RESUME lets drone_1 go on with the task."
+    said = "drone_2 tracks the target; drone_1 hovers. Nobody is lost. RESUME lets drone_1 track."
     page.wait(lambda s: verdict.inner_text() == said)
     stage.flight.battery["drone_2"] = 0.28
-    low = "drone_2: battery 28%, good for ~1 min\nNothing to do yet: at 15% it lands by itself."
+    low = "drone_2: battery 28%, good for ~1 min\nNothing to do yet: at 15% a drone lands by itself."
     page.wait(lambda s: page.there("banner-alarm").inner_text() == low)
     assert page.there("safety").inner_text() == "WATCH"
     stage.flight.battery["drone_2"] = 0.6
@@ -185,7 +185,7 @@ def test_each_drone_says_what_it_does_and_why(stage: Any) -> None:
     page = stage.open()
     duty = page.there("drone_1-duty")
     page.wait(lambda s: duty.inner_text().startswith("Tracks turtlebot, ordered at the terminal: watches turtlebot"))
-    assert "Itself seen by ceiling." in duty.inner_text()
+    assert "Seen by ceiling camera." in duty.inner_text()
     stage.flight.fenced = True
     page.wait(lambda s: "Slowed by the fence." in page.there("drone_2-duty").inner_text())
     stage.flight.detail["drone_1"] = "hovers: no telemetry from the vehicle"
@@ -194,35 +194,35 @@ def test_each_drone_says_what_it_does_and_why(stage: Any) -> None:
     page.wait(lambda s: duty.inner_text() == "Hovers: no telemetry from the vehicle.")
     page.wait(lambda s: "drone_1 lands in 2 s: no telemetry" in page.there("banner-alarm").first.inner_text())
     assert page.there("drone_1-mode").inner_text() == "lands in 2 s"
-    assert page.there("hold").inner_text() == "HOLD 1\ndrone_2 hovers;\ndrone_1 lands anyway"
+    assert page.there("hold").inner_text() == "HOLD\ndrone_2 hovers;\ndrone_1 lands anyway"
     assert page.there("drone_1-hold").inner_text() == "Hold\nlands anyway"
     assert page.there("drone_2-hold").inner_text() == "Hold\nhovers here"
-    assert page.there("drone_2-takeoff").inner_text() == "Take off\nit flies"
+    assert page.there("drone_2-takeoff").inner_text() == "Take off\nflying already"
     stage.flight.detail.clear()
     stage.flight.lands_in_s.clear()
     stage.flight.braked.clear()
     stage.flight.modes["drone_1"] = "HOLD"
     page.wait(lambda s: duty.inner_text() == "Hovers in place: HOLD ordered at the terminal.")
-    assert page.there("hold").inner_text().startswith("HOLD 2")
+    assert page.there("hold").inner_text() == "HOLD\nboth hover in place"
     stage.flight.modes = {"drone_1": "LANDED", "drone_2": "LANDED"}
     page.wait(lambda s: page.there("hold").inner_text() == "HOLD\nnobody flies")
-    assert page.there("take-off").inner_text().startswith("TAKE OFF 2")
+    assert page.there("take-off").inner_text() == "TAKE OFF\nboth rise, one by one"
 
 
 # Whether it is safe, why, who does what, what HOLD would do, and the modes on the cards of both drones.
 TOLD = {
-    "all_is_well": ("SAFE", "No alarms", "track the target. Nobody is lost.", "hover in place", "track", "track"),
+    "all_is_well": ("SAFE", "No alarms", "track the target. Nobody is lost.", "both hover in place", "track", "track"),
     "one_lands_for_its_battery": (
         *("WATCH", "battery 13%, it lands", "drone_1 tracks the target; drone_2 lands."),
         *("drone_1 hovers;\ndrone_2 lands anyway", "track", "landing"),
     ),
-    "all_are_held": ("SAFE", "No alarms", "RESUME lets them go on with the task.", "hovering already", "hold", "hold"),
+    "all_are_held": ("SAFE", "No alarms", "RESUME lets them track.", "both hover already", "hold", "hold"),
     "one_is_unseen_and_will_land": (
         *("WATCH", "drone_1 lands in 6 s", "Lost: drone_1, not seen for 4 s"),
         *("drone_2 hovers;\ndrone_1 lands anyway", "lands in 6 s", "track"),
     ),
     "the_tracker_is_silent": (
-        *("WATCH", "TRACKER SILENT", "land by themselves in 1 s. Who is lost is not known: the tracker is silent."),
+        *("WATCH", "TRACKER SILENT", "in 1 s. Whether anybody is lost is not known: the tracker is silent."),
         *("all land anyway", "lands in 1 s", "lands in 1 s"),
     ),
     "one_has_a_stuck_sensor": (
@@ -270,17 +270,17 @@ def test_every_situation_is_told_in_one_way_and_moves_nothing(stage: Any) -> Non
 
 def test_only_starts_that_would_be_accepted_are_offered(stage: Any) -> None:
     page = stage.open()
-    page.wait(lambda s: page.there("take-off").get_attribute("title") == "nobody on the floor")
+    page.wait(lambda s: page.there("take-off").get_attribute("title") == "flying already")
     assert page.there("take-off").is_disabled() and page.there("drone_1-takeoff").is_disabled()
     assert page.there("track").get_attribute("title") == "tracking already"
     stage.flight.modes = {"drone_1": "LANDED", "drone_2": "HOLD"}
     page.wait(lambda s: page.there("drone_1-takeoff").is_enabled())
     assert page.there("resume").is_enabled() and page.there("drone_2-takeoff").is_disabled()
-    assert page.there("track").inner_text() == "TRACK\npress RESUME"
+    assert page.there("track").inner_text() == "TRACK\npress RESUME instead"
     page.there("drone_1-takeoff").click()
     page.wait(lambda s: [command.scope for command in stage.flight.commands] == [("operator", "drone_1")])
     stage.flight.frozen = True
-    page.wait(lambda s: page.there("resume").get_attribute("title") == "tracker silent")
+    page.wait(lambda s: page.there("resume").get_attribute("title") == "no tracker")
     assert page.there("track").is_disabled()
 
 

@@ -224,7 +224,7 @@ def test_a_mixed_team_below_two_cameras(mixed_stage: Any) -> None:
     for camera in (*mixed_stage.flight.cameras, "drone_1_camera", "drone_2_camera", "drone_3_camera"):
         page.there(f"camera-{camera}").scroll_into_view_if_needed()
         page.there(f"camera-{camera}").locator(".veil").wait_for(state="hidden")
-    assert page.there("land-all").inner_text().startswith("LAND ALL 3")
+    assert page.there("land-all").inner_text().endswith("all 3 land\nwhere they are")
     assert page.there("drone_3-battery").inner_text() == "unknown"
     page.shot("mixed_team")
     assert page.page.evaluate(HIDDEN) == [], "a low desk shows three drones, the target and the orders whole"

@@ -24,8 +24,15 @@ def test_it_is_safe_while_nothing_is_wrong_and_the_reason_says_how_long(world: W
     both(world)
     world.vehicle("drone_2", battery=0.65)
     world.estimate()
-    reason = "No alarms. All who fly are heard, nobody is lost; the worst battery in the air lasts ~6 min."
+    reason = "No alarms. All who fly are heard, nobody is lost; the first must land for its battery in ~6 min."
     assert judged(world) == Safety(Level.SAFE, reason)
+
+
+def test_who_lands_does_not_count_for_how_long_batteries_last(world: World) -> None:
+    both(world)
+    world.vehicle("drone_1", battery=0.65)
+    world.vehicle("drone_2", "LANDING", battery=0.4, flight_state=m.FlightState.LANDING)
+    assert judged(world).reason.endswith("; the first must land for its battery in ~6 min.")
 
 
 def test_how_long_batteries_last_is_left_out_where_it_is_not_known(world: World) -> None:

@@ -7,7 +7,7 @@ import { momentWords } from "./playback.js";
 import { store } from "./store.js";
 
 // What is to be done about an alarm: the word that leads it, and how it is counted.
-const RANKS = { ACT: "more to act on", WATCH: "more to watch", notice: "more" };
+const RANKS = { ACT: "to act on", WATCH: "to watch", notice: "" };
 let shown = "";
 
 export function startStrip() {
@@ -51,8 +51,8 @@ export function showMore(ranks, whole) {
 }
 
 function counted(ranks) {
-  const counts = Object.keys(RANKS).map((rank) => [rank, ranks.filter((one) => one === rank).length]);
-  return counts.filter(([, count]) => count).map(([rank, count]) => `${count} ${RANKS[rank]}`);
+  const counts = Object.keys(RANKS).map((rank) => [rank, ranks.filter((one) => one === rank).length]).filter(([, count]) => count);
+  return counts.map(([rank, count]) => `${count}${counts.length > 1 && RANKS[rank] ? "" : " more"} ${RANKS[rank]}`.trim());
 }
 
 export function showLog() {

@@ -11,6 +11,7 @@ import { momentWords } from "./playback.js";
 import { estimateAge, replaying, runOver, silentS, store, trackerSilent } from "./store.js";
 
 const SHOWN = 4, NOTICE_MS = 8000, LEVELS = { SAFE: "good", WATCH: "warn", ACT: "bad" };
+const MEANS = { SAFE: "no problem", WATCH: "a problem, but\nno need to act", ACT: "a problem:\nact now" };
 const COLOURS = { ACT: "grave", WATCH: "mild" };  // an alarm's is that of its word
 const WIDE = matchMedia("(min-width: 1400px)"), ROOM = 110; // letters
 const notices = [];
@@ -66,9 +67,10 @@ function safetyWord(own) {
 }
 
 export function showBanners() {
-  const own = ownAlarms(), all = banners(own), word = safetyWord(own), badge = byId("safety");
-  text(badge, word);
-  badge.dataset.level = LEVELS[word];
+  const own = ownAlarms(), all = banners(own), word = safetyWord(own);
+  text(byId("safety"), word);
+  text(byId("safety-means"), MEANS[word]);
+  byId("safety-box").dataset.level = LEVELS[word];
   document.body.dataset.safety = word;
   noteOwnAlarms(own);
   const host = byId("banners"), kinds = all.map(({ kind }) => kind).join();

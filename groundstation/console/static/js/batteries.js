@@ -1,34 +1,40 @@
 // What the batteries hold and how long they are good for, as the console's process works it out for all pages.
 
-import { up } from "./glance.js";
+import { modeNow, standing, up } from "./glance.js";
 import { droneNames, store } from "./store.js";
 
 const RANKS = ["empty", "unknown", "low", "good"];
 const LEVELS = { empty: "bad", unknown: "warn", low: "warn", good: "good" };
 
 // Until it lands its drone by itself, in the same words in the bar and on the cards; "" where nobody knows.
-export function lastsWords({ battery, good_for: time, battery_min: limit }) {
-  return time && (battery < limit ? "enough to land" : `${time} of flight`);
+export function lastsWords(name) {
+  const { battery, good_for: time, battery_min: limit } = store.s.vehicles[name];
+  return time && (battery < limit ? "enough to land" : `good for ${time}`);
 }
 
 const share = ({ battery }) => (battery === null ? "unknown" : `${(100 * battery).toFixed(0)} %`);
 
-// The battery that is nearest to its end, of the drones that were heard, and fly if any does: {name, words, level, title};
-// null where none was.
+// Whose battery counts: of who flies, if anybody does; and not of who lands with a good one, while others fly on.
+function counted() {
+  const flying = up(), on = flying.filter((name) => modeNow(name) !== "LANDING" || store.s.vehicles[name].charge !== "good");
+  return on.length ? on : flying.length ? flying : droneNames();
+}
+
+// The battery that is nearest to its end, of the drones that were heard: {name, words, level, title}; null where none was.
 export function worstBattery() {
-  const flying = up(), all = (flying.length ? flying : droneNames()).map((name) => [name, store.s.vehicles?.[name]]).filter(([, status]) => status);
+  const names = counted(), all = names.map((name) => [name, store.s.vehicles?.[name]]).filter(([, status]) => status);
   if (!all.length) return null;
   const [[name, status]] = all.sort(([, a], [, b]) => RANKS.indexOf(a.charge) - RANKS.indexOf(b.charge)
     || (a.minutes ?? Infinity) - (b.minutes ?? Infinity) || a.battery - b.battery);
-  const what = flying.length && flying.length < droneNames().length ? "worst in the air" : "worst battery", lasts = lastsWords(status);
+  const what = names.length === droneNames().length ? "worst battery" : names.length < up().length ? "worst flying on" : "worst in the air", lasts = lastsWords(name);
   return { name, words: share(status), level: LEVELS[status.charge], title: lasts ? `${what}, ${lasts}` : what };
 }
 
 const SCARCE = 0.15; // above its limit; else it is the time that is short
 
 // [words, class] of a card.
-export function batteryWords(status) {
-  const standing = ["LANDED", "CUT"].includes(status.mode), scarce = status.battery < status.battery_min + SCARCE;
-  const more = status.charge === "empty" && standing ? " charge!" : scarce && status.charge !== "unknown" ? " low" : "";
+export function batteryWords(name) {
+  const status = store.s.vehicles[name], scarce = status.battery < status.battery_min + SCARCE;
+  const more = status.charge === "empty" && standing([name]).length ? " charge!" : scarce && status.charge !== "unknown" ? " low" : "";
   return [`${share(status)}${more}`, { empty: "empty", low: "low" }[status.charge] ?? ""];
 }

@@ -137,7 +137,7 @@ export function showCameras() {
   for (const [name, { root, age, veil, stamp }] of feeds) {
     const status = store.s.cameras?.[name], old = ageS(stamp), stale = old > STALE_S || !store.connected;
     root.classList.toggle("stale", stale && stamp !== null);
-    text(age, `${status ? `${status.fps.toFixed(0)} fps` : ""} ${Number.isFinite(old) ? `${(1000 * old).toFixed(0)} ms` : ""}`.trim());
+    text(age, [status && `${status.fps.toFixed(0)} fps`, Number.isFinite(old) && `${old.toFixed(1)} s old`].filter(Boolean).join(", "));
     const refused = store.s.refused_pictures?.[name];
     veil.hidden = !stale && !refused;
     text(veil, refused ? refused : stamp === null ? (status && !status.connected ? `no pictures${status.detail ? `: ${status.detail}` : ""}` : "no picture yet") : `${seconds(old)} old`);

@@ -2,13 +2,12 @@
 
 import { moment, sinceMs } from "./clock.js";
 import { byId, el, seconds, text } from "./dom.js";
-import { effectOf, holding, isIdle, refusalOf, SHORT, waiting } from "./effects.js";
-import { aloft, doing, modeNow, modes, standing } from "./glance.js";
+import { effectOf, effectOnOne, isIdle, refusalOf, startEffect } from "./effects.js";
 import { me, send } from "./link.js";
 import { give, mayGive, OVER, ownOrders, roleText, startOwnOrders } from "./own_orders.js";
 import { forbidden } from "./preflight.js";
 import { ageS, droneNames, replaying, runOver, store } from "./store.js";
-import { giver } from "./who.js";
+import { askedBy, giver } from "./who.js";
 
 const SHOWN = 5, PRESS_MS = 1000, ASLEEP_MS = 1000;
 const WORDS = { TAKEOFF: "TAKE OFF", CUT_MOTORS: "CUT MOTORS" };
@@ -53,20 +52,10 @@ function holdToPress(button, fire) {
   button.addEventListener("contextmenu", (event) => event.preventDefault());
 }
 
-// How many obey: in the air for those that stop, on the floor for the one that starts; nothing where nobody is heard.
-function showCounts(names) {
-  const known = modes(names).length, up = aloft(), landing = doing("LANDING").length;
-  for (const node of document.querySelectorAll(".count")) {
-    const count = node.closest("#takeoff") ? standing() : node.closest("#hold") ? holding(names).length : node.closest("#land") ? up - landing : up;
-    text(node, known && count ? `${count}` : "");
-  }
-}
-
 export function showControls() {
   showStops();
-  showCounts(droneNames());
   const session = store.s.session ?? {}, replay = replaying(), mine = session.operator === me.client;
-  text(byId("operator"), replay ? "" : !me.trusted ? "looking only" : !mayGive("TAKEOFF") ? roleText() : !session.operator ? "starts: any page" : mine ? "starts: this page" : `starts: ${session.operator_name || "another page"}`);
+  text(byId("operator"), replay ? "" : !me.trusted ? "looking only" : !mayGive("TAKEOFF") ? roleText() : `${!session.operator ? "anyone" : mine ? "you" : session.operator_name || "another page"} may start`);
   byId("takeover").hidden = replay || !me.trusted || !mayGive("TAKEOFF") || !session.operator || mine;
   showStarts(barred(session));
 }
@@ -81,7 +70,7 @@ function showStops() {
   for (const node of document.querySelectorAll("small[data-effect]")) {
     const { effect: verb, whom } = node.dataset, names = whom ? [whom] : droneNames();
     node.dataset.caption ??= node.textContent;
-    const effect = runOver() ? "run over" : store.connected ? effectOf(verb, names) : "no connection";
+    const effect = runOver() ? "run over" : !store.connected ? "no connection" : whom ? effectOnOne(verb, whom) : effectOf(verb);
     text(node, effect || node.dataset.caption);
     node.closest("button").classList.toggle("idle", store.connected && !runOver() && isIdle(verb, names));
   }
@@ -94,38 +83,33 @@ function barred(session) {
   if (!store.connected) return ["no connection", "no connection"];
   if (!me.trusted) return ["looking only", "this page may only look"];
   if (!mayGive("TAKEOFF")) return [`may ${me.role} only`, roleText()];
-  if (session.operator && session.operator !== me.client) return ["another page starts", "another page is the operator: take over first"];
-  return session.lease ? null : ["no lease", "the ground station's main process may not give orders now"];
+  if (session.operator && session.operator !== me.client) return ["another page may", "another page is the operator: take over first"];
+  return session.lease ? null : ["station not in charge", "the ground station's main process may not give orders now"];
 }
 
 function showStarts(why) {
   for (const [id, verb] of [["takeoff", "TAKEOFF"], ["track", "TRACK"], ["resume", "RESUME"]]) {
-    const button = byId(id), reason = why ?? startRefusal(verb), caption = button.querySelector("small");
-    caption.dataset.caption ??= caption.textContent;
-    text(caption, reason?.[0] ?? (ofOne(verb) || caption.dataset.caption));
+    const button = byId(id), reason = why ?? startRefusal(verb);
+    text(button.querySelector("small"), reason ? notNow(reason[0]) : startEffect(verb));
     enable(button, reason);
   }
   for (const node of document.querySelectorAll("[data-takeoff]")) {
     const reason = why ?? startRefusal("TAKEOFF", [node.dataset.takeoff]);
     enable(node, reason);
-    text(node.querySelector("small"), reason ? inFewer(reason[0]) : "it takes off");
+    text(node.querySelector("small"), reason ? inFewer(reason[0]) : "rises, hovers");
   }
   enable(byId("anyway"), why ?? twice(refusalOf("TAKEOFF")));
 }
 
-// Why one drone may not take off, where a card has less room or knows better than the bar.
-const OF_ONE = {
-  "nobody on the floor": "it flies", "one is taking off": "one takes off", "another page starts": "another page", "battery too low": "battery low",
-  "battery unknown": "battery?",
-};
-const inFewer = (words) => OF_ONE[words] ?? (words.startsWith("must") ? "see the list" : words);
+// So that no reason reads as an effect.
+const SAYS_SO = /already$|instead$|^mend|^run over|only$|connection$|charge$|unknown$/;
+const notNow = (words) => (SAYS_SO.test(words) ? words : `not now: ${words}`);
 
-// What a start does where only one drone obeys it; "" where several do.
-function ofOne(verb) {
-  const stand = () => droneNames().filter((name) => ["LANDED", "CUT"].includes(modeNow(name)));
-  const [first, ...more] = { TAKEOFF: stand, RESUME: waiting }[verb]?.() ?? [];
-  return !first || more.length ? "" : `${first.length > SHORT ? "one" : first} ${verb === "TAKEOFF" ? "takes off" : "goes on"}`;
-}
+// Why one drone may not take off, where a card has less room.
+const OF_ONE = {
+  "another page may": "no: other page", "battery unknown": "no: battery?", "station not in charge": "not in charge", "not heard yet": "no: not heard",
+};
+const inFewer = (words) => OF_ONE[words] ?? (words.startsWith("mend") ? "mend: see list" : SAYS_SO.test(words) ? words : `no: ${words}`);
 
 const startRefusal = (verb, names = droneNames()) => twice(refusalOf(verb, names)) ?? (verb === "TAKEOFF" ? forbidden(names) : null);
 
@@ -152,10 +136,10 @@ export function showOrders() {
 }
 
 function line(order) {
-  const scope = order.team ? "all" : order.rows.map((row) => row.name).join(", ");
+  const asker = askedBy(order), scope = order.team ? "all" : order.rows.map((row) => row.name).join(", ");
   return el("li", { class: "order", data: { state: order.state, verb: order.verb, testid: "order" } },
     el("div", { class: "head" },
-      el("span", {}, `${WORDS[order.verb] ?? order.verb} `, el("small", {}, `${scope} · ${giver(order.by)} · `, el("span", { class: "ago num", "aria-hidden": "true" }))),
+      el("span", {}, `${WORDS[order.verb] ?? order.verb} `, el("small", {}, `${scope} · ${giver(order.by)}${asker ? ` for ${giver(asker)}` : ""} · `, el("span", { class: "ago num", "aria-hidden": "true" }))),
       el("span", { class: "state" }, STATES[order.state] ?? order.state)),
     el("div", { class: "rows" }, ...order.rows.map((row) => el("span", {}, el("b", {}, `${row.name} `), el("span", { class: row.stage && row.stage !== "REFUSED" ? "" : "missing" }, stage(row, order)))),
       order.note ? el("span", { class: "missing" }, order.note) : null));

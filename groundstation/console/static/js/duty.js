@@ -1,9 +1,9 @@
 // What a drone does now and why, in a sentence or two, and what limits it.
 
 import { joined, seconds } from "./dom.js";
-import { isLost } from "./glance.js";
-import { ageS, SEEN_S, seenBy, store, unseenS } from "./store.js";
-import { ordered } from "./who.js";
+import { isLost, standing } from "./glance.js";
+import { ageS, droneNames, SEEN_S, seenBy, store, trackerSilent, unseenS } from "./store.js";
+import { askedBy, ordered } from "./who.js";
 
 const FRESH_S = 1;
 // Information [1/m²] from which a plan relies on a link, as in the report's doubts.
@@ -12,6 +12,7 @@ const LIMITS = {
   fence: "the fence",
   separation: "a drone nearby",
   speed: "its speed limit",
+  "yaw rate": "how fast it may turn",
   stale: "an old estimate",
   uncertain: "an uncertain place",
   unknown: "an unknown place",
@@ -35,17 +36,25 @@ function tracked(name, plan) {
   const limits = limitsOf(plan.controls.find(({ robot }) => robot === name));
   const [, who] = store.s.vehicles[name].detail.match(/^tracking for (.+)$/) ?? [];
   const task = sought.length ? `Looks for ${joined(sought)}` : `Tracks ${joined(targets)}${who ? `, ${orderedBy(who, name, "tracking")}` : ""}`;
-  const does = watched.length ? `${task}: watches ${joined(watched)}${watched.some((one) => targets.includes(one)) ? "" : ", so that the team knows where that is"}` : sought.length ? task : `${task}: moves to where it will see it`;
-  const known = watchers.length ? `Itself seen by ${joined(watchers)}` : unseen(name);
+  const does = watched.length ? `${task}: watches ${watching(watched)}` : sought.length ? task : `${task}: moves to where it will see it`;
+  const known = watchers.length ? `Seen by ${joined(watchers.map(watcher))}` : unseen(name);
   return [`${does}.`, `${known}.`, limits && `Slowed by ${limits}.`].filter(Boolean).join(" ");
 }
+
+// Who watches no target watches drones for the sake of their places.
+function watching(names) {
+  const purpose = names.every((name) => droneNames().includes(name)) ? `, to know where ${names.length > 1 ? "they are" : "that is"}` : "";
+  return `${joined(names)}${purpose}`;
+}
+
+const watcher = (name) => (droneNames().includes(name) || name.endsWith("camera") ? name : `${name} camera`);
 
 // One that nobody sees may be known by whom it sees itself; who stays lost lands.
 function unseen(name) {
   const age = unseenS(name), { lost_after_s, unseen_land_s } = store.scene;
-  if (age <= SEEN_S) return `Seen by nobody: where it is follows from what it sees`;
+  if (age <= SEEN_S) return "Out of view: its own camera tells where it is";
   const left = Math.max(0, unseen_land_s - age);
-  return isLost(name) ? `Itself lost: lands by itself within ${left.toFixed(0)}\u00a0s, unless it is seen` : `Not seen for ${seconds(age)}; it is lost from ${seconds(lost_after_s)} on`;
+  return isLost(name) ? `Itself lost: lands by itself within ${left.toFixed(0)}\u00a0s, unless it is seen again` : `Not seen for ${seconds(age)}: lost after ${lost_after_s} s`;
 }
 
 const ORDERS = /^(landing|taking off|held|tracking) (?:for|by) (.+)$/;
@@ -53,34 +62,29 @@ const ORDERED = { landing: "lands:", "taking off": "takes off:", held: "hovers i
 
 const VERBS = { landing: ["LAND"], "taking off": ["TAKEOFF"], held: ["HOLD"], tracking: ["TRACK", "RESUME"] };
 
-// Drivers name the program that an order came from; of a page's it is known who gave the last one of its kind.
+// Drivers name the program that an order came from; of a page's, and of what it asked the terminal for, it is known who gave
+// the last one of its kind.
 function orderedBy(who, name, doing) {
   const last = (store.s.orders ?? []).find((order) => VERBS[doing].includes(order.verb) && order.rows.some((row) => row.name === name));
-  return ordered(who !== "console" ? who : last?.by ?? "a page");
+  return ordered((last && askedBy(last)) || (who !== "console" ? who : last?.by ?? "a page"));
 }
 
+const NEEDED = /; RESUME is needed$/;
 // What it does until a failsafe lands it.
-const GOES_ON = { TRACK: "follows its plan", HOLD: "hovers" };
+const GOES_ON = { TRACK: "follows its plan", HOLD: "hovers", HOVER: "hovers" };
 
 // The driver's own reason; what it is the reason for, where it does not say so, and who ordered what "landing for" says.
 function reasonOf(name, { mode, detail, lands_in_s, braked }) {
-  if (mode === "LANDED" || mode === "CUT") return standing(name, detail);
+  if (standing([name]).length) return stands(name, detail);
   const [, doing, who] = detail.match(ORDERS) ?? [];
   if (who) return `${ORDERED[doing]} ${orderedBy(who, name, doing)}`;
-  if (lands_in_s !== null && !braked && mode in GOES_ON && detail) return `${GOES_ON[mode]}, then lands: ${detail}`;
+  if (lands_in_s !== null && !braked && mode in GOES_ON && detail) return `${GOES_ON[mode]}, then lands: ${detail.replace(NEEDED, "")}`;
   if (mode === "LANDING" && detail && !detail.startsWith("land")) return `lands: ${detail}`;
-  return mode === "HOVER" ? hovering(detail, lands_in_s) : detail;
-}
-
-// RESUME helps while no landing is near.
-function hovering(detail, landsInS) {
-  const [, why] = detail.match(/^(.+); RESUME is needed$/) ?? [];
-  if (!why) return detail;
-  return landsInS === null ? `hovers: ${why}. RESUME lets it go on` : `hovers, then lands: ${why}`;
+  return mode === "HOVER" && NEEDED.test(detail) ? `hovers: ${detail.replace(NEEDED, "")}. RESUME lets it go on` : detail;
 }
 
 // Why it landed stands in brackets in its driver's words.
-function standing(name, detail) {
+function stands(name, detail) {
   const [, why] = detail.match(/^landed \((.+)\)$/) ?? [], [, doing, who] = why?.match(ORDERS) ?? [];
   return why ? `stands, motors off. It landed: ${who ? orderedBy(who, name, doing) : why}` : `stands with its motors off${detail && `: ${detail}`}`;
 }
@@ -90,6 +94,7 @@ export function dutyOf(name) {
   const status = store.s.vehicles?.[name], plan = store.s.plan;
   if (!status) return "";
   const planned = status.mode === "TRACK" && !status.braked && status.lands_in_s === null && status.flight !== "LOST" && plan && ageS(plan.at) < FRESH_S;
+  if (planned && trackerSilent()) return "Told to track; without the tracker it hovers, then lands.";
   return planned ? tracked(name, plan) : sentence(reasonOf(name, status));
 }
 

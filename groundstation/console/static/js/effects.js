@@ -1,25 +1,26 @@
-// What a start or a stop would do now.
+// What a start or a stop would do now, or why a start can do nothing: in the few words that a button has room for.
 
-import { aloft, lostTarget, modeNow, modes, up, waits } from "./glance.js";
+import { aloft, isLost, lostTarget, modeNow, modes, standing, up, waits } from "./glance.js";
 import { droneNames, store, trackerSilent } from "./store.js";
 
 // Why a start would be refused or do nothing now; "" if it would not. Stops are never withheld while a run goes on.
 export function refusalOf(verb, names = droneNames()) {
   const all = modes(names);
-  if (modes().includes("TAKING_OFF")) return "one is taking off";
-  if (verb === "TAKEOFF") return takeOffRefusal(names.map((name) => [name, store.s.vehicles?.[name]]).filter(([, status]) => ["LANDED", "CUT"].includes(status?.mode)));
+  if (modes().includes("TAKING_OFF")) return "one rises";
+  if (verb === "TAKEOFF") return takeOffRefusal(names);
   if (!aloft()) return "nobody flies";
-  if (trackerSilent()) return "tracker silent";
+  if (trackerSilent()) return "no tracker";
   const resumes = waiting(names).length;
-  if (verb === "RESUME") return resumes ? "" : "nobody waits for it";
-  if (resumes) return "press RESUME";
-  return all.includes("HOVER") ? "" : all.includes("TRACK") ? (lostTarget() ? "searching already" : "tracking already") : "nobody hovers";
+  if (verb === "RESUME") return resumes ? "" : "none on hold";
+  if (resumes) return "press RESUME instead";
+  return all.includes("HOVER") ? "" : all.includes("TRACK") ? (lostTarget() ? "searching already" : "tracking already") : "none hovers";
 }
 
-function takeOffRefusal(standing) {
-  if (!standing.length) return "nobody on the floor";
-  if (standing.every(([, status]) => status.battery === null)) return "battery unknown";
-  return standing.every(([, status]) => status.battery < status.battery_min) ? "battery too low" : "";
+function takeOffRefusal(names) {
+  const flying = up(names).length, batteries = standing(names).map((name) => store.s.vehicles[name]);
+  if (!batteries.length) return flying === names.length ? "flying already" : flying ? "none stands" : "not heard yet";
+  if (batteries.every(({ battery }) => battery === null)) return "battery unknown";
+  return batteries.every(({ battery, battery_min: least }) => battery < least) ? "low battery" : "";
 }
 
 // After an order or a failsafe a drone hovers until RESUME; after its take-off until TRACK. RESUME lets both go on.
@@ -28,38 +29,59 @@ export function waiting(names = droneNames()) {
   return names.filter((name) => waitsNow(store.s.vehicles?.[name]));
 }
 
-export const SHORT = 8; // letters of a name that has room on a button
+const SHORT = 8; // letters of a name that has room on a button
+const nameOf = (name) => (name.length > SHORT ? "1" : name);
 
-// Who does what, in the few words that a button has room for: "drone_1 hovers", "2 hover".
+// Who does what: "drone_1 hovers", "both hover", "all 4 hover", "2 hover".
 function does(names, one, many) {
-  if (!names.length) return "";
-  return names.length > 1 ? `${names.length} ${many}` : `${names[0].length > SHORT ? "1" : names[0]} ${one}`;
+  if (names.length < 2) return names.length ? `${nameOf(names[0])} ${one}` : "";
+  return `${names.length < droneNames().length ? names.length : names.length > 2 ? `all ${names.length}` : "both"} ${many}`;
 }
 
-// What a stop of these drones would do now, to whom, and to whom not; "" where it does to all what it is for.
-export function effectOf(verb, names = droneNames()) {
-  const flying = up(names), down = names.filter((name) => modeNow(name) && !flying.includes(name));
-  if (!modes(names).length) return "";
-  if (!flying.length) return names.length > 1 ? "nobody flies" : "it stands";
-  if (verb === "CUT_MOTORS") return flying.length > 1 ? "" : "press 1 s: it falls";
-  if (names.length === 1) return effectOnOne(verb, names);
-  const idle = isIdle(verb, names), held = holding(names), bound = flying.filter((name) => !held.includes(name));
-  if (verb === "LAND") return idle ? "landing already" : landing(flying, down);
-  if (bound.length === names.length) return "all land anyway";
-  if (held.length === names.length) return idle ? "hovering already" : "";
-  const already = idle ? " already" : "";
-  return [does(held, `hovers${already}`, `hover${already}`), does(bound, "lands anyway", "land anyway"), does(down, "stands", "stand")].filter(Boolean).join(";\n");
+const told = (parts) => parts.filter(Boolean).join(";\n");
+
+// Who would follow TRACK.
+export const ready = () => droneNames().filter((name) => modeNow(name) === "HOVER");
+
+// What a start of the team would do now, to whom.
+export function startEffect(verb) {
+  if (verb === "TAKEOFF") return does(standing(), "rises, hovers", "rise, one by one");
+  const who = verb === "RESUME" ? waiting() : ready();
+  const how = who.some(isBound) ? ", if able" : verb === "RESUME" ? " again" : "";
+  return does(who, ...(lostTarget() ? ["searches", "search"] : ["tracks", "track"]).map((word) => `${word}${how}`));
 }
 
-function effectOnOne(verb, names) {
-  if (verb === "LAND") return isIdle(verb, names) ? "it lands" : "";
-  return !holding(names).length ? "lands anyway" : isIdle(verb, names) ? "it hovers" : "";
+// What a stop of the team would do now, to whom, and to whom not; "" while nobody is heard.
+export function effectOf(verb) {
+  const flying = up();
+  if (!modes().length) return "";
+  if (!flying.length) return "nobody flies";
+  if (verb === "CUT_MOTORS") return `press 1 s:\n${does(flying, "falls", "fall")}`;
+  return verb === "LAND" ? landing(flying) : hover(flying);
 }
 
-// What LAND would do to who flies, where not all of the team follow it anew; "" where they do.
-function landing(flying, down) {
+// What a stop of one drone would do now.
+export function effectOnOne(verb, name) {
+  if (!modeNow(name)) return "";
+  if (!up([name]).length) return "no use: stands";
+  if (verb === "LAND") return isIdle(verb, [name]) ? "lands already" : "lands here";
+  if (!holding([name]).length) return "lands anyway";
+  return isIdle(verb, [name]) ? "hovers already" : isLost(name) ? "hovers if seen" : "hovers here";
+}
+
+// Who is lost hovers as well, until it is landed for it.
+function hover(flying) {
+  const held = holding(), lost = held.filter(isLost), seen = held.filter((name) => !isLost(name)), bound = flying.filter((name) => !held.includes(name));
+  if (bound.length === droneNames().length) return "all land anyway";
+  const how = isIdle("HOLD") ? " already" : held.length === droneNames().length ? " in place" : "";
+  if (!lost.length) return told([does(held, `hovers${how}`, `hover${how}`), does(bound, "lands anyway", "land anyway"), does(standing(), "stands", "stand")]);
+  if (lost.length < flying.length) return told([does(seen, "hovers", "hover"), does(lost, "hovers if seen", "hover if seen"), does(bound, "lands anyway", "land anyway")]);
+  return does(lost, "hovers; it lands\nif it stays unseen", "hover; they land\nif they stay unseen");
+}
+
+function landing(flying) {
   const anew = flying.filter((name) => modeNow(name) !== "LANDING"), already = flying.filter((name) => !anew.includes(name));
-  return down.length || already.length ? [does(anew, "lands", "land where they are"), does(already, "lands already", "land already")].filter(Boolean).join(";\n") : "";
+  return already.length ? told([does(anew, "lands", "land"), does(already, "lands already", "land already")]) : does(anew, "lands\nwhere it is", "land\nwhere they are");
 }
 
 // Whether a stop would change nothing now.
@@ -69,7 +91,9 @@ export function isIdle(verb, names = droneNames()) {
   return moved.every((name) => modeNow(name) === left);
 }
 
+// Whether a failsafe is about to land it: whether its fault is over, only its driver knows.
+const isBound = (name) => (store.s.vehicles[name].lands_in_s ?? null) !== null;
 // Whom HOLD holds: neither a landing nor what leads to one by itself is stopped by it.
-export const holding = (names = droneNames()) => up(names).filter((name) => modeNow(name) !== "LANDING" && (store.s.vehicles[name].lands_in_s ?? null) === null);
+const holding = (names = droneNames()) => up(names).filter((name) => modeNow(name) !== "LANDING" && !isBound(name));
 
 export const STOPS = new Set(["HOLD", "LAND", "CUT_MOTORS"]);

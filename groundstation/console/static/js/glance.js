@@ -15,8 +15,8 @@ export const modes = (names = droneNames()) => names.map(modeNow).filter(Boolean
 // Of these drones those that fly.
 export const up = (names = droneNames()) => names.filter((name) => ALOFT.has(modeNow(name)));
 export const aloft = () => up().length;
-// How many do not fly.
-export const standing = () => modes().length - aloft();
+// Of these drones those that stand, and might take off.
+export const standing = (names = droneNames()) => names.filter((name) => ["LANDED", "CUT"].includes(modeNow(name)));
 export const targetAgeS = () => Math.min(...entities().filter(({ name }) => isTarget(name)).map((body) => body.age_s + estimateAge()), Infinity);
 
 // What they do who do not stand, the most careful first: [words, level, who does each if not all do the same].

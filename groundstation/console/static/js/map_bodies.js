@@ -161,7 +161,7 @@ export function drawVelocities(g, view, stale) {
     const limits = limitsOf(control);
     if (!limits) continue;
     const places = around(from[0], from[1], bodyRadius(view) + 6, 14).slice(1);
-    note(g, FIGURE, name, `slowed by ${limits}`, places, ink().text, 14, 500);
+    note(g, FIGURE, name, withShortNames(`${name} slowed by ${limits}`), places, ink().text, 14, 500);
   }
 }
 
@@ -175,7 +175,7 @@ export function drawTruth(g, view) {
     g.moveTo(x - r, y + r); g.lineTo(x + r, y - r);
     g.moveTo(x, y); g.lineTo(...view.point(position[0] + 0.32 * Math.cos(yaw), position[1] + 0.32 * Math.sin(yaw)));
     g.stroke();
-    if (!entity(name) && !(store.s.standing ?? []).some((one) => one.name === name)) note(g, NAME, name, withShortNames(`${name} (truth)`), around(x, y, 10, 14), ink().truth, 14, 500);
+    if (!entity(name) && !(store.s.standing ?? []).some((one) => one.name === name)) note(g, NAME, name, withShortNames(`${name} (true place)`), around(x, y, 10, 14), ink().truth, 14, 500);
   }
 }
 

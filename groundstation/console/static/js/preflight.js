@@ -21,7 +21,7 @@ export function openMusts(names = droneNames()) {
 export function forbidden(names) {
   const [first] = openMusts(names);
   if (!first) return null;
-  return [`must: ${first.subject.length > SHORT ? "see list" : first.subject}`, `${mustWords(first)} → ${first.remedy}`];
+  return [`mend first: ${first.subject.length > SHORT ? "see list" : first.subject}`, `${mustWords(first)} → ${first.remedy}`];
 }
 
 export const mustWords = ({ subject, found }) => `${subject}: ${found}`;

@@ -13,7 +13,7 @@ export function showTop() {
   link.dataset.level = level;
   text(link, words);
   const latencies = [...drawn.latencies].sort((a, b) => a - b), middle = latencies[latencies.length >> 1];
-  text(byId("clock"), level === "good" && replaying() ? "" : level === "good" && middle !== undefined ? `${middle.toFixed(0)} ms late` : Number.isFinite(age) ? `${seconds(age)} old` : "");
+  text(byId("clock"), level === "good" && replaying() ? "" : level === "good" && middle !== undefined ? `${(middle / 1000).toFixed(2)} s behind` : Number.isFinite(age) ? `${seconds(age)} old` : "");
 }
 
 export function showHealth() {

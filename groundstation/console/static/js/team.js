@@ -12,7 +12,7 @@ import { ageS, entity, estimateAge, runOver, SEEN_S, seenBy, store, trackerSilen
 
 const STALE_S = 1;
 const LEVELS = { TRACK: "good", HOVER: "good", HOLD: "warn", TAKING_OFF: "warn", LANDING: "warn", CUT: "bad", LANDED: "calm", CONNECTING: "calm" };
-const NARROW = matchMedia("(max-width: 1180px)"), LOW = matchMedia("(max-height: 990px)");
+const NARROW = matchMedia("(max-width: 1380px)"), LOW = matchMedia("(max-height: 990px)");
 const cards = new Map();
 
 export function startTeam() {
@@ -89,7 +89,7 @@ function showVehicle(name, { root, values, mode, detail }) {
   text(heard, status ? `${seconds(age)} ago` : "never");
   heard.className = age > 4 ? "empty" : age > STALE_S ? "low" : "";
   if (!status) return;
-  showBattery(values.battery, status);
+  showBattery(values.battery, name, status);
   text(values.rate, `${status.rate_hz.toFixed(0)} Hz`);
   values.rate.className = status.rate_hz < 1 ? "empty" : status.rate_hz < 10 ? "low" : "";
   showLink(values.link, status.link);
@@ -116,10 +116,10 @@ function showLink(node, share) {
   node.dataset.link = level;
 }
 
-function showBattery(node, status) {
-  const [words, level] = batteryWords(status), known = status.battery !== null;
+function showBattery(node, name, status) {
+  const [words, level] = batteryWords(name), known = status.battery !== null;
   // What must be charged before it flies again lasts for no flight.
-  text(node.previousElementSibling, words.endsWith("charge!") ? "battery" : lastsWords(status) || "battery");
+  text(node.previousElementSibling, words.endsWith("charge!") ? "battery" : lastsWords(name) || "battery");
   if (node.dataset.words === words) return;
   node.dataset.words = words;
   node.className = level;

@@ -2,18 +2,18 @@
 
 import { joined } from "./dom.js";
 import { landsIn } from "./duty.js";
-import { refusalOf, waiting } from "./effects.js";
-import { aloft, doing, isLost, lostTarget, modes, stage, teamMode } from "./glance.js";
+import { ready, refusalOf, waiting } from "./effects.js";
+import { aloft, doing, isLost, lostTarget, modes, stage, standing, teamMode } from "./glance.js";
 import { mustWords, openMusts } from "./preflight.js";
-import { droneNames, entity, store, trackerSilent, unseenS } from "./store.js";
+import { droneNames, entity, SEEN_S, store, trackerSilent, unseenS } from "./store.js";
 
 const NAMED = 4; // more drones than this are counted
 // Of one, of several.
 const DEEDS = {
-  TRACK: ["tracks the target", "track the target"], HOVER: ["hovers", "hover"], HOLD: ["holds", "hold"], TAKING_OFF: ["takes off", "take off"],
+  TRACK: ["tracks the target", "track the target"], HOVER: ["hovers", "hover"], HOLD: ["hovers", "hover"], TAKING_OFF: ["takes off", "take off"],
   LANDING: ["lands", "land"], LANDED: ["stands", "stand"], CUT: ["has its motors cut", "have their motors cut"],
 };
-const LOOKS = ["looks for the target", "look for the target"];
+const LOOKS = ["looks for the target", "look for the target"], ALONE = ["is without the tracker", "are without the tracker"];
 const NEXT = {
   "TAKING OFF": "Each is seen from outside before the next one rises.",
   LANDING: "A drone that has landed stays down until a new TAKE OFF.",
@@ -26,7 +26,7 @@ function landings(soon) {
 
 function deeds() {
   const counted = droneNames().length > NAMED, soon = droneNames().filter(landsIn);
-  const modal = Object.entries(DEEDS).map(([mode, words]) => [doing(mode).filter((name) => !soon.includes(name)), mode === "TRACK" && lostTarget() ? LOOKS : words]);
+  const modal = Object.entries(DEEDS).map(([mode, words]) => [doing(mode).filter((name) => !soon.includes(name)), mode !== "TRACK" ? words : trackerSilent() ? ALONE : lostTarget() ? LOOKS : words]);
   const told = [...landings(soon), ...modal].filter(([names]) => names.length);
   const parts = told.map(([names, [one, many]]) => `${counted ? names.length : joined(names)} ${names.length > 1 ? many : one}`);
   return parts.length ? `${parts.join("; ")}.` : "";
@@ -34,31 +34,41 @@ function deeds() {
 
 // Who should be seen: the target, and who flies.
 function sought() {
-  const floor = new Set([...doing("LANDED"), ...doing("CUT"), ...doing("CONNECTING")]);
+  const floor = new Set([...standing(), ...doing("CONNECTING")]);
   return [...droneNames().filter((name) => !floor.has(name)), ...store.scene.targets.map(({ name }) => name)];
 }
 
-function since(name) {
-  const age = unseenS(name);
-  return Number.isFinite(age) && age < 1e5 ? `not seen for ${age.toFixed(0)} s` : "not seen yet";
+const NEVER_S = 1e5;
+
+// "drone_1 and turtlebot, not seen for 4 to 7 s".
+function unseenFor(names) {
+  const ages = names.map(unseenS), seen = names.filter((_, index) => ages[index] < NEVER_S), never = names.filter((name) => !seen.includes(name));
+  const known = ages.filter((age) => age < NEVER_S), [least, most] = [Math.min(...known), Math.max(...known)].map((age) => age.toFixed(0));
+  return [seen.length && `${joined(seen)}, not seen for ${least === most ? "" : `${least} to `}${most} s`, never.length && `${joined(never)}, not seen yet`].filter(Boolean).join("; ");
 }
 
 // In pictures, and not localised.
 const isUnplaced = (name) => !entity(name) && unseenS(name) <= store.scene.lost_after_s;
 
 function lost() {
-  if (trackerSilent()) return "Who is lost is not known: the tracker is silent.";
-  const gone = sought().filter(isLost), unplaced = gone.filter(isUnplaced), unseen = gone.filter((name) => !isUnplaced(name)), spells = [...new Set(unseen.map(since))];
-  const words = spells.map((spell) => `${joined(unseen.filter((name) => since(name) === spell))}, ${spell}`);
+  if (trackerSilent()) return "Whether anybody is lost is not known: the tracker is silent.";
+  const gone = sought().filter(isLost), unplaced = gone.filter(isUnplaced), unseen = gone.filter((name) => !isUnplaced(name));
   const yet = unplaced.length ? ` It is not known yet where ${joined(unplaced)} ${unplaced.length > 1 ? "are" : "is"}.` : "";
-  return `${words.length ? `Lost: ${words.join("; ")}` : "Nobody is lost"}.${yet}`;
+  return `${unseen.length ? `Lost: ${unseenFor(unseen)}` : `Nobody is lost${unseenYet()}`}.${yet}`;
+}
+
+// Who would be lost next.
+function unseenYet() {
+  const { lost_after_s: limit } = store.scene, unseen = sought().filter((name) => unseenS(name) > SEEN_S && !isLost(name));
+  return unseen.length ? ` (${joined(unseen)} not seen just now: lost after ${limit} s)` : "";
 }
 
 // What lets those go on that wait for it.
 function start() {
-  const stay = waiting().filter((name) => !landsIn(name));
-  if (stay.length && !refusalOf("RESUME")) return `RESUME lets ${stay.length > 1 ? "them" : stay[0]} go on with the task.`;
-  return refusalOf("TRACK") ? "" : "TRACK begins the task.";
+  const task = lostTarget() ? "search" : "track", stay = waiting().filter((name) => !landsIn(name)), them = (names) => (names.length > 1 ? "them" : names[0]);
+  if (stay.length && !refusalOf("RESUME")) return `RESUME lets ${them(stay)} ${task}.`;
+  const next = ready().filter((name) => !landsIn(name));
+  return refusalOf("TRACK") || !next.length ? "" : `TRACK lets ${them(next)} ${task}.`;
 }
 
 // What a take-off waits for, or what it would be.

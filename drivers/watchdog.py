@@ -21,6 +21,7 @@ from drivers.watchdog_types import (
     WatchdogDecision,
     WatchdogLimits,
 )
+from drivers.way_back import WayBack
 from groundstation.bus.messages import (
     AIRBORNE,
     STANDING,
@@ -69,6 +70,7 @@ class Watchdog:
         self._land_until_ns = 0
         self._clearing = False
         self._paused_ns: int | None = None
+        self._way_back = WayBack()
         self._braked_by: Failsafe | None = None
 
     # -- inputs -------------------------------------------------------------------------------------------------------
@@ -223,13 +225,22 @@ class Watchdog:
         self._braked_by = self._heed_table(now_ns)
         setpoint = self.gate.obeyed(now_ns) if self.mode is DriverMode.TRACK and self._braked_by is None else None
         acks = self._acks.effective(self.mode, self.vehicle, setpoint is not None)
+        back = self._way_back.step(now_ns, self._asked_back(now_ns))
         if setpoint is None:
-            action = self._action(now_ns)
-            return WatchdogDecision(self.mode, action, reason=self.reason, acks=acks, entered_ns=self._entered_ns)
-        velocity, turn, stamp_ns = setpoint.velocity_m_s, setpoint.yaw_rate_rad_s, setpoint.header.stamp_ns
-        return WatchdogDecision(
-            self.mode, Action.FLY, velocity, turn, self.reason, acks, stamp_ns, entered_ns=self._entered_ns
-        )
+            action, at_ns = self._action(now_ns), self._entered_ns
+            return WatchdogDecision(self.mode, action, reason=self.reason, acks=acks, entered_ns=at_ns, back_m_s=back)
+        velocity, turn, ns = setpoint.velocity_m_s, setpoint.yaw_rate_rad_s, setpoint.header.stamp_ns
+        return WatchdogDecision(self.mode, Action.FLY, velocity, turn, self.reason, acks, ns, None, self._entered_ns)
+
+    def _asked_back(self, now_ns: int) -> tuple[float, float] | None:
+        """Return the velocity back to the place where it was told to hover; None for whom a failsafe might stop."""
+        setpoint = self.gate.obeyed(now_ns)
+        waits = self.mode in (DriverMode.HOVER, DriverMode.HOLD) and not self.failsafe
+        if setpoint is None or not setpoint.holds or not waits or self.vehicle.flight_state not in UP:
+            return None
+        lasted = ((row, self.evidence.lasted_s(row.condition)) for row in self.table if row.reaction is Reaction.HOVER)
+        doubted = any(row.applies(DriverMode.TRACK, lasted_s) for row, lasted_s in lasted)
+        return None if doubted else setpoint.velocity_m_s[:2]
 
     def _situation(self, now_ns: int, gap_s: float = 0.0) -> Situation:
         return Situation(

@@ -6,16 +6,17 @@ from collections.abc import Callable
 
 import numpy as np
 
-from groundstation.bus.messages import EntityEstimate, Message, RelativeObservation, Severity, Verdict
+from groundstation.bus.messages import EntityEstimate, Message, RelativeObservation, Severity, VehicleStatus, Verdict
 from groundstation.bus.notice import Notice
 from groundstation.control.drift import DriftWatch
+from groundstation.control.hovering import Hovering
 from groundstation.control.joinings import Joinings
 from groundstation.control.lookout import Lookout
 from groundstation.control.moment import Sight
 from groundstation.control.output_limiter import Limited, limit_setpoint
 from groundstation.control.root_watch import RootWatch
 from groundstation.control.setpoints import HOVER, setpoints_from_plan
-from groundstation.control.view import Localisation, spread_m
+from groundstation.control.view import Localisation
 from groundstation.errors import EstimatorFault
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.entity_estimate import entity_estimate
@@ -57,6 +58,7 @@ class Tracker:
         self.mounts = MountWatch(parameters.estimator)
         self._joinings = Joinings()
         self._localisation = Localisation(parameters.safety)
+        self._hovering = Hovering()
         self._topology = Topology(())
         self._plan_stale = False
         self._drifts: defaultdict[str, DriftWatch] = defaultdict(DriftWatch)
@@ -99,6 +101,8 @@ class Tracker:
         verdict = Verdict.IMPLAUSIBLE if refused else self._intake.take(key, message, now_ns)
         if not moved and verdict is not Verdict.IMPLAUSIBLE:
             self.lookout.take(message, message.header.clock == self._clock)
+            if isinstance(message, VehicleStatus):
+                self._hovering.take(message, now_ns)
         if verdict is Verdict.ACCEPTED:
             if not moved:
                 self._roots.hear(message, now_ns)
@@ -204,18 +208,11 @@ class Tracker:
             self.filter.advance(now_ns)
             self._belief = self.filter.belief()
 
-    def _hopeless(self) -> tuple[str, ...]:
-        """Return the missing targets that no plan can use: a scout looks for them while others are tracked."""
-        missing = self.lookout.missing
-        if len(missing) == len(self._targets):
-            return ()
-        known = [name for name in missing if name in self._belief.layout]
-        return tuple(n for n in known if spread_m(self._belief, n) > self.parameters.control.hint_std_m)
-
     def request(self) -> PlanRequest:
         """Return the snapshot for the next plan."""
         warm = {} if self.current is None else self.current.warm_start
-        return PlanRequest(self._belief.core(without=self._hopeless()), self._topology, warm, self.lookout.held)
+        belief = self._belief.core(without=self.lookout.hopeless(self._belief))
+        return PlanRequest(belief, self._topology, warm, self.lookout.held)
 
     def adopt(self, plan: PlanResult) -> None:
         """Put a finished plan in force, for those of its robots that still fly."""
@@ -244,6 +241,8 @@ class Tracker:
         belief, lookout = self._belief.core(), self.lookout
         unseen_s = {name: self.filter.age_s(name) for name in belief.layout.robots}
         seen_s = [self.filter.age_s(name) for name in self._targets if name not in lookout.missing]
+        sure = (n for n, age_s in self.unlocalised_s().items() if age_s == 0.0 and not self.filter.contradicted(n))
+        sure_s = {name: self._tied_age_s(name) for name in sure}
         velocities = {name: np.array(self.filter.velocity_of(name)) for name in belief.layout.robots}
         drifts = {
             name: self._drifts[name].see(now_ns, belief.mean_of(name)[:3] + p.safety.reaction_s * velocity)
@@ -257,8 +256,9 @@ class Tracker:
         wanted = setpoints_from_plan(self.current, belief, airborne, p.control, p.sensors, sight)
         limited = {
             name: limit_setpoint(name, setpoint, belief, now_ns, p.safety, velocities, drifts)
-            for name, setpoint in wanted.items()
+            for name, setpoint in self._hovering.held(wanted, now_ns, belief, sure_s).items()
         }
+        limited = self._hovering.sent(limited, sure_s)
         for name in drifts.keys() & limited.keys():
             velocity = np.array(limited[name].setpoint.velocity_m_s)
             self._drifts[name].tell(world_from_stabilized(velocity, float(belief.mean_of(name)[3])))

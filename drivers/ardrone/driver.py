@@ -243,15 +243,15 @@ class ArDrone:
         if (blind or was_blind or adrift) and (self._sinks or holds):
             climb_m_s = -self._settings.limits.max_climb_m_s if self._sinks else 0.0
             return self._loop.brake(dt_s, force if told else None, decision.seen_m_s, climb_m_s)
-        if holds and fresh:
+        back = decision.back_m_s if holds else None
+        if holds and fresh and back is None:
             return self._loop.hold(self._true(velocity), dt_s)
-        if decision.action is not Action.FLY or not fresh:
+        if (decision.action is not Action.FLY and back is None) or not fresh:
             self._loop.reset()
             return velocity_loop.HOVER
         measured = None if self._motion.repeats else self._true(velocity)
-        asked = self._loop.step(
-            decision.velocity_m_s, decision.yaw_rate_rad_s, measured, dt_s, force, decision.seen_m_s
-        )
+        wanted = decision.velocity_m_s if back is None else (*back, 0.0)
+        asked = self._loop.step(wanted, decision.yaw_rate_rad_s, measured, dt_s, force, decision.seen_m_s)
         if self._loop.contradicted:
             self._doubted_ns = now_ns
             return velocity_loop.HOVER

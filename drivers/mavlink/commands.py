@@ -1,8 +1,8 @@
 """Turns watchdog decisions into requests to PX4 and ArduPilot: modes, arming, take-off, setpoints, landing. Pure.
 
 Each setpoint of the tracker goes out once, at most setpoint_hz times a second. A hovering vehicle is told to hold the
-place where it comes to rest if the tracker knows that place, else to keep zero velocity. Our own loop sends: when it
-stands still, nothing is sent and the vehicle's own time-out acts.
+place where it comes to rest if the tracker knows that place, and where the tracker brings it; else to keep zero
+velocity. Our own loop sends: when it stands still, nothing is sent and the vehicle's own time-out acts.
 """
 
 from collections import deque
@@ -112,7 +112,7 @@ class Orders:
                 return self._fly(now_ns, decision, guided)
             case Action.HOVER:
                 self._end_climb(now_ns, decision.mode, climb_m_s)
-                return self._hover(now_ns, guided, climbed_m)
+                return self._hover(now_ns, guided, climbed_m, decision.back_m_s)
             case Action.LAND:
                 # A report that it lands already or has disarmed may be wrong: it is commanded until it has once
                 # accepted.
@@ -224,8 +224,10 @@ class Orders:
         forward, left, _ = self.drift.hold(now_ns)
         return self._send(now_ns, (forward, left, up), 0.0)
 
-    def _stand(self, now_ns: int, height_m: float | None = None) -> SetPositionTargetLocalNed | None:
-        return self._send(now_ns, self.drift.hold(now_ns, height_m), 0.0)
+    def _stand(
+        self, now_ns: int, height_m: float | None = None, back: tuple[float, float] | None = None
+    ) -> SetPositionTargetLocalNed | None:
+        return self._send(now_ns, self.drift.hold(now_ns, height_m, back), 0.0)
 
     def _end_climb(self, now_ns: int, mode: DriverMode, climb_m_s: float) -> None:
         """Have a climb end at HOLD: no higher than its momentum takes it, and not back to the floor either."""
@@ -236,7 +238,9 @@ class Orders:
             self.drift.let_go()
             self._stops_climbing = climb_m_s > _STOPPED_M_S or now_ns - self._since_ns < _OBEYS_NS
 
-    def _hover(self, now_ns: int, guided: bool, climbed_m: float) -> SetPositionTargetLocalNed | None:
+    def _hover(
+        self, now_ns: int, guided: bool, climbed_m: float, back: tuple[float, float] | None
+    ) -> SetPositionTargetLocalNed | None:
         if not self._rises_to_take_off or climbed_m >= _CLIMBED * self._vehicle.take_off_m:
             self._climb_until_ns = 0
         if self.climbs_by_itself(now_ns):
@@ -245,7 +249,8 @@ class Orders:
             return self._climb(now_ns, climbed_m)
         if not guided:
             return None
-        return self._stand(now_ns, self._floor_m + self._vehicle.take_off_m if self._rises_to_take_off else None)
+        height_m = self._floor_m + self._vehicle.take_off_m if self._rises_to_take_off else None
+        return self._stand(now_ns, height_m, back)
 
     def _fly(self, now_ns: int, decision: WatchdogDecision, guided: bool) -> SetPositionTargetLocalNed | None:
         if not guided and now_ns < self._regain_until_ns:

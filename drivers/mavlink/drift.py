@@ -224,20 +224,25 @@ class DriftFeedback:
         """Hold a given place [world] from now on, rather than the one where it comes to rest."""
         self._held = place
 
-    def hold(self, now_ns: int, height_m: float | None = None) -> Vector3:
+    def hold(self, now_ns: int, height_m: float | None = None, back: Vector2 | None = None) -> Vector3:
         """Return the velocity [base_stabilized] back to the place held, 0.2 m/s at most; zero without a fresh belief.
 
-        height_m: the height to hold, None for that of the place.
+        height_m: the height to hold, None for that of the place. back: the tracker's velocity to the place where it
+        wants the vehicle; the place held goes along.
         """
         place = self.place(now_ns)
         if place is None:
             self.let_go()
             return _STILL
         x, y, z = self._held or self._place_to_rest(now_ns, place)
+        if back is not None:
+            self._held = (place[0], place[1], z)
         wanted = (x - place[0], y - place[1], (z if height_m is None else height_m) - place[2])
         size = math.hypot(*wanted[:2])
         gain = min(_HOLD_GAIN, _HOLD_M_S / size) if size > 0.0 else 0.0
         up = max(-_HOLD_M_S, min(_HOLD_M_S, _HOLD_UP_GAIN * wanted[2]))
+        if back is not None:
+            return *back, up
         return self._in_heading(gain * wanted[0], gain * wanted[1], up)
 
     def _place_to_rest(self, now_ns: int, here: Vector3) -> Vector3:

@@ -159,7 +159,9 @@ class Tello(DatagramVehicle):
             case Action.TAKE_OFF if not flies:
                 self._repeat(now_ns, text.TAKE_OFF if self._ready else text.SDK)
             case Action.FLY if flies:
-                self._link.send(now_ns, self._sticks(decision))
+                self._link.send(now_ns, self._sticks(decision.velocity_m_s, decision.yaw_rate_rad_s))
+            case Action.HOVER if flies and decision.back_m_s is not None:
+                self._link.send(now_ns, self._sticks((*decision.back_m_s, 0.0), 0.0))
             case Action.HOVER | Action.TAKE_OFF if flies:
                 self._link.send(now_ns, text.rc(0, 0, 0, 0))
             case Action.IDLE if now_ns - self._sent_ns.get(text.TAKE_OFF, -_BEGINS_NS) < _BEGINS_NS:
@@ -177,9 +179,9 @@ class Tello(DatagramVehicle):
         detail = f"it answers {self._refused!r} when told to {word}" if self._refused and word else ""
         return replace(super().health(now_ns), detail=detail)
 
-    def _sticks(self, decision: WatchdogDecision) -> bytes:
+    def _sticks(self, velocity: Vector3, turn_rad_s: float) -> bytes:
         own = self._settings.tello
-        (forward, left, up), turn = self._settings.limits.within(decision.velocity_m_s, decision.yaw_rate_rad_s)
+        (forward, left, up), turn = self._settings.limits.within(velocity, turn_rad_s)
         right, ahead = -left / own.full_speed_m_s, forward / own.full_speed_m_s
         shares = (right, ahead, up / own.full_climb_m_s, -math.degrees(turn) / own.full_yaw_rate_deg_s)
         return text.rc(*(round(100 * share) for share in shares))

@@ -19,6 +19,7 @@ from groundstation.control.search_parameters import SearchParameters
 from groundstation.control.stand import Stand
 from groundstation.control.target_search import Search, SearchMode, SearchState
 from groundstation.control.unseen_targets import UnseenTargets
+from groundstation.control.view import spread_m
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.room_map import RoomMap
 from groundstation.sensing.models import SensorSuite
@@ -44,6 +45,7 @@ class Lookout:
         self._robots = MissingRobots(sensors, robots)
         self._errors = OdometryErrors()
         self._names = tuple(robots)
+        self._hint_std_m = control.hint_std_m
         self._modes: dict[str, str] = {}
         self._unseen = UnseenTargets()
         self._told = dict.fromkeys(targets, SearchMode.SEARCH)
@@ -109,6 +111,13 @@ class Lookout:
         self._tell()
         self._notices += self._unseen.advance(belief, self._unseen_s(belief.stamp_ns, ages_s))
         return gone
+
+    def hopeless(self, belief: JointBelief) -> tuple[str, ...]:
+        """Return the missing targets that no plan can use: a scout looks for them while others are tracked."""
+        missing = self.missing
+        if len(missing) == len(self.targets):
+            return ()
+        return tuple(n for n in missing if n in belief.layout and spread_m(belief, n) > self._hint_std_m)
 
     def stands(self, robots: Sequence[str], targets: Collection[str], belief: JointBelief) -> Mapping[str, Stand]:
         """Return the stand from which each robot looks for targets."""

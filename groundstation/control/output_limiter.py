@@ -32,11 +32,15 @@ _AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 @dataclass(frozen=True, slots=True)
 class Limited:
-    """A setpoint that may be sent, the names of the limits that changed it, and the wanted velocity, if finite."""
+    """A setpoint that may be sent, the names of the limits that changed it, and the wanted velocity, if finite.
+
+    holds: it keeps a robot at its place that hovers for an order.
+    """
 
     setpoint: Setpoint
     limited_by: tuple[str, ...] = ()
     wanted_m_s: Vector3 | None = None
+    holds: bool = False
 
 
 class _Wall(NamedTuple):

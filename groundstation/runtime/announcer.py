@@ -76,6 +76,7 @@ class Announcer:
                 lifetime_ms=self._lifetime_ms,
                 epoch=tracker.epoch,
                 converged=tracker.converged(name) and not tracker.holding,
+                holds=entry.holds,
             )
             self._bus.publish(SETPOINT, message)
 

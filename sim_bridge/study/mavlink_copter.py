@@ -115,10 +115,10 @@ class CopterLink:
         vx, vy, vz = e.velocity
         return c * vx + s * vy, c * vy - s * vx, vz
 
-    def status(self, stamp_ns: int) -> VehicleStatus:
-        """Return the vehicle's state."""
+    def status(self, stamp_ns: int, mode: str) -> VehicleStatus:
+        """Return the vehicle's state, in a driver's mode."""
         state = FlightState.FLYING if self._copter.airborne else FlightState.LANDED
-        return VehicleStatus(header=self._header(stamp_ns), flight_state=state, mode="TRACK")
+        return VehicleStatus(header=self._header(stamp_ns), flight_state=state, mode=mode)
 
     def _header(self, stamp_ns: int) -> Header:
         self._seq += 1

@@ -38,6 +38,7 @@ _ODOMETRY_LATENCY_NS = 4 * NS_PER_MS
 _PILOT_TICKS = 6
 _STATUS_TICKS = 40
 _SCORE_TICKS = 20
+_OBEYS = "TRACK"
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,15 +69,16 @@ class FlownLink(Protocol):
     def odometry(self, stamp_ns: int) -> Odometry | None:
         """Return the reading of this tick, if one is due."""
 
-    def status(self, stamp_ns: int) -> VehicleStatus:
-        """Return the vehicle's state."""
+    def status(self, stamp_ns: int, mode: str) -> VehicleStatus:
+        """Return the vehicle's state, in a driver's mode."""
 
 
 class Study:
     """A run in progress; `run` flies it to its end and returns the figures.
 
-    real: drones whose bodies are moved from outside (`world.puppets`); `attach` gives each a driver. wrong: wrong
-    figures of the field; None: only video delays, if the scenario's differ.
+    mode: that of all drivers; in HOVER and HOLD drones are only kept at their places. real: drones whose bodies are
+    moved from outside (`world.puppets`); `attach` gives each a driver. wrong: wrong figures of the field; None: only
+    video delays, if the scenario's differ.
     """
 
     def __init__(
@@ -87,6 +89,7 @@ class Study:
         real: Collection[str] = (),
         wrong: WrongFigures | None = None,
     ) -> None:
+        self.mode = _OBEYS if options.plan else "HOVER"
         self.options, self._wrong = options, wrong or misdated(field, scenario.cameras.video_delay_ms)
         self.site = parse_site(msgspec.to_builtins(self._wrong.world(field)))
         self.world = World(self.site, scenario, options.seed, real, real)
@@ -185,7 +188,7 @@ class Study:
             if self.options.inertia and isinstance(telemetry, TelemetryPublisher):
                 self._send(now_ns + _ODOMETRY_LATENCY_NS, f"imu/{name}", telemetry.inertia(now_ns))
             if world.ticks % _STATUS_TICKS == 0:
-                self._send(now_ns + _ODOMETRY_LATENCY_NS, f"status/{name}", telemetry.status(now_ns))
+                self._send(now_ns + _ODOMETRY_LATENCY_NS, f"status/{name}", telemetry.status(now_ns, self.mode))
         for eye in self._exposures.due(world.time_s):
             if isinstance(eye, RangingEye):
                 self._tell(eye, now_ns)
@@ -234,15 +237,18 @@ class Study:
         for correction in tracker.take_corrections():
             self.score.note(correction)
         tracker.take_notices()
-        if not (tracking and self.options.plan):
+        obeys = tracking and self.mode == _OBEYS
+        if self.mode == _OBEYS and not tracking:
             return
         mark = time.perf_counter()
-        if self.world.ticks % self._plan_every == 0:
+        if obeys and self.world.ticks % self._plan_every == 0:
             tracker.plan()
         self.spent_s["planner"] += time.perf_counter() - mark
         mark = time.perf_counter()
         for name, limited in tracker.setpoints(now_ns).items():
             setpoint = limited.setpoint
+            if not (obeys or limited.holds):
+                continue
             pilot = self._links.get(name) or self._pilots[name]
             pilot.obey(setpoint.velocity_m_s, setpoint.yaw_rate_rad_s, self.world.time_s)
         self.spent_s["setpoints"] += time.perf_counter() - mark

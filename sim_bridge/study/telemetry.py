@@ -53,10 +53,10 @@ class TelemetryPublisher:
             specific_force_m_s2=self._onboard.accelerometers,
         )
 
-    def status(self, stamp_ns: int) -> VehicleStatus:
-        """Return the vehicle's state."""
+    def status(self, stamp_ns: int, mode: str) -> VehicleStatus:
+        """Return the vehicle's state, in a driver's mode."""
         state = _STATES[self._drone.autopilot.phase]
-        return VehicleStatus(header=self._header(stamp_ns), flight_state=state, mode="TRACK")
+        return VehicleStatus(header=self._header(stamp_ns), flight_state=state, mode=mode)
 
     def _header(self, stamp_ns: int) -> Header:
         self._seq += 1

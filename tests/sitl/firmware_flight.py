@@ -1,8 +1,9 @@
-"""One flight of firmwares in step with the team, and its figures. As a program: `FLAVOURS SEED SECONDS [FAULT]`.
+"""One flight of firmwares in step with the team, and its figures. As a program: FLAVOURS SEED SECONDS [FAULT [HOVER]].
 
 FLAVOURS: px4, ardupilot, or px4,ardupilot for both in one flight.
 
-The fault ends it: `dark` takes the cameras, `kill` the driver, `guarded` the driver while the guardian speaks for it.
+The fault ends it: `dark` takes the cameras, `kill` the driver, `guarded` the driver while the guardian speaks for it,
+`none` nothing. HOVER: how long it hovers before TRACK [s].
 """
 
 import json
@@ -37,7 +38,8 @@ Figures = dict[str, Any]
 class Course:
     """What one firmware's flight was like: looked at in each slice, it `rises`, `tracks` and `sinks` in turn."""
 
-    def __init__(self, seat: Seat, room: Room) -> None:
+    def __init__(self, seat: Seat, room: Room, hover_s: float = SETTLED_S) -> None:
+        self.hover_s, self._nearest_m = hover_s, math.inf
         self._seat, self._room, self._body = seat, room, seat.puppet.airframe
         self._floor_m, self._hover_since = self._body.z, 0.0
         self._drifts, self._heights, self._errors = [0.0], [0.0], [0.0]
@@ -56,7 +58,12 @@ class Course:
         self._heights.append(body.z - self._floor_m)
         if self._seat.mode != "HOVER" or body.z - self._floor_m < RISEN_M:
             self._hover_since = self._now_s
-        return self._now_s - self._hover_since <= SETTLED_S
+        else:
+            world = self._room.study.world
+            rows = zip(world.bodies, world.states(), strict=True)
+            others = (row[:3] for name, row in rows if name in world.drones and name != self._seat.name)
+            self._nearest_m = min(self._nearest_m, *(math.dist(one, (body.x, body.y, body.z)) for one in others))
+        return self._now_s - self._hover_since <= self.hover_s
 
     def tracks(self) -> bool:
         """Return whether its driver still tracks."""
@@ -107,7 +114,8 @@ class Course:
         return {
             "name": self._seat.name, "flavour": self._seat.flavour, "left": self._left,
             "highest_m": max(self._heights), "height_m": float(np.mean(self._heights[-100:])),
-            "drift_m": max(self._drifts), "belief_mean_m": float(np.mean(self._errors)),
+            "drift_m": max(self._drifts), "hover_nearest_m": self._nearest_m,
+            "belief_mean_m": float(np.mean(self._errors)),
             "belief_max_m": float(np.max(self._errors)),
             "anees": self._room.study.score.report()["anees"].get(self._seat.name),
         }  # fmt: skip
@@ -126,8 +134,10 @@ def take_off(room: Room, courses: list[Course]) -> None:
         seat.flying = True
     for drone in room.study.world.of(Quadrotor).values():
         drone.autopilot.take_off()
-    up = room.until(lambda: sum(one.rises() for one in courses) == 0, START_S, Verb.TAKEOFF, "LANDED")
+    limit_s = START_S + max(one.hover_s for one in courses)
+    up = room.until(lambda: sum(one.rises() for one in courses) == 0, limit_s, Verb.TAKEOFF, "LANDED")
     assert up, room.said()
+    room.study.mode = "TRACK"
     room.study.options = replace(room.study.options, take_off_s=room.study.world.time_s)
     assert room.until(lambda: all(seat.mode == "TRACK" for seat in room.seats), 5.0, Verb.TRACK, "HOVER"), room.said()
 
@@ -141,14 +151,17 @@ def track(room: Room, courses: list[Course], seconds: float) -> Figures:
     return {"tracked_s": tracked_s, **{key: report[key] for key in kept}}
 
 
-def fly(flavours: list[str], seed: int, seconds: float, folder: Path, fault: str = "", **more: Any) -> Figures:
+def fly(
+    flavours: list[str], seed: int, seconds: float, folder: Path, fault: str = "", hover_s: float = SETTLED_S,
+    **more: Any,
+) -> Figures:  # fmt: skip
     """Fly once; returns the figures of the team, those of each firmware under `firmwares`."""
     room = Room(dict(zip(NAMES, flavours, strict=False)), seed, folder, **more)
     began = time.monotonic()
     try:
         with room.clocked():
             room.get_ready()
-            courses = [Course(seat, room) for seat in room.seats]
+            courses = [Course(seat, room, hover_s) for seat in room.seats]
             take_off(room, courses)
             figures = {"seed": seed, **track(room, courses, seconds)}
             firmwares = [one.figures() for one in courses]
@@ -167,7 +180,9 @@ def fly(flavours: list[str], seed: int, seconds: float, folder: Path, fault: str
 
 
 if __name__ == "__main__":
-    _flavours, _seed, _seconds, *_fault = sys.argv[1:]
+    _flavours, _seed, _seconds, *_more = sys.argv[1:]
+    _fault = _more[0] if _more and _more[0] != "none" else ""
+    _hover_s = float(_more[1]) if len(_more) > 1 else SETTLED_S
     _folder = Path(tempfile.mkdtemp(prefix=f"room-{_seed}-"))
-    _figures = fly(_flavours.split(","), int(_seed), float(_seconds), _folder, *_fault)
+    _figures = fly(_flavours.split(","), int(_seed), float(_seconds), _folder, _fault, _hover_s)
     print(json.dumps(_figures | {"trace": str(_folder)}, indent=1))

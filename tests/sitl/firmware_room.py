@@ -75,6 +75,7 @@ class Room:
         field = load_field(MIXED_TEAM, [f"drones.{name}.mavlink.{key}={json.dumps(v)}" for name, key, v in settings])
         options = StudyOptions(seed, take_off_s=math.inf)
         self.study = FirmwareStudy(resolved_field(field), Scenario(), options, real=[seat.name for seat in self.seats])
+        self.study.mode = "HOVER"
         for seat in self.seats:
             seat.take_seat(self.study, field)
 

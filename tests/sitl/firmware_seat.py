@@ -106,10 +106,10 @@ class Seat:
     # -- the link that the study sees ---------------------------------------------------------------------------------
 
     def obey(self, velocity: tuple[float, float, float], yaw_rate: float, now_s: float) -> None:
-        """Take a setpoint of the tracker."""
-        header = self.bus.header(self.name)
+        """Take a setpoint of the tracker; while the study hovers, only what keeps the vehicle in its place comes."""
+        header, holds = self.bus.header(self.name), self.mode in ("HOVER", "HOLD")
         setpoint = VelocitySetpoint(
-            header=header, velocity_m_s=velocity, yaw_rate_rad_s=yaw_rate, lifetime_ms=300, epoch=1
+            header=header, velocity_m_s=velocity, yaw_rate_rad_s=yaw_rate, lifetime_ms=300, epoch=1, holds=holds
         )
         self.bus.publish(SETPOINT, setpoint)
 
@@ -120,7 +120,7 @@ class Seat:
         """Return the driver's oldest reading that was not asked for yet."""
         return self._newest.popleft() if self._newest else None
 
-    def status(self, stamp_ns: int) -> VehicleStatus:
+    def status(self, stamp_ns: int, _mode: str) -> VehicleStatus:
         """Return the driver's last word."""
         assert self._status is not None
         return self._status

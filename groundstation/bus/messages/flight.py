@@ -100,6 +100,9 @@ class VelocitySetpoint(Message, frozen=True, kw_only=True):
     """Epoch of the tracker that sent it."""
     converged: bool = True
     """Whether the estimate of this drone is good enough to fly on; if not, the drone hovers."""
+    holds: bool = False
+    """Whether it keeps a hovering drone at its place: obeyed in HOVER and HOLD as well, sideways, within the driver's
+    limits."""
 
 
 class Verb(StrEnum):

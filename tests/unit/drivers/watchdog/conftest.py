@@ -28,6 +28,7 @@ class Bench:
         self.unseen = self.lost = False
         self.seen = True
         self.near, self.clears = "", clears
+        self.holds = False
         self.upstream = Upstream()
         self.epoch = 1
         self.ids = itertools.count()
@@ -74,6 +75,7 @@ class Bench:
             lifetime_ms=lifetime,
             epoch=self.epoch if epoch is None else epoch,
             converged=self.converged,
+            holds=self.holds,
         )
         return self.watchdog.accept_setpoint(self.now, message)
 

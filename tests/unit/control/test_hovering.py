@@ -1,0 +1,134 @@
+"""Who hovers for an order stays where it came to rest, moves little, and is left alone where its place is doubted."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from groundstation.bus.messages import FlightState, Header, VehicleStatus
+from groundstation.control.flight_mode import FlightMode
+from groundstation.control.hovering import Hovering
+from groundstation.control.output_limiter import Limited
+from groundstation.control.setpoints import Setpoint
+from groundstation.estimation.belief import JointBelief
+from groundstation.estimation.layout import ROBOT_CORE, EntityKind, StateLayout
+
+S = 1_000_000_000
+TICK_S = 0.02
+PLANNED = Setpoint((0.5, 0.1, 0.3), 0.4, FlightMode.TRACK)
+LAYOUT = StateLayout().with_entity("a", EntityKind.ROBOT, ROBOT_CORE)
+
+
+def status(mode="HOVER", failsafe=""):
+    return VehicleStatus(
+        header=Header(0, "here", "a", "a", 0), flight_state=FlightState.FLYING, mode=mode, failsafe=failsafe
+    )
+
+
+def belief(x, y, yaw=0.0):
+    return JointBelief(np.array((x, y, 1.0, yaw)), 1e-4 * np.eye(4), LAYOUT, 0)
+
+
+class Flight:
+    """A robot without lag that drifts, its estimate, and what it is sent."""
+
+    def __init__(self, mode="HOVER", drift=(0.0, 0.0), yaw=0.7):
+        self.hovering, self.now_ns, self.drift, self.yaw = Hovering(), 5 * S, drift, yaw
+        self.place, self.seen_s, self.ways = np.zeros(2), {"a": 0.1}, []
+        self.hovering.take(status(mode), self.now_ns)
+
+    def step(self):
+        self.now_ns += round(TICK_S * S)
+        held = self.hovering.held(
+            {"a": PLANNED}, self.now_ns, belief(self.place[0], self.place[1], self.yaw), self.seen_s
+        )
+        sent = self.hovering.sent({"a": Limited(held["a"])}, self.seen_s)["a"]
+        forward, left, up = sent.setpoint.velocity_m_s
+        assert up == 0.0 and sent.setpoint.yaw_rate_rad_s == 0.0
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
+        velocity = np.array((c * forward - s * left, s * forward + c * left)) if sent.holds else np.zeros(2)
+        self.place = self.place + TICK_S * (velocity + self.drift)
+        self.ways.append(float(np.hypot(*velocity)))
+        return sent
+
+    def run(self, seconds):
+        return [self.step() for _ in range(round(seconds / TICK_S))]
+
+
+@pytest.mark.parametrize("mode", ["HOVER", "HOLD"])
+def test_a_drift_does_not_carry_it_off(mode):
+    flight = Flight(mode, drift=(0.03, -0.04))
+    flight.run(2.0)
+    settled = flight.place
+    flight.run(240.0)
+    assert math.dist(settled, flight.place) < 0.2
+    assert max(flight.ways) <= 0.2 + 1e-9
+
+
+def test_who_stays_near_its_place_is_left_alone():
+    flight = Flight()
+    flight.run(2.0)
+    flight.place = np.array((0.06, 0.07))
+    assert not any(sent.holds for sent in flight.run(5.0))
+    flight.place = np.array((0.08, 0.07))
+    assert flight.step().holds
+    flight.run(10.0)
+    assert np.hypot(*flight.place) <= 0.03
+
+
+def test_it_is_not_moved_until_it_has_come_to_rest():
+    flight = Flight(drift=(0.5, 0.0))  # it brakes
+    assert not any(sent.holds for sent in flight.run(1.4))
+    flight.drift = (0.0, 0.0)
+    stops = flight.place
+    flight.run(10.0)
+    assert math.dist(stops, flight.place) < 0.01
+
+
+def test_a_belief_that_jumps_moves_nobody_far():
+    flight = Flight()
+    flight.run(2.0)
+    flight.place = np.array((0.8, 0.0))
+    assert not any(sent.holds for sent in flight.run(10.0))
+    flight.place = np.array((0.4, 0.0))
+    flight.run(10.0)
+    assert flight.place[0] == pytest.approx(0.8, abs=0.04)
+
+
+@pytest.mark.parametrize("seen_s", [{}, {"a": 1.1}])
+def test_whose_place_is_doubted_hovers_by_itself(seen_s):
+    flight = Flight(drift=(0.05, 0.0))
+    flight.run(3.0)
+    flight.seen_s = seen_s
+    assert not any(sent.holds for sent in flight.run(10.0))
+    assert flight.place[0] == pytest.approx(13.0 * 0.05, abs=0.05)
+
+
+def test_a_further_order_holds_the_place_of_that_moment():
+    flight = Flight("HOVER")
+    flight.run(2.0)
+    flight.place = np.array((0.3, 0.0))
+    flight.hovering.take(status("HOVER"), flight.now_ns)  # the same order, told again
+    assert flight.step().holds
+    flight.hovering.take(status("HOLD"), flight.now_ns)
+    there = flight.place
+    flight.run(10.0)
+    assert math.dist(there, flight.place) < 0.01
+
+
+@pytest.mark.parametrize("other", [status("TRACK"), status("LANDING"), status("HOVER", failsafe="strays")])
+def test_who_tracks_lands_or_was_stopped_by_a_failsafe_is_not_held(other):
+    flight = Flight()
+    flight.hovering.take(other, flight.now_ns)
+    assert flight.hovering.held({"a": PLANNED}, flight.now_ns, belief(1.0, 1.0), {"a": 0.0}) == {"a": PLANNED}
+    limited = Limited(PLANNED)
+    assert flight.hovering.sent({"a": limited}, {"a": 0.0}) == {"a": limited}
+
+
+def test_what_the_limiter_asks_for_is_sent_without_its_climb():
+    flight = Flight()
+    pushed = Limited(replace(PLANNED, velocity_m_s=(0.0, -0.05, 0.02)), ("separation",))
+    sent = flight.hovering.sent({"a": pushed}, {"a": 0.1})["a"]
+    assert sent.holds and sent.setpoint.velocity_m_s == (0.0, -0.05, 0.0) and sent.limited_by == ("separation",)
+    assert not flight.hovering.sent({"a": pushed}, {})["a"].holds

@@ -105,6 +105,8 @@ def _observe_setpoints(at: Situation, holding: dict[Condition, str]) -> None:
 def _observe_motion(vehicle: VehicleView, limits: WatchdogLimits, holding: dict[Condition, str]) -> None:
     if vehicle.stray:
         holding[Condition.STRAYS] = vehicle.stray
+    if vehicle.crowded:
+        holding[Condition.CROWDED] = vehicle.crowded
     if vehicle.speed_m_s > limits.tolerated_speed_m_s:
         allowed = f"{limits.max_speed_m_s:.1f} are allowed"
         holding[Condition.TOO_FAST] = f"it flies {vehicle.speed_m_s:.1f} m/s, {allowed}"

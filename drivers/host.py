@@ -98,7 +98,8 @@ class VehicleHost:
         if view.flight_state not in AIRBORNE:
             self._localised_ns = None
         unlocalised_s = 0.0 if self._localised_ns is None else (now_ns - self._localised_ns) / NS_PER_S
-        return replace(view, unseen_s=unlocalised_s, near=self._near(now_ns, view))
+        near, crowded = self._near(now_ns, view.flight_state in AIRBORNE)
+        return replace(view, unseen_s=unlocalised_s, near=near, crowded=crowded)
 
     def _hear_estimate(self, now_ns: int, estimate: Estimate) -> None:
         self._neighbours.see(now_ns, estimate.entities)
@@ -108,12 +109,12 @@ class VehicleHost:
                 if math.isfinite(entity.unlocalised_s):
                     self._localised_ns = now_ns - round(entity.unlocalised_s * NS_PER_S)
 
-    def _near(self, now_ns: int, view: VehicleView) -> str:
-        """Return the airborne vehicle that is too near to the pad of this one, which stands; "" if none."""
+    def _near(self, now_ns: int, aloft: bool) -> tuple[str, str]:
+        """Return who is too near to the pad of this vehicle, if it stands, and to it, if it flies; "" if nobody is."""
         for received in self._statuses.drain():
             if isinstance(received.message, VehicleStatus):
                 self._neighbours.hear(received.message)
-        return "" if view.flight_state in AIRBORNE else self._neighbours.obstacle(now_ns)
+        return ("", self._neighbours.crowded(now_ns)) if aloft else (self._neighbours.obstacle(now_ns), "")
 
     def is_finished(self, now_ns: int) -> bool:
         """Return whether a driver that is to exit may: no motor turns, or the vehicle has been silent too long."""

@@ -1,13 +1,17 @@
-"""Other airborne vehicles, and whether one of them is where this vehicle would climb. Pure."""
+"""Other airborne vehicles: one of them may be where this vehicle would climb, or too near in flight. Pure."""
 
 import math
 from collections.abc import Iterable
 
-from groundstation.bus.messages import AIRBORNE, UNHEARD, EntityEstimate, VehicleStatus
+from groundstation.bus.messages import AIRBORNE, UNHEARD, EntityEstimate, FlightState, VehicleStatus
 from groundstation.time_units import NS_PER_S
 
 _STALE_NS = NS_PER_S
+_FRESH_NS = NS_PER_S * 3 // 10
 _SIGMAS = 2.0
+# Of two that are too near the lower one lands, for nobody sinks through another; of two as high as each other one
+# whose name comes later. Heights are known to 0.1 m.
+_AS_HIGH_M = 0.2
 
 
 class Neighbours:
@@ -16,11 +20,16 @@ class Neighbours:
     def __init__(self, name: str, pad_m: tuple[float, float] | None, separation_m: float) -> None:
         self._name, self._pad_m, self._separation_m = name, pad_m, separation_m
         self._aloft: set[str] = set()
+        self._sinking: set[str] = set()
         self._believed: dict[str, tuple[int, EntityEstimate]] = {}
 
     def hear(self, status: VehicleStatus) -> None:
         """Take the status of any vehicle; one that flew and is lost counts as flying."""
         name, state = status.header.entity, status.flight_state
+        if state is FlightState.LANDING or status.mode == "LANDING":
+            self._sinking.add(name)
+        else:
+            self._sinking.discard(name)
         if state in AIRBORNE:
             self._aloft.add(name)
         elif state not in UNHEARD:
@@ -39,8 +48,33 @@ class Neighbours:
             if entity is None or now_ns - heard_ns > _STALE_NS:
                 return f"{name} is in the air, and nobody knows where"
             distance_m = math.dist(entity.mean[:2], self._pad_m)
-            size = math.isqrt(len(entity.covariance))
-            std_m = math.sqrt(max(entity.covariance[0], entity.covariance[size + 1]))
-            if distance_m - _SIGMAS * std_m < self._separation_m:
+            if distance_m - _SIGMAS * math.sqrt(_variance(entity)) < self._separation_m:
                 return f"{name} flies {distance_m:.1f} m from its pad, at least {self._separation_m:.1f} m needed"
         return ""
+
+    def crowded(self, now_ns: int) -> str:
+        """Return why this flying vehicle should make way for another, both of which are surely too near, or ""."""
+        own = self._fresh(self._name, now_ns)
+        if own is None:
+            return ""
+        for name in sorted(self._aloft - self._sinking - {self._name}):
+            other = self._fresh(name, now_ns)
+            if other is None or not self._gives_way(own, other):
+                continue
+            distance_m = math.dist(own.mean[:3], other.mean[:3])
+            if distance_m + _SIGMAS * math.sqrt(_variance(own) + _variance(other)) < self._separation_m:
+                return f"{name} flies {distance_m:.2f} m from it, at least {self._separation_m:g} m is allowed"
+        return ""
+
+    def _fresh(self, name: str, now_ns: int) -> EntityEstimate | None:
+        heard_ns, entity = self._believed.get(name, (0, None))
+        return entity if entity is not None and entity.converged and now_ns - heard_ns <= _FRESH_NS else None
+
+    def _gives_way(self, own: EntityEstimate, other: EntityEstimate) -> bool:
+        below_m = other.mean[2] - own.mean[2]
+        return own.name > other.name if abs(below_m) <= _AS_HIGH_M else below_m > 0.0
+
+
+def _variance(entity: EntityEstimate) -> float:
+    """Return the variance of a place along the worse of x and y [m^2]."""
+    return max(entity.covariance[0], entity.covariance[math.isqrt(len(entity.covariance)) + 1])

@@ -56,8 +56,9 @@ class WatchdogLimits:
     it needs a RESUME, for fast_land_s it lands. stray_land_s: likewise while it strays from its commands: from 1 m/s it
     stands after 0.8 s with 2 m/s^2 and a lag of 0.3 s, doubled. blind_land_s: likewise while its sensors are wrong and
     no camera sees it. lost_hover_s, lost_land_s: without a position from the cameras, for vehicles that need one.
-    pad_m: where it takes off [x, y; world], if known; min_separation_m: least distance from there of all airborne
-    vehicles.
+    crowded_land_s: likewise nearer to another than allowed, so that it has to make way: the limiter moves two apart by
+    0.1 m in that time. pad_m: where it takes off [x, y; world], if known; min_separation_m: least distance from there,
+    and from it in flight, of all airborne vehicles.
     """
 
     hover_after_s: float = _SAFETY.setpoint_lifetime_ms / 1000
@@ -79,6 +80,7 @@ class WatchdogLimits:
     blind_land_s: float = 1.6
     lost_hover_s: float = 0.5
     lost_land_s: float = 2.0
+    crowded_land_s: float = 2.0
     pad_m: tuple[float, float] | None = None
     min_separation_m: float = 0.6
 
@@ -97,8 +99,8 @@ class VehicleView:
     silent. velocity_m_s: the reported one, scaled to the true one; None if it reports none. speed_m_s, stray: computed
     by the host: horizontal speed, and how the vehicle strays from its commands, or ""; seen: whether cameras show its
     speed; unseen_s: how long it may not have been where it is believed, by the tracker; near: airborne vehicle too near
-    to its pad, or "". lost_s: how long it has lacked a position that it needs. clears: whether a separate order ends
-    its emergency without starting motors.
+    to its pad, or ""; crowded: why it makes way for another that is too near in flight, or "". lost_s: how long it has
+    lacked a position that it needs. clears: whether a separate order ends its emergency without starting motors.
     """
 
     flight_state: FlightState = FlightState.UNKNOWN
@@ -113,6 +115,7 @@ class VehicleView:
     seen: bool = False
     unseen_s: float = 0.0
     near: str = ""
+    crowded: str = ""
     lost_s: float = 0.0
     clears: bool = False
 

@@ -173,7 +173,7 @@ def _tracker(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
 
 
 def _near(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
-    """Yield pairs of flying drones that are nearer than allowed: only a drone that tracks is moved away by itself."""
+    """Yield pairs of flying drones that are nearer than allowed."""
     if state.estimate is None or state.estimate.age_s(now_ns) > ESTIMATE_SILENT_S:
         return
     modes = {n: seen.message.mode for n, seen in state.vehicles.items() if seen.message.flight_state in AIRBORNE}
@@ -186,11 +186,9 @@ def _near(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
 
 
 def _apart(modes: set[str]) -> str:
-    if "TRACK" in modes:
-        return "Nothing to do: the tracker moves them apart."
     if "LANDING" in modes:
         return "Nothing to do: it lands."
-    return f"{_TO_DO}LAND one of them, or TRACK: drones that hover drift."
+    return "Nothing to do: they are moved apart; if that does not help, one lands."
 
 
 def _lost(state: MonitorState) -> Iterator[Alarm]:

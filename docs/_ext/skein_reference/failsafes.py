@@ -38,6 +38,9 @@ EVIDENCE: dict[Condition, str] = {
     Condition.UNCONVERGED: "setpoints that say so",
     Condition.STRAYS: "reported or estimated velocity against what was commanded",
     Condition.TOO_FAST: "reported or estimated speed above 1.3 `limits.max_speed_m_s` + 0.2 m/s",
+    Condition.CROWDED: "the estimates of it and of another that flies and does not land are nearer to each other than "
+    "the separation, by more than two standard deviations, and it is the lower one; of two as high as each other "
+    "(0.2 m) the later one by name",
     Condition.DRIVER_STOOD: "more than 0.5 s between two turns of the driver",
     Condition.NOT_READY: "the driver's own reason",
     Condition.SOMEBODY_NEAR: "a vehicle in the air whose estimate, less two standard deviations, is nearer to the pad "

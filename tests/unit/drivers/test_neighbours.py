@@ -16,9 +16,9 @@ def status(name, state):
     return VehicleStatus(header=Header(0, "here", name, name, 0), flight_state=state, mode="TRACK")
 
 
-def believed(name, x_m, y_m=0.0, std_m=0.02):
+def believed(name, x_m, y_m=0.0, std_m=0.02, z_m=1.0, converged=True):
     covariance = tuple(std_m**2 if row == column else 0.0 for row in range(4) for column in range(4))
-    return EntityEstimate(name, "robot", (x_m, y_m, 1.0, 0.0), covariance, (0.0,) * 3, True, 0.1)
+    return EntityEstimate(name, "robot", (x_m, y_m, z_m, 0.0), covariance, (0.0,) * 3, converged, 0.1)
 
 
 def watch(state=FlightState.FLYING, pad_m=(0.0, 0.0)):
@@ -90,3 +90,47 @@ def test_the_separation_itself_is_far_enough():
     neighbours = watch()
     neighbours.see(S, [believed("b", 0.6, std_m=0.0)])
     assert neighbours.obstacle(S) == ""
+
+
+def aloft(*entities):
+    """Return what each of a and b says of being crowded, with both in the air."""
+    both = []
+    for name in "ab":
+        neighbours = Neighbours(name, None, 0.6)
+        for other in "ab":
+            neighbours.hear(status(other, FlightState.FLYING))
+        neighbours.see(S, entities)
+        both.append(neighbours)
+    return both
+
+
+def crowded(*entities):
+    return tuple(one.crowded(S) for one in aloft(*entities))
+
+
+def test_of_two_as_high_as_each_other_the_later_one_makes_way():
+    assert crowded(believed("a", 0.0), believed("b", 0.4)) == ("", "a flies 0.40 m from it, at least 0.6 m is allowed")
+
+
+@pytest.mark.parametrize(("a_m", "lands"), [(0.7, "a"), (1.3, "b")])
+def test_the_lower_one_makes_way(a_m, lands):
+    of_a, of_b = crowded(believed("a", 0.0, z_m=a_m), believed("b", 0.2))
+    assert (bool(of_a), bool(of_b)) == (lands == "a", lands == "b")
+
+
+def test_only_what_is_surely_too_near_counts():
+    assert not any(crowded(believed("a", 0.0), believed("b", 0.56)))
+    assert not any(crowded(believed("a", 0.0), believed("b", 0.4, std_m=0.12)))
+    assert not any(crowded(believed("a", 0.0), believed("b", 0.2, converged=False)))
+    assert not any(crowded(believed("a", 0.0), believed("b", 0.3, z_m=1.6)))
+
+
+def test_nobody_makes_way_for_who_lands_or_stands_or_is_not_known():
+    _, b = aloft(believed("a", 0.0), believed("b", 0.4))
+    assert b.crowded(S) and not b.crowded(S + S // 2)
+    b.hear(status("a", FlightState.LANDING))
+    assert not b.crowded(S)
+    b.hear(status("a", FlightState.HOVERING))
+    assert b.crowded(S)
+    b.hear(status("a", FlightState.LANDED))
+    assert not b.crowded(S)

@@ -27,7 +27,7 @@ class Bench:
         self.speed = self.unseen_s = self.lost_s = 0.0
         self.unseen = self.lost = False
         self.seen = True
-        self.near, self.clears = "", clears
+        self.near, self.crowded, self.clears = "", "", clears
         self.holds = False
         self.upstream = Upstream()
         self.epoch = 1
@@ -55,7 +55,7 @@ class Bench:
     @property
     def view(self):
         view = VehicleView(self.state, self.fresh, self.battery, self.not_ready, unsound=self.unsound)
-        seen = replace(view, unseen_s=self.unseen_s, lost_s=self.lost_s, near=self.near)
+        seen = replace(view, unseen_s=self.unseen_s, lost_s=self.lost_s, near=self.near, crowded=self.crowded)
         return replace(seen, speed_m_s=self.speed, seen=self.seen, stray=self.stray, clears=self.clears).plausible
 
     def see(self):

@@ -63,6 +63,7 @@ class CopterLink:
             self._fly((forward, left, _CLIMB_M_S), 0.0, now_s)
             if copter.estimate.position[2] > _TAKE_OFF_M:
                 self._climbing = False
+                self._drift.let_go()  # it holds this height, not that of the floor
         elif copter.airborne and copter.estimate.aided_s > _VISION.land_after_s:
             copter.steer(Steering.LAND)
             self.landed = True

@@ -269,3 +269,17 @@ def test_a_vehicle_whose_velocity_nobody_knows_holds_its_place_by_pictures():
         vehicle.step()
     assert math.hypot(*vehicle.velocity) < 0.02
     assert math.hypot(*vehicle.place[:2]) < 0.3
+
+
+def test_who_is_brought_back_holds_the_place_to_which_it_came():
+    vehicle = Vehicle()
+    for _ in range(150):
+        vehicle.step()
+    for _ in range(100):
+        wanted = vehicle.feedback.hold(vehicle.now_ns, back=(0.1, -0.05))
+        assert wanted[:2] == (0.1, -0.05)
+        vehicle.place = [one + 0.02 * v for one, v in zip(vehicle.place[:2], (0.1, -0.05), strict=True)] + [0.8]
+        vehicle.now_ns += STEP_NS
+        entity = EntityEstimate("v", "robot", (*vehicle.place, YAW), (1e-4,) * 16, (0.0, 0.0, 0.0), True, 0.1)
+        vehicle.feedback.hear(vehicle.now_ns, entity, (0.0, 0.0, 0.0))
+    assert math.hypot(*vehicle.feedback.hold(vehicle.now_ns)[:2]) < 0.01

@@ -43,12 +43,14 @@ class Flight:
         self.heard.settimeout(1.0)
         self.tello = Tello(settings, MemoryBus(MemoryExchange(), "lab", "tello"))
 
-    def told(self, action: Action, velocity=(0.0, 0.0, 0.0), turn=0.0, state=STATE) -> tuple[bytes, FlightState]:
+    def told(
+        self, action: Action, velocity=(0.0, 0.0, 0.0), turn=0.0, state=STATE, back=None
+    ) -> tuple[bytes, FlightState]:
         """Return what the vehicle is sent for a decision, and what the driver then says of its flight."""
         now_ns = time.monotonic_ns()
         self.tello._ready = True
         self.tello.heard = Heard(now_ns, now_ns, state, velocity_from_state(state))
-        self.tello.apply(now_ns, WatchdogDecision(DriverMode.TRACK, action, velocity, turn))
+        self.tello.apply(now_ns, WatchdogDecision(DriverMode.TRACK, action, velocity, turn, back_m_s=back))
         return self.heard.recv(64), self.tello.view(now_ns).flight_state
 
     def close(self) -> None:
@@ -61,6 +63,11 @@ def flight():
     flight = Flight()
     yield flight
     flight.close()
+
+
+def test_who_hovers_is_brought_back_as_it_would_fly(flight: Flight) -> None:
+    flies, _ = flight.told(Action.FLY, (0.1, -0.15, 0.0))
+    assert flight.told(Action.HOVER, back=(0.1, -0.15))[0] == flies != flight.told(Action.HOVER)[0]
 
 
 class Rig:

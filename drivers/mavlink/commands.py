@@ -273,7 +273,7 @@ class Orders:
         if not self._pace.is_due(now_ns):  # the tracker's 50 Hz must become an even 20
             return None
         vehicle = self._vehicle
-        drift = self.drift.correction(now_ns)
-        message = setpoint_from_velocity(vehicle.system_id, now_ns, velocity_m_s, yaw_rate, vehicle.limits, drift)
-        self.drift.tell(now_ns, (message.vx, -message.vy, -message.vz))
-        return message
+        allowed, _ = vehicle.limits.within(velocity_m_s, yaw_rate)
+        correction = self.drift.correction(now_ns)
+        self.drift.tell(now_ns, allowed)
+        return setpoint_from_velocity(vehicle.system_id, now_ns, velocity_m_s, yaw_rate, vehicle.limits, correction)

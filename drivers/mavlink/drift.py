@@ -8,6 +8,7 @@ again.
 
 import math
 
+from drivers.mavlink.undershoot import Undershoot
 from groundstation.bus.messages import EntityEstimate, Vector3
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
@@ -129,7 +130,7 @@ class DriftFeedback:
         """Forget everything, for a vehicle on the floor."""
         self._drift: Vector2 = (0.0, 0.0)
         self._lately: Vector2 = (0.0, 0.0)
-        self._climb = ClimbError()
+        self._climb, self._undershoot = ClimbError(), Undershoot()
         self._stands = False
         self._at_ns: int | None = None
         self._seen_ns = 0
@@ -150,9 +151,12 @@ class DriftFeedback:
         """Note that it has left the floor."""
         self._stands = False
 
-    def tell(self, now_ns: int, velocity_m_s: Vector3) -> None:
-        """Note the velocity [base_stabilized] that is sent, including the correction."""
-        self._obedience.tell(now_ns, velocity_m_s[:2])
+    def tell(self, now_ns: int, asked_m_s: Vector3) -> None:
+        """Note the velocity [base_stabilized] that is asked of it, without the correction."""
+        forward, left = asked_m_s[:2]
+        self._undershoot.tell(now_ns, self._in_world(forward, left))
+        drift = self._corrected(now_ns, self._drift_by_now())
+        self._obedience.tell(now_ns, (forward + drift[0], left + drift[1]))
 
     def hear(self, now_ns: int, estimate: EntityEstimate, reported_m_s: Vector3) -> None:
         """Take a good estimate and the velocity [base_stabilized] that was reported last."""
@@ -161,12 +165,14 @@ class DriftFeedback:
         if estimate.age_s > _SEEN_S:
             return  # dead reckoning with the same velocity that is being judged
         self._seen_ns = now_ns - round(estimate.age_s * NS_PER_S)
-        c, s = math.cos(yaw), math.sin(yaw)
-        forward, left = reported_m_s[:2]
         vx, vy = estimate.velocity_m_s[:2]
-        self._obeys = self._obedience.hear(now_ns, (forward, left), (c * vx + s * vy, c * vy - s * vx))
+        forward, left = reported_m_s[:2]
+        self._obeys = self._obedience.hear(now_ns, (forward, left), self._in_heading(vx, vy, 0.0)[:2])
         self._climb.hear(now_ns, z, reported_m_s[2])
-        self._correct(now_ns, (c * forward - s * left - vx, s * forward + c * left - vy))
+        reported_x, reported_y = self._in_world(forward, left)
+        self._correct(now_ns, (reported_x - vx, reported_y - vy))
+        if self._corrects(now_ns) and not self._stands:
+            self._undershoot.hear(now_ns, (vx, vy))
 
     def see_place(self, now_ns: int, place: Vector3, yaw_rad: float) -> None:
         """Take the place where a picture showed a vehicle of unknown velocity: it holds its place by that.
@@ -188,16 +194,23 @@ class DriftFeedback:
         return self._corrected(now_ns, self._drift)
 
     def correction(self, now_ns: int) -> Vector3:
-        """Return what to add to a commanded velocity [m/s; base_stabilized]: the drift, extrapolated to now."""
+        """Return what to add to a command [m/s; base_stabilized]: drift, extrapolated to now, and undershoot."""
+        (x, y), (missing_x, missing_y) = self._drift_by_now(), self._undershoot.missing
+        return self._corrected(now_ns, (x + missing_x, y + missing_y))
+
+    def _drift_by_now(self) -> Vector2:
         x, y = (2.0 * seen - before for seen, before in zip(self._drift, self._lately, strict=True))
-        return self._corrected(now_ns, (x, y))
+        return x, y
+
+    def _corrects(self, now_ns: int) -> bool:
+        """Return whether commands are corrected now."""
+        doubted = now_ns < self._doubted_until_ns or (math.hypot(*self._drift) > _SMALL_M_S and not self._obeys)
+        lifts_off = self._stood_ns is not None and now_ns - self._stood_ns <= _LIFT_OFF_NS
+        return self._at_ns is not None and (lifts_off or not doubted)
 
     def _corrected(self, now_ns: int, drift: Vector2) -> Vector3:
         """Return the part of a drift [world] that is believed and corrected [base_stabilized]."""
-        size = math.hypot(*self._drift)
-        doubted = now_ns < self._doubted_until_ns or (size > _SMALL_M_S and not self._obeys)
-        lifts_off = self._stood_ns is not None and now_ns - self._stood_ns <= _LIFT_OFF_NS
-        if self._at_ns is None or (doubted and not lifts_off):
+        if not self._corrects(now_ns):
             return _STILL
         fades = math.exp(-max(0.0, (now_ns - self._seen_ns) / NS_PER_S - _LASTS_S) / _FORGETS_S)
         x, y = drift
@@ -248,6 +261,10 @@ class DriftFeedback:
     def _place_to_rest(self, now_ns: int, here: Vector3) -> Vector3:
         self._coming = self._coming or ComingToRest(now_ns, here)
         return self._coming.place(now_ns, here)
+
+    def _in_world(self, forward: float, left: float) -> Vector2:
+        c, s = math.cos(self._yaw_rad), math.sin(self._yaw_rad)
+        return c * forward - s * left, s * forward + c * left
 
     def _in_heading(self, x: float, y: float, up: float) -> Vector3:
         c, s = math.cos(self._yaw_rad), math.sin(self._yaw_rad)

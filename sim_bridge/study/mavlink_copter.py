@@ -52,7 +52,9 @@ class CopterLink:
         self._ticks += 1
         copter = self._copter
         self._heading = math.remainder(self._heading + copter.estimate.yaw_rate * TICK_S, math.tau)
-        if not copter.airborne:
+        if copter.airborne:
+            self._drift.lift()
+        else:
             self._drift.stand(round(now_s * 1e9))
         if self._ticks % _VISION_TICKS == 0:
             self._feed(estimates, round(now_s * 1e9))
@@ -74,10 +76,9 @@ class CopterLink:
 
     def _fly(self, velocity: Vector3, yaw_rate: float, now_s: float) -> None:
         now_ns = round(now_s * 1e9)
-        (x, y, z), (drift_x, drift_y, drift_z) = velocity, self._drift.correction(now_ns)
-        corrected = (x + drift_x, y + drift_y, z + drift_z)
-        self._drift.tell(now_ns, corrected)
-        self._copter.fly(corrected, yaw_rate)
+        (x, y, z), correction = velocity, self._drift.correction(now_ns)
+        self._drift.tell(now_ns, velocity)
+        self._copter.fly((x + correction[0], y + correction[1], z + correction[2]), yaw_rate)
 
     def _feed(self, estimates: tuple[EntityEstimate, ...], now_ns: int) -> None:
         position, yaw = self._pad, self._pad_yaw

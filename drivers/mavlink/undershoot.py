@@ -13,9 +13,9 @@ Vector2 = tuple[float, float]
 _STILL: Vector2 = (0.0, 0.0)
 # Time constant of a healthy vehicle's response.
 _RESPONSE_S = 0.6
-# Gain of the integral [1/s]: with that response, and a belief that is half a second late, its phase margin is 60
+# Gain of the integral [1/s]: with that response, and a belief that is half a second late, its phase margin is 50
 # degrees.
-_GAIN = 0.5
+_GAIN = 0.7
 _MOST_M_S = 0.25
 # A command that changed by more is still being followed: vehicles differ in how fast, and that is no undershoot.
 _STEADY_M_S = 0.1

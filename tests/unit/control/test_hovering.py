@@ -77,6 +77,23 @@ def test_who_stays_near_its_place_is_left_alone():
     assert np.hypot(*flight.place) <= 0.03
 
 
+@pytest.mark.parametrize(("off_m", "speed_m_s"), [(0.15, 0.12), (0.25, 0.2), (0.45, 0.2)])
+def test_it_is_brought_back_by_eight_tenths_of_the_way_a_second_at_two_decimetres_at_most(off_m, speed_m_s):
+    flight = Flight()
+    flight.run(2.0)
+    flight.place = np.array((0.0, off_m))
+    flight.step()
+    assert flight.ways[-1] == pytest.approx(speed_m_s)
+
+
+def test_who_is_brought_back_is_left_alone_again_within_three_centimetres():
+    flight = Flight()
+    flight.run(2.0)
+    flight.place = np.array((0.2, 0.0))
+    flight.run(10.0)
+    assert np.hypot(*flight.place) == pytest.approx(0.03, abs=0.005)
+
+
 def test_it_is_not_moved_until_it_has_come_to_rest():
     flight = Flight(drift=(0.5, 0.0))  # it brakes
     assert not any(sent.holds for sent in flight.run(1.4))

@@ -125,6 +125,23 @@ def test_only_what_is_surely_too_near_counts():
     assert not any(crowded(believed("a", 0.0), believed("b", 0.3, z_m=1.6)))
 
 
+@pytest.mark.parametrize(("z_m", "makes_way"), [(1.19, True), (1.21, False)])
+def test_heights_within_two_decimetres_are_the_same(z_m, makes_way):
+    _, of_b = crowded(believed("a", 0.0, z_m=1.0), believed("b", 0.1, z_m=z_m))
+    assert bool(of_b) == makes_way
+
+
+@pytest.mark.parametrize(("later_ms", "known"), [(290, True), (310, False)])
+def test_a_place_counts_for_three_tenths_of_a_second(later_ms, known):
+    _, b = aloft(believed("a", 0.0), believed("b", 0.4))
+    assert (b.crowded(S + later_ms * S // 1000) != "") == known
+
+
+def test_who_is_not_crowded_says_nothing():
+    assert crowded(believed("a", 0.0), believed("b", 2.0)) == ("", "")
+    assert crowded(believed("a", 0.0)) == ("", "")
+
+
 def test_nobody_makes_way_for_who_lands_or_stands_or_is_not_known():
     _, b = aloft(believed("a", 0.0), believed("b", 0.4))
     assert b.crowded(S) and not b.crowded(S + S // 2)

@@ -54,6 +54,41 @@ def test_the_way_back_is_open_at_the_limit():
     assert bound.step(round(11.03 * S), (-0.2, 0.0)) == (-0.2, 0.0)
 
 
+def obeys_for(bound, velocity, since_s, step_s=STEP_S):
+    """Return how long it lets a velocity through without a break [s], at most 60."""
+    for step in range(1, round(60 / step_s)):
+        if bound.step(round((since_s + step * step_s) * S), velocity) is None:
+            return (step - 1) * step_s
+    return 60.0
+
+
+def test_half_a_metre_is_let_through_at_full_speed_and_a_metre_from_one_side_to_the_other():
+    """0.2 m/s less the 0.1 m/s that are forgotten: 0.5 m last 5 s, and from there 1 m back 10/3 s and 5 s."""
+    bound = WayBack()
+    bound.step(S, (0.2, 0.0))
+    assert obeys_for(bound, (0.2, 0.0), 1.0) == pytest.approx(5.0, abs=0.1)
+    assert obeys_for(bound, (-0.2, 0.0), 7.0) == pytest.approx(0.4 / 0.3 + 5.0, abs=0.1)
+
+
+@pytest.mark.parametrize("across", [(0.2, 0.0), (0.0, 0.2)])
+def test_what_was_let_through_is_forgotten_by_a_decimetre_a_second(across):
+    """A second of standing, and a gap that counts as 0.2 s, free 0.12 m, which last 1.2 s."""
+    bound = WayBack()
+    bound.step(S, across)
+    obeys_for(bound, across, 1.0)
+    for step in range(1, 31):
+        assert bound.step(round((7 + step * STEP_S) * S), (0.0, 0.0)) == (0.0, 0.0)
+    assert obeys_for(bound, across, 8.0) == pytest.approx(1.2, abs=0.1)
+
+
+def test_a_driver_that_stood_still_counts_a_fifth_of_a_second_at_most():
+    """At 0.2 m/s that is 0.04 m of the half metre."""
+    bound = WayBack()
+    bound.step(S, (0.2, 0.0))
+    bound.step(31 * S, (0.2, 0.0))
+    assert obeys_for(bound, (0.2, 0.0), 31.0) == pytest.approx(4.6, abs=0.1)
+
+
 @pytest.mark.parametrize("asked", [None, (math.nan, 0.0), (0.0, math.inf)])
 def test_nothing_asked_is_its_own_hover(asked):
     assert WayBack().step(S, asked) is None

@@ -119,7 +119,7 @@ class MotionMonitor:
             held_s, change_m_s = watch.update(sample.stamp_ns, velocity, tilt)
             if held_s:
                 needed_s = limits.stuck_s if change_m_s >= limits.stuck_m_s else limits.stuck_alone_s
-                reason = f"its velocity is stuck at {abs(velocity):.2f} m/s"
+                reason = f"reported velocity stuck at {abs(velocity):.2f} m/s"
                 judged += _repeated(Sensor.VELOCITY, held_s, needed_s, reason)
         return judged
 

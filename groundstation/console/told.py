@@ -7,7 +7,7 @@ from typing import Any
 from groundstation.appearance.cost import cost_cm2, cost_text
 from groundstation.appearance.topology import topology_words
 from groundstation.bus import messages as m
-from groundstation.monitor.alarms import Alarm
+from groundstation.monitor.alarms import DARK, Alarm
 from groundstation.monitor.batteries import Battery
 from groundstation.monitor.state import StampedMessage
 from groundstation.sensing.switches import Switch
@@ -114,6 +114,7 @@ def camera(seen: StampedMessage[m.CameraStatus]) -> dict[str, Any]:
         "connected": status.connected,
         "fps": round(status.fps, 1),
         "age_ms": round(status.age_ms),
+        "dark": status.brightness is not None and status.brightness < DARK,
         "detail": status.detail,
     }
 

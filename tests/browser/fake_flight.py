@@ -41,6 +41,8 @@ class FakeFlight(threading.Thread):
         self.deaf: set[str] = set()
         self._sunk_m = dict.fromkeys(drones, 0.0)  # since each began to land
         self.frozen = self.fenced = False
+        self.dark = False  # no camera has light to see by
+        self.mute: set[str] = set()  # drones that say nothing
         self.findings: tuple[m.PreflightFinding, ...] = ()  # of the checks before a take-off
         self.distance_m = 1.3  # of the drones from the target
         self.lease = True
@@ -227,7 +229,7 @@ class FakeFlight(threading.Thread):
         bus.publish_bytes(t.IMAGE, bus.header(camera, stamp_ns), paint(size, focal, at))
 
     def _say_vehicles(self, s: float) -> None:
-        for name in self.drones:
+        for name in (name for name in self.drones if name not in self.mute):
             bus, mode = self.bus(name), self.modes[name]
             status = m.VehicleStatus(
                 header=bus.header(name),
@@ -258,7 +260,14 @@ class FakeFlight(threading.Thread):
         for name in (*self.cameras, *(f"{name}_camera" for name in self.drones)):
             bus = self.bus(name)
             status_of_camera = m.CameraStatus(
-                header=bus.header(name), connected=True, fps=15.0, age_ms=131.0, frames=tick, skipped=0, detections=tick
+                header=bus.header(name),
+                connected=True,
+                fps=15.0,
+                age_ms=131.0,
+                frames=tick,
+                skipped=0,
+                detections=tick,
+                brightness=0.02 if self.dark else None,
             )
             bus.publish(t.CAMERA_STATUS, status_of_camera)
         if tick % 250 == 0:

@@ -13,6 +13,7 @@ def all_is_well(flight: FakeFlight) -> None:
     flight.link, flight.rate_hz, flight.detail = {}, {}, {}
     flight.lands_in_s, flight.unseen_s = {}, {}
     flight.braked, flight.frozen = set(), False
+    flight.mute, flight.dark = set(), False
 
 
 def one_lands_for_its_battery(flight: FakeFlight) -> None:
@@ -40,7 +41,7 @@ def the_tracker_is_silent(flight: FakeFlight) -> None:
 
 def one_has_a_stuck_sensor(flight: FakeFlight) -> None:
     flight.braked.add("drone_2")
-    flight.detail["drone_2"] = "hovers: its sensors cannot be believed: its velocity is stuck at 0.27 m/s"
+    flight.detail["drone_2"] = "hovers: its sensors cannot be believed: reported velocity stuck at 0.27 m/s"
 
 
 def all_land(flight: FakeFlight) -> None:

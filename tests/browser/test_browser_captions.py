@@ -51,14 +51,58 @@ def test_hold_says_what_becomes_of_who_is_lost(stage: Any) -> None:
     SITUATIONS["all_is_well"](stage.flight)
     page = stage.open()
     stage.flight.unseen_s["drone_1"] = 2.0
-    page.wait(lambda s: "(drone_1 not seen just now: lost after 3 s)" in page.there("verdict").inner_text())
+    soon = re.compile(r"\(drone_1 not seen just now: counts as lost in (1\.0|0\.\d) s\)")
+    page.wait(lambda s: soon.search(page.there("verdict").inner_text()))
+    itself = re.compile(r"Itself not seen for 2\.\d s: counts as lost in (1\.0|0\.\d) s\.")
+    page.wait(lambda s: itself.search(page.there("drone_1-duty").inner_text()))
     stage.flight.unseen_s["drone_1"] = 5.0
-    page.wait(lambda s: page.there("hold").inner_text() == "HOLD\ndrone_2 hovers;\ndrone_1 hovers if seen")
-    assert page.there("drone_1-hold").inner_text() == "Hold\nhovers if seen"
+    page.wait(lambda s: page.there("hold").inner_text() == "HOLD\ndrone_2 hovers;\ndrone_1 lands if unseen")
+    assert page.there("drone_1-hold").inner_text() == "Hold\nunseen: lands"
     stage.flight.unseen_s |= {"drone_2": 6.0, TARGET: 9.0}
     page.wait(lambda s: page.there("hold").inner_text() == "HOLD\nboth hover; they land\nif they stay unseen")
+    assert page.there("land-all").inner_text().endswith("both land\nstraight down")
     lost = "Lost: drone_1, drone_2 and turtlebot, not seen for 5 to 9 s."
     page.wait(lambda s: lost in page.there("verdict").inner_text())
+
+
+def test_watch_says_who_lands_by_itself_why_and_when(stage: Any) -> None:
+    SITUATIONS["all_is_well"](stage.flight)
+    page = stage.open()
+    means = page.there("safety-means")
+    stage.flight.unseen_s = {"drone_1": 10.0, "drone_2": 9.0, TARGET: 10.0}
+    page.wait(lambda s: re.fullmatch(r"unseen: both\nland within (20|19) s", means.inner_text()))
+    stage.flight.lands_in_s["drone_1"] = 6.0
+    page.wait(lambda s: means.inner_text() == "unseen: one\nlands in 6 s")
+    stage.flight.unseen_s = {}
+    page.wait(lambda s: means.inner_text() == "one lands in 6 s\nby itself")
+    SITUATIONS["the_tracker_is_silent"](stage.flight)
+    page.wait(lambda s: means.inner_text() == "no tracker: both\nland in 1 s")
+    assert page.there("team-mode").inner_text() == "LANDS IN 1 s"
+    assert page.there("banner-tracker").inner_text().startswith("TRACKER SILENT")
+
+
+def test_who_is_not_heard_is_told_alike_everywhere(stage: Any) -> None:
+    SITUATIONS["all_are_held"](stage.flight)
+    page = stage.open()
+    page.wait(lambda s: page.there("hold").inner_text() == "HOLD\nboth hover already")
+    stage.flight.mute = set(DRONES)
+    page.wait(lambda s: page.there("safety-means").inner_text() == "not heard: both\nhover, then land")
+    assert page.there("team-mode").inner_text() == "NOT HEARD" and page.there("team-who").inner_text() == "team"
+    assert page.there("hold").inner_text() == "HOLD\nboth hover\nif they hear"
+    assert page.there("verdict").inner_text().startswith("drone_1 and drone_2 are not heard.")
+    for name in DRONES:
+        assert page.there(f"{name}-duty").inner_text().startswith("It is not heard: it hovers, then lands by itself.")
+        assert page.there(f"{name}-land").inner_text() == "Land\nif it hears"
+
+
+def test_who_has_no_light_looks_for_nobody(stage: Any) -> None:
+    SITUATIONS["the_target_is_lost"](stage.flight)
+    page = stage.open()
+    stage.flight.dark = True
+    page.wait(lambda s: page.there("team-mode").inner_text() == "BLIND")
+    blind = "Too dark to look for turtlebot, ordered at the terminal."
+    page.wait(lambda s: page.there("drone_1-duty").inner_text().startswith(blind))
+    assert "Also: dark pictures, turtlebot lost" in page.there("banners").inner_text()
 
 
 def test_a_start_says_who_goes_on_and_whether_it_can(stage: Any) -> None:
@@ -68,11 +112,11 @@ def test_a_start_says_who_goes_on_and_whether_it_can(stage: Any) -> None:
     stage.flight.detail["drone_2"] = "hovers after its take-off, waiting for TRACK"
     page.wait(lambda s: page.there("track").inner_text() == "TRACK\ndrone_2 tracks")
     assert page.there("verdict").inner_text().endswith("TRACK lets drone_2 track.")
-    stage.flight.detail["drone_2"] = "its velocity is stuck at 0.00 m/s; RESUME is needed"
+    stage.flight.detail["drone_2"] = "reported velocity stuck at 0.00 m/s; RESUME is needed"
     page.wait(lambda s: page.there("resume").inner_text() == "RESUME\ndrone_2 tracks again")
     stage.flight.lands_in_s["drone_2"] = 2.0
     page.wait(lambda s: page.there("resume").inner_text() == "RESUME\ndrone_2 tracks, if able")
-    assert page.there("drone_2-duty").inner_text() == "Hovers, then lands: its velocity is stuck at 0.00 m/s."
+    assert page.there("drone_2-duty").inner_text() == "Hovers, then lands: reported velocity stuck at 0.00 m/s."
     assert "RESUME" not in page.there("verdict").inner_text()
 
 

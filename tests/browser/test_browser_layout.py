@@ -32,7 +32,7 @@ def ten_alarms(flight: FakeFlight) -> None:
     flight.battery["drone_1"], flight.link["drone_1"] = 0.03, 0.08
     flight.battery["drone_2"] = 0.17
     flight.braked.add("drone_2")
-    flight.detail["drone_2"] = "hovers: its sensors cannot be believed: its velocity is stuck at 0.27 m/s"
+    flight.detail["drone_2"] = "hovers: its sensors cannot be believed: reported velocity stuck at 0.27 m/s"
     flight.lands_in_s["drone_1"] = 12.0
     flight.detail["drone_1"] = "not seen by any camera for too long"
 
@@ -222,7 +222,7 @@ TOLD = {
         *("drone_2 hovers;\ndrone_1 lands anyway", "lands in 6 s", "track"),
     ),
     "the_tracker_is_silent": (
-        *("WATCH", "TRACKER SILENT", "in 1 s. Whether anybody is lost is not known: the tracker is silent."),
+        *("WATCH", "TRACKER SILENT", "in 1 s. The tracker is silent: who is lost is not known; cameras still see all."),
         *("all land anyway", "lands in 1 s", "lands in 1 s"),
     ),
     "one_has_a_stuck_sensor": (

@@ -275,7 +275,7 @@ def test_values_that_cannot_be_true_stop_it_like_silence_and_the_operator_reads_
     rig.messages(ODOMETRY)
     rig.until(lambda: rig.decision.action == "LAND")
     assert rig.messages(ODOMETRY) == [], "what is BAD is not published"
-    word = "all values repeat" if fault == "frozen" else "its velocity is stuck at"
+    word = "all values repeat" if fault == "frozen" else "reported velocity stuck at"
     assert any(word in text for _, text, _ in rig.process.events), rig.process.events
     rig.until(lambda: not rig.fake.state & FLY)
 

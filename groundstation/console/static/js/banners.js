@@ -9,6 +9,7 @@ import { withShortNames } from "./names.js";
 import { noteOwnAlarms, ownAlarms } from "./own_alarms.js";
 import { momentWords } from "./playback.js";
 import { estimateAge, replaying, runOver, silentS, store, trackerSilent } from "./store.js";
+import { landingWords } from "./verdict.js";
 
 const SHOWN = 4, NOTICE_MS = 8000, LEVELS = { SAFE: "good", WATCH: "warn", ACT: "bad" };
 const MEANS = { SAFE: "no problem", WATCH: "a problem, but\nno need to act", ACT: "a problem:\nact now" };
@@ -29,19 +30,22 @@ function banners(own) {
   if (!runOver() && !own.some(({ shell }) => shell) && trackerSilent()) all.push(silentTracker());
   for (const { words, grave } of notices.filter(({ at }) => performance.now() - at < NOTICE_MS)) all.push({ kind: "notice", level: grave ? "grave" : "mild", title: words, rank: "notice" });
   const told = (store.s.alarms ?? []).filter(({ about }) => about !== "tracker silent").map((alarm) => ({ kind: "alarm", level: alarm.grave ? "grave" : "mild",
-    title: alarm.told === null ? alarm.text : `${alarm.text} (told at ${momentWords(alarm.told)})`, more: alarm.advice, rank: alarm.asks ? "ACT" : "WATCH" }));
+    title: alarm.told === null ? alarm.text : `${alarm.text} (told at ${momentWords(alarm.told)})`, more: alarm.advice, subject: subjectOf(alarm), rank: alarm.asks ? "ACT" : "WATCH" }));
   if (store.connected && !runOver()) all.push(...together(told).slice(0, SHOWN));
   if (!all.length && !replaying()) all.push({ kind: "none", level: "calm", title: store.s.safety?.reason ?? "No alarms yet." });
   const urgency = ({ level, rank }) => (rank === "ACT" ? 0 : level === "grave" ? 1 : 2);
   return all.sort((a, b) => urgency(a) - urgency(b));
 }
 
+// "drone_1 lost"; of a suspicion what it suspects, without its reasons.
+const subjectOf = ({ about, text: words }) => (about.startsWith("suspected ") ? words : about === "dark" ? "dark pictures" : about);
+
 // Where there is room, alarms with the same advice stand in one line: the second is no less than the first.
 function together(alarms) {
   const all = [];
   for (const alarm of alarms) {
     const same = WIDE.matches && all.find((other) => other.more && other.more === alarm.more && other.rank === alarm.rank && other.level === alarm.level && other.title.length + alarm.title.length < ROOM);
-    if (same) same.title += `; ${alarm.title}`;
+    if (same) Object.assign(same, { title: `${same.title}; ${alarm.title}`, subject: `${same.subject}, ${alarm.subject}` });
     else all.push(alarm);
   }
   return all;
@@ -54,7 +58,7 @@ function ending({ severity, text: words }) {
 
 function silentTracker() {
   const flying = up(), land = flying.length && flying.every((name) => modeNow(name) === "LANDING");
-  return { kind: "tracker", level: "grave", title: `TRACKER SILENT for ${seconds(estimateAge())}${WIDE.matches ? ": nobody knows where they are" : ""}`, rank: "WATCH",
+  return { kind: "tracker", level: "grave", title: `TRACKER SILENT for ${seconds(estimateAge())}${WIDE.matches ? ": no new places" : ""}`, rank: "WATCH",
     more: `Nothing to do: the drones ${land ? "land" : "hover, then land by themselves. LAND ALL still works"}.` };
 }
 
@@ -69,7 +73,7 @@ function safetyWord(own) {
 export function showBanners() {
   const own = ownAlarms(), all = banners(own), word = safetyWord(own);
   text(byId("safety"), word);
-  text(byId("safety-means"), MEANS[word]);
+  text(byId("safety-means"), (word === "WATCH" && !replaying() && store.scene && landingWords()) || MEANS[word]);
   byId("safety-box").dataset.level = LEVELS[word];
   document.body.dataset.safety = word;
   noteOwnAlarms(own);
@@ -77,7 +81,7 @@ export function showBanners() {
   if (host.dataset.kinds !== kinds) {
     noteSilence(kinds.split(","), (host.dataset.kinds ?? "").split(","), { tracker: estimateAge(), silent: silentS() });
     host.dataset.kinds = kinds;
-    host.replaceChildren(...all.map(({ kind, shell }) => el("div", { class: "banner", data: { testid: `banner-${kind}` } }, el("span"), el("small"), shell && !replaying() ? el("small", {}, "To stop: ", el("code", {}, "groundstation land")) : null)));
+    host.replaceChildren(...all.map(({ kind, shell }) => el("div", { class: "banner", data: { testid: `banner-${kind}` } }, el("span"), el("small"), shell && !replaying() ? el("small", {}, "To stop: ", el("code", {}, "groundstation land")) : null, el("small", { class: "also" }))));
   }
   all.forEach(({ level, title, more, rank }, index) => {
     const node = host.children[index];
@@ -86,7 +90,21 @@ export function showBanners() {
     text(node.children[1], withShortNames(more ?? ""));
   });
   showLog();
-  showMore(all.slice(1).map(({ rank }) => rank), !host.firstElementChild || fitted(host.firstElementChild));
+  const first = host.firstElementChild, behind = all.slice(1);
+  if (first) showAlso(first, behind.map(({ subject }) => subject).filter(Boolean).join(", "));
+  showMore(behind.map(({ rank }) => rank), !first || fitted(first));
+}
+
+// What the other alarms are about, where that has room beside the first; tried anew only where the room may be another, or a
+// screen reader would hear it with every beat.
+function showAlso(banner, subjects) {
+  const [title, more, also] = [banner.children[0], banner.children[1], banner.lastElementChild];
+  const key = [title.textContent.length, more.textContent, subjects, innerWidth, document.body.className, byId("alarms").className].join();
+  if (banner.dataset.also === key) return;
+  banner.dataset.also = key;
+  if (subjects) byId("more").hidden = false; // it takes some of the room
+  text(also, subjects && withShortNames(`Also: ${subjects}`));
+  if (!fitted(banner)) text(also, "");
 }
 
 // Fits an alarm into the strip's height, which is its least, in smaller letters if need be; returns whether it does.

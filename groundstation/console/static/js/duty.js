@@ -1,7 +1,7 @@
 // What a drone does now and why, in a sentence or two, and what limits it.
 
 import { joined, seconds } from "./dom.js";
-import { isLost, standing } from "./glance.js";
+import { isBlind, isLost, standing, unseenLeftS } from "./glance.js";
 import { ageS, droneNames, SEEN_S, seenBy, store, trackerSilent, unseenS } from "./store.js";
 import { askedBy, ordered } from "./who.js";
 
@@ -35,7 +35,8 @@ function tracked(name, plan) {
   const watched = [...new Set([...planned, ...inView])];
   const limits = limitsOf(plan.controls.find(({ robot }) => robot === name));
   const [, who] = store.s.vehicles[name].detail.match(/^tracking for (.+)$/) ?? [];
-  const task = sought.length ? `Looks for ${joined(sought)}` : `Tracks ${joined(targets)}${who ? `, ${orderedBy(who, name, "tracking")}` : ""}`;
+  const search = isBlind(name) ? "Too dark to look for" : "Looks for", order = who ? `, ${orderedBy(who, name, "tracking")}` : "";
+  const task = `${sought.length ? `${search} ${joined(sought)}` : `Tracks ${joined(targets)}`}${order}`;
   const does = watched.length ? `${task}: watches ${watching(watched)}` : sought.length ? task : `${task}: moves to where it will see it`;
   const known = watchers.length ? `Seen by ${joined(watchers.map(watcher))}` : unseen(name);
   return [`${does}.`, `${known}.`, limits && `Slowed by ${limits}.`].filter(Boolean).join(" ");
@@ -43,7 +44,7 @@ function tracked(name, plan) {
 
 // Who watches no target watches drones for the sake of their places.
 function watching(names) {
-  const purpose = names.every((name) => droneNames().includes(name)) ? `, to know where ${names.length > 1 ? "they are" : "that is"}` : "";
+  const purpose = names.every((name) => droneNames().includes(name)) ? ` for ${names.length > 1 ? "their places" : `${names[0]}'s place`}` : "";
   return `${joined(names)}${purpose}`;
 }
 
@@ -51,10 +52,9 @@ const watcher = (name) => (droneNames().includes(name) || name.endsWith("camera"
 
 // One that nobody sees may be known by whom it sees itself; who stays lost lands.
 function unseen(name) {
-  const age = unseenS(name), { lost_after_s, unseen_land_s } = store.scene;
+  const age = unseenS(name);
   if (age <= SEEN_S) return "Out of view: its own camera tells where it is";
-  const left = Math.max(0, unseen_land_s - age);
-  return isLost(name) ? `Itself lost: lands by itself within ${left.toFixed(0)}\u00a0s, unless it is seen again` : `Not seen for ${seconds(age)}: lost after ${lost_after_s} s`;
+  return isLost(name) ? `Itself lost: lands within ${unseenLeftS(name).toFixed(0)}\u00a0s, unless seen` : `Itself not seen for ${seconds(age)}: counts as lost in ${seconds(Math.max(0, store.scene.lost_after_s - age))}`;
 }
 
 const ORDERS = /^(landing|taking off|held|tracking) (?:for|by) (.+)$/;
@@ -96,10 +96,4 @@ export function dutyOf(name) {
   const planned = status.mode === "TRACK" && !status.braked && status.lands_in_s === null && status.flight !== "LOST" && plan && ageS(plan.at) < FRESH_S;
   if (planned && trackerSilent()) return "Told to track; without the tracker it hovers, then lands.";
   return planned ? tracked(name, plan) : sentence(reasonOf(name, status));
-}
-
-// In how many seconds a failsafe will land it, if nothing changes; "" if none is near.
-export function landsIn(name) {
-  const left = store.s.vehicles?.[name]?.lands_in_s ?? null;
-  return left === null ? "" : `${Math.max(1, Math.round(left))} s`;
 }

@@ -1,6 +1,6 @@
 // What a start or a stop would do now, or why a start can do nothing: in the few words that a button has room for.
 
-import { aloft, isLost, lostTarget, modeNow, modes, standing, up, waits } from "./glance.js";
+import { aloft, isLost, isUnheard, lostTarget, modeNow, modes, standing, up, waits } from "./glance.js";
 import { droneNames, store, trackerSilent } from "./store.js";
 
 // Why a start would be refused or do nothing now; "" if it would not. Stops are never withheld while a run goes on.
@@ -57,38 +57,49 @@ export function effectOf(verb) {
   if (!modes().length) return "";
   if (!flying.length) return "nobody flies";
   if (verb === "CUT_MOTORS") return `press 1 s:\n${does(flying, "falls", "fall")}`;
+  if (flying.some(isUnheard)) return unheard(verb, flying);
   return verb === "LAND" ? landing(flying) : hover(flying);
+}
+
+// Whom a stop may not reach: it is sent all the same.
+function unheard(verb, flying) {
+  const deaf = flying.filter(isUnheard), heard = flying.filter((name) => !isUnheard(name)), word = verb === "HOLD" && holding(heard.length ? heard : deaf).length ? "hover" : "land";
+  if (!heard.length) return does(deaf, `${word}s\nif it hears`, `${word}\nif they hear`);
+  return told([does(heard, `${word}s`, word), does(deaf, "if it hears", "if they hear")]);
 }
 
 // What a stop of one drone would do now.
 export function effectOnOne(verb, name) {
   if (!modeNow(name)) return "";
   if (!up([name]).length) return "no use: stands";
+  if (isUnheard(name)) return "if it hears";
   if (verb === "LAND") return isIdle(verb, [name]) ? "lands already" : "lands here";
   if (!holding([name]).length) return "lands anyway";
-  return isIdle(verb, [name]) ? "hovers already" : isLost(name) ? "hovers if seen" : "hovers here";
+  return isIdle(verb, [name]) ? "hovers already" : isLost(name) ? "unseen: lands" : "hovers here";
 }
 
 // Who is lost hovers as well, until it is landed for it.
 function hover(flying) {
   const held = holding(), lost = held.filter(isLost), seen = held.filter((name) => !isLost(name)), bound = flying.filter((name) => !held.includes(name));
   if (bound.length === droneNames().length) return "all land anyway";
+  const yet = isIdle("HOLD") ? " already" : "";
+  if (trackerSilent()) return told([does(held, `hovers${yet},\nthen lands`, `hover${yet},\nthen land`), does(bound, "lands anyway", "land anyway")]);
   const how = isIdle("HOLD") ? " already" : held.length === droneNames().length ? " in place" : "";
   if (!lost.length) return told([does(held, `hovers${how}`, `hover${how}`), does(bound, "lands anyway", "land anyway"), does(standing(), "stands", "stand")]);
-  if (lost.length < flying.length) return told([does(seen, "hovers", "hover"), does(lost, "hovers if seen", "hover if seen"), does(bound, "lands anyway", "land anyway")]);
+  if (lost.length < flying.length) return told([does(seen, "hovers", "hover"), does(lost, "lands if unseen", "land if unseen"), does(bound, "lands anyway", "land anyway")]);
   return does(lost, "hovers; it lands\nif it stays unseen", "hover; they land\nif they stay unseen");
 }
 
 function landing(flying) {
   const anew = flying.filter((name) => modeNow(name) !== "LANDING"), already = flying.filter((name) => !anew.includes(name));
-  return already.length ? told([does(anew, "lands", "land"), does(already, "lands already", "land already")]) : does(anew, "lands\nwhere it is", "land\nwhere they are");
+  return already.length ? told([does(anew, "lands", "land"), does(already, "lands already", "land already")]) : anew.some(isLost) ? does(anew, "lands\nstraight down", "land\nstraight down") : does(anew, "lands\nwhere it is", "land\nwhere they are");
 }
 
 // Whether a stop would change nothing now.
 export function isIdle(verb, names = droneNames()) {
   if (!modes(names).length) return false;
   const left = { HOLD: "HOLD", LAND: "LANDING" }[verb], moved = verb === "HOLD" ? holding(names) : up(names);
-  return moved.every((name) => modeNow(name) === left);
+  return moved.every((name) => modeNow(name) === left && !isUnheard(name));
 }
 
 // Whether a failsafe is about to land it: whether its fault is over, only its driver knows.

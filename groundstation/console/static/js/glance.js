@@ -1,6 +1,6 @@
 // What the bar says of the whole team, worked out of the newest of everything.
 
-import { ageS, droneNames, estimateAge, isTarget, entities, entity, runOver, store, trackerSilent } from "./store.js";
+import { ageS, droneNames, estimateAge, isTarget, entities, entity, runOver, store, trackerSilent, unseenS } from "./store.js";
 
 const HEARD_S = 1; // as in groundstation/monitor/alarms.py
 const RECORDING_SILENT_S = 3;
@@ -21,9 +21,11 @@ export const targetAgeS = () => Math.min(...entities().filter(({ name }) => isTa
 
 // What they do who do not stand, the most careful first: [words, level, who does each if not all do the same].
 export function teamMode() {
-  const all = statuses().map(modeOf), silent = droneNames().filter((name) => store.s.vehicles?.[name] && ageS(store.s.vehicles[name].at) > HEARD_S);
+  const all = statuses().map(modeOf), silent = droneNames().filter(isUnheard);
   if (runOver()) return ["RUN OVER", "calm"];
   if (silent.length) return ["NOT HEARD", "bad", some(silent)];
+  const soon = up().filter(landsIn), words = soon.map(landsIn);
+  if (soon.length && soon.length === aloft()) return [`LANDS IN ${words.sort((a, b) => parseInt(a) - parseInt(b))[0]}`, "bad", some(soon)];
   const done = CAREFUL.filter(([mode]) => all.includes(mode));
   if (!done.length) return [all.length ? "ON GROUND" : "–", "calm"];
   const who = done.map(([mode]) => some(doing(mode))).filter(Boolean);
@@ -37,8 +39,20 @@ const levelOf = (mode, level) => (mode !== "TRACK" || modeWord(mode) === mode ? 
 // What a mode is for now: who is to track a target that is lost searches for it.
 export function modeWord(mode) {
   if (mode !== "TRACK") return mode.replace("_", " ");
-  return trackerSilent() ? "NO TRACKER" : lostTarget() ? "SEARCH" : mode;
+  return trackerSilent() ? "NO TRACKER" : !lostTarget() ? mode : doing(mode).every(isBlind) ? "BLIND" : "SEARCH";
 }
+
+// In how many seconds a failsafe will land it, if nothing changes; "" if none is near.
+export function landsIn(name) {
+  const left = store.s.vehicles?.[name]?.lands_in_s ?? null;
+  return left === null ? "" : `${Math.max(1, Math.round(left))} s`;
+}
+
+export const isUnheard = (name) => Boolean(store.s.vehicles?.[name]) && ageS(store.s.vehicles[name].at) > HEARD_S;
+// Whether its own camera has no light to see by.
+export const isBlind = (name) => Boolean(store.s.cameras?.[`${name}_camera`]?.dark);
+// In how many seconds one that stays lost lands at the latest.
+export const unseenLeftS = (name) => Math.max(0, store.scene.unseen_land_s - unseenS(name));
 
 // Not seen for so long that it is searched for, or soon lands.
 export const isLost = (name) => (entity(name)?.age_s ?? Infinity) + estimateAge() > (store.scene?.lost_after_s ?? 3);

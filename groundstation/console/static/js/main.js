@@ -20,7 +20,7 @@ import { showPreflight } from "./preflight.js";
 import { playbackKey, showPlayback, startPlayback } from "./playback.js";
 import { listen, startSounds } from "./sounds.js";
 import { ghostPoint, startSteering } from "./steer.js";
-import { entities, estimateAge, now, replaying, steerable, store, targetHeight } from "./store.js";
+import { atOneTime, entities, estimateAge, now, replaying, steerable, store, targetHeight } from "./store.js";
 import { buildTeam, paint, showTeam, startTeam } from "./team.js";
 import { View } from "./view.js";
 
@@ -104,7 +104,7 @@ function beat() {
   const at = performance.now();
   drawn.gapS = (at - lastBeat) / 1000;
   lastBeat = at;
-  showAll();
+  atOneTime(showAll);
   drawHeights(byId("heights"), view.ratio ?? 1);
   redraw();
 }

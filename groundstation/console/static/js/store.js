@@ -35,7 +35,13 @@ function onlyNames(table) {
 }
 
 // A replay's time stands still, runs and jumps: it is what the newest frame says.
-export const now = () => (replaying() ? store.serverMs : performance.now() + (store.offset ?? 0));
+export const now = () => held ?? (replaying() ? store.serverMs : performance.now() + (store.offset ?? 0));
+let held = null;
+// What is shown together is of one time: else a drone falls silent between the bar and its card.
+export function atOneTime(show) {
+  held = now();
+  try { show(); } finally { held = null; }
+}
 // The same for what is sent, right also before the first frame after a sleep.
 export const serverNow = () => Math.max(now(), store.serverMs + sinceMs(heard));
 export const ageS = (atMs) => (atMs === undefined || atMs === null ? Infinity : Math.max(0, (now() - atMs) / 1000));

@@ -3,8 +3,8 @@
 import { batteryWords, lastsWords } from "./batteries.js";
 import { byId, el, joined, seconds, svg, text } from "./dom.js";
 import { ellipse95 } from "./geometry.js";
-import { dutyOf, landsIn } from "./duty.js";
-import { aloft, doing, modeOf, modeWord } from "./glance.js";
+import { dutyOf } from "./duty.js";
+import { aloft, doing, isBlind, landsIn, modeOf, modeWord, up } from "./glance.js";
 import { withShortNames } from "./names.js";
 import { give } from "./own_orders.js";
 import { colourOf } from "./palette.js";
@@ -102,9 +102,14 @@ function levelOf(status) {
   return mode !== status.mode || (mode === "TRACK" && modeWord(mode) !== mode) ? "warn" : LEVELS[mode] ?? "wait";
 }
 
-// A vehicle that is not heard does nobody knows what: only its landing is certain.
+// Of a vehicle that is not heard it is known what its driver does by itself.
+function unheardWords(name) {
+  if (!up([name]).length) return "It is not heard; it stood until then.";
+  return `It is not heard: it ${store.s.vehicles[name].mode === "LANDING" ? "was landing" : "hovers, then lands by itself"}. Stops are sent to it.`;
+}
+
 function showDuty(node, name, silent) {
-  text(node, silent ? "It is not heard: only its own failsafes protect it now." : withShortNames(dutyOf(name)));
+  text(node, silent ? unheardWords(name) : withShortNames(dutyOf(name)));
   node.classList.toggle("low", Boolean(landsIn(name) || silent));
 }
 
@@ -130,9 +135,9 @@ function showBattery(node, name, status) {
 }
 
 
-function beliefWords(body, age, lost) {
+function beliefWords(name, body, age, lost) {
   if (runOver()) return "The run is over.";
-  if (trackerSilent()) return "Where it is now is not known: the tracker is silent.";
+  if (trackerSilent()) return `${seenBy(name).length ? "In pictures, but its place" : "Its place"} is not known: the tracker is silent.`;
   if (lost && Number.isFinite(age) && !aloft()) return `Not seen for ${seconds(age)}: nobody flies to look for it.`;
   if (!body) return "";
   if (lost) return `Lost: nobody has seen it for ${seconds(age)}. ${doing("TRACK").length ? `${joined(doing("TRACK"))} ${doing("TRACK").length > 1 ? "look" : "looks"} for it.` : ""}`.trim();
@@ -148,10 +153,11 @@ function showBelief(name, { root, values, mode, detail, drone }) {
   const old = estimateAge() > STALE_S;
   for (const field of BELIEF) values[field]?.parentElement.classList.toggle("old", old);
   if (!drone) {
-    const lost = age > store.scene.lost_after_s, [search, words] = trackerSilent() ? [] : store.s.estimate?.searches?.[name] ?? [];
-    text(mode, runOver() ? "run over" : trackerSilent() ? "unknown" : Number.isFinite(age) && lost && !aloft() ? "not seen" : search || (lost && body) || !body ? (Number.isFinite(age) ? "lost" : "not found yet") : age > SEEN_S ? "not seen" : doing("TRACK").length ? "tracked" : "seen");
+    const lost = age > store.scene.lost_after_s, dark = doing("TRACK").length && doing("TRACK").every(isBlind);
+    const [search, words] = trackerSilent() ? [] : store.s.estimate?.searches?.[name] ?? [];
+    text(mode, runOver() ? "run over" : trackerSilent() ? "place unknown" : Number.isFinite(age) && lost && !aloft() ? "not seen" : search || (lost && body) || !body ? (Number.isFinite(age) ? "lost" : "not found yet") : age > SEEN_S ? "not seen" : doing("TRACK").length ? "tracked" : "seen");
     mode.dataset.level = !body || trackerSilent() ? "wait" : lost ? "bad" : search ? "warn" : age > SEEN_S ? "warn" : "good";
-    text(detail, withShortNames(words ? `${Number.isFinite(age) ? "Lost" : "Not found yet"}: ${words}.` : beliefWords(body, age, lost)));
+    text(detail, withShortNames((words || lost) && dark ? `Lost for ${seconds(age)}: nobody can look for it, the drones' pictures are dark.` : words ? `${Number.isFinite(age) ? "Lost" : "Not found yet"}: ${words}.` : beliefWords(name, body, age, lost)));
     root.classList.toggle("stale", estimateAge() > STALE_S || !store.connected);
   }
   const stands = !body && standsInSight(name), seen = Number.isFinite(age) && !stands;

@@ -1,11 +1,10 @@
 // What the team does and who is lost, in a line that is always there, below the alarms.
 
-import { joined } from "./dom.js";
-import { landsIn } from "./duty.js";
+import { joined, seconds } from "./dom.js";
 import { ready, refusalOf, waiting } from "./effects.js";
-import { aloft, doing, isLost, lostTarget, modes, stage, standing, teamMode } from "./glance.js";
+import { aloft, doing, isBlind, isLost, isUnheard, landsIn, lostTarget, modeNow, modes, stage, standing, teamMode, unseenLeftS, up } from "./glance.js";
 import { mustWords, openMusts } from "./preflight.js";
-import { droneNames, entity, SEEN_S, store, trackerSilent, unseenS } from "./store.js";
+import { droneNames, entity, SEEN_S, seenBy, store, trackerSilent, unseenS } from "./store.js";
 
 const NAMED = 4; // more drones than this are counted
 // Of one, of several.
@@ -13,7 +12,9 @@ const DEEDS = {
   TRACK: ["tracks the target", "track the target"], HOVER: ["hovers", "hover"], HOLD: ["hovers", "hover"], TAKING_OFF: ["takes off", "take off"],
   LANDING: ["lands", "land"], LANDED: ["stands", "stand"], CUT: ["has its motors cut", "have their motors cut"],
 };
-const LOOKS = ["looks for the target", "look for the target"], ALONE = ["is without the tracker", "are without the tracker"];
+const LOOKS = ["looks for the target", "look for the target"], BLIND = ["has no light to see by", "have no light to see by"];
+const ALONE = ["is without the tracker", "are without the tracker"];
+const UNHEARD = ["is not heard", "are not heard"];
 const NEXT = {
   "TAKING OFF": "Each is seen from outside before the next one rises.",
   LANDING: "A drone that has landed stays down until a new TAKE OFF.",
@@ -25,9 +26,9 @@ function landings(soon) {
 }
 
 function deeds() {
-  const counted = droneNames().length > NAMED, soon = droneNames().filter(landsIn);
-  const modal = Object.entries(DEEDS).map(([mode, words]) => [doing(mode).filter((name) => !soon.includes(name)), mode !== "TRACK" ? words : trackerSilent() ? ALONE : lostTarget() ? LOOKS : words]);
-  const told = [...landings(soon), ...modal].filter(([names]) => names.length);
+  const counted = droneNames().length > NAMED, deaf = up().filter(isUnheard), soon = droneNames().filter((name) => landsIn(name) && !deaf.includes(name));
+  const modal = Object.entries(DEEDS).map(([mode, words]) => [doing(mode).filter((name) => !soon.includes(name) && !deaf.includes(name)), mode !== "TRACK" ? words : trackerSilent() ? ALONE : !lostTarget() ? words : doing(mode).every(isBlind) ? BLIND : LOOKS]);
+  const told = [[deaf, UNHEARD], ...landings(soon), ...modal].filter(([names]) => names.length);
   const parts = told.map(([names, [one, many]]) => `${counted ? names.length : joined(names)} ${names.length > 1 ? many : one}`);
   return parts.length ? `${parts.join("; ")}.` : "";
 }
@@ -50,8 +51,14 @@ function unseenFor(names) {
 // In pictures, and not localised.
 const isUnplaced = (name) => !entity(name) && unseenS(name) <= store.scene.lost_after_s;
 
+// Who can be seen without the tracker.
+function inPictures() {
+  const all = sought(), seen = all.filter((name) => seenBy(name).length);
+  return seen.length ? `; cameras still see ${seen.length === all.length ? "all" : joined(seen)}` : "";
+}
+
 function lost() {
-  if (trackerSilent()) return "Whether anybody is lost is not known: the tracker is silent.";
+  if (trackerSilent()) return `The tracker is silent: who is lost is not known${inPictures()}.`;
   const gone = sought().filter(isLost), unplaced = gone.filter(isUnplaced), unseen = gone.filter((name) => !isUnplaced(name));
   const yet = unplaced.length ? ` It is not known yet where ${joined(unplaced)} ${unplaced.length > 1 ? "are" : "is"}.` : "";
   return `${unseen.length ? `Lost: ${unseenFor(unseen)}` : `Nobody is lost${unseenYet()}`}.${yet}`;
@@ -59,8 +66,9 @@ function lost() {
 
 // Who would be lost next.
 function unseenYet() {
-  const { lost_after_s: limit } = store.scene, unseen = sought().filter((name) => unseenS(name) > SEEN_S && !isLost(name));
-  return unseen.length ? ` (${joined(unseen)} not seen just now: lost after ${limit} s)` : "";
+  const unseen = sought().filter((name) => unseenS(name) > SEEN_S && !isLost(name));
+  const left = Math.max(0, store.scene.lost_after_s - Math.max(...unseen.map(unseenS)));
+  return unseen.length ? ` (${joined(unseen)} not seen just now: ${unseen.length > 1 ? "the first " : ""}counts as lost in ${seconds(left)})` : "";
 }
 
 // What lets those go on that wait for it.
@@ -83,4 +91,25 @@ export function verdict() {
   if (stage() === "over") return store.connected && !store.s.result ? "The run is over: it is being judged." : "The run is over.";
   if (!aloft()) return `Nobody flies. ${takeOff()}`;
   return [deeds(), lost(), NEXT[teamMode()[0]] ?? start()].filter(Boolean).join(" ");
+}
+
+// Who lands by itself, why and when, in two short lines; "" if nobody will.
+export function landingWords() {
+  const bound = up().filter((name) => landsIn(name) && !isUnheard(name)), [soonest] = [...bound].sort((a, b) => parseInt(landsIn(a)) - parseInt(landsIn(b)));
+  if (soonest) {
+    const soon = bound.filter((name) => landsIn(name) === landsIn(soonest)), why = trackerSilent() ? "no tracker" : soon.every(isLost) ? "unseen" : "";
+    return landingOf(soon, why, `in ${landsIn(soonest)}`);
+  }
+  const on = up().filter((name) => modeNow(name) !== "LANDING"), unheard = on.filter(isUnheard), gone = on.filter(isLost);
+  if (unheard.length) return landingOf(unheard, "not heard");
+  if (trackerSilent()) return on.length ? landingOf(on, "no tracker") : "";
+  return gone.length ? landingOf(gone, "unseen", `within ${Math.min(...gone.map(unseenLeftS)).toFixed(0)} s`) : "";
+}
+
+// Without a time it hovers first, for as long as only its driver knows.
+function landingOf(names, why, time) {
+  const many = names.length > 1, who = !many ? "one" : names.length < droneNames().length ? names.length : names.length > 2 ? `all ${names.length}` : "both";
+  const lands = many ? "land" : "lands";
+  if (!time) return `${why}: ${who}\n${many ? "hover" : "hovers"}, then ${lands}`;
+  return why ? `${why}: ${who}\n${lands} ${time}` : `${who} ${lands} ${time}\nby ${many ? "themselves" : "itself"}`;
 }

@@ -8,7 +8,7 @@ from pathlib import Path
 
 LONGEST = 16
 _CAPTURE = "a network capture; Wireshark opens it. A run records its vehicles' datagrams (recording.raw_datagrams)"
-_DATAFLASH = "a log of ArduPilot (DataFlash); UAV Log Viewer and pymavlink's mavlogdump.py open it"
+_DATAFLASH = "a log of ArduPilot (DataFlash); UAV Log Viewer and mavlogdump.py open it"
 _BAG = "a ROS bag; PlotJuggler and Foxglove open it. `groundstation export --rosbag2` makes one of a run"
 _PACKED = "a packed file: unpack it first"
 _FORMS: tuple[tuple[bytes, str], ...] = (
@@ -28,7 +28,7 @@ _FORMS: tuple[tuple[bytes, str], ...] = (
         for magic in (b"\x1f\x8b", b"PK\x03\x04", b"BZh", b"\xfd7zXZ\x00", b"\x28\xb5\x2f\xfd", b"7z\xbc\xaf")
     ),
 )
-_TLOG = "a log of MAVLink telemetry (.tlog); Mission Planner, QGroundControl and pymavlink's mavlogdump.py open it"
+_TLOG = "a telemetry log (.tlog); Mission Planner, QGroundControl and mavlogdump.py open it"
 # UNIX time [us] of the years 2001 to 2100.
 _TLOG_TIMES = (978_307_200_000_000, 4_102_444_800_000_000)
 

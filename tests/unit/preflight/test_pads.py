@@ -126,7 +126,7 @@ def test_the_supervisor_does_not_wait_for_an_opinion_of_a_large_team(lab_field: 
 
 def test_what_cannot_be_told_apart_is_told_together(lab_field: ResolvedField) -> None:
     finding = only(lab_field, Truth(shift=(0.2, 0.0, 0.0)))
-    assert "cannot be told from here" in finding.found and "tilted" in finding.found
+    assert "cannot be told apart here" in finding.found and "tilted" in finding.found
 
 
 def test_two_things_wrong_at_once_are_not_forced_into_one(lab_field: ResolvedField) -> None:

@@ -15,7 +15,7 @@ FILES = {
     "flight.ulg": (b"ULog\x01\x12\x35\x01" + bytes(8), "a log of PX4 (ULog)"),
     "00000012.BIN": (b"\xa3\x95\x80\x80\x59FMT\x00BBnNZ", "a log of ArduPilot (DataFlash)"),
     "00000012.log": (b"FMT, 128, 89, FMT, BBnNZ, Type,Length\n", "a log of ArduPilot (DataFlash)"),
-    "flight.tlog": ((1_700_000_000_000_000).to_bytes(8) + b"\xfd\x09\x00\x00", "a log of MAVLink telemetry"),
+    "flight.tlog": ((1_700_000_000_000_000).to_bytes(8) + b"\xfd\x09\x00\x00", "a telemetry log (.tlog)"),
     "day.bag": (b"#ROSBAG V2.0\nE\x00\x00\x00", "a ROS bag"),
     "day_0.db3": (b"SQLite format 3\x00" + bytes(84), "an SQLite database, as in a ROS bag"),
     "flight.rrd": (b"RRF2\x00", "a recording of Rerun"),

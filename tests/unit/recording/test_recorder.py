@@ -116,7 +116,7 @@ def test_write_error_degrades_once_and_recovers(
     _say(bus, "after")
     recorder.close()
     assert child.states[-1][0] == "READY"
-    assert [severity for severity, _ in child.events] == ["ERROR", "INFO"]
+    assert [severity for severity, _ in child.events] == ["ERROR", "WARNING"]
     read = [[raw.data for raw in open_recording(path).raw_records()] for path in parts(tmp_path, "state")]
     assert [len(part) for part in read] == [1, 1]
     assert b"before" in read[0][0] and b"after" in read[1][0]

@@ -120,7 +120,7 @@ def test_setpoints_are_clamped(rig):
     added = rig.vehicle.orders.drift.correction(rig.hand.now)  # the limits are of the true velocity
     assert math.hypot(sent.vx - added[0], sent.vy + added[1]) == pytest.approx(0.6, abs=0.02)
     assert (
-        math.hypot(*added) < 0.25
+        math.hypot(*rig.vehicle.orders.drift.drift(rig.hand.now)) < 0.15
         and sent.vz == pytest.approx(-0.4 - added[2], abs=0.02)
         and sent.yaw_rate == pytest.approx(-math.radians(60))
     )

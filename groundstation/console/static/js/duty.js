@@ -35,7 +35,9 @@ function tracked(name, plan) {
   const watched = [...new Set([...planned, ...inView])];
   const limits = limitsOf(plan.controls.find(({ robot }) => robot === name));
   const [, who] = store.s.vehicles[name].detail.match(/^tracking for (.+)$/) ?? [];
-  const search = isBlind(name) ? "Too dark to look for" : "Looks for", order = who ? `, ${orderedBy(who, name, "tracking")}` : "";
+  const search = isBlind(name) ? "Too dark to look for" : "Looks for";
+  // A card has room for three lines: of one that looks for a target and watches a drone, the list of orders names who asked.
+  const order = who && !(sought.length && watched.length) ? `, ${orderedBy(who, name, "tracking")}` : "";
   const task = `${sought.length ? `${search} ${joined(sought)}` : `Tracks ${joined(targets)}`}${order}`;
   const does = watched.length ? `${task}: watches ${watching(watched)}` : sought.length ? task : `${task}: moves to where it will see it`;
   const known = watchers.length ? `Seen by ${joined(watchers.map(watcher))}` : unseen(name);

@@ -28,6 +28,7 @@ from groundstation.errors import DriverError
 _START_S = 25.0
 _SETTLE_S = 1.0
 _SETPOINT_S = 0.05
+_APART_M = 5.0  # who is too near to another lands
 _STANDING = (1e-4, *(0.0,) * 4, 1e-4, *(0.0,) * 4, 1e-4, *(0.0,) * 4, 1e-4)
 
 
@@ -128,10 +129,10 @@ class _Tracker(threading.Thread):
         while not self.closing.wait(_SETPOINT_S * 1.017):
             entities = tuple(
                 EntityEstimate(
-                    name=name, kind="robot", mean=(0.0, 0.0, 1.0, 0.0), covariance=_STANDING,
+                    name=name, kind="robot", mean=(0.0, _APART_M * number, 1.0, 0.0), covariance=_STANDING,
                     velocity_m_s=(AHEAD_M_S, 0.0, 0.0), converged=True, age_s=0.0,
                 )
-                for name in self._names
+                for number, name in enumerate(self._names)
             )  # fmt: skip
             self._bus.publish(ESTIMATE, Estimate(header=self._bus.header("team"), entities=entities, epoch=1))
             for number, name in enumerate(self._names):

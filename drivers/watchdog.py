@@ -223,18 +223,18 @@ class Watchdog:
         self._follow_vehicle(now_ns)
         self.evidence.step(self._situation(now_ns, gap_s), self.limits)
         self._braked_by = self._heed_table(now_ns)
-        setpoint = self.gate.obeyed(now_ns) if self.mode is DriverMode.TRACK and self._braked_by is None else None
+        obeyed = self.gate.obeyed(now_ns)
+        setpoint = obeyed if self.mode is DriverMode.TRACK and self._braked_by is None else None
         acks = self._acks.effective(self.mode, self.vehicle, setpoint is not None)
-        back = self._way_back.step(now_ns, self._asked_back(now_ns))
+        back = self._way_back.step(now_ns, self._asked_back(obeyed))
         if setpoint is None:
             action, at_ns = self._action(now_ns), self._entered_ns
             return WatchdogDecision(self.mode, action, reason=self.reason, acks=acks, entered_ns=at_ns, back_m_s=back)
         velocity, turn, ns = setpoint.velocity_m_s, setpoint.yaw_rate_rad_s, setpoint.header.stamp_ns
         return WatchdogDecision(self.mode, Action.FLY, velocity, turn, self.reason, acks, ns, None, self._entered_ns)
 
-    def _asked_back(self, now_ns: int) -> tuple[float, float] | None:
+    def _asked_back(self, setpoint: VelocitySetpoint | None) -> tuple[float, float] | None:
         """Return the velocity back to the place where it was told to hover; None for whom a failsafe might stop."""
-        setpoint = self.gate.obeyed(now_ns)
         waits = self.mode in (DriverMode.HOVER, DriverMode.HOLD) and not self.failsafe
         if setpoint is None or not setpoint.holds or not waits or self.vehicle.flight_state not in UP:
             return None

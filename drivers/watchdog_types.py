@@ -56,9 +56,9 @@ class WatchdogLimits:
     it needs a RESUME, for fast_land_s it lands. stray_land_s: likewise while it strays from its commands: from 1 m/s it
     stands after 0.8 s with 2 m/s^2 and a lag of 0.3 s, doubled. blind_land_s: likewise while its sensors are wrong and
     no camera sees it. lost_hover_s, lost_land_s: without a position from the cameras, for vehicles that need one.
-    crowded_land_s: likewise nearer to another than allowed, so that it has to make way: the limiter moves two apart by
-    0.1 m in that time. pad_m: where it takes off [x, y; world], if known; min_separation_m: least distance from there,
-    and from it in flight, of all airborne vehicles.
+    crowded_land_s: likewise nearer to another than allowed, so that it has to make way: the limiter moves each of two
+    by 0.1 m in that time. pad_m: where it takes off [x, y; world], if known; min_separation_m: least distance of all
+    airborne vehicles from there, and from it in flight.
     """
 
     hover_after_s: float = _SAFETY.setpoint_lifetime_ms / 1000

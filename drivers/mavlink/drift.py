@@ -8,6 +8,7 @@ again.
 
 import math
 
+from drivers.mavlink.smoothing import Vector2, share_of, towards
 from drivers.mavlink.undershoot import Undershoot
 from groundstation.bus.messages import EntityEstimate, Vector3
 from groundstation.time_units import NS_PER_MS, NS_PER_S
@@ -47,7 +48,6 @@ _SEEN_S = 0.5
 # most: one that still moves then drifts.
 _STOPPED_M_S, _PACE_NS, _STOPS_WITHIN_NS = 0.1, 500 * NS_PER_MS, NS_PER_S
 _STILL: Vector3 = (0.0, 0.0, 0.0)
-Vector2 = tuple[float, float]
 
 
 class Obedience:
@@ -64,12 +64,12 @@ class Obedience:
 
     def tell(self, now_ns: int, velocity: Vector2) -> None:
         """Note the velocity sent [m/s; base_stabilized]."""
-        share = _share(now_ns - self._told_ns, _RESPONSE_S)
-        self._expected, self._told_ns = _towards(self._expected, velocity, share), now_ns
+        share = share_of(now_ns - self._told_ns, _RESPONSE_S)
+        self._expected, self._told_ns = towards(self._expected, velocity, share), now_ns
 
     def hear(self, now_ns: int, reported: Vector2, seen: Vector2) -> bool:
         """Take its reported and its seen velocity; return whether it flies by the reported one."""
-        share, self._heard_ns = _share(now_ns - self._heard_ns, _JUDGED_S), now_ns
+        share, self._heard_ns = share_of(now_ns - self._heard_ns, _JUDGED_S), now_ns
         self._reported_off += share * (math.dist(reported, self._expected) - self._reported_off)
         self._seen_off += share * (math.dist(seen, self._expected) - self._seen_off)
         return self._reported_off <= self._seen_off + _EVEN_M_S
@@ -185,8 +185,8 @@ class DriftFeedback:
         first, since_ns = self._at_ns is None, now_ns - (self._at_ns or now_ns)
         if not first and math.dist(error, self._drift) > _SUDDEN_M_S + _SUDDEN_M_S2 * since_ns / NS_PER_S:
             self._doubted_until_ns = now_ns + _TRUSTED_AGAIN_NS
-        self._drift = _towards(self._drift, error, 1.0 if first else _share(since_ns, _SMOOTHING_S))
-        self._lately = _towards(self._lately, error, 1.0 if first else _share(since_ns, _LATELY_S))
+        self._drift = towards(self._drift, error, 1.0 if first else share_of(since_ns, _SMOOTHING_S))
+        self._lately = towards(self._lately, error, 1.0 if first else share_of(since_ns, _LATELY_S))
         self._at_ns = now_ns
 
     def drift(self, now_ns: int) -> Vector3:
@@ -248,15 +248,15 @@ class DriftFeedback:
             self.let_go()
             return _STILL
         x, y, z = self._held or self._place_to_rest(now_ns, place)
+        climb_m = (z if height_m is None else height_m) - place[2]
+        up = max(-_HOLD_M_S, min(_HOLD_M_S, _HOLD_UP_GAIN * climb_m))
         if back is not None:
             self._held = (place[0], place[1], z)
-        wanted = (x - place[0], y - place[1], (z if height_m is None else height_m) - place[2])
-        size = math.hypot(*wanted[:2])
-        gain = min(_HOLD_GAIN, _HOLD_M_S / size) if size > 0.0 else 0.0
-        up = max(-_HOLD_M_S, min(_HOLD_M_S, _HOLD_UP_GAIN * wanted[2]))
-        if back is not None:
             return *back, up
-        return self._in_heading(gain * wanted[0], gain * wanted[1], up)
+        way = (x - place[0], y - place[1])
+        size = math.hypot(*way)
+        gain = min(_HOLD_GAIN, _HOLD_M_S / size) if size > 0.0 else 0.0
+        return self._in_heading(gain * way[0], gain * way[1], up)
 
     def _place_to_rest(self, now_ns: int, here: Vector3) -> Vector3:
         self._coming = self._coming or ComingToRest(now_ns, here)
@@ -269,11 +269,3 @@ class DriftFeedback:
     def _in_heading(self, x: float, y: float, up: float) -> Vector3:
         c, s = math.cos(self._yaw_rad), math.sin(self._yaw_rad)
         return c * x + s * y, c * y - s * x, up
-
-
-def _share(elapsed_ns: int, time_s: float) -> float:
-    return 1.0 - math.exp(-max(0, elapsed_ns) / NS_PER_S / time_s)
-
-
-def _towards(old: Vector2, new: Vector2, share: float) -> Vector2:
-    return old[0] + share * (new[0] - old[0]), old[1] + share * (new[1] - old[1])

@@ -7,9 +7,9 @@ right then, so it is no drift.
 
 import math
 
+from drivers.mavlink.smoothing import Vector2, share_of, towards
 from groundstation.time_units import NS_PER_S
 
-Vector2 = tuple[float, float]
 _STILL: Vector2 = (0.0, 0.0)
 # Time constant of a healthy vehicle's response.
 _RESPONSE_S = 0.6
@@ -26,18 +26,12 @@ class Undershoot:
     """missing: the velocity to add to commands [m/s; world] so that the vehicle flies what was asked; 0.25 at most."""
 
     def __init__(self) -> None:
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget everything."""
         self.missing, self._asked, self._expected = _STILL, _STILL, _STILL
         self._told_ns = self._heard_ns = 0
 
     def tell(self, now_ns: int, asked_m_s: Vector2) -> None:
         """Note the velocity that is asked [world], without corrections."""
-        share = 1.0 - math.exp(-max(0, now_ns - self._told_ns) / NS_PER_S / _RESPONSE_S)
-        (old_x, old_y), (x, y) = self._expected, asked_m_s
-        self._expected = old_x + share * (x - old_x), old_y + share * (y - old_y)
+        self._expected = towards(self._expected, asked_m_s, share_of(now_ns - self._told_ns, _RESPONSE_S))
         self._asked, self._told_ns = asked_m_s, now_ns
 
     def hear(self, now_ns: int, seen_m_s: Vector2) -> None:

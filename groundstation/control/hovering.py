@@ -4,10 +4,13 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from groundstation.bus.messages import Vector3, VehicleStatus
 from groundstation.control.output_limiter import Limited
 from groundstation.control.setpoints import Setpoint
 from groundstation.estimation.belief import JointBelief
+from groundstation.geometry.stabilized_frame import stabilized_from_world
 from groundstation.time_units import NS_PER_MS
 
 _HOVERS = frozenset({"HOVER", "HOLD"})  # a driver's modes in which the drone hovers for an order
@@ -84,11 +87,13 @@ class Hovering:
         stay = self._stays.get(name)
         if stay is None:
             return setpoint
-        back = (0.0, 0.0)
+        velocity = _STILL
         if name in belief.layout and _is_sure(name, seen_s):
             x, y, _, yaw = belief.mean_of(name)[:4].tolist()
-            back = _turned(stay.back(now_ns, x, y), yaw)
-        return replace(setpoint, velocity_m_s=(*back, 0.0), yaw_rate_rad_s=0.0)
+            back = np.array((*stay.back(now_ns, x, y), 0.0))
+            forward, left, _ = stabilized_from_world(back, yaw).tolist()
+            velocity = (forward, left, 0.0)
+        return replace(setpoint, velocity_m_s=velocity, yaw_rate_rad_s=0.0)
 
     def _sent(self, limited: Limited, sure: bool) -> Limited:
         forward, left, _ = limited.setpoint.velocity_m_s if sure else _STILL
@@ -98,9 +103,3 @@ class Hovering:
 
 def _is_sure(name: str, seen_s: Mapping[str, float]) -> bool:
     return seen_s.get(name, math.inf) <= _SEEN_S
-
-
-def _turned(velocity: tuple[float, float], yaw: float) -> tuple[float, float]:
-    """Return a velocity [world] as forward and left [base_stabilized]."""
-    (x, y), c, s = velocity, math.cos(yaw), math.sin(yaw)
-    return c * x + s * y, c * y - s * x

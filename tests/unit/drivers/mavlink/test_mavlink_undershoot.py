@@ -4,7 +4,9 @@ import math
 
 import pytest
 
+from drivers.mavlink.drift import DriftFeedback
 from drivers.mavlink.undershoot import Undershoot
+from groundstation.bus.messages import EntityEstimate
 
 S = 1_000_000_000
 STEP_S = 0.02
@@ -52,11 +54,13 @@ def test_a_pause_of_sightings_is_no_time_to_learn_in():
     assert undershoot.missing[0] == pytest.approx(2 * 0.7 * 0.1 * 0.1, rel=0.1)
 
 
-def test_reset_forgets_it():
-    undershoot = Undershoot()
+def test_on_the_floor_it_is_forgotten():
+    feedback = DriftFeedback()
+    slow = EntityEstimate("v", "robot", (0.0, 0.0, 0.8, 0.0), (1e-4,) * 16, (0.2, 0.0, 0.0), True, 0.1)
     for step in range(1, 251):
-        undershoot.tell(100 * S + round(step * STEP_S * S), (0.4, 0.0))
-        undershoot.hear(100 * S + round(step * STEP_S * S), (0.2, 0.0))
-    assert undershoot.missing[0] > 0.2
-    undershoot.reset()
-    assert undershoot.missing == (0.0, 0.0)
+        feedback.tell(100 * S + round(step * STEP_S * S), (0.4, 0.0, 0.0))
+        feedback.hear(100 * S + round(step * STEP_S * S), slow, (0.2, 0.0, 0.0))
+    assert feedback.correction(105 * S)[0] > 0.2
+    feedback.reset()
+    feedback.hear(105 * S, slow, (0.2, 0.0, 0.0))
+    assert feedback.correction(105 * S) == pytest.approx((0.0, 0.0, 0.0), abs=0.02)

@@ -40,9 +40,12 @@ def stabilized_from_optical(mount: MountSettings, roll_rad: float, pitch_rad: fl
 
 
 def observation_from_sighting(
-    sighting: Sighting, header: Header, camera: str, observer_attitude: tuple[float, float]
+    sighting: Sighting, header: Header, camera: str, observer_attitude: tuple[float, float], picture_ns: int = 0
 ) -> RelativeObservation:
-    """Return the message for a sighting; header.entity is the observer, header.stamp_ns the exposure."""
+    """Return the message for a sighting; header.entity is the observer, header.stamp_ns the exposure.
+
+    picture_ns: as in the message.
+    """
     best, other = sighting.choice.best, sighting.choice.alternative
     return RelativeObservation(
         header=header,
@@ -58,6 +61,7 @@ def observation_from_sighting(
         margin=sighting.margin,
         roll_rad=observer_attitude[0],
         pitch_rad=observer_attitude[1],
+        picture_ns=picture_ns,
     )
 
 

@@ -15,6 +15,7 @@ from drivers.camera.pipeline import Pipeline
 from drivers.camera.settings import CameraDriverSettings
 from drivers.camera.sources.frames import GREY_AS_EXPOSED, FrameSource, Packet, Unit
 from drivers.camera.sources.opening import open_source
+from drivers.camera.unchanged import UnchangedPictures
 from drivers.stream_health import StreamHealth, StreamNames
 from drivers.thinning import Grid
 from groundstation.arrays import Image
@@ -27,6 +28,8 @@ from groundstation.time_units import NS_PER_MS
 _log = logging.getLogger(__name__)
 _POLL_S = 0.02
 _LEVEL = (0.0, 0.0)
+# A picture that shows nothing new for so long is reported to hang [s].
+_HANGS_S = 3.0
 
 
 def run(child: HostProcess) -> int:
@@ -65,6 +68,7 @@ class CameraDriver:
         )
         self._surroundings = Surroundings(child.bus, settings)
         self._newest: Image | None = None
+        self._unchanged = UnchangedPictures()
         self._images = Grid(settings.image_fps)
         address = without_password(settings.source)
         remedy = f"check the camera and its address {address}"
@@ -87,7 +91,7 @@ class CameraDriver:
             self._handle(packet)
         self._health.skipped = self._skipped
         why = "connected, but nothing comes" if self._source.connected else self._source.detail
-        self._health.end_turn(why, "", self.counts + self._source.rejected.copy(), self._quality)
+        self._health.end_turn(why, self._hanging(), self.counts + self._source.rejected.copy(), self._quality)
 
     @property
     def _skipped(self) -> int:
@@ -142,6 +146,7 @@ class CameraDriver:
         settings, around = self._settings, self._surroundings
         attitude = around.attitude(exposure_ns) or _LEVEL
         predictions = around.predictions(exposure_ns)
+        picture_ns = self._unchanged.first_shown_ns(picture, exposure_ns)
         sightings = self._pipeline.process(
             picture,
             exposure_ns,
@@ -153,10 +158,10 @@ class CameraDriver:
         for sighting in sightings:
             later_ns = convert.row_ns(sighting.corners, self._intrinsics.height_px, settings.readout_ms)
             header = self._child.bus.header(settings.observer, exposure_ns + later_ns)
-            observation = convert.observation_from_sighting(sighting, header, settings.name, attitude)
+            observation = convert.observation_from_sighting(sighting, header, settings.name, attitude, picture_ns)
             self._child.bus.publish(OBSERVATION, observation)
             self._health.reported += 1
-        if self._pipeline.searched:
+        if self._pipeline.searched and picture_ns == exposure_ns:  # an old picture does not tell who is missing now
             header = self._child.bus.header(settings.observer, exposure_ns)
             found = tuple(sighting.entity for sighting in sightings)
             searched = SearchedPicture(header=header, observer=settings.observer, camera=settings.name, found=found)
@@ -177,6 +182,12 @@ class CameraDriver:
             if self._settings.image_fps > 0.0:
                 header = self._child.bus.header(self._settings.name, self._exposed(unit))
                 self._child.bus.publish_bytes(VIDEO, header, unit.data)
+
+    def _hanging(self) -> str:
+        """Return in words that the picture hangs, or nothing; that of a standing vehicle may be black for long."""
+        shows = self._settings.mount.in_world or self._pipeline.tracked
+        hangs = self._unchanged.lasting_s >= _HANGS_S and shows
+        return "its picture does not change: it hangs, or nothing moves and it has no noise" if hangs else ""
 
     def _quality(self) -> tuple[float | None, float | None]:
         """Return brightness and width of edges [px] of the newest picture."""

@@ -99,7 +99,8 @@ class MessageScreen:
             return fault
         if not _plausible(message.roll_rad, message.pitch_rad):
             return Verdict.IMPLAUSIBLE
-        values = (message.position_m, message.yaw_rad)
+        # One picture can be measured twice with other last digits: the search begins elsewhere.
+        values = (message.picture_ns,) if message.picture_ns else (message.position_m, message.yaw_rad)
         return self._stale((message.observer, message.camera, message.subject), values, stamp_ns)
 
     def _range(self, message: RangeObservation, stamp_ns: int, now_ns: int) -> Verdict | None:

@@ -112,8 +112,10 @@ def camera_findings(
 
 
 def _picture(name: str, status: CameraStatus) -> Iterator[Finding]:
-    """Yield faults in exposure and focus of a camera's newest picture."""
+    """Yield faults in exposure and focus of a camera's newest picture, and that it hangs."""
     light, edge_px = status.brightness, status.edge_px
+    if light is not None and status.detail:
+        yield Finding(Level.SHOULD, name, status.detail, "wave a hand before it; if that changes nothing, restart it")
     if light is not None and not DARK <= light <= _BRIGHT:
         too = "dark" if light < DARK else "bright"
         yield Finding(Level.SHOULD, name, f"its picture is too {too} (mean {light:.0%} of white)",

@@ -203,6 +203,19 @@ def test_a_sensor_that_repeats_itself_is_frozen_and_thaws() -> None:
     assert sights[0] is Verdict.ACCEPTED
     assert sights[1:6] == [Verdict.DUPLICATE] * 5, "the same picture again measures nothing"
     assert sights[-1] is Verdict.FROZEN
+
+
+def test_a_picture_that_hangs_is_frozen_whatever_its_detector_makes_of_it() -> None:
+    """Seen at the wire: two poses in turn, 0.2 um apart, for the search began where the belief had the marker."""
+    desk = Desk()
+    ages = [(500 - 50 * k) * MS for k in range(10)]
+    poses = [(0.1, 0.2, 2.9349272622 - 1e-7 * (k % 2)) for k in range(10)]
+    sights = [
+        desk.take(desk.sight(age, position_m=pose, picture_ns=NOW - 600 * MS), NOW - age)
+        for age, pose in zip(ages, poses, strict=True)
+    ]
+    assert sights[1:5] == [Verdict.DUPLICATE] * 4
+    assert sights[-1] is Verdict.FROZEN
     assert desk.take(desk.sight(position_m=(0.1, 0.2, 2.9001))) is Verdict.ACCEPTED
 
 

@@ -20,6 +20,7 @@ from groundstation.errors import SettingsError
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
 from groundstation.geometry.rotations import base_from_tilted_optical
+from groundstation.time_units import NS_PER_S
 from sim_bridge.render.renderer import Renderer
 from sim_bridge.render.spec import BoardSpec, BodyShape, Mount, PictureQuality, RenderSpec
 
@@ -95,8 +96,9 @@ def test_an_observation_carries_exposure_time_attitude_and_names(rig, jpeg):
 @pytest.mark.parametrize(("told", "searches"), [(None, 4), (0.1, 4), (0.8, 15)])
 def test_a_driver_that_hears_of_a_target_that_nobody_sees_searches_often(rig, told, searches):
     """Every second picture; without the news twice a second, for there is nothing in view."""
-    grey, start_ns = encoded(np.full((360, 640), 128, np.uint8)), clock.now_ns()
+    start_ns = clock.now_ns()
     for k in range(30):
+        grey = encoded(np.full((360, 640), 100 + k, np.uint8))
         came_ns = start_ns + k * 66_666_667
         if told is not None:
             bot = EntityEstimate("bot", "target", (-3.0, 0.0), (0.01, 0.0, 0.0, 0.01), (0.0, 0.0), True, told)
@@ -112,6 +114,33 @@ def test_a_marker_is_as_old_as_the_row_that_shows_it(rig, jpeg):
     driver.CameraDriver(rig.child, settings(readout_ms=30.0), rig.source).turn()
     (seen,) = [r.message for r in rig.heard.drain() if r.key.topic is OBSERVATION]
     assert 1e6 < abs(seen.header.stamp_ns - now_ns + 120_000_000) < 15e6
+
+
+def test_a_picture_that_hangs_is_one_picture_and_is_told(rig, jpeg):
+    """Its sightings carry its first exposure, whatever the detector makes of it; it tells nobody's absence."""
+    start_ns = clock.now_ns() - 4 * NS_PER_S
+    for k in range(50):
+        rig.source.push(jpeg, start_ns + k * 66_666_667)
+        rig.camera.turn()
+    heard = rig.heard.drain()
+    pictures = [r.message.picture_ns for r in heard if r.key.topic is OBSERVATION]
+    assert (len(pictures), set(pictures)) == (50, {start_ns - 120_000_000})
+    assert sum(r.key.topic is SEARCHED_PICTURE for r in heard) == 1
+    until_ns = clock.now_ns() + NS_PER_S
+    while clock.now_ns() < until_ns:
+        rig.source.push(jpeg, clock.now_ns())
+        rig.camera.turn()
+    assert "does not change" in "".join(r.message.detail for r in rig.heard.drain() if r.key.topic is CAMERA_STATUS)
+
+
+def test_pictures_that_differ_in_one_corner_are_different_pictures(rig, jpeg):
+    picture, start_ns = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_GRAYSCALE), clock.now_ns()
+    for k in range(5):
+        picture[:8, :8] = 40 * k
+        rig.source.push(encoded(picture), start_ns + k * 66_666_667)
+        rig.camera.turn()
+    pictures = [r.message.picture_ns for r in rig.heard.drain() if r.key.topic is OBSERVATION]
+    assert pictures == [start_ns - 120_000_000 + k * 66_666_667 for k in range(5)]
 
 
 def test_pictures_are_passed_on_at_most_five_times_a_second(rig, jpeg):

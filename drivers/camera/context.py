@@ -15,6 +15,8 @@ from groundstation.bus.topics import ESTIMATE, ODOMETRY
 from groundstation.geometry.rotations import rotation_from_euler
 
 _LEVEL = (0.0, 0.0)
+# A vehicle whose height sensor says less may stand.
+_ALOFT_M = 0.4
 
 
 class Surroundings:
@@ -53,6 +55,11 @@ class Surroundings:
         """Return the observer's roll and pitch; level for a camera fixed in the world; None when not measured."""
         settings = self._settings
         return _LEVEL if settings.mount.in_world else self._attitudes.at(settings.observer, exposure_ns)
+
+    def tilt_aloft(self, exposure_ns: int) -> Attitude | None:
+        """Return roll and pitch of an observer that flies; None for a camera fixed in the world, or if unknown."""
+        aloft = self._heights.get(self._settings.observer, 0.0) > _ALOFT_M
+        return self.attitude(exposure_ns) if aloft else None
 
     def gravity(self, entity: str, exposure_ns: int) -> Gravity:
         """Return the known direction of "down" for a subject; targets stand level."""

@@ -13,9 +13,10 @@ from drivers.camera.context import Surroundings
 from drivers.camera.picture_quality import quality_of
 from drivers.camera.pipeline import Pipeline
 from drivers.camera.settings import CameraDriverSettings
+from drivers.camera.sighting import Sighting
 from drivers.camera.sources.frames import GREY_AS_EXPOSED, FrameSource, Packet, Unit
 from drivers.camera.sources.opening import open_source
-from drivers.camera.unchanged import UnchangedPictures
+from drivers.camera.unchanged import SteadyMarkers, UnchangedPictures
 from drivers.stream_health import StreamHealth, StreamNames
 from drivers.thinning import Grid
 from groundstation.arrays import Image
@@ -23,7 +24,7 @@ from groundstation.bus.jpeg import whole_size
 from groundstation.bus.messages import SearchedPicture
 from groundstation.bus.topics import IMAGE, OBSERVATION, SEARCHED_PICTURE, VIDEO
 from groundstation.errors import without_password
-from groundstation.time_units import NS_PER_MS
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _log = logging.getLogger(__name__)
 _POLL_S = 0.02
@@ -68,7 +69,8 @@ class CameraDriver:
         )
         self._surroundings = Surroundings(child.bus, settings)
         self._newest: Image | None = None
-        self._unchanged = UnchangedPictures()
+        self._unchanged, self._steady = UnchangedPictures(), SteadyMarkers(self._intrinsics.fx_px)
+        self._hangs_s = 0.0
         self._images = Grid(settings.image_fps)
         address = without_password(settings.source)
         remedy = f"check the camera and its address {address}"
@@ -146,15 +148,15 @@ class CameraDriver:
         settings, around = self._settings, self._surroundings
         attitude = around.attitude(exposure_ns) or _LEVEL
         predictions = around.predictions(exposure_ns)
-        picture_ns = self._unchanged.first_shown_ns(picture, exposure_ns)
         sightings = self._pipeline.process(
             picture,
             exposure_ns,
             lambda entity: around.gravity(entity, exposure_ns),
             predictions,
-            lambda entity: around.drop_m(entity, exposure_ns),
+            lambda entity: None if self._hangs_s else around.drop_m(entity, exposure_ns),
             around.sought(exposure_ns, predictions),
         )
+        picture_ns = self._first_shown_ns(picture, exposure_ns, sightings)
         for sighting in sightings:
             later_ns = convert.row_ns(sighting.corners, self._intrinsics.height_px, settings.readout_ms)
             header = self._child.bus.header(settings.observer, exposure_ns + later_ns)
@@ -183,10 +185,20 @@ class CameraDriver:
                 header = self._child.bus.header(self._settings.name, self._exposed(unit))
                 self._child.bus.publish_bytes(VIDEO, header, unit.data)
 
+    def _first_shown_ns(self, picture: Image, exposure_ns: int, sightings: list[Sighting]) -> int:
+        """Return the exposure of a picture, or of the first that showed the same [ns]."""
+        corners = {sighting.entity: sighting.corners for sighting in sightings}
+        first_ns = min(
+            self._unchanged.since_ns(picture, exposure_ns),
+            self._steady.since_ns(exposure_ns, corners, self._surroundings.tilt_aloft(exposure_ns)),
+        )
+        self._hangs_s = (exposure_ns - first_ns) / NS_PER_S
+        return first_ns
+
     def _hanging(self) -> str:
         """Return in words that the picture hangs, or nothing; that of a standing vehicle may be black for long."""
         shows = self._settings.mount.in_world or self._pipeline.tracked
-        hangs = self._unchanged.lasting_s >= _HANGS_S and shows
+        hangs = self._hangs_s >= _HANGS_S and shows
         return "its picture does not change: it hangs, or nothing moves and it has no noise" if hangs else ""
 
     def _quality(self) -> tuple[float | None, float | None]:

@@ -1,26 +1,56 @@
-"""Recognises pictures that repeat their predecessor to the last pixel: what lives, or moves, never does."""
+"""Recognises pictures that show nothing new although something moves: a camera or a stream that hangs. Pure."""
+
+import math
+from collections.abc import Mapping
 
 import numpy as np
 
-from groundstation.arrays import Image
-from groundstation.time_units import NS_PER_S
+from groundstation.arrays import Array, Image
+
+# Codecs make a marker's centre tremble by less; a flying vehicle never keeps one so steady.
+_STEADY_PX = 1.0
+# By how much the vehicle's tilt must have moved the picture meanwhile [px].
+_TURNED_PX = 15.0
 
 
 class UnchangedPictures:
-    """Call `first_shown_ns` with each picture, in order; keeps one picture."""
+    """Recognises pictures that repeat their predecessor to the last pixel; what lives, or moves, never does."""
 
     def __init__(self) -> None:
         self._picture: Image | None = None
-        self._since_ns = self._newest_ns = 0
+        self._since_ns = 0
 
-    def first_shown_ns(self, picture: Image, exposure_ns: int) -> int:
+    def since_ns(self, picture: Image, exposure_ns: int) -> int:
         """Return the exposure of the first of the equal pictures in a row that end with this one [ns]."""
-        self._newest_ns = exposure_ns
         if self._picture is None or not np.array_equal(self._picture, picture):
             self._picture, self._since_ns = picture, exposure_ns
         return self._since_ns
 
-    @property
-    def lasting_s(self) -> float:
-        """Return for how long pictures have come that show nothing new [s]."""
-        return (self._newest_ns - self._since_ns) / NS_PER_S
+
+class SteadyMarkers:
+    """Recognises a hanging camera whose encoder goes on, so that no two pictures are equal: all markers stand still.
+
+    On a vehicle in the air, that is, whose tilt changes meanwhile. focal_px: of the camera.
+    """
+
+    def __init__(self, focal_px: float) -> None:
+        self._focal_px = focal_px
+        self._begin(0, {})
+
+    def _begin(self, exposure_ns: int, centres: Mapping[str, Array]) -> None:
+        self._since_ns, self._centres = exposure_ns, dict(centres)
+        self._least, self._most = np.full(2, math.inf), np.full(2, -math.inf)
+
+    def since_ns(self, exposure_ns: int, corners: Mapping[str, Array], tilt_rad: tuple[float, float] | None) -> int:
+        """Return the exposure since which the picture has hung, or this one [ns].
+
+        corners (n, 2) [px] of the markers in the picture; tilt_rad: roll and pitch, None for a vehicle on the floor.
+        """
+        centres = {entity: seen.mean(axis=0) for entity, seen in corners.items()}
+        moved = [math.dist(at, self._centres[who]) > _STEADY_PX for who, at in centres.items() if who in self._centres]
+        if tilt_rad is None or not moved or any(moved):
+            self._begin(exposure_ns, centres)
+            return exposure_ns
+        self._least, self._most = np.minimum(self._least, tilt_rad), np.maximum(self._most, tilt_rad)
+        hangs = float((self._most - self._least).max()) * self._focal_px > _TURNED_PX
+        return self._since_ns if hangs else exposure_ns

@@ -39,7 +39,7 @@ REASONS = {
     Verdict.NOT_PERMITTED: "this camera must not observe targets",
     Verdict.IMPLAUSIBLE: "not finite, absurdly large, or from the future",
     Verdict.SINGULAR: "covariance is of the wrong shape, not symmetric, or not positive",
-    Verdict.FROZEN: "repeats itself to the last bit: its sensor or stream hangs",
+    Verdict.FROZEN: "repeats itself: its sensor or stream hangs",
 }
 
 

@@ -123,7 +123,7 @@ class ConsistencyWatch:
             if not alarm.changes(bool(kinds), 0, now_ns):
                 continue
             if alarm.raised:
-                text = f"its {' and '.join(sorted(kinds))} repeats the same numbers to the last bit: refused as frozen"
+                text = f"its {' and '.join(sorted(kinds))} repeats itself: refused as frozen"
                 found.append(Notice(Severity.WARNING, text, _FROZEN_REMEDY, name))
             else:
                 found.append(Notice(Severity.INFO, "no longer frozen", entity=name))

@@ -157,7 +157,7 @@ class Verdict(StrEnum):
     NOT_PERMITTED = "NOT_PERMITTED"
     """This camera must not observe targets."""
     FROZEN = "FROZEN"
-    """Repeats itself to the last bit: its sensor or stream is stuck."""
+    """Repeats itself: its sensor or stream is stuck."""
 
 
 class Innovation(Message, frozen=True, kw_only=True):

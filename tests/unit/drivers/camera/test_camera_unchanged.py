@@ -1,0 +1,62 @@
+"""Pictures that show nothing new: equal ones, and those of a camera that hangs before an encoder that goes on."""
+
+import math
+
+import numpy as np
+import pytest
+
+from drivers.camera.unchanged import SteadyMarkers, UnchangedPictures
+
+PICTURE_NS = 66_666_667
+FOCAL_PX = 560.0
+BOARD = np.array([[300.0, 200.0], [320.0, 200.0], [320.0, 214.0], [300.0, 214.0]])
+
+
+def test_equal_pictures_in_a_row_are_as_old_as_the_first():
+    grey, other = np.zeros((4, 6), np.uint8), np.ones((4, 6), np.uint8)
+    pictures = UnchangedPictures()
+    shown = [grey, grey.copy(), grey.copy(), other, grey]
+    assert [pictures.since_ns(picture, at) for at, picture in enumerate(shown)] == [0, 0, 0, 3, 4]
+
+
+def fly(shift_px, swing_deg, seconds=3.0, aloft=True):
+    """Return for each picture how much older than itself it is said to be [s]; shift_px: of the marker, by time [s]."""
+    rng, steady, ages = np.random.default_rng(3), SteadyMarkers(FOCAL_PX), []
+    for k in range(round(seconds * 15)):
+        at_s, now_ns = k / 15, 10**12 + k * PICTURE_NS
+        tilt = (math.radians(swing_deg / 2) * math.sin(2 * math.pi * at_s / 1.5), 0.0)
+        corners = {"bot": BOARD + shift_px(at_s) + rng.normal(0.0, 0.1, BOARD.shape)}
+        ages.append((now_ns - steady.since_ns(now_ns, corners, tilt if aloft else None)) * 1e-9)
+    return ages
+
+
+@pytest.mark.parametrize("swing_deg", [2.0, 5.0, 20.0])
+def test_a_marker_that_stands_while_its_camera_tilts_shows_that_the_picture_hangs(swing_deg):
+    ages = fly(lambda _: 0.0, swing_deg)
+    first = next(k for k, age in enumerate(ages) if age > 0.0)
+    assert first / 15 <= 1.5 and ages[first:] == pytest.approx([k / 15 for k in range(first, len(ages))], abs=0.01)
+
+
+@pytest.mark.parametrize(
+    "live",
+    [
+        {"shift_px": lambda at_s: 1.2 * at_s * 15, "swing_deg": 5.0},  # it moves
+        {"shift_px": lambda at_s: 12.0 * math.sin(4.2 * at_s), "swing_deg": 2.5},  # as the tilt says
+        {"shift_px": lambda _: 0.0, "swing_deg": 1.0},  # hardly any tilt: nobody can tell
+        {"shift_px": lambda _: 0.0, "swing_deg": 5.0, "aloft": False},  # what stands may shake its sensors
+    ],
+)
+def test_a_living_picture_is_its_own_age(live):
+    assert max(fly(**live)) == 0.0
+
+
+def test_a_picture_that_moves_again_is_new_at_once():
+    ages = fly(lambda at_s: 40.0 * (at_s >= 2.0) + 30.0 * max(0.0, at_s - 2.0), 5.0)
+    assert ages[29] > 1.0 and max(ages[30:]) == 0.0
+
+
+def test_a_picture_without_markers_ends_what_was_steady():
+    steady, tilts = SteadyMarkers(FOCAL_PX), [(math.radians(3.0) * (k % 2), 0.0) for k in range(10)]
+    seen = [{"bot": BOARD}] * 5 + [{}] + [{"bot": BOARD}] * 4
+    ages = [k - steady.since_ns(k, corners, tilt) for k, (corners, tilt) in enumerate(zip(seen, tilts, strict=True))]
+    assert ages == [0, 0, 2, 3, 4, 0, 0, 0, 2, 3]

@@ -57,7 +57,8 @@ _NO_AR1_VIDEO = Notice(
 )
 # Firmware limits tilt to 30 degrees and flies 5 m/s at most. WIRE: the TIME option wraps after 2048 s.
 # 30 degrees are 6 m/s^2. Between two packets of a recorded flight its velocity changed by 0.024 m/s at most.
-LIMITS = PlausibilityLimits(clock_wrap_s=2048.0, jump_m_s=0.2, acceleration_m_s2=6.0)
+# Our velocity loop is closed over the link: with a velocity older than this it oscillates.
+LIMITS = PlausibilityLimits(clock_wrap_s=2048.0, jump_m_s=0.2, acceleration_m_s2=6.0, clock_late_s=0.5)
 _log = logging.getLogger(__name__)
 
 

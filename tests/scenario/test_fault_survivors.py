@@ -75,7 +75,10 @@ UNROOTED = {
     "and_they_see_each_other": (34322, ["camera_stall", "picture_black"]),
 }
 # Telemetry 0.7 s old: the ceiling re-initialised the drone again and again, which swung faster each time.
-SWINGING = (34051, ["camera_stall", "telemetry_delayed"])
+SWINGING = {
+    "as_the_camera_stalls": (34051, ["camera_stall", "telemetry_delayed"]),
+    "as_the_other_lands": (2000016, ["telemetry_delayed", "velocity_stuck"]),
+}
 
 
 def order_of(changes: list[str], field_name: str = "lab") -> dict[str, Any]:
@@ -199,8 +202,9 @@ def test_a_team_that_no_fixed_camera_tells_where_it_is_hovers(seed: int, kinds: 
 
 @pytest.mark.slow
 @pytest.mark.study
-def test_a_drone_that_is_put_elsewhere_again_and_again_stands_still() -> None:
-    safely_flown(order_of([]), *SWINGING)
+@pytest.mark.parametrize(("seed", "kinds"), SWINGING.values(), ids=SWINGING)
+def test_a_drone_that_is_put_elsewhere_again_and_again_stands_still(seed: int, kinds: list[str]) -> None:
+    safely_flown(order_of([]), seed, kinds)
 
 
 @pytest.mark.slow

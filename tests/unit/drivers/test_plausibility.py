@@ -130,6 +130,19 @@ def test_each_fault_is_found_in_time_and_doubted_before(limits, period_ms, fault
     assert any(word in reason for reason in said), said
 
 
+@pytest.mark.parametrize(("limits", "late_s", "worst"), [(ARDRONE, 0.6, Health.BAD), (ARDRONE, 0.4, Health.SUSPECT),
+                                                         (MAVLINK, 0.6, Health.SUSPECT)])  # fmt: skip
+def test_a_velocity_that_our_own_loop_follows_must_be_younger(limits, late_s, worst):
+    """An AR.Drone's loop is closed over the link; an autopilot closes its own, and stamps what it sends."""
+    monitor, found = MotionMonitor(limits), []
+    for k in range(100):
+        at_ns = S + k * 20 * MS
+        old_ns = round(late_s * 1e9) if k > 50 else 0
+        sample = MotionSample(at_ns, (0.2 + 0.001 * k, 0.1), 0.001 * k, 0.0, vehicle_ns=at_ns - old_ns)
+        found.append(monitor.update(sample, FLYING).of(Sensor.CLOCK))
+    assert max(found) is worst and max(found[:50]) is Health.GOOD
+
+
 def test_a_stuck_imu_is_no_reason_to_stop():
     monitor = MotionMonitor(ARDRONE)
     for sample in broken(imu_stuck):

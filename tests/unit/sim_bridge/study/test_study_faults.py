@@ -1,6 +1,7 @@
 """The fault campaign: what is drawn, how truth judges, what stands in for threads and sockets, and its table."""
 
 import math
+from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
 
@@ -281,11 +282,22 @@ def test_wrong_pictures_at_message_level(kind: str, seen: list[float]) -> None:
     camera = WrongEye(eye, [fault(kind, start_s=1.0, end_s=3.0)])
     found = []
     for t in (0.5, 1.0, 2.0, 3.0):
-        world: Any = SimpleNamespace(time_s=t)
+        world: Any = SimpleNamespace(time_s=t, drones=())
         eye.n = round(t)  # what an honest picture would show
         found += camera.look(world, int(t * 1e9), "c")
     assert [one.position_m[0] for one in found] == seen
     assert len({(one.header.stamp_ns, one.header.seq) for one in found}) == len(found)
+
+
+def test_a_vehicles_camera_that_hangs_trembles_until_its_driver_knows_it() -> None:
+    eye: Any = Eye()
+    camera, found = WrongEye(eye, [fault("picture_frozen", start_s=1.0)]), []
+    for k in range(40):
+        world: Any = SimpleNamespace(time_s=0.5 + 0.1 * k, drones={camera.name: None})
+        found += camera.look(world, int(k * 1e8), "c")
+    unknown, known = found[5:20], found[20:]
+    assert all(a.position_m != b.position_m for a, b in pairwise(unknown))
+    assert {one.picture_ns for one in unknown} == {0} and {one.picture_ns for one in known} == {400_000_000}
 
 
 def test_a_frozen_picture_shows_once_it_repeats_somebody() -> None:
@@ -294,7 +306,7 @@ def test_a_frozen_picture_shows_once_it_repeats_somebody() -> None:
     camera = WrongEye(eye, [frozen])
     assert camera.observable_s(frozen) is None
     for t in (0.5, 1.5, 2.0):
-        world: Any = SimpleNamespace(time_s=t)
+        world: Any = SimpleNamespace(time_s=t, drones=())
         camera.look(world, 0, "c")
     assert (camera.observable_s(frozen), camera.observable_s(black)) == (1.5, 1.0)
 
@@ -303,6 +315,6 @@ def test_a_bumped_camera_stays_turned_until_it_is_put_back() -> None:
     eye: Any = Eye()
     camera = WrongEye(eye, [fault("camera_bumped", start_s=1.0, end_s=2.0, value=4.0)])
     for t in (0.0, 1.0, 2.0):
-        world: Any = SimpleNamespace(time_s=t)
+        world: Any = SimpleNamespace(time_s=t, drones=())
         camera.look(world, 0, "c")
     assert eye.bumps == [0.0, 4.0, 0.0]

@@ -134,7 +134,7 @@ def test_a_picture_that_hangs_is_one_picture_and_is_told(rig, jpeg):
 
 
 def test_pictures_that_differ_in_one_corner_are_different_pictures(rig, jpeg):
-    picture, start_ns = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_GRAYSCALE), clock.now_ns()
+    picture, start_ns = np.asarray(cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_GRAYSCALE)), clock.now_ns()
     for k in range(5):
         picture[:8, :8] = 40 * k
         rig.source.push(encoded(picture), start_ns + k * 66_666_667)

@@ -6,30 +6,26 @@ without Content-Length, lines that end in LF alone, any number of blank lines be
 
 import re
 
+from drivers.camera.http_answer import boundary_from_body, may_begin_with_boundary
 from groundstation.bus.jpeg import has_ended
 
 MAX_FRAME_BYTES = 8 << 20
 _MAX_HEAD_BYTES = 4096
 _LENGTH = re.compile(rb"^content-length:[ \t]*(\d{1,9})[ \t]*$", re.IGNORECASE | re.MULTILINE)
 _HEAD_END = re.compile(rb"\r?\n\r?\n")
-_BOUNDARY = re.compile(rb"multipart/[a-z-]+[^\r\n]*boundary=\"?([^\r\n\";]+)", re.IGNORECASE)
 _JPEG_START, _JPEG_END = b"\xff\xd8", b"\xff\xd9"
 
 
-def boundary_from_head(head: bytes) -> bytes | None:
-    """Return the boundary that a response head announces, without leading dashes, or None."""
-    match = _BOUNDARY.search(head)
-    return match[1].strip().lstrip(b"-") if match else None
-
-
 class MultipartParser:
-    """Takes bytes as they come; returns the complete JPEG frames in them.
+    """Takes the bytes of a body as they come; returns the complete JPEG frames in them.
 
-    `rejected` counts parts that are no JPEG, too long, or cut short.
+    boundary: the announced one; a body that begins with another has that. `rejected` counts parts that are no JPEG, too
+    long, or cut short.
     """
 
     def __init__(self, boundary: bytes) -> None:
         self._mark = b"--" + boundary
+        self._begun = False
         self._buffer = bytearray()
         self._needed = 0
         self.rejected = 0
@@ -37,12 +33,24 @@ class MultipartParser:
     def feed(self, data: bytes) -> list[bytes]:
         """Take in bytes; return the frames that are now complete, oldest first."""
         self._buffer += data
+        if not self._begun and not self._begin():
+            return []
         frames: list[bytes] = []
         while len(self._buffer) >= self._needed and self._step(frames):
             pass
         if len(self._buffer) > MAX_FRAME_BYTES + _MAX_HEAD_BYTES:
             self._reject(len(self._buffer) - len(self._mark))
         return frames
+
+    def _begin(self) -> bool:
+        """Take the boundary with which the body begins; False when more bytes are needed."""
+        begun = bytes(self._buffer[:_MAX_HEAD_BYTES])
+        if may_begin_with_boundary(begun):
+            return False
+        found = boundary_from_body(begun)
+        self._mark = b"--" + found if found else self._mark
+        self._begun = True
+        return True
 
     def _step(self, frames: list[bytes]) -> bool:
         """Consume one part; False when more bytes are needed."""

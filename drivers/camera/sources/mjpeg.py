@@ -4,7 +4,15 @@ import socket
 from base64 import b64encode
 from collections import Counter
 
-from drivers.camera.multipart import MultipartParser, boundary_from_head
+from drivers.camera.http_answer import (
+    ChunkedBody,
+    boundary_from_body,
+    boundary_from_head,
+    is_chunked,
+    may_begin_with_boundary,
+    split_answer,
+)
+from drivers.camera.multipart import MultipartParser
 from drivers.camera.sources.frames import Unit
 from drivers.camera.sources.reader_thread import Drain, PictureDecoder
 from drivers.camera.sources.tcp import Line
@@ -37,32 +45,57 @@ class MjpegReader:
         """Hand over pictures until the drain closes."""
         with self._line.open() as connection:
             connection.sendall(self._request)
-            boundary, data = _read_head(connection)
-            parser = MultipartParser(boundary)
+            head, rest = _read_head(connection)
+            body = _Body(connection, ChunkedBody() if is_chunked(head) else None, rest)
+            parser = MultipartParser(body.boundary(boundary_from_head(head)))
+            data = body.begun
             drain.opened()
             while not drain.closing:
                 arrival_ns = clock.now_ns()
                 drain.keep([Unit(jpeg, arrival_ns, arrival_ns) for jpeg in parser.feed(data)])
                 self.rejected["multipart"] += parser.rejected
                 parser.rejected = 0
-                data = connection.recv(_READ_BYTES)
-                if not data:
-                    raise DriverError("the camera closed the stream")
+                data = body.read()
+
+
+class _Body:
+    """What a connection carries behind the head of its answer."""
+
+    def __init__(self, connection: socket.socket, chunks: ChunkedBody | None, rest: bytes) -> None:
+        self._connection, self._chunks = connection, chunks
+        self.begun = self._carried(rest)
+
+    def read(self) -> bytes:
+        """Return the next bytes; raises DriverError at the end, OSError after 2 s of silence."""
+        data = self._connection.recv(_READ_BYTES)
+        if not data or (self._chunks is not None and self._chunks.ended):
+            raise DriverError("the camera closed the stream")
+        return self._carried(data)
+
+    def boundary(self, announced: bytes | None) -> bytes:
+        """Return the announced boundary, else that with which the body begins; raises DriverError without any."""
+        if announced:
+            return announced
+        while may_begin_with_boundary(self.begun):  # ffmpeg announces none
+            self.begun += self.read()
+        boundary = boundary_from_body(self.begun)
+        if not boundary:
+            raise DriverError("the answer is no multipart stream")
+        return boundary
+
+    def _carried(self, data: bytes) -> bytes:
+        return data if self._chunks is None else self._chunks.feed(data)
 
 
 def _read_head(connection: socket.socket) -> tuple[bytes, bytes]:
-    """Return the boundary and the bytes after the response head; raises DriverError if it is no MJPEG stream."""
-    head = b""
-    while b"\r\n\r\n" not in head:
-        data = connection.recv(4096)
-        if not data or len(head) > _MAX_HEAD_BYTES:
+    """Return the head of a successful answer and the bytes behind it; raises DriverError for any other answer."""
+    data = b""
+    while (parts := split_answer(data)) is None:
+        more = connection.recv(4096)
+        if not more or len(data) > _MAX_HEAD_BYTES:
             raise DriverError("no HTTP answer")
-        head += data
-    head, rest = head.split(b"\r\n\r\n", 1)
-    status = head.split(b"\r\n", 1)[0].split()
+        data += more
+    status = parts[0].split(b"\n", 1)[0].split()
     if len(status) < 2 or not status[0].startswith(b"HTTP/") or status[1] != b"200":
         raise DriverError(f"the camera answered {b' '.join(status[:3]).decode('ascii', 'replace')!r}")
-    boundary = boundary_from_head(head)
-    if not boundary:
-        raise DriverError("the answer is no multipart stream")
-    return boundary, rest
+    return parts

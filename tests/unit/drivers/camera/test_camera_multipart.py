@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from drivers.camera.multipart import MAX_FRAME_BYTES, MultipartParser, boundary_from_head
+from drivers.camera.multipart import MAX_FRAME_BYTES, MultipartParser
 
 JPEG = b"\xff\xd8 first picture \xff\xd9"
 OTHER = b"\xff\xd8 second\r\n--picture \xff\xd9"
@@ -90,9 +90,16 @@ def test_memory_stays_bounded_in_a_part_without_end():
     assert parser.feed(b"\r\n" + sized(JPEG))[-1:] == [JPEG]
 
 
-def test_boundaries_in_response_heads():
-    head = b"HTTP/1.0 200 OK\r\nContent-Type: multipart/x-mixed-replace; boundary=%s\r\n"
-    assert boundary_from_head(head % b"frame") == b"frame"
-    assert boundary_from_head(head % b'"--frame"') == b"frame"
-    assert boundary_from_head(head % b"--myboundary") == b"myboundary"
-    assert boundary_from_head(b"HTTP/1.0 200 OK\r\nContent-Type: text/html\r\n") is None
+def test_a_body_has_the_boundary_with_which_it_begins():
+    """Cameras announce one boundary and send another, or no dashes before the first part."""
+    for announced in (b"frame", b"other"):
+        for step in (1, 5, 4096):
+            parser, found, stream = MultipartParser(announced), [], b"\r\n" + sized(JPEG) + sized(OTHER)
+            for at in range(0, len(stream), step):
+                found += parser.feed(stream[at : at + step])
+            assert found == [JPEG, OTHER]
+
+
+def test_a_stream_without_its_first_boundary_begins_with_the_second_picture():
+    stream = sized(JPEG).removeprefix(b"--frame\r\n") + sized(OTHER)
+    assert MultipartParser(b"frame").feed(stream) == [OTHER]

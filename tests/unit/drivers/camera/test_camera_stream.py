@@ -160,6 +160,22 @@ def test_strange_servers_are_named(answer, complaint):
         assert not source.connected
 
 
+_PART = b"--frame\r\nContent-Type: image/jpeg\r\nContent-Length: %d\r\n\r\n"
+
+
+@pytest.mark.parametrize("kind", [b"multipart/x-mixed-replace;boundary=frame", b"application/octet-stream"])
+def test_a_stream_in_chunks_is_read(kind):
+    """As an ESP32 sends it: head, picture and boundary each a chunk; ffmpeg calls it a stream of octets."""
+    jpeg = JPEG % 1
+    chunks = b"".join(b"%x\r\n%s\r\n" % (len(part), part) for part in (_PART % len(jpeg), jpeg, b"\r\n"))
+    head = b"HTTP/1.1 200 OK\r\nContent-Type: %s\r\nTransfer-Encoding: chunked\r\n\r\n" % kind
+    with reading(_serve_once(head + chunks)) as source:
+        packet = source.take_newest(5.0)
+        assert packet is not None
+        assert packet.data == jpeg
+        assert not source.rejected["multipart"]
+
+
 def test_the_reader_logs_in_with_the_address_s_user_and_password():
     with socket.create_server(("127.0.0.1", 0)) as listener:
         source = open_source(f"http://me:p%40ss@127.0.0.1:{listener.getsockname()[1]}/video.mjpg")

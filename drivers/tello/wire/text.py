@@ -15,6 +15,7 @@ OK, ERROR = b"ok", b"error"
 # WIRE (docs/reference/tello.md 3): `tof` without an echo, as over the floor that it stands on.
 NO_ECHO_CM = 6553
 _LARGEST = 1024
+_MARGIN = "; \t\r\n\0"
 
 
 class WireError(ValueError):
@@ -50,7 +51,9 @@ def parse_state(data: bytes) -> State:
     if len(data) > _LARGEST:
         raise WireError("size")
     try:
-        pairs = dict(pair.split(":", 1) for pair in data.decode("ascii").strip().strip(";").split(";"))
+        fields = data.decode("ascii").strip(_MARGIN).split(";")
+        # WIRE (docs/reference/tello.md 3): some firmwares put spaces before a key or a value.
+        pairs = {key.strip(): value for key, value in (field.split(":", 1) for field in fields)}
     except UnicodeDecodeError:
         raise WireError("not_ascii") from None
     except ValueError:

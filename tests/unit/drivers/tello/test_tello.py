@@ -122,6 +122,13 @@ def test_a_state_survives_its_text():
     assert parse_state(state_text(STATE)) == STATE
 
 
+def test_spaces_and_an_end_mark_around_keys_and_values_are_no_damage():
+    """As real ones send it: spaces before values and keys, none or several marks at the end."""
+    said = state_text(STATE).decode().strip()
+    for other in (said.rstrip(";"), said + "  ", said + "\r\n\0", said.replace(";", "; "), said.replace(":", ": ")):
+        assert parse_state(other.encode()) == STATE
+
+
 def test_sticks_survive_their_text_and_are_cut():
     assert parse_rc(rc(-100, 7, 0, 100)) == (-100, 7, 0, 100)
     assert rc(-250, 0, 101, 3) == b"rc -100 0 100 3"

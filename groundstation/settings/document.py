@@ -1,6 +1,7 @@
 """YAML 1.2 documents as trees whose nodes all know their line in the file."""
 
 import os
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +12,7 @@ from groundstation.errors import SettingsError, without_password
 _MAX_BYTES = 1_000_000
 _MAX_NODES = 20_000  # an alias may be expanded many times over: bounded, so that a small file cannot fill memory
 _MAX_DEPTH = 12
+_END = re.compile(r"\n---\s*\Z")
 _KINDS = ("str", "int", "float", "bool", "null", "timestamp")
 
 KeyPath = tuple[str | int, ...]
@@ -125,13 +127,16 @@ def _neighbours(path: Path) -> str:
 
 
 def parse(text: str, place: str, line: int | None = None) -> Node:
-    """Return the tree of one YAML document; `line` fixes the line of all nodes (0 for options)."""
+    """Return the tree of one YAML document, behind which nothing but its end may follow (`---`, as ROS prints it).
+
+    line: fixes the line of all nodes (0 for options).
+    """
     from ruamel.yaml import YAML
     from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
     yaml = YAML(typ="safe", pure=True)
     try:
-        root = yaml.compose(text)
+        root = yaml.compose(_END.sub("\n", text))
         if root is None:
             raise SettingsError([f"{place}: is empty"])
         reader = _Reader(place, line, yaml.constructor)

@@ -9,7 +9,7 @@ from groundstation.settings.document import Node, read
 from groundstation.settings.wording import problem
 
 # Names of our model in these programs: k1 k2 p1 p2 k3, further coefficients 0.
-_OUR_MODEL = ("plumb_bob", "radtan", "rational_polynomial")
+_OUR_MODEL = ("plumb_bob", "radtan", "radial-tangential", "rational_polynomial")
 _REMEDY = "measure this lens with `groundstation calibrate camera`"
 
 
@@ -39,6 +39,10 @@ _KNOWN = (
         residual="Avg_Reprojection_Error",
     ),
     _Keys("intrinsics", "distortion_coeffs", ("resolution",), "distortion_model"),
+    _Keys("intrinsics", "distortion_coefficients", ("resolution",), "distortion_model"),  # of the EuRoC data sets
+    # Messages `camera_info` as `ros2 topic echo` and `rostopic echo` print them.
+    _Keys("k", "d", ("width", "height"), "distortion_model"),
+    _Keys("K", "D", ("width", "height"), "distortion_model"),
 )
 
 
@@ -52,10 +56,10 @@ def _ours(tree: Node) -> Node:
     if isinstance(tree.value, str) and tree.value.startswith("<?xml"):
         raise _refused(tree, f"is XML: let OpenCV write it as YAML (a name that ends in .yml), or {_REMEDY}")
     tree = _only_camera(tree)
-    for keys in _KNOWN:
-        if tree.get(keys.matrix) is not None:
-            return _translated(tree, keys)
-    return tree
+    known = [keys for keys in _KNOWN if tree.get(keys.matrix) is not None]
+    if not known:
+        return tree
+    return _translated(tree, next((keys for keys in known if tree.get(keys.distortion) is not None), known[0]))
 
 
 def _only_camera(tree: Node) -> Node:
@@ -83,6 +87,10 @@ def _translated(tree: Node, keys: _Keys) -> Node:
 
 
 def _size(tree: Node, keys: _Keys) -> list[Node]:
+    for name in ("binning_x", "binning_y"):  # of `camera_info`: its size is that of the pictures before
+        binning = tree.get(name)
+        if binning is not None and binning.value not in (0, 1):
+            raise _refused(binning, f"its pictures are reduced: {_REMEDY}")
     found = [node for key in keys.size for node in _items(tree.value[key])]
     if len(found) != 2:
         raise _refused(tree.value[keys.size[0]], "must be the width and the height of the pictures")

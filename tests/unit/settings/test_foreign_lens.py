@@ -42,6 +42,29 @@ cam0:
   distortion_coeffs: [-0.5, 0.25, 0.01, -0.002]
   resolution: [640, 360]
 """
+EUROC = """\
+sensor_type: camera
+camera_model: pinhole
+intrinsics: [561.5, 562.5, 320.25, 170.5] # fu, fv, cu, cv
+distortion_model: radial-tangential
+distortion_coefficients: [-0.5, 0.25, 0.01, -0.002]
+resolution: [640, 360]
+"""
+ROS_2_TOPIC = """\
+header:
+  stamp: {sec: 1662013622, nanosec: 672922214}
+  frame_id: front
+height: 360
+width: 640
+distortion_model: plumb_bob
+d: [-0.5, 0.25, 0.01, -0.002, 0.03]
+k: [561.5, 0.0, 320.25, 0.0, 562.5, 170.5, 0.0, 0.0, 1.0]
+r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
+binning_x: 0
+binning_y: 0
+---
+"""
+ROS_1_TOPIC = ROS_2_TOPIC.replace("\nd:", "\nD:").replace("\nk:", "\nK:")
 
 Reader = Callable[[str], CalibrationSettings]
 
@@ -60,8 +83,15 @@ def lens_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Reader:
 
 @pytest.mark.parametrize(
     ("text", "k3", "residual_px"),
-    [(ROS, 0.03, 0.2), (OPENCV, 0.03, 0.4), (KALIBR, 0.0, 0.2)],
-    ids=["ros", "opencv", "kalibr"],
+    [
+        (ROS, 0.03, 0.2),
+        (OPENCV, 0.03, 0.4),
+        (KALIBR, 0.0, 0.2),
+        (EUROC, 0.0, 0.2),
+        (ROS_2_TOPIC, 0.03, 0.2),
+        (ROS_1_TOPIC, 0.03, 0.2),
+    ],
+    ids=["ros", "opencv", "kalibr", "euroc", "ros 2 topic", "ros 1 topic"],
 )
 def test_a_calibration_of_another_program_is_the_same_lens(
     lens_of: Reader, text: str, k3: float, residual_px: float
@@ -96,6 +126,9 @@ def test_opencvs_published_calibration_is_read(real_data: Callable[[str], Path])
         (OPENCV, "02, 0., 320", "02, 0.7, 320", "lens.yaml:5: camera_matrix: must be fx 0 cx, 0 fy cy, 0 0 1"),
         (OPENCV, "5.615e+02", "-5.615e+02", "lens.yaml:9: camera_matrix.data[0]: must be > 0"),
         (OPENCV, "2.5e-01", ".Nan", "lens.yaml:14: distortion_coefficients.data[1]: must be a number"),
+        (ROS_2_TOPIC, "binning_y: 0", "binning_y: 2", "lens.yaml:11: binning_y: its pictures are reduced"),
+        (ROS_2_TOPIC, "plumb_bob", "equidistant", "lens.yaml:6: distortion_model: equidistant is another model"),
+        (ROS_2_TOPIC, "\nd:", "\nx:", "lens.yaml:1: a calibration of another program that lacks d"),
         (KALIBR, "pinhole", "omni", "lens.yaml:2: cam0.camera_model: omni is no pinhole"),
         (KALIBR, "radtan", "equidistant", "lens.yaml:4: cam0.distortion_model: equidistant is another model"),
         (KALIBR, "cam0:", "cam1: {intrinsics: [1, 1, 0, 0]}\ncam0:", "lens.yaml:1: holds 2 cameras (cam1, cam0)"),

@@ -18,7 +18,7 @@ def parse_dump(text: bytes) -> dict[str, str]:
     values: dict[str, str] = {}
     last = ""
     for line in text.rstrip(END).decode("latin-1").splitlines():
-        name, separator, value = line.partition(" = ")
+        name, separator, value = line.partition(" =")  # an empty value may lack the space behind it
         if separator and ":" in name and " " not in name.strip():
             last = name.strip().lower()
             values[last] = value.strip()

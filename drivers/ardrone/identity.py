@@ -11,8 +11,8 @@ from drivers.ardrone.wire.tags import Tag
 # WIRE (docs/reference/ardrone.md 5.3): session, user and application ids exist since firmware 1.6.0.
 _FIRST_WITH_IDS = (1, 6, 0)
 _VERSION = re.compile(r"(\d{1,3})\.(\d{1,3})(?:\.(\d{1,5}))?")
-# WIRE: general:num_version_mb of the two generations.
-_BOARDS = {"17": 1, "33": 2}
+# WIRE (docs/reference/ardrone.md 5.4): general:num_version_mb of the two generations.
+_BOARDS = {"17": 1, "33": 2, "34": 2}
 _AR1_VISION_DETECT = 120
 
 

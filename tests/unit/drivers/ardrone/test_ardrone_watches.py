@@ -95,6 +95,7 @@ def test_versions(text, model, ids):
 
 def test_the_board_tells_the_generation_when_the_firmware_does_not():
     assert identity_from_dump({"general:num_version_mb": "17"}).model is Model.AR1
+    assert identity_from_dump({"general:num_version_mb": "34"}).model is Model.AR2
     assert identity_from_dump({"general:num_version_mb": "33", "general:drone_serial": "PS7"}).text.endswith(
         "serial PS7"
     )
@@ -114,6 +115,8 @@ def test_dumps_are_read_with_wrapped_values_and_compared_by_meaning():
     )
     stored = parse_dump(text)
     assert stored["control:gyros_gains"] == "{ 1.0 2.0 }" and stored["general:ardrone_name"] == "My = Drone: one"
+    bare = parse_dump(b"network:secure = FALSE\nnetwork:passkey =\nnetwork:at_port = 5556\n")
+    assert bare == {"network:secure": "FALSE", "network:passkey": "", "network:at_port": "5556"}
     same = (("control:euler_angle_max", "0.20944"), ("control:outdoor", "false"), ("general:unheard_of", "1"))
     assert differences(same, stored) == ()
     other = (("control:euler_angle_max", "0.2"), ("custom:session_id", "99e99999"))

@@ -113,6 +113,7 @@ class NatnetSource:
                 frame = self._take(datagram)
             except natnet.WireError as error:
                 self.rejected[error.reason] += 1
+                self.detail = error.told or self.detail
                 continue
             if frame is not None:
                 frames.append(frame)

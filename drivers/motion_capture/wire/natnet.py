@@ -17,17 +17,18 @@ _BODY = struct.Struct("<i3f4ffh")
 _SERVER = struct.Struct("<256s4B4BQH?4B")
 _TAIL = {False: struct.Struct("<dQQQhi"), True: struct.Struct("<dQQQIIhi")}
 _NAME_BYTES, _POINT_BYTES, _LABEL_BYTES = 256, 12, 4
+_VERSION_AT, _OLD_SERVER_BYTES = 260, 264
 _MARKER_SET, _RIGID_BODY = 0, 1
 _CHANGED = 2  # of a frame's flags
 _MOST = 10_000
 
 
 class WireError(ValueError):
-    """A malformed datagram; `reason` is a word to count it by."""
+    """A datagram that cannot be read; `reason` is a word to count it by, `told` what to tell of it, or ""."""
 
-    def __init__(self, reason: str) -> None:
+    def __init__(self, reason: str, told: str = "") -> None:
         super().__init__(reason)
-        self.reason = reason
+        self.reason, self.told = reason, told
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,12 +94,15 @@ def connect_request(version: Version = (4, 1)) -> bytes:
 
 def decode_server(payload: bytes) -> Server:
     """Return a server's description of itself; raises WireError if cut short, and for versions before 3.0."""
+    if len(payload) < _OLD_SERVER_BYTES:
+        raise WireError("short")
+    version = (payload[_VERSION_AT], payload[_VERSION_AT + 1])
+    if version < _OLDEST:  # whose description ends here
+        raise WireError("version", "it streams NatNet {}.{}; versions from 3.0 (Motive 2) on are read".format(*version))
     if len(payload) < _SERVER.size:
         raise WireError("short")
     name, *rest = _SERVER.unpack_from(payload)
-    version, ticks, port, multicast, group = (rest[4], rest[5]), rest[8], rest[9], rest[10], rest[11:15]
-    if version < _OLDEST:
-        raise WireError("version")
+    ticks, port, multicast, group = rest[8], rest[9], rest[10], rest[11:15]
     address = ".".join(map(str, group)) if multicast else ""
     return Server(name.partition(b"\0")[0].decode("utf-8", "replace"), version, ticks, port, address)
 

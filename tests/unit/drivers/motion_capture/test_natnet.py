@@ -74,8 +74,14 @@ def test_a_server_names_itself_its_version_and_where_it_sends() -> None:
     assert natnet.message_of(natnet.encode_server(server))[1][264:] == payload[264:]
     alone = natnet.decode_server(payload[:-5] + bytes([0, 0, 0, 0, 0]))
     assert alone.group == ""
-    with pytest.raises(natnet.WireError, match="version"):
-        natnet.decode_server(payload[:260] + bytes([2, 9, 0, 0]) + payload[264:])
+    with pytest.raises(natnet.WireError, match="short"):
+        natnet.decode_server(payload[:264])
+
+
+def test_a_server_that_is_too_old_says_its_version_in_a_shorter_answer() -> None:
+    with pytest.raises(natnet.WireError, match="version") as caught:
+        natnet.decode_server(b"NatNetLib".ljust(256, b"\0") + bytes([2, 9, 0, 0, 2, 9, 0, 0]))
+    assert caught.value.told == "it streams NatNet 2.9; versions from 3.0 (Motive 2) on are read"
 
 
 def described(version: tuple[int, int]) -> bytes:

@@ -3,7 +3,9 @@
 import socket
 from base64 import b64encode
 from collections import Counter
+from secrets import token_hex
 
+from drivers.camera.digest import Challenge, authorization, challenge_of
 from drivers.camera.http_answer import (
     ChunkedBody,
     boundary_from_body,
@@ -32,10 +34,8 @@ class MjpegReader:
         self._line = Line(host, port, interface)
         self.name = self._line.name
         self.rejected: Counter[str] = Counter()
-        request = f"GET {path} HTTP/1.0\r\nHost: {host}:{port}\r\nAccept: multipart/x-mixed-replace\r\n"
-        # WIRE (RFC 7617): sent with the first request; a camera that requires Digest still answers 401.
-        secret = f"Authorization: Basic {b64encode(login.encode()).decode()}\r\n" if login else ""
-        self._request = f"{request}{secret}\r\n".encode("ascii", "replace")
+        self._host, self._path, self._login = f"{host}:{port}", path, login
+        self._wants_digest = False
 
     def interrupt(self) -> None:
         """Make `read` return."""
@@ -43,9 +43,22 @@ class MjpegReader:
 
     def read(self, drain: Drain) -> None:
         """Hand over pictures until the drain closes."""
+        challenge = self._read_as(drain, None)
+        if challenge is not None:
+            self._wants_digest = True
+            self._read_as(drain, challenge)
+
+    def _read_as(self, drain: Drain, challenge: Challenge | None) -> Challenge | None:
+        """Hand over pictures; returns at once with the challenge of a camera that wants a login by Digest."""
         with self._line.open() as connection:
-            connection.sendall(self._request)
+            connection.sendall(self._request(challenge))
             head, rest = _read_head(connection)
+            wanted = (
+                challenge_of(head) if self._login and challenge is None and _status(head)[1:2] == [b"401"] else None
+            )
+            if wanted is not None:
+                return wanted
+            _require_success(head)
             body = _Body(connection, ChunkedBody() if is_chunked(head) else None, rest)
             parser = MultipartParser(body.boundary(boundary_from_head(head)))
             data = body.begun
@@ -56,6 +69,19 @@ class MjpegReader:
                 self.rejected["multipart"] += parser.rejected
                 parser.rejected = 0
                 data = body.read()
+        return None
+
+    def _request(self, challenge: Challenge | None) -> bytes:
+        request = f"GET {self._path} HTTP/1.0\r\nHost: {self._host}\r\nAccept: multipart/x-mixed-replace\r\n"
+        secret = ""
+        if challenge is not None:
+            secret = authorization(challenge, self._login, self._path, token_hex(8))
+        elif self._login and not self._wants_digest:
+            # WIRE (RFC 7617): sent with the first request; not again to a camera that has asked for Digest.
+            secret = f"Basic {b64encode(self._login.encode()).decode()}"
+        if secret:
+            request += f"Authorization: {secret}\r\n"
+        return f"{request}\r\n".encode("ascii", "replace")
 
 
 class _Body:
@@ -88,14 +114,21 @@ class _Body:
 
 
 def _read_head(connection: socket.socket) -> tuple[bytes, bytes]:
-    """Return the head of a successful answer and the bytes behind it; raises DriverError for any other answer."""
+    """Return the head of an answer and the bytes behind it; raises DriverError if it is none of HTTP."""
     data = b""
     while (parts := split_answer(data)) is None:
         more = connection.recv(4096)
         if not more or len(data) > _MAX_HEAD_BYTES:
             raise DriverError("no HTTP answer")
         data += more
-    status = parts[0].split(b"\n", 1)[0].split()
+    return parts
+
+
+def _status(head: bytes) -> list[bytes]:
+    return head.split(b"\n", 1)[0].split()
+
+
+def _require_success(head: bytes) -> None:
+    status = _status(head)
     if len(status) < 2 or not status[0].startswith(b"HTTP/") or status[1] != b"200":
         raise DriverError(f"the camera answered {b' '.join(status[:3]).decode('ascii', 'replace')!r}")
-    return parts

@@ -190,6 +190,50 @@ def test_the_reader_logs_in_with_the_address_s_user_and_password():
     assert b"\r\nAuthorization: Basic " + b64encode(b"me:p@ss") + b"\r\n" in request
 
 
+def _answer_in_turn(listener, answers):
+    """Answer one connection after the other; returns what they asked."""
+    requests = []
+    listener.settimeout(5.0)
+    for answer in answers:
+        connection, _ = listener.accept()
+        with connection:
+            requests.append(read_until(connection, b"\r\n\r\n"))
+            connection.sendall(answer)
+    return requests
+
+
+_CHALLENGE = b'HTTP/1.0 401 Unauthorized\r\nWWW-Authenticate: Digest realm="cam", nonce="7", qop="auth"\r\n\r\n'
+
+
+def test_the_reader_logs_in_by_digest_and_keeps_the_password_to_itself_from_then_on():
+    jpeg = JPEG % 1
+    head = b"HTTP/1.0 200 OK\r\nContent-Type: multipart/x-mixed-replace; boundary=frame\r\n\r\n"
+    stream = head + _PART % len(jpeg) + jpeg + b"\r\n"
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        source = open_source(f"http://me:secret@127.0.0.1:{listener.getsockname()[1]}/video.mjpg?x=1")
+        try:
+            asked = _answer_in_turn(listener, [_CHALLENGE, stream, _CHALLENGE, stream])
+            packet = source.take_newest(5.0)
+        finally:
+            source.close()
+    assert packet is not None and packet.data == jpeg
+    assert b"Authorization: Basic" in asked[0]
+    assert b"Authorization" not in asked[2]
+    for request in (asked[1], asked[3]):
+        assert b'Authorization: Digest username="me", realm="cam", nonce="7", uri="/video.mjpg?x=1"' in request
+        assert b"secret" not in request and b64encode(b"me:secret") not in request
+
+
+def test_a_wrong_password_is_told():
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        source = open_source(f"http://me:wrong@127.0.0.1:{listener.getsockname()[1]}/video.mjpg")
+        try:
+            _answer_in_turn(listener, [_CHALLENGE, _CHALLENGE])
+            wait_for(lambda: "401" in source.detail)
+        finally:
+            source.close()
+
+
 def test_an_absent_camera_is_named():
     with socket.create_server(("127.0.0.1", 0)) as listener:
         port = listener.getsockname()[1]

@@ -126,13 +126,19 @@ def _status(bus: _Published, t: float) -> VehicleStatus:
 
 
 class Cameras:
-    """What the ceiling and the drone's own camera see of the truth."""
+    """What the ceiling and the drone's own camera see of the truth; askew: the ceiling hangs as badly as it may."""
 
-    def __init__(self, recording: Recording, field: ResolvedField, seed: int) -> None:
+    def __init__(self, recording: Recording, field: ResolvedField, seed: int, askew: bool = False) -> None:
         self._truth, self._reported = recording.truth, recording.reported
         self._rng, self._seq = np.random.default_rng(seed), itertools.count()
         drone, ceiling = field.drones[DRONE], field.cameras[CEILING]
         self._marker, self._ceiling = np.array(drone.marker.position_m), np.array(ceiling.position_m)
+        self._looking = np.diag([1.0, -1.0, -1.0])
+        if askew:
+            mounting = np.random.default_rng((seed, 1))
+            self._ceiling = self._ceiling + ceiling.position_std_m * mounting.standard_normal(3)
+            turned = math.radians(ceiling.attitude_std_deg) * mounting.standard_normal(3)
+            self._looking = rotation_from_euler(*turned) @ self._looking
         self._camera = np.array(drone.camera.position_m)
         self._optical = base_from_tilted_optical(math.radians(drone.camera.tilt_down_deg))
 
@@ -140,7 +146,7 @@ class Cameras:
         """Return the ceiling's sighting of the drone."""
         pose = self._truth(t)
         point = pose[:3] + rotation_from_euler(*pose[3:]) @ self._marker - self._ceiling
-        return self._message(CEILING, DRONE, t, np.diag([1.0, -1.0, -1.0]) @ point, float(pose[5]), (0.0, 0.0))
+        return self._message(CEILING, DRONE, t, self._looking @ point, float(pose[5]), (0.0, 0.0))
 
     def onboard(self, t: float) -> RelativeObservation | None:
         """Return the drone's sighting of the target, if it is before its camera and near."""
@@ -232,10 +238,10 @@ class Dark:
 
 
 def arrivals_of(
-    recording: Recording, field: ResolvedField, dark: Dark, seed: int, inertial: bool
+    recording: Recording, field: ResolvedField, dark: Dark, seed: int, inertial: bool, askew: bool = False
 ) -> list[tuple[float, Message]]:
     """Return all messages by time of arrival."""
-    arrivals, cameras = driver_messages(recording, inertial), Cameras(recording, field, seed)
+    arrivals, cameras = driver_messages(recording, inertial), Cameras(recording, field, seed, askew)
     for t in np.arange(ALOFT_S, recording.end_s, FRAME_S).tolist():
         if not dark.hides(t):
             arrivals.append((t + VIDEO_LATE_S[CEILING], cameras.ceiling(t)))
@@ -245,12 +251,14 @@ def arrivals_of(
     return sorted(arrivals, key=lambda arrival: arrival[0])
 
 
-def fly(recording: Recording, field: ResolvedField, dark: Dark, seed: int = 1, inertial: bool = True) -> Score:
+def fly(
+    recording: Recording, field: ResolvedField, dark: Dark, seed: int = 1, inertial: bool = True, askew: bool = False
+) -> Score:
     """Feed the flight to a tracker and return how far its belief was from the truth."""
     lab = field_for_flight(field)
     tracker, score = tracker_from_field(lab, CLOCK, 1), Score(recording)
     due = 0.0
-    for t, message in arrivals_of(recording, lab, dark, seed, inertial):
+    for t, message in arrivals_of(recording, lab, dark, seed, inertial, askew):
         while due <= t:
             belief = tracker.advance(ns(due))
             if due >= JUDGED_FROM_S:

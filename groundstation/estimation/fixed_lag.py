@@ -15,10 +15,11 @@ from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.correction import is_distribution
 from groundstation.estimation.event_kernels import event_kernels
 from groundstation.estimation.event_log import EventLog, change_values, observation_values
-from groundstation.estimation.filter_state import Belief, Inputs, Moments, Span
+from groundstation.estimation.filter_state import Belief, Inputs, Span
 from groundstation.estimation.layout import EntityKind, StateLayout
 from groundstation.estimation.measurement import Correction, Measurement, OdometrySample, SensorReading
 from groundstation.estimation.models.protocol import DrivenModel
+from groundstation.estimation.modes import moments_of
 from groundstation.estimation.odometry_ring import OdometryRing
 from groundstation.estimation.parameters import EstimatorParameters
 from groundstation.estimation.records import ADMITTED, COMPARED, DISMISSED, OBSERVATION, PLACED, REPORTED
@@ -242,7 +243,7 @@ class FixedLagFilter:
         self._odometry = OdometryRing(ring, len(self.names))
         self._log = EventLog()
         self._fresh: dict[int, tuple[str, str, float]] = {}
-        self._moments = Moments(self._state.means[0].copy(), self._state.covariances[0].copy())
+        self._moments = moments_of(self._state)
         self._velocities: dict[str, Vector3] = {}
         self._started = False
         self._origin_ns = self._now_ns = self._last = self._dirty = 0

@@ -10,13 +10,16 @@ from groundstation.kernel import caller, kernel
 
 
 def predict(belief: Belief, e: int, dt: float) -> None:
-    """Move one entity's block of the mean, and P with it."""
+    """Move one entity's block of the mean, and P with it.
+
+    The mean may begin with the block, and P be the block beside an identity (ahead.py): nothing else is read.
+    """
 
 
 def begin(belief: Belief, deferred: Deferred, odometry: CondensedOdometry, e: int, step_s: float, gate: float) -> None:
     """Take one step's condensed odometry of one entity; gate: of a single row.
 
-    deferred: corrections not yet made in P.
+    deferred: corrections not yet made in P. P is only read or changed in a step with a height (ahead.py).
     """
 
 

@@ -8,7 +8,7 @@ Kirubarajan (2001), section 11.6.6.
 
 from groundstation.arrays import Matrix, MatrixStack, Vector
 from groundstation.estimation.filter_state import Moments, State, Tables
-from groundstation.estimation.linear import copy_matrix, wrap
+from groundstation.estimation.linear import wrap
 from groundstation.estimation.records import EntityRow
 from groundstation.kernel import Rows, kernel
 
@@ -78,13 +78,16 @@ def mix(state: State, tables: Tables) -> None:
         write_moments(old_means, old_P, share, tables.entities[0], work, out)
 
 
+def moments_of(state: State) -> Moments:
+    """Return where the belief over all modes is to be written; the only mode's own arrays if there is one."""
+    moments = Moments(state.means[0], state.covariances[0])
+    return moments if len(state.weights) == 1 else Moments(*(part.copy() for part in moments))
+
+
 @kernel()
 def combine(state: State, tables: Tables, out: Moments) -> None:
-    """Write the belief over all modes."""
+    """Write the belief over all modes; a single one is that belief (`moments_of`)."""
     if state.means.shape[0] == 1:
-        for j in range(out.mean.shape[0]):
-            out.mean[j] = state.means[0, j]
-        copy_matrix(state.covariances[0], out.P)
         return
     work = state.means[:2].copy()
     write_moments(state.means, state.covariances, state.weights, tables.entities[0], work, out)

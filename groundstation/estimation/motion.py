@@ -11,7 +11,7 @@ from typing import NamedTuple
 from groundstation.arrays import Matrix, Vector
 from groundstation.estimation.filter_state import Belief
 from groundstation.estimation.model_kernels import call_predict
-from groundstation.estimation.records import YAW, PriorRow, X, Y, Z
+from groundstation.estimation.records import YAW, EntityRow, PriorRow, X, Y, Z
 from groundstation.estimation.register_blocks import LANES, add_to_row, add_two_to_row, copy_to_columns, scale_row
 from groundstation.kernel import kernel
 
@@ -96,27 +96,39 @@ def copy_out(P: Matrix, first: int, stop: int) -> None:
     copy_to_columns(P, first, stop - first, stop, P.shape[0])
 
 
+@kernel(inlined=True)
+def open_rows(P: Matrix, entity: EntityRow, first: int, stop: int) -> int:
+    """Prepare an entity's rows to be moved; returns the first row that is then not yet copied to the columns.
+
+    Rows first..stop were not. They go on waiting if they belong to neighbours whose blocks share cache lines with the
+    entity's, which gets what it needs of them.
+    """
+    start, end = entity.start, entity.start + entity.size
+    if start != stop or start % LANES == 0 or end - first > _MOST_ROWS:
+        copy_out(P, first, stop)
+        return int(start)
+    copy_to_columns(P, first, start - first, start, end)
+    return first
+
+
+@kernel(inlined=True)
+def finish_rows(P: Matrix, entity: EntityRow, first: int) -> int:
+    """Give neighbours whose rows wait, from `first` on, what they need of an entity's moved rows; returns their end."""
+    copy_to_columns(P, entity.start, entity.size, first, entity.start)
+    return int(entity.start + entity.size)
+
+
 @kernel()
 def predict(belief: Belief, dt: float) -> None:
-    """Predict all entities that are in the state, each by its own model's kernel; P stays exactly symmetric.
-
-    Rows first..stop are not yet copied to the columns; they belong to neighbours whose blocks share cache lines.
-    """
+    """Predict all entities that are in the state, each by its own model's kernel; P stays exactly symmetric."""
     P, first, stop = belief.P, 0, 0
     for e in range(belief.entities.shape[0]):
         entity = belief.entities[e]
         if belief.memory[e].active == 0 or entity.predict == 0:
             continue
-        start, end = entity.start, entity.start + entity.size
-        if start != stop or start % LANES == 0 or end - first > _MOST_ROWS:
-            copy_out(P, first, stop)
-            first = stop = start
-        if first < start:
-            copy_to_columns(P, first, start - first, start, end)
+        first = open_rows(P, entity, first, stop)
         call_predict(entity.predict, (belief, e, dt))
-        if first < start:
-            copy_to_columns(P, start, end - start, first, start)
-        stop = end
+        stop = finish_rows(P, entity, first)
     copy_out(P, first, stop)
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 
 from groundstation.arrays import IntVector
+from groundstation.estimation.ahead import is_reading, predict_ahead, quiet_from
 from groundstation.estimation.deferred import make_all
 from groundstation.estimation.filter_state import (
     Checkpoints,
@@ -18,7 +19,7 @@ from groundstation.estimation.linear import copy_matrix
 from groundstation.estimation.model_kernels import call_begin, call_handle
 from groundstation.estimation.modes import combine, mix
 from groundstation.estimation.motion import predict
-from groundstation.estimation.records import COMPARED, OBSERVATION, REPORTED, CondensedOdometry, EntityMemory, EventRow
+from groundstation.estimation.records import CondensedOdometry, EntityMemory
 from groundstation.estimation.register_blocks import copy_upper_blocks, reflect
 from groundstation.kernel import Rows, copy_rows, kernel
 
@@ -60,12 +61,6 @@ def checkpoint(ring: Checkpoints, step: int, state: State) -> State:
 
 
 @kernel(inlined=True)
-def is_reading(event: EventRow) -> bool:
-    """Return whether an event is a sensor's reading, not a change of the entities in the state."""
-    return bool(event.kind == OBSERVATION or event.kind == REPORTED or event.kind == COMPARED)
-
-
-@kernel(inlined=True)
 def predict_modes(state: State, tables: Tables, dt: float) -> None:
     """Predict all modes, after the deferred corrections."""
     make_all(state)
@@ -87,10 +82,13 @@ def replay(
     copy_state(checkpoint(ring, span.first, state), state)
     for m in range(state.covariances.shape[0]):
         reflect(state.covariances[m])
-    i = 0
+    i, quiet = 0, quiet_from(inputs, span, state.means.shape[0])
     for k in range(span.first, span.last + 1):
         if span.first < k <= span.waiting:
             copy_state(state, checkpoint(ring, k, state))
+        if k == quiet:
+            predict_ahead(state, tables, inputs, span, k)
+            break
         mix(state, tables)
         begin_step(state, tables, inputs.odometry[k % ring.means.shape[0]])
         t = k * step_s

@@ -8,7 +8,7 @@ import numpy as np
 
 from groundstation.arrays import Matrix
 from groundstation.kernel import kernel
-from groundstation.planning.dense import PIVOTS, copy_upper, padded, subtract_products
+from groundstation.planning.dense import PIVOTS, copy_upper, multiply, multiply_to_symmetric, padded
 from groundstation.planning.elimination import negative_inverse
 from groundstation.planning.records import TARGET_STATES, CostOptions
 
@@ -74,9 +74,5 @@ def invert(A: Matrix) -> None:
 @kernel()
 def between(A: Matrix, B: Matrix, C: Matrix, work: Matrix) -> None:
     """C <- A B A for symmetric A as `room_for` returns them; work (m, m)."""
-    m = A.shape[0]
-    for i in range(m):
-        for j in range(m):
-            work[i, j] = C[i, j] = 0.0
-    subtract_products(work, A, B, m)
-    subtract_products(C, work, A, m)
+    multiply(B, A, work)
+    multiply_to_symmetric(A, work, C)

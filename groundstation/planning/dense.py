@@ -16,6 +16,7 @@ from numba.extending import intrinsic
 from groundstation.arrays import Matrix
 from groundstation.estimation.register_blocks import LANES, reflect
 from groundstation.kernel import kernel
+from groundstation.planning.lanes import Lanes, in_lanes, index, nothing, repeated
 
 PIVOTS = 4
 
@@ -92,6 +93,35 @@ def subtract_products(target: Matrix, matrix: Matrix, columns: Matrix, count: in
         for a in range(0, m, 4):
             factors = columns.ctypes.data + c * stride + a * 8
             _rank4(target.ctypes.data + c * stride, matrix.ctypes.data + a * stride, stride, factors, 8, stride, m >> 3)
+
+
+@in_lanes
+def _write_block(b: Any, A: Any, B: Any, C: Any, row: Any, column: Any) -> None:
+    """Write the 8 x 8 block of A^T B that begins at (row, column) to C."""
+
+    def add(k: Any, sums: list[Lanes]) -> list[Lanes]:
+        factors = B.read(k, column)
+        return [total.plus(A.one(k, b.add(row, index(i))).times(factors)) for i, total in enumerate(sums)]
+
+    for i, total in enumerate(repeated(b, A.shape(0), [nothing(b)] * LANES, add)):
+        C.write(total, b.add(row, index(i)), column)
+
+
+@kernel()
+def multiply(A: Matrix, B: Matrix, C: Matrix) -> None:
+    """C <- A^T B, in blocks that stay in registers."""
+    for row in range(0, C.shape[0], LANES):
+        for column in range(0, C.shape[1], LANES):
+            _write_block(A, B, C, row, column)
+
+
+@kernel()
+def multiply_to_symmetric(A: Matrix, B: Matrix, C: Matrix) -> None:
+    """C <- A^T B where that is symmetric: one half, copied to the other."""
+    for row in range(0, C.shape[0], LANES):
+        for column in range(row, C.shape[1], LANES):
+            _write_block(A, B, C, row, column)
+    reflect(C)
 
 
 @kernel()

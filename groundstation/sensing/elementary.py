@@ -6,7 +6,7 @@ _LEAST = -40.0
 _LOG_MIDDLE = 0.8958797346140275  # of the square root of 6
 
 
-@kernel(inlined=True)
+@kernel(inlined=True, contract=True)
 def decay(exponent: float) -> float:
     """Return exp(exponent) for an exponent of at most 0, to 1e-12 of it from -20 on; 0 below -40."""
     y = (exponent if exponent > _LEAST else _LEAST) / 128.0
@@ -22,7 +22,7 @@ def decay(exponent: float) -> float:
     return y if exponent > _LEAST else 0.0
 
 
-@kernel(inlined=True)
+@kernel(inlined=True, contract=True)
 def log_of_sum(total: float) -> float:
     """Return log(total) of a sum of up to six shares, the largest of them 1: for 1 to 6, to 1e-10."""
     ratio = total * 0.4082482904638631

@@ -103,7 +103,7 @@ def lesser(a: float, b: float) -> float:
     return a if a < b else b
 
 
-@kernel(inlined=True)
+@kernel(inlined=True, contract=True)
 def margin(view: ViewLimits, x: float, y: float, z: float, distance: float) -> Availability:
     """Return the soft minimum of the distances to the view's limits at an optical point [m], and its derivatives.
 
@@ -130,7 +130,7 @@ def margin(view: ViewLimits, x: float, y: float, z: float, distance: float) -> A
     )
 
 
-@kernel(inlined=True)
+@kernel(inlined=True, contract=True)
 def available(
     view: ViewLimits, x: float, y: float, z: float, blur_m2: float, turn_rad2: float, share: float
 ) -> Availability:
@@ -145,25 +145,25 @@ def available(
     error = math.sqrt(error2 + 1e-12)
     inside = m.a - view.caution * error
     # A logistic edge, seen with a Gaussian error, is again nearly logistic (MacKay 1992): only wider.
-    width2 = view.width_m * view.width_m + SPREAD * error2
-    width = math.sqrt(width2)
-    rare = decay(-abs(inside) / width)
+    per_width = 1.0 / math.sqrt(view.width_m * view.width_m + SPREAD * error2)
+    per_tail, over = 1.0 / view.tail_m, inside * per_width
+    rare = decay(-abs(over))
     rare = rare / (1.0 + rare)
     logistic = rare if inside < 0.0 else 1.0 - rare
-    ratio = lesser(inside, 0.0) / view.tail_m
+    ratio = lesser(inside, 0.0) * per_tail
     flat = 1.0 / (1.0 + ratio * ratio)
-    slope = -2.0 * ratio / view.tail_m * flat * flat
-    steep = (1.0 - share) * logistic * (1.0 - logistic) / width
+    slope = -2.0 * ratio * per_tail * flat * flat
+    steep = (1.0 - share) * logistic * (1.0 - logistic) * per_width
     inwards = steep + share * slope
     # d width = SPREAD turn / width * (x, y, z), d error = turn / error * (x, y, z)
-    widening = -steep * inside / width2 * SPREAD * turn_rad2 - inwards * view.caution * turn_rad2 / error
+    widening = -(steep * over * per_width * SPREAD + inwards * view.caution / error) * turn_rad2
     return Availability(
         (1.0 - share) * logistic + share * flat,
         inwards * m.a_x + widening * x, inwards * m.a_y + widening * y, inwards * m.a_z + widening * z,
     )  # fmt: skip
 
 
-@kernel()
+@kernel(contract=True)
 def available_at_once(views: Matrix, points: Matrix, found: Matrix) -> None:
     """Write `available` (4, m) of m optical points (3, m) [m], each seen by a camera of its own.
 

@@ -63,7 +63,7 @@ class Flight:
         ]
 
 
-def test_what_waited_gives_the_same_belief_to_the_bit() -> None:
+def test_what_waited_gives_the_same_belief() -> None:
     flights = [Flight(parameters) for parameters in (AT_ONCE, WAITING)]
     for _ in range(2):  # nothing is carried on in which the present beliefs differ by rounding
         for flight in flights:

@@ -7,6 +7,7 @@ machine makes the flight slower.
 
 import json
 import math
+import random
 import sys
 import time
 from collections.abc import Iterator, Mapping
@@ -30,6 +31,9 @@ MIXED_TEAM = HERE.parents[1] / "config" / "mixed-team.yaml"
 FIRST_SYSTEM = 8
 SLICE_NS, ESTIMATE_NS = 10_000_000, 20_000_000
 READY_S, SILENT_S = 120.0, 20.0
+# PX4's simulator shakes its sensors by the same random numbers at each start: flights that begin at the same time after
+# it are one draw of them. The seed decides how long after it they begin.
+WAITS_AT_MOST_S = 8.0
 
 
 class FirmwareStudy(Study):
@@ -60,6 +64,7 @@ class Room:
         self.flying = False
         self.trace: list[dict[str, Any]] = []
         self._now_ns = self._next_estimate_ns = 0
+        self._waits_s = 1.0 + random.Random(seed).uniform(0.0, WAITS_AT_MOST_S)
         self.seats: list[Seat] = []
         try:
             for system, (name, flavour) in enumerate(flavours.items(), FIRST_SYSTEM):
@@ -162,7 +167,7 @@ class Room:
         ready = self.until(lambda: all(_is_ready(seat) for seat in self.seats), READY_S)
         assert ready, self.said()
         assert self._now_ns and all(s.puppet.poses for s in self.seats), "neither time nor true pose is heard"
-        self.until(lambda: False, 1.0)
+        self.until(lambda: False, self._waits_s)
 
     def said(self) -> str:
         """Return what the drivers are about, for the reader of a failure."""

@@ -84,7 +84,8 @@ class VehicleHost:
             if isinstance(received.message, VelocitySetpoint):
                 self._count("setpoint", self.watchdog.accept_setpoint(now_ns, received.message))
         decision = self.watchdog.step(now_ns, view, self._upstream())
-        self._told = decision = replace(decision, seen_m_s=self._seen.velocity(now_ns))
+        seen, why = self._seen.velocity(now_ns), self.watchdog.failsafe
+        self._told = decision = replace(decision, seen_m_s=seen, failsafe=why)
         self.vehicle.apply(now_ns, decision)
         self._report(now_ns, view, decision)
         return decision

@@ -116,7 +116,7 @@ class Watchdog:
                 return self._obey_track(now_ns, command)
 
     def _obey_land(self, now_ns: int, command: Command) -> str:
-        if self.mode in ALOFT:
+        if self.mode in ALOFT or (self.mode is DriverMode.LANDING and self.failsafe):
             return self._enter(now_ns, DriverMode.LANDING, f"landing for {command.issuer}")
         if self.mode is DriverMode.CUT:
             return "motors are cut"

@@ -157,7 +157,7 @@ class WatchdogDecision:
     velocity forward and left by cameras, for a vehicle that brakes without a velocity of its own; None if they do not
     see it. entered_ns: when it entered the mode, or was last ordered into it; only an operator's order leads to TRACK.
     back_m_s: of a vehicle that is to hover, the velocity forward and left back to its place; None: it holds its place
-    by itself.
+    by itself. failsafe: the condition of the row that caused the mode, "" after an order.
     """
 
     mode: DriverMode
@@ -170,3 +170,4 @@ class WatchdogDecision:
     seen_m_s: tuple[float, float] | None = None
     entered_ns: int = 0
     back_m_s: tuple[float, float] | None = None
+    failsafe: str = ""

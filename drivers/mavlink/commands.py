@@ -10,6 +10,7 @@ from collections import deque
 from drivers.mavlink.convert import setpoint_from_velocity
 from drivers.mavlink.drift import DriftFeedback
 from drivers.mavlink.lift_off import LiftOff
+from drivers.mavlink.pilot import LandingPilot
 from drivers.mavlink.requests import Requests
 from drivers.mavlink.settings import VehicleSettings
 from drivers.mavlink.wire.flight import SetPositionTargetLocalNed
@@ -35,6 +36,8 @@ _TAKEN_OVER_NS = 1_500 * NS_PER_MS
 _REGAIN_NS = 1_400 * NS_PER_MS
 # An older text explains no present event.
 _EXPLAINS_NS = 4 * NS_PER_S
+# ArduPilot's text comes just after the heartbeat with the mode.
+_EXPLAINED_NS = 200 * NS_PER_MS
 _STILL: Vector3 = (0.0, 0.0, 0.0)
 # The end of a climb is slower, so that it stops at the requested height.
 _CLIMBED, _CLIMB_GAIN, _LEAST_CLIMB_M_S = 0.95, 1.2, 0.12
@@ -49,6 +52,7 @@ class Orders:
         self.events: deque[tuple[int, str]] = deque(maxlen=32)
         self.said: deque[tuple[int, str]] = deque(maxlen=8)
         self.starting = False
+        self.pilot = LandingPilot(flavour)
         self.lift = LiftOff()
         self.drift = DriftFeedback()
         self._vehicle, self._flavour, self._requests = vehicle, flavour, requests
@@ -61,11 +65,17 @@ class Orders:
         self._told_ns = -1
         self._guided_ns = self._regain_until_ns = 0
         self._started = self._taken_over = False
-        self._ordered_ns = -1
+        self._why = ""
+        self._ordered_ns = self._landing_ns = -1
 
     def are_heeded(self, now_ns: int, custom_mode: int) -> bool:
         """Return whether the vehicle obeys our setpoints, not a pilot's or its own."""
         return custom_mode == self._guided and not self._taken_over and not self.climbs_by_itself(now_ns)
+
+    @property
+    def yields(self) -> str:
+        """Return why it is not ours to fly, "" while it is."""
+        return self._why if self._taken_over and self._action in (Action.FLY, Action.HOVER) else ""
 
     def climbs_by_itself(self, now_ns: int) -> bool:
         """Return whether the vehicle ends its take-off by itself, without setpoints."""
@@ -73,10 +83,9 @@ class Orders:
         return hovers and self._rises_to_take_off and now_ns < self._climb_until_ns
 
     def last_said(self, now_ns: int) -> str:
-        """Return the vehicle's last text, if recent: it explains a change of its mode."""
-        if not self.said or now_ns - self.said[-1][0] > _EXPLAINS_NS:
-            return ""
-        return f" ({self.said[-1][1]})"
+        """Return the vehicle's last text before it left our mode, if recent: it explains that; later ones do not."""
+        texts = [(at, text) for at, text in self.said if at <= self._guided_ns + _EXPLAINED_NS]
+        return f" ({texts[-1][1]})" if texts and now_ns - texts[-1][0] <= _EXPLAINS_NS else ""
 
     def see(self, now_ns: int, good: EntityEstimate, reported_m_s: Vector3 | None) -> bool:
         """Take a good estimate and the velocity [base_stabilized] reported at that time; return whether both count.
@@ -114,12 +123,7 @@ class Orders:
                 self._end_climb(now_ns, decision.mode, climb_m_s)
                 return self._hover(now_ns, guided, climbed_m, decision.back_m_s)
             case Action.LAND:
-                # A report that it lands already or has disarmed may be wrong: it is commanded until it has once
-                # accepted.
-                if "landing" not in self._requests.accepted or (armed and custom_mode != self._landing):
-                    self._ask(now_ns, "landing", MavCmd.NAV_LAND)
-                # Until it obeys it must not fly on at the last velocity.
-                return self._stand(now_ns) if armed and guided else None
+                return self._land(now_ns, decision, armed, guided, custom_mode)
             case Action.CUT:
                 if armed:
                     self._ask(now_ns, "motor cut", MavCmd.COMPONENT_ARM_DISARM, 0.0, FORCE)
@@ -184,9 +188,29 @@ class Orders:
             self._yield(now_ns, f"is in {mode_name(self._flavour, custom_mode)}")
 
     def _yield(self, now_ns: int, why: str) -> None:
-        self._taken_over = True
-        text = f"{self._vehicle.name} {why}: not ours to fly until RESUME"
-        self.events.append((MavSeverity.WARNING, text + self.last_said(now_ns)))
+        self._taken_over, self._why = True, f"it {why}: not ours to fly until RESUME"
+        self.events.append((MavSeverity.WARNING, self._why + self.last_said(now_ns)))
+
+    def _land(
+        self, now_ns: int, decision: WatchdogDecision, armed: bool, guided: bool, custom_mode: int
+    ) -> SetPositionTargetLocalNed | None:
+        if decision.mode is DriverMode.LANDING and decision.entered_ns != self._landing_ns:
+            self._landing_ns = decision.entered_ns
+            self._requests.accepted.discard("landing")
+            self.pilot.start_over()
+        # Who ordered a landing gets it, but once: a pilot may take over from it, or from what a failsafe would do.
+        begun = bool(decision.failsafe) or "landing" in self._requests.accepted
+        if armed and begun and self.pilot.lands(now_ns, custom_mode):
+            self._requests.drop("landing")
+            if self.pilot.is_news(now_ns):
+                name = mode_name(self._flavour, custom_mode)
+                self.events.append((MavSeverity.WARNING, f"it is in {name}: its pilot lands it, nobody else does"))
+            return None
+        # A report that it lands already or has disarmed may be wrong: it is commanded until it has once accepted.
+        if "landing" not in self._requests.accepted or (armed and custom_mode != self._landing):
+            self._ask(now_ns, "landing", MavCmd.NAV_LAND)
+        # Until it obeys it must not fly on at the last velocity.
+        return self._stand(now_ns) if armed and guided else None
 
     def _watch_start(self, now_ns: int, armed: bool, guided: bool, custom_mode: int) -> None:
         # Only a pilot, a second ground station or the autopilot itself ends what has begun: a second request would make

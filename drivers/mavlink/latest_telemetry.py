@@ -18,6 +18,7 @@ class LatestTelemetry:
     """The last reports; times 0: never. moved_ns, attitude_ns: of the last velocity and attitude.
 
     asked_ns: of the last request for our time; disarmed_ns: since when heartbeats report again that its motors stand.
+    transmitter: it hears a pilot's transmitter.
     """
 
     heard_ns: int = 0
@@ -31,6 +32,7 @@ class LatestTelemetry:
     landed: int = 0
     landed_ns: int = 0
     healthy: int = 0
+    transmitter: bool = False
     ekf: int = 0
     battery: float | None = None
     battery_ns: int = 0

@@ -21,7 +21,7 @@ from drivers.mavlink.traffic import Traffic
 from drivers.mavlink.vision import VisionFeed
 from drivers.mavlink.wire import flight, service, telemetry
 from drivers.mavlink.wire.errors import WireError
-from drivers.mavlink.wire.names import ARMED, AUTOPILOT_COMPONENT, Flavour, Landed, MavSeverity
+from drivers.mavlink.wire.names import ARMED, AUTOPILOT_COMPONENT, Flavour, Landed, MavSeverity, SensorBits
 from drivers.plausibility.health import Health
 from drivers.plausibility.motion import MotionMonitor
 from drivers.watchdog_types import VehicleView, WatchdogDecision
@@ -140,7 +140,10 @@ class MavlinkVehicle:
             case telemetry.ExtendedSysState():
                 return replace(known, landed=message.landed_state, landed_ns=now_ns)
             case telemetry.SysStatus():
-                known = replace(known, healthy=message.onboard_control_sensors_health)
+                healthy = message.onboard_control_sensors_health
+                # WIRE (PX4): the health of what is not there is good as well.
+                heard = message.onboard_control_sensors_present & healthy & SensorBits.RC_RECEIVER
+                known = replace(known, healthy=healthy, transmitter=bool(heard))
                 return _charged(now_ns, message.battery_remaining, known)
             case telemetry.BatteryStatus(id=0):  # the others feed a payload
                 return _charged(now_ns, message.battery_remaining, known)
@@ -226,6 +229,7 @@ class MavlinkVehicle:
         messages += self._feed(now_ns, known)
         up = (known.position_m[2] if known.position_m else 0.0, known.velocity_m_s[2])
         landed = self._landed(now_ns, known)
+        self.orders.pilot.transmitter = known.transmitter
         setpoint = self.orders.step(now_ns, decision, known.base_mode, known.custom_mode, landed, *up)
         messages += self._requests.due(now_ns)
         if setpoint is not None:
@@ -284,7 +288,7 @@ class MavlinkVehicle:
         rate_hz, quality = self._traffic.rates(now_ns)
         lost_s, limit_s = self.vision.lost_s(now_ns), self._settings.vision.hover_after_s
         lost = f"no position from the cameras for {lost_s:.1f} s" if lost_s >= limit_s else ""
-        detail = lost or self._session.detail(self._requests)
+        detail = lost or self.orders.yields or self._session.detail(self._requests)
         rejected = dict(self._link.rejected.copy() + self._refused)
         clocks, firmware = self._plausibility.clock.figures, self._session.firmware
         return LinkHealth(quality, rate_hz, rejected, detail, clocks, firmware, self._asks_time(now_ns))

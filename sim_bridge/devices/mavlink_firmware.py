@@ -30,7 +30,10 @@ _OK: Answer = (MavResult.ACCEPTED, "")
 
 
 class AutopilotFirmware:
-    """One autopilot around a body of the world, with overrides by flavour. texts: (severity, line) to send."""
+    """One autopilot around a body of the world, with overrides by flavour. texts: (severity, line) to send.
+
+    transmitter: it hears a pilot's.
+    """
 
     flavour: Flavour
     guided: int
@@ -39,7 +42,7 @@ class AutopilotFirmware:
 
     def __init__(self, copter: MavlinkCopter, parameters: Parameters, start_mode: int) -> None:
         self.copter, self.parameters = copter, parameters
-        self.armed = False
+        self.armed = self.transmitter = False
         self.mode = start_mode
         self.texts: deque[tuple[int, str]] = deque(maxlen=32)
         self.origin: tuple[int, int, int] | None = None

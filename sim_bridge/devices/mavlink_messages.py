@@ -102,6 +102,8 @@ class Speaker:
             healthy |= SensorBits.VISION_POSITION
         if self._firmware.global_position:
             healthy |= SensorBits.GPS
+        if self._firmware.transmitter:
+            healthy |= SensorBits.RC_RECEIVER
         ardupilot = isinstance(self._firmware, ArduCopter)
         if (ardupilot or self._firmware.global_position) and not self._firmware.health_fault():
             healthy |= SensorBits.PREARM_CHECK
@@ -109,6 +111,9 @@ class Speaker:
         if ardupilot:
             # WIRE (ArduPilot, GCS.cpp): a fence that does not exist is healthy; else MAVProxy reports a breach.
             healthy |= SensorBits.GEOFENCE
+        else:
+            # WIRE (PX4 1.16): what is not there is healthy.
+            healthy |= SensorBits.RC_RECEIVER
         return t.SysStatus(present, present, healthy, 300, self._millivolts, 500, self._percent)
 
     @property

@@ -85,6 +85,7 @@ class SensorBits(IntFlag):
     MAGNETOMETER = 0x4
     GPS = 0x20
     VISION_POSITION = 0x80
+    RC_RECEIVER = 0x10000
     GEOFENCE = 0x100000
     PREARM_CHECK = 0x10000000
 
@@ -110,6 +111,7 @@ class Px4Main(IntEnum):
     ALTITUDE = 2
     POSITION = 3
     AUTO = 4
+    ACRO = 5
     OFFBOARD = 6
     STABILIZED = 7
 
@@ -128,6 +130,7 @@ class CopterMode(IntEnum):
     """ArduCopter's custom_mode."""
 
     STABILIZE = 0
+    ACRO = 1
     ALT_HOLD = 2
     AUTO = 3
     GUIDED = 4
@@ -152,6 +155,19 @@ def guided_mode(flavour: Flavour) -> int:
 def land_mode(flavour: Flavour) -> int:
     """Return the custom_mode in which it lands by itself."""
     return px4_mode(Px4Main.AUTO, Px4Auto.LAND) if flavour is Flavour.PX4 else CopterMode.LAND
+
+
+_STICKS = {
+    Flavour.PX4: frozenset(
+        px4_mode(main) for main in (Px4Main.MANUAL, Px4Main.ALTITUDE, Px4Main.ACRO, Px4Main.STABILIZED)
+    ),
+    Flavour.ARDUPILOT: frozenset((CopterMode.STABILIZE, CopterMode.ACRO, CopterMode.ALT_HOLD)),
+}
+
+
+def flies_by_sticks(flavour: Flavour, custom_mode: int) -> bool:
+    """Return whether a pilot's sticks alone fly it in a mode, without a position."""
+    return custom_mode in _STICKS[flavour]
 
 
 def mode_name(flavour: Flavour, custom_mode: int) -> str:

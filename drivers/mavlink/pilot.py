@@ -1,0 +1,40 @@
+"""Judges whether a pilot lands a vehicle that we want to land: their sticks have the last word. Pure.
+
+Only modes that fly by sticks, without a position, and only while the vehicle hears a transmitter: nobody sits behind
+any other mode, and without our positions it would not hold its place in them.
+"""
+
+from drivers.mavlink.wire.names import Flavour, flies_by_sticks
+from groundstation.time_units import NS_PER_MS
+
+# A heartbeat may still name the mode that a landing has just ended.
+_CERTAIN_NS = 1_500 * NS_PER_MS
+
+
+class LandingPilot:
+    """transmitter: the vehicle hears one."""
+
+    def __init__(self, flavour: Flavour) -> None:
+        self.transmitter = False
+        self._flavour = flavour
+        self._since_ns: int | None = None
+        self._told = False
+
+    def start_over(self) -> None:
+        """Begin a new landing."""
+        self._since_ns, self._told = None, False
+
+    def lands(self, now_ns: int, custom_mode: int) -> bool:
+        """Return whether a pilot flies it now."""
+        if not self.transmitter or not flies_by_sticks(self._flavour, custom_mode):
+            self._since_ns = None
+            return False
+        self._since_ns = self._since_ns or now_ns
+        return True
+
+    def is_news(self, now_ns: int) -> bool:
+        """Return once in a landing that this has lasted long enough to be told."""
+        if self._told or self._since_ns is None or now_ns - self._since_ns < _CERTAIN_NS:
+            return False
+        self._told = True
+        return True

@@ -1,0 +1,80 @@
+"""A pilot with a transmitter has the last word on who lands a vehicle; without one, the driver has."""
+
+import pytest
+
+from drivers.mavlink.wire.flight import CommandLong
+from drivers.mavlink.wire.names import CopterMode, Flavour, MavCmd, Px4Main, px4_mode
+from groundstation.bus.messages import Verb
+
+_STICKS = {Flavour.PX4: px4_mode(Px4Main.ALTITUDE), Flavour.ARDUPILOT: CopterMode.ALT_HOLD}
+_PLACES = {Flavour.PX4: px4_mode(Px4Main.POSITION), Flavour.ARDUPILOT: CopterMode.POSHOLD}
+
+
+def landings(rig) -> int:
+    return sum(m.command == MavCmd.NAV_LAND for _, m in rig.sent(CommandLong))
+
+
+def take_over(rig, mode):
+    rig.track_on()
+    rig.emulator.firmware.transmitter = True
+    rig.run(1.0)  # its health is told twice a second
+    rig.emulator.firmware.enter(mode)
+    rig.run(2.0)
+    rig.link.sent.clear()
+
+
+def lose_positions(rig):
+    rig.sees = False
+    rig.until(lambda: rig.mode == "LANDING", 6.0)
+    rig.run(2.5)
+
+
+def test_what_flies_by_sticks_is_not_landed_by_a_failsafe(rig):
+    take_over(rig, _STICKS[rig.flavour])
+    lose_positions(rig)
+    assert not landings(rig)
+    assert sum("its pilot lands it" in text for text in rig.texts) == 1
+
+
+def test_it_is_landed_once_the_pilot_gives_it_back(rig):
+    take_over(rig, _STICKS[rig.flavour])
+    lose_positions(rig)
+    rig.emulator.firmware.enter(rig.emulator.firmware.guided)
+    rig.run(1.5)
+    assert landings(rig) and rig.emulator.firmware.mode == rig.emulator.firmware.landing
+
+
+def test_it_is_landed_once_the_transmitter_is_silent(rig):
+    take_over(rig, _STICKS[rig.flavour])
+    lose_positions(rig)
+    rig.emulator.firmware.transmitter = False
+    rig.run(1.5)
+    assert landings(rig)
+
+
+def test_it_is_landed_in_a_mode_that_needs_a_position(rig):
+    take_over(rig, _PLACES[rig.flavour])
+    lose_positions(rig)
+    assert landings(rig)
+
+
+@pytest.mark.parametrize("heard", [True, False])
+def test_who_takes_over_from_a_landing_keeps_it_by_a_transmitter_only(rig, heard):
+    rig.track_on()
+    firmware = rig.emulator.firmware
+    firmware.transmitter = heard
+    rig.run(1.0)
+    rig.order(Verb.LAND)
+    rig.until(lambda: firmware.mode == firmware.landing, 2.0)
+    rig.link.sent.clear()
+    firmware.enter(_STICKS[rig.flavour])
+    rig.run(2.0)
+    assert bool(landings(rig)) is not heard
+
+
+def test_an_operators_landing_is_sent_to_a_pilot_too(rig):
+    take_over(rig, _STICKS[rig.flavour])
+    lose_positions(rig)
+    rig.order(Verb.LAND)
+    rig.run(1.0)
+    assert landings(rig)

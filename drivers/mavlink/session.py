@@ -161,8 +161,17 @@ class MavlinkSession:
         """Take a parameter's value; raises WireError."""
         if message.param_id in self._by_name:
             value = value_from_carried(self._flavour, message.param_value, message.param_type)
+            before = self._found.get(message.param_id, value)
             self._found[message.param_id], self._comparison = value, None
-            self._note_doubtful(self._by_name[message.param_id], {message.param_id: value})
+            wanted = self._by_name[message.param_id]
+            if value != before:
+                self._note_change(wanted, message.param_id, before, value)
+            self._note_doubtful(wanted, {message.param_id: value})
+
+    def _note_change(self, wanted: parameters.Needed, name: str, before: float, value: float) -> None:
+        """Report a value that somebody else changed: autopilots tell it on all their links."""
+        needs = "" if wanted.takes(value) else f", needs {wanted.wish} ({wanted.reason})"
+        self.notes.append(f"somebody changed its parameter {name} from {before:.7g} to {value:.7g}{needs}")
 
     def _note_doubtful(self, wanted: parameters.Needed, found: dict[str, float]) -> None:
         """Report once a value that permits flight but is not the best."""

@@ -34,6 +34,7 @@ class Texts:
                     del self._pieces[next(iter(self._pieces))]
                 return None
             text = "".join(self._pieces.pop(message.id))
+        text = text.rstrip()  # WIRE (PX4): a tab at the end says that the text is also sent as an event
         self._heard.append((now_ns, (message.severity, text)))
         return message.severity, text
 

@@ -156,6 +156,8 @@ class MavlinkEmulator:
         self._send_lists()
 
     def _say(self, severity: int, text: str) -> None:
+        if self.firmware.flavour is Flavour.PX4:
+            text += "\t"  # WIRE (PX4 1.16): the text is also sent as an event
         # WIRE (STATUSTEXT): 50 characters; longer ones go in pieces with an id, of which the last is not full.
         if len(text) <= _TEXT_SIZE:
             self._send_to_all(t.Statustext(severity, text))

@@ -92,4 +92,4 @@ class Bench:
         return self.run(2.0)
 
     def texts(self):
-        return [m.text for m in self.heard if isinstance(m, t.Statustext)]
+        return [m.text.rstrip() for m in self.heard if isinstance(m, t.Statustext)]

@@ -167,3 +167,14 @@ def test_after_a_restart_everything_is_asked_for_anew() -> None:
     vehicle.session.start_over(vehicle.requests)
     assert vehicle.session.detail(vehicle.requests) == "waiting for its heartbeat"
     assert sorted(vehicle.live(4.0)) == sorted(map(id_of, (ExtendedSysState, BatteryStatus, Attitude)))
+
+
+def test_a_parameter_that_somebody_else_changes_is_told_once_with_its_need() -> None:
+    session = read_all(set(), 5.0)
+    session.notes.clear()
+    for value in (10.0, 10.0):
+        session.hear_parameter(ParamValue("GUID_TIMEOUT", value, REAL32, 1, 0))
+    (told,) = session.notes
+    assert told.startswith("somebody changed its parameter GUID_TIMEOUT from 0.5 to 10, needs 0.1 to 0.5")
+    session.hear_parameter(ParamValue("GUID_TIMEOUT", 0.4, REAL32, 1, 0))
+    assert session.notes[-1].endswith("from 10 to 0.4")

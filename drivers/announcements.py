@@ -75,8 +75,9 @@ class Announcements:
             self._silent = True
             if view.unsound and mode is not DriverMode.CONNECTING:  # the watchdog's reason names the fault
                 return
-            told = f"{name}: {view.silence}" if view.unsound else f"{name} does not answer at {address}"
-            remedy = _UNSOUND if view.unsound else how_to_reach(address)
+            heard = view.unsound or view.mute
+            told = f"{name}: {view.silence}" if heard else f"{name} does not answer at {address}"
+            remedy = _UNSOUND if view.unsound else "" if heard else how_to_reach(address)
             self._event(Severity.ERROR, f"{told}; trying on", remedy)
             self._child.degrade(told)
 

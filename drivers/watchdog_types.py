@@ -101,6 +101,7 @@ class VehicleView:
     speed; unseen_s: how long it may not have been where it is believed, by the tracker; near: airborne vehicle too near
     to its pad, or ""; crowded: why it makes way for another that is too near in flight, or "". lost_s: how long it has
     lacked a position that it needs. clears: whether a separate order ends its emergency without starting motors.
+    mute: what it does not tell although it is heard, or "".
     """
 
     flight_state: FlightState = FlightState.UNKNOWN
@@ -118,6 +119,7 @@ class VehicleView:
     crowded: str = ""
     lost_s: float = 0.0
     clears: bool = False
+    mute: str = ""
 
     @property
     def plausible(self) -> "VehicleView":
@@ -127,7 +129,9 @@ class VehicleView:
     @property
     def silence(self) -> str:
         """Return why the vehicle is not heard, in words; valid while the view is not fresh."""
-        return f"its sensors cannot be believed: {self.unsound}" if self.unsound else "no telemetry from the vehicle"
+        if self.unsound:
+            return f"its sensors cannot be believed: {self.unsound}"
+        return self.mute or "no telemetry from the vehicle"
 
 
 @dataclass(frozen=True, slots=True)

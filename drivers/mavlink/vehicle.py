@@ -194,8 +194,15 @@ class MavlinkVehicle:
         velocity = self._true_velocity(now_ns, known) if self.orders.are_heeded(now_ns, known.custom_mode) else None
         not_ready = self._readiness.why_not(now_ns, known)
         battery = known.battery if now_ns - known.battery_ns < _BATTERY_NS else None
-        lost_s = self.vision.lost_s(now_ns)
-        return VehicleView(state, fresh, battery, not_ready, unsound=unsound, velocity_m_s=velocity, lost_s=lost_s)
+        lost_s, mute = self.vision.lost_s(now_ns), "" if fresh else self._mute(now_ns, known)
+        return VehicleView(
+            state, fresh, battery, not_ready, unsound=unsound, velocity_m_s=velocity, lost_s=lost_s, mute=mute
+        )
+
+    def _mute(self, now_ns: int, known: LatestTelemetry) -> str:
+        # WIRE (ArduCopter 4.6.2): without a position it ends its LOCAL_POSITION_NED, in flight as well.
+        heard = now_ns - known.heard_ns < FRESH_NS and now_ns - known.heartbeat_ns < _HEARTBEAT_NS
+        return "it tells no velocity, as its own estimator knows none" if heard and known.moved_ns else ""
 
     def _true_velocity(self, now_ns: int, known: LatestTelemetry) -> Vector3:
         # Its commands include its drift: that is no control error.

@@ -4,6 +4,7 @@ import pytest
 
 from drivers.mavlink.wire.flight import CommandLong
 from drivers.mavlink.wire.names import CopterMode, Flavour, MavCmd, Px4Main, px4_mode
+from drivers.mavlink.wire.telemetry import LocalPositionNed
 from groundstation.bus.messages import Verb
 
 _STICKS = {Flavour.PX4: px4_mode(Px4Main.ALTITUDE), Flavour.ARDUPILOT: CopterMode.ALT_HOLD}
@@ -78,3 +79,14 @@ def test_an_operators_landing_is_sent_to_a_pilot_too(rig):
     rig.order(Verb.LAND)
     rig.run(1.0)
     assert landings(rig)
+
+
+def test_who_is_heard_but_tells_no_velocity_is_told_as_that(rig):
+    """A real ArduCopter ends its LOCAL_POSITION_NED in flight once its estimator has no position."""
+    rig.track_on()
+    rig.emulator.speaker.builders[LocalPositionNed] = lambda: None
+    rig.run(2.0)
+    view = rig.host.watchdog.vehicle
+    assert not view.fresh and view.silence == "it tells no velocity, as its own estimator knows none"
+    (told,) = [text for text in rig.process.texts if "trying on" in text]
+    assert "does not answer" not in told and view.silence in told

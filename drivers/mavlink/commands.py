@@ -10,6 +10,7 @@ from collections import deque
 from drivers.mavlink.convert import setpoint_from_velocity
 from drivers.mavlink.drift import DriftFeedback
 from drivers.mavlink.lift_off import LiftOff
+from drivers.mavlink.motors import Motors
 from drivers.mavlink.pilot import LandingPilot
 from drivers.mavlink.requests import Requests
 from drivers.mavlink.settings import VehicleSettings
@@ -55,6 +56,7 @@ class Orders:
         self.pilot = LandingPilot(flavour)
         self.lift = LiftOff()
         self.drift = DriftFeedback()
+        self._motors = Motors()
         self._vehicle, self._flavour, self._requests = vehicle, flavour, requests
         self._guided, self._landing = guided_mode(flavour), land_mode(flavour)
         self._pace = Decimator(vehicle.setpoint_hz)
@@ -106,6 +108,7 @@ class Orders:
     ) -> SetPositionTargetLocalNed | None:  # fmt: skip
         """Return the setpoint to send now, if any; commands go through the requests."""
         armed, guided = bool(base_mode & ARMED), custom_mode == self._guided
+        self._watch_motors(now_ns, decision.action, armed)
         climbed_m = self._climbed(now_ns, landed, height_m, climb_m_s)
         action = decision.action
         if action is not self._action:
@@ -211,6 +214,18 @@ class Orders:
             self._ask(now_ns, "landing", MavCmd.NAV_LAND)
         # Until it obeys it must not fly on at the last velocity.
         return self._stand(now_ns) if armed and guided else None
+
+    def _watch_motors(self, now_ns: int, action: Action, armed: bool) -> None:
+        place = self.drift.place(now_ns) if self.lift.lifted else None
+        height_m = 0.0 if place is None else place[2] - self._floor_m
+        if self._motors.stop_aloft(now_ns, armed, height_m) and action is not Action.CUT:
+            self.events.append((MavSeverity.ERROR, "its motors were stopped in flight, not by us: it fell"))
+
+    def start_failed(self, now_ns: int) -> None:
+        """Give up a take-off of a vehicle that was started anew meanwhile: its estimator has to settle first."""
+        if self._action is Action.TAKE_OFF and not self._taken_over:
+            self._requests.drop("arming", "guided mode", "take-off")
+            self._yield(now_ns, "was started anew while it takes off")
 
     def _watch_start(self, now_ns: int, armed: bool, guided: bool, custom_mode: int) -> None:
         # Only a pilot, a second ground station or the autopilot itself ends what has begun: a second request would make

@@ -232,6 +232,7 @@ class MavlinkVehicle:
         if self._boot_clock.restarted and not known.base_mode & ARMED:
             self._boot_clock.restarted = False
             self._session.start_over(self._requests)  # origin and parameters were lost, though it was hardly silent
+            self.orders.start_failed(now_ns)
         messages = self._session.step(now_ns, silence_ns, self._requests)
         messages += self._feed(now_ns, known)
         up = (known.position_m[2] if known.position_m else 0.0, known.velocity_m_s[2])

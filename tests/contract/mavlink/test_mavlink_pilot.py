@@ -3,7 +3,7 @@
 import pytest
 
 from drivers.mavlink.wire.flight import CommandLong
-from drivers.mavlink.wire.names import CopterMode, Flavour, MavCmd, Px4Main, px4_mode
+from drivers.mavlink.wire.names import FORCE, CopterMode, Flavour, MavCmd, Px4Main, px4_mode
 from drivers.mavlink.wire.telemetry import LocalPositionNed
 from groundstation.bus.messages import Verb
 
@@ -90,3 +90,18 @@ def test_who_is_heard_but_tells_no_velocity_is_told_as_that(rig):
     assert not view.fresh and view.silence == "it tells no velocity, as its own estimator knows none"
     (told,) = [text for text in rig.process.texts if "trying on" in text]
     assert "does not answer" not in told and view.silence in told
+
+
+def test_motors_that_somebody_stops_in_flight_are_told_as_that(rig):
+    rig.track_on()
+    rig.run(1.0)
+    rig.emulator.firmware.disarm(FORCE)
+    rig.run(2.0)
+    assert sum("its motors were stopped" in text and "not by us" in text for text in rig.texts) == 1
+
+
+def test_motors_that_stop_after_a_landing_are_not(rig):
+    rig.track_on()
+    rig.order(Verb.LAND)
+    rig.until(lambda: rig.mode == "LANDED", 10.0)
+    assert not any("its motors were stopped" in text for text in rig.texts)

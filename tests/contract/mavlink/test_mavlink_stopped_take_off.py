@@ -2,6 +2,7 @@
 
 from drivers.mavlink.wire.flight import CommandLong
 from drivers.mavlink.wire.names import FORCE, CopterMode, Flavour, MavCmd, Px4Auto, Px4Main, px4_mode
+from drivers.mavlink.wire.telemetry import LocalPositionNed
 from groundstation.bus.messages import Verb
 
 _RESTARTS = {MavCmd.DO_SET_MODE, MavCmd.NAV_TAKEOFF}
@@ -61,3 +62,21 @@ def test_motors_that_were_switched_off_stay_off_until_the_next_order(rig):
     rig.until(lambda: rig.mode == "LANDED", 10.0)
     rig.order(Verb.TAKEOFF)
     rig.until(lambda: rig.mode == "HOVER", 15.0)
+
+
+def test_a_vehicle_that_restarts_while_it_takes_off_is_not_armed(rig):
+    """Its estimator has only just begun: it would slide off, and be landed."""
+    rig.connect()
+    rig.run(8.0)
+    began, tell = rig.hand.now, rig.emulator.speaker.local_position
+    rig.emulator.firmware.arming_fault = lambda: "not yet"
+    rig.order(Verb.TAKEOFF)
+    rig.run(0.5)
+    rig.emulator.speaker.builders[LocalPositionNed] = lambda: (
+        (m := tell()) and m._replace(time_boot_ms=(rig.hand.now - began) // 1_000_000)
+    )
+    rig.run(0.5)
+    del rig.emulator.firmware.arming_fault
+    rig.run(8.0)
+    assert not rig.emulator.firmware.armed and rig.mode != "HOVER"
+    assert sum("it was started anew while it takes off" in text for text in rig.texts) == 1

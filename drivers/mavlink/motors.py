@@ -1,0 +1,26 @@
+"""Notices that a vehicle's motors were stopped in flight, which not every autopilot reports as a fall. Pure.
+
+WIRE (ArduCopter 4.6.2): disarmed by force 1.2 m above the floor it says ON_GROUND at once, while it falls.
+"""
+
+from groundstation.time_units import NS_PER_MS
+
+# Beyond the error of a height that cameras see as it touches down.
+_ALOFT_M = 0.5
+# A heartbeat tells of it up to a second late; after a landing motors turn for longer before they stop.
+_FELL_NS = 1_300 * NS_PER_MS
+
+
+class Motors:
+    """Watches the motors of one vehicle."""
+
+    def __init__(self) -> None:
+        self._turned = False
+        self._aloft_ns: int | None = None
+
+    def stop_aloft(self, now_ns: int, turn: bool, height_m: float) -> bool:
+        """Return, once, that they have stopped although it was in the air a moment ago; height_m: above the floor."""
+        stopped, self._turned = self._turned and not turn, turn
+        if height_m > _ALOFT_M:
+            self._aloft_ns = now_ns
+        return stopped and self._aloft_ns is not None and now_ns - self._aloft_ns < _FELL_NS

@@ -12,6 +12,7 @@ from groundstation.time_units import NS_PER_S
 
 _UNANSWERED_NS, _UNCONFIGURED_NS = 5 * NS_PER_S, 15 * NS_PER_S
 _SILENCE_EVENT_NS = _REFUSAL_PERIOD_NS = NS_PER_S
+_STANDS = frozenset({DriverMode.CONNECTING, DriverMode.LANDED})
 _UNSOUND = "restart it; if it says this again, have that sensor repaired"
 # Refusals caused from outside of this run, in the operator's words.
 _INTRUSIONS = {
@@ -73,7 +74,7 @@ class Announcements:
         limit_ns = _UNANSWERED_NS if mode is DriverMode.CONNECTING else _SILENCE_EVENT_NS
         if not self._silent and now_ns - self.heard_ns >= limit_ns:
             self._silent = True
-            if view.unsound and mode is not DriverMode.CONNECTING:  # the watchdog's reason names the fault
+            if view.unsound and mode not in _STANDS:  # the watchdog's reason names the fault
                 return
             heard = view.unsound or view.mute
             told = f"{name}: {view.silence}" if heard else f"{name} does not answer at {address}"

@@ -154,8 +154,11 @@ class VehicleHost:
 
     def _detail(self, of_link: str) -> str:
         """Return the reason for a vehicle's present action; if no failsafe acts, a wait of its link comes first."""
-        stopped = self.watchdog.braked or (self.watchdog.failsafe and self.watchdog.mode is not DriverMode.LANDED)
-        return self.watchdog.explanation if stopped else of_link or self.watchdog.explanation
+        stands, view = self.watchdog.mode is DriverMode.LANDED, self.watchdog.vehicle
+        if self.watchdog.braked or (self.watchdog.failsafe and not stands):
+            return self.watchdog.explanation
+        unheard = view.silence if stands and not view.fresh else ""
+        return of_link or unheard or self.watchdog.explanation
 
     def _upstream(self) -> Upstream:
         return Upstream(self._child.supervisor_alive, self._child.supervisor_fresh, self._child.stop_requested)

@@ -1,7 +1,8 @@
 """Monitors one vehicle: takes samples of its motion, gives the health of its sensors. Pure.
 
-Judged in the air only: on the floor values may stand still, and attitudes may be anything. During take-off or landing
-it may touch the floor, and only its velocity may stand still.
+On the floor values may stand still, and attitudes may be anything: only telemetry that repeats altogether, or without
+its clock, counts there, or a vehicle that says that it stands could be sent up and never say otherwise. During take-off
+or landing it may touch the floor, and only its velocity may stand still.
 """
 
 import math
@@ -16,6 +17,7 @@ from drivers.plausibility.repeats import RepeatWatch, StandstillWatch
 from groundstation.bus.messages import AIRBORNE, UP, FlightState
 
 _Judged = tuple[Sensor, Health, str]
+_CLOCK_STANDS, _FROZEN = "its clock stands", "its telemetry is frozen: all values repeat"
 # After a pause a step between two values means nothing.
 _GAP_S = 0.3
 
@@ -73,6 +75,7 @@ class MotionMonitor:
         if state not in AIRBORNE:
             if self._before is not None:
                 self.reset()
+            self.report = self._settle(sample.stamp_ns, self._judge_standing(sample))
             return self.report
         judged = self._judge_repeats(sample, state in UP)
         judged += self._judge_clock(sample)
@@ -93,18 +96,27 @@ class MotionMonitor:
         self._held = {sensor: held for sensor, held in self._held.items() if now_ns - held[0] <= hold_ns}
         return HealthReport(tuple(sorted((one for _, one in self._held.values()), key=lambda one: -one.health)))
 
+    def _judge_standing(self, sample: MotionSample) -> list[_Judged]:
+        limits, stamp_ns, judged = self.limits, sample.stamp_ns, list[_Judged]()
+        if sample.vehicle_ns is not None:
+            stands_s, _ = self._clock.update(stamp_ns, sample.vehicle_ns)
+            judged += [(Sensor.CLOCK, Health.BAD, _CLOCK_STANDS)] if stands_s >= limits.clock_stands_s else []
+        if sample.inertial and limits.stirs_on_floor:
+            frozen_s = self._contents.update(stamp_ns, _contents_of(sample))
+            judged += _repeated(Sensor.TELEMETRY, frozen_s, limits.frozen_s, _FROZEN)
+        return judged
+
     # -- what repeats -------------------------------------------------------------------------------------------------
 
     def _judge_repeats(self, sample: MotionSample, flies: bool) -> list[_Judged]:
         limits, stamp_ns = self.limits, sample.stamp_ns
         tilt = (sample.roll_rad, sample.pitch_rad)
-        frozen_s = self._contents.update(stamp_ns, (sample.velocity_m_s, tilt, sample.inertial))
+        frozen_s = self._contents.update(stamp_ns, _contents_of(sample))
         attitude_s = self._attitude.update(stamp_ns, tilt)
         inertial_s = self._inertial.update(stamp_ns, sample.inertial) if sample.inertial else 0.0
         judged = self._judge_standstill(sample, flies)
         if frozen_s or attitude_s or inertial_s:
-            frozen = "its telemetry is frozen: all values repeat"
-            judged += _repeated(Sensor.TELEMETRY, frozen_s, limits.frozen_s, frozen)
+            judged += _repeated(Sensor.TELEMETRY, frozen_s, limits.frozen_s, _FROZEN)
             judged += _repeated(Sensor.ATTITUDE, attitude_s, limits.stuck_s, "its attitude is stuck")
             judged += _repeated(Sensor.IMU, inertial_s, limits.stuck_s, "its IMU is stuck")
         return judged
@@ -131,7 +143,7 @@ class MotionMonitor:
         limits = self.limits
         stands_s, late_s = self._clock.update(sample.stamp_ns, sample.vehicle_ns)
         if stands_s >= limits.clock_stands_s:
-            return [(Sensor.CLOCK, Health.BAD, "its clock stands")]
+            return [(Sensor.CLOCK, Health.BAD, _CLOCK_STANDS)]
         if late_s < limits.clock_suspect_s:
             return []
         health = Health.BAD if late_s >= limits.clock_late_s else Health.SUSPECT
@@ -174,6 +186,10 @@ class MotionMonitor:
         times.append(sample.stamp_ns)
         often = len(times) == limits.jumps and times[-1] - times[0] <= limits.jumps_within_s * 1e9
         return sensor, Health.BAD if often else Health.SUSPECT, reason
+
+
+def _contents_of(sample: MotionSample) -> tuple[object, ...]:
+    return sample.velocity_m_s, (sample.roll_rad, sample.pitch_rad), sample.inertial
 
 
 def _repeated(sensor: Sensor, held_s: float, limit_s: float, reason: str) -> list[_Judged]:

@@ -37,7 +37,7 @@ _PAUSE_NS = {
     text.STREAM_ON: 3 * NS_PER_S,
 }
 # Whole numbers at 10 Hz: a single standing value means nothing; the accelerations of all three axes never stand.
-LIMITS = PlausibilityLimits(frozen_s=0.6, stuck_s=math.inf, stuck_alone_s=math.inf, jump_m_s=0.8)
+LIMITS = PlausibilityLimits(frozen_s=0.6, stuck_s=math.inf, stuck_alone_s=math.inf, jump_m_s=0.8, stirs_on_floor=False)
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,7 @@ from drivers.mavlink.convert import LIMITS as MAVLINK
 from drivers.plausibility.clock_watch import ClockWatch
 from drivers.plausibility.health import Health, Sensor
 from drivers.plausibility.motion import MotionMonitor, MotionSample
+from drivers.tello.driver import LIMITS as TELLO
 from groundstation.bus.messages import FlightState
 
 MS = 1_000_000
@@ -189,11 +190,44 @@ def test_what_recovers_is_good_again_after_a_second():
     assert good_s[0] == pytest.approx(8.0 + ARDRONE.hold_s, abs=0.1)
 
 
-def test_a_drone_on_the_floor_may_stand_still():
-    first, _ = judge((frozen(sample, next(healthy(1.0))) for sample in healthy(5.0)), state=FlightState.LANDED)
+@pytest.mark.parametrize("fault", [stuck_at_zero, attitude_stuck, imu_stuck])
+def test_a_drone_on_the_floor_may_stand_still(fault):
+    first, _ = judge((fault(sample, next(healthy(1.0))) for sample in healthy(5.0)), state=FlightState.LANDED)
     assert first == {}
     first, _ = judge((stuck_at_zero(sample, None) for sample in healthy(5.0)), state=FlightState.TAKING_OFF)
     assert first == {}
+
+
+@pytest.mark.parametrize("limits", [ARDRONE, MAVLINK], ids=["ardrone", "mavlink"])
+@pytest.mark.parametrize(
+    ("fault", "sensor"),
+    [
+        (frozen, Sensor.TELEMETRY),
+        (frozen, Sensor.CLOCK),
+        (frozen_but_for_the_clock, Sensor.TELEMETRY),
+        (clock_stands, Sensor.CLOCK),
+    ],
+)
+def test_one_that_says_for_ever_that_it_stands_is_not_believed(limits, fault, sensor):
+    first, _ = judge(broken(fault), limits, FlightState.LANDED)
+    assert FAULT_S <= first[sensor, Health.BAD] <= FAULT_S + 0.4
+
+
+def test_on_the_floor_repeats_count_only_where_noise_would_show():
+    coarse = [frozen(sample, next(healthy(1.0)))._replace(vehicle_ns=None) for sample in healthy(5.0)]
+    assert judge(coarse, TELLO, FlightState.LANDED) == ({}, set())
+    still = [sample._replace(inertial=()) for sample in coarse]
+    assert judge(still, ARDRONE, FlightState.LANDED) == ({}, set())
+
+
+def test_what_froze_on_the_floor_is_believed_again_a_second_after_it_moves_on():
+    monitor, good_s = MotionMonitor(ARDRONE), list[float]()
+    began = next(healthy(1.0))
+    for sample in healthy(8.0):
+        told = frozen(sample, began) if FAULT_S <= at_s(sample) < 6.0 else sample
+        report = monitor.update(told, FlightState.LANDED)
+        good_s += [at_s(sample)] if at_s(sample) > 6.0 and report.of(Sensor.TELEMETRY) is Health.GOOD else []
+    assert good_s[0] == pytest.approx(6.0 + ARDRONE.hold_s, abs=0.1)
 
 
 @pytest.mark.parametrize("period_ms", [5, 20, 66])
@@ -236,6 +270,7 @@ def test_the_recorded_flight_gives_no_alarm(real_data):
             math.radians(rotation[0]),
             math.radians(rotation[1]),
             tuple(force.tolist()),
+            round(at * 1e9),
         )
         # Judged from half a second before the ultrasound sees it fly.
         doubts += monitor.update(sample, FLYING if height > 0 or at > 4.1 else FlightState.LANDED).findings

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from drivers.failsafe_table import Condition, Failsafe, Reaction
+from drivers.failsafe_table import Condition, Failsafe, Latch, Reaction
 from drivers.setpoints import SetpointGate
 from drivers.watchdog_types import DriverMode, Upstream, VehicleView, WatchdogLimits
 from groundstation.bus.messages import AIRBORNE, STANDING, UNHEARD, FlightState
@@ -157,6 +157,7 @@ class Evidence:
         self._forgets = {row.condition: row.forgets for row in table if row.forgets is not None}
         self.holding: dict[Condition, str] = {}
         self.charged_s: dict[Condition, float] = {}
+        self._pardoned_s: dict[Condition, float] = {}
         self._last_ns: int | None = None
 
     def step(self, at: Situation, limits: WatchdogLimits) -> None:
@@ -174,6 +175,18 @@ class Evidence:
             self.charged_s[condition] = self.charged_s.get(condition, 0.0) + more_s
         for condition, lasted_s in timed(at).items():
             self.holding[condition], self.charged_s[condition] = "", lasted_s
+        self._pardoned_s = {
+            condition: min(pardoned_s, self.charged_s[condition])
+            for condition, pardoned_s in self._pardoned_s.items()
+            if condition in self.charged_s
+        }
+
+    def against_s(self, row: Failsafe) -> float | None:
+        """Return how long a row's condition has lasted [s]: since the last order that ends the row, if one does."""
+        lasted_s = self.lasted_s(row.condition)
+        if lasted_s is None or row.latch is not Latch.RESUME:
+            return lasted_s
+        return lasted_s - self._pardoned_s.get(row.condition, 0.0)
 
     def lasted_s(self, condition: Condition) -> float | None:
         """Return for how long a condition has lasted [s], or None if it does not hold."""
@@ -189,7 +202,11 @@ class Evidence:
         ]  # fmt: skip
         return min(waits, key=lambda outlook: outlook.in_s, default=None)
 
-    def forget(self, *conditions: Condition) -> None:
-        """Begin anew with some conditions, or with all."""
-        for condition in conditions or tuple(self.charged_s):
-            self.charged_s.pop(condition, None)
+    def forget(self) -> None:
+        """Begin anew with all conditions, for a take-off."""
+        self.charged_s.clear()
+        self._pardoned_s.clear()
+
+    def pardon(self) -> None:
+        """Begin anew for the rows that an order to go on ends; their conditions go on counting for all others."""
+        self._pardoned_s = dict(self.charged_s)

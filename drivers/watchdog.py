@@ -174,7 +174,7 @@ class Watchdog:
                 return "the tracker was restarted: RESUME is needed"
             if not self.gate.adopt(now_ns):
                 return "the restarted tracker has no converged belief of this drone yet"
-        self.evidence.forget(*(row.condition for row in self.table if row.latch is Latch.RESUME))
+        self.evidence.pardon()
         return self._enter(now_ns, DriverMode.TRACK, f"tracking for {command.issuer}")
 
     def _enter(self, now_ns: int, mode: DriverMode, reason: str, brake: bool = False, failsafe: str = "") -> str:
@@ -238,7 +238,7 @@ class Watchdog:
         waits = self.mode in (DriverMode.HOVER, DriverMode.HOLD) and not self.failsafe
         if setpoint is None or not setpoint.holds or not waits or self.vehicle.flight_state not in UP:
             return None
-        lasted = ((row, self.evidence.lasted_s(row.condition)) for row in self.table if row.reaction is Reaction.HOVER)
+        lasted = ((row, self.evidence.against_s(row)) for row in self.table if row.reaction is Reaction.HOVER)
         doubted = any(row.applies(DriverMode.TRACK, lasted_s) for row, lasted_s in lasted)
         return None if doubted else setpoint.velocity_m_s[:2]
 
@@ -277,7 +277,7 @@ class Watchdog:
         """React by the first row of the table that applies; returns it if it only brakes for now, within the mode."""
         evidence = self.evidence
         for row in self._acting:
-            if row.condition not in evidence.holding or not row.applies(self.mode, evidence.lasted_s(row.condition)):
+            if row.condition not in evidence.holding or not row.applies(self.mode, evidence.against_s(row)):
                 continue
             if row.latch is Latch.NONE:
                 return row

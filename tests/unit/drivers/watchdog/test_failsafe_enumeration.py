@@ -178,6 +178,28 @@ def test_a_resume_in_between_is_refused_or_undone_by_a_named_row_only(new_bench,
         judge(fly(new_bench(), DriverMode.TRACK), [DEVIATIONS[name]], resume_s)
 
 
+# Who orders RESUME after a pause, or adopts another tracker, has ended that.
+PERSISTENT = [name for name, one in DEVIATIONS.items() if one.land_s is not None and not {*one.conditions} & {*TRACKER}]
+
+
+@pytest.mark.parametrize("period_s", [0.5, 1.3])
+@pytest.mark.parametrize("verb", [Verb.HOLD, Verb.TRACK, Verb.RESUME])
+@pytest.mark.parametrize("name", PERSISTENT)
+def test_orders_that_are_repeated_put_off_no_landing(new_bench, name, verb, period_s):
+    one, bench, landed_s = DEVIATIONS[name], fly(new_bench(), DriverMode.TRACK), None
+    usual = {value: getattr(bench, value) for value in one.values}
+    for turn in range(round(LONG_S / TURN_S)):
+        for value, now in (one.values if one.is_on(turn) else usual).items():
+            setattr(bench, value, now)
+        if turn and turn % round(period_s / TURN_S) == 0:
+            bench.see()
+            bench.order(verb)
+        lands = bench.step(round(TURN_S * S)).action in DOWN
+        landed_s = turn * TURN_S if lands and landed_s is None else landed_s
+        assert lands or landed_s is None, "an order undid the landing"
+    assert landed_s is not None and landed_s <= one.land_s + 0.1
+
+
 def test_pairs_of_the_same_input_are_few():
     hidden = sum(bool(a.values.keys() & b.values.keys()) for a, b in itertools.combinations(DEVIATIONS.values(), 2))
     assert hidden <= 30

@@ -105,7 +105,7 @@ class ControlErrorMonitor:
         if self._envelopes is None:
             x, y = reported or (0.0, 0.0)
             self._envelopes = (Envelope(_clamp(x, _FIRST_M_S)), Envelope(_clamp(y, _FIRST_M_S)))
-        wanted = told.velocity_m_s[:2] if told.action is Action.FLY else told.back_m_s or (0.0, 0.0)
+        wanted = told.velocity_m_s[:2] if told.action is Action.FLY else (told.back_m_s or (0.0, 0.0))[:2]
         for envelope, command in zip(self._envelopes, wanted, strict=True):
             envelope.step(command, dt_s)
         turning = _TURNING_S * abs(told.yaw_rate_rad_s) * math.hypot(*wanted)

@@ -31,6 +31,7 @@ from groundstation.bus.messages import (
     Command,
     FlightState,
     Lease,
+    Vector3,
     VelocitySetpoint,
     Verb,
 )
@@ -233,14 +234,14 @@ class Watchdog:
         velocity, turn, ns = setpoint.velocity_m_s, setpoint.yaw_rate_rad_s, setpoint.header.stamp_ns
         return WatchdogDecision(self.mode, Action.FLY, velocity, turn, self.reason, acks, ns, None, self._entered_ns)
 
-    def _asked_back(self, setpoint: VelocitySetpoint | None) -> tuple[float, float] | None:
+    def _asked_back(self, setpoint: VelocitySetpoint | None) -> Vector3 | None:
         """Return the velocity back to the place where it was told to hover; None for whom a failsafe might stop."""
         waits = self.mode in (DriverMode.HOVER, DriverMode.HOLD) and not self.failsafe
         if setpoint is None or not setpoint.holds or not waits or self.vehicle.flight_state not in UP:
             return None
         lasted = ((row, self.evidence.against_s(row)) for row in self.table if row.reaction is Reaction.HOVER)
         doubted = any(row.applies(DriverMode.TRACK, lasted_s) for row, lasted_s in lasted)
-        return None if doubted else setpoint.velocity_m_s[:2]
+        return None if doubted else setpoint.velocity_m_s
 
     def _situation(self, now_ns: int, gap_s: float = 0.0) -> Situation:
         return Situation(

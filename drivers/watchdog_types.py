@@ -160,8 +160,8 @@ class WatchdogDecision:
     setpoint_ns: stamp of the setpoint obeyed, for vehicles that get each setpoint once; 0 if none is. seen_m_s:
     velocity forward and left by cameras, for a vehicle that brakes without a velocity of its own; None if they do not
     see it. entered_ns: when it entered the mode, or was last ordered into it; only an operator's order leads to TRACK.
-    back_m_s: of a vehicle that is to hover, the velocity forward and left back to its place; None: it holds its place
-    by itself. failsafe: the condition of the row that caused the mode, "" after an order.
+    back_m_s: of a vehicle that is to hover, the velocity forward, left and up back to its place; None: it holds its
+    place by itself. failsafe: the condition of the row that caused the mode, "" after an order.
     """
 
     mode: DriverMode
@@ -173,5 +173,5 @@ class WatchdogDecision:
     setpoint_ns: int = 0
     seen_m_s: tuple[float, float] | None = None
     entered_ns: int = 0
-    back_m_s: tuple[float, float] | None = None
+    back_m_s: Vector3 | None = None
     failsafe: str = ""

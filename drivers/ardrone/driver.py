@@ -251,7 +251,7 @@ class ArDrone:
             self._loop.reset()
             return velocity_loop.HOVER
         measured = None if self._motion.repeats else self._true(velocity)
-        wanted = decision.velocity_m_s if back is None else (*back, 0.0)
+        wanted = decision.velocity_m_s if back is None else back
         asked = self._loop.step(wanted, decision.yaw_rate_rad_s, measured, dt_s, force, decision.seen_m_s)
         if self._loop.contradicted:
             self._doubted_ns = now_ns

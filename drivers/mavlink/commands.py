@@ -46,6 +46,11 @@ _CLIMBED, _CLIMB_GAIN, _LEAST_CLIMB_M_S = 0.95, 1.2, 0.12
 _STOPPED_M_S, _OBEYS_NS = 0.1, 500 * NS_PER_MS
 
 
+def _sideways(back_m_s: Vector3 | None) -> tuple[float, float] | None:
+    """Return the horizontal part of a way back, if it has one: these vehicles hold their height by themselves."""
+    return back_m_s[:2] if back_m_s is not None and any(back_m_s[:2]) else None
+
+
 class Orders:
     """Makes the requests to one vehicle. events: (severity, text) for the operator; said: (time, its STATUSTEXT)."""
 
@@ -124,7 +129,7 @@ class Orders:
                 return self._fly(now_ns, decision, guided)
             case Action.HOVER:
                 self._end_climb(now_ns, decision.mode, climb_m_s)
-                return self._hover(now_ns, guided, climbed_m, decision.back_m_s)
+                return self._hover(now_ns, guided, climbed_m, _sideways(decision.back_m_s))
             case Action.LAND:
                 return self._land(now_ns, decision, armed, guided, custom_mode)
             case Action.CUT:

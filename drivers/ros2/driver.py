@@ -144,7 +144,7 @@ class Ros2Vehicle:
             case Action.FLY:
                 self._fly(now_ns, *self._settings.limits.within(decision.velocity_m_s, decision.yaw_rate_rad_s))
             case Action.HOVER:
-                self._fly(now_ns, (*(decision.back_m_s or (0.0, 0.0)), 0.0), 0.0)
+                self._fly(now_ns, decision.back_m_s or (0.0, 0.0, 0.0), 0.0)
             case Action.IDLE | Action.CLEAR if self._is_due(now_ns, None):
                 self._fly(now_ns, (0.0, 0.0, 0.0), 0.0)
 

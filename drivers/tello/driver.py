@@ -161,7 +161,7 @@ class Tello(DatagramVehicle):
             case Action.FLY if flies:
                 self._link.send(now_ns, self._sticks(decision.velocity_m_s, decision.yaw_rate_rad_s))
             case Action.HOVER if flies and decision.back_m_s is not None:
-                self._link.send(now_ns, self._sticks((*decision.back_m_s, 0.0), 0.0))
+                self._link.send(now_ns, self._sticks(decision.back_m_s, 0.0))
             case Action.HOVER | Action.TAKE_OFF if flies:
                 self._link.send(now_ns, text.rc(0, 0, 0, 0))
             case Action.IDLE if now_ns - self._sent_ns.get(text.TAKE_OFF, -_BEGINS_NS) < _BEGINS_NS:

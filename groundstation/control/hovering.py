@@ -19,8 +19,10 @@ _SETTLES_NS = 1500 * NS_PER_MS
 # Places are known to 0.03 m: nobody is moved for less, nor for the noise of it.
 _LEAVES_M, _ARRIVES_M = 0.1, 0.03
 _GAIN_PER_S, _MOST_M_S = 0.8, 0.2
-# Nobody drifts as far while it is brought back: the belief was wrong, or is.
-_LEASH_M = 0.5
+# The vehicle keeps its height, which is known less well; it climbs or sinks with what it takes for the floor.
+_LEAVES_UP_M, _ARRIVES_UP_M = 0.2, 0.05
+# Nobody drifts as far while it is brought back, nor climbs: the belief was wrong, or is.
+_LEASH_M, _LEASH_UP_M = 0.5, 1.0
 # Two sightings in sequence may be lost. Unseen for longer, its own hover knows as much as the belief.
 _SEEN_S = 1.0
 _STILL: Vector3 = (0.0, 0.0, 0.0)
@@ -28,26 +30,28 @@ _STILL: Vector3 = (0.0, 0.0, 0.0)
 
 @dataclass(slots=True)
 class _Stay:
-    """A robot's hover: the place to hold [x, y; world], once it has come to rest; returning: it is brought back."""
+    """A robot's hover: the place to hold [x, y, z; world], once it has come to rest; returning, levelling: it is
+    brought back to that, or to its height."""
 
     mode: str
     since_ns: int
-    place: tuple[float, float] | None = None
+    place: Vector3 | None = None
     returning: bool = False
+    levelling: bool = False
 
-    def back(self, now_ns: int, x: float, y: float) -> tuple[float, float]:
+    def back(self, now_ns: int, x: float, y: float, z: float) -> Vector3:
         """Return the velocity to the place [m/s; world], zero near it and until the robot has come to rest."""
         if now_ns - self.since_ns < _SETTLES_NS:
-            return 0.0, 0.0
-        if self.place is None or math.dist(self.place, (x, y)) > _LEASH_M:
-            self.place, self.returning = (x, y), False
-        dx, dy = self.place[0] - x, self.place[1] - y
+            return _STILL
+        if self.place is None or math.dist(self.place[:2], (x, y)) > _LEASH_M or abs(self.place[2] - z) > _LEASH_UP_M:
+            self.place, self.returning, self.levelling = (x, y, z), False, False
+        dx, dy, dz = self.place[0] - x, self.place[1] - y, self.place[2] - z
         off_m = math.hypot(dx, dy)
         self.returning = off_m > (_ARRIVES_M if self.returning else _LEAVES_M)
-        if not self.returning:
-            return 0.0, 0.0
-        gain = min(_GAIN_PER_S, _MOST_M_S / off_m)
-        return gain * dx, gain * dy
+        self.levelling = abs(dz) > (_ARRIVES_UP_M if self.levelling else _LEAVES_UP_M)
+        gain = min(_GAIN_PER_S, _MOST_M_S / off_m) if self.returning else 0.0
+        climb = min(_GAIN_PER_S, _MOST_M_S / abs(dz)) if self.levelling else 0.0
+        return gain * dx, gain * dy, climb * dz
 
 
 class Hovering:
@@ -77,8 +81,9 @@ class Hovering:
         return {name: self._held(name, one, now_ns, belief, seen_s) for name, one in wanted.items()}
 
     def sent(self, limited: Mapping[str, Limited], seen_s: Mapping[str, float]) -> dict[str, Limited]:
-        """Return what is sent after limiting: who hovers moves sideways only, and only while it is seen."""
-        return {name: self._sent(one, _is_sure(name, seen_s)) if name in self._stays else one
+        """Return what is sent after limiting: who hovers moves only while it is seen, and keeps its height by itself
+        unless it has left that, or would leave the fence."""
+        return {name: self._sent(self._stays[name], one, _is_sure(name, seen_s)) if name in self._stays else one
                 for name, one in limited.items()}  # fmt: skip
 
     def _held(
@@ -89,16 +94,16 @@ class Hovering:
             return setpoint
         velocity = _STILL
         if name in belief.layout and _is_sure(name, seen_s):
-            x, y, _, yaw = belief.mean_of(name)[:4].tolist()
-            back = np.array((*stay.back(now_ns, x, y), 0.0))
-            forward, left, _ = stabilized_from_world(back, yaw).tolist()
-            velocity = (forward, left, 0.0)
+            x, y, z, yaw = belief.mean_of(name)[:4].tolist()
+            forward, left, up = stabilized_from_world(np.array(stay.back(now_ns, x, y, z)), yaw).tolist()
+            velocity = (forward, left, up)
         return replace(setpoint, velocity_m_s=velocity, yaw_rate_rad_s=0.0)
 
-    def _sent(self, limited: Limited, sure: bool) -> Limited:
-        forward, left, _ = limited.setpoint.velocity_m_s if sure else _STILL
-        setpoint = replace(limited.setpoint, velocity_m_s=(forward, left, 0.0), yaw_rate_rad_s=0.0)
-        return replace(limited, setpoint=setpoint, holds=math.hypot(forward, left) > 0.0)
+    def _sent(self, stay: _Stay, limited: Limited, sure: bool) -> Limited:
+        forward, left, up = limited.setpoint.velocity_m_s if sure else _STILL
+        up = up if stay.levelling or "fence" in limited.limited_by else 0.0
+        setpoint = replace(limited.setpoint, velocity_m_s=(forward, left, up), yaw_rate_rad_s=0.0)
+        return replace(limited, setpoint=setpoint, holds=math.hypot(forward, left, up) > 0.0)
 
 
 def _is_sure(name: str, seen_s: Mapping[str, float]) -> bool:

@@ -26,8 +26,8 @@ def status(mode="HOVER", failsafe=""):
     )
 
 
-def belief(x, y, yaw=0.0):
-    return JointBelief(np.array((x, y, 1.0, yaw)), 1e-4 * np.eye(4), LAYOUT, 0)
+def belief(x, y, yaw=0.0, z=1.0):
+    return JointBelief(np.array((x, y, z, yaw)), 1e-4 * np.eye(4), LAYOUT, 0)
 
 
 class Flight:
@@ -36,16 +36,18 @@ class Flight:
     def __init__(self, mode="HOVER", drift=(0.0, 0.0), yaw=0.7):
         self.hovering, self.now_ns, self.drift, self.yaw = Hovering(), 5 * S, drift, yaw
         self.place, self.seen_s, self.ways = np.zeros(2), {"a": 0.1}, []
+        self.height_m, self.climbs = 1.0, []
         self.hovering.take(status(mode), self.now_ns)
 
     def step(self):
         self.now_ns += round(TICK_S * S)
-        held = self.hovering.held(
-            {"a": PLANNED}, self.now_ns, belief(self.place[0], self.place[1], self.yaw), self.seen_s
-        )
+        believed = belief(self.place[0], self.place[1], self.yaw, self.height_m)
+        held = self.hovering.held({"a": PLANNED}, self.now_ns, believed, self.seen_s)
         sent = self.hovering.sent({"a": Limited(held["a"])}, self.seen_s)["a"]
         forward, left, up = sent.setpoint.velocity_m_s
-        assert up == 0.0 and sent.setpoint.yaw_rate_rad_s == 0.0
+        assert sent.setpoint.yaw_rate_rad_s == 0.0
+        self.height_m += TICK_S * up
+        self.climbs.append(up)
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         velocity = np.array((c * forward - s * left, s * forward + c * left)) if sent.holds else np.zeros(2)
         self.place = self.place + TICK_S * (velocity + self.drift)
@@ -62,7 +64,7 @@ def test_a_drift_does_not_carry_it_off(mode):
     flight.run(2.0)
     settled = flight.place
     flight.run(240.0)
-    assert math.dist(settled, flight.place) < 0.2
+    assert math.dist(settled, flight.place) < 0.2 and not any(flight.climbs)
     assert max(flight.ways) <= 0.2 + 1e-9
 
 
@@ -141,6 +143,37 @@ def test_who_tracks_lands_or_was_stopped_by_a_failsafe_is_not_held(other):
     assert flight.hovering.held({"a": PLANNED}, flight.now_ns, belief(1.0, 1.0), {"a": 0.0}) == {"a": PLANNED}
     limited = Limited(PLANNED)
     assert flight.hovering.sent({"a": limited}, {"a": 0.0}) == {"a": limited}
+
+
+@pytest.mark.parametrize("off_m", [0.8, -0.8, 0.25])
+def test_who_leaves_its_height_is_brought_back_to_it(off_m):
+    """Something under the ultrasound of a drone lifts it by its height; when that is gone it sinks as far."""
+    flight = Flight()
+    flight.run(2.0)
+    flight.height_m += off_m
+    flight.run(10.0)
+    assert flight.height_m == pytest.approx(1.0, abs=0.06)
+    assert max(map(abs, flight.climbs)) <= 0.2 + 1e-9 and not any(flight.ways)
+
+
+def test_who_keeps_its_height_by_itself_is_left_alone():
+    flight = Flight()
+    flight.run(2.0)
+    flight.height_m = 1.19
+    assert not any(sent.holds for sent in flight.run(5.0))
+
+
+def test_a_height_that_jumps_moves_nobody():
+    flight = Flight()
+    flight.run(2.0)
+    flight.height_m = 2.1
+    assert not any(sent.holds for sent in flight.run(5.0))
+
+
+def test_the_fence_pushes_down_who_hovers():
+    pushed = Limited(replace(PLANNED, velocity_m_s=(0.0, 0.0, -0.1)), ("fence",))
+    sent = Flight().hovering.sent({"a": pushed}, {"a": 0.1})["a"]
+    assert sent.holds and sent.setpoint.velocity_m_s == (0.0, 0.0, -0.1)
 
 
 def test_what_the_limiter_asks_for_is_sent_without_its_climb():

@@ -119,7 +119,7 @@ def test_the_speed_is_the_faster_of_what_is_reported_and_seen():
     assert ControlErrorMonitor().judge(S, view(0.3, 0.4), told(0.5), None).speed_m_s == pytest.approx(0.5)
 
 
-@pytest.mark.parametrize("back", [(0.15, -0.1), None])
+@pytest.mark.parametrize("back", [(0.15, -0.1, 0.0), None])
 def test_a_hovering_vehicle_that_is_brought_back_does_what_it_is_told(back):
     asked = WatchdogDecision(DriverMode.HOLD, Action.HOVER, back_m_s=back)
     forward, left = (2.2 * 0.15, 2.2 * -0.1)  # within the tolerance of what it is told, and beyond that of standing

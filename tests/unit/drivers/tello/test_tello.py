@@ -67,7 +67,7 @@ def flight():
 
 def test_who_hovers_is_brought_back_as_it_would_fly(flight: Flight) -> None:
     flies, _ = flight.told(Action.FLY, (0.1, -0.15, 0.0))
-    assert flight.told(Action.HOVER, back=(0.1, -0.15))[0] == flies != flight.told(Action.HOVER)[0]
+    assert flight.told(Action.HOVER, back=(0.1, -0.15, 0.0))[0] == flies != flight.told(Action.HOVER)[0]
 
 
 class Rig:

@@ -14,7 +14,7 @@ from fake_flight import FakeFlight
 from free_port import free_port as any_port
 from real_flight import answers, kernels, live, served  # noqa: F401
 from seen_page import Seen, open_seen
-from serve_fake import start_console
+from serve_fake import many_drones, start_console
 
 FLAGS = [
     "--no-sandbox",
@@ -43,8 +43,10 @@ def browser() -> Iterator[Any]:
 class Stage:
     """A flight with its console, and pages in front of it."""
 
-    def __init__(self, browser: Any, flight: FakeFlight | None = None, field: str = "lab") -> None:
-        self.browser, self.flight, self.field = browser, flight or FakeFlight(), field
+    def __init__(
+        self, browser: Any, flight: FakeFlight | None = None, field: str = "lab", sets: list[str] | None = None
+    ) -> None:
+        self.browser, self.flight, self.field, self.sets = browser, flight or FakeFlight(), field, sets
         self.port = any_port()
         self.flight.start()
         self.console = self.start_console()
@@ -56,7 +58,7 @@ class Stage:
         return f"http://127.0.0.1:{self.port}/"
 
     def start_console(self, truth: bool = True, run: str = "run-1") -> "subprocess.Popen[bytes]":
-        self.console = start_console(self.flight.endpoint, self.port, truth, field=self.field, run=run)
+        self.console = start_console(self.flight.endpoint, self.port, truth, field=self.field, run=run, sets=self.sets)
         return self.console
 
     def answers(self) -> bool:
@@ -89,6 +91,17 @@ def mixed_stage(browser: Any) -> Iterator[Stage]:
     """Three drones of three kinds and two ceiling cameras."""
     drones, cameras = ("drone_1", "drone_2", "drone_3"), ("ceiling_west", "ceiling_east")
     made = Stage(browser, FakeFlight(drones, cameras), "mixed-team")
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def large_stage(browser: Any) -> Iterator[Stage]:
+    """Eight drones: two more than there are colours."""
+    drones = tuple(f"drone_{number}" for number in range(1, 9))
+    flight = FakeFlight(drones)
+    flight.battery = dict.fromkeys(drones, 0.71)
+    made = Stage(browser, flight, sets=many_drones(drones))
     yield made
     made.close()
 

@@ -16,6 +16,7 @@ from groundstation.bus import zenoh_bus
 
 DRONES = ("drone_1", "drone_2")
 TURN_S, DESCENT_M_S = 0.02, 0.3
+ANGLES = (2.2, 0.0, 4.3, 0.73, 1.47, 2.93, 3.6, 5.2)  # of the drones around the target, far enough apart
 
 
 class FakeFlight(threading.Thread):
@@ -93,7 +94,7 @@ class FakeFlight(threading.Thread):
 
     def drone_at(self, name: str, s: float) -> tuple[float, float, float, float]:
         tx, ty, *_ = self.target_at(s)
-        angle = 0.12 * s + {"drone_1": 2.2, "drone_3": 4.3}.get(name, 0.0)
+        angle = 0.12 * s + ANGLES[self.drones.index(name)]
         px, py = 0.75 * tx + self.distance_m * math.cos(angle), 0.75 * ty + self.distance_m * math.sin(angle)
         height = {"drone_1": 2.1, "drone_3": 1.6}.get(name, 1.2) - self._sunk_m[name]
         return px, py, max(0.0, height) if name in self.flying() else 0.0, math.atan2(ty - py, tx - px)

@@ -184,7 +184,7 @@ def test_one_sentence_says_what_the_team_does_and_what_may_be_done(stage: Any) -
 def test_each_drone_says_what_it_does_and_why(stage: Any) -> None:
     page = stage.open()
     duty = page.there("drone_1-duty")
-    page.wait(lambda s: duty.inner_text().startswith("Tracks turtlebot, ordered at the terminal: watches turtlebot"))
+    page.wait(lambda s: duty.inner_text().startswith("Tracks turtlebot, ordered at the terminal: watches it. "))
     assert "Seen by ceiling camera." in duty.inner_text()
     stage.flight.fenced = True
     page.wait(lambda s: "Slowed by the fence." in page.there("drone_2-duty").inner_text())
@@ -223,12 +223,12 @@ TOLD = {
     ),
     "the_tracker_is_silent": (
         *("WATCH", "TRACKER SILENT", "in 1 s. The tracker is silent: who is lost is not known; cameras still see all."),
-        *("all land anyway", "lands in 1 s", "lands in 1 s"),
+        *("both land anyway", "lands in 1 s", "lands in 1 s"),
     ),
     "one_has_a_stuck_sensor": (
         *("WATCH", "stuck at 0.27 m/s", "drone_2 hovers. Nobody", "hover in place", "track", "hover"),
     ),
-    "all_land": ("SAFE", "No alarms", "drone_1 and drone_2 land.", "all land anyway", "landing", "landing"),
+    "all_land": ("SAFE", "No alarms", "drone_1 and drone_2 land.", "both land anyway", "landing", "landing"),
     "one_has_a_weak_link": ("ACT", "weak link, 31%", "Nobody is lost.", "hover in place", "track", "track"),
     "one_stands_with_an_unknown_battery": (
         *("ACT", "battery 19%, good for < 1 min", "drone_2 stands."),

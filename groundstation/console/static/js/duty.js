@@ -26,7 +26,7 @@ export function limitsOf(control) {
 
 const sentence = (words) => words ? `${words[0].toUpperCase()}${words.slice(1)}${/[.!?]$/.test(words) ? "" : "."}` : "";
 
-function tracked(name, plan) {
+function tracked(name, plan, room) {
   const relied = (plan.edges ?? []).filter(([, , information]) => information >= RELIED_ON);
   const watchers = seenBy(name);
   const targets = store.scene.targets.map((target) => target.name), sought = targets.filter(isLost);
@@ -36,16 +36,18 @@ function tracked(name, plan) {
   const limits = limitsOf(plan.controls.find(({ robot }) => robot === name));
   const [, who] = store.s.vehicles[name].detail.match(/^tracking for (.+)$/) ?? [];
   const search = isBlind(name) ? "Too dark to look for" : "Looks for";
-  // A card has room for three lines: of one that looks for a target and watches a drone, the list of orders names who asked.
-  const order = who && !(sought.length && watched.length) ? `, ${orderedBy(who, name, "tracking")}` : "";
-  const task = `${sought.length ? `${search} ${joined(sought)}` : `Tracks ${joined(targets)}`}${order}`;
-  const does = watched.length ? `${task}: watches ${watching(watched)}` : sought.length ? task : `${task}: moves to where it will see it`;
+  const task = sought.length ? `${search} ${joined(sought)}` : `Tracks ${joined(targets)}`;
+  const how = watched.length ? `: watches ${watching(watched, targets)}` : sought.length ? "" : ": moves to where it will see it";
   const known = watchers.length ? `Seen by ${joined(watchers.map(watcher))}` : unseen(name);
-  return [`${does}.`, `${known}.`, limits && `Slowed by ${limits}.`].filter(Boolean).join(" ");
+  const told = (order) => [`${task}${order}${how}.`, `${known}.`, limits && `Slowed by ${limits}.`].filter(Boolean).join(" ");
+  // Where a card has no room for who asked, the list of orders says it.
+  const whole = told(who ? `, ${orderedBy(who, name, "tracking")}` : "");
+  return whole.length > room ? told("") : whole;
 }
 
-// Who watches no target watches drones for the sake of their places.
-function watching(names) {
+// Who watches no target watches drones for the sake of their places; the only target was just named.
+function watching(names, targets) {
+  if (targets.length === 1 && names.length === 1 && names[0] === targets[0]) return "it";
   const purpose = names.every((name) => droneNames().includes(name)) ? ` for ${names.length > 1 ? "their places" : `${names[0]}'s place`}` : "";
   return `${joined(names)}${purpose}`;
 }
@@ -91,11 +93,16 @@ function stands(name, detail) {
   return why ? `stands, motors off. It landed: ${who ? orderedBy(who, name, doing) : why}` : `stands with its motors off${detail && `: ${detail}`}`;
 }
 
-// In TRACK what the plan has it do, unless its driver knows better; else the driver's own reason.
-export function dutyOf(name) {
+// In TRACK what the plan has it do, unless its driver knows better; else the driver's own reason. room: letters.
+export function dutyOf(name, room) {
   const status = store.s.vehicles?.[name], plan = store.s.plan;
   if (!status) return "";
   const planned = status.mode === "TRACK" && !status.braked && status.lands_in_s === null && status.flight !== "LOST" && plan && ageS(plan.at) < FRESH_S;
   if (planned && trackerSilent()) return "Told to track; without the tracker it hovers, then lands.";
-  return planned ? tracked(name, plan) : sentence(reasonOf(name, status));
+  return planned ? tracked(name, plan, room) : `${sentence(reasonOf(name, status))}${stray(name, status)}`;
+}
+
+// Of one that hovers and is lost: it will not stay where it is.
+function stray(name, { mode, lands_in_s }) {
+  return ["HOLD", "HOVER"].includes(mode) && lands_in_s === null && !trackerSilent() && isLost(name) ? ` ${unseen(name)}.` : "";
 }

@@ -13,11 +13,14 @@ export function refusalOf(verb, names = droneNames()) {
   const resumes = waiting(names).length;
   if (verb === "RESUME") return resumes ? "" : "none on hold";
   if (resumes) return "press RESUME instead";
-  return all.includes("HOVER") ? "" : all.includes("TRACK") ? (lostTarget() ? "searching already" : "tracking already") : "none hovers";
+  if (all.includes("HOVER")) return "";
+  if (up(names).every(isBound)) return names.length > 1 ? "they land" : "it lands";
+  return all.includes("TRACK") ? (lostTarget() ? "searching already" : "tracking already") : "none hovers";
 }
 
 function takeOffRefusal(names) {
-  const flying = up(names).length, batteries = standing(names).map((name) => store.s.vehicles[name]);
+  const flying = up(names).length, stand = standing(names), batteries = stand.map((name) => store.s.vehicles[name]);
+  if (stand.length && stand.every(isUnheard)) return "not heard";
   if (!batteries.length) return flying === names.length ? "flying already" : flying ? "none stands" : "not heard yet";
   if (batteries.every(({ battery }) => battery === null)) return "battery unknown";
   return batteries.every(({ battery, battery_min: least }) => battery < least) ? "low battery" : "";
@@ -38,18 +41,25 @@ function does(names, one, many) {
   return `${names.length < droneNames().length ? names.length : names.length > 2 ? `all ${names.length}` : "both"} ${many}`;
 }
 
-const told = (parts) => parts.filter(Boolean).join(";\n");
+// A button has room for two deeds; of more, the first is named.
+function told(parts, others = "others land") {
+  const all = parts.filter(Boolean);
+  return (all.length > 2 ? [all[0], others] : all).join(";\n");
+}
 
 // Who would follow TRACK.
 export const ready = () => droneNames().filter((name) => modeNow(name) === "HOVER");
 
 // What a start of the team would do now, to whom.
 export function startEffect(verb) {
-  if (verb === "TAKEOFF") return does(standing(), "rises, hovers", "rise, one by one");
+  if (verb === "TAKEOFF") return standing().some(isCutOff) ? does(standing(), "rises, if able", "rise, if able") : does(standing(), "rises, hovers", "rise, one by one");
   const who = verb === "RESUME" ? waiting() : ready();
   const how = who.some(isBound) ? ", if able" : verb === "RESUME" ? " again" : "";
   return does(who, ...(lostTarget() ? ["searches", "search"] : ["tracks", "track"]).map((word) => `${word}${how}`));
 }
+
+// Whether its own emergency stop has cut its motors: an order to take off may do no more than end that.
+export const isCutOff = (name) => store.s.vehicles?.[name]?.flight === "EMERGENCY";
 
 // What a stop of the team would do now, to whom, and to whom not; "" while nobody is heard.
 export function effectOf(verb) {
@@ -75,17 +85,17 @@ export function effectOnOne(verb, name) {
   if (isUnheard(name)) return "if it hears";
   if (verb === "LAND") return isIdle(verb, [name]) ? "lands already" : "lands here";
   if (!holding([name]).length) return "lands anyway";
-  return isIdle(verb, [name]) ? "hovers already" : isLost(name) ? "unseen: lands" : "hovers here";
+  return isLost(name) ? "unseen: lands" : isIdle(verb, [name]) ? "hovers already" : "hovers here";
 }
 
 // Who is lost hovers as well, until it is landed for it.
 function hover(flying) {
   const held = holding(), lost = held.filter(isLost), seen = held.filter((name) => !isLost(name)), bound = flying.filter((name) => !held.includes(name));
-  if (bound.length === droneNames().length) return "all land anyway";
+  if (bound.length === droneNames().length) return does(bound, "lands anyway", "land anyway");
   const yet = isIdle("HOLD") ? " already" : "";
   if (trackerSilent()) return told([does(held, `hovers${yet},\nthen lands`, `hover${yet},\nthen land`), does(bound, "lands anyway", "land anyway")]);
   const how = isIdle("HOLD") ? " already" : held.length === droneNames().length ? " in place" : "";
-  if (!lost.length) return told([does(held, `hovers${how}`, `hover${how}`), does(bound, "lands anyway", "land anyway"), does(standing(), "stands", "stand")]);
+  if (!lost.length) return told([does(held, `hovers${how}`, `hover${how}`), does(bound, "lands anyway", "land anyway"), does(standing(), "stands", "stand")], "others land or stand");
   if (lost.length < flying.length) return told([does(seen, "hovers", "hover"), does(lost, "lands if unseen", "land if unseen"), does(bound, "lands anyway", "land anyway")]);
   return does(lost, "hovers; it lands\nif it stays unseen", "hover; they land\nif they stay unseen");
 }

@@ -1,5 +1,6 @@
 // What the bar says of the whole team, worked out of the newest of everything.
 
+import { joined } from "./dom.js";
 import { ageS, droneNames, estimateAge, isTarget, entities, entity, runOver, store, trackerSilent, unseenS } from "./store.js";
 
 const HEARD_S = 1; // as in groundstation/monitor/alarms.py
@@ -24,12 +25,15 @@ export function teamMode() {
   const all = statuses().map(modeOf), silent = droneNames().filter(isUnheard);
   if (runOver()) return ["RUN OVER", "calm"];
   if (silent.length) return ["NOT HEARD", "bad", some(silent)];
-  const soon = up().filter(landsIn), words = soon.map(landsIn);
-  if (soon.length && soon.length === aloft()) return [`LANDS IN ${words.sort((a, b) => parseInt(a) - parseInt(b))[0]}`, "bad", some(soon)];
+  const soon = up().filter(landsIn), [first] = soon.map(landsIn).sort((a, b) => parseInt(a) - parseInt(b));
+  if (soon.length && soon.length === aloft()) return [`LANDS IN ${first}`, "bad", some(soon)];
   const done = CAREFUL.filter(([mode]) => all.includes(mode));
   if (!done.length) return [all.length ? "ON GROUND" : "–", "calm"];
-  const who = done.map(([mode]) => some(doing(mode))).filter(Boolean);
-  return [done.map(([mode]) => modeWord(mode)).join(" + "), levelOf(...done[0]), who.join(" + ")];
+  const named = done.map(([mode]) => modeWord(mode)), level = levelOf(...done[0]);
+  if (soon.length) return [named.slice(0, MODES).join(" + "), level, `${some(soon)} ${soon.length > 1 ? "land" : "lands"} in ${first}`];
+  // More modes than have room beside each other: whose is the most careful one, and what others do.
+  if (done.length > MODES) return [named[0], level, `${some(doing(done[0][0]))}; others ${named.slice(1).join(", ")}`];
+  return [named.join(" + "), level, done.map(([mode]) => some(doing(mode))).filter(Boolean).join(" + ")];
 }
 
 const CAREFUL = [["CUT", "bad"], ["LANDING", "warn"], ["TAKING_OFF", "warn"], ["HOLD", "warn"], ["HOVER", "warn"], ["TRACK", "good"]];
@@ -38,7 +42,7 @@ const levelOf = (mode, level) => (mode !== "TRACK" || modeWord(mode) === mode ? 
 
 // What a mode is for now: who is to track a target that is lost searches for it.
 export function modeWord(mode) {
-  if (mode !== "TRACK") return mode.replace("_", " ");
+  if (mode !== "TRACK") return mode === "CUT" ? "MOTORS OFF" : mode.replace("_", " ");
   return trackerSilent() ? "NO TRACKER" : !lostTarget() ? mode : doing(mode).every(isBlind) ? "BLIND" : "SEARCH";
 }
 
@@ -60,7 +64,14 @@ export const lostTarget = () => (store.scene?.targets ?? []).every(({ name }) =>
 // Who does this now, among those that are heard of.
 export const doing = (mode) => droneNames().filter((name) => modeOf(store.s.vehicles?.[name]) === mode);
 
-const FEW = 2; // names that have room below a word
+export const NAMED = 4; // more drones than this are counted
+// "drone_1 and turtlebot"; of many the drones are counted.
+export function namedOrCounted(names) {
+  const drones = names.filter((name) => !isTarget(name));
+  return joined(drones.length > NAMED ? [`${drones.length} drones`, ...names.filter(isTarget)] : names);
+}
+
+const FEW = 2, MODES = 2; // names that have room below a word; modes that have it beside each other
 // Which drones are meant, if not all are.
 function some(names) {
   const all = droneNames().length;

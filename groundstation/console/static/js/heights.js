@@ -1,7 +1,7 @@
 // How high everybody flies: the room from the side, beside the map.
 
 import { label } from "./canvas.js";
-import { colourOf, ink } from "./palette.js";
+import { colourOf, ink, isAgain } from "./palette.js";
 import { entities, estimateAge, isTarget, store } from "./store.js";
 
 const MARGIN = 14, GAP = 16, STALE_S = 0.5;
@@ -24,7 +24,9 @@ export function drawHeights(canvas, ratio) {
     last = words;
     g.strokeStyle = colourOf(name);
     g.lineWidth = 3;
+    g.setLineDash(isAgain(name) ? [3, 3] : []);
     g.beginPath(); g.moveTo(22, at); g.lineTo(36, at); g.stroke();
+    g.setLineDash([]);
     label(g, `${mean[2].toFixed(2)} m`, 39, words + 4, colourOf(name), 14, 600, "left");
   }
   g.globalAlpha = 1;

@@ -1,7 +1,7 @@
 // Who is where: ellipses, drones, target, trails, velocities, the truth.
 
 import { bodyToWorld, ellipse95 } from "./geometry.js";
-import { colourOf, ink } from "./palette.js";
+import { colourOf, ink, isAgain } from "./palette.js";
 import { drawArrow, label, path } from "./canvas.js";
 import { seconds } from "./dom.js";
 import { limitsOf } from "./duty.js";
@@ -79,7 +79,7 @@ export function drawBodies(g, view, stale) {
   for (const body of entities()) {
     g.globalAlpha = alpha * fade(body);
     const [x, y] = view.point(body.mean[0], body.mean[1]);
-    if (body.kind === "robot") drawDrone(g, x, y, body.mean[3], Math.max(13, 0.27 * view.scale), colourOf(body.name));
+    if (body.kind === "robot") drawDrone(g, x, y, body.mean[3], Math.max(13, 0.27 * view.scale), body.name);
     else drawTarget(g, x, y, body.velocity, Math.max(9, 0.18 * view.scale), colourOf(body.name));
     const age = estimateAge() + body.age_s;
     const suffix = stale ? `, ${seconds(age)} ago` : isLost(body.name) ? `, lost for ${seconds(age)}` : "";
@@ -95,7 +95,7 @@ export function drawStanding(g, view) {
   for (const { name, place, yaw } of store.s.standing ?? []) {
     const [x, y] = view.point(...place);
     g.globalAlpha = alpha * 0.6;
-    drawDrone(g, x, y, yaw ?? 0, Math.max(13, 0.27 * view.scale), colourOf(name));
+    drawDrone(g, x, y, yaw ?? 0, Math.max(13, 0.27 * view.scale), name);
     g.globalAlpha = alpha;
     keepClear(x, y, bodyRadius(view) / 2);
     note(g, NAME, name, withShortNames(`${name} stands`), around(x, y, bodyRadius(view), 14), colourOf(name), 14, 500);
@@ -105,7 +105,9 @@ export function drawStanding(g, view) {
 // Within this distance of a body's middle no words stand [pixels].
 const bodyRadius = (view) => Math.max(20, 0.36 * view.scale);
 
-function drawDrone(g, x, y, yaw, r, colour) {
+// Its rotors are filled where a drone before it has its colour.
+function drawDrone(g, x, y, yaw, r, name) {
+  const colour = colourOf(name);
   g.save();
   g.translate(x, y);
   g.rotate(-yaw);
@@ -116,7 +118,7 @@ function drawDrone(g, x, y, yaw, r, colour) {
   for (const [a, b] of [[arm, arm], [arm, -arm], [-arm, arm], [-arm, -arm]]) {
     g.beginPath();
     g.arc(a, b, r * 0.4, 0, 7);
-    g.fillStyle = ink().floor;
+    g.fillStyle = isAgain(name) ? colour : ink().floor;
     g.fill();
     g.lineWidth = Math.max(1.5, r * 0.1);
     g.stroke();

@@ -5,12 +5,18 @@ const INK = {
   dark: { text: "#e7edf3", dim: "#93a4b3", grid: "#223140", axis: "#5d7081", floor: "#131d26", outside: "#0b1117", link: "#a9bac8", truth: "#d9a3f0", halo: "#0b1117", band: "#57d3a6" },
 };
 const KEY = "skein-theme";
-let colours = {}, fence = {};
+let colours = {}, fence = {}, again = new Set();
 
 export const theme = () => document.documentElement.dataset.theme;
 export const ink = () => INK[theme()];
-export function takeColours(scene) { colours = scene.colours; fence = scene.fence_colour; }
+export function takeColours(scene) {
+  [colours, fence] = [scene.colours, scene.fence_colour];
+  const shades = scene.drones.map(({ name }) => colours[name].light);
+  again = new Set(scene.drones.filter((_, index) => shades.indexOf(shades[index]) < index).map(({ name }) => name));
+}
 
+// Whether a drone before it has its colour: then its signs differ.
+export const isAgain = (name) => again.has(name);
 export const colourOf = (name) => colours[name]?.[theme()] ?? ink().text;
 // In a picture, whose own light does not follow the theme, within a black edge.
 export const colourInPicture = (name) => colours[name]?.dark ?? INK.dark.text;

@@ -1,18 +1,21 @@
 // A card for each drone and one for each target.
 
 import { batteryWords, lastsWords } from "./batteries.js";
-import { byId, el, joined, seconds, svg, text } from "./dom.js";
+import { byId, el, seconds, svg, text } from "./dom.js";
 import { ellipse95 } from "./geometry.js";
 import { dutyOf } from "./duty.js";
-import { aloft, doing, isBlind, landsIn, modeOf, modeWord, up } from "./glance.js";
+import { aloft, doing, isBlind, isLost, landsIn, modeOf, modeWord, namedOrCounted, up } from "./glance.js";
 import { withShortNames } from "./names.js";
 import { give } from "./own_orders.js";
-import { colourOf } from "./palette.js";
+import { colourOf, isAgain } from "./palette.js";
 import { ageS, entity, estimateAge, runOver, SEEN_S, seenBy, store, trackerSilent, unseenS } from "./store.js";
 
 const STALE_S = 1;
+// In these modes one that is lost is told as that.
+const STRAYS = new Set(["TRACK", "HOVER", "HOLD"]);
 const LEVELS = { TRACK: "good", HOVER: "good", HOLD: "warn", TAKING_OFF: "warn", LANDING: "warn", CUT: "bad", LANDED: "calm", CONNECTING: "calm" };
 const NARROW = matchMedia("(max-width: 1380px)"), LOW = matchMedia("(max-height: 990px)");
+const FEW = 3, ROOM = { usual: 135, crowd: 95 }; // cards; letters
 const cards = new Map();
 
 export function startTeam() {
@@ -21,8 +24,12 @@ export function startTeam() {
   for (const screen of [NARROW, LOW]) screen.onchange = fit;
 }
 
-// A low screen has room for three cards with all their lines.
-const fit = () => byId("team").classList.toggle("close", NARROW.matches || (LOW.matches && cards.size > 3));
+// A low screen has room for three cards with all their lines; more drones stand in two columns where that is wide enough.
+function fit() {
+  const crowd = !NARROW.matches && store.scene?.drones.length > FEW;
+  byId("team").classList.toggle("crowd", crowd);
+  byId("team").classList.toggle("close", NARROW.matches || crowd || (LOW.matches && cards.size > FEW));
+}
 
 export function buildTeam() {
   cards.clear();
@@ -67,7 +74,7 @@ export function paint(only) {
   for (const [name, { root, chip, drone }] of cards) {
     if (only && name !== only) continue;
     root.style.setProperty("--own", colourOf(name));
-    chip.replaceChildren(drone ? svg("path", { d: "M4 4 L14 14 M14 4 L4 14", stroke: colourOf(name), "stroke-width": 3 }) : svg("circle", { cx: 9, cy: 9, r: 6, fill: "none", stroke: colourOf(name), "stroke-width": 3 }));
+    chip.replaceChildren(drone ? svg("path", { d: isAgain(name) ? "M9 2 V16 M2 9 H16" : "M4 4 L14 14 M14 4 L4 14", stroke: colourOf(name), "stroke-width": 3 }) : svg("circle", { cx: 9, cy: 9, r: 6, fill: "none", stroke: colourOf(name), "stroke-width": 3 }));
   }
 }
 
@@ -83,8 +90,9 @@ function showVehicle(name, { root, values, mode, detail }) {
   const silent = status && age > STALE_S && store.connected && !runOver();
   root.classList.toggle("stale", stale);
   const left = status && landsIn(name);
-  text(mode, silent ? "silent" : left ? `lands in ${left}` : status ? modeWord(modeOf(status)).toLowerCase() : "no word yet");
-  mode.dataset.level = silent || left ? "bad" : !status || stale ? "wait" : status.flight === "LOST" || status.flight === "EMERGENCY" ? "bad" : levelOf(status);
+  const lost = status && STRAYS.has(status.mode) && !runOver() && !trackerSilent() && isLost(name);
+  text(mode, silent ? "silent" : left ? `lands in ${left}` : lost ? "lost" : status ? modeWord(modeOf(status)).toLowerCase() : "no word yet");
+  mode.dataset.level = silent || left ? "bad" : runOver() ? "calm" : lost ? "warn" : !status || stale ? "wait" : status.flight === "LOST" || status.flight === "EMERGENCY" ? "bad" : levelOf(status);
   const heard = values.heard;
   text(heard, status ? `${seconds(age)} ago` : "never");
   heard.className = age > 4 ? "empty" : age > STALE_S ? "low" : "";
@@ -109,7 +117,7 @@ function unheardWords(name) {
 }
 
 function showDuty(node, name, silent) {
-  text(node, silent ? unheardWords(name) : withShortNames(dutyOf(name)));
+  text(node, silent ? unheardWords(name) : withShortNames(dutyOf(name, byId("team").classList.contains("crowd") ? ROOM.crowd : ROOM.usual)));
   node.classList.toggle("low", Boolean(landsIn(name) || silent));
 }
 
@@ -140,7 +148,7 @@ function beliefWords(name, body, age, lost) {
   if (trackerSilent()) return `${seenBy(name).length ? "In pictures, but its place" : "Its place"} is not known: the tracker is silent.`;
   if (lost && Number.isFinite(age) && !aloft()) return `Not seen for ${seconds(age)}: nobody flies to look for it.`;
   if (!body) return "";
-  if (lost) return `Lost: nobody has seen it for ${seconds(age)}. ${doing("TRACK").length ? `${joined(doing("TRACK"))} ${doing("TRACK").length > 1 ? "look" : "looks"} for it.` : ""}`.trim();
+  if (lost) return `Lost: nobody has seen it for ${seconds(age)}. ${doing("TRACK").length ? `${namedOrCounted(doing("TRACK"))} ${doing("TRACK").length > 1 ? "look" : "looks"} for it.` : ""}`.trim();
   if (age > SEEN_S) return `Not seen for ${seconds(age)}: it may be hidden near (${body.mean.slice(0, 2).map((value) => value.toFixed(1)).join(", ")}).`;
   return doing("TRACK").length ? "Seen: the team tracks it." : aloft() ? "Seen; nobody follows it now." : "Seen.";
 }
@@ -156,7 +164,7 @@ function showBelief(name, { root, values, mode, detail, drone }) {
     const lost = age > store.scene.lost_after_s, dark = doing("TRACK").length && doing("TRACK").every(isBlind);
     const [search, words] = trackerSilent() ? [] : store.s.estimate?.searches?.[name] ?? [];
     text(mode, runOver() ? "run over" : trackerSilent() ? "place unknown" : Number.isFinite(age) && lost && !aloft() ? "not seen" : search || (lost && body) || !body ? (Number.isFinite(age) ? "lost" : "not found yet") : age > SEEN_S ? "not seen" : doing("TRACK").length ? "tracked" : "seen");
-    mode.dataset.level = !body || trackerSilent() ? "wait" : lost ? "bad" : search ? "warn" : age > SEEN_S ? "warn" : "good";
+    mode.dataset.level = runOver() ? "calm" : !body || trackerSilent() ? "wait" : lost ? "bad" : search ? "warn" : age > SEEN_S ? "warn" : "good";
     text(detail, withShortNames((words || lost) && dark ? `Lost for ${seconds(age)}: nobody can look for it, the drones' pictures are dark.` : words ? `${Number.isFinite(age) ? "Lost" : "Not found yet"}: ${words}.` : beliefWords(name, body, age, lost)));
     root.classList.toggle("stale", estimateAge() > STALE_S || !store.connected);
   }

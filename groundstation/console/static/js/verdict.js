@@ -2,21 +2,20 @@
 
 import { joined, seconds } from "./dom.js";
 import { ready, refusalOf, waiting } from "./effects.js";
-import { aloft, doing, isBlind, isLost, isUnheard, landsIn, lostTarget, modeNow, modes, stage, standing, teamMode, unseenLeftS, up } from "./glance.js";
+import { aloft, doing, isBlind, isLost, isUnheard, landsIn, lostTarget, modeNow, modes, NAMED, namedOrCounted, stage, standing, unseenLeftS, up } from "./glance.js";
 import { mustWords, openMusts } from "./preflight.js";
 import { droneNames, entity, SEEN_S, seenBy, store, trackerSilent, unseenS } from "./store.js";
 
-const NAMED = 4; // more drones than this are counted
 // Of one, of several.
 const DEEDS = {
-  TRACK: ["tracks the target", "track the target"], HOVER: ["hovers", "hover"], HOLD: ["hovers", "hover"], TAKING_OFF: ["takes off", "take off"],
-  LANDING: ["lands", "land"], LANDED: ["stands", "stand"], CUT: ["has its motors cut", "have their motors cut"],
+  TRACK: ["tracks the target", "track the target"], HOVER: ["hovers", "hover"], TAKING_OFF: ["takes off", "take off"],
+  LANDING: ["lands", "land"], LANDED: ["stands", "stand"], CUT: ["has its motors off", "have their motors off"],
 };
 const LOOKS = ["looks for the target", "look for the target"], BLIND = ["has no light to see by", "have no light to see by"];
 const ALONE = ["is without the tracker", "are without the tracker"];
 const UNHEARD = ["is not heard", "are not heard"];
 const NEXT = {
-  "TAKING OFF": "Each is seen from outside before the next one rises.",
+  TAKING_OFF: "Each is seen from outside before the next one rises.",
   LANDING: "A drone that has landed stays down until a new TAKE OFF.",
 };
 
@@ -27,7 +26,8 @@ function landings(soon) {
 
 function deeds() {
   const counted = droneNames().length > NAMED, deaf = up().filter(isUnheard), soon = droneNames().filter((name) => landsIn(name) && !deaf.includes(name));
-  const modal = Object.entries(DEEDS).map(([mode, words]) => [doing(mode).filter((name) => !soon.includes(name) && !deaf.includes(name)), mode !== "TRACK" ? words : trackerSilent() ? ALONE : !lostTarget() ? words : doing(mode).every(isBlind) ? BLIND : LOOKS]);
+  const doers = (mode) => (mode === "HOVER" ? droneNames().filter((name) => [...doing(mode), ...doing("HOLD")].includes(name)) : doing(mode));
+  const modal = Object.entries(DEEDS).map(([mode, words]) => [doers(mode).filter((name) => !soon.includes(name) && !deaf.includes(name)), mode !== "TRACK" ? words : trackerSilent() ? ALONE : !lostTarget() ? words : doing(mode).every(isBlind) ? BLIND : LOOKS]);
   const told = [[deaf, UNHEARD], ...landings(soon), ...modal].filter(([names]) => names.length);
   const parts = told.map(([names, [one, many]]) => `${counted ? names.length : joined(names)} ${names.length > 1 ? many : one}`);
   return parts.length ? `${parts.join("; ")}.` : "";
@@ -45,7 +45,7 @@ const NEVER_S = 1e5;
 function unseenFor(names) {
   const ages = names.map(unseenS), seen = names.filter((_, index) => ages[index] < NEVER_S), never = names.filter((name) => !seen.includes(name));
   const known = ages.filter((age) => age < NEVER_S), [least, most] = [Math.min(...known), Math.max(...known)].map((age) => age.toFixed(0));
-  return [seen.length && `${joined(seen)}, not seen for ${least === most ? "" : `${least} to `}${most} s`, never.length && `${joined(never)}, not seen yet`].filter(Boolean).join("; ");
+  return [seen.length && `${namedOrCounted(seen)}, not seen for ${least === most ? "" : `${least} to `}${most} s`, never.length && `${namedOrCounted(never)}, not seen yet`].filter(Boolean).join("; ");
 }
 
 // In pictures, and not localised.
@@ -54,7 +54,7 @@ const isUnplaced = (name) => !entity(name) && unseenS(name) <= store.scene.lost_
 // Who can be seen without the tracker.
 function inPictures() {
   const all = sought(), seen = all.filter((name) => seenBy(name).length);
-  return seen.length ? `; cameras still see ${seen.length === all.length ? "all" : joined(seen)}` : "";
+  return seen.length ? `; cameras still see ${seen.length === all.length ? "all" : namedOrCounted(seen)}` : "";
 }
 
 function lost() {
@@ -68,7 +68,7 @@ function lost() {
 function unseenYet() {
   const unseen = sought().filter((name) => unseenS(name) > SEEN_S && !isLost(name));
   const left = Math.max(0, store.scene.lost_after_s - Math.max(...unseen.map(unseenS)));
-  return unseen.length ? ` (${joined(unseen)} not seen just now: ${unseen.length > 1 ? "the first " : ""}counts as lost in ${seconds(left)})` : "";
+  return unseen.length ? ` (${namedOrCounted(unseen)} not seen just now: ${unseen.length > 1 ? "the first " : ""}counts as lost in ${seconds(left)})` : "";
 }
 
 // What lets those go on that wait for it.
@@ -86,11 +86,14 @@ function takeOff() {
   return store.s.flight?.flown ? "TAKE OFF flies again." : "TAKE OFF begins the flight.";
 }
 
+// What follows where all who fly do the same.
+const next = () => (new Set(up().map(modeNow)).size === 1 ? NEXT[modeNow(up()[0])] : undefined);
+
 export function verdict() {
   if (!modes().length) return "No drone has been heard yet.";
   if (stage() === "over") return store.connected && !store.s.result ? "The run is over: it is being judged." : "The run is over.";
   if (!aloft()) return `Nobody flies. ${takeOff()}`;
-  return [deeds(), lost(), NEXT[teamMode()[0]] ?? start()].filter(Boolean).join(" ");
+  return [deeds(), lost(), next() ?? start()].filter(Boolean).join(" ");
 }
 
 // Who lands by itself, why and when, in two short lines; "" if nobody will.

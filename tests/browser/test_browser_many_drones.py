@@ -1,0 +1,65 @@
+"""Eight drones: all of them in sight, in words that have room, and told apart though colours return."""
+
+import re
+from typing import Any
+
+import pytest
+from clipping import clipped, covered, overhanging
+from fake_flight import TARGET
+from situations import SITUATIONS
+
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
+
+SIZES = ((1440, 900), (1280, 800), (2560, 1440), (390, 844))
+# Whether words of the bar lie on others.
+OVERLAID = """() => { const boxes = [...document.querySelectorAll(".readings :is(dt, dd)")].map((one) => {
+  const words = document.createRange(); words.selectNodeContents(one); return words.getBoundingClientRect(); });
+  return boxes.some((a, index) => boxes.slice(index + 1).some((b) =>
+    a.left < b.right - 1 && b.left < a.right - 1 && a.top < b.bottom - 4 && b.top < a.bottom - 4)); }"""
+BELOW = """() => [...document.querySelectorAll(".unit")].filter((one) => {
+  const panel = document.querySelector(".crew").getBoundingClientRect(), box = one.getBoundingClientRect();
+  return box.bottom > Math.min(panel.bottom, innerHeight) + 1; }).map((one) => one.ariaLabel)"""
+
+
+def all_at_once(flight: Any) -> None:
+    """Somebody lands, holds, hovers, stands and is lost, while others track."""
+    doing = ("TRACK", "TRACK", "HOLD", "LANDING", "LANDED", "TRACK", "TRACK", "HOVER")
+    flight.modes = dict(zip(flight.drones, doing, strict=True))
+    flight.unseen_s["drone_6"] = 4.0
+
+
+def test_each_of_eight_has_its_card_in_sight_and_words_that_have_room(large_stage: Any) -> None:
+    page, flight = large_stage.open(), large_stage.flight
+    for arrange in (SITUATIONS["all_is_well"], all_at_once):
+        arrange(flight)
+        for width, height in SIZES:
+            page.page.set_viewport_size({"width": width, "height": height})
+            page.page.wait_for_timeout(700)
+            assert overhanging(page.page) == covered(page.page) == [], (arrange, width)
+            assert not page.page.evaluate(OVERLAID), (arrange, width)
+            if width == 1280:  # where two columns have no room, the team scrolls in its panel
+                continue
+            assert clipped(page.page) == [], (arrange, width)
+            assert width < 1000 or page.page.evaluate(BELOW) == [], (arrange, width)
+
+
+def test_what_eight_do_is_counted_and_who_is_lost_named(large_stage: Any) -> None:
+    page, flight = large_stage.open(), large_stage.flight
+    all_at_once(flight)
+    page.wait(lambda s: page.there("team-mode").inner_text() == "LANDING")
+    assert page.there("team-who").inner_text() == "drone_4; others HOLD, HOVER, TRACK"
+    assert page.there("hold").inner_text() == "HOLD\n5 hover;\nothers land"
+    told = "4 track the target; 2 hover; 1 lands; 1 stands. Lost: drone_6, not seen for 4 s."
+    page.wait(lambda s: page.there("verdict").inner_text().startswith(told))
+    assert page.there("drone_6-mode").inner_text() == "lost"
+    flight.modes = dict.fromkeys(flight.drones, "TRACK")
+    flight.unseen_s = dict.fromkeys((*flight.drones, TARGET), 5.0)
+    lost = re.compile(r"^8 look for the target\. Lost: 8 drones and turtlebot, not seen for 5 s\.")
+    page.wait(lambda s: lost.search(page.there("verdict").inner_text()))
+
+
+def test_who_has_the_colour_of_another_has_another_sign(large_stage: Any) -> None:
+    page = large_stage.open()
+    chip = "(name) => document.querySelector(`[data-testid=card-${name}] .chip`).innerHTML"
+    signs = [page.page.evaluate(chip, name) for name in large_stage.flight.drones]
+    assert len(set(signs)) == len(signs)

@@ -94,7 +94,7 @@ class Failsafe:
 # A vehicle's action while nothing else is asked of it.
 _TRACK = frozenset({DriverMode.TRACK})
 _STANDS = frozenset({DriverMode.LANDED, DriverMode.CUT})
-_UNCONVERGED = "the tracker does not know well enough where it is (safety.max_position_std_m)"
+_UNCONVERGED = "the tracker does not know well enough where it is"
 
 
 @cache

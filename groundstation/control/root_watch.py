@@ -20,8 +20,8 @@ _USED = (Verdict.ACCEPTED, Verdict.INFLATED)
 # Longer than the silence of a camera with 2 pictures a second, or of one that is restarted; for a sensor whose data are
 # refused, no longer than two of its pictures take.
 _SILENT_NS, _HANGS_NS = 1_500 * NS_PER_MS, 500 * NS_PER_MS
-_SILENCE = "no fixed sensor tells anything new of the room: drones hover, and land if none does"
-_REMEDY = "see to the cameras and motion capture (frozen? unplugged?); the team goes on once one sees it"
+_SILENCE = "no fixed camera or sensor tells anything new: drones hover, then land"
+_REMEDY = "check power and cable of what is fixed in the room; the team goes on when that sees it"
 
 
 class RootWatch:

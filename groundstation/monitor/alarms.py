@@ -41,8 +41,8 @@ _RESTARTED = "Nothing to do: it is restarted if it hangs."
 _CALL = f"{_TO_DO}check its marker and the light; drive it into the middle of the room; or LAND ALL."
 _DOWN = {
     FlightState.EMERGENCY: (
-        "EMERGENCY",
-        f"{_TO_DO}keep away until its motors have stopped, then set it upright on its pad.",
+        "EMERGENCY, its motors are off",
+        f"{_TO_DO}keep away while others fly, or LAND ALL; then set it upright on its pad.",
     ),
     FlightState.LOST: ("its driver no longer hears it", f"{_TO_DO}check its battery and its link."),
 }

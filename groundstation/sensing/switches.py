@@ -42,4 +42,4 @@ def _reason(before: Plan, now: Plan, stay: float | None) -> str:
         return f"mode {before.mode} to {now.mode}"
     if stay is None or stay <= 0.0:
         return "the former topology was no alternative"
-    return f"expected uncertainty {100 * (1 - now.cost / stay):.0f} % lower"
+    return f"the target's place is to be {100 * (1 - now.cost / stay):.0f} % less uncertain"

@@ -265,8 +265,12 @@ def test_the_map_says_why_the_topology_is_as_it_is(stage: Any) -> None:
     line = page.there("switch")
     page.wait(lambda s: line.is_visible())
     change = page.state()["sections"]["switch"]
-    assert change["reason"] == "expected uncertainty 15 % lower"  # the fake planner's: staying costs 1.18 times as much
-    assert line.inner_text().startswith("Switched ") and line.inner_text().endswith(f": {change['reason']}")
+    assert (
+        change["reason"] == "the target's place is to be 15 % less uncertain"
+    )  # the fake planner's: staying costs 1.18 times as much
+    assert line.inner_text().startswith("Who watches whom changed ") and line.inner_text().endswith(
+        f": {change['reason']}"
+    )
     page.there("layer-graph").click()
     assert line.is_hidden()
 

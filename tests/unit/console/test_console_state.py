@@ -197,7 +197,12 @@ def test_the_last_switch_of_topology_stays_with_its_reason() -> None:
     board.begin()
     state.put_often(board, NS_PER_S)
     said = json.loads(board.since(-1))["switch"]
-    assert said == {"at": 2000.0, "before": "a + b", "now": "a over b", "reason": "expected uncertainty 50 % lower"}
+    assert said == {
+        "at": 2000.0,
+        "before": "a + b",
+        "now": "a over b",
+        "reason": "the target's place is to be 50 % less uncertain",
+    }
 
 
 def test_what_was_never_seen_can_still_be_said() -> None:

@@ -96,7 +96,11 @@ def test_every_switch_has_its_reason() -> None:
         plan(4.0, "a", 0.4, {"a": 0.4}),
     ]
     found = switches(run_with(plans=plans))
-    assert [switch.reason for switch in found] == ["b joined", "expected uncertainty 50 % lower", "b left"]
+    assert [switch.reason for switch in found] == [
+        "b joined",
+        "the target's place is to be 50 % less uncertain",
+        "b left",
+    ]
     assert found[1].stay_cost == 0.2
 
 

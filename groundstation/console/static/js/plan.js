@@ -32,7 +32,7 @@ export function showPlan() {
 export function showSwitch() {
   const change = store.s.switch, node = byId("switch");
   node.hidden = !change || !layers.graph;
-  if (change) text(node, `Switched ${seconds(ageS(change.at))} ago from ${change.before} to ${change.now}: ${change.reason}`);
+  if (change) text(node, `Who watches whom changed ${seconds(ageS(change.at))} ago: ${change.reason}`);
 }
 
 function option(item, worst, plan, now) {

@@ -192,6 +192,15 @@ def test_a_drone_that_is_heard_and_not_believed_is_not_called_silent(
     assert (alarm.text, alarm.grave, alarm.asks) == (f"drone_1: {words}", True, asks)
 
 
+def test_who_crashed_is_to_be_left_alone_while_others_fly(world: World) -> None:
+    world.vehicle("drone_1", "CUT", flight_state=m.FlightState.EMERGENCY)
+    world.estimate()
+    world.text()
+    (alarm,) = alarms_of(world.state, NOW)
+    assert alarm.text == "drone_1: EMERGENCY, its motors are off"
+    assert alarm.asks and "keep away while others fly, or LAND ALL" in alarm.advice
+
+
 def test_each_alarm_says_first_whether_there_is_anything_to_do(world: World) -> None:
     world.vehicle("drone_1", battery=0.18, link_quality=0.5, detail="hovers: its velocity is stuck", braked=True)
     world.vehicle("drone_2", age_s=4.0, flight_state=m.FlightState.LOST)

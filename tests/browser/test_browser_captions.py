@@ -100,7 +100,7 @@ def test_who_has_no_light_looks_for_nobody(stage: Any) -> None:
     page = stage.open()
     stage.flight.dark = True
     page.wait(lambda s: page.there("team-mode").inner_text() == "BLIND")
-    blind = "Too dark to look for turtlebot, ordered at the terminal."
+    blind = "Too dark to look for turtlebot. "
     page.wait(lambda s: page.there("drone_1-duty").inner_text().startswith(blind))
     assert "Also: dark pictures, turtlebot lost" in page.there("banners").inner_text()
 

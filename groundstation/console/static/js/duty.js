@@ -41,7 +41,7 @@ function tracked(name, plan, room) {
   const known = watchers.length ? `Seen by ${joined(watchers.map(watcher))}` : unseen(name);
   const told = (order) => [`${task}${order}${how}.`, `${known}.`, limits && `Slowed by ${limits}.`].filter(Boolean).join(" ");
   // Where a card has no room for who asked, the list of orders says it.
-  const whole = told(who ? `, ${orderedBy(who, name, "tracking")}` : "");
+  const whole = told(who && !isBlind(name) ? `, ${orderedBy(who, name, "tracking")}` : "");
   return whole.length > room ? told("") : whole;
 }
 

@@ -28,9 +28,14 @@ def all_at_once(flight: Any) -> None:
     flight.unseen_s["drone_6"] = 4.0
 
 
+def one_crashed(flight: Any) -> None:
+    SITUATIONS["all_is_well"](flight)
+    flight.modes["drone_2"] = "CUT"
+
+
 def test_each_of_eight_has_its_card_in_sight_and_words_that_have_room(large_stage: Any) -> None:
     page, flight = large_stage.open(), large_stage.flight
-    for arrange in (SITUATIONS["all_is_well"], all_at_once):
+    for arrange in (one_crashed, all_at_once):
         arrange(flight)
         for width, height in SIZES:
             page.page.set_viewport_size({"width": width, "height": height})
@@ -47,11 +52,16 @@ def test_what_eight_do_is_counted_and_who_is_lost_named(large_stage: Any) -> Non
     page, flight = large_stage.open(), large_stage.flight
     all_at_once(flight)
     page.wait(lambda s: page.there("team-mode").inner_text() == "LANDING")
-    assert page.there("team-who").inner_text() == "drone_4; others HOLD, HOVER, TRACK"
-    assert page.there("hold").inner_text() == "HOLD\n5 hover;\nothers land"
+    page.wait(lambda s: page.there("team-who").inner_text() == "drone_4; others HOLD, HOVER, TRACK")
+    one_crashed(flight)
+    page.wait(lambda s: page.there("team-who").inner_text() == "drone_2; others TRACK")
+    page.wait(lambda s: page.there("team-mode").inner_text() == "MOTORS OFF")
+    all_at_once(flight)
+    page.wait(lambda s: page.there("team-mode").inner_text() == "LANDING")
+    page.wait(lambda s: page.there("hold").inner_text() == "HOLD\n5 hover;\nothers land")
     told = "4 track the target; 2 hover; 1 lands; 1 stands. Lost: drone_6, not seen for 4 s."
     page.wait(lambda s: page.there("verdict").inner_text().startswith(told))
-    assert page.there("drone_6-mode").inner_text() == "lost"
+    page.wait(lambda s: page.there("drone_6-mode").inner_text() == "lost")
     flight.modes = dict.fromkeys(flight.drones, "TRACK")
     flight.unseen_s = dict.fromkeys((*flight.drones, TARGET), 5.0)
     lost = re.compile(r"^8 look for the target\. Lost: 8 drones and turtlebot, not seen for 5 s\.")

@@ -73,7 +73,8 @@ function safetyWord(own) {
 export function showBanners() {
   const own = ownAlarms(), all = banners(own), word = safetyWord(own);
   text(byId("safety"), word);
-  text(byId("safety-means"), (word === "WATCH" && !replaying() && store.scene && landingWords()) || MEANS[word]);
+  const unheard = !store.s.safety && !store.s.ended && word === "WATCH" && "nothing is\nheard yet";
+  text(byId("safety-means"), unheard || (word === "WATCH" && !replaying() && store.scene && landingWords()) || MEANS[word]);
   byId("safety-box").dataset.level = LEVELS[word];
   document.body.dataset.safety = word;
   noteOwnAlarms(own);

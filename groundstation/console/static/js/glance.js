@@ -30,10 +30,11 @@ export function teamMode() {
   const done = CAREFUL.filter(([mode]) => all.includes(mode));
   if (!done.length) return [all.length ? "ON GROUND" : "–", "calm"];
   const named = done.map(([mode]) => modeWord(mode)), level = levelOf(...done[0]);
-  if (soon.length) return [named.slice(0, MODES).join(" + "), level, `${some(soon)} ${soon.length > 1 ? "land" : "lands"} in ${first}`];
-  // More modes than have room beside each other: whose is the most careful one, and what others do.
-  if (done.length > MODES) return [named[0], level, `${some(doing(done[0][0]))}; others ${named.slice(1).join(", ")}`];
-  return [named.join(" + "), level, done.map(([mode]) => some(doing(mode))).filter(Boolean).join(" + ")];
+  if (soon.length) return [named[0], level, `${some(soon)} ${soon.length > 1 ? "land" : "lands"} in ${first}`];
+  // Where not all have room beside each other: who is in the most careful mode, and what others do.
+  const together = named.join(" + "), careful = doing(done[0][0]);
+  if (together.length > LETTERS) return [named[0], level, `${some(careful)}; ${all.length - careful.length > 1 ? "others" : "the other"} ${named.slice(1).join(", ")}`];
+  return [together, level, done.map(([mode]) => some(doing(mode))).filter(Boolean).join(" + ")];
 }
 
 const CAREFUL = [["CUT", "bad"], ["LANDING", "warn"], ["TAKING_OFF", "warn"], ["HOLD", "warn"], ["HOVER", "warn"], ["TRACK", "good"]];
@@ -71,7 +72,7 @@ export function namedOrCounted(names) {
   return joined(drones.length > NAMED ? [`${drones.length} drones`, ...names.filter(isTarget)] : names);
 }
 
-const FEW = 2, MODES = 2; // names that have room below a word; modes that have it beside each other
+const FEW = 2, LETTERS = 15; // names that have room below a word; letters that have it beside the figures
 // Which drones are meant, if not all are.
 function some(names) {
   const all = droneNames().length;

@@ -10,6 +10,7 @@ from groundstation.cli.bench_planner import numbers
 from groundstation.cli.exits import ExitCode
 from groundstation.cli.kernels import use_all_kernels
 from groundstation.cli.terminal import write_over
+from groundstation.process.one_thread import stay_on_one_thread
 
 
 @click.command(
@@ -35,8 +36,7 @@ def estimator(robots: str, rounds: int, flight_ms: int, field_name: str, seed: i
     required figure is missed, or if the filters do not agree.
     """
     sizes = numbers(robots, "--robots", 2, 40)
-    for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS"):
-        os.environ.setdefault(variable, "1")
+    stay_on_one_thread()
     from groundstation.settings.files import find_field
     from groundstation.settings.load import load_field
     from groundstation.settings.resolved import resolved_field

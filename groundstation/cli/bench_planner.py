@@ -1,7 +1,6 @@
 """`groundstation bench planner`: one control step of the planar planner, timed against brute force and peers."""
 
 import json
-import os
 from typing import Any
 
 import click
@@ -9,6 +8,7 @@ import click
 from groundstation.cli.kernels import use_all_kernels
 from groundstation.cli.numbers import FiniteRange
 from groundstation.cli.terminal import write_over
+from groundstation.process.one_thread import stay_on_one_thread
 
 _LAYOUTS = ("two-level", "random", "string", "flat")
 _PEERS = ("naive", "numpy", "jax")
@@ -70,8 +70,7 @@ def planner(
     peers = choices(peer, _PEERS, "--peer") if peer else []
     if model == "frustum":
         layouts = _of_the_planner_that_flies(layouts, peers)
-    for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS"):
-        os.environ.setdefault(variable, "1")
+    stay_on_one_thread()
     use_all_kernels()
     from groundstation.bench.planner import run_bench
 

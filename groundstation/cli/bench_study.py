@@ -11,6 +11,7 @@ import click
 from groundstation.cli.bench_limits import judge
 from groundstation.cli.numbers import FiniteRange
 from groundstation.errors import GroundStationError
+from groundstation.process.one_thread import one_thread
 
 # 40 times real time on one core: a campaign of 1000 flights of a minute in 25 minutes.
 _LIMITS = {"cpu_ms_per_flight_s": 25.0}
@@ -41,8 +42,7 @@ def study(duration: float, runs: int, as_json: bool) -> int:
 
 def _fly(seconds: float) -> dict[str, Any]:
     command = [sys.executable, "-m", "sim_bridge.study", "demo", "--duration", str(seconds), "--json"]
-    threads = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
-    result = subprocess.run(command, env=os.environ | threads, capture_output=True, text=True, check=False)
+    result = subprocess.run(command, env=one_thread(), capture_output=True, text=True, check=False)
     if result.returncode != 0:
         raise GroundStationError(f"the study ended with exit code {result.returncode}: {result.stderr.strip()[-500:]}")
     flight: dict[str, Any] = json.loads(result.stdout)

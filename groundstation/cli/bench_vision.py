@@ -1,12 +1,13 @@
 """`groundstation bench vision`: runs the simulator's study of markers and detector in a process of its own."""
 
-import os
 import subprocess
 import sys
 from datetime import UTC, datetime
 from pathlib import Path
 
 import click
+
+from groundstation.process.one_thread import one_thread
 
 
 @click.command(
@@ -39,8 +40,7 @@ def vision(pictures: int, seed: int, out: Path | None, as_json: bool) -> int:
     folder = out or Path("runs") / f"vision-{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
     command = [sys.executable, "-m", "sim_bridge.study", "vision", "--pictures", str(pictures), "--seed", str(seed)]
     command += ["--output", str(folder), *(["--json"] if as_json else [])]
-    threads = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
-    code = subprocess.run(command, env=os.environ | threads, check=False).returncode
+    code = subprocess.run(command, env=one_thread(), check=False).returncode
     if not as_json:
         click.echo(f"figures and plots: {folder}", err=True)
     return code

@@ -12,13 +12,12 @@ from typing import BinaryIO
 from groundstation.bus.roles import Identity
 from groundstation.errors import GroundStationError
 from groundstation.process.child import ChildSpec
+from groundstation.process.one_thread import one_thread
 from groundstation.supervisor.interrupts import put_aside_by_nobody
 from groundstation.supervisor.process_spec import ProcessSpec
 from groundstation.supervisor.run import Run
 
-# 13 processes on 2 cores: a thread pool per process would only compete.
 _TAIL_LINES = 8
-_SINGLE_THREADED = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
 class Launcher:
@@ -98,7 +97,7 @@ class Launcher:
                 stderr=log,
                 start_new_session=True,
                 pass_fds=spec.keep_open,
-                env=os.environ | dict.fromkeys(_SINGLE_THREADED, "1"),
+                env=one_thread(),
             )
 
     def log_tail(self, name: str) -> str:

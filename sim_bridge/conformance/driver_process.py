@@ -11,6 +11,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from groundstation.process.child import ChildSpec
+from groundstation.process.one_thread import one_thread
 from groundstation.process.stat_file import stat_of
 from groundstation.vehicles import DriverProcess
 
@@ -21,7 +22,6 @@ _PARENT = (
     "print(child.pid, flush=True)\n"
     "sys.exit(child.wait() & 255)\n"
 )
-_SINGLE_THREADED = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
 class DriverLife:
@@ -30,13 +30,12 @@ class DriverLife:
     def __init__(self, entry: str, process: DriverProcess, spec: ChildSpec, log: Path) -> None:
         document = json.dumps(asdict(spec) | {"section": process.section}).encode()
         command = [sys.executable, "-c", _PARENT, sys.executable, "-m", "groundstation.process.entry", spec.name, entry]
-        environment = os.environ | dict.fromkeys(_SINGLE_THREADED, "1")
         with os.fdopen(os.memfd_create("child"), "r+b") as told, log.open("ab") as errors:
             told.write(document)
             told.flush()
             told.seek(0)
             self._parent = subprocess.Popen(
-                command, stdin=told, stdout=subprocess.PIPE, stderr=errors, start_new_session=True, env=environment
+                command, stdin=told, stdout=subprocess.PIPE, stderr=errors, start_new_session=True, env=one_thread()
             )
         assert self._parent.stdout is not None
         self.pid = int(self._parent.stdout.readline())

@@ -6,9 +6,9 @@ from typing import Any
 
 import click
 
-from groundstation.cli.bench_planner import numbers
 from groundstation.cli.exits import ExitCode
 from groundstation.cli.kernels import use_all_kernels
+from groundstation.cli.lists import numbers
 from groundstation.cli.terminal import write_over
 from groundstation.process.one_thread import stay_on_one_thread
 

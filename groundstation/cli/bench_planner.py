@@ -6,34 +6,13 @@ from typing import Any
 import click
 
 from groundstation.cli.kernels import use_all_kernels
+from groundstation.cli.lists import choices, numbers
 from groundstation.cli.numbers import FiniteRange
 from groundstation.cli.terminal import write_over
 from groundstation.process.one_thread import stay_on_one_thread
 
 _LAYOUTS = ("two-level", "random", "string", "flat")
 _PEERS = ("naive", "numpy", "jax")
-
-
-def choices(value: str, allowed: tuple[str, ...], option: str) -> list[str]:
-    """Return a comma-separated option as a list, each choice once; raises UsageError for none, or one not allowed."""
-    chosen = list(dict.fromkeys(part.strip() for part in value.split(",") if part.strip()))
-    if not chosen:
-        raise click.UsageError(f"{option}: name at least one of {', '.join(allowed)}")
-    for part in chosen:
-        if part not in allowed:
-            raise click.UsageError(f"{option}: {part!r} is none of {', '.join(allowed)}")
-    return chosen
-
-
-def numbers(value: str, option: str, low: int, high: int) -> list[int]:
-    """Return a comma-separated option as integers within a range, each once; raises UsageError."""
-    try:
-        found = list(dict.fromkeys(int(part) for part in value.split(",") if part.strip()))
-    except ValueError:
-        raise click.UsageError(f"{option}: {value!r} is not a list of whole numbers") from None
-    if not found or min(found) < low or max(found) > high:
-        raise click.UsageError(f"{option}: numbers from {low} to {high}, separated by commas")
-    return found
 
 
 @click.command()

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from groundstation.cli.bench_planner import choices, numbers
 from groundstation.cli.experiment_calibrations import calibrations
 from groundstation.cli.experiment_culprits import culprits
 from groundstation.cli.experiment_faults import faults
@@ -15,6 +14,7 @@ from groundstation.cli.experiment_missions import missions
 from groundstation.cli.experiment_mrclam import mrclam
 from groundstation.cli.experiment_scenarios import scenarios
 from groundstation.cli.kernels import use_all_kernels
+from groundstation.cli.lists import choices, numbers
 from groundstation.cli.numbers import FiniteRange
 from groundstation.cli.terminal import progress
 from groundstation.errors import GroundStationError

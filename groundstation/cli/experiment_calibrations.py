@@ -8,12 +8,19 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from groundstation.cli.exits import ExitCode
-from groundstation.cli.experiment_campaign import flown_field, flown_scenario, fly_all, labs_options
+from groundstation.cli.experiment_campaign import (
+    chosen_labs,
+    flown_field,
+    flown_scenario,
+    fly_all,
+    labs_options,
+    publish,
+)
 from groundstation.errors import SettingsError
 
 if TYPE_CHECKING:
     from groundstation.experiments.culprit_rows import WrongFigure, WrongLab
-    from groundstation.experiments.faults import FlightBatch
+    from groundstation.experiments.flight_batches import FlightBatch
 
 Flight = dict[str, Any]
 
@@ -32,17 +39,16 @@ def calibrations(
     Prints for both flights, of the same seed, the target's error and ANEES, and the errors left in the field file.
     """
     from groundstation.experiments.calibrations import row_of, table, verdict_on
-    from groundstation.experiments.runner import write_atomically
 
     told = Told(**flown)
     labs, seeds_flown = _chosen(told, only), range(seed, seed + seeds)
     batches = [_batch(order, one) for order in (_order(told, lab.errors) for lab in labs) for one in seeds_flown]
-    before = _flights(fly_all(batches, scheduler, workers, len(batches) == 1, out))
+    before = _flights(fly_all(batches, scheduler, workers, out))
     again = [
         _batch(_mended(told, lab, flight, out), flight["seed"])
         for lab, flight in zip((lab for lab in labs for _ in seeds_flown), before, strict=True)
     ]
-    after = _flights(fly_all(again, scheduler, workers, len(again) == 1, out))
+    after = _flights(fly_all(again, scheduler, workers, out))
     rows, verdicts = [], []
     for index, lab in enumerate(labs):
         own = slice(index * seeds, (index + 1) * seeds)
@@ -50,8 +56,7 @@ def calibrations(
         rows.append(row_of(lab, found))
         verdicts += [{"lab": lab.name, **one} for one in found]
     document = {"experiment": "calibrations", "rows": rows, "flights": verdicts}
-    write_atomically(out / "calibrations.json", json.dumps(document, indent=1) + "\n")
-    click.echo(json.dumps(document, indent=1) if as_json else "\n".join(table(rows)))
+    publish(document, table(rows), out, as_json)
     good = all(one["mended"] and not one["missed"] for one in verdicts)
     return ExitCode.OK if good else ExitCode.FAILED
 
@@ -75,12 +80,12 @@ class Told:
 
 def _chosen(told: Told, only: str) -> "list[WrongLab]":
     from groundstation.experiments.calibrations import calibrated_labs
-    from groundstation.experiments.culprit_rows import chosen, labs_of
+    from groundstation.experiments.culprit_rows import labs_of
 
     values = flown_field(told.path, told.options)["field"]
     if not values["cameras"] or len(values["drones"]) < 2:
         raise SettingsError([f"{told.field}: calibrations needs a fixed camera and two drones"])
-    return chosen(only, calibrated_labs(labs_of(values)))
+    return chosen_labs(only, calibrated_labs(labs_of(values)))
 
 
 def _order(told: Told, errors: "tuple[WrongFigure, ...]", mended: Path | None = None) -> str:
@@ -93,13 +98,13 @@ def _order(told: Told, errors: "tuple[WrongFigure, ...]", mended: Path | None = 
 
 
 def _batch(order: str, seed: int) -> "FlightBatch":
-    from groundstation.experiments.faults import FlightBatch
+    from groundstation.experiments.flight_batches import FlightBatch
 
     return FlightBatch(order, (seed,), "calibrations")
 
 
 def _flights(rows: list[dict[str, Any]]) -> list[Flight]:
-    from groundstation.experiments.faults import flights_of
+    from groundstation.experiments.flight_batches import flights_of
 
     return flights_of(rows)[0]
 

@@ -1,26 +1,28 @@
 """The shared part of experiments that fly batches of message-level flights: options, field, and the runs."""
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from groundstation.cli.lists import choices
 from groundstation.cli.numbers import FiniteRange
 from groundstation.cli.terminal import progress
 from groundstation.errors import GroundStationError
 
 if TYPE_CHECKING:
-    from groundstation.experiments.faults import FlightBatch
+    from groundstation.experiments.culprit_rows import WrongLab
+    from groundstation.experiments.flight_batches import FlightBatch
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 
 def campaign_options(name: str) -> Callable[[Command], Command]:
     """Return a decorator with the options of a campaign; its results go to runs/experiment-NAME."""
-    options = (
+    return _all_of(
         click.option(
             "--set", "options", multiple=True, metavar="A.B=C", help="Override one setting of the field; repeatable."
         ),
@@ -45,35 +47,51 @@ def campaign_options(name: str) -> Callable[[Command], Command]:
         click.option("--json", "as_json", is_flag=True, help="Print all flights as JSON."),
     )
 
-    return _all_of(*options)
 
+def flown_options(name: str, seconds: float, least_s: float) -> Callable[[Command], Command]:
+    """Return a decorator with the options of a campaign that flies one field under one scenario.
 
-def labs_options(name: str, seeds: int, seconds: float, least_s: float) -> Callable[[Command], Command]:
-    """Return a decorator with the options of a campaign over rows of wrong labs.
-
-    seeds, seconds: the defaults of flights in a row and of their tracking [s], which takes least_s or more.
+    seconds: the default of tracking in each flight [s], which takes least_s or more.
     """
     return _all_of(
-        click.option(
-            "--seeds", type=click.IntRange(1, 1000), default=seeds, show_default=True, help="Flights of each row."
-        ),
         click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the first flight."),
-        click.option(
-            "--rows", "only", default="", metavar="NAMES", help="Only these rows, separated by commas (default: all)."
-        ),
         click.option(
             "--duration",
             "seconds",
             type=FiniteRange(least_s, 600),
             default=seconds,
             show_default=True,
-            help="Seconds of tracking.",
+            help="Seconds of tracking in each flight.",
         ),
         click.option("--field", default="lab", show_default=True, help="Field file, or a shipped one's name."),
         click.option(
             "--scenario", default="realistic", show_default=True, help="Scenario: sensor errors, the target's path."
         ),
         campaign_options(name),
+    )
+
+
+def flights_option(flights: int) -> Callable[[Command], Command]:
+    """Return the option that says how many flights a campaign has."""
+    return click.option(
+        "--flights",
+        type=click.IntRange(1),
+        default=flights,
+        show_default=True,
+        help="Number of flights, each with a seed of its own.",
+    )
+
+
+def labs_options(name: str, seeds: int, seconds: float, least_s: float) -> Callable[[Command], Command]:
+    """Return a decorator with the options of a campaign over rows of wrong labs; seeds: default of flights in a row."""
+    return _all_of(
+        click.option(
+            "--seeds", type=click.IntRange(1, 1000), default=seeds, show_default=True, help="Flights of each row."
+        ),
+        click.option(
+            "--rows", "only", default="", metavar="NAMES", help="Only these rows, separated by commas (default: all)."
+        ),
+        flown_options(name, seconds, least_s),
     )
 
 
@@ -131,28 +149,41 @@ def flown_scenario(name: str, field: Path) -> dict[str, Any]:
     return scenario
 
 
-def order_of(name: str, scenario: str, options: Sequence[str], seconds: float, **own: Any) -> str:
+def order_of(field: str, scenario: str, options: Sequence[str], seconds: float, **own: Any) -> str:
     """Return the simulator's order without the seeds, by names of field and scenario; own: keys of one study only."""
     from groundstation.settings.files import find_field
 
-    path = find_field(name)
+    path = find_field(field)
     order = {"scenario": flown_scenario(scenario, path), "seconds": seconds}
     return json.dumps(flown_field(path, options) | order | own, sort_keys=True)
 
 
-def fly_all(
-    batches: "Sequence[FlightBatch]", scheduler: str, workers: int, single: bool, out: Path
-) -> list[dict[str, Any]]:
-    """Return the row of each batch; single: too little work for a local cluster. Raises GroundStationError.
+def chosen_labs(only: str, labs: "Sequence[WrongLab]") -> "list[WrongLab]":
+    """Return the labs of the named rows, of all for ""; raises UsageError for an unknown name."""
+    known = {lab.name: lab for lab in labs}
+    return [known[name] for name in (choices(only, known, "--rows") if only else known)]
+
+
+def fly_all(batches: "Sequence[FlightBatch]", scheduler: str, workers: int, out: Path) -> list[dict[str, Any]]:
+    """Return the row of each batch; a single one needs no local cluster. Raises GroundStationError.
 
     Each row is kept in a folder of `out`, so that an interrupted campaign can be continued.
     """
-    from groundstation.experiments.faults import fly
+    from groundstation.experiments.flight_batches import CampaignError, fly
     from groundstation.experiments.runner import SweepError, dask_is_there, run_tasks
 
     (out / "flights").mkdir(parents=True, exist_ok=True)  # fails before hours of flights, not after
-    serial = scheduler == "none" or (scheduler == "local" and (single or not dask_is_there()))
+    serial = scheduler == "none" or (scheduler == "local" and (len(batches) == 1 or not dask_is_there()))
     try:
         return run_tasks(batches, out / "flights", "" if serial else scheduler, workers, progress, fly)
-    except (SweepError, RuntimeError) as error:
+    except (SweepError, CampaignError) as error:
         raise GroundStationError(str(error)) from error
+
+
+def publish(document: dict[str, Any], lines: Iterable[str], out: Path, as_json: bool) -> None:
+    """Write a campaign's document to its folder, and print it: as JSON, or its lines."""
+    from groundstation.experiments.runner import write_atomically
+
+    text = json.dumps(document, indent=1)
+    write_atomically(out / f"{document['experiment']}.json", text + "\n")
+    click.echo(text if as_json else "\n".join(lines))

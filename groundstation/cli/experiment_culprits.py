@@ -7,12 +7,19 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from groundstation.cli.exits import ExitCode
-from groundstation.cli.experiment_campaign import flown_field, flown_scenario, fly_all, labs_options
+from groundstation.cli.experiment_campaign import (
+    chosen_labs,
+    flown_field,
+    flown_scenario,
+    fly_all,
+    labs_options,
+    publish,
+)
 from groundstation.errors import SettingsError
 
 if TYPE_CHECKING:
     from groundstation.experiments.culprit_rows import WrongLab
-    from groundstation.experiments.faults import FlightBatch
+    from groundstation.experiments.flight_batches import FlightBatch
 
 _BATCH = 5
 
@@ -34,12 +41,11 @@ def culprits(
     a finding forbids the take-off for it, or if it is the first suspicion within 20 s of the command to take off.
     """
     from groundstation.experiments.culprits import row_of, table, verdict_on
-    from groundstation.experiments.faults import flights_of
-    from groundstation.experiments.runner import write_atomically
+    from groundstation.experiments.flight_batches import flights_of
 
     planned = _planned(only, seeds, seed, **flown)
     batches = [batch for _, own in planned for batch in own]
-    found = iter(fly_all(batches, scheduler, workers, len(batches) == 1, out))
+    found = iter(fly_all(batches, scheduler, workers, out))
     rows, flights = [], []
     for lab, own in planned:
         known = [one for _ in own for one in flights_of([next(found)])[0]]
@@ -49,8 +55,7 @@ def culprits(
             {"lab": lab.name, **verdict, "told": one["told"]} for verdict, one in zip(verdicts, known, strict=True)
         ]
     document = {"experiment": "culprits", "rows": rows, "flights": flights}
-    write_atomically(out / "culprits.json", json.dumps(document, indent=1) + "\n")
-    click.echo(json.dumps(document, indent=1) if as_json else "\n".join(table(rows)))
+    publish(document, table(rows), out, as_json)
     return ExitCode.OK if all(row["as_wanted"] >= 0.9 * row["flights"] for row in rows) else ExitCode.FAILED
 
 
@@ -58,8 +63,8 @@ def _planned(
     only: str, seeds: int, seed: int, seconds: float, field: str, scenario: str, options: tuple[str, ...]
 ) -> "list[tuple[WrongLab, list[FlightBatch]]]":
     """Return the batches of flights of each chosen row."""
-    from groundstation.experiments.culprit_rows import chosen, labs_of
-    from groundstation.experiments.faults import batches
+    from groundstation.experiments.culprit_rows import labs_of
+    from groundstation.experiments.flight_batches import batches
     from groundstation.settings.files import find_field
 
     path = find_field(field)
@@ -69,7 +74,7 @@ def _planned(
         raise SettingsError([f"{path}: culprits needs a fixed camera and two drones"])
     return [
         (lab, batches(_order(order, base, lab), seed, seeds, _BATCH, "culprits"))
-        for lab in chosen(only, labs_of(order["field"]))
+        for lab in chosen_labs(only, labs_of(order["field"]))
     ]
 
 

@@ -1,6 +1,5 @@
 """`groundstation experiment faults`: many short flights with random faults, judged by truth."""
 
-import json
 import time
 from pathlib import Path
 from typing import Any
@@ -8,8 +7,8 @@ from typing import Any
 import click
 
 from groundstation.cli.exits import ExitCode
-from groundstation.cli.experiment_campaign import campaign_options, fly_all, order_of
-from groundstation.cli.numbers import FiniteRange
+from groundstation.cli.experiment_campaign import flights_option, flown_options, fly_all, order_of, publish
+from groundstation.cli.lists import parts
 
 
 @click.command(
@@ -19,30 +18,13 @@ from groundstation.cli.numbers import FiniteRange
     "Exit codes: 0 no unsafe end, 1 unsafe ends, 2 wrong settings."
 )
 @click.option(
-    "--flights",
-    type=click.IntRange(1),
-    default=100,
-    show_default=True,
-    help="Number of flights, each with a seed of its own.",
-)
-@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the first flight.")
-@click.option(
-    "--duration",
-    "seconds",
-    type=FiniteRange(12, 600),
-    default=20.0,
-    show_default=True,
-    help="Seconds of tracking in each flight.",
-)
-@click.option("--field", "name", default="lab", show_default=True, help="Field file, or a shipped one's name.")
-@click.option("--scenario", default="realistic", show_default=True, help="Scenario without faults: sensor errors.")
-@click.option(
     "--kinds",
     default="",
     help="Only these kinds of faults, separated by commas (default: all that are drawn at random); none: healthy "
     "flights.",
 )
-@campaign_options("faults")
+@flights_option(100)
+@flown_options("faults", seconds=20.0, least_s=12)
 def faults(
     flights: int, seed: int, scheduler: str, workers: int, out: Path, as_json: bool, kinds: str, **flown: Any
 ) -> int:
@@ -53,29 +35,23 @@ def faults(
     second with a belief that is 0.5 m off; and, once a vehicle's telemetry is useless, no hover within 1 s or no rest
     within 3.5 s.
     """
-    from groundstation.experiments.faults import batches, by_kind, ends_told, flights_of, table, totals
-    from groundstation.experiments.runner import write_atomically
+    from groundstation.experiments.faults import by_kind, ends_told, table, totals
+    from groundstation.experiments.flight_batches import batches, flights_of
 
     began = time.monotonic()
-    order = order_of(**flown, kinds=[kind.strip() for kind in kinds.split(",") if kind.strip()])
+    order = order_of(**flown, kinds=parts(kinds))
     planned = batches(order, seed, flights, size=max(1, min(20, flights // max(1, 2 * workers or 4))))
-    found, timing = flights_of(fly_all(planned, scheduler, workers, flights == 1, out))
+    found, timing = flights_of(fly_all(planned, scheduler, workers, out))
     summary = totals(found, timing) | {"elapsed_s": round(time.monotonic() - began, 1)}
     by_kinds = by_kind(found)
     document = {"experiment": "faults", **summary, "kinds": by_kinds, "flights_flown": found}
-    write_atomically(out / "faults.json", json.dumps(document, indent=1) + "\n")
-    if as_json:
-        click.echo(json.dumps(document, indent=1))
-    else:
-        _tell([*table(by_kinds), *ends_told(summary)], summary, out)
+    publish(document, [*table(by_kinds), *ends_told(summary), *_spent(summary, out)], out, as_json)
     return ExitCode.FAILED if summary["unsafe"] else ExitCode.OK
 
 
-def _tell(lines: list[str], summary: dict[str, Any], folder: Path) -> None:
-    for line in lines:
-        click.echo(line)
+def _spent(summary: dict[str, Any], folder: Path) -> list[str]:
     shares = ", ".join(f"{name} {share:.0%}" for name, share in summary["time_shares"].items())
-    click.echo(f"{summary['cpu_s_per_flight']} s of CPU time for a flight ({shares}), {summary['elapsed_s']} s in all")
-    click.echo(
-        f"written to {folder}/faults.json; one again: groundstation experiment faults --flights 1 --seed N --json"
-    )
+    return [
+        f"{summary['cpu_s_per_flight']} s of CPU time for a flight ({shares}), {summary['elapsed_s']} s in all",
+        f"written to {folder}/faults.json; one again: groundstation experiment faults --flights 1 --seed N --json",
+    ]

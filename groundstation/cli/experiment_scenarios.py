@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from groundstation.cli.exits import ExitCode
-from groundstation.cli.experiment_campaign import campaign_options, flown_field, flown_scenario, fly_all
+from groundstation.cli.experiment_campaign import campaign_options, flown_field, flown_scenario, fly_all, publish
+from groundstation.cli.lists import choices
 from groundstation.cli.numbers import FiniteRange
-from groundstation.errors import SettingsError
 
 if TYPE_CHECKING:
-    from groundstation.experiments.faults import FlightBatch
+    from groundstation.experiments.flight_batches import FlightBatch
 
 _BATCH = 5
 
@@ -57,12 +57,11 @@ def scenarios(
     neighbour from rest, only the topology's sightings are fused). Figures count from when the target was found; lost
     is an error above 0.5 m.
     """
-    from groundstation.experiments.faults import flights_of
-    from groundstation.experiments.runner import write_atomically
-    from groundstation.experiments.scenarios import against_best_fixed, comparison, rows_of, table
+    from groundstation.experiments.flight_batches import flights_of
+    from groundstation.experiments.scenarios import STRATEGIES, against_best_fixed, comparison, rows_of, table
 
-    planned, began = _planned(names, _known(strategies), **flown), time.monotonic()
-    found = fly_all([batch for _, batch in planned], scheduler, workers, len(planned) == 1, out)
+    planned, began = _planned(names, choices(strategies, STRATEGIES, "--strategies"), **flown), time.monotonic()
+    found = fly_all([batch for _, batch in planned], scheduler, workers, out)
     flights = [
         {"scenario": name, **one} for (name, _), row in zip(planned, found, strict=True) for one in flights_of([row])[0]
     ]
@@ -74,23 +73,8 @@ def scenarios(
         "against_best_fixed": best,
         "flights": flights,
     }
-    write_atomically(out / "scenarios.json", json.dumps(document, indent=1) + "\n")
-    if as_json:
-        click.echo(json.dumps(document, indent=1))
-    else:
-        _tell([*table(rows), *comparison(best)], rows, out)
+    publish(document, [*table(rows), *comparison(best), *_missed(rows, out)], out, as_json)
     return ExitCode.FAILED if any(row["missed"] for row in rows) else ExitCode.OK
-
-
-def _known(strategies: str) -> list[str]:
-    from groundstation.experiments.scenarios import STRATEGIES
-
-    chosen = list(dict.fromkeys(name.strip() for name in strategies.split(",") if name.strip()))
-    strangers = [name for name in chosen if name not in STRATEGIES]
-    if strangers or not chosen:
-        what = f"no strategy {', '.join(map(repr, strangers))}" if strangers else "names none"
-        raise SettingsError([f"--strategies: {what}; there are {', '.join(STRATEGIES)}"])
-    return chosen
 
 
 def _planned(
@@ -98,7 +82,7 @@ def _planned(
     options: tuple[str, ...],
 ) -> "list[tuple[str, FlightBatch]]":  # fmt: skip
     """Return each batch of flights with its scenario's name: some seeds of a scenario under a strategy each."""
-    from groundstation.experiments.faults import batches
+    from groundstation.experiments.flight_batches import batches
 
     planned = []
     for name, label in _labelled(names or _shipped()).items():
@@ -139,10 +123,10 @@ def _order(name: str, seconds: float | None, field: str | None, options: tuple[s
     }
 
 
-def _tell(lines: list[str], rows: list[dict[str, Any]], folder: Path) -> None:
-    for line in lines:
-        click.echo(line)
-    for row in rows:
-        for seed, missed in row["missed"].items():
-            click.echo(f"{row['scenario']} {row['strategy']} seed {seed}: {'; '.join(missed)}")
-    click.echo(f"written to {folder}/scenarios.json")
+def _missed(rows: list[dict[str, Any]], folder: Path) -> list[str]:
+    missed = [
+        f"{row['scenario']} {row['strategy']} seed {seed}: {'; '.join(why)}"
+        for row in rows
+        for seed, why in row["missed"].items()
+    ]
+    return [*missed, f"written to {folder}/scenarios.json"]

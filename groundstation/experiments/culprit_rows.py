@@ -5,8 +5,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from groundstation.errors import SettingsError
-
 STAND_S = 4.0
 """How long the team stands on its pads before it is judged and ordered to take off."""
 
@@ -135,14 +133,6 @@ def _failures(ceiling: str, one: str) -> Iterable[WrongLab]:
     yield fails("a drone's picture hangs", "picture_frozen", one)
     yield fails("a drone's telemetry hangs", "telemetry_frozen", one)
     yield fails("a drone's velocity is stuck", "velocity_stuck", one, 0.0)
-
-
-def chosen(only: str, labs: Iterable[WrongLab]) -> list[WrongLab]:
-    """Return the rows of names separated by commas ("": all); raises SettingsError for an unknown name."""
-    names, known = [name.strip() for name in only.split(",") if name.strip()], {lab.name: lab for lab in labs}
-    if strangers := [name for name in names if name not in known]:
-        raise SettingsError([f"--rows: no row {', '.join(map(repr, strangers))}; there are {', '.join(known)}"])
-    return [known[name] for name in names] or list(known.values())
 
 
 def size_told(lab: WrongLab, line: str) -> float | None:

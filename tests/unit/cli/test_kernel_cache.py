@@ -9,7 +9,7 @@ import click
 import pytest
 
 from groundstation.cli import kernels
-from groundstation.cli.bench_planner import choices, numbers
+from groundstation.cli.lists import choices, numbers
 from groundstation.cli.recorded_flight import recorded_flight
 from groundstation.errors import GroundStationError
 from groundstation.process import numba_cache

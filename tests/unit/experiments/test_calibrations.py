@@ -11,7 +11,7 @@ from groundstation.calibration.team_settings import with_changes
 from groundstation.cli.main import run
 from groundstation.experiments.calibrations import calibrated_labs, row_of, table, verdict_on
 from groundstation.experiments.culprit_rows import WrongLab, labs_of
-from groundstation.experiments.faults import FlightBatch
+from groundstation.experiments.flight_batches import FlightBatch
 from groundstation.field.resolved import ResolvedField
 from groundstation.settings.files import find_field
 from groundstation.settings.load import load_field

@@ -10,7 +10,8 @@ import pytest
 from groundstation.cli.exits import ExitCode
 from groundstation.cli.experiment import experiment
 from groundstation.errors import OperatorMistake
-from groundstation.experiments.faults import HEALTHY, FlightBatch, batches, by_kind, ends_told, fly, table, totals
+from groundstation.experiments.faults import HEALTHY, by_kind, ends_told, table, totals
+from groundstation.experiments.flight_batches import FlightBatch, batches, fly
 
 
 def flight(seed: int, kinds: list[str], unsafe: dict[str, float], mode: str = "TRACK", **more: Any) -> dict[str, Any]:
@@ -90,7 +91,7 @@ def test_the_command_writes_all_flights_and_fails_for_unsafe_ends(
         timing = [{"tracker": 1.0, "cpu": 1.0} for _ in flights]
         return {"task": {}, "merits": {"flights": flights}, "timing": {"flights": timing}}
 
-    monkeypatch.setattr("groundstation.experiments.faults.fly", flown)
+    monkeypatch.setattr("groundstation.experiments.flight_batches.fly", flown)
     monkeypatch.setattr("groundstation.experiments.runner._planar_run", lambda: pytest.fail("needs no kernels"))
     options = ["--scheduler", "none", "--kinds", "wind, velocity_stuck", "--set", "safety.min_separation_m=0.7"]
     arguments = ["faults", "--flights", "3", *options, "--output", str(tmp_path)]
@@ -117,7 +118,7 @@ def test_an_interrupted_campaign_goes_on_where_it_was(tmp_path: Path, monkeypatc
         flights = [flight(seed, [], {}) for seed in batch.seeds]
         return {"task": {}, "merits": {"flights": flights}, "timing": {"flights": [{"cpu": 1.0} for _ in flights]}}
 
-    monkeypatch.setattr("groundstation.experiments.faults.fly", fly_two)
+    monkeypatch.setattr("groundstation.experiments.flight_batches.fly", fly_two)
     arguments = ["faults", "--flights", "3", "--scheduler", "none", "-o", str(tmp_path)]
     with pytest.raises(click.Abort):
         experiment.main(arguments, standalone_mode=False)
@@ -129,7 +130,7 @@ def test_an_interrupted_campaign_goes_on_where_it_was(tmp_path: Path, monkeypatc
 def test_another_program_flies_anew(monkeypatch: pytest.MonkeyPatch) -> None:
     (batch,) = batches("{}", 1, 1)
     key = batch.key
-    monkeypatch.setattr("groundstation.experiments.faults.program_digest", lambda: "of another program")
+    monkeypatch.setattr("groundstation.experiments.flight_batches.program_digest", lambda: "of another program")
     assert batch.key != key
 
 

@@ -2,7 +2,6 @@
 
 import contextlib
 import json
-import os
 import socket
 import subprocess
 import sys
@@ -241,8 +240,3 @@ def free_port() -> int:
     with contextlib.closing(socket.socket()) as probe:
         probe.bind((HOST, 0))
         return int(probe.getsockname()[1])
-
-
-def load_average() -> float:
-    """Return the mean number of tasks that wanted a core in the last minute."""
-    return round(os.getloadavg()[0], 1)

@@ -17,7 +17,10 @@ _LIMITS = {
 }
 
 
-@click.command(epilog="Example: groundstation bench console --seconds 20 --json")
+@click.command(
+    short_help="CPU and delays of the operator's page.",
+    epilog="Example: groundstation bench console --seconds 20 --json",
+)
 @click.option("--seconds", type=FiniteRange(2, 600), default=20.0, show_default=True, help="How long to run [s].")
 @click.option("--drones", type=click.IntRange(1, 20), default=4, show_default=True, help="Number of drones that send.")
 @click.option("--no-browser", is_flag=True, help="Leave out what needs Chromium.")
@@ -28,12 +31,11 @@ def console(seconds: float, drones: int, no_browser: bool, as_json: bool) -> int
     The server's cost is CPU time. Delays are medians of wall time: a busy machine shows in them, so its load is
     printed. Exit code 0 when all limits are kept, 1 when one is not.
     """
-    from groundstation.bench.console import load_average, measure
+    from groundstation.bench.console import measure
 
     browser = "" if no_browser else next(filter(None, map(shutil.which, _CHROMIUM)), "")
     figures: dict[str, Any] = {"drones": drones, "seconds": seconds, **measure(seconds, drones, _pictures(), browser)}
     figures["ratio_to_peer"] = round(figures["cpu_percent_of_core"] / figures["peer"]["cpu_percent_of_core"], 2)
-    figures["load_average"] = load_average()
     return judge(figures, _LIMITS, "median", as_json)
 
 

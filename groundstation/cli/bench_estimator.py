@@ -14,7 +14,8 @@ from groundstation.process.one_thread import stay_on_one_thread
 
 
 @click.command(
-    epilog="\b\nExamples:\n  groundstation bench estimator\n  groundstation bench estimator --robots 30 --json"
+    short_help="Time the joint filter, its path, and peers.",
+    epilog="\b\nExamples:\n  groundstation bench estimator\n  groundstation bench estimator --robots 30 --json",
 )
 @click.option("--robots", default="5,10,30", show_default=True, help="Team sizes; 30 are judged.")
 @click.option(

@@ -1,6 +1,7 @@
-"""Compares figures of a bench with their limits, and prints them for people or programs."""
+"""Compares figures of a bench with their limits, and prints them and the machine's load for people or programs."""
 
 import json
+import os
 from collections.abc import Mapping
 from typing import Any
 
@@ -21,7 +22,7 @@ def judge(figures: Mapping[str, Any], limits: Mapping[str, float], measure: str,
 
     missed = [name for name, limit in limits.items() if name in figures and not value(name) <= limit]
     unknown = [name for name in limits if name not in figures]
-    everything = {**figures, "limits": dict(limits)}
+    everything = {**figures, "load_average": round(os.getloadavg()[0], 1), "limits": dict(limits)}
     if as_json:
         click.echo(json.dumps(everything | {"not_measured": unknown, "passed": not missed}, indent=2))
     else:

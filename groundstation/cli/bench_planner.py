@@ -15,7 +15,7 @@ _LAYOUTS = ("two-level", "random", "string", "flat")
 _PEERS = ("naive", "numpy", "jax")
 
 
-@click.command()
+@click.command(short_help="Time the planar planner against brute force and peers.")
 @click.option("--robots", default="2,5,10,20,30,50,100", show_default=True, help="Team sizes.")
 @click.option("--layout", default="two-level,random,string", show_default=True, help=f"Of {', '.join(_LAYOUTS)}.")
 @click.option("--peer", default="", help=f"Also time {', '.join(_PEERS)} (comma-separated), each in a child process.")

@@ -11,9 +11,10 @@ from groundstation.process.one_thread import one_thread
 
 
 @click.command(
+    short_help="Measure markers and detector on rendered pictures.",
     epilog="\b\nExamples:\n  groundstation bench vision\n"
     "  groundstation bench vision --pictures 250 -o runs/vision\n"
-    "  groundstation bench vision --json | jq .targets"
+    "  groundstation bench vision --json | jq .targets",
 )
 @click.option(
     "--pictures",

@@ -15,9 +15,10 @@ _MAX_LINES = 5
 
 
 @click.command(
+    short_help="Write a recorded run in the formats of other programs.",
     epilog="\b\nExamples:\n  groundstation recording export --csv runs/20261120T120000Z-lab\n"
     "  groundstation recording export --rrd --output flight.rrd runs/20261120T120000Z-lab\n"
-    "  groundstation export --tlog runs/20261120T120000Z-mixed-team"
+    "  groundstation export --tlog runs/20261120T120000Z-mixed-team",
 )
 @click.argument("recording", type=click.Path(exists=True, path_type=Path))
 @click.option("--csv", "formats", flag_value="csv", multiple=True, help="One table for each topic, units in the names.")

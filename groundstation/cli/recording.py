@@ -1,6 +1,5 @@
 """`groundstation recording`: inspects, repairs, cuts and exports recordings."""
 
-import importlib
 import json
 from dataclasses import asdict
 from datetime import UTC, datetime
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from groundstation.cli.exits import ExitCode
+from groundstation.cli.export import export
 from groundstation.cli.numbers import FiniteRange
 
 if TYPE_CHECKING:
@@ -19,30 +19,16 @@ EXISTING = click.Path(exists=True, path_type=Path)
 _MAX_LINES = 20
 
 
-class RecordingGroup(click.Group):
-    """The commands below, and `export`, which is the verb of that name."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the names in the order of their use."""
-        return ["info", "recover", "cut", "export"]
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Return a command, importing the module of `export` only when it is asked for."""
-        if cmd_name == "export":
-            command = importlib.import_module("groundstation.cli.export").export
-            assert isinstance(command, click.Command)
-            return command
-        return super().get_command(ctx, cmd_name)
-
-
 @click.group(
-    cls=RecordingGroup,
     epilog="\b\nExamples:\n  groundstation recording info runs/20261120T101500Z-lab\n"
     "  groundstation recording cut runs/20261120T101500Z-lab --from 30 --to 45\n"
     "  groundstation recording export --csv runs/20261120T101500Z-lab",
 )
 def recording() -> None:
     """Inspect, repair, cut and convert recordings: a run folder, or one .mcap file of it."""
+
+
+recording.add_command(export)
 
 
 @recording.command()

@@ -6,21 +6,22 @@ import pytest
 from click.testing import CliRunner
 
 from drivers.ardrone.wire import navdata, options
-from groundstation.cli import bench_ardrone
+from groundstation.bench.ardrone import bare_loop, full_packet, read_everything
+from groundstation.cli.bench_ardrone import ardrone
 
 
 def test_the_packet_is_full_and_good():
-    packet = bench_ardrone.full_packet()
+    packet = full_packet()
     assert len(packet) == 1916
     assert [tag for tag, _ in navdata.decode(packet).options] == list(range(28))
-    assert bench_ardrone.bare_loop(packet) == 28
-    assert bench_ardrone.bare_loop(packet[:-1] + b"\x77") == -1
-    assert bench_ardrone.read_everything(packet) == len(options.LAYOUTS) - 1, "tag 27 has one of two meanings"
+    assert bare_loop(packet) == 28
+    assert bare_loop(packet[:-1] + b"\x77") == -1
+    assert read_everything(packet) == len(options.LAYOUTS) - 1, "tag 27 has one of two meanings"
 
 
 @pytest.mark.parametrize("arguments", [["--json"], []])
 def test_it_reports_every_figure(arguments):
-    result = CliRunner().invoke(bench_ardrone.ardrone, ["--count", "10", "--rounds", "1", *arguments])
+    result = CliRunner().invoke(ardrone, ["--count", "10", "--rounds", "1", *arguments])
     assert result.exception is None, result.output
     if arguments:
         times = json.loads(result.output)["times"]

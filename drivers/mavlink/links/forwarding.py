@@ -36,7 +36,7 @@ def with_riders(transport: Transport, vehicles: Mapping[int, VehicleSettings], t
     return ForwardedLink(transport, riders, tell) if riders else transport
 
 
-class ForwardedLink:
+class ForwardedLink(Transport):
     """Another transport, shown to riders; a thread of its own listens to them.
 
     A rider's frames are judged by `riding_along.passage_of`; what is refused or goes beyond 50 frames a second is
@@ -69,10 +69,6 @@ class ForwardedLink:
     def newest_stamp(self) -> int:
         """Return the newest time of signing of the transport."""
         return self._transport.newest_stamp
-
-    def receive(self) -> list[Heard]:
-        """Wait up to 0.1 s; return what arrived."""
-        return [heard for heard, _ in self.receive_raw()]
 
     def receive_raw(self) -> list[tuple[Heard, bytes]]:
         """Wait up to 0.1 s; return what arrived, and show it to the vehicle's rider."""

@@ -43,6 +43,10 @@ class MavlinkLink(Protocol):
 class Transport(MavlinkLink, Protocol):
     """A link that also carries raw frames, encoded and decoded by somebody else."""
 
+    def receive(self) -> list[Heard]:
+        """Wait up to 0.1 s; return the messages received."""
+        return [heard for heard, _ in self.receive_raw()]
+
     def receive_raw(self) -> list[tuple[Heard, bytes]]:
         """Wait up to 0.1 s; return the messages received, and the bytes of each frame."""
 

@@ -6,14 +6,13 @@ import threading
 from collections import Counter
 from contextlib import suppress
 
-from drivers.mavlink.links.seam import Heard, Sniffer, ignore_bytes
-from drivers.mavlink.links.signing_time import time_to_sign
+from drivers.mavlink.links.frame_codec import FrameCodec
+from drivers.mavlink.links.seam import Heard, Sniffer, Transport, ignore_bytes
 from drivers.mavlink.links.tty import open_raw
 from drivers.mavlink.other_stations import speaks_as_we
 from drivers.mavlink.settings import LinkSettings
-from drivers.mavlink.signing_clock import SigningClock
 from drivers.mavlink.wire.errors import WireError
-from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder, Message
+from drivers.mavlink.wire.frames import Message
 from drivers.mavlink.wire.signature import frame_size
 from drivers.mavlink.wire.verification import Signing
 from groundstation.adapters import Address
@@ -49,17 +48,15 @@ class StreamCutter:
         return frames
 
 
-class SerialLink:
+class SerialLink(Transport):
     """A terminal device, raw, 8N1; after a failure it is reopened, ten times a second."""
 
     def __init__(self, settings: LinkSettings, signing: Signing | None = None, sniffer: Sniffer = ignore_bytes) -> None:
         _, device, baud = settings.target.split(":")
         self.rejected: Counter[str] = Counter()
-        self._own = (settings.system_id, settings.component_id)
-        self._decoder = FrameDecoder(signing)
-        self._encoder = FrameEncoder(settings.system_id, settings.component_id, signing)
+        self._codec = FrameCodec(settings, signing)
         self._cutter, self._lock, self._sniffer = StreamCutter(), threading.RLock(), sniffer
-        self._closed, self._clock = False, SigningClock()
+        self._closed = False
         self._device, self._baud = device, int(baud)
         self._fd = open_raw(self._device, self._baud)
 
@@ -71,11 +68,7 @@ class SerialLink:
     @property
     def newest_stamp(self) -> int:
         """Return the newest time of signing, heard or sent; 0 without a key."""
-        return max(self._decoder.newest_stamp, self._encoder.newest_stamp)
-
-    def receive(self) -> list[Heard]:
-        """Wait up to 0.1 s for bytes; return the frames that are whole by now."""
-        return [heard for heard, _ in self.receive_raw()]
+        return self._codec.newest_stamp
 
     def receive_raw(self) -> list[tuple[Heard, bytes]]:
         """Wait up to 0.1 s for bytes; return the frames complete by now, each with its bytes."""
@@ -94,11 +87,11 @@ class SerialLink:
         now_ns, heard = clock.now_ns(), list[tuple[Heard, bytes]]()
         for raw in self._cutter.feed(data):
             try:
-                frame = self._decoder.decode(raw)
+                frame = self._codec.decode(raw)
             except WireError as error:
                 self.rejected[error.reason] += 1
                 continue
-            if not speaks_as_we(frame, self._own, self.rejected):
+            if not speaks_as_we(frame, self._codec.own, self.rejected):
                 self._sniffer(frame.system, now_ns, raw, True)
                 heard.append((Heard(now_ns, frame), raw))
         return heard
@@ -121,7 +114,7 @@ class SerialLink:
     def send(self, system: int, message: Message) -> None:
         """Write one frame; a line that is too slow loses it."""
         with self._lock:  # signed frames must leave in the order of their times
-            self.send_raw(system, self._encoder.encode(message, not_before=time_to_sign(self._clock, self._decoder)))
+            self.send_raw(system, self._codec.encode(message))
 
     def send_raw(self, system: int, data: bytes) -> None:
         """Write whole frames; a line that is too slow loses them."""

@@ -8,13 +8,12 @@ from collections import Counter
 from contextlib import suppress
 
 from drivers import vehicle_socket
-from drivers.mavlink.links.seam import Heard, Sniffer, ignore_bytes
-from drivers.mavlink.links.signing_time import time_to_sign
+from drivers.mavlink.links.frame_codec import FrameCodec
+from drivers.mavlink.links.seam import Heard, Sniffer, Transport, ignore_bytes
 from drivers.mavlink.other_stations import speaks_as_we
 from drivers.mavlink.settings import LinkSettings
-from drivers.mavlink.signing_clock import SigningClock
 from drivers.mavlink.wire.errors import WireError
-from drivers.mavlink.wire.frames import MAX_DATAGRAM, FrameDecoder, FrameEncoder, Message, ReceivedFrame, split
+from drivers.mavlink.wire.frames import MAX_DATAGRAM, Message, ReceivedFrame, split
 from drivers.mavlink.wire.names import AUTOPILOT_COMPONENT
 from drivers.mavlink.wire.signature import MAGIC_1
 from drivers.mavlink.wire.telemetry import OUR_HEARTBEAT
@@ -40,7 +39,7 @@ def _bind_as_ever(sock: socket.socket, target: str) -> None:
         sock.bind(("", 0))
 
 
-class UdpLink:
+class UdpLink(Transport):
     """Datagrams. `udpout` sends to one address; `udpin` waits for vehicles and keeps the address of each.
 
     WIRE (docs/reference/mavlink.md 5.6): one socket for many vehicles needs an address per system id: that of its
@@ -53,12 +52,9 @@ class UdpLink:
         self.rejected: Counter[str] = Counter()
         self._peer = (address, int(port)) if way == "udpout" else None
         self._addresses: dict[int, tuple[tuple[str, int], int]] = {}
-        self._decoder = FrameDecoder(signing)
-        self._encoder = FrameEncoder(settings.system_id, settings.component_id, signing)
-        self._lock, self._clock = threading.Lock(), SigningClock()
+        self._codec, self._lock = FrameCodec(settings, signing), threading.Lock()
         self._sniffer, self._signed = sniffer, signing is not None
         self._greeted: dict[tuple[str, int], int] = {}
-        self._own = (settings.system_id, settings.component_id)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         bind_to_adapter(self._socket, interface)
         try:
@@ -80,11 +76,7 @@ class UdpLink:
     @property
     def newest_stamp(self) -> int:
         """Return the newest time of signing, heard or sent; 0 without a key."""
-        return max(self._decoder.newest_stamp, self._encoder.newest_stamp)
-
-    def receive(self) -> list[Heard]:
-        """Wait up to 0.1 s for a datagram; return its frames."""
-        return [heard for heard, _ in self.receive_raw()]
+        return self._codec.newest_stamp
 
     def receive_raw(self) -> list[tuple[Heard, bytes]]:
         """Wait up to 0.1 s for a datagram; return its frames, each with its bytes."""
@@ -109,7 +101,7 @@ class UdpLink:
                     self._hear_old(now_ns, raw, source)
                     continue
                 frame = self._decode(now_ns, raw, source)
-                if frame is None or speaks_as_we(frame, self._own, self.rejected):
+                if frame is None or speaks_as_we(frame, self._codec.own, self.rejected):
                     continue
                 if self._is_at(now_ns, frame, source):
                     self._sniffer(frame.system, now_ns, raw, True)
@@ -139,13 +131,13 @@ class UdpLink:
             return
         self._greeted[source] = now_ns
         with self._lock:
-            greeting = self._encode(OUR_HEARTBEAT)
+            greeting = self._codec.encode(OUR_HEARTBEAT)
         with suppress(OSError):
             self._socket.sendto(greeting, source)
 
     def _decode(self, now_ns: int, raw: bytes, source: tuple[str, int]) -> ReceivedFrame | None:
         try:
-            return self._decoder.decode(raw)
+            return self._codec.decode(raw)
         except WireError as error:
             self._reject(error.reason, str(error))
             if error.reason == "replayed" and self._peer is None:
@@ -175,10 +167,7 @@ class UdpLink:
         if self._address_of(system) is None:
             return
         with self._lock:
-            self.send_raw(system, self._encode(message))
-
-    def _encode(self, message: Message) -> bytes:
-        return self._encoder.encode(message, not_before=time_to_sign(self._clock, self._decoder))
+            self.send_raw(system, self._codec.encode(message))
 
     def _address_of(self, system: int) -> tuple[str, int] | None:
         known = self._addresses.get(system)

@@ -11,7 +11,7 @@ from pydantic_core import PydanticCustomError
 from drivers.watchdog_types import WatchdogLimits
 from groundstation.field.behaviour import SafetyValues
 from groundstation.field.drones import DroneLimits
-from groundstation.field.room import Vector3
+from groundstation.vectors import Vector3
 from groundstation.vehicles import DriverProcess, VehicleOrder
 
 _SAFETY = SafetyValues()

@@ -8,10 +8,11 @@ again.
 
 import math
 
-from drivers.mavlink.smoothing import Vector2, share_of, towards
+from drivers.mavlink.smoothing import share_of, towards
 from drivers.mavlink.undershoot import Undershoot
 from groundstation.bus.messages import EntityEstimate, Vector3
 from groundstation.time_units import NS_PER_MS, NS_PER_S
+from groundstation.vectors import Vector2
 
 # Velocities of the belief have noise of 0.05 m/s.
 _SMOOTHING_S = 0.12

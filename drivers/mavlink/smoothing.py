@@ -3,8 +3,7 @@
 import math
 
 from groundstation.time_units import NS_PER_S
-
-Vector2 = tuple[float, float]
+from groundstation.vectors import Vector2
 
 
 def share_of(elapsed_ns: int, time_s: float) -> float:

@@ -7,8 +7,9 @@ right then, so it is no drift.
 
 import math
 
-from drivers.mavlink.smoothing import Vector2, share_of, towards
+from drivers.mavlink.smoothing import share_of, towards
 from groundstation.time_units import NS_PER_S
+from groundstation.vectors import Vector2
 
 _STILL: Vector2 = (0.0, 0.0)
 # Time constant of a healthy vehicle's response.

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from itertools import combinations
 
 from groundstation.time_units import NS_PER_S
+from groundstation.vectors import Vector3, difference
 
-Vector3 = tuple[float, float, float]
 # A standing marker jitters by tenths of a millimetre from frame to frame; exact repeats are no measurements.
 _FROZEN_S, _FROZEN_FRAMES = 0.2, 5
 # Allowance for noise and one lost frame in a body's motion between two frames.
@@ -44,7 +44,7 @@ class BodyWatch:
         before = {name: track.position for name, track in self._tracks.items()}
         reach_m = {name: self._reach_m(track, stamp_ns) for name, track in self._tracks.items()}
         jumped = {
-            name: _difference(position, before[name])
+            name: difference(position, before[name])
             for name, position in positions.items()
             if name in before and math.dist(before[name], position) > reach_m[name]
         }
@@ -87,10 +87,6 @@ class BodyWatch:
                 (other,) = pair - {name}
                 return f"its name was exchanged with that of {other} in flight"
         return f"jumped by {track.jumped_m:.2f} m from one frame to the next" if track.jumped_m > _BACK_M else ""
-
-
-def _difference(a: Vector3, b: Vector3) -> Vector3:
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 def _exchanges(

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-Vector3 = tuple[float, float, float]
-Quaternion = tuple[float, float, float, float]
+from groundstation.vectors import Quaternion, Vector3
+
 Pose = tuple[Vector3, Quaternion]
 
 

@@ -10,9 +10,8 @@ from groundstation.arrays import Array
 from groundstation.bus.messages import BodyPose, Header, RelativeObservation
 from groundstation.geometry.angles import quaternion_from_euler
 from groundstation.geometry.rotations import euler_from_rotation, rotation_z
+from groundstation.vectors import Quaternion, Vector3
 
-Vector3 = tuple[float, float, float]
-Quaternion = tuple[float, float, float, float]
 # No volume is this large; beyond it, sums of jumps lose a body's motion to rounding, and products overflow.
 _FARTHEST_M = 1e4
 

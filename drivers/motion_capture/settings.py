@@ -14,9 +14,7 @@ from drivers.vehicle_settings import DriverSection, Name, NotNegative, Positive
 from groundstation import plug_ins
 from groundstation.arrays import Array
 from groundstation.geometry.rotations import rotation_x, rotation_z
-
-Vector3 = tuple[float, float, float]
-Span = tuple[float, float]
+from groundstation.vectors import Interval, Vector3
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +128,7 @@ class MotionCaptureSection(DriverSection):
     rate_hz: Positive = 30.0
     position_std_m: Positive = 0.002
     heading_std_deg: Positive = 0.5
-    volume_m: tuple[Span, Span, Span]
+    volume_m: tuple[Interval, Interval, Interval]
     max_speed_m_s: Positive = 5.0
     start_within_s: Annotated[float, Field(gt=0)] = 5.0
     silent_after_s: Annotated[float, Field(gt=0)] = 0.5

@@ -6,9 +6,7 @@ from urllib.parse import urlsplit
 from pydantic import Field
 
 from drivers.vehicle_settings import DriverSection, Name, NotNegative, Positive
-
-Vector3 = tuple[float, float, float]
-Span = tuple[float, float]
+from groundstation.vectors import Interval, Vector3
 
 # WIRE (docs/reference/ranges.md 1): ours, registered nowhere.
 _USUAL_PORT = 7417
@@ -52,7 +50,7 @@ class RangingSection(DriverSection):
     source: str
     anchors: dict[str, Vector3]
     transponders: tuple[TransponderSection, ...]
-    volume_m: tuple[Span, Span, Span]
+    volume_m: tuple[Interval, Interval, Interval]
     delay_ms: NotNegative = 20.0
     range_std_m: Positive = 0.08
     bias_std_m: Positive = 0.05

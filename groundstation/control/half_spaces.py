@@ -9,8 +9,8 @@ from itertools import combinations
 import numpy as np
 
 from groundstation.arrays import Array
-from groundstation.bus.messages import Vector3
-from groundstation.control.touching import Plane, dot, touching
+from groundstation.control.touching import Plane, touching
+from groundstation.vectors import Vector3, dot
 
 TOLERANCE_M_S = 1e-7
 _EXCHANGES = 40

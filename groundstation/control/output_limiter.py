@@ -11,14 +11,13 @@ from typing import NamedTuple
 import numpy as np
 
 from groundstation.arrays import Array
-from groundstation.bus.messages import Vector3
 from groundstation.control.half_spaces import project
 from groundstation.control.parameters import SafetyParameters
 from groundstation.control.setpoints import Setpoint
-from groundstation.control.touching import dot
 from groundstation.estimation.belief import JointBelief
 from groundstation.geometry.stabilized_frame import stabilized_from_world, world_from_stabilized
 from groundstation.planning.parameters import MotionLimits
+from groundstation.vectors import Vector3, difference, dot
 
 # No two bodies are this near to each other: a belief that says so does not tell on which side the other one is.
 _NO_SIDE_M = 0.1
@@ -217,8 +216,8 @@ def _others(
             continue
         there, other_time = _braking(other, belief, parameters, velocities)
         covariance = _relative_covariance(robot, other, belief)
-        apart = _difference(_place(other, belief), place)
-        for gap in (_difference(there, rest), apart):
+        apart = difference(_place(other, belief), place)
+        for gap in (difference(there, rest), apart):
             distance = math.hypot(*gap)
             # Points of rest of robots that fly at each other may coincide: the present direction is used then.
             x, y, z = gap if distance > 1e-6 else apart
@@ -228,10 +227,6 @@ def _others(
             keep += parameters.sigmas * _spread(covariance, normal)
             walls.append(_Wall("separation", normal, max(0.0, distance - keep) / (2.0 * max(time, other_time))))
     return walls
-
-
-def _difference(a: Vector3, b: Vector3) -> Vector3:
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 def _relative_covariance(robot: str, other: str, belief: JointBelief) -> list[Vector3]:

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from groundstation.control.search_height import search_height_m
 from groundstation.field.resolved import ResolvedField
 from groundstation.planning.parameters import MotionLimits, limits_from_field
+from groundstation.vectors import Interval
 from groundstation.vehicles import kind_named
 
-Interval = tuple[float, float]
 _USUAL_LIMITS = MotionLimits()
 # Of robots that search: slow enough for sharp pictures that follow each other densely.
 SEARCH_SPEED_M_S, SEARCH_YAW_RATE_RAD_S = 0.5, 0.8

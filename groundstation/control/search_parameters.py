@@ -8,8 +8,7 @@ from groundstation.control.parameters import SEARCH_SPEED_M_S, SEARCH_YAW_RATE_R
 from groundstation.control.search_ranges import search_ranges_m
 from groundstation.field.resolved import ResolvedField
 from groundstation.field.room import MotionCapture, WorldCamera
-
-Interval = tuple[float, float]
+from groundstation.vectors import Interval
 
 NEAR_YAW_RATE_RAD_S = 1.04
 """For a target that was tracked when it got out of sight: near, and large even in a picture that is not quite sharp."""

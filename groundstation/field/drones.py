@@ -5,8 +5,9 @@ from typing import Any
 
 import msgspec
 
-from groundstation.field.room import LensCalibration, Vector2, Vector3
+from groundstation.field.room import LensCalibration
 from groundstation.field.targets import DroneMarker
+from groundstation.vectors import Vector2, Vector3
 
 
 def camera_name(drone: str) -> str:

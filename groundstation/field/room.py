@@ -5,9 +5,7 @@ from typing import Literal
 
 import msgspec
 
-Interval = tuple[float, float]
-Vector2 = tuple[float, float]
-Vector3 = tuple[float, float, float]
+from groundstation.vectors import Interval, Vector2, Vector3
 
 
 class Fence(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -4,7 +4,7 @@ from typing import Literal
 
 import msgspec
 
-from groundstation.field.room import Vector3
+from groundstation.vectors import Vector3
 
 
 def odometry_name(target: str) -> str:

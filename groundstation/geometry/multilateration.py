@@ -7,14 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.arrays import Array
+from groundstation.vectors import Interval, Vector3
 
 _LEAST_RANGES = 4
 _STEPS, _SETTLED_M = 12, 1e-4
 # A residual beyond this many deviations means a reflection: the ranges together then yield no place.
 _MOST_SIGMAS = 3.5
-
-Vector3 = tuple[float, float, float]
-Span = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +55,7 @@ def fix_from_ranges(
     return Fix((x, y, z), np.linalg.inv(information))
 
 
-def likely_in(volume_m: tuple[Span, Span, Span]) -> tuple[Vector3, Vector3]:
+def likely_in(volume_m: tuple[Interval, Interval, Interval]) -> tuple[Vector3, Vector3]:
     """Return the a priori place of a transponder in a box or a little outside, with its deviation [m; world]."""
     x, y, z = (sum(span) / 2 for span in volume_m)
     wide, deep, high = (max(1.0, span[1] - span[0]) for span in volume_m)

@@ -7,7 +7,6 @@ import msgspec
 
 from groundstation.appearance.colours import colours_of
 from groundstation.bus.messages import Header, Severity
-from groundstation.bus.messages.base import Vector3
 from groundstation.bus.topics import CAMERA_STATUS, ESTIMATE, EVENT, OBSERVATION
 from groundstation.field.drones import camera_name
 from groundstation.field.resolved import ResolvedField
@@ -32,6 +31,7 @@ from groundstation.recording.viewers import (
     stamp,
 )
 from groundstation.time_units import NS_PER_MS
+from groundstation.vectors import Vector3
 
 WORLD = "world"
 # Viewers interpolate between transforms; the estimate itself is recorded at its full rate.

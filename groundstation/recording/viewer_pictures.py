@@ -8,9 +8,9 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from groundstation.appearance.colours import NEUTRAL_COLOUR, Colour, rgb
-from groundstation.bus.messages.base import Vector3
 from groundstation.geometry.lens import LensFigures, intrinsics_of
 from groundstation.recording.protobuf import Kind, ProtobufField, Type, blob, double, fixed32
+from groundstation.vectors import Vector3
 
 CALIBRATION_PREFIX, ANNOTATIONS_PREFIX = "/calibration/", "/annotations/"
 PICTURE_PREFIXES = (CALIBRATION_PREFIX, ANNOTATIONS_PREFIX)

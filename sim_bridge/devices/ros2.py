@@ -17,6 +17,7 @@ import numpy as np
 from drivers.rmw_zenoh.wire import graph, vehicle
 from drivers.rmw_zenoh.wire.cdr import WireError
 from groundstation.errors import GroundStationError
+from groundstation.vectors import Vector3
 from sim_bridge.devices.ros2_router import Ros2Router
 from sim_bridge.devices.tello import TelloBody
 from sim_bridge.launch_spec import LaunchSpec
@@ -26,7 +27,6 @@ from sim_bridge.world.airframe import STANDING_HEIGHT_M
 from sim_bridge.world.readings import Readings
 from sim_bridge.wrong_values import WrongValues, wrong_values_of
 
-Vector3 = tuple[float, float, float]
 _TICK_S, _ODOMETRY_TICKS, _BATTERY_TICKS, _HELD_TICKS = 0.005, 7, 100, 100
 _CLIMB_M_S, _DESCENT_M_S = 0.5, 0.4
 _STILL: Vector3 = (0.0, 0.0, 0.0)

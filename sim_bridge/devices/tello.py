@@ -21,6 +21,7 @@ from drivers.tello.wire.text import (
     TAKE_OFF,
     State,
 )
+from groundstation.vectors import Vector3
 from sim_bridge.devices.tello_text import STOP, STREAM_OFF, parse_rc, state_text
 from sim_bridge.launch_spec import LaunchSpec
 from sim_bridge.listening import open_udp
@@ -33,7 +34,6 @@ from sim_bridge.world.flow_sensors import FlowSensors
 from sim_bridge.world.noise import GaussMarkov, standard_normals
 from sim_bridge.wrong_values import WrongValues, wrong_values_of
 
-Vector3 = tuple[float, float, float]
 _STATE_TICKS = 20
 _TICK_S = 0.005
 _QUIET_S = 15.0

@@ -16,11 +16,12 @@ from drivers.mavlink.wire.simulator import HilStateQuaternion, SimState
 from drivers.mavlink.wire.telemetry import Attitude, LocalPositionNed
 from groundstation.geometry.angles import euler_from_quaternion
 from groundstation.time_units import NS_PER_S
+from groundstation.vectors import Vector3
 from sim_bridge.devices.mavlink_identity import identity_of
 from sim_bridge.listening import open_udp
 from sim_bridge.real.placed import Placement, TrueState
 from sim_bridge.site import SiteDrone
-from sim_bridge.world.puppet import OutsidePose, Vector3
+from sim_bridge.world.puppet import OutsidePose
 
 Address = tuple[str, int]
 # The id of a system that is neither vehicle nor ground station: no failsafe of a vehicle depends on it.

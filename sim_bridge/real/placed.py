@@ -3,8 +3,9 @@
 import math
 from dataclasses import dataclass, replace
 
+from groundstation.vectors import Vector3
 from sim_bridge.world.airframe import STANDING_HEIGHT_M
-from sim_bridge.world.puppet import OutsidePose, Vector3
+from sim_bridge.world.puppet import OutsidePose
 
 _WANDERS_M = 0.5
 

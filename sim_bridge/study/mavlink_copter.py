@@ -10,10 +10,10 @@ from drivers.mavlink.drift import DriftFeedback
 from drivers.mavlink.settings import VisionFeedback
 from drivers.mavlink.uncertainty import StatedUncertainty
 from groundstation.bus.messages import EntityEstimate, FlightState, Header, Odometry, VehicleStatus
+from groundstation.vectors import Vector3
 from sim_bridge.world.mavlink_copter import MavlinkCopter, Steering
 from sim_bridge.world.world import TICK_S
 
-Vector3 = tuple[float, float, float]
 _PERIOD_TICKS = 4  # 50 Hz
 _VISION_TICKS = 7  # 28.6 Hz
 _VISION = VisionFeedback()

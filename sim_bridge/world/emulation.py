@@ -7,14 +7,13 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 
 from groundstation.errors import SettingsError
+from groundstation.vectors import Vector3
 from groundstation.vehicles import kind_named
 from sim_bridge.launch_spec import LaunchSpec
 from sim_bridge.own_video import OwnVideo
 from sim_bridge.scenario import Scenario
 from sim_bridge.site import SiteDrone
 from sim_bridge.world.airframe import Airframe
-
-Vector3 = tuple[float, float, float]
 
 
 class Motors(Protocol):

@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 
+from groundstation.vectors import Vector3
 from sim_bridge.scenario import DroneScenario
 from sim_bridge.world.airframe import Airframe
 from sim_bridge.world.inertia import Inertia
@@ -21,7 +22,6 @@ from sim_bridge.world.recorded_errors import (
     YAW_DRIFT_RAD_S,
 )
 
-Vector3 = tuple[float, float, float]
 _CLIMB_WHITE_M_S = 0.05
 
 

@@ -3,10 +3,10 @@
 Noise as recorded of an AR.Drone (docs/explanation/estimation.md 9.2).
 """
 
+from groundstation.vectors import Vector3
 from sim_bridge.world.airframe import GRAVITY_M_S2, Airframe
 from sim_bridge.world.noise import Draw, Vibration
 
-Vector3 = tuple[float, float, float]
 _ACCELEROMETER_GAIN = 0.92
 # Recorded noise of the gyros [rad/s] and accelerometers [m/s^2], x y z: motors off, idling on the floor, in flight.
 _STILL = ((7.5e-4, 7.5e-4, 7.5e-4), (0.031, 0.001, 0.017))

@@ -11,13 +11,13 @@ from enum import Enum, auto
 
 import numpy as np
 
+from groundstation.vectors import Vector3
 from sim_bridge.mavlink_scenario import CopterScenario
 from sim_bridge.world.airframe import GRAVITY_M_S2, STANDING_HEIGHT_M, Airframe
 from sim_bridge.world.downwash import wake_between
 from sim_bridge.world.mavlink_estimator import InertialEstimate
 from sim_bridge.world.noise import DelayLine, GaussMarkov, standard_normals
 
-Vector3 = tuple[float, float, float]
 _STILL: Vector3 = (0.0, 0.0, 0.0)
 _UNREST_CORRELATION_S = 0.8
 _MOST_M_S2 = 3.0

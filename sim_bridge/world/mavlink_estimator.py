@@ -9,11 +9,11 @@ import math
 
 import numpy as np
 
+from groundstation.vectors import Vector3
 from sim_bridge.mavlink_scenario import CopterScenario
 from sim_bridge.world.airframe import GRAVITY_M_S2, Airframe
 from sim_bridge.world.noise import GaussMarkov, standard_normals
 
-Vector3 = tuple[float, float, float]
 _BANDWIDTH, _DAMPING = 1.6, 1.0  # of the position loop [rad/s]
 _BIAS_GAIN = 0.15
 _YAW_GAIN = 1.0  # 1/s

@@ -3,10 +3,10 @@
 import math
 from dataclasses import dataclass
 
+from groundstation.vectors import Vector3
 from sim_bridge.world.airframe import STANDING_HEIGHT_M, Airframe
 from sim_bridge.world.downwash import wake_between
 
-Vector3 = tuple[float, float, float]
 STALE_S = 0.5
 _AIRBORNE_M = 0.05  # above its standing height
 _TINY_M = 1e-9

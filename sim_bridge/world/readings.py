@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-Vector3 = tuple[float, float, float]
+from groundstation.vectors import Vector3
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 Frames and units follow the field names; covariances are row-major tuples of an (n, n) matrix.
 """
 
-from groundstation.bus.messages.base import Header, Message, Quaternion, Vector3
+from groundstation.bus.messages.base import Header, Message
 from groundstation.bus.messages.belief import (
     Belief,
     EntityEstimate,
@@ -52,6 +52,7 @@ from groundstation.bus.messages.sensing import (
     SearchedPicture,
 )
 from groundstation.bus.messages.simulation import SimCommand, SimStatus, TruthState
+from groundstation.vectors import Quaternion, Vector3
 
 __all__ = [
     "AIRBORNE",

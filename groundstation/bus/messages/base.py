@@ -6,10 +6,6 @@ from typing import Annotated, Any
 import msgspec
 from msgspec.structs import astuple
 
-Vector3 = tuple[float, float, float]
-Quaternion = tuple[float, float, float, float]
-
-
 _WHOLE_LIMIT = 2**63
 # JSON carries whole numbers of any length, but numpy, MCAP and our own encoder end at 64 bits.
 Whole = Annotated[int, msgspec.Meta(ge=-_WHOLE_LIMIT, le=_WHOLE_LIMIT - 1)]

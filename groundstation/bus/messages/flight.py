@@ -4,8 +4,9 @@ from enum import StrEnum
 
 import msgspec
 
-from groundstation.bus.messages.base import Message, Vector3
+from groundstation.bus.messages.base import Message
 from groundstation.time_units import NS_PER_S
+from groundstation.vectors import Vector3
 
 
 class FlightState(StrEnum):

@@ -2,7 +2,8 @@
 
 import msgspec
 
-from groundstation.bus.messages.base import Message, Vector3
+from groundstation.bus.messages.base import Message
+from groundstation.vectors import Vector3
 
 
 class Alternative(msgspec.Struct, frozen=True):

@@ -2,7 +2,8 @@
 
 import msgspec
 
-from groundstation.bus.messages.base import Message, Quaternion, Vector3, require_square
+from groundstation.bus.messages.base import Message, require_square
+from groundstation.vectors import Quaternion, Vector3
 
 
 class ImuSample(Message, frozen=True, kw_only=True):

@@ -1,6 +1,7 @@
 """Messages of the simulator: ground truth, steering, timing."""
 
-from groundstation.bus.messages.base import Message, Vector3
+from groundstation.bus.messages.base import Message
+from groundstation.vectors import Vector3
 
 
 class TruthState(Message, frozen=True, kw_only=True):

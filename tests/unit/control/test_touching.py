@@ -4,7 +4,8 @@ import math
 
 import pytest
 
-from groundstation.control.touching import Plane, cross, dot, touching
+from groundstation.control.touching import Plane, touching
+from groundstation.vectors import cross, dot
 
 X: Plane = ((1.0, 0.0, 0.0), 0.2)
 Y: Plane = ((0.0, 1.0, 0.0), -0.3)

@@ -112,7 +112,16 @@ def test_settings_open_no_socket() -> None:
         ),
         ("ruamel", ("groundstation.settings", "groundstation.cli")),
         ("yaml", ()),
-        ("cv2", ("drivers.camera", "sim_bridge.render", "sim_bridge.study.vision", "groundstation.recording.blurring")),
+        (
+            "cv2",
+            (
+                "drivers.camera",
+                "sim_bridge.render",
+                "sim_bridge.study.vision",
+                "groundstation.recording.blurring",
+                "groundstation.console.qr",
+            ),
+        ),
         ("av", ("drivers.camera", "drivers.ardrone", "sim_bridge.devices", "sim_bridge.study.vision")),
         ("click", ("groundstation.cli",)),
         (

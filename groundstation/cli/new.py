@@ -1,6 +1,5 @@
 """`groundstation new`: a field file from a few questions, in the terminal or on a page."""
 
-import os
 import shlex
 import tempfile
 from collections.abc import Callable
@@ -39,22 +38,17 @@ def _checked(check: Callable[[str], object]) -> Callable[[str], str]:
 @click.option("--page", is_flag=True, help="Ask on a page in the browser, which draws the room to scale.")
 def new(directory: Path, page: bool) -> None:
     """Ask for room, camera, drones and target, draw the room, and write a commented field file into DIRECTORY."""
+    from groundstation.settings.files import unwritable
     from groundstation.settings.shipped_copies import refuse_existing
 
     path = directory.resolve()
     path = path / f"{path.name}.yaml"
     refuse_existing([path])
-    _require_place(path.parent)
+    if why := unwritable(path.parent):  # told before the first question
+        raise OperatorMistake(f"{path.parent}: {why}")
     (_ask_on_page if page else _ask)(path)
     shown, typed = directory / path.name, shlex.quote(str(directory / path.name))
     click.echo(f"wrote {shown}\nnext: groundstation config check {typed}, then groundstation sitl {typed}")
-
-
-def _require_place(folder: Path) -> None:
-    """Raise OperatorMistake before the first question if nothing can be written; the folder is not made yet."""
-    nearest = next(place for place in (folder, *folder.parents) if place.exists())
-    if not (nearest.is_dir() and os.access(nearest, os.W_OK)):
-        raise OperatorMistake(f"{folder}: cannot be written: {nearest} is not a folder of yours")
 
 
 def _ask(path: Path) -> None:

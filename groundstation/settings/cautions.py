@@ -2,7 +2,6 @@
 
 import ipaddress
 import math
-import os
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -13,6 +12,7 @@ from drivers.camera.settings import SourceKind, parse_source
 from groundstation.adapters import adapters, drops_strangers
 from groundstation.geometry.rotations import world_from_downward_optical
 from groundstation.settings.document import KeyPath
+from groundstation.settings.files import unwritable
 from groundstation.settings.in_view import STANDING_MARKER_M, in_picture
 from groundstation.settings.marker_sizes import too_small
 from groundstation.settings.parts import Finding
@@ -158,10 +158,8 @@ def _folds(lens: CalibrationSettings) -> bool:
 
 
 def _places(field: Field) -> Iterator[Finding]:
-    folder = Path(field.recording.directory).absolute()
-    nearest = next(place for place in (folder, *folder.parents) if place.exists())
-    if field.recording.enabled and not (nearest.is_dir() and os.access(nearest, os.W_OK)):
-        yield ("recording", "directory"), f"cannot be written: {nearest} is not a folder of yours"
+    if field.recording.enabled and (why := unwritable(Path(field.recording.directory).absolute())):
+        yield ("recording", "directory"), why
     sources: list[tuple[KeyPath, str]] = [
         (("cameras", name, "source"), camera.source) for name, camera in field.cameras.items()
     ]

@@ -1,5 +1,6 @@
 """Places of field files and scenarios, including those shipped with the program."""
 
+import os
 from pathlib import Path
 
 from groundstation.errors import SettingsError
@@ -51,3 +52,13 @@ def _refuse_folder(path: Path, what: str) -> None:
     if path.is_dir():
         files = ", ".join(str(file) for file in sorted(path.glob("*.yaml")))
         raise SettingsError([f"{path}: is a folder, not a {what}; in it: {files or 'no .yaml file'}"])
+
+
+def unwritable(folder: Path) -> str:
+    """Return why nothing can be written to a folder, which need not be there yet; "" if it can."""
+    nearest = next(place for place in (folder, *folder.parents) if place.exists())
+    return (
+        ""
+        if nearest.is_dir() and os.access(nearest, os.W_OK)
+        else f"cannot be written: {nearest} is not a folder of yours"
+    )

@@ -1,7 +1,7 @@
 """Resolves a field file: options, calibrations, then defaults < type < robot."""
 
 import json
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -13,6 +13,17 @@ from groundstation.settings.wording import problem
 # Sections of sensors fixed in the world, and all sections that are mappings of names.
 FIXED = ("cameras", "motion_capture", "ranging")
 NAMED = ("drones", *FIXED, "targets", "types")
+
+
+def with_options(tree: Node, options: Iterable[str], named: Collection[str] = ()) -> tuple[Node, list[str]]:
+    """Return the tree with all options set that can be, and the problems of the others; see `with_option`."""
+    problems: list[str] = []
+    for option in options:
+        try:
+            tree = with_option(tree, option, named)
+        except SettingsError as error:
+            problems += error.problems
+    return tree, problems
 
 
 def with_option(tree: Node, option: str, named: Collection[str] = ()) -> Node:

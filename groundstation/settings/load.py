@@ -12,7 +12,7 @@ from groundstation.settings.cautions import cautions
 from groundstation.settings.checks import findings
 from groundstation.settings.document import KeyPath, Node, SourceLine, read
 from groundstation.settings.drones import Drone
-from groundstation.settings.levels import FIXED, NAMED, Calibrations, Levels, with_option
+from groundstation.settings.levels import FIXED, NAMED, Calibrations, Levels, with_options
 from groundstation.settings.parts import Parts
 from groundstation.settings.schema import SCHEMA_VERSION, Field
 from groundstation.settings.wording import ordered, problem, problem_of_error
@@ -57,13 +57,7 @@ def cautions_of(path: Path | str, options: Sequence[str] = ()) -> list[str]:
 def _with_options(tree: Node, options: Iterable[str]) -> tuple[Node, list[str]]:
     if not isinstance(tree.value, dict):
         raise SettingsError([f"{tree.origin}: must be a mapping with schema_version, room, drones, ..."])
-    problems: list[str] = []
-    for option in options:
-        try:
-            tree = with_option(tree, option, NAMED)
-        except SettingsError as error:
-            problems += error.problems
-    return tree, problems
+    return with_options(tree, options, NAMED)
 
 
 def _require_version(tree: Node, problems: list[str]) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 
 from groundstation.errors import GroundStationError, SettingsError
 from groundstation.settings.document import KeyPath, Node, read
-from groundstation.settings.levels import with_option
+from groundstation.settings.levels import with_options
 from groundstation.settings.schema import Field
 from groundstation.settings.wording import closest, ordered, problem, text_of_error
 
@@ -39,12 +39,7 @@ def load_scenario(path: Path, options: Sequence[str] = (), room: Room | None = N
     tree = read(path)
     if not isinstance(tree.value, dict):
         raise SettingsError([f"{tree.origin}: must be a mapping with schema_version, target, drones, ..."])
-    problems: list[str] = []
-    for option in options:
-        try:
-            tree = with_option(tree, option)
-        except SettingsError as error:
-            problems += error.problems
+    tree, problems = with_options(tree, options)
     plain: dict[str, Any] = tree.plain()
     problems += [_worded(fault, tree) for fault in _faults(plain, room)]
     if problems:

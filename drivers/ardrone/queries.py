@@ -70,9 +70,7 @@ def read_version(address: str, port: int, timeout_s: float = _FTP_S) -> str:
     return b"".join(parts)[:_LONGEST_VERSION].decode("latin-1").strip()
 
 
-def read_dump(
-    address: str, port: int, listening: Callable[[], None], wait_s: float = _DUMP_S, connect_s: float = _CONNECT_S
-) -> bytes:
+def read_dump(address: str, port: int, listening: Callable[[], None]) -> bytes:
     """Return the next configuration dump, without its NUL, or b"" if none comes; `listening` is called once connected.
 
     address: also ADDRESS%ADAPTER.
@@ -82,9 +80,9 @@ def read_dump(
     text = bytearray()
     host, interface = split_zone(address)
     try:
-        with connected((host, port), connect_s, interface) as stream:
+        with connected((host, port), _CONNECT_S, interface) as stream:
             listening()
-            deadline_s = time.monotonic() + wait_s
+            deadline_s = time.monotonic() + _DUMP_S
             while END not in text and len(text) < _LONGEST_DUMP:
                 stream.settimeout(max(0.001, deadline_s - time.monotonic()))
                 part = stream.recv(8192)

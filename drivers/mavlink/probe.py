@@ -19,6 +19,7 @@ from drivers.mavlink.wire.telemetry import (
 )
 
 _HEARTBEAT_S = 0.5
+_EVERYBODY = 0
 
 
 @dataclass(slots=True)
@@ -44,17 +45,14 @@ class Found:
         return words.get(self.autopilot, f"autopilot {self.autopilot}")
 
 
-def probe(link: MavlinkLink, seconds: float, greet: tuple[int, ...] = (0,)) -> dict[int, Found]:
-    """Return the vehicles that answer within some seconds, by system id; nothing is changed on them.
-
-    greet: systems to address first, if the link must.
-    """
+def probe(link: MavlinkLink, seconds: float) -> dict[int, Found]:
+    """Return the vehicles that answer within some seconds, by system id; nothing is changed on them."""
     found: dict[int, Found] = {}
     deadline, next_s = time.monotonic() + seconds, 0.0
     while time.monotonic() < deadline:
         if time.monotonic() >= next_s:
             next_s = time.monotonic() + _HEARTBEAT_S
-            for system in {*greet, *found}:
+            for system in {_EVERYBODY, *found}:
                 link.send(system, OUR_HEARTBEAT)
             for vehicle in found.values():
                 _ask(link, vehicle)

@@ -25,12 +25,15 @@ class _Moment:
     warm_start: dict[str, Any] | None
 
 
+# Of a step in flight.
+_BUDGET_MS = 40.0
+
+
 def run_frustum_bench(
     robots: Sequence[int],
     layouts: Sequence[str],
     repeats: int = 9,
     seed: int = 3,
-    budget_ms: float = 40.0,
     running_s: float = 8.0,
     tell: Callable[[str], None] = lambda text: None,
 ) -> dict[str, Any]:
@@ -42,12 +45,12 @@ def run_frustum_bench(
     rows = []
     for layout, n, belief in itertools.product(layouts, robots, ("fresh", "running")):
         tell(f"{layout}, {n} robots, {belief}")
-        figures = _row(n, layout, running_s if belief == "running" else 0.0, repeats, seed, budget_ms)
+        figures = _row(n, layout, running_s if belief == "running" else 0.0, repeats, seed)
         rows.append({"robots": n, "layout": layout, "belief": belief, **figures})
-    return {"rows": rows, "seed": seed, "budget_ms": budget_ms, "running_s": running_s}
+    return {"rows": rows, "seed": seed, "budget_ms": _BUDGET_MS, "running_s": running_s}
 
 
-def _row(n: int, layout: str, running_s: float, repeats: int, seed: int, budget_ms: float) -> dict[str, Any]:
+def _row(n: int, layout: str, running_s: float, repeats: int, seed: int) -> dict[str, Any]:
     running = settled(n, layout, seed, running_s) if running_s else None
     cpu_ms, over_ms, gaps, solvers, shares = [], [], [], [], []
     for turn in range(repeats):
@@ -56,7 +59,7 @@ def _row(n: int, layout: str, running_s: float, repeats: int, seed: int, budget_
         before = time.process_time()
         plan = moment.planner.plan(moment.belief, moment.topology, moment.warm_start, lambda: False)
         cpu_ms.append(1e3 * (time.process_time() - before))
-        over_ms.append(_over(moment, budget_ms))
+        over_ms.append(_over(moment))
         gaps.append(plan.solver.gap or 0.0)
         solvers.append(plan.solver)
         shares.append(plan.solver.survivors / plan.solver.topologies)
@@ -74,8 +77,8 @@ def _row(n: int, layout: str, running_s: float, repeats: int, seed: int, budget_
     }
 
 
-def _over(moment: _Moment, budget_ms: float) -> float:
+def _over(moment: _Moment) -> float:
     """Return the excess of a step's time over the budget [ms]."""
-    budget = TimeBudget(1e-3 * budget_ms, time.perf_counter)
+    budget = TimeBudget(1e-3 * _BUDGET_MS, time.perf_counter)
     moment.planner.plan(moment.belief, moment.topology, moment.warm_start, budget.must_stop)
     return 1e3 * (time.perf_counter() - budget.deadline)

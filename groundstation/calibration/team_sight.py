@@ -11,7 +11,7 @@ import numpy as np
 
 from groundstation.arrays import Array, BoolArray
 from groundstation.field.resolved import ResolvedField
-from groundstation.geometry.rotations import BASE_FROM_LEVEL_OPTICAL, world_from_downward_optical
+from groundstation.geometry.rotations import BASE_FROM_LEVEL_OPTICAL, rotations_from_euler, world_from_downward_optical
 
 _STEP = 1e-5
 # Errors of a detector's pose beyond its covariance: across, along per metre, heading [m, share, rad].
@@ -72,12 +72,12 @@ def looks_of(field: ResolvedField, observers: Sequence[str], subjects: Sequence[
 
 def predicted(looks: Looks, scene: Scene) -> Array:
     """Return the predicted report of each marker (n, 4): centre [m; camera_optical] and heading [rad]."""
-    base = _rotations(scene.observer[:, 3], scene.observer[:, 5], scene.observer[:, 4])
+    base = rotations_from_euler(scene.observer[:, 4], scene.observer[:, 5], scene.observer[:, 3])
     pan, tilt = looks.pan + scene.mounting[:, 0], looks.tilt + scene.mounting[:, 1]
-    turned = _rotations(pan, tilt, np.zeros(len(pan)))
+    turned = rotations_from_euler(np.zeros(len(pan)), tilt, pan)
     rotation = base @ (turned @ looks.level)
     eye = scene.observer[:, :3] + np.einsum("nij,nj->ni", base, looks.eye + scene.mounting[:, 2:])
-    leaning = _rotations(scene.subject[:, 3], scene.subject[:, 5], scene.subject[:, 4])
+    leaning = rotations_from_euler(scene.subject[:, 4], scene.subject[:, 5], scene.subject[:, 3])
     marker = scene.subject[:, :3] + np.einsum("nij,nj->ni", leaning, looks.marker)
     centre = np.einsum("nji,nj->ni", rotation, marker - eye)
     # A larger print looks nearer in all directions, a longer lens along the axis only.
@@ -116,14 +116,3 @@ def off(seen: Array, here: Array) -> Array:
     gap = seen - here
     gap[:, 3] = np.remainder(gap[:, 3] + math.pi, math.tau) - math.pi
     return np.asarray(gap)
-
-
-def _rotations(yaw: Array, pitch: Array, roll: Array) -> Array:
-    """Return parent_from_body (n, 3, 3), as `rotation_from_euler` has it."""
-    (cy, sy), (cp, sp), (cr, sr) = ((np.cos(a), np.sin(a)) for a in (yaw, pitch, roll))
-    rows = (
-        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
-        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
-        (-sp, cp * sr, cp * cr),
-    )
-    return np.moveaxis(np.array(rows), -1, 0)

@@ -25,6 +25,7 @@ from groundstation.experiments.planar.parameters import PlanarParameters
 LEVEL_COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00")
 TRUTH, ESTIMATE, FAINT = "#222222", "#D55E00", "#BBBBBB"
 _SIGMAS = 3.0
+_MARGIN_M = 0.12
 STYLE: dict[Any, Any] = {
     "font.size": 9,
     "axes.spines.top": False,
@@ -107,9 +108,9 @@ def _legend(figure: Any, levels: int) -> None:
     figure.legend(handles=handles, loc="lower center", ncols=len(handles), frameon=False)
 
 
-def _limits(steps: Sequence[SimulatedStep], margin: float = 0.12) -> tuple[tuple[float, float], tuple[float, float]]:
+def _limits(steps: Sequence[SimulatedStep]) -> tuple[tuple[float, float], tuple[float, float]]:
     points = np.vstack([*(step.truth for step in steps), np.zeros((1, 2))])
-    low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
+    low, high = points.min(axis=0) - _MARGIN_M, points.max(axis=0) + _MARGIN_M
     return (float(low[0]), float(high[0])), (float(low[1]), float(high[1]))
 
 

@@ -1,19 +1,28 @@
 """Figures of merit over seeds: medians, shares and ratios to the paper's heuristic, as the JSON summary holds them."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-GROUP = ("experiment", "robots", "strategy", "start")
+_GROUP = ("experiment", "robots", "strategy", "start")
 
 
-def summarise(rows: Sequence[dict[str, Any]], by: Sequence[str] = GROUP) -> list[dict[str, Any]]:
-    """Return one entry per group of equal task fields `by`, in order of first appearance."""
+def summarise(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return one entry per group of equal experiment, team, strategy and start, in order of first appearance."""
+    return _by_group(rows, _merits)
+
+
+def timings(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return the CPU times of a decision per group; kept apart, because they differ from run to run."""
+    return _by_group(rows, _times)
+
+
+def _by_group(rows: Sequence[dict[str, Any]], figures: Callable[[list[dict[str, Any]]], dict[str, Any]]) -> list[Any]:
     groups: dict[tuple[Any, ...], list[dict[str, Any]]] = {}
     for row in rows:
-        groups.setdefault(tuple(row["task"][name] for name in by), []).append(row)
-    return [{**dict(zip(by, key, strict=True)), **_merits(members)} for key, members in groups.items()]
+        groups.setdefault(tuple(row["task"][name] for name in _GROUP), []).append(row)
+    return [{**dict(zip(_GROUP, key, strict=True)), **figures(members)} for key, members in groups.items()]
 
 
 def _merits(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -40,31 +49,24 @@ def _merits(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     return entry
 
 
-def add_ratios(entries: Sequence[dict[str, Any]], reference: str = "paper") -> None:
-    """Add to each entry its mean trace over that of the reference strategy with equal team and start.
+def add_ratios(entries: Sequence[dict[str, Any]]) -> None:
+    """Add to each entry its mean trace over that of the paper's strategy with equal team and start.
 
-    A fixed topology has no start of its own: it is compared with the reference's string start.
+    A fixed topology has no start of its own: it is compared with the paper's string start.
     """
     for entry in entries:
         for other in entries:
             start = "string" if entry["strategy"].startswith("fixed") else entry["start"]
-            if (other["strategy"], other["robots"], other["start"]) == (reference, entry["robots"], start):
-                entry[f"trace_ratio_to_{reference}"] = entry["mean_trace_m2"] / other["mean_trace_m2"]
+            if (other["strategy"], other["robots"], other["start"]) == ("paper", entry["robots"], start):
+                entry["trace_ratio_to_paper"] = entry["mean_trace_m2"] / other["mean_trace_m2"]
 
 
-def timings(rows: Sequence[dict[str, Any]], by: Sequence[str] = GROUP) -> list[dict[str, Any]]:
-    """Return the CPU times of a decision per group; kept apart, because they differ from run to run."""
-    groups: dict[tuple[Any, ...], list[dict[str, Any]]] = {}
-    for row in rows:
-        groups.setdefault(tuple(row["task"][name] for name in by), []).append(row["timing"])
-    return [
-        {
-            **dict(zip(by, key, strict=True)),
-            "cpu_ms_median": float(np.median([m["cpu_ms_median"] for m in members])),
-            "cpu_ms_p99_worst": float(max(m["cpu_ms_p99"] for m in members)),
-        }
-        for key, members in groups.items()
-    ]
+def _times(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    times = [row["timing"] for row in rows]
+    return {
+        "cpu_ms_median": float(np.median([one["cpu_ms_median"] for one in times])),
+        "cpu_ms_p99_worst": float(max(one["cpu_ms_p99"] for one in times)),
+    }
 
 
 def worst(flights: Iterable[Mapping[str, Any]], key: str, pick: Any) -> float | None:

@@ -68,22 +68,18 @@ class RecordedRun:
                 total[key] = total.get(key, 0) + count
         return total
 
-    def records_from(
-        self, time_ns: int, wanted: Wanted = every_topic, until_ns: int | None = None
-    ) -> Iterator[RawRecord]:
-        """Yield messages with time <= log time (< until), in order of log time across all files."""
+    def records_from(self, time_ns: int, wanted: Wanted = every_topic) -> Iterator[RawRecord]:
+        """Yield messages with time <= log time, in order of log time across all files."""
         waiting: list[tuple[int, int, RawRecord]] = []
         number = 0
         for place in self._places:
             chunk = place.chunk
-            if until_ns is not None and chunk.start_ns >= until_ns:
-                break
             if chunk.end_ns < time_ns or not place.index.holds(chunk, wanted):
                 continue
             while waiting and waiting[0][0] < chunk.start_ns:
                 yield heapq.heappop(waiting)[2]
             for record in place.index.read(chunk, wanted):
-                if record.log_time_ns >= time_ns and (until_ns is None or record.log_time_ns < until_ns):
+                if record.log_time_ns >= time_ns:
                     heapq.heappush(waiting, (record.log_time_ns, number, record))
                     number += 1
         while waiting:

@@ -245,10 +245,10 @@ def turns(samples: Iterable[tuple[int, Sample]]) -> Iterator[tuple[int, list[Sam
     yield now_ns, turn
 
 
-def write_run(folder: Path, field: bytes, duration_s: float, rotation: Rotation = NO_ROTATION, seed: int = 1) -> None:
+def write_run(folder: Path, field: bytes, duration_s: float, rotation: Rotation = NO_ROTATION) -> None:
     """Write a made-up run to a folder; field: the resolved field as JSON."""
     writer = RunWriter(folder, field, 1, Timeline(CLOCK, UNIX_OFFSET_NS), rotation=rotation)
-    for now_ns, samples in turns(SyntheticRun(seed).samples(0.0, duration_s)):
+    for now_ns, samples in turns(SyntheticRun().samples(0.0, duration_s)):
         write_turn(writer, samples, now_ns)
     writer.close()
 

@@ -35,11 +35,11 @@ def faces_on(motion: Sequence[Moment]) -> None:
     assert turns < _STILL_RAD_S, f"it turns by {turns:.2f} rad/s"
 
 
-def lands(case: Case, mark: str, limit_s: float = _LANDED_S) -> None:
+def lands(case: Case, mark: str) -> None:
     """The vehicle stands on the floor, motors off, in time."""
     case.record.span(mark)
     took = case.record.facts[mark]
-    assert took < limit_s, f"it stood after {took:.1f} s" if math.isfinite(took) else "it did not land"
+    assert took < _LANDED_S, f"it stood after {took:.1f} s" if math.isfinite(took) else "it did not land"
 
 
 def stops_without_positions(case: Case, mark: str) -> None:

@@ -81,10 +81,10 @@ class Subject:
         return LaunchSpec(child, site, Scenario(faults=tuple(faults)), {NAME: self.address}, {}, 1)
 
 
-def subject_of(name: str, options: Iterable[str] = (), number: int = 0) -> Subject:
+def subject_of(name: str, options: Iterable[str] = ()) -> Subject:
     """Return a vehicle of a kind, described as the kind's own example with some keys set otherwise (A.B=C).
 
-    number: distinguishes vehicles that are judged at the same time. Raises SettingsError for an unknown kind or key.
+    Raises SettingsError for an unknown kind or key.
     """
     kind = kind_named(name)
     written: dict[str, Any] = {key: dict(values) for key, values in kind.example.items()}
@@ -100,7 +100,7 @@ def subject_of(name: str, options: Iterable[str] = (), number: int = 0) -> Subje
         words = [f"{name} has no section {key}" for key in unknown]
         raise SettingsError([*words, *(f"{name} needs a section {key}: give its example" for key in missing)])
     pid = os.getpid()
-    address = f"127.{60 + pid % 180}.{pid // 180 % 250}.{11 + number}"
+    address = f"127.{60 + pid % 180}.{pid // 180 % 250}.11"
     return _moved(Subject(kind, address, {key: _section(kind, key, values) for key, values in written.items()}))
 
 

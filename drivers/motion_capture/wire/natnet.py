@@ -84,11 +84,11 @@ def encode(kind: int, payload: bytes = b"") -> bytes:
     return _HEAD.pack(kind, len(payload)) + payload
 
 
-def connect_request(version: Version = (4, 1)) -> bytes:
-    """Return the request for frames in a version of the stream; the server may answer with another version."""
+def connect_request() -> bytes:
+    """Return the request for frames of version 4.1; the server may answer with another version."""
     payload = bytearray(271)
     payload[:4] = b"Ping"
-    payload[265:267] = bytes(version)
+    payload[265:267] = bytes((4, 1))
     return encode(CONNECT, bytes(payload))
 
 

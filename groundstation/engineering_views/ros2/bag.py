@@ -24,6 +24,7 @@ from groundstation.recording.run import RecordedRun
 
 # WIRE: Humble reads no QoS of metadata 9 (ros2/rosbag2 issue 2013); all later distributions read 8.
 _VERSION: Literal[8] = 8
+_DISTRIBUTION = "jazzy"
 _FOR_EVER = QosTime(9223372036, 854775807)
 _VOLATILE = Qos(
     QosHistory.KEEP_LAST,
@@ -40,12 +41,12 @@ _VOLATILE = Qos(
 _OFFERED = {"/tf_static": _VOLATILE._replace(depth=1, durability=QosDurability.TRANSIENT_LOCAL)}
 
 
-def write_bag(run: RecordedRun, folder: Path, distribution: str = "jazzy") -> tuple[int, list[str]]:
+def write_bag(run: RecordedRun, folder: Path) -> tuple[int, list[str]]:
     """Write a new folder; returns its number of ROS 2 messages, and data that could not be decoded.
 
     Raises OperatorMistake when the folder exists or cannot be there, OutputError when the disk refuses.
     """
-    codec = Ros2Codec(distribution)
+    codec = Ros2Codec(_DISTRIBUTION)
     scene = Ros2Scene(codec, field_of(run.attachments))
     unread: dict[str, None] = {}
     with unmade_folder(folder), Writer(folder, version=_VERSION, storage_plugin=StoragePlugin.MCAP) as writer:

@@ -142,15 +142,18 @@ def stream(dataset: Dataset, scenario: SensingScenario, robot_readings: bool, se
 
 
 def run_scenario(
-    dataset: Dataset, scenario: SensingScenario, robot_readings: bool, figures: ModelFigures | None = None,
-    seed: int = 1, span: tuple[float, float] = (0.0, 1.0),
-) -> ScenarioErrors:  # fmt: skip
+    dataset: Dataset,
+    scenario: SensingScenario,
+    robot_readings: bool,
+    seed: int = 1,
+    span: tuple[float, float] = (0.0, 1.0),
+) -> ScenarioErrors:
     """Return the filter's errors over a share of the set's time; seed: of the emulated camera's noise.
 
     Causal: no belief uses later data. It starts at the true poses; no other truth is
     given to it.
     """
-    feed, score = DatasetFeed(dataset, figures or ModelFigures()), ScenarioScore(dataset)
+    feed, score = DatasetFeed(dataset, ModelFigures()), ScenarioScore(dataset)
     length = dataset.end_s - dataset.start_s
     begin, end = dataset.start_s + span[0] * length, dataset.start_s + span[1] * length
     feed.joint.advance(feed.ns(begin))

@@ -1,7 +1,9 @@
 """A run in parts: nothing lost where one ends, and any moment of it read at once."""
 
+import itertools
 import json
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -10,7 +12,7 @@ from groundstation.bus.topics import ESTIMATE, EVENT, IMAGE, IMU, PLAN
 from groundstation.recording.cut import cut_run
 from groundstation.recording.file_topics import LATCHED_TOPICS
 from groundstation.recording.mcap_file import McapFile
-from groundstation.recording.reader import RecordingError, open_recording, parts
+from groundstation.recording.reader import RawRecord, RecordingError, open_recording, parts
 from groundstation.recording.rotating_file import Rotation
 from groundstation.recording.run import open_run
 from groundstation.recording.synthetic import SyntheticRun, write_run
@@ -91,6 +93,10 @@ def test_where_no_next_part_can_be_begun_the_full_one_goes_on(
     assert sum(open_run(tmp_path).counts().values()) == sum(1 for _ in SyntheticRun().samples(0.0, 3.0))
 
 
+def until(end_ns: int, records: Iterator[RawRecord]) -> Iterator[RawRecord]:
+    return itertools.takewhile(lambda record: record.log_time_ns < end_ns, records)
+
+
 def test_records_come_in_order_of_time_from_any_moment(run_dir: Path) -> None:
     run = open_run(run_dir)
     everything = list(run.records_from(run.start_ns))
@@ -99,7 +105,7 @@ def test_records_come_in_order_of_time_from_any_moment(run_dir: Path) -> None:
     middle = run.start_ns + round(2.37 * NS_PER_S)
     later = [record.log_time_ns for record in run.records_from(middle)]
     assert later == [time for time in times if time >= middle]
-    some = list(run.records_from(middle, lambda topic: topic is PLAN, until_ns=middle + NS_PER_S))
+    some = list(until(middle + NS_PER_S, run.records_from(middle, lambda topic: topic is PLAN)))
     assert len(some) == 10 and {record.key.topic for record in some} == {PLAN}
 
 
@@ -131,11 +137,11 @@ def test_a_stretch_is_a_run_of_its_own_with_what_was_known_when_it_begins(run_di
     assert stretch.damage == [] and stretch.duration_s == pytest.approx(2.0, abs=0.05)
     begin_ns = whole.start_ns + round(1.5 * NS_PER_S)
     latched = whole.latest_before(begin_ns, LATCHED_TOPICS.__contains__)
-    first = {record.key: record for record in stretch.records_from(0, until_ns=begin_ns + 1)}
+    first = {record.key: record for record in until(begin_ns + 1, stretch.records_from(0))}
     for key, record in latched.items():
         assert key in first
-        assert record.data in {one.data for one in stretch.records_from(0, until_ns=begin_ns + 1) if one.key == key}
-    count = sum(1 for _ in whole.records_from(begin_ns, until_ns=begin_ns + 2 * NS_PER_S))
+        assert record.data in {one.data for one in until(begin_ns + 1, stretch.records_from(0)) if one.key == key}
+    count = sum(1 for _ in until(begin_ns + 2 * NS_PER_S, whole.records_from(begin_ns)))
     assert sum(stretch.counts().values()) == count + len(latched)
     assert stretch.attachments == whole.attachments
     assert stretch.metadata["cut"]["from_unix_ns"] == str(begin_ns)

@@ -88,13 +88,9 @@ class TelloBody:
             self.battery = max(0.0, self.battery - self._drain_per_s * dt)
             acceleration = self._pursue(wake)
         body.ax, body.ay, body.az = acceleration
-        body.vx, body.vy, body.vz = (v + a * dt for v, a in zip((body.vx, body.vy, body.vz), acceleration, strict=True))
-        body.x, body.y, body.z = body.x + body.vx * dt, body.y + body.vy * dt, body.z + body.vz * dt
         body.yaw_rate += (self.wanted[1] - body.yaw_rate) * dt / _TURN_S
         body.yaw = math.remainder(body.yaw + body.yaw_rate * dt, math.tau)
-        body.on_ground = False
-        if body.z <= STANDING_HEIGHT_M:
-            body.stand()
+        if body.advance(dt):
             self._expected, self._trim = [0.0, 0.0], [0.0, 0.0]
 
     def _pursue(self, wake: Vector3) -> Vector3:

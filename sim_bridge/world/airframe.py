@@ -87,6 +87,10 @@ class Airframe:
         self.ax = c * forward - s * left - drag * self.vx + push[0]
         self.ay = s * forward + c * left - drag * self.vy + push[1]
         self.az = climb_acceleration + push[2]
+        self.advance(tick_s)
+
+    def advance(self, tick_s: float) -> bool:
+        """Move by the present accelerations for one tick; return whether that ends on the floor, where it stands."""
         self.vx += self.ax * tick_s
         self.vy += self.ay * tick_s
         self.vz += self.az * tick_s
@@ -96,6 +100,7 @@ class Airframe:
         self.on_ground = False
         if self.z <= STANDING_HEIGHT_M:
             self.stand()
+        return self.on_ground
 
     def _turn(self, tick_s: float, tilt: tuple[float, float], yaw_rate: float) -> None:
         stiffness, damping = _TILT_RATE**2, 2.0 * _TILT_DAMPING * _TILT_RATE
@@ -112,12 +117,7 @@ class Airframe:
         self.roll = math.remainder(self.roll + roll_rate * tick_s, math.tau)
         self.pitch = math.remainder(self.pitch + pitch_rate * tick_s, math.tau)
         self.ax, self.ay, self.az = 0.0, 0.0, -GRAVITY_M_S2
-        self.vz += self.az * tick_s
-        self.x += self.vx * tick_s
-        self.y += self.vy * tick_s
-        self.z += self.vz * tick_s
-        if self.z <= STANDING_HEIGHT_M:
-            self.stand()
+        self.advance(tick_s)
 
     def level(self) -> None:
         """End a tumble upright."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from groundstation.vectors import Vector3
 from sim_bridge.mavlink_scenario import CopterScenario
-from sim_bridge.world.airframe import GRAVITY_M_S2, STANDING_HEIGHT_M, Airframe
+from sim_bridge.world.airframe import GRAVITY_M_S2, Airframe
 from sim_bridge.world.downwash import wake_between
 from sim_bridge.world.mavlink_estimator import InertialEstimate
 from sim_bridge.world.noise import DelayLine, GaussMarkov, standard_normals
@@ -206,11 +206,7 @@ class MavlinkCopter:
         body.pitch += share * (math.atan(forward / GRAVITY_M_S2) - body.pitch)
         body.yaw_rate += _YAW_RATE * (turn - body.yaw_rate) * dt
         body.yaw = math.remainder(body.yaw + body.yaw_rate * dt, math.tau)
-        body.vx, body.vy, body.vz = body.vx + body.ax * dt, body.vy + body.ay * dt, body.vz + body.az * dt
-        body.x, body.y, body.z = body.x + body.vx * dt, body.y + body.vy * dt, body.z + body.vz * dt
-        body.on_ground = False
-        if body.z <= STANDING_HEIGHT_M:
-            body.stand()
+        if body.advance(dt):
             self._acceleration = [0.0, 0.0, 0.0]
 
     def wake_on(self, other: Airframe) -> Vector3 | None:

@@ -1,7 +1,4 @@
-"""The process that receives one target's odometry: messages in.
-
-Reports and status out. It sends nothing to the target.
-"""
+"""The process of one target's odometry: messages in; reports and status out. It sends nothing to the target."""
 
 import math
 import threading

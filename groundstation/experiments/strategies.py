@@ -21,7 +21,6 @@ class TeamDecision(NamedTuple):
     velocity_m_s: Array
     cost: float
     evaluations: int
-    considered: int
 
 
 class Strategy:
@@ -55,4 +54,4 @@ class Strategy:
             self.level = layout_levels("random", belief.robots, self._generator)
         plan = self._planner.plan(belief.positions, belief.position_covariance, self.level, belief.target_velocity)
         self.level = plan.level
-        return TeamDecision(plan.level, plan.velocity_m_s[0], plan.cost, plan.evaluations, len(plan.certificate))
+        return TeamDecision(plan.level, plan.velocity_m_s[0], plan.cost, plan.evaluations)

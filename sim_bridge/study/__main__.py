@@ -48,7 +48,9 @@ def main() -> int:
 
         return vision(sys.argv[2:])
     if sys.argv[1:2] and sys.argv[1] in _CAMPAIGNS:
-        return int(import_module(f"sim_bridge.study.{sys.argv[1]}.command").main())
+        from sim_bridge.study.faults.flight_order import fly_seeds
+
+        return fly_seeds(import_module(f"sim_bridge.study.{sys.argv[1]}.command").fly)
     arguments = _parser().parse_args()
     try:
         field = resolved_field(arguments.field, arguments.set)

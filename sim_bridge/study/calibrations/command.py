@@ -6,16 +6,12 @@ asked for.
 
 from typing import Any
 
-from sim_bridge.study.faults.flight_order import FlightOrder, fly_seeds
+from sim_bridge.study.faults.flight_order import FlightOrder
 from sim_bridge.study.wrong_figures import WrongFigures
 
 
-def main() -> int:
-    """Fly the order on standard input."""
-    return fly_seeds(_fly)
-
-
-def _fly(order: FlightOrder, seed: int) -> dict[str, Any]:
+def fly(order: FlightOrder, seed: int) -> dict[str, Any]:
+    """Return the report of one seed, with the settings that its recording asks for if the order wants them."""
     from sim_bridge.study.calibrations.flight import CalibrationFlight
     from sim_bridge.study.scenarios.flight import as_drawn
 

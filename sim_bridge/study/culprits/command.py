@@ -6,16 +6,12 @@ on the pads; diagnosed_from_s: start of the diagnosis.
 
 from typing import Any
 
-from sim_bridge.study.faults.flight_order import FlightOrder, fly_seeds
+from sim_bridge.study.faults.flight_order import FlightOrder
 from sim_bridge.study.wrong_figures import WrongFigures
 
 
-def main() -> int:
-    """Fly the order on standard input."""
-    return fly_seeds(_fly)
-
-
-def _fly(order: FlightOrder, seed: int) -> dict[str, Any]:
+def fly(order: FlightOrder, seed: int) -> dict[str, Any]:
+    """Return the report of one seed with the wrong figures of the order."""
     from sim_bridge.study.culprits.flight import CulpritFlight
     from sim_bridge.study.scenarios.flight import as_drawn
 

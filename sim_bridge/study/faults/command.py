@@ -8,7 +8,7 @@ from typing import Any
 
 from sim_bridge.fault_kinds import FaultKind
 from sim_bridge.study.faults.draw import KINDS, draw
-from sim_bridge.study.faults.flight_order import FlightOrder, WrongOrder, fly_seeds
+from sim_bridge.study.faults.flight_order import FlightOrder, WrongOrder
 from sim_bridge.study.faults.hosted_kinds import UP_AFTER_S
 
 # Faults begin when the team has found the target, and early enough that their consequences are seen.
@@ -16,13 +16,11 @@ _SETTLED_S, _LEFT_S = 3.0, 6.0
 _HEALTHY = "none"
 
 
-def main() -> int:
-    """Fly the order on standard input; WRONG_ORDER for an unknown kind of fault."""
-    return fly_seeds(fly)
-
-
 def fly(order: FlightOrder, seed: int) -> dict[str, Any]:
-    """Return the verdict on one seed; if the order has only this one, with its events as "events"."""
+    """Return the verdict on one seed; if the order has only this one, with its events as "events".
+
+    Raises WrongOrder for an unknown kind of fault.
+    """
     from sim_bridge.study.faults.flight import FaultFlight
 
     kinds = _kinds(order.own.get("kinds") or ())

@@ -5,17 +5,13 @@ Its own key: understated, the factor by which the covariance of sightings is too
 
 from typing import Any
 
-from sim_bridge.study.faults.flight_order import FlightOrder, fly_seeds
+from sim_bridge.study.faults.flight_order import FlightOrder
 
 _EVERY = 3
 
 
-def main() -> int:
-    """Fly the order on standard input."""
-    return fly_seeds(_fly)
-
-
-def _fly(order: FlightOrder, seed: int) -> dict[str, Any]:
+def fly(order: FlightOrder, seed: int) -> dict[str, Any]:
+    """Return the verdict on one seed."""
     from sim_bridge.study.missions.draw import draw_mission
     from sim_bridge.study.missions.flight import MissionFlight
 

@@ -2,15 +2,11 @@
 
 from typing import Any
 
-from sim_bridge.study.faults.flight_order import FlightOrder, WrongOrder, fly_seeds
+from sim_bridge.study.faults.flight_order import FlightOrder, WrongOrder
 
 
-def main() -> int:
-    """Fly the order on standard input; WRONG_ORDER for an unknown strategy."""
-    return fly_seeds(_fly)
-
-
-def _fly(order: FlightOrder, seed: int) -> dict[str, Any]:
+def fly(order: FlightOrder, seed: int) -> dict[str, Any]:
+    """Return the verdict on one seed; raises WrongOrder for an unknown strategy."""
     from sim_bridge.study.scenarios.flight import ScenarioFlight, as_drawn
     from sim_bridge.study.scenarios.strategies import STRATEGIES
 

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from sim_bridge.scenario import parse_scenario
-from sim_bridge.study.faults.command import main
-from sim_bridge.study.faults.flight_order import WrongOrder
+from sim_bridge.study.faults.command import fly
+from sim_bridge.study.faults.flight_order import WrongOrder, fly_seeds
 from sim_bridge.study.faults.hosted_kinds import WRONG_ORDER
 from sim_bridge.study.scenarios.flight import as_drawn
 
@@ -26,7 +26,7 @@ def test_kinds_that_mean_nothing_are_refused_in_one_line(
 ) -> None:
     order = {"field": {"drones": {}}, "sections": [], "scenario": {}, "seeds": [1], "seconds": 20.0, "kinds": kinds}
     monkeypatch.setattr(sys, "stdin", io.StringIO(json.dumps(order)))
-    assert main() == WRONG_ORDER
+    assert fly_seeds(fly) == WRONG_ORDER
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 1 and lines[0].startswith(said)
 

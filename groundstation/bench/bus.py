@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from groundstation.bench.bus_peer import DRIVER, DRONE, ROUTER, SITE, TRACKER, identity
-from groundstation.bench.console import free_port
 from groundstation.bus.messages import VelocitySetpoint
 from groundstation.bus.topics import ODOMETRY, SETPOINT
 from groundstation.bus.zenoh_bus import ZenohBus, open_bus
 from groundstation.errors import GroundStationError
+from groundstation.process.ports import free_port
 from groundstation.supervisor.authority import make_identities
 
 HOST = "127.0.0.1"

@@ -2,7 +2,6 @@
 
 import contextlib
 import json
-import socket
 import subprocess
 import sys
 import time
@@ -28,6 +27,7 @@ from groundstation.console.server import HOST, claim_port
 from groundstation.errors import GroundStationError
 from groundstation.field.resolved import ResolvedField
 from groundstation.process.child import ChildSpec
+from groundstation.process.ports import free_port
 
 _WARM_S = 3.0
 _START_S = 30.0
@@ -233,10 +233,3 @@ def cpu_s(pid: int) -> float:
         with contextlib.suppress(OSError):  # a thread that has just ended
             total_ns += int((task / "schedstat").read_text().split()[0])
     return total_ns / 1e9
-
-
-def free_port() -> int:
-    """Return a free TCP port of loopback."""
-    with contextlib.closing(socket.socket()) as probe:
-        probe.bind((HOST, 0))
-        return int(probe.getsockname()[1])

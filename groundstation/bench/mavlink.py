@@ -24,6 +24,7 @@ from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import Command, EntityEstimate, Estimate, Lease, Severity, VelocitySetpoint, Verb
 from groundstation.bus.topics import COMMAND, ESTIMATE, IMU, LEASE, SETPOINT, Topic
 from groundstation.errors import DriverError
+from groundstation.process.ports import free_port
 
 _START_S = 25.0
 _SETTLE_S = 1.0
@@ -146,7 +147,7 @@ class _Tracker(threading.Thread):
 
 def measure(kind: str, count: int, seconds: float) -> dict[str, Any]:
     """Return CPU [cores], delays [ms] and start-up [s] of the driver; raises DriverError when it never flies them."""
-    port = free_port()
+    port = free_port(socket.SOCK_DGRAM)
     exchange = MemoryExchange()
     bus = _TimedBus(exchange)
     names = [f"v{n}" for n in range(count)]
@@ -225,7 +226,7 @@ def peer(count: int, seconds: float) -> dict[str, float]:
     os.environ["MAVLINK20"] = "1"
     from pymavlink import mavutil
 
-    port = free_port()
+    port = free_port(socket.SOCK_DGRAM)
     connection = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}")
     talking = talk(port, count, seconds + 5)
     try:
@@ -245,13 +246,6 @@ def talk(port: int, count: int, seconds: float) -> "subprocess.Popen[bytes]":
     """Start the sending vehicles."""
     module = [sys.executable, "-m", "groundstation.bench.mavlink_vehicles"]
     return subprocess.Popen([*module, str(port), str(count), str(seconds)])
-
-
-def free_port() -> int:
-    """Return a free UDP port of loopback."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
-        udp.bind(("127.0.0.1", 0))
-        return int(udp.getsockname()[1])
 
 
 def quantiles(late_ms: list[float]) -> dict[str, float]:

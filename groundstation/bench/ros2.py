@@ -14,10 +14,11 @@ from typing import Any
 
 import msgspec
 
-from groundstation.bench.console import cpu_s, field_of, free_port
+from groundstation.bench.console import cpu_s, field_of
 from groundstation.bus.zenoh_bus import open_router
 from groundstation.console.server import HOST
 from groundstation.errors import GroundStationError
+from groundstation.process.ports import free_port
 from groundstation.recording.synthetic import DRONES, SITE, SyntheticRun, write_run
 from groundstation.supervisor import runtime_file
 from groundstation.supervisor.runtime_file import ProcessRecord, RuntimeRecord

@@ -1,4 +1,4 @@
-"""Finds who holds a port of this machine, by the kernel's tables of sockets and the descriptors of processes."""
+"""Finds a free port, and who holds one, by the kernel's tables of sockets and the descriptors of processes."""
 
 import errno
 import os
@@ -35,6 +35,13 @@ class _Socket:
     address: str
     port: int
     inode: str
+
+
+def free_port(kind: socket.SocketKind = socket.SOCK_STREAM) -> int:
+    """Return a port of loopback that was free a moment ago."""
+    with socket.socket(socket.AF_INET, kind) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
 
 
 def host_of(endpoint: str) -> str:

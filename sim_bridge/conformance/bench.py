@@ -17,6 +17,7 @@ from groundstation.bus.topics import COMMAND_ACK, EVENT, PROCESS_STATUS, VEHICLE
 from groundstation.bus.zenoh_bus import open_bus, open_router
 from groundstation.process.child import ChildSpec
 from groundstation.process.heartbeat import HeartbeatBlock
+from groundstation.process.ports import free_port
 from groundstation.vehicles import StopDatagrams
 from sim_bridge.conformance.driver_process import DriverLife
 from sim_bridge.conformance.record import Moment, Record
@@ -44,7 +45,7 @@ class Bench:
         self._lives: list[DriverLife] = []
         self._voice: Any = None
         self.room = Room(subject.launch(faults), self.record)
-        self._endpoint = f"tcp/127.0.0.1:{_free_port()}"
+        self._endpoint = f"tcp/127.0.0.1:{free_port()}"
         self._router = open_router(self._endpoint)
         self._buses = [open_bus(self._endpoint, SITE, name) for name in ("kit", "stranger")]
         self._block = HeartbeatBlock.create(f"skein-conformance-{os.getpid()}-{id(self)}", 4)
@@ -263,10 +264,3 @@ class _UdpVoice:
 
     def close(self) -> None:
         self._socket.close()
-
-
-def _free_port() -> int:
-    with socket.socket() as tcp:
-        tcp.bind(("127.0.0.1", 0))
-        port: int = tcp.getsockname()[1]
-        return port

@@ -3,10 +3,10 @@
 import foxglove
 
 from groundstation.bus import codec, keys
-from groundstation.bus.api import Bus, Sample, Subscription
+from groundstation.bus.api import Sample
 from groundstation.engineering_views.foxglove_scene import FoxgloveScene, scene_schema
 from groundstation.engineering_views.scene import DRAWN
-from groundstation.engineering_views.watch import USUAL_PERIOD_S, everything
+from groundstation.engineering_views.watch import LiveView
 from groundstation.errors import MessageError, OperatorMistake
 from groundstation.field.resolved import ResolvedField
 from groundstation.recording.capture import Capture, Entry
@@ -20,10 +20,8 @@ _BACKLOG = 512
 _DRAWN = frozenset(topic.name for topic in DRAWN)
 
 
-class FoxgloveView:
+class FoxgloveView(LiveView):
     """Serves until closed; viewers come and go. It takes no orders: no services, nothing can be published to it."""
-
-    PERIOD_S = USUAL_PERIOD_S
 
     def __init__(self, name: str, field: ResolvedField | None, timeline: Timeline, port: int) -> None:
         self._context = foxglove.Context()
@@ -50,10 +48,6 @@ class FoxgloveView:
     def alive(self) -> bool:
         """Return whether viewers can still connect."""
         return True
-
-    def subscribe(self, bus: Bus) -> tuple[Subscription, ...]:
-        """Return the queues of the topics that it shows."""
-        return everything(bus)
 
     def take(self, sample: Sample, now_ns: int) -> None:
         """Forward a sample that arrived at a boot-clock time."""

@@ -7,11 +7,11 @@ from pathlib import Path
 import rerun as rr
 
 from groundstation.bus import codec, keys
-from groundstation.bus.api import Bus, Sample, Subscription
+from groundstation.bus.api import Sample
 from groundstation.bus.keys import Key
 from groundstation.engineering_views.rerun_file import APPLICATION
 from groundstation.engineering_views.rerun_scene import RerunScene, blueprint
-from groundstation.engineering_views.watch import USUAL_PERIOD_S, everything
+from groundstation.engineering_views.watch import LiveView
 from groundstation.errors import GroundStationError, MessageError
 from groundstation.field.resolved import ResolvedField
 from groundstation.recording.file_topics import is_picture
@@ -57,10 +57,8 @@ class RerunServer:
             self._process.wait()
 
 
-class RerunView:
+class RerunView(LiveView):
     """Shows the bus's messages, on a server or in a file."""
-
-    PERIOD_S = USUAL_PERIOD_S
 
     def __init__(
         self,
@@ -85,10 +83,6 @@ class RerunView:
     def alive(self) -> bool:
         """Return whether its server or file can still be written to."""
         return self._server is None or self._server.alive
-
-    def subscribe(self, bus: Bus) -> tuple[Subscription, ...]:
-        """Return the queues of the topics that it shows."""
-        return everything(bus)
 
     def take(self, sample: Sample, now_ns: int) -> None:
         """Show a sample that arrived at a boot-clock time; samples that cannot be decoded are ignored."""

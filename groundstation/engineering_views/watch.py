@@ -9,7 +9,6 @@ from groundstation.bus.api import Bus, Sample, Subscription
 from groundstation.bus.topics import IMU, JOURNAL, ODOMETRY
 from groundstation.recording.file_topics import IMAGE_TOPICS, STATE_TOPICS
 
-USUAL_PERIOD_S = 0.05
 # Hundreds of samples a second cannot be seen; recordings have them.
 _SHOWN = tuple(topic for topic in STATE_TOPICS if topic not in (IMU, ODOMETRY, JOURNAL))
 
@@ -17,25 +16,21 @@ _SHOWN = tuple(topic for topic in STATE_TOPICS if topic not in (IMU, ODOMETRY, J
 class LiveView(Protocol):
     """A view that shows samples; PERIOD_S: time between two turns."""
 
-    PERIOD_S: float
+    PERIOD_S: float = 0.05
 
     @property
     def alive(self) -> bool:
         """Return whether it can still show them."""
 
     def subscribe(self, bus: Bus) -> Sequence[Subscription]:
-        """Return the queues of the topics that it shows."""
+        """Return the queues of the topics that it shows: of all that a recording has, unless it says otherwise."""
+        return bus.subscribe(_SHOWN, capacity=4096), bus.subscribe(IMAGE_TOPICS, capacity=64)
 
     def take(self, sample: Sample, now_ns: int) -> None:
         """Show a sample that arrived at a boot-clock time."""
 
     def close(self) -> None:
         """End the view, after sending remaining data."""
-
-
-def everything(bus: Bus) -> tuple[Subscription, ...]:
-    """Return the queues of all topics of a recording."""
-    return bus.subscribe(_SHOWN, capacity=4096), bus.subscribe(IMAGE_TOPICS, capacity=64)
 
 
 def watch(bus: Bus, view: LiveView, goes_on: Callable[[], bool]) -> int:

@@ -1,12 +1,13 @@
 """Charts over time as values, without their drawing."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import msgspec
 import numpy as np
 
 from groundstation.appearance.colours import Colour
 from groundstation.arrays import Array
+from groundstation.report.accuracy import time_grid
 
 _MOST_POINTS = 3000
 
@@ -45,9 +46,15 @@ class Chart(msgspec.Struct, frozen=True):
     axis: str = "s"
 
 
-def thin(count: int) -> slice:
-    """Return the slice that leaves at most a few thousand of `count` points."""
-    return slice(None, None, max(1, -(-count // _MOST_POINTS)))
+def chart_times(start_s: float, end_s: float) -> Array:
+    """Return the times of a chart's points: a few thousand at most, evenly spaced."""
+    grid = time_grid(start_s, end_s)
+    return grid[:: max(1, -(-len(grid) // _MOST_POINTS))]
+
+
+def with_data(charts: Iterable[Chart]) -> list[Chart]:
+    """Return the charts that have a point."""
+    return [chart for chart in charts if any(value is not None for curve in chart.curves for value in curve.values)]
 
 
 def points(values: Array | Sequence[float], digits: int = 4) -> list[float | None]:

@@ -7,11 +7,11 @@ import numpy as np
 
 from groundstation.appearance.cost import COST_UNIT, cost_cm2
 from groundstation.arrays import Array
-from groundstation.report.accuracy import errors_at, time_grid
+from groundstation.report.accuracy import errors_at
 from groundstation.report.compare import differences, labels
 from groundstation.report.interval import tracking_interval
 from groundstation.report.judge import RunReport
-from groundstation.report.page.chart import Chart, Curve, held, points, thin, times
+from groundstation.report.page.chart import Chart, Curve, chart_times, held, points, times
 from groundstation.report.page.document import holders, no_flight_note, page
 from groundstation.report.page.flight_charts import semi_axis_m
 from groundstation.report.page.tables import number, table
@@ -45,8 +45,7 @@ def write_comparison(runs: tuple[tuple[RunData, RunReport], tuple[RunData, RunRe
 def _grids(runs: tuple[tuple[RunData, RunReport], ...]) -> tuple[Array, list[float]]:
     """Return the common time axis [s since tracking began] and its begin in each recording."""
     spans = [tracking_interval(data) or (0.0, max(data.end_s, 1.0)) for data, _ in runs]
-    grid = time_grid(0.0, max(end - start for start, end in spans))
-    return grid[thin(len(grid))], [start for start, _ in spans]
+    return chart_times(0.0, max(end - start for start, end in spans)), [start for start, _ in spans]
 
 
 def _errors(runs: tuple[tuple[RunData, RunReport], ...], called: tuple[str, str]) -> Chart:

@@ -7,8 +7,8 @@ from groundstation.appearance.cost import COST_UNIT, cost_cm2
 from groundstation.appearance.topology import topology_words
 from groundstation.arrays import Array
 from groundstation.geometry.ellipse import semi_axes_95
-from groundstation.report.accuracy import STALE_S, errors_at, time_grid
-from groundstation.report.page.chart import Chart, Curve, Span, held, points, thin, times
+from groundstation.report.accuracy import STALE_S, errors_at
+from groundstation.report.page.chart import Chart, Curve, Span, chart_times, held, points, times, with_data
 from groundstation.report.plot_style import KIND_COLORS, MUTED_CURVE, color_of
 from groundstation.report.topology_use import kind_of, merged, segments
 from groundstation.report.tracks import EstimateTrack, RunData
@@ -18,10 +18,8 @@ _PLAN_HOLDS_S = 0.5
 
 def flight_charts(data: RunData, start_s: float, end_s: float) -> list[Chart]:
     """Return the charts that the recording has data for."""
-    grid = time_grid(start_s, end_s)
-    grid = grid[thin(len(grid))]
-    charts = (_errors(data, grid), _beliefs(data, grid), _cost(data, grid), _heights(data, grid), _speeds(data, grid))
-    return [chart for chart in charts if any(value is not None for curve in chart.curves for value in curve.values)]
+    grid = chart_times(start_s, end_s)
+    return with_data(make(data, grid) for make in (_errors, _beliefs, _cost, _heights, _speeds))
 
 
 def _spans(data: RunData, grid: Array) -> list[Span]:

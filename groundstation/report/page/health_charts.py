@@ -7,9 +7,8 @@ import numpy as np
 from groundstation.appearance.colours import NEUTRAL_COLOUR
 from groundstation.arrays import Array
 from groundstation.bus.messages import VehicleStatus
-from groundstation.report.accuracy import time_grid
 from groundstation.report.consistency import bounds, nees_per_dof, windowed_nis
-from groundstation.report.page.chart import Chart, Curve, held, points, thin, times
+from groundstation.report.page.chart import Chart, Curve, chart_times, held, points, times, with_data
 from groundstation.report.plot_style import MUTED_CURVE, SERIES_COLORS, color_of
 from groundstation.report.tracks import RunData
 
@@ -20,11 +19,9 @@ _PROCESSES_SHOWN = 6
 
 def health_charts(data: RunData, start_s: float, end_s: float) -> list[Chart]:
     """Return the charts that the recording has data for."""
-    grid = time_grid(start_s, end_s)
-    grid = grid[thin(len(grid))]
-    charts = (_nis(data, start_s, end_s), _nees(data, grid), _latency(data, start_s, end_s), *_vehicles(data, grid),
-              _processor(data, grid))  # fmt: skip
-    return [chart for chart in charts if any(value is not None for curve in chart.curves for value in curve.values)]
+    grid, span = chart_times(start_s, end_s), (start_s, end_s)
+    vehicles = _vehicles(data, grid)
+    return with_data((_nis(data, *span), _nees(data, grid), _latency(data, *span), *vehicles, _processor(data, grid)))
 
 
 def _nis(data: RunData, start_s: float, end_s: float) -> Chart:

@@ -14,6 +14,7 @@ from drivers.mavlink.motors import Motors
 from drivers.mavlink.pilot import LandingPilot
 from drivers.mavlink.requests import Requests
 from drivers.mavlink.settings import VehicleSettings
+from drivers.mavlink.texts import Explanations
 from drivers.mavlink.wire.flight import SetPositionTargetLocalNed
 from drivers.mavlink.wire.names import (
     ARMED,
@@ -35,10 +36,6 @@ _STREAM_FIRST_NS = 1_200 * NS_PER_MS
 _CLIMB_LIMIT_NS = 8 * NS_PER_S
 _TAKEN_OVER_NS = 1_500 * NS_PER_MS
 _REGAIN_NS = 1_400 * NS_PER_MS
-# An older text explains no present event.
-_EXPLAINS_NS = 4 * NS_PER_S
-# ArduPilot's text comes just after the heartbeat with the mode.
-_EXPLAINED_NS = 200 * NS_PER_MS
 _STILL: Vector3 = (0.0, 0.0, 0.0)
 # The end of a climb is slower, so that it stops at the requested height.
 _CLIMBED, _CLIMB_GAIN, _LEAST_CLIMB_M_S = 0.95, 1.2, 0.12
@@ -52,11 +49,11 @@ def _sideways(back_m_s: Vector3 | None) -> tuple[float, float] | None:
 
 
 class Orders:
-    """Makes the requests to one vehicle. events: (severity, text) for the operator; said: (time, its STATUSTEXT)."""
+    """Makes the requests to one vehicle. events: (severity, text) for the operator; said: what it says."""
 
     def __init__(self, vehicle: VehicleSettings, flavour: Flavour, requests: Requests) -> None:
         self.events: deque[tuple[int, str]] = deque(maxlen=32)
-        self.said: deque[tuple[int, str]] = deque(maxlen=8)
+        self.said = Explanations()
         self.starting = False
         self.pilot = LandingPilot(flavour)
         self.lift = LiftOff()
@@ -88,11 +85,6 @@ class Orders:
         """Return whether the vehicle ends its take-off by itself, without setpoints."""
         hovers = self._flavour is Flavour.ARDUPILOT and self._action is Action.HOVER
         return hovers and self._rises_to_take_off and now_ns < self._climb_until_ns
-
-    def last_said(self, now_ns: int) -> str:
-        """Return the vehicle's last text before it left our mode, if recent: it explains that; later ones do not."""
-        texts = [(at, text) for at, text in self.said if at <= self._guided_ns + _EXPLAINED_NS]
-        return f" ({texts[-1][1]})" if texts and now_ns - texts[-1][0] <= _EXPLAINS_NS else ""
 
     def see(self, now_ns: int, good: EntityEstimate, reported_m_s: Vector3 | None) -> bool:
         """Take a good estimate and the velocity [base_stabilized] reported at that time; return whether both count.
@@ -197,7 +189,7 @@ class Orders:
 
     def _yield(self, now_ns: int, why: str) -> None:
         self._taken_over, self._why = True, f"it {why}: not ours to fly until RESUME"
-        self.events.append((MavSeverity.WARNING, self._why + self.last_said(now_ns)))
+        self.events.append((MavSeverity.WARNING, self._why + self.said.of(self._guided_ns, now_ns)))
 
     def _land(
         self, now_ns: int, decision: WatchdogDecision, armed: bool, guided: bool, custom_mode: int

@@ -4,12 +4,14 @@ from collections import deque
 
 from drivers.mavlink.wire.names import MavSeverity
 from drivers.mavlink.wire.telemetry import Statustext
-from groundstation.time_units import NS_PER_S
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _PIECE = 50
 _JUMP_MS = 1000
 _PIECES = 8
 _RECENT_S = 2
+# An older text explains no present event; ArduPilot's comes just after the heartbeat with the mode.
+_EXPLAINS_NS, _COMES_WITHIN_NS = 4 * NS_PER_S, 200 * NS_PER_MS
 Said = tuple[int, str]  # severity 0 emergency .. 7 debug, text
 
 
@@ -45,6 +47,22 @@ class Texts:
         """
         newest = {text: at for at, (level, text) in self._heard if at >= since_ns and level <= MavSeverity.WARNING}
         return [text + _age(at, now_ns) for text, at in newest.items() if word in text.lower()]
+
+
+class Explanations:
+    """Remembers the last texts of a vehicle: what it said as it left our mode explains that; later ones do not."""
+
+    def __init__(self) -> None:
+        self._texts: deque[tuple[int, str]] = deque(maxlen=8)
+
+    def hear(self, now_ns: int, text: str) -> None:
+        """Take a whole text."""
+        self._texts.append((now_ns, text))
+
+    def of(self, left_ns: int, now_ns: int) -> str:
+        """Return, in brackets, the last text until a time, or "" if there is none or none that is recent."""
+        texts = [(at, text) for at, text in self._texts if at <= left_ns + _COMES_WITHIN_NS]
+        return f" ({texts[-1][1]})" if texts and now_ns - texts[-1][0] <= _EXPLAINS_NS else ""
 
 
 def _age(at_ns: int, now_ns: int | None) -> str:

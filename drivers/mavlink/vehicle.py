@@ -268,7 +268,7 @@ class MavlinkVehicle:
         while self.texts:
             said = self._said.hear(*self.texts.popleft())
             if said is not None:
-                self.orders.said.append((now_ns, said[1]))
+                self.orders.said.hear(now_ns, said[1])
                 events.append(said)
         while self._jumps:
             jump_s = self._jumps.popleft() / 1000

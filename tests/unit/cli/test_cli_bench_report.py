@@ -83,7 +83,7 @@ def test_the_command_passes_seed_duration_and_folder(tmp_path: Path) -> None:
 
 def test_bench_help_lists_benches(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["bench", "--help"]) == 0
-    assert "Fly many seeds of the demo" in capsys.readouterr().out
+    assert "Fly the demo once per seed" in capsys.readouterr().out
 
 
 def test_report_names_a_folder_without_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -57,10 +57,10 @@ def test_hold_says_what_becomes_of_who_is_lost(stage: Any) -> None:
     page.wait(lambda s: itself.search(page.there("drone_1-duty").inner_text()))
     stage.flight.unseen_s["drone_1"] = 5.0
     page.wait(lambda s: page.there("hold").inner_text() == "HOLD\ndrone_2 hovers;\ndrone_1 lands if unseen")
-    assert page.there("drone_1-hold").inner_text() == "Hold\nunseen: lands"
+    assert page.there("drone_1-hold").inner_text() == "Hold\nlands if unseen"
     stage.flight.unseen_s |= {"drone_2": 6.0, TARGET: 9.0}
     page.wait(lambda s: page.there("hold").inner_text() == "HOLD\nboth hover; they land\nif they stay unseen")
-    assert page.there("land-all").inner_text().endswith("both land\nstraight down")
+    assert page.there("land-all").inner_text().endswith("both land\nwhere they are")
     lost = "Lost: drone_1, drone_2 and turtlebot, not seen for 5 to 9 s."
     page.wait(lambda s: lost in page.there("verdict").inner_text())
 
@@ -89,6 +89,7 @@ def test_who_is_not_heard_is_told_alike_everywhere(stage: Any) -> None:
     page.wait(lambda s: page.there("safety-means").inner_text() == "not heard: both\nhover, then land")
     assert page.there("team-mode").inner_text() == "NOT HEARD" and page.there("team-who").inner_text() == "team"
     assert page.there("hold").inner_text() == "HOLD\nboth hover\nif they hear"
+    assert page.there("cut-motors").inner_text() == "CUT MOTORS\nboth fall\nif they hear"
     assert page.there("verdict").inner_text().startswith("drone_1 and drone_2 are not heard.")
     for name in DRONES:
         assert page.there(f"{name}-duty").inner_text().startswith("It is not heard: it hovers, then lands by itself.")

@@ -66,14 +66,15 @@ export function effectOf(verb) {
   const flying = up();
   if (!modes().length) return "";
   if (!flying.length) return "nobody flies";
-  if (verb === "CUT_MOTORS") return `press 1 s:\n${does(flying, "falls", "fall")}`;
   if (flying.some(isUnheard)) return unheard(verb, flying);
+  if (verb === "CUT_MOTORS") return `press 1 s:\n${does(flying, "falls", "fall")}`;
   return verb === "LAND" ? landing(flying) : hover(flying);
 }
 
 // Whom a stop may not reach: it is sent all the same.
 function unheard(verb, flying) {
-  const deaf = flying.filter(isUnheard), heard = flying.filter((name) => !isUnheard(name)), word = verb === "HOLD" && holding(heard.length ? heard : deaf).length ? "hover" : "land";
+  const deaf = flying.filter(isUnheard), heard = flying.filter((name) => !isUnheard(name));
+  const word = verb === "CUT_MOTORS" ? "fall" : verb === "HOLD" && holding(heard.length ? heard : deaf).length ? "hover" : "land";
   if (!heard.length) return does(deaf, `${word}s\nif it hears`, `${word}\nif they hear`);
   return told([does(heard, `${word}s`, word), does(deaf, "if it hears", "if they hear")]);
 }
@@ -85,7 +86,7 @@ export function effectOnOne(verb, name) {
   if (isUnheard(name)) return "if it hears";
   if (verb === "LAND") return isIdle(verb, [name]) ? "lands already" : "lands here";
   if (!holding([name]).length) return "lands anyway";
-  return isLost(name) ? "unseen: lands" : isIdle(verb, [name]) ? "hovers already" : "hovers here";
+  return isLost(name) ? "lands if unseen" : isIdle(verb, [name]) ? "hovers already" : "hovers here";
 }
 
 // Who is lost hovers as well, until it is landed for it.
@@ -102,7 +103,7 @@ function hover(flying) {
 
 function landing(flying) {
   const anew = flying.filter((name) => modeNow(name) !== "LANDING"), already = flying.filter((name) => !anew.includes(name));
-  return already.length ? told([does(anew, "lands", "land"), does(already, "lands already", "land already")]) : anew.some(isLost) ? does(anew, "lands\nstraight down", "land\nstraight down") : does(anew, "lands\nwhere it is", "land\nwhere they are");
+  return already.length ? told([does(anew, "lands", "land"), does(already, "lands already", "land already")]) : does(anew, "lands\nwhere it is", "land\nwhere they are");
 }
 
 // Whether a stop would change nothing now.

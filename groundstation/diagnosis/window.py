@@ -2,19 +2,21 @@
 
 from collections import deque
 
-from groundstation.bus.messages import STANDING, FlightState, Message, VehicleStatus
+from groundstation.bus.messages import STANDING, FlightState, Message, RelativeObservation, VehicleStatus
 from groundstation.bus.topics import IMU, OBSERVATION, ODOMETRY, VEHICLE_STATUS
 from groundstation.calibration.flown import Flown
 from groundstation.estimation.message_screen import MessageScreen
 from groundstation.estimation.parameters import parameters_from_field
 from groundstation.field.resolved import ResolvedField
-from groundstation.time_units import NS_PER_S
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 TOPICS = (ODOMETRY, IMU, OBSERVATION, VEHICLE_STATUS)
 _LASTS_NS = 40 * NS_PER_S
 # Length of flight that is judged; longer if it began in the air, where no pad tells the start and figures bend paths.
 _LEAST_NS, _LEAST_ALOFT_NS = 8 * NS_PER_S, 20 * NS_PER_S
 _DOWN = STANDING | {FlightState.UNKNOWN}
+# A picture that is repeated for so long hangs; until then one may have been sent twice.
+_HANGS_NS = 300 * NS_PER_MS
 
 
 class Window:
@@ -29,11 +31,16 @@ class Window:
         self._rows: deque[tuple[int, tuple[tuple[str, Message], ...]]] = deque()
         self._flying: dict[str, bool] = {}
         self._stood: set[str] = set()
+        self._hung_ns: dict[str, int] = {}
 
     def take(self, key: str, message: Message, now_ns: int) -> None:
         """Take a message; stamps of another clock are ignored."""
         stamp_ns = message.header.stamp_ns
-        if message.header.clock != self._clock or self._screen.refusal(key, message, stamp_ns, now_ns):
+        if message.header.clock != self._clock:
+            return
+        if isinstance(message, RelativeObservation):
+            self._forget_hung(message)
+        if self._screen.refusal(key, message, stamp_ns, now_ns):
             return
         if isinstance(message, VehicleStatus):
             name = message.header.entity
@@ -44,10 +51,22 @@ class Window:
         while self._rows[0][0] < now_ns - _LASTS_NS:
             self._rows.popleft()
 
+    def _forget_hung(self, seen: RelativeObservation) -> None:
+        """Drop what a camera showed after the picture that it now turns out to repeat."""
+        since_ns, hung = self._hung_ns.get(seen.camera, 0), seen.picture_ns
+        if not hung or hung == since_ns or seen.header.stamp_ns - hung < _HANGS_NS:
+            return
+        self._hung_ns[seen.camera] = hung
+        self._rows = deque(row for row in self._rows if not _shown_after(row[1][0][1], seen.camera, hung))
+
     def flown(self) -> Flown | None:
         """Return the messages; None while nobody flies, or before 8 s (20 s if the start was missed)."""
         aloft = {name for name, flies in self._flying.items() if flies}
         least_ns = _LEAST_NS if aloft <= self._stood else _LEAST_ALOFT_NS
-        if not aloft or self._rows[-1][0] - self._rows[0][0] < least_ns:
+        if not aloft or not self._rows or self._rows[-1][0] - self._rows[0][0] < least_ns:
             return None
         return Flown(tuple(self._rows), self._clock)
+
+
+def _shown_after(message: Message, camera: str, picture_ns: int) -> bool:
+    return isinstance(message, RelativeObservation) and message.camera == camera and message.picture_ns > picture_ns

@@ -12,7 +12,7 @@ from sim_bridge.world.world import World
 
 _NOTHING = frozenset({FaultKind.CAMERA_CUT, FaultKind.CAMERA_STALL, FaultKind.PICTURE_BLACK})
 # A vehicle's own video is compressed, so that no two pictures of a hanging camera are equal; at the wire its driver
-# knew it by markers that stood while it tilted, after 1.0 to 1.5 s.
+# knows it by markers that stand while it tilts, after some 0.8 s.
 _KNOWN_S = 1.5
 _WOBBLE = 1e-5
 

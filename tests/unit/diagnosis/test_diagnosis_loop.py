@@ -69,6 +69,28 @@ def test_what_another_clock_stamped_tells_nothing(lab_field: ResolvedField) -> N
     assert window.flown() is None
 
 
+def sighting(at_s: float, picture_s: float, camera: str = "drone_1_camera") -> Message:
+    return RelativeObservation(
+        header=Header(round(at_s * S), "c", "drone_1", camera, round(1e3 * at_s)), observer="drone_1", camera=camera,
+        subject="turtlebot", position_m=(0.0, 0.0, 1.0 + 0.01 * at_s), yaw_rad=None,
+        covariance=(1e-4, 0.0, 0.0, 0.0, 1e-4, 0.0, 0.0, 0.0, 1e-4), picture_ns=round(picture_s * S),
+    )  # fmt: skip
+
+
+def test_what_a_camera_showed_since_it_hung_does_not_count_once_that_is_known(lab_field: ResolvedField) -> None:
+    window = Window(lab_field, "c")
+    for tenth in range(200):
+        at_s = tenth / 10
+        window.take("s", status(at_s, FlightState.LANDED if at_s < 1 else FlightState.FLYING), round(at_s * S))
+        window.take("o", sighting(at_s, 15.0 if at_s >= 17.0 else at_s), round(at_s * S))
+        window.take("p", sighting(at_s, at_s, "another"), round(at_s * S))
+    flown = window.flown()
+    assert flown is not None
+    seen = [m for _, row in flown.ticks for _, m in row if isinstance(m, RelativeObservation)]
+    assert max(m.picture_ns for m in seen if m.camera == "drone_1_camera") == 15 * S
+    assert max(m.picture_ns for m in seen if m.camera == "another") == round(19.9 * S)
+
+
 def hanging(message: Message, at_s: float) -> Message:
     """Return a message as it comes again and again from a picture or an autopilot that hangs."""
     header = msgspec.structs.replace(message.header, stamp_ns=round(at_s * S), seq=round(1e3 * at_s))

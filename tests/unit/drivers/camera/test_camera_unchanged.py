@@ -34,7 +34,7 @@ def fly(shift_px, swing_deg, seconds=3.0, aloft=True):
 def test_a_marker_that_stands_while_its_camera_tilts_shows_that_the_picture_hangs(swing_deg):
     ages = fly(lambda _: 0.0, swing_deg)
     first = next(k for k, age in enumerate(ages) if age > 0.0)
-    assert first / 15 <= 1.5 and ages[first:] == pytest.approx([k / 15 for k in range(first, len(ages))], abs=0.01)
+    assert first / 15 <= 1.0 and ages[first:] == pytest.approx([k / 15 for k in range(first, len(ages))], abs=0.01)
 
 
 @pytest.mark.parametrize(
@@ -42,7 +42,7 @@ def test_a_marker_that_stands_while_its_camera_tilts_shows_that_the_picture_hang
     [
         {"shift_px": lambda at_s: 1.2 * at_s * 15, "swing_deg": 5.0},  # it moves
         {"shift_px": lambda at_s: 12.0 * math.sin(4.2 * at_s), "swing_deg": 2.5},  # as the tilt says
-        {"shift_px": lambda _: 0.0, "swing_deg": 1.0},  # hardly any tilt: nobody can tell
+        {"shift_px": lambda _: 0.0, "swing_deg": 0.3},  # hardly any tilt: nobody can tell
         {"shift_px": lambda _: 0.0, "swing_deg": 5.0, "aloft": False},  # what stands may shake its sensors
     ],
 )
@@ -55,8 +55,10 @@ def test_a_picture_that_moves_again_is_new_at_once():
     assert ages[29] > 1.0 and max(ages[30:]) == 0.0
 
 
-def test_a_picture_without_markers_ends_what_was_steady():
-    steady, tilts = SteadyMarkers(FOCAL_PX), [(math.radians(3.0) * (k % 2), 0.0) for k in range(10)]
-    seen = [{"bot": BOARD}] * 5 + [{}] + [{"bot": BOARD}] * 4
-    ages = [k - steady.since_ns(k, corners, tilt) for k, (corners, tilt) in enumerate(zip(seen, tilts, strict=True))]
-    assert ages == [0, 0, 2, 3, 4, 0, 0, 0, 2, 3]
+def test_a_picture_without_markers_tells_nothing():
+    steady, seen = SteadyMarkers(FOCAL_PX), [{"bot": BOARD}] * 14 + [{}] + [{"bot": BOARD}] * 3 + [{"bot": BOARD + 2.0}]
+    ages = []
+    for k, corners in enumerate(seen):
+        tilt = (math.radians(3.0) * (k % 2), 0.0)
+        ages.append(k - steady.since_ns(k * PICTURE_NS, corners, tilt) / PICTURE_NS)
+    assert ages == [0] * 12 + [12, 13, 0, 15, 16, 17, 0]

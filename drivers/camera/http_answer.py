@@ -7,7 +7,8 @@ import re
 
 from groundstation.errors import DriverError
 
-_HEAD_END = re.compile(rb"\r?\n\r?\n")
+# Of an answer, and of each part of a stream.
+HEAD_END = re.compile(rb"\r?\n\r?\n")
 _CHUNKED = re.compile(rb"^transfer-encoding:[^\r\n]*\bchunked\b", re.IGNORECASE | re.MULTILINE)
 _BOUNDARY = re.compile(rb"multipart/[a-z-]+[^\r\n]*boundary=\"?([^\r\n\";]+)", re.IGNORECASE)
 # A line of dashes counts only before a part's head: anything may begin so.
@@ -18,7 +19,7 @@ _MAX_LINE_BYTES = 256
 
 def split_answer(data: bytes) -> tuple[bytes, bytes] | None:
     """Return head and what is behind it, or None while the head has not ended."""
-    end = _HEAD_END.search(data)
+    end = HEAD_END.search(data)
     return None if end is None else (data[: end.start()], data[end.end() :])
 
 

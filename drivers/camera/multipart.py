@@ -6,13 +6,12 @@ without Content-Length, lines that end in LF alone, any number of blank lines be
 
 import re
 
-from drivers.camera.http_answer import boundary_from_body, may_begin_with_boundary
+from drivers.camera.http_answer import HEAD_END, boundary_from_body, may_begin_with_boundary
 from groundstation.bus.jpeg import has_ended
 
 MAX_FRAME_BYTES = 8 << 20
 _MAX_HEAD_BYTES = 4096
 _LENGTH = re.compile(rb"^content-length:[ \t]*(\d{1,9})[ \t]*$", re.IGNORECASE | re.MULTILINE)
-_HEAD_END = re.compile(rb"\r?\n\r?\n")
 _JPEG_START, _JPEG_END = b"\xff\xd8", b"\xff\xd9"
 
 
@@ -61,7 +60,7 @@ class MultipartParser:
             del self._buffer[: max(0, len(self._buffer) - len(self._mark) + 1)]
             return False
         head_start = start + len(self._mark)
-        head = _HEAD_END.search(self._buffer, head_start, head_start + _MAX_HEAD_BYTES)
+        head = HEAD_END.search(self._buffer, head_start, head_start + _MAX_HEAD_BYTES)
         if head is None:
             if len(self._buffer) - head_start > _MAX_HEAD_BYTES:
                 self._reject(head_start)

@@ -16,8 +16,8 @@ class PlausibilityLimits:
     values may be. speed_m_s, tilt_rad: beyond the vehicle's means, for beyond_s. jump_m_s, acceleration_m_s2 and
     jump_rad, turn_rad_s: the largest step between two values, at once and by time. jumps, jumps_within_s: number of
     such steps that is too many within a time. hold_s: how long a verdict outlives its evidence. clock_wrap_s: time at
-    which the vehicle's clock starts over. stirs_on_floor: the noise of its inertial
-    values shows while it stands. essential: sensors without which the vehicle cannot fly.
+    which the vehicle's clock starts over. stirs_on_floor: the noise of its inertial values shows while it stands.
+    essential: sensors without which the vehicle cannot fly.
     """
 
     frozen_s: float = 0.3

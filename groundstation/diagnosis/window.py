@@ -2,7 +2,7 @@
 
 from collections import deque
 
-from groundstation.bus.messages import STANDING, FlightState, Message, RelativeObservation, VehicleStatus
+from groundstation.bus.messages import STANDING, FlightState, Message, RelativeObservation, VehicleStatus, Verdict
 from groundstation.bus.topics import IMU, OBSERVATION, ODOMETRY, VEHICLE_STATUS
 from groundstation.calibration.flown import Flown
 from groundstation.estimation.message_screen import MessageScreen
@@ -17,6 +17,7 @@ _LEAST_NS, _LEAST_ALOFT_NS = 8 * NS_PER_S, 20 * NS_PER_S
 _DOWN = STANDING | {FlightState.UNKNOWN}
 # A picture that is repeated for so long hangs; until then one may have been sent twice.
 _HANGS_NS = 300 * NS_PER_MS
+_REPEATS = (Verdict.DUPLICATE, Verdict.FROZEN)
 
 
 class Window:
@@ -38,9 +39,10 @@ class Window:
         stamp_ns = message.header.stamp_ns
         if message.header.clock != self._clock:
             return
-        if isinstance(message, RelativeObservation):
+        verdict = self._screen.refusal(key, message, stamp_ns, now_ns)
+        if verdict in _REPEATS and isinstance(message, RelativeObservation):
             self._forget_hung(message)
-        if self._screen.refusal(key, message, stamp_ns, now_ns):
+        if verdict:
             return
         if isinstance(message, VehicleStatus):
             name = message.header.entity

@@ -80,7 +80,7 @@ class RelativeObservation(Message, frozen=True, kw_only=True):
     pitch_rad: float = 0.0
     """Pitch of the observer that the yaw was derived with [rad]; 0 for world-fixed cameras."""
     picture_ns: int = 0
-    """Exposure of the picture [ns]; that of the first, if several in a row are equal to the last pixel; 0: unknown."""
+    """Exposure of the picture [ns]; that of the first, if several in a row show nothing new; 0: unknown."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -1,20 +1,15 @@
 """Settings of one camera driver, as the composition hands them over (JSON of `CameraDriverSettings`)."""
 
-from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Annotated, Literal
-from urllib.parse import unquote, urlsplit
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
-from drivers.rmw_zenoh.address import ROUTER_PORT, domain_of
-from groundstation import plug_ins
-from groundstation.adapters import split_zone, with_zone
+from drivers.camera.source_address import parse_source
 from groundstation.geometry.board import VALID_CODES, Checkerboard
 from groundstation.geometry.lens import CameraIntrinsics, intrinsics_of
 from groundstation.geometry.tag import SquareTag
-from groundstation.vehicles import all_kinds
 
 _Positive = Annotated[float, Field(gt=0)]
 _Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,47}$")]
@@ -22,90 +17,6 @@ _Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,47}$")]
 
 SEARCH_RATE_HZ = 2.0
 """How often whole pictures are searched in which nothing is in view."""
-
-
-class SourceKind(StrEnum):
-    """Kinds of sources of pictures."""
-
-    HTTP = "http"
-    RTSP = "rtsp"
-    ROS2 = "ros2"
-    DEVICE = "device"
-    FILE = "file"
-    VEHICLE = "vehicle"
-    PLUG_IN = "plug-in"
-
-
-_PORTS = {SourceKind.HTTP: 80, SourceKind.RTSP: 554, SourceKind.ROS2: ROUTER_PORT}
-# Libraries open these, through any adapter.
-_ANY_ADAPTER = frozenset({SourceKind.RTSP, SourceKind.ROS2})
-
-
-@dataclass(frozen=True, slots=True)
-class SourceAddress:
-    """A source taken apart.
-
-    path: of the stream with its query, of the topic, of the device, of the file or folder; host: of a plug-in, its
-    scheme; login: "user:password", or "" for none; interface: the network adapter that it is behind, or "" for any;
-    domain: of ROS 2; vehicle: whose own video it is, the scheme of its kind.
-    """
-
-    kind: SourceKind
-    host: str = ""
-    port: int = 0
-    path: str = ""
-    login: str = field(default="", repr=False)
-    interface: str = ""
-    domain: int = 0
-    vehicle: str = ""
-
-
-def parse_source(text: str) -> SourceAddress:
-    """Return the parts of a source's address; raises ValueError that names all forms."""
-    if text.startswith("/dev/"):
-        return SourceAddress(SourceKind.DEVICE, path=text)
-    if text.startswith(("/", "file:///")):
-        return SourceAddress(SourceKind.FILE, path=text.removeprefix("file://"))
-    kinds = {kind.value: kind for kind in _PORTS}
-    scheme, mark, rest = text.partition("://")
-    unusable = not mark or not rest or any(character.isspace() for character in text)
-    if not unusable and scheme not in kinds and scheme in plug_ins.names(plug_ins.CAMERAS):
-        return SourceAddress(SourceKind.PLUG_IN, host=scheme, path=rest)
-    vehicles = {} if scheme in kinds else {one.camera: one for one in all_kinds().values() if one.reader}
-    if unusable or (scheme not in kinds and scheme not in vehicles):
-        own = "".join(f"{each}://192.168.1.1, " for each in vehicles)
-        raise ValueError(
-            f"must be an address such as http://192.168.1.50:8080/video.mjpg, {own}"
-            "rtsp://192.168.1.60/stream, ros2://192.168.1.20/camera/image/compressed, /dev/video0 or /a/video.mp4"
-        )
-    parts = urlsplit(text)
-    try:
-        port = parts.port or (vehicles[scheme].camera_port if scheme in vehicles else _PORTS[kinds[scheme]])
-    except ValueError:
-        escape = " (a / in a password is written %2F)" if "@" in rest else ""
-        raise ValueError(f"the port is no number from 1 to 65535{escape}") from None
-    if not parts.hostname:
-        raise ValueError(f"must name a host, as in {scheme}://192.168.1.50")
-    host, interface = split_zone(parts.hostname)
-    if scheme in vehicles:
-        return SourceAddress(SourceKind.VEHICLE, host, port, interface=interface, vehicle=scheme)
-    if interface and kinds[scheme] in _ANY_ADAPTER:
-        raise ValueError(f"cannot be behind an adapter (%{interface}): the library that opens {scheme}:// takes any")
-    if kinds[scheme] is SourceKind.ROS2:
-        if not (topic := parts.path.strip("/")):
-            raise ValueError("must name a topic, as in ros2://192.168.1.20/camera/image/compressed")
-        return SourceAddress(SourceKind.ROS2, host, port, topic, domain=domain_of(parts.query))
-    path = (parts.path or "/") + (f"?{parts.query}" if parts.query else "")
-    login = "" if parts.username is None else f"{unquote(parts.username)}:{unquote(parts.password or '')}"
-    return SourceAddress(kinds[scheme], host, port, path, login, interface)
-
-
-def behind_adapter(text: str, interface: str) -> str:
-    """Return a source's address with the network adapter that it is reached through, where it names none itself."""
-    parts = urlsplit(text)
-    login, at, place = parts.netloc.rpartition("@")
-    host, colon, port = place.partition(":")
-    return parts._replace(netloc=f"{login}{at}{with_zone(host, interface)}{colon}{port}").geturl()
 
 
 def _checked_source(text: str) -> str:

@@ -90,7 +90,7 @@ def _until_possible(ask: Callable[[], _Answer]) -> _Answer:
 
 
 def _ask_room() -> "NewRoom":
-    from drivers.camera.settings import parse_source
+    from drivers.camera.source_address import parse_source
     from groundstation.settings.new_field import NewRoom, check_room
 
     length = click.prompt("Length of the room [m]", default=8.0, type=FiniteRange(3, 60))
@@ -119,7 +119,7 @@ def _ask_count(room: "NewRoom") -> int:
 
 
 def _ask_drones(room: "NewRoom") -> "list[NewDrone]":
-    from drivers.camera.settings import parse_source
+    from drivers.camera.source_address import parse_source
     from drivers.vehicle_settings import is_address
     from groundstation.settings.new_field import NewDrone, offers
 

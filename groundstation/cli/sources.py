@@ -24,7 +24,7 @@ def _forms() -> str:
 
 def source_of(_context: click.Context, _parameter: click.Parameter, value: str) -> str:
     """Return a camera source; a file or folder may be given relative. Raises BadParameter for anything else."""
-    from drivers.camera.settings import parse_source
+    from drivers.camera.source_address import parse_source
 
     path = Path(value)
     if "://" not in value and not value.startswith("/dev/"):

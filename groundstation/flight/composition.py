@@ -9,7 +9,7 @@ from typing import Any
 
 import msgspec
 
-from drivers.camera.settings import parse_source
+from drivers.camera.source_address import parse_source
 from groundstation.bus.access import AccessList
 from groundstation.bus.roles import SHELLS, Member, Role, certificate_name
 from groundstation.console.section import enough_hz

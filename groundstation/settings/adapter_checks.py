@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from itertools import combinations
 from urllib.parse import urlsplit
 
-from drivers.camera.settings import SourceKind, parse_source
+from drivers.camera.source_address import SourceKind, parse_source
 from groundstation.settings.document import KeyPath
 from groundstation.settings.drones import Drone
 from groundstation.vehicles import kind_named

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from drivers.camera.settings import SourceKind, parse_source
+from drivers.camera.source_address import SourceKind, parse_source
 from groundstation.adapters import adapters, drops_strangers
 from groundstation.geometry.rotations import world_from_downward_optical
 from groundstation.settings.document import KeyPath

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 
-from drivers.camera.settings import parse_source
+from drivers.camera.source_address import parse_source
 from groundstation.errors import without_password
 from groundstation.settings.adapter_checks import findings_of_adapters
 from groundstation.settings.document import KeyPath

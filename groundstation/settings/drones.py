@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import AfterValidator, Field, create_model
 from pydantic_core import PydanticCustomError, PydanticKnownError
 
-from drivers.camera.settings import behind_adapter, parse_source
+from drivers.camera.source_address import behind_adapter, parse_source
 from groundstation.settings.marker import MarkerSettings
 from groundstation.settings.room import CalibrationSettings
 from groundstation.settings.values import (

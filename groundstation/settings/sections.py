@@ -7,7 +7,8 @@ from types import MappingProxyType
 
 from pydantic import BaseModel
 
-from drivers.camera.settings import SEARCH_RATE_HZ, parse_source
+from drivers.camera.settings import SEARCH_RATE_HZ
+from drivers.camera.source_address import parse_source
 from drivers.motion_capture.settings import emulated_source
 from drivers.ranging.settings import emulated_source as emulated_gateway
 from groundstation.field.drones import camera_name

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer
 from pydantic_core import PydanticCustomError
 
-from drivers.camera.settings import parse_source
+from drivers.camera.source_address import parse_source
 from drivers.vehicle_settings import Address as Address
 from drivers.vehicle_settings import is_address
 from groundstation.errors import without_password

@@ -14,7 +14,7 @@ from free_port import free_port
 pytest.importorskip("rosbags")
 import zenoh
 
-from drivers.camera.settings import SourceKind, parse_source
+from drivers.camera.source_address import SourceKind, parse_source
 from drivers.camera.sources.frames import FrameSource, Packet
 from drivers.camera.sources.opening import open_source
 from drivers.rmw_zenoh.wire import graph

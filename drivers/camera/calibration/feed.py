@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from drivers.camera.settings import SourceKind, parse_source
+from drivers.camera.source_address import SourceKind, parse_source
 from drivers.camera.sources.files import FileReader
 from drivers.camera.sources.frames import GREY_AS_EXPOSED, FrameSource, Packet
 from drivers.camera.sources.opening import open_source

@@ -2,7 +2,7 @@
 
 from pkgutil import resolve_name
 
-from drivers.camera.settings import SourceAddress, SourceKind, parse_source
+from drivers.camera.source_address import SourceAddress, SourceKind, parse_source
 from drivers.camera.sources.container import device, rtsp
 from drivers.camera.sources.files import FileReader
 from drivers.camera.sources.frames import FrameSource

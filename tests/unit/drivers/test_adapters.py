@@ -14,7 +14,7 @@ from drivers.ardrone.link import ArDroneLink
 from drivers.ardrone.network_setup import own_hardware_address
 from drivers.ardrone.queries import read_dump, read_version
 from drivers.ardrone.settings import ArDroneDriverSettings
-from drivers.camera.settings import behind_adapter, parse_source
+from drivers.camera.source_address import behind_adapter, parse_source
 from drivers.camera.sources.tcp import Line
 from drivers.datagrams import DatagramLog
 from drivers.mavlink.links.udp import UdpLink

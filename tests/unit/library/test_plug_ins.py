@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from installation import install
 
-from drivers.camera.settings import SourceKind, parse_source
+from drivers.camera.source_address import SourceKind, parse_source
 from drivers.camera.sources.opening import open_source
 from drivers.motion_capture.settings import SystemAddress
 from drivers.motion_capture.sources import open_source as open_system

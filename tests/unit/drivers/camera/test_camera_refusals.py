@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from drivers.camera.settings import SourceAddress, SourceKind, parse_source
+from drivers.camera.source_address import SourceAddress, SourceKind, parse_source
 from drivers.stream_watch import StreamState, StreamWatch
 from groundstation.bus.jpeg import whole_size
 

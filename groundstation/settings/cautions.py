@@ -10,6 +10,7 @@ import numpy as np
 
 from drivers.camera.source_address import SourceKind, parse_source
 from groundstation.adapters import adapters, drops_strangers
+from groundstation.arrays import Array
 from groundstation.geometry.rotations import world_from_downward_optical
 from groundstation.settings.document import KeyPath
 from groundstation.settings.files import unwritable
@@ -38,26 +39,33 @@ def cautions(field: Field) -> Iterator[Finding]:
 
 
 def _views(field: Field) -> Iterator[Finding]:
-    pads = {name: np.array([*drone.pad_m, STANDING_MARKER_M]) for name, drone in field.drones.items()}
-    unseen, risen = set(pads), set(pads)
+    pads = _pads(field)
     for name, camera in field.cameras.items():
-        path = ("cameras", name, "rotation_deg")
         if world_from_downward_optical(camera.rotation_deg)[2, 2] > -_AT_WALLS:
-            yield path, "lets it look at the walls or the ceiling: drones below it are not seen"
-        seen = {pad for pad, centre in pads.items() if in_picture(camera, centre)}
-        unseen -= seen
-        risen -= {name for name, drone in field.drones.items() if _in_picture_risen(camera, drone.pad_m)}
-        if not seen:
+            text = "lets it look at the walls or the ceiling: drones below it are not seen"
+            yield ("cameras", name, "rotation_deg"), text
+        if not any(in_picture(camera, centre) for centre in pads.values()):
             text = "and rotation_deg leave no pad in its view: it knows of a drone only after that has flown there"
             yield ("cameras", name, "position_m"), text
+
+
+def _unseen_pads(field: Field) -> Iterator[Finding]:
+    cameras = field.cameras.values()
     boxes = [one.volume_m for name, one in field.motion_capture.items() if name != field.truth.get("from")]
-    for box in (*boxes, *(one.volume_m for one in field.ranging.values())):
-        unseen -= {name for name in unseen if _within(box.x_m, pads[name][0]) and _within(box.y_m, pads[name][1])}
-    for name in sorted(unseen):
-        yield ("drones", name, "pad_m"), "is in view of nothing fixed: nobody knows where it is when it takes off"
-    for name in sorted(risen - unseen) if field.cameras and not boxes and not field.ranging else ():
-        text = f"is near the edge of the view: {RISEN_MARKER_M:g} m above it, no fixed camera sees a whole marker"
-        yield ("drones", name, "pad_m"), text
+    boxes += [one.volume_m for one in field.ranging.values()]
+    for name, pad in sorted(_pads(field).items()):
+        if any(_within(box.x_m, pad[0]) and _within(box.y_m, pad[1]) for box in boxes):
+            continue
+        if not any(in_picture(camera, pad) for camera in cameras):
+            yield ("drones", name, "pad_m"), "is in view of nothing fixed: nobody knows where it is when it takes off"
+        elif not boxes and not any(_in_picture_risen(camera, field.drones[name].pad_m) for camera in cameras):
+            text = f"is near the edge of the view: {RISEN_MARKER_M:g} m above it, no fixed camera sees a whole marker"
+            yield ("drones", name, "pad_m"), text
+
+
+def _pads(field: Field) -> dict[str, Array]:
+    """Return the centre of each drone's marker as it stands on its pad (3) [m; world]."""
+    return {name: np.array([*drone.pad_m, STANDING_MARKER_M]) for name, drone in field.drones.items()}
 
 
 def _within(span: tuple[float, float], value: float) -> bool:
@@ -172,6 +180,7 @@ def _places(field: Field) -> Iterator[Finding]:
 
 OF_A_FIELD: tuple[Caution, ...] = (
     _views,
+    _unseen_pads,
     _carried_cameras,
     _fence,
     _obstacles,

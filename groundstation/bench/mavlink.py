@@ -7,7 +7,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from drivers.host import VehicleHost, sleep_serving
@@ -165,7 +165,7 @@ def measure(kind: str, count: int, seconds: float) -> dict[str, Any]:
     tracker = _Tracker(exchange, names, link)
     talking = talk(port, count, _START_S + seconds + 5)
     try:
-        return _flown(host, fleet, hosts_of(host, fleet, settings), tracker, link, bus, seconds)
+        return _Flight(host, hosts_of(host, fleet, settings), fleet, tracker).measure(link, bus, seconds)
     finally:
         talking.kill()
         talking.wait()
@@ -173,52 +173,61 @@ def measure(kind: str, count: int, seconds: float) -> dict[str, Any]:
         fleet.close()
 
 
-def _flown(
-    host: _Host, fleet: Fleet, hosts: Sequence[VehicleHost], tracker: _Tracker, link: _TimedLink, bus: _TimedBus,
-    seconds: float,
-) -> dict[str, Any]:  # fmt: skip
-    begin = clock.now_ns()
-    found_s: float | None = None
-    deadline_ns = begin
-    stages = iter((("LANDED", Verb.TAKEOFF), ("HOVER", Verb.TRACK), ("TRACK", None)))
-    stage, order = next(stages)
-    measured: tuple[int, float, int] | None = None
-    while True:
+class _Flight:
+    """Turns the driver while the vehicles take off and follow setpoints, and measures that."""
+
+    def __init__(self, host: _Host, hosts: Sequence[VehicleHost], fleet: Fleet, tracker: _Tracker) -> None:
+        self._host, self._hosts, self._fleet, self._tracker = host, hosts, fleet, tracker
+        self._begin_ns = self._deadline_ns = clock.now_ns()
+
+    def measure(self, link: _TimedLink, bus: _TimedBus, seconds: float) -> dict[str, Any]:
+        """Return the figures of `seconds` in TRACK; raises DriverError if a vehicle does not get or stay there."""
+        self._turn_until(lambda: all(v.telemetry.heartbeat_ns for v in self._fleet.vehicles.values()), "heard")
+        found_s = (clock.now_ns() - self._begin_ns) / 1e9
+        self._tracker.start()
+        for mode, verb in (("LANDED", Verb.TAKEOFF), ("HOVER", Verb.TRACK)):
+            self._reach(mode)
+            self._tracker.order(verb)
+        self._reach("TRACK")
+        self._turn_for(_SETTLE_S)
+        link.late_ms.clear()
+        bus.late_ms.clear()
+        begin_ns, cpu_s, frames = clock.now_ns(), time.process_time(), link.frames
+        self._turn_for(seconds)
+        elapsed_s, cpu_s, frames = (clock.now_ns() - begin_ns) / 1e9, time.process_time() - cpu_s, link.frames - frames
+        if fallen := [each.watchdog for each in self._hosts if each.watchdog.mode != "TRACK"]:
+            raise DriverError(f"a vehicle left TRACK while it was measured: {fallen[0].reason}")
+        return {
+            "discovery_s": round(found_s, 2),
+            "cores": round(cpu_s / elapsed_s, 3),
+            "frames_per_s": round(frames / elapsed_s),
+            "us_per_frame": round(1e6 * cpu_s / max(1, frames), 1),
+            "telemetry_to_bus_ms": quantiles(bus.late_ms),
+            "setpoint_to_wire_ms": quantiles(link.late_ms),
+        }
+
+    def _reach(self, mode: str) -> None:
+        dogs = [each.watchdog for each in self._hosts]
+        self._turn_until(lambda: all(dog.mode == mode and not dog.vehicle.not_ready for dog in dogs), f"in {mode}")
+
+    def _turn_until(self, reached: Callable[[], bool], what: str) -> None:
+        while not reached():
+            if clock.now_ns() - self._begin_ns > _START_S * 1e9:
+                raise DriverError(f"the vehicles are not {what}: {self._hosts[0].watchdog.vehicle.not_ready}")
+            self._turn()
+
+    def _turn_for(self, seconds: float) -> None:
+        end_ns = clock.now_ns() + round(seconds * 1e9)
+        while clock.now_ns() < end_ns:
+            self._turn()
+
+    def _turn(self) -> None:
         now_ns = clock.now_ns()
-        fleet.turn(now_ns)
-        for each in hosts:
+        self._fleet.turn(now_ns)
+        for each in self._hosts:
             each.turn(now_ns)
-        if found_s is None and all(v.telemetry.heartbeat_ns for v in fleet.vehicles.values()):
-            found_s = (now_ns - begin) / 1e9
-            tracker.start()
-        if all(h.watchdog.mode == stage and not h.watchdog.vehicle.not_ready for h in hosts) and measured is None:
-            if order is not None:
-                tracker.order(order)
-                stage, order = next(stages)
-            else:
-                measured = (now_ns + round(_SETTLE_S * 1e9), 0.0, 0)
-        if measured is None and now_ns - begin > _START_S * 1e9:
-            raise DriverError(f"the vehicles are not in {stage}: {hosts[0].watchdog.vehicle.not_ready}")
-        if measured is not None and not measured[1] and now_ns >= measured[0]:
-            measured = (now_ns, time.process_time(), link.frames)
-            link.late_ms.clear()
-            bus.late_ms.clear()
-        if measured is not None and measured[1] and now_ns - measured[0] >= seconds * 1e9:
-            break
-        deadline_ns = max(deadline_ns + round(1e9 / RATE_HZ), now_ns)
-        sleep_serving(host, hosts, deadline_ns)
-    if fallen := [h for h in hosts if h.watchdog.mode != stage]:
-        raise DriverError(f"a vehicle left {stage} while it was measured: {fallen[0].watchdog.reason}")
-    elapsed_s, cpu_s = (clock.now_ns() - measured[0]) / 1e9, time.process_time() - measured[1]
-    frames = link.frames - measured[2]
-    return {
-        "discovery_s": round(found_s or math.nan, 2),
-        "cores": round(cpu_s / elapsed_s, 3),
-        "frames_per_s": round(frames / elapsed_s),
-        "us_per_frame": round(1e6 * cpu_s / max(1, frames), 1),
-        "telemetry_to_bus_ms": quantiles(bus.late_ms),
-        "setpoint_to_wire_ms": quantiles(link.late_ms),
-    }
+        self._deadline_ns = max(self._deadline_ns + round(1e9 / RATE_HZ), now_ns)
+        sleep_serving(self._host, self._hosts, self._deadline_ns)
 
 
 def peer(count: int, seconds: float) -> dict[str, float]:

@@ -52,9 +52,26 @@ def setpoints_from_plan(
     sight: Sight = NOTHING_SEEN,
 ) -> dict[str, Setpoint]:
     """Return a setpoint for every airborne robot; plan: the last valid one, or None."""
-    age_s, missing = sight.target_age_s, sight.missing
-    fresh = age_s is not None and age_s <= parameters.lost_after_s and bool(belief.layout.targets)
     now = Moment(belief, [name for name in belief.layout.robots if name in airborne], parameters, sensors, sight)
+    phases = _phases(plan, airborne, now)
+    able = [name for name in steered(now.robots, now) if phases[name] is FlightMode.SEARCH]
+    stands = _stands(phases, sight.search(able, sight.missing), now)
+    coming = [name for name in now.robots if _comes_back(name, phases[name], now)]
+    wanted: dict[str, Setpoint] = {}
+    for name, phase in phases.items():
+        if phase is FlightMode.UNKNOWN:
+            wanted[name] = HOVER
+        elif phase is FlightMode.TRACK and plan is not None:
+            wanted[name] = _planned(name, plan, coming, now)
+        else:
+            wanted[name] = _towards(name, stands[name], phase, now)
+    return wanted
+
+
+def _phases(plan: PlanResult | None, airborne: Collection[str], now: Moment) -> dict[str, FlightMode]:
+    """Return what each robot does; one that tracks is spared for the search if a target is missing."""
+    age_s = now.sight.target_age_s
+    fresh = age_s is not None and age_s <= now.parameters.lost_after_s and bool(now.belief.layout.targets)
     phases = {
         name: flight_mode_of(
             Situation(
@@ -67,27 +84,18 @@ def setpoints_from_plan(
         for name in airborne
     }
     tracking = [name for name in steered(now.robots, now) if phases[name] is FlightMode.TRACK]
-    scout = _scout(tracking, now) if fresh and missing else None
-    if scout is not None:
-        phases[scout] = FlightMode.SEARCH
-    able = [name for name in steered(now.robots, now) if phases[name] is FlightMode.SEARCH]
-    searching = sight.search(able, missing)
-    stands = _stands(phases, searching, now)
-    coming = [name for name in now.robots if _comes_back(name, phases[name], now)]
-    wanted: dict[str, Setpoint] = {}
-    for name, phase in phases.items():
-        if phase is FlightMode.UNKNOWN:
-            wanted[name] = HOVER
-        elif phase is FlightMode.TRACK and plan is not None:
-            vx, vy, rate = _regained(name, plan, now)
-            level_m = _level_m(name, plan.heights[name], now)
-            velocity = recoverable(name, giving_way(name, (vx, vy), coming, now), now)
-            ahead_m = parameters.planned_s * math.hypot(*velocity)
-            velocity, level_m = kept_in_sight(name, velocity, level_m, ahead_m, now)
-            wanted[name] = _with_height(name, velocity, rate, level_m, phase, now)
-        else:
-            wanted[name] = _towards(name, stands[name], phase, now)
-    return wanted
+    scout = _scout(tracking, now) if fresh and now.sight.missing else None
+    return phases if scout is None else phases | {scout: FlightMode.SEARCH}
+
+
+def _planned(name: str, plan: PlanResult, coming: Sequence[str], now: Moment) -> Setpoint:
+    """Return the plan's setpoint within what the robot may do: who flies back goes first, and it stays in view."""
+    vx, vy, rate = _regained(name, plan, now)
+    level_m = _level_m(name, plan.heights[name], now)
+    velocity = recoverable(name, giving_way(name, (vx, vy), coming, now), now)
+    ahead_m = now.parameters.planned_s * math.hypot(*velocity)
+    velocity, level_m = kept_in_sight(name, velocity, level_m, ahead_m, now)
+    return _with_height(name, velocity, rate, level_m, FlightMode.TRACK, now)
 
 
 def _comes_back(name: str, phase: FlightMode, now: Moment) -> bool:

@@ -19,6 +19,7 @@ from groundstation.process import log
 from groundstation.process.heartbeat import SUPERVISOR_SLOT, HeartbeatBlock, SlotState
 from groundstation.process.parent import ParentWatch
 from groundstation.process.priority import take_share
+from groundstation.process.processor import OwnUse
 from groundstation.process.signals import StopSignal
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
@@ -73,7 +74,7 @@ class Child:
         self._detail = ""
         self._counters = (0, 0, 0)
         self._next_status_ns = 0
-        self._cpu_mark = (time.monotonic_ns(), time.process_time_ns())
+        self._use = OwnUse()
         self._addresses: tuple[tuple[str, int], ...] = ()
 
     def __enter__(self) -> Self:
@@ -218,17 +219,15 @@ class Child:
         """Publish the ProcessStatus now."""
         if not self._has_bus:
             return
-        wall_ns, cpu_ns = time.monotonic_ns(), time.process_time_ns()
-        elapsed_ns = wall_ns - self._cpu_mark[0]
-        share = (cpu_ns - self._cpu_mark[1]) / elapsed_ns if elapsed_ns > 0 else 0.0
-        self._cpu_mark = (wall_ns, cpu_ns)
-        self._next_status_ns = wall_ns + _STATUS_PERIOD_NS
+        cpu, waited = self._use.since()
+        self._next_status_ns = time.monotonic_ns() + _STATUS_PERIOD_NS
         ticks, overruns, overflowed = self._counters
         status = ProcessStatus(
             header=self.bus.header(self.name),
             state=self._state,
             pid=os.getpid(),
-            cpu=share,
+            cpu=cpu,
+            waited=waited,
             ticks=ticks,
             overruns=overruns,
             overflowed=overflowed,

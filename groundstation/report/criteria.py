@@ -1,6 +1,6 @@
 """Criteria of a run: the usual limits, defined only here, or those that its scenario expects."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import msgspec
 
@@ -18,6 +18,7 @@ MAX_PLANNER_P99_MS = 50.0
 MAX_MISSED_PERCENT = 1.0
 MIN_RATE_SHARE = 0.98
 MAX_SIM_OVERRUN_PERCENT = 1.0
+MAX_STARVED_S = 1.0
 MAX_AIRBORNE_S = 40.0
 # Drones take off one by one. An emulated AR.Drone takes 5.2 s until it is seen in flight, on a full machine 7 s.
 AIRBORNE_S_PER_DRONE = 10.0
@@ -65,9 +66,15 @@ def criteria_of(figures: RunFigures, field: ResolvedField, facts: RunFacts) -> l
     return criteria
 
 
-def is_valid(figures: RunFigures) -> bool:
-    """Return whether the simulator kept real time: else the figures mean nothing."""
-    return figures.sim_overrun_percent is None or figures.sim_overrun_percent <= MAX_SIM_OVERRUN_PERCENT
+def invalidity(figures: RunFigures, criteria: Sequence[Criterion]) -> str:
+    """Return why the figures of a simulated run mean nothing, "" if they count: the computer was too busy for it."""
+    if figures.sim_overrun_percent is None:
+        return ""
+    if figures.sim_overrun_percent > MAX_SIM_OVERRUN_PERCENT:
+        return "the simulator did not keep real time"
+    if figures.starved_s > MAX_STARVED_S and not all(criterion.ok for criterion in criteria):
+        return f"other programs kept it from the processor for {figures.starved_s:.0f} s"
+    return ""
 
 
 def _against_truth(figures: RunFigures, field: ResolvedField, expected: Expectation) -> Iterator[Criterion]:

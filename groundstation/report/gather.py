@@ -1,5 +1,6 @@
 """Gathers the files of a run into arrays, in one pass over the relevant topics."""
 
+import math
 from collections import defaultdict
 from pathlib import Path
 
@@ -97,7 +98,8 @@ class _Rows:
             case m.ProcessStatus():
                 counters = (message.pid, message.ticks, message.overruns, message.overflowed)
                 said = self._processes[message.header.entity][message.header.source]
-                said.append((time_s, message.cpu, *map(float, counters)))
+                others = math.nan if message.others_cpu is None else message.others_cpu
+                said.append((time_s, message.cpu, *map(float, counters), message.waited, others))
             case m.SimStatus():
                 counts = (message.ticks, message.overruns, message.pictures, message.late_pictures)
                 self._sim.append((time_s, *map(float, counts)))
@@ -134,7 +136,7 @@ class _Rows:
         for name, said in self._processes.items():
             # Never both: the supervisor's status of an absent process (no pid, ticks or CPU) is no figure of it.
             table = np.array(sorted(said.get(name) or (row for rows in said.values() for row in rows)))
-            data.processes[name] = ProcessTrack(table[:, 0], table[:, 1], table[:, 2:])
+            data.processes[name] = ProcessTrack(table[:, 0], table[:, 1], table[:, 2:6], table[:, 6], table[:, 7])
         for name, times_ns in self._heard.items():
             data.heard_s[name] = (np.sort(np.array(times_ns, dtype=np.int64)) - data.start_unix_ns) / 1e9
         if self._sim:

@@ -11,7 +11,7 @@ from groundstation.recording.part_names import shown
 from groundstation.recording.rerun import Rerun
 from groundstation.recording.stretch import Stretch
 from groundstation.report import run_facts
-from groundstation.report.criteria import Criterion, criteria_of, is_valid
+from groundstation.report.criteria import Criterion, criteria_of, invalidity
 from groundstation.report.expectation import expectation_of
 from groundstation.report.findings import Findings, findings_of
 from groundstation.report.metrics import RunFigures, figures_of
@@ -25,16 +25,19 @@ _DAMAGE_LINES = 20
 
 @dataclass(frozen=True, slots=True)
 class RunReport:
-    """A judged run. `valid`: the simulator kept real time; rerun, stretch: what it repeats or is a part of;
+    """A judged run.
+
+    invalid: why its figures mean nothing, "" if they count; rerun, stretch: what it repeats or is a part of;
     broken_off: the failure that ended it, "" without; recorded_s: where the recording breaks off in flight, None
-    where it does not."""
+    where it does not.
+    """
 
     run_dir: Path
     facts: RunFacts
     figures: RunFigures
     criteria: tuple[Criterion, ...]
     findings: Findings
-    valid: bool
+    invalid: str
     damage: tuple[str, ...]
     rerun: Rerun | None = None
     stretch: Stretch | None = None
@@ -52,6 +55,11 @@ class RunReport:
         return shown(self.run_dir.resolve().name)
 
     @property
+    def valid(self) -> bool:
+        """Return whether its figures count: the computer was not too busy to simulate it."""
+        return not self.invalid
+
+    @property
     def passed(self) -> bool | None:
         """Whether it is valid, recorded until the landing, and meets all criteria; None for no flight."""
         if self.no_flight is not None:
@@ -63,8 +71,8 @@ class RunReport:
         """Return the reasons for its failure, in words; empty if it passed or there is nothing to judge."""
         if self.passed is not False:
             return ()
-        if not self.valid:
-            return ("the simulator did not keep real time",)
+        if self.invalid:
+            return (self.invalid,)
         if self.broken_off and not self.figures.tracked_s:
             return (self.broken_off,)  # without a flight every other criterion is missed for that reason
         missing = tuple(missed(criterion) for criterion in self.criteria if not criterion.ok)
@@ -110,7 +118,7 @@ def judge(data: RunData, run_dir: Path) -> RunReport:
         figures=figures,
         criteria=criteria,
         findings=findings_of(data),
-        valid=is_valid(figures),
+        invalid=invalidity(figures, criteria),
         damage=(*([f"{run_facts.NAME}: {unread}"] if unread else []), *data.damage[:_DAMAGE_LINES]),
         rerun=data.rerun,
         stretch=data.stretch,

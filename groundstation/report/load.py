@@ -9,6 +9,8 @@ from groundstation.report.tracks import ProcessTrack, RunData
 
 TRACKER = "tracker"
 _PID, _TICKS, _OVERRUNS, _OVERFLOWED = range(4)
+# Alone on a computer of two cores, nobody waits for a core for more than a tenth of a second; what others use is 0.1.
+_WAITED, _OTHERS_CPU = 0.3, 0.5
 
 
 def cpu_cores(data: RunData) -> dict[str, float]:
@@ -63,6 +65,17 @@ def sim_overrun_percent(data: RunData) -> float | None:
         return None
     ticks, overruns, pictures, late = data.sim_counters[-1]
     return float(100.0 * max(overruns / max(ticks, 1.0), late / max(pictures, 1.0)))
+
+
+def starved_s(data: RunData, start_s: float, end_s: float) -> float:
+    """Return for how long a process waited for a core while other programs of the computer used them [s]."""
+    seconds = np.arange(start_s, end_s)
+    waited, others = np.zeros(len(seconds)), np.zeros(len(seconds))
+    for track in data.processes.values():
+        status = np.searchsorted(track.time_s, seconds)  # each covers the time before it; behind the last: nothing
+        waited = np.fmax(waited, np.append(track.waited, 0.0)[status])
+        others = np.fmax(others, np.append(track.others_cpu, 0.0)[status])
+    return float(np.count_nonzero((waited >= _WAITED) & (others >= _OTHERS_CPU)))
 
 
 def planner_ms(data: RunData) -> tuple[float, float] | None:

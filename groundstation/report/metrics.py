@@ -20,7 +20,8 @@ class RunFigures(msgspec.Struct, frozen=True, kw_only=True):
     target_*: of several targets, those of the worst; target: all figures of the one with the largest error; found: of
     each target from when it was found, None if it never was.
     failsafe_landings: which drones a failsafe landed or cut, when and why. truth: what the errors are measured against,
-    a motion capture system of the field or the simulator, "" for nothing.
+    a motion capture system of the field or the simulator, "" for nothing. starved_s: how long other programs of the
+    computer kept processes of the run from it.
     """
 
     tracked_s: float
@@ -45,6 +46,7 @@ class RunFigures(msgspec.Struct, frozen=True, kw_only=True):
     mean_cpu_cores: float | None
     cpu_cores: dict[str, float]
     sim_overrun_percent: float | None
+    starved_s: float = 0.0
     command_to_airborne_s: float | None
     verdicts: dict[str, int]
     mean_nis: dict[str, float]
@@ -89,6 +91,7 @@ def figures_of(data: RunData) -> RunFigures:
         mean_cpu_cores=sum(cores.values()) if cores else None,
         cpu_cores=cores,
         sim_overrun_percent=load.sim_overrun_percent(data),
+        starved_s=load.starved_s(data, *(interval or (0.0, data.end_s))),
         command_to_airborne_s=_command_to_airborne_s(data),
         verdicts=dict(Counter(str(item.message.verdict) for item in data.innovations)),
         mean_nis=_mean_nis(data),

@@ -111,11 +111,17 @@ class TimedMessage(Generic[T]):
 
 @dataclass(frozen=True, slots=True)
 class ProcessTrack:
-    """Statuses of one process: time (n), cpu share (n), pid, ticks, overruns, overflowed (n each)."""
+    """Statuses of one process: time (n), cpu share (n), pid, ticks, overruns, overflowed (n each).
+
+    waited: share of the time for which it had no core (n); others_cpu: cores that other programs used (n), nan where
+    it does not tell.
+    """
 
     time_s: Array
     cpu: Array
     counters: Array
+    waited: Array
+    others_cpu: Array
 
 
 _ANYWHERE = (-1e9, 1e9)

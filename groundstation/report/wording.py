@@ -24,6 +24,7 @@ _TITLES = {
     "tracker_rate_hz": ("tracker's rate", "Hz"),
     "mean_cpu_cores": ("processor used", "cores"),
     "sim_overrun_percent": ("simulator's ticks or pictures late", "%"),
+    "starved_s": ("kept from the processor by other programs", "s"),
     "topology_switches": ("switches of topology", ""),
 }
 KIND_WORDS = {

@@ -61,6 +61,10 @@ class ProcessStatus(Message, frozen=True, kw_only=True):
     """Process id."""
     cpu: float
     """Share of one core since the last status."""
+    waited: float = 0.0
+    """Share of the time since the last status for which its main thread was ready to run and had no core."""
+    others_cpu: float | None = None
+    """Cores that other programs of this computer used since the last status; only the supervisor tells it."""
     ticks: int = 0
     """Cycles of its loop so far."""
     overruns: int = 0

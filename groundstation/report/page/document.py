@@ -87,7 +87,7 @@ def _lead(report: RunReport) -> str:
         "seed": "" if facts.seed is None else str(facts.seed), "tracked": f"{report.figures.tracked_s:.0f} s",
     }  # fmt: skip
     words = " · ".join(f"{name} {escape(value)}" for name, value in known.items() if value)
-    why = "" if report.valid else " The simulator did not keep real time: the figures mean nothing."
+    why = f" {report.invalid[0].upper()}{report.invalid[1:]}: the figures mean nothing." if report.invalid else ""
     if report.no_flight:
         words = f"recorded flight: {words}"
     badge = f'<p><span class="verdict {verdict}">{verdict.upper()}</span> <span class="dim">{words}.{why}</span></p>'

@@ -1,5 +1,6 @@
 """The rules of the report one by one: what counts as tracking, as a switch, as late, as CPU."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import msgspec
@@ -13,7 +14,7 @@ from groundstation.field.targets import DroneMarker
 from groundstation.geometry.ellipse import semi_axes_95
 from groundstation.report import load, topology_use
 from groundstation.report.accuracy import accuracy
-from groundstation.report.criteria import criteria_of
+from groundstation.report.criteria import Criterion, criteria_of, invalidity
 from groundstation.report.interval import tracking_interval
 from groundstation.report.judge import judge
 from groundstation.report.metrics import figures_of
@@ -60,6 +61,12 @@ def _plan(time_s: float, text: str) -> TimedMessage[m.Plan]:
         header=HEADER, topology=text, cost=1.0, controls=(), edges=(), alternatives=(), solver=solver, mode="multistart"
     )
     return TimedMessage(time_s, plan)
+
+
+def _track(times: np.ndarray, cpu: np.ndarray, counters: np.ndarray | None = None) -> ProcessTrack:
+    count = len(times)
+    nobody = np.full(count, np.nan)
+    return ProcessTrack(times, cpu, np.zeros((count, 4)) if counters is None else counters, np.zeros(count), nobody)
 
 
 def _truth(ground: list[bool], z: float = 1.0) -> TruthTrack:
@@ -125,16 +132,39 @@ def test_a_silent_planner_flies_no_topology() -> None:
 def test_counters_go_on_across_a_restart() -> None:
     # columns: pid, ticks, overruns, overflowed
     counters = np.array([[1, 50, 0, 0], [1, 100, 2, 0], [2, 10, 0, 0], [2, 60, 1, 0]], dtype=float)
-    data = _data(processes={"tracker": ProcessTrack(np.array([1.0, 2.0, 3.0, 4.0]), np.zeros(4), counters)})
+    data = _data(processes={"tracker": _track(np.array([1.0, 2.0, 3.0, 4.0]), np.zeros(4), counters)})
     ticks, missed, _rate = load.tracker_deadlines(data)
     assert (ticks, missed) == (160, 3)
 
 
 def test_cpu_is_averaged_over_the_whole_run() -> None:
-    whole = ProcessTrack(np.arange(11.0), np.full(11, 0.5), np.zeros((11, 4)))
-    half = ProcessTrack(np.arange(6.0), np.full(6, 0.4), np.zeros((6, 4)))
+    whole = _track(np.arange(11.0), np.full(11, 0.5))
+    half = _track(np.arange(6.0), np.full(6, 0.4))
     cores = load.cpu_cores(_data(processes={"tracker": whole, "camera": half}))
     assert cores == pytest.approx({"camera": 0.2, "tracker": 0.5})
+
+
+def _load(waited: float, others_cpu: float) -> RunData:
+    times = np.arange(1.0, 41.0)
+    camera = replace(_track(times + 0.3, np.full(40, 0.2)), waited=np.where(times < 13.0, waited, 0.05))
+    supervisor = replace(_track(times, np.full(40, 0.01)), others_cpu=np.where(times > 10.0, others_cpu, 0.1))
+    return _data(processes={"camera": camera, "supervisor": supervisor})
+
+
+@pytest.mark.parametrize(("waited", "others_cpu", "starved_s"), [(0.6, 1.2, 2.0), (0.6, 0.1, 0.0), (0.05, 1.2, 0.0)])
+def test_a_run_is_starved_while_it_waits_for_cores_that_others_use(
+    waited: float, others_cpu: float, starved_s: float
+) -> None:
+    assert load.starved_s(_load(waited, others_cpu), 5.0, 30.0) == starved_s
+
+
+def test_a_starved_simulated_run_that_fails_says_nothing_and_one_that_passes_counts() -> None:
+    figures = msgspec.structs.replace(figures_of(_data()), sim_overrun_percent=0.9, starved_s=4.0)
+    met, missed = Criterion("landed", True, "==", True, ok=True), Criterion("landed", False, "==", True, ok=False)
+    assert invalidity(figures, [met]) == ""
+    assert invalidity(figures, [met, missed]) == "other programs kept it from the processor for 4 s"
+    assert invalidity(msgspec.structs.replace(figures, starved_s=1.0), [missed]) == ""
+    assert invalidity(msgspec.structs.replace(figures, sim_overrun_percent=None), [missed]) == ""
 
 
 def test_the_fence_binds_flying_drones_only() -> None:

@@ -146,7 +146,7 @@ def test_silence_of_a_diagnosis_that_reached_no_verdict_is_a_doubt(
         header=header("drone_1", "drone_1"), command_id="1", verb=m.Verb.TRACK, stage=m.AckStage.ACCEPTED
     )
     nothing = TimedMessage(9.0, m.Suspicion(header=header("diagnosis"), cause=""))
-    process = ProcessTrack(np.zeros(1), np.zeros(1), np.zeros((1, 4)))
+    process = ProcessTrack(np.zeros(1), np.zeros(1), np.zeros((1, 4)), np.zeros(1), np.zeros(1))
     doubts = trust_of(
         run_with(
             acks=[TimedMessage(1.0, ack)],

@@ -3,9 +3,12 @@
 from types import SimpleNamespace
 from typing import Any
 
+import pytest
+
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import Lifecycle, ProcessStatus
 from groundstation.bus.topics import PROCESS_STATUS
+from groundstation.supervisor import status
 from groundstation.supervisor.status import StatusPublisher
 
 
@@ -26,3 +29,18 @@ def test_who_was_not_started_yet_has_not_ended() -> None:
         "recorder": (Lifecycle.STOPPING, "ended"),
         "console": (Lifecycle.STOPPING, "restarting"),
     }
+
+
+def test_what_the_run_does_not_use_others_use(monkeypatch: pytest.MonkeyPatch) -> None:
+    exchange = MemoryExchange()
+    heard = MemoryBus(exchange, "lab", "console").subscribe([PROCESS_STATUS])
+    publisher = StatusPublisher(MemoryBus(exchange, "lab", "supervisor"))
+    tracker: Any = SimpleNamespace(spec=SimpleNamespace(name="tracker", on_bus=True), pid=7, running=True, life=1)
+    for second, computer_s, tracker_s in ((1, 100.0, 20.0), (2, 101.9, 20.4), (3, 102.3, 20.8)):
+        monkeypatch.setattr(status, "busy_s", lambda value=computer_s: value)
+        monkeypatch.setattr(status, "_used_s", lambda pid, value=tracker_s: value)
+        monkeypatch.setattr(publisher._use, "since", lambda: (0.1, 0.0))
+        publisher.publish_due(second * 10**9, [tracker])
+    told = [received.message for received in heard.drain()]
+    others = [one.others_cpu for one in told if isinstance(one, ProcessStatus)]
+    assert others[1:] == pytest.approx([1.4, 0.0])

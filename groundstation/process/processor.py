@@ -1,11 +1,11 @@
-"""How much of the processor this process, and the rest of the computer, used and waited for."""
+"""How much of the processor processes, and the whole computer, used and waited for."""
 
 import os
 import time
+from contextlib import suppress
 from pathlib import Path
 
-_OWN_WAITS = Path("/proc/self/schedstat")
-_COMPUTER = Path("/proc/stat")
+_PROC = Path("/proc")
 _TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 _IDLE = slice(3, 5)  # idle, and idle while a disk works
 _COUNTED = slice(0, 8)  # from user to steal; what guests use counts as user already
@@ -28,18 +28,28 @@ class OwnUse:
         return time.monotonic_ns(), time.process_time_ns(), waited_ns()
 
 
-def waited_ns() -> int:
-    """Return for how long the main thread was ready to run and had no core [ns]; 0 if the kernel does not tell."""
+def waited_ns(task: str = "self") -> int:
+    """Return for how long a task was ready to run and had no core [ns]; 0 if the kernel does not tell.
+
+    task: its folder below /proc; "self" is this process's main thread.
+    """
     try:
-        return int(_OWN_WAITS.read_text().split()[1])
+        return int((_PROC / task / "schedstat").read_text().split()[1])
     except (OSError, IndexError, ValueError):
         return 0
+
+
+def all_waited_ns(pid: int) -> int:
+    """Return the sum of `waited_ns` over all threads of a process [ns]."""
+    with suppress(OSError):
+        return sum(waited_ns(f"{pid}/task/{each.name}") for each in (_PROC / str(pid) / "task").iterdir())
+    return 0
 
 
 def busy_s() -> float | None:
     """Return the time that all cores of this computer were busy, since it started [s]; None if it does not tell."""
     try:
-        head, *times = _COMPUTER.read_text().partition("\n")[0].split()
+        head, *times = (_PROC / "stat").read_text().partition("\n")[0].split()
         counted = [int(each) for each in times[_COUNTED]]
     except (OSError, ValueError):
         return None

@@ -7,6 +7,7 @@ from contextlib import suppress
 
 from groundstation.bus.messages import Lifecycle, ProcessStatus
 from groundstation.process.heartbeat import HeartbeatBlock, SlotState
+from groundstation.process.processor import all_waited_ns
 from groundstation.supervisor.process_spec import ProcessSpec
 from groundstation.supervisor.runtime_file import start_time
 from groundstation.supervisor.silence import signs_of, silent_since
@@ -14,6 +15,7 @@ from groundstation.time_units import NS_PER_S
 
 _BACK_OFF_S = (0.0, 0.5, 1.0, 2.0, 5.0)
 _FORGIVEN_AFTER_NS = 30 * NS_PER_S
+_STARVED_SHARE = 0.5  # of its silence; one that hangs or is stopped waits for no core
 STORM_RESTARTS = 5
 
 
@@ -34,6 +36,7 @@ class ManagedProcess:
         self.restart_due_ns: int | None = None
         self.kill_reason = ""
         self.detail = self.farewell = ""
+        self._waited: tuple[int, int] | None = None
         self._failures = 0
 
     @property
@@ -71,6 +74,7 @@ class ManagedProcess:
         self.started_ns, self.ready_ns = now_ns, 0
         self.restart_due_ns = None
         self.kill_reason = self.farewell = ""
+        self.heard_again()
 
     def heard(self, status: ProcessStatus) -> None:
         """Keep the process's last status, and the reason of its end."""
@@ -97,6 +101,16 @@ class ManagedProcess:
         """
         signs = signs_of(self._block, self.slot, gone=gone)
         return silent_since(signs, self.silent_since_ns, now_ns, awake_since_ns, limit_ns)
+
+    def starved(self, now_ns: int) -> bool:
+        """Return whether its threads have mostly waited for a core since the first call after `heard_again`."""
+        waited = all_waited_ns(self.pid)
+        since_ns, before = self._waited = self._waited or (now_ns, waited)
+        return waited - before > _STARVED_SHARE * (now_ns - since_ns)
+
+    def heard_again(self) -> None:
+        """Forget that it was silent."""
+        self._waited = None
 
     def reap(self) -> int | None:
         """Return the exit code if the process has ended (negative: by that signal), and forget its handle."""

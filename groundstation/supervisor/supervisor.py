@@ -33,6 +33,9 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 _TURN_S = 0.05
 _OWN_DELAY_NS = 200 * NS_PER_MS
 _HURRY_S = 1.0
+_QUIET_S = 0.3  # processes beat ten times a second
+_STARVED_FOR = 3.0  # times the limit of one that hangs
+_TOLD_AGAIN_NS = 10 * NS_PER_S
 # A process that remains after a kill hangs in the kernel, on a device or a network disk.
 _KERNEL_S = 3.0
 _log = logging.getLogger(__name__)
@@ -68,6 +71,7 @@ class Supervisor:
         self.failure = ""
         self._entry = RunEntry(run, self._block.path, self._identities)
         self._turn_ns = self._awake_since_ns = time.monotonic_ns()
+        self._tell_starved_ns = 0
         self._stopping = False
 
     # -- start ---------------------------------------------------------------------------------------------------
@@ -200,6 +204,9 @@ class Supervisor:
         process.ready_ns = process.ready_ns or now_ns
         # Silence counts only while this loop was awake, unless the guardian has noticed it meanwhile.
         heard_s = min(process.heartbeat_age_ns(now_ns), now_ns - self._awake_since_ns) / NS_PER_S
+        if heard_s <= _QUIET_S:
+            process.heard_again()
+        starved = heard_s > _QUIET_S and process.starved(now_ns)
         limit_ns = int(process.spec.silence_limit_s * NS_PER_S)
         process.silent_since_ns = process.judge_silence(now_ns, self._awake_since_ns, limit_ns)
         if not process.silent_since_ns:
@@ -207,7 +214,19 @@ class Supervisor:
                 self.events.event(Severity.INFO, process, "is back in control of its drone")
             return
         self._speak_for(process, f"silent for {heard_s:.2f} s", now_ns)
-        self._kill(process, f"hung: no heartbeat for {heard_s:.2f} s", heard_s >= process.spec.hang_limit_s)
+        late_s = process.spec.hang_limit_s
+        late = heard_s >= late_s
+        # A new one would wait for a core as well. A driver must not come back and contradict who speaks for it.
+        if late and starved and process.spec.failsafe_datagrams is None and heard_s < _STARVED_FOR * late_s:
+            self._tell_starved(process, now_ns)
+        else:
+            self._kill(process, f"hung: no heartbeat for {heard_s:.2f} s", late)
+
+    def _tell_starved(self, process: ManagedProcess, now_ns: int) -> None:
+        if now_ns >= self._tell_starved_ns:
+            self._tell_starved_ns = now_ns + _TOLD_AGAIN_NS
+            text = "gets no core of the processor: this computer is too busy"
+            self.events.event(Severity.ERROR, process, text, "close other programs on it, or land")
 
     def _speak_for(self, process: ManagedProcess, why: str, now_ns: int) -> None:
         words = process.spec.failsafe_datagrams

@@ -14,7 +14,7 @@ import pytest
 from dummy_table import spec, start, until
 from free_port import free_port
 
-from groundstation.supervisor import runtime_file
+from groundstation.supervisor import managed_process, runtime_file
 from groundstation.supervisor.process_spec import FailsafeDatagrams, Restart
 from groundstation.supervisor.supervisor import Supervisor
 
@@ -77,6 +77,22 @@ def test_frozen_process_gets_last_words_then_is_replaced(make: Callable[..., Sup
             supervisor.step()
         with pytest.raises(BlockingIOError):
             drone.recv(100)
+
+
+def test_who_waits_for_a_core_is_not_replaced_as_one_that_hangs(
+    make: Callable[..., Supervisor], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    supervisor = make(spec("ceiling", "obedient", silence_limit_s=0.4, hang_limit_s=0.6))
+    start(supervisor)
+    camera, heard = supervisor.processes[1], []
+    monkeypatch.setattr(supervisor.events, "event", lambda *words: heard.append(words[2]))
+    monkeypatch.setattr(managed_process, "all_waited_ns", lambda pid: time.monotonic_ns())
+    pid, begin = camera.pid, time.monotonic()
+    os.kill(pid, signal.SIGSTOP)  # it does not beat, and the kernel says that it waits
+    until(supervisor, lambda: time.monotonic() > begin + 1.2)
+    assert camera.pid == pid and not camera.kill_reason
+    assert heard == ["gets no core of the processor: this computer is too busy"]
+    until(supervisor, lambda: camera.pid != pid and camera.is_up)  # but not for ever
 
 
 def test_a_freeze_of_the_supervisor_itself_is_nobodys_fault(make: Callable[..., Supervisor]) -> None:

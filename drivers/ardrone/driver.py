@@ -7,10 +7,9 @@ from collections import Counter
 from functools import partial
 from typing import NamedTuple
 
-from drivers.ardrone import convert, velocity_loop
-from drivers.ardrone.adrift import AdriftWatch
+from drivers.ardrone import convert
+from drivers.ardrone.attitude_control import AttitudeControl, MotionReport
 from drivers.ardrone.averages import MotionMean
-from drivers.ardrone.blind_descent import BlindDescent
 from drivers.ardrone.commands import orders_from_decision
 from drivers.ardrone.desired_config import ids_of, scale_from_settings, wishes
 from drivers.ardrone.identity import Model, model_from_navdata
@@ -21,7 +20,6 @@ from drivers.ardrone.rate_watch import RateWatch
 from drivers.ardrone.session import ArdroneSession, SessionPhase
 from drivers.ardrone.settings import ArDroneDriverSettings
 from drivers.ardrone.uplink_watch import UplinkWatch
-from drivers.ardrone.velocity_loop import VelocityLoop
 from drivers.ardrone.wire.errors import WireError
 from drivers.ardrone.wire.navdata import Navdata
 from drivers.ardrone.wire.options import DEMO, SPEED_REFERENCES
@@ -37,15 +35,11 @@ from groundstation.adapters import with_zone
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import UP, FlightState, Severity, Vector3
 from groundstation.bus.notice import Notice
-from groundstation.time_units import NS_PER_MS, NS_PER_S
+from groundstation.time_units import NS_PER_MS
 
 # WIRE: at least every 30 ms (guide), 20-25 ms (SDK); on a busy machine a turn comes late.
 RATE_HZ = 40.0
 _FRESH_NS = 300 * NS_PER_MS
-# A pause of this length makes the drone wait for RESUME.
-_DOUBTED_NS = 1_300 * NS_PER_MS
-# A blind drone that falls silent or freezes is braked on by the loop's knowledge, until it would land for that.
-_BRAKED_ON_NS = 3 * NS_PER_S
 # Velocity reported by a drone that sees no floor: not its true one, so that its firmware's own braking fails as well.
 _NO_FLOW_M_S = 0.02
 _RATE_PERIOD_NS = 200 * NS_PER_MS
@@ -102,14 +96,8 @@ class ArDrone:
         self._rate_watch, self._uplink = RateWatch(), UplinkWatch()
         self._next_rate_ns = 0
         self._scale = scale_from_settings(settings)
-        self._loop = VelocityLoop(settings.limits)
-        self._motion = MotionMean()
-        self._descent, self._sinks = BlindDescent(), False
-        self._adrift = AdriftWatch()
+        self._motion, self._attitude = MotionMean(), AttitudeControl(settings.limits)
         self._plausibility = MotionMonitor(LIMITS)
-        self._applied_ns = 0
-        self._blind_ns = -_BRAKED_ON_NS
-        self._doubted_ns = -_DOUBTED_NS
         self._video_refused = False
         self._refused: Counter[str] = Counter()
         self._closing = threading.Event()
@@ -165,7 +153,7 @@ class ArDrone:
         fresh = heard.heard_ns > 0 and now_ns - heard.heard_ns < _FRESH_NS
         configured = self._session.phase is SessionPhase.READY
         unsound = self._plausibility.report.reason(Health.BAD, LIMITS.essential)
-        if not unsound and now_ns - self._doubted_ns < _DOUBTED_NS:
+        if not unsound and self._attitude.is_doubted(now_ns):
             unsound = "its velocity contradicts what was asked for"
         not_ready = self._not_ready(heard)
         velocity = self._true(heard.velocity_m_s)
@@ -192,8 +180,8 @@ class ArDrone:
         silence_ns = now_ns - heard.heard_ns
         if self._session.request_due(now_ns, silence_ns):
             self._link.request_navdata()
-        attitude = self._attitude(now_ns, decision, heard)
-        action = Action.HOVER if self._sinks else decision.action
+        attitude = self._attitude.step(now_ns, decision, self._report(now_ns, heard))
+        action = Action.HOVER if self._attitude.sinks else decision.action
         if action is Action.TAKE_OFF and self._session.phase is not SessionPhase.READY:
             action = Action.HOVER  # restarted since the order: if it flies it stays up, if it stands it stays there
         commands = orders_from_decision(action, attitude, heard.state, heard.flight_state, self._scale)
@@ -223,40 +211,20 @@ class ArDrone:
             told.append(_NO_AR1_VIDEO)
         return told
 
-    def _attitude(self, now_ns: int, decision: WatchdogDecision, heard: LatestNavdata) -> velocity_loop.AttitudeRequest:
-        dt_s = (now_ns - self._applied_ns) * 1e-9
-        self._applied_ns = now_ns
+    def _report(self, now_ns: int, heard: LatestNavdata) -> MotionReport:
         velocity, force = self._motion.drain()
         fresh = now_ns - heard.moved_ns <= _FRESH_NS
-        if decision.action is Action.IDLE and fresh and force is not None:
-            self._loop.stand(force, dt_s)
         blind = fresh and self._is_blind()
-        flowless = blind and math.hypot(*heard.velocity_m_s[:2]) < _NO_FLOW_M_S
-        self._sinks = self._descent.step(now_ns, decision.action is Action.LAND, flowless, heard.height_m)
-        told = fresh and not self._motion.frozen
-        self._blind_ns = now_ns if blind and told else self._blind_ns
-        was_blind = not told and now_ns - self._blind_ns <= _BRAKED_ON_NS
-        holds = decision.action is Action.HOVER
-        known_adrift, seen = self._adrift.adrift, decision.seen_m_s
-        adrift = self._adrift.step(now_ns, holds, not told, seen)
-        if adrift and not known_adrift and not was_blind and seen is not None:
-            self._loop.hold((*seen, 0.0), dt_s)  # nothing else gives the speed from which to brake it
-        if (blind or was_blind or adrift) and (self._sinks or holds):
-            climb_m_s = -self._settings.limits.max_climb_m_s if self._sinks else 0.0
-            return self._loop.brake(dt_s, force if told else None, decision.seen_m_s, climb_m_s)
-        back = decision.back_m_s if holds else None
-        if holds and fresh and back is None:
-            return self._loop.hold(self._true(velocity), dt_s)
-        if (decision.action is not Action.FLY and back is None) or not fresh:
-            self._loop.reset()
-            return velocity_loop.HOVER
-        measured = None if self._motion.repeats else self._true(velocity)
-        wanted = decision.velocity_m_s if back is None else back
-        asked = self._loop.step(wanted, decision.yaw_rate_rad_s, measured, dt_s, force, decision.seen_m_s)
-        if self._loop.contradicted:
-            self._doubted_ns = now_ns
-            return velocity_loop.HOVER
-        return asked
+        return MotionReport(
+            fresh=fresh,
+            told=fresh and not self._motion.frozen,
+            repeats=self._motion.repeats,
+            blind=blind,
+            flowless=blind and math.hypot(*heard.velocity_m_s[:2]) < _NO_FLOW_M_S,
+            velocity_m_s=self._true(velocity),
+            force_m_s2=force,
+            height_m=heard.height_m,
+        )
 
     def _is_blind(self) -> bool:
         """Return whether the drone sees nothing of its motion; one that only wind pushes holds its place better itself.

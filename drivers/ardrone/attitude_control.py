@@ -1,0 +1,99 @@
+"""Chooses what an AR.Drone is told: to hold its place by itself, the velocity loop's attitude, or one that brakes it.
+
+Pure. A drone holds its place by the optical flow by which it measures its velocity. Where that fails while it hovers or
+lands, the driver brakes it.
+"""
+
+from typing import NamedTuple
+
+from drivers.ardrone.adrift import AdriftWatch
+from drivers.ardrone.blind_descent import BlindDescent
+from drivers.ardrone.settings import ArDroneLimits
+from drivers.ardrone.velocity_loop import HOVER, AttitudeRequest, VelocityLoop
+from drivers.watchdog_types import Action, WatchdogDecision
+from groundstation.bus.messages import Vector3
+from groundstation.time_units import NS_PER_MS, NS_PER_S
+
+# A blind drone that falls silent or freezes is braked on by the loop's knowledge, until it would land for that.
+_BRAKED_ON_NS = 3 * NS_PER_S
+# A pause of this length makes the drone wait for RESUME.
+_DOUBTED_NS = 1_300 * NS_PER_MS
+
+
+class MotionReport(NamedTuple):
+    """What a drone tells of its motion.
+
+    fresh: it was heard a moment ago; told: and not with old contents; repeats: its velocity is no measurement; blind:
+    fresh, and it sees nothing of its motion, though all else that it tells is sound; flowless: blind, and it believes
+    to stand; velocity_m_s: true (scaled), FLU; force_m_s2: specific force forward and left, None if it tells none;
+    height_m: above the floor, likewise.
+    """
+
+    fresh: bool
+    told: bool
+    repeats: bool
+    blind: bool
+    flowless: bool
+    velocity_m_s: Vector3
+    force_m_s2: tuple[float, float] | None
+    height_m: float | None
+
+
+class AttitudeControl:
+    """Turns the watchdog's decisions into attitudes, at the sender's rate; sinks: whether a landing is braked now."""
+
+    def __init__(self, limits: ArDroneLimits) -> None:
+        self._limits = limits
+        self._loop = VelocityLoop(limits)
+        self._descent, self._adrift = BlindDescent(), AdriftWatch()
+        self.sinks = False
+        self._turn_ns = 0
+        self._blind_ns = -_BRAKED_ON_NS
+        self._doubted_ns = -_DOUBTED_NS
+
+    def is_doubted(self, now_ns: int) -> bool:
+        """Return whether the drone's velocity contradicted a moment ago what was asked for."""
+        return now_ns - self._doubted_ns < _DOUBTED_NS
+
+    def step(self, now_ns: int, decision: WatchdogDecision, report: MotionReport) -> AttitudeRequest:
+        """Return the attitude for a decision."""
+        dt_s = (now_ns - self._turn_ns) * 1e-9
+        self._turn_ns = now_ns
+        if decision.action is Action.IDLE and report.fresh and report.force_m_s2 is not None:
+            self._loop.stand(report.force_m_s2, dt_s)
+        self.sinks = self._descent.step(now_ns, decision.action is Action.LAND, report.flowless, report.height_m)
+        unguided = self._is_unguided(now_ns, decision, report, dt_s)
+        if unguided and (self.sinks or decision.action is Action.HOVER):
+            climb_m_s = -self._limits.max_climb_m_s if self.sinks else 0.0
+            force = report.force_m_s2 if report.told else None
+            return self._loop.brake(dt_s, force, decision.seen_m_s, climb_m_s)
+        return self._guided(now_ns, decision, report, dt_s)
+
+    def _is_unguided(self, now_ns: int, decision: WatchdogDecision, report: MotionReport, dt_s: float) -> bool:
+        """Return whether the drone's own hover would not stop it: it is or was blind, or cameras see it drift."""
+        if report.blind and report.told:
+            self._blind_ns = now_ns
+        was_blind = not report.told and now_ns - self._blind_ns <= _BRAKED_ON_NS
+        known, seen = self._adrift.adrift, decision.seen_m_s
+        adrift = self._adrift.step(now_ns, decision.action is Action.HOVER, not report.told, seen)
+        if adrift and not known and not was_blind and seen is not None:
+            self._loop.hold((*seen, 0.0), dt_s)  # nothing else gives the speed from which to brake it
+        return report.blind or was_blind or adrift
+
+    def _guided(self, now_ns: int, decision: WatchdogDecision, report: MotionReport, dt_s: float) -> AttitudeRequest:
+        """Return the attitude of a drone that flies as told, or holds its place by itself."""
+        holds = decision.action is Action.HOVER
+        back = decision.back_m_s if holds else None
+        if holds and report.fresh and back is None:
+            return self._loop.hold(report.velocity_m_s, dt_s)
+        if not report.fresh or (decision.action is not Action.FLY and back is None):
+            self._loop.reset()
+            return HOVER
+        wanted = decision.velocity_m_s if back is None else back
+        measured = None if report.repeats else report.velocity_m_s
+        force, seen = report.force_m_s2, decision.seen_m_s
+        asked = self._loop.step(wanted, decision.yaw_rate_rad_s, measured, dt_s, force, seen)
+        if not self._loop.contradicted:
+            return asked
+        self._doubted_ns = now_ns
+        return HOVER

@@ -1,0 +1,72 @@
+"""Who stops an AR.Drone: its firmware, which holds its place by optical flow, or the driver's braking."""
+
+import pytest
+
+from drivers.ardrone.attitude_control import AttitudeControl, MotionReport
+from drivers.ardrone.settings import ArDroneLimits
+from drivers.ardrone.velocity_loop import AttitudeRequest
+from drivers.watchdog_types import Action, DriverMode, WatchdogDecision
+
+TURN_NS = 25_000_000
+SOUND = MotionReport(
+    fresh=True, told=True, repeats=False, blind=False, flowless=False,
+    velocity_m_s=(0.4, 0.0, 0.0), force_m_s2=(0.0, 0.0), height_m=1.2,
+)  # fmt: skip
+BLIND = SOUND._replace(repeats=True, blind=True)
+FLOWLESS = BLIND._replace(flowless=True, velocity_m_s=(0.0, 0.0, 0.0))
+SILENT = SOUND._replace(fresh=False, told=False)
+
+
+def decision(action: Action, **more: object) -> WatchdogDecision:
+    return WatchdogDecision(DriverMode.TRACK, action, **more)  # type: ignore[arg-type]
+
+
+class Turns:
+    """Turns of the sender, one after the other."""
+
+    def __init__(self) -> None:
+        self.control, self.now_ns = AttitudeControl(ArDroneLimits()), 0
+
+    def __call__(self, action: Action, report: MotionReport, seconds: float = 0.1, **more: object) -> AttitudeRequest:
+        for _ in range(round(seconds * 1e9 / TURN_NS)):
+            self.now_ns += TURN_NS
+            asked = self.control.step(self.now_ns, decision(action, **more), report)
+        return asked
+
+
+@pytest.fixture
+def turns() -> Turns:
+    turns = Turns()
+    turns(Action.FLY, SOUND, 1.0, velocity_m_s=(0.4, 0.0, 0.0))
+    return turns
+
+
+@pytest.mark.parametrize("report", [SOUND, SILENT])
+def test_one_that_sees_the_floor_or_was_never_blind_holds_its_place_by_itself(turns, report) -> None:
+    assert turns(Action.HOVER, report).hover
+
+
+def test_a_blind_one_is_braked_and_for_three_seconds_after_it_fell_silent(turns) -> None:
+    assert not turns(Action.HOVER, BLIND).hover
+    assert not turns(Action.HOVER, SILENT, 2.8).hover
+    assert turns(Action.HOVER, SILENT, 0.4).hover
+
+
+def test_one_that_sees_no_floor_sinks_under_the_drivers_braking(turns) -> None:
+    asked = turns(Action.LAND, FLOWLESS)
+    assert turns.control.sinks and not asked.hover and asked.climb_m_s < 0.0
+    turns(Action.LAND, SOUND)
+    assert not turns.control.sinks  # its firmware lands it
+
+
+def test_a_silent_one_that_cameras_see_drift_is_braked(turns) -> None:
+    assert turns(Action.HOVER, SILENT, 1.2, seen_m_s=(0.3, 0.0)).hover
+    asked = turns(Action.HOVER, SILENT, 0.3, seen_m_s=(0.3, 0.0))
+    assert not asked.hover and asked.pitch_rad < 0.0
+
+
+def test_a_velocity_that_contradicts_what_was_asked_for_is_doubted_for_a_while(turns) -> None:
+    turns(Action.FLY, SOUND._replace(velocity_m_s=(-1.5, 0.0, 0.0)), 3.0, velocity_m_s=(0.4, 0.0, 0.0))
+    assert turns.control.is_doubted(turns.now_ns)
+    turns(Action.HOVER, SOUND, 1.5)
+    assert not turns.control.is_doubted(turns.now_ns)

@@ -1,7 +1,7 @@
 """Settings of one motion capture driver, as the composition hands them over (JSON of `MotionCaptureSection`)."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal
 from urllib.parse import urlsplit
@@ -19,7 +19,7 @@ from groundstation.vectors import Interval, Vector3
 
 @dataclass(frozen=True, slots=True)
 class PoseProtocol:
-    """A protocol for poses: its usual port (0: none), what reads it, and what its address may have beside a host.
+    """A protocol for poses: its usual port, what reads it, and what its address may have beside a host.
 
     reader: "module:class", made from a SystemAddress, a `drivers.motion_capture.sources.Source`; paths: a path and a
     query; any_port: another port than the usual one.
@@ -65,29 +65,35 @@ class SystemAddress:
 
 def parse_source(text: str) -> SystemAddress:
     """Return the parts of a system's address; raises ValueError that names all forms."""
-    scheme, mark, rest = text.partition("://")
+    scheme, _, rest = text.partition("://")
     others = [name for name in plug_ins.names(plug_ins.WORLD_SENSORS) if name not in OURS]
-    if not mark or scheme not in (*OURS, *others) or not rest or any(character.isspace() for character in text):
-        installed = "".join(f", {name}://" for name in others)
-        raise ValueError(
-            "must be an address such as natnet://192.168.1.5 (OptiTrack), vicon://, qualisys:// or vrpn://192.168.1.5, "
-            "or ros2://192.168.1.5/vrpn_mocap?domain=0 for topics /vrpn_mocap/<body>/pose behind a ROS 2 Zenoh router"
-            f"{installed}"
-        )
-    protocol, parts = OURS.get(scheme, PoseProtocol(0, "", paths=True)), urlsplit(text)
+    if scheme not in (*OURS, *others) or not rest or any(character.isspace() for character in text):
+        raise _unknown(others)
+    parts = urlsplit(text)
     try:
-        port = parts.port or protocol.port
+        port = parts.port
     except ValueError:
         raise ValueError("the port is no number from 1 to 65535") from None
-    if port != protocol.port and not protocol.any_port:
-        raise ValueError(f"must have no port: {scheme}:// is heard at port {protocol.port} only")
     path = parts.path.strip("/")
-    if (scheme in OURS and not parts.hostname) or ((path or parts.query) and not protocol.paths):
+    if scheme not in OURS:
+        return SystemAddress(scheme, parts.hostname or "", port or 0, path, parts.query)
+    protocol = OURS[scheme]
+    if port not in (None, protocol.port) and not protocol.any_port:
+        raise ValueError(f"must have no port: {scheme}:// is heard at port {protocol.port} only")
+    if not parts.hostname or ((path or parts.query) and not protocol.paths):
         raise ValueError(f"must name a host and nothing else, as in {scheme}://192.168.1.5")
-    address = SystemAddress(scheme, parts.hostname or "", port, path, parts.query)
-    if scheme in OURS and protocol.paths:
-        _ = address.domain
-    return address
+    if protocol.paths:
+        domain_of(parts.query)
+    return SystemAddress(scheme, parts.hostname, port or protocol.port, path, parts.query)
+
+
+def _unknown(others: Sequence[str]) -> ValueError:
+    installed = "".join(f", {name}://" for name in others)
+    return ValueError(
+        "must be an address such as natnet://192.168.1.5 (OptiTrack), vicon://, qualisys:// or vrpn://192.168.1.5, "
+        "or ros2://192.168.1.5/vrpn_mocap?domain=0 for topics /vrpn_mocap/<body>/pose behind a ROS 2 Zenoh router"
+        f"{installed}"
+    )
 
 
 def emulated_source(text: str, host: str, port: int) -> str:

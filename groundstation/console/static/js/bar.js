@@ -32,7 +32,7 @@ export function showBar() {
   showStages();
 }
 
-// A stage that is done, the one now, and those to come; where there is no room, only the one now has its name.
+// A stage that is done, the one now, and those to come; where there is no room, only the one now is shown.
 function showStages() {
   const host = byId("stages"), now = STAGES.indexOf(stage()), words = STAGES.map(stageWord), key = `${now} ${words}`;
   if (host.dataset.key === key) return;

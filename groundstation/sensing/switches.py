@@ -36,10 +36,14 @@ def _robots(topology: str) -> set[str]:
 def _reason(before: Plan, now: Plan, stay: float | None) -> str:
     came, went = _robots(now.topology) - _robots(before.topology), _robots(before.topology) - _robots(now.topology)
     if came or went:
-        parts = [f"{', '.join(sorted(names))} {what}" for names, what in ((came, "joined"), (went, "left")) if names]
+        parts = [
+            f"{', '.join(sorted(names))} {what}"
+            for names, what in ((came, "joined the team"), (went, "left the team"))
+            if names
+        ]
         return " and ".join(parts)
     if now.mode != before.mode:
         return f"mode {before.mode} to {now.mode}"
     if stay is None or stay <= 0.0:
-        return "the former topology was no alternative"
-    return f"the target's place is to be {100 * (1 - now.cost / stay):.0f} % less uncertain"
+        return "what went before was no longer possible"
+    return f"the target's place should be known {100 * (1 - now.cost / stay):.0f} % better this way"

@@ -266,7 +266,7 @@ def test_the_map_says_why_the_topology_is_as_it_is(stage: Any) -> None:
     page.wait(lambda s: line.is_visible())
     change = page.state()["sections"]["switch"]
     assert (
-        change["reason"] == "the target's place is to be 15 % less uncertain"
+        change["reason"] == "the target's place should be known 15 % better this way"
     )  # the fake planner's: staying costs 1.18 times as much
     assert line.inner_text().startswith("Who watches whom changed ") and line.inner_text().endswith(
         f": {change['reason']}"

@@ -201,7 +201,7 @@ def test_the_last_switch_of_topology_stays_with_its_reason() -> None:
         "at": 2000.0,
         "before": "a + b",
         "now": "a over b",
-        "reason": "the target's place is to be 50 % less uncertain",
+        "reason": "the target's place should be known 50 % better this way",
     }
 
 

@@ -98,7 +98,7 @@ def test_every_switch_has_its_reason() -> None:
     found = switches(run_with(plans=plans))
     assert [switch.reason for switch in found] == [
         "b joined",
-        "the target's place is to be 50 % less uncertain",
+        "the target's place should be known 50 % better this way",
         "b left",
     ]
     assert found[1].stay_cost == 0.2

@@ -7,6 +7,7 @@ import { FIGURE, SENSOR, around, keepClear, note } from "./labels.js";
 import { ageS, droneNames, entities, entity, isSeen, store, targetHeight } from "./store.js";
 
 const FIGURE_PX = 75;
+export const DRAWN_S = 2; // a plan that is older is not drawn
 
 export function drawFootprints(g, view) {
   const alpha = g.globalAlpha, [w, h] = store.scene.room.size_m;
@@ -75,7 +76,7 @@ function place(name) {
 export function drawGraph(g, view) {
   for (const sensor of worldSensors()) drawSensor(g, view, sensor);
   const plan = store.s.plan;
-  if (!plan || ageS(plan.at) > 2) return;
+  if (!plan || ageS(plan.at) > DRAWN_S) return;
   const alpha = g.globalAlpha;
   for (const [observer, subject, information] of plan.edges) {
     const a = place(observer), b = place(subject);

@@ -4,6 +4,7 @@ import { byId, el, seconds, svg, text } from "./dom.js";
 import { limitsOf } from "./duty.js";
 import { colourOf, ink } from "./palette.js";
 import { layers } from "./map.js";
+import { DRAWN_S } from "./map_sensing.js";
 import { ageS, store } from "./store.js";
 
 let shown = "";
@@ -31,7 +32,7 @@ export function showPlan() {
 // Below the sensing graph, for as long as that is drawn: since when it is as it is, and why.
 export function showSwitch() {
   const change = store.s.switch, node = byId("switch");
-  node.hidden = !change || !layers.graph;
+  node.hidden = !change || !layers.graph || ageS(store.s.plan?.at) > DRAWN_S;
   if (change) text(node, `Who watches whom changed ${seconds(ageS(change.at))} ago: ${change.reason}`);
 }
 

@@ -77,10 +77,9 @@ function showAll() {
 
 function describe() {
   const note = byId("map-note");
-  note.hidden = !store.scene || entities().length > 0;
-  note.textContent = "Nobody is localised yet.";
+  note.hidden = !store.scene || entities().length > 0 || store.s.standing?.length > 0;
   const words = entities().map(({ name, mean }) => `${name} at ${mean[0].toFixed(1)}, ${mean[1].toFixed(1)} m`).join("; ");
-  byId("map").setAttribute("aria-label", `Map of the room. ${words || "Nobody is localised yet."}`);
+  byId("map").setAttribute("aria-label", `Map of the room. ${words || note.textContent}`);
 }
 
 // Only when there is something new: on a busy machine clicks wait behind every picture of the screen that is asked for.

@@ -4,9 +4,8 @@ import { bodyToWorld, ellipse95 } from "./geometry.js";
 import { colourOf, ink, isAgain } from "./palette.js";
 import { drawArrow, label, path } from "./canvas.js";
 import { seconds } from "./dom.js";
-import { limitsOf } from "./duty.js";
 import { isLost } from "./glance.js";
-import { FIGURE, NAME, around, keepClear, note } from "./labels.js";
+import { NAME, around, keepClear, note } from "./labels.js";
 import { withShortNames } from "./names.js";
 import { ageS, entities, entity, estimateAge, isTarget, store } from "./store.js";
 
@@ -160,10 +159,6 @@ export function drawVelocities(g, view, stale) {
     const tip = (v) => { const [dx, dy] = bodyToWorld(v, body.mean[3]); return view.point(body.mean[0] + dx * ARROW_S, body.mean[1] + dy * ARROW_S); };
     if (control?.wanted && control.limited_by.length) drawArrow(g, from, tip(control.wanted), 1.2, colourOf(name), 0, true);
     drawArrow(g, from, tip(setpoint.velocity), 3, ink().text);
-    const limits = limitsOf(control);
-    if (!limits) continue;
-    const places = around(from[0], from[1], bodyRadius(view) + 6, 14).slice(1);
-    note(g, FIGURE, name, withShortNames(`${name} slowed by ${limits}`), places, ink().text, 14, 500);
   }
 }
 

@@ -1,14 +1,16 @@
 // What the batteries hold and how long they are good for, as the console's process works it out for all pages.
 
-import { modeNow, standing, up } from "./glance.js";
+import { aloft, modeNow, standing, up } from "./glance.js";
 import { droneNames, store } from "./store.js";
 
 const RANKS = ["empty", "unknown", "low", "good"];
 const LEVELS = { empty: "bad", unknown: "warn", low: "warn", good: "good" };
 
-// Until it lands its drone by itself, in the same words in the bar and on the cards; "" where nobody knows.
+// Until it lands its drone by itself, in the same words in the bar and on the cards; "" where nobody knows, of one that must
+// be charged before it flies again, and while others fly of one that stands.
 export function lastsWords(name) {
-  const { battery, good_for: time, battery_min: limit } = store.s.vehicles[name];
+  const { battery, charge, good_for: time, battery_min: limit } = store.s.vehicles[name];
+  if (standing([name]).length && (charge === "empty" || aloft())) return "";
   return time && (battery < limit ? "enough to land" : `good for ${time}`);
 }
 

@@ -131,8 +131,7 @@ function showLink(node, share) {
 
 function showBattery(node, name, status) {
   const [words, level] = batteryWords(name), known = status.battery !== null;
-  // What must be charged before it flies again lasts for no flight.
-  text(node.previousElementSibling, words.endsWith("charge!") ? "battery" : lastsWords(name) || "battery");
+  text(node.previousElementSibling, lastsWords(name) || "battery");
   if (node.dataset.words === words) return;
   node.dataset.words = words;
   node.className = level;

@@ -43,6 +43,7 @@ class FakeFlight(threading.Thread):
         self._sunk_m = dict.fromkeys(drones, 0.0)  # since each began to land
         self.frozen = self.fenced = False
         self.dark = False  # no camera has light to see by
+        self.crashed: set[str] = set()  # drones whose own emergency stop has cut their motors
         self.mute: set[str] = set()  # drones that say nothing
         self.findings: tuple[m.PreflightFinding, ...] = ()  # of the checks before a take-off
         self.distance_m = 1.3  # of the drones from the target
@@ -234,7 +235,9 @@ class FakeFlight(threading.Thread):
             bus, mode = self.bus(name), self.modes[name]
             status = m.VehicleStatus(
                 header=bus.header(name),
-                flight_state=STATES.get(mode, m.FlightState.FLYING),
+                flight_state=m.FlightState.EMERGENCY
+                if name in self.crashed
+                else STATES.get(mode, m.FlightState.FLYING),
                 mode=mode,
                 battery=self.battery.get(name),
                 link_quality=self.link.get(name, 0.93),

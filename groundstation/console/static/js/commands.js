@@ -102,14 +102,14 @@ function showStarts(why) {
 }
 
 // So that no reason reads as an effect.
-const SAYS_SO = /already$|instead$|^mend|^run over|only$|connection$|charge$|unknown$/;
+const SAYS_SO = /already$|instead$|first$|checked$|^mend|^run over|only$|connection$|charge$|unknown$/;
 const notNow = (words) => (SAYS_SO.test(words) ? words : `not now: ${words}`);
 
 // Why one drone may not take off, where a card has less room.
 const OF_ONE = {
   "another page may": "no: other page", "battery unknown": "no: battery?", "station not in charge": "not in charge", "not heard yet": "no: not heard",
 };
-const inFewer = (words) => OF_ONE[words] ?? (words.startsWith("mend") ? "mend: see list" : SAYS_SO.test(words) ? words : `no: ${words}`);
+const inFewer = (words) => OF_ONE[words] ?? (words.startsWith("mend") ? "mend: see list" : words.endsWith("checked") ? "check it first" : SAYS_SO.test(words) ? words : `no: ${words}`);
 
 const startRefusal = (verb, names = droneNames()) => twice(refusalOf(verb, names)) ?? (verb === "TAKEOFF" ? forbidden(names) : null);
 
@@ -139,7 +139,7 @@ function line(order) {
   const asker = askedBy(order), scope = order.team ? "all" : order.rows.map((row) => row.name).join(", ");
   return el("li", { class: "order", data: { state: order.state, verb: order.verb, testid: "order" } },
     el("div", { class: "head" },
-      el("span", {}, `${WORDS[order.verb] ?? order.verb} `, el("small", {}, `${scope} · ${giver(order.by)}${asker ? ` for ${giver(asker)}` : ""} · `, el("span", { class: "ago num", "aria-hidden": "true" }))),
+      el("span", {}, `${WORDS[order.verb] ?? order.verb} `, el("small", {}, `${scope} · ${asker ? `passed on for ${giver(asker)}` : giver(order.by)} · `, el("span", { class: "ago num", "aria-hidden": "true" }))),
       el("span", { class: "state" }, STATES[order.state] ?? order.state)),
     el("div", { class: "rows" }, ...order.rows.map((row) => el("span", {}, el("b", {}, `${row.name} `), el("span", { class: row.stage && row.stage !== "REFUSED" ? "" : "missing" }, stage(row, order)))),
       order.note ? el("span", { class: "missing" }, order.note) : null));

@@ -1,6 +1,7 @@
 // What a drone does now and why, in a sentence or two, and what limits it.
 
 import { joined, seconds } from "./dom.js";
+import { isCutOff } from "./effects.js";
 import { isBlind, isLost, standing, unseenLeftS } from "./glance.js";
 import { ageS, droneNames, SEEN_S, seenBy, store, trackerSilent, unseenS } from "./store.js";
 import { askedBy, ordered } from "./who.js";
@@ -35,11 +36,12 @@ function tracked(name, plan, room) {
   const watched = [...new Set([...planned, ...inView])];
   const limits = limitsOf(plan.controls.find(({ robot }) => robot === name));
   const [, who] = store.s.vehicles[name].detail.match(/^tracking for (.+)$/) ?? [];
-  const search = isBlind(name) ? "Too dark to look for" : "Looks for";
-  const task = sought.length ? `${search} ${joined(sought)}` : `Tracks ${joined(targets)}`;
+  const search = isBlind(name) ? "has no light to look for" : "looks for";
+  const task = sought.length ? `${search} ${joined(sought)}` : `tracks ${joined(targets)}`;
   const how = watched.length ? `: watches ${watching(watched, targets)}` : sought.length ? "" : ": moves to where it will see it";
-  const known = watchers.length ? `Seen by ${joined(watchers.map(watcher))}` : unseen(name);
-  const told = (order) => [`${task}${order}${how}.`, `${known}.`, limits && `Slowed by ${limits}.`].filter(Boolean).join(" ");
+  const known = isLost(name) ? "" : watchers.length ? `Seen by ${joined(watchers.map(watcher))}.` : `${unseen(name)}.`;
+  const does = (order) => (isLost(name) ? `${unseen(name)}. Until then it ${task}${how}.` : sentence(`${task}${order}${how}`));
+  const told = (order) => [does(order), known, limits && `Slowed by ${limits}.`].filter(Boolean).join(" ");
   // Where a card has no room for who asked, the list of orders says it.
   const whole = told(who && !isBlind(name) ? `, ${orderedBy(who, name, "tracking")}` : "");
   return whole.length > room ? told("") : whole;
@@ -54,17 +56,18 @@ function watching(names, targets) {
 
 const watcher = (name) => (droneNames().includes(name) || name.endsWith("camera") ? name : `${name} camera`);
 
-// One that nobody sees may be known by whom it sees itself; who stays lost lands.
+// Who stays lost lands; one that nobody sees may be known by whom it sees itself.
 function unseen(name) {
   const age = unseenS(name);
+  if (isLost(name)) return `Lost: ${seenBy(name).length ? "seen, but where is not known" : "no camera sees it"}. Lands within ${unseenLeftS(name).toFixed(0)}\u00a0s, unless seen`;
   if (age <= SEEN_S) return "Out of view: its own camera tells where it is";
-  return isLost(name) ? `Itself lost: lands within ${unseenLeftS(name).toFixed(0)}\u00a0s, unless seen` : `Itself not seen for ${seconds(age)}: counts as lost in ${seconds(Math.max(0, store.scene.lost_after_s - age))}`;
+  return `Itself not seen for ${seconds(age)}: counts as lost in ${seconds(Math.max(0, store.scene.lost_after_s - age))}`;
 }
 
-const ORDERS = /^(landing|taking off|held|tracking) (?:for|by) (.+)$/;
+const ORDERS = /^(landing|taking off|held|tracking|motors cut) (?:for|by) (.+)$/;
 const ORDERED = { landing: "lands:", "taking off": "takes off:", held: "hovers in place: HOLD", tracking: "tracks:" };
 
-const VERBS = { landing: ["LAND"], "taking off": ["TAKEOFF"], held: ["HOLD"], tracking: ["TRACK", "RESUME"] };
+const VERBS = { landing: ["LAND"], "taking off": ["TAKEOFF"], held: ["HOLD"], tracking: ["TRACK", "RESUME"], "motors cut": ["CUT_MOTORS"] };
 
 // Drivers name the program that an order came from; of a page's, and of what it asked the terminal for, it is known who gave
 // the last one of its kind.
@@ -89,7 +92,9 @@ function reasonOf(name, { mode, detail, lands_in_s, braked }) {
 
 // Why it landed stands in brackets in its driver's words.
 function stands(name, detail) {
-  const [, why] = detail.match(/^landed \((.+)\)$/) ?? [], [, doing, who] = why?.match(ORDERS) ?? [];
+  const [, why] = detail.match(/^landed \((.+)\)$/) ?? [], [, doing, who] = (why ?? detail).match(ORDERS) ?? [];
+  if (doing === "motors cut") return `is on the floor, motors off: CUT MOTORS ${orderedBy(who, name, doing)}`;
+  if (isCutOff(name)) return "is on the floor, motors off: its own emergency stop";
   return why ? `stands, motors off. It landed: ${who ? orderedBy(who, name, doing) : why}` : `stands with its motors off${detail && `: ${detail}`}`;
 }
 

@@ -12,8 +12,8 @@ const DEEDS = {
   LANDING: ["lands", "land"], LANDED: ["stands", "stand"], CUT: ["has its motors off", "have their motors off"],
 };
 const LOOKS = ["looks for the target", "look for the target"], BLIND = ["has no light to see by", "have no light to see by"];
-const ALONE = ["is without the tracker", "are without the tracker"];
-const UNHEARD = ["is not heard", "are not heard"];
+const ALONE = ["hovers, then lands", "hover, then land"];
+const UNHEARD = ["is not heard", "are not heard"], UNSEEN = ["flies on unseen", "fly on unseen"];
 const NEXT = {
   TAKING_OFF: "Each is seen from outside before the next one rises.",
   LANDING: "A drone that has landed stays down until a new TAKE OFF.",
@@ -26,9 +26,10 @@ function landings(soon) {
 
 function deeds() {
   const counted = droneNames().length > NAMED, deaf = up().filter(isUnheard), soon = droneNames().filter((name) => landsIn(name) && !deaf.includes(name));
+  const stray = trackerSilent() || lostTarget() ? [] : doing("TRACK").filter((name) => isLost(name) && !soon.includes(name) && !deaf.includes(name)), named = [...deaf, ...soon, ...stray];
   const doers = (mode) => (mode === "HOVER" ? droneNames().filter((name) => [...doing(mode), ...doing("HOLD")].includes(name)) : doing(mode));
-  const modal = Object.entries(DEEDS).map(([mode, words]) => [doers(mode).filter((name) => !soon.includes(name) && !deaf.includes(name)), mode !== "TRACK" ? words : trackerSilent() ? ALONE : !lostTarget() ? words : doing(mode).every(isBlind) ? BLIND : LOOKS]);
-  const told = [[deaf, UNHEARD], ...landings(soon), ...modal].filter(([names]) => names.length);
+  const modal = Object.entries(DEEDS).map(([mode, words]) => [doers(mode).filter((name) => !named.includes(name)), mode !== "TRACK" ? words : trackerSilent() ? ALONE : !lostTarget() ? words : doing(mode).every(isBlind) ? BLIND : LOOKS]);
+  const told = [[deaf, UNHEARD], ...landings(soon), ...modal, [stray, UNSEEN]].filter(([names]) => names.length);
   const parts = told.map(([names, [one, many]]) => `${counted ? names.length : joined(names)} ${names.length > 1 ? many : one}`);
   return parts.length ? `${parts.join("; ")}.` : "";
 }

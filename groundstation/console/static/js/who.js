@@ -5,7 +5,7 @@ import { store } from "./store.js";
 
 const TERMINAL = "operator";
 
-export const giver = (by) => (by === me.name ? "you" : by === TERMINAL ? "terminal" : by);
+export const giver = (by) => (by === me.name ? "you" : by === TERMINAL ? "the run's terminal" : by);
 
 // For how long the terminal may carry out a start that a page asked it for: it lifts drones one after the other [ms].
 const ASKED_MS = { TAKEOFF: 60000, TRACK: 3000, RESUME: 3000 };
@@ -16,4 +16,4 @@ export function askedBy({ by, verb, given_ms: at }) {
   return by === TERMINAL ? (store.s.orders ?? []).find(asks)?.by ?? "" : "";
 }
 
-export const ordered = (by) => (by === TERMINAL ? "ordered at the terminal" : `ordered by ${giver(by)}`);
+export const ordered = (by) => (by === TERMINAL ? "ordered at the terminal that started the run" : `ordered by ${giver(by)}`);

@@ -101,7 +101,7 @@ def test_who_has_no_light_looks_for_nobody(stage: Any) -> None:
     page = stage.open()
     stage.flight.dark = True
     page.wait(lambda s: page.there("team-mode").inner_text() == "BLIND")
-    blind = "Too dark to look for turtlebot. "
+    blind = "Has no light to look for turtlebot. "
     page.wait(lambda s: page.there("drone_1-duty").inner_text().startswith(blind))
     assert "Also: dark pictures, turtlebot lost" in page.there("banners").inner_text()
 
@@ -119,6 +119,51 @@ def test_a_start_says_who_goes_on_and_whether_it_can(stage: Any) -> None:
     page.wait(lambda s: page.there("resume").inner_text() == "RESUME\ndrone_2 tracks, if able")
     assert page.there("drone_2-duty").inner_text() == "Hovers, then lands: reported velocity stuck at 0.00 m/s."
     assert "RESUME" not in page.there("verdict").inner_text()
+
+
+def test_who_crashed_is_not_sent_up_while_others_fly(stage: Any) -> None:
+    SITUATIONS["all_is_well"](stage.flight)
+    page = stage.open()
+    stage.flight.crashed, stage.flight.modes["drone_2"] = {"drone_2"}, "CUT"
+    stage.flight.detail["drone_2"] = "the vehicle reports an emergency"
+    page.wait(lambda s: page.there("take-off").inner_text() == "TAKE OFF\ndrone_2 must be checked")
+    assert page.there("take-off").is_disabled() and page.there("drone_2-takeoff").is_disabled()
+    assert page.there("drone_2-takeoff").inner_text() == "Take off\ncheck it first"
+    down = "Is on the floor, motors off: "
+    assert page.there("drone_2-duty").inner_text() == f"{down}its own emergency stop."
+    stage.flight.detail["drone_2"] = "motors cut by operator"
+    page.wait(lambda s: page.there("drone_2-duty").inner_text().startswith(f"{down}CUT MOTORS ordered at the terminal"))
+    stage.flight.modes["drone_1"] = "LANDED"
+    page.wait(lambda s: page.there("drone_2-takeoff").inner_text() == "Take off\nrises, if able")
+
+
+def test_minutes_are_of_who_flies_or_might(stage: Any) -> None:
+    SITUATIONS["all_is_well"](stage.flight)
+    page = stage.open()
+    stage.flight.modes["drone_2"] = "LANDED"
+    titles = [page.there(f"{name}-battery").locator("xpath=preceding-sibling::dt") for name in DRONES]
+    page.wait(lambda s: titles[1].inner_text() == "battery")
+    assert titles[0].inner_text().startswith("good for ")
+    stage.flight.modes["drone_1"] = "LANDED"
+    page.wait(lambda s: titles[1].inner_text().startswith("good for "))
+    stage.flight.battery["drone_2"] = 0.16
+    page.wait(lambda s: page.there("worst-battery").inner_text() == "16 % drone_2")
+    assert (page.there("battery-lasts").inner_text(), titles[1].inner_text()) == ("worst battery", "battery")
+
+
+def test_without_the_tracker_nobody_is_said_to_be_lost(stage: Any) -> None:
+    SITUATIONS["all_is_well"](stage.flight)
+    page = stage.open()
+    stage.flight.unseen_s["drone_1"] = 5.0
+    lost = "Lost: no camera sees it. Lands within 25\u00a0s, unless seen. Until then it tracks turtlebot"
+    page.wait(lambda s: page.there("drone_1-duty").inner_text().startswith(lost))
+    said = "drone_2 tracks the target; drone_1 flies on unseen. Lost: drone_1, not seen for 5 s."
+    assert page.there("verdict").inner_text() == said
+    stage.flight.frozen = True
+    page.wait(lambda s: page.there("banner-tracker").is_visible())
+    assert "lost" not in page.there("banners").inner_text()
+    stage.flight.modes = dict.fromkeys(DRONES, "LANDED")
+    page.wait(lambda s: page.there("banner-tracker").inner_text().endswith("Nothing to do: nobody flies."))
 
 
 def test_a_battery_that_lands_well_charged_does_not_count_while_others_fly(stage: Any) -> None:
@@ -141,6 +186,8 @@ def test_who_asked_the_terminal_is_who_ordered_it(stage: Any) -> None:
     page.wait(lambda s: ("operator", "confirmed") in [(one["by"], one["state"]) for one in s["orders"]])
     stage.flight.modes = dict.fromkeys(DRONES, "TRACK")
     page.wait(lambda s: page.there("drone_1-duty").inner_text().startswith("Tracks turtlebot, ordered by you: "))
-    page.wait(lambda s: any("terminal for you" in line for line in page.there("order").all_inner_texts()))
+    page.wait(lambda s: any("passed on for you" in line for line in page.there("order").all_inner_texts()))
     order(stage.flight, m.Verb.TRACK, "operator")
-    page.wait(lambda s: page.there("drone_1-duty").inner_text().startswith("Tracks turtlebot, ordered at the terminal"))
+    page.wait(
+        lambda s: page.there("drone_1-duty").inner_text().startswith("Tracks turtlebot, ordered at the terminal that")
+    )

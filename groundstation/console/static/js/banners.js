@@ -15,6 +15,8 @@ const SHOWN = 4, NOTICE_MS = 8000, LEVELS = { SAFE: "good", WATCH: "warn", ACT: 
 const MEANS = { SAFE: "no problem", WATCH: "a problem, but\nno need to act", ACT: "a problem:\nact now" };
 const COLOURS = { ACT: "grave", WATCH: "mild" };  // an alarm's is that of its word
 const WIDE = matchMedia("(min-width: 1400px)"), ROOM = 110; // letters
+// Without the tracker: it is told already, and who is lost is not known.
+const MOOT = /^process tracker silent$| lost$/;
 const notices = [];
 
 export function addNotice({ text: words, grave }) {
@@ -29,7 +31,7 @@ function banners(own) {
   const all = [...(ended ? [ending(ended)] : []), ...own.map((alarm) => ({ ...alarm, level: "grave", rank: "ACT" }))];
   if (!runOver() && !own.some(({ shell }) => shell) && trackerSilent()) all.push(silentTracker());
   for (const { words, grave } of notices.filter(({ at }) => performance.now() - at < NOTICE_MS)) all.push({ kind: "notice", level: grave ? "grave" : "mild", title: words, rank: "notice" });
-  const told = (store.s.alarms ?? []).filter(({ about }) => about !== "tracker silent").map((alarm) => ({ kind: "alarm", level: alarm.grave ? "grave" : "mild",
+  const told = (store.s.alarms ?? []).filter(({ about }) => about !== "tracker silent" && !(trackerSilent() && MOOT.test(about))).map((alarm) => ({ kind: "alarm", level: alarm.grave ? "grave" : "mild",
     title: alarm.told === null ? alarm.text : `${alarm.text} (told at ${momentWords(alarm.told)})`, more: alarm.advice, subject: subjectOf(alarm), rank: alarm.asks ? "ACT" : "WATCH" }));
   if (store.connected && !runOver()) all.push(...together(told).slice(0, SHOWN));
   if (!all.length && !replaying()) all.push({ kind: "none", level: "calm", title: store.s.safety?.reason ?? "No alarms yet." });
@@ -57,9 +59,9 @@ function ending({ severity, text: words }) {
 }
 
 function silentTracker() {
-  const flying = up(), land = flying.length && flying.every((name) => modeNow(name) === "LANDING");
-  return { kind: "tracker", level: "grave", title: `TRACKER SILENT for ${seconds(estimateAge())}${WIDE.matches ? ": no new places" : ""}`, rank: "WATCH",
-    more: `Nothing to do: the drones ${land ? "land" : "hover, then land by themselves. LAND ALL still works"}.` };
+  const flying = up(), then = !flying.length ? "nobody flies" : flying.every((name) => modeNow(name) === "LANDING") ? "the drones land" : "the drones hover, then land by themselves. LAND ALL still works";
+  return { kind: "tracker", level: "grave", title: `TRACKER SILENT for ${seconds(estimateAge())}${WIDE.matches ? ": the program that steers the drones sends nothing" : ""}`, rank: "WATCH",
+    more: `Nothing to do: ${then}.` };
 }
 
 // As the console's process judges it, but for what only this page can know.
@@ -73,8 +75,8 @@ function safetyWord(own) {
 export function showBanners() {
   const own = ownAlarms(), all = banners(own), word = safetyWord(own);
   text(byId("safety"), word);
-  const unheard = !store.s.safety && !store.s.ended && word === "WATCH" && "nothing is\nheard yet";
-  text(byId("safety-means"), unheard || (word === "WATCH" && !replaying() && store.scene && landingWords()) || MEANS[word]);
+  const over = store.s.ended && word === "SAFE" && "all are on\nthe ground", unheard = !store.s.safety && !store.s.ended && word === "WATCH" && "nothing is\nheard yet";
+  text(byId("safety-means"), over || unheard || (word === "WATCH" && !replaying() && store.scene && landingWords()) || MEANS[word]);
   byId("safety-box").dataset.level = LEVELS[word];
   document.body.dataset.safety = word;
   noteOwnAlarms(own);

@@ -132,7 +132,9 @@ def test_who_crashed_is_not_sent_up_while_others_fly(stage: Any) -> None:
     down = "Is on the floor, motors off: "
     assert page.there("drone_2-duty").inner_text() == f"{down}its own emergency stop."
     stage.flight.detail["drone_2"] = "motors cut by operator"
-    page.wait(lambda s: page.there("drone_2-duty").inner_text().startswith(f"{down}CUT MOTORS ordered at the terminal"))
+    page.wait(
+        lambda s: page.there("drone_2-duty").inner_text().startswith(f"{down}CUT MOTORS ordered at the run's terminal")
+    )
     stage.flight.modes["drone_1"] = "LANDED"
     page.wait(lambda s: page.there("drone_2-takeoff").inner_text() == "Take off\nrises, if able")
 
@@ -155,7 +157,7 @@ def test_without_the_tracker_nobody_is_said_to_be_lost(stage: Any) -> None:
     SITUATIONS["all_is_well"](stage.flight)
     page = stage.open()
     stage.flight.unseen_s["drone_1"] = 5.0
-    lost = "Lost: no camera sees it. Lands within 25\u00a0s, unless seen. Until then it tracks turtlebot"
+    lost = "Lost: lands within 25\u00a0s, unless seen. Until then it tracks turtlebot"
     page.wait(lambda s: page.there("drone_1-duty").inner_text().startswith(lost))
     said = "drone_2 tracks the target; drone_1 flies on unseen. Lost: drone_1, not seen for 5 s."
     assert page.there("verdict").inner_text() == said
@@ -189,5 +191,5 @@ def test_who_asked_the_terminal_is_who_ordered_it(stage: Any) -> None:
     page.wait(lambda s: any("passed on for you" in line for line in page.there("order").all_inner_texts()))
     order(stage.flight, m.Verb.TRACK, "operator")
     page.wait(
-        lambda s: page.there("drone_1-duty").inner_text().startswith("Tracks turtlebot, ordered at the terminal that")
+        lambda s: page.there("drone_1-duty").inner_text().startswith("Tracks turtlebot, ordered at the run's terminal")
     )

@@ -97,9 +97,9 @@ def test_every_switch_has_its_reason() -> None:
     ]
     found = switches(run_with(plans=plans))
     assert [switch.reason for switch in found] == [
-        "b joined",
+        "b joined the team",
         "the target's place should be known 50 % better this way",
-        "b left",
+        "b left the team",
     ]
     assert found[1].stay_cost == 0.2
 

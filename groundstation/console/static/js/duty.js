@@ -58,7 +58,7 @@ const watcher = (name) => (droneNames().includes(name) || name.endsWith("camera"
 
 // Who stays lost lands; one that nobody sees may be known by whom it sees itself.
 function unseen(name) {
-  const age = unseenS(name), [where, end] = seenBy(name).length ? [", though in view", "its place is known"] : ["", "seen"];
+  const age = unseenS(name), [where, end] = seenBy(name).length ? [", though in view", "found"] : ["", "seen"];
   if (isLost(name)) return `Lost${where}: lands within ${unseenLeftS(name).toFixed(0)}\u00a0s, unless ${end}`;
   if (age <= SEEN_S) return "Out of view: its own camera tells where it is";
   return `Itself not seen for ${seconds(age)}: counts as lost in ${seconds(Math.max(0, store.scene.lost_after_s - age))}`;

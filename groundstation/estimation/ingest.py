@@ -14,6 +14,7 @@ from groundstation.bus.messages import (
     SearchedPicture,
     VehicleStatus,
     Verdict,
+    flies,
 )
 from groundstation.estimation.attitude_intake import AttitudeIntake
 from groundstation.estimation.fixed_lag import FUTURE_NS, FixedLagFilter
@@ -23,12 +24,6 @@ from groundstation.estimation.models.protocol import ObservationModel
 from groundstation.estimation.range_intake import RangeIntake
 from groundstation.estimation.report_intake import ReportIntake
 
-_AIRBORNE = {
-    FlightState.FLYING: True,
-    FlightState.HOVERING: True,
-    FlightState.LANDED: False,
-    FlightState.EMERGENCY: False,
-}
 _HEARD = (RelativeObservation, Odometry, ImuSample, RangeObservation, ReportedMotion, VehicleStatus)  # often first
 
 REASONS = {
@@ -93,7 +88,7 @@ class Intake:
         return Verdict.ACCEPTED
 
     def _status(self, message: VehicleStatus, stamp_ns: int, now_ns: int) -> Verdict:
-        entity, airborne = message.header.entity, _AIRBORNE.get(message.flight_state)
+        entity, airborne = message.header.entity, flies(message.flight_state, message.mode)
         if message.flight_state is FlightState.TAKING_OFF and entity in self._joins_early:
             airborne = True
         if airborne is None:

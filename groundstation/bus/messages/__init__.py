@@ -32,6 +32,7 @@ from groundstation.bus.messages.flight import (
     VehicleStatus,
     VelocitySetpoint,
     Verb,
+    flies,
     known_state,
     stood_last,
 )
@@ -115,6 +116,7 @@ __all__ = [
     "VelocitySetpoint",
     "Verb",
     "Verdict",
+    "flies",
     "known_state",
     "stood_last",
 ]

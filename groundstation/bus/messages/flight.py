@@ -34,6 +34,7 @@ UP = frozenset({FlightState.FLYING, FlightState.HOVERING})
 AIRBORNE = UP | {FlightState.TAKING_OFF, FlightState.LANDING}
 STANDING = frozenset({FlightState.LANDED, FlightState.EMERGENCY})
 UNHEARD = frozenset({FlightState.UNKNOWN, FlightState.LOST})
+_ALOFT = frozenset({"HOVER", "TRACK", "HOLD", "LANDING"})
 
 
 def known_state(before: FlightState, said: FlightState) -> FlightState:
@@ -50,6 +51,16 @@ def stood_last(state: FlightState, mode: str) -> bool:
     No take-off was ordered since. Most often its battery is empty.
     """
     return state is FlightState.LOST and mode == "LANDED"
+
+
+def flies(state: FlightState, mode: str) -> bool | None:
+    """Return whether a vehicle flies, by state and mode of its VehicleStatus; None: these do not tell.
+
+    A lost one flies if its driver had it in the air. During a take-off it is not known when it leaves the ground.
+    """
+    if state is FlightState.LOST:
+        return True if mode in _ALOFT else None
+    return True if state in AIRBORNE - {FlightState.TAKING_OFF} else False if state in STANDING else None
 
 
 class VehicleStatus(Message, frozen=True, kw_only=True):

@@ -230,3 +230,33 @@ def test_only_who_has_to_be_known_before_its_lift_off_joins_while_it_takes_off(e
     intake.take("status/drone", status, NOW)
     joint.advance(NOW)
     assert joint.airborne("drone") is early
+
+
+@pytest.mark.parametrize(
+    ("state", "mode", "known"),
+    [
+        (FlightState.LANDING, "LANDING", True),
+        (FlightState.LOST, "TRACK", True),
+        (FlightState.LOST, "LANDING", True),
+        (FlightState.LOST, "LANDED", False),
+        (FlightState.LOST, "CUT", False),
+        (FlightState.LOST, "TAKING_OFF", False),
+        (FlightState.UNKNOWN, "CONNECTING", False),
+    ],
+)
+def test_who_lands_or_was_lost_in_the_air_is_known_to_a_tracker_that_begins_then(
+    state: FlightState, mode: str, known: bool
+) -> None:
+    desk = Desk()
+    status = VehicleStatus(header=desk.header("drone", 100 * MS), flight_state=state, mode=mode)
+    assert desk.take(status) is Verdict.ACCEPTED
+    desk.filter.advance(NOW)
+    assert desk.filter.airborne("drone") is known
+
+
+def test_who_stood_and_is_no_longer_heard_does_not_fly() -> None:
+    desk = Desk()
+    for age_ns, state in ((200 * MS, FlightState.LANDED), (100 * MS, FlightState.LOST)):
+        desk.take(VehicleStatus(header=desk.header("drone", age_ns), flight_state=state, mode="LANDED"))
+    desk.filter.advance(NOW)
+    assert not desk.filter.airborne("drone")

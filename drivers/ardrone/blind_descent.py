@@ -1,12 +1,14 @@
 """Lands an AR.Drone whose optical flow sees no floor. Pure.
 
 Its firmware would land it level: it stops by the optical flow that fails, and moving air carries it off. So the driver
-lets it sink and goes on braking it, until it is low enough for the firmware to land it.
+lets it sink and brakes it on, until it is low enough for the firmware to land it, lower than its ultrasound tells.
 """
 
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 LOWEST_M = 0.35
+# From there it sinks on by time: by 0.12 m at the usual 0.4 m/s.
+_ON_NS = 300 * NS_PER_MS
 _LONGEST_NS = 6 * NS_PER_S
 # A drone told to sink answers after 0.7 s. One that does not sink is landed by its firmware.
 _LOWER_M, _LOWER_WITHIN_NS = 0.1, 1_200 * NS_PER_MS
@@ -20,6 +22,7 @@ class BlindDescent:
 
     def __init__(self) -> None:
         self._since_ns: int | None = None
+        self._low_ns: int | None = None
         self._over = False
         self._reached_m, self._reached_ns = 0.0, 0
 
@@ -30,9 +33,14 @@ class BlindDescent:
         if not reported.
         """
         if not lands:
-            self._since_ns, self._over = None, False
+            self._since_ns, self._low_ns, self._over = None, None, False
             return False
-        if not blind or height_m is None or height_m <= LOWEST_M:
+        if self._low_ns is None and height_m is not None and height_m <= LOWEST_M:
+            self._low_ns = now_ns
+        if self._low_ns is not None:
+            self._over = self._over or not blind or now_ns - self._low_ns > _ON_NS
+            return not self._over
+        if not blind or height_m is None:
             self._over = True
             return False
         if self._since_ns is None or height_m <= self._reached_m - _LOWER_M:

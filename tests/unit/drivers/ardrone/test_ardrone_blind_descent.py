@@ -15,7 +15,23 @@ def told(heights: list[float], every_s: float, begins_s: float = 10.0) -> list[b
 
 def test_it_sinks_until_it_is_low_and_is_then_told_to_land() -> None:
     heights = [1.2, 1.0, 0.5, LOWEST_M + 0.01, LOWEST_M, LOWEST_M + 0.1, 1.0]
-    assert told(heights, 0.5) == [True] * 4 + [False] * 3, "an order to land is not taken back"
+    assert told(heights, 0.5) == [True] * 5 + [False] * 2, "an order to land is not taken back"
+
+
+def test_from_there_it_sinks_on_for_a_moment_whatever_its_height_says() -> None:
+    descent = BlindDescent()
+    heights = [0.5, LOWEST_M, None, 0.0, None, None]
+    assert [descent.step(S + i * S // 10, True, True, height) for i, height in enumerate(heights)] == [True] * 5 + [
+        False
+    ]
+    assert not descent.step(3 * S, True, True, 1.0)
+
+
+def test_who_sees_the_floor_when_it_is_low_is_told_to_land() -> None:
+    descent = BlindDescent()
+    assert descent.step(S, True, True, LOWEST_M)
+    assert not descent.step(S + 1, True, False, LOWEST_M)
+    assert not descent.step(S + 2, True, True, LOWEST_M)
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,8 @@
 """Poses for an autopilot from the tracker's estimate, and the time without one. Pure.
 
 On the floor the vehicle is fed the pad of the field file, or its last landing place: the tracker has no estimate of a
-landed robot. Once the take-off has begun there is one, which is fed if it continues from there. A position that
+landed robot. Once the take-off has begun there is one, which is fed if it continues from there; one at the pad shows
+that the vehicle was carried back there. A position that
 observations do not keep accurate is not fed: it would be the autopilot's own dead reckoning. Its covariance decides,
 not who was seen: sightings by its own camera localise a vehicle as well. A vehicle whose telemetry is silent or not
 believed is fed only the places at which it was seen. Nothing is fed while sightings far from the estimate are being
@@ -39,7 +40,8 @@ class VisionFeed:
         self.resets = 0
         self.sighted: VisionPose | None = None
         self._name, self._clock, self._vision = name, clock, vision
-        self._standing = VisionPose(0, (*pad_m, 0.0), pad_yaw_rad, _STANDING_VARIANCES, (0.0, 0.0, 0.0))
+        self._pad = VisionPose(0, (*pad_m, 0.0), pad_yaw_rad, _STANDING_VARIANCES, (0.0, 0.0, 0.0))
+        self._standing = self._pad
         self._last: VisionPose | None = None
         self._newest: VisionPose | None = None
         self._epoch: int | None = None
@@ -91,6 +93,8 @@ class VisionFeed:
         if not aloft:
             self._aloft_ns = None
             if pose is None or self._last is None or self._jumps(self._last, pose):
+                if pose is not None and not self._jumps(replace(self._pad, stamp_ns=pose.stamp_ns), pose):
+                    self._standing = self._pad  # it was carried back
                 pose = replace(self._standing, stamp_ns=now_ns)
         else:
             if self._aloft_ns is None:

@@ -53,6 +53,19 @@ def test_an_estimate_elsewhere_does_not_count_while_it_stands(feed: VisionFeed) 
     assert place(feed, NOW + 33 * MS, aloft=False) == (*PAD, 0.0)
 
 
+def test_who_was_carried_back_is_fed_its_pad_once_cameras_see_it_there(feed: VisionFeed) -> None:
+    for step in range(3):
+        believe(feed, NOW + 33 * MS * step, PAD[0] + 2.0, PAD[1], 0.3)
+        feed.pose(NOW + 33 * MS * step, aloft=step < 2)
+    later = NOW + 60_000 * MS
+    assert place(feed, later, aloft=False) == (PAD[0] + 2.0, PAD[1], 0.0), "where it landed"
+    resets = feed.resets
+    for step in range(3):
+        believe(feed, later + 33 * MS * (step + 1), *PAD, 0.06)
+        assert place(feed, later + 33 * MS * (step + 1), aloft=False) == (*PAD, 0.06 if step else 0.0)
+    assert feed.resets == resets + 1
+
+
 def test_a_pause_in_flight_is_a_reset_for_the_autopilot_has_coasted(feed: VisionFeed) -> None:
     now_ns, resets = NOW, []
     for pause_ms in (33, 33, 300, 33, 500, 33):

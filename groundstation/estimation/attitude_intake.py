@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 
-from groundstation.bus.messages import ImuSample, Odometry, Verdict
+from groundstation.bus.messages import ImuSample, Odometry, RelativeObservation, Verdict
 from groundstation.estimation.frozen_sensor import FreezeWatch
 from groundstation.estimation.inertial import Attitude, InertialAttitude
 from groundstation.estimation.measurement import OdometrySample
@@ -63,6 +63,12 @@ class AttitudeIntake:
             yaw_std_rad=yaw_std_rad,
             velocity_std_m_s=velocity_std_m_s,
         )
+
+    def sight(self, message: RelativeObservation, camera: str, stamp_ns: int) -> None:
+        """Take a fixed camera's sighting, which shows how its subject turns."""
+        inertial = self._inertial.get(message.subject)
+        if inertial is not None and message.yaw_rad is not None:
+            inertial.take_sight(camera, stamp_ns, message.yaw_rad, message.covariance[-1])
 
     def tilt(self, robot: str, stamp_ns: int, reported: tuple[float, float]) -> tuple[float, float]:
         """Return (roll, pitch) of a robot at an exposure; reported: by the camera's driver.

@@ -1,38 +1,66 @@
-"""The bias of a vehicle's gyroscopes: learnt while it stands and, slowly, from its own doubtful heading in flight."""
+"""The bias of a vehicle's gyroscopes: learnt while it stands and, slowly, in flight.
+
+In flight accelerometers tell two of them; the third is told by a fixed camera that sees the vehicle turn, and poorly by
+the vehicle's own doubtful heading.
+"""
 
 import math
 
 from groundstation.bus.messages import Vector3
-from groundstation.geometry.angles import difference
+from groundstation.estimation.biased_angle import BiasedAngle
+from groundstation.geometry.angles import difference, wrap
 from groundstation.time_units import NS_PER_S
 
 _BLOCK_NS = NS_PER_S  # of standing still give one measurement
 # A vehicle that turns faster was carried [rad/s]; a block is this precise, or as its own scatter.
 _STILL_RAD_S, _BLOCK_STD = 0.05, 2e-4
-_UNKNOWN_STD = math.radians(0.5)  # before anything is learnt [rad/s]
-_DRIFT_STD = 3e-5  # [rad/s per root second]
+# Deviation of roll and pitch after a while; and at the start, from one sample of a vehicle that may accelerate.
+_SETTLED_RAD, _FIRST_RAD = math.radians(0.5), math.radians(5.0)
 # Random walk of a magnetic heading, and of an integrated gyro beside its bias [rad per root second].
 _HEADING_WANDER, _GYRO_WANDER = math.radians(1.7), math.radians(0.1)
 _SPAN_NS = 2 * NS_PER_S  # between two uses of the heading
+_LOST_S = 2.0  # a camera that has not shown the heading for longer is begun anew, or another one takes its place
 _GATE = 9.0  # a heading with a larger disagreement says nothing of the bias
 _HORIZON_S = 20.0  # the bias's effect on the heading is modelled as a random walk that is right after this time
 
 
 class GyroBias:
-    """Bias of three gyroscopes [rad/s; base] and its deviation; tilt_std_rad_s: of the first two."""
+    """Bias of three gyroscopes [rad/s; base], and how well it is known."""
 
     def __init__(self) -> None:
         self.rad_s: Vector3 = (0.0, 0.0, 0.0)
-        self.tilt_std_rad_s = _UNKNOWN_STD
-        self._variance = _UNKNOWN_STD**2
+        self._tilt, self._turn = BiasedAngle(_FIRST_RAD**2), BiasedAngle(0.0)
         self._block: list[Vector3] = []
         self._block_ns = 0
         self._heading: tuple[int, float, float, int] | None = None
+        self._seen: tuple[str, int, float] | None = None
+
+    @property
+    def tilt_std_rad(self) -> float:
+        """Return the deviation of roll and of pitch [rad]."""
+        return math.sqrt(self._tilt.variance)
 
     @property
     def yaw_std_rad(self) -> float:
         """Return the random walk of a heading by these gyroscopes [rad per root second]."""
-        return math.sqrt(_GYRO_WANDER**2 + self._variance * _HORIZON_S)
+        return math.sqrt(_GYRO_WANDER**2 + self._turn.bias_variance * _HORIZON_S)
+
+    def begin(self) -> None:
+        """Roll and pitch begin anew from one sample, and so does the heading."""
+        self._tilt.begin(_FIRST_RAD**2)
+        self._seen = None
+
+    def go_on(self, elapsed_s: float, within_s: float) -> None:
+        """Integrate over a time; with a known bias accelerometers draw the tilt back over within_s."""
+        self._tilt.go_on(elapsed_s, _SETTLED_RAD**2 / within_s)
+        self._turn.go_on(elapsed_s, _GYRO_WANDER**2)
+
+    def take_tilt(self, elapsed_s: float, within_s: float, ahead_rad: tuple[float, float]) -> tuple[float, float]:
+        """Take by how much the accelerometers' roll and pitch exceed ours; returns the corrections of ours [rad]."""
+        angle, bias = self._tilt.see_angle(_SETTLED_RAD**2 * within_s / elapsed_s)
+        (roll, pitch), (x, y, z) = ahead_rad, self.rad_s
+        self.rad_s = x + bias * roll, y + bias * pitch, z
+        return angle * roll, angle * pitch
 
     def take_standing(self, stamp_ns: int, rates_rad_s: Vector3) -> None:
         """Take the rates of a vehicle on the ground: these are bias, unless somebody carries it."""
@@ -60,8 +88,23 @@ class GyroBias:
         elapsed_s = (stamp_ns - before[0]) / NS_PER_S
         self._heading = (stamp_ns, yaw_rad, own_yaw_rad, reset)
         ahead = difference(difference(own_yaw_rad, before[2]), difference(yaw_rad, before[1])) / elapsed_s
-        self._variance += _DRIFT_STD**2 * elapsed_s
         self._correct(ahead, _HEADING_WANDER**2 / elapsed_s)
+
+    def take_sight(self, camera: str, stamp_ns: int, yaw_rad: float, variance: float, own_yaw_rad: float) -> None:
+        """Take the heading that a fixed camera shows, from any zero, beside that by the gyroscopes; one camera's."""
+        ahead = difference(yaw_rad, own_yaw_rad)
+        last, at_ns, offset = self._seen or (camera, 0, 0.0)
+        elapsed_s = (stamp_ns - at_ns) / NS_PER_S
+        if elapsed_s > _LOST_S:
+            self._seen = camera, stamp_ns, ahead
+            self._turn.begin(variance)
+        elif camera == last and elapsed_s > 0.0:
+            excess = difference(ahead, offset)
+            self._seen = camera, stamp_ns, offset
+            if excess * excess <= _GATE * (self._turn.variance + variance):
+                angle, bias = self._turn.see_angle(variance)
+                self._seen = camera, stamp_ns, wrap(offset + angle * excess)
+                self.rad_s = (*self.rad_s[:2], self.rad_s[2] + bias * excess)
 
     def _learn(self) -> None:
         n, (x, y, _) = len(self._block), self.rad_s
@@ -70,14 +113,14 @@ class GyroBias:
         share = self._correct(means[2] - self.rad_s[2], _BLOCK_STD**2 + scatter / n)
         if share > 0.0:
             self.rad_s = (x + share * (means[0] - x), y + share * (means[1] - y), self.rad_s[2])
-            self.tilt_std_rad_s = _BLOCK_STD
+            self._tilt.see_bias(_BLOCK_STD**2)
 
     def _correct(self, excess: float, variance: float) -> float:
         """Correct the third bias by a measured excess; returns the share that was taken, 0 beyond the gate."""
-        total = self._variance + variance
-        if excess * excess > _GATE * total:
+        if excess * excess > _GATE * (self._turn.bias_variance + variance):
             return 0.0
-        share = self._variance / total
-        self._variance *= 1.0 - share
-        self.rad_s = (*self.rad_s[:2], self.rad_s[2] + share * excess)
-        return share
+        angle, bias = self._turn.see_bias(variance)
+        self.rad_s = (*self.rad_s[:2], self.rad_s[2] + bias * excess)
+        if self._seen is not None:
+            self._seen = (*self._seen[:2], wrap(self._seen[2] + angle * excess))
+        return bias

@@ -22,8 +22,6 @@ _GAP_S = 0.5  # nothing is integrated across a longer one
 _RESTARTED_S = 5.0  # after a longer silence a vehicle may have a new battery, and another gyro bias
 _FRESH_NS = 100 * NS_PER_MS  # largest time between a sample and a time that it stands for
 _KEPT = 256  # samples: more than a second
-# Deviation of roll and pitch after a while; and at the start, from one sample of a vehicle that may accelerate.
-_SETTLED_RAD, _FIRST_RAD = math.radians(0.5), math.radians(5.0)
 # A specific force beyond these is a blow, not gravity [m/s^2]; a gain error of 8 % is usual.
 _LEAST_FORCE, _MOST_FORCE = 0.6 * STANDARD_GRAVITY_M_S2, 1.4 * STANDARD_GRAVITY_M_S2
 
@@ -53,7 +51,6 @@ class InertialAttitude:
         self._kept: deque[tuple[int, float, float, float]] = deque(maxlen=_KEPT)
         self._roll = self._pitch = self._yaw = 0.0
         self._resets = 0
-        self._variance = _FIRST_RAD**2
         self._stamp_ns: int | None = None
         self._velocity = (0.0, 0.0)
         self._acceleration = (0.0, 0.0)
@@ -75,8 +72,10 @@ class InertialAttitude:
         if elapsed_s > _GAP_S:
             self._begin(force_m_s2)
         else:
+            within_s = _STANDING_S if standing else _LEVEL_S
             self._turn(unbiased[0], unbiased[1], unbiased[2], elapsed_s)
-            self._level(force_m_s2, stamp_ns, elapsed_s, _STANDING_S if standing else _LEVEL_S)
+            self._bias.go_on(elapsed_s, within_s)
+            self._level(force_m_s2, stamp_ns, elapsed_s, within_s)
         self._stamp_ns, self._rate = stamp_ns, (unbiased[0], unbiased[1], unbiased[2])
         self._kept.append((stamp_ns, self._roll, self._pitch, self._yaw))
 
@@ -100,13 +99,18 @@ class InertialAttitude:
         if self._is_fresh(stamp_ns):
             self._bias.take_heading(stamp_ns, yaw_rad, self._yaw, reset + self._resets)
 
+    def take_sight(self, camera: str, stamp_ns: int, yaw_rad: float, variance: float) -> None:
+        """Take the heading that a fixed camera shows, from any zero: the gyro's bias learns from its change."""
+        at = self._at(stamp_ns)
+        if at is not None:
+            self._bias.take_sight(camera, stamp_ns, yaw_rad, variance, at[2])
+
     def at(self, stamp_ns: int) -> Attitude | None:
         """Return the attitude at a time; None if all samples are too far from it."""
         tilted = self._at(stamp_ns)
         if tilted is None:
             return None
-        attitude_std = math.sqrt(self._variance)
-        return Attitude(*tilted, self._resets, attitude_std, self._bias.yaw_std_rad)
+        return Attitude(*tilted, self._resets, self._bias.tilt_std_rad, self._bias.yaw_std_rad)
 
     def tilt_at(self, stamp_ns: int) -> tuple[float, float] | None:
         """Return (roll, pitch) at a time, as `at` does."""
@@ -147,7 +151,7 @@ class InertialAttitude:
     def _begin(self, force: Vector3) -> None:
         """Begin (again) from one sample; the heading continues, but with a void increment."""
         self._roll, self._pitch = _tilt_of(force)
-        self._variance = _FIRST_RAD**2
+        self._bias.begin()
         self._resets += 1
 
     def _turn(self, wx: float, wy: float, wz: float, elapsed_s: float) -> None:
@@ -164,18 +168,17 @@ class InertialAttitude:
         return wx + about_vertical * tangent, wy * cosine - wz * sine, about_vertical / math.cos(self._pitch)
 
     def _level(self, force: Vector3, stamp_ns: int, elapsed_s: float, within_s: float) -> None:
-        """Draw roll and pitch towards the accelerometers' values; the effect of a gyro's bias remains."""
+        """Draw roll and pitch towards the accelerometers' values, and the gyroscopes' bias with them."""
         if not _LEAST_FORCE < math.hypot(*force) < _MOST_FORCE:
             return
         roll, pitch = _tilt_of(force)
         if self._velocity_ns is not None and abs(stamp_ns - self._velocity_ns) < _SILENT_S * NS_PER_S:
             roll -= self._acceleration[1] / STANDARD_GRAVITY_M_S2
             pitch += self._acceleration[0] / STANDARD_GRAVITY_M_S2
-        share = elapsed_s / (within_s + elapsed_s)
-        self._roll = wrap(self._roll + share * wrap(roll - self._roll))
-        self._pitch += share * (pitch - self._pitch)
-        settled = _SETTLED_RAD**2 + (within_s * self._bias.tilt_std_rad_s) ** 2
-        self._variance += 2.0 * share * (settled - self._variance)
+        ahead_rad = wrap(roll - self._roll), pitch - self._pitch
+        roll_rad, pitch_rad = self._bias.take_tilt(elapsed_s, within_s, ahead_rad)
+        self._roll = wrap(self._roll + roll_rad)
+        self._pitch += pitch_rad
 
 
 def _tilt_of(force: Vector3) -> tuple[float, float]:

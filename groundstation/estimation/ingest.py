@@ -115,7 +115,10 @@ class Intake:
             message.alternative,
         )
         tie = f"{key}#{message.subject}#{message.header.seq}"
-        return self._filter.add_observation(measurement, tie, now_ns) or Verdict.ACCEPTED
+        verdict = self._filter.add_observation(measurement, tie, now_ns) or Verdict.ACCEPTED
+        if verdict is Verdict.ACCEPTED and message.observer in self._filter.parameters.world_cameras:
+            self._attitudes.sight(message, measurement.camera, stamp_ns)
+        return verdict
 
     def _camera_of(self, message: RelativeObservation) -> str:
         """Return the camera by which an observer saw: never another carrier's, whatever the message calls it."""

@@ -26,7 +26,7 @@ from groundstation.tracker import tracker_from_field
 DRONE, TARGET, CEILING, CLOCK = "drone_1", "turtlebot", "ceiling", "recorded"
 START_NS = 10**12
 GRAVITY_M_S2 = 9.80665
-TAKE_OFF_S, ALOFT_S, JUDGED_FROM_S = 4.3, 6.0, 9.0
+TAKE_OFF_S, ALOFT_S, JUDGED_FROM_S, FOUND_S = 4.3, 6.0, 9.0, 3.0
 FRAME_S, TICK_S, STATUS_S = 1 / 15, 0.02, 0.2
 VIDEO_LATE_S = {CEILING: 0.06, DRONE: 0.12}
 SEEN_M = 2.5
@@ -252,16 +252,19 @@ def arrivals_of(
 
 
 def fly(
-    recording: Recording, field: ResolvedField, dark: Dark, seed: int = 1, inertial: bool = True, askew: bool = False
-) -> Score:
-    """Feed the flight to a tracker and return how far its belief was from the truth."""
+    recording: Recording, field: ResolvedField, dark: Dark, seed: int = 1, inertial: bool = True, askew: bool = False,
+    begun_s: float = 0.0,
+) -> Score:  # fmt: skip
+    """Feed the flight, from a time on, to a tracker and return how far its belief was from the truth."""
     lab = field_for_flight(field)
     tracker, score = tracker_from_field(lab, CLOCK, 1), Score(recording)
-    due = 0.0
+    due, judged_from_s = begun_s, max(JUDGED_FROM_S, begun_s + FOUND_S)
     for t, message in arrivals_of(recording, lab, dark, seed, inertial, askew):
+        if t < begun_s:
+            continue
         while due <= t:
             belief = tracker.advance(ns(due))
-            if due >= JUDGED_FROM_S:
+            if due >= judged_from_s:
                 score.take(belief, due)
             due += TICK_S
         tracker.ingest(f"{type(message).__name__}/{message.header.entity}", message, ns(t))

@@ -55,6 +55,20 @@ def test_the_belief_says_how_well_it_knows_where_the_ceiling_camera_hangs_a_litt
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("begun_s", [14.0, 34.0])
+def test_a_tracker_that_is_started_in_flight_knows_as_much(
+    recording: Recording, lab_field: ResolvedField, begun_s: float
+) -> None:
+    """Nothing was learnt on the ground; at 34 s the drone leans, and changes its lean, in moving air."""
+    found = figures(fly(recording, lab_field, Dark(), begun_s=begun_s).errors)
+    print(found)
+    assert found.target_m <= 0.03
+    assert LEAST_ANEES <= found.target_anees <= MOST_ANEES
+    assert found.heading_deg <= 0.6
+    assert found.heading_nees <= MOST_HEADING_NEES
+
+
+@pytest.mark.slow
 def test_without_an_imu_the_lean_goes_to_the_target(recording: Recording, lab_field: ResolvedField) -> None:
     """What the IMU is worth: the same flight with navdata in demo mode."""
     assert figures(fly(recording, lab_field, Dark(), inertial=False).errors).target_m >= 0.06

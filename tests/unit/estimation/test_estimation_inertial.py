@@ -149,10 +149,33 @@ def test_without_time_on_the_ground_the_heading_teaches_the_bias_slowly() -> Non
             START + k * 2 * 10**9, math.remainder(magnetic, math.tau), math.remainder(yaw, math.tau), 0
         )
     bias = learner.rad_s[2]
-    claimed = math.sqrt(learner._variance)
+    claimed = math.sqrt(learner._turn.bias_variance)
     assert abs(bias - 0.02) < 3.0 * claimed
     assert claimed < 0.5 * math.radians(0.5)
     assert learner.yaw_std_rad < 0.6 * unsure
+
+
+def test_in_flight_a_fixed_camera_tells_the_bias_of_the_heading_and_accelerometers_that_of_the_tilt() -> None:
+    """Taken up in the air: nothing was learnt on the ground."""
+    vehicle, rng = Vehicle(), np.random.default_rng(5)
+    for _ in range(300):
+        vehicle.run(1 / 15, turn=0.2)
+        shown = vehicle.yaw + 1.0 + 0.035 * rng.standard_normal()
+        vehicle.attitude.take_sight("ceiling", vehicle.now, math.remainder(shown, math.tau), 0.035**2)
+    found, bias = vehicle.attitude.at(vehicle.now), vehicle.attitude._bias
+    assert found is not None
+    assert math.degrees(found.yaw_std_rad) < 0.3
+    assert abs(bias.rad_s[2] - BIAS[2]) < 3.0 * math.sqrt(bias._turn.bias_variance) < math.radians(0.15)
+    assert vehicle.tilt_error_deg < math.degrees(found.attitude_std_rad) < 0.7
+
+
+def test_two_cameras_zeros_and_a_bumped_camera_do_not_look_like_bias(flying: Vehicle) -> None:
+    for k in range(150):
+        flying.run(1 / 15)
+        for camera, zero in (("ceiling", 0.0 if k < 75 else 0.3), ("wall", -1.0)):
+            flying.attitude.take_sight(camera, flying.now, math.remainder(flying.yaw + zero, math.tau), 0.035**2)
+    bias = flying.attitude._bias
+    assert abs(bias.rad_s[2] - BIAS[2]) < 5e-4
 
 
 def test_a_gap_voids_the_increment_and_silence_has_no_attitude(flying: Vehicle) -> None:

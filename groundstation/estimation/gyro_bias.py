@@ -18,6 +18,8 @@ _STILL_RAD_S, _BLOCK_STD = 0.05, 2e-4
 _SETTLED_RAD, _FIRST_RAD = math.radians(0.5), math.radians(5.0)
 # Random walk of a magnetic heading, and of an integrated gyro beside its bias [rad per root second].
 _HEADING_WANDER, _GYRO_WANDER = math.radians(1.7), math.radians(0.1)
+# The same of a heading that a camera shows: its error changes as the vehicle crosses the view.
+_SIGHT_WANDER = math.radians(0.3)
 _SPAN_NS = 2 * NS_PER_S  # between two uses of the heading
 _LOST_S = 2.0  # a camera that has not shown the heading for longer is begun anew, or another one takes its place
 _GATE = 9.0  # a heading with a larger disagreement says nothing of the bias
@@ -53,7 +55,7 @@ class GyroBias:
     def go_on(self, elapsed_s: float, within_s: float) -> None:
         """Integrate over a time; with a known bias accelerometers draw the tilt back over within_s."""
         self._tilt.go_on(elapsed_s, _SETTLED_RAD**2 / within_s)
-        self._turn.go_on(elapsed_s, _GYRO_WANDER**2)
+        self._turn.go_on(elapsed_s, _SIGHT_WANDER**2)
 
     def take_tilt(self, elapsed_s: float, within_s: float, ahead_rad: tuple[float, float]) -> tuple[float, float]:
         """Take by how much the accelerometers' roll and pitch exceed ours; returns the corrections of ours [rad]."""

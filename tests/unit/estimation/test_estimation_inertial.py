@@ -164,8 +164,8 @@ def test_in_flight_a_fixed_camera_tells_the_bias_of_the_heading_and_acceleromete
         vehicle.attitude.take_sight("ceiling", vehicle.now, math.remainder(shown, math.tau), 0.035**2)
     found, bias = vehicle.attitude.at(vehicle.now), vehicle.attitude._bias
     assert found is not None
-    assert math.degrees(found.yaw_std_rad) < 0.3
-    assert abs(bias.rad_s[2] - BIAS[2]) < 3.0 * math.sqrt(bias._turn.bias_variance) < math.radians(0.15)
+    assert math.degrees(found.yaw_std_rad) < 0.4
+    assert abs(bias.rad_s[2] - BIAS[2]) < 3.0 * math.sqrt(bias._turn.bias_variance) < math.radians(0.3)
     assert vehicle.tilt_error_deg < math.degrees(found.attitude_std_rad) < 0.7
 
 

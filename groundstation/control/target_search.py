@@ -4,6 +4,7 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from itertools import combinations
 
 import numpy as np
 
@@ -29,6 +30,8 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _STEP_NS = 100 * NS_PER_MS  # of the maps' motion
 _SLOW_SEARCH_S = 999.0
+_AT_ONCE_NS = 100 * NS_PER_MS  # longest time between two last sightings of the same moment
+_TWO_SIDES_COS = math.cos(math.radians(30.0))
 _TIPPED_M = 0.08  # error of a picture at the distance of a target, since the robot is not level as believed
 
 
@@ -91,7 +94,7 @@ class Search:
         self._pictures: list[SearchedPicture] = []
         self._history = BeliefHistory()
         self._moved_ns = 0
-        self._shown_ns: dict[str, int] = {}
+        self._shown_ns: dict[str, dict[str, int]] = {name: {} for name in targets}
         self._outlook = NO_OUTLOOK
         self._planned: tuple[int, tuple[str, ...], tuple[str, ...]] = (0, (), ())
 
@@ -104,7 +107,8 @@ class Search:
         """Take a sighting; even if the filter refuses it, the target is where a camera sees it."""
         name = sighting.subject
         if sighting.observer in self._cameras and name in self.targets:
-            self._shown_ns[name] = max(sighting.header.stamp_ns, self._shown_ns.get(name, 0))
+            shown_ns, observer = self._shown_ns[name], sighting.observer
+            shown_ns[observer] = max(sighting.header.stamp_ns, shown_ns.get(observer, 0))
 
     def is_missing(self, name: str) -> bool:
         """Return whether a target is searched for."""
@@ -112,7 +116,7 @@ class Search:
 
     def shown_s(self, name: str, now_ns: int) -> float:
         """Return for how long no picture has shown a target [s]; infinite if none ever did."""
-        stamp_ns = self._shown_ns.get(name)
+        stamp_ns = max(self._shown_ns[name].values(), default=None)
         return math.inf if stamp_ns is None else (now_ns - stamp_ns) / NS_PER_S
 
     def advance(self, belief: JointBelief, ages_s: Mapping[str, float]) -> tuple[str, ...]:
@@ -179,8 +183,8 @@ class Search:
         mean, covariance = belief.mean_of(name)[:2], belief.covariance_of(name)[:2, :2]
         room = state.room
         if room is None:
-            room, predicted = lost_at(self.grid, mean, covariance), _place_and_variance(belief, name)
-            state = replace(state, predicted=predicted)
+            room = lost_at(self.grid, mean, covariance, at_once=self._lost_at_once(name, mean))
+            state = replace(state, predicted=_place_and_variance(belief, name))
         state = replace(state, room=room, near=True)
         if state.given_up:
             return state
@@ -190,6 +194,15 @@ class Search:
         if age_s > self._lost_after_s and state.mode is SearchMode.TRACK:
             return replace(state, mode=SearchMode.SEARCH, since_ns=now_ns)
         return state
+
+    def _lost_at_once(self, name: str, place: Array) -> bool:
+        """Return whether cameras on two sides of a place (2) [m; world] last saw a target there in the same moment."""
+        shown_ns = self._shown_ns[name]
+        last_ns = max(shown_ns.values(), default=0)
+        poses = {eye: self._pose_at(eye, ns)[0] for eye, ns in shown_ns.items() if last_ns - ns <= _AT_ONCE_NS}
+        at = np.append(place, self._sensors.marker_height_m[name])
+        lines = [self._sensors.eye(eye, pose) - at for eye, pose in poses.items() if pose is not None]
+        return any(a @ b < _TWO_SIDES_COS * np.linalg.norm(a) * np.linalg.norm(b) for a, b in combinations(lines, 2))
 
     def _anywhere(self, belief: JointBelief) -> RoomMap:
         """Return the map of a target that was never seen: likeliest ahead of the team, which starts towards it."""

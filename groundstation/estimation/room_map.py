@@ -26,6 +26,8 @@ _THERE, _NEAR, _ANYWHERE = 0.6, 0.3, 0.1
 _NEAR_M = 1.2
 _HINTED = 0.5
 _HIDDEN = 0.5  # share of a target that is where it was predicted: somebody stands in the way
+# Who walks by hides a target from cameras on two sides one after the other: so rarely at once (docs/decisions/9501).
+_HIDDEN_AT_ONCE = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,10 +143,11 @@ def unknown_place(grid: RoomGrid, hints: Sequence[tuple[float, float]] = ()) -> 
     return _shared(grid, _HINTED * near / near.sum() + (1.0 - _HINTED) * even)
 
 
-def lost_at(grid: RoomGrid, mean: Sequence[float] | Array, covariance: Array) -> RoomMap:
+def lost_at(grid: RoomGrid, mean: Sequence[float] | Array, covariance: Array, at_once: bool = False) -> RoomMap:
     """Return the map of a target that was predicted at a Gaussian place (2), (2, 2) and is not seen any more.
 
-    It may be hidden there; or it was carried away, so places near to it and the whole room have their share.
+    It may be hidden there, but rarely if cameras on two sides lost it at once; or it was carried away, so places near
+    to it and the whole room have their share.
     """
     dx, dy = grid.xs[None, :] - mean[0], grid.ys[:, None] - mean[1]
     wide = np.asarray(covariance) + (0.5 * grid.cell_m) ** 2 * np.eye(2)
@@ -154,7 +157,9 @@ def lost_at(grid: RoomGrid, mean: Sequence[float] | Array, covariance: Array) ->
     near = np.exp(-(away - away.min()) / _NEAR_M)  # of a place far beyond the walls, the nearest cells
     there *= _THERE / there.sum()
     elsewhere = _NEAR * near / near.sum() + _ANYWHERE / there.size
-    return _shared(grid, elsewhere, (1.0 - _HIDDEN) * there, _HIDDEN * there)
+    share = _HIDDEN * (_HIDDEN_AT_ONCE if at_once else 1.0)
+    total = 1.0 - _THERE * (_HIDDEN - share)
+    return _shared(grid, elsewhere / total, (1.0 - _HIDDEN) * there / total, share * there / total)
 
 
 def _squared_distance(dx: Array, dy: Array, covariance: Array) -> Array:

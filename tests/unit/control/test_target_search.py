@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from groundstation.bus.messages import Header, SearchedPicture
+from groundstation.bus.messages import Header, RelativeObservation, SearchedPicture
 from groundstation.control.coverage import choose_stands
 from groundstation.control.excursion import Excursions
 from groundstation.control.parameters import ControlParameters, control_from_field
@@ -48,6 +48,14 @@ def belief(poses: dict[str, np.ndarray], stamp_s: float, target: tuple[float, fl
 def picture(observer: str, stamp_s: float, *found: str) -> SearchedPicture:
     header = Header(round(stamp_s * 1e9), "c", observer, observer, round(stamp_s * 100))
     return SearchedPicture(header=header, observer=observer, camera=f"{observer}_camera", found=found)
+
+
+def sighting(observer: str, stamp_s: float) -> RelativeObservation:
+    header = Header(round(stamp_s * 1e9), "c", observer, observer, round(stamp_s * 100))
+    return RelativeObservation(
+        header=header, observer=observer, subject="turtlebot", camera=f"{observer}_camera", position_m=(0.0, 0.0, 1.0),
+        yaw_rad=0.0, covariance=tuple((1e-4 * np.eye(4)).ravel().tolist()), margin=2.0, roll_rad=0.0, pitch_rad=0.0,
+    )  # fmt: skip
 
 
 def new_search(
@@ -212,6 +220,34 @@ def test_a_target_that_pictures_do_not_show_may_be_hidden_and_then_is_no_longer_
     search.advance(belief(poses, now_s + 0.02, (2.0, 1.0)), {"turtlebot": 0.1})
     assert search.targets["turtlebot"].mode is SearchMode.TRACK
     assert search.targets["turtlebot"].room is None
+
+
+def given_up_after_s(bearing_deg: float, sooner_s: float) -> float:
+    """Return after which time unseen a target at (1, 0) is given up.
+
+    bearing_deg: of drone_2 from there; drone_1's is 180; sooner_s: how long before drone_1 drone_2 saw it last.
+    """
+    search, bearing = new_search(), math.radians(bearing_deg)
+    poses = {
+        "drone_1": np.array([0.0, 0.0, 1.6, 0.0]),
+        "drone_2": np.array([1.0 + math.cos(bearing), math.sin(bearing), 1.6, bearing + math.pi]),
+    }
+    for tick in range(1, 200):
+        now_s, age_s = 0.02 * tick, max(0.0, 0.02 * tick - 1.0)
+        for name, last_s in zip(NAMES, (1.0, 1.0 - sooner_s), strict=True):
+            if now_s <= last_s:
+                search.see(sighting(name, now_s))
+            elif tick % 8 == 0:
+                search.take(picture(name, now_s))
+        if search.advance(belief(poses, now_s, (1.0, 0.0)), {"turtlebot": age_s}):
+            return age_s
+    return math.inf
+
+
+def test_a_target_that_two_sides_lose_at_once_is_not_hidden_by_a_passer_by() -> None:
+    assert given_up_after_s(bearing_deg=-90.0, sooner_s=0.06) < 1.2
+    assert given_up_after_s(bearing_deg=-90.0, sooner_s=0.3) > 1.9
+    assert given_up_after_s(bearing_deg=170.0, sooner_s=0.0) > 1.9
 
 
 def test_pictures_that_show_it_or_look_elsewhere_change_nothing() -> None:

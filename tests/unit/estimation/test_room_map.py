@@ -29,6 +29,14 @@ def test_a_lost_target_is_mostly_where_it_was_predicted_and_a_little_anywhere() 
     assert room.chances.min() > 0.0
 
 
+def test_a_target_that_two_sides_lost_at_once_is_hardly_hidden() -> None:
+    usual, at_once = (lost_at(GRID, (1.0, -0.5), 0.04 * np.eye(2), once) for once in (False, True))
+    assert at_once.chances.sum() == pytest.approx(1.0)
+    assert usual.hidden.sum() == pytest.approx(0.3)
+    assert at_once.hidden.sum() < 0.05
+    assert at_once.goes_on.sum() > usual.goes_on.sum()
+
+
 def test_a_target_that_was_never_seen_is_rather_where_a_hint_says() -> None:
     room = unknown_place(GRID, [(-0.5, 0.5), (-0.5, -0.5)])
     assert room.chances.sum() == pytest.approx(1.0)

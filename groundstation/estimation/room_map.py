@@ -26,7 +26,7 @@ _THERE, _NEAR, _ANYWHERE = 0.6, 0.3, 0.1
 _NEAR_M = 1.2
 _HINTED = 0.5
 _HIDDEN = 0.5  # share of a target that is where it was predicted: somebody stands in the way
-# Who walks by hides a target from cameras on two sides one after the other: so rarely at once (docs/decisions/9501).
+# Who walks by hides a target from cameras on two sides one after the other: so rarely at once (docs/decisions/0274).
 _HIDDEN_AT_ONCE = 0.1
 
 

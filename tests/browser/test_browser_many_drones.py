@@ -59,7 +59,7 @@ def test_what_eight_do_is_counted_and_who_is_lost_named(large_stage: Any) -> Non
     all_at_once(flight)
     page.wait(lambda s: page.there("team-mode").inner_text() == "LANDING")
     page.wait(lambda s: page.there("hold").inner_text() == "HOLD\n5 hover;\nothers land")
-    told = "3 track the target; 2 hover; 1 lands; 1 stands; 1 flies on unseen. Lost: drone_6, not seen for 4 s."
+    told = "4 track the target; 2 hover; 1 lands; 1 stands. Lost: drone_6, not seen for 4 s."
     page.wait(lambda s: page.there("verdict").inner_text().startswith(told))
     page.wait(lambda s: page.there("drone_6-mode").inner_text() == "lost")
     flight.modes = dict.fromkeys(flight.drones, "TRACK")

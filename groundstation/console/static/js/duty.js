@@ -40,7 +40,7 @@ function tracked(name, plan, room) {
   const task = sought.length ? `${search} ${joined(sought)}` : `tracks ${joined(targets)}`;
   const how = watched.length ? `: watches ${watching(watched, targets)}` : sought.length ? "" : ": moves to where it will see it";
   const known = isLost(name) ? "" : watchers.length ? `Seen by ${joined(watchers.map(watcher))}.` : `${unseen(name)}.`;
-  const does = (order) => (isLost(name) ? `${unseen(name)}. Until then it ${task}${how}.` : sentence(`${task}${order}${how}`));
+  const does = (order) => (isLost(name) ? `${unseen(name)}. Until then it ${task}.` : sentence(`${task}${order}${how}`));
   const told = (order) => [does(order), known, limits && `Slowed by ${limits}.`].filter(Boolean).join(" ");
   // Where a card has no room for who asked, the list of orders says it.
   const whole = told(who && !isBlind(name) ? `, ${orderedBy(who, name, "tracking")}` : "");

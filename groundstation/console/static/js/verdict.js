@@ -26,7 +26,7 @@ function landings(soon) {
 
 function deeds() {
   const counted = droneNames().length > NAMED, deaf = up().filter(isUnheard), soon = droneNames().filter((name) => landsIn(name) && !deaf.includes(name));
-  const stray = trackerSilent() || lostTarget() ? [] : doing("TRACK").filter((name) => isLost(name) && !soon.includes(name) && !deaf.includes(name)), named = [...deaf, ...soon, ...stray];
+  const stray = counted || trackerSilent() || lostTarget() ? [] : doing("TRACK").filter((name) => isLost(name) && !soon.includes(name) && !deaf.includes(name)), named = [...deaf, ...soon, ...stray];
   const doers = (mode) => (mode === "HOVER" ? droneNames().filter((name) => [...doing(mode), ...doing("HOLD")].includes(name)) : doing(mode));
   const modal = Object.entries(DEEDS).map(([mode, words]) => [doers(mode).filter((name) => !named.includes(name)), mode !== "TRACK" ? words : trackerSilent() ? ALONE : !lostTarget() ? words : doing(mode).every(isBlind) ? BLIND : LOOKS]);
   const told = [[deaf, UNHEARD], ...landings(soon), ...modal, [stray, UNSEEN]].filter(([names]) => names.length);

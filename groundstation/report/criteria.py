@@ -19,6 +19,7 @@ MAX_MISSED_PERCENT = 1.0
 MIN_RATE_SHARE = 0.98
 MAX_SIM_OVERRUN_PERCENT = 1.0
 MAX_STARVED_S = 1.0
+_SAFE = frozenset({"max_fence_violation_m", "min_separation_m", "landed"})
 MAX_AIRBORNE_S = 40.0
 # Drones take off one by one. An emulated AR.Drone takes 5.2 s until it is seen in flight, on a full machine 7 s.
 AIRBORNE_S_PER_DRONE = 10.0
@@ -67,12 +68,16 @@ def criteria_of(figures: RunFigures, field: ResolvedField, facts: RunFacts) -> l
 
 
 def invalidity(figures: RunFigures, criteria: Sequence[Criterion]) -> str:
-    """Return why the figures of a simulated run mean nothing, "" if they count: the computer was too busy for it."""
+    """Return why the figures of a simulated run mean nothing, "" if they count: the computer was too busy for it.
+
+    Drones must land, within the fence and apart, on the busiest computer as well.
+    """
     if figures.sim_overrun_percent is None:
         return ""
     if figures.sim_overrun_percent > MAX_SIM_OVERRUN_PERCENT:
         return "the simulator did not keep real time"
-    if figures.starved_s > MAX_STARVED_S and not all(criterion.ok for criterion in criteria):
+    failed = {criterion.name for criterion in criteria if not criterion.ok}
+    if figures.starved_s > MAX_STARVED_S and failed and not failed & _SAFE:
         return f"other programs kept it from the processor for {figures.starved_s:.0f} s"
     return ""
 

@@ -82,7 +82,7 @@ class Run:
     def report(self) -> dict[str, Any]:
         judged: dict[str, Any] = json.loads((self.run_folder / "report.json").read_text())
         if not judged["valid"]:
-            pytest.skip("the simulator did not keep real time: nothing is shown")
+            pytest.skip(f"{'; '.join(judged['reasons'])}: nothing is shown")
         return judged
 
     def close(self) -> None:

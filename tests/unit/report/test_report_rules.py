@@ -160,9 +160,11 @@ def test_a_run_is_starved_while_it_waits_for_cores_that_others_use(
 
 def test_a_starved_simulated_run_that_fails_says_nothing_and_one_that_passes_counts() -> None:
     figures = msgspec.structs.replace(figures_of(_data()), sim_overrun_percent=0.9, starved_s=4.0)
-    met, missed = Criterion("landed", True, "==", True, ok=True), Criterion("landed", False, "==", True, ok=False)
+    met, missed = Criterion("landed", True, "==", True, ok=True), Criterion("target_lost_s", 2.1, "<=", 2.0, ok=False)
+    unsafe = Criterion("max_fence_violation_m", 0.1, "<=", 0.0, ok=False)
     assert invalidity(figures, [met]) == ""
     assert invalidity(figures, [met, missed]) == "other programs kept it from the processor for 4 s"
+    assert invalidity(figures, [missed, unsafe]) == ""  # that must not happen on any computer
     assert invalidity(msgspec.structs.replace(figures, starved_s=1.0), [missed]) == ""
     assert invalidity(msgspec.structs.replace(figures, sim_overrun_percent=None), [missed]) == ""
 

@@ -132,9 +132,7 @@ def test_who_crashed_is_not_sent_up_while_others_fly(stage: Any) -> None:
     down = "Is on the floor, motors off: "
     assert page.there("drone_2-duty").inner_text() == f"{down}its own emergency stop."
     stage.flight.detail["drone_2"] = "motors cut by operator"
-    page.wait(
-        lambda s: page.there("drone_2-duty").inner_text().startswith(f"{down}CUT MOTORS ordered at the run's terminal")
-    )
+    page.wait(lambda s: page.there("drone_2-duty").inner_text().startswith(f"{down}CUT MOTORS ordered at the terminal"))
     stage.flight.modes["drone_1"] = "LANDED"
     page.wait(lambda s: page.there("drone_2-takeoff").inner_text() == "Take off\nrises, if able")
 
@@ -190,6 +188,4 @@ def test_who_asked_the_terminal_is_who_ordered_it(stage: Any) -> None:
     page.wait(lambda s: page.there("drone_1-duty").inner_text().startswith("Tracks turtlebot, ordered by you: "))
     page.wait(lambda s: any("passed on for you" in line for line in page.there("order").all_inner_texts()))
     order(stage.flight, m.Verb.TRACK, "operator")
-    page.wait(
-        lambda s: page.there("drone_1-duty").inner_text().startswith("Tracks turtlebot, ordered at the run's terminal")
-    )
+    page.wait(lambda s: page.there("drone_1-duty").inner_text().startswith("Tracks turtlebot, ordered at the terminal"))

@@ -184,7 +184,7 @@ def test_one_sentence_says_what_the_team_does_and_what_may_be_done(stage: Any) -
 def test_each_drone_says_what_it_does_and_why(stage: Any) -> None:
     page = stage.open()
     duty = page.there("drone_1-duty")
-    page.wait(lambda s: duty.inner_text().startswith("Tracks turtlebot, ordered at the run's terminal: watches it. "))
+    page.wait(lambda s: duty.inner_text().startswith("Tracks turtlebot, ordered at the terminal: watches it. "))
     assert "Seen by ceiling camera." in duty.inner_text()
     stage.flight.fenced = True
     page.wait(lambda s: "Slowed by the fence." in page.there("drone_2-duty").inner_text())
@@ -202,7 +202,7 @@ def test_each_drone_says_what_it_does_and_why(stage: Any) -> None:
     stage.flight.lands_in_s.clear()
     stage.flight.braked.clear()
     stage.flight.modes["drone_1"] = "HOLD"
-    page.wait(lambda s: duty.inner_text() == "Hovers in place: HOLD ordered at the run's terminal.")
+    page.wait(lambda s: duty.inner_text() == "Hovers in place: HOLD ordered at the terminal.")
     assert page.there("hold").inner_text() == "HOLD\nboth hover in place"
     stage.flight.modes = {"drone_1": "LANDED", "drone_2": "LANDED"}
     page.wait(lambda s: page.there("hold").inner_text() == "HOLD\nnobody flies")

@@ -16,4 +16,4 @@ export function askedBy({ by, verb, given_ms: at }) {
   return by === TERMINAL ? (store.s.orders ?? []).find(asks)?.by ?? "" : "";
 }
 
-export const ordered = (by) => (by === TERMINAL ? "ordered at the run's terminal" : `ordered by ${giver(by)}`);
+export const ordered = (by) => (by === TERMINAL ? "ordered at the terminal" : `ordered by ${giver(by)}`);

@@ -11,6 +11,8 @@ import pytest
 
 HERE = Path(__file__).parent
 WITHIN_S = 20.0
+# A process that starts beside flights, at the pages' low priority.
+STARTED_WITHIN_S = 60.0
 
 
 def eventually(condition: Callable[[], Any], within_s: float = WITHIN_S, what: str = "") -> Any:
@@ -44,6 +46,15 @@ class Seen:
                 return state
             self.page.wait_for_timeout(50)
         pytest.fail(f"the page did not come to this within {within_s:g} s")
+
+    def slow_down(self, times: int) -> None:
+        """Let the page's clocks go slower than the computer's, which may need long for what the page waits for."""
+        self.page.evaluate(
+            """(times) => { for (const clock of [performance, Date]) {
+                const now = clock.now.bind(clock), start = now();
+                clock.now = () => start + (now() - start) / times; } }""",
+            times,
+        )
 
     def there(self, testid: str) -> Any:
         return self.page.get_by_test_id(testid)
@@ -95,6 +106,6 @@ def open_seen(browser: Any, contexts: list[Any], url: str, role: str = "", scrip
             return False
         return True
 
-    eventually(answers, what="the console answers")
+    eventually(answers, STARTED_WITHIN_S, "the console answers")
     seen.wait(lambda state: state["frames"] > 2 and state["trusted"])
     return seen

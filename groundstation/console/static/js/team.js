@@ -15,7 +15,7 @@ const STALE_S = 1;
 const STRAYS = new Set(["TRACK", "HOVER", "HOLD"]);
 const LEVELS = { TRACK: "good", HOVER: "good", HOLD: "warn", TAKING_OFF: "warn", LANDING: "warn", CUT: "bad", LANDED: "calm", CONNECTING: "calm" };
 const NARROW = matchMedia("(max-width: 1380px)"), LOW = matchMedia("(max-height: 990px)");
-const FEW = 3, ROOM = { usual: 135, few: 95 }; // cards; letters, and those of many cards or large print
+const FEW = 3, ROOM = 95; // cards; letters of what a drone does
 const cards = new Map();
 
 export function startTeam() {
@@ -116,10 +116,8 @@ function unheardWords(name) {
   return `It is not heard: it ${store.s.vehicles[name].mode === "LANDING" ? "was landing" : "hovers, then lands by itself"}. Stops are sent to it.`;
 }
 
-const isTight = () => byId("team").classList.contains("crowd") || document.body.classList.contains("wall");
-
 function showDuty(node, name, silent) {
-  text(node, silent ? unheardWords(name) : withShortNames(dutyOf(name, isTight() ? ROOM.few : ROOM.usual)));
+  text(node, silent ? unheardWords(name) : withShortNames(dutyOf(name, ROOM)));
   node.classList.toggle("low", Boolean(landsIn(name) || silent));
 }
 

@@ -19,6 +19,9 @@ MAX_MISSED_PERCENT = 1.0
 MIN_RATE_SHARE = 0.98
 MAX_SIM_OVERRUN_PERCENT = 1.0
 MAX_STARVED_S = 1.0
+# Share of the time; and what runs beside a flight, at low priority.
+_MOST_WAITED = 0.3
+_IN_NO_HURRY = frozenset({"diagnosis", "recorder", "console"})
 _SAFE = frozenset({"max_fence_violation_m", "min_separation_m", "landed"})
 MAX_AIRBORNE_S = 40.0
 # Drones take off one by one. An emulated AR.Drone takes 5.2 s until it is seen in flight, on a full machine 7 s.
@@ -80,6 +83,15 @@ def invalidity(figures: RunFigures, criteria: Sequence[Criterion]) -> str:
     if figures.starved_s > MAX_STARVED_S and failed and not failed & _SAFE:
         return f"other programs kept it from the processor for {figures.starved_s:.0f} s"
     return ""
+
+
+def overload(figures: RunFigures) -> str:
+    """Return which process waited longest for a core, of those that a flight waits for; "" if none did for long."""
+    flying = {name: share for name, share in figures.waited.items() if name not in _IN_NO_HURRY}
+    name = max(flying, key=flying.__getitem__, default="")
+    if not name or flying[name] < _MOST_WAITED:
+        return ""
+    return f"{name} waited for a core {flying[name]:.0%} of the time: this computer is too busy, or too small for it"
 
 
 def _against_truth(figures: RunFigures, field: ResolvedField, expected: Expectation) -> Iterator[Criterion]:

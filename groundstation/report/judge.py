@@ -11,7 +11,7 @@ from groundstation.recording.part_names import shown
 from groundstation.recording.rerun import Rerun
 from groundstation.recording.stretch import Stretch
 from groundstation.report import run_facts
-from groundstation.report.criteria import Criterion, criteria_of, invalidity
+from groundstation.report.criteria import Criterion, criteria_of, invalidity, overload
 from groundstation.report.expectation import expectation_of
 from groundstation.report.findings import Findings, findings_of
 from groundstation.report.metrics import RunFigures, figures_of
@@ -76,6 +76,7 @@ class RunReport:
         if self.broken_off and not self.figures.tracked_s:
             return (self.broken_off,)  # without a flight every other criterion is missed for that reason
         missing = tuple(missed(criterion) for criterion in self.criteria if not criterion.ok)
+        missing += tuple(filter(None, [overload(self.figures)]))
         if self.recorded_s is None:
             return missing
         return (f"the recording breaks off after {self.recorded_s:.0f} s, before the run ended", *missing)

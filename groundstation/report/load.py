@@ -78,6 +78,16 @@ def starved_s(data: RunData, start_s: float, end_s: float) -> float:
     return float(np.count_nonzero((waited >= _WAITED) & (others >= _OTHERS_CPU)))
 
 
+def waited(data: RunData, start_s: float, end_s: float) -> dict[str, float]:
+    """Return the share of a time for which each process waited for a core; processes that say nothing are left out."""
+    shares: dict[str, float] = {}
+    for name, track in sorted(data.processes.items()):
+        during = track.waited[(track.time_s > start_s) & (track.time_s <= end_s)]
+        if len(during):
+            shares[name] = float(np.mean(during))
+    return shares
+
+
 def planner_ms(data: RunData) -> tuple[float, float] | None:
     """Return median and 99th percentile of the planner's time [ms]."""
     if not data.plans:

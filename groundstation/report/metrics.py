@@ -21,7 +21,7 @@ class RunFigures(msgspec.Struct, frozen=True, kw_only=True):
     each target from when it was found, None if it never was.
     failsafe_landings: which drones a failsafe landed or cut, when and why. truth: what the errors are measured against,
     a motion capture system of the field or the simulator, "" for nothing. starved_s: how long other programs of the
-    computer kept processes of the run from it.
+    computer kept processes of the run from it; waited: the share of the time for which each waited for a core.
     """
 
     tracked_s: float
@@ -47,6 +47,7 @@ class RunFigures(msgspec.Struct, frozen=True, kw_only=True):
     cpu_cores: dict[str, float]
     sim_overrun_percent: float | None
     starved_s: float = 0.0
+    waited: dict[str, float] = {}
     command_to_airborne_s: float | None
     verdicts: dict[str, int]
     mean_nis: dict[str, float]
@@ -92,6 +93,7 @@ def figures_of(data: RunData) -> RunFigures:
         cpu_cores=cores,
         sim_overrun_percent=load.sim_overrun_percent(data),
         starved_s=load.starved_s(data, *(interval or (0.0, data.end_s))),
+        waited=load.waited(data, *(interval or (0.0, data.end_s))),
         command_to_airborne_s=_command_to_airborne_s(data),
         verdicts=dict(Counter(str(item.message.verdict) for item in data.innovations)),
         mean_nis=_mean_nis(data),

@@ -14,7 +14,7 @@ from groundstation.field.targets import DroneMarker
 from groundstation.geometry.ellipse import semi_axes_95
 from groundstation.report import load, topology_use
 from groundstation.report.accuracy import accuracy
-from groundstation.report.criteria import Criterion, criteria_of, invalidity
+from groundstation.report.criteria import Criterion, criteria_of, invalidity, overload
 from groundstation.report.interval import tracking_interval
 from groundstation.report.judge import judge
 from groundstation.report.metrics import figures_of
@@ -156,6 +156,14 @@ def test_a_run_is_starved_while_it_waits_for_cores_that_others_use(
     waited: float, others_cpu: float, starved_s: float
 ) -> None:
     assert load.starved_s(_load(waited, others_cpu), 5.0, 30.0) == starved_s
+
+
+def test_a_run_that_waits_for_cores_of_a_small_computer_is_told_so() -> None:
+    shares = load.waited(_load(0.6, 0.1), 2.0, 12.0)
+    assert shares == {"camera": pytest.approx(0.6), "supervisor": pytest.approx(0.0)}
+    figures = msgspec.structs.replace(figures_of(_data()), waited={**shares, "diagnosis": 0.9})
+    assert overload(figures).startswith("camera waited for a core 60% of the time")
+    assert overload(msgspec.structs.replace(figures, waited={"camera": 0.2, "diagnosis": 0.9})) == ""
 
 
 def test_a_starved_simulated_run_that_fails_says_nothing_and_one_that_passes_counts() -> None:

@@ -208,7 +208,7 @@ def _run(
     removed = [] if output else make_room(Path(field.recording.directory), field.recording.keep_gb)
     run_dir = make_run_dir(output or Path(field.recording.directory), path.stem)
     (run_dir / "resolved.yaml").write_text(yaml_of(field))
-    write_facts(run_dir, facts)
+    write_facts(run_dir, facts, asks=plan.asks)
     log_to(run_dir)
     endpoint = simulation.network.endpoint if simulation else fly_endpoint(field)
     monitor = not headless and can_be_drawn_on()

@@ -10,6 +10,7 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 # Two pictures a second, the lowest rate met on a busy machine, make a median in this time.
 _LONGEST_NS = 8 * NS_PER_S
 _AGAIN_NS = 200 * NS_PER_MS
+_STEADY_NS = 2 * NS_PER_S  # who would be left out is told anew once it has been the same for as long
 
 
 class Looking:
@@ -21,6 +22,7 @@ class Looking:
     def __init__(self, checks: BeforeTakeOff, drones: Collection[str], now_ns: int) -> None:
         self._checks, self._drones, self._began_ns, self._next_ns = checks, drones, now_ns, now_ns
         self._left_out: tuple[str, ...] = ()
+        self._told: tuple[str, ...] = ()
         self._findings: list[Finding] = []
         self._found_ns = now_ns
         self.forbidden = self.nobody = False
@@ -43,5 +45,19 @@ class Looking:
         self._checks.publish(self._findings, self._found_ns)
         yield from lines(one for one in self._findings if whole or one.level is not Level.OK)
         musts = sum(one.level is Level.MUST for one in self._findings)
-        who = "nobody would take off" if self.nobody else f"{' and '.join(self._left_out)} would be left out"
-        yield f"before take-off: {musts or 'nothing'} must be mended{f'; {who}' if self._left_out else ''}"
+        self._told = self._left_out
+        yield f"before take-off: {musts or 'nothing'} must be mended{f'; {self._who()}' if self._left_out else ''}"
+
+    def told_anew(self, now_ns: int) -> str:
+        """Return who would be left out by now, if that has changed for good since it was told; "" otherwise."""
+        if now_ns < self._next_ns:
+            return ""
+        self._next_ns, before = now_ns + _STEADY_NS, self._left_out
+        self._left_out = self._checks.left_out(now_ns)
+        if self._left_out != before or self._left_out == self._told:
+            return ""
+        self._told, self.nobody = self._left_out, set(self._left_out) >= set(self._drones)
+        return f"before take-off: {self._who() if self._left_out else 'nobody would be left out any more'}"
+
+    def _who(self) -> str:
+        return "nobody would take off" if self.nobody else f"{' and '.join(self._left_out)} would be left out"

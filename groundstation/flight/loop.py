@@ -47,6 +47,7 @@ class Flight:
         self._began_ns = time.monotonic_ns()
         self._keyboard, self._sleep = keyboard or Keyboard(), SleepWatch()
         self._prompting = False
+        self._looking: Looking | None = None
         self._grounded = False
         self._forbidden = False
 
@@ -107,7 +108,7 @@ class Flight:
 
     def _look(self, operator: Operator, checks: BeforeTakeOff) -> bool:
         """Wait for the evidence of the checks, and report the findings; return whether nothing more is to be done."""
-        looking = Looking(checks, self._supervisor.run.drones, self._turn(operator))
+        self._looking = looking = Looking(checks, self._supervisor.run.drones, self._turn(operator))
         while not self._breaks_off():
             if looking.finished(self._turn(operator)):
                 for line in looking.tell(whole=self._plan.look_only):
@@ -185,6 +186,8 @@ class Flight:
             self._prompting = False  # another shell was faster
         else:
             self._answer(operator, now_ns)
+            if self._looking is not None and (anew := self._looking.told_anew(now_ns)):
+                self._say(anew)
         if not self._prompting:
             self._start.show_screen()
 

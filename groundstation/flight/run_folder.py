@@ -51,9 +51,12 @@ def make_run_dir(parent: Path, field_name: str) -> Path:
     return path
 
 
-def write_facts(run_dir: Path, facts: run_facts.RunFacts) -> None:
-    """Write how the run was requested, and when this process started: from then on the operator waits."""
-    command_ns, lacked = time.time_ns() - _age_ns(), not kernels.are_compiled()
+def write_facts(run_dir: Path, facts: run_facts.RunFacts, *, asks: bool) -> None:
+    """Write how the run was requested, and when this process started: from then on the operator waits.
+
+    asks: whether the run waits for the operator before the take-off; then that time says nothing.
+    """
+    command_ns, lacked = 0 if asks else time.time_ns() - _age_ns(), not kernels.are_compiled()
     typed = without_passwords(shlex.join(["groundstation", *sys.argv[1:]]))
     known = msgspec.structs.replace(facts, command_unix_ns=command_ns, kernels_lacked=lacked, command=typed)
     run_facts.write(run_dir, known)

@@ -11,10 +11,10 @@ NAME = "run.json"
 class RunFacts(msgspec.Struct, frozen=True, omit_defaults=True):
     """The command that started a run.
 
-    mode: demo, sitl or fly; command_unix_ns: when the operator gave the command (0 = unknown); tracking_s: time of
-    ordered tracking; kernels_lacked: whether they had to be compiled first, once per version; real: real parts of a
-    simulated run; command: as typed, without passwords; expected: the section of the scenario's
-    file, verbatim (`report/expectation.py` reads it).
+    mode: demo, sitl or fly; command_unix_ns: when the operator gave the command (0: unknown, or the run asked before
+    the take-off); tracking_s: time of ordered tracking; kernels_lacked: whether they had to be compiled first, once per
+    version; real: real parts of a simulated run; command: as typed, without passwords; expected: the section of the
+    scenario's file, verbatim (`report/expectation.py` reads it).
     """
 
     mode: str = ""

@@ -205,6 +205,11 @@ def test_a_look_tells_who_would_be_left_out(lab_field: ResolvedField, silent: tu
     who = "drone_2 would be left out" if len(silent) == 1 else "nobody would take off"
     assert list(looking.tell(whole=False))[-1] == f"before take-off: nothing must be mended; {who}"
     assert looking.nobody is (len(silent) == 2)
+    lab.states = dict.fromkeys(lab.states, FlightState.LANDED)
+    lab.turn()
+    said = [looking.told_anew(lab.now_ns + second * 1000 * MS) for second in range(6)]
+    assert [text for text in said if text] == ["before take-off: nobody would be left out any more"]
+    assert not said[1], "it is told once it lasts"
 
 
 @pytest.mark.parametrize(("battery", "level"), [(0.9, None), (0.3, Level.SHOULD), (0.17, Level.MUST)])

@@ -152,14 +152,15 @@ def _battery(name: str, status: VehicleStatus, battery: Battery) -> Iterator[Ala
     if _lands(status) or (below and status.lands_in_s is not None):
         yield Alarm(about, f"{held}, it lands", False, "Nothing to do.")
     elif battery.charge is Charge.EMPTY:
-        yield Alarm(about, f"{held}{battery.good_for}", below, f"{_TO_DO}press Land now; {lands}, wherever it is.")
+        advice = f"{_TO_DO}press Land on its card now; {lands}, wherever it is."
+        yield Alarm(about, f"{held}{battery.good_for}", below, advice)
     else:
         yield Alarm(about, f"{held}{battery.good_for}", False, f"Nothing to do yet: {lands}.")
 
 
 def _link(name: str, share: float | None) -> Iterator[Alarm]:
     if share is not None and share < WEAK_LINK:
-        advice = f"{_TO_DO}press Land, or clear the way to it. Without a link it lands by itself."
+        advice = f"{_TO_DO}press Land on its card, or clear the way to it. Without a link it lands by itself."
         yield Alarm(f"{name} link", f"{name}: weak link, {share:.0%} arrives", share < BAD_LINK, advice)
 
 

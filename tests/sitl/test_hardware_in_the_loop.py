@@ -24,7 +24,7 @@ from real_parts import STAND_IN, Run, field, heights, stand_in, started, true_po
 __all__ = ["stand_in", "started"]  # fixtures
 pytestmark = [pytest.mark.slow, pytest.mark.sitl, pytest.mark.timeout(400)]
 SYSTEM = 8
-# The whole team beside a real firmware takes 2.3 cores (in step it flies on any computer: test_firmware_in_step.py).
+# The whole team beside a firmware takes 2.3 cores (in step it flies on any computer: test_firmware_in_step.py).
 TWO_DRONES = ("--set", "drones.drone_3=null")
 
 
@@ -33,12 +33,12 @@ def test_a_foreign_firmware_flies_in_the_team_and_ctrl_c_lands_it_with_the_other
     tmp_path: Path, started: Callable[..., Run]
 ) -> None:
     path = field(tmp_path, "flavour: ardupilot, system_id: 1", STAND_IN)
-    run = started(path, "--real", "drone_2=autopilot:25648")
+    run = started(path, "--real", "drone_2=autopilot:25648", *TWO_DRONES)
     run.until("To take off and track press Enter", 120)
     time.sleep(3.0)
     assert max(heights(tmp_path)) < 0.1, "nobody takes off unasked"
     run.press_enter()
-    run.until("drone_3: TRACK sent / received / accepted / effective", 90)
+    run.until("drone_2: TRACK sent / received / accepted / effective", 90)
     time.sleep(10.0)
     assert heights(tmp_path)[-1] > 0.5
     run.process.send_signal(signal.SIGINT)

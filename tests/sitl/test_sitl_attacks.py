@@ -54,9 +54,9 @@ class Neighbour:
         return got
 
     def close(self) -> None:
-        if self._process.poll() is None:
-            self._process.kill()
-            self._process.wait()
+        with self._process:  # its pipe is closed as well, where only some of these tests run and none has ended it
+            if self._process.poll() is None:
+                self._process.kill()
 
 
 @pytest.fixture(scope="module")

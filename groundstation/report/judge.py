@@ -75,11 +75,10 @@ class RunReport:
             return (self.invalid,)
         if self.broken_off and not self.figures.tracked_s:
             return (self.broken_off,)  # without a flight every other criterion is missed for that reason
-        missing = tuple(missed(criterion) for criterion in self.criteria if not criterion.ok)
-        missing += tuple(filter(None, [overload(self.figures)]))
-        if self.recorded_s is None:
-            return missing
-        return (f"the recording breaks off after {self.recorded_s:.0f} s, before the run ended", *missing)
+        off = self.recorded_s
+        broken = "" if off is None else f"the recording breaks off after {off:.0f} s, before the run ended"
+        missing = (missed(criterion) for criterion in self.criteria if not criterion.ok)
+        return tuple(filter(None, (broken, *missing, overload(self.figures))))
 
     @property
     def verdict(self) -> str:

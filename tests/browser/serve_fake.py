@@ -3,6 +3,7 @@
 By hand, to work on the page: `python tests/browser/serve_fake.py [PORT]`, then open the address it prints.
 """
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -43,7 +44,8 @@ def start_console(
     sets: list[str] | None = None,
 ) -> "subprocess.Popen[bytes]":
     section = {"field": field_json(port, field, sets), "run_dir": run, "truth": truth}
-    spec = ChildSpec("console", "console", endpoint, "lab", section=msgspec.json.encode(section).decode())
+    told = msgspec.json.encode(section).decode()
+    spec = ChildSpec("console", "console", endpoint, "lab", section=told, nice=os.nice(0))  # not its own share of a run
     process = subprocess.Popen(
         [sys.executable, "-m", "groundstation.process.entry", "console", "groundstation.console.process:run"],
         stdin=subprocess.PIPE,

@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "sitl"))
 from sitl_run import COMMAND, SitlRun
 
 _NODES = Path(__file__).with_name("ros2_nodes.py")
-_START_S, _SPAN_S, _WATCH_S, _LEAST = 30.0, 2.0, 90.0, 16
+_START_S, _TRACK_S, _SPAN_S, _WATCH_S, _LEAST = 30.0, 90.0, 2.0, 90.0, 16
 
 
 class Stage:
@@ -89,7 +89,7 @@ def main(python: str, folder: Path) -> None:
         # How well it flies is not judged here, so a busy machine does without the checks before take-off.
         run = SitlRun(folder, "sitl", "lab", "--anyway", "--duration", "240")
         stack.callback(run.close)
-        run.until(lambda: all(run.mode(name) == "TRACK" for name in run.record.drones), _START_S, "all track")
+        run.until(lambda: all(run.mode(name) == "TRACK" for name in run.record.drones), _TRACK_S, "all track")
         run.until(lambda: any(run.run_dir.glob("state*.mcap")), _START_S, "a recording, which has the field")
         told: dict[str, Any] = {"before": stage.heard()}
         view = stage.start("view", [*COMMAND, "view", "--ros2"])

@@ -18,7 +18,7 @@ import pytest
 HERE = Path(__file__).parent
 ALONE = ["unshare", "--user", "--map-root-user", "--net"]
 
-pytestmark = [pytest.mark.slow, pytest.mark.interop, pytest.mark.timeout(500)]
+pytestmark = [pytest.mark.slow, pytest.mark.interop, pytest.mark.timeout(560)]
 
 
 @pytest.fixture
@@ -36,7 +36,7 @@ def alone(absent: Callable[[str], NoReturn]) -> list[str]:
 def told(alone: list[str], interpreter: Callable[[str], Path], tmp_path: Path) -> dict[str, Any]:
     command = [*alone, sys.executable, str(HERE / "ros2_flight.py"), str(interpreter("zenoh_ros2")), str(tmp_path)]
     # Longer than all of its own limits together: killed, it would leave its flight behind.
-    done = subprocess.run(command, capture_output=True, text=True, timeout=480, env=os.environ)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=540, env=os.environ)
     assert done.returncode == 0, done.stdout + done.stderr
     told: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
     return told

@@ -14,7 +14,6 @@ from groundstation.time_units import NS_PER_MS
 _TRAIL_POINTS = 300
 _TRAIL_NS = 200 * NS_PER_MS
 _SAMPLES = 240
-_PASSED = 1000
 _SAMPLE_NS = 500 * NS_PER_MS
 
 
@@ -25,8 +24,8 @@ class History:
         self._targets = targets
         self._trails: dict[str, deque[tuple[float, float]]] = {}
         self._samples: deque[dict[str, Any]] = deque(maxlen=_SAMPLES)
-        self._passed: deque[tuple[str, float, float]] = deque(maxlen=_PASSED)
-        self._passed_samples: deque[dict[str, Any]] = deque(maxlen=_SAMPLES)
+        self._new_points: list[tuple[str, float, float]] = []
+        self._new_samples: list[dict[str, Any]] = []
         self._next_trail_ns = self._next_sample_ns = 0
 
     def due(self, now_ns: int) -> bool:
@@ -44,28 +43,26 @@ class History:
         plan: Plan | None,
         nis: float | None,
         truth: Mapping[str, TruthState],
-    ) -> dict[str, Any] | None:
-        """Take due samples; returns a new sample of the curves, if any."""
+    ) -> None:
+        """Take due samples."""
         if estimate is not None and now_ns >= self._next_trail_ns:
             self._next_trail_ns = now_ns + _TRAIL_NS
             for entity in estimate.entities:
                 point = (round(entity.mean[0], 3), round(entity.mean[1], 3))
                 self._trails.setdefault(entity.name, deque(maxlen=_TRAIL_POINTS)).append(point)
-                self._passed.append((entity.name, *point))
+                self._new_points.append((entity.name, *point))
         if not self.sample_due(now_ns):
-            return None
+            return
         self._next_sample_ns = now_ns + _SAMPLE_NS
         sample = self._sample(now_ns, estimate, plan, nis, truth)
         self._samples.append(sample)
-        self._passed_samples.append(sample)
-        return sample
+        self._new_samples.append(sample)
 
-    def take_passed(self) -> dict[str, Any]:
-        """Return and forget the samples since the last call: a fast replay takes several of each at a time."""
-        passed = {"points": list(self._passed), "samples": list(self._passed_samples)}
-        self._passed.clear()
-        self._passed_samples.clear()
-        return passed
+    def take_new(self) -> tuple[list[tuple[str, float, float]], list[dict[str, Any]]]:
+        """Return the points of trails (name, x, y), and the samples, since the last call: of a fast replay many."""
+        new = self._new_points, self._new_samples
+        self._new_points, self._new_samples = [], []
+        return new
 
     def as_json(self) -> dict[str, Any]:
         """Return everything kept."""

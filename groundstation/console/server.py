@@ -252,7 +252,6 @@ class ConsoleServer:
         self.state.put(self.board, now_ns)
         self.state.put_often(self.board, now_ns)
         self.state.put_seldom(self.board, now_ns)
-        self.state.history.take_passed()  # the seed holds it
         self._put_own(now_ns)
         for viewer in self.sessions.viewers.values():
             viewer.reseed()
@@ -272,7 +271,6 @@ class ConsoleServer:
             self.board.put("result", self._result.section())
         if self._player is not None:
             self.board.put("playback", self._player.section())
-            self.board.put("passed", self.state.history.take_passed())
 
     def _hear(self, message: object, now_ns: int) -> None:
         match message:

@@ -44,7 +44,6 @@ class ConsoleState:
         self.truth: dict[str, StampedMessage[m.TruthState]] = {}
         self.search_maps: dict[str, m.SearchMap] = {}
         self.preflight: StampedMessage[m.Preflight] | None = None
-        self._sample: dict[str, Any] | None = None
         self._airborne_since_ns: int | None = None
         self._flown = False
 
@@ -79,7 +78,7 @@ class ConsoleState:
         truth = {name: seen.message for name, seen in self.truth.items()}
         estimate, plan = _current(self.monitor.estimate, now_ns), _current(self.monitor.plan, now_ns)
         nis = self.health.nis() if estimate is not None and self.history.sample_due(now_ns) else None
-        self._sample = self.history.step(now_ns, estimate, plan, nis, truth) or self._sample
+        self.history.step(now_ns, estimate, plan, nis, truth)
 
     def doing(self) -> dict[str, str]:
         """Return what each drone says it does."""
@@ -91,8 +90,9 @@ class ConsoleState:
         board.put("setpoints", {name: told.setpoint(seen) for name, seen in self.setpoints.items()})
         if self.truth:
             board.put("truth", {name: told.truth(seen) for name, seen in self.truth.items()})
-        if self._sample is not None:
-            board.put("sample", self._sample)
+        points, samples = self.history.take_new()
+        board.add("points", points)
+        board.add("samples", samples)
         if board.turn % _OFTEN == 0:
             self.put_often(board, now_ns)
         if board.turn % _SELDOM == 0:

@@ -151,7 +151,7 @@ def test_sections_say_what_came() -> None:
     assert said["events"][0]["remedy"] == "duck"
     assert said["processes"]["tracker"]["late"] == 0.02
     assert said["cameras"]["ceiling"]["fps"] == 15
-    assert said["sample"]["error_m"] == pytest.approx(0.1)
+    assert json.loads(board.since(0))["samples"][0]["error_m"] == pytest.approx(0.1)
     assert any("bang" in alarm["text"] and alarm["grave"] and alarm["asks"] for alarm in said["alarms"])
     assert said["safety"] == {"level": "ACT", "reason": "drone_1: bang. To do: duck"}
 
@@ -183,7 +183,7 @@ def test_curves_of_a_tracker_that_is_silent_end() -> None:
         state.note(NS_PER_S + round(seconds * NS_PER_S))
         board.begin()
         state.put(board, NS_PER_S)
-        samples.append(json.loads(board.since(-1))["sample"])
+        samples += json.loads(board.since(board.turn - 1))["samples"]
     figures = ("axis_m", "cost_cm2", "nis")
     assert all(samples[0][name] is not None for name in figures)
     assert [samples[1][name] for name in figures] == [None, None, None] and samples[1]["topology"] == ""
@@ -205,6 +205,29 @@ def test_the_last_switch_of_topology_stays_with_its_reason() -> None:
     }
 
 
+def test_a_viewer_gets_all_that_was_added_since_its_last_frame() -> None:
+    """One that is slow as well: else trails and curves had holes in a fast replay."""
+    board = Snapshot()
+    for turn in range(1, 4):
+        board.begin()
+        board.put("estimate", turn)
+        board.add("points", [["drone_1", turn], ["drone_2", turn]])
+    assert json.loads(board.since(1)) == {
+        "estimate": 3,
+        "points": [[f"drone_{k}", turn] for turn in (2, 3) for k in (1, 2)],
+    }
+    assert json.loads(board.since(3)) == {} and json.loads(board.since(-1)) == {"estimate": 3}, (
+        "the seed has the history"
+    )
+    board.begin()
+    board.add("points", [])
+    assert json.loads(board.since(3)) == {}
+    board.add("points", ([index] for index in range(1500)))
+    assert len(json.loads(board.since(3))["points"]) == 1000
+    board.forget()
+    assert json.loads(board.since(1)) == {}
+
+
 def test_what_was_never_seen_can_still_be_said() -> None:
     state, board = ConsoleState(Cast("lab", {}, ("turtlebot",)), 0), Snapshot()
     state.ingest([received(t.ESTIMATE, estimate(age_s=1e300))])
@@ -214,15 +237,14 @@ def test_what_was_never_seen_can_still_be_said() -> None:
 
 
 def test_history_keeps_trails_and_samples_within_bounds() -> None:
-    history = History(("turtlebot",))
-    samples = [
+    history, new = History(("turtlebot",)), 0
+    for k in range(20 * 200):
         history.step(NS_PER_S + k * 50_000_000, estimate(NS_PER_S + k * 50_000_000), None, 1.0, {})
-        for k in range(20 * 200)
-    ]
+        new += len(history.take_new()[1])
     kept = history.as_json()
     assert len(kept["trails"]["drone_1"]) == 300 and kept["trails"]["drone_1"][-1] == (1.0, 2.0)
     assert len(kept["samples"]) == 240
-    assert sum(sample is not None for sample in samples) == pytest.approx(400, abs=2)
+    assert new == pytest.approx(400, abs=2)
     assert kept["samples"][-1]["axis_m"] == pytest.approx(0.1 * math.sqrt(5.991), abs=1e-3)
 
 

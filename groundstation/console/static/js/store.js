@@ -2,7 +2,7 @@
 
 import { moment, sinceMs } from "./clock.js";
 
-const TRAIL_MS = 200, TRAIL_POINTS = 300, SAMPLES = 240;
+const TRAIL_POINTS = 300, SAMPLES = 240;
 const OFFSET_WINDOW_MS = 30000;
 
 export const store = {
@@ -10,7 +10,7 @@ export const store = {
   trails: {}, samples: [], receivedAt: -Infinity, serverMs: 0, connected: false,
 };
 
-let offsets = [], heard = moment(), lastTrail = 0, lastSample = 0;
+let offsets = [], heard = moment();
 
 // The greatest difference seen is the one with the least delay: sent and received at nearly the same time.
 function noteClock(serverMs) {
@@ -49,7 +49,6 @@ export const silentS = () => (performance.now() - store.receivedAt) / 1000;
 
 export function takeSeed(seed) {
   offsets = [];
-  lastTrail = lastSample = 0;
   noteClock(seed.now);
   onlyNames(seed);
   Object.assign(store, { scene: seed.scene, s: seed.s, run: seed.run, seq: seed.seq });
@@ -63,37 +62,14 @@ export function takeDelta(delta) {
   store.seq = delta.seq;
   store.frames += 1;
   Object.assign(store.s, onlyNames(delta.s));
-  if (replaying()) return takePassed(delta.s.passed);
-  if (delta.s.estimate) extendTrails(delta.s.estimate);
-  if (delta.s.sample && delta.s.sample.t_ms > lastSample) {
-    lastSample = delta.s.sample.t_ms;
-    store.samples.push(delta.s.sample);
-    if (store.samples.length > SAMPLES) store.samples.shift();
-    return true;
-  }
-  return false;
-}
-
-// A fast replay passes more than one point and sample between two frames.
-function takePassed(passed) {
-  for (const [name, x, y] of passed?.points ?? []) {
+  for (const [name, x, y] of delta.s.points ?? []) {
     const trail = (store.trails[name] ??= []);
     trail.push([x, y]);
     if (trail.length > TRAIL_POINTS) trail.shift();
   }
-  store.samples.push(...(passed?.samples ?? []));
+  store.samples.push(...(delta.s.samples ?? []));
   store.samples.splice(0, Math.max(0, store.samples.length - SAMPLES));
-  return Boolean(passed?.samples.length);
-}
-
-function extendTrails(estimate) {
-  if (estimate.at - lastTrail < TRAIL_MS) return;
-  lastTrail = estimate.at;
-  for (const { name, mean } of estimate.entities) {
-    const trail = (store.trails[name] ??= []);
-    trail.push([mean[0], mean[1]]);
-    if (trail.length > TRAIL_POINTS) trail.shift();
-  }
+  return Boolean(delta.s.samples);
 }
 
 export const entities = () => store.s.estimate?.entities ?? [];

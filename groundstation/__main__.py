@@ -1,7 +1,8 @@
-"""The program `groundstation`: for a stop it raises its priority before it imports anything."""
+"""The program `groundstation`: before it imports anything, it raises its priority for a stop, and takes one thread."""
 
 import sys
 
+from groundstation.process.one_thread import stay_on_one_thread
 from groundstation.process.priority import go_first
 
 # An ordinary process of a shell gets a thirtieth of a busy machine (docs/decisions/0137). A dead man's switch stays
@@ -13,6 +14,7 @@ def main() -> None:
     """Entry point of the `groundstation` script."""
     if sys.argv[1:] and sys.argv[1] in STOPS:
         go_first(heirs=True)
+    stay_on_one_thread()
     from groundstation.cli.main import main as carry_out
 
     carry_out()

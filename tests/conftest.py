@@ -11,6 +11,10 @@ from measurement import Measurement
 
 MEASUREMENT = Measurement()
 
+from groundstation.process.one_thread import stay_on_one_thread
+
+stay_on_one_thread()
+
 from groundstation.field.resolved import ResolvedField
 from groundstation.process import child, numba_cache
 

@@ -10,7 +10,6 @@ from groundstation.cli.exits import ExitCode
 from groundstation.cli.kernels import use_all_kernels
 from groundstation.cli.lists import numbers
 from groundstation.cli.terminal import write_over
-from groundstation.process.one_thread import stay_on_one_thread
 
 
 @click.command(
@@ -37,7 +36,6 @@ def estimator(robots: str, rounds: int, flight_ms: int, field_name: str, seed: i
     required figure is missed, or if the filters do not agree.
     """
     sizes = numbers(robots, "--robots", 2, 40)
-    stay_on_one_thread()
     from groundstation.settings.files import find_field
     from groundstation.settings.load import load_field
     from groundstation.settings.resolved import resolved_field

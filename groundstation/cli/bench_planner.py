@@ -9,7 +9,6 @@ from groundstation.cli.kernels import use_all_kernels
 from groundstation.cli.lists import choices, numbers
 from groundstation.cli.numbers import FiniteRange
 from groundstation.cli.terminal import write_over
-from groundstation.process.one_thread import stay_on_one_thread
 
 _LAYOUTS = ("two-level", "random", "string", "flat")
 _PEERS = ("naive", "numpy", "jax")
@@ -49,7 +48,6 @@ def planner(
     peers = choices(peer, _PEERS, "--peer") if peer else []
     if model == "frustum":
         layouts = _of_the_planner_that_flies(layouts, peers)
-    stay_on_one_thread()
     use_all_kernels()
     from groundstation.bench.planner import run_bench
 

@@ -44,7 +44,7 @@ class Snapshot:
             self._composed.clear()
 
     def add(self, name: str, items: Iterable[Any]) -> None:
-        """Add to a section of what each viewer gets once, with its next frame; the last 1000 are kept for slow ones."""
+        """Add items that each viewer gets once, with its next frame; the last 1000 of a name are kept for slow ones."""
         for item in items:
             self._added.setdefault(name, deque(maxlen=_KEPT)).append((self.turn, _encoder.encode(item)))
             self._composed.clear()

@@ -55,12 +55,12 @@ raise-floors: $(STAMP)-test  ## set the coverage floors to the last run's figure
 # in two halves. What only computes runs beside both, where they leave time, and is printed at its end. The largest
 # flights fill two slow cores and have them to themselves.
 test-slow: $(STAMP)-test-slow  ## flights in real time, browser, programs of other projects; make interop first
-	code=0; $(MAKE) --jobs $(if $(REPEAT),1,3) --keep-going --output-sync=none slow-timed slow-scenarios slow-studies || code=$$?; \
+	code=0; $(MAKE) --jobs $(if $(REPEAT),1,4) --keep-going --output-sync=none slow-timed slow-scenarios slow-studies || code=$$?; \
 	$(MAKE) slow-largest && exit $$code
 
 slow-timed:
 	code=0; $(MAKE) slow-flights || code=$$?; \
-	$(MAKE) --jobs $(if $(REPEAT),1,2) --keep-going --output-sync=none slow-pages-1 slow-pages-2 && exit $$code
+	$(MAKE) slow-pages-1 slow-pages-2 && exit $$code
 
 slow-flights: $(STAMP)-test-slow
 	$(PYTEST) -m "slow and not page and not study and not largest and not firmware and not exhaustive" --timeout 900 tests
@@ -70,12 +70,12 @@ slow-largest: $(STAMP)-test-slow
 
 slow-pages-1: SLOW = "page and not exhaustive" $(wildcard tests/browser/test_browser_[a-l]*.py)
 slow-pages-2: SLOW = "page and not exhaustive" $(wildcard tests/browser/test_browser_[m-z]*.py)
-slow-pages-1 slow-pages-2: export NICE = 0
 slow-scenarios: SLOW = "study and not exhaustive" tests/scenario
 slow-studies: SLOW = "study and not exhaustive" --ignore=tests/scenario --ignore=tests/browser --ignore=tests/sitl tests
+slow-scenarios slow-studies: BESIDE = .ci/background
 slow-pages-1 slow-pages-2 slow-scenarios slow-studies: slow-%: $(STAMP)-test-slow
 	@mkdir -p .pytest_cache/$* && code=0; \
-	.ci/background $(PYTEST) --timeout 1800 -o cache_dir=.pytest_cache/$* -m $(SLOW) >.pytest_cache/$*/log 2>&1 || code=$$?; \
+	$(BESIDE) $(PYTEST) --timeout 1800 -o cache_dir=.pytest_cache/$* -m $(SLOW) >.pytest_cache/$*/log 2>&1 || code=$$?; \
 	cat .pytest_cache/$*/log; exit $$code
 
 # More cases of what test-slow shows, e.g. every flight of each kind of vehicle, and the long recordings: an hour.

@@ -249,6 +249,7 @@ class ConsoleServer:
         self._take_pictures(now_ns)
         self.board.begin()
         self.board.forget()
+        self.state.history.take_new()  # the seed holds it
         self.state.put(self.board, now_ns)
         self.state.put_often(self.board, now_ns)
         self.state.put_seldom(self.board, now_ns)

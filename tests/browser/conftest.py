@@ -26,8 +26,6 @@ FLAGS = [
     "--disable-sync",
 ]
 CHROMIUM = "/usr/bin/chromium"
-AS_TESTS = str(Path(__file__).with_name("chromium"))
-"""Starts it with the priority of the tests."""
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +35,7 @@ def browser() -> Iterator[Any]:
         pytest.skip(f"no Chromium at {CHROMIUM}: apt-get install chromium")
     playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
     with playwright.sync_playwright() as driver:
-        launched = driver.chromium.launch(executable_path=AS_TESTS, args=FLAGS)
+        launched = driver.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
         yield launched
         launched.close()
 

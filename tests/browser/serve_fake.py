@@ -3,7 +3,6 @@
 By hand, to work on the page: `python tests/browser/serve_fake.py [PORT]`, then open the address it prints.
 """
 
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -44,8 +43,7 @@ def start_console(
     sets: list[str] | None = None,
 ) -> "subprocess.Popen[bytes]":
     section = {"field": field_json(port, field, sets), "run_dir": run, "truth": truth}
-    told = msgspec.json.encode(section).decode()
-    spec = ChildSpec("console", "console", endpoint, "lab", section=told, nice=os.nice(0))  # not its own share of a run
+    spec = ChildSpec("console", "console", endpoint, "lab", section=msgspec.json.encode(section).decode())
     process = subprocess.Popen(
         [sys.executable, "-m", "groundstation.process.entry", "console", "groundstation.console.process:run"],
         stdin=subprocess.PIPE,

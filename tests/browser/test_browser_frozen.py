@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from conftest import AS_TESTS, CHROMIUM, FLAGS, Stage
+from conftest import CHROMIUM, FLAGS, Stage
 from free_port import free_port
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
@@ -52,7 +52,7 @@ def watched() -> Iterator[tuple[Stage, DevTools]]:
     port = free_port()
     with playwright.sync_playwright() as driver:
         flags = [*FLAGS, f"--remote-debugging-port={port}"]
-        browser = driver.chromium.launch(executable_path=AS_TESTS, args=flags)
+        browser = driver.chromium.launch(executable_path=CHROMIUM, args=flags)
         stage = Stage(browser)
         yield stage, DevTools(port)
         stage.close()

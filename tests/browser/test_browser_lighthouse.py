@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
-from conftest import AS_TESTS, FLAGS
+from conftest import CHROMIUM, FLAGS
 from lighthouse import accessibility
 from new_field_form import new_field_form
 
@@ -23,7 +23,7 @@ class Debugged(NamedTuple):
 def debugged(browser: Any, tmp_path: Path, free_port: int) -> Iterator[Debugged]:
     flags = [*FLAGS, f"--remote-debugging-port={free_port}"]
     launch = browser.browser_type.launch_persistent_context
-    context = launch(str(tmp_path / "profile"), executable_path=AS_TESTS, args=flags)
+    context = launch(str(tmp_path / "profile"), executable_path=CHROMIUM, args=flags)
     yield Debugged(context.pages[0], free_port)
     context.close()
 

@@ -1,6 +1,6 @@
 """Lets supervisor and guardian reach vehicles whose driver is silent: signed, at addresses that called, or by a line.
 
-No pymavlink here: the guardian is small. Reason for all of it: docs/decisions/0084-a-voice-for-every-link.md.
+No pymavlink here: the guardian is small. Reason: docs/decisions/0084-a-commanding-process-for-every-link.md.
 """
 
 import json

@@ -85,7 +85,7 @@ class FixedLagFilter:
     def add_report(self, reading: SensorReading, tie: str, now_ns: int, *, used: bool) -> Verdict | None:
         """Take an entity's report of its own motion, to be used or only compared; returns as `add_observation` does.
 
-        It is no sighting: no entity joins by it, it is refused beyond the gate, and corrects no other entity.
+        A report is no sighting: no entity joins by it, it is refused beyond the gate, and corrects no other entity.
         """
         return self._add(reading, REPORTED if used else COMPARED, tie, now_ns)
 
@@ -119,7 +119,7 @@ class FixedLagFilter:
     def set_airborne(self, robot: str, airborne: bool, stamp_ns: int, now_ns: int) -> Verdict:
         """Take a change of flight state: only airborne robots join the state, a landed one leaves it.
 
-        Later than the rewind reaches, it takes effect as early as it can.
+        A change older than the rewind reaches takes effect as early as possible.
         """
         index = self._index.get(robot)
         if index is None or self._models[index].kind is not EntityKind.ROBOT:
@@ -200,7 +200,8 @@ class FixedLagFilter:
     def contradicted(self, name: str) -> bool:
         """Return whether sightings far from an entity's place are being weighed against it.
 
-        True for twice the time that the weighing takes; then sightings not believed are ignored. One that is ends it.
+        True for at most twice the time that the weighing takes; later sightings beyond the gate are ignored. One within
+        the gate ends it.
         """
         memory, within_s = self._state.memory[self._index[name]], self.parameters.divergence_s
         now, wild = self._seconds(self._now_ns), memory["wild"]

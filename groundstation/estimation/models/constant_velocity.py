@@ -1,4 +1,4 @@
-"""A target at constant velocity, moved by white acceleration; its heading is a state where markers show it."""
+"""A target at constant velocity with white acceleration noise; its heading is a state where markers show it."""
 
 import math
 from dataclasses import dataclass
@@ -55,7 +55,7 @@ def predict_constant_velocity(belief: Belief, e: int, dt: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class ConstantVelocityTarget:
-    """A ground vehicle known only by a marker at a known height; white acceleration moves it.
+    """A ground vehicle observed only by a marker at a known height, with white acceleration noise.
 
     acceleration_std_m_s2 lasts for correlation_s; speed_std_m_s: deviation of the speed before the first sighting.
     heading: whether its marker shows its heading, which is then a state with a random walk of turn_std_rad per root

@@ -21,7 +21,7 @@ from groundstation.estimation.records import VX, VY, X, Y, own_parameters
 from groundstation.kernel import Record, kernel
 
 TURN_RATE = 4  # after x, y, vx, vy
-_SMALL_RAD = 1e-3  # below, series are more exact than quotients
+_SMALL_RAD = 1e-3  # below it series are more exact than quotients
 
 
 class TurnParameters(Record):

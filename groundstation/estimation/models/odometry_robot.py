@@ -22,7 +22,7 @@ from groundstation.kernel import kernel
 
 AERIAL = ("roll_error", "pitch_error", "climb", "velocity_scale", "height_error", "floor")
 SLOW_STATES = (*AERIAL, "velocity_bias_x", "velocity_bias_y", "yaw_offset")
-# The field file's figure is what a vehicle reports while it is sure; the lasting part of it is 0.6.
+# The field file's figure is the error of a vehicle that reports no doubt; its lasting part is 0.6.
 _STATED_ROOM = 2.0
 _DOUBT_S = 1.0  # time constant with which doubt raised by surprises decays
 
@@ -179,7 +179,7 @@ class OdometryRobot:
             walk_density=self.velocity_walk**2,
             velocity_std=_STATED_ROOM * max(self.velocity_std_m_s, self.velocity_bias_std_m_s * self.velocity_scale),
             has_climb_rate=float(self.reports_climb),
-            # The slow part of the error is a state; the rest is quick, and alike in neighbouring samples.
+            # The slow part of the error is a state; the rest is quick, and correlated in neighbouring samples.
             height_variance=(0.5 * self.height_std_m) ** 2,
             hold_s=self.hold_s,
             **{f"at_{label}": place_of(self.labels, label) for label in _OWN_STATES},

@@ -16,7 +16,7 @@ from groundstation.estimation.models.protocol import SensorDefaults
 from groundstation.estimation.records import NOT_LOCATED, VX, VY, EventRow, Prediction, SensorRow
 from groundstation.kernel import kernel
 
-# A believed speed of this many deviations has a direction; a reported one of fewer counts as standing.
+# An estimated speed of this many deviations has a direction; a reported one of fewer counts as standing.
 _MOVES, _STANDS = 3.0, 2.0
 _SLOWEST_M_S = 1e-3  # a mode with a lower speed has no direction, and the derivative no size
 

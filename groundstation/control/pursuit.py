@@ -20,7 +20,7 @@ _WAYS_M, _BEARINGS = (0.8, 2.0, 4.0), 12
 
 @dataclass(frozen=True, slots=True)
 class _Searcher:
-    """One robot that may look for the target: the ways and headings of its sweeps, and where it may be.
+    """One robot that may look for the target: paths and headings of its sweeps, and its permitted stands.
 
     seen: chance that a target in each cell of its footprint is found within a view; rows, columns (n, _VIEWS): cells of
     the grid on the way to each stand; headings (2, _VIEWS): as numbers, by direction; free, near (n): where it may be,

@@ -1,4 +1,4 @@
-"""Stands far enough apart that robots at them do not push each other away."""
+"""Stands far enough apart for the separation limit not to push robots away from them."""
 
 import math
 from collections.abc import Collection, Mapping

@@ -69,7 +69,7 @@ def setpoints_from_plan(
 
 
 def _phases(plan: PlanResult | None, airborne: Collection[str], now: Moment) -> dict[str, FlightMode]:
-    """Return what each robot does; one that tracks is spared for the search if a target is missing."""
+    """Return each robot's flight mode; one that tracks is spared for the search if a target is missing."""
     age_s = now.sight.target_age_s
     fresh = age_s is not None and age_s <= now.parameters.lost_after_s and bool(now.belief.layout.targets)
     phases = {
@@ -89,7 +89,7 @@ def _phases(plan: PlanResult | None, airborne: Collection[str], now: Moment) -> 
 
 
 def _planned(name: str, plan: PlanResult, coming: Sequence[str], now: Moment) -> Setpoint:
-    """Return the plan's setpoint within what the robot may do: who flies back goes first, and it stays in view."""
+    """Return the plan's setpoint within the robot's limits: it makes room for returning robots, and stays in view."""
     vx, vy, rate = _regained(name, plan, now)
     level_m = _level_m(name, plan.heights[name], now)
     velocity = recoverable(name, giving_way(name, (vx, vy), coming, now), now)
@@ -130,7 +130,7 @@ def _regained(name: str, plan: PlanResult, now: Moment) -> tuple[float, float, f
 def _level_m(name: str, level_m: float, now: Moment) -> float:
     """Return a robot's height [m]; while it looks for a view it sinks a little, for views are narrower higher up.
 
-    Told to keep its height, a climbing vehicle would rise on, because its climb rate is in error as well.
+    With its height held, a climbing vehicle would rise on, because its climb rate is in error as well.
     """
     if not is_untied(name, now):
         return level_m

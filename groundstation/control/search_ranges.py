@@ -13,8 +13,7 @@ SEARCH_PX = 8.8
 
 
 def search_ranges_m(resolved: ResolvedField) -> dict[str, float]:
-    """Return the range in which a full search of each drone's pictures finds all targets [m], at least that of
-    plans."""
+    """Return the range of a full search of each drone's pictures for all targets [m], at least that of plans."""
     return {name: _range_m(drone, resolved) for name, drone in resolved.drones.items()}
 
 

@@ -1,4 +1,4 @@
-"""The space left on the disk, and what to omit when it runs low."""
+"""The space left on the disk, and the data to omit when it runs low."""
 
 import os
 from enum import IntEnum

@@ -1,4 +1,4 @@
-"""A whole run: all parts of all its files as one time line, from which any moment can be read at once."""
+"""A whole run: all parts of all its files as one time line, with direct access to any time."""
 
 import heapq
 from collections.abc import Iterator
@@ -86,7 +86,7 @@ class RecordedRun:
             yield heapq.heappop(waiting)[2]
 
     def latest_before(self, time_ns: int, wanted: Wanted = every_topic) -> dict[Key, RawRecord]:
-        """Return for each wanted key its last message with log time < time: the knowledge at that time."""
+        """Return for each wanted key its last message with log time < time: the state at that time."""
         found: dict[Key, RawRecord] = {}
         for index in self.indexes:
             for key, record in index.latest(time_ns, wanted).items():

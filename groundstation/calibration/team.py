@@ -64,7 +64,7 @@ class Measured:
     """One figure: its error against the field and one sigma [unit], and the same with all figures in doubt.
 
     shown: whether the recording alone determines it well enough for use; beside: the figure (who, part) from which it
-    is hardest to separate, None if no single one stands out; corrected: whether a found cause moves it.
+    is hardest to separate, None if there is no single one; corrected: whether a found cause moves it.
     """
 
     who: str

@@ -29,7 +29,7 @@ _RISES_ON_M = 0.3
 _UNSEEN_S = 1.0
 # The limits of separation let two robots come as near as that, and this of the way that is left to it be flown [1/s].
 _APART_M, _CLOSING_GAIN = 0.8, 0.5
-_SINKS_M, _SINK_STEPS = 0.1, 6  # to where a gap is short enough
+_SINKS_M, _SINK_STEPS = 0.1, 6  # down to a level at which a gap is short enough
 
 
 def kept_in_sight(

@@ -53,7 +53,7 @@ class Lookout:
 
     @property
     def targets(self) -> Mapping[str, SearchState]:
-        """Return how the search for each target stands."""
+        """Return the state of the search for each target."""
         return self._search.targets
 
     @property

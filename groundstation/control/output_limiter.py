@@ -1,6 +1,6 @@
 """The last step before a setpoint is sent: shrinks a velocity or hovers; adds velocity only against a drift.
 
-Why its half-spaces keep fence and separation whatever is asked: docs/explanation/safety.md#why-it-holds.
+Why its half-spaces keep fence and separation for any wanted velocity: docs/explanation/safety.md#why-it-holds.
 """
 
 import math

@@ -140,8 +140,7 @@ def _level_m(name: str, level_m: float, now: Moment) -> float:
 def _search_level_m(name: str, now: Moment) -> float:
     """Return the height at which a robot searches or returns.
 
-    One that flies on our estimate climbs only where it is in a view at that height as well, else it would leave its
-    view.
+    One that flies on our estimate climbs only where it is in a view at that height too, else it would leave its view.
     """
     x, y, z = (float(value) for value in now.belief.mean_of(name)[:3])
     view = view_of(x, y, name, now.parameters, now.sensors) if name in now.parameters.fed else None
@@ -193,7 +192,7 @@ def _stands(phases: Mapping[str, FlightMode], searching: Mapping[str, Stand], no
 def _towards(name: str, stand: Stand, phase: FlightMode, now: Moment) -> Setpoint:
     """Return a setpoint that flies to a stand and turns to its heading, keeping off other robots.
 
-    From a returning robot's velocity its drift is subtracted, up to the largest that is believed.
+    From a returning robot's velocity its drift is subtracted, up to the largest credible one.
     """
     mean, parameters = now.belief.mean_of(name), now.parameters
     drift_m_s = now.sight.drifts_m_s.get(name, STILL) if phase is FlightMode.RETURN else STILL

@@ -219,7 +219,7 @@ def headings(yaw_rad: float, views: int) -> IntMatrix:
 
 
 def _mark_seen(left: Array, searcher: Searcher, row: int, column: int, heading: int) -> None:
-    """Subtract what one view finds from the chances left for the robots that choose later."""
+    """Subtract the chances found by one view from those left for the robots that choose later."""
     footprint = searcher.footprint
     part = slice(int(footprint.first[heading]), int(footprint.first[heading + 1]))
     rows, columns = row + footprint.rows[part], column + footprint.columns[part]

@@ -285,6 +285,6 @@ class Search:
 
 
 def _place_and_variance(belief: JointBelief, name: str) -> tuple[float, float, float]:
-    """Return where an entity is believed [x, y in m], and the mean variance of both axes [m^2]."""
+    """Return an entity's estimated place [x, y in m], and the mean variance of both axes [m^2]."""
     mean, variances = belief.mean_of(name), np.diag(belief.covariance_of(name))[:2]
     return float(mean[0]), float(mean[1]), float(variances.mean())

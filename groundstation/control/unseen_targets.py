@@ -11,7 +11,7 @@ TELL_AFTER_S = 0.6
 
 
 def unseen_words(name: str, unseen_s: float, place_m: Iterable[float]) -> str:
-    """Return the message for a target that is unseen for a time [s], and where it is expected (x, y) [m; world]."""
+    """Return the message for a target that is unseen for a time [s] and expected at a place (x, y) [m; world]."""
     x, y = place_m
     return f"{name} is not seen for {unseen_s:.1f} s: it may be hidden near ({x:.1f}, {y:.1f})"
 

@@ -40,7 +40,7 @@ class Lateness:
 
 @dataclass(slots=True)
 class _Turning:
-    """A robot's own headings: when [s] and what [rad, unwrapped] since its heading last jumped."""
+    """A robot's own headings [rad, unwrapped] and their times [s] since its heading last jumped."""
 
     reset: int
     times: deque[float] = field(default_factory=deque)

@@ -35,8 +35,8 @@ _IDLE_STEPS = 10  # steps that may pass between two calls of `advance` before `a
 class FixedLagFilter:
     """Joint EKF over all entities of the parameters that have joined.
 
-    `add_motion`, `add_observation`, `set_airborne` take what arrives in any order (up to max_lateness_s late) and
-    return a verdict; `advance` brings the belief to a time; `take_corrections` returns the effects of observations.
+    `add_motion`, `add_observation`, `set_airborne` take arrivals in any order (up to max_lateness_s late) and return a
+    verdict; `advance` brings the belief to a time; `take_corrections` returns the effects of observations.
     """
 
     def __init__(self, parameters: EstimatorParameters) -> None:
@@ -192,7 +192,7 @@ class FixedLagFilter:
         return self._seconds(self._now_ns) - float(memory["corrected_at"]) if memory["active"] else math.inf
 
     def sighting(self, name: str) -> tuple[float, float] | None:
-        """Return how long ago an entity was last seen [s], and the deviation of its place then [m]; None: never."""
+        """Return the time since an entity was last seen [s], and the deviation of its place then [m]; None: never."""
         memory = self._state.memory[self._index[name]]
         seen = memory["active"] and memory["seen_variance"] > 0.0
         return (self.age_s(name), math.sqrt(float(memory["seen_variance"]))) if seen else None
@@ -264,7 +264,7 @@ class FixedLagFilter:
         if self._started:
             return
         self._started = True
-        # On a grid that does not depend on what came first: step borders are multiples of the step.
+        # On a grid that does not depend on the first arrival: step borders are multiples of the step.
         self._origin_ns = (now_ns // self._step_ns - self._behind) * self._step_ns
         self._now_ns, self._last, self._dirty = now_ns, self._behind, 0
 

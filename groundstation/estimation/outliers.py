@@ -52,7 +52,7 @@ def fits_another(
     belief: Belief, deferred: Deferred, sensor: SensorRow, settings: Settings, event: EventRow, rows: int,
     hypothesis: Hypothesis,
 ) -> bool:  # fmt: skip
-    """Return whether the sighting is where the belief has another robot or target: its marker was misread."""
+    """Return whether the sighting is at the place of another robot or target: its marker was misread."""
     subject = event.subject
     work, HP = np.empty(1, _INNOVATION), np.empty((4, belief.mean.shape[0]))
     found = False
@@ -80,7 +80,7 @@ def is_doubted(memory: EntityMemory, settings: Settings, at: float) -> bool:
 
 @kernel()
 def insists(streak: Streak, settings: Settings, at: float) -> bool:
-    """Count one more contradiction in a row; True when they are enough, and last long enough, to be believed."""
+    """Count one more contradiction in a row; True when their number and duration suffice to accept them."""
     if streak.count == 0:
         streak.since = at
     streak.count += 1
@@ -123,7 +123,7 @@ def is_hasty(observer: EntityMemory, subject: int, at: float) -> bool:
 
 @kernel()
 def note_given_up(observer: EntityMemory, subject: int, at: float) -> None:
-    """Note that a robot's belief was given up for what one observer saw."""
+    """Note that a robot's belief was given up for one observer's sightings."""
     observer.gave_up = given_up_lately(observer, at) + 1.0
     observer.gave_up_at, observer.gave_up_whom = at, subject
 

@@ -111,7 +111,7 @@ class EntityMemory(Record):
     count); last_yaw, last_reset, has_yaw: the vehicle's own heading [rad; odom] at the step before, received yaw_age_s
     ago. velocity_x, _y, _z: how they change [m/s; world], as last predicted; velocity_doubt [m/s]: deviation that a
     fixed camera's surprises add to the error of the reported velocity; velocity_lie [m/s]: by how much that error was
-    lately seen to exceed that of a sound sensor; unseen_s: time predicted since the last sighting. wild: observations
+    recently seen to exceed that of a sound sensor; unseen_s: time predicted since the last sighting. wild: observations
     far beyond the gate, the last of them at wild_at; refused: observations by which it would have joined if they had
     not contradicted their observer; corrected_at: last use of an observation; seen_variance: of the worse of x and y
     [m^2] right after it. gave_up, gave_up_at, gave_up_whom: number of robots recently re-initialised by this one's

@@ -109,7 +109,7 @@ class ReportIntake:
             self._believe(one.subject, trust)
 
     def _lag(self, name: str, trust: _Trust) -> float:
-        """Return how far ahead of the belief or behind it a target is seen along its direction [deviations].
+        """Return how far a target's sightings lie from the belief, ahead or behind, along its direction [deviations].
 
         A standing target has no direction: the whole offset counts.
         """

@@ -71,7 +71,7 @@ class RoomMap:
 
     @property
     def in_view(self) -> Array:
-        """Return the probability of each cell for a target that nothing hides: what a search can find there."""
+        """Return the probability of each cell for a target in plain view, which a search can find there."""
         shown = self.stands + self.drives + self.goes_on
         return np.asarray(shown / max(float(shown.sum()), 1e-12))
 

@@ -113,7 +113,7 @@ class Views:
         return worst
 
     def why_unplaced(self, place: Place) -> str:
-        """Return why no fixed camera sees a drone at its stand for a place, at that nearest to the room's middle."""
+        """Return why no fixed camera sees a drone at the stand for a place that is nearest to the room's middle."""
         world, (mx, my) = self._team.sensors.world, self._team.planner.fence.center
         stands = [
             self.marker(robot, pose)

@@ -62,7 +62,7 @@ class StampedMessage(Generic[T]):
 
 @dataclass(slots=True)
 class MonitorState:
-    """The newest message of each kind and entity; `hint` says what Ctrl-C does here."""
+    """The newest message of each kind and entity; `hint` states the effect of Ctrl-C here."""
 
     cast: Cast = field(default_factory=Cast)
     hint: str = ""

@@ -61,7 +61,7 @@ def render(state: MonitorState, now_ns: int) -> RenderableType:
         *_unseen(state, now_ns),
         Text(),
     ]
-    # Above what grows with the team: a low window cuts the lines below.
+    # Above the parts that grow with the team: a low window cuts the lines below.
     if state.command is not None and state.command.age_s(now_ns) < _COMMAND_SHOWN_S:
         parts.append(_command(state))
     parts.append(_plan(state, now_ns))

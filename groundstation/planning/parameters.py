@@ -84,7 +84,7 @@ class PlannerParameters:
 
     @property
     def horizon_s(self) -> float:
-        """Return how far ahead the planner looks [s]."""
+        """Return the length of the horizon [s]."""
         return self.horizon_steps * self.step_s
 
     def limits_of(self, robot: str) -> MotionLimits:

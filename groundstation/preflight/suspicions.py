@@ -10,7 +10,7 @@ import numpy as np
 from groundstation.preflight.pad_fit import TEAM_PRINT, Fit, Key, PadFit
 from groundstation.preflight.stand import PadSighting, Stand
 
-# For a figure that nobody measured, or measured wrongly: one sigma. A camera hangs askew, or is turned the wrong way.
+# One sigma of a figure that was not measured, or wrongly. A camera hangs askew, or is turned the wrong way.
 _MOVED_M, _TURNED_RAD, _ASKEW_RAD, _TILTED_RAD, _SHARE, _CARRIED_M = 0.5, 0.6, 0.06, 0.15, 0.08, 1.0
 # A fit is good while its chi-square is below that which chance exceeds once in 100,000 (this many sigmas).
 _CHANCE_SIGMAS = 4.26

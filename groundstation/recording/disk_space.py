@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 class Space(IntEnum):
-    """Levels of free disk space, by what may still be written, from best to worst."""
+    """Levels of free disk space, by the data that may still be written, from best to worst."""
 
     AMPLE = 0
     LOW = 1

@@ -23,8 +23,8 @@ class _Place:
 class RecordedRun:
     """The files of a run by time [UNIX ns]; cut files are read as far as they are sound.
 
-    metadata and attachments are those of the first part that has any. `unread` says why a part is no recording at all
-    (killed before its first byte); if none is readable, RecordingError is raised.
+    metadata and attachments are those of the first part that has any. `unread` has the reasons of parts that are no
+    recordings at all (killed before the first byte); if none is readable, RecordingError is raised.
     """
 
     def __init__(self, paths: list[Path]) -> None:

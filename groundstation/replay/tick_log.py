@@ -41,7 +41,7 @@ class Tick:
 class Tape:
     """Reads the files of a run once, in order, holding a few seconds at a time.
 
-    `said` collects what the tracker published, by (topic, entity, publish time), until it is taken.
+    `said` collects the tracker's messages, by (topic, entity, publish time), until they are taken.
     """
 
     def __init__(self, files: Iterable[Path]) -> None:

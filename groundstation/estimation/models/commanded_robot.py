@@ -191,7 +191,7 @@ class CommandedRobot:
 
     @property
     def place_m(self) -> Vector3:
-        """Return where the marker is."""
+        """Return the place of the marker."""
         return self.marker_position_m
 
     def own(self) -> DriveParameters:
@@ -220,7 +220,7 @@ class CommandedRobot:
         )
 
     def prior(self) -> Array:
-        """Return mean and variances (2, size) of what joins."""
+        """Return mean and variances (2, size) of its block when it joins."""
         deviations = (
             self.scale_std,
             self.turn_drag_std_m,

@@ -81,7 +81,7 @@ class ConstantVelocityTarget:
 
     @property
     def place_m(self) -> Vector3:
-        """Return where the marker is."""
+        """Return the place of the marker."""
         return 0.0, 0.0, self.marker_height_m
 
     def own(self) -> ConstantVelocityParameters:
@@ -91,7 +91,7 @@ class ConstantVelocityTarget:
         )
 
     def prior(self) -> Array:
-        """Return mean and variances (2, size) of what joins."""
+        """Return mean and variances (2, size) of its block when it joins."""
         prior = np.zeros((2, len(self.labels)))
         prior[1, VX] = prior[1, VY] = self.speed_std_m_s**2
         return prior

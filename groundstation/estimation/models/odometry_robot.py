@@ -115,8 +115,8 @@ class OdometryRobot:
     slow_states: those of SLOW_STATES that this type of vehicle needs; without any the block is the paper's four.
     velocity_scale: true speed over reported speed as calibrated, known to `scale_std` (a state follows the rest);
     velocity_std_m_s with its correlation time becomes white noise; heading wanders by yaw_std_rad per root second;
-    attitude, height and velocity errors are Gauss-Markov states; velocity_walk: change of the latter while nobody sees
-    the vehicle [m/s per root second]; climb is a state if the vehicle reports none. floor: height of the object below;
+    attitude, height and velocity errors are Gauss-Markov states; velocity_walk: change of the latter while the vehicle
+    is unseen [m/s per root second]; climb is a state if the vehicle reports none. floor: height of the object below;
     yaw_offset: error of the vehicle's own heading, for the heading sensor.
     """
 
@@ -156,7 +156,7 @@ class OdometryRobot:
 
     @property
     def place_m(self) -> Vector3:
-        """Return where the marker is."""
+        """Return the place of the marker."""
         return self.marker_position_m
 
     def own(self) -> RobotParameters:

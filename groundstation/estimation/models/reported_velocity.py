@@ -1,8 +1,8 @@
 """A target's own odometry: its velocity in its own frame, which has neither origin nor drift. A claim (reports.py).
 
 With a heading in the block z = (forward, left) = R(yaw)^T v. Without one only the speed counts: z = |v|, linear along
-the believed direction, if the believed speed is well above its deviation. A report of standing counts in both axes, z =
-v = 0; other reports cannot be used while the direction is unknown.
+the estimated direction, if the estimated speed is well above its deviation. A report of standing counts in both axes, z
+= v = 0; other reports cannot be used while the direction is unknown.
 """
 
 import math

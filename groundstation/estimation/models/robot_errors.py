@@ -20,8 +20,8 @@ class RobotParameters(Record):
     velocity_gain: true over reported speed; velocity_density [m^2/s], yaw_density and yaw_offset_density [rad^2/s],
     scale_density [1/s], floor_density [m^2/s]: white noise; *_std, *_tau_s: Gauss-Markov states; has_climb_rate: 1.0 if
     the vehicle reports one; height_variance [m^2]: of one step's height; velocity_std [m/s]: a larger stated deviation
-    is doubt; walk_density [m^2/s^3]: white noise of the velocity's error while nobody sees the vehicle; hold_s: how
-    long a velocity holds in silence; at_*: entries (-1: the block has none).
+    is doubt; walk_density [m^2/s^3]: white noise of the velocity's error while the vehicle is unseen; hold_s: how long
+    a velocity holds in silence; at_*: entries (-1: the block has none).
     """
 
     velocity_gain: float

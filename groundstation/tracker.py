@@ -156,7 +156,7 @@ class Tracker:
         """Return whether an entity is known well enough to fly on; without a world-fixed sensor none is."""
         if name not in self._belief.layout or self.mounts.is_rootless or self._roots.is_silent:
             return False
-        # For a robot that flies on our estimate the deviation shows its velocity error while unseen (0214).
+        # For a robot that flies on our estimate the deviation accounts for its velocity error while unseen (0214).
         fed = name in self.parameters.control.fed
         settled = fed or not self._joinings.is_unsettled(name)
         return settled and self._localisation.holds(self._belief, name, 0.0 if fed else self._tied_age_s(name))

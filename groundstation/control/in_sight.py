@@ -27,7 +27,7 @@ Kept = tuple[Array, float]
 _RISES_ON_M = 0.3
 # An unseen vehicle's place is known for a second; then it is sent no estimate, hovers, and lands 0.7 s later (0214).
 _UNSEEN_S = 1.0
-# The limits of separation let two robots come as near as that, and this of the way that is left to it be flown [1/s].
+# Least distance [m] that the separation limits allow two robots, and closing speed per remaining distance [1/s].
 _APART_M, _CLOSING_GAIN = 0.8, 0.5
 _SINKS_M, _SINK_STEPS = 0.1, 6  # down to a level at which a gap is short enough
 

@@ -10,7 +10,7 @@ from groundstation.vectors import Interval
 from groundstation.vehicles import kind_named
 
 _USUAL_LIMITS = MotionLimits()
-# Of robots that search: slow enough for sharp pictures that follow each other densely.
+# Speeds of searching robots: slow enough for sharp and densely spaced pictures.
 SEARCH_SPEED_M_S, SEARCH_YAW_RATE_RAD_S = 0.5, 0.8
 
 

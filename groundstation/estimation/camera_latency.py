@@ -22,7 +22,7 @@ _KEPT_S, _SPACING_S = 3.0, 0.01
 _GAP_S = 0.5  # the turn within a longer gap is unknown
 _NEAR = 4
 _HALF_LIFE_S = 60.0
-# Deviation of such a difference, and the number of them beyond which a wild one, squared, must not decide.
+# Deviation of such a difference, and the squared normalised misfit beyond which outliers count less.
 _COARSE_STD_RAD, _WILD = 0.03, 8.0
 _LEAST_PAIRS, _UNTOLD_S = 60.0, 0.025
 # Number of subjects followed per camera: more are not worth the time. One unseen for this long [s] is dropped.

@@ -1,4 +1,4 @@
-"""Finds the delay of each sensor in a recorded flight, by comparing different sensors' measurements of the same motion.
+"""Finds the delay of each sensor in a recorded flight, by comparing measurements of the same motion.
 
 A fixed camera sees headings, which a vehicle's gyroscopes report without delay: that gives the camera's delay. Its
 positions then give the delays of the vehicles' velocities and heights. Delays of cameras on vehicles come from the

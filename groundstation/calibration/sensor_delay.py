@@ -11,7 +11,7 @@ _UNSURE_MS, _TOLERATED_MS = 15.0, 10.0
 class Delay:
     """One sensor's delay: the setting, its value [ms], the measured delay and one sigma of it.
 
-    reason: for no measurement, or for its distrust. flight: the flight that would determine it.
+    reason: why it was not measured, or is not trusted. flight: the flight that would determine it.
     """
 
     sensor: str

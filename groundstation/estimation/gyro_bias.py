@@ -1,4 +1,4 @@
-"""Estimates the bias of a vehicle's gyroscopes: while it stands and, slowly, in flight.
+"""Estimates the bias of a vehicle's gyroscopes while it stands and, slowly, in flight.
 
 In flight accelerometers determine the bias of two axes; the third comes from a fixed camera that sees the vehicle turn,
 and poorly from the vehicle's own doubtful heading.

@@ -10,7 +10,7 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 # Two pictures a second, the lowest rate met on a busy machine, make a median in this time.
 _LONGEST_NS = 8 * NS_PER_S
 _AGAIN_NS = 200 * NS_PER_MS
-_STEADY_NS = 2 * NS_PER_S  # changed drones to leave out are reported after no change for this long
+_STEADY_NS = 2 * NS_PER_S  # a changed list of drones to leave out is reported once it is stable for this long
 
 
 class Looking:

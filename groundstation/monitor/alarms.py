@@ -105,7 +105,7 @@ def _vehicles(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
 
 
 def _is_heard_in_vain(status: VehicleStatus) -> bool:
-    """Return whether a driver accepts none of its vehicle's telemetry: it knows no more than of a silent vehicle."""
+    """Return whether a driver refuses all its vehicle's telemetry: no more is known of it than of a silent one."""
     lost = status.flight_state is FlightState.LOST and status.mode != "CONNECTING"
     return lost and status.rate_hz >= _SPEAKS_HZ
 

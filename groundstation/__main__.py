@@ -5,8 +5,8 @@ import sys
 from groundstation.process.one_thread import stay_on_one_thread
 from groundstation.process.priority import go_first
 
-# An ordinary process of a shell gets a thirtieth of a busy machine (docs/decisions/0137). A dead man's switch stays
-# an ordinary one: it runs for long, and if it is late, drones hold.
+# A process at ordinary priority gets a thirtieth of a busy machine (docs/decisions/0137). A dead man's switch keeps
+# that priority: it runs for long, and if it is late, drones hold.
 STOPS = ("hold", "land", "cut-motors")
 
 

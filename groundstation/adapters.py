@@ -1,6 +1,6 @@
 """Sockets bound to one network adapter, to distinguish vehicles that all have the same address.
 
-Without it this computer's routes decide, and of two equal ones only the first is ever used.
+Without such a binding this computer's routes decide, and of two equal ones only the first is ever used.
 """
 
 import errno
@@ -58,7 +58,7 @@ def _why(error: OSError) -> str:
 def connected(address: Address, timeout_s: float, interface: str = "") -> socket.socket:
     """Return a TCP connection through one adapter ("": any) whose waits end after timeout_s.
 
-    Raises OSError when nobody answers, DriverError for an adapter that cannot be used.
+    Raises OSError without an answer, DriverError for an adapter that cannot be used.
     """
     if not interface:
         return socket.create_connection(address, timeout=timeout_s)

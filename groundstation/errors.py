@@ -54,7 +54,7 @@ class OperatorMistake(GroundStationError):
 
 
 def is_wrong_place(error: OSError) -> bool:
-    """Return whether a disk error is the fault of the named path; that of a full or broken disk is not."""
+    """Return whether a disk error is the named path's fault, not that of a full or broken disk."""
     return error.errno in _WRONG_PLACE
 
 

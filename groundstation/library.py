@@ -1,4 +1,4 @@
-"""Skein from a script or a notebook: fields, beliefs, one step of planning, the judgement of a recording.
+"""Skein for scripts and notebooks: fields, beliefs, one step of planning, the judgement of a recording.
 
 The names in `__all__` are the public interface: it changes with an entry in the change log only. Everything else may
 change at any time. Examples that run: docs/notebooks.
@@ -64,7 +64,7 @@ def belief_of(
 
 
 def planner_of(field: ResolvedField) -> Planner:
-    """Return the planner that flies in a field, with the field's sensors, limits and costs."""
+    """Return the flight planner of a field, with the field's sensors, limits and costs."""
     return tracker_from_field(field, "library", 0).planner
 
 

@@ -156,7 +156,7 @@ class Tracker:
         """Return whether an entity is known well enough to fly on; without a world-fixed sensor none is."""
         if name not in self._belief.layout or self.mounts.is_rootless or self._roots.is_silent:
             return False
-        # For a robot that flies on our estimate the deviation tells how wrong its velocity becomes unseen (0214).
+        # For a robot that flies on our estimate the deviation accounts for its velocity error while unseen (0214).
         fed = name in self.parameters.control.fed
         settled = fed or not self._joinings.is_unsettled(name)
         return settled and self._localisation.holds(self._belief, name, 0.0 if fed else self._tied_age_s(name))
@@ -173,7 +173,7 @@ class Tracker:
         return age if math.isfinite(age) else None
 
     def unlocalised_s(self) -> dict[str, float]:
-        """Return for how long each airborne robot may have been elsewhere than believed [s]; infinite: never seen.
+        """Return for how long each airborne robot may have been elsewhere than estimated [s]; infinite: never seen.
 
         A robot known well enough and missed by no camera is localised, even if seen long ago; but odometry is
         trusted no longer than for twice the time within which a robot flies back.
@@ -188,7 +188,7 @@ class Tracker:
         }
 
     def _tied_age_s(self, name: str) -> float:
-        """Return the time [s] since an entity was seen, or saw one that a world-fixed sensor knows; or infinity."""
+        """Return the time [s] since an entity was seen, or saw one located by a world-fixed sensor; or infinity."""
         return min(self.filter.age_s(name), self._roots.age_s(name))
 
     def _rooted_age_s(self, robot: str) -> float:
@@ -196,7 +196,7 @@ class Tracker:
         return max(self.filter.age_s(robot), self._roots.age_s(robot))
 
     def _heed_absence(self, now_ns: int) -> None:
-        """Use pictures that do not show entities: an entity missing at its believed place leaves the belief."""
+        """Use pictures that do not show entities: an entity missing at its estimated place leaves the belief."""
         ages_s = {name: self.filter.age_s(name) for name in (*self.airborne, *self._targets)}
         rooted_s = {name: self._rooted_age_s(name) for name in self.airborne}
         gone = self.lookout.advance(self._belief, ages_s, rooted_s)

@@ -1,4 +1,4 @@
-"""Vectors of plain floats, for which arrays would take ten times as long, and the little that is computed with them."""
+"""Vectors of plain floats and operations on them, for which arrays would take ten times as long."""
 
 Interval = tuple[float, float]
 """Lower and upper bound."""

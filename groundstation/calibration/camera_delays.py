@@ -1,4 +1,4 @@
-"""Delays of cameras on vehicles, found with the filter: each is judged by what all cameras see."""
+"""Delays of cameras on vehicles, found with the filter: each is judged by the sightings of all cameras."""
 
 import math
 from collections import Counter
@@ -13,7 +13,7 @@ from groundstation.calibration.sensor_delay import LEAST_SEEN, Delay
 from groundstation.field.resolved import ResolvedField
 
 _ROUNDS = 2
-# A camera's delay is found anew when others have since changed by more than this: a third of it is blamed on the first.
+# A camera's delay is found anew when others have since changed by more than this: a third of it enters the first's.
 _SETTLED_MS = 5.0
 _TARGET_ONLY = "doubtful: it saw hardly any other drone, and how the target moves nobody knows"
 _WATCH = "turn and move while it sees another drone"
@@ -22,8 +22,8 @@ _WATCH = "turn and move while it sees another drone"
 def onboard_cameras(flown: Flown, resolved: ResolvedField, fixed: Mapping[str, Delay]) -> list[Delay]:
     """Return the delays of the cameras on vehicles, found in turn, and again where others have changed since.
 
-    fixed: delays of the fixed cameras. The filter is hardly affected if all cameras are equally late, so these delays
-    can be no better known than those.
+    fixed: delays of the fixed cameras. An equal delay of all cameras hardly affects the filter, so these delays can be
+    no better known than those of the fixed cameras.
     """
     found = dict(fixed)
     assumed: dict[str, dict[str, float]] = {}
@@ -39,7 +39,7 @@ def onboard_cameras(flown: Flown, resolved: ResolvedField, fixed: Mapping[str, D
 
 
 def _later_ms(delay: Delay) -> float:
-    """Return by how much a camera is later than its setting says [ms]; 0 if that is not sure."""
+    """Return a camera's delay beyond its setting [ms]; 0 if it is uncertain."""
     return (delay.measured_ms or delay.now_ms) - delay.now_ms if delay.sure else 0.0
 
 

@@ -1,4 +1,4 @@
-"""Finds the delay of each sensor in a recorded flight, by comparing what sensors say of the same motion.
+"""Finds the delay of each sensor in a recorded flight, by comparing measurements of the same motion.
 
 A fixed camera sees headings, which a vehicle's gyroscopes report without delay: that gives the camera's delay. Its
 positions then give the delays of the vehicles' velocities and heights. Delays of cameras on vehicles come from the
@@ -126,7 +126,7 @@ def _fixed_camera(name: str, camera: WorldCamera, tracks: Mapping[str, _Track], 
             reason="it saw too little of any drone's turning",
             flight=_TURN,
         )
-    # A later exposure than assumed means that the way to us is shorter.
+    # A later exposure than assumed means a shorter transmission delay.
     return Delay(name, f"cameras.{name}.video_delay_ms", now_ms, now_ms - 1e3 * shift[0], 1e3 * shift[1], flight=_TURN)
 
 
@@ -159,7 +159,7 @@ def _odometry(drone: str, settings: FieldDrone, habits: OdometryRobot, track: _T
 
 
 def _body_positions(track: _Track, own: _Own, marker_m: tuple[float, float, float]) -> Array:
-    """Return the path of the drone's centre from that of its marker, which leans with it."""
+    """Return the path of the drone's centre from that of its marker, which tilts with it."""
     lean = [np.interp(track.times, own.times, angle) for angle in (own.roll, own.pitch)]
     offsets = [
         rotation_from_euler(roll, pitch, yaw) @ marker_m for roll, pitch, yaw in zip(*lean, track.headings, strict=True)
@@ -168,7 +168,7 @@ def _body_positions(track: _Track, own: _Own, marker_m: tuple[float, float, floa
 
 
 def _path(track: _Track, own: _Own) -> Callable[[Array, float], Array]:
-    """Return (times, delay) -> positions, integrated from the reported velocities if they are this late."""
+    """Return (times, delay) -> positions, integrated from the reported velocities under this delay."""
     at = np.interp(track.times, own.times, own.heading)
     drift = np.polyfit(track.times, np.unwrap(track.headings - at), 2)
 

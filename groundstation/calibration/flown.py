@@ -1,4 +1,4 @@
-"""The messages that a tracker took in: the input of every calibration."""
+"""The tracker's recorded input messages: the input of every calibration."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from groundstation.bus.messages import Message, RelativeObservation
 
 @dataclass(frozen=True, slots=True)
 class Flown:
-    """The messages of a tracker: (now [ns], messages with their keys) by tick, and the clock it read."""
+    """The input messages of a tracker: (now [ns], messages with their keys) by tick, and the clock it read."""
 
     ticks: tuple[tuple[int, tuple[tuple[str, Message], ...]], ...]
     clock: str

@@ -1,4 +1,4 @@
-"""Finds the delay of a camera under which a recording is likeliest, and its uncertainty."""
+"""Finds the maximum-likelihood delay of a camera in a recording, and its uncertainty."""
 
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
@@ -20,7 +20,7 @@ Costs = Mapping[tuple[str, str, int], float]
 
 
 class Likeliest(NamedTuple):
-    """By how much later a camera is than its setting says, and one sigma [ms]; infinite if undetermined."""
+    """A camera's delay beyond its setting, and one sigma [ms]; infinite if undetermined."""
 
     later_ms: float
     std_ms: float
@@ -29,7 +29,7 @@ class Likeliest(NamedTuple):
 def likeliest(cost: Callable[[float], Costs]) -> Likeliest | None:
     """Return the delay with the least sum of costs; None if that is at the end of the range tried.
 
-    cost: of all observations if the camera is so much later [ms].
+    cost: of all observations under an additional delay of the camera [ms].
     """
     tried = {0.0: cost(0.0)}
     if len({stamp // _BLOCK_NS for *_, stamp in tried[0.0]}) < _LEAST_BLOCKS:
@@ -65,7 +65,7 @@ def _by_block(tried: Mapping[float, Costs]) -> tuple[Array, Array]:
 def _fitted(later_ms: Array, blocks: Array) -> Likeliest:
     """Return the minimum; its deviation comes from leaving out one block of time at a time (jackknife).
 
-    A heading that wanders by itself dents the cost: its curvature alone promises too much.
+    A drifting heading dents the cost, so its curvature alone would give too small a deviation.
     """
     total, count = blocks.sum(axis=0), len(blocks)
     whole = _minimum(later_ms, total)

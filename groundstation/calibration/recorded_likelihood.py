@@ -1,6 +1,6 @@
 """Re-runs the filter on a recorded flight with given delays, for the likelihood of its measurements.
 
-No planner, no truth: only what the tracker took in, tick by tick.
+No planner, no truth: only the tracker's inputs, tick by tick.
 """
 
 import math
@@ -46,9 +46,9 @@ def flown_of(source: Source) -> Flown:
 def costs(flown: Flown, resolved: ResolvedField, later_ms: Mapping[str, float]) -> Costs:
     """Return minus twice the log-likelihood of each observation of any observer, once the filter has settled.
 
-    later_ms: by how much observers' pictures are later than their settings say. One camera's sightings are predicted
-    from those of all, so only the sum over all is the likelihood of a delay: one camera alone is predicted well even if
-    its delay is blamed on the target.
+    later_ms: delays of observers' pictures beyond their settings. One camera's sightings are predicted from those of
+    all, so only the sum over all is the likelihood of a delay: one camera alone is predicted well even if its delay is
+    attributed to the target.
     """
     shifts_ns = {name: round(later * 1e6) for name, later in later_ms.items()}
     tracker = tracker_from_field(resolved, flown.clock, 1)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-# Fewer sightings than this determine nothing.
+# Fewer sightings than this determine no delay.
 LEAST_SEEN = 60
 _UNSURE_MS, _TOLERATED_MS = 15.0, 10.0
 
@@ -11,8 +11,7 @@ _UNSURE_MS, _TOLERATED_MS = 15.0, 10.0
 class Delay:
     """One sensor's delay: the setting, its value [ms], the measured delay and one sigma of it.
 
-    reason: why it was not measured, or why the measurement is not to be trusted. flight: the flight that would
-    determine it.
+    reason: why it was not measured, or is not trusted. flight: the flight that would determine it.
     """
 
     sensor: str

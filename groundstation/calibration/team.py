@@ -1,4 +1,4 @@
-"""Calibrates all figures of a team from one recorded flight: which are wrong, and which settings mend them."""
+"""Calibrates all figures of a team from one recorded flight: finds the wrong ones, and the settings that mend them."""
 
 import math
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from groundstation.calibration.team_record import team_record
 from groundstation.calibration.team_settings import Path, changes, unit_of, with_changes
 from groundstation.field.resolved import ResolvedField
 
-# A recording does not determine a figure whose deviation is worse than this, with all others in doubt as well.
+# A recording does not determine a figure whose deviation, with all others in doubt as well, is larger than this.
 _NEEDED = {
     "print": 0.015,
     "focal": 0.015,
@@ -64,7 +64,7 @@ class Measured:
     """One figure: its error against the field and one sigma [unit], and the same with all figures in doubt.
 
     shown: whether the recording alone determines it well enough for use; beside: the figure (who, part) from which it
-    is hardest to separate, None if no single one stands out; corrected: whether a found cause moves it.
+    is hardest to separate, None if there is no single one; corrected: whether a found cause moves it.
     """
 
     who: str
@@ -94,8 +94,8 @@ class Found:
 class TeamCalibration:
     """The result of a calibration.
 
-    figures: all, in the field's order; found: what is wrong, gravest first; settings: changes that mend it; gain: of
-    those changes.
+    figures: all, in the field's order; found: proposed causes, gravest first; settings: changes that mend them; gain:
+    of those changes.
 
     sightings: number used; misfit: their mean squared deviation (1: as expected or, with all that is allowed for,
     less).

@@ -35,13 +35,13 @@ _FREEDOM = 8.0
 # The first rounds weigh outliers more, so that distant ones still attract.
 _FORGIVING = (30.0, 10.0, 4.0, 2.0)
 _ROUNDS, _SETTLED = 14, 0.02
-# Full steps oscillate about the best common delay of all sensors, which little constrains.
+# Full steps oscillate about the best common delay of all sensors, which is weakly constrained.
 _DAMPED = 0.5
 
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """The best explanation of a recording under a prior.
+    """The best fit of a recording under a prior.
 
     theta (n): the figures' errors; information (n, n), pull (n): of the recording alone, about zero; misfit: mean
     squared deviation of a sighting's row; used: number of sightings; cost: twice the negative log likelihood of paths
@@ -141,7 +141,7 @@ class TeamBatch:
         return self.robots[name] if name in self.robots else self.targets[name]
 
     def fit(self, sigma: Array, alike: float = 1.0) -> Fit:
-        """Return the best explanation if the figures' errors have a prior with this covariance (n, n).
+        """Return the best fit if the figures' errors have a prior with this covariance (n, n).
 
         alike: this many sightings count as one, because disturbances last; the precision of pads is not changed by it.
         """
@@ -266,7 +266,7 @@ class TeamBatch:
                     rows.by_knots(at[mine].ravel(), columns, (values * part[:, None]).ravel())
 
     def _by_attitude(self, rows: Rows, at: IntArray, slopes_: Array, name: str, times: Array) -> None:
-        """Add the derivatives of an attitude by the common delay of all that its drone reports."""
+        """Add the derivatives of an attitude by the common delay of all reports of its drone."""
         values = np.einsum("nic,nc->ni", slopes_[:, :, 3:], self.robots[name].turning(times))
         rows.by_figures(at.ravel(), np.full(at.size, self.figures.place[name, "own_delay"]), values.ravel())
 

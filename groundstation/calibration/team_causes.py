@@ -1,8 +1,8 @@
 """Finds the figures of a field that a recording shows to be wrong: as few causes as explain it. Pure arrays.
 
 All figures are free within their surveys. One cause after another is freed, always the one that raises the evidence
-most, until none raises it enough. A linear Gaussian model selects those worth a trial; what counts is how much better a
-fit with the cause explains the recording than one without it.
+most, until none raises it enough. A linear Gaussian model selects the candidates for a trial; the decision is by the
+gain of a fit with the cause over one without it.
 """
 
 import math
@@ -15,9 +15,10 @@ import numpy as np
 from groundstation.arrays import Array, Vector
 from groundstation.calibration.team_figures import Suspicion
 
-# By how much (log) a cause must raise the evidence; causes worse than the best by this much are ruled out.
+# Gain (log) in evidence that a cause needs; causes worse than the best by this much are ruled out.
 _SURE, RULED_OUT = math.log(100.0), math.log(20.0)
-# Velocity errors are the least known: noise that happened to look like a delay was worth e^8 in a healthy flight.
+# Velocity errors are the least known: noise that happened to look like a delay raised the evidence by e^8 in a healthy
+# flight.
 _SURE_OF = {"velocity_delay": math.log(1e4)}
 # Causes with a smaller lead in the linear model are not tried; of the others, this many at once.
 _WORTH_A_TRIAL, _AT_ONCE = math.log(10.0), 4
@@ -45,7 +46,7 @@ Explain = Callable[[Array], Explained]
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """A suspicion, the fit with it, and by how much (log) that is better than without."""
+    """A suspicion, the fit with it, and its gain (log) over the fit without."""
 
     suspicion: Suspicion
     explained: Explained
@@ -54,7 +55,7 @@ class Trial:
 
 @dataclass(frozen=True, slots=True)
 class Cause:
-    """Something that is wrong, by how much (log) it raises the evidence, and what would explain it nearly as well."""
+    """A cause, its gain (log) in evidence, and the suspicions that explain the data nearly as well."""
 
     suspicion: Suspicion
     gain: float
@@ -70,7 +71,7 @@ class Round:
 
     @property
     def best(self) -> tuple[Suspicion, float]:
-        """Return the suspicion that explains most, and its gain."""
+        """Return the suspicion with the largest gain, and that gain."""
         return max(self.gains, key=lambda one: one[1])
 
     @property
@@ -101,7 +102,7 @@ def rounds(H: Array, g: Vector, surveyed: Vector, suspicions: Iterable[Suspicion
 
 
 def sure_of(what: str) -> float:
-    """Return by how much (log) a cause of this sort must raise the evidence."""
+    """Return the gain (log) in evidence that a cause of this sort needs."""
     return _SURE_OF.get(what, _SURE)
 
 

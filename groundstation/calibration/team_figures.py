@@ -1,4 +1,4 @@
-"""The figures of a field that a recording may show to be wrong: names, precision, and place in the field."""
+"""The figures of a field that a recording may prove wrong: names, precision, and place in the field."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -58,7 +58,7 @@ _OF_DRONES_CAMERAS = ("pan", "tilt", "focal", *_PLACED)
 
 @dataclass(frozen=True, slots=True)
 class Suspicion:
-    """Figures that may be wrong together: directions (n, k) in which a common cause moves them, one sigma each (k).
+    """Figures that may be wrong together: directions (n, k) of their errors by a common cause, one sigma each (k).
 
     what: the part's name, or the common name of its parts; who: "" for all.
     """
@@ -95,7 +95,7 @@ class Figures:
         return max(_SURVEYED[part], self._told(who, part))
 
     def _told(self, who: str, part: str) -> float:
-        """Return the sigma that the field gives for a lens or the mounting of a drone's camera; 0 if it gives none."""
+        """Return the field's sigma for a lens or the mounting of a drone's camera; 0 if it gives none."""
         if part == "focal" and who in self.field.cameras:
             return self.field.cameras[who].calibration.focal_std
         if part not in _OF_DRONES_CAMERAS:
@@ -115,7 +115,7 @@ class Figures:
         return np.array([self.place.get((name, part), -1) for name in names], dtype=np.int64)
 
     def suspicions(self) -> Iterator[Suspicion]:
-        """Yield all suspicions: the figures that one cause may put wrong."""
+        """Yield all suspicions: groups of figures that one cause makes wrong."""
         n = len(self.keys)
         for place, (who, part) in enumerate(self.keys):
             if part not in ("x", "y", "roll", "pitch"):

@@ -1,4 +1,4 @@
-"""What new settings would have gained: today's tracker lives the recording again, under the old field and the new."""
+"""Gain of new settings: today's tracker re-runs the recording under the old field and the new one."""
 
 import math
 from collections.abc import Mapping
@@ -19,7 +19,7 @@ _EVERY, _SETTLING_S = 5, 3.0
 
 @dataclass(frozen=True, slots=True)
 class Gain:
-    """How far (rms) [m] the tracker held the targets from their likeliest paths: as flown, and with new settings."""
+    """The tracker's error (rms) [m] against the targets' likeliest paths: as flown, and with new settings."""
 
     before_m: float
     after_m: float

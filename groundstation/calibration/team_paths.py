@@ -1,4 +1,4 @@
-"""Paths of drones and targets: knots in time, between which their own sensors give the way."""
+"""Paths of drones and targets: knots in time, joined by the motion that their own sensors measured."""
 
 import math
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ _SPACING_S = 0.19
 LATER_S = 0.04
 """Half of the step by which derivatives by delays are taken [s]: about the size of a wrong delay.
 
-Over a smaller step they are mostly noise of the velocities, which the fit would take for information on the delay.
+Over a smaller step they are mostly velocity noise, which the fit would take for information on the delay.
 """
 
 
@@ -38,7 +38,7 @@ class Grid:
 
 
 def grid_of(duration_s: float, earlier: float = 0.0) -> Grid:
-    """Return the knots of a recording; earlier: by which share of their spacing the first lies before its begin."""
+    """Return the knots of a recording; earlier: share of their spacing by which the first lies before its begin."""
     count = max(3, math.ceil(duration_s / _SPACING_S + earlier) + 1)
     return Grid(np.asarray(_SPACING_S * (np.arange(count) - earlier)), _SPACING_S)
 
@@ -82,8 +82,8 @@ class RobotPath:
     def bulge(self, times: Array) -> Array:
         """Return the distance of the way between two knots from their line (n, 2), as the field has the odometry.
 
-        Most of it is the velocities' noise, a millimetre. If it moved with suspected delays, each sighting would tell
-        of them what is none: of a flight at one phase of the knots e^9, of the same at another nothing.
+        Most of it is the velocities' noise, a millimetre. If it moved with suspected delays, each sighting would give
+        false evidence of them: e^9 for a flight at one phase of the knots, none for the same at another.
         """
         first, share = self.grid.between(times)
         return _along(self._between_knots, times) - _between(self._between_at_knots, first, share)

@@ -22,10 +22,10 @@ from groundstation.time_units import NS_PER_S
 
 _STANDING = frozenset({FlightState.LANDED})
 _UNKNOWN_YAW = 1e6
-# During a shorter stand somebody may still be placing the drone.
+# During a shorter stand a person may still be placing the drone.
 _LEAST_STAND_S = 0.5
-# Sightings this near to a jump of a drone's own heading are left out, and those this near to an end of what is known
-# of a motion: a suspected delay would move them beyond it [s].
+# Sightings this near to a jump of a drone's own heading, or to the end of a known motion, are left out: a suspected
+# delay would move them beyond it [s].
 _JUMP_S, _EDGE_S = 0.4, 0.15
 # A longer silence of a drone's odometry hides how it moved [s].
 _SILENT_S = 0.3
@@ -76,7 +76,7 @@ class Sightings:
 
 @dataclass(frozen=True, slots=True)
 class TeamRecord:
-    """The data of a recording; stands: from when to when [s] a drone stood before its first flight."""
+    """The data of a recording; stands: begin and end [s] of each drone's stand before its first flight."""
 
     own: Mapping[str, OwnMotion]
     sightings: Sightings

@@ -11,7 +11,7 @@ from groundstation.calibration.team_paths import RobotPath, TargetPath
 from groundstation.field.drones import FieldDrone
 from groundstation.vehicles import kind_named
 
-# How fast a climb and a target's heading change [m/s^2], [rad/s^2]; a turning target accelerates beyond its wheels.
+# Rates at which a climb and a target's turn change [m/s^2], [rad/s^2]; a turning target accelerates beyond its wheels.
 _CLIMB_M_S2, _TURN_RAD_S2, _TURNING_M_S2 = 0.8, 2.0, 0.3
 _HEIGHT_EACH_S, _HEIGHT_LASTS_S, _LOWEST_M = 0.4, 2.0, 0.3
 _RESET_RAD, _STILL, _FREEDOM = 10.0, 5e-4, 8.0
@@ -49,7 +49,7 @@ class Rows:
         self.figures.append((rows[known], columns[known], values[known]))
 
     def count_as_one_of(self, alike: float) -> None:
-        """Make every `alike` of the rows so far count as one, because they say the same."""
+        """Make every `alike` of the rows so far count as one, because they are correlated."""
         share = alike**-0.5
         self.residuals = [share * values for values in self.residuals]
         self.local = [(rows, columns, share * values) for rows, columns, values in self.local]

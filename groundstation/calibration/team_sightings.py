@@ -1,4 +1,4 @@
-"""Selects the sightings of a recording that a team is fitted to."""
+"""Selects the sightings of a recording for the fit of a team."""
 
 from collections.abc import Collection
 

@@ -1,4 +1,4 @@
-"""Finds by how much one record of a motion is later than another, by comparing their changes under many delays."""
+"""Finds the time offset of two records of one motion, by comparing their changes under many delays."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -38,7 +38,7 @@ class Change:
     alike: float = 1.0
 
     def __call__(self, values: Array) -> Array:
-        """Return the differences (n, k) of values (times, k)."""
+        """Return the differences (n, k) of a record's values (times, k)."""
         now = values[self.second] - values[self.first]
         return now - self.kept * (values[self.first] - values[self.before]) if self.kept else now
 
@@ -79,7 +79,7 @@ def briefly(times: Array, lasting_s: float) -> Change:
 
 
 def interpolated(times: Array, values: Array) -> Callable[[Array, float], Array]:
-    """Return (times, delay) -> reported values, if they are this late."""
+    """Return (times, delay) -> reported values under this delay."""
 
     def at(wanted: Array, delay_s: float) -> Array:
         return np.column_stack([np.interp(wanted, times - delay_s, column) for column in values.T])
@@ -88,7 +88,7 @@ def interpolated(times: Array, values: Array) -> Callable[[Array, float], Array]
 
 
 def shift_between(parts: list[Part], scaled: bool) -> tuple[float, float] | None:
-    """Return by how much the second of two records of the same motion is late, and one sigma [s].
+    """Return the delay of the second of two records of the same motion, and one sigma [s].
 
     scaled: up to a factor. None if there are too few data, or no minimum.
     """
@@ -103,7 +103,7 @@ def shift_between(parts: list[Part], scaled: bool) -> tuple[float, float] | None
     found = least(_GRID_S, chi, _REACH)
     if found is None or found.curvature <= 0.0:
         return None
-    # Differences overlap: this many of them say the same.
+    # Differences overlap: this many of them count as one.
     change = parts[0].change
     variance = change.alike * max(1.0, rate_hz(parts[0].times) * change.window_s) / found.curvature
     return found.place, float(np.sqrt(variance))

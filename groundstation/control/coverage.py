@@ -1,4 +1,4 @@
-"""Sweeps with which a team soonest sees most of the floor where a lost target may be; robots turn while they fly."""
+"""Sweeps by which a team soonest sees most of the floor on which a lost target may be; robots turn while they fly."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -19,7 +19,7 @@ _VIEWS = 10
 
 @dataclass(frozen=True, slots=True)
 class _Searcher:
-    """One robot that may look for the target: the stands and headings of its sweeps, and where it may be.
+    """One robot that may look for the target: stands and headings of its sweeps, and its permitted stands.
 
     at (n, _VIEWS): for the sweep to each stand, the stand nearest to the robot at each view; headings (2, _VIEWS): as
     numbers, by direction.
@@ -76,6 +76,6 @@ choose_stands = partial(choose, Kind(_VIEWS, _searcher))
 
 
 def robots_in_order(robots: Sequence[str], chances: Array, poses: Mapping[str, Array], grid: RoomGrid) -> list[str]:
-    """Return the robots, first the one nearest to where the target is expected."""
+    """Return the robots, first the one nearest to the expected place of the target."""
     centre = (float(chances.sum(axis=0) @ grid.xs), float(chances.sum(axis=1) @ grid.ys))
     return sorted(robots, key=lambda name: (math.dist(poses[name][:2], centre), name))

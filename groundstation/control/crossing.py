@@ -1,4 +1,4 @@
-"""How a robot crosses from one world-fixed view into the next, through a gap where nobody sees it. Pure."""
+"""A robot's crossing from one world-fixed view into the next, through a gap in which it is unseen. Pure."""
 
 import math
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from groundstation.arrays import Array
 from groundstation.sensing.models import Rectangle
 
 RUN_UP_M = 0.3  # before the border: a vehicle needs this distance to reach its speed
-_INSET_M = 0.1  # behind the border, where it is seen for certain
+_INSET_M = 0.1  # inside the border, where it is certainly seen
 HOLD_GAIN = 1.0  # of the distance to the border [1/s]
 _GAIN = 3.0  # of the remaining way into the view [1/s]: with a smaller gain a velocity error carries it out
 _STANDS_M_S = 1e-3
@@ -33,7 +33,7 @@ class Passage:
 
     @property
     def gap_m(self) -> float:
-        """Return the length of the way on which nobody sees the robot [m]."""
+        """Return the length of the way on which the robot is unseen [m]."""
         return max(0.0, self.reaches_m - self.leaves_m)
 
 
@@ -82,8 +82,8 @@ def gap_about_m(place: Array, views: Sequence[Rectangle]) -> float:
 def unseen_way_m(leaves_m: float, speed: float, most: float, follows_s: float, unseen_s: float) -> float:
     """Return how far [m] a vehicle gets beyond a border in `unseen_s` after it has passed it.
 
-    The border is `leaves_m` ahead. The vehicle has a speed [m/s] now, is told to fly at its maximum `most` [m/s], and
-    follows with a lag `follows_s`.
+    The border is `leaves_m` ahead. The vehicle has a speed [m/s] now, a set-point at its maximum `most` [m/s], and a
+    lag `follows_s`.
     """
     lacks = max(0.0, most - speed)
     low, high = 0.0, follows_s + leaves_m / max(most, _STANDS_M_S)
@@ -98,8 +98,8 @@ def unseen_way_m(leaves_m: float, speed: float, most: float, follows_s: float, u
 def hold(view: Rectangle, place: Array, velocity: Array, most: float) -> Array:
     """Return the part of a velocity (2) [m/s] that keeps a robot in its view.
 
-    place (2) [m]: where it would come to rest: held by its present place, a vehicle that follows late leaves the view.
-    Outside of the view it flies back at up to `most` [m/s].
+    place (2) [m]: its point of rest, because a lagging vehicle held by its present place leaves the view. Outside of
+    the view it flies back at up to `most` [m/s].
     """
     low, high = (HOLD_GAIN * (side - place) for side in np.transpose((view.x_m, view.y_m)))
     return np.asarray(np.clip(velocity, np.minimum(low, most), np.maximum(high, -most)))
@@ -108,7 +108,7 @@ def hold(view: Rectangle, place: Array, velocity: Array, most: float) -> Array:
 def into(view: Rectangle, place: Array, velocity: Array, most: float) -> Array:
     """Return the velocity (2) [m/s] with which a robot outside a view flies straight into it.
 
-    Inwards it is as fast as wanted, or where that is slower, up to `most`; along the border it moves little.
+    Inwards it flies at the wanted speed, or faster, up to `most`; along the border it moves little.
     """
     low, high = (np.array(side) for side in np.transpose((view.x_m, view.y_m)))
     inner = view.shrunk(_INSET_M)
@@ -125,7 +125,7 @@ def _depth_m(place: Array, view: Rectangle) -> float:
 
 
 def _inside_m(place: Array, way: Array, view: Rectangle) -> tuple[float, float]:
-    """Return where a line enters and leaves a view [m from its begin]; the first is beyond the last if it misses it."""
+    """Return where a line enters and leaves a view [m from its begin]; if it misses the view, the first is larger."""
     first, last = -math.inf, math.inf
     for at, along, (low, high) in zip(place.tolist(), way.tolist(), (view.x_m, view.y_m), strict=True):
         if abs(along) < 1e-9:

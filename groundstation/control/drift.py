@@ -15,9 +15,8 @@ _GAP_NS = NS_PER_S // 2
 class DriftWatch:
     """Motion of one robot's point of rest beyond its commands, over two seconds.
 
-    A vehicle that follows the command c with lag T obeys d/dt (x + T v) = c + d: the difference over a window is d,
-    whatever its reason: wind, a wrong odometry that cameras correct, another lag. Good to 0.02 m/s where positions are
-    to 0.03 m.
+    A vehicle that follows the command c with lag T obeys d/dt (x + T v) = c + d: the difference over a window is d, for
+    any cause: wind, a wrong odometry that cameras correct, another lag. Good to 0.02 m/s where positions are to 0.03 m.
     """
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""How far robots may leave the sight of the world-fixed cameras, so that they are back before they are lost."""
+"""Limits how far robots may leave the views of world-fixed cameras, so that they are back before they are lost."""
 
 import math
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ _BACK_GAIN = 3.0
 
 @dataclass
 class Excursions:
-    """Judges by uncertainty and time how far robots may go out of sight.
+    """Limits by uncertainty and time how far robots may go out of sight.
 
     `unseen_s`: time since a camera last saw each robot; `velocity_errors_m_s`: rms errors of their odometry.
     """
@@ -55,7 +55,7 @@ def within_reach(
     velocity: Array, name: str, belief: JointBelief, parameters: ControlParameters, sensors: SensorSuite,
     error_m_s: float, drift_m_s: Array, near_m: tuple[float, float] | None = None,
 ) -> Array:  # fmt: skip
-    """Return the part of a velocity (2) [m/s; world] that keeps a robot where it could still fly back into view.
+    """Return the part of a velocity (2) [m/s; world] with which a robot can still fly back into view.
 
     It is assumed to be unseen from now on. The view is the world-fixed one at its height nearest to near_m [x, y], or
     to the robot itself; views that it reaches from there in time count as one with it. error_m_s: expected rms error of
@@ -69,7 +69,7 @@ def within_reach(
     if view is None:
         return velocity
     if not math.isfinite(error_m_s):
-        # Believed in view but not seen, it is somewhere else: towards the middle it is seen sooner.
+        # A robot estimated in view but unseen is elsewhere: towards the middle it is seen sooner.
         view = view.shrunk(math.inf)
     reach_m = p.return_speed_m_s * max(0.0, left_s - p.return_margin_s)
     low, high = np.transpose((view.x_m, view.y_m))

@@ -57,7 +57,7 @@ def _nearest(wanted: Array, normals: Array, most: Array) -> tuple[Array | None, 
 
 
 def _corner(wanted: Vector3, asked: tuple[Plane, ...]) -> tuple[Vector3, tuple[Plane, ...]] | None:
-    """Return the nearest velocity that some half-spaces allow and the last of them touches, and those that touch it."""
+    """Return the nearest velocity on the border of the last half-space that all allow, and those that touch it."""
     for size in range(min(3, len(asked))):
         for others in combinations(asked[:-1], size):
             touched = (*others, asked[-1])

@@ -1,4 +1,4 @@
-"""Where a robot departs from its plan: to make room for robots that return, and to stay where it can return itself."""
+"""Departures from the plan: to make room for returning robots, and to stay where the robot itself can return."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -11,13 +11,13 @@ from groundstation.control.moment import STILL, Moment, is_untied, soon
 from groundstation.control.view import spread_m
 from groundstation.geometry.stabilized_frame import stabilized_from_world, world_from_stabilized
 
-# Standard deviations of a robot's place that others leave as room: two keep it away from them, one is to spare.
+# Standard deviations of a returning robot's place that others leave as room: two for the separation, one to spare.
 _ROOM_SIGMAS = 3.0
 _ROOM_GAIN = 1.0  # of the missing distance [1/s]
 
 
 def giving_way(name: str, velocity: tuple[float, float], coming: Sequence[str], now: Moment) -> tuple[float, float]:
-    """Return the velocity [base_stabilized] of a robot that makes room for robots that fly back.
+    """Return the velocity [base_stabilized] of a robot that makes room for returning robots.
 
     Their places are uncertain, so the separation limit keeps them far off: a robot that hovers in the middle of the
     view would keep them out of it.
@@ -36,9 +36,9 @@ def giving_way(name: str, velocity: tuple[float, float], coming: Sequence[str], 
 
 
 def recoverable(name: str, velocity: tuple[float, float], now: Moment) -> tuple[float, float]:
-    """Return the part of a velocity [base_stabilized] that keeps a robot where it can come back from if it gets lost.
+    """Return the part of a velocity [base_stabilized] with which a robot could still come back if it got lost.
 
-    A robot that flies on our estimate comes back as soon as nothing tells its place: it would land before that is lost.
+    A robot that flies on our estimate turns back as soon as no sensor locates it: it would land before it is lost.
     """
     error_m_s = now.sight.velocity_errors_m_s.get(name, 0.0)
     drift = now.sight.drifts_m_s.get(name, STILL)[:2]

@@ -1,4 +1,4 @@
-"""Keeps robots that hover, on HOLD or until TRACK, at the place where each came to rest. Pure."""
+"""Keeps hovering robots, on HOLD or until TRACK, at the place where each came to rest. Pure."""
 
 import math
 from collections.abc import Mapping
@@ -14,16 +14,17 @@ from groundstation.geometry.stabilized_frame import stabilized_from_world
 from groundstation.time_units import NS_PER_MS
 
 _HOVERS = frozenset({"HOVER", "HOLD"})  # a driver's modes in which the drone hovers for an order
-# From its greatest speed a drone stands after a second, and says so.
+# A drone at its maximum speed comes to rest within a second, and then reports that too.
 _SETTLES_NS = 1500 * NS_PER_MS
-# Places are known to 0.03 m: nobody is moved for less, nor for the noise of it.
+# Places are known to 0.03 m: no drone is moved for less, nor for the noise of its place.
 _LEAVES_M, _ARRIVES_M = 0.1, 0.03
 _GAIN_PER_S, _MOST_M_S = 0.8, 0.2
-# The vehicle keeps its height, which is known less well; it climbs or sinks with what it takes for the floor.
+# The vehicle keeps its own height, which is known less well; it climbs or sinks with the surface that it takes for the
+# floor.
 _LEAVES_UP_M, _ARRIVES_UP_M = 0.2, 0.05
-# Nobody drifts as far while it is brought back, nor climbs: the belief was wrong, or is.
+# No drone drifts or climbs so far while it is brought back: beyond this the estimate is, or was, wrong.
 _LEASH_M, _LEASH_UP_M = 0.5, 1.0
-# Two sightings in sequence may be lost. Unseen for longer, its own hover knows as much as the belief.
+# Two sightings in sequence may be lost. A drone unseen for longer holds itself as well as the belief could.
 _SEEN_S = 1.0
 _STILL: Vector3 = (0.0, 0.0, 0.0)
 
@@ -74,15 +75,17 @@ class Hovering:
     def held(
         self, wanted: Mapping[str, Setpoint], now_ns: int, belief: JointBelief, seen_s: Mapping[str, float]
     ) -> dict[str, Setpoint]:
-        """Return the setpoints, those of hovering robots replaced by what brings each back to its place.
+        """Return the setpoints, those of hovering robots replaced by velocities back to their places.
 
         seen_s: time since each robot was seen whose place is not doubted [s].
         """
         return {name: self._held(name, one, now_ns, belief, seen_s) for name, one in wanted.items()}
 
     def sent(self, limited: Mapping[str, Limited], seen_s: Mapping[str, float]) -> dict[str, Limited]:
-        """Return what is sent after limiting: who hovers moves only while it is seen, and keeps its height by itself
-        unless it has left that, or would leave the fence."""
+        """Return the setpoints to send after limiting: a hovering robot moves only while it is seen.
+
+        It keeps its height by itself unless it has left it, or would leave the fence.
+        """
         return {name: self._sent(self._stays[name], one, _is_sure(name, seen_s)) if name in self._stays else one
                 for name, one in limited.items()}  # fmt: skip
 

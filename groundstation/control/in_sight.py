@@ -25,11 +25,11 @@ Kept = tuple[Array, float]
 
 # Views are narrower higher up, and a climbing vehicle rises on by this much before it holds its height.
 _RISES_ON_M = 0.3
-# Unseen a vehicle's place is known for a second, after which it is fed nothing, hovers, and lands 0.7 s later (0214).
+# An unseen vehicle's place is known for a second; then it is sent no estimate, hovers, and lands 0.7 s later (0214).
 _UNSEEN_S = 1.0
-# The limits of separation let two robots come as near as that, and this of the way that is left to it be flown [1/s].
+# Least distance [m] that the separation limits allow two robots, and closing speed per remaining distance [1/s].
 _APART_M, _CLOSING_GAIN = 0.8, 0.5
-_SINKS_M, _SINK_STEPS = 0.1, 6  # to where a gap is short enough
+_SINKS_M, _SINK_STEPS = 0.1, 6  # down to a level at which a gap is short enough
 
 
 def kept_in_sight(
@@ -37,9 +37,9 @@ def kept_in_sight(
 ) -> tuple[tuple[float, float], float]:
     """Return velocity [base_stabilized] and level [m] with which a robot is never unseen for longer than it can afford.
 
-    It stays in its view, as large as that is at the height to which it climbs, and leaves it only towards another view
-    that it reaches in time: straight, at full speed, and without a climb. A robot whose place others tell may be
-    anywhere between views that are farther apart. ahead_m: how far the robot is about to go.
+    It stays in its view, taken at the height to which it climbs, and leaves it only towards another view that it
+    reaches in time: straight, at full speed, and without a climb. A robot that others locate may be anywhere between
+    views that are farther apart. ahead_m: how far the robot is about to go.
     """
     if name not in now.parameters.fed:
         return velocity, level_m
@@ -65,7 +65,7 @@ def _kept(name: str, wanted: Array, level_m: float, ahead_m: float, now: Moment)
     if found is None:
         return _held_in(name, wanted, level_m, now)
     short_m, helped = _short_m(name, found, now), _is_helped(name, now)
-    # Whom others see may be told in the gap to stay there, but does not stay: half of the way is enough.
+    # A robot that others locate does not stay in the gap, even if its set-points would: half of the way is enough.
     needed_m = 0.5 * (found.leaves_m + found.reaches_m) if helped else found.reaches_m
     crosses = needed_m <= ahead_m * found.share
     if found.gap_m > short_m and helped:
@@ -80,7 +80,7 @@ def _kept(name: str, wanted: Array, level_m: float, ahead_m: float, now: Moment)
 
 
 def _short_m(name: str, found: Passage, now: Moment) -> float:
-    """Return how wide a gap a robot crosses in time, from where it is or from the begin of its run-up."""
+    """Return the widest gap that a robot crosses in time [m], from its place or from the begin of its run-up."""
     speed = float(now.sight.velocities_m_s.get(name, STILL)[:2] @ found.way)
     return unseen_way_m(
         min(found.leaves_m, RUN_UP_M), max(0.0, speed), _pace_m_s(name, found, now), FOLLOWS_S, _UNSEEN_S
@@ -102,7 +102,7 @@ def _pace_m_s(name: str, found: Passage, now: Moment) -> float:
 
 
 def _outside(name: str, wanted: Array, level_m: float, views: tuple[Rectangle, ...], now: Moment) -> Kept:
-    """Return velocity and level that bring a robot which is in no view into the one that it flies to."""
+    """Return velocity and level that bring a robot outside all views into the one ahead of it."""
     mean, most = now.belief.mean_of(name), now.parameters.limits_of(name).max_speed_m_s
     place, gap_m = mean[:2], gap_about_m(mean[:2], views)
     if math.isfinite(gap_m) and gap_m > _UNSEEN_S * most and _is_helped(name, now):
@@ -120,14 +120,14 @@ def is_between_views(name: str, now: Moment) -> bool:
 
 
 def _held_in(name: str, wanted: Array, level_m: float, now: Moment) -> Kept:
-    """Return velocity and level that keep a robot in its view, at the height to which it climbs."""
+    """Return velocity and level that keep a robot in its view at the height to which it climbs."""
     place, z = now.belief.mean_of(name)[:2], float(now.belief.mean_of(name)[2])
     view = view_around(place, _views(name, max(level_m, z), now))
     return _held_by(view, name, wanted, now), _climbed(name, level_m, now)
 
 
 def _in_box(name: str, wanted: Array, level_m: float, now: Moment) -> Kept:
-    """Return velocity and level that keep a robot which others see in the box about all views."""
+    """Return velocity and level that keep a robot seen by others in the box about all views."""
     x, y, z = (float(value) for value in now.belief.mean_of(name)[:3])
     kept = _held_by(box_about_views(name, now.belief, now.sensors, max(level_m, z)), name, wanted, now)
     box = box_about_views(name, now.belief, now.sensors, max(z, min(level_m, z + _RISES_ON_M)))
@@ -140,7 +140,7 @@ def _held_by(view: Rectangle | None, name: str, wanted: Array, now: Moment) -> A
 
 
 def _climbed(name: str, level_m: float, now: Moment) -> float:
-    """Return the level of a robot in view, which climbs only if it is still in a view higher up."""
+    """Return the level of a robot in view: it climbs only if it is in a view at that height too."""
     mean = now.belief.mean_of(name)
     z = float(mean[2])
     if level_m <= z:
@@ -150,7 +150,7 @@ def _climbed(name: str, level_m: float, now: Moment) -> float:
 
 
 def _sunk(z: float, level_m: float, now: Moment) -> float:
-    """Return the level of a robot between two views: told to keep its height, a climbing robot would rise on (0213)."""
+    """Return the level of a robot between two views: with its height held, a climbing robot would rise on (0213)."""
     return min(level_m, z - now.parameters.height_tolerance_m)
 
 

@@ -1,4 +1,4 @@
-"""Entities that join the belief or are re-initialised in it: told to the operator, and unsettled if repeated. Pure."""
+"""Reports entities that join the belief or are re-initialised in it; a repeated one is unsettled. Pure."""
 
 import math
 from collections.abc import Iterable
@@ -8,7 +8,7 @@ from groundstation.bus.notice import Notice
 from groundstation.estimation.measurement import Correction
 from groundstation.time_units import NS_PER_S
 
-# Two re-initialisations within this time: what the belief relies on is wrong, and remains so.
+# Two re-initialisations within this time: a source of the belief is wrong, and remains so.
 _AGAIN_NS = 5 * NS_PER_S
 # Without another one for this time, the entity is settled.
 _SETTLED_NS = 3 * NS_PER_S

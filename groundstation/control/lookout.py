@@ -1,4 +1,4 @@
-"""Targets and robots that pictures do not show: searches, missed robots, and events for the operator."""
+"""Unseen targets and robots: searches, missed robots, and events for the operator."""
 
 from collections.abc import Collection, Mapping, Sequence
 
@@ -53,22 +53,22 @@ class Lookout:
 
     @property
     def targets(self) -> Mapping[str, SearchState]:
-        """Return how the search for each target stands."""
+        """Return the state of the search for each target."""
         return self._search.targets
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """Return the targets that the team searches for."""
+        """Return the targets being searched for."""
         return tuple(name for name in self.targets if self._search.is_missing(name))
 
     @property
     def missed_s(self) -> Mapping[str, float]:
-        """Return for how long cameras should have seen robots and did not, by robot [s]."""
+        """Return how long cameras have missed each robot that they should see [s]."""
         return self._robots.missed_s
 
     @property
     def unsteered(self) -> tuple[str, ...]:
-        """Return the robots that follow no setpoints according to their drivers: they wait or land."""
+        """Return the robots that, by their drivers' modes, follow no setpoints: they wait or land."""
         return tuple(name for name in self._names if self._modes.get(name, _OBEYS) != _OBEYS)
 
     @property
@@ -82,7 +82,7 @@ class Lookout:
         return self._excursions.velocity_errors_m_s
 
     def take(self, message: Message, in_our_time: bool = True) -> None:
-        """Take in a driver's mode, or a fully searched picture; a picture stamped by another clock does not count."""
+        """Take a driver's mode, or a fully searched picture; a picture stamped by another clock does not count."""
         match message:
             case VehicleStatus():
                 self._modes[message.header.entity] = message.mode
@@ -91,13 +91,13 @@ class Lookout:
                 self._robots.take(message)
 
     def see(self, sighting: RelativeObservation) -> None:
-        """Take in a sighting, stamped by our clock, that the filter is given."""
+        """Take a sighting, stamped by our clock, that the filter gets too."""
         self._search.see(sighting)
 
     def advance(
         self, belief: JointBelief, ages_s: Mapping[str, float], rooted_s: Mapping[str, float]
     ) -> tuple[str, ...]:
-        """Count all pictures; returns the targets that are no longer where the belief has them.
+        """Count all pictures; returns the targets whose estimates no longer hold.
 
         ages_s: time since each airborne robot and each target was last seen; rooted_s: time since a sensor fixed in the
         room last located each airborne robot, directly or through others. Infinite: not in the belief.
@@ -113,7 +113,7 @@ class Lookout:
         return gone
 
     def hopeless(self, belief: JointBelief) -> tuple[str, ...]:
-        """Return the missing targets that no plan can use: a scout looks for them while others are tracked."""
+        """Return the missing targets too uncertain for a plan: a scout searches for them while others are tracked."""
         missing = self.missing
         if len(missing) == len(self.targets):
             return ()
@@ -126,13 +126,13 @@ class Lookout:
         return found
 
     def searches(self, now_ns: int) -> tuple[TargetSearch, ...]:
-        """Return for people how each search stands; none while nobody searches."""
+        """Return the state of each search, for display; none while no robot searches."""
         if not self._obeyed:
             return ()
         return tuple(_message(name, self.targets[name], now_ns) for name in self.missing if self.targets[name].place)
 
     def maps(self) -> Mapping[str, RoomMap]:
-        """Return the map of each target that is searched for: where it may be."""
+        """Return the probability map of each target that is searched for."""
         rooms = {name: self.targets[name].room for name in self.missing}
         return {name: room for name, room in rooms.items() if room is not None}
 
@@ -143,16 +143,16 @@ class Lookout:
 
     @property
     def _obeyed(self) -> bool:
-        """Return whether any robot obeys the search's setpoints: not while all hold or land."""
+        """Return whether any robot follows the search's setpoints: not while all hold or land."""
         return _OBEYS in self._modes.values()
 
     def _unseen_s(self, now_ns: int, ages_s: Mapping[str, float]) -> Mapping[str, float]:
-        """Return for how long no picture has shown each target that the team tracks [s]."""
+        """Return the time since a picture last showed each tracked target [s]."""
         tracked = [name for name in self.targets if not self._search.is_missing(name)] if self._obeyed else []
         return {name: min(ages_s[name], self._search.shown_s(name, now_ns)) for name in tracked}
 
     def _tell(self) -> None:
-        """Tell the operator when the search for a target begins, ends or becomes hopeless, once a robot can search."""
+        """Add a notice when the search for a target begins, ends or becomes hopeless, once a robot can search."""
         for name, state in self.targets.items():
             if state.mode is self._told[name] or (state.mode is not SearchMode.TRACK and not self._obeyed):
                 continue

@@ -16,13 +16,13 @@ from groundstation.sensing.visibility import camera_rows
 from groundstation.time_units import NS_PER_S
 
 _SEEN_S = 0.6  # a robot seen this recently is not missing
-_DOUBT = math.log(0.02)  # log of the chance that a robot is where it is believed and yet in none of the pictures
+_DOUBT = math.log(0.02)  # log of the probability that a robot is at its estimated place and yet in none of the pictures
 _BODY_M = 0.5  # a robot this near to the line of sight hides what is behind it
 _FIXED = np.zeros(4)
 
 
 class MissingRobots:
-    """Adds up pictures in which robots should be. Use: `take` them, `advance` with each belief, read `missed_s`."""
+    """Accumulates pictures that should show robots. Use: `take` them, `advance` with each belief, read `missed_s`."""
 
     def __init__(self, sensors: SensorSuite, robots: Sequence[str]) -> None:
         self._sensors, self._robots = sensors, tuple(robots)

@@ -12,9 +12,9 @@ from groundstation.estimation.belief import JointBelief
 from groundstation.sensing.models import SensorSuite
 
 STILL = np.zeros(3)
-# Between two views a robot goes on towards the one ahead: the nearest one may change with each estimate.
+# A robot between two views goes on to the one ahead: the nearest one may change with each estimate.
 _AHEAD_S = 1.0
-# After a step of its setpoint a real autopilot has come to 63 % of the velocity within 0.5 to 0.9 s.
+# A real autopilot reaches 63 % of a step of its velocity setpoint within 0.5 to 0.9 s.
 FOLLOWS_S = 0.7
 
 Stands = Callable[[Sequence[str], Collection[str]], Mapping[str, Stand]]
@@ -25,13 +25,13 @@ Stands = Callable[[Sequence[str], Collection[str]], Mapping[str, Stand]]
 class Sight:
     """Times since robots and targets were seen, and the places where robots search.
 
-    target_age_s: time since any target was last observed where it is believed, None if never; unseen_s: time since a
-    camera last saw each robot; missed_s: for how long a camera should have seen a robot and did not; missing: targets
-    to be searched for, by one robot while others are tracked; velocity_errors_m_s: rms error of each robot's odometry;
-    drifts_m_s: motion of each robot beyond its commands (3) [m/s; world]; unsteered: robots that follow no setpoints:
-    they wait or land; untied_s: time since a sensor fixed in the room last located each robot, or another one saw it;
-    velocities_m_s: of each robot (3) [m/s; world]; helped_s: time since others than the sensors fixed in the room last
-    told where each robot is.
+    target_age_s: time since a target was last observed at its estimated place, None if never; unseen_s: time since a
+    camera last saw each robot; missed_s: time for which a camera has missed a robot that it should see; missing:
+    targets to be searched for, by one robot while others are tracked; velocity_errors_m_s: rms error of each robot's
+    odometry; drifts_m_s: motion of each robot beyond its commands (3) [m/s; world]; unsteered: robots that follow no
+    setpoints: they wait or land; untied_s: time since a sensor fixed in the room last located each robot, or another
+    one saw it; velocities_m_s: of each robot (3) [m/s; world]; helped_s: time since others than the sensors fixed in
+    the room last located each robot.
     """
 
     target_age_s: float | None = None
@@ -49,7 +49,7 @@ class Sight:
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """The inputs of all setpoints of a step; robots: those in the air whose place is believed."""
+    """The inputs of all setpoints of a step; robots: those in the air with a trusted estimate."""
 
     belief: JointBelief
     robots: Sequence[str]
@@ -59,21 +59,21 @@ class Moment:
 
 
 def steered(names: Sequence[str], now: Moment) -> list[str]:
-    """Return those of the robots that follow setpoints; all of them if none does, for they may soon."""
+    """Return the robots that follow setpoints; all of them if none does, because they may soon."""
     return [name for name in names if name not in now.sight.unsteered] or list(names)
 
 
 def is_untied(name: str, now: Moment) -> bool:
-    """Return whether a robot flies on our estimate and nothing tells any more where it is."""
+    """Return whether a robot flies on our estimate and no sensor locates it any more."""
     return name in now.parameters.fed and now.sight.untied_s.get(name, 0.0) > now.parameters.untied_after_s
 
 
 def soon(name: str, now: Moment) -> tuple[float, float]:
-    """Return where a robot will be in one second (x, y) [m; world]."""
+    """Return a robot's predicted place in one second (x, y) [m; world]."""
     x, y = now.belief.mean_of(name)[:2] + _AHEAD_S * now.sight.velocities_m_s.get(name, STILL)[:2]
     return float(x), float(y)
 
 
 def at_rest(name: str, now: Moment) -> Array:
-    """Return where a robot would come to rest if it were told to stand (2) [m; world]."""
+    """Return the place where a robot would come to rest if it were stopped now (2) [m; world]."""
     return np.asarray(now.belief.mean_of(name)[:2] + FOLLOWS_S * now.sight.velocities_m_s.get(name, STILL)[:2])

@@ -6,7 +6,7 @@ from groundstation.control.view import known_velocity_error_m_s, velocity_error_
 from groundstation.estimation.belief import JointBelief
 from groundstation.time_units import NS_PER_S
 
-# An autopilot's error comes from its tilt, which sways over 10 s: an error that passes zero comes back.
+# An autopilot's velocity error comes from its tilt error, which sways over 10 s: after a zero it comes back.
 _FORGOTTEN_S = 10.0
 
 

@@ -1,6 +1,6 @@
 """The last step before a setpoint is sent: shrinks a velocity or hovers; adds velocity only against a drift.
 
-Why its half-spaces keep fence and separation whatever is asked: docs/explanation/safety.md#why-it-holds.
+Why its half-spaces keep fence and separation for any wanted velocity: docs/explanation/safety.md#why-it-holds.
 """
 
 import math
@@ -19,7 +19,7 @@ from groundstation.geometry.stabilized_frame import stabilized_from_world, world
 from groundstation.planning.parameters import MotionLimits
 from groundstation.vectors import Vector3, difference, dot
 
-# No two bodies are this near to each other: a belief that says so does not tell on which side the other one is.
+# No two bodies are this near to each other: if their estimates are, the direction between them is unknown.
 _NO_SIDE_M = 0.1
 # Number of sides of a polygon within the circle of the fastest horizontal velocities.
 _ROUND = np.array([(math.cos(a), math.sin(a), 0.0) for a in np.arange(16) * (2.0 * math.pi / 16)])
@@ -33,7 +33,7 @@ _AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 class Limited:
     """A setpoint that may be sent, the names of the limits that changed it, and the wanted velocity, if finite.
 
-    holds: it keeps a robot at its place that hovers for an order.
+    holds: it keeps a robot, hovering by order, at its place.
     """
 
     setpoint: Setpoint
@@ -137,7 +137,7 @@ def _unfit(robot: str, setpoint: Setpoint, belief: JointBelief, now_ns: int, par
 
 
 def _coincides(robot: str, belief: JointBelief) -> bool:
-    """Return whether another robot is believed in the same place: its direction is then unknown."""
+    """Return whether another robot's estimate is at the same place: its direction is then unknown."""
     place = _place(robot, belief)
     others = (_place(other, belief) for other in belief.layout.robots if other != robot)
     return not all(math.dist(other, place) >= _NO_SIDE_M for other in others)
@@ -175,8 +175,7 @@ def _clip(robot: str, setpoint: Setpoint, parameters: SafetyParameters) -> tuple
 def _braking(
     robot: str, belief: JointBelief, parameters: SafetyParameters, velocities: Mapping[str, Array]
 ) -> tuple[Vector3, float]:
-    """Return where the robot would come to rest (its place if the velocity is unknown), and the time to shed slack in
-    [s].
+    """Return the robot's point of rest (its place if the velocity is unknown), and the time in which to shed slack [s].
 
     A vehicle that follows a velocity c with lag T obeys d/dt (x + T v) = c: the point of rest is an integrator of the
     command. Without v the loop x' = v, v' = (slack / time - v) / T overshoots by 0.4 % of the slack at time = 3 T.

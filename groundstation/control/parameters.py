@@ -10,7 +10,7 @@ from groundstation.vectors import Interval
 from groundstation.vehicles import kind_named
 
 _USUAL_LIMITS = MotionLimits()
-# Of robots that search: slow enough for sharp pictures that follow each other densely.
+# Speeds of searching robots: slow enough for sharp and densely spaced pictures.
 SEARCH_SPEED_M_S, SEARCH_YAW_RATE_RAD_S = 0.5, 0.8
 
 
@@ -21,14 +21,14 @@ class ControlParameters:
     search_height_m: height while searching or returning; column_m: horizontal distance between two robots within which
     neither changes height, and the least between two stands; return_std_m: a robot outside the world-fixed views with a
     larger deviation flies back; so does one whose deviation would reach return_limit_m before it is back in view, or
-    that would then have been unseen for return_within_s (odometry may be worse than it says), each with return_margin_s
-    to turn round and be found; but none before return_soonest_s, a usual gap between sightings; return_drift_m_s:
-    largest measured drift that is subtracted on the way back; drift_m_s: least rate at which a place becomes uncertain
-    out of sight, starting from seen_std_m; sound_error_m_s: largest error of sound odometry; regain_after_s: when
-    nobody has seen a target for this long, the robots that track it turn to it and back off; hint_std_m: no plan uses a
-    target with a larger deviation; planned_s: how far plans reach; max_plan_age_s: controls of an older plan are no
-    longer flown; fed: robots that fly on our estimate; untied_after_s: if nothing tells their place for this long, they
-    turn back; the next sighting takes 0.3 s at most, where there is one.
+    that would then have been unseen for return_within_s (odometry may be worse than its stated error), each with
+    return_margin_s to turn round and be found; but none before return_soonest_s, a usual gap between sightings;
+    return_drift_m_s: largest measured drift that is subtracted on the way back; drift_m_s: least rate at which a place
+    becomes uncertain out of sight, starting from seen_std_m; sound_error_m_s: largest error of sound odometry;
+    regain_after_s: when a target has been unseen for this long, the robots that track it turn to it and back off;
+    hint_std_m: no plan uses a target with a larger deviation; planned_s: how far plans reach; max_plan_age_s: controls
+    of an older plan are no longer flown; fed: robots that fly on our estimate; untied_after_s: if no sensor locates
+    them for this long, they turn back; the next sighting takes 0.3 s at most, where there is one.
     """
 
     search_height_m: float

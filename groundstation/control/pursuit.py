@@ -20,11 +20,11 @@ _WAYS_M, _BEARINGS = (0.8, 2.0, 4.0), 12
 
 @dataclass(frozen=True, slots=True)
 class _Searcher:
-    """One robot that may look for the target: the ways and headings of its sweeps, and where it may be.
+    """One robot that may look for the target: paths and headings of its sweeps, and its permitted stands.
 
     seen: chance that a target in each cell of its footprint is found within a view; rows, columns (n, _VIEWS): cells of
-    the grid on the way to each stand; headings (2, _VIEWS): as numbers, by direction; free, near (n): where it may be,
-    and the stands that are compared if it may be there.
+    the grid on the way to each stand; headings (2, _VIEWS): as numbers, by direction; free, near (n): its permitted
+    stands, and those that are compared if permitted.
     """
 
     footprint: Footprint
@@ -85,5 +85,5 @@ def _around() -> Array:
     return np.concatenate((np.zeros((1, 2)), *(way_m * ring for way_m in _WAYS_M)))
 
 
-# Arguments and result: as `choose`. Fewer stands are compared, all the way to them and more of what follows.
+# Arguments and result: as `choose`. Fewer stands are compared, but by their whole way and more of the views after it.
 choose_pursuit = partial(choose, Kind(_VIEWS, _searcher))

@@ -1,4 +1,4 @@
-"""How a tracking robot regains a target that left its picture: it turns to it and backs off, before any search."""
+"""Regains a target that left a tracking robot's picture: before any search the robot turns to it and backs off."""
 
 import math
 from collections.abc import Collection
@@ -16,7 +16,7 @@ from groundstation.sensing.topology import Topology
 _WAY_GAIN, _TURN_GAIN = 1.5, 2.0  # of its error in distance and heading [1/s]
 _FASTEST_M_S = 0.5
 _ABOVE_RAD = 0.12  # a target is kept this much above the middle of the picture: a robot that backs off tips it up
-_MOST_SPREAD_M = 0.6  # a wider belief does not tell how far to back off
+_MOST_SPREAD_M = 0.6  # with a wider belief the distance to back off is unknown
 _NEAREST_M = 0.3
 
 

@@ -1,4 +1,4 @@
-"""When a robot flies back into view of a world-fixed camera, where to, and how it looks for the view there."""
+"""A robot's return into view of a world-fixed camera: its condition, its goal, and the search for the view there."""
 
 import math
 
@@ -37,7 +37,7 @@ def is_lost(
     left_s = time_left_s(spread, unseen_s, parameters, velocity_error_m_s)
     marker = sensors.marker(name, mean, is_robot=True)
     if any(sensors.world_in_view(camera, marker) for camera in sensors.world):
-        # A robot believed in view but not seen may be beside it: towards the middle it is seen sooner.
+        # A robot estimated in view but unseen may be beside the view: towards the middle it is seen sooner.
         return unseen_s > parameters.return_soonest_s and left_s < parameters.return_margin_s
     view = view_of(float(mean[0]), float(mean[1]), name, parameters, sensors)
     if view is None or unseen_s <= parameters.return_soonest_s:
@@ -47,10 +47,10 @@ def is_lost(
 
 
 def return_stand(mean: Array, view: Rectangle | None, looks_s: float = 0.0) -> Stand:
-    """Return the middle of a world-fixed view, with the heading as it is; without a view, where the robot is.
+    """Return the middle of a world-fixed view, with the present heading; without a view, the robot's place.
 
-    looks_s: for how long the robot should have been in view and was not: it turns, and circles the middle ever wider,
-    until a camera sees it or it sees something that it knows.
+    looks_s: time for which the robot should have been in view and was not: it turns, and circles the middle ever wider,
+    until a camera sees it or it sees a known entity.
     """
     x, y, yaw = float(mean[0]), float(mean[1]), float(mean[3])
     x, y = view.center if view else (x, y)

@@ -1,4 +1,4 @@
-"""How long ago a sensor fixed in the room last located each robot, and whether any such sensor still works. Pure."""
+"""Time since a sensor fixed in the room last located each robot, and whether any such sensor still works. Pure."""
 
 import math
 from collections.abc import Collection, Iterable
@@ -45,9 +45,10 @@ class RootWatch:
 
     @property
     def is_silent(self) -> bool:
-        """Return whether no root has told anything new for 1.5 s, or 0.5 s if all that it still sends is refused.
+        """Return whether no root has sent new data for 1.5 s, or 0.5 s if all data that it still sends are refused.
 
-        A root that never reports empty pictures may just see nobody; it is judged only while it repeats itself.
+        A root that never reports empty pictures may just have no robot in view; it is judged only while it repeats
+        itself.
         """
         return bool(self._roots) and all(map(self._says_nothing, self._roots))
 
@@ -91,7 +92,7 @@ class RootWatch:
         return math.inf if at_ns is None else (self._now_ns - at_ns) / NS_PER_S
 
     def _note(self, root: str, now_ns: int, *, works: bool) -> None:
-        """Take word of a root that also reports when it sees nobody; with its first word it counts as working."""
+        """Take a report of a root that also reports empty pictures; after its first report it counts as working."""
         self._telling.add(root)
         if works or root not in self._heard_ns:
             self._renew(root, now_ns)

@@ -1,4 +1,4 @@
-"""The height from which turning robots see most of the floor."""
+"""Search height: that from which turning robots see most of the floor."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ _STEP_M, _CELL_M = 0.05, 0.2
 def search_height_m(field: ResolvedField) -> float:
     """Return the height [m], of the planned ones, from which the team's cameras show most of the floor in a turn.
 
-    Too low, far markers are seen too flatly; too high, all are far, and the blind spot beneath is wider.
+    From too low, far markers are seen too obliquely; from too high, all are far, and the blind spot beneath is wider.
     """
     sensors = sensors_from_field(field)
     marker_m = max((sensors.marker_height_m[name] for name in field.tracked), default=0.0)

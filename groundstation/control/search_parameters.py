@@ -1,4 +1,4 @@
-"""Settings of the search for targets that are not seen."""
+"""Settings of the search for unseen targets."""
 
 import math
 from collections.abc import Mapping
@@ -11,12 +11,12 @@ from groundstation.field.room import MotionCapture, WorldCamera
 from groundstation.vectors import Interval
 
 NEAR_YAW_RATE_RAD_S = 1.04
-"""For a target that was tracked when it got out of sight: near, and large even in a picture that is not quite sharp."""
+"""For a target that was tracked when it got out of sight: it is near, and large even in a slightly blurred picture."""
 
 
 @dataclass(frozen=True, slots=True)
 class SearchParameters:
-    """How a target that is not seen is searched for.
+    """Settings of the search for unseen targets.
 
     room_m: size along x and y; ranges_m: within which a search of each robot's pictures succeeds, larger than those
     that plans count on; observers: robots and world-fixed cameras that may see targets; begin_after_s: time unseen
@@ -25,7 +25,7 @@ class SearchParameters:
     1/e; near_yaw_rate_rad_s: yaw rate while all targets searched for were tracked before; keep_gain: another stand must
     promise this much more; starts_ahead_m: how far before the team a target that was never seen is expected;
     target_speed_m_s, target_straight_s: of a target that drives about; lost_after_s, lost_excluded: length of a search,
-    and share of the room excluded by it, after which a person is asked.
+    and share of the room excluded by it, after which the operator is asked.
     """
 
     room_m: tuple[float, float]

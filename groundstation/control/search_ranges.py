@@ -1,4 +1,4 @@
-"""How far away a searching robot's camera finds targets: farther than plans count on."""
+"""Range within which a searching robot's camera finds targets: longer than plans count on."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -9,11 +9,11 @@ from groundstation.sensing.from_field import square_m
 from groundstation.sensing.models import OnboardCameraModel
 
 SEARCH_PX = 8.8
-"""So large a square is found in 86 % of the pictures that are searched all over (docs/reference/vision.md 2)."""
+"""Size of a square that is found in 86 % of fully searched pictures (docs/reference/vision.md 2)."""
 
 
 def search_ranges_m(resolved: ResolvedField) -> dict[str, float]:
-    """Return how far a full search of each drone's pictures finds all targets [m], at least as far as plans go."""
+    """Return the range of a full search of each drone's pictures for all targets [m], at least that of plans."""
     return {name: _range_m(drone, resolved) for name, drone in resolved.drones.items()}
 
 

@@ -1,4 +1,4 @@
-"""Stands far enough apart that robots at them do not push each other away."""
+"""Stands far enough apart for the separation limit not to push robots away from them."""
 
 import math
 from collections.abc import Collection, Mapping
@@ -23,8 +23,8 @@ def apart(
 ) -> dict[str, Stand]:
     """Return the stands, each moved as little as needed for any two to be at least a distance apart.
 
-    The first keeps its own, the others give way in order. places: where each robot is [m; world]; views: where its
-    stand must lie, None: anywhere. In views too small for that distance, stands are as far apart as the corners allow.
+    The first keeps its own, the others give way in order. places: of the robots [m; world]; views: in which each stand
+    must lie, None: anywhere. In views too small for that distance, stands are as far apart as the corners allow.
     """
     points: dict[str, Point] = {}
     for name, stand in wanted.items():

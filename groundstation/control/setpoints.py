@@ -69,7 +69,7 @@ def setpoints_from_plan(
 
 
 def _phases(plan: PlanResult | None, airborne: Collection[str], now: Moment) -> dict[str, FlightMode]:
-    """Return what each robot does; one that tracks is spared for the search if a target is missing."""
+    """Return each robot's flight mode; one that tracks is spared for the search if a target is missing."""
     age_s = now.sight.target_age_s
     fresh = age_s is not None and age_s <= now.parameters.lost_after_s and bool(now.belief.layout.targets)
     phases = {
@@ -89,7 +89,7 @@ def _phases(plan: PlanResult | None, airborne: Collection[str], now: Moment) -> 
 
 
 def _planned(name: str, plan: PlanResult, coming: Sequence[str], now: Moment) -> Setpoint:
-    """Return the plan's setpoint within what the robot may do: who flies back goes first, and it stays in view."""
+    """Return the plan's setpoint within the robot's limits: it makes room for returning robots, and stays in view."""
     vx, vy, rate = _regained(name, plan, now)
     level_m = _level_m(name, plan.heights[name], now)
     velocity = recoverable(name, giving_way(name, (vx, vy), coming, now), now)
@@ -130,7 +130,7 @@ def _regained(name: str, plan: PlanResult, now: Moment) -> tuple[float, float, f
 def _level_m(name: str, level_m: float, now: Moment) -> float:
     """Return a robot's height [m]; while it looks for a view it sinks a little, for views are narrower higher up.
 
-    Told to keep its height, a climbing vehicle would rise on, because its climb rate is in error as well.
+    With its height held, a climbing vehicle would rise on, because its climb rate is in error as well.
     """
     if not is_untied(name, now):
         return level_m
@@ -140,8 +140,7 @@ def _level_m(name: str, level_m: float, now: Moment) -> float:
 def _search_level_m(name: str, now: Moment) -> float:
     """Return the height at which a robot searches or returns.
 
-    One that flies on our estimate climbs only where it is in a view at that height as well, else it would leave its
-    view.
+    One that flies on our estimate climbs only where it is in a view at that height too, else it would leave its view.
     """
     x, y, z = (float(value) for value in now.belief.mean_of(name)[:3])
     view = view_of(x, y, name, now.parameters, now.sensors) if name in now.parameters.fed else None
@@ -193,7 +192,7 @@ def _stands(phases: Mapping[str, FlightMode], searching: Mapping[str, Stand], no
 def _towards(name: str, stand: Stand, phase: FlightMode, now: Moment) -> Setpoint:
     """Return a setpoint that flies to a stand and turns to its heading, keeping off other robots.
 
-    From a returning robot's velocity its drift is subtracted, up to the largest that is believed.
+    From a returning robot's velocity its drift is subtracted, up to the largest credible one.
     """
     mean, parameters = now.belief.mean_of(name), now.parameters
     drift_m_s = now.sight.drifts_m_s.get(name, STILL) if phase is FlightMode.RETURN else STILL

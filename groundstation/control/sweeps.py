@@ -1,6 +1,6 @@
-"""How a team chooses its sweeps: robots in turn, each the one with the best chances in what earlier ones leave unseen.
+"""A team's choice of sweeps: robots in turn, each the best sweep of the cells that earlier ones leave unseen.
 
-A robot turns while it flies to a stand. Its `Searcher` says which stands are compared, and what counts.
+A robot turns while it flies to a stand. Its `Searcher` defines the stands that are compared, and their promise.
 """
 
 import math
@@ -20,7 +20,7 @@ from groundstation.sensing.footprint import HEADINGS, Footprint
 _ANY_ORDER = 3  # with up to this many robots, any may choose first
 _STEP_RAD = math.tau / HEADINGS
 DIRECTIONS = (1, -1)
-# How far ahead of a robot's heading its commanded heading is: too far for the robot to slow down.
+# Lead of the commanded heading over a robot's heading: too far for the robot to slow down.
 _LEAD_RAD = 0.5 * math.pi
 
 
@@ -99,13 +99,13 @@ class Compared(NamedTuple):
 class Searcher(Protocol):
     """A robot that may look for the target.
 
-    seen: chance that a target in each cell of its footprint is found within a view; free (n): stands where it may be;
+    seen: chance that a target in each cell of its footprint is found within a view; free (n): its permitted stands;
     kept: its sweep so far.
     """
 
     @property
     def footprint(self) -> Footprint:
-        """Return the part of the floor that it sees."""
+        """Return its camera's footprint on the floor."""
 
     @property
     def seen(self) -> Array:
@@ -117,7 +117,7 @@ class Searcher(Protocol):
 
     @property
     def free(self) -> BoolArray:
-        """Return the stands where it may be."""
+        """Return its permitted stands."""
 
     @property
     def kept(self) -> Sweep | None:
@@ -131,7 +131,7 @@ class Searcher(Protocol):
 
 
 class Kind(NamedTuple):
-    """A way to choose sweeps: how many of their views count, and the function that makes a searcher of a robot.
+    """A way to choose sweeps: the number of their views that count, and the function that makes a robot's searcher.
 
     searcher: of footprint, lattice, pose, allowed times, sweep so far and parameters.
     """
@@ -206,7 +206,7 @@ def times_s(views: int, parameters: SearchParameters) -> Array:
 
 
 def on_the_way(lattice: Lattice, pose: Array, views: int, parameters: SearchParameters) -> tuple[Array, Array]:
-    """Return the time of flight to each stand (n) [s], and where a robot is at each view of its sweep (n, views, 2)."""
+    """Return the flight time to each stand (n) [s], and the robot's place at each view of its sweep (n, views, 2)."""
     ways = lattice.places - pose[:2]
     flight_s = np.hypot(*ways.T) / parameters.speed_m_s
     share = np.minimum(1.0, times_s(views, parameters) / np.maximum(flight_s, 1e-9)[:, None])
@@ -219,7 +219,7 @@ def headings(yaw_rad: float, views: int) -> IntMatrix:
 
 
 def _mark_seen(left: Array, searcher: Searcher, row: int, column: int, heading: int) -> None:
-    """Subtract what one view finds from the chances left for the robots that choose later."""
+    """Subtract the chances found by one view from those left for the robots that choose later."""
     footprint = searcher.footprint
     part = slice(int(footprint.first[heading]), int(footprint.first[heading + 1]))
     rows, columns = row + footprint.rows[part], column + footprint.columns[part]

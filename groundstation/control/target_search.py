@@ -1,4 +1,4 @@
-"""The search for targets that are not seen: maps of where they may be replace the Gaussians, and robots get stands."""
+"""The search for unseen targets: probability maps of their places replace the Gaussians, and robots get stands."""
 
 import math
 from collections.abc import Collection, Mapping, Sequence
@@ -30,26 +30,26 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _STEP_NS = 100 * NS_PER_MS  # of the maps' motion
 _SLOW_SEARCH_S = 999.0
-_AT_ONCE_NS = 100 * NS_PER_MS  # longest time between two last sightings of the same moment
+_AT_ONCE_NS = 100 * NS_PER_MS  # largest difference of two last sightings that count as simultaneous
 _TWO_SIDES_COS = math.cos(math.radians(30.0))
-_TIPPED_M = 0.08  # error of a picture at the distance of a target, since the robot is not level as believed
+_TIPPED_M = 0.08  # error of a picture at the distance of a target, by the error of the robot's tilt
 
 
 class SearchMode(StrEnum):
     """State of the search for one target."""
 
     TRACK = "TRACK"  # it is seen, or was a moment ago
-    SEARCH = "SEARCH"  # the team looks for it where it may be
-    LOST = "LOST"  # the team has looked nearly everywhere: a person is asked
+    SEARCH = "SEARCH"  # the team searches for it
+    LOST = "LOST"  # the team has searched nearly everywhere: the operator is asked
 
 
 @dataclass(frozen=True, slots=True)
 class SearchState:
-    """How the search for one target stands.
+    """The state of the search for one target.
 
-    since_ns: since when the mode holds; place: where it most likely is [m; world]; excluded: share of the floor where
-    it is not; expected_s: about how long finding it takes; near: it was tracked when it got out of sight; predicted: to
-    where the map has followed its prediction [x, y in m] and that one's variance (mean of both axes) [m^2].
+    since_ns: since when the mode holds; place: its most likely place [m; world]; excluded: share of the floor where it
+    is not; expected_s: approximate time to find it; near: it was tracked when it got out of sight; predicted: to where
+    the map has followed its prediction [x, y in m] and that one's variance (mean of both axes) [m^2].
     """
 
     mode: SearchMode
@@ -64,7 +64,7 @@ class SearchState:
 
 
 class Search:
-    """Maps of the targets that are not seen, updated by pictures without them, and the stands of the searching robots.
+    """Probability maps of unseen targets, updated by pictures without them, and the stands of the searching robots.
 
     Call `see` with sightings, `take` with searched pictures, `advance` with each belief; read `targets`, ask for
     `stands`.
@@ -104,7 +104,7 @@ class Search:
             self._pictures.append(picture)
 
     def see(self, sighting: RelativeObservation) -> None:
-        """Take a sighting; even if the filter refuses it, the target is where a camera sees it."""
+        """Take a sighting; it counts even if the filter refuses it, because a camera shows the target there."""
         name = sighting.subject
         if sighting.observer in self._cameras and name in self.targets:
             shown_ns, observer = self._shown_ns[name], sighting.observer
@@ -115,12 +115,12 @@ class Search:
         return self.targets[name].mode is not SearchMode.TRACK
 
     def shown_s(self, name: str, now_ns: int) -> float:
-        """Return for how long no picture has shown a target [s]; infinite if none ever did."""
+        """Return the time since a picture last showed a target [s]; infinite if none ever did."""
         stamp_ns = max(self._shown_ns[name].values(), default=None)
         return math.inf if stamp_ns is None else (now_ns - stamp_ns) / NS_PER_S
 
     def advance(self, belief: JointBelief, ages_s: Mapping[str, float]) -> tuple[str, ...]:
-        """Update the maps to a belief's time; returns the targets that are no longer where the belief has them.
+        """Update the maps to a belief's time; returns the targets whose estimates no longer hold.
 
         ages_s: time since each target was last seen (infinite: not in the belief).
         """
@@ -140,7 +140,7 @@ class Search:
         return tuple(dropped)
 
     def stands(self, robots: Sequence[str], targets: Collection[str], belief: JointBelief) -> Mapping[str, Stand]:
-        """Return where robots look for targets, none within `column_m` of another; some may have no stand."""
+        """Return the robots' stands for the search, none within `column_m` of another; some robots may have none."""
         wanted = tuple(name for name in sorted(targets) if name in self.targets and self.targets[name].room is not None)
         able = tuple(name for name in robots if name in self._footprints)
         planned_ns, of_robots, of_targets = self._planned
@@ -205,7 +205,7 @@ class Search:
         return any(a @ b < _TWO_SIDES_COS * np.linalg.norm(a) * np.linalg.norm(b) for a, b in combinations(lines, 2))
 
     def _anywhere(self, belief: JointBelief) -> RoomMap:
-        """Return the map of a target that was never seen: likeliest ahead of the team, which starts towards it."""
+        """Return the map of a target that was never seen: likeliest ahead of the team."""
         ahead_m = self.parameters.starts_ahead_m
         poses = (belief.mean_of(name) for name in belief.layout.robots)
         places = [(float(p[0] + ahead_m * np.cos(p[3])), float(p[1] + ahead_m * np.sin(p[3]))) for p in poses]
@@ -285,6 +285,6 @@ class Search:
 
 
 def _place_and_variance(belief: JointBelief, name: str) -> tuple[float, float, float]:
-    """Return where an entity is believed [x, y in m], and the mean variance of both axes [m^2]."""
+    """Return an entity's estimated place [x, y in m], and the mean variance of both axes [m^2]."""
     mean, variances = belief.mean_of(name), np.diag(belief.covariance_of(name))[:2]
     return float(mean[0]), float(mean[1]), float(variances.mean())

@@ -1,4 +1,4 @@
-"""The point nearest to a wanted one where one, two or three planes meet. Pure."""
+"""The point nearest to a wanted one on the intersection of one, two or three planes. Pure."""
 
 from groundstation.vectors import Vector3, cross, dot
 

@@ -1,4 +1,4 @@
-"""Tells the operator at once of targets that no picture has shown for a moment: they may be hidden or gone."""
+"""Operator notices about targets that are unseen for a moment: they may be hidden or gone."""
 
 from collections.abc import Iterable, Mapping
 
@@ -11,19 +11,19 @@ TELL_AFTER_S = 0.6
 
 
 def unseen_words(name: str, unseen_s: float, place_m: Iterable[float]) -> str:
-    """Return the message for a target that is unseen for a time [s], and where it is expected (x, y) [m; world]."""
+    """Return the message for a target that is unseen for a time [s] and expected at a place (x, y) [m; world]."""
     x, y = place_m
     return f"{name} is not seen for {unseen_s:.1f} s: it may be hidden near ({x:.1f}, {y:.1f})"
 
 
 class UnseenTargets:
-    """Says once of each target that it is unseen, and once that it is seen again."""
+    """Reports once of each target that it is unseen, and once that it is seen again."""
 
     def __init__(self) -> None:
         self._told: frozenset[str] = frozenset()
 
     def advance(self, belief: JointBelief, unseen_s: Mapping[str, float]) -> list[Notice]:
-        """Return new notices; unseen_s: for how long no picture has shown each target that is not searched for."""
+        """Return new notices; unseen_s: time since a picture last showed each target that is not searched for."""
         unseen = {name: age_s for name, age_s in unseen_s.items() if age_s > TELL_AFTER_S and name in belief.layout}
         told, self._told = self._told, frozenset(unseen)
         new = [

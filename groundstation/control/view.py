@@ -1,4 +1,4 @@
-"""Where world-fixed cameras see robots, and how well the place of a robot is known."""
+"""Views of world-fixed cameras at search height, and the uncertainty of a robot's place."""
 
 import math
 
@@ -30,7 +30,7 @@ def spread_m(belief: JointBelief, name: str) -> float:
 
 
 def velocity_error_m_s(belief: JointBelief, name: str) -> float:
-    """Return the rms error of a robot's reported velocity, as the belief has it: its mean and its deviation [m/s].
+    """Return the rms error of a robot's reported velocity by the belief, from its mean and deviation [m/s].
 
     0 where the belief has no such states: in its core, and for vehicles without them.
     """

@@ -1,1 +1,1 @@
-"""Says in flight which figure of the field is wrong, if any."""
+"""Finds wrong figures of the field in flight."""

@@ -23,7 +23,7 @@ _CAPACITY = 8192
 
 
 class Diagnosis:
-    """Call `turn`: it takes in messages and informs the tracker; notices for the operator are left in `notices`."""
+    """Call `turn`: it takes in messages and informs the tracker; `notices` then holds those for the operator."""
 
     def __init__(self, bus: Bus, field: ResolvedField, judging: Judging) -> None:
         self.notices: list[Notice] = []

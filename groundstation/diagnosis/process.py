@@ -1,4 +1,4 @@
-"""The diagnosis process: says in flight which figure of the field is wrong. No setpoint depends on it.
+"""The diagnosis process: finds wrong figures of the field in flight. No setpoint depends on it.
 
 Started as `groundstation.diagnosis.process:run`. Numba, which the sensor models need, is imported only after the kernel
 cache is chosen.

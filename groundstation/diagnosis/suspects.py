@@ -1,4 +1,4 @@
-"""Judges which figures of the field a stretch of flight shows to be wrong. Pure.
+"""Finds the figures of the field that a stretch of flight proves wrong. Pure.
 
 All figures and paths are fitted at once, as `calibrate team` does; causes need less evidence, because the operator
 reads them as suspicions and a flight is short.
@@ -43,9 +43,9 @@ _WORTH_TELLING_M = 0.06
 # share a disturbance.
 _USUAL_MISFIT = 0.25
 _MOST = 3
-# Suspects with a smaller lead in the linear model are not tried by fits; of the others, this many for each cause. Taken
-# where all figures were in doubt, it preferred early pictures of all drones to late ones of the ceiling camera by e^12,
-# and to a drone's late telemetry by e^0.5; fits prefer what was true.
+# Suspects with a smaller lead in the linear model are not tried by fits; of the others, this many for each cause.
+# Linearised with all figures in doubt, it preferred early pictures of all drones to late ones of the ceiling camera by
+# e^12, and to a drone's late telemetry by e^0.5; fits preferred the true causes.
 _WORTH_A_TRIAL, _AT_ONCE = math.log(10.0), 4
 # A charge is tried again with knots that lie in the middle between those of the first fit.
 _BETWEEN = 0.5
@@ -53,7 +53,7 @@ _BETWEEN = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Charge:
-    """A suspect: its error, one sigma, and by how much (log) it explains the flight better than no error does."""
+    """A suspect: its error, one sigma, and its lead: the gain (log) in evidence over no error."""
 
     suspect: Suspect
     size: float
@@ -91,8 +91,8 @@ def verdict_on(flown: Flown, field: ResolvedField) -> Verdict | None:
 def _tried(verdict: Verdict, batch: TeamBatch, between: TeamBatch, alike: float) -> Verdict:
     """Return the verdict after the flight was fitted with each of its charges, and without any.
 
-    Leads of charges that were tried come from the fits: a charge that explains nothing is refuted, however sure the
-    linear model is. Those of a cause must also lead with the knots of another batch, `between`.
+    Leads of tried charges come from the fits: a charge that explains nothing is refuted, however large its lead in the
+    linear model. Those of a cause must also lead with the knots of another batch, `between`.
     """
     known = {(s.who, s.what): s for s in batch.figures.suspicions()}
     sigma, causes, leads = np.diag(batch.figures.surveyed**2), list[tuple[Charge, ...]](), dict(verdict.leads)
@@ -148,7 +148,7 @@ def weighed(H: Array, g: Vector, surveyed: Vector, suspicions: Sequence[Suspicio
 
 
 def is_told(charge: Charge) -> bool:
-    """Return whether the evidence for a charge suffices, and its size does harm."""
+    """Return whether a charge has enough evidence, and a harmful size."""
     what = charge.suspect[1]
     return charge.lead >= sure_of(what) and abs(charge.size) >= _WORTH_TELLING.get(what, _WORTH_TELLING_M)
 

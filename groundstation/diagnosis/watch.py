@@ -12,7 +12,7 @@ _REFUTED = math.log(3.0)
 
 
 class FigureWatch:
-    """Takes verdicts; no action follows. `cause`: the standing suspicion in a few words, or ""."""
+    """Takes verdicts, without action on the flight. `cause`: the standing suspicion in a few words, or ""."""
 
     def __init__(self, field: ResolvedField) -> None:
         self._field = field

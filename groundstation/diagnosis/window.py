@@ -12,16 +12,16 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 TOPICS = (ODOMETRY, IMU, OBSERVATION, VEHICLE_STATUS)
 _LASTS_NS = 40 * NS_PER_S
-# Length of flight that is judged; longer if it began in the air, where no pad tells the start and figures bend paths.
+# Length of flight that is judged; longer if it began in the air: no pad then gives the start, and figures bend paths.
 _LEAST_NS, _LEAST_ALOFT_NS = 8 * NS_PER_S, 20 * NS_PER_S
 _DOWN = STANDING | {FlightState.UNKNOWN}
-# A picture that is repeated for so long hangs; until then one may have been sent twice.
+# A picture repeated for this long is frozen; until then it may have been sent twice.
 _HANGS_NS = 300 * NS_PER_MS
 _REPEATS = (Verdict.DUPLICATE, Verdict.FROZEN)
 
 
 class Window:
-    """Takes messages as they arrive; `flown` returns those of the last 40 s while somebody flies.
+    """Takes messages as they arrive; `flown` returns those of the last 40 s while a drone flies.
 
     Messages that the tracker would refuse do not count here either: a frozen picture is no wrong figure.
     """
@@ -54,7 +54,7 @@ class Window:
             self._rows.popleft()
 
     def _forget_hung(self, seen: RelativeObservation) -> None:
-        """Drop what a camera showed after the picture that it now turns out to repeat."""
+        """Drop a camera's sightings since the picture that it is now found to repeat."""
         since_ns, hung = self._hung_ns.get(seen.camera, 0), seen.picture_ns
         if not hung or hung == since_ns or seen.header.stamp_ns - hung < _HANGS_NS:
             return
@@ -62,7 +62,7 @@ class Window:
         self._rows = deque(row for row in self._rows if not _shown_after(row[1][0][1], seen.camera, hung))
 
     def flown(self) -> Flown | None:
-        """Return the messages; None while nobody flies, or before 8 s (20 s if the start was missed)."""
+        """Return the messages; None while no drone flies, or before 8 s of flight (20 s if the start was missed)."""
         aloft = {name for name, flies in self._flying.items() if flies}
         least_ns = _LEAST_NS if aloft <= self._stood else _LEAST_ALOFT_NS
         if not aloft or not self._rows or self._rows[-1][0] - self._rows[0][0] < least_ns:

@@ -1,4 +1,4 @@
-"""A suspected figure in words: what is wrong, by how much, how sure, and the remedy. Pure."""
+"""A suspected figure in words: its error, size, deviation, and the remedy. Pure."""
 
 from collections.abc import Sequence
 
@@ -28,7 +28,7 @@ def sentence(charges: Sequence[Charge], field: ResolvedField) -> str:
 
 
 def remedies(charges: Sequence[Charge], field: ResolvedField) -> str:
-    """Return what a person can do about each suspect."""
+    """Return the remedy for each suspect."""
     return "; or ".join(dict.fromkeys(_remedy(one, field) for one in charges[:_MOST_TOLD]))
 
 
@@ -75,7 +75,7 @@ def _remedy(charge: Charge, field: ResolvedField) -> str:
 
 
 def _setting(name: str, part: str, error: float, field: ResolvedField) -> str:
-    """Return the setting that would describe a camera's mounting as it is."""
+    """Return the setting that matches a camera's actual mounting."""
     path = ".".join(paths_of(field, (name, part))[0])
     camera, factor = field.drones[name].camera, unit_of(part)[0]
     now = {"pan": camera.pan_left_deg, "tilt": camera.tilt_down_deg}.get(part)

@@ -1,7 +1,7 @@
-"""Predicts over several steps in which nobody looks at P: each block apart from it, then P in one pass; compiled.
+"""Predicts several steps in which no measurement needs P: first each block by itself, then P in one pass; compiled.
 
-While readings wait, each tick predicts some ten steps. A block of P that is moved beside an identity leaves there the
-product of all its steps, by which the rest of its rows is multiplied once.
+While readings wait, each tick predicts some ten steps. A block of P is predicted beside an identity, which becomes the
+product of all its steps; the rest of the block's rows is multiplied by that once.
 """
 
 from typing import Any, NamedTuple
@@ -20,9 +20,9 @@ _ENTITY = EntityRow.dtype
 
 
 class Work(NamedTuple):
-    """Room for one block in place of P, (2 MAX_BLOCK, 2 MAX_BLOCK): of its rows only those of the block are used, which
-    hold from column MAX_BLOCK on what moves it; its rows of P as moved (MAX_BLOCK, n); factors of four of these (4,
-    MAX_BLOCK) by which rows `at` of P."""
+    """Room for one block in place of P, (2 MAX_BLOCK, 2 MAX_BLOCK): only the block's rows are used, with its transition
+    matrix from column MAX_BLOCK on; its rows of P as moved (MAX_BLOCK, n); factors of four of these (4, MAX_BLOCK) by
+    which rows `at` of P."""
 
     block: Matrix
     rows: Matrix
@@ -38,9 +38,9 @@ def is_reading(event: EventRow) -> bool:
 
 @kernel()
 def quiet_from(inputs: Inputs, span: Span, modes: int) -> int:
-    """Return the first step from which on nobody looks at P: readings wait, no heights have come, nobody enters.
+    """Return the first step from which on nothing needs P: readings wait, there are no heights, no entity enters.
 
-    Several modes are mixed in each step, which takes P.
+    Several modes are mixed in each step, which needs P.
     """
     quiet, ring = max(span.waiting, span.first), inputs.odometry.shape[0]
     if modes > 1:
@@ -70,7 +70,7 @@ def take_apart(P: Matrix, entity: EntityRow, block: Matrix) -> None:
 
 @kernel(inlined=True)
 def put_back(P: Matrix, entity: EntityRow, work: Work) -> None:
-    """Multiply an entity's rows of P by what moved its block, and put in the block."""
+    """Multiply an entity's rows of P by its block's transition matrix, and put in the block."""
     block, rows, factors, at = work.block, work.rows, work.factors, work.at
     start, size, n = entity.start, entity.size, P.shape[1]
     for row in range(0, size, ROWS):

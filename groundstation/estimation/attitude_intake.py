@@ -73,7 +73,7 @@ class AttitudeIntake:
     def tilt(self, robot: str, stamp_ns: int, reported: tuple[float, float]) -> tuple[float, float]:
         """Return (roll, pitch) of a robot at an exposure; reported: by the camera's driver.
 
-        The heading in a sighting was derived with the reported one: for a level marker that is a second-order error.
+        The heading in a sighting was derived with the reported tilt: for a level marker that is a second-order error.
         """
         inertial = self._inertial.get(robot)
         tilt = None if inertial is None else inertial.tilt_at(stamp_ns)

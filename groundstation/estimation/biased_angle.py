@@ -1,4 +1,4 @@
-"""How well an angle that a gyroscope carries on, and the bias of that gyroscope, are known."""
+"""Covariance of an angle that is integrated from a gyroscope, and of that gyroscope's bias."""
 
 import math
 
@@ -26,7 +26,7 @@ class BiasedAngle:
         self.bias_variance += elapsed_s * _BIAS_DRIFT**2
 
     def see_angle(self, variance: float) -> tuple[float, float]:
-        """Return which share of what a measured angle exceeds ours by corrects the angle, and which the bias [1/s]."""
+        """Return the gains by which the innovation of a measured angle corrects the angle, and the bias [1/s]."""
         total = self.variance + variance
         angle, bias = self.variance / total, self._shared / total
         self.bias_variance -= bias * self._shared
@@ -35,7 +35,7 @@ class BiasedAngle:
         return angle, bias
 
     def see_bias(self, variance: float) -> tuple[float, float]:
-        """Return which share of what a measured bias exceeds ours by corrects the angle [s], and which the bias."""
+        """Return the gains by which the innovation of a measured bias corrects the angle [s], and the bias."""
         total = self.bias_variance + variance
         angle, bias = self._shared / total, self.bias_variance / total
         self.variance -= angle * self._shared

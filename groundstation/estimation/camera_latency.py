@@ -1,8 +1,8 @@
 """Error of each camera's calibrated delay, estimated in flight from the headings of the robots that it sees.
 
 Gyroscopes show without delay how far a robot turned within a second; a picture older than its stamp shows it for a
-different second. Only headings are used: velocity errors last, and controls react to them. Nothing here acts on the
-filter, and nothing is taken from it.
+different second. Only headings are used: velocity errors last, and controls react to them. The estimate is independent
+of the filter, and does not act on it.
 """
 
 import math
@@ -19,13 +19,13 @@ from groundstation.time_units import NS_PER_S
 _TRIED_S = np.arange(-0.10, 0.2001, 0.02)
 _WINDOW_S, _WIDEST_S = 1.0, 1.3
 _KEPT_S, _SPACING_S = 3.0, 0.01
-_GAP_S = 0.5  # within a longer gap the turn is unknown
+_GAP_S = 0.5  # the turn within a longer gap is unknown
 _NEAR = 4
 _HALF_LIFE_S = 60.0
-# Deviation of such a difference, and the number of them beyond which a wild one, squared, must not decide.
+# Deviation of such a difference, and the squared normalised misfit beyond which outliers count less.
 _COARSE_STD_RAD, _WILD = 0.03, 8.0
 _LEAST_PAIRS, _UNTOLD_S = 60.0, 0.025
-# Number of subjects followed per camera: more are not worth the time. One unseen for this long [s] makes room.
+# Number of subjects followed per camera: more are not worth the time. One unseen for this long [s] is dropped.
 _FOLLOWED, _GONE_S = 4, 5.0
 
 
@@ -40,7 +40,7 @@ class Lateness:
 
 @dataclass(slots=True)
 class _Turning:
-    """A robot's own headings: when [s] and what [rad, unwrapped] since its heading last jumped."""
+    """A robot's own headings [rad, unwrapped] and their times [s] since its heading last jumped."""
 
     reset: int
     times: deque[float] = field(default_factory=deque)

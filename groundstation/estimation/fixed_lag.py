@@ -35,8 +35,8 @@ _IDLE_STEPS = 10  # steps that may pass between two calls of `advance` before `a
 class FixedLagFilter:
     """Joint EKF over all entities of the parameters that have joined.
 
-    `add_motion`, `add_observation`, `set_airborne` take what arrives in any order (up to max_lateness_s late) and
-    return a verdict; `advance` brings the belief to a time; `take_corrections` returns the effects of observations.
+    `add_motion`, `add_observation`, `set_airborne` take arrivals in any order (up to max_lateness_s late) and return a
+    verdict; `advance` brings the belief to a time; `take_corrections` returns the effects of observations.
     """
 
     def __init__(self, parameters: EstimatorParameters) -> None:
@@ -85,7 +85,7 @@ class FixedLagFilter:
     def add_report(self, reading: SensorReading, tie: str, now_ns: int, *, used: bool) -> Verdict | None:
         """Take an entity's report of its own motion, to be used or only compared; returns as `add_observation` does.
 
-        It is no sighting: no entity joins by it, it is refused beyond the gate, and corrects no other entity.
+        A report is no sighting: no entity joins by it, it is refused beyond the gate, and corrects no other entity.
         """
         return self._add(reading, REPORTED if used else COMPARED, tie, now_ns)
 
@@ -119,7 +119,7 @@ class FixedLagFilter:
     def set_airborne(self, robot: str, airborne: bool, stamp_ns: int, now_ns: int) -> Verdict:
         """Take a change of flight state: only airborne robots join the state, a landed one leaves it.
 
-        Later than the rewind reaches, it takes effect as early as it can.
+        A change older than the rewind reaches takes effect as early as possible.
         """
         index = self._index.get(robot)
         if index is None or self._models[index].kind is not EntityKind.ROBOT:
@@ -192,7 +192,7 @@ class FixedLagFilter:
         return self._seconds(self._now_ns) - float(memory["corrected_at"]) if memory["active"] else math.inf
 
     def sighting(self, name: str) -> tuple[float, float] | None:
-        """Return how long ago an entity was last seen [s], and the deviation of its place then [m]; None: never."""
+        """Return the time since an entity was last seen [s], and the deviation of its place then [m]; None: never."""
         memory = self._state.memory[self._index[name]]
         seen = memory["active"] and memory["seen_variance"] > 0.0
         return (self.age_s(name), math.sqrt(float(memory["seen_variance"]))) if seen else None
@@ -200,7 +200,8 @@ class FixedLagFilter:
     def contradicted(self, name: str) -> bool:
         """Return whether sightings far from an entity's place are being weighed against it.
 
-        True for twice the time that the weighing takes; then sightings not believed are ignored. One that is ends it.
+        True for at most twice the time that the weighing takes; later sightings beyond the gate are ignored. One within
+        the gate ends it.
         """
         memory, within_s = self._state.memory[self._index[name]], self.parameters.divergence_s
         now, wild = self._seconds(self._now_ns), memory["wild"]
@@ -263,7 +264,7 @@ class FixedLagFilter:
         if self._started:
             return
         self._started = True
-        # On a grid that does not depend on what came first: step borders are multiples of the step.
+        # On a grid that does not depend on the first arrival: step borders are multiples of the step.
         self._origin_ns = (now_ns // self._step_ns - self._behind) * self._step_ns
         self._now_ns, self._last, self._dirty = now_ns, self._behind, 0
 

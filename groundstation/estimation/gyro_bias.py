@@ -1,7 +1,7 @@
-"""The bias of a vehicle's gyroscopes: learnt while it stands and, slowly, in flight.
+"""Estimates the bias of a vehicle's gyroscopes while it stands and, slowly, in flight.
 
-In flight accelerometers tell two of them; the third is told by a fixed camera that sees the vehicle turn, and poorly by
-the vehicle's own doubtful heading.
+In flight accelerometers determine the bias of two axes; the third comes from a fixed camera that sees the vehicle turn,
+and poorly from the vehicle's own doubtful heading.
 """
 
 import math
@@ -21,8 +21,8 @@ _HEADING_WANDER, _GYRO_WANDER = math.radians(1.7), math.radians(0.1)
 # The same of a heading that a camera shows: its error changes as the vehicle crosses the view.
 _SIGHT_WANDER = math.radians(0.3)
 _SPAN_NS = 2 * NS_PER_S  # between two uses of the heading
-_LOST_S = 2.0  # a camera that has not shown the heading for longer is begun anew, or another one takes its place
-_GATE = 9.0  # a heading with a larger disagreement says nothing of the bias
+_LOST_S = 2.0  # a camera that has not shown the heading for longer is begun anew, or replaced by another one
+_GATE = 9.0  # a heading with a larger NIS is not used for the bias
 _HORIZON_S = 20.0  # the bias's effect on the heading is modelled as a random walk that is right after this time
 
 
@@ -48,24 +48,24 @@ class GyroBias:
         return math.sqrt(_GYRO_WANDER**2 + self._turn.bias_variance * _HORIZON_S)
 
     def begin(self) -> None:
-        """Roll and pitch begin anew from one sample, and so does the heading."""
+        """Begin roll, pitch and heading anew from one sample."""
         self._tilt.begin(_FIRST_RAD**2)
         self._seen = None
 
     def go_on(self, elapsed_s: float, within_s: float) -> None:
-        """Integrate over a time; with a known bias accelerometers draw the tilt back over within_s."""
+        """Integrate over a time; with a known bias accelerometers draw the tilt back with time constant within_s."""
         self._tilt.go_on(elapsed_s, _SETTLED_RAD**2 / within_s)
         self._turn.go_on(elapsed_s, _SIGHT_WANDER**2)
 
     def take_tilt(self, elapsed_s: float, within_s: float, ahead_rad: tuple[float, float]) -> tuple[float, float]:
-        """Take by how much the accelerometers' roll and pitch exceed ours; returns the corrections of ours [rad]."""
+        """Take the accelerometers' roll and pitch minus ours; returns the corrections of ours [rad]."""
         angle, bias = self._tilt.see_angle(_SETTLED_RAD**2 * within_s / elapsed_s)
         (roll, pitch), (x, y, z) = ahead_rad, self.rad_s
         self.rad_s = x + bias * roll, y + bias * pitch, z
         return angle * roll, angle * pitch
 
     def take_standing(self, stamp_ns: int, rates_rad_s: Vector3) -> None:
-        """Take the rates of a vehicle on the ground: these are bias, unless somebody carries it."""
+        """Take the rates of a vehicle on the ground: these are bias, unless it is carried."""
         if not self._block:
             self._block_ns = stamp_ns
         self._block.append(rates_rad_s)
@@ -80,7 +80,7 @@ class GyroBias:
         self._block.clear()
 
     def take_heading(self, stamp_ns: int, yaw_rad: float, own_yaw_rad: float, reset: int) -> None:
-        """Take the vehicle's heading beside that by its gyroscopes; across a reset both mean nothing."""
+        """Take the vehicle's heading beside that by its gyroscopes; differences across a reset are void."""
         before = self._heading
         if before is None or before[3] != reset:
             self._heading = (stamp_ns, yaw_rad, own_yaw_rad, reset)
@@ -93,7 +93,7 @@ class GyroBias:
         self._correct(ahead, _HEADING_WANDER**2 / elapsed_s)
 
     def take_sight(self, camera: str, stamp_ns: int, yaw_rad: float, variance: float, own_yaw_rad: float) -> None:
-        """Take the heading that a fixed camera shows, from any zero, beside that by the gyroscopes; one camera's."""
+        """Take one fixed camera's heading of the vehicle, from any zero, beside that by the gyroscopes."""
         ahead = difference(yaw_rad, own_yaw_rad)
         last, at_ns, offset = self._seen or (camera, 0, 0.0)
         elapsed_s = (stamp_ns - at_ns) / NS_PER_S

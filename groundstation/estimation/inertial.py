@@ -20,7 +20,7 @@ _SMOOTH_S = 0.3  # velocities are smoothed over this before they are differentia
 _SILENT_S = 0.3  # after this silence the acceleration counts as zero
 _GAP_S = 0.5  # nothing is integrated across a longer one
 _RESTARTED_S = 5.0  # after a longer silence a vehicle may have a new battery, and another gyro bias
-_FRESH_NS = 100 * NS_PER_MS  # largest time between a sample and a time that it stands for
+_FRESH_NS = 100 * NS_PER_MS  # largest time between a sample and a time that it is used for
 _KEPT = 256  # samples: more than a second
 # A specific force beyond these is a blow, not gravity [m/s^2]; a gain error of 8 % is usual.
 _LEAST_FORCE, _MOST_FORCE = 0.6 * STANDARD_GRAVITY_M_S2, 1.4 * STANDARD_GRAVITY_M_S2

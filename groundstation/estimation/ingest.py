@@ -55,7 +55,7 @@ class Intake:
         self._joins_early = joint.parameters.joins_early
 
     def take(self, key: str, message: Message, now_ns: int) -> Verdict:
-        """Take one message that came under a key; ACCEPTED, or why not. Other kinds of messages are ignored."""
+        """Take one message that came under a key; return ACCEPTED, or why not. Other kinds of messages are ignored."""
         if not isinstance(message, _HEARD):
             return self._other(message, now_ns)
         stamp_ns = self._local_stamp(message)
@@ -121,7 +121,7 @@ class Intake:
         return verdict
 
     def _camera_of(self, message: RelativeObservation) -> str:
-        """Return the camera by which an observer saw: never another carrier's, whatever the message calls it."""
+        """Return the camera by which an observer saw: its own, whatever the message calls it."""
         named = self._cameras.get(message.camera)
         return message.camera if named is not None and named.carrier == message.observer else message.observer
 

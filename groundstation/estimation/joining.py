@@ -97,7 +97,7 @@ def admit(state: State, tables: Tables, event: EventRow, rows: int, hypothesis: 
     """Let the subject join and prepare the innovations for `correct`; or return why not, the belief unchanged.
 
     No correction is deferred when it is called. CONTRADICTED: the surplus lies beyond the gate. After enough of these
-    in a row the subject joins all the same (INFLATED), with R raised until the surplus lies on the gate.
+    in a row the subject joins nevertheless (INFLATED), with R raised until the surplus lies on the gate.
     """
     memory, settings = state.memory[event.subject], tables.settings
     trial = State(

@@ -147,7 +147,7 @@ def _fault_of_report(message: ReportedMotion) -> Verdict | None:
 
 
 def _fault_of(pose: RelativeObservation | PoseHypothesis) -> Verdict | None:
-    """Return why a measured pose cannot be used whatever the belief, or None."""
+    """Return why a measured pose cannot be used with any belief, or None."""
     if len(pose.position_m) != 3 or not _plausible(*pose.position_m, pose.yaw_rad or 0.0):
         return Verdict.IMPLAUSIBLE
     if not (math.isfinite(sum(pose.covariance)) or all(map(math.isfinite, pose.covariance))):

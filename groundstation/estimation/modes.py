@@ -79,7 +79,7 @@ def mix(state: State, tables: Tables) -> None:
 
 
 def moments_of(state: State) -> Moments:
-    """Return where the belief over all modes is to be written; the only mode's own arrays if there is one."""
+    """Return the arrays for the belief over all modes: those of the only mode, if there is just one."""
     moments = Moments(state.means[0], state.covariances[0])
     return moments if len(state.weights) == 1 else Moments(*(part.copy() for part in moments))
 

@@ -101,7 +101,7 @@ def open_rows(P: Matrix, entity: EntityRow, first: int, stop: int) -> int:
     """Prepare an entity's rows to be moved; returns the first row that is then not yet copied to the columns.
 
     Rows first..stop were not. They go on waiting if they belong to neighbours whose blocks share cache lines with the
-    entity's, which gets what it needs of them.
+    entity's; the entries that the entity needs are copied to it.
     """
     start, end = entity.start, entity.start + entity.size
     if start != stop or start % LANES == 0 or end - first > _MOST_ROWS:
@@ -113,7 +113,7 @@ def open_rows(P: Matrix, entity: EntityRow, first: int, stop: int) -> int:
 
 @kernel(inlined=True)
 def finish_rows(P: Matrix, entity: EntityRow, first: int) -> int:
-    """Give neighbours whose rows wait, from `first` on, what they need of an entity's moved rows; returns their end."""
+    """Copy the entries of an entity's moved rows to neighbours whose rows wait, from `first` on; returns their end."""
     copy_to_columns(P, entity.start, entity.size, first, entity.start)
     return int(entity.start + entity.size)
 

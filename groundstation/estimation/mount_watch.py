@@ -1,4 +1,4 @@
-"""Finds fixed cameras that were moved in flight: reported, and not believed until all robots have landed. Pure."""
+"""Finds fixed cameras that were moved in flight, and refuses their sightings until all robots have landed. Pure."""
 
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -18,9 +18,9 @@ from groundstation.geometry.camera_turn import CameraTurn
 from groundstation.time_units import NS_PER_S
 
 MOVED = "its camera was moved: what it sees counts for nothing until all have landed"
-# A tracker that begins in flight hears by then who flies.
+# A tracker that starts in flight knows by then which robots fly.
 _NOBODY_NS = 5 * NS_PER_S
-# A camera with a smaller displacement [m] is reported, but still believed: the rooms' margins are wider.
+# A camera with a smaller displacement [m] is reported, but its sightings are used: the rooms' margins are wider.
 _HARMS_M = 0.15
 _REMEDY = (
     "land; fix the camera where the field file has it, or survey it anew (groundstation calibrate), then check again"
@@ -58,7 +58,7 @@ class MountWatch:
     def recall(self, moved: Collection[str], now_ns: int) -> list[Notice]:
         """Distrust cameras that were found to have moved before this watch began, in the same flight; returns notices.
 
-        Forgotten again if nobody flies within 5 s.
+        They are trusted again if no robot flies within 5 s.
         """
         self._moved |= self._cameras & frozenset(moved)
         self._recalled_ns = now_ns
@@ -67,7 +67,7 @@ class MountWatch:
 
     @property
     def is_rootless(self) -> bool:
-        """Return whether no trusted fixed sensor is left to tell where the team is in the room."""
+        """Return whether no trusted fixed sensor is left to locate the team in the room."""
         return bool(self._moved) and self._moved == self.roots
 
     def distrusts(self, observer: str) -> bool:

@@ -46,7 +46,7 @@ _INNOVATION = Innovation.dtype
 
 @kernel(inlined=True)
 def refusal(belief: Belief, event: EventRow, rows: int) -> int:
-    """Return why an observation cannot be used whatever its values are, or PENDING."""
+    """Return why an observation cannot be used, independent of its values, or PENDING."""
     observer, subject = belief.memory[event.observer], belief.memory[event.subject]
     if observer.active == 0:
         return OBSERVER_UNKNOWN

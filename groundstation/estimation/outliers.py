@@ -24,7 +24,8 @@ from groundstation.estimation.update import linearise
 from groundstation.kernel import kernel
 
 _INNOVATION = Innovation.dtype
-# A sighting farther than this from another's believed place is not that one: a wide belief would fit anything [m].
+# A sighting farther than this from another entity's estimate is not of that entity: a wide belief would fit anything
+# [m].
 _SAME_M = 0.5
 # Contradictions farther apart than this are not in a row.
 _IN_A_ROW_S = 5.0
@@ -51,7 +52,7 @@ def fits_another(
     belief: Belief, deferred: Deferred, sensor: SensorRow, settings: Settings, event: EventRow, rows: int,
     hypothesis: Hypothesis,
 ) -> bool:  # fmt: skip
-    """Return whether the sighting is where the belief has another robot or target: its marker was misread."""
+    """Return whether the sighting is at the place of another robot or target: its marker was misread."""
     subject = event.subject
     work, HP = np.empty(1, _INNOVATION), np.empty((4, belief.mean.shape[0]))
     found = False
@@ -79,7 +80,7 @@ def is_doubted(memory: EntityMemory, settings: Settings, at: float) -> bool:
 
 @kernel()
 def insists(streak: Streak, settings: Settings, at: float) -> bool:
-    """Count one more contradiction in a row; True when they are enough, and last long enough, to be believed."""
+    """Count one more contradiction in a row; True when their number and duration suffice to accept them."""
     if streak.count == 0:
         streak.since = at
     streak.count += 1
@@ -111,8 +112,8 @@ def given_up_lately(observer: EntityMemory, at: float) -> float:
 def is_hasty(observer: EntityMemory, subject: int, at: float) -> bool:
     """Return whether it is too early to give up a robot's belief: another one just was, or there were too many.
 
-    Several robots that one camera contradicts at once speak against the camera; one that is re-initialised again and
-    again is not helped by it. A robot whose sightings are refused counts as unseen, and flies back or lands.
+    If one camera contradicts several robots at once, the camera is likely wrong; repeated re-initialisation does not
+    help a robot either. A robot whose sightings are refused counts as unseen, and flies back or lands.
     """
     lately = given_up_lately(observer, at)
     if lately > 0.0 and observer.gave_up_whom != subject and at - observer.gave_up_at < _BETWEEN_S:
@@ -122,7 +123,7 @@ def is_hasty(observer: EntityMemory, subject: int, at: float) -> bool:
 
 @kernel()
 def note_given_up(observer: EntityMemory, subject: int, at: float) -> None:
-    """Note that a robot's belief was given up for what one observer saw."""
+    """Note that a robot's belief was given up for one observer's sightings."""
     observer.gave_up = given_up_lately(observer, at) + 1.0
     observer.gave_up_at, observer.gave_up_whom = at, subject
 
@@ -131,14 +132,15 @@ def note_given_up(observer: EntityMemory, subject: int, at: float) -> None:
 def doubt_velocity(memory: EntityMemory) -> None:
     """Doubt a vehicle's reported velocity, after a fixed camera saw it beyond the gate.
 
-    A single surprise says little, and a wild one nothing, about a velocity: such a jump has another cause.
+    A single sighting beyond the gate says little about a velocity, and a wild one nothing: such a jump has another
+    cause.
     """
     memory.velocity_doubt = min(_MOST_DOUBT_M_S, _FIRST_DOUBT_M_S + _DOUBT_GROWS * memory.velocity_doubt)
 
 
 @kernel()
 def forget_lie(memory: EntityMemory, at: float) -> None:
-    """Forget that a velocity was wrong while the vehicle is seen: if it is still wrong, it is noted again."""
+    """Let a noted velocity error decay while the vehicle is seen: if the velocity is still wrong, it is noted again."""
     memory.velocity_lie *= math.exp(-min(at - memory.corrected_at, _SEEN_S) / _LIE_FORGOTTEN_S)
     memory.unseen_s = 0.0
 

@@ -68,7 +68,7 @@ class EstimatorParameters:
     attitude is taken from their IMU where they publish one (inertial.py), with their velocity scale. joins_early:
     robots that join as soon as they begin to take off. tells_steps: robots whose odometry may repeat itself in flight.
     world_cameras: sensors mounted in the room that can be bumped. ranging: robots with a transponder, by system.
-    reporting: targets whose own odometry is heard.
+    reporting: targets whose own odometry is received.
     """
 
     entities: Mapping[str, MotionModel]
@@ -125,7 +125,7 @@ def parameters_from_field(resolved: ResolvedField) -> EstimatorParameters:
 
 
 def _wait_s(drones: Collection[FieldDrone]) -> float:
-    """Return how long observations of a team wait [s]: for a small team recomputing them is cheap."""
+    """Return how long observations wait for odometry [s]: 0 for a small team, whose steps are cheap to recompute."""
     if len(drones) < _LARGE_TEAM:
         return 0.0
     delays_ms = [delay for d in drones for delay in (d.odometry.velocity_delay_ms, d.odometry.height_delay_ms)]

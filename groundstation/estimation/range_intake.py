@@ -1,7 +1,7 @@
 """Feeds ranges to the filter, and lets a robot join at the place that one round of ranges gives.
 
 A single range places nothing, and ranges give no heading of a standing robot. The heading is that of the pad until a
-robot has flown, then its last believed one, each continued by the vehicle's own; after a jump of that (a reset) it is
+robot has flown, then its last estimate, each continued by the vehicle's own heading; after a reset of the latter it is
 unknown, and another sensor must see the robot first.
 """
 
@@ -31,7 +31,7 @@ _LESS_SURE = 25.0
 
 @dataclass(slots=True)
 class _Heading:
-    """A vehicle's own heading, and the world's less it as last known (None: unknown), with variance and time."""
+    """A vehicle's own heading; world heading minus own as last known (None: unknown), with variance and time."""
 
     own_rad: float = 0.0
     reset: int = 0
@@ -53,7 +53,7 @@ class RangeIntake:
         self._joined: list[tuple[str, str, bool]] = []
 
     def take_joined(self) -> list[tuple[str, str, bool]]:
-        """Return and forget (system, robot, whether it was believed elsewhere before) of placed robots."""
+        """Return and forget (system, robot, whether its estimate was elsewhere before) of placed robots."""
         joined, self._joined = self._joined, []
         return joined
 

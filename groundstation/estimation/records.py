@@ -34,7 +34,7 @@ EVENT_KINDS = 6
 )
 NOT_LOCATED, MISTAKEN, OBSERVER_DOUBTED, OBSERVER_UNCONFIRMED, CONTRADICTED, OBSERVER_HASTY = 9, 10, 11, 12, 13, 14
 
-# Entries of a block that other entities' models may need: EntityRow has their places.
+# Entries of a block that other entities' models may need; EntityRow has their indices.
 SHARED_LABELS = ("z", "yaw", "roll_error", "pitch_error", "yaw_offset", "range_bias", "range_scale", "bearing_bias")
 
 
@@ -108,14 +108,14 @@ class EntityMemory(Record):
     yaw_rate: inputs held during a step: velocity [m/s; base_stabilized], turn rate [rad/s], roll and pitch [rad];
     slow_v*: the smoothed velocity; commanded_*: the last command of a CommandedRobot; odometry_age_s: since the last
     velocity; attitude_std [rad], yaw_std [rad per root second]: errors as stated by the odometry (0: the model's own
-    count); last_yaw, last_reset, has_yaw: the vehicle's own heading [rad; odom] at the step before, told yaw_age_s ago.
-    velocity_x, _y, _z: how they change [m/s; world], as last predicted; velocity_doubt [m/s]: deviation that a fixed
-    camera's surprises add to the error of the reported velocity; velocity_lie [m/s]: by how much that error was lately
-    seen to exceed that of a sound sensor; unseen_s: time predicted since the last sighting. wild: observations far
-    beyond the gate, the last of them at wild_at; refused: observations by which it would have joined if they had not
-    contradicted their observer; corrected_at: last use of an observation; seen_variance: of the worse of x and y [m^2]
-    right after it. gave_up, gave_up_at, gave_up_whom: number of robots recently re-initialised by this one's sightings,
-    the last time, and the last robot.
+    count); last_yaw, last_reset, has_yaw: the vehicle's own heading [rad; odom] at the step before, received yaw_age_s
+    ago. velocity_x, _y, _z: how they change [m/s; world], as last predicted; velocity_doubt [m/s]: deviation that a
+    fixed camera's surprises add to the error of the reported velocity; velocity_lie [m/s]: by how much that error was
+    recently seen to exceed that of a sound sensor; unseen_s: time predicted since the last sighting. wild: observations
+    far beyond the gate, the last of them at wild_at; refused: observations by which it would have joined if they had
+    not contradicted their observer; corrected_at: last use of an observation; seen_variance: of the worse of x and y
+    [m^2] right after it. gave_up, gave_up_at, gave_up_whom: number of robots recently re-initialised by this one's
+    sightings, the last time, and the last robot.
     """
 
     active: int

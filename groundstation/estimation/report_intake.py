@@ -1,8 +1,8 @@
 """Feeds targets' reports of their own motion to the filter, and drops reporters that cameras contradict.
 
 Wheels slip, a lifted robot's wheels turn on, a base sends another one's figures. Reports beyond the gate are refused
-one by one; reports that pull the belief along show in the sightings, which then lie to one side of the belief. A
-dropped target's reports are only compared, and used again once all have agreed for a while, longer each time.
+one by one; reports that pull the belief along are detected by sightings to one side of the belief. A dropped target's
+reports are only compared, and used again once all have agreed for a while, longer each time.
 """
 
 import math
@@ -21,7 +21,7 @@ from groundstation.time_units import NS_PER_S
 
 # Without sightings nothing contradicts a report: none is used later than this after the last sighting [s].
 _UNSEEN_S = 1.0
-# Number of reports in a row beyond the gate, and their duration [s], after which the target is not believed.
+# Number of reports in a row beyond the gate, and their duration [s], after which the target's reports are dropped.
 _REFUSED, _REFUSED_S = 5, 0.5
 # Weight of the newest sighting in the mean of their offsets, and the mean [deviations] that contradicts.
 _SHARE, _AHEAD = 0.1, 1.4
@@ -29,7 +29,7 @@ _SHARE, _AHEAD = 0.1, 1.4
 _TELLING_M_S = 0.25
 # Time for which all reports must agree [s]: at first, and at most.
 _PROBATION_S, _LONGEST_S = 2.0, 64.0
-# A believed speed of this many deviations has a direction.
+# An estimated speed of this many deviations has a direction.
 _MOVES = 3.0
 _REMEDY = (
     "look whether its wheels slip or it is lifted, and whether the topic is its own; cameras track it all the same"
@@ -109,7 +109,7 @@ class ReportIntake:
             self._believe(one.subject, trust)
 
     def _lag(self, name: str, trust: _Trust) -> float:
-        """Return how far ahead of the belief or behind it a target is seen along its direction [deviations].
+        """Return how far a target's sightings lie from the belief, ahead or behind, along its direction [deviations].
 
         A standing target has no direction: the whole offset counts.
         """

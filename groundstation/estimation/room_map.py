@@ -1,9 +1,7 @@
-"""Where in the room a target is that is not seen: probabilities on a grid, that it stands, drives about, drives on as
-it was predicted, or is hidden there.
+"""Probability grid of an unseen target's place: it stands there, drives about, drives on as predicted, or is hidden.
 
-Hypotheses are kept apart, since what was searched stays empty of a target that stands, and does not of one that drives;
-one that drives on takes its probability along; and no picture shows one that something hides. Every operation returns
-a new value.
+The hypotheses are kept apart: a searched cell stays empty of a standing target, but not of a driving one; a target that
+drives on takes its probability along; no picture shows a hidden one. Every operation returns a new value.
 """
 
 import math
@@ -19,14 +17,14 @@ STANDS_SHARE = 0.3
 """Prior probability that an unseen target stands."""
 
 HIDDEN_S = 2.0
-"""How long a person who passes hides a target from all cameras, on average (docs/decisions/0125)."""
+"""Mean time for which a passing person hides a target from all cameras (docs/decisions/0125)."""
 
-# For a target seen just now and not where it was predicted: it is there all the same, near, anywhere.
+# For a target seen a moment ago, but not now where it is predicted: it is there nevertheless, near, anywhere.
 _THERE, _NEAR, _ANYWHERE = 0.6, 0.3, 0.1
 _NEAR_M = 1.2
 _HINTED = 0.5
-_HIDDEN = 0.5  # share of a target that is where it was predicted: somebody stands in the way
-# Who walks by hides a target from cameras on two sides one after the other: so rarely at once (docs/decisions/0274).
+_HIDDEN = 0.5  # share of a target where it was predicted that is hidden: somebody stands in the way
+# A passing person hides a target from cameras on two sides one after the other, rarely at once (docs/decisions/0274).
 _HIDDEN_AT_ONCE = 0.1
 
 
@@ -73,12 +71,12 @@ class RoomMap:
 
     @property
     def in_view(self) -> Array:
-        """Return the probability of each cell for a target that nothing hides: what a search can find there."""
+        """Return the probability of each cell for a target in plain view, which a search can find there."""
         shown = self.stands + self.drives + self.goes_on
         return np.asarray(shown / max(float(shown.sum()), 1e-12))
 
     def moved(self, variance_m2: float) -> "RoomMap":
-        """Return the map after the target, if it drives, went about: the variance that this adds to each axis.
+        """Return the map after a driving target moved about, which adds a variance to each axis.
 
         Walls keep it in. variance_m2: at most half the square of a cell.
         """
@@ -87,13 +85,13 @@ class RoomMap:
     def predicted(self, rows: int, columns: int, variance_m2: float) -> "RoomMap":
         """Return the map after the prediction went on by some cells, and its variance grew, for each axis.
 
-        What goes on as predicted goes with it, in view or hidden; only the former spreads. Walls keep it in.
+        The share that goes on as predicted moves along, in view or hidden; only that in view spreads. Walls keep it in.
         """
         goes_on, hidden = (_shifted(_shifted(one, 0, rows), 1, columns) for one in (self.goes_on, self.hidden))
         return replace(self, goes_on=self._spread(goes_on, variance_m2), hidden=hidden)
 
     def given_up(self) -> "RoomMap":
-        """Return the map of a target that is not predicted any more: what went on drives about."""
+        """Return the map of a target without prediction: the share that went on as predicted drives about."""
         return replace(self, drives=self.drives + self.goes_on, goes_on=np.zeros(self.grid.shape))
 
     def _spread(self, values: Array, variance_m2: float) -> Array:
@@ -101,14 +99,14 @@ class RoomMap:
         return _smoothed(_smoothed(values, 0, share), 1, share)
 
     def uncovered(self, time_s: float) -> "RoomMap":
-        """Return the map after some time, in which what hides it may have gone: it stands or goes on in view."""
+        """Return the map after some time: the hiding object may have gone, and the target stands or goes on in view."""
         left = math.exp(-time_s / HIDDEN_S)
         shown = (1.0 - left) * self.hidden
         stands, goes_on = self.stands + STANDS_SHARE * shown, self.goes_on + (1.0 - STANDS_SHARE) * shown
         return replace(self, stands=stands, goes_on=goes_on, hidden=left * self.hidden)
 
     def emptied(self, chance: Array) -> "RoomMap":
-        """Return the map after a picture without the target; chance: with which it shows a target in each cell."""
+        """Return the map after a picture without the target; chance: probability that it shows a target, by cell."""
         missed = 1.0 - chance
         stands, drives, goes_on = self.stands * missed, self.drives * missed, self.goes_on * missed
         total, overlooked = float((stands + drives + goes_on + self.hidden).sum()), self.overlooked * missed
@@ -134,7 +132,7 @@ class RoomMap:
 
 
 def unknown_place(grid: RoomGrid, hints: Sequence[tuple[float, float]] = ()) -> RoomMap:
-    """Return the map of a target that was never seen: anywhere, and rather near the middle of some places."""
+    """Return the map of a target that was never seen: anywhere, more likely near the mean of some places."""
     even = np.full(grid.shape, 1.0 / (grid.shape[0] * grid.shape[1]))
     if not hints:
         return _shared(grid, even)
@@ -144,7 +142,7 @@ def unknown_place(grid: RoomGrid, hints: Sequence[tuple[float, float]] = ()) -> 
 
 
 def lost_at(grid: RoomGrid, mean: Sequence[float] | Array, covariance: Array, at_once: bool = False) -> RoomMap:
-    """Return the map of a target that was predicted at a Gaussian place (2), (2, 2) and is not seen any more.
+    """Return the map of a target that was predicted at a place with mean (2) and covariance (2, 2), and is unseen.
 
     It may be hidden there, but rarely if cameras on two sides lost it at once; or it was carried away, so places near
     to it and the whole room have their share.

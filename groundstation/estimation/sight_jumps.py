@@ -20,7 +20,7 @@ from groundstation.time_units import NS_PER_S
 # Number of pictures before and after a jump; those of one side lie within this time, and the gap is no longer [s].
 _BEFORE, _AFTER, _SIDE_S, _GAP_S = 3, 4, 0.6, 0.4
 # Reported displacements: from this size [m], increased by the possible velocity error of a robot [m/s] over the gap.
-# One robot alone may err by as much as a robot can; two do not err alike.
+# The odometry of one robot alone may have its largest possible error; those of two robots do not err alike.
 _LEAST_M, ALONE_M_S, _TOGETHER_M_S = 0.06, 1.2, 0.3
 # On each side of a jump sightings stay within this share of it; those of a drifting robot do not.
 _STEADY = 0.3
@@ -115,7 +115,7 @@ class SightJumps:
             gap_s = began_s - rows[_BEFORE - 1].at_s
             together_m, alone_m = (_LEAST_M + gap_s * speed for speed in (_TOGETHER_M_S, ALONE_M_S))
             # A robot that does not jump beside one that does exonerates the camera: it hardly turned about exactly that
-            # sight.
+            # line of sight.
             together = len(displaced) > 1 and min(one.size_m for one in displaced) > together_m
             if together or (len(displaced) == 1 and jump > alone_m):
                 return camera_turn(camera, displaced)

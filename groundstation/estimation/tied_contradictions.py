@@ -1,8 +1,8 @@
 """Finds fixed cameras that contradict robots which agree with each other. Pure.
 
-A robot that nobody saw for a while may be lost, and is then believed to be where the camera sees it. Two robots that
-see each other, or one target, in the expected places cannot be lost by the same amount: then the camera has moved. Nor
-can a robot that the camera saw in the expected place a moment ago be lost by more than it can fly in that time.
+A robot unseen for a while may be lost, and is then placed where the camera sees it. Two robots that see each other, or
+one target, in the expected places cannot be lost by the same amount: then the camera has moved. Nor can a robot that
+the camera saw in the expected place a moment ago be lost by more than it can fly in that time.
 """
 
 import math
@@ -36,7 +36,7 @@ Pair = tuple[str, str]
 class _Contradiction:
     """A camera's contradiction of a robot's place: its begin, time since they last agreed then [s].
 
-    Times and residuals.
+    rows: times and residuals.
     """
 
     since_s: float

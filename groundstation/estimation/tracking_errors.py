@@ -1,4 +1,4 @@
-"""Figures of a tracked target from its errors at an even rate: when it was found, and errors and losses since then."""
+"""Figures of a tracked target from its errors at an even rate: when it was found, errors and losses since then."""
 
 from dataclasses import dataclass
 
@@ -14,8 +14,8 @@ class TrackingFigures:
     """Tracking figures of one target.
 
     found_s: when its error was first below 0.3 m, after the first value; the rest counts from then on. rmse_m, worst_m:
-    its error, where nobody knows it 1 m; kept_rmse_m: rms of the errors that are no loss; lost_s, longest_loss_s: with
-    an error above 0.5 m, all together and in one piece.
+    its error, 1 m where it is unknown; kept_rmse_m: rms of the errors that are no loss; lost_s, longest_loss_s: with an
+    error above 0.5 m, all together and in one piece.
     """
 
     found_s: float

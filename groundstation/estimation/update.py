@@ -165,7 +165,7 @@ def write_outcome(out: OutcomeRow, innovation: Innovation) -> None:
 
 @kernel()
 def write_ahead(out: OutcomeRow, entity: EntityRow, innovation: Innovation) -> None:
-    """Record how a target's sighting lies from its belief: H^T S^-1 y over x and y, whitened by its own covariance."""
+    """Record a target sighting's offset from the belief: H^T S^-1 y over x and y, whitened by its own covariance."""
     rows, H, factor = innovation.prediction.size, innovation.prediction.H_subject, innovation.factor
     if entity.kind != KIND_TARGET:
         return

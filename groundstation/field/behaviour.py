@@ -45,7 +45,7 @@ class SafetyValues(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
 
     @property
     def unseen_land_at_last_s(self) -> float:
-        """Return after what time unseen a drone lands however well it is known [s]."""
+        """Return the time unseen after which a drone lands even if its place is well known [s]."""
         return 3.0 * self.unseen_land_after_s
 
 

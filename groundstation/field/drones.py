@@ -58,7 +58,7 @@ class OdometryErrors(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
 
 
 class FieldDrone(msgspec.Struct, frozen=True, kw_only=True):
-    """One drone of the team; pad_m, pad_yaw_deg: where it takes off [world].
+    """One drone of the team; pad_m, pad_yaw_deg: its take-off place and heading [world].
 
     sections: those that only its kind has, by key, unread; its driver and its emulator read them. In a
     drone decoded without `gathered`, as in processes that do not need them, they are left out.

@@ -9,7 +9,7 @@ from groundstation.vectors import Interval, Vector2, Vector3
 
 
 class Fence(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Box that drones are stopped before they leave [m; world]."""
+    """Box that drones must not leave [m; world]."""
 
     x_m: Interval
     y_m: Interval
@@ -64,7 +64,7 @@ class LensCalibration(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
 
     @property
     def focal_std(self) -> float:
-        """Return the deviation of its focal length as a share; 0 if the file does not tell it."""
+        """Return the deviation of its focal length as a share; 0 if the file does not state it."""
         if self.std is None:
             return 0.0
         return max(self.std.fx_px / self.fx_px, self.std.fy_px / self.fy_px)

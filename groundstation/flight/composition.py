@@ -1,4 +1,4 @@
-"""Makes the process table of a resolved field: the one place that knows the processes of a run."""
+"""Makes the process table of a resolved field; no other module knows all processes of a run."""
 
 import json
 import time
@@ -50,7 +50,7 @@ _SENSOR_DRIVERS = {
 
 @dataclass(frozen=True, slots=True)
 class Simulation:
-    """The simulated part of a run: its network, scenario and seed, and the parts that are real all the same.
+    """The simulated part of a run: its network, scenario and seed, and the parts that are real nevertheless.
 
     The scenario is kept as in its file: only the simulator, which checks it, knows its keys.
     """
@@ -62,7 +62,7 @@ class Simulation:
 
 
 def fly_endpoint(field: Field) -> str:
-    """Return where the router of a real flight listens."""
+    """Return the endpoint on which the router of a real flight listens."""
     return f"tls/127.0.0.1:{field.bus.port}"
 
 
@@ -158,7 +158,7 @@ def _liaison(host: str, field: Field) -> ProcessSpec:
 def router_section(
     endpoint: str, site: str, table: Iterable[ProcessSpec], bus: Bus, elsewhere: Iterable[Member] = ()
 ) -> str:
-    """Return the router's section: where it listens, and the members it admits, here and on other hosts."""
+    """Return the router's section: its endpoint, and the members it admits, here and on other hosts."""
     members = [
         Member(spec.name, Role(spec.role), (spec.name,), spec.entities or (spec.name,)) for spec in table if spec.on_bus
     ]

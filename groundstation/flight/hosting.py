@@ -1,7 +1,7 @@
 """Runs devices of a field on another host than the run's: awaits the order, starts, watches and stops the drivers.
 
-These vehicles are supervised there, by the same supervisor class and a guardian of its own; the run's supervisor is
-heard over the bus, and its silence is passed on to the drivers as that of this process.
+These vehicles are supervised on that host, by the same supervisor class and a guardian of its own. The run's supervisor
+is heard over the bus; the drivers see its silence as that of this process.
 """
 
 import math
@@ -30,10 +30,10 @@ from groundstation.supervisor.supervisor import Supervisor
 from groundstation.supervisor.terminal import Terminal
 
 _CONNECT_S, _TURN_S = 1.0, 0.05
-# By then even a slowly loading run has sent its order.
+# Time within which even a slowly loading run sends its order.
 _IDLE_S = 30.0
 _GUARDIAN_S = 10.0
-# Drivers land long before; after this nobody will come back to the run.
+# Drivers land long before; after this the run's supervisor will not return.
 _LOST_S = 20.0
 _FAREWELLS = 5
 
@@ -169,7 +169,7 @@ class Hosting:
                 return f"nothing was heard of it for {_LOST_S:.0f} s"
 
     def _leave(self) -> None:
-        """Report that nothing of the run is left here."""
+        """Report that no process of the run is left on this host."""
         self._own = OwnState()
         for _ in range(_FAREWELLS):
             self._link.turn(clock.own_ns(), self._own)

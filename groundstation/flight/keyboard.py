@@ -30,7 +30,7 @@ class Keyboard:
             # os.read and not input(): nothing here may block the watch over the processes.
             data = os.read(self._descriptor, 4096)
         except OSError:
-            return None  # a run in the background: the keyboard is another program's for now
+            return None  # a run in the background: another program has the keyboard now
         self.gone = not data
         line, ended, _ = (self._typed + data).partition(b"\n")
         self._typed = b"" if ended else line

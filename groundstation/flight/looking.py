@@ -10,11 +10,11 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 # Two pictures a second, the lowest rate met on a busy machine, make a median in this time.
 _LONGEST_NS = 8 * NS_PER_S
 _AGAIN_NS = 200 * NS_PER_MS
-_STEADY_NS = 2 * NS_PER_S  # who would be left out is told anew once it has been the same for as long
+_STEADY_NS = 2 * NS_PER_S  # a changed list of drones to leave out is reported once it is stable for this long
 
 
 class Looking:
-    """One run of the checks. forbidden: whether something must be mended; nobody: whether all drones would be left out.
+    """One run of the checks. forbidden: a finding forbids the take-off; nobody: all drones would be left out.
 
     drones: the names of the team.
     """
@@ -28,7 +28,7 @@ class Looking:
         self.forbidden = self.nobody = False
 
     def finished(self, now_ns: int) -> bool:
-        """Return whether all evidence has been seen, or the wait was long enough."""
+        """Return whether all evidence is in, or the wait was long enough."""
         if now_ns < self._next_ns:
             return False
         self._next_ns = now_ns + _AGAIN_NS
@@ -49,7 +49,7 @@ class Looking:
         yield f"before take-off: {musts or 'nothing'} must be mended{f'; {self._who()}' if self._left_out else ''}"
 
     def told_anew(self, now_ns: int) -> str:
-        """Return who would be left out by now, if that has changed for good since it was told; "" otherwise."""
+        """Return words for the drones to leave out, if these changed for good since the last report; else ""."""
         if now_ns < self._next_ns:
             return ""
         self._next_ns, before = now_ns + _STEADY_NS, self._left_out

@@ -1,4 +1,4 @@
-"""One flight from start to landing: supervisor and operator in one loop, until time is up or somebody stops it."""
+"""One flight from start to landing: supervisor and operator in one loop, until time is up or a person stops it."""
 
 import time
 from dataclasses import dataclass
@@ -81,7 +81,7 @@ class Flight:
         return FlightOutcome(failure, supervisor.interrupts.stop_requested, landed)
 
     def _announce(self, severity: Severity, how: str) -> None:
-        """Publish that the run ends, and how, while others still listen."""
+        """Publish the end of the run, and its reason, while other processes still listen."""
         if self._supervisor.bus is not None:
             header = self._supervisor.bus.header(RUN)
             self._supervisor.bus.publish(EVENT, Event(header=header, severity=severity, text=f"{RUN_ENDED}{how}"))
@@ -107,7 +107,7 @@ class Flight:
     # -- look ----------------------------------------------------------------------------------------------------
 
     def _look(self, operator: Operator, checks: BeforeTakeOff) -> bool:
-        """Wait for the evidence of the checks, and report the findings; return whether nothing more is to be done."""
+        """Wait for the evidence of the checks, and report the findings; return whether the run ends here."""
         self._looking = looking = Looking(checks, self._supervisor.run.drones, self._turn(operator))
         while not self._breaks_off():
             if looking.finished(self._turn(operator)):
@@ -153,7 +153,7 @@ class Flight:
                 return failure
 
     def _tell_grounded(self, operator: Operator, now_ns: int) -> None:
-        """Tell what the run waits for if drones landed without an order for all: by watchdogs, or one order each."""
+        """Report what the run waits for if drones landed without an order for all: by watchdogs, or one order each."""
         if operator.phase not in (TeamPhase.UP, TeamPhase.TRACKING, TeamPhase.HELD):
             self._grounded = False
         elif operator.landed(now_ns) and not self._grounded:
@@ -183,7 +183,7 @@ class Flight:
 
     def _prompt(self, operator: Operator, now_ns: int) -> None:
         if operator.phase is not TeamPhase.GROUND:
-            self._prompting = False  # another shell was faster
+            self._prompting = False  # another shell took off first
         else:
             self._answer(operator, now_ns)
             if self._looking is not None and (anew := self._looking.told_anew(now_ns)):
@@ -214,7 +214,7 @@ class Flight:
         if not operator.landed(now_ns):
             self._say("landing")
         operator.land(now_ns)
-        # Without the simulator nobody can report a landing, unless a drone is real.
+        # Without the simulator no drone can report a landing, except a real one.
         patient = self._plan.asks or not supervisor.failure
         limit_s = self._plan.landing_limit_s if patient else _FAILED_LANDING_S
         deadline_ns = now_ns + int(limit_s * NS_PER_S)

@@ -1,4 +1,4 @@
-"""The real parts of a simulated run (`--real drone_2=autopilot:19410`, `--real ceiling`), and their needs."""
+"""The real parts of a simulated run (`--real drone_2=autopilot:19410`, `--real ceiling`), and their requirements."""
 
 import ipaddress
 from collections.abc import Iterable, Mapping
@@ -16,7 +16,7 @@ _LOOPBACK = "127.0.0.1"
 
 @dataclass(frozen=True, slots=True)
 class RealBody:
-    """A real drone or target; source: provider of its place; address: where its firmware's simulator sends that.
+    """A real drone or target; source: provider of its place; address: to which its firmware's simulator sends it.
 
     system: the motion capture system that follows it.
     """
@@ -115,7 +115,7 @@ def _require_sense(field: Field, parts: RealParts) -> None:
     fixed = parts.cameras & set(field.cameras) | parts.systems - set(field.truth.values())
     for name, body in parts.drones.items():
         if body.source == ESTIMATE and not fixed:
-            # A fence judged by emulated cameras alone is useless: they would show the drone where it is believed.
+            # A fence judged by emulated cameras alone is useless: they would show the drone at its estimated place.
             sensor = next(iter((*field.cameras, *field.volumes)))
             raise OperatorMistake(
                 f"--real {name}: nothing real says where it is, so nothing would hold it inside of the fence: make a "

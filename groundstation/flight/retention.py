@@ -29,8 +29,8 @@ class RecordedRun:
 def make_room(parent: Path, limit_gb: float, now_s: float | None = None) -> list[RecordedRun]:
     """Remove the oldest runs until the rest takes at most `limit_gb` [GB]; return those removed. 0: keeps all.
 
-    A run with a file named KEEP stays, and so does one that was written to within two minutes: it may still fly. A
-    folder that cannot be removed stays, and the next older one goes in its place.
+    A run with a file named KEEP stays, and so does one written to within the last two minutes: it may still fly. A
+    folder that cannot be removed stays, and the next older one is removed in its place.
     """
     runs = sorted(_runs(parent), key=lambda run: run.folder.name) if limit_gb > 0 else []
     excess = sum(run.size for run in runs) - limit_gb * 1e9
@@ -54,7 +54,7 @@ def _runs(parent: Path) -> Iterator[RecordedRun]:
     for folder in parent.iterdir() if parent.is_dir() else ():
         if _NAME.fullmatch(folder.name) and folder.is_dir() and not folder.is_symlink():
             if is_stretch(part_path(folder, STATE, 1)):
-                continue  # somebody chose its contents
+                continue  # a person chose its contents
             try:
                 status = [path.lstat() for path in (folder, *folder.rglob("*"))]
             except OSError:  # another flight is removing it

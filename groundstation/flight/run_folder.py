@@ -52,9 +52,9 @@ def make_run_dir(parent: Path, field_name: str) -> Path:
 
 
 def write_facts(run_dir: Path, facts: run_facts.RunFacts, *, asks: bool) -> None:
-    """Write how the run was requested, and when this process started: from then on the operator waits.
+    """Write the request for the run, and the start time of this process, from which on the operator waits.
 
-    asks: whether the run waits for the operator before the take-off; then that time says nothing.
+    asks: whether the run waits for the operator before the take-off; then that time means nothing.
     """
     command_ns, lacked = 0 if asks else time.time_ns() - _age_ns(), not kernels.are_compiled()
     typed = without_passwords(shlex.join(["groundstation", *sys.argv[1:]]))

@@ -1,4 +1,4 @@
-"""Flight time of each drone's battery, as far as its kind tells it."""
+"""Flight time of each drone's battery, where its kind states one."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from groundstation.vehicles import kind_named
 
 @dataclass(frozen=True, slots=True)
 class Endurance:
-    """A drone's time in the air from a full battery until it lands [s]; None: its kind tells no figure."""
+    """A drone's time in the air from a full battery until it lands [s]; None: its kind states no figure."""
 
     drone: str
     kind: str

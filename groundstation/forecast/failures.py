@@ -46,6 +46,6 @@ def _told(forecaster: PlaceForecaster, place: Place, told: Callable[[], None]) -
 
 
 def _unlocalised(team: Team, seen: Iterable[PlaceForecast]) -> tuple[str, ...]:
-    """Return the drones that no stand at any place lets a fixed sensor locate, directly or through drones."""
+    """Return the drones that fixed sensors locate, directly or through drones, at the stand of none of these places."""
     placed = frozenset[str]().union(*(one.stand.placed for one in seen if one.stand is not None))
     return tuple(name for name in (*team.robots, team.target) if name not in placed)

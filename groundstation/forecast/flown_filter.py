@@ -1,4 +1,4 @@
-"""The filter that flies, fed with error-free sightings of a team at its stand: its covariance is the forecast."""
+"""The flight filter, fed with error-free sightings of a team at its stand: its covariance is the forecast."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,7 +22,7 @@ from groundstation.forecast.views import Views
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _ODOMETRY_NS, _BEGIN_NS = 40 * NS_PER_MS, 10 * NS_PER_S
-_CIRCLE_M, _ROUND_S = 0.25, 8.0  # circle of all bodies, which reveals states observable only in motion
+_CIRCLE_M, _ROUND_S = 0.25, 8.0  # circle of all bodies, for the states observable only in motion
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,8 +18,8 @@ _CELLS, _PATH_PLACES = 110, 24
 class Forecast:
     """The forecast of a field: places along the path (none: no path is known) and over the floor, and its basis.
 
-    watched: place of the target for the observability; base: of the places at which failures are judged, with
-    everything in order.
+    watched: place of the target for the observability; base: the spread without a failure over the places at which
+    failures are judged.
     """
 
     team: Team
@@ -69,6 +69,6 @@ def forecast(
 
 
 def _hardest(places: Sequence[PlaceForecast]) -> PlaceForecast | None:
-    """Return the seen place with the largest deviation: there topologies differ most."""
+    """Return the seen place with the largest deviation, where topologies differ most."""
     seen = [one for one in places if one.std_m is not None]
     return max(seen, key=lambda one: one.std_m or 0.0, default=None)

@@ -48,7 +48,7 @@ class Direction:
 
 @dataclass(frozen=True, slots=True)
 class Observability:
-    """What a team in one topology can observe in FLOWN_S of flight.
+    """The observability of the state by a team in one topology, in FLOWN_S of flight.
 
     rank: directions of the state whose deviation is at least halved; missing: entities never in it; worst_m: the
     least certain direction of all places; worst_yaw: likewise of the drones' headings [rad]. Both None if none is in

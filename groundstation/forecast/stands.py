@@ -17,7 +17,7 @@ from groundstation.planning.records import HEIGHT, ROBOT_CONTROLS, YAW, X, Y, Z
 from groundstation.planning.rollout import empty_tape, roll_out
 from groundstation.sensing.topology import Topology
 
-_ROUNDS, _SETTLED_M = 3, 0.2  # most plans until the team stands; the last one moves it less than this
+_ROUNDS, _SETTLED_M = 3, 0.2  # most plans until the team is settled: the last one moves it less than this
 _RESTS = 3  # horizons at the stand after which the covariance is constant
 _BEHIND_M, _APART_RAD = 1.0, math.radians(80.0)  # first places: towards the room's middle, side by side
 _ROBOT_STD_M, _YAW_STD, _TARGET_STD_M, _SPEED_STD_M_S = 0.05, 0.05, 0.1, 0.2
@@ -28,7 +28,7 @@ class TeamStand:
     """The team's stand: poses (x, y, z, yaw) [m, rad; world], and its knowledge there.
 
     std_m: of the target's place in the floor plan, root of the trace; placed: those that fixed cameras see, directly or
-    through drones that they show.
+    through drones in their view.
     """
 
     place: Place
@@ -52,12 +52,12 @@ class StandSearch:
     def __init__(self, team: Team) -> None:
         self.team, self.views = team, Views(team)
         self._parameters = replace(team.planner, min_dwell_s=0.0, hysteresis=0.0)
-        # Without the attraction's tail, which is no information.
+        # Without the tail of the attraction, which carries no information.
         soft = replace(team.sensors.softness, tail_share=0.0)
         self._judge = ProblemBuilder(team.planner, replace(team.sensors, softness=soft))
 
     def at(self, place: Place) -> TeamStand | Obstruction:
-        """Return the team's best stand for a standing target at a place, or the obstruction that leaves it unseen.
+        """Return the team's best stand for a standing target at a place, or the obstruction that hides it.
 
         Raises EstimatorFault when the expected uncertainty is not finite.
         """
@@ -84,7 +84,7 @@ class StandSearch:
         return self._planned(place, scene, topology, _Held(self._parameters, self.team.sensors))
 
     def _planned(self, place: Place, scene: PlanningScene, topology: Topology, planner: Planner) -> TeamStand:
-        """Return the stand to which the planner leads."""
+        """Return the stand that the planner reaches."""
         warm = None
         for _ in range(_ROUNDS):
             plan = planner.plan(_belief_of(scene), topology, warm, lambda: False)

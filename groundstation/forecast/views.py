@@ -22,7 +22,7 @@ _NOWHERE = np.zeros(4)
 
 
 class Obstruction(IntEnum):
-    """Causes that leave a place unseen, in the order of their checks."""
+    """Causes of an unseen place, in the order of their checks."""
 
     NO_CAMERA = 0
     OUT_OF_SIGHT = 1
@@ -44,7 +44,7 @@ Chain = tuple[Link, ...]
 
 
 class Views:
-    """The views of a team's cameras, with hard limits: those of a full search of a picture."""
+    """The views of a team's cameras, with the hard limits of a full search of a picture."""
 
     def __init__(self, team: Team) -> None:
         self._team = team
@@ -79,7 +79,7 @@ class Views:
         return float(pose[0]), float(pose[1]), float(pose[2]) + self._team.sensors.marker_height_m[robot]
 
     def placed(self, poses: Mapping[str, Array], place: Place) -> frozenset[str]:
-        """Return the robots, and the target, that fixed cameras show directly or through robots that they show."""
+        """Return the robots, and the target, that fixed cameras see directly or through robots in their view."""
         team = self._team
         points = {name: self.marker(name, pose) for name, pose in poses.items()} | {team.target: self.ground(place)}
         found = {name for name, point in points.items() if self.placed_by(point, name == team.target)}
@@ -113,7 +113,7 @@ class Views:
         return worst
 
     def why_unplaced(self, place: Place) -> str:
-        """Return why no fixed camera shows the drone that sees a place from nearest to the room's middle."""
+        """Return why no fixed camera sees a drone at the stand for a place that is nearest to the room's middle."""
         world, (mx, my) = self._team.sensors.world, self._team.planner.fence.center
         stands = [
             self.marker(robot, pose)

@@ -1,8 +1,8 @@
 """Finds the one rotation of a fixed camera that explains the displacements of all its sightings. Pure.
 
 A camera that turns by an angle a about an axis n displaces a point that it saw at p to q, with q - p = (p + q) x g and
-g = n tan(a / 2) (Cayley), in its own old axes: linear in g, however far it turns. Noise of detection and what a belief
-knows of its subjects are the same for all, so least squares will do.
+g = n tan(a / 2) (Cayley), in its own old axes: linear in g, however far it turns. Detection noise and the uncertainty
+of the subjects are the same for all sightings, so least squares suffice.
 """
 
 import math

@@ -56,7 +56,7 @@ class Alarm:
 
     advice: first whether an operator must do something now, then what happens next.
 
-    told_ns: when it was first raised, for an alarm that stands from then on.
+    told_ns: time when it was first raised, for an alarm that stands from then on.
     """
 
     about: str
@@ -105,7 +105,7 @@ def _vehicles(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
 
 
 def _is_heard_in_vain(status: VehicleStatus) -> bool:
-    """Return whether a vehicle sends but its driver accepts nothing: it is no better known than a silent one."""
+    """Return whether a driver refuses all its vehicle's telemetry: no more is known of it than of a silent one."""
     lost = status.flight_state is FlightState.LOST and status.mode != "CONNECTING"
     return lost and status.rate_hz >= _SPEAKS_HZ
 
@@ -118,12 +118,12 @@ def _not_believed(status: VehicleStatus) -> tuple[str, str]:
 
 
 def _lands(status: VehicleStatus) -> bool:
-    """Return whether a vehicle lands, or was just told to."""
+    """Return whether a vehicle lands, or was just ordered to."""
     return status.flight_state is FlightState.LANDING or status.mode == "LANDING"
 
 
 def _failsafe(name: str, status: VehicleStatus) -> Iterator[Alarm]:
-    """Yield what keeps a drone from its plan, or will land it."""
+    """Yield alarms about a condition that keeps a drone from its plan, or will land it."""
     if status.lands_in_s is not None:
         advice = "Nothing to do: that comes by itself unless this ends. HOLD does not stop it."
         why, soon_s = status.detail.removeprefix("hovers: ").removesuffix("; RESUME is needed"), status.lands_in_s
@@ -134,7 +134,7 @@ def _failsafe(name: str, status: VehicleStatus) -> Iterator[Alarm]:
 
 
 def _standing(state: MonitorState) -> Iterator[Alarm]:
-    """Batteries of drones on the floor: they come after all that concerns who flies."""
+    """Yield alarms about batteries of drones on the floor, which come after all alarms about flying drones."""
     for name, seen in state.vehicles.items():
         status, battery = seen.message, battery_of(state, name)
         unheard = battery.level is None and status.flight_state is FlightState.UNKNOWN
@@ -193,7 +193,7 @@ def _apart(modes: set[str]) -> str:
 
 
 def _lost(state: MonitorState) -> Iterator[Alarm]:
-    """Yield robots that should be seen and are not; a drone that lands because of it has that alarm instead."""
+    """Yield alarms about lost robots and targets; a drone that lands because it is lost has that alarm instead."""
     if state.estimate is None:
         return
     estimate = state.estimate.message
@@ -215,7 +215,7 @@ def _lost(state: MonitorState) -> Iterator[Alarm]:
 
 
 def _searched(search: TargetSearch) -> Alarm:
-    """Return the alarm for a target whose place the belief no longer holds, or not yet."""
+    """Return the alarm for a target without a usable estimate, no longer or not yet."""
     about, (x, y) = f"{search.target} lost", search.place_m
     if search.mode == "LOST":
         return Alarm(
@@ -238,14 +238,14 @@ def _cameras(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
 
 
 def _dark_words(names: Sequence[str]) -> str:
-    """Say it of one camera or of several together: then it is the light and no camera."""
+    """Return the words for one dark camera, or for several together: then the cause is the light."""
     if len(names) == 1:
         return f"{names[0]}: its picture is dark, it sees nobody"
     return f"{', '.join(names[:-1])} and {names[-1]}: their pictures are dark, they see nobody"
 
 
 def _stands_with(state: MonitorState, camera: str) -> bool:
-    """Return whether a camera belongs to a drone on the floor, where it may look into anything."""
+    """Return whether a camera belongs to a drone on the floor, where its picture means nothing."""
     carriers = (seen.message for drone, seen in state.vehicles.items() if camera_name(drone) == camera)
     return any(carrier.flight_state not in AIRBORNE for carrier in carriers)
 

@@ -1,4 +1,4 @@
-"""The state of each battery: how long it lasts, and whether that is too little. Pure."""
+"""The state of each battery: its remaining flight time, and whether that is too short. Pure."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -42,7 +42,7 @@ class Battery:
 
 
 def battery_of(state: MonitorState, name: str) -> Battery:
-    """Return the battery of a drone that was heard."""
+    """Return the battery of a drone whose status was received."""
     seen, limit = state.vehicles[name], state.cast.drones.get(name, LIMIT)
     status = seen.message
     if status.battery is None:

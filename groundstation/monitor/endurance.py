@@ -1,12 +1,12 @@
-"""How long batteries last: by what a kind usually flies, and more and more by the drain of this flight. Pure."""
+"""Remaining flight time of batteries: by a kind's usual flight time, and increasingly by this flight's drain. Pure."""
 
 from dataclasses import dataclass
 
 from groundstation.bus.messages import AIRBORNE, FlightState, VehicleStatus
 
-# What has to be spent before a drain is believed that nothing is known of, and for how long.
+# Least charge spent, and least time, before the drain is used for a kind without a usual one.
 _LEAST_DRAIN, _LEAST_MIN = 0.02, 0.5
-# Minutes of this flight that the usual drain of a kind weighs as much as: a battery says its charge in whole points.
+# Weight of a kind's usual drain, in minutes of this flight: a battery reports its charge in whole percent.
 # Until _LEAST_MIN the usual drain counts alone, from twice that on a flight counts in full.
 _USUAL_MIN = 1.0
 _NS_PER_MIN = 60e9
@@ -14,7 +14,7 @@ _NS_PER_MIN = 60e9
 
 @dataclass(frozen=True, slots=True)
 class TakeOff:
-    """When a drone was first heard in the air, and its battery level then."""
+    """Time of a drone's first status in the air, and its battery level then."""
 
     stamp_ns: int
     battery: float
@@ -28,12 +28,12 @@ class Endurance:
 
     @property
     def words(self) -> str:
-        """Say it: "~6 min"."""
+        """Return "~6 min"."""
         return "< 1 min" if self.minutes < 1.0 else f"~{int(self.minutes)} min"
 
 
 def flies(status: VehicleStatus, take_off: TakeOff | None) -> bool:
-    """Return whether a vehicle is in the air, or was when it was last heard."""
+    """Return whether a vehicle is in the air, or was by its last status."""
     return status.flight_state in AIRBORNE or (status.flight_state is FlightState.LOST and take_off is not None)
 
 
@@ -51,10 +51,10 @@ def take_off_of(known: TakeOff | None, stamp_ns: int, status: VehicleStatus) -> 
 def endurance(
     stamp_ns: int, battery: float, limit: float, take_off: TakeOff | None, flight_time_s: float | None
 ) -> Endurance | None:
-    """Return how long a battery lasts; None if unknown.
+    """Return the remaining flight time of a battery; None if unknown.
 
     battery, limit: shares of a full one, at `stamp_ns` and when it lands its drone. flight_time_s: of a full battery,
-    None if its kind does not say.
+    None if its kind states none.
     """
     left, minutes, spent = max(0.0, battery - limit), 0.0, 0.0
     if take_off is not None:

@@ -11,7 +11,7 @@ from groundstation.monitor.state import MonitorState
 
 
 class Level(StrEnum):
-    """SAFE: nothing is wrong. WATCH: something is, but nobody need act. ACT: somebody must do something now."""
+    """SAFE: nothing is wrong. WATCH: something is, but needs no action. ACT: the operator must do something now."""
 
     SAFE = "SAFE"
     WATCH = "WATCH"

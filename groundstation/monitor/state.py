@@ -1,4 +1,4 @@
-"""What an observer of the bus remembers: the newest message of each kind, and its time."""
+"""The state that an observer of the bus keeps: the newest message of each kind, and its time."""
 
 from collections import deque
 from collections.abc import Iterable, Mapping
@@ -22,9 +22,9 @@ T = TypeVar("T")
 class Cast:
     """The expected entities: drones with their battery limit, targets, world-fixed cameras.
 
-    flight_times_s: what a full battery of a drone usually lasts, where its kind says so. lost_after_s: unseen for so
-    long, a robot or target is lost. unseen_land_s: after so long a robot lands at the latest. min_separation_m: the
-    least distance of flying drones.
+    flight_times_s: usual flight time of a drone with a full battery, where its kind states one. lost_after_s: time
+    unseen after which a robot or target is lost. unseen_land_s: time unseen after which a robot lands at the latest.
+    min_separation_m: the least distance of flying drones.
     """
 
     site: str = ""
@@ -62,7 +62,7 @@ class StampedMessage(Generic[T]):
 
 @dataclass(slots=True)
 class MonitorState:
-    """The newest message of each kind and entity; `hint` says what Ctrl-C does here."""
+    """The newest message of each kind and entity; `hint` states the effect of Ctrl-C here."""
 
     cast: Cast = field(default_factory=Cast)
     hint: str = ""

@@ -61,7 +61,7 @@ def render(state: MonitorState, now_ns: int) -> RenderableType:
         *_unseen(state, now_ns),
         Text(),
     ]
-    # Above what grows with the team: a low window cuts the lines below.
+    # Above the parts that grow with the team: a low window cuts the lines below.
     if state.command is not None and state.command.age_s(now_ns) < _COMMAND_SHOWN_S:
         parts.append(_command(state))
     parts.append(_plan(state, now_ns))
@@ -85,7 +85,7 @@ def _title(state: MonitorState, now_ns: int) -> Text:
 class _Entities:
     """Drones and targets, with as many columns as the terminal has room for; no text is shortened.
 
-    The choice of columns depends only on what does not change during a flight, so that none comes and goes.
+    The choice of columns depends only on data that are constant during a flight, so that none comes and goes.
     """
 
     state: MonitorState
@@ -140,7 +140,7 @@ def _searches(state: MonitorState) -> Iterator[Text]:
 
 
 def _unseen(state: MonitorState, now_ns: int) -> Iterator[Text]:
-    """Yield where each unseen target is expected, until it is searched for or an alarm names it."""
+    """Yield the expected place of each unseen target, until it is searched for or an alarm names it."""
     searched = {search.target for search in state.estimate.message.searches} if state.estimate else set()
     for name in state.cast.targets:
         target = state.entity(name)

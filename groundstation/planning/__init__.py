@@ -1,1 +1,1 @@
-"""Picks the sensing topology and the velocities that minimise the expected uncertainty of the target."""
+"""Chooses the sensing topology and velocities that minimise the target's expected position uncertainty."""

@@ -15,7 +15,7 @@ from groundstation.sensing.visibility import SPREAD
 def most_information(
     problem: CostProblem, e: int, i: int, reach: Vector, low: Vector, high: Vector, turn_rad2: float
 ) -> float:
-    """Return an upper bound of the information of an edge in step i, whatever is flown until then."""
+    """Return an upper bound of the information of an edge in step i, for all controls until then."""
     edge, n = problem.edges[e], problem.poses.shape[0]
     camera, steps, markers = problem.cameras[edge.camera], i + 1.0, problem.markers
     bottom = top = markers[edge.subject]

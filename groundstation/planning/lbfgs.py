@@ -1,6 +1,6 @@
 """Compiled projected L-BFGS in the box [-1, 1]^m, point by point: the caller computes cost and gradient of each.
 
-Both planners minimise with it: the one that flies, and the planar one (`experiments/planar`).
+Used by both planners: the one that flies, and the planar one (`experiments/planar`).
 """
 
 from typing import Any, NamedTuple
@@ -18,7 +18,7 @@ _FLAT = 1e-10  # a pair of step and change with less curvature is of no use
 
 
 class Progress(Record):
-    """How far a descent has come.
+    """Progress of a descent.
 
     cost: at x; size: divisor of costs and gradients (0: the first cost); expected: predicted change of cost at the next
     point, over size; step: length along the direction; stored: rows of history; evaluations: so far; over: 1 once x

@@ -13,7 +13,7 @@ from groundstation.planning.problem import PlanningProblem
 from groundstation.planning.records import CostProblem
 from groundstation.sensing.topology import Topology
 
-_LEAST_GAIN = 1e-2  # as a share of the tolerance: a step that gains less is the last one
+_LEAST_GAIN = 1e-2  # as a share of the tolerance: the search ends with a step that gains less
 
 
 class SearchState(NamedTuple):

@@ -37,8 +37,8 @@ class Weights:
 
     PAPER (docs/explanation/method.md 7): the forms are ours.
 
-    robots: share of the robots' own position uncertainty; without it a robot that the target's estimate does not need
-    drifts out of every camera's view, and a drone without a known place must land.
+    robots: share of the robots' own position uncertainty; without it a robot that does not improve the target's
+    estimate drifts out of every camera's view, and a drone without a known place must land.
     """
 
     repulsion: float = 0.1
@@ -84,7 +84,7 @@ class PlannerParameters:
 
     @property
     def horizon_s(self) -> float:
-        """Return how far ahead the planner looks [s]."""
+        """Return the length of the horizon [s]."""
         return self.horizon_steps * self.step_s
 
     def limits_of(self, robot: str) -> MotionLimits:

@@ -23,7 +23,7 @@ from groundstation.sensing.topology import Topology
 
 @dataclass(frozen=True, slots=True)
 class PlanRequest:
-    """A snapshot to plan on, away from the tracker's loop; held: robots that follow no plan and stay where they are."""
+    """A snapshot to plan on, outside the tracker's loop; held: robots that follow no plan and stay in place."""
 
     belief: JointBelief
     topology: Topology
@@ -31,7 +31,7 @@ class PlanRequest:
     held: frozenset[str] = frozenset()
 
     def put_to(self, planner: Any, should_stop: Callable[[], bool], max_evaluations: int | None = None) -> "PlanResult":
-        """Return the answer of a planner: `Planner`, or one of another package, told of `held` if it `takes_held`."""
+        """Return the plan of a planner: `Planner`, or another package's, which gets `held` if it `takes_held`."""
         more = {"held": self.held} if getattr(planner, "takes_held", False) else {}
         scene = self.belief, self.topology, self.warm_start
         answer: PlanResult = planner.plan(*scene, should_stop, max_evaluations, **more)
@@ -128,7 +128,7 @@ def choose(current: Topology, costs: Mapping[Topology, float], required_gain: fl
 
 
 class Planner:
-    """Plans on belief snapshots. Its only memory is since when the current topology has been the same.
+    """Plans on belief snapshots. Its only memory is the time since when the topology has been the same.
 
     builder_of: makes the arrays of a problem; a different one changes the sightings that the cost assumes. takes_held:
     whether `plan` has the argument `held`.
@@ -163,8 +163,8 @@ class Planner:
         """Return the best of the current topology and its neighbours; raises EstimatorFault for a broken belief.
 
         current: over the robots to plan for (those missing in the belief are ignored); held: those of them that stay in
-        place, and only look. `should_stop` is called after every few evaluations, some 0.3 ms for ten robots. A stopped
-        plan is repeated exactly with its number of evaluations as `max_evaluations`.
+        place, and only observe. `should_stop` is called after every few evaluations, some 0.3 ms for ten robots. A
+        stopped plan is repeated exactly with its number of evaluations as `max_evaluations`.
         """
         current = current.reconciled(current.robots & frozenset(belief.layout.robots))
         scene = scene_from_belief(belief, current.robots, held)
@@ -177,7 +177,7 @@ class Planner:
         return self._result(belief.stamp_ns, scene, current, search, 1 + len(others))
 
     def options(self, current: Topology) -> tuple[Topology, ...]:
-        """Return the other topologies that a step looks at."""
+        """Return the other topologies that a step considers."""
         return current.neighbours()
 
     def _warm(

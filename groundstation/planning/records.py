@@ -24,7 +24,7 @@ class EdgeRow(Record):
     """An edge: row of its camera, number of its observer (-1: fixed in the world) and of its subject, robots first.
 
     wanted: 1 for an edge of the topology, whose tail attracts; 0 for a possible sighting besides. blur_m2, turn_rad2:
-    variances, as believed now, of the relative position per axis and of the observer's direction of view.
+    present variances of the relative position per axis and of the observer's direction of view.
     """
 
     camera: int

@@ -1,4 +1,4 @@
-"""Deterministic starts for the local search: the cost has several minima and is flat where nothing is seen."""
+"""Deterministic starts for the local search: the cost has several minima, and is flat where no sensor sees anything."""
 
 import math
 from collections.abc import Collection, Sequence
@@ -68,7 +68,7 @@ class Starts:
         return max(-1.0, min(1.0, share))
 
     def _towards(self, topology: Topology, base: Array, robots: Collection[str], keep_root: bool) -> Array:
-        """Return controls with which each robot goes to where it looks at the middle of the level below."""
+        """Return controls with which each robot goes to a stand that looks at the middle of the level below."""
         p, sensors, scene = self._parameters, self._sensors, self._scene
         heights, ahead, x = p.level_heights(len(topology.levels)) or (), p.horizon_s, base.copy()
         subjects: list[Point] = [

@@ -1,1 +1,1 @@
-"""Checks before a take-off: links, cameras, and where each drone stands."""
+"""Checks before a take-off: links, cameras, and each drone's place on its pad."""

@@ -1,4 +1,4 @@
-"""Compares where motion capture and ranging systems see standing drones with their pads. Pure."""
+"""Compares the places of standing drones, by motion capture and ranging systems, with their pads. Pure."""
 
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -10,7 +10,7 @@ from groundstation.preflight.stand import PadSighting
 
 # A person sets a drone on its cross to a centimetre; a drone farther off stands somewhere else.
 _ASIDE_M, _TURNED_RAD = 0.25, math.radians(25.0)
-# Ranges of one place err by as much again as the part of their error that lasts, times the geometry of the anchors.
+# A place by ranges also has the lasting part of their errors, times the dilution by the anchors' geometry.
 _RANGED_SIGMAS = 4.0
 
 _BODIES = "check that it streams rigid bodies, their names, up, position_m and yaw_deg in the field file"

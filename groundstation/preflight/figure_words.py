@@ -14,7 +14,7 @@ _LENS = "calibrate the lens of {who} (groundstation calibrate camera)"
 
 
 def marker_is(who: str, share: float, std: float) -> str:
-    """Return by what share a marker ("": all markers) is larger or smaller than the field says."""
+    """Return words for the share by which a marker ("": all) is larger or smaller than the field says."""
     whose = f"{who}'s marker is" if who else "all markers are"
     return f"{whose} {_percent(share, std)} {'larger' if share > 0.0 else 'smaller'} than the field says"
 
@@ -25,7 +25,7 @@ def measured_by(setting: str = "its size in the field", told: str = "") -> str:
 
 
 def lens_is(camera: str, share: float, std: float) -> str:
-    """Return by what share a camera's focal length is longer or shorter than its calibration says."""
+    """Return words for the share by which a camera's focal length is longer or shorter than its calibration says."""
     longer = "longer" if share > 0.0 else "shorter"
     return f"{camera} has a focal length {_percent(share, std)} {longer} than calibrated"
 
@@ -41,7 +41,7 @@ def fixed_camera(who: str) -> str:
 
 
 def hangs(who: str, what: str, more: bool, size: str) -> str:
-    """Return how a fixed camera's mounting differs from the field; what: z, aside, yaw, tilted; more: its sign."""
+    """Return words for the error of a fixed camera's mounting; what: z, aside, yaw, tilted; more: its sign."""
     return f"{fixed_camera(who)} {_HANGS[what][not more].format(size=size)}"
 
 

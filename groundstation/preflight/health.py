@@ -9,7 +9,7 @@ from groundstation.field.drones import camera_name
 from groundstation.field.resolved import ResolvedField
 from groundstation.monitor.alarms import DARK
 
-# Drivers append the command that mends what they found.
+# Drivers append to a fault the command that mends it.
 _COMMAND = ": groundstation "
 _BATTERY_MARGIN, _BATTERY_SHOULD = 0.05, 0.4
 _TELEMETRY_HZ, _LINK_SHARE = 5.0, 0.9
@@ -42,7 +42,7 @@ def drone_findings(field: ResolvedField, statuses: Mapping[str, VehicleStatus]) 
 
 
 def left_out(field: ResolvedField, statuses: Mapping[str, VehicleStatus]) -> tuple[str, ...]:
-    """Return the drones that a take-off would leave out: those not heard, or that would refuse it."""
+    """Return the drones that a take-off would leave out: without telemetry, or refusing the take-off."""
     known = {name: statuses.get(name) for name in field.drones}
     return tuple(n for n, told in known.items() if told is None or told.flight_state in UNHEARD or told.not_ready)
 
@@ -112,7 +112,7 @@ def camera_findings(
 
 
 def _picture(name: str, status: CameraStatus) -> Iterator[Finding]:
-    """Yield faults in exposure and focus of a camera's newest picture, and that it hangs."""
+    """Yield faults in exposure and focus of a camera's newest picture, and whether it is frozen."""
     light, edge_px = status.brightness, status.edge_px
     if light is not None and status.detail:
         yield Finding(Level.SHOULD, name, status.detail, "wave a hand before it; if that changes nothing, restart it")

@@ -1,4 +1,4 @@
-"""All findings before a take-off, the grave first. Pure."""
+"""All findings before a take-off, the gravest first. Pure."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
@@ -35,7 +35,7 @@ def judge(
 def pad_findings(
     field: ResolvedField, sightings: Sequence[PadSighting], flew: Collection[str] = ()
 ) -> Iterator[Finding]:
-    """Yield findings of fixed sensors on drones on their pads: those not seen, and what is wrong with the others."""
+    """Yield findings of fixed sensors on drones on their pads: unseen ones, and the errors of the others."""
     yield from captured_pad_findings(field, sightings, flew)
     if not field.cameras:
         return

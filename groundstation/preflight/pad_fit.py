@@ -26,8 +26,8 @@ PER_CAMERA = ("x", "y", "z", "roll", "pitch", "yaw", "focal")
 PER_DRONE = ("aside_x", "aside_y", "turned", "higher", "print")
 TEAM_PRINT = ("", "print")
 _SCATTER_M, _SCATTER_SHARE, _SCATTER_RAD = 0.003, 0.002, math.radians(0.5)
-# Few pixels a square (docs/reference/vision.md 8): where the board lies in their grid shifts its distance, by this
-# share at 4 px, and however long one looks. 4 px is where the share was measured; that boards are read from 4 px on
+# Few pixels a square (docs/reference/vision.md 8): the board's place in their grid shifts its distance, by this share
+# at 4 px, and does not average out. The share was measured at 4 px; that boards are read from 4 px on
 # (settings/marker_sizes.py) is another figure.
 _COARSE_SHARE, _COARSE_PX, _COARSE_POWER = 0.0035, 4.0, 10
 _STEPS, _DIFFERENCE = 8, 1e-6
@@ -76,7 +76,7 @@ class PadFit:
         self._weights = np.concatenate([self._deviations(s) for s in self.sightings])[self._used]
 
     def _deviations(self, s: PadSighting) -> Vector:
-        """Return the standard deviations of one sighting: its own, and what lasts however long one looks."""
+        """Return the standard deviations of one sighting: its own, and those of errors that do not average out."""
         far = float(np.linalg.norm(s.position_m))
         pixels = self.stand.cameras[s.camera].focal_px * self.stand.pads[s.drone].square_m / far
         share = math.hypot(_SCATTER_SHARE, _COARSE_SHARE * (_COARSE_PX / pixels) ** _COARSE_POWER)

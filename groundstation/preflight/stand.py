@@ -1,4 +1,4 @@
-"""Where each drone stands on its pad, and how fixed cameras see it there. Pure values."""
+"""The stand of each drone on its pad, and fixed cameras' sightings of it there. Pure values."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -13,7 +13,7 @@ from groundstation.geometry.rotations import world_from_downward_optical
 from groundstation.sensing.from_field import square_m
 from groundstation.vehicles import kind_named
 
-# How precisely a person sets a drone on a cross and a line on the floor.
+# Precision with which a person sets a drone on a cross and a line on the floor.
 PLACED_M, PLACED_RAD = 0.01, math.radians(1.5)
 # Relative errors of a lens and of a print that were measured.
 LENS_STD, PRINT_STD = 0.004, 0.003

@@ -1,4 +1,4 @@
-"""Finds the one thing that, if it were wrong, would explain how fixed cameras see standing drones. Pure."""
+"""Finds the one wrong figure that would explain fixed cameras' sightings of standing drones. Pure."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -10,13 +10,13 @@ import numpy as np
 from groundstation.preflight.pad_fit import TEAM_PRINT, Fit, Key, PadFit
 from groundstation.preflight.stand import PadSighting, Stand
 
-# For a figure that nobody measured, or measured wrongly: one sigma. A camera hangs askew, or is turned the wrong way.
+# One sigma of a figure that was not measured, or wrongly. A camera hangs askew, or is turned the wrong way.
 _MOVED_M, _TURNED_RAD, _ASKEW_RAD, _TILTED_RAD, _SHARE, _CARRIED_M = 0.5, 0.6, 0.06, 0.15, 0.08, 1.0
-# A fit is good while its chi-square is not beyond what chance exceeds once in 100,000 (this many sigmas).
+# A fit is good while its chi-square is below that which chance exceeds once in 100,000 (this many sigmas).
 _CHANCE_SIGMAS = 4.26
 # Explanations this much less likely (1 to 20) than the best one are ruled out.
 _RULED_OUT = math.log(20.0)
-# Where chance might explain everything, one wrong thing must explain it this much better (1 to 30) to be reported.
+# Where chance might explain everything, one cause must explain it this much better (1 to 30) to be reported.
 _TELLING = math.log(30.0)
 _REFINED = 8
 _ANGLES = frozenset({"roll", "pitch", "yaw", "turned"})
@@ -24,7 +24,7 @@ _ANGLES = frozenset({"roll", "pitch", "yaw", "turned"})
 
 @dataclass(frozen=True, slots=True)
 class Suspicion:
-    """One thing that may be wrong: its sort, its owner ("": all), the figures that it frees, exchanged drones.
+    """One possible cause: its sort, its owner ("": all), the figures that it frees, exchanged drones.
 
     what: nothing, prints, aside, height, focal, turned, tilted, placed, heading, print, exchanged.
     """
@@ -58,8 +58,8 @@ class Explanation:
 class Opinion:
     """The conclusion from the sightings.
 
-    all_well: nothing has to be wrong; explanations: what may be wrong, likeliest first; empty: no single thing explains
-    them.
+    all_well: the field explains the sightings; explanations: possible causes, likeliest first; empty: no single cause
+    explains them.
     """
 
     all_well: bool
@@ -109,7 +109,7 @@ def _suspicions(plain: PadFit) -> Iterator[Suspicion]:
 
 
 def _promise(plain: PadFit, suspicion: Suspicion) -> float:
-    """Return how promising a fit of a suspicion is; derivatives at zero say nothing about those with large angles."""
+    """Return the approximate evidence of a suspicion; derivatives at zero say nothing about those with large angles."""
     if suspicion.exchanged:
         return _exchanged(plain, suspicion).promise({})
     if any(part in _ANGLES and std >= _TURNED_RAD for (_, part), std in suspicion.loose.items()):

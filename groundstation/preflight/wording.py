@@ -1,4 +1,4 @@
-"""An explanation in words: what is wrong, by how much, how sure, and the remedy. Pure."""
+"""An explanation in words: the error, its size and deviation, and the remedy. Pure."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -18,7 +18,7 @@ _MUST_PLACED_M, _MUST_HEADING = 0.25, math.radians(10.0)
 _MOST_TOLD = 3
 _SURVEY = ", or survey it: groundstation calibrate extrinsics"
 _Told = tuple[bool, str, str]
-"""Whether it must be mended, what is wrong, and the remedy."""
+"""Whether it must be mended, the fault, and the remedy."""
 
 
 def finding(field: ResolvedField, opinion: Opinion) -> Finding:

@@ -1,11 +1,11 @@
-"""Makes pictures in which nobody can be recognised: an eighth of the resolution, enlarged again."""
+"""Blurs pictures so that no person can be recognised: an eighth of the resolution, enlarged again."""
 
 import cv2
 import numpy as np
 
 _QUALITY = 60
 _LEAST_PX = 8
-# Of an eighth of the size: no camera takes 64 million pixels, and a recorder that draws more ends for want of memory.
+# Of an eighth of the size: no camera takes 64 million pixels, and more would exhaust the recorder's memory.
 _MOST_PX = 1 << 20
 
 

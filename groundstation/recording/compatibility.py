@@ -1,4 +1,4 @@
-"""Checks that a recording was written by us, with messages that this program understands."""
+"""Checks that Skein wrote a recording, with messages that this program understands."""
 
 from groundstation.errors import OperatorMistake
 
@@ -11,7 +11,7 @@ VERSION_FIELD = "message_version"
 
 
 class RecordingError(OperatorMistake):
-    """The file is missing, no recording, or unreadable; damage inside one of ours is never an error."""
+    """The file is missing, no recording, or unreadable; damage inside a recording of ours is never an error."""
 
 
 def require_ours(name: str, profile: str, library: str) -> None:

@@ -1,4 +1,4 @@
-"""The space left on the disk, and what to omit when it runs low."""
+"""The space left on the disk, and the data to omit when it runs low."""
 
 import os
 from enum import IntEnum
@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 class Space(IntEnum):
-    """Levels of free disk space, by what may still be written, from best to worst."""
+    """Levels of free disk space, by the data that may still be written, from best to worst."""
 
     AMPLE = 0
     LOW = 1

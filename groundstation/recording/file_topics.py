@@ -11,7 +11,7 @@ def is_picture(topic: Topic) -> bool:
     return topic.type is None and topic.encoding.startswith(("image/", "video/"))
 
 
-# Typed messages are small and hold the whole story; pictures and datagrams are bulky and go to a separate file.
+# Typed messages are small and describe the whole run; pictures and datagrams are bulky and go to a separate file.
 STATE_TOPICS: tuple[Topic, ...] = tuple(topic for topic in TOPICS.values() if topic.type is not None)
 IMAGE_TOPICS: tuple[Topic, ...] = tuple(topic for topic in TOPICS.values() if is_picture(topic))
 DATAGRAM_TOPICS: tuple[Topic, ...] = tuple(

@@ -1,4 +1,4 @@
-"""What a file is that is no recording of a ground station, by its first bytes, and what opens it.
+"""Recognises files of other programs by their first bytes, and names the program that opens them.
 
 WIRE: the marks are those of pcap and pcapng (IETF drafts opsawg-pcap, opsawg-pcapng), ULog (PX4 user guide),
 ArduPilot's DataFlash (AP_Logger), rosbag 2.0 and SQLite.
@@ -34,7 +34,7 @@ _TLOG_TIMES = (978_307_200_000_000, 4_102_444_800_000_000)
 
 
 def kind_of_content(start: bytes) -> str:
-    """Return what a file is that begins so, and what opens it, or "" if nothing known begins so; the first LONGEST."""
+    """Return a file's kind and the program that opens it, by its first LONGEST bytes; "" if it is not known."""
     for mark, what in _FORMS:
         if start.startswith(mark):
             return what
@@ -45,13 +45,13 @@ def kind_of_content(start: bytes) -> str:
 
 
 def kind_of_folder(folder: Path) -> str:
-    """Return what a folder without recording is, or "" if it is none of the known."""
+    """Return the kind of a folder without a recording, or "" if it is not known."""
     # WIRE (rosbag2): beside its parts, a bag's folder has this file.
     return _BAG if (folder / "metadata.yaml").is_file() else ""
 
 
 def kind_of_file(path: Path) -> str:
-    """Return what a file is, and what opens it, or "" if it is not known or cannot be read."""
+    """Return a file's kind and the program that opens it, or "" if it is not known or cannot be read."""
     try:
         with path.open("rb") as stream:
             return kind_of_content(stream.read(LONGEST))

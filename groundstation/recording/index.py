@@ -1,4 +1,4 @@
-"""Indexes a file by time and channel, in one pass that decompresses next to nothing."""
+"""Indexes a file by time and channel, in one pass that decompresses hardly anything."""
 
 import re
 import struct

@@ -25,7 +25,7 @@ _RATED_S = 1.0  # messages over a shorter time have no rate
 _HOLE_S = 1.0
 _HOLE_PERIODS = 5.0
 _MAX_HOLES = 20
-# Published only while somebody is seen, searched for, or on the ground.
+# Published only while an entity is seen, searched for, or on the ground.
 _NOW_AND_THEN = (OBSERVATION, INNOVATION, SEARCHED_PICTURE, SEARCH_MAP, PREFLIGHT)
 _LATEST_NS = (1 << 63) - 1
 

@@ -1,4 +1,4 @@
-"""The head of every file of a run, by which each part can be understood alone."""
+"""The head of every file of a run, which makes each part understandable alone."""
 
 import json
 import platform

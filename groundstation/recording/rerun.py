@@ -1,4 +1,4 @@
-"""Marks recordings that are re-runs: a tracker processed a flight again; nothing flew, so nothing is judged."""
+"""Marks recordings that are re-runs: a tracker processed a flight again; no drone flew, so nothing is judged."""
 
 from collections.abc import Mapping
 
@@ -31,7 +31,7 @@ class Rerun(msgspec.Struct, frozen=True):
 
     @property
     def sentence(self) -> str:
-        """Return a sentence that tells a re-run from a flight, and how far its figures count."""
+        """Return a sentence that distinguishes a re-run from a flight, and limits the meaning of its figures."""
         return (
             f"{self.subject}: no flight, so nothing is judged; estimates and plans were computed, "
             "vehicles, safety and processes are those of the recorded flight"

@@ -122,7 +122,7 @@ class FileSeries:
         try:
             self._begin(now_ns)
         except OSError:
-            self._begun_ns = now_ns  # no second try at every flush; the disk's level is watched by the recorder
+            self._begun_ns = now_ns  # no second try at every flush; the recorder watches the free disk space
             return
         try:
             full.close()
@@ -131,7 +131,7 @@ class FileSeries:
 
     def _begin(self, now_ns: int) -> McapFile:
         """Open the next part; raises OSError, and leaves the current one as it is, when there is no room."""
-        self._folder.mkdir(parents=True, exist_ok=True)  # somebody may have removed it
+        self._folder.mkdir(parents=True, exist_ok=True)  # a person may have removed it
         if not self._has_room():
             raise OSError(errno.ENOSPC, "no space left on the disk")
         number = 1 + max((number for number, _ in numbered_parts(self._folder, self._stem)), default=0)

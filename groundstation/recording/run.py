@@ -1,4 +1,4 @@
-"""A whole run: all parts of all its files as one time line, from which any moment can be read at once."""
+"""A whole run: all parts of all its files as one time line, with direct access to any time."""
 
 import heapq
 from collections.abc import Iterator
@@ -23,8 +23,8 @@ class _Place:
 class RecordedRun:
     """The files of a run by time [UNIX ns]; cut files are read as far as they are sound.
 
-    metadata and attachments are those of the first part that has any. `unread` says why a part is no recording at all
-    (killed before its first byte); if none is readable, RecordingError is raised.
+    metadata and attachments are those of the first part that has any. `unread` has the reasons of parts that are no
+    recordings at all (killed before the first byte); if none is readable, RecordingError is raised.
     """
 
     def __init__(self, paths: list[Path]) -> None:
@@ -86,7 +86,7 @@ class RecordedRun:
             yield heapq.heappop(waiting)[2]
 
     def latest_before(self, time_ns: int, wanted: Wanted = every_topic) -> dict[Key, RawRecord]:
-        """Return for each wanted key its last message with log time < time: the knowledge at that time."""
+        """Return for each wanted key its last message with log time < time: the state at that time."""
         found: dict[Key, RawRecord] = {}
         for index in self.indexes:
             for key, record in index.latest(time_ns, wanted).items():

@@ -24,7 +24,7 @@ class Stretch(msgspec.Struct, frozen=True):
 
     @property
     def sentence(self) -> str:
-        """Return a sentence that tells a cut from a flight, and how far its figures count."""
+        """Return a sentence that distinguishes a cut from a flight, and limits the meaning of its figures."""
         duration_s = (self.until_unix_ns - self.from_unix_ns) / NS_PER_S
         return f"cut of {duration_s:.1f} s from a recording: a part of a flight, so nothing is judged"
 

@@ -1,6 +1,6 @@
 """A made-up run of two drones with the topics, rates and sizes of the demo's: for benches and tests of recordings.
 
-It uses no simulator: bodies move in circles, estimates are those circles with noise of full precision.
+It uses no simulator: bodies move in circles, and estimates are those circles with full-precision noise.
 """
 
 import heapq

@@ -19,10 +19,10 @@ class Trajectories:
         self._pose_due_ns = self._due_ns = 0
 
     def take(self, now_ns: int, bodies: Iterable[Transform]) -> dict[str, list[Transform]]:
-        """Return the trajectory of each body, oldest pose first, where it is time for it; else nothing.
+        """Return the trajectory of each body, oldest pose first, when one is due; else nothing.
 
-        The trajectory of a body without estimates becomes shorter each time, and at last empty. A clock that goes back
-        begins anew.
+        The trajectory of a body without estimates becomes shorter each time, and finally empty. After a backward step
+        of the clock trajectories begin anew.
         """
         if now_ns < self._pose_due_ns - _POSE_PERIOD_NS:
             self._poses.clear()

@@ -1,4 +1,4 @@
-"""Messages that viewers understand without knowing us: well-known Foxglove types, in protobuf.
+"""Messages in types that viewers know: well-known Foxglove types, in protobuf.
 
 WIRE (foxglove/schemas, proto): names and numbers of the fields below. Pictures carry our header in a field of our own.
 """

@@ -1,6 +1,6 @@
 """Compares belief and plans under other settings with the recorded ones; the truth is for judging only.
 
-The vehicles flew as recorded: a plan that differs from the recorded one moved nobody.
+The vehicles flew as recorded: a plan that differs from the recorded one moved no vehicle.
 """
 
 from dataclasses import asdict, dataclass, field

@@ -84,7 +84,7 @@ class Playback:
         """Advance time; yields (after, until) in stretches, each when the one before has been shown."""
         if not self.playing:
             return
-        # A missed turn is not made up for: nobody would see it.
+        # A missed turn is not made up for: no viewer would see it.
         goal_ns = min(self.reel.end_ns, self.at_ns + round(min(elapsed_s, _LONGEST_TURN_S) * self.speed * 1e9))
         while self.at_ns < goal_ns:
             after_ns, self.at_ns = self.at_ns, min(goal_ns, self.at_ns + _STRETCH_NS)

@@ -1,4 +1,4 @@
-"""A recording in the console's own server and page, through a bus that ends in this process."""
+"""Shows a recording in the console's own server and page, through a bus within this process."""
 
 import math
 import time
@@ -21,7 +21,7 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _LATCHED = (*STATES, LEASE)
 _TRACED = (ESTIMATE, PLAN, TRUTH, INNOVATION)
-# The time that the page looks back on: two minutes of curves, and longer than any detection or sighting is shown.
+# The past that the page shows: two minutes of curves, which is longer than any detection or sighting is shown.
 _LOOK_BACK_NS, _SEEN_NS = 122 * NS_PER_S, 5 * NS_PER_S
 # The first, shorter look back after a jump, shown before two minutes can be read.
 _GLANCE_NS = 5 * NS_PER_S
@@ -32,7 +32,7 @@ _MS = 1e6
 
 
 class Show:
-    """One replay in front of any number of viewers, who all see the same and may all control it."""
+    """One replay for any number of viewers, who all see the same and may all control it."""
 
     def __init__(self, playback: Playback, port: int | None) -> None:
         source = playback.source

@@ -1,4 +1,4 @@
-"""Runs today's tracker in the flight loop from a journal: same inputs, same ticks, plans adopted at the same ticks."""
+"""Re-runs today's tracker in the flight loop from a journal: same inputs and ticks, plans adopted at the same ticks."""
 
 import logging
 from collections import Counter
@@ -100,7 +100,7 @@ class JournalWorker:
             plan = request.put_to(self._planner, lambda: False, budget)
         except EstimatorFault:
             return Adoption(tick, None)
-        except Exception:  # noqa: BLE001 - as in flight (PlanWorker): what was flown through can be replayed
+        except Exception:  # noqa: BLE001 - as in flight (PlanWorker): a fault survived in flight can be replayed
             _log.exception("planning crashed")
             return Adoption(tick, None)
         return Adoption(tick, plan)

@@ -1,4 +1,4 @@
-"""A recording from the tracker's view: tick by tick, with its inputs and its messages."""
+"""A recording tick by tick of the tracker, with its inputs and its messages."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
@@ -41,7 +41,7 @@ class Tick:
 class Tape:
     """Reads the files of a run once, in order, holding a few seconds at a time.
 
-    `said` collects what the tracker published, by (topic, entity, publish time), until it is taken.
+    `said` collects the tracker's messages, by (topic, entity, publish time), until they are taken.
     """
 
     def __init__(self, files: Iterable[Path]) -> None:
@@ -92,7 +92,7 @@ class Tape:
     def _filled(self, tick: Tick) -> Tick:
         for key, seq in tick.entry.ingested:
             candidates = self._held.get((key, seq & 0xFFFF_FFFF), [])
-            # A restarted driver counts from zero again: the nearest one in time is meant.
+            # A restarted driver counts from zero again: the message nearest in time is the right one.
             candidates.sort(key=lambda record: abs(record.log_time_ns - tick.at_ns))
             message = self._decoded(candidates.pop(0)) if candidates else None
             if message is None:

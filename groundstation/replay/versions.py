@@ -17,7 +17,7 @@ def current() -> dict[str, str]:
 
 
 def foreign(recorded: Mapping[str, str]) -> list[str]:
-    """Return a line for each library, or the kernels' sources, that differs from the recording."""
+    """Return a line for each library, or for the kernels' sources, where it differs from the recording."""
     lines = []
     for name in DECIDING:
         then, now = recorded.get(name), version(name)

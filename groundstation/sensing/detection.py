@@ -1,4 +1,4 @@
-"""The chance that a wholly searched picture shows a marker, by the marker's place; compiled."""
+"""Probability that a full search of a picture finds a marker, by the marker's place; compiled."""
 
 import math
 
@@ -9,7 +9,7 @@ from groundstation.kernel import kernel
 from groundstation.sensing.visibility import CameraRow
 
 FOUND_SHARE = 0.7
-"""Share of the pictures in view in which a full search finds a marker: blur, glare and drones in between cost some."""
+"""Share of pictures in which a full search finds a marker in view: blur, glare and drones in between cost some."""
 
 STEEPEST_COS = math.cos(math.radians(70.0))
 """A flat marker is found up to this angle between its normal and the line of sight (docs/reference/vision.md 2)."""
@@ -17,10 +17,10 @@ STEEPEST_COS = math.cos(math.radians(70.0))
 
 @kernel()
 def detection(camera: CameraRow, pose: Vector, slack_m: float, x: float, y: float, z: float) -> float:
-    """Return the chance that a picture shows a level marker at a world point [m].
+    """Return the probability that a picture shows a level marker at a world point [m].
 
-    pose: x, y, z, yaw of the carrier, zeros for a camera fixed in the world; slack_m: by how much the view's edge is
-    moved inwards, for an uncertain pose.
+    pose: x, y, z, yaw of the carrier, zeros for a camera fixed in the world; slack_m: distance by which the view's edge
+    is moved inwards, for an uncertain pose.
     """
     c, s = math.cos(pose[3]), math.sin(pose[3])
     dx, dy, dz = x - pose[0], y - pose[1], z - pose[2]

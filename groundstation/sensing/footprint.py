@@ -1,4 +1,4 @@
-"""The part of the floor that a robot's camera sees from its place, in cells of a grid."""
+"""Footprint of a robot's camera on the floor, in cells of a grid."""
 
 import math
 from dataclasses import dataclass
@@ -17,9 +17,9 @@ _LEAST = 0.05  # smaller chances are not counted
 
 @dataclass(frozen=True, slots=True)
 class Footprint:
-    """The cells that a robot's camera sees from the centre of a cell, for each heading: row, column, chance.
+    """The cells that a robot's camera sees from the centre of a cell, for each heading: row, column, probability.
 
-    first (HEADINGS + 1): where the cells of a heading begin; fresh: share of a view that the neighbouring one does not
+    first (HEADINGS + 1): begin of the cells of each heading; fresh: share of a view that the neighbouring one does not
     show, on average over a full turn.
     """
 

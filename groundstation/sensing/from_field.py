@@ -26,18 +26,18 @@ FAR_M = 200.0
 """Height of the assumed eye of a motion capture system above its box."""
 
 CAPTURE_BORDER_M = 0.1
-"""A body nearer to the border of a motion capture system's box is not relied upon."""
+"""Least distance of a body from the border of a motion capture system's box, for use."""
 
 HEIGHT_KNOWN = 0.5
 """Deviation of a vehicle's own height relative to that of one range."""
 
-_WORST_DILUTION = 10.0  # for anchors that stand in a line: such a system determines next to nothing
+_WORST_DILUTION = 10.0  # for anchors in a line: such a system determines next to nothing
 
 DETECTION_PX = 10.0
-"""A square must be this large to be found with certainty; bounds the range of world-fixed cameras."""
+"""Least size of a square that is found with certainty; bounds the range of world-fixed cameras."""
 
 TAG_SQUARES = 3.8
-"""A tag is found as far as a checkerboard with squares of this part of its side (measured: 168 mm like 44 mm)."""
+"""A tag is found as far as a checkerboard whose squares are its side divided by this (measured: 168 mm like 44 mm)."""
 
 ATTITUDE_REPEATS = 2.0
 """Attitude errors last for seconds: they are counted with this factor, as if they were white."""

@@ -15,7 +15,7 @@ OPTICAL_FROM_WORLD_LOOKING_DOWN.setflags(write=False)
 
 @dataclass(frozen=True, slots=True)
 class Frustum:
-    """A view pyramid: tangents of its half angles, range, and border within which a marker is not relied upon.
+    """A view pyramid: tangents of its half angles, range, and border within which no marker counts as seen.
 
     border_m: a marker's centre must be this far inside the side planes (half the board's diagonal).
     """

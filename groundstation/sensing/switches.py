@@ -1,4 +1,4 @@
-"""A change of the sensing topology, and why the planner made it."""
+"""A change of the sensing topology, and the planner's reason."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""A ground robot of which only the commanded speeds are known: it follows them late and never exactly.
+"""A ground robot of which only the commanded speeds are known: it follows them late and inexactly.
 
 f: forward = (1 + forward_scale) v - turn_drag |w|, rate = (1 + turn_scale) w + turn_offset, on an arc during a step. It
 answers a command `response_s` late (its odometry delay is minus that) and approaches it within `lag_s`. The errors of
@@ -82,7 +82,7 @@ def predict_commanded_robot(belief: Belief, e: int, dt: float) -> None:
     mean, P, entity, memory = belief.mean, belief.P, belief.entities[e], belief.memory[e]
     start, size, p = entity.start, entity.size, _own(entity)
     v, w = memory.held_vx, memory.yaw_rate
-    # A robot that is told to stand does stand.
+    # A robot commanded to stand does stand.
     moving = 1.0 if abs(v) > STANDS or abs(w) > STANDS else 0.0
     rate = (1.0 + mean[start + TURN_SCALE]) * w + moving * mean[start + TURN_OFFSET]
     drag = (p.drag_mean + mean[start + TURN_DRAG]) * abs(w)
@@ -191,7 +191,7 @@ class CommandedRobot:
 
     @property
     def place_m(self) -> Vector3:
-        """Return where the marker is."""
+        """Return the place of the marker."""
         return self.marker_position_m
 
     def own(self) -> DriveParameters:
@@ -220,7 +220,7 @@ class CommandedRobot:
         )
 
     def prior(self) -> Array:
-        """Return mean and variances (2, size) of what joins."""
+        """Return mean and variances (2, size) of its block when it joins."""
         deviations = (
             self.scale_std,
             self.turn_drag_std_m,

@@ -1,4 +1,4 @@
-"""A target at constant velocity, moved by white acceleration; its heading is a state where markers show it."""
+"""A target at constant velocity with white acceleration noise; its heading is a state where markers show it."""
 
 import math
 from dataclasses import dataclass
@@ -55,7 +55,7 @@ def predict_constant_velocity(belief: Belief, e: int, dt: float) -> None:
 
 @dataclass(frozen=True, slots=True)
 class ConstantVelocityTarget:
-    """A ground vehicle known only by a marker at a known height; white acceleration moves it.
+    """A ground vehicle observed only by a marker at a known height, with white acceleration noise.
 
     acceleration_std_m_s2 lasts for correlation_s; speed_std_m_s: deviation of the speed before the first sighting.
     heading: whether its marker shows its heading, which is then a state with a random walk of turn_std_rad per root
@@ -81,7 +81,7 @@ class ConstantVelocityTarget:
 
     @property
     def place_m(self) -> Vector3:
-        """Return where the marker is."""
+        """Return the place of the marker."""
         return 0.0, 0.0, self.marker_height_m
 
     def own(self) -> ConstantVelocityParameters:
@@ -91,7 +91,7 @@ class ConstantVelocityTarget:
         )
 
     def prior(self) -> Array:
-        """Return mean and variances (2, size) of what joins."""
+        """Return mean and variances (2, size) of its block when it joins."""
         prior = np.zeros((2, len(self.labels)))
         prior[1, VX] = prior[1, VY] = self.speed_std_m_s**2
         return prior

@@ -21,7 +21,7 @@ from groundstation.estimation.records import VX, VY, X, Y, own_parameters
 from groundstation.kernel import Record, kernel
 
 TURN_RATE = 4  # after x, y, vx, vy
-_SMALL_RAD = 1e-3  # below, series are more exact than quotients
+_SMALL_RAD = 1e-3  # below it series are more exact than quotients
 
 
 class TurnParameters(Record):
@@ -138,7 +138,7 @@ class CoordinatedTurnTarget:
 
     @property
     def place_m(self) -> Vector3:
-        """Return where the marker is."""
+        """Return the place of the marker."""
         return 0.0, 0.0, self.marker_height_m
 
     def own(self) -> TurnParameters:
@@ -153,7 +153,7 @@ class CoordinatedTurnTarget:
         )
 
     def prior(self) -> Array:
-        """Return mean and variances (2, size) of what joins."""
+        """Return mean and variances (2, size) of its block when it joins."""
         prior = np.zeros((2, len(self.labels)))
         prior[1, VX] = prior[1, VY] = self.speed_std_m_s**2
         prior[1, TURN_RATE] = self.turn_rate_std_rad_s**2

@@ -8,10 +8,10 @@ from groundstation.kernel import kernel
 
 # The speed of a silent vehicle is unknown: 0.3 m/s, constant over some 0.5 s [m^2/s].
 SILENT_DENSITY = 0.09
-# So is its turn: 0.15 rad/s, likewise [rad^2/s]. It is told to hover, but may have been turning when last heard.
+# So is its turn: 0.15 rad/s, likewise [rad^2/s]. It is ordered to hover, but may have been turning at its last message.
 SILENT_TURN_DENSITY = 0.0225
 _SILENT_S = 0.3  # after a longer pause between headings the vehicle was silent
-# Velocity is smoothed over this for all that is learnt about its errors [s].
+# Velocity is smoothed over this time for the estimates of its errors [s].
 SLOW_S = 1.0
 
 

@@ -25,7 +25,7 @@ class Landmark:
 
     @property
     def place_m(self) -> Vector3:
-        """Return where it stands."""
+        """Return its place."""
         return self.position_m
 
     def own(self) -> None:

@@ -58,5 +58,5 @@ class ManoeuvringTarget:
         return self.modes[0].own()
 
     def prior(self) -> Array:
-        """Return mean and variances of what joins, the same in all modes."""
+        """Return mean and variances of its block when it joins, the same in all modes."""
         return self.modes[0].prior()

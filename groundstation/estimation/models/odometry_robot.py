@@ -22,7 +22,7 @@ from groundstation.kernel import kernel
 
 AERIAL = ("roll_error", "pitch_error", "climb", "velocity_scale", "height_error", "floor")
 SLOW_STATES = (*AERIAL, "velocity_bias_x", "velocity_bias_y", "yaw_offset")
-# The field file's figure is what a vehicle reports while it is sure; the lasting part of it is 0.6.
+# The field file's figure is the error of a vehicle that reports no doubt; its lasting part is 0.6.
 _STATED_ROOM = 2.0
 _DOUBT_S = 1.0  # time constant with which doubt raised by surprises decays
 
@@ -115,8 +115,8 @@ class OdometryRobot:
     slow_states: those of SLOW_STATES that this type of vehicle needs; without any the block is the paper's four.
     velocity_scale: true speed over reported speed as calibrated, known to `scale_std` (a state follows the rest);
     velocity_std_m_s with its correlation time becomes white noise; heading wanders by yaw_std_rad per root second;
-    attitude, height and velocity errors are Gauss-Markov states; velocity_walk: change of the latter while nobody sees
-    the vehicle [m/s per root second]; climb is a state if the vehicle reports none. floor: height of the object below;
+    attitude, height and velocity errors are Gauss-Markov states; velocity_walk: change of the latter while the vehicle
+    is unseen [m/s per root second]; climb is a state if the vehicle reports none. floor: height of the object below;
     yaw_offset: error of the vehicle's own heading, for the heading sensor.
     """
 
@@ -156,7 +156,7 @@ class OdometryRobot:
 
     @property
     def place_m(self) -> Vector3:
-        """Return where the marker is."""
+        """Return the place of the marker."""
         return self.marker_position_m
 
     def own(self) -> RobotParameters:
@@ -179,7 +179,7 @@ class OdometryRobot:
             walk_density=self.velocity_walk**2,
             velocity_std=_STATED_ROOM * max(self.velocity_std_m_s, self.velocity_bias_std_m_s * self.velocity_scale),
             has_climb_rate=float(self.reports_climb),
-            # The slow part of the error is a state; the rest is quick, and alike in neighbouring samples.
+            # The slow part of the error is a state; the rest is quick, and correlated in neighbouring samples.
             height_variance=(0.5 * self.height_std_m) ** 2,
             hold_s=self.hold_s,
             **{f"at_{label}": place_of(self.labels, label) for label in _OWN_STATES},

@@ -47,7 +47,7 @@ class MotionModel(Protocol):
         """Return the parameters that its kernels read (`own_parameters`)."""
 
     def prior(self) -> Array:
-        """Return mean and variances (2, size) of what joins; pose entries are overwritten where a pose was measured."""
+        """Return mean and variances (2, size) of its block as it joins; a measured pose overwrites the pose entries."""
 
 
 @runtime_checkable
@@ -56,11 +56,11 @@ class DrivenModel(MotionModel, Protocol):
 
     @property
     def velocity_delay_s(self) -> float:
-        """How long before its stamp a velocity was true; negative for a command that is followed later."""
+        """Delay of a velocity's stamp after its time of measurement; negative for a command that is followed later."""
 
     @property
     def height_delay_s(self) -> float:
-        """How long before its stamp a height was true."""
+        """Delay of a height's stamp after its time of measurement."""
 
     def velocity_m_s(self, block: Array, memory: EntityMemory) -> Vector3:
         """Return the velocity [world] from the block's mean and the held inputs."""
@@ -76,7 +76,7 @@ class SwitchingModel(MotionModel, Protocol):
 
     @property
     def stay_s(self) -> tuple[float, ...]:
-        """How long it stays with each, on average."""
+        """Mean time for which it stays with each."""
 
 
 class ObservationModel(Protocol):
@@ -92,7 +92,7 @@ class ObservationModel(Protocol):
 
     @property
     def repeats_s(self) -> float:
-        """For how long an error of one pair repeats: readings within it share one reading's information."""
+        """Time for which an error of one pair repeats: readings within it share one reading's information."""
 
     @property
     def stamp_std_s(self) -> float:
@@ -139,5 +139,5 @@ class SensorDefaults:
 
 
 def place_of(labels: tuple[str, ...], wanted: str) -> int:
-    """Return where a label stands in a block, or -1."""
+    """Return the index of a label in a block, or -1."""
     return labels.index(wanted) if wanted in labels else -1

@@ -30,8 +30,8 @@ class RangeBearingParameters(Record):
 
 
 _own = own_parameters(RangeBearingParameters)
-_NEAREST_M = 0.01  # a bearing to a nearer marker says nothing
-_LEAST_COS = 0.1  # farther aside a depth is undefined
+_NEAREST_M = 0.01  # a bearing to a nearer marker has no information
+_LEAST_COS = 0.1  # at larger angles a depth is undefined
 
 
 @kernel()

@@ -39,7 +39,7 @@ class AnchorParameters(Record):
 
 
 class RangeParameters(Record):
-    """Where the transponder sits on its robot [m; base], and how far its ranges reach [m]."""
+    """Place of the transponder on its robot [m; base], and the reach of its ranges [m]."""
 
     transponder_x: float
     transponder_y: float

@@ -1,8 +1,8 @@
 """A target's own odometry: its velocity in its own frame, which has neither origin nor drift. A claim (reports.py).
 
 With a heading in the block z = (forward, left) = R(yaw)^T v. Without one only the speed counts: z = |v|, linear along
-the believed direction, if the believed speed is well above its deviation. A report of standing counts in both axes, z =
-v = 0; other reports cannot be used while the direction is unknown.
+the estimated direction, if the estimated speed is well above its deviation. A report of standing counts in both axes, z
+= v = 0; other reports cannot be used while the direction is unknown.
 """
 
 import math
@@ -16,7 +16,7 @@ from groundstation.estimation.models.protocol import SensorDefaults
 from groundstation.estimation.records import NOT_LOCATED, VX, VY, EventRow, Prediction, SensorRow
 from groundstation.kernel import kernel
 
-# A believed speed of this many deviations has a direction; a reported one of fewer counts as standing.
+# An estimated speed of this many deviations has a direction; a reported one of fewer counts as standing.
 _MOVES, _STANDS = 3.0, 2.0
 _SLOWEST_M_S = 1e-3  # a mode with a lower speed has no direction, and the derivative no size
 

@@ -1,4 +1,4 @@
-"""The errors of a vehicle's own sensors: how they grow, decay and last."""
+"""Dynamics of the errors of a vehicle's own sensors: growth, decay and time constants."""
 
 import math
 
@@ -15,13 +15,13 @@ _WALKS_AFTER_S = 0.2  # a robot in view is seen more often
 
 
 class RobotParameters(Record):
-    """Densities, deviations and correlation times of the errors, and where in the block the states of them stand.
+    """Densities, deviations and correlation times of the errors, and the indices of their states in the block.
 
     velocity_gain: true over reported speed; velocity_density [m^2/s], yaw_density and yaw_offset_density [rad^2/s],
     scale_density [1/s], floor_density [m^2/s]: white noise; *_std, *_tau_s: Gauss-Markov states; has_climb_rate: 1.0 if
     the vehicle reports one; height_variance [m^2]: of one step's height; velocity_std [m/s]: a larger stated deviation
-    is doubt; walk_density [m^2/s^3]: white noise of the velocity's error while nobody sees the vehicle; hold_s: how
-    long a velocity holds in silence; at_*: entries (-1: the block has none).
+    is doubt; walk_density [m^2/s^3]: white noise of the velocity's error while the vehicle is unseen; hold_s: how long
+    a velocity holds in silence; at_*: entries (-1: the block has none).
     """
 
     velocity_gain: float
@@ -78,10 +78,10 @@ def fade_velocity_bias(
 ) -> None:
     """Let the velocity's error decay over dt.
 
-    An error too large for a sound sensor gets more variance, and stays longer. A heavy tail of its prior (0078): once
+    An error too large for a sound sensor gets more variance, and lasts longer. Its prior has a heavy tail (0078): once
     sightings have moved the error beyond its prior, the deviation follows the error, so that the next sightings weigh
-    more; surprises of fixed cameras add to it. Not for an unseen robot (0143), whose error is a random walk if its
-    kind's is.
+    more; sightings of fixed cameras beyond the gate add to it. Not for an unseen robot (0143), whose error is a random
+    walk if its kind's is.
     """
     start, size = entity.start, entity.size
     x, y = mean[start + p.at_velocity_bias_x], mean[start + p.at_velocity_bias_y]

@@ -82,7 +82,7 @@ def gap_about_m(place: Array, views: Sequence[Rectangle]) -> float:
 def unseen_way_m(leaves_m: float, speed: float, most: float, follows_s: float, unseen_s: float) -> float:
     """Return how far [m] a vehicle gets beyond a border in `unseen_s` after it has passed it.
 
-    The border is `leaves_m` ahead. The vehicle has a speed [m/s] now, a set-point at its maximum `most` [m/s], and a
+    The border is `leaves_m` ahead. The vehicle has a speed [m/s] now, a setpoint at its maximum `most` [m/s], and a
     lag `follows_s`.
     """
     lacks = max(0.0, most - speed)

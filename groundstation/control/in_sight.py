@@ -65,7 +65,7 @@ def _kept(name: str, wanted: Array, level_m: float, ahead_m: float, now: Moment)
     if found is None:
         return _held_in(name, wanted, level_m, now)
     short_m, helped = _short_m(name, found, now), _is_helped(name, now)
-    # A robot that others locate does not stay in the gap, even if its set-points would: half of the way is enough.
+    # A robot that others locate does not stay in the gap, even if its setpoints would: half of the way is enough.
     needed_m = 0.5 * (found.leaves_m + found.reaches_m) if helped else found.reaches_m
     crosses = needed_m <= ahead_m * found.share
     if found.gap_m > short_m and helped:

@@ -17,7 +17,7 @@ from groundstation.estimation.tied_contradictions import Pair, TiedContradiction
 from groundstation.geometry.camera_turn import CameraTurn
 from groundstation.time_units import NS_PER_S
 
-MOVED = "its camera was moved: what it sees counts for nothing until all have landed"
+MOVED = "its camera was moved: its sightings are not used until all have landed"
 # A tracker that starts in flight knows by then which robots fly.
 _NOBODY_NS = 5 * NS_PER_S
 # A camera with a smaller displacement [m] is reported, but its sightings are used: the rooms' margins are wider.

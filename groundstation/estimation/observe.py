@@ -12,7 +12,7 @@ from groundstation.estimation.evidence import confront, least_nis, likeliest, se
 from groundstation.estimation.filter_state import Belief, Deferred, Hypothesis, State, Tables, belief_of, deferred_of
 from groundstation.estimation.joining import admit
 from groundstation.estimation.motion import clear, enter, join
-from groundstation.estimation.outliers import blame, doubt_velocity, forget_lie, note_given_up
+from groundstation.estimation.outliers import blame, doubt_velocity, forget_noted_error, note_given_up
 from groundstation.estimation.records import (
     ACCEPTED,
     ADMITTED,
@@ -142,7 +142,7 @@ def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> N
     if joins:
         make_all(state)  # a diffuse prior is too wide for deferred corrections beside it
     weigh(state.weights, used.innovations, rows, excess)
-    forget_lie(subject, event.at)
+    forget_noted_error(subject, event.at)
     note_place(first, deferred_of(state, 0), event.subject)
     subject.corrected_at = state.used_at[event.sensor, event.subject] = event.at
 

@@ -33,7 +33,7 @@ _IN_A_ROW_S = 5.0
 # more is permitted.
 _BETWEEN_S, _AT_MOST, _FORGOTTEN_S = 3.0, 3.0, 10.0
 # A sighting counts for this time at most; while seen, a wrong velocity is forgotten with this time constant.
-_SEEN_S, _LIE_FORGOTTEN_S = 0.2, 1.0
+_SEEN_S, _ERROR_FORGOTTEN_S = 0.2, 1.0
 _FIRST_DOUBT_M_S, _DOUBT_GROWS, _MOST_DOUBT_M_S = 0.2, 2.0, 1.0
 
 
@@ -139,9 +139,9 @@ def doubt_velocity(memory: EntityMemory) -> None:
 
 
 @kernel()
-def forget_lie(memory: EntityMemory, at: float) -> None:
+def forget_noted_error(memory: EntityMemory, at: float) -> None:
     """Let a noted velocity error decay while the vehicle is seen: if the velocity is still wrong, it is noted again."""
-    memory.velocity_lie *= math.exp(-min(at - memory.corrected_at, _SEEN_S) / _LIE_FORGOTTEN_S)
+    memory.noted_error *= math.exp(-min(at - memory.corrected_at, _SEEN_S) / _ERROR_FORGOTTEN_S)
     memory.unseen_s = 0.0
 
 

@@ -110,7 +110,7 @@ class EntityMemory(Record):
     velocity; attitude_std [rad], yaw_std [rad per root second]: errors as stated by the odometry (0: the model's own
     count); last_yaw, last_reset, has_yaw: the vehicle's own heading [rad; odom] at the step before, received yaw_age_s
     ago. velocity_x, _y, _z: how they change [m/s; world], as last predicted; velocity_doubt [m/s]: deviation that a
-    fixed camera's surprises add to the error of the reported velocity; velocity_lie [m/s]: by how much that error was
+    fixed camera's surprises add to the error of the reported velocity; noted_error [m/s]: by how much that error was
     recently seen to exceed that of a sound sensor; unseen_s: time predicted since the last sighting. wild: observations
     far beyond the gate, the last of them at wild_at; refused: observations by which it would have joined if they had
     not contradicted their observer; corrected_at: last use of an observation; seen_variance: of the worse of x and y
@@ -142,7 +142,7 @@ class EntityMemory(Record):
     velocity_y: float
     velocity_z: float
     velocity_doubt: float
-    velocity_lie: float
+    noted_error: float
     unseen_s: float
     wild: Streak
     wild_at: float

@@ -125,13 +125,13 @@ class ReportIntake:
 
     def _drop(self, name: str, trust: _Trust) -> None:
         trust.heeded, trust.agreed_ns = False, None
-        text = f"{name} says that it moves otherwise than it is seen to: what it says is not used"
+        text = f"{name} reports another motion than cameras see: its reports are not used"
         self._notices.append(Notice(Severity.WARNING, text, _REMEDY, name))
 
     def _believe(self, name: str, trust: _Trust) -> None:
         trust.heeded, trust.refused, trust.ahead = True, 0, (0.0, 0.0)
         trust.probation_s = min(2.0 * trust.probation_s, _LONGEST_S)
-        text = f"{name} moves again as it says: what it says is used"
+        text = f"{name} reports the motion that cameras see again: its reports are used"
         self._notices.append(Notice(Severity.INFO, text, entity=name))
 
 

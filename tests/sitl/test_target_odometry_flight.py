@@ -11,7 +11,7 @@ from scenario_faults import faults, until_the_first_fault
 pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.exhaustive, pytest.mark.timeout(240)]
 Start = Callable[..., Any]
 HEARD = ("--set", "target.odometry.source=ros2://192.168.1.20/odom")
-NOT_BELIEVED = "turtlebot says that it moves otherwise than it is seen to"
+NOT_BELIEVED = "turtlebot reports another motion than cameras see"
 
 
 def test_each_way_in_which_it_breaks_is_told_and_the_team_tracks_on(sitl: Start, tmp_path: Path) -> None:

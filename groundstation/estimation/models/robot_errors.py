@@ -10,7 +10,7 @@ from groundstation.kernel import Record, kernel
 
 _TURN_SHARE = 0.02  # of each turn is in error
 _BELIEVABLE, _WRONG = 3.0, 5.0  # deviations beyond which an error lasts longer, and the sensor counts as wrong
-_LIE_S, _UNSEEN_LIE_S, _UNSEEN_S = 2.0, 8.0, 0.5  # duration of a wrong velocity, seen and unseen; unseen from then on
+_ERROR_S, _UNSEEN_ERROR_S, _UNSEEN_S = 2.0, 8.0, 0.5  # duration of a wrong velocity, seen and unseen; unseen after
 _WALKS_AFTER_S = 0.2  # a robot in view is seen more often
 
 
@@ -91,13 +91,13 @@ def fade_velocity_bias(
     seen = memory.unseen_s < _UNSEEN_S
     if square > believable and seen:
         variance += square - believable
-        lasts_s = max(lasts_s, lasts_s + (_LIE_S - lasts_s) * (1.0 - believable / square))
+        lasts_s = max(lasts_s, lasts_s + (_ERROR_S - lasts_s) * (1.0 - believable / square))
     if square > _WRONG * _WRONG * p.bias_std * p.bias_std and seen:
-        memory.velocity_lie = max(memory.velocity_lie, math.sqrt(square - believable))
-    if memory.velocity_lie > 0.0:
-        lie = memory.velocity_lie * memory.velocity_lie * min(1.0, memory.unseen_s / _UNSEEN_S)
-        variance = max(variance, p.bias_std * p.bias_std + lie)
-        lasts_s = max(lasts_s, lasts_s + (_UNSEEN_LIE_S - lasts_s) * lie / (lie + p.bias_std * p.bias_std))
+        memory.noted_error = max(memory.noted_error, math.sqrt(square - believable))
+    if memory.noted_error > 0.0:
+        noted = memory.noted_error * memory.noted_error * min(1.0, memory.unseen_s / _UNSEEN_S)
+        variance = max(variance, p.bias_std * p.bias_std + noted)
+        lasts_s = max(lasts_s, lasts_s + (_UNSEEN_ERROR_S - lasts_s) * noted / (noted + p.bias_std * p.bias_std))
     deviation = math.sqrt(variance)
     fade(mean, P, start, size, p.at_velocity_bias_x, deviation, dt / lasts_s)
     fade(mean, P, start, size, p.at_velocity_bias_y, deviation, dt / lasts_s)

@@ -1,4 +1,4 @@
-"""Runtime file, terminal, interrupts, fail-safe datagrams: each alone."""
+"""Runtime file, terminal, interrupts, failsafe datagrams: each alone."""
 
 import os
 import select

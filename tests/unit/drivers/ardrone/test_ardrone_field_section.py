@@ -1,4 +1,4 @@
-"""What the field file says of an AR.Drone reaches its driver and its fail-safe datagrams, and no emulator's ports."""
+"""What the field file says of an AR.Drone reaches its driver and its failsafe datagrams, and no emulator's ports."""
 
 import dataclasses
 import json

@@ -1,4 +1,4 @@
-"""Shared by all tests: coverage, the kernel cache of these sources, shipped settings, and recorded evidence."""
+"""Shared by all tests: coverage, the kernel cache of these sources, shipped settings, and recorded data."""
 
 import os
 from collections.abc import Callable, Iterator

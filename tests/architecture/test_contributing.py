@@ -1,4 +1,4 @@
-"""What a contributor is offered runs what the Makefile and `.ci/run` run."""
+"""The commands in CONTRIBUTING.md run the same checks as the Makefile and `.ci/run`."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Which libraries have their place where; who may import whom of our own packages is said in `.importlinter`."""
+"""Third-party libraries are imported only in their own packages; `.importlinter` has the rules for our packages."""
 
 import ast
 import configparser

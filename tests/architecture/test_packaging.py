@@ -1,4 +1,4 @@
-"""What is shipped, and what the tree at large must look like."""
+"""Contents of the shipped package and state of the source tree."""
 
 import importlib.util
 import re

@@ -1,4 +1,4 @@
-"""What the page of a first flight quotes is what the programs say, word for word."""
+"""Messages quoted on the first-flight page are those of the programs, word for word."""
 
 import re
 from pathlib import Path

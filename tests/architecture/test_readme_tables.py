@@ -1,4 +1,4 @@
-"""The README of a package names each of its modules, so that a reader finds a behaviour without a search."""
+"""The README of a package names each of its modules."""
 
 import re
 from collections.abc import Iterator

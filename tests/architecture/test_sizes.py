@@ -1,4 +1,4 @@
-"""Small files, small functions, no drawers for leftovers."""
+"""Limits on the length of files and functions, no packages for leftovers, and other rules of style."""
 
 import ast
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""What is installed: each part pinned and in the bill of materials, and no file whose hash is not known."""
+"""Installed packages: each is pinned and in the bill of materials, and no file without a known hash is installed."""
 
 import ast
 import hashlib

@@ -1,4 +1,4 @@
-"""Ground truth is for judging and showing a run: what estimates, plans or drives cannot even name it."""
+"""Ground truth serves judgement and display of a run only: estimation, planning and control never name it."""
 
 import ast
 from pathlib import Path

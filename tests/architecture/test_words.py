@@ -1,4 +1,4 @@
-"""One word for one thing: words that the glossary has replaced do not come back."""
+"""Words that the glossary has replaced do not come back."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""axe-core, the accessibility checker of browsers, on a page of ours."""
+"""Runs axe-core, the accessibility checker, on a page."""
 
 import os
 from pathlib import Path

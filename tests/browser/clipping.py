@@ -1,4 +1,4 @@
-"""Text of a page that cannot be read whole, measured: no list of elements to look at, so none that is forgotten."""
+"""Measures which text of a page is clipped or covered, over all elements."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""A page in the system's Chromium, in front of a console process, in front of a flight that nobody flies."""
+"""A page in the system's Chromium, with a console process and a fake flight behind it."""
 
 import shutil
 import subprocess

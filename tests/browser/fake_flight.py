@@ -1,4 +1,4 @@
-"""A flight that nobody flies: two drones, a target, plans, pictures and answers to commands, on a real Zenoh router."""
+"""Fake flight on a real Zenoh router: two drones, a target, plans, pictures and answers to commands."""
 
 import math
 import threading

@@ -1,4 +1,4 @@
-"""What the fake tracker plans for those that fly: a string and a star by turns, a single drone if only one is left."""
+"""Plans of the fake tracker: a string and a star in turn, a single drone if only one is left."""
 
 import math
 from collections.abc import Callable, Sequence

@@ -1,4 +1,4 @@
-"""What the fake drones say of themselves in each mode, and the mode that an order leads to."""
+"""Status texts of the fake drones in each mode, and the mode that each command leads to."""
 
 from groundstation.bus import messages as m
 

@@ -1,4 +1,4 @@
-"""How small the letters of a page are: of all visible text, and of all that is drawn on a canvas."""
+"""Smallest font sizes of a page: in visible text and in text drawn on a canvas."""
 
 from typing import Any
 

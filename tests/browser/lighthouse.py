@@ -1,4 +1,4 @@
-"""Lighthouse, the checker of pages by the makers of Chromium: which of its accessibility audits a page fails."""
+"""Runs Lighthouse and returns the accessibility audits that a page fails."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Where everything stands on the page that must not move."""
+"""Positions of the page elements that must not move."""
 
 from seen_page import Seen
 

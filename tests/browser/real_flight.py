@@ -1,4 +1,4 @@
-"""A whole run of emulated drones, and its console: fixtures of the tests that look at one."""
+"""Fixtures for browser tests: a whole SITL run of emulated drones and its console."""
 
 import json
 import signal

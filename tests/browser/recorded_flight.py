@@ -1,4 +1,4 @@
-"""The flight that nobody flies, recorded while a live page looks on: what the page saw last, and the recording."""
+"""Records the fake flight while a live page is open: the page's last state, and the recording."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""A page under observation: what it shows, what it asked for, what went wrong in it."""
+"""A page under observation: its content, its network requests and its errors."""
 
 import os
 import time

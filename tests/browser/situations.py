@@ -1,4 +1,4 @@
-"""Ten moments of a flight that an operator must understand at a glance, as a run would show them."""
+"""Ten situations of a flight that an operator must understand at a glance, as a run would show them."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""A way to a port of this computer that can stall: what goes in does not come out, and nobody closes it."""
+"""TCP proxy to a local port that can stall: data no longer pass, and the connection stays open."""
 
 import contextlib
 import socket

@@ -1,4 +1,4 @@
-"""What axe-core, the accessibility checker of browsers, finds on each page of the console: nothing."""
+"""axe-core, the accessibility checker, finds no fault on any page of the console."""
 
 from typing import Any
 

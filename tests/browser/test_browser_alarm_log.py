@@ -1,4 +1,4 @@
-"""Alarms that are over: they are read behind the strip, by keyboard, and nothing moves."""
+"""Past alarms: the log behind the alarm strip opens by keyboard, and opening it moves nothing."""
 
 import re
 import signal

@@ -1,4 +1,4 @@
-"""What a button says: what a press does now, to whom, or in words that no effect has why it does nothing."""
+"""Captions of buttons: the effect of a press now and the drones concerned, or why a press has no effect."""
 
 import re
 from typing import Any

@@ -1,4 +1,4 @@
-"""From a click on a stop to the first datagram that obeys it, in flight."""
+"""Time from a click on a stop to the first datagram that obeys it, in flight."""
 
 import math
 import os

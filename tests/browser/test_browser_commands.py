@@ -1,4 +1,4 @@
-"""What the buttons do on the bus, and what the page says about it."""
+"""Commands that the buttons publish on the bus, and what the page says about them."""
 
 from typing import Any
 

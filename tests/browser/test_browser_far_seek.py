@@ -1,4 +1,4 @@
-"""From the key that goes to the other end of a recording to the picture of that moment."""
+"""Time from the key that jumps to the other end of a recording to the picture of that moment."""
 
 import subprocess
 import sys

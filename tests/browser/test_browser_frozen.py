@@ -1,4 +1,4 @@
-"""A page whose process stands still in flight and goes on: what it shows then, and what becomes of what was pressed."""
+"""A page whose process freezes in flight and resumes: its display, and the clicks made meanwhile."""
 
 import json
 import os

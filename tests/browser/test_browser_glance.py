@@ -1,4 +1,4 @@
-"""What the bar, the alarms and the cards say of one thing, they say alike."""
+"""Bar, alarms and cards describe the same event in the same way."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""What stops and warns keeps its place, nothing is cut off at any size, and the bar says what the team does."""
+"""Layout: stops and alarms keep their place, nothing is clipped at any size, and the bar states the team's activity."""
 
 from typing import Any
 

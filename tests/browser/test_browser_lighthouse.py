@@ -1,4 +1,4 @@
-"""Lighthouse gives the console, the wall view and the form of a new field 100 points for accessibility."""
+"""Lighthouse gives the console, the wall view and the new-field form 100 points for accessibility."""
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Eight drones: all of them in sight, in words that have room, and told apart though colours return."""
+"""Eight drones: all are visible, their texts fit, and they can be told apart though colours repeat."""
 
 import re
 from typing import Any

@@ -1,4 +1,4 @@
-"""Names that are hard on a page: one that every object of JavaScript has, and long ones."""
+"""Names that are hard on a page: long ones, and one that every JavaScript object has."""
 
 import shutil
 from collections.abc import Callable, Iterator

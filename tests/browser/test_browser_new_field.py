@@ -1,4 +1,4 @@
-"""The page of `groundstation new --page`: it draws while one answers, names mistakes, and writes once."""
+"""The page of `groundstation new --page` draws the field during input, names mistakes, and writes the file once."""
 
 import signal
 import subprocess

@@ -1,4 +1,4 @@
-"""A recording in the page: it ends with the picture that a live page had, and its knobs do what they say."""
+"""Replay in the page: it ends with the picture of the live page, and its controls work."""
 
 import subprocess
 import sys

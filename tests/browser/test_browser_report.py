@@ -1,4 +1,4 @@
-"""The page of a run, opened from its file: charts drawn, zoom shared, nothing asked of any network."""
+"""The report page opened from its file: charts, shared zoom, no network requests."""
 
 import math
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What the page says when a run has ended, and that it is the next run's page afterwards."""
+"""The page after the end of a run, and its reuse for the next run."""
 
 import json
 import time

@@ -1,4 +1,4 @@
-"""Stops by the page and by an invited tablet, and what reaches the emulated drones on the wire."""
+"""Stops from the page and from an invited tablet reach the emulated drones on the wire."""
 
 import math
 import os

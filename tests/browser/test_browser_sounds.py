@@ -1,4 +1,4 @@
-"""What is spoken, sounded and felt for which event, and that muting never silences a stop."""
+"""Speech, sounds and vibration for each event; muting never disables a stop."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""The run's life on the page: its stages, and what the checks before a take-off allow."""
+"""Stages of a run on the page, and the start that the pre-flight checks allow."""
 
 from collections.abc import Iterator
 from typing import Any

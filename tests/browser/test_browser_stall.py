@@ -1,4 +1,4 @@
-"""A connection that stalls, a page that stood still, and names that are hard on a page."""
+"""A stalled connection is reopened within seconds, and a stop given meanwhile is sent."""
 
 from collections.abc import Iterator
 from typing import Any

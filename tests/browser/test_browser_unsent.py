@@ -1,4 +1,4 @@
-"""What becomes of a stop that was given while there was no connection: it belongs to one run, and lives for 5 s."""
+"""A stop given without a connection belongs to one run and expires after 5 s."""
 
 import signal
 from typing import Any

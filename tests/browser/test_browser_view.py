@@ -1,4 +1,4 @@
-"""What the page shows, and that it shows when it is not true any more."""
+"""The page's display of the flight, and its warnings when the display is out of date."""
 
 import itertools
 import math

@@ -1,4 +1,4 @@
-"""A bench for the AR.Drone emulator: real loopback UDP, bytes assembled by hand, and a hand on the clock.
+"""Test bench for the AR.Drone emulator: real loopback UDP, bytes assembled by hand, and a manual clock.
 
 Neither the driver's encoders nor its decoders take part: offsets, signs and commands are written out here.
 """

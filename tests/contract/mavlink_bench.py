@@ -1,4 +1,4 @@
-"""An emulated autopilot alone on a bench: a client that speaks when told to, and eyes that can be closed."""
+"""Test bench with one emulated autopilot: a client that sends on request, and vision that can be switched off."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What `Child` offers, without a process."""
+"""Stand-in for `Child`, without a process."""
 
 
 class FakeProcess:

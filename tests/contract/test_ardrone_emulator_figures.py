@@ -1,4 +1,4 @@
-"""The emulated drone against the figures of real ones (docs/reference/ardrone.md 7), as they are seen on the wire.
+"""The emulated drone's motion on the wire against measurements of real ones (docs/reference/ardrone.md 7).
 
 The bench (conftest.py) assembles and reads bytes by hand (docs/reference/ardrone.md 2, 4).
 """

@@ -1,4 +1,4 @@
-"""The emulated drone's video port: its bytes taken apart by hand, and the driver's reader on it over loopback."""
+"""The emulated drone's video port: bytes decoded by hand, and the driver's reader over loopback."""
 
 import io
 import os

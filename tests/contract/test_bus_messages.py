@@ -1,4 +1,4 @@
-"""Every message survives the wire, and nothing that contradicts its key does."""
+"""Every message passes the bus unchanged, and a message that contradicts its key is refused."""
 
 import math
 from functools import partial

@@ -1,4 +1,4 @@
-"""The bus of a run over real TLS: strangers hear and move nothing, and nobody speaks as another."""
+"""The bus of a run over real TLS: strangers can neither read nor write, and no member can speak as another."""
 
 import json
 import socket

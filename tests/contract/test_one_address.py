@@ -1,4 +1,4 @@
-"""Vehicles that all have the same address, each behind an adapter of its own: in network namespaces, at the wire."""
+"""Vehicles with the same address, each behind its own network adapter: in network namespaces, at the wire."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Every recorded type has a schema that viewers can type and that its own encoding fits."""
+"""Every recorded message type has a schema that viewers can read and that matches its encoding."""
 
 import json
 from enum import StrEnum

@@ -1,4 +1,4 @@
-"""A ROS-like Zenoh router, the bridge, and a foreign client that lists topics and decodes them."""
+"""The ROS 2 bridge on a ROS-like Zenoh router: a foreign client lists its topics and decodes them."""
 
 import time
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""A target's nav_msgs/Odometry, written by a foreign encoder and published through a ROS-like router, as reports."""
+"""A target's nav_msgs/Odometry from a foreign encoder, through a ROS-like router, becomes reports."""
 
 import time
 from collections.abc import Iterator

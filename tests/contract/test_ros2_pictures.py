@@ -1,4 +1,4 @@
-"""Pictures of ROS 2, written by a foreign encoder and published through a ROS-like router, arrive at a reader."""
+"""ROS 2 images from a foreign encoder, through a ROS-like router, arrive at the camera reader."""
 
 import json
 import time

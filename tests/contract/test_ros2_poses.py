@@ -1,4 +1,4 @@
-"""Poses of ROS 2, written by a foreign encoder and published through a ROS-like router, arrive as frames."""
+"""ROS 2 poses from a foreign encoder, through a ROS-like router, arrive as motion capture frames."""
 
 import time
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""The driver of a vehicle behind a ROS 2 node, its failsafe voice and its emulator, through a router on loopback."""
+"""Driver, fail-safe sender and emulator of a vehicle behind a ROS 2 node, through a router on loopback."""
 
 import time
 from collections.abc import Callable, Iterator

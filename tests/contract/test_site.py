@@ -1,4 +1,4 @@
-"""A site over real TLS: hosts that it admitted order in its runs, others do not, and none of them is more than that."""
+"""A site over real TLS: admitted hosts give commands in its runs, others cannot, and none has further rights."""
 
 import shutil
 import stat

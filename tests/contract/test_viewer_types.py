@@ -1,4 +1,4 @@
-"""Our hand-written well-known types are the ones that Foxglove's own library writes."""
+"""Our hand-written well-known types equal those of Foxglove's own library."""
 
 from typing import Any
 

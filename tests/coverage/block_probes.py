@@ -1,4 +1,4 @@
-"""Which statements of a source have run: a probe at the start of each straight stretch of a function.
+"""Records which statements of a source have run: a probe at the start of each basic block of a function.
 
 A probe is one store into an array of bytes. Kernels have none: they run compiled. Why not a library:
 docs/decisions/0079-coverage-by-probes.md.

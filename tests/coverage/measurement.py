@@ -1,4 +1,4 @@
-"""Measures what one run of pytest executes, where `COVERAGE_DATA` names the file for it (make test)."""
+"""Measures the statements that one run of pytest executes, where `COVERAGE_DATA` names its file (make test)."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Imports the product's modules with probes, from their sources: what is compiled with probes is never cached."""
+"""Imports the product's modules with probes, from their sources; the compiled code is never cached."""
 
 import ast
 import importlib.abc

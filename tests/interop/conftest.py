@@ -1,4 +1,4 @@
-"""Programs of others, in environments of their own (`make interop`), and emulated drones in a process of theirs."""
+"""Third-party programs in environments of their own (`make interop`), and emulated drones in a separate process."""
 
 import itertools
 import json

@@ -1,4 +1,4 @@
-"""Flies a vehicle with PyPI `dronekit` and its defaults; prints a line of JSON. Argument: where the vehicle calls."""
+"""Flies a vehicle with PyPI `dronekit` and its defaults; prints a line of JSON. Argument: the connection address."""
 
 import collections
 import collections.abc

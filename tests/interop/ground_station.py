@@ -1,4 +1,4 @@
-"""Traffic like that of QGroundControl at a start and through a flight, by pymavlink; system 255, component 190."""
+"""Traffic like that of QGroundControl at start and in flight, by pymavlink; system 255, component 190."""
 
 import math
 import socket

@@ -1,4 +1,4 @@
-"""Public AR.Drone clients fly our emulator: they take off, really move, get their settings acknowledged, and land."""
+"""Public AR.Drone clients fly our emulator: take-off, motion, acknowledged settings, landing."""
 
 from typing import Any
 

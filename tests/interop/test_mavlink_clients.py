@@ -1,4 +1,4 @@
-"""Programs of others fly the emulated MAVLink vehicles as they come: connect with defaults, take off, land."""
+"""Third-party programs fly the emulated MAVLink vehicles unmodified: connect with defaults, take off, land."""
 
 import asyncio
 import socket

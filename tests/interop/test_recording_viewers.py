@@ -1,4 +1,4 @@
-"""Recordings and live views as the viewers' own programs find them."""
+"""Recordings and live views, read by the programs of Rerun, Foxglove and others."""
 
 import json
 import socket

@@ -1,4 +1,4 @@
-"""Second ground stations that others wrote, by their defaults: they look and stop, and fly nobody."""
+"""Third-party ground stations with their defaults as second station: they observe and stop, and fly nothing."""
 
 import asyncio
 import socket

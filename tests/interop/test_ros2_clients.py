@@ -1,4 +1,4 @@
-"""A client of ROS 2 over Zenoh that others wrote sees a flight, and ROS 2's own nodes do not notice the view.
+"""A third-party ROS 2 client over Zenoh sees a flight, and the view does not disturb ROS 2's own nodes.
 
 That nobody moves a drone through the view: its session on the bus has the role VIEW, which the access list lets say
 nothing (tests/contract/test_guarded_bus.py), and the one on the side of ROS 2 subscribes to nothing.

@@ -1,4 +1,4 @@
-"""What lies here and is no test belongs to these tests."""
+"""Makes the helper modules of this folder importable."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The mutations that tests of the safety path are judged by."""
+"""The mutation operators that judge the tests of the safety path."""
 
 import ast
 

@@ -1,4 +1,4 @@
-"""Tests of decoders share what damages their inputs."""
+"""Makes the helper modules of this folder importable."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Each decoder of what comes from outside, damaged inputs for it, and the errors it declares."""
+"""Table of the decoders of external data: damaged inputs for each, and the errors that it declares."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable

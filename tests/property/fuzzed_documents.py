@@ -1,4 +1,4 @@
-"""Damaged messages of the bus and of pages, and field files, and the decoders that read them."""
+"""Damaged bus messages, page messages and field files, and the decoders that read them."""
 
 import json
 from copy import deepcopy

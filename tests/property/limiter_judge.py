@@ -1,4 +1,4 @@
-"""What the output limiter makes of random wishes in random states of teams, judged by the safety page's half-spaces."""
+"""Judges the output limiter's response to random wishes in random team states by the safety page's half-spaces."""
 
 import math
 from collections import Counter

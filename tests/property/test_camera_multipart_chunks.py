@@ -1,4 +1,4 @@
-"""However the network cuts the stream, the frames are the same; garbage never raises."""
+"""The multipart reader finds the same frames however the stream is cut; garbage never raises."""
 
 from hypothesis import given, settings
 from hypothesis import strategies as st

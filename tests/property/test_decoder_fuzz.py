@@ -1,4 +1,4 @@
-"""Damaged inputs for every decoder: they are read, or refused by the decoder's own error, and never anything else.
+"""Every decoder either reads a damaged input or refuses it with its declared error.
 
 $FUZZ_INPUTS: how many in the long run; `make fuzz` takes a million.
 """

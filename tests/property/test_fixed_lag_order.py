@@ -1,4 +1,4 @@
-"""Within the rewind's bound the order of arrival changes nothing, nor does how often the belief is asked for."""
+"""Within the rewind's bound, neither the order of arrival nor the number of queries changes the belief."""
 
 import math
 import random

@@ -1,4 +1,4 @@
-"""Whatever the calibration, undoing the distortion of a pixel and doing it again gives the pixel."""
+"""Undistorting and distorting a pixel again returns the pixel, for any calibration."""
 
 import numpy as np
 from hypothesis import given, settings

@@ -1,4 +1,4 @@
-"""Whatever bytes come: nothing but counted refusals, and no frame where there is none."""
+"""The MAVLink decoder counts arbitrary bytes as refused, and finds no frame where there is none."""
 
 import random
 from collections import Counter

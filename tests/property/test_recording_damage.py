@@ -1,4 +1,4 @@
-"""A recording cut or damaged anywhere is read as far as it is sound, or refused by name; never a traceback."""
+"""A cut or damaged recording is read up to the damage, or refused by name; never a traceback."""
 
 import shutil
 import struct

@@ -1,4 +1,4 @@
-"""The output limiter: never faster than asked or allowed, never through the fence, never into each other."""
+"""Limits of the output limiter: speed, fence, and separation of robots."""
 
 import math
 from dataclasses import replace

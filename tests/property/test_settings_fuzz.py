@@ -1,4 +1,4 @@
-"""Whatever stands in a field file: the answer is a field, or problems that each name a place. Never anything else."""
+"""Any content of a field file gives either a field or a list of problems that each name a place."""
 
 import json
 import tempfile

@@ -1,4 +1,4 @@
-"""Whatever arrives at the AT port, the emulated drone stays a drone: no exception, finite state, limits kept."""
+"""The emulated drone under arbitrary input at its AT port: no exception, finite state, limits kept."""
 
 import math
 

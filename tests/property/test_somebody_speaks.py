@@ -1,4 +1,4 @@
-"""Somebody always speaks to a drone, and never two with contradicting words, whatever dies, freezes and wakes when.
+"""A drone always has a sender, and never two that contradict each other, whatever dies, freezes or wakes when.
 
 Driver, supervisor and guardian are modelled as loops around the rules that fly (`groundstation.supervisor.silence`),
 with their real periods and limits; every pair of faults is enumerated over time.

@@ -1,4 +1,4 @@
-"""Recordings that are not as they were: a message changed, a topic left out, the end cut off."""
+"""Modified copies of recordings: a message changed, a topic left out, the end cut off."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Delays of sensors, measured in a flight whose delays are known: the study's cameras are dated exactly."""
+"""Sensor delays measured from a flight with known delays: the study's cameras have exact time stamps."""
 
 import json
 from pathlib import Path

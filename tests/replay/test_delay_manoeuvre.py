@@ -1,4 +1,4 @@
-"""Delays told by a flight that dashes, turns and climbs to and fro under the ceiling camera, at message level."""
+"""Delay estimation from the calibration manoeuvre under the ceiling camera, at message level."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""A recording in the console's server: time goes, stands, jumps; nothing can be commanded."""
+"""Playback of a recording in the console's server: play, pause, seek, and no commands."""
 
 import json
 from collections.abc import Callable, Iterator

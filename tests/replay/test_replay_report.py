@@ -1,4 +1,4 @@
-"""A re-run is marked as one wherever it is reported, and never judged as a flight."""
+"""Reports mark a re-run as such and never judge it as a flight."""
 
 import json
 import shutil

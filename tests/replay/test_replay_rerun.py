@@ -1,4 +1,4 @@
-"""A recorded run in, accepted beliefs and plans out: the same to the bit, or where it differs."""
+"""Re-run of a recorded run: beliefs and plans are equal to the bit, or the first difference is reported."""
 
 import json
 from pathlib import Path

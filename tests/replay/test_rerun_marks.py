@@ -1,4 +1,4 @@
-"""A re-run is marked as not flown in the replay's page, in Rerun's file and in Foxglove's scene; a flight is not."""
+"""A re-run is marked as not flown in the replay page, in Rerun's file and in Foxglove's scene; a flight is not."""
 
 import json
 import subprocess

@@ -1,4 +1,4 @@
-"""A planner that crashes: a flight survives it, and so does its replay."""
+"""A planner that crashes: the flight and its replay both continue."""
 
 from typing import Any, cast
 

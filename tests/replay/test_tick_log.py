@@ -1,4 +1,4 @@
-"""The ticks of a recording find their inputs, whatever the stamps of others say."""
+"""Each tick of a recording finds its inputs, whatever stamps the messages carry."""
 
 from collections.abc import Iterator
 

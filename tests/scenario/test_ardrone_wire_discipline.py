@@ -1,4 +1,4 @@
-"""Every datagram of a driver that runs beside a busy machine: form and numbers are judged, the gaps are reported.
+"""Every datagram of a driver beside a busy machine: form and numbers are judged, gaps only reported.
 
 Run as a script it is the driver's process: `test_ardrone_wire_discipline.py ADDRESS`.
 """

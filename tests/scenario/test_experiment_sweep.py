@@ -1,4 +1,4 @@
-"""Sweeps on a real dask cluster on loopback, one worker of which is killed."""
+"""Sweeps on a real dask cluster on loopback with one worker killed."""
 
 import os
 import signal

@@ -1,4 +1,4 @@
-"""Flights of the campaign: the drivers that fly, their watchdogs and the tracker, hosted in one thread."""
+"""Flights of the fault campaign: drivers, watchdogs and tracker, hosted in one thread."""
 
 from typing import Any
 

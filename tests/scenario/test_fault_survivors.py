@@ -1,4 +1,4 @@
-"""Flights of the fault campaign that once ended unsafe, each by the name of what went wrong in it."""
+"""Flights of the fault campaign that once ended unsafe, each named after its failure."""
 
 import json
 from typing import Any

@@ -1,4 +1,4 @@
-"""What is forecast is what a flight comes to."""
+"""The forecast agrees with the flight."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""A mission ends with the order to land, and is judged until all drones stand."""
+"""A mission ends with the LAND command, and is judged until all drones have landed."""
 
 import msgspec
 import pytest

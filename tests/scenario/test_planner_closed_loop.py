@@ -1,4 +1,4 @@
-"""Planner, setpoints and safety close the loop over kinematic robots and hard sensors; no wire, no processes."""
+"""Planner, setpoints and safety in closed loop with kinematic robots and hard-edged sensors; no wire, no processes."""
 
 import math
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""Flights of scenario files: the target is found and held, and what a strategy does not change stays the same."""
+"""Flights of scenario files: the target is found and tracked; parts that a strategy leaves alone stay the same."""
 
 import json
 import math

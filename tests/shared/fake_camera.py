@@ -1,4 +1,4 @@
-"""A camera's source and its process, for tests of the driver between them."""
+"""Fake camera source and process, for tests of the camera driver."""
 
 import json
 from collections import Counter, deque

@@ -1,4 +1,4 @@
-"""A port that nobody holds."""
+"""Returns a free port."""
 
 import socket
 

@@ -1,4 +1,4 @@
-"""A tracker that two drones and a ceiling camera tell of a target, message by message."""
+"""A tracker that gets messages about a target from two hovering drones and a ceiling camera."""
 
 import math
 from typing import Any

@@ -1,4 +1,4 @@
-"""A foreign package as its installation leaves it."""
+"""Simulates the installation of a foreign package."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Least errors that the default scenario must have: those measured on real drones and cameras."""
+"""Minimum errors of the default scenario: those measured on real drones and cameras."""
 
 from collections.abc import Callable
 

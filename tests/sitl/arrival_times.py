@@ -1,4 +1,4 @@
-"""When the kernel had a datagram: a test that is late to read it does not make it late."""
+"""Kernel arrival times of datagrams, independent of when the test reads them."""
 
 import socket
 import struct

@@ -1,4 +1,4 @@
-"""Runs of `groundstation sitl`, ended whatever a test does, and what reaches the drones' command ports."""
+"""Runs of `groundstation sitl` that end with the test, and taps on the drones' command ports."""
 
 import itertools
 import sys

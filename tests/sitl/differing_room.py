@@ -1,4 +1,4 @@
-"""The ground station in a room that is not as its field says: `differing_room.py A.B=C ... -- sitl lab ...`."""
+"""Runs the ground station in a room that differs from its field: `differing_room.py A.B=C ... -- sitl lab ...`."""
 
 import sys
 from typing import Any

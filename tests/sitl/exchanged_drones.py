@@ -1,4 +1,4 @@
-"""The ground station in a room where drone_1 and drone_2 stand on each other's pads with each other's markers.
+"""Runs the ground station with drone_1 and drone_2 on each other's pads, with each other's markers.
 
 To the ground station that is a field file with the two addresses exchanged.
 """

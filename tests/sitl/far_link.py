@@ -1,4 +1,4 @@
-"""A link between two network namespaces with delay and loss, for machines whose kernel has no netem.
+"""A link between two network namespaces with delay and loss, for kernels without netem.
 
 Each end is a TUN adapter; a thread carries the packets from one to the other, late, and drops some: TCP and UDP meet
 what they would meet on a bad network.

@@ -1,4 +1,4 @@
-"""Firmwares of their own as drones of the mixed team, at message level and in step with it.
+"""Unmodified firmwares as drones of the mixed team, at message level and in step with it.
 
 Cameras, target and the other drones are those of the study; drivers, tracker and firmwares are the real ones. The
 firmwares' processes are stopped while the room computes, and go on for 10 ms of their own time at a time: a loaded

@@ -1,4 +1,4 @@
-"""One firmware of its own in the room: its process, its driver, and what the study sees of both."""
+"""One unmodified firmware in the room: its process, its driver, and its connection to the study."""
 
 import math
 import signal

@@ -1,4 +1,4 @@
-"""Emulated MAVLink vehicles and a free port, as the contract tests of the links have them, for flights here."""
+"""Emulated MAVLink vehicles and a free port for SITL tests, as in the contract tests of the links."""
 
 import importlib.util
 from pathlib import Path

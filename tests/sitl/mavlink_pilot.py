@@ -1,4 +1,4 @@
-"""The real driver and a stand-in for the tracker; as a process of two vehicles on a port.
+"""The real driver with a stand-in for the tracker; as a process, with two vehicles on a port.
 
 `PORT LINK PLACES [RIDER [ALLOWED]]`.
 

@@ -1,4 +1,4 @@
-"""A camera of somebody else: pictures as MJPEG over HTTP, drawn by the test."""
+"""A third-party camera: MJPEG over HTTP, pictures drawn by the test."""
 
 import threading
 import time

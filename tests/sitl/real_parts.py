@@ -1,4 +1,4 @@
-"""The mixed team with one of its drones or cameras real: its field, `groundstation sitl --real`, and a stand-in.
+"""The mixed team with one real drone or camera: its field, `groundstation sitl --real`, and a stand-in.
 
 Without a SITL binary an emulated vehicle in a process of its own stands for the firmware: it sends its true state and
 is flown by poses from outside. What it prints is the truth that judges.

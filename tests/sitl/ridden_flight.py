@@ -1,4 +1,4 @@
-"""Two emulated vehicles that the real driver flies in a process of its own, forwarded to a second ground station."""
+"""Two emulated vehicles, flown by the real driver in its own process and forwarded to a second ground station."""
 
 import math
 import subprocess

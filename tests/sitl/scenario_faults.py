@@ -1,4 +1,4 @@
-"""Scenarios with faults, and the moment when the first of them begins in flight."""
+"""Scenarios with faults, and the time at which the first of them begins in flight."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""A real `groundstation sitl` in a process of its own: watch it over the bus, break it, judge it by the truth."""
+"""A real `groundstation sitl` process: observed over the bus, disturbed, and judged by ground truth."""
 
 import json
 import os

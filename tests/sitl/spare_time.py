@@ -1,4 +1,4 @@
-"""Whether the processors had time to spare: where they had not, what waits for them says nothing of the program."""
+"""Whether the processors had idle time: without it, a missed deadline proves nothing about the program."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

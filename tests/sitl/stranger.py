@@ -1,4 +1,4 @@
-"""A program that is not of the run: `stranger.py ATTACK ARGUMENT...`; prints what it got, as JSON.
+"""A program outside the run: `stranger.py ATTACK ARGUMENT...`; prints what it received, as JSON.
 
 It speaks Zenoh and HTTP by itself, with nothing of ours.
 """

@@ -1,4 +1,4 @@
-"""Any three of AR.Drone, PX4, ArduPilot, Tello and ROS 2 in one field file track the target together, at the wire."""
+"""Any three of AR.Drone, PX4, ArduPilot, Tello and ROS 2 in one field track the target together, at the wire."""
 
 import itertools
 import json

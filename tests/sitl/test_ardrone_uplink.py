@@ -1,4 +1,4 @@
-"""A drone that is heard and hears nothing for 0.8 s: the operator is told, and told when it hears again."""
+"""A drone that receives nothing for 0.8 s while its telemetry arrives: the operator is warned, then told of its end."""
 
 import time
 

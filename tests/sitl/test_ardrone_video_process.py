@@ -1,4 +1,4 @@
-"""A real render process serving an AR.Drone's video: exposure times, camera and size as configured, late not lost."""
+"""A real render process serves an AR.Drone's video: exposure times, camera and size as configured, late not lost."""
 
 import multiprocessing
 import os

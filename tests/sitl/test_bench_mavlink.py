@@ -1,4 +1,4 @@
-"""The bench of many vehicles flies them as it says: a driver that lands them measures something else."""
+"""The bench of many MAVLink vehicles really flies them; if the driver landed them, it would measure something else."""
 
 import pytest
 

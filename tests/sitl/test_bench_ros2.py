@@ -1,4 +1,4 @@
-"""The bench of the view for ROS 2 shows a whole flight: one that shows less costs less."""
+"""The bench of the ROS 2 view shows a whole flight; showing less would cost less."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""A real run with cameras that want a password, on loopback, without a take-off: nothing that it leaves holds it."""
+"""A real run on loopback with password-protected cameras, without take-off: no output contains the password."""
 
 import asyncio
 import os

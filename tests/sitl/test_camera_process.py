@@ -1,4 +1,4 @@
-"""A real render process and the real reader: pictures over HTTP, faults, and no orphan when the parent dies."""
+"""A real render process and the real reader: pictures over HTTP, faults, and no orphan after the parent's death."""
 
 import multiprocessing
 import os

@@ -1,4 +1,4 @@
-"""Unmodified firmware as one drone of the team, in step with the room: how well it holds, and how it ends.
+"""Unmodified firmware as one drone of the team, in step with the room: accuracy of position, and end of flight.
 
 `make test-firmware`; a skip where the variable of a firmware names no binary. One flight each: figures of more are in
 docs/reference/mavlink.md 2.1.

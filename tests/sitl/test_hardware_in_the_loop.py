@@ -1,4 +1,4 @@
-"""`sitl --real`: a firmware of its own in an otherwise emulated room; stops reach both."""
+"""`sitl --real`: an unmodified firmware in an otherwise emulated room; stops reach both."""
 
 import signal
 import sys

@@ -1,4 +1,4 @@
-"""Clients of others fly our emulated vehicles: MAVSDK's own plugins, and MAVProxy from an environment of its own."""
+"""Third-party clients fly our emulated vehicles: MAVSDK's own plugins, and MAVProxy from its own environment."""
 
 import asyncio
 import itertools

@@ -1,4 +1,4 @@
-"""Under which COM_RC_IN_MODE a transmitter's kill switch stops a real PX4, and that others are refused.
+"""The COM_RC_IN_MODE values with which a transmitter's kill switch stops a real PX4; others are refused.
 
 `make test-firmware`. RC_CHANNELS_OVERRIDE stands for the transmitter: PX4 handles it as it handles a receiver's
 channels. MANUAL_CONTROL is the joystick of a ground station.

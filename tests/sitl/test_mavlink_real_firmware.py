@@ -1,4 +1,4 @@
-"""Our driver sets up and flies real ArduCopter and PX4 SITL binaries, without GPS; our emulators by the same steps.
+"""Our driver sets up and flies real ArduCopter and PX4 SITL binaries, without GPS, and our emulators likewise.
 
 `make test-firmware`; building the binaries: docs/explanation/mavlink-vehicles.md#tests-with-other-programs.
 """

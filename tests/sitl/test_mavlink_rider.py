@@ -1,4 +1,4 @@
-"""A second ground station that floods a forwarded link: setpoints go out as evenly as without it, stops pass."""
+"""A second ground station floods a forwarded link: setpoints stay as regular as without it, and stops pass."""
 
 import itertools
 import socket

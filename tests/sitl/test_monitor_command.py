@@ -1,4 +1,4 @@
-"""`groundstation monitor` against a bus and a runtime file of its own."""
+"""`groundstation monitor` against a test bus and its runtime file."""
 
 import json
 import os

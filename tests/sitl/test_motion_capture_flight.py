@@ -1,4 +1,4 @@
-"""Motion capture and ranging at the wire: above the team, as truth of a report, and with poses that cannot be true."""
+"""Motion capture and ranging at the wire: as the team's sensor, as a report's truth, and with impossible poses."""
 
 import json
 import signal

@@ -1,4 +1,4 @@
-"""`sitl --real` with a real world-fixed camera: alone, above a real drone, and looking at a printed board."""
+"""`sitl --real` with a real world-fixed camera: alone, above a real drone, and in front of a printed board."""
 
 import signal
 import sys

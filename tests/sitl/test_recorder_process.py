@@ -1,4 +1,4 @@
-"""The recorder as a real process: what is readable after kill -9, and after an orderly stop."""
+"""The recorder as a real process: the readable part after kill -9 and after an orderly stop."""
 
 import json
 import operator

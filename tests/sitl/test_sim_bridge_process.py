@@ -1,4 +1,4 @@
-"""`python -m sim_bridge` as a process: ready, truth on the bus, orders obeyed, and how it ends."""
+"""`python -m sim_bridge` as a process: start-up, truth on the bus, commands, and end."""
 
 import itertools
 import json

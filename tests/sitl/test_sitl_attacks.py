@@ -1,4 +1,4 @@
-"""Attacks on a run that flies: none moves or stops a drone, and each leaves an event that names what was refused.
+"""Attacks on a flying run: none moves or stops a drone, and each leaves an event that names the refusal.
 
 The rest of the table in SECURITY.md is replayed beside the part that it attacks: MAVLink in
 tests/contract/mavlink_links/test_mavlink_takeover.py, pages in tests/browser, passwords in test_camera_password_run.py.

@@ -1,4 +1,4 @@
-"""Members of the bus gone mad, strangers at its door and on the drone's port: named, counted, without consequence."""
+"""Faulty bus members, and strangers at the bus and the drone's port: named, counted, without consequence."""
 
 import json
 import random

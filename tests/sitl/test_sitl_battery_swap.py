@@ -1,4 +1,4 @@
-"""A drone lands for a new battery and comes back, while the other goes on."""
+"""A drone lands for a new battery and returns, while the other flies on."""
 
 import json
 import subprocess

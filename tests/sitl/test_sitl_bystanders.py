@@ -1,4 +1,4 @@
-"""What does not fly must not matter to what flies: recorder, cameras, renderer, disk, terminal."""
+"""Faults of recorder, cameras, renderer, disk and terminal do not affect the flight."""
 
 import os
 import pty

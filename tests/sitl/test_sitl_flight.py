@@ -1,4 +1,4 @@
-"""The whole ground station as real processes: it flies, lands on request, and survives what breaks."""
+"""The whole ground station as real processes: it flies, lands on request, and survives faults."""
 
 import json
 import os

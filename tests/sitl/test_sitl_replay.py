@@ -1,4 +1,4 @@
-"""A real flight of real processes, repeated by today's tracker: every word of it to the bit."""
+"""Today's tracker repeats a real flight of real processes, equal to the bit."""
 
 import json
 import subprocess

@@ -1,4 +1,4 @@
-"""Whatever dies or freezes in flight: hover is on the wire within 0.5 s, landing in time, and nothing moves unasked."""
+"""A process dies or freezes in flight: hover within 0.5 s on the wire, landing in time, no unrequested motion."""
 
 import os
 import signal

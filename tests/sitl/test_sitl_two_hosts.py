@@ -1,4 +1,4 @@
-"""A run whose drivers and cameras are on another host: in network namespaces, its clock 895 s ahead, at the wire."""
+"""A run with drivers and cameras on another host: in network namespaces, its clock 895 s ahead, at the wire."""
 
 import json
 import os

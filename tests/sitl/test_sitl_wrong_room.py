@@ -1,4 +1,4 @@
-"""A room that is not as the field says: nobody takes off, unless a person insists."""
+"""A room that differs from its field: no drone takes off unless a person insists."""
 
 import operator
 import sys

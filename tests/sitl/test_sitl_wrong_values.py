@@ -1,4 +1,4 @@
-"""Values that arrive and are wrong, in flight at the wire: the drone, or the team, stops in time and hits nothing."""
+"""Wrong values in flight at the wire: the drone, or the team, stops in time and hits nothing."""
 
 from collections.abc import Callable
 from pathlib import Path

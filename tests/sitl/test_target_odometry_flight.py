@@ -1,4 +1,4 @@
-"""A target's own odometry at the wire: flown with, and silent, frozen and wrong while the cameras go on."""
+"""A target's odometry at the wire: healthy, silent, frozen and wrong, while the cameras continue."""
 
 import json
 from collections.abc import Callable

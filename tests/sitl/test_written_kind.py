@@ -1,4 +1,4 @@
-"""The kind that the how-to page writes from nothing: its files, taken from the page, pass the conformance kit."""
+"""The vehicle kind written on the how-to page passes the conformance kit, with its files taken from the page."""
 
 import os
 import re

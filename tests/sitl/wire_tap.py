@@ -1,4 +1,4 @@
-"""Listens to the loopback interface: what reaches an AR.Drone's command port, whoever sent it."""
+"""Records the datagrams to an AR.Drone's command port on the loopback interface, from any sender."""
 
 import ctypes
 import re

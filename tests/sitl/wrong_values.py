@@ -1,4 +1,4 @@
-"""A flight at the wire in which one value goes wrong while the team tracks, judged by truth as the campaign judges."""
+"""A flight at the wire in which one value goes wrong during tracking, judged by truth as in the fault campaign."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""A real AR.Drone's flight as its driver would publish it, with cameras that look at the motion capture's truth.
+"""A real AR.Drone's flight as its driver would publish it, with simulated cameras that observe motion capture truth.
 
 The data are described in their README; cameras are drawn: white noise, a target at rest, dark spells of the ceiling.
 """

@@ -1,4 +1,4 @@
-"""The figures that the detector has to keep (640x360, f 460 px): range, errors, honesty, identities, flips."""
+"""Required detector performance (640x360, f 460 px): range, errors, covariance consistency, identities, flips."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The tracker on a real AR.Drone's flight in moving air: where is a resting target that the leaning drone sees?
+"""The tracker on a real AR.Drone's flight in moving air: position of a resting target seen by the leaning drone.
 
 The drone's navdata call it level while it leans 5 to 10 degrees, and its magnetic heading wanders by 7 degrees in 20 s.
 """

@@ -1,4 +1,4 @@
-"""The joint filter on real data: UTIAS MRCLAM set 7, causal, one set of figures; the bars are those of real use."""
+"""The joint filter on real data: UTIAS MRCLAM set 7, causal, one set of parameters; bounds as needed in real use."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The belief of the mixed team with the loop closed: it aids the autopilots whose velocities come back as odometry.
+"""Consistency of the mixed team's belief in closed loop: autopilots return the aiding estimates as odometry.
 
 Judged as in test_estimator_consistency: means over flights per degree of freedom, with their 95 % intervals.
 """

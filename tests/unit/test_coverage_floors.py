@@ -1,4 +1,4 @@
-"""The measurement of coverage itself: what is counted, what counts as run, and that a lower share fails."""
+"""The coverage measurement: what is counted, what counts as run, and failure below the floor."""
 
 import ast
 import json

@@ -1,4 +1,4 @@
-"""Kernels are compiled for the signature of their annotations, and called by address with records and tuples."""
+"""Kernels are compiled for their annotated signature, and called by address with records and tuples."""
 
 from collections.abc import Callable
 from types import GenericAlias

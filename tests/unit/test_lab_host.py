@@ -1,4 +1,4 @@
-"""What runs a lab host: the unit is one that systemd reads, the image is made of files that exist."""
+"""Files of a lab host: a unit that systemd reads, and an image made of existing files."""
 
 import re
 import shutil

@@ -1,4 +1,4 @@
-"""A driver with a bus around it, and a scripted drone at the other end of its sockets."""
+"""An AR.Drone driver on a memory bus, with a scripted drone at the other end of its sockets."""
 
 import itertools
 import sys

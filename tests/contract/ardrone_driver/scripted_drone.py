@@ -1,4 +1,4 @@
-"""A drone on loopback whose bytes are assembled here by hand: UDP, and TCP where a test wants it."""
+"""Scripted drone on loopback, with bytes assembled by hand: UDP, and TCP where a test needs it."""
 
 import itertools
 import os

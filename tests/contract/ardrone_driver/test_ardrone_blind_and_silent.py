@@ -1,4 +1,4 @@
-"""A drone that saw no floor as it fell silent or froze is braked on by its driver; one that saw it holds itself."""
+"""The driver brakes a silent or frozen drone that last saw no floor; one that saw it is left to its own hover."""
 
 import time
 

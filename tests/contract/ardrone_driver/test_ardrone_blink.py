@@ -1,4 +1,4 @@
-"""`groundstation vehicle blink`: which drone answers to which name, seen where it stands."""
+"""`groundstation vehicle blink` shows on the ground which drone has which name."""
 
 import shutil
 

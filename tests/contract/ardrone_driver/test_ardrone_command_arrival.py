@@ -1,4 +1,4 @@
-"""A command does not wait for the driver's next turn."""
+"""A command is executed at once, not at the driver's next turn."""
 
 import time
 

@@ -1,4 +1,4 @@
-"""What the driver finds out about a drone, and how it configures it, over loopback UDP and TCP."""
+"""The driver's queries of a drone, and its configuration, over loopback UDP and TCP."""
 
 import itertools
 import time

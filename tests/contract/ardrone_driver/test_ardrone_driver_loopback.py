@@ -1,4 +1,4 @@
-"""The whole driver over loopback UDP: what a drone hears from it, and what the bus hears of the drone."""
+"""The whole driver over loopback UDP: datagrams to the drone, and messages about it on the bus."""
 
 import socket
 import struct

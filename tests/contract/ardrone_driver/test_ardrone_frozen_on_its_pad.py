@@ -1,4 +1,4 @@
-"""A drone whose telemetry froze before its take-off is not sent up, or comes down again, and the operator reads why."""
+"""A drone with frozen telemetry does not take off, or lands again, and the operator gets the reason."""
 
 import time
 

@@ -1,4 +1,4 @@
-"""`groundstation ardrone join` and `setup` against a drone on loopback: what is written, and what is refused."""
+"""`groundstation ardrone join` and `setup` against a drone on loopback: settings written, and refusals."""
 
 import click
 import pytest

@@ -1,4 +1,4 @@
-"""`groundstation ardrone probe` against a drone on loopback: what it says, and what it must never send."""
+"""`groundstation ardrone probe` against a drone on loopback: its output, and the commands that it must never send."""
 
 import json
 import time

@@ -1,4 +1,4 @@
-"""An emulated vehicle, the driver and a stand-in for the tracker on one hand-turned clock, without sockets or threads.
+"""An emulated vehicle, the driver and a stand-in for the tracker on one manual clock, without sockets or threads.
 
 Bytes go through both codecs; 20 s of flight take about a second.
 """

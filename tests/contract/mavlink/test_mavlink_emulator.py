@@ -1,4 +1,4 @@
-"""The emulated autopilots, without the driver, against figures of real ones (docs/reference/mavlink.md 1, 2, 4, 5)."""
+"""The emulated autopilots, without the driver, against data of real ones (docs/reference/mavlink.md 1, 2, 4, 5)."""
 
 import struct
 

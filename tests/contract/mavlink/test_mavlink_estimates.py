@@ -1,4 +1,4 @@
-"""What the emulated autopilots say of their own estimates, and where those lead without cameras."""
+"""The emulated autopilots' reports of their own estimates, and their errors without cameras."""
 
 import math
 

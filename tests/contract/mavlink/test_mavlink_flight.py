@@ -1,4 +1,4 @@
-"""The driver flies the emulated PX4 and ArduPilot: start, velocity, silence of anybody, landing."""
+"""The driver flies the emulated PX4 and ArduPilot: take-off, velocity, loss of any sender, landing."""
 
 import itertools
 import math

@@ -1,4 +1,4 @@
-"""A vehicle whose estimator errs is held where it is wanted: through take-off, while it hovers, while it flies."""
+"""Position hold of a vehicle whose estimator errs: during take-off, hover and flight."""
 
 import math
 

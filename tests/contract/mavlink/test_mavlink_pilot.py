@@ -1,4 +1,4 @@
-"""A pilot with a transmitter has the last word on who lands a vehicle; without one, the driver has."""
+"""A pilot with a transmitter overrules the driver about landing; without one, the driver decides."""
 
 import pytest
 

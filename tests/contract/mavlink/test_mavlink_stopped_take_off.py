@@ -1,4 +1,4 @@
-"""Somebody else stops a vehicle while it takes off: its driver does not ask for what they ended."""
+"""A take-off that somebody else stops: the driver does not request it again."""
 
 from drivers.mavlink.wire.flight import CommandLong
 from drivers.mavlink.wire.names import FORCE, CopterMode, Flavour, MavCmd, Px4Auto, Px4Main, px4_mode

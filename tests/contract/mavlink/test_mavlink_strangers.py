@@ -1,4 +1,4 @@
-"""What strangers send to a vehicle's link or in the tracker's name moves nothing, and the operator reads of it."""
+"""Messages of strangers, on a vehicle's link or in the tracker's name, move nothing and are reported."""
 
 from drivers.mavlink.links.seam import Heard
 from drivers.mavlink.wire.flight import CommandAckMessage

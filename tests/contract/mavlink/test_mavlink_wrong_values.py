@@ -1,4 +1,4 @@
-"""A vehicle whose values arrive and are wrong: its driver stops it as if it were silent, and says why."""
+"""A vehicle that sends wrong values: its driver stops it as if it were silent, and gives the reason."""
 
 import math
 from typing import Any

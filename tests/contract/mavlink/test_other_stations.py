@@ -1,4 +1,4 @@
-"""Another ground station that commands the vehicles of a link is noticed, and told once with a remedy."""
+"""A second ground station that commands the vehicles of a link is reported once, with a remedy."""
 
 from collections import Counter
 

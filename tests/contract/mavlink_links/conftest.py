@@ -1,4 +1,4 @@
-"""Emulated vehicles on real loopback ports, turned by a thread of their own, 200 times a second."""
+"""Emulated vehicles on real loopback ports, updated by a thread of their own 200 times a second."""
 
 import itertools
 import os

@@ -1,4 +1,4 @@
-"""`groundstation mavlink probe` and `setup` against emulated vehicles on loopback; refusals on a link by name."""
+"""`groundstation mavlink probe` and `setup` against emulated vehicles on loopback; refusals name the link."""
 
 import os
 import socket

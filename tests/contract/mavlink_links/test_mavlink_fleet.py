@@ -1,4 +1,4 @@
-"""The driver as a process runs it, on real sockets: a fleet on one port, strangers, duplicates, a vehicle that goes."""
+"""The MAVLink driver on real sockets: a fleet on one port, strangers, duplicates, a vehicle that leaves."""
 
 import itertools
 import socket

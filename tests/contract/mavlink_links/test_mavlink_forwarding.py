@@ -1,4 +1,4 @@
-"""A second ground station on a forwarded link sees the vehicle, may stop it, and cannot fly it or crowd us out."""
+"""A second ground station on a forwarded link sees the vehicle and may stop it, but cannot fly it or crowd us out."""
 
 import socket
 import time

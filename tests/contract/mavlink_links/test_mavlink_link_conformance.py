@@ -1,4 +1,4 @@
-"""What every link keeps: discovery, telemetry, commands, numbers to the bit, several vehicles, close."""
+"""Properties of every link: discovery, telemetry, commands, numbers exact to the bit, several vehicles, close."""
 
 import itertools
 import socket

@@ -1,4 +1,4 @@
-"""A serial line whose radio is unplugged, and one that two threads write to."""
+"""A serial line whose radio is unplugged, and one with two writing threads."""
 
 import json
 import os

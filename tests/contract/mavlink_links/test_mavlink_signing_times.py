@@ -1,4 +1,4 @@
-"""Times of signing: ours are a steady clock's and go on from what vehicles know; who lost its time gets ours."""
+"""Signing timestamps: monotonic, continued from those of the vehicles, and sent to a vehicle with an old time."""
 
 import os
 import pty

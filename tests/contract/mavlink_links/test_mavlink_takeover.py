@@ -1,4 +1,4 @@
-"""Nobody takes over a vehicle's address, or passes for its life, with frames that nothing vouches for."""
+"""Unverified frames can neither take over a vehicle's address nor count as its sign of life."""
 
 import socket
 import time

@@ -1,4 +1,4 @@
-"""One partner for good, and autopilots that speak MAVLink 1 until they hear version 2."""
+"""UDP links to one lasting partner, and autopilots that speak MAVLink 1 until they receive version 2."""
 
 import socket
 import time

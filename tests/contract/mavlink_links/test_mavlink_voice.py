@@ -1,4 +1,4 @@
-"""Who speaks for a dead driver is heard on every kind of link: signed, called by the vehicle, by a serial line."""
+"""Fail-safe frames in place of a dead driver arrive on every kind of link: signed, called by the vehicle, serial."""
 
 import dataclasses
 import json

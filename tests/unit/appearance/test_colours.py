@@ -1,4 +1,4 @@
-"""Robots and targets can be told apart and read: on light and dark ground, and by those who are colour-blind."""
+"""Colours of robots and targets are distinct and readable on light and dark ground, also for the colour-blind."""
 
 import re
 from itertools import combinations

@@ -1,4 +1,4 @@
-"""Console, report, plots, pictures, Rerun and Foxglove give a name the same colour."""
+"""Console, report, plots, pictures, Rerun and Foxglove show a name in the same colour."""
 
 import struct
 

@@ -1,4 +1,4 @@
-"""`groundstation bench study` counts the quickest flight and holds it against 40 times real time."""
+"""`groundstation bench study` takes the quickest flight and compares it with 40 times real time."""
 
 import json
 from typing import Any

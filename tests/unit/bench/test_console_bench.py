@@ -1,4 +1,4 @@
-"""The console's bench: it measures the real process, and it judges by its limits."""
+"""The console's bench measures the real process and judges by its limits."""
 
 import json
 from typing import Any

@@ -1,4 +1,4 @@
-"""The bench of the planner that flies: its team in flight, and the rows that it fills."""
+"""The bench of the planner used in flight: its simulated team, and the rows of its table."""
 
 import itertools
 

@@ -1,4 +1,4 @@
-"""Who may publish and hear what, as the table of topics says it and as the router is told."""
+"""Rights to publish and subscribe: from the table of topics to the router's configuration."""
 
 import re
 

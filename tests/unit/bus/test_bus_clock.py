@@ -1,4 +1,4 @@
-"""The clock of stamps: this host's own, or that of the run's host by a measured offset."""
+"""The clock of stamps: this host's own, or the run's host's clock by a measured offset."""
 
 import time
 from collections.abc import Iterator

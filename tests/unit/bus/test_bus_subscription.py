@@ -1,4 +1,4 @@
-"""Subscriptions drop the oldest and count it, keep the newest per key, and refuse what is malformed."""
+"""Subscriptions drop and count the oldest messages, keep the newest per key, and refuse malformed ones."""
 
 from groundstation.bus import codec, topics
 from groundstation.bus.api import Sample, Subscription

@@ -1,4 +1,4 @@
-"""A stop overtakes the starts that were given before it, by the clock of whoever gave them."""
+"""A stop cancels earlier start commands, by the sender's clock."""
 
 import pytest
 

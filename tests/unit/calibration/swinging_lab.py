@@ -1,4 +1,4 @@
-"""A lab whose drones swing about a driving target, as its cameras and drones report it under wrong figures."""
+"""A lab whose drones swing about a driving target, with measurements made under wrong settings."""
 
 import math
 from collections.abc import Iterator

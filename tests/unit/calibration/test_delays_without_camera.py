@@ -1,4 +1,4 @@
-"""Delays of a field whose fixed sensor is no camera: what nothing dates is said, with the reason."""
+"""Delay calibration in a field without a fixed camera: it names the delays that cannot be measured, with the reason."""
 
 from pathlib import Path
 

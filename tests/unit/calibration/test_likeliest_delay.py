@@ -1,4 +1,4 @@
-"""The delay under which a recording is likeliest: costs of single observations in, delay and deviation out."""
+"""The most likely delay of a recording: costs of single observations in, delay and deviation out."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""All figures of a team from one recording: what is wrong is found with its size, and nothing where nothing is."""
+"""Calibration of all team settings from one recording: finds each wrong one with its size, and no others."""
 
 from typing import Any
 

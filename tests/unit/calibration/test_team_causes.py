@@ -1,4 +1,4 @@
-"""As few causes as explain it: from information and pull to what is wrong."""
+"""The smallest set of causes that explains the data, from the information matrix and vector."""
 
 import math
 from dataclasses import dataclass

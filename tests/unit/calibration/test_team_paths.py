@@ -1,4 +1,4 @@
-"""Paths of the batch: what lies between two knots tells nothing of delays, wherever pictures lie between them."""
+"""Trajectories of the batch: interpolation between two knots is independent of delays and of picture times."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Which sightings a record shows: only those of entities whose own motion is known about that time."""
+"""Observations used from a recording: only those of entities whose odometry covers that time."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""`groundstation bench ardrone` times what it says it times."""
+"""`groundstation bench ardrone` times the operations that it names."""
 
 import json
 

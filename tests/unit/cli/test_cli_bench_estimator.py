@@ -1,4 +1,4 @@
-"""`groundstation bench estimator` compares filters that agree, on a path that ends in explained observations."""
+"""`groundstation bench estimator` compares filters that agree, on a path with only explained observations."""
 
 import json
 

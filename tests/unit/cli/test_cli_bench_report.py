@@ -1,4 +1,4 @@
-"""`bench demo` with a stand-in for the demo, and `report` on folders good and bad."""
+"""`bench demo` with a stand-in for the demo, and `report` on good and bad folders."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""`groundstation forecast`: what is printed and written, and the mistakes of operators."""
+"""`groundstation forecast`: printed and written output, and operator mistakes."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The command line as an operator meets it: help, exit codes, messages, and no slow imports."""
+"""The command line: help, exit codes, messages, and no slow imports."""
 
 import importlib.util
 import json

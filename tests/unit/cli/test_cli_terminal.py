@@ -1,4 +1,4 @@
-"""Which terminals get the live table."""
+"""Terminals that get the live table."""
 
 import os
 import pty

@@ -1,4 +1,4 @@
-"""What a shell completes, by the line that commands-by-task.md has for it."""
+"""Shell completion, set up by the line in commands-by-task.md."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Every `groundstation ...` and `python -m ...` that a README or a help text shows can be typed as it stands."""
+"""Every `groundstation ...` and `python -m ...` shown in a README or help text is valid."""
 
 import re
 import shlex

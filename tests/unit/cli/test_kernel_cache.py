@@ -1,4 +1,4 @@
-"""Commands that compile kernels keep them: numba reads where to when it is imported, and never again."""
+"""Commands that compile kernels set the cache folder before numba is imported, which reads it only then."""
 
 import subprocess
 import sys

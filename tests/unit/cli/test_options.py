@@ -1,4 +1,4 @@
-"""One name of an option means one thing over the whole command line, and old spellings lead to today's."""
+"""An option name has one meaning in the whole command line, and old spellings suggest today's."""
 
 import re
 from collections.abc import Iterator

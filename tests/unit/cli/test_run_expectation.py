@@ -1,4 +1,4 @@
-"""A simulated run records what its scenario expects, so that its report judges it by that."""
+"""A simulated run records its scenario's expectation, by which its report is judged."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Tests of the console's server share a site to speak to."""
+"""Fixtures of the console server's tests."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A console's server on a real socket, with one drone that hears its commands."""
+"""A console server on a real socket, with one drone that receives its commands."""
 
 import asyncio
 import json

@@ -1,4 +1,4 @@
-"""Alarms that are over: from when to when, and that one which wavers or changes its figures is one alarm."""
+"""The log of past alarms: start and end; a flickering alarm, or one whose figures change, is one entry."""
 
 from groundstation.console.alarm_log import AlarmLog
 from groundstation.monitor.alarms import Alarm

@@ -1,4 +1,4 @@
-"""The dead man's handle: states, keys, a gamepad's bytes, and what goes out on the bus."""
+"""The dead man's handle: states, keys, gamepad bytes, and messages on the bus."""
 
 import contextlib
 import os

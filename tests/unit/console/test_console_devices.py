@@ -1,4 +1,4 @@
-"""Tablets and phones in the network: invited once, by TLS, and each may do what its role says."""
+"""Tablets and phones on the network: one invitation each, TLS, rights by role."""
 
 import asyncio
 import contextlib

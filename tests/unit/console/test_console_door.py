@@ -1,4 +1,4 @@
-"""Who gets in: programs of our own user, others with the code; and what silent connections cost."""
+"""Access to the console: programs of our own user, others with the code; and the cost of silent connections."""
 
 import asyncio
 import os

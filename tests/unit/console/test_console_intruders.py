@@ -1,4 +1,4 @@
-"""Nonsense, floods and crowds: what a bad viewer costs the others."""
+"""Nonsense, floods and crowds: the cost of a bad viewer to the others."""
 
 import asyncio
 import contextlib

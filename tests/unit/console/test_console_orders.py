@@ -1,4 +1,4 @@
-"""Orders of the page on the bus, who may give them, and how far they came."""
+"""The page's commands on the bus: the right to give them, and their progress."""
 
 from pathlib import Path
 from typing import Any

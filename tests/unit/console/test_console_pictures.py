@@ -1,4 +1,4 @@
-"""Pictures on the page: their rate, their size, and the detections that belong to them."""
+"""Pictures on the page: rate, size, and matching detections."""
 
 import json
 

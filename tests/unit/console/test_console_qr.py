@@ -1,4 +1,4 @@
-"""A camera reads what the terminal shows."""
+"""A camera can read the QR code in the terminal."""
 
 import cv2
 import numpy as np

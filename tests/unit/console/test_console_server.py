@@ -1,4 +1,4 @@
-"""The server on a real socket: who gets in, what gets out, and what a bad or slow viewer costs."""
+"""The server on a real socket: access, output, and the cost of a bad or slow viewer."""
 
 import asyncio
 import json

@@ -1,4 +1,4 @@
-"""Drones that stand are shown where a fixed camera sees them, until the filter has them."""
+"""Drones on the ground are shown where a fixed camera sees them, until the filter contains them."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""What the console knows and how it says it: sections, history, health, pictures, scene."""
+"""The console's state and its form: sections, history, health, pictures, scene."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""What the console lets in: what comes more often than it is looked at, and nothing else, is thinned."""
+"""Input of the console: only messages more frequent than its display rate are thinned."""
 
 from groundstation.bus import keys
 from groundstation.bus.topics import COMMAND, COMMAND_ACK, ESTIMATE, SETPOINT, TRUTH

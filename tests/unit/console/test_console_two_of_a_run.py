@@ -1,4 +1,4 @@
-"""Two consoles of one run: who gave the last start is the operator, at both of them."""
+"""Two consoles of one run: both show the sender of the last start as the operator."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,4 @@
-"""The form of a new field: what its answers make, and answers that no form sends."""
+"""The new-field form: the field that its answers make, and answers that no form sends."""
 
 import json
 from pathlib import Path

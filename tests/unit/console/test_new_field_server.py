@@ -1,4 +1,4 @@
-"""The form of a new field is served until it is written: its files, its drawing, its end."""
+"""The new-field form is served until the field is written: its files, its drawing, its end."""
 
 import asyncio
 import json

@@ -1,4 +1,4 @@
-"""Modules of the page that need no browser, run by node: what the bar says of batteries, and what is heard of them."""
+"""Page modules that need no browser, run by node: battery texts in the bar and in speech."""
 
 import json
 import shutil

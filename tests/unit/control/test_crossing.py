@@ -1,4 +1,4 @@
-"""Straight ways from one world-fixed view into the next, in fields of one, two and three views."""
+"""Straight routes from one world-fixed view into the next, in fields of one, two and three views."""
 
 import math
 

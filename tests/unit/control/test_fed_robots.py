@@ -1,4 +1,4 @@
-"""Who flies on our estimate turns back as soon as nothing tells where it is: it lands before its place is lost."""
+"""Robots that fly on our estimate turn back once nothing locates them, and land before their position is lost."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The nearest velocity that half-spaces allow, in cases that can be worked out by hand."""
+"""The nearest velocity that half-spaces permit, in cases worked out by hand."""
 
 import numpy as np
 import pytest

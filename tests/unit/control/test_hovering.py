@@ -1,4 +1,4 @@
-"""Who hovers for an order stays where it came to rest, moves little, and is left alone where its place is doubted."""
+"""Hovering drones hold their place with little motion, and are not moved while their position is in doubt."""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Who flies on our estimate crosses between views straight, at speed, and only where the gap is short."""
+"""Robots that fly on our estimate cross between views straight, at speed, and only over short gaps."""
 
 from collections.abc import Mapping
 

@@ -1,4 +1,4 @@
-"""One that joins is told, one that is put elsewhere is warned of, and if that happens again soon it is not flown on."""
+"""Notices of joining and of relocation; a robot relocated again soon is not flown on for some seconds."""
 
 import pytest
 

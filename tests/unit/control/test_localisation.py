@@ -1,4 +1,4 @@
-"""Whether an entity is known well enough to fly on, asked many times of one belief."""
+"""Whether an entity is known well enough to fly on, queried many times of one belief."""
 
 from pathlib import Path
 

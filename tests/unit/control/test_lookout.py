@@ -1,4 +1,4 @@
-"""What the operator is told of searches and of robots that are missed."""
+"""Operator notices about searches and missing robots."""
 
 import math
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A robot that a fixed camera should see and does not is missed; one that may be hidden is not."""
+"""A robot is missing if a fixed camera should see it and does not; one that may be hidden is not."""
 
 import math
 from dataclasses import replace

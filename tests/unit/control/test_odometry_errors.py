@@ -1,4 +1,4 @@
-"""An odometry that erred is expected to err again, for some seconds."""
+"""An odometry that erred is expected to err again for some seconds."""
 
 import numpy as np
 import pytest

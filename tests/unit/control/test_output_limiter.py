@@ -1,4 +1,4 @@
-"""When a robot must hover whatever is wanted: belief too old, from the future, or not known well enough."""
+"""A robot must hover if its belief is too old, from the future, or too uncertain."""
 
 import math
 

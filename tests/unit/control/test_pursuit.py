@@ -1,4 +1,4 @@
-"""A team whose target was carried off sweeps where it has not been, apart, and in time for its own way back."""
+"""A team whose target was carried off searches unexplored places, apart, and leaves time for its own return."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""A robot that has lost its target from the picture gets it back by itself: it turns to it and backs off."""
+"""A robot whose target left its picture regains it by turning to it and backing off."""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The way back into a world-fixed view starts in time for it."""
+"""The return into a world-fixed view starts early enough."""
 
 import math
 from dataclasses import replace

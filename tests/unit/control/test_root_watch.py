@@ -1,4 +1,4 @@
-"""Where the team is in the room is told by what is fixed there, directly or through whom it sees; or by nothing."""
+"""Whether fixed sensors still locate the team, directly or through observations between robots."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""A search flies where cameras that turn see most of the floor."""
+"""A search flies at the height from which turning cameras see most of the floor."""
 
 from dataclasses import replace as replaced
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Stands of several robots: far enough apart, in view, and the same for the same belief."""
+"""Stands of several robots: far enough apart, in view, and equal for equal beliefs."""
 
 import math
 import random

@@ -1,4 +1,4 @@
-"""Setpoints from plans: level heights, columns, the search, the way back, and the flight-mode table."""
+"""Setpoints from plans: level heights, columns, the search, the return, and the flight-mode table."""
 
 import math
 from collections.abc import Collection, Sequence

@@ -1,4 +1,4 @@
-"""A team without its target covers the whole room, each from its own stand, and the maps follow the pictures."""
+"""A team without its target covers the whole room, each robot from its own stand; pictures update the maps."""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Points where planes meet, and the half-spaces that hold nobody back."""
+"""Points where planes meet, and half-spaces that restrict nothing."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The loop of the diagnosis: what it takes in, when it judges, and what it says."""
+"""The diagnosis loop: its inputs, the times of its judgements, and its messages."""
 
 import threading
 import time

@@ -1,4 +1,4 @@
-"""The process of the diagnosis: it hands on what is for the operator, and ends when it is told to."""
+"""The diagnosis process forwards the operator's notices, and ends on request."""
 
 from typing import Any, cast
 

@@ -1,4 +1,4 @@
-"""A stretch of flight names the figure that is wrong, with its size, and nothing where all are right."""
+"""A stretch of flight identifies the wrong setting with its size, and none if all are right."""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""From verdicts to notices: each suspicion is told once, and refuted once."""
+"""From verdicts to notices: each suspicion is reported once, and withdrawn once."""
 
 import math
 

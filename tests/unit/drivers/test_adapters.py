@@ -1,4 +1,4 @@
-"""Sockets that use one network adapter only: through loopback's own, and refused where there is none."""
+"""Sockets bound to one network adapter: on loopback's own, and refused where there is none."""
 
 import json
 import socket

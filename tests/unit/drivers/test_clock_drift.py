@@ -1,4 +1,4 @@
-"""A vehicle's clock against ours: how fast it goes, how late its telemetry comes."""
+"""A vehicle's clock relative to ours: its rate, and the delay of its telemetry."""
 
 import numpy as np
 import pytest

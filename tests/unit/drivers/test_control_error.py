@@ -1,4 +1,4 @@
-"""A vehicle that does not do what it is told is found out; one that lags, swings and shakes is not."""
+"""A vehicle that does not follow its setpoints is detected; one that lags, swings and shakes is not."""
 
 import math
 import random

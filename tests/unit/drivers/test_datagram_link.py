@@ -1,4 +1,4 @@
-"""The link of datagrams: who takes what comes, what is refused, and what a taker's fault costs."""
+"""The datagram link: recipients of datagrams, refusals, and the effect of a recipient's error."""
 
 import socket
 import threading

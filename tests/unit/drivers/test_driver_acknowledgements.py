@@ -1,4 +1,4 @@
-"""What a driver remembers of the commands that it answered, and when it calls one effective."""
+"""A driver's record of answered commands, and the time at which it calls one effective."""
 
 import pytest
 

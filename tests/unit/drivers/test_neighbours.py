@@ -1,4 +1,4 @@
-"""Who may be in the air while another drone climbs from its pad."""
+"""Conditions under which other drones may be in the air while a drone climbs from its pad."""
 
 import itertools
 import math

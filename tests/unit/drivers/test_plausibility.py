@@ -1,4 +1,4 @@
-"""What a vehicle says of its motion is found out when it cannot be true, in time, and only then."""
+"""Motion telemetry that cannot be true is detected in time, and only then."""
 
 import math
 import random

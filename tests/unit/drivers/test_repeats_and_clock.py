@@ -1,4 +1,4 @@
-"""For how long a value, a velocity or a vehicle's clock has stood, and how late values are: to the packet."""
+"""How long a value, a velocity or a vehicle's clock has been constant, and how late values are: exact to the packet."""
 
 import math
 

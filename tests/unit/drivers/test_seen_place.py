@@ -1,4 +1,4 @@
-"""When a vehicle was where its estimate has it, by the last picture of it alone."""
+"""A vehicle's position and its time, from the last picture of it alone."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""How fast a vehicle is by the places at which cameras saw it."""
+"""A vehicle's velocity from the positions at which cameras observed it."""
 
 import math
 from typing import Any

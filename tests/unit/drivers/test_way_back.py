@@ -1,4 +1,4 @@
-"""Whatever a tracker asks for, a hovering vehicle is moved slowly and not far."""
+"""A hovering vehicle is moved slowly and not far, whatever the tracker requests."""
 
 import math
 import random

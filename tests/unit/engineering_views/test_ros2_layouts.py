@@ -1,4 +1,4 @@
-"""The layouts for RViz and Foxglove name what a flight in the shipped field says, and show it as what it is."""
+"""The layouts for RViz and Foxglove name the topics of a flight in the shipped field, with the right types."""
 
 import json
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""Messages of a flight as ROS 2 reads them: values, frames, keys and tokens, a bag that its own reader opens."""
+"""A flight's messages in ROS 2: values, frames, keys and tokens, and a bag that its own reader opens."""
 
 import math
 from collections import Counter

@@ -1,4 +1,4 @@
-"""What engineering views draw of sensors that are fixed in the world."""
+"""World-fixed sensors in the engineering views."""
 
 from pathlib import Path
 

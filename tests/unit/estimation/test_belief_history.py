@@ -1,4 +1,4 @@
-"""Pictures are judged by the belief of their time."""
+"""Pictures are judged by the belief at their time."""
 
 from dataclasses import replace
 

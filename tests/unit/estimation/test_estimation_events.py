@@ -1,4 +1,4 @@
-"""What one observation does to the belief, by the compiled kernels alone."""
+"""The effect of one observation on the belief, by the compiled kernels alone."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""The library examples of the documentation run as they stand."""
+"""The library examples of the documentation run unchanged."""
 
 import re
 from collections.abc import Callable

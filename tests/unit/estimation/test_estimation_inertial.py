@@ -1,4 +1,4 @@
-"""Attitude by gyroscopes and accelerometers, against a vehicle whose motion is known; sensors as bad as real ones."""
+"""Attitude from gyroscopes and accelerometers, on a vehicle with known motion; sensors as bad as real ones."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""What the estimator's intake refuses by itself, with the verdict that names why; nothing of it reaches the filter."""
+"""Refusals by the estimator's ingest, with the verdict that names the reason; none of it reaches the filter."""
 
 import math
 from dataclasses import replace

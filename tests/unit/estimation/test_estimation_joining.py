@@ -1,4 +1,4 @@
-"""A first or re-initialising sighting: what it says beyond where its subject is must agree with its observer."""
+"""A first or re-initialising observation must agree with its observer wherever it has redundant information."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""How often beliefs may be given up for one observer: several at once, or one again and again, speak against it."""
+"""Limits on re-initialisations by one observer: several robots at once, or one repeatedly, count against it."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Who is in the state: cameras and robots that come and go, several targets, manoeuvres, floors, repeated errors."""
+"""The joint state: cameras and robots that come and go, several targets, manoeuvres, floors, repeated errors."""
 
 import math
 

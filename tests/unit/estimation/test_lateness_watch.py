@@ -1,4 +1,4 @@
-"""How late a camera is, told by headings alone: of which robots, how soon, and when nothing can be told."""
+"""A camera's delay error from headings alone: required robots, time needed, and cases without evidence."""
 
 import math
 

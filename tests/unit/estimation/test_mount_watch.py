@@ -1,4 +1,4 @@
-"""A fixed camera that was bumped is named, by what it sees and by what robots see of each other; nobody else is."""
+"""A bumped fixed camera is identified by its own and the robots' mutual observations; no other camera is blamed."""
 
 import math
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Several steps predicted apart from P are those predicted one by one."""
+"""Several prediction steps accumulated apart from P equal the same steps one by one."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Ranges at the intake: how a robot joins by them and what its heading is, what is refused, what a reflection does."""
+"""Ingest of ranges: initialisation of a robot and its heading, refusals, reflections."""
 
 import math
 from typing import Any

@@ -1,4 +1,4 @@
-"""What a target says of its own motion: what it tells the filter, what it must not, and how a wrong one is dropped."""
+"""A target's report of its own motion: its use in the filter, its limits, and the rejection of a wrong one."""
 
 import math
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""The map of a target that is not seen: bounded by walls, moved, and emptied by pictures without the target."""
+"""The map of an unseen target: bounded by walls, moved with time, and cleared by pictures without the target."""
 
 import numpy as np
 import pytest

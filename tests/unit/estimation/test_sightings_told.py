@@ -1,4 +1,4 @@
-"""When an entity was last seen, and how well its place was known then, whatever became of the belief since."""
+"""Time of an entity's last observation, and its position uncertainty then, whatever the belief since."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The error of a vehicle's velocity walks while nobody sees it, where its kind's does."""
+"""The velocity error of an unobserved vehicle is a random walk, for the vehicle kinds that have one."""
 
 import math
 

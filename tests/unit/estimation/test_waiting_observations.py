@@ -1,4 +1,4 @@
-"""Observations that wait for the odometry of their time: same belief later, computed once."""
+"""Observations that wait for the odometry of their time: the same belief later, computed once."""
 
 import math
 from dataclasses import replace

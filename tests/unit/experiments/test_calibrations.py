@@ -1,4 +1,4 @@
-"""What is left wrong of a field once settings were changed, and how a mended flight is judged."""
+"""Errors left in a field after settings change, and the judgement of a flight with corrected settings."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Is the right thing blamed? Verdicts on flights of wrong labs, by what the operator reads."""
+"""Attribution of faults: verdicts on flights of wrong labs, by the operator's notices."""
 
 from dataclasses import replace
 from typing import Any

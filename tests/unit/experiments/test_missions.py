@@ -1,4 +1,4 @@
-"""What missions come to: rows by how much covariance was stated, and which seeds broke a bound."""
+"""Results of missions: rows by stated covariance, and the seeds that broke a bound."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Folders of MRCLAM sets: plain or packed files, barcodes instead of subjects, and what an operator gets wrong."""
+"""Folders of MRCLAM sets: plain or packed files, barcodes instead of subjects, and operator mistakes."""
 
 import json
 import lzma

@@ -1,4 +1,4 @@
-"""Figures of flown scenarios: what counts as found, lost and as expected, and how strategies are compared."""
+"""Results of flown scenarios: criteria for found, lost and as expected, and the comparison of strategies."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""A run says on the bus that it ends, and how, before its processes are stopped."""
+"""A run announces its end, and the reason, on the bus before its processes are stopped."""
 
 import stat
 import time

@@ -1,4 +1,4 @@
-"""A look before a take-off that is broken off: nobody takes off after Ctrl-C, a dead process, or in a mere look."""
+"""Interrupted pre-flight checks: no take-off after Ctrl-C, a dead process, or in a run that only checks."""
 
 import time
 from types import SimpleNamespace

@@ -1,4 +1,4 @@
-"""The limits of a flight follow the size of its team."""
+"""The limits of a flight depend on the size of its team."""
 
 import pytest
 

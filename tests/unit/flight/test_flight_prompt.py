@@ -1,4 +1,4 @@
-"""What is pressed before a take-off: the prompt stays, and a flight that asks nobody does not take off after a stop."""
+"""Keys before a take-off: the prompt stays, and a flight without confirmation does not take off after a stop."""
 
 import os
 import pty

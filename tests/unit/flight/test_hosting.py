@@ -1,4 +1,4 @@
-"""One run served by another host: the order awaited, the end followed, a wrong version refused; without a network."""
+"""A run served by another host: launch specification, end, refusal of a wrong version; without a network."""
 
 import logging
 import signal

@@ -1,4 +1,4 @@
-"""What `--real` asks for: which combinations make sense, and where each device of a mixed run is looked for."""
+"""The option `--real`: valid combinations, and the address of each device in a mixed run."""
 
 import json
 from pathlib import Path

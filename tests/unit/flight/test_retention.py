@@ -1,4 +1,4 @@
-"""Old runs make room for new ones, and nothing else in the folder does."""
+"""Old runs are deleted for new ones, and nothing else in the folder is."""
 
 import os
 import shutil

@@ -1,4 +1,4 @@
-"""Deviations, observability and failures of a forecast, against what can be computed by hand."""
+"""Standard deviations, observability and failures of a forecast, against values computed by hand."""
 
 import math
 from dataclasses import replace

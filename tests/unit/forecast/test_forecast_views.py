@@ -1,4 +1,4 @@
-"""Which places a team sees, and what is in the way of the others."""
+"""The places that a team can see, and the reasons for the others."""
 
 from dataclasses import replace
 

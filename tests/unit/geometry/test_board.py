@@ -1,4 +1,4 @@
-"""The marker's exact layout: what is printed must be what is measured."""
+"""The marker's exact layout: the printed marker equals the measured one."""
 
 import numpy as np
 import pytest

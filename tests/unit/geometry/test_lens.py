@@ -1,4 +1,4 @@
-"""The lens model: known figures, inversion everywhere in the picture, derivatives, refusal of nonsense."""
+"""The lens model: known values, inversion everywhere in the picture, derivatives, refusal of nonsense."""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Printed markers: exact to hundredths of a millimetre, refused when they do not fit, and readable by the detector."""
+"""Printed markers: exact to hundredths of a millimetre, refused if too large, and readable by the detector."""
 
 import re
 import shutil

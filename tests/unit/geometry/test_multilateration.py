@@ -1,4 +1,4 @@
-"""Places from ranges: exact ones, noisy ones with an honest covariance, too few and contradictory ones."""
+"""Positions from ranges: exact ones, noisy ones with a consistent covariance, too few and contradictory ones."""
 
 import math
 

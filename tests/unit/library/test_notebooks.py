@@ -1,4 +1,4 @@
-"""The notebooks of the documentation run, each in a process of its own, and say what they promise."""
+"""The notebooks of the documentation run, each in its own process, and print the promised results."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Tags of another package, as the how-to page writes them: from the field file over pictures and print to poses."""
+"""A foreign package's tags, as on the how-to page: from the field file through pictures and print to poses."""
 
 import math
 import re

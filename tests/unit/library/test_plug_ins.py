@@ -1,4 +1,4 @@
-"""Planners and camera sources of other packages: found by name, used, and named when they cannot be loaded."""
+"""Planners and camera sources of other packages: found by name, used, and named when loading fails."""
 
 import re
 import sys

@@ -1,4 +1,4 @@
-"""A source of poses from another package, as the how-to page writes it: accepted, read, and named when it is broken."""
+"""A foreign package's source of poses, as on the how-to page: accepted, read, and named when broken."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""Tests of the monitor share a world to look at."""
+"""Fixtures of the monitor's tests."""
 
 import sys
 from pathlib import Path

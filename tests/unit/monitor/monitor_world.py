@@ -1,4 +1,4 @@
-"""A bus with the monitor's screen on it, and shorthands to speak as the other processes."""
+"""A bus with the monitor's screen on it, and shorthands to publish as the other processes."""
 
 import io
 from typing import Any

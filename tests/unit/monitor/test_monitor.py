@@ -1,4 +1,4 @@
-"""The monitor's picture of a given state."""
+"""The monitor's display of a given state."""
 
 import io
 import re

@@ -1,4 +1,4 @@
-"""What the monitor and the console raise as alarms, and how grave each is."""
+"""Alarms of the monitor and the console, and their severity."""
 
 import pytest
 from monitor_world import NOW, S, World

@@ -1,4 +1,4 @@
-"""How long a battery is good for: by its kind at first, and more and more by the drain of this flight."""
+"""Remaining flight time of a battery: at first by its kind, then increasingly by this flight's drain."""
 
 from itertools import pairwise
 

@@ -1,4 +1,4 @@
-"""Whether it is safe: one word and its reason, from alarms and states."""
+"""Summary of safety: one word and its reason, from alarms and states."""
 
 from dataclasses import replace
 

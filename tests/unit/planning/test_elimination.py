@@ -1,4 +1,4 @@
-"""Factors, inverses and columns of small matrices against numpy, and the vectors of eight they are made with."""
+"""Factors, inverses and columns of small matrices against numpy, and their vectors of eight."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""One planning step: what it chooses, why, and what it does when time or belief run out."""
+"""One planning step: its choice, the reasons, and its behaviour when time or belief run out."""
 
 import itertools
 import math

@@ -1,4 +1,4 @@
-"""Starts of the local search: where robots go and look, under one world-fixed camera of several."""
+"""Start values of the local search: motion and view directions under one of several world-fixed cameras."""
 
 import math
 from dataclasses import replace

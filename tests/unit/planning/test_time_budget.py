@@ -1,4 +1,4 @@
-"""A planner that asks only now and then ends within its time."""
+"""A planner that checks its time only now and then still ends within its budget."""
 
 import pytest
 

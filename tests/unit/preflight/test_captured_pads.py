@@ -1,4 +1,4 @@
-"""What motion capture says of drones on their pads: well, exchanged, turned, not followed."""
+"""Motion capture of drones on their pads: right, exchanged, turned, not tracked."""
 
 import math
 

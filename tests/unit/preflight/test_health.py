@@ -1,4 +1,4 @@
-"""What pre-flight says of each camera's pictures."""
+"""Pre-flight findings about each camera's pictures."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Medians of what fixed cameras saw of standing drones."""
+"""Medians of the fixed cameras' observations of drones on the ground."""
 
 import numpy as np
 import pytest

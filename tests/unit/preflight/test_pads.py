@@ -1,4 +1,4 @@
-"""What fixed cameras see of standing drones tells which one figure of the field is wrong, or that none is."""
+"""Observations of drones on the ground show which one setting of the field is wrong, or that none is."""
 
 import math
 import time

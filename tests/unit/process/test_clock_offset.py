@@ -1,4 +1,4 @@
-"""The offset of another clock from round trips: through jitter, loss and drift, and what cannot be measured."""
+"""The offset of another clock from round trips: under jitter, loss and drift, and cases without a result."""
 
 import random
 

@@ -1,4 +1,4 @@
-"""A program that only looks on leaves at one signal, whatever it is doing."""
+"""A read-only program exits at one signal, whatever it is doing."""
 
 import signal
 import subprocess

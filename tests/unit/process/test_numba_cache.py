@@ -1,4 +1,4 @@
-"""The kernel cache belongs to one state of the sources, and to nobody who chose another."""
+"""The kernel cache belongs to one state of the sources; a cache folder chosen by the user is left alone."""
 
 import os
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A loop with deadlines goes first where it may; what it starts does not."""
+"""A loop with deadlines gets a higher priority where permitted; its child processes do not."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""What was refused reaches the operator once, in words, and not as a flood."""
+"""Refusals reach the operator once, in words, and not as a flood."""
 
 from groundstation.process.refusals import Refusals
 from groundstation.time_units import NS_PER_S

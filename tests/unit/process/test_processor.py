@@ -1,4 +1,4 @@
-"""Use of the processor, as the kernel tells it."""
+"""Processor use, from the kernel's counters."""
 
 import time
 

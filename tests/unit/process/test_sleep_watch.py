@@ -1,4 +1,4 @@
-"""A computer that slept, by two clocks of which one stood still."""
+"""Detection of a computer's sleep, by two clocks of which one stops."""
 
 from groundstation.process.sleep_watch import SleepWatch
 

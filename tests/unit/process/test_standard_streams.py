@@ -1,4 +1,4 @@
-"""Standard streams that a program was started without, or whose encoding lacks signs."""
+"""Programs started without standard streams, or with an encoding that lacks characters."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""A file of another program is named for what it is, with what opens it; nothing is made of it."""
+"""A file of another program is identified, with the program that opens it; nothing is written from it."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""`export --tlog`: what was recorded is what pymavlink's own reader finds, in order and in time."""
+"""`export --tlog`: pymavlink's own reader finds the recorded frames, in order and with their times."""
 
 import os
 

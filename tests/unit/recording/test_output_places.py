@@ -1,4 +1,4 @@
-"""Where what is made of a recording may go: a wrong place is wrong usage, a full disk leaves what was there."""
+"""Output paths of exports: a wrong path is a usage error, a full disk leaves the old file."""
 
 import errno
 import shutil

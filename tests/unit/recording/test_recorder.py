@@ -1,4 +1,4 @@
-"""The recorder's loop against a memory bus: a full disk is loud once and costs nothing but the recording."""
+"""The recorder's loop with a memory bus: a full disk is reported once and costs only the recording."""
 
 import json
 import os

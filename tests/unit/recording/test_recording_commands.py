@@ -1,4 +1,4 @@
-"""`groundstation recording`: what an operator sees of whole, cut, foreign and missing recordings."""
+"""`groundstation recording`: output for whole, cut, foreign and missing recordings."""
 
 import csv
 import json

@@ -1,4 +1,4 @@
-"""What recordings say for viewers beside our own messages: where every frame is, and events as log lines."""
+"""Data for viewers in recordings beside our own messages: all frames, and events as log lines."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""A recorder that runs for hours keeps little of each chunk, and its index is still whole."""
+"""A recorder that runs for hours keeps little of each chunk, and its index is still complete."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A run in parts: nothing lost where one ends, and any moment of it read at once."""
+"""A run in parts: nothing is lost between them, and any moment is read at once."""
 
 import itertools
 import json

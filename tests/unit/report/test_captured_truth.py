@@ -1,4 +1,4 @@
-"""Truth by motion capture: tracks of bodies, without poses that cannot be true, on the ground while a drone says so."""
+"""Truth from motion capture: tracks without impossible poses, on the ground while the drone reports so."""
 
 import math
 

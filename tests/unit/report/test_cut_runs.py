@@ -1,4 +1,4 @@
-"""A stretch that was cut out of a run is a part of a flight: it is neither judged, nor counted, nor the newest run."""
+"""An excerpt of a run is part of a flight: it is neither judged, nor counted, nor the newest run."""
 
 import json
 import os

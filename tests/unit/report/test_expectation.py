@@ -1,4 +1,4 @@
-"""A flight of a scenario is judged by what that expects, and its report says so; any other one by the usual limits."""
+"""A scenario's flight is judged by the scenario's expectation, as the report states; others by the usual limits."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""What happened in a run, in the report: its story, what was broken, what reacted; a failsafe ends no good flight."""
+"""Events of a run in the report: its story, faults and reactions; a flight that a failsafe ended has failed."""
 
 import dataclasses
 

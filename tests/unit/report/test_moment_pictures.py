@@ -1,4 +1,4 @@
-"""The gravest moments of a run are shown as a camera saw them; a run without pictures has none."""
+"""Camera pictures of a run's most serious moments; none for a run without pictures."""
 
 import base64
 from pathlib import Path

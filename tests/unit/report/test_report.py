@@ -1,4 +1,4 @@
-"""The report of synthetic recordings whose figures are known beforehand."""
+"""The report of synthetic recordings with known results."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""From the files of a run to figures of its processes and links."""
+"""From the files of a run to measurements of its processes and links."""
 
 from pathlib import Path
 

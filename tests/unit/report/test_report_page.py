@@ -1,4 +1,4 @@
-"""What the page of a run says and that it needs nothing but itself."""
+"""Content of a run's page, and that it needs no other file."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""The rules of the report one by one: what counts as tracking, as a switch, as late, as CPU."""
+"""The rules of the report one by one: definitions of tracking, switch, late, CPU."""
 
 from dataclasses import replace
 from pathlib import Path

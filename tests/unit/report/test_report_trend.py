@@ -1,4 +1,4 @@
-"""Many runs beside each other: by time, without re-runs, with the reason of each failure, damage named."""
+"""Trend over many runs: by time, without re-runs, with the reason of each failure, damage named."""
 
 import json
 from pathlib import Path

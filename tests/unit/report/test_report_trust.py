@@ -1,4 +1,4 @@
-"""A report says why its run may not be trusted: sensors, surveys, delays, links, and warnings of the flight."""
+"""Reasons in the report for distrusting a run: sensors, surveys, delays, links, and warnings of the flight."""
 
 import random
 

@@ -1,4 +1,4 @@
-"""Searches in the report: when a target was searched for, and the maps that tell where."""
+"""Searches in the report: their times, and the maps that show their places."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Limits of a run that follow the size of its team."""
+"""Limits of a run that depend on the size of its team."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Tests of the operator share a team that obeys."""
+"""Fixtures of the operator's tests."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Drones with their drivers over a bus in memory, and the operator whom they obey."""
+"""Drones with their drivers on a memory bus, and the operator who commands them."""
 
 from collections.abc import Iterator
 

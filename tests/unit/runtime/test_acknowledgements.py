@@ -1,4 +1,4 @@
-"""The answers to one command, of the drones that were asked."""
+"""Acknowledgements of one command by its addressed drones."""
 
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import AckStage, Command, CommandAck, Verb

@@ -1,4 +1,4 @@
-"""A take-off with something that must be mended: refused, unless a person insists, which is put on record."""
+"""Take-off despite a MUST finding: refused, unless a person insists, which is recorded."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Who contradicts the belief for seconds is named to the operator, with the remedy; a wild sighting is not."""
+"""Operator warnings about sensors that contradict the belief for seconds, with the remedy; outliers give none."""
 
 from groundstation.bus.messages import Header, Odometry, Severity, Verdict
 from groundstation.bus.notice import Notice

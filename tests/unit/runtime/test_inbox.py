@@ -1,4 +1,4 @@
-"""What the tracker takes in at once: no more than it can, and what it leaves is counted."""
+"""The tracker's limit on messages per tick; the excess is counted."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""When a camera's age is told: on the evidence that the diagnosis asks for, and until it is refuted."""
+"""Operator warnings of a wrong camera latency: from the diagnosis's evidence, until refuted."""
 
 import pytest
 

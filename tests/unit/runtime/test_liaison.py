@@ -1,4 +1,4 @@
-"""The liaison and the other host's link, without a network: orders, answers, silence, and the offset of the clocks."""
+"""The liaison and the other host's link, without a network: commands, answers, silence, and clock offset."""
 
 import time
 

@@ -1,4 +1,4 @@
-"""Whose marker rose: seen in flight, exchanged, or nothing to be said yet."""
+"""Check of markers at lift-off: the right one rose, another one rose, or not yet known."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A tracker that is started anew in flight does not believe again a camera that was found to have moved."""
+"""A tracker restarted in flight keeps distrusting a camera that was found to have moved."""
 
 from collections.abc import Iterator
 from pathlib import Path

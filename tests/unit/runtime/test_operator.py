@@ -1,4 +1,4 @@
-"""The operator over a bus in memory: lease, take-off one by one, stops from elsewhere, requests of other shells."""
+"""The operator on a memory bus: lease, take-off one by one, stops from elsewhere, requests of other shells."""
 
 import pytest
 from operated_team import Scene

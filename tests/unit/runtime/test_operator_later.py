@@ -1,4 +1,4 @@
-"""The operator of a team that is in the air: a driver that starts anew, and a later take-off of others."""
+"""The operator of a team in the air: a restarted driver, and a later take-off of others."""
 
 import pytest
 from operated_team import Scene

@@ -1,4 +1,4 @@
-"""What other shells ask of the operator, and whom his orders go to; each order to the drones it names alone."""
+"""Requests of other shells to the operator, and the recipients of the commands; each goes only to the named drones."""
 
 import pytest
 from msgspec import structs

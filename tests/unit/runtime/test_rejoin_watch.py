@@ -1,4 +1,4 @@
-"""Who is named when beliefs are given up for what a camera says."""
+"""Operator warnings about the camera or robot behind repeated re-initialisations."""
 
 from groundstation.bus.messages import Severity, Verdict
 from groundstation.estimation.event_log import HASTY

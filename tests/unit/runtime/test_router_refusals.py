@@ -1,4 +1,4 @@
-"""What the router's own lines say of those whom it refused, as an operator reads it."""
+"""Operator warnings from the router's log lines about refused connections."""
 
 import logging
 import os

@@ -1,4 +1,4 @@
-"""The tracker levels what a drone sees by its IMU: wind leans it, and its own attitude says nothing of that."""
+"""The tracker levels a drone's observations by its IMU: wind tilts it, and its reported attitude does not show that."""
 
 import math
 

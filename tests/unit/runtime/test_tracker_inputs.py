@@ -1,4 +1,4 @@
-"""The tracker's inputs: joining, leaving, re-initialisation; everything unusable is a verdict, never an exception."""
+"""The tracker's inputs: joining, leaving, re-initialisation; unusable input gives a verdict, never an exception."""
 
 import itertools
 import math

@@ -1,4 +1,4 @@
-"""What pictures say of themselves is not taken at its word: when they were taken, and by which camera."""
+"""Claims of a picture about its time and camera are checked before use."""
 
 import math
 

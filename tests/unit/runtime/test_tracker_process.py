@@ -1,4 +1,4 @@
-"""The tracker's loop on a bus: what it publishes, its journal and the replay of it, its deadlines, its watch."""
+"""The tracker's loop on a bus: its messages, its journal and the replay of it, its deadlines, its watch."""
 
 import math
 import time

@@ -1,4 +1,4 @@
-"""A vehicle's word about its velocity is a claim: what a camera sees of it wins, and is believed again at once."""
+"""A vehicle's reported velocity is overruled by cameras, and used again at once when it is right."""
 
 import math
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""The chance that a searched picture shows a marker follows the one model of what cameras see."""
+"""The probability that a searched picture shows a marker follows the one model of camera visibility."""
 
 import math
 from pathlib import Path

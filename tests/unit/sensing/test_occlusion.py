@@ -1,4 +1,4 @@
-"""The smooth share in which nothing hides a marker agrees with hard geometry, and its slopes with differences."""
+"""The smooth unoccluded share of a marker agrees with hard geometry, and its derivatives with differences."""
 
 import numpy as np
 import pytest

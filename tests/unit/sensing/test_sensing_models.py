@@ -1,4 +1,4 @@
-"""Cameras as the planner believes in them: frustum, noise, smooth availability and its derivatives."""
+"""The planner's camera models: frustum, noise, smooth availability and its derivatives."""
 
 import math
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Availabilities of many edges in one loop: those of single points, with polynomials for exponential and logarithm."""
+"""Availabilities of many edges in one loop equal those of single points; polynomials replace exp and log."""
 
 import math
 

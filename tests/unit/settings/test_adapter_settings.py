@@ -1,4 +1,4 @@
-"""Vehicles with one address: told apart by their network adapters, or refused with the remedy."""
+"""Vehicles with one address: distinguished by network adapter, or refused with the remedy."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The password of a camera's address reaches its driver, and nothing that is written, published or shown."""
+"""The password in a camera's address reaches its driver, and is never written, published or shown."""
 
 import logging
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Devices that another host runs: who starts them, who may speak as them, and what is refused."""
+"""Devices on another host: their start, the right to publish as them, and refusals."""
 
 import json
 from pathlib import Path

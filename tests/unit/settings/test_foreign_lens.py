@@ -1,4 +1,4 @@
-"""Calibrations that other programs wrote: the same lens, or one line that says why it is none."""
+"""Calibration files of other programs: the same lens, or a one-line reason for refusal."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Motion capture in a field file: what is refused, what the driver gets, what estimator and planner make of it."""
+"""Motion capture in a field file: refusals, and the values for driver, estimator and planner."""
 
 import json
 from pathlib import Path

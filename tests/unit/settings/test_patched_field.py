@@ -1,4 +1,4 @@
-"""A field file with some settings changed: comments stay, what was looked up becomes content, and it can be read."""
+"""A field file with some settings changed: comments stay, looked-up files become content, and it can be read."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Ranging in a field file: what is refused, what driver, estimator and planner make of it, where it is listed."""
+"""Ranging in a field file: refusals, values for driver, estimator and planner, and listings."""
 
 import json
 import math

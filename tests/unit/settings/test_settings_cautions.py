@@ -1,4 +1,4 @@
-"""What is legal and foolish in a field is told, with its place, and refuses nothing."""
+"""Legal but unwise settings give a caution with its place, and no refusal."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Every key of a field file explains itself: in the schema that editors read, and so in the generated reference."""
+"""Every key of a field file has a description in the editors' schema, and so in the generated reference."""
 
 import json
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""A catalogue of broken field files: each with the exact lines that the operator reads."""
+"""A catalogue of broken field files: each with the exact lines shown to the operator."""
 
 import os
 import re

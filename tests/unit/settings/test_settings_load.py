@@ -1,4 +1,4 @@
-"""Field files that are right: three levels, options, and the forms of the resolved field."""
+"""Valid field files: three levels, options, and the forms of the resolved field."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""A field file from a few answers: it is good for every room and team that it is written for."""
+"""A field file from a few answers is valid for every room and team."""
 
 from pathlib import Path
 

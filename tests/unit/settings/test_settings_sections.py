@@ -1,4 +1,4 @@
-"""What each process is handed, and that simulation changes addresses only."""
+"""Sections of the processes; simulation changes addresses only."""
 
 import json
 from pathlib import Path

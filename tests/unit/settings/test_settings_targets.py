@@ -1,4 +1,4 @@
-"""What a field file says of its targets reaches the estimator."""
+"""Target settings of a field file reach the estimator."""
 
 import math
 from pathlib import Path

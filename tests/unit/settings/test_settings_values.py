@@ -1,4 +1,4 @@
-"""The models that judge a field and the values that the program reads have the same keys, types and defaults."""
+"""The models that validate a field and the values used by the program have the same keys, types and defaults."""
 
 import re
 import types

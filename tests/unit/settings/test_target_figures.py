@@ -1,4 +1,4 @@
-"""The figure that a field gives for a target fits what the target can do."""
+"""A field's figure for a target matches the target's capabilities."""
 
 import math
 from pathlib import Path

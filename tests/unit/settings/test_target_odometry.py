@@ -1,4 +1,4 @@
-"""A target's odometry in a field file: what is refused, what driver and estimator make of it, where it is emulated."""
+"""A target's odometry in a field file: refusals, values for driver and estimator, and its emulation."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Each kind of vehicle is met as itself: ours, one of a foreign package, one that nobody knows, one that is broken."""
+"""Every vehicle kind is treated as itself: ours, a foreign package's, an unknown one, a broken one."""
 
 import re
 import sys

@@ -1,4 +1,4 @@
-"""The bench of the detector: its pictures are what they claim, its judgement is strict, its command is a command."""
+"""The detector's bench: its pictures are as described, its judgement is strict, its command works."""
 
 import json
 import math

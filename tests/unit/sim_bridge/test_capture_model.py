@@ -1,4 +1,4 @@
-"""Motion capture at message level: where bodies are, in the axes that it takes for the world's, and only in its box."""
+"""Motion capture at message level: poses of bodies in the system's axes, and only inside its box."""
 
 import math
 from typing import Any

@@ -1,4 +1,4 @@
-"""A real body's pose out of a motion capture system's frames: carried on to now, and not from what is refused."""
+"""A real body's pose from motion capture frames: extrapolated to now, and not from refused frames."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Ranging at message level: distances from the transponder, errors that last, reflections, silence, rounds of all."""
+"""Ranging at message level: distances from the transponder, lasting errors, reflections, silence, full rounds."""
 
 import math
 from typing import Any

@@ -1,4 +1,4 @@
-"""What Tellos and robots of ROS 2 believe of themselves errs by the scenario's figures, and no more than is claimed."""
+"""State estimates of emulated Tellos and ROS 2 robots err by the scenario's figures, within the stated accuracy."""
 
 import math
 

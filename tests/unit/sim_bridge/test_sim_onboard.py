@@ -1,4 +1,4 @@
-"""What the drone believes of itself errs by the measured figures: rms, delays, correlation, the jump of yaw."""
+"""The drone's own state estimate errs by the measured figures: rms, delays, correlation, the jump of yaw."""
 
 import math
 from dataclasses import dataclass, field

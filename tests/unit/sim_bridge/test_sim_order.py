@@ -1,4 +1,4 @@
-"""The start order of the bridge: what is checked, what each render process is told, how time and faults run."""
+"""The bridge's launch specification: checks, sections of the render processes, time and faults."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A body that follows poses from outside: how it moves between them, and where it is nowhere."""
+"""A body that follows external poses: its motion between them, and when it is absent."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Real bodies in the emulated room: whose poses they follow, when they are nowhere, and what shows them."""
+"""Real bodies in the emulated room: the sources of their poses, their absence, and their display."""
 
 import json
 import math

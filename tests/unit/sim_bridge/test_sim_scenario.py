@@ -1,4 +1,4 @@
-"""Scenario files: every key is checked, and the default one flatters nobody."""
+"""Scenario files: every key is checked, and the default scenario is not optimistic."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""MAVLink vehicles that stand alone: found by satellites, taken off by command, asked for missions."""
+"""Stand-alone MAVLink vehicles: GPS position, take-off by command, mission requests."""
 
 import socket
 import subprocess

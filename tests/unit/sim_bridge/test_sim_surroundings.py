@@ -1,4 +1,4 @@
-"""What stands about in the room: hidden markers, misled sensors, bursts of radio, cameras that hang a little off."""
+"""Disturbances of the room: hidden markers, misled sensors, radio bursts, cameras with mounting errors."""
 
 import json
 import math

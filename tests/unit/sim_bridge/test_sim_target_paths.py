@@ -1,4 +1,4 @@
-"""Where simulated targets drive: each path keeps its promise, within the limits of its base, the same for a seed."""
+"""Paths of simulated targets: each keeps its promise within its base's limits, and repeats for a seed."""
 
 import itertools
 import math

@@ -1,4 +1,4 @@
-"""The truth board crosses process borders and survives readers that end."""
+"""The truth board works across processes and survives readers that end."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""Emulated autopilots as unkind as measured ones: what each key of a scenario does to a vehicle and its link."""
+"""Emulated autopilots as imperfect as measured ones: effect of each scenario key on a vehicle and its link."""
 
 import json
 import math

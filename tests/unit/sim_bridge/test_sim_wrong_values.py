@@ -1,4 +1,4 @@
-"""Wrong values: what each kind of fault makes of an honest reading, at both kinds of vehicles and in the world."""
+"""Wrong values: effect of each fault on an honest reading, for both kinds of vehicles and in the world."""
 
 import json
 import math

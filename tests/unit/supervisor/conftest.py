@@ -1,4 +1,4 @@
-"""A supervisor of real children that leaves none behind."""
+"""A supervisor of real child processes that leaves none behind."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Children that behave as their names say."""
+"""Dummy child processes that behave as their names say."""
 
 import json
 import os

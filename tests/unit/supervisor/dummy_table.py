@@ -1,4 +1,4 @@
-"""Rows of a process table whose children are dummies, and how to wait for what they do."""
+"""Rows of a process table whose children are dummies, and waits for their actions."""
 
 import time
 from collections.abc import Callable

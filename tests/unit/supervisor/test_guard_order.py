@@ -1,4 +1,4 @@
-"""What the guardian is ordered to watch: the rows of the very table that it stands in, and how long it may take."""
+"""The guardian's launch specification: the rows of the process table that it stands in, and its time limit."""
 
 import msgspec
 import pytest

@@ -1,4 +1,4 @@
-"""A run whose bus is its own: certificates from start to end, who joins from another shell, who is refused."""
+"""A run with its own bus: certificates from start to end, joining from another shell, refusals."""
 
 import os
 import signal

@@ -1,4 +1,4 @@
-"""The guardian against real processes: who speaks to a fake drone when driver and supervisor die, freeze and end."""
+"""The guardian with real processes: the sender to a fake drone when driver and supervisor die, freeze and end."""
 
 import json
 import os

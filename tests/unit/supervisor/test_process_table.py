@@ -1,4 +1,4 @@
-"""The rows of the process table: each can be started, and none is there twice."""
+"""The rows of the process table: each can be started, and none occurs twice."""
 
 import ast
 from importlib.util import find_spec

@@ -1,4 +1,4 @@
-"""The rules for who speaks to a drone, at their limits; over time they are proved in test_somebody_speaks.py."""
+"""The rules for the sender to a drone, at their limits; over time they are proved in test_somebody_speaks.py."""
 
 from dataclasses import replace
 

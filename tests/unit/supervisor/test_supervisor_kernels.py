@@ -1,4 +1,4 @@
-"""Kernels are compiled before anything starts; what fails, hangs or is not wanted any more leaves nothing behind."""
+"""Kernels are compiled before anything starts; a failed, hanging or cancelled compilation leaves nothing behind."""
 
 import sys
 import time

@@ -1,4 +1,4 @@
-"""Networks of simulated runs, and what is said of a port that somebody else holds."""
+"""Networks of simulated runs, and messages about a port in use."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""The supervisor against real children: crash, hang, deaf to SIGTERM; and its own death."""
+"""The supervisor with real children: crash, hang, ignored SIGTERM; and its own death."""
 
 import os
 import signal

@@ -1,4 +1,4 @@
-"""How a run starts: in order, patiently, and never for ever."""
+"""Start of a run: in order, patient, and limited in time."""
 
 import errno
 import os

@@ -1,4 +1,4 @@
-"""What the supervisor says of processes that cannot speak for themselves."""
+"""The supervisor's reports about processes that cannot report themselves."""
 
 from types import SimpleNamespace
 from typing import Any

@@ -1,4 +1,4 @@
-"""How long a start waits for processes that it can do without."""
+"""The time that a start waits for optional processes."""
 
 from types import SimpleNamespace
 from typing import Any

@@ -1,4 +1,4 @@
-"""A silent drone that cameras see drift though it was told to hold its place."""
+"""Cameras see a silent drone drift although it was commanded to hold its place."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""AT datagrams: sloppy ones, as Parrot's own codec reads them (docs/reference/ardrone.md 2.1), and refused ones."""
+"""AT datagrams: irregular ones, as Parrot's own codec reads them (docs/reference/ardrone.md 2.1), and refused ones."""
 
 import math
 

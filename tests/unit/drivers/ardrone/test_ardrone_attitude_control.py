@@ -1,4 +1,4 @@
-"""Who stops an AR.Drone: its firmware, which holds its place by optical flow, or the driver's braking."""
+"""The choice of brake for an AR.Drone: the firmware's hold by optical flow, or the driver's braking."""
 
 import pytest
 

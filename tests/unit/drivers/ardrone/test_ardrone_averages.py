@@ -1,4 +1,4 @@
-"""Means of what an AR.Drone tells between two turns, and what is no measurement."""
+"""Means of an AR.Drone's telemetry between two turns, and values that are no measurement."""
 
 import pytest
 

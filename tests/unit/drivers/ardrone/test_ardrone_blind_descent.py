@@ -1,4 +1,4 @@
-"""When a drone that does not see its motion sinks under its driver's braking, and when it is told to land."""
+"""A drone without velocity measurement descends while its driver brakes it, and is landed."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What the field file says of an AR.Drone reaches its driver and its failsafe datagrams, and no emulator's ports."""
+"""AR.Drone settings reach its driver and its fail-safe datagrams; emulator ports do not."""
 
 import dataclasses
 import json

@@ -1,4 +1,4 @@
-"""Navdata packets that are cut, wrong or unusual; configuration values."""
+"""Truncated, wrong and unusual navdata packets; configuration values."""
 
 import pytest
 

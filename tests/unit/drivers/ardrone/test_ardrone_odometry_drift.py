@@ -1,4 +1,4 @@
-"""A drone whose optical flow drifts is flown by what cameras see, and a picture that hangs does not carry it off."""
+"""A drone with drifting optical flow is corrected by cameras; a frozen picture does not drive it away."""
 
 import math
 import random

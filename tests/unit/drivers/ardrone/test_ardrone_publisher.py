@@ -1,4 +1,4 @@
-"""What of 200 packets a second goes to the bus: every second odometry, and the mean of all IMU samples."""
+"""Messages from 200 packets a second: every second odometry, and the mean of all IMU samples."""
 
 from itertools import pairwise
 from typing import Any

@@ -1,4 +1,4 @@
-"""Bootstrap and configuration against a drone that acknowledges with every delay (docs/reference/ardrone.md 5.1)."""
+"""Bootstrap and configuration with a drone that acknowledges after any delay (docs/reference/ardrone.md 5.1)."""
 
 import math
 

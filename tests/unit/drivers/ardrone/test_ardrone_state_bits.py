@@ -1,4 +1,4 @@
-"""State words of real drones, and every bit and phase against the wire sheet (docs/reference/ardrone.md 4.1)."""
+"""State words of real drones, and every bit and phase against docs/reference/ardrone.md 4.1."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The velocity loop on the dynamics of an AR.Drone: tilt 10/63/90 % after 90/180/270 ms, speed late and low."""
+"""The velocity loop on AR.Drone dynamics: tilt 10/63/90 % after 90/180/270 ms, velocity delayed and too low."""
 
 import math
 import random

@@ -1,4 +1,4 @@
-"""What the driver holds against foreign ultrasound and host scans, and what it makes of versions and dumps. Pure."""
+"""The driver's measures against foreign ultrasound and host scans; versions and dumps. No I/O."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""A lens from pictures: the published calibration of real photographs, drawn boards of a known lens, and bad input."""
+"""Lens calibration from pictures: published calibration of real photographs, drawn boards, and bad input."""
 
 from functools import cache
 

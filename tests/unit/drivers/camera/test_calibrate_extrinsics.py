@@ -1,4 +1,4 @@
-"""Where a camera is, from markers on the floor: pictures in, lines for the field file out; and does it still hold?"""
+"""Extrinsics from floor markers: pictures in, lines for the field file out; and a check whether they still hold."""
 
 import json
 from pathlib import Path

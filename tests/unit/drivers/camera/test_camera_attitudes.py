@@ -1,4 +1,4 @@
-"""Attitudes of the carrier, read at the exposure."""
+"""Attitudes of the camera's carrier, interpolated to the exposure."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The pixels of a picture, as its sensor exposed them."""
+"""Decoded pixels equal those that the sensor exposed."""
 
 import struct
 

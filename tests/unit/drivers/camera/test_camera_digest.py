@@ -1,4 +1,4 @@
-"""Logging in by Digest: the examples of the standards, and what a camera may ask that cannot be answered."""
+"""Digest authentication: the standards' examples, and challenges that cannot be answered."""
 
 import re
 

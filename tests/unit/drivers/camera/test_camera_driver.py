@@ -1,4 +1,4 @@
-"""The camera driver's loop against a fake source and a bus in memory: what it says when pictures are bad or absent."""
+"""The camera driver's loop with a fake source and a memory bus: its messages about bad or absent pictures."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""Pictures from the disk: video files and folders, and what is wrong with them."""
+"""Pictures from the disk: video files and folders, and their errors."""
 
 import os
 import time

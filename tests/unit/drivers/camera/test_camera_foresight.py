@@ -1,4 +1,4 @@
-"""The belief tells where to look: windows about the truth, no window where nothing can be, and no identity from it."""
+"""Search windows from the belief: about the truth, none where nothing can be, and no identity from the belief."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""From access units to pictures: backlogs, gaps, damage, another size; and what a real drone recorded."""
+"""From access units to pictures: backlogs, gaps, damage, another size, and a real drone's recording."""
 
 from collections import Counter
 from fractions import Fraction

@@ -1,4 +1,4 @@
-"""The multipart reader on hand-made bytes of several kinds of cameras, and on what no camera should send."""
+"""The multipart reader on hand-made bytes of several camera types, and on invalid streams."""
 
 import cv2
 import numpy as np

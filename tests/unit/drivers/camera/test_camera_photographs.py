@@ -1,4 +1,4 @@
-"""Corners in real photographs (OpenCV's calibration pictures): found, and refined to the print's own error."""
+"""Corners in real photographs (OpenCV's calibration pictures): found, and accurate to the print's own error."""
 
 import cv2
 import numpy as np

@@ -1,4 +1,4 @@
-"""From rendered picture to relative pose: signs, accuracy, honest covariance, identities that are never wrong."""
+"""From rendered picture to relative pose: signs, accuracy, consistent covariance, no wrong identities."""
 
 import math
 

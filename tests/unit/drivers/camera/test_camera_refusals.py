@@ -1,4 +1,4 @@
-"""What a camera driver makes of a stream before it looks at a picture: silence, refusals, sizes in the head."""
+"""Checks of a camera stream before its pictures: silence, refusals, sizes in the header."""
 
 import cv2
 import numpy as np

@@ -1,4 +1,4 @@
-"""With a rolling shutter the rows above the middle of a picture are exposed before it, those below after it."""
+"""A rolling shutter exposes the rows above the picture's middle before it, and those below after it."""
 
 import numpy as np
 import pytest

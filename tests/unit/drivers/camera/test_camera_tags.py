@@ -1,4 +1,4 @@
-"""The second kind of marker, from the field file through rendering to pose: tags, their signs, honesty and identity."""
+"""Tags, the second kind of marker, from field file through rendering to pose: signs, consistency, identity."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Pictures that show nothing new: equal ones, and those of a camera that hangs before an encoder that goes on."""
+"""Pictures without new content: equal ones, and a frozen camera behind an encoder that continues."""
 
 import math
 

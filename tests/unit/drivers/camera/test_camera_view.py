@@ -1,4 +1,4 @@
-"""`groundstation camera view`: lines and pictures of what is found, and a stream for a browser."""
+"""`groundstation camera view`: lines and pictures of the detections, and a stream for a browser."""
 
 import json
 import socket

@@ -1,4 +1,4 @@
-"""When whole pictures are searched: seldom while all is tracked, often for what no camera sees, within a budget."""
+"""Searches of whole pictures: rare while all is tracked, frequent for unseen entities, within a budget."""
 
 from collections.abc import Callable
 

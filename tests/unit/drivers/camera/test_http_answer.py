@@ -1,4 +1,4 @@
-"""The head of a camera's answer and its chunks, on bytes as an ESP32, ffmpeg and others send them."""
+"""Head and chunks of a camera's HTTP response, on bytes as sent by an ESP32, ffmpeg and others."""
 
 import pytest
 

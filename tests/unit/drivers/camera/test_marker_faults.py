@@ -1,4 +1,4 @@
-"""Faults of printed markers, told from what chance shows."""
+"""Printing faults of markers, distinguished from chance."""
 
 from drivers.camera.faults import MarkerFaults
 from groundstation.time_units import NS_PER_S

@@ -1,4 +1,4 @@
-"""Focus and exposure of a picture, whatever it shows."""
+"""Focus and exposure of a picture, independent of its content."""
 
 import cv2
 import numpy as np

@@ -1,4 +1,4 @@
-"""A MAVLink vehicle plays a tune so that one hears which it is, and an armed one does not."""
+"""A MAVLink vehicle plays a tune to identify itself; an armed one does not."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Signs and units, written out by hand: a drone that flies the wrong way is a sign error here."""
+"""Signs and units of MAVLink, written out by hand; a drone that flies the wrong way is a sign error here."""
 
 import math
 

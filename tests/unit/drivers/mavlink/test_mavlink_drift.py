@@ -1,4 +1,4 @@
-"""Velocity errors of autopilots: estimated from the belief, corrected, and not where it is the report that is wrong."""
+"""Velocity errors of autopilots: estimated from the belief and corrected, unless only the telemetry is wrong."""
 
 import itertools
 import math

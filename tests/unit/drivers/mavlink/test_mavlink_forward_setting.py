@@ -1,4 +1,4 @@
-"""Where a second ground station may listen: an address and a port that exist, and not on the vehicle's own link."""
+"""Valid addresses for a second ground station: existing address and port, and not on the vehicle's own link."""
 
 from dataclasses import replace
 

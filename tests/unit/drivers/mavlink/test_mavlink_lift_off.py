@@ -1,4 +1,4 @@
-"""When a vehicle has left the floor: by its height or climb, not by its word that it flies."""
+"""Lift-off is detected by a vehicle's height or climb, not by its reported flight state."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Orders to an autopilot: HOLD in a climb stops it where it is, a plain hover goes on to the height asked for."""
+"""Commands to an autopilot: HOLD in a climb stops it at once, a plain hover continues to the requested height."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What a parameter may be: by value, range and other values; and what the field file has otherwise."""
+"""Allowed parameter values: by value, range and other parameters; and defaults for those absent in the field file."""
 
 import pytest
 

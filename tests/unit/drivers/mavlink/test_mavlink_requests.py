@@ -1,4 +1,4 @@
-"""Requests whose answers take their time."""
+"""Requests with delayed answers."""
 
 from drivers.mavlink.requests import Requests
 from drivers.mavlink.wire.flight import CommandAckMessage

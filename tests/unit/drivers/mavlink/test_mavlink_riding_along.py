@@ -1,4 +1,4 @@
-"""A second ground station may ask and stop; whatever flies, feeds or configures a vehicle does not pass."""
+"""A second ground station may query and stop; messages that fly, feed or configure a vehicle are not forwarded."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Reading parameters: one that a firmware does not know is named, and hides none of the others."""
+"""Reading parameters: one unknown to the firmware is named, and the others are still read."""
 
 from drivers.mavlink.identity import serial_number_of
 from drivers.mavlink.parameters import needed

@@ -1,4 +1,4 @@
-"""What a vehicle that tells no motion learns of a picture that showed where it is: a place to hold, in flight only."""
+"""A vehicle without motion telemetry holds the place where a picture showed it, in flight only."""
 
 from collections import Counter
 from typing import ClassVar, cast

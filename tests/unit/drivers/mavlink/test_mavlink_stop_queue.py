@@ -1,4 +1,4 @@
-"""A second ground station's stops: the first goes at once, none is lost, and the last one ordered arrives last."""
+"""Stops of a second ground station: the first is sent at once, none is lost, and the last one arrives last."""
 
 import itertools
 

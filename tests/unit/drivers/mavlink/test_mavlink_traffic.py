@@ -1,4 +1,4 @@
-"""Link quality by sequence numbers: losses count, reordering does not; the age of what a vehicle said."""
+"""Link quality by sequence numbers: losses count, reordering does not; the age of a vehicle's telemetry."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""An attitude between two words of it follows its own body rates, for a while."""
+"""An attitude is extrapolated by the vehicle's body rates between two messages, for a limited time."""
 
 import math
 

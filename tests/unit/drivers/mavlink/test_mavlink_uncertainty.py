@@ -1,4 +1,4 @@
-"""Deviations of an autopilot's velocity and attitude: what it states, its test ratios, and its drift."""
+"""Standard deviations of an autopilot's velocity and attitude: its own report, its test ratios, and its drift."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Which pose an autopilot is fed: its pad, the tracker's estimate through the lift-off, or none."""
+"""The pose sent to an autopilot: its pad, the tracker's estimate through the lift-off, or none."""
 
 import pytest
 

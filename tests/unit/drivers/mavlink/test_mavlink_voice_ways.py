@@ -1,4 +1,4 @@
-"""What a voice does with a line that fails or is full, with an adapter, and with words for many vehicles."""
+"""The fail-safe sender with a broken or full serial line, with a network adapter, and for many vehicles."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Which poses of a motion capture system are believed: healthy flight, freezing, jumps, exchanged names."""
+"""Plausibility of motion capture poses: healthy flight, freezing, jumps, exchanged names."""
 
 import math
 import random

@@ -1,4 +1,4 @@
-"""The motion capture driver against the emulated system on loopback, and against a stand-in of the library."""
+"""The motion capture driver with the emulated system on loopback, and with a stand-in for the library."""
 
 import socket
 import sys

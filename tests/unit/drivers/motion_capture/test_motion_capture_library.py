@@ -1,4 +1,4 @@
-"""The library `motioncapture` itself, as LibrarySource uses it: its simulated system, and where it connects."""
+"""The library `motioncapture` itself, as LibrarySource uses it: its simulated system, and its connection address."""
 
 import socket
 import time

@@ -1,4 +1,4 @@
-"""NatNet: datagrams assembled by hand from the wire sheet, what is cut short, and what others may send."""
+"""NatNet: datagrams assembled by hand from the wire sheet, truncated ones, and those of strangers."""
 
 import struct
 

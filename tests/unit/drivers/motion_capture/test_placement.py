@@ -1,4 +1,4 @@
-"""From a rigid body in the axes of its system to the entity that carries it, by figures worked out by hand."""
+"""From a rigid body in its system's axes to the entity that carries it, in cases worked out by hand."""
 
 import math
 

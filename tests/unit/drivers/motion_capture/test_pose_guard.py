@@ -1,4 +1,4 @@
-"""Poses of a ROS 2 topic that are another publisher's, in another frame, or late are not used."""
+"""Poses of a ROS 2 topic from another publisher, in another frame, or late are not used."""
 
 import pytest
 

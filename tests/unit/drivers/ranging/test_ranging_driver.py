@@ -1,4 +1,4 @@
-"""The ranging driver against the emulated gateway on loopback, and datagrams that are none."""
+"""The ranging driver with the emulated gateway on loopback, and with invalid datagrams."""
 
 import math
 import socket

@@ -1,4 +1,4 @@
-"""A vehicle behind a ROS 2 node whose messages are wrong: each is refused, with the reason and the remedy."""
+"""A vehicle behind a ROS 2 node that sends wrong messages: each is refused, with reason and remedy."""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""A vehicle behind a ROS 2 node, without a network: whether it flies, signs of angles, names, what a field may say."""
+"""A vehicle behind a ROS 2 node, without network: flight state, signs of angles, names, field settings."""
 
 import math
 import shutil

@@ -1,4 +1,4 @@
-"""Messages of ROS 2 as a foreign encoder writes and reads them."""
+"""ROS 2 messages as a foreign encoder writes and reads them."""
 
 import math
 from typing import Any

@@ -1,4 +1,4 @@
-"""The Tello at the wire: text, signs and units by flying its emulator, what is no state."""
+"""The Tello at the wire: text, signs and units, checked by flying its emulator; invalid states."""
 
 import dataclasses
 import json

@@ -1,4 +1,4 @@
-"""A Tello's video: pictures cut into datagrams without numbers, and several vehicles that send to one port."""
+"""A Tello's video: pictures split into datagrams without numbers, and several vehicles that send to one port."""
 
 import socket
 import time

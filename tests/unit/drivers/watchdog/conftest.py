@@ -1,4 +1,4 @@
-"""A watchdog with a vehicle that obeys, under a clock of our own."""
+"""A watchdog with an obedient vehicle, on a manual clock."""
 
 import itertools
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Every deviation, alone and with every other, for 16 s: what must stop a vehicle does, in time and for good."""
+"""Every deviation, alone and with every other, for 16 s: those that must stop a vehicle do so in time and for good."""
 
 import itertools
 import re

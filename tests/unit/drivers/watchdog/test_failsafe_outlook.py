@@ -1,4 +1,4 @@
-"""What the watchdog says of itself: why the vehicle hovers, and when it will be landed."""
+"""The watchdog's report: the reason for a hover, and the time of a landing to come."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""In HOVER and HOLD the tracker may bring a vehicle back to its place, within limits, while nothing is wrong."""
+"""In HOVER and HOLD the tracker may return a vehicle to its place, within limits, while nothing is wrong."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Orders and setpoints that are well formed, and not from whom or for what they say."""
+"""Well-formed commands and setpoints whose sender or addressee is not the stated one."""
 
 import pytest
 

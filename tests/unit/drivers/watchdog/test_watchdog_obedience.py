@@ -1,4 +1,4 @@
-"""No accepted order is undone without a true reason that beats it: order x history x vehicle state x tracker."""
+"""No accepted command is undone without a true overriding reason: command x history x vehicle state x tracker."""
 
 import copy
 import itertools

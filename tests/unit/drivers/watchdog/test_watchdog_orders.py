@@ -1,4 +1,4 @@
-"""Who may order what, and what an order does: the authority rules one by one."""
+"""Rights and effects of commands: the authority rules one by one."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What silence, of tracker, vehicle or supervisor, does to a flying vehicle."""
+"""Effect of a silent tracker, vehicle or supervisor on a flying vehicle."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The whole state table of the watchdog: every mode under every input, as tables to read and as invariants."""
+"""The whole state table of the watchdog: every mode under every input, as tables and as invariants."""
 
 import itertools
 import random

@@ -1,4 +1,4 @@
-"""What a topology with one robot moved is said to cost, against its cost, and the search that believes it."""
+"""Predicted cost of a topology with one robot moved, compared with its true cost, and the search that uses it."""
 
 from dataclasses import replace
 from typing import Any

@@ -1,4 +1,4 @@
-"""One decision of the planar planner: modes, proofs, budgets, and input nobody would send on purpose."""
+"""One decision of the planar planner: modes, proofs, budgets, and absurd input."""
 
 import threading
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The kit's bad wire: damage, loss, disorder and a stranger reach an emulator whatever way it speaks; nobody else."""
+"""The kit's bad wire: damage, loss, reordering and a stranger, over any transport, reach only the emulator."""
 
 import asyncio
 import itertools

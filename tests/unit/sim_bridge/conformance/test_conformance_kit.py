@@ -1,4 +1,4 @@
-"""The conformance kit: our kinds' objects pass, wrong flights fail, its command and its plug-in find the checks."""
+"""The conformance kit: our kinds pass, wrong flights fail, its command and its plug-in find the checks."""
 
 import math
 import os

@@ -1,4 +1,4 @@
-"""Rendered pictures: corners where projection says, errors as the scenario says, and reproducible."""
+"""Rendered pictures: corners at their projections, errors as in the scenario, and reproducible."""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Rendered pictures against rays cast one by one, and what scenarios can ask for: shutter, light, floors, tags."""
+"""Rendered pictures against single rays, and the scenario's options: shutter, light, floors, tags."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The emulated Tello's own video: H.264 in datagrams, to who asked for it, when it is due."""
+"""The emulated Tello's video: H.264 in datagrams, sent on time to the client that requested it."""
 
 import math
 import multiprocessing

@@ -1,4 +1,4 @@
-"""At message level a camera looks where its driver would: seldom all over, and where the belief has a marker."""
+"""At message level a camera searches as its driver does: rarely all over, and where the belief has a marker."""
 
 import msgspec
 import pytest

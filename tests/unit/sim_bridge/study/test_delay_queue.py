@@ -1,4 +1,4 @@
-"""What is on its way arrives in the order of its time, and what was sent first comes first."""
+"""Delayed messages arrive in the order of their times, and in the order of sending at equal times."""
 
 from sim_bridge.study.delay_queue import DelayQueue
 

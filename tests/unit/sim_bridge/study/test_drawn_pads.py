@@ -1,4 +1,4 @@
-"""What the drivers of a campaign are told of the pads that a seed draws."""
+"""The drivers of a campaign get the pads drawn for a seed."""
 
 import json
 import math

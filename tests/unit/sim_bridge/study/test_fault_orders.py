@@ -1,4 +1,4 @@
-"""Orders of the fault campaign that its process refuses, with what to write instead."""
+"""Fault campaign specifications that its process refuses, with the remedy."""
 
 import io
 import json

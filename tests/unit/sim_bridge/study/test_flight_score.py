@@ -1,4 +1,4 @@
-"""Figures of a flight at message level: of a robot's position the mean error and the greatest."""
+"""Scores of a flight at message level: mean and greatest position error of a robot."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What is drawn for a mission: rooms with their fence, pads, and targets that stay in the room."""
+"""Random missions: rooms with their fence, pads, and targets that stay in the room."""
 
 import msgspec
 import pytest

@@ -1,4 +1,4 @@
-"""Pads that a campaign draws: apart, for every seed, and for every team that has room before the camera."""
+"""Random pads of a campaign: apart, for every seed, and for every team that fits in the camera's view."""
 
 import math
 from itertools import combinations

@@ -1,4 +1,4 @@
-"""What the rivals of our planner decide, and on which sightings."""
+"""Decisions of the planners compared with ours, and the observations that each uses."""
 
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The study's command line: an operator's mistake is answered in a line, without a traceback."""
+"""The study's command line answers an operator's mistake in one line, without a traceback."""
 
 import sys
 

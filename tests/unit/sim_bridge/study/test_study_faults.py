@@ -1,4 +1,4 @@
-"""The fault campaign: what is drawn, how truth judges, what stands in for threads and sockets, and its table."""
+"""The fault campaign: random draws, judgement by truth, stand-ins for threads and sockets, and its table."""
 
 import math
 from itertools import pairwise

@@ -1,4 +1,4 @@
-"""Flights judged together: flights are the samples, their spread gives the confidence."""
+"""Summary over flights: flights are the samples, and their spread gives the confidence."""
 
 import math
 

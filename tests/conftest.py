@@ -26,7 +26,7 @@ BESIDE_FLIGHTS = {"browser": "page", "property": "study", "replay": "study", "st
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the slow tests of folders that fly nothing in real time."""
+    """Mark the slow tests in folders whose tests fly nothing in real time."""
     for item in items:
         for folder in set(item.path.relative_to(ROOT).parts) & set(BESIDE_FLIGHTS):
             if item.get_closest_marker("slow"):
@@ -34,7 +34,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
-    """Let a repetition pass in which there is nothing to repeat."""
+    """Let a repetition without failed tests pass."""
     nothing_to_repeat = session.config.getoption("last_failed_no_failures", "all") == "none"
     if exitstatus == pytest.ExitCode.NO_TESTS_COLLECTED and nothing_to_repeat:
         session.exitstatus = pytest.ExitCode.OK
@@ -45,7 +45,7 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
 
 @pytest.fixture(scope="session", autouse=True)
 def own_share() -> Iterator[None]:
-    """Children that run inside pytest leave its share of the processor as it is."""
+    """Keep pytest's processor share: children that run inside pytest must not change it."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(child, "take_share", lambda _nice: False)
         yield

@@ -42,7 +42,7 @@ class Citation:
 
 
 def files(suffixes: set[str]) -> Iterator[Path]:
-    """Return the files of the tree with these suffixes, and, among code, those that have none."""
+    """Yield the files of the tree with these suffixes, and, for code, the Makefile and `.ci/run`."""
     for folder in (*PACKAGES, "docs"):
         found = (path for path in sorted((ROOT / folder).rglob("*")) if path.suffix in suffixes and path.is_file())
         yield from (path for path in found if not {"_build", "vendor", "generated"} & set(path.parts))
@@ -160,7 +160,7 @@ def test_documentation_names_files_that_exist() -> None:
 
 
 def test_files_are_named_as_they_are_called() -> None:
-    """A file in a table of a package, or in a page, that was renamed or has gone; files of the reader's own aside."""
+    """Files named in a package's table or a page exist; the reader's own files are excepted."""
     there = {path.name for path in files({".py", ".js", ".css", ".yaml"})}
     readers_own = {"uwb_range.py", "test_uwb_range.py", "coasting_target.py", "test_coasting_target.py"}
     readers_own |= {"resolved.yaml", "lab.yaml"}

@@ -21,7 +21,7 @@ def test_absent_data_are_named(ci: str, verdict: str, tmp_path: Path) -> None:
 
 
 def test_one_place_looks_for_real_data() -> None:
-    """A test that finds recordings by itself could skip them by itself."""
+    """A test that looks for recordings by itself could also skip by itself."""
     allowed = {
         Path("tests/conftest.py"),
         Path(__file__).relative_to(ROOT),

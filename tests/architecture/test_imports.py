@@ -20,7 +20,7 @@ CORE = tuple(
 )
 NO_EFFECTS = {"socket", "asyncio", "threading", "time", "logging", "multiprocessing", "subprocess", "select"}
 NUMERICS = {"numpy", "numba", "scipy", "llvmlite"}
-VALUES = {"msgspec"}  # structs, as messages are: what is made of each message is one, too
+VALUES = {"msgspec"}  # structs, as messages are: so are the values made from each message
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ def test_a_library_has_its_place(library: str, owners: tuple[str, ...]) -> None:
 
 
 def test_nothing_is_forked() -> None:
-    """A fork with threads and sockets is undefined; everything is spawned."""
+    """A fork with threads and sockets is undefined; every process is spawned."""
     found = [
         f"{path.relative_to(ROOT)}:{node.lineno}"
         for path in sources()
@@ -149,7 +149,7 @@ def test_nothing_is_forked() -> None:
 
 
 def test_kernels_have_one_kind() -> None:
-    """Only groundstation.kernel compiles, so that every kernel has annotations, and the same arithmetic and cache."""
+    """Only groundstation.kernel compiles, so that all kernels have annotations and the same arithmetic and cache."""
     compiling = {"njit", "jit", "vectorize", "guvectorize", "cfunc"}
     found = []
     for path in sources():
@@ -176,7 +176,7 @@ def test_import_contracts_hold() -> None:
 
 
 def test_each_package_of_the_ground_station_has_a_layer() -> None:
-    """And the simulator may know it only where the contract of the simulator says so."""
+    """The simulator may import it only where the simulator's contract says so."""
     contracts = configparser.ConfigParser()
     contracts.read(ROOT / ".importlinter")
     layers = contracts["importlinter:contract:layers"]["layers"]

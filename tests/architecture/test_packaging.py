@@ -109,7 +109,7 @@ def test_dependencies_have_lower_bounds_and_exact_pins() -> None:
 
 
 def test_each_command_installs_what_it_uses() -> None:
-    """The Makefile names extras that exist; the heavy ones are for the slow suite, whose tests alone may need them."""
+    """The Makefile names existing extras; heavy ones are for the slow suite, the only one whose tests may need them."""
     settings = project()["project"]
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     installed = re.findall(r"\$\(STAMP\)-([a-z-]+)(?:  ## .*)?$", makefile, re.M)
@@ -143,7 +143,7 @@ def test_markers_exist() -> None:
 
 
 def test_shipped_settings_are_the_repository_s() -> None:
-    """One copy: the package refers to config/, from which the wheel takes its own."""
+    """There is one copy: the package refers to config/, from which the wheel takes its own."""
     from groundstation.settings.files import SHIPPED
 
     assert SHIPPED.resolve() == ROOT / "config"

@@ -6,9 +6,9 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "how-to" / "first-flight-of-a-mavlink-vehicle.md"
 SOURCES = [path.read_text() for package in ("groundstation", "drivers") for path in (ROOT / package).rglob("*.py")]
-# A message is a sentence; the rest in backquotes is what one types: commands, keys, names of parameters.
+# Messages are sentences; other text in backquotes is input: commands, keys, names of parameters.
 _TYPED = re.compile(r"^(groundstation|--|mavlink\.|sitl|PX4|MPC_|EKF2_|GUID_|COM_|RC)|^[A-Za-z_.0-9/-]+$")
-# What a program fills in: a name, a number, the rest of a sentence; or adds behind a semicolon.
+# Filled in by a program: a name, a number, the rest of a sentence, or an addition after a semicolon.
 _FILLED_IN = re.compile(r"\.\.\.|;|drone_\d|\d+%?|px4")
 
 

@@ -6,12 +6,12 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("groundstation", "drivers", "sim_bridge")
-# What every package may have, and nobody looks for.
+# Files that every package may have and that need no description.
 USUAL = {"__init__.py", "__main__.py"}
 
 
 def modules_of(package: Path) -> Iterator[Path]:
-    """Yield those of a package and of the packages below it that have no README of their own."""
+    """Yield the modules of a package and of its subpackages without a README of their own."""
     for path in sorted(package.iterdir()):
         if path.suffix == ".py" and path.name not in USUAL:
             yield path

@@ -35,7 +35,7 @@ def test_no_function_is_too_long() -> None:
 
 
 def test_no_function_has_too_many_parameters() -> None:
-    """What belongs together is handed over together; `self` and `cls` are handed over by nobody."""
+    """Values that belong together are passed together; `self` and `cls` do not count."""
     many = []
     for path in sources(*PACKAGES):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -63,7 +63,7 @@ def test_modules_say_what_they_are() -> None:
 
 
 def test_packages_have_a_readme() -> None:
-    """The packages one level down; what lies deeper is told by the README above it."""
+    """The packages one level down; deeper ones are described by the README above them."""
     folders = [ROOT / "config", *(ROOT / name for name in PACKAGES[1:])]
     for package in PACKAGES:
         folders += [path.parent for path in sorted((ROOT / package).glob("*/__init__.py"))]

@@ -77,7 +77,7 @@ def test_the_lists_are_the_pins() -> None:
 
 
 def test_what_tests_import_is_installed_by_make_test() -> None:
-    """What a test module imports as it is collected; with one import missing, no test beside it runs."""
+    """Modules that tests import at collection are installed; one missing import would stop the whole run."""
     local = {path.stem for folder in ("tests", "docs", ".ci") for path in (ROOT / folder).rglob("*")}
     own = {path.name for path in ROOT.iterdir()} | local | sys.stdlib_module_names
     texts = [path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("test_*.py")]
@@ -101,7 +101,7 @@ def test_each_part_that_runs_is_installed_by_its_hash(tool: ModuleType) -> None:
 
 
 def test_make_refuses_a_file_that_was_tampered_with(tmp_path: Path) -> None:
-    """The options of the Makefile, with a registry of one wheel."""
+    """With the Makefile's options and a registry of one wheel."""
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     (options,) = re.findall(r"^\t\$\(INSTALL\) (.*\$\(HASHED\)) requirements/run\.txt$", makefile, re.M)
     for name in ("HASHED", "INSTALL"):

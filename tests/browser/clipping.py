@@ -2,13 +2,13 @@
 
 from typing import Any
 
-# Lists that scroll, with all that they hold in reach of wheel, finger and keyboard; wherever else text does not fit, it
-# is cut off. "Skip to the commands" waits outside of the page until it has the focus.
+# Lists that scroll, whose whole content is in reach of wheel, finger and keyboard. Elsewhere, text that does not fit is
+# clipped. "Skip to the commands" waits outside of the page until it has the focus.
 SCROLLS = ("#orders", "#events", "#alarm-log")
 OUT_OF_SIGHT = (".skip", "option", "body.wall .brand", "#playback[hidden]")
 
-# Each line of each text against every ancestor that clips it, and against the page's width. Text needs less height than
-# its font's box, which is what is measured: a few pixels of that are no letter.
+# Each line of each text against every ancestor that clips it, and against the page's width. The measured box of a font
+# is a few pixels higher than its letters.
 _MEASURE = """([scrolls, hidden]) => {
   const SIDE_PX = 1, FONT_BOX_PX = 3, found = new Set();
   const clips = (node) => { const {overflowX, overflowY} = getComputedStyle(node);
@@ -61,11 +61,11 @@ _COVERED = """() => { const found = [];
 
 
 def clipped(page: Any) -> list[str]:
-    """Return each visible text that is not whole, after the name of what cuts it off."""
+    """Return each visible text that is clipped, after the name of the element that clips it."""
     return list(page.evaluate(_MEASURE, [SCROLLS, OUT_OF_SIGHT]))
 
 
-# Words of a button that hang out of it, by more than a font's box: what does not clip them shows them on others.
+# Words of a button that overflow it by more than a font's box: without clipping they overlap others.
 _OVERHANG = """() => [...document.querySelectorAll("button")].filter((one) => one.checkVisibility()).filter((one) => {
   const words = document.createRange(), box = one.getBoundingClientRect();
   words.selectNodeContents(one);
@@ -80,5 +80,5 @@ def overhanging(page: Any) -> list[str]:
 
 
 def covered(page: Any) -> list[str]:
-    """Return what a button lies over in its part of the page: other buttons, and words."""
+    """Return the other buttons and words that a button covers in its part of the page."""
     return list(page.evaluate(_COVERED))

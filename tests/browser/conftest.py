@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))  # what lies here and is no test belongs to these tests
+sys.path.insert(0, str(Path(__file__).parent))  # for the helper modules of this folder
 from fake_flight import FakeFlight
 from free_port import free_port as any_port
 from real_flight import answers, kernels, live, served  # noqa: F401
@@ -41,7 +41,7 @@ def browser() -> Iterator[Any]:
 
 
 class Stage:
-    """A flight with its console, and pages in front of it."""
+    """A flight with its console, and pages that show it."""
 
     def __init__(
         self, browser: Any, flight: FakeFlight | None = None, field: str = "lab", sets: list[str] | None = None
@@ -62,7 +62,7 @@ class Stage:
         return self.console
 
     def answers(self) -> bool:
-        """Whether a console serves at the port."""
+        """Return whether a console serves at the port."""
         return answers(self.url)
 
     def open(self, **options: Any) -> Seen:

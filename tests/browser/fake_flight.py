@@ -16,7 +16,7 @@ from groundstation.bus import zenoh_bus
 
 DRONES = ("drone_1", "drone_2")
 TURN_S, DESCENT_M_S = 0.02, 0.3
-ANGLES = (2.2, 0.0, 4.3, 0.73, 1.47, 2.93, 3.6, 5.2)  # of the drones around the target, far enough apart
+ANGLES = (2.2, 0.0, 4.3, 0.73, 1.47, 2.93, 3.6, 5.2)  # bearings of the drones from the target, far enough apart
 
 
 class FakeFlight(threading.Thread):
@@ -38,15 +38,15 @@ class FakeFlight(threading.Thread):
         self.detail: dict[str, str] = {}
         self.lands_in_s: dict[str, float] = {}
         self.braked: set[str] = set()
-        self.unseen_s: dict[str, float] = {}  # for how long nobody has seen it
+        self.unseen_s: dict[str, float] = {}  # seconds since the target was last observed
         self.deaf: set[str] = set()
-        self._sunk_m = dict.fromkeys(drones, 0.0)  # since each began to land
+        self._sunk_m = dict.fromkeys(drones, 0.0)  # descent of each landing drone so far
         self.frozen = self.fenced = False
-        self.dark = False  # no camera has light to see by
+        self.dark = False  # no camera has enough light
         self.crashed: set[str] = set()  # drones whose own emergency stop has cut their motors
-        self.mute: set[str] = set()  # drones that say nothing
-        self.findings: tuple[m.PreflightFinding, ...] = ()  # of the checks before a take-off
-        self.distance_m = 1.3  # of the drones from the target
+        self.mute: set[str] = set()  # drones without telemetry
+        self.findings: tuple[m.PreflightFinding, ...] = ()  # findings of the pre-flight checks
+        self.distance_m = 1.3  # distance of the drones from the target
         self.lease = True
         self.commands: list[m.Command] = []
         self.steered: list[m.SimCommand] = []
@@ -73,7 +73,7 @@ class FakeFlight(threading.Thread):
             time.sleep(max(0.0, due - time.monotonic()))
 
     def finish(self) -> None:
-        """Say nothing more; who listens stays connected."""
+        """Publish nothing more; subscribers stay connected."""
         self._over.set()
         self.join(5)
 
@@ -105,14 +105,14 @@ class FakeFlight(threading.Thread):
             self._sunk_m[name] = self._sunk_m[name] + TURN_S * DESCENT_M_S if mode == "LANDING" else 0.0
 
     def sees(self, observer: str, subject: str) -> bool:
-        """Whether this observer, if it flies, has this subject in sight."""
+        """Return whether this observer is in flight and has this subject in view."""
         here = observer not in self.drones or observer in self.flying()
         return here and subject not in self.unseen_s
 
     def flying(self) -> list[str]:
         return [name for name in self.drones if self.modes[name] not in ("LANDED", "CUT")]
 
-    # -- what is said ---
+    # -- publishing ---
 
     def _turn(self, tick: int, s: float) -> None:
         self._sink()
@@ -281,10 +281,10 @@ class FakeFlight(threading.Thread):
         bus = self.bus("tracker")
         bus.publish(t.EVENT, m.Event(header=bus.header(entity), severity=severity, text=text, remedy=remedy))
 
-    # -- what is obeyed ---
+    # -- commands ---
 
     def _obey(self, command: m.Command) -> None:
-        # As a driver does: what is said again is answered again, since the first answers may have been lost.
+        # As a driver does: a repeated command is answered again, since the first answers may have been lost.
         if all(known.id != command.id for known in self.commands):
             self.commands.append(command)
         now = time.monotonic()

@@ -3,7 +3,7 @@
 from typing import Any
 
 LEAST_PX = 14.0
-# To be run before the page's own scripts: remembers the size of each text drawn on a canvas, in pixels of the page.
+# To be run before the page's own scripts: records the size of each text drawn on a canvas, in pixels of the page.
 REMEMBER = """(() => { window.__drawn = {}; const draw = CanvasRenderingContext2D.prototype.fillText;
   CanvasRenderingContext2D.prototype.fillText = function (words, ...place) {
     const size = parseFloat(this.font.match(/([\\d.]+)px/)[1]);

@@ -13,7 +13,7 @@ OPTIONS = (
     "--only-categories=accessibility",
     "--preset=desktop",
     "--disable-storage-reset",  # the wall view is a choice that the browser remembers
-    "--max-wait-for-load=15000",  # a page that is sent something 20 times a second is never idle
+    "--max-wait-for-load=15000",  # a page that receives 20 messages a second is never idle
     "--no-enable-error-reporting",
     "--output=json",
     "--quiet",

@@ -2,7 +2,7 @@
 
 from seen_page import Seen
 
-# What is pressed in a hurry, and what is looked at first.
+# Elements to press in a hurry, and those looked at first.
 FIXED = """() => Object.fromEntries(
     [...document.querySelectorAll(
       "#shell :is(button, dd), #team, #team article, #team :is(button, .pill, dd), main .map button, #map, #orders")]
@@ -13,11 +13,11 @@ FIXED = """() => Object.fromEntries(
 
 
 def boxes(page: Seen) -> dict[str, list[float]]:
-    """Return where everything stands that must not move, and how large it is; of words only where they begin."""
+    """Return place and size of each element that must not move; of texts the start only."""
     return dict(page.page.evaluate(FIXED))
 
 
 def moved(page: Seen, before: dict[str, list[float]]) -> dict[str, tuple[list[float], list[float] | None]]:
-    """Return what stands elsewhere than before: 0 px are allowed."""
+    """Return the elements that have moved; 0 px are allowed."""
     after = boxes(page)
     return {name: (box, after.get(name)) for name, box in before.items() if after.get(name) != box}

@@ -29,7 +29,7 @@ def answers(url: str) -> bool:
 
 @pytest.fixture(scope="module")
 def kernels() -> None:
-    """Compile the tracker's kernels before the run: on a busy machine that takes longer than a run waits for it."""
+    """Compile the tracker's kernels before the run: on a busy machine that takes longer than the run waits."""
     script = (
         "import sys; from groundstation.process import numba_cache; numba_cache.activate();"
         "from groundstation.field.resolved import field_from_json; from groundstation.runtime.warm_up import warm_up;"
@@ -61,5 +61,5 @@ def live(
 @pytest.fixture
 def served(live: runtime_file.RuntimeRecord, free_port: int) -> str:
     url = f"http://127.0.0.1:{free_port}/"
-    eventually(lambda: answers(url), 30.0, "the run's console answers")  # a page that is refused says so on its console
+    eventually(lambda: answers(url), 30.0, "the run's console answers")  # a refused page reports that on its console
     return url

@@ -19,7 +19,7 @@ from groundstation.recording.chunks import frames
 
 @dataclass(frozen=True)
 class Recorded:
-    """A run folder, and the state of a live page when the last message had come."""
+    """A run folder, and the last state of a live page."""
 
     folder: Path
     live: dict[str, Any]
@@ -40,7 +40,7 @@ def start_recorder(endpoint: str, folder: Path) -> "subprocess.Popen[bytes]":
 
 
 def _until_it_records(path: Path) -> None:
-    """Wait for a second chunk: a recording whose first messages come with the gust would show it from its start."""
+    """Wait for a second chunk: a recording that starts with a burst of messages would show the flight from there."""
     deadline = time.monotonic() + 30
     while not (path.exists() and _chunks(path) >= 2):
         assert time.monotonic() < deadline, "the recorder does not start"
@@ -53,7 +53,7 @@ def _chunks(path: Path) -> int:
 
 
 def record(flight: FakeFlight, page: Any, folder: Path, seconds: float) -> Recorded:
-    """Record a flight to its end; the page looks on live."""
+    """Record a flight to its end while a live page is open."""
     recorder = start_recorder(flight.endpoint, folder)
     try:
         _until_it_records(folder / "state.mcap")

@@ -28,14 +28,14 @@ def eventually(condition: Callable[[], Any], within_s: float = WITHIN_S, what: s
 
 @dataclass
 class Seen:
-    """One page, and everything it did that it should not have done."""
+    """One page, and a record of everything that went wrong in it."""
 
     page: Any
     requests: list[str] = field(default_factory=list)
     troubles: list[str] = field(default_factory=list)
 
     def state(self) -> dict[str, Any]:
-        # No wait_for_function: it evaluates a string in the page, which the content security policy forbids.
+        # Not wait_for_function: it evaluates a string in the page, which the content security policy forbids.
         return dict(self.page.evaluate("() => window.__console?.state ?? {}"))
 
     def wait(self, condition: Callable[[dict[str, Any]], Any], within_s: float = WITHIN_S) -> Any:
@@ -48,7 +48,7 @@ class Seen:
         pytest.fail(f"the page did not come to this within {within_s:g} s")
 
     def slow_down(self, times: int) -> None:
-        """Let the page's clocks go slower than the computer's, which may need long for what the page waits for."""
+        """Slow the page's clocks, because the computer may need long for an event that the page waits for."""
         self.page.evaluate(
             """(times) => { for (const clock of [performance, Date]) {
                 const now = clock.now.bind(clock), start = now();
@@ -69,7 +69,7 @@ class Seen:
 
 
 def give_role(context: Any, role: str) -> None:
-    """Let the server's welcome name another role, as it does for an invited device."""
+    """Change the role in the server's welcome, as for an invited device."""
 
     def between(page: Any) -> None:
         server = page.connect_to_server()
@@ -84,7 +84,7 @@ def give_role(context: Any, role: str) -> None:
 
 
 def open_seen(browser: Any, contexts: list[Any], url: str, role: str = "", script: str = "", **options: Any) -> Seen:
-    """Return a page of its own profile at the address, once it has the first frames; the script runs before its own."""
+    """Open a page with its own profile; return it once it has its first frames. The script runs before the page's."""
     from playwright.sync_api import Error
 
     context = browser.new_context(**{"viewport": {"width": 1440, "height": 900}} | options)

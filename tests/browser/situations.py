@@ -74,6 +74,6 @@ SITUATIONS: dict[str, Callable[[FakeFlight], None]] = {
         one_has_a_weak_link,
         one_stands_with_an_unknown_battery,
         the_target_is_lost,
-        one_lands_for_its_battery,  # the last: its event stays in the list
+        one_lands_for_its_battery,  # the last one, because its event stays in the list
     )
 }

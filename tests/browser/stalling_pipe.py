@@ -8,7 +8,7 @@ from free_port import free_port
 
 
 class StallingPipe:
-    """Passes connections on; while `stalled` it takes everything and passes nothing. What stalled once stays dead."""
+    """TCP proxy; while `stalled` it accepts data and passes nothing on. A connection that has stalled stays dead."""
 
     def __init__(self, behind: int) -> None:
         self.stalled = threading.Event()
@@ -50,4 +50,4 @@ class StallingPipe:
             if not dead:
                 sink.shutdown(socket.SHUT_WR)
         except OSError:
-            pass  # the other way has ended it
+            pass  # the other direction has ended it

@@ -17,12 +17,12 @@ pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 
 def weak_links(state: dict[str, Any]) -> list[str]:
-    """Return the words of those past alarms that these tests raise; a busy machine may add others."""
+    """Return the texts of the past alarms that these tests raise; a busy machine may add others."""
     return [past["text"] for past in state["sections"]["past_alarms"] if "weak link" in past["text"]]
 
 
 def counted(button: Any) -> int:
-    """Return how many past alarms the button counts; it says no number where there are none."""
+    """Return the number of past alarms on the button; it shows none for 0."""
     return int(str(button.inner_text()).removeprefix("Past alarms") or 0)
 
 
@@ -41,7 +41,7 @@ def test_past_alarms_are_read_behind_the_strip_by_keyboard(stage: Any) -> None:
     assert weak_links(page.state()) == []  # it lasts
     stage.flight.link.clear()
     page.wait(weak_links)
-    # At least: the page adds what only it noticed.
+    # At least: the page adds alarms that only it noticed.
     page.wait(lambda s: counted(button) >= len(s["sections"]["past_alarms"]) > 0)
     button.focus()
     page.page.keyboard.press("Enter")

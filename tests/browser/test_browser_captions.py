@@ -12,14 +12,14 @@ from groundstation.bus import topics as t
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
-# Of each button that may not be pressed, or would change nothing: its caption.
+# The caption of each button that may not be pressed or would change nothing.
 IDLE = """() => [...document.querySelectorAll(":is(.stops, .starts, .actions) button:is(:disabled, .idle) small")]
   .map((one) => one.innerText)"""
 REASON = re.compile(r"not now: |no: |no use: |nobody flies|\balready\b|\banyway\b|instead$|^battery unknown$")
 
 
 def order(flight: FakeFlight, verb: m.Verb, issuer: str) -> None:
-    """Order all drones, as a program that is not the page does."""
+    """Command all drones from a program other than the page."""
     bus = flight.bus(issuer)
     header = bus.header(issuer)
     bus.publish(t.COMMAND, m.Command(header=header, id=f"{issuer}-{verb}", verb=verb, scope=DRONES, issuer=issuer))

@@ -28,7 +28,7 @@ _LISTEN = """() => { window.__clicked = []; document.addEventListener("click", (
 
 
 class Datagrams:
-    """When each drone was told to move or to hover, by the driver's stamp of the datagram [s since boot]."""
+    """Times of datagrams with motion and with hover to each drone, by the driver's stamp [s since boot]."""
 
     def __init__(self, bus: ZenohBus) -> None:
         self._sent = bus.subscribe([RAW_TX], capacity=20_000)
@@ -53,7 +53,7 @@ class Datagrams:
         return not any(heard and heard[-1][1] for heard in self.heard.values())
 
     def given_s(self, since_s: float) -> float:
-        """Return after how long the console gave the order."""
+        """Return the time from the click to the console's command [s]."""
         return next((at - since_s for at in self.look().holds.values() if at >= since_s), math.nan)
 
     def obeyed_s(self, drone: str, since_s: float) -> float | None:

@@ -37,7 +37,7 @@ def test_keys_stop_too(stage: Any) -> None:
 def test_a_key_that_is_held_down_on_a_button_presses_it_once(stage: Any) -> None:
     page = stage.open()
     page.there("hold").focus()
-    for _ in range(20):  # the first, and what a keyboard repeats
+    for _ in range(20):  # the first, and the keyboard's repetitions
         page.page.keyboard.down("Enter")
     page.page.keyboard.up("Enter")
     page.wait(lambda s: s["orders"] and s["orders"][0]["state"] == "confirmed")
@@ -66,7 +66,7 @@ def test_an_order_that_nobody_answers_is_red_until_it_is(stage: Any) -> None:
     assert "NOT CONFIRMED" in line.inner_text() and "drone_2 no answer" in line.inner_text().replace("\n", " ")
     alarm = page.there("banner-unheard")
     assert "LAND NOT CONFIRMED: no answer from drone_2" in alarm.inner_text()
-    page.there("drone_1-hold").click()  # what drone_1 hears says nothing of drone_2
+    page.there("drone_1-hold").click()  # commands to drone_1 say nothing about drone_2
     page.wait(lambda s: s["orders"][0]["state"] == "confirmed")
     page.page.wait_for_timeout(1000)
     assert "LAND NOT CONFIRMED: no answer from drone_2" in alarm.inner_text()
@@ -111,7 +111,7 @@ def test_one_operator_at_a_time(stage: Any) -> None:
     first.there("take-off").click()
     first.wait(lambda s: verbs(stage) == ["TAKEOFF"])
     (command,) = stage.flight.commands
-    assert command.scope[0] == "operator"  # starts are the lease holder's business
+    assert command.scope[0] == "operator"  # starts need the lease
     second.page.wait_for_timeout(600)
     assert second.there("track").is_disabled()
     second.there("hold").click()  # anybody may stop
@@ -174,7 +174,7 @@ def test_answers_that_were_lost_are_given_again(stage: Any) -> None:
     assert page.state()["orders"][0]["state"] == "sent"
     stage.flight.deaf = set()
     page.wait(lambda s: s["orders"][0]["state"] == "confirmed")
-    assert verbs(stage) == ["LAND"]  # said again, but one command
+    assert verbs(stage) == ["LAND"]  # repeated, but one command
 
 
 def test_a_device_that_may_only_stop_has_stops_and_says_why_it_cannot_start(stage: Any) -> None:

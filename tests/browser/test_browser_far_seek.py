@@ -14,7 +14,7 @@ from seen_page import Seen
 pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.exhaustive, pytest.mark.timeout(300)]
 
 _RECORDED_S, _JUMPS, _LIMIT_MS = 80.0, 30, 200.0
-# The page's own time from a key to the first picture drawn from what the jump brought [ms].
+# The page's own time from a key press to the first picture after the jump [ms].
 _JUMP = """(key) => new Promise((done) => {
     const before = window.__console.state, began = performance.now();
     dispatchEvent(new KeyboardEvent("keydown", {key}));

@@ -19,7 +19,7 @@ FROZEN_S = 20.0
 
 
 class DevTools:
-    """A browser's debugging port, spoken to without waiting for an answer: a frozen page has none."""
+    """A browser's debugging port; requests do not wait for answers, since a frozen page gives none."""
 
     def __init__(self, port: int) -> None:
         self._port = port
@@ -84,7 +84,7 @@ def test_what_was_pressed_on_a_frozen_page_is_not_given_when_it_goes_on(watched:
     page.wait(
         lambda s: s["estimateAge"] < 500 and page.there("drone_1-heard").inner_text().startswith("0."), within_s=5
     )
-    page.page.wait_for_timeout(1000)  # what is pressed from now on is new
+    page.page.wait_for_timeout(1000)  # clicks from now on are new
     page.there("land-all").click()
     page.wait(lambda s: any(order["state"] == "confirmed" for order in s["orders"]))
     assert [command.verb for command in stage.flight.commands] == ["LAND"]

@@ -15,7 +15,7 @@ from groundstation.bus.messages import RUN, Severity
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 SIZES = ((1440, 900), (1024, 768), (390, 844), (2560, 1440))
-# The situations are looked at in all sizes; a whole flight in a desk's and a phone's, on demand in the others.
+# The situations are checked at all sizes; a whole flight at a desk's and a phone's, at the others on demand.
 FLOWN = [
     pytest.param(size, marks=() if size in ((1440, 900), (390, 844)) else pytest.mark.exhaustive) for size in SIZES
 ]
@@ -23,7 +23,7 @@ FLOWN = [
 
 def resize(page: Seen, size: tuple[int, int]) -> None:
     page.page.set_viewport_size({"width": size[0], "height": size[1]})
-    page.page.wait_for_timeout(300)  # until the page has written what fits there
+    page.page.wait_for_timeout(300)  # until the page has chosen the texts that fit
 
 
 def ten_alarms(flight: FakeFlight) -> None:
@@ -64,7 +64,7 @@ def test_nothing_moves_while_alarms_and_orders_come(stage: Any, size: tuple[int,
 
 
 def whole(page: Seen) -> list[str]:
-    """Return what is wrong with the page as it stands: cut off, covered, too small, or wider than the window."""
+    """Return the faults of the page's layout: clipped, covered, too small, or wider than the window."""
     wide = page.page.evaluate(
         "() => document.documentElement.scrollWidth > innerWidth ? ['wider than the window'] : []"
     )
@@ -96,7 +96,7 @@ def test_no_text_is_cut_off_from_the_flight_to_the_end_of_the_run(stage: Any, si
 
 
 def test_the_whole_team_is_in_sight(stage: Any) -> None:
-    """Its mode, its battery and its stops, without scrolling; on a phone above the stops of all."""
+    """Mode, battery and stops of each drone, without scrolling; on a phone above the stops for all."""
     page = stage.open()
     ten_alarms(stage.flight)
     for size in SIZES:
@@ -127,7 +127,7 @@ def test_an_alarm_of_any_length_can_be_read(stage: Any) -> None:
 
 @pytest.mark.exhaustive
 def test_the_bar_says_how_long_the_worst_battery_lasts(stage: Any) -> None:
-    """By the usual drain of its kind at first; after a minute what this flight has spent counts in full."""
+    """At first by the usual drain of its kind; after a minute this flight's own drain has full weight."""
     page = stage.open()
     stage.flight.battery = {"drone_1": 0.9, "drone_2": 0.6}
     page.wait(lambda s: page.there("worst-battery").inner_text() == "60 % drone_2")
@@ -139,7 +139,7 @@ def test_the_bar_says_how_long_the_worst_battery_lasts(stage: Any) -> None:
     page.wait(lambda s: page.there("worst-battery").inner_text() == "52 % drone_1")
     assert page.there("battery-lasts").inner_text() == "worst battery, good for ~1 min"
     stage.flight.modes["drone_2"] = "LANDED"
-    page.wait(lambda s: "good for" not in page.there("card-drone_2").inner_text())  # it stands while others fly
+    page.wait(lambda s: "good for" not in page.there("card-drone_2").inner_text())  # on the ground while others fly
     assert "good for ~1 min" in page.there("card-drone_1").inner_text()
 
 
@@ -209,7 +209,7 @@ def test_each_drone_says_what_it_does_and_why(stage: Any) -> None:
     assert page.there("take-off").inner_text() == "TAKE OFF\nboth rise, one by one"
 
 
-# Whether it is safe, why, who does what, what HOLD would do, and the modes on the cards of both drones.
+# Safety and its reason, who does what, the effect of HOLD, and the modes on the cards of both drones.
 TOLD = {
     "all_is_well": ("SAFE", "No alarms", "track the target. Nobody is lost.", "both hover in place", "track", "track"),
     "one_lands_for_its_battery": (
@@ -256,10 +256,10 @@ def test_every_situation_is_told_in_one_way_and_moves_nothing(stage: Any) -> Non
         stands[size] = boxes(page)
     for name, arrange in SITUATIONS.items():
         SITUATIONS["all_is_well"](stage.flight)
-        page.page.wait_for_timeout(300)  # until the page has it
+        page.page.wait_for_timeout(300)  # until the page has received it
         arrange(stage.flight)
         page.wait(lambda s, name=name: told(name))
-        page.page.wait_for_timeout(700)  # until what was seen in the situation before counts no more
+        page.page.wait_for_timeout(700)  # until observations of the previous situation no longer count
         for size in SIZES:
             resize(page, size)
             assert whole(page) == [], (name, size)
@@ -306,7 +306,7 @@ def test_a_low_or_narrow_screen_has_the_stops_and_reaches_the_team(stage: Any, s
     resize(page, size)
     page.wait(lambda s: page.there("banner-none").is_visible())
     assert clipped(page.page) == [] and covered(page.page) == []
-    page.there("drone_1-land").click(timeout=5000)  # what lies over it would have the click
+    page.there("drone_1-land").click(timeout=5000)  # an element above it would get the click
     for stop in ("hold", "land-all"):
         page.there(stop).click(timeout=5000)
     page.wait(lambda s: len(s["orders"]) == 3)

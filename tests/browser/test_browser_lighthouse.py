@@ -13,7 +13,7 @@ pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 
 class Debugged(NamedTuple):
-    """A page of a browser that Lighthouse can enter by this port, and shares the profile of."""
+    """A page of a browser whose debugging port and profile Lighthouse can use."""
 
     page: Any
     port: int

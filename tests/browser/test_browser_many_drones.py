@@ -11,7 +11,7 @@ from situations import SITUATIONS
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 SIZES = ((1440, 900), (1280, 800), (2560, 1440), (390, 844))
-# Whether words of the bar lie on others.
+# Whether texts of the bar overlap.
 OVERLAID = """() => { const boxes = [...document.querySelectorAll(".readings :is(dt, dd)")].map((one) => {
   const words = document.createRange(); words.selectNodeContents(one); return words.getBoundingClientRect(); });
   return boxes.some((a, index) => boxes.slice(index + 1).some((b) =>
@@ -22,7 +22,7 @@ BELOW = """() => [...document.querySelectorAll(".unit")].filter((one) => {
 
 
 def all_at_once(flight: Any) -> None:
-    """Somebody lands, holds, hovers, stands and is lost, while others track."""
+    """Drones that land, hold, hover, stand and are lost, while others track."""
     doing = ("TRACK", "TRACK", "HOLD", "LANDING", "LANDED", "TRACK", "TRACK", "HOVER")
     flight.modes = dict(zip(flight.drones, doing, strict=True))
     flight.unseen_s["drone_6"] = 4.0

@@ -17,13 +17,13 @@ from groundstation.bus.messages import Severity
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 CONFIG = Path(__file__).parents[2] / "config"
-LONG = "the_longest_name_that_a_drone_may_have_in"  # 41 letters: its camera is called as it is, and _camera
+LONG = "the_longest_name_that_a_drone_may_have_in"  # 41 letters; its camera has the same name with _camera
 SIZES = ((390, 844), (1024, 768), (1440, 900), (2560, 1440))
 
 
 @pytest.fixture
 def named(browser: Any, tmp_path: Path) -> Iterator[Callable[..., Stage]]:
-    """Stages of a field whose drone_1 has another name; `heard`: the drones that say anything."""
+    """Stages of a field with another name for drone_1; `heard`: the drones with telemetry."""
     made = []
     shutil.copytree(CONFIG / "cameras", tmp_path / "cameras")
 
@@ -62,11 +62,11 @@ def test_no_text_is_cut_off_where_names_are_long(named: Any, size: tuple[int, in
     page.page.wait_for_timeout(700)
     page.shot(f"long_name_{size[0]}")
     assert LONG not in page.there("verdict").inner_text() and LONG in page.there("orders").inner_text()
-    # An alarm that is longer than its strip opens over the page, as any other.
+    # An alarm longer than its strip opens over the page, as any other.
     assert [words for words in wrong(page) if not words.startswith("banners")] == []
 
 
 def wrong(page: Seen) -> list[str]:
-    """Return what is cut off, covered, too small, or wider than the window."""
+    """Return the texts that are clipped, covered, too small, or wider than the window."""
     wide = page.page.evaluate("() => document.documentElement.scrollWidth > innerWidth ? ['wide'] : []")
     return [*clipped(page.page), *covered(page.page), *small(page.page), *wide]

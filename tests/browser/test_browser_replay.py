@@ -13,7 +13,7 @@ from seen_page import Seen, open_seen
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
-# What the fake flight's own processes say: the recorder's and console's own words go on after it.
+# Messages of the fake flight's own processes; those of recorder and console go on after it.
 _COMPARED = ("estimate", "setpoints", "truth", "vehicles", "plan", "cameras")
 
 
@@ -28,7 +28,7 @@ def recorded(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator
 
 @pytest.fixture
 def replay(browser: Any, recorded: Recorded, free_port: int) -> Iterator[Callable[..., Seen]]:
-    """Start the command and open its page; once more: another page of the same replay."""
+    """Start the command and open its page; a further call opens another page of the same replay."""
     contexts: list[Any] = []
     command = [sys.executable, "-m", "groundstation", "replay", str(recorded.folder), "--port", str(free_port)]
     process = subprocess.Popen([*command, "--paused"], stdout=subprocess.DEVNULL)
@@ -50,7 +50,7 @@ def test_it_ends_with_the_picture_that_the_live_page_had(replay: Callable[..., S
     live, then = recorded.live, state["sections"]
     for name in _COMPARED:
         assert then[name] == live["sections"][name], name
-    # What was said before the recorder began is in no recording.
+    # Messages from before the recorder's start are in no recording.
     events = [event["text"] for event in then["events"]]
     assert "a gust" in events and events == [event["text"] for event in live["sections"]["events"]][-len(events) :]
     (order,), (given,) = then["orders"], live["orders"]
@@ -128,7 +128,7 @@ def test_a_reloaded_and_a_second_page_see_the_same(replay: Callable[..., Seen]) 
         assert state["sections"]["estimate"] == before["sections"]["estimate"]
         assert state["trail"] == before["trail"] and state["samples"] == before["samples"]
         assert state["playback"] == before["playback"]
-    page.page.keyboard.press("Home")  # the knobs are shared
+    page.page.keyboard.press("Home")  # all pages share the controls
     page.wait(lambda s: not s["playback"]["ended"])
 
 
@@ -154,18 +154,18 @@ def test_the_fastest_replay_loses_nothing(replay: Callable[..., Seen], recorded:
     page.there("speed").select_option("20")
     page.there("play").click()
     page.wait(lambda s: s["playback"]["ended"])
-    page.page.wait_for_timeout(800)  # some sections are told four times a second
+    page.page.wait_for_timeout(800)  # some sections are sent four times a second
     fast = page.state()
     page.page.keyboard.press("Home")
     page.wait(lambda s: not s["playback"]["ended"])
     page.page.keyboard.press("End")
     page.wait(lambda s: s["playback"]["ended"])
-    page.page.wait_for_timeout(800)  # the moment comes first, what led to it in the next turn
+    page.page.wait_for_timeout(800)  # the moment comes first, its history in the next turn
     sought = page.state()
     for name in _COMPARED:
         assert fast["sections"][name] == sought["sections"][name], name
     for name, length in sought["trail"].items():
-        # Points of the trail come with frames: at this speed one that the page drew late stands for several.
+        # Points of the trail come with frames: at this speed, one frame drawn late stands for several.
         assert abs(fast["trail"][name] - length) <= max(2, length // 6)
     assert not page.troubles, page.troubles
 

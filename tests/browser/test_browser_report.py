@@ -59,7 +59,7 @@ def test_page_draws_its_charts_from_the_file_alone(browser: Any, tmp_path: Path)
       return d.some((value) => value !== 0);
     })"""
     assert all(page.evaluate(painted))
-    assert page.evaluate("document.documentElement.scrollWidth") <= 390  # nothing sticks out of a phone's screen
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390  # nothing exceeds a phone's screen
     page.screenshot(path=tmp_path / "phone.png")
     found = violations(page)
     assert not found, "\n".join(found)

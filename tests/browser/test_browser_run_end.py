@@ -19,8 +19,8 @@ pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 
 def end_run(stage: Any, severity: Severity, how: str) -> None:
-    """End the run as the main process does: a word on the bus, and a signal to each process."""
-    stage.console.terminate()  # the word is often slower than the signal
+    """End the run as the main process does: a message on the bus, and a signal to each process."""
+    stage.console.terminate()  # the message is often slower than the signal
     stage.flight.event(severity, f"run ended: {how}", RUN)
     stage.console.wait(10)
 
@@ -29,7 +29,7 @@ def ended_page(stage: Any, severity: Severity, how: str) -> Seen:
     page: Seen = stage.open()
     end_run(stage, severity, how)
     page.wait(lambda s: not s["connected"])
-    page.page.wait_for_timeout(1500)  # for all that it might say after a loss of its connection
+    page.page.wait_for_timeout(1500)  # for all messages that it might send after a lost connection
     return page
 
 
@@ -47,7 +47,7 @@ def test_a_normal_end_is_calm_and_leaves_nothing_to_stop(stage: Any) -> None:
     assert page.page.locator(".banner").count() == 1  # no NO CONNECTION, no TRACKER SILENT, no alarm
     assert page.there("link").inner_text() == "run ended"
     assert all(stop.is_disabled() and "the run has ended" in stop.get_attribute("title") for stop in stops(page))
-    page.page.wait_for_timeout(3000)  # nobody beats any more, and nobody needs to
+    page.page.wait_for_timeout(3000)  # no process sends heartbeats any more, and none needs to
     assert page.there("recording").inner_text() == "ended"
     assert page.there("worst-age").inner_text() == "–"
     assert page.there("turtlebot-duty").inner_text() == "The run is over."
@@ -74,9 +74,9 @@ def test_an_end_without_a_landing_is_grave(stage: Any) -> None:
     strip.wait_for(timeout=20_000)
     assert "grave" in strip.get_attribute("class")
     stage.flight.event(Severity.ERROR, "drone_1 LANDING: nothing heard of the supervisor", "drone_1")
-    alarms = page.page.locator("[data-testid=banner-alarm]")  # what stops are given by
+    alarms = page.page.locator("[data-testid=banner-alarm]")  # an operator gives stops because of these
     eventually(lambda: any("drone_1 LANDING" in text for text in alarms.all_text_contents()), what="the alarm stays")
-    assert all(stop.is_enabled() for stop in stops(page))  # for as long as there is somebody to take them
+    assert all(stop.is_enabled() for stop in stops(page))  # while there is a recipient
     stage.console.terminate()
     stage.console.wait(10)
     eventually(lambda: all(stop.is_disabled() for stop in stops(page)), what="the stops are off")
@@ -96,7 +96,7 @@ def test_a_console_that_dies_is_no_end_of_the_run(stage: Any) -> None:
 
 
 def judged_run(folder: Path) -> None:
-    """Write what a run leaves that failed, as the command writes it."""
+    """Write the files of a failed run, as the command does."""
     folder.mkdir(exist_ok=True)
     run_facts.write(folder, run_facts.RunFacts(command="groundstation demo --duration 15"))
     judged = {"verdict": "failed", "reasons": ["target error (rms) 0.3 m, asked for at most 0.2 m"]}

@@ -23,7 +23,7 @@ from groundstation.bus.zenoh_bus import ZenohBus
 from groundstation.supervisor import runtime_file
 from groundstation.supervisor.joining import join
 
-# A flight and a browser that draws in software are more than two slow cores have.
+# A flight and a browser with software rendering need more than two slow cores.
 pytestmark = [pytest.mark.browser, pytest.mark.sitl, pytest.mark.slow, pytest.mark.exhaustive, pytest.mark.timeout(600)]
 
 _FLY, _LAND = 290718208, 290717696
@@ -34,12 +34,12 @@ _TABLET = {
     "viewport": {"width": 820, "height": 1180},
     "is_mobile": True,
     "has_touch": True,
-    "ignore_https_errors": True,  # nobody signed the console's certificate: a person compares its fingerprint
+    "ignore_https_errors": True,  # the console's certificate is self-signed: a person compares its fingerprint
 }
 
 
 class Witness:
-    """Hears what drivers send to their drones, and where the bodies really are."""
+    """Records the drivers' messages to their drones, and the true poses."""
 
     def __init__(self, bus: ZenohBus) -> None:
         self.bus = bus
@@ -66,7 +66,7 @@ def test_land_all_reaches_the_emulated_drones(live: runtime_file.RuntimeRecord, 
         eventually(lambda: not live.supervisor.alive or _aloft(witness.look()), 150.0, "both drones fly")
         assert live.supervisor.alive, "the run has ended before its time"
         page.wait(lambda s: {"drone_1", "drone_2"} <= set(s["ellipses"]), 60.0)
-        # Both carry their own camera, whose H.264 reaches the page as the JPEGs that its driver makes of it.
+        # Both drones have an own camera, whose H.264 reaches the page as JPEGs made by its driver.
         for camera in ("ceiling", "drone_1_camera", "drone_2_camera"):
             page.there(f"camera-{camera}").locator(".veil").wait_for(state="hidden", timeout=60_000)
         page.page.wait_for_timeout(1500)
@@ -84,7 +84,7 @@ def test_land_all_reaches_the_emulated_drones(live: runtime_file.RuntimeRecord, 
 
 
 def _hold_by_tablet(open_page: Any) -> None:
-    """A tablet that was invited to stop comes in over TLS, touches HOLD, and may do nothing more."""
+    """Connect a tablet with the right to stop over TLS and touch HOLD; it may do nothing else."""
     command = [sys.executable, "-m", "groundstation", "console", "--invite", "stop"]
     said = subprocess.run(command, capture_output=True, text=True, timeout=30, check=True).stdout
     invitation = next(line for line in said.splitlines() if line.startswith("https://"))
@@ -99,13 +99,13 @@ def _hold_by_tablet(open_page: Any) -> None:
     stranger = tablet.page.context.browser.new_context(**_TABLET)
     assert stranger.new_page().goto(invitation).status == 403, "the code works once"
     stranger.close()
-    tablet.page.context.close()  # two pages that are drawn in software take what a flight beside them needs
+    tablet.page.context.close()  # two pages with software rendering leave a flight too little processor time
 
 
 def test_ten_slow_viewers_leave_the_tracker_its_deadlines(
     live: runtime_file.RuntimeRecord, served: str, record_property: Callable[[str, object], None]
 ) -> None:
-    """Ten pages that take nothing, in every other window of the same flight: what else the machine does is in both."""
+    """Ten viewers that read nothing, in every other window of one flight; other load is the same in all windows."""
     bus = join(live, "view", Role.VIEW)
     try:
         witness, pace = Witness(bus), Pace(bus)
@@ -125,13 +125,13 @@ def test_ten_slow_viewers_leave_the_tracker_its_deadlines(
     record_property("late", figures)
     print(f"{figures}; load {os.getloadavg()[0]:.1f}")
     assert with_them["ticks"] > 0.8 * without["ticks"]
-    # Twice the standard deviation of the difference of two such shares, and what one hiccup of the machine costs.
+    # Twice the standard deviation of the difference of two such shares, plus one hiccup of the machine.
     assert late_with < late + 0.03 + 2.0 * math.sqrt((late + 0.001) * 2 / without["ticks"])
 
 
 @contextmanager
 def idle_viewer(url: str) -> Iterator[None]:
-    """A page that shakes hands, asks for all pictures, and then reads nothing any more."""
+    """A page that shakes hands, requests all pictures, and then reads nothing."""
     origin = url.rstrip("/")
     host, port = origin.removeprefix("http://").split(":")
     with socket.create_connection((host, int(port)), timeout=10) as page:
@@ -149,7 +149,7 @@ def idle_viewer(url: str) -> Iterator[None]:
 
 
 class Pace:
-    """How many ticks of the tracker there were, and how many of them were late."""
+    """Number of ticks of the tracker, and of late ones."""
 
     def __init__(self, bus: ZenohBus) -> None:
         self._told = bus.subscribe([t.PROCESS_STATUS], entity="tracker", newest=True)

@@ -11,7 +11,7 @@ from groundstation.bus.messages import Severity
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
-# In the place of the browser's speech, tones and vibration: what would be heard and felt.
+# Replaces the browser's speech, tones and vibration, and records them.
 STUBS = """
   const heard = window.__heard = {spoken: [], tones: [], shakes: []};
   window.SpeechSynthesisUtterance = class { constructor(words) { this.words = words; } };
@@ -35,7 +35,7 @@ def forget(page: Seen) -> None:
 
 
 def listen(stage: Any, muted: bool = False) -> Seen:
-    """Return a page on which somebody has pressed a key, while all is well."""
+    """Return a page on which somebody has pressed a key, without alarms."""
     SITUATIONS["all_is_well"](stage.flight)
     page: Seen = stage.open(script=STUBS)
     page.wait(lambda s: page.there("worst-battery").inner_text().startswith("71 %"))
@@ -46,7 +46,7 @@ def listen(stage: Any, muted: bool = False) -> Seen:
 
 
 def becomes(page: Seen, words: str, tone: int, shakes: list[int]) -> None:
-    """Wait until these words are spoken, as the only ones; then forget them."""
+    """Wait until exactly these words are spoken; then forget them."""
     page.wait(lambda s: words in heard(page)["spoken"])
     assert heard(page) == {"spoken": [words], "tones": [tone], "shakes": [shakes] if shakes else []}
     forget(page)
@@ -85,7 +85,7 @@ def test_muted_only_stops_are_heard_and_felt(stage: Any) -> None:
 
 def test_before_the_first_touch_it_only_speaks(stage: Any) -> None:
     SITUATIONS["all_is_well"](stage.flight)
-    # What looks into the page for this test counts as a touch; so the answer is given in the browser's place.
+    # The test's own access to the page counts as a touch, so the answer is given in the browser's place.
     untouched = "Object.defineProperty(navigator, 'userActivation', {value: {hasBeenActive: false}});"
     page = stage.open(script=STUBS + untouched)
     stage.flight.battery["drone_2"] = 0.28

@@ -20,7 +20,7 @@ LINK = PreflightFinding("SHOULD", "drone_2", "telemetry 4 Hz", "bring it nearer"
 
 @pytest.fixture
 def floor(browser: Any) -> Iterator[Stage]:
-    """Two drones that stand and have not flown."""
+    """Two drones that are on the ground and have not flown."""
     flight = FakeFlight()
     flight.modes = dict.fromkeys(flight.modes, "LANDED")
     flight.battery = dict.fromkeys(flight.drones, 0.8)
@@ -74,7 +74,7 @@ def test_a_must_keeps_take_off_shut_until_it_is_mended_or_somebody_insists(floor
     assert page.there("drone_2-duty").inner_text() == "Stands with its motors off."  # its driver gives no reason
 
     anyway = page.there("anyway")
-    anyway.click()  # one click is no second of pressing
+    anyway.click()  # one click is not a press of one second
     page.page.wait_for_timeout(1200)
     assert floor.flight.commands == []
     anyway.hover()
@@ -84,7 +84,7 @@ def test_a_must_keeps_take_off_shut_until_it_is_mended_or_somebody_insists(floor
     (command,) = eventually(lambda: floor.flight.commands, what="the order")
     assert (command.verb, command.anyway, command.scope) == (Verb.TAKEOFF, True, ("operator",))
     assert command.issuer.startswith("console (viewer ")
-    page.there("preflight").wait_for(state="hidden")  # they fly: the map is wanted
+    page.there("preflight").wait_for(state="hidden")  # they fly, and the map is shown
 
 
 def test_what_is_mended_opens_take_off(floor: Stage) -> None:

@@ -27,17 +27,17 @@ def test_a_connection_that_stalls_is_opened_again_and_a_stop_given_meanwhile_goe
     page.there("land-all").click()
     page.page.wait_for_timeout(500)
     assert stage.flight.commands == []
-    pipe.stalled.clear()  # the network is back; what stalled stays dead
+    pipe.stalled.clear()  # the network is back; stalled connections stay dead
     page.wait(lambda s: s["seeds"] == 2 and any(order["state"] == "confirmed" for order in s["orders"]))
     assert [command.verb for command in stage.flight.commands] == ["LAND"]
 
 
 def test_a_connection_is_tried_for_no_longer_than_some_seconds(pipe: StallingPipe, open_page: Any) -> None:
-    """Neither the token nor the connection is waited for without end."""
+    """The waits for token and connection are both limited."""
     page = open_page(pipe.url)
     pipe.stalled.set()
     page.there("banner-link").wait_for(timeout=20_000)
-    page.page.wait_for_timeout(1500)  # it asks for the token by now, and nobody answers
+    page.page.wait_for_timeout(1500)  # it requests the token by now, and gets no answer
     pipe.stalled.clear()
     page.wait(lambda s: s["seeds"] == 2 and s["trusted"])
     before = page.state()["frames"]

@@ -30,7 +30,7 @@ def hold_cut_motors(page: Seen) -> None:
 
 
 def reconnect(page: Seen) -> dict[str, Any]:
-    """Return the state of the page once it has had the time to say everything that it means to."""
+    """Return the state of the page once it had time to send everything that it will send."""
     page.page.context.set_offline(False)
     page.wait(lambda s: s["connected"] and s["seeds"] == 2 and s["trusted"])
     page.page.wait_for_timeout(1500)
@@ -49,7 +49,7 @@ def test_a_stop_goes_out_to_a_restarted_console_of_the_same_run(stage: Any) -> N
 def test_a_stop_that_was_lost_with_its_console_goes_out_to_the_next_one(stage: Any) -> None:
     page: Seen = stage.open()
     page.slow_down(6)  # a stop lives for 5 s, in which the next console may not be there yet
-    stage.console.send_signal(signal.SIGSTOP)  # it takes what the page sends, and does nothing with it
+    stage.console.send_signal(signal.SIGSTOP)  # it accepts the page's messages, and does nothing with them
     page.there("land-all").click()
     page.page.wait_for_timeout(200)
     stage.console.kill()
@@ -70,13 +70,13 @@ def test_a_stop_never_goes_to_the_next_run(stage: Any) -> None:
     assert stage.flight.commands == [] and state["orders"] == []
     assert page.there("orders").inner_text().count("for another run") == 2
     page.shot("stop_of_another_run")
-    page.there("land-all").click()  # what is given from now on is for the run that the page shows
+    page.there("land-all").click()  # stops from now on are for the run that the page shows
     page.wait(lambda s: [command.verb for command in stage.flight.commands] == ["LAND"])
 
 
 def test_cut_motors_held_while_the_next_run_appears_does_not_cut_it(stage: Any) -> None:
     page = cut_off(stage, run="run-2")
-    # The next press of the button lasts for longer than the page needs to connect; by the page's clocks it is a second.
+    # The next press lasts for longer than the page needs to connect; by the page's clocks it is a second.
     page.page.evaluate("""() => {
         const later = setTimeout;
         window.setTimeout = (f, ms, ...rest) => later(f, ms === 1000 ? 6000 : ms, ...rest);

@@ -14,7 +14,7 @@ from fake_flight import DRONES, FakeFlight
 
 
 def slowness() -> float:
-    """Return how much longer than alone this process waits for its core now: 1 on a machine that has nothing to do."""
+    """Return the slowdown of this process by others on its core: 1 on an idle machine."""
     wall, used = time.monotonic(), time.thread_time()
     while time.thread_time() - used < 0.1:
         pass
@@ -22,13 +22,13 @@ def slowness() -> float:
 
 
 def assert_told_in_time(page: Any, kind: str) -> None:
-    """Within 1.5 s by the page's own clock, plus what the browser did not let it draw."""
+    """Require a warning within 1.5 s by the page's clock, plus the time in which the browser did not let it draw."""
     mark = page.state()["marks"][kind]
     assert mark["afterS"] < 1.5 + mark["gapS"]
 
 
 def becomes(page: Any, testid: str, attribute: str, value: str) -> str:
-    """Return the attribute as soon as it has this value, or as it is 15 s later."""
+    """Return the attribute as soon as it has this value, or after 15 s."""
     deadline = time.monotonic() + 15.0
     while (now := page.there(testid).get_attribute(attribute) or "") != value and time.monotonic() < deadline:
         page.page.wait_for_timeout(100)
@@ -163,7 +163,7 @@ def test_killed_console_comes_back_with_everything(stage: Any) -> None:
     stage.start_console()
     after = page.wait(lambda s: s["connected"] and s["seeds"] == 2 and s["trusted"] and s["frames"] > before["frames"])
     assert after["run"] == before["run"]
-    page.wait(lambda s: set(s["ellipses"]) == set(before["ellipses"]))  # as soon as the tracker speaks again
+    page.wait(lambda s: set(s["ellipses"]) == set(before["ellipses"]))  # as soon as the tracker sends again
 
 
 def test_battery_colours_at_their_thresholds(stage: Any) -> None:
@@ -254,10 +254,10 @@ def test_a_slow_viewer_slows_nobody(stage: Any) -> None:
     )
     before = fast.state()
     after = fast.wait(lambda s: s["nowMs"] - before["nowMs"] > 3000)
-    # By the page's clock: 20 a second are sent, and half of them is what a busy machine may lose.
+    # By the page's clock: 20 a second are sent, and a busy machine may lose half of them.
     assert after["frames"] - before["frames"] > 30
     caught_up = slow.wait(lambda s: s["connected"] and s["estimateAge"] < 2.0)
-    assert caught_up["seeds"] == 1  # it was never thrown out
+    assert caught_up["seeds"] == 1  # the server never disconnected it
 
 
 def test_the_map_says_why_the_topology_is_as_it_is(stage: Any) -> None:
@@ -276,7 +276,7 @@ def test_the_map_says_why_the_topology_is_as_it_is(stage: Any) -> None:
 
 
 def test_the_heights_fall_while_the_drones_land(stage: Any) -> None:
-    """On the map's belief and in the view from the side; so that a picture of a landing shows one."""
+    """On the map's estimates and in the side view; so that a picture of a landing shows one."""
     page = stage.open()
     before = page.wait(lambda s: set(DRONES) <= set(s["at"]))["at"]
     stage.flight.modes = dict.fromkeys(DRONES, "LANDING")

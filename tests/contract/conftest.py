@@ -22,7 +22,7 @@ _addresses = itertools.count(1)
 
 
 class Bench:
-    """One emulated drone on an address of its own, a client socket pair, and a hand on the clock."""
+    """One emulated drone on its own address, a pair of client sockets, and a manual clock."""
 
     def __init__(self, scenario: DroneScenario | None = None) -> None:
         pid = os.getpid()
@@ -89,7 +89,7 @@ class Bench:
         self.navdata.sendto(payload, (self.address, 5554))
 
     def connect(self, demo: str = "FALSE") -> None:
-        """Bootstrap to streaming."""
+        """Bootstrap until the drone streams."""
         self.request()
         self.say(f'CONFIG,"general:navdata_demo","{demo}"')
         self.tick(4 * 13)

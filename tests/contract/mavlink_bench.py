@@ -22,7 +22,7 @@ def sent_by(emulator):
 
 
 class Bench:
-    """One vehicle, a client that speaks when told to, and eyes that can be closed."""
+    """One vehicle, a client that sends on request, and vision that can be switched off."""
 
     def __init__(self, flavour, configured=True, scenario=CALM):
         px4 = flavour == "px4"

@@ -2,7 +2,7 @@
 
 
 class FakeProcess:
-    """Keeps what it is told; `texts` are those of its events."""
+    """Records its calls; `texts` are those of its events."""
 
     def __init__(self, bus):
         self.name, self.bus, self.section = bus.source, bus, "{}"

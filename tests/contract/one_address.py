@@ -55,7 +55,7 @@ def _checked(result: int) -> None:
 
 
 class Beyond:
-    """What is at the other end of an adapter: an AR.Drone, a PX4 and a Tello, and their clock."""
+    """The other end of an adapter: an AR.Drone, a PX4 and a Tello, and their clock."""
 
     def __init__(self, adapter: str, index: int) -> None:
         here = os.open("/proc/self/ns/net", os.O_RDONLY)
@@ -67,7 +67,7 @@ class Beyond:
         self._connect(adapter, ".2")
         with self.entered():
             self._connect("far", ".1")
-            # The place in the row is the system id of a PX4.
+            # The position in the list is the system id of a PX4.
             names = [_ARDRONE, f"px4@{_ARDRONE}"]
             self.hangar = Hangar(names[:: 1 if index else -1], FIRMWARES[_ADAPTERS[adapter]])
             body = TelloBody(SiteDrone.model_validate({"kind": "tello", **_PAD}), Scenario(), 0.005, _rng(index))
@@ -84,7 +84,7 @@ class Beyond:
 
     @contextmanager
     def entered(self) -> Iterator[None]:
-        """Make sockets and start processes at the other end."""
+        """Create sockets and start processes in the namespace at the other end."""
         _checked(_libc.setns(self._there, 0))
         try:
             yield
@@ -134,7 +134,7 @@ def _decision(action: Action) -> WatchdogDecision:
 
 
 def ardrones(beyond: dict[str, Beyond]) -> dict[str, Any]:
-    """Two drivers; one drone is sent up, the other stays; then the guardian lands it through its adapter."""
+    """Two drivers: one drone takes off, the other stays; then the guardian lands it through its adapter."""
     made = {
         name: ArDrone(ArDroneDriverSettings(name=name, address=_ARDRONE, interface=name), _bus(name)) for name in beyond
     }
@@ -200,7 +200,7 @@ def systems(name: str) -> list[int]:
 
 
 def videos(beyond: dict[str, Beyond]) -> dict[str, bool]:
-    """Return which drone's video port a source connects to, by the adapter that it names."""
+    """Return the drone whose video port a source connects to, by the adapter that it names."""
     servers, reached = {}, {}
     for name, one in beyond.items():
         with one.entered():
@@ -223,7 +223,7 @@ def videos(beyond: dict[str, Beyond]) -> dict[str, bool]:
 def main() -> None:
     """Print one line of JSON."""
     beyond = {name: Beyond(name, index) for index, name in enumerate(_ADAPTERS)}
-    # Loose: a strict filter drops what comes through another adapter than the route back to it.
+    # Loose: a strict filter drops packets that arrive through another adapter than the route back.
     Path("/proc/sys/net/ipv4/conf/all/rp_filter").write_text("2")
     stop = threading.Event()
     clock = threading.Thread(target=_turn, args=(list(beyond.values()), stop))

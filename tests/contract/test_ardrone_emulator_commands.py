@@ -87,7 +87,7 @@ def test_the_magnetometer_is_calibrated_by_a_turn(bench: Any) -> None:
 def test_absolute_control_flies_by_the_controllers_heading(bench: Any) -> None:
     bench.fly()
     psi = bench.demo()[4] / 180_000  # the drone's heading as it reports it
-    quarter = math.remainder(psi + 0.5, 2.0)  # the pilot looks 90 deg to the drone's right
+    quarter = math.remainder(psi + 0.5, 2.0)  # the pilot faces 90 deg to the right of the drone's heading
     bits = struct.unpack("<i", struct.pack("<f", quarter))[0]
     bench.keep(1.0, f"PCMD_MAG,5,0,{MINUS_ONE},0,0,{bits},0")
     yaw = bench.body.yaw

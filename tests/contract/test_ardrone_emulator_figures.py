@@ -17,7 +17,7 @@ PWM, PHYS, ALTITUDE = 9, 3, 10
 
 
 def option(packet: bytes, tag: int) -> int:
-    """Return where an option begins."""
+    """Return the offset of an option."""
     offset = 16
     while True:
         found, size = struct.unpack_from("<HH", packet, offset)
@@ -42,7 +42,7 @@ def column(packets: list[bytes], form: str, offset: int, tag: int | None = None)
 
 
 def imu(packets: list[bytes]) -> tuple[np.ndarray, np.ndarray]:
-    """Return accelerations [m/s^2] and rates [rad/s] (n, 3) without what is slower than 0.2 s."""
+    """Return accelerations [m/s^2] and rates [rad/s] (n, 3), high-pass filtered at 0.2 s."""
     at = option(packets[0], PHYS)
     rows = np.array([struct.unpack_from("<6f", packet, at + 10) for packet in packets])
     window = np.ones(40) / 40

@@ -27,7 +27,7 @@ def connect(bench: Any, port: int) -> socket.socket:
 
 
 def heard(bench: Any, tcp: socket.socket, end: bytes = b"\0") -> bytes:
-    """Return what comes up to an end mark."""
+    """Return the bytes up to an end mark."""
     text = b""
     for _ in range(200):
         bench.tick()
@@ -48,7 +48,7 @@ def configure(bench: Any, *commands: str) -> None:
 
 
 def fit(bench: Any, firmware: str) -> None:
-    """Exchange the drone's electronics."""
+    """Replace the drone's electronics."""
     bench.emulator.close()
     drone, onboard = bench.world.drones["d"], bench.world.onboard["d"]
     bench.emulator = ArDroneEmulator("d", bench.address, drone, onboard, firmware=FIRMWARES[firmware])

@@ -19,7 +19,7 @@ def real(real_data):
 
 
 def reproduced(datagram, layout):
-    """Whether a layout, where the packet has it, gives back the bytes that it has read."""
+    """Return whether a layout re-encodes to the bytes that it was decoded from, where the packet has it."""
     packet = navdata.decode(datagram)
     value = packet.read(layout)
     if value is None:

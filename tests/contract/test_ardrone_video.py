@@ -27,7 +27,7 @@ MODE_720P = VideoMode(codec=0x83)
 
 
 def picture(number, size=(640, 360)):
-    """Return a structured picture; its number is in the brightness of the left half."""
+    """Return a structured picture with its number in the brightness of the left half."""
     width, height = size
     rows, columns = np.mgrid[0:height, 0:width]
     pixels = 128 + 60 * np.sin(columns / 9 + number / 3) * np.cos(rows / 7)
@@ -74,7 +74,7 @@ def receive(client, size):
 
 
 def shown(source, server, pictures, seconds=5.0):
-    """Send pictures and return the next one that comes out."""
+    """Send pictures and return the next decoded one."""
     for one in pictures:
         server.send_at(0, one)
     packet, deadline = None, time.monotonic() + seconds
@@ -251,7 +251,7 @@ def test_much_damage_on_the_way_costs_pictures_but_never_the_reader():
 
 
 def fuzzed(stream, rounds, seed):
-    """Cut, turn over and repeat parts of a stream; whatever is decoded has a size of the stream's."""
+    """Cut, flip and repeat parts of a stream; every decoded picture has a size of the stream's."""
     rng = random.Random(seed)
     decoded = 0
     for _ in range(rounds):

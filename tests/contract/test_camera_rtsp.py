@@ -36,7 +36,7 @@ def encoder():
 
 
 class Camera:
-    """Answers one client at a time and sends it 25 pictures a second, brighter and brighter."""
+    """Serves one client at a time with 25 pictures a second of rising brightness."""
 
     def __init__(self, in_band):
         self.in_band = in_band

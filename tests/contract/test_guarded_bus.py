@@ -79,7 +79,7 @@ def order(bus: ZenohBus) -> None:
 
 
 def heard(say: Callable[[], None], subscription: Subscription, until: Callable[[], None] | None = None) -> int:
-    """Return how many came, after saying it until something did, or until a control message did."""
+    """Return how many messages arrived, publishing until one did, or until a control message did."""
     for _ in range(60):
         say()
         if until is not None:
@@ -196,7 +196,7 @@ refusals.close()
 
 @pytest.fixture
 def told(tmp_path: Path) -> Iterator[tuple[Join, Callable[[], list[str]]]]:
-    """A guarded router in a process of its own: how to join it, and what it has refused since it was last asked."""
+    """Start a guarded router in its own process: how to join it, and its refusals since the last query."""
     endpoint = f"tls/127.0.0.1:{free_port()}"
     make_identities(tmp_path / "keys", ["127.0.0.1"], NAMES)
     access = msgspec.json.encode(AccessList("lab", MEMBERS)).decode()

@@ -21,7 +21,7 @@ KEY = bytes(range(32))
 
 
 def crc(data: bytes) -> int:
-    """X.25, written from its definition."""
+    """Return the X.25 CRC, written from its definition."""
     value = 0xFFFF
     for byte in data:
         value ^= byte
@@ -127,7 +127,7 @@ def test_many_frames_in_one_datagram_and_what_is_refused():
         assert refused.value.reason == reason
 
 
-# Kinds that nothing here decodes: of ArduPilot's dialect (VFR_HUD) and of another (STORM32_GIMBAL_MANAGER_STATUS).
+# Messages that nothing here decodes: of ArduPilot's dialect (VFR_HUD) and of another (STORM32_GIMBAL_MANAGER_STATUS).
 UNUSED = ((74, 20, b"\1" * 20), (60011, 183, b"\1" * 7))
 
 
@@ -188,7 +188,7 @@ def test_signed_frames():
         with pytest.raises(WireError) as refused:
             link.decode(raw)
         assert refused.value.reason == reason
-    # A forged frame with a time far ahead must not shut the true sender out.
+    # A forged frame with a time far ahead must not lock out the true sender.
     with pytest.raises(WireError):
         link.decode(signed(0, payload, 50, stamp + 10**9, key=bytes(32)))
     assert link.decode(signed(0, payload, 50, stamp + 2)).message is not None

@@ -15,7 +15,7 @@ ALONE = ["unshare", "--user", "--map-root-user", "--net"]
 
 
 def why_impossible() -> str:
-    """Return why this machine makes no network namespaces with adapters between them, "" if it does."""
+    """Return why this machine cannot connect network namespaces by adapters, or ""."""
     missing = [name for name in ("unshare", "ip") if shutil.which(name) is None]
     if missing:
         return f"{' and '.join(missing)} not installed"

@@ -69,7 +69,7 @@ def _check(value: Any, schema: dict[str, Any], path: str) -> None:
 
 
 def _assert_typable(schema: dict[str, Any], path: str) -> None:
-    # What Lichtblick's and Foxglove's schema parser accepts: every field a plain type, items never arrays.
+    # The subset accepted by Lichtblick's and Foxglove's schema parser: every field a plain type, items never arrays.
     assert schema["type"] in ("boolean", "string", "number", "integer", "object", "array"), path
     assert not {"$ref", "anyOf", "oneOf", "prefixItems"} & set(schema), path
     if schema["type"] == "object":

@@ -49,7 +49,7 @@ class FakeChild:
 
 
 class Rig:
-    """The driver, somebody who listens to it, and a way to turn it until something is true."""
+    """The driver, a subscriber, and a way to run it until a condition holds."""
 
     def __init__(self, port: int) -> None:
         exchange = MemoryExchange()
@@ -177,7 +177,7 @@ def test_a_scenario_breaks_the_emulated_odometry(rig: Rig, port: int, kind: str,
 
 
 class Says:
-    """A guard, and a node that speaks 50 times a second; its clock is not ours."""
+    """A guard, and a node that publishes 50 times a second on another clock."""
 
     def __init__(self) -> None:
         self.guard, self.now, self.step = OdometryGuard(1.05), 10**12, 0

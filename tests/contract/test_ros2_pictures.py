@@ -22,7 +22,7 @@ from groundstation.engineering_views.ros2.codec import Ros2Codec
 
 CODEC = Ros2Codec()
 TOPIC, DOMAIN = "/camera/image", 5
-# No bar: until then a busy machine may be slow.
+# Not a limit to be tested: a busy machine may be slow.
 _PATIENCE_S = 30.0
 IMAGE, COMPRESSED, STRING = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage", "std_msgs/msg/String"
 # Blue, green, red in the corners, 6 x 4 pixels.
@@ -77,7 +77,7 @@ def node() -> Iterator[Node]:
 def source(node: Node) -> Iterator[FrameSource]:
     source = open_source(f"ros2://127.0.0.1:{node.port}{TOPIC}?domain={DOMAIN}")
     until(lambda: source.connected)
-    # A router that has just been joined may not know yet who hears: what is refused leaves no other trace.
+    # A router just joined may not know its subscribers yet; a refusal leaves no other trace.
     for _ in range(10):
         node.say(compressed("", "jpeg", b""))
         deadline = time.monotonic() + 3.0
@@ -98,7 +98,7 @@ def until(condition: Callable[[], object]) -> None:
 
 
 def taken(node: Node, source: FrameSource, message: tuple[str, bytes]) -> Packet:
-    for _ in range(5):  # a router that has just been joined may not know yet who hears
+    for _ in range(5):  # a router just joined may not know its subscribers yet
         node.say(message)
         packet = source.take_newest(5.0)
         if packet is not None:
@@ -146,7 +146,7 @@ def test_what_cannot_be_read_is_named(node: Node, source: FrameSource, message: 
     until(lambda: not source.connected)
     assert words in source.detail and str(node.port) in source.detail
     said = time.monotonic()
-    # It tries again, and a better picture is taken.
+    # It tries again, and accepts a better picture.
     while time.monotonic() - said < _PATIENCE_S and not source.connected:
         node.say(image("bgr8", PIXELS))
         time.sleep(0.02)

@@ -24,7 +24,7 @@ from sim_bridge.site import SiteDrone
 from sim_bridge.world.noise import generator_of
 
 ADDRESS = "127.64.91.11"
-# No bar: until then a busy machine may be slow.
+# Not a limit to be tested: a busy machine may be slow.
 _PATIENCE_S = 30.0
 DRONE = SiteDrone.model_validate(
     {"kind": "ros2", "pad_m": (0.0, 0.0), "pad_yaw_deg": 30.0, "marker": {"code": 1, "position_m": (0.0, 0.0, 0.08)}}
@@ -32,7 +32,7 @@ DRONE = SiteDrone.model_validate(
 
 
 class Room:
-    """An emulated vehicle whose time passes by calls, and its driver without a loop."""
+    """An emulated vehicle whose time advances by calls, and its driver without a loop."""
 
     def __init__(self, **own: Any) -> None:
         self.section = Ros2Section(port=free_port(ADDRESS), namespace="drone_1", domain=3, **own)
@@ -44,7 +44,7 @@ class Room:
         self.driver = Ros2Vehicle(self.settings, MemoryBus(exchange, "lab", "drone_1"))
 
     def until(self, condition: Callable[[], bool], action: Action = Action.IDLE, velocity=(0.0, 0.0, 0.0)) -> None:
-        """Let time pass, the driver told an action twenty times a second, until something holds."""
+        """Advance time, with an action sent to the driver twenty times a second, until a condition holds."""
         deadline = time.monotonic() + _PATIENCE_S
         tick = 0
         while not condition():

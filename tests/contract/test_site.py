@@ -62,7 +62,7 @@ def admit(home: Path, host: str, port: int) -> None:
 
 
 class Run:
-    """A run whose router listens for other hosts too, with an operator and a driver that speak."""
+    """A run whose router also listens for other hosts, with an operator and a driver that publish."""
 
     def __init__(self, folder: Path, port: int) -> None:
         make_identities(folder, [HERE, ELSEWHERE], ["router", *(m.name for m in MEMBERS)], site.authority_of("lab"))
@@ -145,7 +145,7 @@ def test_a_host_speaks_as_itself_and_as_the_devices_that_the_field_gives_it(run:
     heard = run.operator.subscribe([topics.HOST_REPORT, topics.CAMERA_STATUS, topics.VEHICLE_STATUS, topics.SETPOINT])
     for source, entity in (("laptop", "laptop"), ("ceiling", "ceiling"), ("ceiling", "west"), ("drone_1", "drone_1")):
         bus = zenoh_bus.open_bus(run.elsewhere, "lab", source, 2.0, place)
-        for _ in range(2):  # the first may come before the router has told who listens
+        for _ in range(2):  # the first may come before the router has announced its subscribers
             say_everything(bus, entity)
             time.sleep(0.04)
         bus.close()
@@ -172,7 +172,7 @@ def test_who_was_not_admitted_before_the_run_or_was_expelled_says_nothing(home: 
 
 
 def test_a_host_cannot_pass_for_the_router(home: Path, run: Run, port: int) -> None:
-    """Its certificate names no address and is good for clients only."""
+    """Its certificate has no address and is valid for clients only."""
     place = site.folder("joined", "lab")
     endpoint = f"tls/{ELSEWHERE}:{free_port(ELSEWHERE)}"
     router = zenoh_bus.open_router(endpoint, Identity(str(place), "host-laptop", "r"), AccessList("lab", ()))
@@ -201,7 +201,7 @@ def test_a_run_of_an_authority_made_anew_is_named_with_the_remedy(home: Path, po
         assert [reason.split(": ")[0] for reason in site.closed_doors()] == [f"lab at {run.elsewhere}"]
         with pytest.raises(UnreachableError, match=r"^lab at tls/.*its authority was made anew"):
             choose_run(None)
-        # The other way round: a host that believes whatever it meets is not let in either.
+        # Conversely, a host that trusts any router is not admitted either.
         shutil.copy(home / "keys" / "authority.pem", site.folder("joined", "lab") / "authority.pem")
         assert "refuses the certificate of this host" in why_closed(run.elsewhere, identity_of("laptop"))
     finally:

@@ -34,7 +34,7 @@ def _types(descriptor_set: bytes) -> dict[str, dict[int, tuple[Any, ...]]]:
 
 
 def _tree(data: bytes, inner: tuple[int, ...]) -> dict[int, Any]:
-    """Return a message as number -> value, with the named fields taken apart once more."""
+    """Return a message as number -> value, with the named fields decoded once more."""
     return {
         number: sorted(fields(value)) if number in inner and isinstance(value, bytes) else value
         for number, value in fields(data)

@@ -27,7 +27,7 @@ def endpoint() -> Iterator[str]:
 
 
 def send_until_heard(sender: zenoh_bus.ZenohBus, subscription: Subscription) -> int:
-    """Publish until the subscription has been learnt everywhere; returns how many were heard."""
+    """Publish until all subscribers are known; returns how many messages arrived."""
     for _ in range(100):
         sender.publish(topics.EVENT, Event(header=sender.header("drone_1"), severity=Severity.INFO, text="x"))
         if subscription.wait(0.05):
@@ -51,7 +51,7 @@ def test_another_site_hears_nothing(endpoint: str) -> None:
 
 
 def test_all_of_a_burst_of_sensor_samples_arrives(endpoint: str) -> None:
-    """As after a stall of the router; what is missing in a recording cannot be replayed (decision 0132)."""
+    """As after a stall of the router; messages missing in a recording cannot be replayed (decision 0132)."""
     count = 3000
     with (
         closing(zenoh_bus.open_bus(endpoint, "lab", "drone_1")) as sender,

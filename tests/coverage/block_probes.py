@@ -7,7 +7,7 @@ docs/decisions/0079-coverage-by-probes.md.
 import ast
 
 HITS = "__hits__"
-# Functions that numba compiles or calls while it compiles.
+# Functions that numba compiles, or calls during compilation.
 COMPILED = frozenset({"kernel", "njit", "jit", "overload", "intrinsic", "lower_cast"})
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
@@ -15,27 +15,27 @@ _COMPOUND = (ast.If, ast.For, ast.AsyncFor, ast.While, ast.Try, ast.TryStar, ast
 
 
 class Probes:
-    """The number of statements behind each probe."""
+    """The number of statements after each probe."""
 
     def __init__(self) -> None:
         self.statements: list[int] = []
 
     def add(self, before: ast.stmt) -> ast.stmt:
-        """Return a new probe, at the place of the statement that it stands before."""
+        """Return a new probe, placed before this statement."""
         target = ast.Subscript(ast.Name(HITS, ast.Load()), ast.Constant(len(self.statements)), ast.Store())
         self.statements.append(0)
         return ast.fix_missing_locations(ast.copy_location(ast.Assign([target], ast.Constant(1)), before))
 
 
 def put_probes(tree: ast.Module) -> Probes:
-    """Put probes into the functions of a module's tree; return what stands behind each."""
+    """Put probes into the functions of a module's tree; return their statement counts."""
     probes = Probes()
     _enter(tree.body, probes)
     return probes
 
 
 def _enter(body: list[ast.stmt], probes: Probes) -> None:
-    """Look for functions where nothing is counted: in modules and classes, and in functions that are compiled."""
+    """Search for functions in places where nothing is counted: modules, classes, and compiled functions."""
     for statement in body:
         if isinstance(statement, Function):
             if not _is_compiled(statement):
@@ -51,7 +51,7 @@ def _is_compiled(function: Function) -> bool:
 
 
 def _probed(body: list[ast.stmt], probes: Probes) -> list[ast.stmt]:
-    """Return a body with probes at its start and behind each compound statement, which may return or raise."""
+    """Return a body with probes at its start and after each compound statement, which may return or raise."""
     result: list[ast.stmt] = []
     current = -1
     for statement in body:

@@ -1,7 +1,7 @@
 """Compares the coverage of runs with a floor for each package: `python floors.py DATA... [--raise]`.
 
-Counted are the statements of functions that Python runs, in every module of the product, imported or not. `--raise`
-moves the floors up to what was measured; nothing here moves one down.
+The measurement counts the statements of functions that Python runs, in every module of the product, imported or not.
+`--raise` moves the floors up to the measured values; nothing here lowers one.
 """
 
 import ast
@@ -17,24 +17,24 @@ from probing_importer import MEASURED
 
 ROOT = Path(__file__).parents[2]
 FLOORS = Path(__file__).with_name("floors.toml")
-# What differs from run to run: threads, time-outs, random examples [percent].
+# Variation between runs: threads, time-outs, random examples [percent].
 PLAY = 3
 
 
 class Count(NamedTuple):
-    """Statements that ran, of all."""
+    """Number of statements that ran, and of all."""
 
     run: int = 0
     all: int = 0
 
     @property
     def percent(self) -> float:
-        """Return the share that ran; all of nothing is everything."""
+        """Return the share that ran; 100 for no statements."""
         return 100.0 * self.run / self.all if self.all else 100.0
 
 
 def package_of(module: Path) -> str:
-    """Return the package that a module (relative path) is counted with: the top one's child, else the top itself."""
+    """Return the package under which a module (relative path) is counted: the top one's child, else the top itself."""
     return ".".join(module.parts[:2] if len(module.parts) > 2 else module.parts[:1])
 
 
@@ -54,7 +54,7 @@ def counts(root: Path, measured: Measured) -> dict[str, Count]:
 
 
 def faults(found: dict[str, Count], floors: dict[str, int]) -> list[str]:
-    """Return one sentence for each package below its floor, without one, or with one and gone."""
+    """Return one sentence for each package below its floor, without a floor, or with a floor and gone."""
     low = [
         f"{name}: {count.percent:.1f} % of its statements run, its floor is {floors[name]} %: test what you added"
         for name, count in found.items()
@@ -66,7 +66,7 @@ def faults(found: dict[str, Count], floors: dict[str, int]) -> list[str]:
 
 
 def raised(found: dict[str, Count], floors: dict[str, int]) -> dict[str, int]:
-    """Return the floors of what was measured, none lower than before."""
+    """Return the floors for the measured values, none lower than before."""
     return {name: max(floors.get(name, 0), _floor(count)) for name, count in sorted(found.items())}
 
 

@@ -19,20 +19,20 @@ class Measured(NamedTuple):
     skipped: int = 0
 
     def write(self, path: Path) -> None:
-        """Write it as JSON."""
+        """Write the measurement as JSON."""
         path.parent.mkdir(parents=True, exist_ok=True)
         data = {"hits": {name: each.hex() for name, each in self.hits.items()}, "skipped": self.skipped}
         path.write_text(json.dumps(data), encoding="utf-8")
 
     @classmethod
     def read(cls, path: Path) -> Self:
-        """Read what `write` wrote."""
+        """Read a measurement from the file of `write`."""
         data = json.loads(path.read_text(encoding="utf-8"))
         return cls({name: bytes.fromhex(each) for name, each in data["hits"].items()}, data["skipped"])
 
     @classmethod
     def joined(cls, parts: Iterable[Self]) -> Self:
-        """Return what runs of different tests measured together."""
+        """Return the joint measurement of runs of different tests."""
         hits: dict[str, bytes] = {}
         skipped = 0
         for part in parts:
@@ -41,7 +41,7 @@ class Measured(NamedTuple):
         return cls(hits, skipped)
 
     def with_repeated(self, again: "Measured") -> "Measured":
-        """Add a run that repeated some of the tests; a file that has changed since counts as the later run saw it."""
+        """Add a run that repeated some of the tests; a file changed since counts as in the later run."""
         return Measured(_either(self.hits, again.hits), self.skipped)
 
 
@@ -56,10 +56,10 @@ def _either(first: dict[str, bytes], second: dict[str, bytes]) -> dict[str, byte
 
 
 class Measurement:
-    """One run's measurement; it has to start before the first import of what is measured."""
+    """Measurement of one run; it must start before the first import of a measured module."""
 
     def __init__(self) -> None:
-        # Taken out of the environment: a pytest that a test starts must not write the same file.
+        # Removed from the environment: a pytest started by a test must not write the same file.
         self._path = os.environ.pop(VARIABLE, "")
         self._finder = ProbingFinder()
         if self._path:

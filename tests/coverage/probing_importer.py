@@ -14,7 +14,7 @@ MEASURED = ("groundstation", "drivers", "sim_bridge")
 
 
 class ProbingLoader(SourceFileLoader):
-    """Loads one module and keeps its probes in the table of all."""
+    """Loads one module and keeps its probes in the common table."""
 
     def __init__(self, name: str, path: str, hits: dict[str, bytearray]) -> None:
         super().__init__(name, path)
@@ -28,14 +28,14 @@ class ProbingLoader(SourceFileLoader):
         return compile(tree, path, "exec", dont_inherit=True)
 
     def exec_module(self, module: ModuleType) -> None:
-        """Run the module with its table of hits among its names."""
+        """Run the module with its table of hits in its namespace."""
         code = self.get_code(module.__name__)
         vars(module)[HITS] = self._hits[self.path]
         exec(code, vars(module))
 
 
 class ProbingFinder(importlib.abc.MetaPathFinder):
-    """Finds the product's modules before anybody else does."""
+    """Finds the product's modules before all other finders."""
 
     def __init__(self) -> None:
         self.hits: dict[str, bytearray] = {}

@@ -20,7 +20,7 @@ _addresses = itertools.count(1)
 
 
 class Hangar:
-    """Emulated drones served by `python -m sim_bridge.standalone`; kind: of MAVLink vehicle, "" for AR.Drones."""
+    """Emulated drones run by `python -m sim_bridge.standalone`; kind: of MAVLink vehicle, "" for AR.Drones."""
 
     def __init__(self, count: int, *options: str, kind: str = "") -> None:
         pid = os.getpid()
@@ -85,7 +85,7 @@ def interpreter(absent: Callable[[str], NoReturn]) -> Callable[[str], Path]:
 
 
 class Programs:
-    """Starts clients and collects the line of JSON that each prints."""
+    """Starts clients and collects each one's line of JSON."""
 
     def __init__(self, absent: Callable[[str], NoReturn]) -> None:
         self._absent = absent

@@ -15,7 +15,7 @@ _OPEN_FILE, _NAK = 4, 129
 
 
 class GroundStation:
-    """Says that it lives once a second for as long as it waits for anything."""
+    """Sends a heartbeat once a second while it waits."""
 
     def __init__(self, address: str, port: int) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -32,7 +32,7 @@ class GroundStation:
         self._socket.send(data)
 
     def until(self, kind: str, good: Callable[[Any], bool] = lambda _: True, seconds: float = 20.0) -> Any:
-        """Return the next good message of a kind; fails after so long."""
+        """Return the next good message of a kind; fails on time-out."""
         deadline = time.monotonic() + seconds
         while (now := time.monotonic()) < deadline:
             if now - self._beat_s >= 1.0:
@@ -69,7 +69,7 @@ class GroundStation:
         return found
 
     def files_are_refused(self) -> bool:
-        """Return whether a file is refused aloud, and not ignored."""
+        """Return whether a file request is refused explicitly, and not ignored."""
         payload = [0] * 251
         payload[0], payload[3] = 7, _OPEN_FILE
         self._mav.file_transfer_protocol_send(0, self.system, 1, payload)
@@ -87,7 +87,7 @@ class GroundStation:
         return sizes
 
     def take_off(self, height_m: float) -> None:
-        """Take off; PX4 climbs to the height of its parameters, 2.5 m, as it comes."""
+        """Take off; PX4 climbs to the height of its parameters, 2.5 m by default."""
         if not self.px4:
             self._mav.request_data_stream_send(self.system, 1, _ALL, _RATE_HZ, 1)
         ready = dialect.MAV_SYS_STATUS_PREARM_CHECK
@@ -100,7 +100,7 @@ class GroundStation:
         self.until("GLOBAL_POSITION_INT", lambda place: place.relative_alt > 920 * height_m, 30.0)
 
     def land(self) -> None:
-        """Land, and wait until the motors stand."""
+        """Land, and wait until the motors have stopped."""
         assert self.command(dialect.MAV_CMD_NAV_LAND) == 0
         armed = dialect.MAV_MODE_FLAG_SAFETY_ARMED
         self.until("HEARTBEAT", lambda beat: not beat.base_mode & armed, 40.0)

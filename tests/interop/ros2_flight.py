@@ -1,8 +1,9 @@
 """A flight seen by a foreign ROS 2 client through `view --ros2`, beside two nodes that talk to each other.
 
-Run in a network namespace of its own, as root there, for the port of ROS 2's router may be taken outside: `unshare
---user --map-root-user --net python ros2_flight.py PYTHON FOLDER`; PYTHON: that of the foreign programs. Prints a line
-of JSON: what the client listed and decoded, and how many messages the nodes exchanged before, during and after.
+Run in a network namespace of its own, as root there, since the port of ROS 2's router may be taken outside: `unshare
+--user --map-root-user --net python ros2_flight.py PYTHON FOLDER`; PYTHON: interpreter of the foreign programs. Prints a
+line of JSON: the client's topics and decoded messages, and the number of messages between the nodes before, during and
+after.
 """
 
 import json
@@ -48,7 +49,7 @@ class Stage:
             time.sleep(0.1)
 
     def heard(self) -> int:
-        """Return how many messages the listener gets in a span of time."""
+        """Return the number of messages that the listener receives in a span of time."""
         before = len(self.lines("listener"))
         time.sleep(_SPAN_S)
         return len(self.lines("listener")) - before
@@ -65,7 +66,7 @@ def _end(process: "subprocess.Popen[bytes]") -> None:
 
 
 def _watched(stage: Stage) -> dict[str, Any]:
-    """Return what the client found; each order makes an event, which one who joined before sees on /rosout."""
+    """Return the client's result; each command makes an event, which an earlier subscriber sees on /rosout."""
     watcher = stage.node("watcher", str(_WATCH_S), str(_LEAST))
     for turn in range(int(_WATCH_S)):
         if watcher.poll() is not None:
@@ -86,7 +87,7 @@ def main(python: str, folder: Path) -> None:
         for name, lines in (("router", 1), ("talker", 0), ("listener", 10)):
             stage.node(name)
             stage.until(name, lines)
-        # How well it flies is not judged here, so a busy machine does without the checks before take-off.
+        # Flight quality is not judged here, so a busy machine skips the pre-flight checks.
         run = SitlRun(folder, "sitl", "lab", "--anyway", "--duration", "240")
         stack.callback(run.close)
         run.until(lambda: all(run.mode(name) == "TRACK" for name in run.record.drones), _TRACK_S, "all track")

@@ -1,7 +1,7 @@
 """Programs by zenoh-ros2-sdk, a client of ROS 2 over Zenoh: `router`, `talker`, `listener`, `watcher`.
 
-A router as rmw_zenoh's (gossip on) and two nodes that talk to each other; each line that the listener prints is the
-number that it heard. The watcher lists the topics, decodes each, and prints what it found as a line of JSON.
+A router like rmw_zenoh's (gossip on) and two nodes that talk to each other; the listener prints each number that it
+receives. The watcher lists the topics, decodes each, and prints its result as a line of JSON.
 """
 
 import json
@@ -45,13 +45,13 @@ def listener():
 
 
 def subscribed(topic, kind, heard):
-    """Subscribe with a type's definition from rosbags: the SDK would fetch it from the network."""
+    """Subscribe with a type's definition from rosbags, which the SDK would fetch from the network."""
     from zenoh_ros2_sdk import ROS2Subscriber
     from zenoh_ros2_sdk.session import ZenohSession
 
     definition, _ = STORE.generate_msgdef(kind, ros_version=2)
     session = ZenohSession.get_instance("127.0.0.1", PORT)
-    if kind in session.store.types:  # came with another type, and cannot be registered again
+    if kind in session.store.types:  # registered with another type, and cannot be registered again
         session._registered_types[kind] = kind
     return ROS2Subscriber(topic, kind, heard, definition, type_hash=STORE.hash_rihs01(kind))
 

@@ -8,14 +8,14 @@ pytestmark = [pytest.mark.slow, pytest.mark.interop, pytest.mark.timeout(180)]
 
 
 def flew(states: list[dict[str, Any]], address: str) -> None:
-    """Assert by the truth that a drone rose, moved ahead on its own track and landed again."""
+    """Assert by ground truth that a drone rose, moved ahead on its own track and landed again."""
     track = [state[address] for state in states]
     begin, end = track[0]["position"], track[-1]["position"]
     assert max(row["position"][2] for row in track) > 0.6
     assert 0.3 < end[0] - begin[0] < 6.0, "forward is along x"
     assert abs(end[1] - begin[1]) < 0.8
     phases = {row["phase"] for row in track}
-    # Told to hover it brakes first: a program that a full machine delays orders the landing before it stands.
+    # At a hover command it first brakes: on a busy machine the program may command the landing before that ends.
     assert {"TAKING_OFF", "FLYING", "LANDING"} <= phases and phases & {"BRAKING", "HOVERING"}
     assert track[-1]["phase"] == "LANDED" and end[2] < 0.1
 

@@ -15,7 +15,7 @@ from mavsdk.asyncio.plugins.action import ActionAsync
 from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 
-sys.path.insert(0, str(Path(__file__).parent))  # what lies here and is no test belongs to these tests
+sys.path.insert(0, str(Path(__file__).parent))  # for the helper modules of this folder
 from ground_station import GroundStation
 
 pytestmark = [pytest.mark.slow, pytest.mark.interop, pytest.mark.timeout(150)]
@@ -61,7 +61,7 @@ def test_traffic_like_qgroundcontrols_is_answered_and_flies(hangar: Any, kind: s
 
 
 async def fly_with_mavsdk(port: int) -> list[Any]:
-    """Download the mission, take off and land, all by defaults; returns the mission's items."""
+    """Download the mission, take off and land, all with defaults; returns the mission's items."""
     async with Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION)) as mavsdk:
         await mavsdk.add_any_connection(f"udpin://127.0.0.1:{port}")
         system = await mavsdk.first_autopilot(timeout_s=20.0)

@@ -30,7 +30,7 @@ from groundstation.recording.timeline import Timeline
 from groundstation.settings.files import find_field
 from groundstation.settings.load import load_field
 
-pytestmark = [pytest.mark.interop, pytest.mark.slow]  # their programs are large: make test does without them
+pytestmark = [pytest.mark.interop, pytest.mark.slow]  # the viewers' programs are large: make test does without them
 
 
 @pytest.fixture(scope="module")
@@ -112,7 +112,7 @@ def test_an_export_never_touches_what_is_there(kind: str, run_dir: Path, tmp_pat
 
 @pytest.fixture
 def flight() -> Iterator[MemoryBus]:
-    """Yield a bus on which a made-up run goes on in real time."""
+    """Yield a bus on which a synthetic run plays in real time."""
     exchange, over = MemoryExchange(), threading.Event()
 
     def fly() -> None:

@@ -15,7 +15,7 @@ from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
 from mavsdk.asyncio.plugins.action import ActionAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "sitl"))  # the flight that they ride along with
+sys.path.insert(0, str(Path(__file__).parents[1] / "sitl"))  # the flight that they observe as second station
 from free_port import free_port
 from ridden_flight import FLAVOURS, RiddenFlight, described, hangar, is_on_time, port, ridden
 from spare_time import needing_processors
@@ -49,7 +49,7 @@ class Proxy:
         print(line, file=self._process.stdin, flush=True)
 
     def until(self, text: str, seconds: float = 15.0) -> None:
-        """Wait until it has said something since the last order."""
+        """Wait for this output since the last command."""
         deadline = time.monotonic() + seconds
         while text not in self.said[self._read :]:
             assert time.monotonic() < deadline, f"never said {text!r}:\n{self.said}"
@@ -58,7 +58,7 @@ class Proxy:
 
 @contextmanager
 def proxy_on(python: Path, port: int, folder: Path) -> Iterator[Proxy]:
-    """Start MAVProxy with nothing but its master."""
+    """Start MAVProxy with no option but its master."""
     command = [str(python), "-u", str(python.with_name("mavproxy.py")), f"--master=udpin:127.0.0.1:{port}"]
     output = folder / "mavproxy.txt"
     with (
@@ -86,7 +86,7 @@ def test_mavproxy_sees_both_vehicles_is_refused_what_flies_and_stops_them(
             for system in FLAVOURS.values():
                 proxy.until(f"Detected vehicle {system}:1")
             for system in FLAVOURS.values():
-                proxy.until(f"mav_{system}_1.parm", 30.0)  # where it has saved all parameters
+                proxy.until(f"mav_{system}_1.parm", 30.0)  # the file of all saved parameters
             proxy.order(f"vehicle {ARDUPILOT}")
             for line, command in (("arm throttle", "COMPONENT_ARM_DISARM"), ("takeoff 3", "NAV_TAKEOFF")):
                 proxy.order(line)
@@ -108,7 +108,7 @@ def assert_on_time(flight: RiddenFlight, began_s: float, ridden_s: float) -> Non
 
 
 def stop_each(flight: RiddenFlight, proxy: Proxy) -> None:
-    """Pause and land each vehicle from the prompt; each is seen to do it, here and there."""
+    """Pause and land each vehicle from the prompt; check the effect in both places."""
     for system, kind, pause, mode, landing in (
         (ARDUPILOT, "pause", "pause", "BRAKE", "mode LAND"),
         (PX4, "pause", PAUSE, "LOITER", "long DO_SET_MODE 157 4 6"),
@@ -128,7 +128,7 @@ def stop_each(flight: RiddenFlight, proxy: Proxy) -> None:
 
 
 async def ride_with_mavsdk(port: int, flight: RiddenFlight) -> dict[int, str]:
-    """Hold and land all vehicles; returns what an order to take off was answered."""
+    """Hold and land all vehicles; returns the result of a take-off command."""
     answers = {}
     async with Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION)) as mavsdk:
         await mavsdk.add_any_connection(f"udpin://127.0.0.1:{port}")

@@ -1,7 +1,7 @@
 """A third-party ROS 2 client over Zenoh sees a flight, and the view does not disturb ROS 2's own nodes.
 
-That nobody moves a drone through the view: its session on the bus has the role VIEW, which the access list lets say
-nothing (tests/contract/test_guarded_bus.py), and the one on the side of ROS 2 subscribes to nothing.
+Nobody can move a drone through the view: its session on the bus has the role VIEW, to which the access list gives no
+right to publish (tests/contract/test_guarded_bus.py), and its session on the side of ROS 2 subscribes to nothing.
 """
 
 import json
@@ -23,7 +23,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.interop, pytest.mark.timeout(560)]
 
 @pytest.fixture
 def alone(absent: Callable[[str], NoReturn]) -> list[str]:
-    """What makes a network namespace; ends a test on a machine that has none."""
+    """Return the command that makes a network namespace; skips the test on a machine without namespaces."""
     if shutil.which("unshare") is None or shutil.which("ip") is None:
         absent("no network namespaces here: unshare or ip is not installed")
     tried = subprocess.run([*ALONE, "ip", "link", "set", "lo", "up"], capture_output=True, text=True)
@@ -35,7 +35,7 @@ def alone(absent: Callable[[str], NoReturn]) -> list[str]:
 @pytest.fixture
 def told(alone: list[str], interpreter: Callable[[str], Path], tmp_path: Path) -> dict[str, Any]:
     command = [*alone, sys.executable, str(HERE / "ros2_flight.py"), str(interpreter("zenoh_ros2")), str(tmp_path)]
-    # Longer than all of its own limits together: killed, it would leave its flight behind.
+    # Longer than all of its own limits together: if killed, it would leave its flight behind.
     done = subprocess.run(command, capture_output=True, text=True, timeout=540, env=os.environ)
     assert done.returncode == 0, done.stdout + done.stderr
     told: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])

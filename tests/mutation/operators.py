@@ -20,7 +20,7 @@ ARITHMETIC: dict[type[ast.operator], type[ast.operator]] = {
 
 @dataclass(frozen=True)
 class Mutant:
-    """A changed source. name: where and what, without line numbers, so that it outlives edits elsewhere."""
+    """A changed source. name: place and change, without line numbers, so that it survives edits elsewhere."""
 
     name: str
     line: int
@@ -54,7 +54,7 @@ Path = tuple[tuple[str, int], ...]
 
 
 def _paths(tree: ast.AST) -> Iterator[tuple[Path, str]]:
-    """Yield where every node is that may be changed, with the qualified name of its function."""
+    """Yield the path of every node that may be changed, with the qualified name of its function."""
 
     def walk(node: ast.AST, path: Path, scope: str) -> Iterator[tuple[Path, str]]:
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
@@ -73,7 +73,7 @@ def _paths(tree: ast.AST) -> Iterator[tuple[Path, str]]:
 
 
 def _is_words(node: ast.AST) -> bool:
-    """Whether it is a docstring, or text for people."""
+    """Return whether it is a docstring, or text for people."""
     if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
         return True
     logs = isinstance(node, ast.Expr) and ast.unparse(node).startswith(("_log.", "log."))

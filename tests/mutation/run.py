@@ -1,8 +1,8 @@
 """Mutation testing of the safety path: `make mutants`, or `python tests/mutation/run.py MODULE... --seconds N`.
 
 Each mutant is written into a copy of the sources and judged by the tests that targets.toml maps to its module, in a
-process forked from one which has the libraries loaded already. Exit code 1: a mutant survived that explained.toml does
-not name; 3: none did, and some were not judged for want of time.
+process forked from one with the libraries already loaded. Exit code 1: a mutant survived that explained.toml does not
+name; 3: none did, but some were not judged in time.
 """
 
 import argparse
@@ -26,7 +26,7 @@ from operators import Mutant, mutants_of
 ROOT = Path(__file__).parents[2]
 HERE = Path(__file__).parent
 COPIED = ("groundstation", "drivers", "sim_bridge", "tests", "config", "docs", "pyproject.toml", ".importlinter")
-# Ours must be imported anew, and pytest's plugins by pytest itself.
+# Our modules must be imported anew, and pytest's plugins by pytest itself.
 NOT_BEFOREHAND = ("groundstation", "drivers", "sim_bridge", "tests", "conftest", "hypothesis", "pytest_timeout")
 QUIET = (
     "-x",
@@ -49,7 +49,7 @@ UNFINISHED = 3
 
 @dataclass(frozen=True, slots=True)
 class Share:
-    """Which of a module's mutants are judged: every parts-th from the part-th on; of these all, or a seeded sample."""
+    """The mutants of a module to be judged: every parts-th from the part-th on; of these all, or a seeded sample."""
 
     part: int
     parts: int
@@ -65,7 +65,7 @@ class Share:
         return cls(k, n, sample, seed)
 
     def of(self, mutants: list[Mutant]) -> list[Mutant]:
-        """Return those of one module."""
+        """Return the chosen mutants of one module."""
         mine = mutants[self.part - 1 :: self.parts]
         return random.Random(self.seed).sample(mine, min(self.sample, len(mine))) if self.sample else mine
 
@@ -82,7 +82,7 @@ class Bench:
         self.baseline_s = 0.0
 
     def prepare(self) -> str:
-        """Run the tests of the unchanged module, then again with libraries loaded; returns what is wrong with them."""
+        """Run the tests of the unchanged module, then again with libraries loaded; returns their fault, if any."""
         for _ in range(2):
             began = time.monotonic()
             code, modules = self._judge(self._original, 600.0)
@@ -98,12 +98,12 @@ class Bench:
         return ""
 
     def verdict(self, mutant: Mutant) -> str:
-        """Return what became of a mutant."""
+        """Return the outcome of a mutant."""
         code, _ = self._judge(mutant.source, 3.0 * self.baseline_s + 10.0)
         return {0: SURVIVED, -1: LATE, 5: BROKEN}.get(code, KILLED)
 
     def close(self) -> None:
-        """Leave the copy as it was."""
+        """Restore the copy."""
         self._path.write_text(self._original, encoding="utf-8")
 
     def _judge(self, source: str, limit_s: float) -> tuple[int, list[str]]:
@@ -134,14 +134,14 @@ def _run_tests(tests: list[str], write: int) -> None:
 
 
 def _await(pid: int, read: int, limit_s: float) -> tuple[int, list[str]]:
-    """Return the exit code (-1: it took too long and was ended, with what it had started) and the modules it loaded."""
+    """Return the exit code (-1: time-out, ended with its child processes) and the modules that it loaded."""
     deadline = time.monotonic() + limit_s
     while os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None:
         if time.monotonic() > deadline:
             break
         time.sleep(0.01)
     late = os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None
-    with suppress(ProcessLookupError):  # it leads a session of its own: whatever its tests started ends with it
+    with suppress(ProcessLookupError):  # it leads its own session, which ends with all processes that its tests started
         os.killpg(pid, signal.SIGKILL)
     _, status = os.waitpid(pid, 0)
     text = os.read(read, 65_536) if not late else b""
@@ -193,7 +193,7 @@ def _told() -> argparse.Namespace:
 
 
 def _module(bench: Bench, module: str, share: Share, deadline: float) -> tuple[int, int]:
-    """Judge a module's mutants; returns how many survived unexplained, and how many were not judged."""
+    """Judge a module's mutants; returns the numbers of unexplained survivors, and of mutants not judged."""
     mutants, counts, survivors = share.of(bench.mutants), Counter[str](), list[Mutant]()
     if time.monotonic() > deadline:
         print(f"{module}: none of {len(mutants)} judged", flush=True)
@@ -219,7 +219,7 @@ def _module(bench: Bench, module: str, share: Share, deadline: float) -> tuple[i
 
 
 def _tell(survivors: list[Mutant], module: str) -> int:
-    """Name the survivors; returns how many nothing explains."""
+    """Name the survivors; returns the number of unexplained ones."""
     known, open_ends = explained(module), 0
     for mutant in survivors:
         why = known.get(mutant.name.partition(" #")[0], "")

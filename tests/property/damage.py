@@ -18,7 +18,7 @@ _TOKEN = re.compile(rb'"(?:[^"\\]|\\.)*"|-?\d[\d.eE+-]*|true|false|null|[\[\]{}:
 
 
 def damaged_json(rng: Random, good: bytes) -> bytes:
-    """Put something else for one or two words of a document, drop or repeat them; or damage its bytes."""
+    """Replace, drop or repeat one or two words of a document; or damage its bytes."""
     words = _TOKEN.findall(good)
     if not words or rng.random() < 0.4:
         return bytes(damaged_bytes(rng, good, b'"{}[],:0-e\\'))
@@ -41,7 +41,7 @@ def damaged_json(rng: Random, good: bytes) -> bytes:
 
 
 def damaged_bytes(rng: Random, good: bytes, favourites: bytes = b"") -> bytearray:
-    """Change, cut, lengthen, repeat or swap some bytes; favourites: values that mean something to the decoder."""
+    """Change, cut, lengthen, repeat or swap some bytes; favourites: values with a meaning for the decoder."""
     data = bytearray(good)
     for _ in range(rng.randint(1, 4)):
         place = rng.randrange(len(data) or 1)

@@ -34,7 +34,7 @@ from groundstation.errors import MessageError, SettingsError
 
 @dataclass(frozen=True, slots=True)
 class Decoder:
-    """make: returns a damaged input. read: decodes it and uses what came out. declared: all that it may raise."""
+    """make: returns a damaged input. read: decodes it and uses the result. declared: all errors that it may raise."""
 
     name: str
     make: Callable[[Random], Any]
@@ -43,7 +43,7 @@ class Decoder:
 
 
 def fuzz(decoder: Decoder, count: int, seed: int) -> Counter[str]:
-    """Feed damaged inputs; returns how many were read and how many refused, by reason. Any other error escapes."""
+    """Feed damaged inputs; returns the numbers read and refused, by reason. Any other error is raised."""
     rng, outcomes = Random(seed), Counter[str]()
     for _ in range(count):
         damaged = decoder.make(rng)

@@ -134,7 +134,7 @@ def _damaged_tree(rng: Random) -> Any:
                 elif rng.random() < 0.1 and isinstance(inner, dict):
                     inner[rng.choice(("x", "", "drone_2", "tpye"))] = inner.pop(key)
                 else:
-                    inner[key] = deepcopy(rng.choice(_ODD))  # what is damaged next must not change the choice itself
+                    inner[key] = deepcopy(rng.choice(_ODD))  # later damage must not change the choice itself
                 break
             inner = inner[key]
     return tree

@@ -21,7 +21,7 @@ NATNET = [
 
 
 def damaged_natnet(rng: Random) -> tuple[bytes, natnet.Version]:
-    """Return a datagram and the version to read it in; half of them have a size that is right again."""
+    """Return a datagram and the version to read it in; half of them have a corrected size."""
     good, version = rng.choice(NATNET)
     data = damaged_bytes(rng, good, b"\x01\x05\x07")
     if rng.random() < 0.5 and len(data) >= 4:
@@ -30,7 +30,7 @@ def damaged_natnet(rng: Random) -> tuple[bytes, natnet.Version]:
 
 
 def read_natnet(damaged: tuple[bytes, natnet.Version]) -> None:
-    """Read a datagram as what it says it is."""
+    """Read a datagram by its own type."""
     kind, payload = natnet.message_of(damaged[0])
     match kind:
         case natnet.FRAME:

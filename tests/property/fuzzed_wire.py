@@ -113,7 +113,7 @@ SIGNED_FRAMES = [FrameEncoder(1, 1, Signing(KEY, 1000)).encode(message) for mess
 
 
 def damaged_frame(rng: Random) -> tuple[bytes, bool]:
-    """Return a frame and whether it is signed; half of them have a checksum and a signature that are right again."""
+    """Return a frame and whether it is signed; half of them have a corrected checksum and signature."""
     signed = rng.random() < 0.3
     data = damaged_bytes(rng, rng.choice(SIGNED_FRAMES if signed else FRAMES_2), b"\xfd\xfe\x01")
     tail = 13 if signed else 0

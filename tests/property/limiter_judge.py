@@ -15,20 +15,20 @@ from groundstation.control.setpoints import Setpoint
 
 TEAMS = 1000  # drawn at a time
 _TOLERANCE_M_S, _STEP_M_S = 1e-6, 1e-4
-# The limiter takes a circle for a polygon of 16 sides.
+# The limiter approximates a circle by a polygon of 16 sides.
 _WITHIN = math.cos(math.pi / 16)
 
 
 @dataclass(frozen=True)
 class Told:
-    """What the limiter makes of each robot's wish: velocities [n, r, 3; m/s; world] and yaw_rates [n, r; rad/s]."""
+    """The limiter's output for each robot's wish: velocities [n, r, 3; m/s; world] and yaw_rates [n, r; rad/s]."""
 
     velocities: Array
     yaw_rates: Array
 
 
 def limited(states: TeamStates) -> Told:
-    """Ask the limiter, state by state, as the tracker does."""
+    """Run the limiter, state by state, as the tracker does."""
     yaws = states.poses[..., 3]
     asked, answers = _turned(states.wishes, -yaws), np.empty((*yaws.shape, 4))
     wishes, rates = asked.tolist(), states.yaw_rates.tolist()
@@ -42,13 +42,13 @@ def limited(states: TeamStates) -> Told:
 
 
 def _turned(vectors: Array, angles: Array) -> Array:
-    """Return vectors turned about the vertical [..., 3]."""
+    """Return vectors rotated about the vertical [..., 3]."""
     (x, y, z), c, s = np.moveaxis(vectors, -1, 0), np.cos(angles), np.sin(angles)
     return np.stack((c * x - s * y, s * x + c * y, z), axis=-1)
 
 
 def judge(states: TeamStates, told: Told, robot: int) -> Counter[str]:
-    """Assert what is promised of one robot's commands; returns how many states ended how.
+    """Assert the promises for one robot's setpoints; returns the number of states by outcome.
 
     "hovers": unfit to fly; "open": the wish leads nowhere; "bent": a wall is in its way; "held off": a wall asks for
     motion against a drift; "squeezed": the walls ask for more than a vehicle can do.
@@ -94,7 +94,7 @@ def _clipped(wish: Array) -> Array:
 
 
 def _could_be_nearer(velocity: Array, wish: Array, normals: Array, most: Array) -> BoolArray:
-    """Return where a small step straight to the wish stays clear of all walls, well within the limits."""
+    """Return where a small step straight towards the wish stays clear of all walls, well within the limits."""
     way = wish - velocity
     size = np.linalg.norm(way, axis=1)
     step = velocity + way * (_STEP_M_S / np.maximum(size, _STEP_M_S))[:, None]
@@ -112,7 +112,7 @@ def _none(wrong: BoolArray, what: str) -> None:
 
 
 def judged(states: int, seed: int) -> Counter[str]:
-    """Draw and judge at least so many states; returns how many ended how."""
+    """Draw and judge at least so many states; returns the number of states by outcome."""
     ends, numbers = Counter[str](), count()
     while ends.total() < states:
         ends += judged_batch(seed, next(numbers), min(TEAMS, 1 + (states - ends.total()) // 2))
@@ -120,7 +120,7 @@ def judged(states: int, seed: int) -> Counter[str]:
 
 
 def judged_batch(seed: int, number: int, teams: int) -> Counter[str]:
-    """Draw and judge the states of one batch, teams of two and of three in turn; any is drawn again by its number."""
+    """Draw and judge the states of one batch, teams of two and of three in turn; its number reproduces it."""
     drawn = random_states(np.random.default_rng((seed, number)), teams, 2 + number % 2)
     told, ends = limited(drawn), Counter[str]()
     for robot in range(len(drawn.names)):

@@ -1,7 +1,8 @@
 """The output limiter in very many random states: `make limiter-states`, or `python tests/property/limiter_states.py`.
 
-Draws at least so many states (--states; a team's counts once for each of its robots) from --seed on, and judges what
-the limiter makes of a random wish in each. The first that breaks a promise ends it with how to draw that one again.
+Draws at least so many states (--states; a team's counts once for each of its robots) from --seed on, and judges the
+limiter's response to a random wish in each. The first broken promise ends the run and is printed with the command that
+draws it again.
 """
 
 import argparse
@@ -14,7 +15,7 @@ from groundstation.process import numba_cache
 
 
 def main() -> int:
-    """Judge, and say every minute how far it is."""
+    """Judge, and print the progress every minute."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--states", type=int, default=10_000_000)
     parser.add_argument("--seed", type=int, default=2)

@@ -1,6 +1,6 @@
 """Random states of teams for the output limiter, and the half-spaces that the safety page promises in each.
 
-Many states at a time, as arrays: to draw and to judge one takes a tenth of the time that the limiter takes.
+Many states at a time, as arrays: drawing and judging one takes a tenth of the limiter's time.
 """
 
 import math
@@ -19,8 +19,8 @@ from groundstation.planning.parameters import MotionLimits
 SAFETY = SafetyParameters(fence=((-3.7, 3.7), (-2.7, 2.7), (0.0, 2.8)))
 LIMITS = MotionLimits()
 _FENCE = np.array(SAFETY.fence)
-_SAID = 0.85  # share of robots that report a velocity, and of those whose drift is known
-# Many linear programs are one with blocks; beyond so many it takes longer for each.
+_SAID = 0.85  # share of robots with a reported velocity, and of those with a known drift
+# Many linear programs are combined to one with blocks; with more blocks each takes longer.
 _PROGRAMS = 200
 _MET_M_S = 1e-8
 
@@ -37,10 +37,10 @@ _LAYOUTS = {count: _layout("abc"[:count]) for count in (2, 3)}
 
 @dataclass(frozen=True)
 class TeamStates:
-    """States of n teams of r robots, and what each robot is asked to fly.
+    """States of n teams of r robots, and the wish of each robot.
 
-    poses [n, r, 4], covariances [n, 4 r, 4 r]; velocities that are reported and drifts that are known [n, r, 3; m/s;
-    world], NaN where they are not; wishes [n, r, 3; m/s; world], yaw_rates [n, r; rad/s].
+    poses [n, r, 4], covariances [n, 4 r, 4 r]; reported velocities and known drifts [n, r, 3; m/s; world], NaN if
+    absent; wishes [n, r, 3; m/s; world], yaw_rates [n, r; rad/s].
     """
 
     poses: Array
@@ -68,7 +68,7 @@ class TeamStates:
         return _known(self.names, self.drifts[row])
 
     def rest(self, robot: int) -> tuple[Array, Array]:
-        """Return the points of rest [n, 3], and the times in which a barrier may be used up [n]."""
+        """Return the points of rest [n, 3], and the times within which a barrier may be used up [n]."""
         place, T, velocity = self.poses[:, robot, :3], SAFETY.reaction_s, self.velocities[:, robot]
         speechless = np.isnan(velocity[:, 0])
         return np.where(speechless[:, None], place, place + T * velocity), np.where(speechless, 3.0 * T, 2.0 * T)
@@ -81,7 +81,7 @@ class TeamStates:
         return [other for other in range(self.poses.shape[1]) if other != robot]
 
     def unfit(self, robot: int) -> BoolArray:
-        """Return where the robot must hover: it is known too little, or another one is believed in its place [n]."""
+        """Return where the robot must hover: its belief is too uncertain, or another is believed in its place [n]."""
         gaps = [np.linalg.norm(self.poses[:, k, :3] - self.poses[:, robot, :3], axis=1) for k in self.others(robot)]
         return (self.variances(robot).max(axis=1) > SAFETY.max_position_std_m**2) | (np.min(gaps, axis=0) < 0.1)
 
@@ -91,9 +91,9 @@ def _known(names: tuple[str, ...], values: Array) -> dict[str, Array]:
 
 
 def random_states(rng: np.random.Generator, count: int, robots: int) -> TeamStates:
-    """Return states of teams: every second robot near another, some outside the fence or speechless.
+    """Return states of teams: every second robot near another, some outside the fence or without reported velocity.
 
-    Half of the wishes lead to another robot, half of them turn.
+    Half of the wishes lead to another robot, half of them include a turn.
     """
     places = np.empty((count, robots, 3))
     places[:, 0] = rng.uniform(_FENCE[:, 0] - 0.1, _FENCE[:, 1] + 0.1, (count, 3))
@@ -121,7 +121,7 @@ def _anywhere(rng: np.random.Generator, sizes: Array) -> Array:
 
 
 def _wishes(rng: np.random.Generator, places: Array) -> Array:
-    """Return what plans may ask [n, r, 3]: any velocity, or one at another robot."""
+    """Return possible requests of plans [n, r, 3]: any velocity, or one towards another robot."""
     count, robots, _ = places.shape
     others = (np.arange(robots) + rng.integers(1, robots, (count, robots))) % robots
     gaps = np.take_along_axis(places, others[..., None], axis=1) - places
@@ -131,10 +131,10 @@ def _wishes(rng: np.random.Generator, places: Array) -> Array:
 
 
 def promised(states: TeamStates, robot: int, yaw_rates: Array) -> tuple[Array, Array]:
-    """Return the half-spaces of the safety page (why it holds): normals [n, m, 3], the most along each [n, m; m/s].
+    """Return the half-spaces of the safety page (why it holds): normals [n, m, 3], the limit along each [n, m; m/s].
 
-    They leave room for the drift, and hold for a velocity as it is sent and as the vehicle carries it along when it
-    turns, v + T yaw_rate (z x v).
+    They leave room for the drift. They hold for the velocity as sent and as the vehicle carries it along in a turn, v +
+    T yaw_rate (z x v).
     """
     parts = [_fence(states, robot), *(_pair(states, robot, other) for other in states.others(robot))]
     normals, barriers, times = (np.concatenate(part, axis=1) for part in zip(*parts, strict=True))
@@ -156,7 +156,7 @@ def _fence(states: TeamStates, robot: int) -> tuple[Array, Array, Array]:
 
 
 def _pair(states: TeamStates, robot: int, other: int) -> tuple[Array, Array, Array]:
-    """Return two rows, at the points of rest and at the places, with half the speed for each robot."""
+    """Return two rows, at the points of rest and at the positions, with half the speed for each robot."""
     (rest, time_s), (there, its_time_s) = states.rest(robot), states.rest(other)
     gaps = np.stack((there - rest, states.poses[:, other, :3] - states.poses[:, robot, :3]), axis=1)
     distances = np.linalg.norm(gaps, axis=2)
@@ -172,7 +172,7 @@ def _pair(states: TeamStates, robot: int, other: int) -> tuple[Array, Array, Arr
 def anything_allowed(normals: Array, most: Array) -> BoolArray:
     """Return where some velocity well within a vehicle's limits satisfies all half-spaces [n].
 
-    By linear programs, which is not how the limiter finds out: the least excess t with normals v - t <= most.
+    By linear programs, unlike the limiter: the least excess t with normals v - t <= most.
     """
     found = np.zeros(len(most), dtype=bool)
     across, climb = 0.95 * LIMITS.max_speed_m_s / math.sqrt(2.0), 0.95 * LIMITS.max_climb_m_s

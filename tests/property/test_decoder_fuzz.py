@@ -1,6 +1,6 @@
 """Every decoder either reads a damaged input or refuses it with its declared error.
 
-$FUZZ_INPUTS: how many in the long run; `make fuzz` takes a million.
+$FUZZ_INPUTS: number of inputs in the long run; `make fuzz` takes a million.
 """
 
 import os

@@ -20,7 +20,7 @@ from groundstation.geometry.rotations import base_from_tilted_optical
 MS = 1_000_000
 START = 5_000_000_000_000
 NOW = START + 400 * MS
-END = NOW + 60 * MS  # the last sighting comes 120 ms late
+END = NOW + 60 * MS  # the last observation comes 120 ms late
 
 
 def parameters(wait_s: float = 0.0) -> EstimatorParameters:
@@ -46,7 +46,7 @@ def diagonal(*variances: float) -> tuple[float, ...]:
 
 
 class Arrival(Protocol):
-    """What arrives: `due_ns`, when it would come in flight, and how the filter takes it."""
+    """An input: `due_ns`, its arrival time in flight, and the filter's call for it."""
 
     @property
     def due_ns(self) -> int: ...
@@ -87,7 +87,7 @@ class Sight(NamedTuple):
 
 
 def stream(seed: int) -> list[Arrival]:
-    """0.4 s of a flight: both robots seen, the target seen, one wild sighting, one reset."""
+    """0.4 s of a flight: both robots observed, the target observed, one outlier, one reset."""
     rng = np.random.default_rng(seed)
     flight: list[Arrival] = [Airborne("a", START), Airborne("b", START + 11 * MS)]
     for k in range(80):
@@ -149,7 +149,7 @@ def test_the_stream_is_worth_permuting() -> None:
     belief = final(stream(0), begin_ns=START)
     assert set(belief.layout.robots) == {"a", "b"}
     assert belief.layout.targets == ("t",)
-    # Seen as it came, in steps, with the observations 120 ms late.
+    # Processed on arrival, in steps, with the observations 120 ms late.
     joint = FixedLagFilter(parameters())
     joint.advance(START)
     for arrival in sorted(stream(0), key=lambda each: each.due_ns):
@@ -175,7 +175,7 @@ def test_a_stamp_from_the_future_is_refused() -> None:
 
 
 def test_a_long_pause_is_survived() -> None:
-    """The process was frozen: a minute passes between two calls, and late data are refused, not mixed up."""
+    """The process was frozen: a minute passes between two calls, and late data are refused, not confused."""
     joint = FixedLagFilter(parameters())
     for arrival in stream(1):
         feed(joint, arrival)

@@ -26,5 +26,5 @@ def test_round_trip(k1, k2, p1, p2, k3, u, v):
     if np.isfinite(ray).all():
         assert np.abs(lens.pixels_from_normalised(ray) - pixel).max() < 1e-5
     else:
-        # Only pixels that the model does not reach, far from the centre, may have no ray.
+        # Only pixels outside of the model's range, far from the centre, may have no ray.
         assert np.hypot(u - 319.5, v - 179.5) > 0.5 * 460.0

@@ -64,7 +64,7 @@ def test_where_nothing_is_allowed_less_is_asked_and_nobody_is_approached() -> No
 
 def check_states(count: int, seed: int) -> None:
     ends = judged(count, seed)
-    # The draws reach what is to be shown.
+    # The draws cover the cases to be shown.
     assert ends["held off"] > 0.3 * count and ends["bent"] > 0.1 * count and ends["open"] > 0.2 * count, ends
     assert ends["squeezed"] < 0.1 * count, ends
 
@@ -88,7 +88,7 @@ def test_a_batch_of_linear_programs_finds_what_each_alone_finds() -> None:
 
 
 def _slow_wishes(known_drifts: bool) -> TeamStates:
-    """Return states with wishes of 0.3 m/s, and a drone that is known too little."""
+    """Return states with wishes of 0.3 m/s, and an underestimated drift."""
     states = random_states(np.random.default_rng(6), 200, 2)
     covariances = states.covariances.copy()
     covariances[0] += np.eye(8)
@@ -129,7 +129,7 @@ def test_the_judge_sees_each_broken_promise(promise: str, known_drifts: bool, sp
 def fly_at_each_other(
     lag_s: float, delay_s: float, drift: Array, aside_m_s: float, seconds: float
 ) -> tuple[Array, Array]:
-    """Two drones asked to fly at each other, and besides pushed by an unsaid drift; returns distances and places."""
+    """Command two drones to fly at each other under an unreported drift; returns distances and places."""
     dt = 0.05
     poses = np.array([[-1.5, 0.0, 1.4, 0.0], [1.5, 0.2, 1.4, 0.0]])
     moves, wishes = np.zeros((2, 3)), np.array([[0.6, aside_m_s, 0.0], [-0.6, aside_m_s, 0.0]])
@@ -138,7 +138,7 @@ def fly_at_each_other(
     for step in range(round(seconds / dt)):
         now_ns = 1 + round(step * dt * 1e9)
         at = JointBelief(poses.ravel().copy(), 0.03**2 * np.eye(8), LAYOUT, now_ns)
-        said = {n: moves[i] for i, n in enumerate("ab")}  # what the drift does is not in what they report
+        said = {n: moves[i] for i, n in enumerate("ab")}  # the reported velocity does not contain the drift
         drifts = {n: watches[i].see(now_ns, poses[i, :3] + SAFETY.reaction_s * moves[i]) for i, n in enumerate("ab")}
         told = np.zeros((2, 3))
         for i, name in enumerate("ab"):

@@ -39,7 +39,7 @@ def test_round_trip_of_a_setpoint(numbers, time_ms, mask):
 
 
 def noise(size: int, seed: int) -> bytes:
-    """Random bytes in which every 20th or so begins what could be a frame: a start, a length, a kind, no more."""
+    """Random bytes in which about every 20th begins a possible frame: only a start, a length, a kind."""
     rng, known, data = random.Random(seed), sorted(widest.mavlink_map), bytearray()
     while len(data) < size:
         data += rng.randbytes(rng.randrange(30))
@@ -56,7 +56,7 @@ def test_no_frame_is_found_in_noise():
     cutter, candidates, outcomes = StreamCutter(), list[bytes](), Counter[str]()
     for begin in range(0, len(data), 256):
         candidates += cutter.feed(data[begin : begin + 256])
-    for begin in range(len(data)):  # what a datagram that begins there would hold
+    for begin in range(len(data)):  # the payload of a datagram that begins there
         with suppress(WireError):
             candidates.append(next(split(data[begin : begin + 300])))
     decoder = FrameDecoder()

@@ -36,7 +36,7 @@ def folder(tmp_path: Path) -> Iterator[Path]:
 
 
 def _read_everything(path: Path) -> int:
-    """Use every command on a damaged file; returns the messages that were read, -1 when it was refused by name."""
+    """Use every command on a damaged file; returns the number of messages read, -1 for a refusal by name."""
     folder = path.parent
     for made in ("csv", "cut.mcap", "recovered.mcap"):
         shutil.rmtree(folder / made, ignore_errors=True)
@@ -105,7 +105,7 @@ def test_a_flipped_length_costs_its_chunk_and_not_the_flight(whole: bytes, folde
     total, chunks = sum(run.counts().values()), run.indexes[0].chunks
     assert len(chunks) > 4
     lost = chunks[2]
-    for bit in (3, 61):  # a little too long, and longer than any disk
+    for bit in (3, 61):  # slightly too long, and longer than any disk
         data = bytearray(whole)
         data[lost.offset + 1 + bit // 8] ^= 1 << bit % 8
         path.write_bytes(data)

@@ -28,11 +28,11 @@ FOREVER = 10**9
 LAND_AFTER_S = 3.0
 FLY, HOVER, LAND = 0, 1, 2
 RANK = {Word.HOVER: HOVER, Word.LAND: LAND}
-WARM_UP_MS = 4_000  # the faults come then; a stamp of 0 means "never"
+WARM_UP_MS = 4_000  # time of the faults; a stamp of 0 means "never"
 
 
 class Fate(NamedTuple):
-    """What happens to a process: it dies, or it is frozen and wakes after a while."""
+    """The fate of a process: it dies, or it freezes and wakes after a while."""
 
     kind: str = "alive"
     at_ms: int = 0
@@ -62,7 +62,7 @@ FINE = fates(340, 600, 700, 1_300, 4_000, FOREVER)
 
 @dataclass
 class World:
-    """One drone, its driver, supervisor and guardian; `said` holds (time [ms], who, what)."""
+    """One drone, its driver, supervisor and guardian; `said` holds (time [ms], sender, message)."""
 
     supervisor: Fate
     driver: Fate
@@ -78,13 +78,13 @@ class World:
     since: int = 0
     supervisor_beat: int = 0
     guardian_beat: int = 0
-    # Of the driver's process.
+    # State of the driver's process.
     last_turn: int = 0
     lands: bool = False
     hovers: bool = False
     up_at: int = 0
     noticed: dict[str, int] = field(default_factory=dict)
-    # Of the supervisor's, the guardian's.
+    # State of the supervisor's and the guardian's.
     supervisor_turn: int = 0
     supervisor_awake: int = 0
     guardian_turn: int = 0
@@ -117,13 +117,13 @@ class World:
         return DriverSigns(self.state, self.beat * MS, self.worked, self.ended, self.gone)
 
     def turn_driver(self, t: int) -> None:
-        """Fly; hover, and land, when the supervisor is silent, as the watchdog does. A new one lands what flies."""
+        """Fly; hover, then land, if the supervisor is silent, as the watchdog does. A new driver lands the drone."""
         reborn = self.up_at > 0
         if self.gone or self.ended or (reborn and t < self.up_at) or not (reborn or self.driver.runs(t)):
             return
         if reborn and self.state is SlotState.STARTING:
             if self.supervisor.dead(t):
-                self.state, self.ended, self.gone = SlotState.STOPPING, True, True  # it never heard the drone
+                self.state, self.ended, self.gone = SlotState.STOPPING, True, True  # it never had the drone's telemetry
                 return
             self.state, self.worked, self.lands = SlotState.READY, True, True
         dead, frozen = self.lasted("dead", self.supervisor.dead(t), t), self.lasted("frozen", self.stale(t), t)
@@ -136,12 +136,12 @@ class World:
         return t - self.supervisor_beat >= 300
 
     def lasted(self, what: str, condition: bool, t: int) -> int:
-        """Return for how long a driver has noticed something: one that wakes up notices late."""
+        """Return for how long a driver has observed a condition; one that wakes up observes it late."""
         since = self.noticed.setdefault(what, t) if condition else self.noticed.pop(what, t)
         return t - since
 
     def turn_supervisor(self, t: int) -> None:
-        """Speak after 400 ms, kill after 800 ms, start again what ended."""
+        """Send after 400 ms, kill after 800 ms, restart ended processes."""
         if t - self.supervisor_turn > 250:
             self.supervisor_awake = t
         self.supervisor_turn = self.supervisor_beat = t
@@ -190,7 +190,7 @@ def worlds(faulty: int, choice: list[Fate]) -> Iterator[World]:
 
 
 def contradictions(world: World) -> list[str]:
-    """Return where two speak at once, or where LAND is taken back."""
+    """Return where two send at once, or where LAND is withdrawn."""
     found, landing = list(world.interruptions), False
     for t, who, what in world.said:
         if landing and what < LAND:
@@ -204,7 +204,7 @@ def last_onset_ms(world: World) -> int:
 
 
 def broken_promises(world: World) -> list[str]:
-    """Return what was missing: words at least each 0.5 s, no motion 0.5 s and LAND 3.5 s after the faults."""
+    """Return the missing actions: messages at least each 0.5 s, no motion 0.5 s and LAND 3.5 s after the faults."""
     found = []
     times = [t for t, _, _ in world.said]
     for before, after in zip(times, [*times[1:], WARM_UP_MS + RUN_MS], strict=True):

@@ -7,7 +7,7 @@ import pytest
 
 from groundstation.field.resolved import ResolvedField
 
-sys.path.insert(0, str(Path(__file__).parent))  # what lies here and is no test belongs to these tests
+sys.path.insert(0, str(Path(__file__).parent))  # for the helper modules of this folder
 
 
 @pytest.fixture(scope="session")

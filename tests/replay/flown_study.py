@@ -36,7 +36,7 @@ _TOPICS = {
 
 
 class Arrivals:
-    """What the study hands over at a tick."""
+    """The study's messages at a tick."""
 
     def __init__(self) -> None:
         self.refused: Counter[str] = Counter()
@@ -49,7 +49,7 @@ class Arrivals:
 
 
 class Worker:
-    """Plans in so many evaluations; the plan comes back two ticks later, as from a thread that took 40 ms."""
+    """Plans with a fixed number of evaluations; the plan arrives two ticks later, as from a thread that took 40 ms."""
 
     def __init__(self, planner: Planner) -> None:
         self._planner = planner
@@ -76,7 +76,7 @@ class Worker:
 
 
 class FlownStudy(Study):
-    """Flies and records. small: less odometry, and a tenth of what is said 50 times a second."""
+    """Flies and records. small: less odometry, and a tenth of the messages sent 50 times a second."""
 
     def __init__(self, field: ResolvedField, folder: Path, options: StudyOptions, small: bool = False) -> None:
         super().__init__(field, Scenario(), options)

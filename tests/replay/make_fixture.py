@@ -1,6 +1,6 @@
 """Writes the recording in tests/fixtures/replay: `python tests/replay/make_fixture.py`.
 
-To be renewed only when the message version changes on purpose: it stands for the recordings that users have.
+Renew it only when the message version changes on purpose: it stands for the users' recordings.
 """
 
 from pathlib import Path
@@ -12,7 +12,7 @@ FIXTURE = ROOT / "tests" / "fixtures" / "replay"
 
 
 def main() -> None:
-    """Fly it."""
+    """Fly the study and write its recording."""
     numba_cache.activate(numba_cache.EVERYTHING)  # before anything imports numba
     from flown_study import FlownStudy
 

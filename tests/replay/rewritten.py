@@ -17,7 +17,7 @@ Change = Callable[[RawRecord], bytes | None]
 
 
 def rewritten(source: Path, folder: Path, change: Change, field: bytes = b"") -> Path:
-    """Copy a recording message by message, as `change` will have its content; None leaves it out."""
+    """Copy a recording message by message through `change`, which returns the new content, or None to drop it."""
     folder.mkdir()
     opened = open_recording(source / "state.mcap")
     attachments = {name: ("", data) for name, data in opened.attachments.items()}

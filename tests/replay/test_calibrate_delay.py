@@ -24,7 +24,7 @@ def measured(folder: Path) -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def tracked(tmp_path_factory: pytest.TempPathFactory, lab_field: ResolvedField) -> Path:
-    """A recorded flight of tracking: drones that move little tell a delay slowly."""
+    """A recorded flight of tracking: drones that move little give slow information about delays."""
     from flown_study import FlownStudy
 
     from sim_bridge.study.runner import StudyOptions
@@ -48,12 +48,12 @@ def test_the_delays_of_cameras_are_found_and_a_wrong_setting_shows(tracked: Path
     told = measured(rewritten(tracked, tmp_path / "wrong", later))
     for name, error_ms in (("ceiling", SHIFT_MS), ("drone_1 camera", SHIFT_MS), ("drone_2 camera", 0.0)):
         one = told[name]
-        # Two minutes and a half tell a delay to 9 ms (one deviation); a minute and a half does not on every processor,
+        # Two minutes and a half give a delay to 9 ms (one deviation); a minute and a half does not on every processor,
         # whose last digits make another flight.
         assert one["sure"] and one["std_ms"] < 15.0, one
         assert abs(one["measured_ms"] - 120.0 - error_ms) < 2.5 * one["std_ms"], one
         assert abs(one["measured_ms"] - one["now_ms"]) > 20.0 or not error_ms, one
-    # What a recording does not tell must say so: nothing that is sure may be far from the truth.
+    # Delays that a recording does not determine must be marked so: no confident one may be far from the truth.
     for drone in ("drone_1", "drone_2"):
         for kind, truth_ms in (("velocity", 30.0), ("height", 85.0)):
             one = told[f"{drone} {kind}"]

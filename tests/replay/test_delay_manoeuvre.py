@@ -20,7 +20,7 @@ Ticks = list[tuple[int, tuple[tuple[str, Message], ...]]]
 
 
 class Manoeuvre(Study):
-    """Drones that are commanded to and fro, and all that reached the tracker."""
+    """Drones that are commanded to and fro, and all messages that reached the tracker."""
 
     def __init__(self, field: ResolvedField, seed: int) -> None:
         super().__init__(field, Scenario(), StudyOptions(seed, DURATION_S, plan=False))
@@ -47,7 +47,7 @@ def manoeuvre(lab_field: ResolvedField) -> Manoeuvre:
 
 
 def told_in_flight(field: ResolvedField, ticks: Ticks, error_ms: float) -> tuple[PictureAge, list[str]]:
-    """Live the flight with a ceiling camera whose setting is too small by an error."""
+    """Replay the flight with a ceiling camera whose delay setting is too small by an error."""
     age, warnings = PictureAge(field, CLOCK), []
     for number, (_, inputs) in enumerate(ticks):
         for _, message in inputs:

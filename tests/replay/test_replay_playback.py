@@ -21,7 +21,7 @@ MS = 1_000_000
 
 
 class Watched:
-    """A replay without a web server: turns of the console by hand, and what a page would know after each."""
+    """A replay without a web server: the console's turns by hand, and a page's state after each."""
 
     def __init__(self, folder: Path) -> None:
         self.playback = Playback(open_source([folder]))
@@ -85,12 +85,12 @@ def test_time_goes_on_as_fast_as_it_is_asked_to(flown: Path) -> None:
     playback.play(False)
     assert gone_s(1.0) == 0.0
     playback.play(True)
-    list(playback.advance(60.0))  # slept through: not made up for
+    list(playback.advance(60.0))  # the pause is not made up for
     assert (playback.at_ns - playback.reel.start_ns) / 1e9 < 6.2
 
 
 def test_a_seek_shows_what_was_seen_then(watched: Watched) -> None:
-    """Whoever has watched until a time and whoever jumps to it see the same."""
+    """A viewer who has watched until a time and one who jumps to it see the same."""
     watched.ask("speed", factor=1.0)
     while watched.at_s < 7.5:
         watched.go(0.5)

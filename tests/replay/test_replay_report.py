@@ -31,7 +31,7 @@ def flight(flown: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module", params=KINDS)
 def rerun(request: pytest.FixtureRequest, flight: Path) -> tuple[Path, str]:
-    """Return the folder of a re-run and what it should be called."""
+    """Return the folder of a re-run, and its expected name."""
     folder = flight.parent / str(request.param)
     done("replay", flight, *KINDS[request.param], "--output", folder)
     return folder, str(request.param)

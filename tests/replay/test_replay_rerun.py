@@ -66,7 +66,7 @@ def test_one_measurement_changed_by_a_nanometre_is_noticed(flown: Path, tmp_path
     assert code == 1 and not said["identical"]
     first = said["first_differences"][0]
     at_s = float(first.split(", ")[1].split(" s")[0])
-    # It is noticed where it was taken in: a camera's delay after its exposure.
+    # The difference is found where the observation was used: a camera's delay after its exposure.
     assert 0.0 < at_s - (changed[0] - began_ns) / 1e9 < 0.4, first
     assert "recorded" in first and "now" in first
 
@@ -126,7 +126,7 @@ def test_other_settings_are_computed_the_same_twice(flown: Path, tmp_path: Path,
     inflated = figures["observations INFLATED"]
     assert (inflated["after"] or 0) > (inflated["before"] or 0)
     assert 0.0 < figures["target rmse [m]"]["after"] < 0.5  # judged by the recorded truth
-    # What was written is a run of its own: with its settings in it, it is repeated to the bit.
+    # The written re-run is a run of its own: with its settings in it, it is repeated to the bit.
     assert code_of(tmp_path / "what-if", "--recompute")[0] == 0
     assert open_source([tmp_path / "what-if"]).resolved.planner.horizon_steps == 3
 
@@ -174,7 +174,7 @@ def test_a_foreign_version_is_said(flown: Path, monkeypatch: pytest.MonkeyPatch)
 
 
 def test_recordings_made_earlier_are_understood() -> None:
-    """The stored recording: every message still has its meaning, and today's tracker believes nearly the same."""
+    """The stored recording: every message still has its meaning, and today's tracker has nearly the same beliefs."""
     source = open_source([FIXTURE])
     repetition = Repetition(source, resolved_field(recorded_field(source.field)))
     now = {m.header.stamp_ns: m for lived in repetition.ticks() for _, m in lived.said if isinstance(m, Belief)}
@@ -188,7 +188,7 @@ def test_recordings_made_earlier_are_understood() -> None:
         again = dict(zip(now[belief.header.stamp_ns].layout, now[belief.header.stamp_ns].mean, strict=True))
         for label, value in zip(belief.layout, belief.mean, strict=True):
             if label.endswith((".x", ".y", ".z")) and not label.startswith("ceiling"):
-                if label not in again:  # it joins later now: not by who was itself seen once only
+                if label not in again:  # it joins later now: not through a robot that was itself observed only once
                     later += 1
                     continue
                 compared += 1

@@ -42,7 +42,7 @@ def kind(request: pytest.FixtureRequest) -> str:
 
 @pytest.fixture
 def folder(kind: str, flight: Path, tmp_path: Path) -> Path:
-    """Return the folder of a recording that says which re-run it is, as `replay --output` writes it."""
+    """Return the folder of a recording marked with its re-run, as `replay --output` writes it."""
     rerun = KINDS[kind]
     note = rerun.as_metadata() if rerun else {}
     with new_copy(tmp_path / "state.mcap", preamble_copy(open_recording(flight / "state.mcap"), note)) as writer:
@@ -71,10 +71,10 @@ def test_the_page(kind: str, folder: Path) -> None:
 def test_the_file_for_rerun(kind: str, folder: Path, tmp_path: Path) -> None:
     pytest.importorskip("rerun")
     write_rrd(open_run(folder), tmp_path / "flight.rrd")
-    # The bytes of the file are compressed, sometimes in the middle of the words.
+    # The bytes of the file are compressed, sometimes in the middle of the texts.
     command = [sys.executable, "-m", "rerun", "rrd", "print", "-vvv", str(tmp_path / "flight.rrd")]
     printed = subprocess.run(command, capture_output=True, timeout=100, check=True).stdout
-    # The recording's name, and the words over the room.
+    # The recording's name, and the text above the room.
     assert printed.count(mark(kind)) == (0 if kind == "flight" else 2)
 
 
@@ -90,7 +90,7 @@ def test_the_scene_for_foxglove(kind: str, folder: Path, tmp_path: Path) -> None
 
 
 def test_two_runs_of_one_boot_are_not_one_recording(flight: Path, tmp_path: Path) -> None:
-    """A replay of both would be a flight that never was; parts of one run go together, a damaged one too."""
+    """A replay of both would be a flight that never took place; parts of one run belong together, a damaged one too."""
     opened = open_recording(flight / "state.mcap")
     for name, command in (("a", b'{"seed":1}'), ("b", b'{"seed":2}'), ("c", b'{"seed":1}'), ("damaged", b"")):
         told = preamble_copy(opened, {})

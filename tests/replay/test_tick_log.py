@@ -36,7 +36,7 @@ def journal(tick: int, ingested: tuple[tuple[str, int], ...]) -> RawRecord:
 def test_an_input_that_is_stamped_seconds_ahead_costs_no_other_its_place(monkeypatch: pytest.MonkeyPatch) -> None:
     late, ahead = imu("drone_1", START_NS - NS_PER_MS, 7), imu("drone_2", START_NS + 5 * NS_PER_S, 3)
     names = ((str(late.key), 7), (str(ahead.key), 3))
-    # The recorder hears one sender a little after the tracker, whose journal names both already.
+    # The recorder receives one sender a little later than the tracker, whose journal names both already.
     rows = [journal(0, names), ahead, late, *(journal(tick, ()) for tick in range(1, 200))]
 
     def records(_tape: Tape) -> Iterator[RawRecord]:

@@ -45,7 +45,7 @@ class NoTcp:
 
 
 class Flight:
-    """One emulated drone and the pure parts of its driver, joined by their datagrams."""
+    """One emulated drone and the I/O-free parts of its driver, connected by their datagrams."""
 
     def __init__(self, seed: int, **changes: float) -> None:
         self.settings = ArDroneDriverSettings(name="drone_1", address="127.0.0.1", velocity_scale=1.18)
@@ -136,7 +136,7 @@ QUIET = {"air_unrest_m_s2": 1e-9, "velocity_noise_m_s": 1e-9, "attitude_noise_de
 
 
 def step_response(flight, axis, seconds=6.0):
-    """Return (seconds to 90 %, peak of 2.5 s, speed held in the end) of a step to 0.5 m/s, smoothed over 50 ms."""
+    """Return (seconds to 90 %, peak of 2.5 s, final speed) of a step to 0.5 m/s, smoothed over 50 ms."""
     wanted = [0.0, 0.0, 0.0]
     wanted[axis] = 0.5
     speeds = [row[axis] for row in flight.record(seconds, tuple(wanted))]
@@ -191,14 +191,14 @@ def still(motion):
 
 
 def shaking(motion):
-    """A stuck velocity with the noise of a sensor that lives."""
+    """A stuck velocity with the noise of a working sensor."""
     stir = 0.03 * math.sin(1e6 * sum(motion.rates_rad_s))
     return motion._replace(velocity_m_s=(stir, -stir, motion.velocity_m_s[2]))
 
 
 @pytest.mark.parametrize(("lie", "within_m"), [(still, 0.5), (shaking, 1.2)])
 def test_a_velocity_that_says_0_runs_away_no_more(lie, within_m):
-    """From hovering to 0.5 m/s: it was 1.76 m/s. What is noticed makes the drone hold its place, and brake."""
+    """From hover to 0.5 m/s: it was 1.76 m/s. After detection, the drone holds its place and brakes."""
     flight = Flight(7).take_off()
     flight.lie, speeds, noticed_s, start = lie, [], None, (flight.drone.airframe.x, flight.drone.airframe.y)
     for tick in range(round(6.0 / TICK_S)):
@@ -232,7 +232,7 @@ def test_zero_stops_and_stays():
 
 
 def deaf(flight, seconds=4.0):
-    """Let no datagram reach the drone any more; returns how fast and how far it flies then, by itself."""
+    """Let no datagram reach the drone any more; returns its speed and distance from then on, by itself."""
     body, speeds, places = flight.drone.airframe, [], []
     for _ in range(round(seconds / TICK_S)):
         flight.ticks += 1
@@ -256,7 +256,7 @@ def deaf(flight, seconds=4.0):
     ids=["even flight", "half a step", "a step", "a stop", "turning back"],
 )
 def test_what_a_drone_does_that_hears_nothing_any_more(before, then, after_s, speed_m_s, flown_m):
-    """It keeps its tilt until its own watchdog acts after 2 s; the safety page tells these figures."""
+    """It keeps its tilt until its own watchdog acts after 2 s; the safety page states these figures."""
     flight = Flight(1).take_off()
     flight.record(3.0, (before, 0.0, 0.0))
     flight.record(after_s, (then, 0.0, 0.0))

@@ -1,6 +1,6 @@
 """Every datagram of a driver beside a busy machine: form and numbers are judged, gaps only reported.
 
-Run as a script it is the driver's process: `test_ardrone_wire_discipline.py ADDRESS`.
+As a script it is the driver's process: `test_ardrone_wire_discipline.py ADDRESS`.
 """
 
 import itertools
@@ -54,7 +54,7 @@ def burn(ends_s: float) -> None:
 
 
 class Recorder:
-    """The drone's side: acknowledges what must be, streams 200 packets a second, notes when each datagram came."""
+    """The drone's side: sends the acknowledgements, streams 200 packets a second, records arrival times."""
 
     def __init__(self, address: str, navdata: bytes) -> None:
         self.navdata, self.at = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2))
@@ -81,7 +81,7 @@ class Recorder:
                 datagram, extra, _, _ = self.at.recvmsg(2048, 64)
             except BlockingIOError:
                 break
-            # By the kernel's clock: how late this process reads it does not matter.
+            # By the kernel's clock: a late read by this process does not matter.
             seconds, nanoseconds = struct.unpack("qq", extra[0][2])
             self.came.append((seconds * 10**9 + nanoseconds, datagram))
             if b"AT*CONFIG=" in datagram:

@@ -22,7 +22,7 @@ Corrupt = Callable[[float, Message], list[tuple[float, Message]]]  # (simulated 
 
 
 class Abused(Study):
-    """A flight whose messages are corrupted on their way; what happened to the belief, by entity."""
+    """A flight with corrupted messages; the effect on the belief, by entity."""
 
     def __init__(
         self, field: ResolvedField, corrupt: Corrupt, seed: int = 2, parked: bool = True, outliers: float = 0.0
@@ -70,7 +70,7 @@ class Abused(Study):
         return max(error for at, error in self.errors[name] if at >= since_s)
 
     def worst_height_m(self) -> float:
-        """Return the largest error of a height now: of drones, and of the ceiling camera."""
+        """Return the largest current height error: of drones, and of the ceiling camera."""
         belief, truth = self.tracker.belief, dict(zip(self.world.bodies, self.world.states(), strict=True))
         true = {name: float(truth[name][2]) for name in DRONES}
         true |= {
@@ -96,7 +96,7 @@ def shifted(message: Message, seconds: float) -> Message:
 
 
 def frozen(kind: type) -> Corrupt:
-    """What this kind of message says stays as it was when the sensor froze; stamps and numbers go on."""
+    """Repeat this kind of message as it was when the sensor froze; stamps and numbers continue."""
     last: dict[tuple[str, str], Message] = {}
 
     def corrupt(now_s: float, message: Message) -> list[tuple[float, Message]]:
@@ -194,7 +194,7 @@ def test_wild_sightings_by_the_dozen_move_nobody(lab_field: ResolvedField) -> No
 
 @pytest.mark.parametrize("name", [*DRONES, "turtlebot"])
 def test_who_joins_by_a_wild_sighting_is_put_right_by_the_next(lab_field: ResolvedField, name: str) -> None:
-    """Without that, what is believed too surely drags along whoever sees it and the mounting of the ceiling camera."""
+    """Otherwise an overconfident robot drags along its observers and the ceiling camera's mounting."""
     used = []
 
     def corrupt(now_s: float, message: Message) -> list[tuple[float, Message]]:
@@ -241,8 +241,11 @@ def test_a_kidnapped_robot_is_found_again_and_does_not_take_the_target_along(lab
 
 @pytest.mark.parametrize("seed", [5, 7, 10, 12])
 def test_outliers_among_first_sightings_bend_no_height(lab_field: ResolvedField, seed: int) -> None:
-    """One sighting in ten is grossly wrong. The first of a target has a row to spare, which bent its observer and the
-    ceiling camera with it (5, 7); drones join by outliers and are put right by the next (10, 12)."""
+    """One observation in ten is grossly wrong.
+
+    A target's first observation has a redundant row, which bent its observer and the ceiling camera with it (5, 7);
+    drones initialised by outliers are corrected by the next observation (10, 12).
+    """
     flight = Abused(lab_field, as_it_is, seed, parked=False, outliers=0.1).fly(BEGIN_S)
     assert flight.worst_height_m() < 0.04
     assert max(flight.worst(name, 7.0) for name in DRONES) < 0.12

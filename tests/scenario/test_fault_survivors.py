@@ -16,7 +16,7 @@ from sim_bridge.study.faults.command import fly
 
 SECONDS = 20.0
 
-# An AR.Drone that sees no floor says 0 and flies on: level, it hardly slows down, and its own hover levels it.
+# An AR.Drone that sees no floor reports 0 and flies on: level, it hardly slows down, and its own hover levels it.
 BLIND = {
     "blind_at_full_speed_flies_into_the_wall": (19, ["uniform_floor"]),
     "blind_until_it_lands_and_sees_again": (40, ["uniform_floor"]),
@@ -25,56 +25,56 @@ BLIND = {
     "blind_and_then_deaf": (23, ["at_deaf", "uniform_floor"]),
 }
 
-# Braked to rest, blind and out of all views, and then landed level: the air carried it off at 0.27 m/s.
+# Braked to rest, without floor and out of all views, and then landed level: wind carried it off at 0.27 m/s.
 CARRIED_OFF = (42032, ["uniform_floor"])
-# Blind in sight of the ceiling camera, braked by what it knew last: carried off at 0.1 m/s until they had landed, as
-# their belief was too wide, while pictures were under way, for a speed to be seen in it.
+# No floor in view, seen by the ceiling camera, braked by its last known velocity: carried off at 0.1 m/s until landed,
+# as its belief was too wide, between pictures, to show a speed.
 SEEN_WHILE_BLIND = {
     "over_something": (70282, ["obstacle_below", "uniform_floor"], []),
     "twice": (72017, ["uniform_floor", "uniform_floor"], ["uniform_floor"]),
 }
-# A velocity stuck at -0.6 m/s is no floor that is not seen: the firmware brakes better than the driver then.
+# A velocity stuck at -0.6 m/s does not mean that no floor is seen: the firmware brakes better than the driver then.
 STUCK_IN_MOTION = (20223, ["velocity_stuck"])
 
-# Blind, and half a second later silent or frozen: told to hold its place, which it does by the same optical flow, it
-# flew on level. Drawn of these two kinds.
+# Without floor in view, and half a second later silent or frozen: commanded to hold its place, which uses the same
+# optical flow, it flew on level. Drawn of these two kinds.
 SILENT_TOO = {"frozen": (48132, ["telemetry_frozen", "uniform_floor"])}
 
-# Silent and blind within 40 ms: nobody heard that its own hover would fail, but the ceiling camera saw it drift off.
+# Silent and without floor within 40 ms: nobody learnt that its own hover would fail, but a camera saw it drift.
 ADRIFT = (42024, ["navdata_silent", "uniform_floor"])
 
-# Frozen, and braked by its own firmware: cameras still saw the speed of half a second before.
+# Frozen, and braked by its own firmware: cameras still observed the speed of half a second before.
 BRAKED_BY_ITSELF = (120292, ["telemetry_frozen"])
-# Autopilots whose telemetry is not believed, in view of a fixed camera: no longer told where they were, they drifted.
+# Autopilots with distrusted telemetry, in view of a fixed camera: without further position updates they drifted.
 NOT_BELIEVED = {
     "frozen": (140014, ["battery_drop", "telemetry_frozen"]),
     "turning_as_its_velocity_sticks": (140017, ["velocity_stuck"]),
     "at_a_place_that_pictures_show": (141040, ["telemetry_frozen"]),
 }
 
-# The ceiling saw the velocity drift off, and lost sight of the drone; the other drone was blind.
+# The ceiling camera saw the velocity drift off, and lost the drone; the other drone was without floor in view.
 BELIEVED_AGAIN = (50, ["picture_black", "velocity_drifting"])
 
-# A ceiling camera that is bumped while it sees the drones, and one that sees nobody for two seconds, then one drone
-# half a metre aside, which the other sees where it is. Drawn of bumped cameras; with the size of the bump [deg] and the
-# modes at the end, which comes too soon for the second team to land.
+# A ceiling camera bumped while it sees the drones, and one that sees nobody for two seconds, then one drone half a
+# metre aside, whose true place the other sees. Drawn of bumped cameras; with the size of the bump [deg] and the modes
+# at the end, which comes too soon for the second team to land.
 BUMPED = {
     "while_it_sees_them": (63020, ["camera_bumped"], 7.69, {"LANDING"}),
     "while_it_sees_nobody": (63023, ["camera_bumped", "camera_bumped"], 8.24, {"TRACK"}),
 }
 
-# A velocity that lies while nobody sees the drone, or as its only ceiling camera goes black.
+# A wrong velocity while nobody sees the drone, or as its only ceiling camera goes black.
 LYING = {
     "drifting_slowly_while_it_tracks_unseen": (7003, ["velocity_drifting"]),
     "jumping_as_the_ceiling_camera_goes_black": (7019, ["picture_black", "velocity_jumping"]),
 }
 
-# The only ceiling camera hangs or goes black; drones that saw each other drifted together, and nothing showed it.
+# The only ceiling camera hangs or goes black; drones that saw each other drifted together, undetected.
 UNROOTED = {
     "while_a_velocity_drifts": (34010, ["picture_frozen", "velocity_drifting"]),
     "and_they_see_each_other": (34322, ["camera_stall", "picture_black"]),
 }
-# Telemetry 0.7 s old: the ceiling re-initialised the drone again and again, which swung faster each time.
+# Telemetry 0.7 s old: the ceiling camera re-initialised the drone repeatedly, which swung faster each time.
 SWINGING = {
     "as_the_camera_stalls": (34051, ["camera_stall", "telemetry_delayed"]),
     "as_the_other_lands": (2000016, ["telemetry_delayed", "velocity_stuck"]),
@@ -82,7 +82,7 @@ SWINGING = {
 
 
 def order_of(changes: list[str], field_name: str = "lab") -> dict[str, Any]:
-    """Return what `groundstation experiment faults` hands to the simulator, with changes of the scenario."""
+    """Return the simulator's input from `groundstation experiment faults`, with changes of the scenario."""
     path = find_field(field_name)
     field = load_field(path, ("recording.raw_datagrams=false",))
     sections = [(s.kind, s.section) for s in driver_sections(field) if s.kind != CAMERA]
@@ -91,9 +91,9 @@ def order_of(changes: list[str], field_name: str = "lab") -> dict[str, Any]:
     return {"field": builtins, "sections": sections, "scenario": scenario, "seconds": SECONDS, "kinds": []}
 
 
-# Not mended: cameras that look as their drivers do see less of these two than those of earlier studies. One falls blind
-# and silent as it leaves the ceiling's view, and is carried at up to 0.2 m/s until it has landed; the velocity of the
-# other drifts at the border of that view, and it is told to fly 0.5 m beside where it is believed for 1.6 s.
+# Not mended: cameras with their drivers' search pattern see less of these two than in earlier studies. One loses floor
+# and telemetry as it leaves the ceiling's view, and is carried at up to 0.2 m/s until it has landed; the velocity of
+# the other drifts at the border of that view, and its setpoints lead 0.5 m beside its believed place for 1.6 s.
 UNSAFE = {
     "silent_as_it_leaves_the_view": ([], ["uniform_floor", "navdata_silent"], 48303, {"rest"}),
     "drifting_in_the_corner_of_the_view": (["cameras.fps=15"], [], 7115, {"unlocalised"}),
@@ -102,12 +102,12 @@ UNSAFE = {
 
 @pytest.fixture(scope="module")
 def order() -> dict[str, Any]:
-    """The order of the older seeds: with any other rate of pictures they stand for other flights."""
+    """Return the input for the older seeds: with another picture rate they stand for other flights."""
     return order_of(["cameras.fps=15"])
 
 
 def safely_flown(order: dict[str, Any], seed: int, kinds: list[str]) -> dict[str, Any]:
-    """Return the flight of a seed, which has the faults that it stands for, and did nothing unsafe."""
+    """Return the flight of a seed, after checking that it has the faults that it stands for, and was safe."""
     flown: dict[str, Any] = fly(flight_order.order_of(order | {"seeds": [seed]}), seed)
     assert flown["kinds"] == kinds, "the seed stands for another flight now"
     assert flown["unsafe"] == {}
@@ -213,7 +213,7 @@ def test_a_drone_that_is_put_elsewhere_again_and_again_stands_still(seed: int, k
 def test_what_is_known_to_be_unsafe_does_no_more_than_that(
     changes: list[str], kinds: list[str], seed: int, unsafe: set[str]
 ) -> None:
-    """One that is safe belongs to those above."""
+    """A flight that is safe belongs to the list above."""
     flown = fly(flight_order.order_of(order_of(changes) | {"kinds": kinds, "seeds": [seed]}), seed)
     assert set(flown["unsafe"]) == unsafe
     assert flown["fence_m"] == 0.0

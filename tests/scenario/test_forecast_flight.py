@@ -16,7 +16,7 @@ _FOUND_S, _SECONDS, _EVERY, _FORECAST_EVERY = 3.0, 15.0, 20, 30
 
 
 def test_the_filters_deviation_in_flight_is_within_thirty_percent_of_the_forecast(lab_field: ResolvedField) -> None:
-    """Along the same places. The error is smaller than both."""
+    """Along the same positions. The error is smaller than both."""
     options = StudyOptions(seed=1, duration_s=_SECONDS)
     study, forecaster = Study(lab_field, Scenario(), options), PlaceForecaster(lab_field, team_of(lab_field))
     for drone in study.world.of(Quadrotor).values():

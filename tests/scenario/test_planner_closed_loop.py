@@ -101,7 +101,7 @@ class World:
         return JointBelief(self.mean, self.P, self.layout, round(now * 1e9))
 
     def sight(self, belief: JointBelief, now: float) -> Sight:
-        """Return what the tracker makes of the pictures; a target that is given up may be anywhere."""
+        """Return the tracker's result of the pictures; a target that is given up may be anywhere."""
         age_s = now - self.last_seen
         seen_now = dict.fromkeys(self.names, 0.0)
         if self.lookout.advance(belief, {**seen_now, self.target: age_s}, seen_now):
@@ -114,7 +114,7 @@ class World:
         return Sight(None if missing else age_s, unseen_s, missing=missing, search=stands)
 
     def velocities(self) -> dict[str, Array]:
-        """Return what odometry says of each robot's velocity [world]."""
+        """Return the odometry of each robot's velocity [world]."""
         return {
             n: world_from_stabilized(v[:3], float(x[3])) for n, v, x in zip(self.names, self.v, self.x, strict=True)
         }
@@ -149,7 +149,7 @@ class World:
         self.P = 0.5 * (self.P + self.P.T)
 
     def look(self, k: int) -> bool:
-        """Fuse what the hard sensors see; returns whether the target was seen."""
+        """Fuse the observations of the hard-edged sensors; returns whether the target was seen."""
         d, seen = len(self.mean), False
         markers = [self.sensors.marker(n, x, is_robot=True) for n, x in zip(self.names, self.x, strict=True)]
         markers.append(np.array([*self.path[k], self.sensors.marker_height_m[self.target]]))
@@ -180,7 +180,7 @@ class World:
         return seen
 
     def observe(self, i: int, j: int, marker: Array) -> None:
-        """Fuse robot i's sight of entity j: relative (x, y) in its yaw frame, and heading of a robot."""
+        """Fuse robot i's observation of entity j: relative (x, y) in its yaw frame, and heading of a robot."""
         eye = self.sensors.onboard[self.names[i]]
         std = eye.noise.position_std_m(float(np.linalg.norm(marker - self.x[i, :3])))
         robot = j < len(self.names)
@@ -276,7 +276,7 @@ def test_the_figure_eight_is_tracked_by_both_topologies(seed: int, start: str) -
 @pytest.mark.slow
 @pytest.mark.study
 def test_a_target_that_jumps_away_is_found_again() -> None:
-    """It took 17 to 60 s, by seed and processor; how soon it should be is judged by kidnap-2m and kidnap-3m."""
+    """It took 17 to 60 s, by seed and processor; its limit is judged by kidnap-2m and kidnap-3m."""
     resolved = lab()
     path = realistic_path(110.0)
     path[500:] = path[500:] * np.array([-0.5, 1.0])  # kidnapped after 10 s, to the other side

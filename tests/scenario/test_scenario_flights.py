@@ -28,7 +28,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.study]
 
 
 def order(name: str, *options: str) -> tuple[Drawn, list[Section]]:
-    """Return what a flight of a scenario in the lab begins with, seed 1; options: of the field."""
+    """Return the launch specification of a scenario's flight in the lab, seed 1; options: of the field."""
     path = find_field("lab")
     scenario = parse_scenario(json.dumps(load_scenario(find_scenario(name, path))))
     field = load_field(path, ("recording.raw_datagrams=false", *options))
@@ -38,7 +38,7 @@ def order(name: str, *options: str) -> tuple[Drawn, list[Section]]:
 
 @pytest.mark.timeout(3000)
 def test_scenarios_end_as_their_files_expect(tmp_path: Path) -> None:
-    """One seed of each: found in time, held, nobody lands."""
+    """One seed of each: target found in time and tracked, no drone lands."""
     command = [sys.executable, "-m", "groundstation", "experiment", "scenarios", "--scheduler", "none"]
     flown = subprocess.run([*command, "-o", str(tmp_path)], capture_output=True, text=True, check=False)
     results = tmp_path / "scenarios.json"
@@ -60,7 +60,7 @@ def test_a_target_that_wanders_is_found_and_held(strategy: str) -> None:
 
 
 class HearingFlight(ScenarioFlight):
-    """Notes what the tracker is told of the target's own motion, and how old it is [ns]."""
+    """Records the target's reports to the tracker, and their age [ns]."""
 
     heard: list[tuple[ReportedMotion, int]] | None = None
 
@@ -82,7 +82,7 @@ def test_a_target_that_tells_its_odometry_is_heard_in_the_study() -> None:
 
 
 class WatchedFlight(ScenarioFlight):
-    """Notes when the target is carried away."""
+    """Records when the target is carried away."""
 
     carried_s: float | None = None
     _was: Array | None = None

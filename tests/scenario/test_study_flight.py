@@ -77,7 +77,7 @@ def test_a_wrong_field_is_reported_as_the_command_line_does() -> None:
 
 
 class Dated(Study):
-    """Notes how much later than its stamp each sighting arrives [ms]."""
+    """Records how much later than its stamp each observation arrives [ms]."""
 
     late_ms: list[float]
 
@@ -91,7 +91,7 @@ class Dated(Study):
 def test_a_video_that_is_later_than_its_setting_is_dated_by_the_setting(
     lab_field: ResolvedField, late_ms: float
 ) -> None:
-    """As a camera's driver does: it knows when a picture arrived, and how late it should be."""
+    """As a camera's driver does: it knows a picture's arrival time, and its configured delay."""
     cameras = Scenario().cameras.model_copy(update={"video_delay_ms": late_ms})
     study = Dated(lab_field, Scenario().model_copy(update={"cameras": cameras}), StudyOptions(seed=1, duration_s=0.5))
     study.late_ms = []

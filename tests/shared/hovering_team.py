@@ -18,7 +18,7 @@ TARGET = np.array([0.2, 0.3, 0.4])
 
 
 class Flight:
-    """Two drones that hover, a target that stands still, and cameras without noise."""
+    """Two hovering drones, a target at rest, and cameras without noise."""
 
     def __init__(self, field: ResolvedField) -> None:
         self.tracker: Tracker = tracker_from_field(field, "here", 3)
@@ -41,7 +41,7 @@ class Flight:
             assert self.ingest(VehicleStatus(header=self.header(name), flight_state=state, mode="TRACK")) is None
 
     def odometry(self, name: str, **changes: Any) -> Odometry:
-        trembling = 1e-9 * self.seq  # what never changes is taken for a frozen sensor
+        trembling = 1e-9 * self.seq  # constant values would count as a frozen sensor
         values: dict[str, Any] = {"velocity_m_s": (0.0, 0.0, 0.0), "yaw_rad": 0.0, "height_m": 1.3}
         values |= {"roll_rad": trembling, "pitch_rad": 0.0}
         return Odometry(header=self.header(name), velocity_covariance=(0.01,) * 9, **(values | changes))

@@ -6,7 +6,7 @@ from typing import Any
 
 
 def wait_for(condition: Callable[..., Any], seconds: float = 10.0) -> None:
-    """Return once a condition holds; fails when it does not in time."""
+    """Return once a condition holds; fails on time-out."""
     deadline = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < deadline, "did not happen in time"

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from sim_bridge.scenario import Scenario
 from sim_bridge.target_paths import Anywhere, Path, Standstill
 
-# A weaker value in the default scenario would make a simulated run look better than a flight.
+# A weaker value in the default scenario would make a simulated run optimistic.
 _REALISTIC: tuple[tuple[str, Callable[[Scenario], bool]], ...] = (
     ("drones.navdata_hz: 200", lambda s: s.drones.navdata_hz == 200),
     (

@@ -7,6 +7,6 @@ import zenoh
 
 
 def opened(**settings: Any) -> Any:
-    """Return a session with some settings, which looks for nobody by multicast."""
+    """Return a session with some settings, without multicast scouting."""
     silent = {"scouting": {"multicast": {"enabled": False}}}
     return zenoh.open(zenoh.Config.from_json5(json.dumps(silent | settings)))

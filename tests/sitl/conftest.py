@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))  # what lies here and is no test belongs to these tests
+sys.path.insert(0, str(Path(__file__).parent))  # for the helper modules of this folder
 from sitl_run import COMMAND, SitlRun
 from wire_tap import WireTap
 

@@ -20,7 +20,7 @@ import numpy as np
 from groundstation.process import numba_cache
 from sim_bridge.world.ardrone import Quadrotor
 
-sys.path.insert(0, str(Path(__file__).parent))  # what lies here and is no test belongs to these tests
+sys.path.insert(0, str(Path(__file__).parent))  # for the helper modules of this folder
 numba_cache.activate()  # before the kernels are imported: afterwards they would be compiled anew, for a minute
 from firmware_room import Room  # noqa: E402
 from firmware_seat import Seat  # noqa: E402

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE))  # what lies here and is no test belongs to these tests
+sys.path.insert(0, str(HERE))  # for the helper modules of this folder
 from firmware_seat import Seat  # noqa: E402
 
 from groundstation.bus import clock  # noqa: E402

@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 
 HERE = Path(__file__).parent
-sys.path[:0] = [str(HERE), str(HERE.parent / "contract")]  # what lies here and is no test belongs to these tests
+sys.path[:0] = [str(HERE), str(HERE.parent / "contract")]  # for the helper modules of this folder
 from firmware import Firmware, ports_of  # noqa: E402
 from mavlink_process import FakeProcess  # noqa: E402
 

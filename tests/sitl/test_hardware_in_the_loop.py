@@ -17,7 +17,7 @@ from sim_bridge.devices.captured_bodies import CapturedBodies
 from sim_bridge.devices.natnet import NatnetEmulator
 from sim_bridge.site import SiteCapture
 
-sys.path.insert(0, str(Path(__file__).parent))  # what lies here and is no test belongs to these tests
+sys.path.insert(0, str(Path(__file__).parent))  # for the helper modules of this folder
 from firmware import VARIABLES, Firmware, binary_of
 from real_parts import STAND_IN, Run, field, heights, stand_in, started, true_poses
 

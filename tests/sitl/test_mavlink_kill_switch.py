@@ -21,7 +21,7 @@ from drivers.mavlink.setup import ParameterSetup
 from drivers.mavlink.wire.names import Flavour
 
 HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE))  # what lies here and is no test belongs to these tests
+sys.path.insert(0, str(HERE))  # for the helper modules of this folder
 from firmware import VARIABLES, Firmware, binary_of  # noqa: E402
 from mavlink_pilot import Pilot  # noqa: E402
 

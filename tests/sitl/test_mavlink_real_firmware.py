@@ -22,7 +22,7 @@ from drivers.mavlink.wire.names import Flavour
 from groundstation.bus.messages import Verb
 
 HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE))  # what lies here and is no test belongs to these tests
+sys.path.insert(0, str(HERE))  # for the helper modules of this folder
 import mavlink_hangar  # noqa: E402
 from firmware import VARIABLES, Firmware, binary_of  # noqa: E402
 from mavlink_pilot import Pilot  # noqa: E402

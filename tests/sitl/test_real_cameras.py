@@ -19,7 +19,7 @@ from sim_bridge.render.renderer import Renderer
 from sim_bridge.scenario import Scenario
 from sim_bridge.site import parse_site
 
-sys.path.insert(0, str(Path(__file__).parent))  # what lies here and is no test belongs to these tests
+sys.path.insert(0, str(Path(__file__).parent))  # for the helper modules of this folder
 from mjpeg import camera
 from real_parts import PAD_M, PAD_YAW_RAD, ROOT, STAND_IN, Run, field, places, stand_in, started, true_poses
 

@@ -27,14 +27,14 @@ from groundstation.bus.topics import (
     VEHICLE_STATUS,
 )
 
-sys.path.insert(0, str(Path(__file__).parent))  # what lies here and is no test belongs to these tests
+sys.path.insert(0, str(Path(__file__).parent))  # for the helper modules of this folder
 from scripted_drone import BOOTSTRAP, ScriptedDrone, ScriptedTcp
 
 S = 1_000_000_000
 
 
 class Process:
-    """What `Child` offers, without a process."""
+    """Stand-in for `Child`, without a process."""
 
     def __init__(self, bus: MemoryBus, section: str = "{}") -> None:
         self.name, self.section = bus.source, section
@@ -76,7 +76,7 @@ class Process:
 
 
 class Rig:
-    """Scripted drone, driver, and somebody on the other end of the bus."""
+    """Scripted drone, driver, and a subscriber on the bus."""
 
     def __init__(self, version: str = "", **settings) -> None:
         exchange = MemoryExchange()
@@ -103,7 +103,7 @@ class Rig:
         self.fake.close()
 
     def turn(self, settle: bool = True) -> None:
-        """One cycle of drone and driver, 10 ms apart or so."""
+        """Turn drone and driver once, some 10 ms apart."""
         if self.speaking:
             before = self.drone.telemetry.heard_ns
             self.fake.turn()
@@ -169,7 +169,7 @@ def rig():
 
 @pytest.fixture
 def new_rig():
-    """Build rigs: version of the firmware ("": no TCP ports), and settings of the driver."""
+    """Build rigs from the firmware's version ("": no TCP ports) and settings of the driver."""
     rigs = []
 
     def build(version="", **settings):
@@ -183,7 +183,7 @@ def new_rig():
 
 @pytest.fixture
 def drone_alone():
-    """Build scripted drones that stream by themselves 200 times a second; version of the firmware as above."""
+    """Build scripted drones that stream by themselves 200 times a second; firmware version as above."""
     drones, ended = [], threading.Event()
 
     def live(drone):
@@ -209,5 +209,5 @@ def drone_alone():
 
 @pytest.fixture
 def process_on():
-    """The class of a process to hand to `run`."""
+    """Return the process class to pass to `run`."""
     return Process

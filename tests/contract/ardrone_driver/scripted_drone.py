@@ -80,7 +80,7 @@ class ScriptedTcp:
 
 
 class ScriptedDrone:
-    """Two sockets and a state: acknowledges CONFIG, takes off and lands at once, remembers every command line."""
+    """Two sockets and a state: acknowledges CONFIG, takes off and lands at once, records every command line."""
 
     def __init__(self) -> None:
         pid = os.getpid()
@@ -116,7 +116,7 @@ class ScriptedDrone:
         body = struct.pack("<IIII", 0x55667788, self.state, self.sequence, 0)
         if self.state & BOOTSTRAP:
             return checked(body)
-        # Nothing that flies says the same twice; float32 cannot tell less apart.
+        # In flight no value repeats exactly; float32 resolves no smaller difference.
         stir = 0.0 if self.lie == "frozen" else 6e-5 * (self.sequence % 2)
         moved = 0.0 if self.lie else stir
         altitude = 800 if self.state & FLY else 0
@@ -129,7 +129,7 @@ class ScriptedDrone:
         return checked(body + demo.ljust(148, b"\0") + phys)
 
     def turn(self) -> None:
-        """Take what came, and stream one packet."""
+        """Read all datagrams, and stream one packet."""
         for _, source in self._waiting(self.navdata):
             self.client, self.requests = source, self.requests + 1
         for datagram, _ in self._waiting(self.at):

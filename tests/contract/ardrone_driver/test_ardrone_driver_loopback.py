@@ -85,7 +85,7 @@ def next_motion(rig):
 def test_odometry_and_imu_in_our_frames(rig):
     rig.take_off()
     rig.fake.force_mg = 100.0
-    next_motion(rig)  # what was told before is in the first mean
+    next_motion(rig)  # earlier samples are in the first mean
     before = time.monotonic_ns()
     odometry, imu = next_motion(rig)
     assert odometry.header.entity == "drone_1" and before <= odometry.header.stamp_ns <= time.monotonic_ns()

@@ -25,7 +25,7 @@ def test_one_that_freezes_as_it_is_to_take_off_lands_as_if_silent(new_rig):
     rig.host = VehicleHost(rig.process, rig.drone, WatchdogLimits(land_after_s=1.3))
     rig.connect()
     obey = rig.fake.obey
-    rig.fake.obey = lambda name, *rest: None if name == "REF" else obey(name, *rest)  # LANDED, it says for ever
+    rig.fake.obey = lambda name, *rest: None if name == "REF" else obey(name, *rest)  # it repeats LANDED for ever
     rig.fake.lie = "frozen"
     rig.order(Verb.TAKEOFF)
     began = time.monotonic()

@@ -40,7 +40,7 @@ from sim_bridge.mavlink_scenario import CopterScenario
 from sim_bridge.world.mavlink_copter import ARDUPILOT_RESPONSE, PX4_RESPONSE, MavlinkCopter
 from sim_bridge.world.world import TICK_NS, TICK_S
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # what lies there and is no test belongs to these tests
+sys.path.insert(0, str(Path(__file__).parents[1]))  # for the helper modules of that folder
 from mavlink_process import FakeProcess
 
 S = 1_000_000_000
@@ -48,7 +48,7 @@ GROUND = ("127.0.0.1", 14999)
 
 
 class FakeSocket:
-    """Collects what the emulator sends."""
+    """Collects the emulator's datagrams."""
 
     def __init__(self):
         self.sent = deque[bytes]()
@@ -64,7 +64,7 @@ class FakeSocket:
 
 
 class DirectLink:
-    """A Link whose other end is an emulator in the same thread."""
+    """A Link to an emulator in the same thread."""
 
     called_from, newest_stamp = (), 0
 
@@ -86,7 +86,7 @@ class DirectLink:
         return [] if self.cut else heard
 
     def lose(self):
-        """Drop what the emulator has sent since."""
+        """Drop the emulator's datagrams since the last call."""
         self.emulator.socket.sent.clear()
 
     def send(self, system, message):
@@ -99,7 +99,7 @@ class DirectLink:
 
 
 class Rig:
-    """A vehicle of a flavour at (0.5, -0.3), heading 0.4 rad, with everything around it."""
+    """A vehicle of a flavour at (0.5, -0.3), heading 0.4 rad, with driver and tracker stand-in."""
 
     def __init__(self, flavour, hand, seed=1, configured=True, scenario=None, **settings):
         self.hand = hand
@@ -243,7 +243,7 @@ class Rig:
         return (*self.body.velocity_stabilized(), self.body.vz)
 
     def mean_velocity(self, seconds):
-        """Fly on and return the mean: air and sensors push it about, by a tenth of a metre per second for a second."""
+        """Fly on and return the mean velocity: gusts and sensors disturb it by 0.1 m/s for a second."""
         flown = []
         for _ in range(round(seconds / TICK_S)):
             self.tick()
@@ -252,7 +252,7 @@ class Rig:
 
 
 class Hand:
-    """The clock, turned by hand."""
+    """The manual clock."""
 
     def __init__(self):
         self.now = 5_000 * S

@@ -47,7 +47,7 @@ def test_signs_of_setpoints_and_telemetry(bench_of, flavour):
     bench.fly(down=0.2)
     bench.run(0.8)
     assert body.vz < -0.1
-    bench.fly(forward=0.5, frame=1)  # to the north: world x, wherever the nose points
+    bench.fly(forward=0.5, frame=1)  # to the north: world x, whatever the heading
     bench.run(2.0)
     assert body.vx > 0.3 and abs(body.vy) < 0.1
     bench.command(511, 32.0, 20_000.0)

@@ -14,7 +14,7 @@ def bench_of(hand):
 
 
 def test_test_ratios_are_those_of_its_own_estimate(bench_of, flavour):
-    """PX4 sends them unasked, once a second; ArduPilot when asked to."""
+    """PX4 sends them unasked, once a second; ArduPilot on request."""
     bench = bench_of(flavour)
     px4 = flavour == "px4"
     if not px4:
@@ -35,7 +35,7 @@ def test_test_ratios_are_those_of_its_own_estimate(bench_of, flavour):
 
 
 class Leaning:
-    """An error of its level [rad]."""
+    """A level error [rad]."""
 
     def __init__(self, degrees):
         self._error = math.radians(degrees)

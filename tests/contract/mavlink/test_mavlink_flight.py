@@ -28,7 +28,7 @@ def test_it_takes_off_hovers_flies_and_lands(rig):
     rig.wanted = ((0.4, 0.0, 0.0), 0.0)
     rig.run(1.5)
     forward, left, up = rig.mean_velocity(4.0)
-    # PX4 stays 15 % under what it is told: nothing may wind up over that.
+    # PX4 stays 15 % below its setpoint, which must cause no windup.
     assert 0.27 < forward < 0.45 and abs(left) < 0.1 and abs(up) < 0.1
     rig.wanted = ((0.0, 0.3, 0.0), 0.5)
     rig.run(3.0)
@@ -77,10 +77,10 @@ def test_each_setpoint_goes_out_once_at_most_at_its_rate(rig):
     rig.tracking = False
     rig.link.sent.clear()
     rig.run(0.25)
-    # Nothing new from the tracker: nothing is repeated; after 0.3 s the watchdog hovers.
+    # No new setpoint from the tracker: none is repeated; after 0.3 s the watchdog hovers.
     assert len(rig.sent(SetPositionTargetLocalNed)) <= 1
     rig.run(0.3)
-    # To stand still: what it is told then is what its velocity errs by and what it misses, as they were last known.
+    # To stand still: the setpoint then is its last known velocity error and shortfall.
     added = rig.vehicle.orders.drift.correction(rig.hand.now)
     assert rig.sent(SetPositionTargetLocalNed)[-1][1].vx == pytest.approx(added[0], abs=0.01)
 
@@ -231,7 +231,7 @@ def test_pilots_mode_change_is_not_fought(rig):
 
 @pytest.mark.parametrize("verb", [Verb.RESUME, Verb.TRACK])
 def test_what_a_pilot_took_is_given_back_by_an_order_and_not_by_setpoints_that_come_again(rig, verb):
-    """The tracker pauses for less than it takes to need a RESUME: that is no order to take the vehicle from a pilot."""
+    """The tracker pauses for less than the time that requires RESUME; that does not take the vehicle from a pilot."""
     rig.track_on()
     firmware = rig.emulator.firmware
     firmware.enter(px4_mode(Px4Main.AUTO, Px4Auto.HOLD) if rig.flavour == Flavour.PX4 else CopterMode.BRAKE)
@@ -284,7 +284,7 @@ def test_a_vehicles_clock_that_jumps_is_named_and_moves_nothing(rig, jump_s):
 
 
 def test_a_standing_vehicle_that_restarts_within_a_moment_is_asked_for_everything_anew(rig):
-    """Its heartbeats hardly pause: streams, origin and parameters went all the same."""
+    """Its heartbeats hardly pause, but streams, origin and parameters are lost."""
     rig.connect()
     rig.run(8.0)
     before = len(rig.sent(ParamRequestRead))

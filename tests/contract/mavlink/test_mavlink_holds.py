@@ -8,7 +8,7 @@ from groundstation.bus.topics import ODOMETRY
 
 
 class Swaying:
-    """A tilt error that changes sides: the estimator learns one that lasts. Its velocity is wrong by up to 0.5 m/s."""
+    """A tilt error that changes sign, as the estimator learns a lasting one; its velocity is wrong by up to 0.5 m/s."""
 
     def __init__(self, degrees, period_s=10.0):
         self._error, self._period_s = math.radians(degrees), period_s
@@ -26,7 +26,7 @@ def unlevel(rig):
 
 
 def _watch(rig, seconds):
-    """Return the largest error of the velocity that it goes by, and how far it went from where it was."""
+    """Return the largest error of its own velocity, and its greatest distance from its place."""
     x, y, worst, gone = rig.body.x, rig.body.y, 0.0, 0.0
     for _ in range(round(seconds / 0.005)):
         rig.tick()

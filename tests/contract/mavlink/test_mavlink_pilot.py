@@ -18,7 +18,7 @@ def landings(rig) -> int:
 def take_over(rig, mode):
     rig.track_on()
     rig.emulator.firmware.transmitter = True
-    rig.run(1.0)  # its health is told twice a second
+    rig.run(1.0)  # its health is sent twice a second
     rig.emulator.firmware.enter(mode)
     rig.run(2.0)
     rig.link.sent.clear()
@@ -82,7 +82,7 @@ def test_an_operators_landing_is_sent_to_a_pilot_too(rig):
 
 
 def test_who_is_heard_but_tells_no_velocity_is_told_as_that(rig):
-    """A real ArduCopter ends its LOCAL_POSITION_NED in flight once its estimator has no position."""
+    """A real ArduCopter stops sending LOCAL_POSITION_NED in flight once its estimator has no position."""
     rig.track_on()
     rig.emulator.speaker.builders[LocalPositionNed] = lambda: None
     rig.run(2.0)

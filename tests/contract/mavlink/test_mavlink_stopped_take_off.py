@@ -16,7 +16,7 @@ def begin(rig):
     rig.order(Verb.TAKEOFF)
     firmware = rig.emulator.firmware
     rig.until(lambda: firmware.armed and firmware.mode == firmware.guided, 6.0)
-    rig.run(1.1)  # its heartbeat says so once a second
+    rig.run(1.1)  # its heartbeat reports it once a second
     assert rig.mode == "TAKING_OFF"
     rig.link.sent.clear()
     return firmware
@@ -33,7 +33,7 @@ def is_given_up(rig) -> bool:
 
 
 def stop(rig, mode):
-    """Somebody else changes its mode, and it stays changed."""
+    """Change the vehicle's mode as somebody else, for good."""
     firmware = begin(rig)
     firmware.enter(mode)
     rig.run(4.0)
@@ -65,7 +65,7 @@ def test_motors_that_were_switched_off_stay_off_until_the_next_order(rig):
 
 
 def test_a_vehicle_that_restarts_while_it_takes_off_is_not_armed(rig):
-    """Its estimator has only just begun: it would slide off, and be landed."""
+    """Its estimator has only just started: the vehicle would drift away, and be landed."""
     rig.connect()
     rig.run(8.0)
     began, tell = rig.hand.now, rig.emulator.speaker.local_position

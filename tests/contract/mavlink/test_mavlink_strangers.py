@@ -21,7 +21,7 @@ def test_frames_that_nothing_vouches_for_are_told(rig_of):
 
 
 def test_a_second_address_may_be_that_of_a_vehicle_that_was_restarted(rig_of):
-    """A real ArduCopter called from another port then, and was told to be a second vehicle for 3 s."""
+    """After a restart, a real ArduCopter called from another port and was reported as a second vehicle for 3 s."""
     rig = rig_of("ardupilot")
     rig.connect()
     rig.link.rejected.update(duplicate_system=60)

@@ -109,7 +109,7 @@ def test_a_velocity_that_is_alive_and_wrong_stops_it_too(rig_of, lie, word):
 
 
 def test_a_px4_that_says_that_it_is_not_ready_is_given_four_seconds_from_its_first_positions_on(rig_of):
-    """It refuses to arm for 3 s then; without a remote control it may say so for ever."""
+    """It refuses to arm for 3 s then; without a remote control it may report that for ever."""
     rig = rig_of("px4")
     Liar(rig.link).set(Heartbeat, system_status=0)
     rig.until(lambda: rig.host.watchdog.vehicle.not_ready == "its own checks have not passed yet")
@@ -132,7 +132,7 @@ def test_a_battery_that_is_told_no_more_is_unknown_and_lands_it(rig_of):
 
 
 def test_a_vehicle_that_says_in_flight_that_it_stands_is_landed(rig):
-    """Its land detector errs, or repeats itself: it must not be left hovering as one that has landed."""
+    """Its land detector errs or repeats itself; the vehicle must not stay in hover as if it had landed."""
     rig.track_on()
     Liar(rig.link).set(ExtendedSysState, landed_state=Landed.ON_GROUND)
     rig.until(lambda: rig.mode == "LANDING", 1.0)
@@ -143,7 +143,7 @@ def test_a_vehicle_that_says_in_flight_that_it_stands_is_landed(rig):
 
 @pytest.mark.parametrize("custom_mode", [0, None], ids=["in another mode", "landing already"])
 def test_a_vehicle_whose_heartbeat_says_in_flight_that_it_is_disarmed_is_landed(rig, custom_mode):
-    """It may be another's heartbeat with its ids: what flies is in the air by its own word, and is told to land."""
+    """It may be another vehicle's heartbeat with its ids; this one reports that it is in the air, and is sent LAND."""
     rig.track_on()
     mode = land_mode(rig.flavour) if custom_mode is None else custom_mode
     Liar(rig.link).set(Heartbeat, base_mode=0, custom_mode=mode)
@@ -154,7 +154,7 @@ def test_a_vehicle_whose_heartbeat_says_in_flight_that_it_is_disarmed_is_landed(
 
 
 def test_an_order_to_land_is_sent_whatever_the_vehicle_says(rig):
-    """Also to one that says by all its words that it stands, and to one that nobody has heard."""
+    """Even to one whose every message says that it has landed, and to one without telemetry."""
     rig.connect()
     rig.order(Verb.LAND)
     rig.run(1.0)
@@ -178,7 +178,7 @@ def test_an_order_to_land_is_sent_to_a_vehicle_that_nobody_hears(rig):
 
 
 def test_a_driver_that_is_to_exit_has_told_to_land_first(rig):
-    """Also one that says that it stands, a moment after it was told."""
+    """Even to one that reports landed a moment after the command."""
     rig.connect()
     rig.order(Verb.LAND)
     rig.process.stop_requested = True

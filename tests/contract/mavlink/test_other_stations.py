@@ -46,14 +46,14 @@ def test_an_answer_to_its_order_is_told() -> None:
 @pytest.mark.parametrize(
     ("system", "message"),
     [
-        (1, Heartbeat(2, 12, 0, 0, 3)),  # a vehicle: told as one that is not in the field file
+        (1, Heartbeat(2, 12, 0, 0, 3)),  # a vehicle: reported as one that is not in the field file
         (11, Heartbeat(18, 8, 0, 0, 4)),  # its computer on board
-        (11, QGROUNDCONTROL),  # a companion that takes itself for a ground station, under the vehicle's id
+        (11, QGROUNDCONTROL),  # a companion that identifies as a ground station, under the vehicle's id
         (255, OUR_HEARTBEAT),
         (11, ack(MavCmd.NAV_LAND, 255)),
         (11, ack(MavCmd.NAV_LAND, 0)),
         (11, ack(MavCmd.NAV_LAND, 11)),  # PX4 answers itself
-        (11, ack(MavCmd.REQUEST_MESSAGE, 254)),  # it only looks
+        (11, ack(MavCmd.REQUEST_MESSAGE, 254)),  # it only observes
         (1, ack(MavCmd.NAV_LAND, 254)),  # a vehicle of somebody else
     ],
 )

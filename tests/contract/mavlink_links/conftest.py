@@ -18,18 +18,18 @@ from sim_bridge.world.mavlink_copter import ARDUPILOT_RESPONSE, PX4_RESPONSE, Ma
 from sim_bridge.world.world import TICK_S
 
 _numbers = itertools.count(1)
-# Two sources at once would be two reset counters: each pose a jump that says nothing of the velocity.
+# Two sources at once have two reset counters, so that each pose is a jump without velocity information.
 SILENT_S = 0.2
 
 
 def free_address():
-    """A loopback address that no other test of this run uses."""
+    """Return a loopback address that no other test of this run uses."""
     pid = os.getpid()
     return f"127.{10 + pid % 90}.{pid // 90 % 250}.{next(_numbers)}"
 
 
 class Hangar:
-    """Vehicles in a room of their own each; `aided`: while nobody else feeds them poses, they are given here."""
+    """Vehicles, each in its own room; `aided`: poses come from here while no other source sends them."""
 
     def __init__(self):
         self.emulators = {}

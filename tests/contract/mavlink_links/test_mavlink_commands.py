@@ -46,7 +46,7 @@ def test_probe_names_who_answers(hangar):
 
 
 def test_a_stranger_that_reads_the_announcement_can_open_the_stream(hangar, monkeypatch):
-    """Any MAVLink program, by pymavlink's own hands; what it is told is what comes."""
+    """Any MAVLink program, here pymavlink; the announced stream is the one that arrives."""
     monkeypatch.setenv("MAVLINK20", "1")
     stream = CameraStream("127.0.0.1", 0)
     source = None
@@ -179,7 +179,7 @@ def test_a_key_that_others_can_read_is_none(tmp_path, mode):
 
 
 def test_a_companion_that_calls_from_elsewhere_does_not_take_the_address_of_its_autopilot():
-    """A camera or a computer on board has the system id of the vehicle: orders and failsafe words are not for it."""
+    """A companion has the vehicle's system id; commands and fail-safe frames are not for it."""
     link = UdpLink(LinkSettings(target="udpin:127.0.0.1:0"))
     companion = FrameEncoder(11, 191).encode(telemetry.Heartbeat(18, 8, 0, 0, 4))
     autopilot = FrameEncoder(11, 1).encode(telemetry.Heartbeat(2, 12, 1, 0, 3))
@@ -202,7 +202,7 @@ def test_duplicates_strangers_and_rubbish_are_refused_by_name():
     now = time.monotonic_ns()
     assert len(link._judge(now, beat, ("127.0.0.2", 1))) == 1
     assert link._judge(now + 1, beat, ("127.0.0.3", 1)) == []
-    # Its address may change once the old one is silent (a new lease, another radio).
+    # Its address may change once the old one is silent (a new DHCP lease, another radio).
     assert len(link._judge(now + 4_000_000_000, beat, ("127.0.0.3", 1))) == 1
     assert link._judge(now, b"rubbish", ("127.0.0.3", 1)) == []
     assert len(link._judge(now, beat + beat[:-3], ("127.0.0.3", 1))) == 1

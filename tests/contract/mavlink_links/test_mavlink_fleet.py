@@ -19,14 +19,14 @@ from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import Command, Lease, Verb
 from groundstation.bus.topics import COMMAND, IMU, LEASE, ODOMETRY, VEHICLE_STATUS
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # what lies there and is no test belongs to these tests
+sys.path.insert(0, str(Path(__file__).parents[1]))  # for the helper modules of that folder
 from mavlink_process import FakeProcess
 
 _ids = itertools.count()
 
 
 class Flying:
-    """A fleet with hosts, turned by this thread."""
+    """A fleet with hosts, run by this thread."""
 
     def __init__(self, target, vehicles, kind="pymavlink"):
         exchange = MemoryExchange()
@@ -157,7 +157,7 @@ REASONS = (
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 def test_a_refused_arming_lists_all_reasons(hangar, kind, flavour):
-    """They arrive after the acknowledgement, one of them in two pieces, and on every link."""
+    """They arrive after the acknowledgement, one of them in two parts, and on every link."""
     emulator, _, (address, port) = hangar.add(flavour, 9)
     flying = Flying(f"udpout:{address}:{port}", {9: flavour}, kind)
     try:
@@ -202,7 +202,7 @@ def test_parameters_and_health_forbid_a_take_off_on_every_link(hangar, kind):
     try:
         assert flying.turn(10.0, lambda: "GUID_TIMEOUT is 3, needs 0.1 to 0.5" in reason()), reason()
         emulator.firmware.parameters.values["GUID_TIMEOUT"] = 0.5
-        emulator.silent = True  # it is restarted: everything is read anew
+        emulator.silent = True  # it has restarted: everything is read again
         flying.turn(2.5)
         emulator.silent = False
         assert flying.turn(10.0, lambda: ready(flying)), reason()

@@ -18,7 +18,7 @@ HEARTBEAT = Heartbeat(2, 12, 81, 0, 4)
 
 
 class Ground:
-    """A vehicle, our link to it, and a second ground station, all by hand."""
+    """A vehicle, our link to it, and a second ground station, all stepped by hand."""
 
     def __init__(self, allows=()):
         self.vehicle = udp()
@@ -40,7 +40,7 @@ class Ground:
         _, self._rider = self.station.recvfrom(2048)
 
     def hear(self):
-        """Let the vehicle speak, and us listen."""
+        """Let the vehicle send and our link receive."""
         self.vehicle.sendto(self.vehicle_says.encode(HEARTBEAT), self.ours)
         return eventually(self.link.receive)
 

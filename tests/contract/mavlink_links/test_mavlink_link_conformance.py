@@ -35,7 +35,7 @@ def opened(kind):
 
 
 def collect(link, wanted, seconds=5.0, each=lambda: None):
-    """Return everything heard until `wanted(heard)`; fails after a while."""
+    """Return all messages received until `wanted(heard)`; fails on time-out."""
     heard, deadline = [], time.monotonic() + seconds
     while time.monotonic() < deadline:
         each()
@@ -62,7 +62,7 @@ def heartbeat(link, *systems):
 
 
 def noting(take, messages):
-    """Return `take` of an emulator's services, which appends the messages that it is given."""
+    """Return `take` of an emulator's services, which also records the messages."""
 
     def noted(frame, now):
         messages.append(frame.message)
@@ -157,7 +157,7 @@ def test_a_taken_port_is_named(kind, opened, port):
 
 
 def test_a_pose_reaches_the_vehicle_it_is_of_and_no_other(hangar, opened, port):
-    """ODOMETRY, VISION_POSITION_ESTIMATE and TIMESYNC name no target: on a shared port the address alone decides."""
+    """ODOMETRY, VISION_POSITION_ESTIMATE and TIMESYNC name no target: on a shared port only the address decides."""
     place = ("127.0.0.1", port)
     link = opened(f"udpin:127.0.0.1:{port}")
     taken: dict[int, list[Any]] = {}
@@ -178,7 +178,7 @@ def test_a_pose_reaches_the_vehicle_it_is_of_and_no_other(hangar, opened, port):
 
 
 def test_what_goes_over_the_port_is_told_to_the_byte(hangar, opened):
-    """The recording, and the .tlog made of it, hold the frames themselves on every link."""
+    """On every link, the recording and its .tlog contain the original frames."""
     _, _, (address, port) = hangar.add("px4", 7)
     told = []
     link = opened(f"udpout:{address}:{port}", lambda system, at, data, received: told.append((system, data, received)))
@@ -203,7 +203,7 @@ def test_a_vehicle_that_goes_and_comes_again_and_again_is_spoken_to_again(hangar
     emulator, _, (address, port) = hangar.add("px4", 7)
     link = opened(f"udpout:{address}:{port}")
     each = heartbeat(link, 7)
-    for silence_s in (0.3, 1.0, 3.5):  # the last beyond the time after which MAVSDK gives a vehicle up
+    for silence_s in (0.3, 1.0, 3.5):  # the last beyond the time after which MAVSDK gives up a vehicle
         collect(link, lambda h: of(h, telemetry.Heartbeat, 7), 3.0, each)
         emulator.silent = True
         time.sleep(silence_s)

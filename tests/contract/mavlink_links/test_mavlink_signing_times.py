@@ -65,7 +65,7 @@ def test_what_is_wrongly_signed_is_not_greeted(vehicle, now):
 
 
 def test_our_times_go_on_from_what_a_vehicle_knows(vehicle, now):
-    """Another ground station told it a newer one, or our clock is slow: older than that, it hears nobody."""
+    """Another ground station gave it a newer time, or our clock is slow: it ignores frames with an older time."""
     port = free_port(kind=socket.SOCK_DGRAM)
     link = UdpLink(LinkSettings(target=f"udpin:127.0.0.1:{port}"), Signing(KEY, now))
     told = FrameEncoder(11, 1, Signing(KEY, now + 2 * HOUR)).encode(BEAT)
@@ -77,7 +77,7 @@ def test_our_times_go_on_from_what_a_vehicle_knows(vehicle, now):
 
 
 def test_a_clock_that_is_set_in_flight_moves_our_times_by_nothing(vehicle, now, monkeypatch):
-    """Who speaks for a dead driver signs by the same clock, and has not heard what the driver signed with."""
+    """A fail-safe sender signs by the same clock, and does not know the driver's last timestamp."""
     link = UdpLink(LinkSettings(target=f"udpout:127.0.0.1:{vehicle.getsockname()[1]}"), Signing(KEY, now))
     real, stamps = time.time, []
     for hours in (0, 1, 1, -1):

@@ -31,7 +31,7 @@ FORGED = FrameEncoder(11, 1, Signing(bytes(32), STAMP + 10**6)).encode(BEAT)
 
 @pytest.fixture
 def scene(monkeypatch):
-    """The vehicle, the attacker, and who opens our port; addresses are held for 0.05 s only."""
+    """The vehicle, the attacker, and our port's opener; addresses are held for 0.05 s only."""
     monkeypatch.setattr("drivers.mavlink.links.udp._ADDRESS_HELD_NS", HELD_NS)
     with ExitStack() as stack:
         sockets = []

@@ -33,7 +33,7 @@ S = 1_000_000_000
 
 
 def words_of(tmp_path, **mavlink):
-    """Return what the MAVLink drivers of the mixed team leave behind, reached in another way."""
+    """Return the fail-safe frames of the mixed team's MAVLink drivers, for another address."""
     field = load_field(FIELD)
     for name, drone in field.drones.items():
         if drone.kind == "mavlink":
@@ -63,7 +63,7 @@ def at(words, udp, **changes):
 
 @pytest.mark.parametrize("signed", [False, True])
 def test_words_to_many_vehicles_fit_a_usual_network_unfragmented(vehicle, key_file, signed):
-    """A fragment that is lost takes the whole datagram with it: nobody would be stopped."""
+    """One lost fragment loses the whole datagram, and no vehicle would be stopped."""
     systems = list(range(1, 61))
     way = json.dumps({"serial": "", "key_file": key_file if signed else "", "interface": ""})
     voice = MavlinkVoice(way, 2)
@@ -123,7 +123,7 @@ def test_who_speaks_for_a_driver_is_heard_though_the_clock_was_set_in_flight(
         for _ in range(3):
             link.send(11, HEARTBEAT)
             heard = vehicle.recv(2048)
-            # A vehicle hears a driver that was started anew once that has heard it: see the test of its own.
+            # A vehicle accepts a restarted driver once that driver has received a frame of it: see the separate test.
             if int.from_bytes(heard[-12:-6], "little") > verifier.newest:
                 verifier.verify(heard)
                 left = link.newest_stamp
@@ -137,7 +137,7 @@ def test_who_speaks_for_a_driver_is_heard_though_the_clock_was_set_in_flight(
 
 
 def test_who_speaks_for_a_driver_is_heard_though_the_computers_clock_is_slow(vehicle, port, key_file, tmp_path):
-    """The vehicle knows the time of another ground station, which flew it before; the driver has heard that."""
+    """The vehicle knows the time of another ground station, which flew it before; the driver has received that time."""
     (words, *_), _ = words_of(tmp_path, key_file=key_file, link="pymavlink")
     ahead = stamp_at(time.time()) + 360_000_000
     verifier = Verifier(Signing(KEY, ahead))

@@ -1,4 +1,4 @@
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parent))  # what lies here and is no test belongs to these tests
+sys.path.insert(0, str(Path(__file__).parent))  # for the helper modules of this folder

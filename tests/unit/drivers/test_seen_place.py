@@ -1,4 +1,4 @@
-"""A vehicle's position and its time, from the last picture of it alone."""
+"""The time at which a vehicle was where its estimate has it, by its last observation alone."""
 
 from typing import Any
 

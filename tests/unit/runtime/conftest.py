@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))  # what lies here and is no test belongs to these tests
+sys.path.insert(0, str(Path(__file__).parent))  # for the helper modules of this folder
 from operated_team import Scene
 
 

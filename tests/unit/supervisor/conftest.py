@@ -18,7 +18,7 @@ from groundstation.supervisor.supervisor import Supervisor
 from groundstation.supervisor.terminal import Terminal
 
 HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE))  # what lies here and is no test belongs to these tests
+sys.path.insert(0, str(HERE))  # for the helper modules of this folder
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""What a vehicle misses of a steady command: learnt at the stated rate, limited, and not while a command changes."""
+"""A vehicle's shortfall at a steady setpoint: learnt at the stated rate, limited, not while the setpoint changes."""
 
 import math
 

@@ -142,7 +142,7 @@ async def ride_with_mavsdk(port: int, flight: RiddenFlight) -> dict[int, str]:
                 assert time.monotonic() < deadline, "it is not seen to fly"
                 await asyncio.sleep(0.1)
             answers[number] = await answer_of(action.takeoff())
-            # It repeats a command after half a second, and takes a second refusal of a mode for that of the next one.
+            # It repeats a command after half a second, and takes a second refusal of a mode as the next command's.
             await asyncio.sleep(_ANSWERED_S)
             await action.hold()
             await asyncio.to_thread(flight.until, lambda n=number: flight.speed(n) < STANDS_M_S, 10)

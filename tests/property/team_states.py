@@ -133,8 +133,8 @@ def _wishes(rng: np.random.Generator, places: Array) -> Array:
 def promised(states: TeamStates, robot: int, yaw_rates: Array) -> tuple[Array, Array]:
     """Return the half-spaces of the safety page (why it holds): normals [n, m, 3], the limit along each [n, m; m/s].
 
-    They leave room for the drift. They hold for the velocity as sent and as the vehicle carries it along in a turn, v +
-    T yaw_rate (z x v).
+    They leave room for the drift. They hold for the velocity as sent and as the vehicle carries it along in a turn:
+    v + T yaw_rate (z x v).
     """
     parts = [_fence(states, robot), *(_pair(states, robot, other) for other in states.others(robot))]
     normals, barriers, times = (np.concatenate(part, axis=1) for part in zip(*parts, strict=True))

@@ -74,7 +74,7 @@ class Trace:
 
 
 class World:
-    """Robots (x, y, z, yaw) with first-order velocity lag, a target on a path, and a plain EKF on hard sensors."""
+    """Robots (x, y, z, yaw) with first-order velocity lag, a target on a path, and an EKF on hard-edged sensors."""
 
     def __init__(self, resolved: ResolvedField, starts: Array, path: Array, seed: int) -> None:
         self.rng = np.random.default_rng(seed)

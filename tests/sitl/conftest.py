@@ -17,7 +17,7 @@ from wire_tap import WireTap
 def sitl(tmp_path: Path) -> Iterator[Callable[..., SitlRun]]:
     """Start a run: `sitl("--duration", "10")`; its field is the lab unless the first argument names a verb.
 
-    Each is closed whatever becomes of the others: one that flew on would take the processor from all later tests.
+    Each is closed whatever becomes of the others: one that kept flying would take the processor from all later tests.
     """
     count, runs = itertools.count(), ExitStack()
 
@@ -35,7 +35,7 @@ def sitl(tmp_path: Path) -> Iterator[Callable[..., SitlRun]]:
 
 @pytest.fixture
 def tap() -> Iterator[WireTap]:
-    """What reaches the drones' command ports."""
+    """Record the datagrams to the drones' command ports."""
     try:
         made = WireTap()
     except PermissionError:

@@ -1,6 +1,6 @@
 """Runs the ground station with drone_1 and drone_2 on each other's pads, with each other's markers.
 
-To the ground station that is a field file with the two addresses exchanged.
+For the ground station this equals a field file with the two addresses exchanged.
 """
 
 from typing import Any

@@ -1,7 +1,7 @@
 """A link between two network namespaces with delay and loss, for kernels without netem.
 
-Each end is a TUN adapter; a thread carries the packets from one to the other, late, and drops some: TCP and UDP meet
-what they would meet on a bad network.
+Each end is a TUN adapter; a thread carries the packets from one to the other, late, and drops some: TCP and UDP behave
+as on a bad network.
 """
 
 import ctypes
@@ -29,7 +29,7 @@ def _checked(result: int) -> None:
 
 
 def ip(order: str) -> None:
-    """Run `ip` with an order."""
+    """Run `ip` with these arguments."""
     subprocess.run(["ip", *order.split()], check=True)
 
 
@@ -45,12 +45,12 @@ class Namespace:
 
     @property
     def path(self) -> str:
-        """Where other programs find it."""
+        """Path for other programs."""
         return f"/proc/{os.getpid()}/fd/{self._there}"
 
     @contextmanager
     def entered(self) -> Iterator[None]:
-        """Make sockets and adapters in it, in this thread."""
+        """Create sockets and adapters in it, in this thread."""
         _checked(_libc.setns(self._there, 0))
         try:
             yield
@@ -67,7 +67,7 @@ def _tun(name: str, address: str) -> int:
 
 
 class FarLink:
-    """Connects this namespace with another one; delay_s: each way. `cut` ends it for good."""
+    """Connects this namespace with another one; delay_s: each way. `cut` ends the link for good."""
 
     def __init__(self, there: Namespace, ends: tuple[str, str], delay_s: float, loss: float, seed: int = 1) -> None:
         near = _tun("far", ends[0])

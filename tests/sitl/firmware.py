@@ -8,11 +8,11 @@ from contextlib import suppress
 from pathlib import Path
 
 VARIABLES = {"px4": "SKEIN_PX4", "ardupilot": "SKEIN_ARDUCOPTER"}
-# PX4 sends to 14540 + n, and its simulator the truth to 19410 + n; its system id is n + 1.
+# PX4 sends to 14540 + n, and its simulator sends the truth to 19410 + n; its system id is n + 1.
 PX4_API, PX4_TRUTH = 14540, 19410
-# Without a frame it never arms; our driver lets nobody take off whose battery is unknown.
+# Without a frame it never arms; our driver forbids take-off with an unknown battery.
 _COPTER = {"FRAME_CLASS": 1.0, "FRAME_TYPE": 0.0, "BATT_MONITOR": 4.0}
-# Nor without calibrated accelerometers, which have another offset than zero; there are two of them.
+# Also required: calibrated accelerometers, with a non-zero offset; there are two of them.
 _COPTER |= {f"INS_ACC{number}OFFS_{axis}": 0.001 for number in ("", "2") for axis in "XYZ"}
 _SAVED_S = 2.0
 
@@ -23,14 +23,14 @@ def binary_of(flavour: str) -> str:
 
 
 def ports_of(flavour: str, system: int) -> tuple[int, int]:
-    """Return the ports that a firmware sends to: its telemetry, the true state of its vehicle."""
+    """Return a firmware's destination ports: for telemetry, and for its vehicle's true state."""
     if flavour == "px4":
         return PX4_API + system - 1, PX4_TRUTH + system - 1
     return 25540 + system, 25640 + system
 
 
 class Firmware:
-    """One running binary; parameters: set before the first start; speed: of its clock beside the real one, at most.
+    """One running binary; parameters: set before the first start; speed: its clock's maximum rate, real time = 1.
 
     `end` keeps what was set since.
     """
@@ -45,7 +45,7 @@ class Firmware:
         self.process = self._start()
 
     def restart(self) -> None:
-        """End it once what was set is on its disk, and start it again."""
+        """End it once its parameters are on its disk, and start it again."""
         self.wait_saved()
         self.end()
         self.process = self._start()
@@ -84,9 +84,9 @@ class Firmware:
         return command + quiet + (["-w"] if self._starts == 1 else []), dict(os.environ)
 
     def wait_saved(self, limit_s: float = 20.0) -> None:
-        """Wait until its file of parameters has not changed for a while: PX4 writes it some time after a change."""
+        """Wait until its parameter file has not changed for a while: PX4 writes it some time after a change."""
         names = ("parameters.bson", "parameters_backup.bson") if self.flavour == "px4" else ("eeprom.bin",)
-        # What was set a moment ago is not in a file that is older: the first look comes once it would be.
+        # An older file lacks a parameter set a moment ago: the first check comes after the time of writing.
         time.sleep(_SAVED_S)
         deadline = time.monotonic() + limit_s
         while time.monotonic() < deadline:
@@ -98,7 +98,7 @@ class Firmware:
             time.sleep(0.2)
 
     def end(self) -> None:
-        """Stop it."""
+        """Stop the process."""
         self.process.terminate()
         with suppress(subprocess.TimeoutExpired):
             self.process.wait(10)

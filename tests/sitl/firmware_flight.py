@@ -2,8 +2,8 @@
 
 FLAVOURS: px4, ardupilot, or px4,ardupilot for both in one flight.
 
-The fault ends it: `dark` takes the cameras, `kill` the driver, `guarded` the driver while the guardian speaks for it,
-`none` nothing. HOVER: how long it hovers before TRACK [s].
+The fault ends the flight: `dark` takes the cameras, `kill` the driver, `guarded` the driver with the guardian as fail-
+safe sender, `none` nothing. HOVER: duration of the hover before TRACK [s].
 """
 
 import json
@@ -21,22 +21,22 @@ from groundstation.process import numba_cache
 from sim_bridge.world.ardrone import Quadrotor
 
 sys.path.insert(0, str(Path(__file__).parent))  # for the helper modules of this folder
-numba_cache.activate()  # before the kernels are imported: afterwards they would be compiled anew, for a minute
+numba_cache.activate()  # before the kernels are imported: otherwise they would be compiled again, for a minute
 from firmware_room import Room  # noqa: E402
 from firmware_seat import Seat  # noqa: E402
 
 from drivers.mavlink.failsafe import HOVERS_S, hover_and_land  # noqa: E402
 from groundstation.bus.messages import Verb  # noqa: E402
 
-# Of the mixed team; the other drones are emulated.
+# Drones of the mixed team; the other ones are emulated.
 NAMES = ("drone_2", "drone_3")
-RISEN_M, SETTLED_S, START_S = 0.5, 3.0, 30.0  # hovering before the team tracks
+RISEN_M, SETTLED_S, START_S = 0.5, 3.0, 30.0  # duration of the hover before tracking
 GUARDIAN_SPEAKS_S = 0.3
 Figures = dict[str, Any]
 
 
 class Course:
-    """What one firmware's flight was like: looked at in each slice, it `rises`, `tracks` and `sinks` in turn."""
+    """Course of one firmware's flight, checked in each slice: it `rises`, `tracks` and `sinks` in turn."""
 
     def __init__(self, seat: Seat, room: Room, hover_s: float = SETTLED_S) -> None:
         self.hover_s, self._nearest_m = hover_s, math.inf
@@ -76,7 +76,7 @@ class Course:
         return not self._left
 
     def lose(self, fault: str) -> None:
-        """Take its cameras (dark) or its driver."""
+        """Remove its cameras (dark) or its driver."""
         self._started_at = (self._body.x, self._body.y)
         self._began_s = self._slow_since = self._now_s
         if fault == "dark":
@@ -85,7 +85,7 @@ class Course:
             self._seat.killed = True
 
     def sinks(self, fault: str) -> bool:
-        """Return whether it has come neither to the floor nor to rest; a guardian speaks meanwhile (guarded)."""
+        """Return whether it has reached neither floor nor rest; a guardian sends meanwhile (guarded)."""
         if fault == "guarded":
             self._guard(self._now_s - self._began_s)
         body = self._body
@@ -110,7 +110,7 @@ class Course:
             link.send_raw(self._seat.system, hover if elapsed_s < HOVERS_S else land)
 
     def figures(self) -> Figures:
-        """Return those of take-off and tracking."""
+        """Return the figures of take-off and tracking."""
         return {
             "name": self._seat.name, "flavour": self._seat.flavour, "left": self._left,
             "highest_m": max(self._heights), "height_m": float(np.mean(self._heights[-100:])),
@@ -128,7 +128,7 @@ class Course:
 
 
 def take_off(room: Room, courses: list[Course]) -> None:
-    """Bring the team into the air, and let it track."""
+    """Bring the team into the air, and start tracking."""
     room.study.start_ns, room.flying = room.now_ns(), True
     for seat in room.seats:
         seat.flying = True

@@ -1,8 +1,8 @@
 """Unmodified firmwares as drones of the mixed team, at message level and in step with it.
 
 Cameras, target and the other drones are those of the study; drivers, tracker and firmwares are the real ones. The
-firmwares' processes are stopped while the room computes, and go on for 10 ms of their own time at a time: a loaded
-machine makes the flight slower.
+firmwares' processes are stopped while the room computes, then run for 10 ms of their own time: a loaded machine makes
+the flight slower.
 """
 
 import json
@@ -31,8 +31,8 @@ MIXED_TEAM = HERE.parents[1] / "config" / "mixed-team.yaml"
 FIRST_SYSTEM = 8
 SLICE_NS, ESTIMATE_NS = 10_000_000, 20_000_000
 READY_S, SILENT_S = 120.0, 20.0
-# PX4's simulator shakes its sensors by the same random numbers at each start: flights that begin at the same time after
-# it are one draw of them. The seed decides how long after it they begin.
+# PX4's simulator disturbs its sensors by the same random numbers at each start: flights that begin at the same time
+# after it are one sample. The seed decides how long after it they begin.
 WAITS_AT_MOST_S = 8.0
 
 
@@ -55,8 +55,8 @@ class FirmwareStudy(Study):
 class Room:
     """One flight. `slice` is 10 ms of it; `until` goes on until a condition holds; `close` ends the firmwares.
 
-    flavours: of each drone's firmware. alone_s: for how long a firmware flew on at most while this process waited for
-    the processor. Its clock is slower than the real one, so that such a pause is short for it.
+    flavours: firmware of each drone. alone_s: longest time that a firmware flew on while this process waited for the
+    processor. Its clock is slower than real time, so that it experiences such a pause as short.
     """
 
     def __init__(self, flavours: Mapping[str, str], seed: int, folder: Path, speed: float = 0.5) -> None:
@@ -86,7 +86,7 @@ class Room:
 
     @contextmanager
     def clocked(self) -> Iterator[None]:
-        """Have everything here read the firmwares' clock."""
+        """Make all modules here read the firmwares' clock."""
         old, clock.now_ns = clock.now_ns, self.now_ns
         try:
             yield
@@ -94,11 +94,11 @@ class Room:
             clock.now_ns = old
 
     def now_ns(self) -> int:
-        """Return the time of the room, the real one until every firmware has told its own."""
+        """Return the time of the room, or real time until every firmware has reported its own."""
         return self._now_ns or time.monotonic_ns()
 
     def slice(self) -> None:
-        """Let 10 ms pass for everybody."""
+        """Advance everything by 10 ms."""
         self._let_firmwares_run()
         for seat in self.seats:
             seat.follow_truth()
@@ -145,9 +145,9 @@ class Room:
                     self.alone_s = max(self.alone_s, seat.ahead_ns(self._now_ns) / 1e9)
 
     def until(self, condition: Any, limit_s: float, verb: Verb | None = None, mode: str = "") -> bool:
-        """Let time pass until a condition holds; returns whether it did in time.
+        """Advance time until a condition holds; returns whether it did in time.
 
-        verb: ordered twice a second, of those whose driver is in a mode.
+        verb: commanded twice a second to the drones whose driver is in a mode.
         """
         end_ns = self.now_ns() + round(limit_s * 1e9)
         next_ns = 0
@@ -170,7 +170,7 @@ class Room:
         self.until(lambda: False, self._waits_s)
 
     def said(self) -> str:
-        """Return what the drivers are about, for the reader of a failure."""
+        """Return the drivers' modes and states, for failure messages."""
         return "\n".join(
             f"{s.name} {s.mode}: {s.host.watchdog.vehicle.not_ready}; {s.process.texts[-6:]}" for s in self.seats
         )

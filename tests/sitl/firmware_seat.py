@@ -28,12 +28,12 @@ from sim_bridge.real.mavlink_truth import AutopilotTruth  # noqa: E402
 from sim_bridge.real.placed import Placement  # noqa: E402
 from sim_bridge.study.runner import CLOCK, Study  # noqa: E402
 
-# Twice its period: on a loaded machine the thread that sends the true pose lags behind the others of a firmware.
+# Twice its period: on a loaded machine the thread that sends the true pose lags behind a firmware's other threads.
 TRUTH_NS = 80_000_000
 
 
 class Lean:
-    """What the camera of a drone is told of its attitude."""
+    """Attitude telemetry for a drone's camera."""
 
     def __init__(self, vehicle: Any) -> None:
         self._vehicle = vehicle
@@ -52,7 +52,7 @@ class Lean:
 class Seat:
     """A drone of the field flown by a firmware. Its process runs until it is `stop`ped; `take_seat` gives it a driver.
 
-    heard_ns: its own time as it told last; zero_ns: the room's time less its own; killed: its driver is dead.
+    heard_ns: its own time at its last message; zero_ns: the room's time less its own; killed: its driver is dead.
     """
 
     def __init__(self, name: str, flavour: str, system: int, folder: Path, speed: float) -> None:
@@ -67,14 +67,14 @@ class Seat:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Return what the field has to say of its link: it calls a port of this computer."""
+        """Return the field settings of its link: it calls a port of this computer."""
         return {
             "flavour": self.flavour, "system_id": self.system, "link": "pymavlink",
             "listen": True, "local_address": "127.0.0.1", "port": ports_of(self.flavour, self.system)[0],
         }  # fmt: skip
 
     def take_seat(self, study: Study, field: Any) -> None:
-        """Start its driver, and let the study see it."""
+        """Start its driver, and add it to the study."""
         self.drone = study.site.drones[self.name]
         section = next(one.section for one in driver_sections(field) if one.name == self.name)
         settings = MavlinkDriverSettings.model_validate_json(section)
@@ -103,10 +103,10 @@ class Seat:
 
         return noted
 
-    # -- the link that the study sees ---------------------------------------------------------------------------------
+    # -- the study's link ---------------------------------------------------------------------------------------------
 
     def obey(self, velocity: tuple[float, float, float], yaw_rate: float, now_s: float) -> None:
-        """Take a setpoint of the tracker; while the study hovers, only what keeps the vehicle in its place comes."""
+        """Accept a setpoint of the tracker; while the study hovers, only setpoints that hold its place come."""
         header, holds = self.bus.header(self.name), self.mode in ("HOVER", "HOLD")
         setpoint = VelocitySetpoint(
             header=header, velocity_m_s=velocity, yaw_rate_rad_s=yaw_rate, lifetime_ms=300, epoch=1, holds=holds
@@ -114,33 +114,33 @@ class Seat:
         self.bus.publish(SETPOINT, setpoint)
 
     def step(self, now_s: float, estimates: Any) -> None:
-        """Do nothing: the driver has turns of its own."""
+        """Do nothing: the driver has its own turns."""
 
     def odometry(self, stamp_ns: int) -> Odometry | None:
-        """Return the driver's oldest reading that was not asked for yet."""
+        """Return the driver's oldest odometry not yet fetched."""
         return self._newest.popleft() if self._newest else None
 
     def status(self, stamp_ns: int, _mode: str) -> VehicleStatus:
-        """Return the driver's last word."""
+        """Return the driver's last status."""
         assert self._status is not None
         return self._status
 
     # -- time ---------------------------------------------------------------------------------------------------------
 
     def run(self) -> None:
-        """Let its process go on; one that ended by itself stays so."""
+        """Resume its process; one that ended by itself stays ended."""
         self.firmware.process.send_signal(signal.SIGCONT)
 
     def stop(self) -> None:
-        """Have its process stand still."""
+        """Suspend its process."""
         self.firmware.process.send_signal(signal.SIGSTOP)
 
     def ahead_ns(self, now_ns: int) -> int:
-        """Return for how long it flew on after a time of the room."""
+        """Return how long it flew on after a time of the room."""
         return self.heard_ns + self.zero_ns - now_ns
 
     def lags(self, now_ns: int) -> bool:
-        """Return whether it has not come to a time of the room yet, its true pose included."""
+        """Return whether it has not reached a time of the room yet, its true pose included."""
         assert self.firmware.process.poll() is None, "the firmware ended by itself"
         if self.ahead_ns(now_ns) < 0:
             return True
@@ -148,13 +148,13 @@ class Seat:
         return self.flying and self.heard_ns - self._truth_ns > TRUTH_NS
 
     def follow_truth(self) -> None:
-        """Move its body in the room to where its simulator has it."""
+        """Move its body in the room to its simulator's pose."""
         if (pose := self.truth.latest(time.monotonic_ns())) is not None:
             self.puppet.follow(pose)
             self._truth_ns = self.heard_ns
 
     def drive(self, now_ns: int) -> None:
-        """Give its driver a turn."""
+        """Run one turn of its driver."""
         if not self.killed:
             self.fleet.turn(now_ns)
             self.host.turn(now_ns)
@@ -165,19 +165,19 @@ class Seat:
         if not self.flying:
             self._newest.clear()
 
-    # -- what the room tells it ---------------------------------------------------------------------------------------
+    # -- input from the room ------------------------------------------------------------------------------------------
 
     @property
     def mode(self) -> str:
-        """Return what the driver is about."""
+        """Return the driver's mode."""
         return str(self.host.watchdog.mode)
 
     def tell(self, entities: tuple[Any, ...]) -> None:
-        """Give its driver the tracker's estimate."""
+        """Send the tracker's estimate to its driver."""
         self.bus.publish(ESTIMATE, Estimate(header=self.bus.header("team"), entities=entities, epoch=1))
 
     def order(self, verb: Verb, now_ns: int) -> None:
-        """Give its driver an operator's command."""
+        """Send an operator's command to its driver."""
         header, self._orders = self.bus.header("team"), self._orders + 1
         expires_ns = now_ns + 10**10
         self.bus.publish(LEASE, Lease(header=header, holder="op", expires_ns=expires_ns))
@@ -187,7 +187,7 @@ class Seat:
         self.bus.publish(COMMAND, command)
 
     def row(self, believed: Any, now_ns: int) -> dict[str, Any]:
-        """Return how its true motion, its own word and the belief differ now."""
+        """Return the current differences between its true motion, its telemetry and the belief."""
         body, known = self.puppet.airframe, self.vehicle.telemetry
         c, s = math.cos(body.yaw), math.sin(body.yaw)
         forward, left, up = known.velocity_m_s

@@ -2,9 +2,9 @@
 
 `PORT LINK PLACES [RIDER [ALLOWED]]`.
 
-The stand-in tells the driver where the vehicles are (as a process: as the file PLACES says, x, y, z, yaw of each as
+The stand-in sends the vehicles' poses to the driver (as a process: from the file PLACES, x, y, z, yaw of each as
 doubles in the order of FLAVOURS), takes off and flies them forward at 0.4 m/s, at 1.2 m. RIDER: the port of a second
-ground station on this host, to which both are forwarded; ALLOWED: what it may do besides to look and to stop.
+ground station on this host, to which both are forwarded; ALLOWED: its rights besides observing and stopping.
 """
 
 import itertools
@@ -30,7 +30,7 @@ _COVARIANCE = tuple(1e-4 if place % 5 == 0 else 0.0 for place in range(16))
 
 
 def places_of(path):
-    """Return a function that reads ((x, y, z) [m], yaw [rad]) of a vehicle in the world from a file others write."""
+    """Return a function that reads ((x, y, z) [m], yaw [rad]) of a vehicle in the world from a file by others."""
     places = np.memmap(path, dtype=float, mode="r", shape=(len(FLAVOURS), 4))
     rows = {f"v{system}": row for row, system in enumerate(FLAVOURS)}
 
@@ -42,7 +42,7 @@ def places_of(path):
 
 
 class Pilot:
-    """turn() is one cycle of the driver and of the tracker's part."""
+    """The driver and the tracker's part; turn() runs one cycle of both."""
 
     def __init__(self, port: int, kind: str, where, flavours=FLAVOURS, **vehicle) -> None:
         exchange, self.orders, self.where = MemoryExchange(), 0, where
@@ -56,7 +56,7 @@ class Pilot:
         self.hosts = hosts_of(self.process, self.fleet, settings)
 
     def order(self, verb: Verb, mode: str) -> None:
-        """Order what is in a mode, and ready, to do something: again and again, as a patient operator would."""
+        """Command the vehicles in a mode, and ready, repeatedly, as a patient operator would."""
         ready = [h.vehicle.name for h in self.hosts if h.watchdog.mode == mode and not h.watchdog.vehicle.not_ready]
         if not ready:
             return
@@ -88,7 +88,7 @@ class Pilot:
         self.bus.publish(ESTIMATE, Estimate(header=self.bus.header("team"), entities=tuple(entities), epoch=1))
 
     def _velocity(self, name: str, place) -> tuple[float, ...]:
-        """By where it was a quarter of a second ago, smoothed: the driver corrects the vehicle's own by it."""
+        """Return the smoothed velocity over a quarter of a second; the driver corrects the vehicle's own by it."""
         now, places = time.monotonic(), self.places.setdefault(name, deque(maxlen=64))
         places.append((now, place))
         while now - places[0][0] > 0.25:

@@ -14,7 +14,7 @@ Draw = Callable[[], np.ndarray]
 
 @contextmanager
 def camera(draw: Draw, fps: float, delay_s: float = 0.0) -> Iterator[str]:
-    """Serve what `draw` returns, each picture so long after it is drawn; yields the source."""
+    """Serve the pictures of `draw`, each delayed by this time; yields the source."""
 
     class Handler(BaseHTTPRequestHandler):
         def do_GET(self) -> None:

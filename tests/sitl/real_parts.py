@@ -1,7 +1,7 @@
 """The mixed team with one real drone or camera: its field, `groundstation sitl --real`, and a stand-in.
 
-Without a SITL binary an emulated vehicle in a process of its own stands for the firmware: it sends its true state and
-is flown by poses from outside. What it prints is the truth that judges.
+Without a SITL binary an emulated vehicle in its own process stands for the firmware: it sends its true state and is
+flown by external poses. It prints the truth for judging.
 """
 
 import json
@@ -27,12 +27,12 @@ STAND_IN = "127.95.1.2"
 TRUTH = ("127.0.0.1", 25648)
 PAD_M, PAD_YAW_RAD = (-0.45, -0.5), math.radians(48.0)
 GROUND = (sys.executable, "-m", "groundstation")
-# Fourteen processes beside a firmware: two cores have no room for the pictures that a lab would take.
+# Fourteen processes beside a firmware: two cores cannot render as many pictures as a lab takes.
 FEW = ("--scenario", str(FEW_PICTURES), "--set", "planner.rate_hz=5", "--set", "recording.image_fps=1")
 
 
 def field(folder: Path, mavlink: str, address: str = "127.0.0.1", **sources: str) -> Path:
-    """Write the mixed team with drone_2 at another place, and cameras with other sources."""
+    """Write the mixed team with drone_2 at another address, and cameras with other sources."""
     text = (ROOT / "config" / "mixed-team.yaml").read_text()
     text = text.replace("mavlink: {flavour: px4, system_id: 11, link: mavsdk}", f"mavlink: {{{mavlink}}}")
     text = text.replace("address: 192.168.1.12", f"address: {address}")
@@ -45,7 +45,7 @@ def field(folder: Path, mavlink: str, address: str = "127.0.0.1", **sources: str
 
 
 class Run:
-    """`groundstation sitl` with a keyboard that the test types on; `said` is what it printed so far."""
+    """`groundstation sitl` with a keyboard for the test's input; `said` is its output so far."""
 
     def __init__(self, path: Path, *arguments: str) -> None:
         self.folder = path.parent
@@ -114,7 +114,7 @@ def started() -> Iterator[Callable[..., Run]]:
 
 @pytest.fixture
 def stand_in(tmp_path: Path) -> Iterator[list[dict[str, Any]]]:
-    """An emulated ArduPilot in a process of its own; what it printed of its true state, in the end."""
+    """An emulated ArduPilot in its own process; at the end, the true states that it printed."""
     states: list[dict[str, Any]] = []
     command = [sys.executable, "-m", "sim_bridge.standalone", f"ardupilot@{STAND_IN}", "--indoor", "--truth"]
     with (tmp_path / "truth.txt").open("w") as sink:
@@ -135,5 +135,5 @@ def heights(folder: Path) -> list[float]:
 
 
 def true_poses() -> AutopilotTruth:
-    """Hear the stand-in's true poses in the room."""
+    """Receive the stand-in's true poses in the room."""
     return AutopilotTruth("drone_2", TRUTH, 1, Placement(PAD_M, PAD_YAW_RAD))

@@ -22,13 +22,13 @@ HERE = Path(__file__).parent
 hangar, port = mavlink_hangar.hangar, mavlink_hangar.port
 
 FLAVOURS = {"px4": 11, "ardupilot": 12}
-VEHICLE_WAITS_S = 0.5  # GUID_TIMEOUT: beyond it an ArduPilot brakes
-UNEVEN = 1.5  # what chance adds to the 99th percentile of some 80 gaps
+VEHICLE_WAITS_S = 0.5  # GUID_TIMEOUT: after it an ArduPilot brakes
+UNEVEN = 1.5  # random share of the 99th percentile of some 80 gaps
 _FLIES_M_S = 0.25
 
 
 class TimedSocket:
-    """An emulator's socket that notes when setpoints arrived [s]."""
+    """An emulator's socket that records the arrival times of setpoints [s]."""
 
     def __init__(self, udp: Any) -> None:
         self._udp, self._times, self.setpoints_s = udp, ArrivalTimes(udp), list[float]()
@@ -47,7 +47,7 @@ class TimedSocket:
 
 
 class RiddenFlight:
-    """`wires` and `vehicles` (emulator, body) by system id; `log`: what the driver told its operator."""
+    """`wires` and `vehicles` (emulator, body) by system id; `log`: the driver's messages to its operator."""
 
     def __init__(self, hangar: Any, port: int, folder: Path) -> None:
         self.vehicles = {
@@ -90,7 +90,7 @@ class RiddenFlight:
 
 @contextmanager
 def ridden(hangar: Any, port: int, folder: Path, rider: int, *allowed: str) -> Iterator[RiddenFlight]:
-    """Fly both vehicles forward at 0.4 m/s, forwarded to a port; allowed: what rides there besides looks and stops."""
+    """Fly both vehicles forward at 0.4 m/s, forwarded to a port; allowed: the rider's rights besides look and stop."""
     flight = RiddenFlight(hangar, port, folder)
     order = [str(HERE / "mavlink_pilot.py"), str(port), "pymavlink", str(folder / "places"), str(rider), *allowed]
     with (folder / "pilot.txt").open("wb") as sink:
@@ -109,5 +109,5 @@ def described(gaps_s: Any) -> str:
 
 
 def is_on_time(quiet: Any, ridden: Any) -> bool:
-    """Return whether gaps between setpoints are as even as they were without a rider."""
+    """Return whether gaps between setpoints are as regular as without a rider."""
     return bool(np.percentile(ridden, 99) <= UNEVEN * np.percentile(quiet, 99) and max(ridden) < VEHICLE_WAITS_S)

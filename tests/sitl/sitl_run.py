@@ -24,7 +24,7 @@ FEW_PICTURES = Path(__file__).parents[1] / "fixtures" / "few_pictures.yaml"
 
 
 class SitlRun:
-    """One run. `history` holds (time of arrival [s], message) by (topic, entity); `text` is all it printed."""
+    """One run. `history` holds (time of arrival [s], message) by (topic, entity); `text` is its output."""
 
     def __init__(
         self, folder: Path, *arguments: str, terminal: int | None = None, program: tuple[str, ...] = COMMAND
@@ -37,7 +37,7 @@ class SitlRun:
         command = [*program, *arguments, *screen, *report, *scenario]
         with self.output.open("wb") as sink:
             self.process = subprocess.Popen(
-                # With a terminal, `setsid --ctty` makes it the run's own: closing it hangs up.
+                # With a terminal, `setsid --ctty` makes it the run's own: closing it sends a hang-up.
                 command if terminal is None else ["setsid", "--ctty", *command],
                 stdin=subprocess.DEVNULL if terminal is None else terminal,
                 stdout=sink if terminal is None else terminal,
@@ -50,7 +50,7 @@ class SitlRun:
         self._pids: dict[int, int] = {}
         try:
             self.record = self._find_record()
-        except BaseException:  # nobody else knows of it yet: one that flew on would take the processor from all others
+        except BaseException:  # nobody else knows of it yet: if it flew on, it would take the processor from all others
             self.close()
             raise
 
@@ -76,7 +76,7 @@ class SitlRun:
         return Path(self.record.run_dir)
 
     def listen(self) -> None:
-        """Take in what the bus brought."""
+        """Read the messages from the bus."""
         now = time.monotonic()
         for received in self._inbox.drain():
             self._note(received, now)
@@ -90,7 +90,7 @@ class SitlRun:
             self.history[received.key.topic.name, received.key.entity].append((now, received.message))
 
     def until(self, condition: Callable[[], bool], limit_s: float, what: str = "condition") -> float:
-        """Wait for something to become true; returns the time [s]."""
+        """Wait for a condition; returns the time [s]."""
         deadline = time.monotonic() + limit_s
         while True:
             self.listen()
@@ -133,7 +133,7 @@ class SitlRun:
         return bool(known) and known[-1][1].on_ground
 
     def pid(self, name: str) -> int:
-        """Return the pid of a process as the runtime file says now."""
+        """Return the pid of a process from the runtime file."""
         self.listen()
         return next(process.pid for process in self.record.processes if process.name == name)
 
@@ -143,23 +143,23 @@ class SitlRun:
         return isinstance(message, ProcessStatus) and message.pid != former_pid and message.state == "READY"
 
     def address(self, drone: str) -> str:
-        """Return where the emulator of a drone listens."""
+        """Return the address of a drone's emulator."""
         order = json.loads((self.run_dir / "sim_bridge.json").read_text())
         return str(order["addresses"][drone])
 
     def events(self) -> list[str]:
-        """Return every event that came, as "SEVERITY entity: text"."""
+        """Return all events as "SEVERITY entity: text"."""
         heard = [entry for (topic, _), entries in self.history.items() if topic == EVENT.name for entry in entries]
         heard.sort(key=lambda entry: entry[0])
         return [f"{m.severity} {m.header.entity}: {m.text}" for _, m in heard if isinstance(m, Event)]
 
     def until_tracking(self, limit_s: float = 90.0) -> float:
-        """Wait until every drone obeys the tracker."""
+        """Wait until every drone tracks."""
         drones = self.record.drones
         return self.until(lambda: all(self.mode(name) == "TRACK" for name in drones), limit_s, "all in TRACK")
 
     def until_landed(self, limit_s: float = 30.0) -> float:
-        """Wait until the truth says that every drone stands."""
+        """Wait until every drone is on the ground by the truth."""
         drones = self.record.drones
         return self.until(lambda: all(self.on_ground(name) for name in drones), limit_s, "all on the ground")
 
@@ -184,7 +184,7 @@ class SitlRun:
             time.sleep(0.05)
 
     def close(self) -> None:
-        """End whatever is left of the run."""
+        """End all remaining processes of the run."""
         for number, patience_s in ((signal.SIGTERM, 40), (signal.SIGTERM, 10), (signal.SIGKILL, 5)):
             if self.process.poll() is not None:
                 break

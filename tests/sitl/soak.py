@@ -36,7 +36,7 @@ def watch(run: SitlRun, minutes: float) -> dict[str, list[tuple[float, int, floa
     began = time.monotonic()
     while (passed_min := (time.monotonic() - began) / 60.0) < minutes and run.process.poll() is None:
         run.listen()
-        run.history.clear()  # this process is to stay small itself
+        run.history.clear()  # this process must not grow itself
         for record in (run.record.supervisor, *run.record.processes):
             memory_mb = resident_mb(record.pid)
             if memory_mb is not None:

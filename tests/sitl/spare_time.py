@@ -6,26 +6,26 @@ from pathlib import Path
 
 import pytest
 
-# Where less than this share of all processors was idle, detectors wait for them, and drones land for want of pictures.
+# With a smaller idle share of all processors, detectors wait for them, and drones land for want of pictures.
 ENOUGH = 0.15
 
 
 class SpareTime:
-    """Measures from when it is made."""
+    """Measures from its creation."""
 
     def __init__(self) -> None:
         self._before = _ticks()
 
     @property
     def share(self) -> float:
-        """Return for which share of the time processors were idle."""
+        """Return the share of time in which processors were idle."""
         idle, total = (after - then for after, then in zip(_ticks(), self._before, strict=True))
         return idle / max(1, total)
 
 
 @contextmanager
 def needing_processors() -> Iterator[None]:
-    """Skip what fails within, where processors had no time to spare meanwhile."""
+    """Skip a test that fails within, if the processors had no idle time meanwhile."""
     spare = SpareTime()
     try:
         yield
@@ -36,6 +36,6 @@ def needing_processors() -> Iterator[None]:
 
 
 def _ticks() -> tuple[int, int]:
-    """Return the ticks for which the processors were idle, and all ticks, since the system's start."""
+    """Return the processors' idle ticks, and all ticks, since the system's start."""
     ticks = [int(text) for text in Path("/proc/stat").read_text().split("\n", 1)[0].split()[1:9]]
     return ticks[3] + ticks[4], sum(ticks)

@@ -1,6 +1,6 @@
 """A program outside the run: `stranger.py ATTACK ARGUMENT...`; prints what it received, as JSON.
 
-It speaks Zenoh and HTTP by itself, with nothing of ours.
+It uses Zenoh and HTTP directly, with nothing of ours.
 """
 
 import contextlib
@@ -17,7 +17,7 @@ import zenoh
 
 
 def session(mode: str, endpoint: str, folder: str = "", name: str = "") -> zenoh.Session:
-    """Open a session that speaks to an endpoint, with certificates where there are some."""
+    """Open a session to an endpoint, with certificates where there are some."""
     link = {}
     if folder:
         link = {
@@ -38,7 +38,7 @@ def session(mode: str, endpoint: str, folder: str = "", name: str = "") -> zenoh
 
 
 def forgeries(site: str, epoch: int) -> dict[str, bytes]:
-    """Return what takes drones over: setpoints and a lease in others' names, and a take-off."""
+    """Return messages that would take over drones: setpoints and a lease in others' names, and a take-off."""
     now = time.clock_gettime_ns(time.CLOCK_BOOTTIME)
     boot = Path("/proc/sys/kernel/random/boot_id").read_text()[:8]
     forged: dict[str, dict[str, object]] = {}
@@ -64,7 +64,7 @@ def forgeries(site: str, epoch: int) -> dict[str, bytes]:
 
 
 def put_forgeries(opened: zenoh.Session, site: str, seconds: float) -> None:
-    """Put all that takes drones over, 50 times a second, with an epoch just ahead and one far ahead by turns."""
+    """Publish all forgeries 50 times a second, with an epoch just ahead and one far ahead in turn."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         for epoch in (5000, 10**15):
@@ -74,7 +74,7 @@ def put_forgeries(opened: zenoh.Session, site: str, seconds: float) -> None:
 
 
 def bus(endpoint: str, site: str, folder: str) -> dict[str, str]:
-    """Try every way onto the bus that needs no certificate of the run; returns what became of each."""
+    """Try every way onto the bus that needs no certificate of the run; returns the result of each."""
     plain = endpoint.replace("tls/", "tcp/")
     ways = {
         "plain": (plain, "", ""),
@@ -94,7 +94,7 @@ def bus(endpoint: str, site: str, folder: str) -> dict[str, str]:
 
 
 def neighbour(port: str, site: str, stop: str) -> dict[str, int]:
-    """Be a router such as ROS 2's, on every address, with a node that talks and forges, and one that hears all."""
+    """Act as a router such as ROS 2's, on every address, with a node that talks and forges, and one that reads all."""
     listen = {
         "mode": "router",
         "listen": {"endpoints": [f"tcp/[::]:{port}"], "exit_on_failure": True},
@@ -120,7 +120,7 @@ def neighbour(port: str, site: str, stop: str) -> dict[str, int]:
 
 
 def status_of(console: str, path: str) -> tuple[int, int]:
-    """Ask for a page; returns the status of the answer and its length."""
+    """Request a page; returns the status of the answer and its length."""
     host, _, port = console.removeprefix("http://").strip("/").partition(":")
     with socket.create_connection((host, int(port)), timeout=5) as asking:
         asking.sendall(f"GET {path} HTTP/1.1\r\nHost: {host}:{port}\r\nConnection: close\r\n\r\n".encode())
@@ -129,7 +129,7 @@ def status_of(console: str, path: str) -> tuple[int, int]:
 
 
 def other_user(uid: str, console: str, endpoint: str, *paths: str) -> dict[str, object]:
-    """Become somebody else, and read, ask and join."""
+    """Change to another user, and read, request and join."""
     os.setgroups([])
     os.setgid(int(uid))
     os.setuid(int(uid))
@@ -152,7 +152,7 @@ def other_user(uid: str, console: str, endpoint: str, *paths: str) -> dict[str, 
 
 
 def silence(console: str, count: str) -> dict[str, object]:
-    """Hold connections that never ask; returns what a page gets meanwhile."""
+    """Hold connections without a request; returns a page's results meanwhile."""
     host, _, port = console.removeprefix("http://").strip("/").partition(":")
     held = [socket.create_connection((host, int(port)), timeout=5) for _ in range(int(count))]
     for number, one in enumerate(held):

@@ -22,7 +22,7 @@ from sim_bridge.truth import TruthBoard
 
 pytestmark = pytest.mark.sitl
 BODIES = ("drone_1", "bot")
-# Looks at the wall; the board lies right below, where only the bottom camera sees it.
+# Looks at the wall; the board is right below, where only the bottom camera sees it.
 LEVEL = Pose(np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]), np.zeros(3))
 
 
@@ -44,7 +44,7 @@ def make_spec(truth_name, port, **scenario):
 
 @contextmanager
 def rendering(**scenario):
-    """Yield (truth board, source, teller of modes) of a running camera."""
+    """Yield (truth board, source, function that sets modes) of a running camera."""
     name = f"{os.getpid()}-{time.monotonic_ns()}"
     with socket.create_server(("127.0.0.1", 0)) as listener:
         port = listener.getsockname()[1]
@@ -72,7 +72,7 @@ def states():
 
 
 def pictures_until(truth, source, condition, seconds=20.0):
-    """Keep the world going at 100 Hz; return the packets up to the one that satisfies the condition."""
+    """Advance the world at 100 Hz; return the packets up to the one that satisfies the condition."""
     packets, began = list[Packet](), time.monotonic()
     while not packets or not condition(packets):
         assert time.monotonic() - began < seconds, (source.detail, source.rejected)

@@ -31,7 +31,7 @@ SECRET = "s3cr3t-w0rd"
 
 
 class LockedCamera:
-    """Answers 401 whatever it is told, and keeps it."""
+    """Answers 401 to everything, and records the requests."""
 
     def __init__(self) -> None:
         self._listener = socket.create_server(("127.0.0.1", 0))
@@ -70,7 +70,7 @@ def cameras() -> Iterator[list[LockedCamera]]:
 
 
 def all_bytes(run_dir: Path) -> Iterator[tuple[str, bytes]]:
-    """Yield every file as it is, and what recordings hold, unpacked."""
+    """Yield every file unchanged, and the unpacked contents of recordings."""
     for path in sorted(run_dir.rglob("*")):
         if path.is_file():
             yield str(path), path.read_bytes()
@@ -144,7 +144,7 @@ def test_a_run_leaves_no_password_behind(
 
 
 def heard(record: runtime_file.RuntimeRecord, seconds: float) -> bytes:
-    """Return all that is said on the bus for a while."""
+    """Return all messages on the bus for a while."""
     bus = join(record, "view", Role.VIEW)
     everything = bus.subscribe(TOPICS.values(), capacity=100_000)
     time.sleep(seconds)

@@ -58,7 +58,7 @@ def rendering(**scenario):
 
 
 def write_until(truth, condition, seconds=15.0):
-    """Keep the world going at 100 Hz until something happens; return how long it took [s]."""
+    """Advance the world at 100 Hz until an event; return the time that it took [s]."""
     began = time.monotonic()
     while not condition():
         assert time.monotonic() - began < seconds, "did not happen in time"

@@ -24,7 +24,7 @@ from real_parts import STAND_IN, Run, field, heights, stand_in, started, true_po
 __all__ = ["stand_in", "started"]  # fixtures
 pytestmark = [pytest.mark.slow, pytest.mark.sitl, pytest.mark.timeout(400)]
 SYSTEM = 8
-# The whole team beside a firmware takes 2.3 cores (in step it flies on any computer: test_firmware_in_step.py).
+# The whole team beside a firmware takes 2.3 cores (in step any computer can fly it: test_firmware_in_step.py).
 TWO_DRONES = ("--set", "drones.drone_3=null")
 
 
@@ -50,9 +50,9 @@ def test_a_foreign_firmware_flies_in_the_team_and_ctrl_c_lands_it_with_the_other
 
 
 class Hall(threading.Thread):
-    """Motion capture of the hall that the stand-in flies in: its server streams the one body that is there.
+    """Motion capture of the stand-in's hall: its server streams the one body that is there.
 
-    The other drone is emulated, and located by emulated ranges: no pictures of fixed cameras, which cost the most.
+    The other drone is emulated, and located by emulated ranges: without pictures of fixed cameras, which cost the most.
     """
 
     BOX: ClassVar = {"x_m": (-3.5, 3.5), "y_m": (-2.6, 2.6), "z_m": (-0.1, 2.7)}
@@ -130,7 +130,7 @@ def test_real_firmware_flies_in_the_team(flavour: str, tmp_path: Path, started: 
         real = f"drone_2=autopilot:{firmware.truth_port}"
         run = started(path, "--real", real, "--duration", "40", *TWO_DRONES)
         run.until("To take off and track press Enter", 120)
-        if "drone_2 would be left out" in run.said:  # its estimator needs longer than the others' start
+        if "drone_2 would be left out" in run.said:  # its estimator needs longer to start than the others
             run.until("nobody would be left out any more", 60)
         run.press_enter()
         run.process.wait(200)

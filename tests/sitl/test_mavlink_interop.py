@@ -109,7 +109,7 @@ def mavproxy(absent):
 
 
 class Proxy:
-    """A MAVProxy with a prompt; `until` waits for what it brings about."""
+    """A MAVProxy with a prompt; `until` waits for a command's effect."""
 
     def __init__(self, program, master, folder):
         command = [str(Path(program).parent / "python"), program, f"--master={master}", "--target-system=5"]
@@ -168,7 +168,7 @@ def test_mavproxy_flies_our_ardupilot(proxy_at, hangar):
 
 
 class Tracked:
-    """The real driver of one vehicle and its tracker's stand-in, turned by a thread of their own."""
+    """The real driver of one vehicle and the tracker's stand-in, run by a thread of their own."""
 
     def __init__(self, port, rider, flavour, copter):
         def where(_):
@@ -199,7 +199,7 @@ class Tracked:
         return math.hypot(*self._copter.airframe.velocity_stabilized())
 
     def order(self, verb, done):
-        """Order something again and again, as a patient operator would."""
+        """Give a command repeatedly, as a patient operator would."""
 
         def asked():
             self._wishes.append(verb)
@@ -219,20 +219,20 @@ class Tracked:
         self._pilot.fleet.close()
 
 
-# What one types to go home, to hold and to land. MAVProxy 1.8 sends no mode of PX4's by its name: pymavlink takes the
-# three numbers that make one for a single one, and fails to pack them.
+# Prompt commands to return home, hold and land. MAVProxy 1.8 cannot send PX4's modes by name: pymavlink takes the three
+# numbers of a mode for a single one, and fails to pack them.
 TYPED = {
     "ardupilot": ("mode RTL", "mode BRAKE", "mode LAND"),
     "px4": ("long DO_SET_MODE 157 4 5", "long DO_SET_MODE 157 4 3", "long DO_SET_MODE 157 4 6"),
 }
 
 
-# In a whole run MAVProxy and MAVSDK ride along in tests/interop/test_riding_clients.py.
+# In a whole run MAVProxy and MAVSDK are second stations in tests/interop/test_riding_clients.py.
 @pytest.mark.exhaustive
 @needing_processors()
 @pytest.mark.parametrize("flavour", ["ardupilot", "px4"])
 def test_mavproxy_rides_along_and_may_only_stop(proxy_at, hangar, port, flavour):
-    """Our driver tracks; MAVProxy cannot change what it flies by, holds it until our RESUME, and lands it."""
+    """Our driver tracks; MAVProxy cannot change the setpoints, holds the vehicle until our RESUME, and lands it."""
     emulator, copter, _ = hangar.add(flavour, 5, aided=True, calls=("127.0.0.1", port))
     firmware, rider, (home, hold, land) = emulator.firmware, free_port(kind=socket.SOCK_DGRAM), TYPED[flavour]
     tracked = Tracked(port, rider, flavour, copter)
@@ -251,7 +251,7 @@ def test_mavproxy_rides_along_and_may_only_stop(proxy_at, hangar, port, flavour)
         assert until(lambda: firmware.mode != firmware.guided), tracked.texts
         held = firmware.mode
         assert until(lambda: tracked.speed_m_s < 0.1), "it brakes"
-        for _ in range(40):  # the tracker's setpoints go on, and move nothing
+        for _ in range(40):  # the tracker's setpoints continue, and move nothing
             time.sleep(0.1)
             assert firmware.mode == held and tracked.speed_m_s < 0.2, tracked.texts
         tracked.order(Verb.RESUME, lambda: firmware.mode == firmware.guided and tracked.speed_m_s > 0.25)

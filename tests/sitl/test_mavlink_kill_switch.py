@@ -33,7 +33,7 @@ RATE_HZ = 25
 
 
 class Hands:
-    """A transmitter, and perhaps a joystick, beside one PX4."""
+    """A transmitter, and optionally a joystick, beside one PX4."""
 
     def __init__(self, port: int) -> None:
         self._mav = dialect.MAVLink(None, 254, 190)
@@ -46,7 +46,7 @@ class Hands:
         self._socket.sendto(message.pack(self._mav), self._peer)
 
     def move(self, seconds: float, kill: int | None, joystick: bool) -> None:
-        """Hold the switch (None: the transmitter is off) and the joystick for a while."""
+        """Hold switch (None: the transmitter is off) and joystick in a position for a while."""
         for _ in range(round(seconds * RATE_HZ)):
             if joystick:
                 self._send(dialect.MAVLink_manual_control_message(SYSTEM, 0, 0, 500, 0, 0))
@@ -60,7 +60,7 @@ class Hands:
 
 
 def kills(firmware: Firmware, joystick: bool) -> bool:
-    """Return whether the switch stops it, with a joystick that was there first or without."""
+    """Return whether the switch stops it, with a joystick that was connected first or without."""
     hands = Hands(firmware.port)
     try:
         time.sleep(3.0)
@@ -75,7 +75,7 @@ def kills(firmware: Firmware, joystick: bool) -> bool:
 
 @contextmanager
 def started(folder: Path, value: int) -> Iterator[Firmware]:
-    """Start a PX4 set up for flight, and write the parameter as `setup` does for a field file that has it so."""
+    """Start a PX4 set up for flight, and write the parameter as `setup` does for such a field file."""
     if not binary_of("px4"):
         pytest.skip(f"{VARIABLES['px4']} names no SITL binary: none is in a package registry")
     wanted = {one.name: one.value for one in needed(Flavour.PX4, 255)}
@@ -88,7 +88,7 @@ def started(folder: Path, value: int) -> Iterator[Firmware]:
 
 
 def set_up(port: int, overrides: dict[str, float]) -> list[str]:
-    """Write what differs, and read it back; returns the names of what was written."""
+    """Write differing parameters, and read them back; returns the written names."""
     link = open_link(LinkSettings(target=f"udpin:127.0.0.1:{port}"))
     try:
         setup = ParameterSetup(link, SYSTEM, Flavour.PX4, 255, overrides)
@@ -111,7 +111,7 @@ def test_the_kill_switch_lives_where_the_parameter_is_accepted(value: int, joyst
 
 
 def what_forbids(port: int) -> str:
-    """Return what the driver says on its pad once it has read the parameter."""
+    """Return the driver's findings on the pad after it has read the parameter."""
     pilot = Pilot(port, "pymavlink", lambda vehicle: ((0.0, 0.0, 0.0), 0.0), {SYSTEM: "px4"})
     try:
         deadline, host = time.monotonic() + 20, pilot.hosts[0]

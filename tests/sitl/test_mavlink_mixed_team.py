@@ -16,9 +16,9 @@ FLOWN_S = 45
 
 
 def flown(folder):
-    """Fly the team; returns (report, run directory, what was printed)."""
+    """Fly the team; returns (report, run directory, output)."""
     command = [sys.executable, "-m", "groundstation", "sitl", str(FIELD), "--duration", str(FLOWN_S)]
-    # Five cameras, fourteen processes: no more pictures than the vehicles can do with, fewer for eyes, half the plans.
+    # Five cameras, fourteen processes: as few pictures as the vehicles can fly with, fewer for people, half the plans.
     scenario = folder / "four_pictures.yaml"
     scenario.write_text("schema_version: 1\ncameras: {fps: 4}\n")
     few = ["--scenario", str(scenario), "--set", "recording.image_fps=1", "--set", "planner.rate_hz=5"]
@@ -55,7 +55,7 @@ def test_mixed_team_tracks_and_lands(tmp_path):
 
 
 def judge_tlogs(run):
-    """What both sides said is in the logs, in order, and any program reads it: the MAVSDK link leaves nothing out."""
+    """The logs contain both directions, in order, readable by any program: the MAVSDK link omits nothing."""
     exported = subprocess.run(
         [sys.executable, "-m", "groundstation", "export", "--tlog", str(run)],
         capture_output=True,

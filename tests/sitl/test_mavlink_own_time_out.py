@@ -16,8 +16,8 @@ pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(180)]
 HERE = Path(__file__).parent
 hangar, port = mavlink_hangar.hangar, mavlink_hangar.port
 
-# PX4: COM_OF_LOSS_T 1.0 s and what it was measured to add, then it lands. ArduPilot: GUID_TIMEOUT 0.5 s, then it
-# brakes; FS_GCS_TIMEOUT 2 s, then it lands. Add the time of braking, and that of one heartbeat.
+# PX4: COM_OF_LOSS_T 1.0 s plus a measured delay, then it lands. ArduPilot: GUID_TIMEOUT 0.5 s, then it brakes;
+# FS_GCS_TIMEOUT 2 s, then it lands. Add the braking time, and that of one heartbeat.
 STOPPED_S = {"px4": 2.5, "ardupilot": 2.2}
 LANDS_S = {"px4": 3.5, "ardupilot": 4.0}
 
@@ -47,7 +47,7 @@ def test_each_flavour_stops_by_its_own_time_out(hangar, port, link, number, tmp_
     place = ("127.0.0.1", port)
     flown = {}
     for flavour, system in (("px4", 11), ("ardupilot", 12)):
-        # Poses go on: it is the silence of the setpoints and of the heartbeat that must act, not that of the cameras.
+        # Poses continue: the silence of setpoints and heartbeat must take effect, not that of the cameras.
         flown[flavour] = hangar.add(flavour, system, calls=place, aided=True)[:2]
     places = np.memmap(tmp_path / "places", dtype=float, mode="w+", shape=(len(flown), 4))
     with (tmp_path / "pilot.txt").open("wb") as sink:
@@ -69,7 +69,7 @@ def test_each_flavour_stops_by_its_own_time_out(hangar, port, link, number, tmp_
 
         def landed():
             for flavour, (emulator, copter) in flown.items():
-                # In the vehicle's own time: what counts are its time-outs, not how fast this machine turns it.
+                # In the vehicle's own time: its time-outs count, not the speed at which this machine simulates it.
                 body, firmware = copter.airframe, emulator.firmware
                 tracks[flavour].append((firmware.now_s - at_s[flavour], (body.x, body.y), firmware.mode))
             return not any(e.firmware.armed or c.airborne for e, c in flown.values())

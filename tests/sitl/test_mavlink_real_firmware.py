@@ -35,7 +35,7 @@ M_PER_DEGREE = 111_319.5
 
 
 class Truth(threading.Thread):
-    """Where the simulation of a binary has its vehicle, from a port of its own: (x, y, z) [m] and yaw [rad], FLU."""
+    """A vehicle's true pose from its binary's simulation, by a separate port: (x, y, z) [m] and yaw [rad], FLU."""
 
     def __init__(self, port, ask):
         super().__init__(daemon=True)
@@ -81,14 +81,14 @@ class Truth(threading.Thread):
 
 
 def start(flavour, folder):
-    """Start the binary that a variable names, with its factory's parameters; a skip where it names none."""
+    """Start the binary that a variable names, with its factory parameters; skips without one."""
     if not binary_of(flavour):
         pytest.skip(f"{VARIABLES[flavour]} names no SITL binary: none is in a package registry")
     return Firmware(flavour, folder, SYSTEM)
 
 
 def set_up(flavour, port):
-    """Meet the vehicle, write what indoor flight needs and read it back."""
+    """Meet the vehicle, write the parameters for indoor flight and read them back."""
     link = open_link(LinkSettings(target=f"udpin:127.0.0.1:{port}"))
     try:
         found = probe(link, 10.0)
@@ -140,7 +140,7 @@ def test_real_firmware_is_set_up_and_flown(flavour, kind, tmp_path):
     truth = None
     try:
         set_up(flavour, firmware.port)
-        firmware.restart()  # what was set is used from the next start on
+        firmware.restart()  # parameters take effect at the next start
         truth = Truth(firmware.truth_port, flavour == "ardupilot")
         deadline = time.monotonic() + 30
         while truth.place is None:

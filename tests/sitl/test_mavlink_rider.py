@@ -17,7 +17,7 @@ __all__ = ["hangar", "port"]  # fixtures
 
 pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(180)]
 
-# The rider floods the way of one; the other shows what that costs the link that both share.
+# The rider floods the forwarded path of one vehicle; the other shows the cost to their common link.
 STOPPED, FLOWN = FLAVOURS["px4"], FLAVOURS["ardupilot"]
 SECONDS, A_SECOND = 8.0, 1000
 STOPS = "a second ground station stops it"
@@ -41,7 +41,7 @@ def rider():
 
 
 def way_to(rider, system):
-    """Return the address from which a rider is shown a vehicle's frames."""
+    """Return the address from which a rider receives a vehicle's frames."""
     for _ in range(10_000):
         data, source = rider.recvfrom(MAX_DATAGRAM)
         if data[5] == system:
@@ -50,7 +50,7 @@ def way_to(rider, system):
 
 
 def flood(rider, place):
-    """Send what a mad ground station may, 1000 times a second."""
+    """Send a faulty ground station's messages, 1000 times a second."""
     began = time.monotonic()
     for number, data in zip(range(int(SECONDS * A_SECOND)), itertools.cycle(FLOOD), strict=False):
         rider.sendto(data, place)

@@ -14,11 +14,11 @@ from groundstation.bus.topics import SETPOINT
 
 pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(200)]
 DRONES = ("drone_1", "drone_2")
-# Poses that repeat for 0.2 s are refused, and what tells only such is waited for for 0.5 s; for silence 1.5 s.
+# Poses that repeat for 0.2 s are refused; a sensor with only such poses is given 0.5 s, a silent one 1.5 s.
 HOVER_S = {"capture_frozen": 0.2 + 0.5, "capture_silent": 1.5}
 UNSEEN_LAND_S = 4.0
 DOWN_S = 5.0
-# What two busy cores may add before a fault and what follows from it are seen here.
+# Delay of two busy cores until a fault and its consequences are seen here.
 LATE_S = 0.8
 POSE_TOPICS = ("--set", "motion_capture.mocap.source=ros2://192.168.1.5/vrpn_mocap?domain=5")
 Start = Callable[..., Any]
@@ -29,7 +29,7 @@ def report_of(run: Any) -> dict[str, Any]:
 
 
 def told_to_hover(run: Any, drone: str, since: float) -> bool:
-    """Return whether the tracker has said since a time that it does not know where a drone is."""
+    """Return whether the tracker has reported since a time that it does not know a drone's position."""
     return any(
         at > since and isinstance(message, VelocitySetpoint) and not message.converged
         for at, message in run.history[SETPOINT.name, drone]
@@ -58,7 +58,7 @@ def test_each_field_tracks(sitl: Start, field: str, limit_m: float, source: tupl
 
 
 def test_poses_that_cannot_be_true_are_told_and_flown_over(sitl: Start, tmp_path: Path) -> None:
-    """One second each of a frozen stream, a body that jumped and two that were exchanged: nobody follows them."""
+    """One second each of a frozen stream, a body that jumped and two that were exchanged: none affects the flight."""
     scenario = faults(
         tmp_path,
         "kind: capture_frozen, entity: mocap, start_s: 24, end_s: 25",
@@ -88,7 +88,7 @@ def test_poses_that_cannot_be_true_are_told_and_flown_over(sitl: Start, tmp_path
 @pytest.mark.exhaustive
 @pytest.mark.parametrize("fault", HOVER_S)
 def test_a_stream_that_ends_stops_and_lands_the_team(sitl: Start, tmp_path: Path, fault: str) -> None:
-    """Nothing tells where the team is any more: it hovers, and lands as the table of failsafes says, apart."""
+    """Nothing locates the team any more: it hovers, and lands by the table of failsafes, apart."""
     scenario = faults(tmp_path, f"kind: {fault}, entity: mocap, start_s: 24")
     patience = ("--set", f"safety.unseen_land_after_s={UNSEEN_LAND_S}")
     run = sitl("sitl", "mocap-lab", "--duration", "60", "--scenario", scenario, *patience)

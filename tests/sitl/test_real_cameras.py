@@ -27,13 +27,13 @@ __all__ = ["stand_in", "started"]  # fixtures
 pytestmark = [pytest.mark.slow, pytest.mark.sitl, pytest.mark.exhaustive, pytest.mark.timeout(400)]
 FPS, DELAY_S = 6.0, 0.12
 FENCE_M = (3.7, 2.7)
-# The emulated partner stands where the emulated ceiling_east sees it.
+# The emulated partner is in view of the emulated ceiling_east.
 SMALL_TEAM = ("--set", "drones.drone_3=null", "--set", "drones.drone_1.pad_m=[0.6,0.5]")
 Row = np.ndarray
 
 
 class Ceiling:
-    """What ceiling_west sees of drone_2 alone, wherever `row` (of the truth board) has it."""
+    """The observations of drone_2 alone by ceiling_west, at any pose in `row` (of the truth board)."""
 
     def __init__(self, row: Callable[[], Row | None]) -> None:
         site = parse_site(msgspec.to_builtins(resolved_field(load_field(ROOT / "config" / "mixed-team.yaml"))))
@@ -61,7 +61,7 @@ def test_emulated_drones_fly_beside_a_real_ceiling_camera(tmp_path: Path, starte
 def test_a_real_drone_below_a_real_ceiling_camera_chases_an_emulated_target(
     tmp_path: Path, started: Callable[..., Run]
 ) -> None:
-    """Of the drone the station has its telemetry and what the camera sees of it, and nothing else."""
+    """The station has only the drone's telemetry and its observations by the camera."""
     truth = true_poses()
 
     def row() -> Row | None:
@@ -87,7 +87,7 @@ def test_a_real_drone_below_a_real_ceiling_camera_chases_an_emulated_target(
 
 
 def test_a_printed_board_is_seen_by_the_camera_and_flies_nowhere(tmp_path: Path, started: Callable[..., Run]) -> None:
-    """A drone that never answers is no robot of the belief: its board shows what the camera makes of it."""
+    """A drone that never answers is no robot of the belief: its board shows the camera's raw observations."""
     board = np.array([*PAD_M, 0.06, *[0.0] * 5, PAD_YAW_RAD, *[0.0] * 3, 1.0])
     with camera(Ceiling(lambda: board).picture, FPS, DELAY_S) as source:
         path = field(tmp_path, "flavour: px4, system_id: 11", "127.95.1.3", of_50=source)

@@ -41,7 +41,7 @@ def free_net() -> str:
 
 
 class Site:
-    """A router, a bus of our own, and the order for one drone."""
+    """A router, a separate bus session, and the launch specification for one drone."""
 
     def __init__(self, folder: Path) -> None:
         self.net = free_net()
@@ -150,7 +150,7 @@ def test_a_wrong_scenario_is_refused_with_code_2(site: Site) -> None:
 
 @pytest.mark.slow
 def test_without_its_supervisor_it_stays_until_the_drone_has_landed(site: Site) -> None:
-    """Started by an intermediate process that is killed: flies on, lands for silence, ends, and leaves nobody."""
+    """Started by an intermediate process that is killed: flies on, lands for silence, ends, and leaves no process."""
     site.write(streams={"ceiling": [f"{site.net}.50", 8080]})
     starter = (
         "import subprocess, sys, time\n"

@@ -1,6 +1,6 @@
 """Attacks on a flying run: none moves or stops a drone, and each leaves an event that names the refusal.
 
-The rest of the table in SECURITY.md is replayed beside the part that it attacks: MAVLink in
+The rest of the table in SECURITY.md is tested beside the part under attack: MAVLink in
 tests/contract/mavlink_links/test_mavlink_takeover.py, pages in tests/browser, passwords in test_camera_password_run.py.
 """
 
@@ -29,7 +29,7 @@ ENVIRONMENT = {"PATH": os.environ["PATH"]}
 
 
 def attack(*arguments: object, limit_s: float = 60.0) -> dict[str, object]:
-    """Let the stranger attack; returns what it got."""
+    """Let the stranger attack; returns its results."""
     command = [sys.executable, str(STRANGER), *map(str, arguments)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=limit_s, env=ENVIRONMENT, check=True)
     got: dict[str, object] = json.loads(done.stdout.splitlines()[-1])
@@ -48,13 +48,13 @@ class Neighbour:
         assert self._process.stdout.readline() == "listening\n"
 
     def end(self) -> dict[str, int]:
-        """Return how many messages its nodes exchanged, and how many of the run's they heard."""
+        """Return the number of messages exchanged by its nodes, and of the run's messages that they received."""
         self._stop.touch()
         got: dict[str, int] = json.loads(self._process.communicate(timeout=30)[0])
         return got
 
     def close(self) -> None:
-        with self._process:  # its pipe is closed as well, where only some of these tests run and none has ended it
+        with self._process:  # closes its pipe as well, in case only some of these tests run and none has ended it
             if self._process.poll() is None:
                 self._process.kill()
 
@@ -78,14 +78,14 @@ def run(tmp_path_factory: pytest.TempPathFactory, neighbour: Neighbour) -> Itera
 
 
 class Watched:
-    """What the drones do while somebody attacks."""
+    """The drones' behaviour during an attack."""
 
     def __init__(self, run: SitlRun) -> None:
         run.listen()
         self.run, self.since, self.events = run, time.monotonic(), len(run.events())
 
     def judge(self, named: str = "") -> None:
-        """Fail unless all tracked on, nobody was nearer than he may be, and an event names what was refused."""
+        """Fail unless all kept tracking, no distance was below its limit, and an event names the refusal."""
         if named:
             self.run.until(lambda: any(named in event for event in self.fresh()), 15, f"event: {named}")
         self.run.until(lambda: time.monotonic() > self.since + 2.0, 5)
@@ -125,7 +125,7 @@ def test_strangers_neither_hear_nor_move_anything(run: SitlRun, watched: Watched
 
 
 def test_a_member_moves_nothing_in_anothers_name(run: SitlRun, watched: Watched) -> None:
-    """What the owner's shells hold a certificate for is to order as themselves."""
+    """The certificate of the owner's shells gives the right to command as themselves."""
     identity = Identity(run.record.identities, shell(Role.CLI), run.run_dir.name)
     liars = [
         zenoh_bus.open_bus(run.record.endpoint, run.record.site, source, 2.0, identity)
@@ -165,7 +165,7 @@ def test_an_order_that_nobody_may_give_is_refused_by_name(
 ) -> None:
     identity = Identity(run.record.identities, shell(Role.CLI), run.run_dir.name)
     bus = zenoh_bus.open_bus(run.record.endpoint, run.record.site, "cli_99", 2.0, identity)
-    time.sleep(1.1)  # a refusal is told once a second
+    time.sleep(1.1)  # a refusal is reported once a second
     watched = Watched(run)
     head = bus.header("team", clock.now_ns() - age_s * 10**9)
     order = Command(
@@ -208,7 +208,7 @@ def test_another_user_reads_joins_and_commands_nothing(run: SitlRun, watched: Wa
 
 
 def test_a_router_beside_us_works_and_neither_sees_the_other(run: SitlRun, neighbour: Neighbour) -> None:
-    """The last of these: it ends the neighbour, who has forged since before the run began."""
+    """The last of these tests: it ends the neighbour, who has forged messages since before the run began."""
     watched = Watched(run)
     watched.judge()
     assert f":{neighbour.port}" not in run.record.endpoint
@@ -218,7 +218,7 @@ def test_a_router_beside_us_works_and_neither_sees_the_other(run: SitlRun, neigh
 
 
 def test_no_attack_has_left_a_trace(run: SitlRun) -> None:
-    """After all of them: the flight ends as if nobody had been there."""
+    """After all of them: the flight ends normally."""
     run.process.terminate()
     run.until_landed(30)
     assert run.wait(40) == 0

@@ -43,7 +43,7 @@ ROGUES = ("supervisor", "tracker", "drone_1", shell(Role.CLI))
 
 
 class Rogues:
-    """Members of a run that keep to no rule: each says everything, as everybody."""
+    """Members of a run without rules: each publishes everything, in every name."""
 
     def __init__(self, record: RuntimeRecord) -> None:
         run = Path(record.run_dir).name
@@ -57,7 +57,7 @@ class Rogues:
             bus._session.put(key, payload, attachment=attachment)
 
     def garbage(self) -> None:
-        """Put everything that is no message under keys of every topic, also under names of our own processes."""
+        """Put everything that is no message under keys of every topic, also in the names of our own processes."""
         for topic in TOPICS.values():
             for entity in ("drone_1", "team", "tracker", "nobody"):
                 for source in ("cli_1", "supervisor", "tracker", "drone_1"):
@@ -108,7 +108,7 @@ def test_members_gone_mad_change_nothing(sitl: Start, rogues: Callable[..., Rogu
         with pytest.raises(GroundStationError, match="no router answers"):
             open_bus(address, run.record.site, "tracker", 0.0)
     rogue = rogues(run)
-    for _ in range(8):  # a busy router drops; what counts is what arrived
+    for _ in range(8):  # a busy router drops; the messages that arrived count
         if all(set(run.status(drone).rejected) >= COUNTED for drone in run.record.drones):
             break
         rogue.garbage()
@@ -143,7 +143,7 @@ def _forge_starts(run: Any, rogue: Rogues) -> None:
         answers = bus.subscribe([COMMAND_ACK])
         forged = (("TAKEOFF", "operator", 1), ("TAKEOFF", "stranger", soon_ns), ("TRACK", "stranger", soon_ns))
         refused: set[tuple[str, str]] = set()
-        for seq in range(20):  # as every sender of ours repeats what is not answered: the garbage may push it out
+        for seq in range(20):  # repeated, as all our senders do without an acknowledgement: the garbage may push it out
             if len(refused) == 3 * len(run.record.drones):
                 break
             rogue.say(LEASE, "team", "supervisor", seq, f'"holder":"stranger","expires_ns":{now_ns + 10**12}')
@@ -206,7 +206,7 @@ def test_what_comes_to_a_drivers_port_from_elsewhere_is_counted(sitl: Start) -> 
 
 
 def _ports(run: Any) -> list[int]:
-    """Return the UDP ports that the driver of drone_1 has open."""
+    """Return the open UDP ports of drone_1's driver."""
     inodes = set()
     for link in Path(f"/proc/{run.pid('drone_1')}/fd").iterdir():
         target = str(link.readlink())

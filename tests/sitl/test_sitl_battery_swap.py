@@ -12,12 +12,12 @@ from sitl_run import COMMAND, SitlRun
 from groundstation.bus.messages import FlightState
 
 pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.exhaustive, pytest.mark.timeout(300)]
-# Nothing is heard of a drone that has no battery; it is out by then, and the new one is in before the flight ends.
+# A drone without battery is silent; the battery is out by then, and the new one is in before the flight ends.
 OFF_S, ON_S = 45.0, 57.0
 
 
 def order(run: SitlRun, *words: str) -> None:
-    """Give an order as a lab engineer does, and go on listening while it is obeyed."""
+    """Give a command as a lab engineer does, and keep listening during its execution."""
     with subprocess.Popen([*COMMAND, *words], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as shell:
         run.until(lambda: shell.poll() is not None, 60.0, " ".join(words))
         assert shell.returncode == 0, shell.communicate()[0]

@@ -43,7 +43,7 @@ def test_other_shells_hold_resume_and_land_a_run_that_had_to_take_other_ports(si
         router = others.enter_context(
             socket.create_server(("::", 0), family=socket.AF_INET6, dualstack_ipv6=True)
         ).getsockname()[1]
-        with suppress(OSError):  # a web server may already be there
+        with suppress(OSError):  # a web server may use it already
             others.enter_context(socket.create_server(("0.0.0.0", 8080)))
         run = sitl("--set", f"bus.port={router}")
         run.until_tracking()
@@ -79,7 +79,7 @@ def test_ctrl_c_lands_first(sitl: Start) -> None:
 @FAULTS
 @pytest.mark.exhaustive
 def test_second_ctrl_c_stops_at_once_but_for_the_guardian(sitl: Start) -> None:
-    """Its drones still fly, without drivers: they are told to hover for 1 s and to land for 10 s."""
+    """Its drones still fly, without drivers: they are sent hover for 1 s, then LAND for 10 s."""
     run = sitl()
     run.until_tracking()
     run.process.send_signal(signal.SIGINT)
@@ -96,7 +96,7 @@ def test_second_ctrl_c_stops_at_once_but_for_the_guardian(sitl: Start) -> None:
 @FAULTS
 @pytest.mark.exhaustive
 def test_two_runs_at_once(sitl: Start) -> None:
-    """One flies, the other has met its drones: two flights are more than two cores do in time."""
+    """One flies, the other has met its drones: two flights are too much for two cores in real time."""
     flying = sitl()
     flying.until_tracking()
     standing = sitl()

@@ -13,7 +13,7 @@ Start = Callable[..., "SitlRun"]  # type: ignore[name-defined]  # noqa: F821 - t
 
 
 def verdict_of(run: "SitlRun") -> tuple[int, dict[str, Any], str]:  # type: ignore[name-defined]  # noqa: F821
-    """Fly to the end and re-run it; returns exit code, verdict and what was printed."""
+    """Fly to the end and re-run it; returns exit code, verdict and output."""
     run.wait(150)
     command = [sys.executable, "-m", "groundstation", "replay", str(run.run_dir), "--recompute"]
     done = subprocess.run([*command, "--json"], capture_output=True, text=True, timeout=120, check=False)

@@ -36,7 +36,7 @@ def expectation_of(name: str) -> ScenarioExpectation:
 
 
 def flown_at_the_wire(run_dir: Path, report: dict[str, Any]) -> dict[str, Any]:
-    """Return the figures of a run as those of message level: errors count from when the target was found."""
+    """Return the figures of a run as at message level: errors count from the detection of the target."""
     data = gather(run_dir)
     interval = tracking_interval(data)
     assert interval is not None
@@ -58,10 +58,10 @@ def errors_at_message_level(name: str, folder: Path) -> list[float]:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_scenario_ends_at_the_wire_as_at_message_level(sitl: Start, tmp_path: Path, name: str) -> None:
-    """No two flights at the wire are the same, with one seed neither, so one seed of each cannot be compared.
+    """No two flights at the wire are the same, even with one seed, so that single seeds cannot be compared.
 
-    The seed draws the same room, target and sensors for both; when the team starts, and what is late, is real. So the
-    flight's error must lie within what the seeds of message level span, and 30 % beyond.
+    The seed draws the same room, target and sensors for both; the team's start and delays are real. So the flight's
+    error must lie within the range of the seeds at message level, plus 30 %.
     """
     expected = expectation_of(name)
     run = sitl("--scenario", name, "--seed", "1", "--duration", f"{expected.seconds:g}")

@@ -16,8 +16,8 @@ Start = Callable[..., Any]
 
 HOVER_S = 0.5
 LAND_S = 3.0  # safety.land_after_s of the lab
-# A process, and what happens to it. A router is back before the drones land, which must not keep them aloft. What a
-# lost supervisor alone leads to is seen below, in the drone whose driver lives on; all others: `make wire-faults`.
+# A process, and its fault. A router is back before the drones land, and must not delay the landing. The effect of a
+# lost supervisor alone is seen below, in the drone with a living driver; all others: `make wire-faults`.
 CASES = [
     ("tracker", signal.SIGKILL),
     ("drone_1", signal.SIGSTOP),
@@ -43,7 +43,7 @@ def test_hover_is_on_the_wire_in_time(sitl: Start, tap: Any, name: str, number: 
         assert tap.first_stop(address, broken) <= HOVER_S
         moved = tap.last_motion(address, broken, broken + 60)
         assert moved is None or moved <= HOVER_S, f"moved {moved:.2f} s after the fault, unasked"
-        # A driver that was killed lands what it finds in the air as soon as it is back.
+        # A restarted driver lands drones that are in the air.
         assert tap.first_landing(address, broken) <= LAND_S + HOVER_S
     if name == "tracker":
         _new_tracker_moves_nothing(run, broken, epochs)

@@ -14,15 +14,15 @@ import pytest
 pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(300)]
 
 PROGRAM = Path(__file__).with_name("two_hosts.py")
-# In a user's namespace nobody has real-time priority, and a busy machine flies badly there: root needs none.
+# In a user namespace no process has real-time priority, and a busy machine flies badly there: root needs none.
 ALONE = ["unshare", *([] if os.geteuid() == 0 else ["--user", "--map-root-user"]), "--net"]
 AHEAD_S = 895
 LAND_S = 3.0  # safety.land_after_s of the demo
-LINK_S = 0.5  # 20 ms, a packet that is sent again, and 0.2 s without an answer: then the host's supervisor is silent
+LINK_S = 0.5  # 20 ms, a repeated packet, and 0.2 s without an answer: then the host's supervisor counts as silent
 AT_ONCE_S = 1.5  # a dead supervisor: brake for a second, then land
 FIRMWARE_S = 2.5  # an AR.Drone's own time-out: it hovers after 2 s, and the emulated one lands
 DOWN_S = 5.0  # from the order to the floor
-STOPPED_S = 2.0  # hover after 0.3 s, or 0.4 s where others speak for a driver; then it brakes
+STOPPED_S = 2.0  # hover after 0.3 s, or 0.4 s with a fail-safe sender; then it brakes
 
 
 def why_impossible() -> str:
@@ -53,7 +53,7 @@ def test_all_drivers_and_cameras_on_another_host_behind_a_bad_link(tmp_path: Pat
     report = told["report"]
     assert told["host_code"] == 0, told["host_text"]
     assert report["landed"] and report["max_fence_violation_m"] == 0.0, told["text"]
-    # Both ways have their packets late by the same thread: what is left is the scatter of two busy cores.
+    # One thread delays the packets of both directions: the rest is the scatter of two busy cores.
     assert told["offset_s"] == pytest.approx(-AHEAD_S, abs=0.005)
     assert 0.02 <= told["error_s"] < 0.03 and 0.005 < told["lost"] < 0.02
     if not report["valid"]:
@@ -62,15 +62,16 @@ def test_all_drivers_and_cameras_on_another_host_behind_a_bad_link(tmp_path: Pat
 
 
 Modes = frozenset[str]
-# A driver that ends with its landing has LANDING or LANDED as its last word.
+# The last state of a driver that ends with its landing is LANDING or LANDED.
 DOWN, TRACK, HOVER = frozenset({"LANDING", "LANDED"}), frozenset({"TRACK"}), frozenset({"HOVER"})
 
 
 @dataclass(frozen=True)
 class End:
-    """Something of a host that ends; landing_s: when its drones are told to land at the latest, None: never.
+    """A part of a host that ends; landing_s: latest time of LAND to its drones, None: never.
 
-    concerned: whom it stops; modes: of drone_1 and drone_2 at the end; resumes: whether they go on after RESUME.
+    concerned: the drones that it stops; modes: of drone_1 and drone_2 at the end; resumes: whether they go on after
+    RESUME.
     """
 
     victim: str
@@ -89,8 +90,8 @@ ON_DEMAND = [
     End("driver", LAND_S, modes=(DOWN, TRACK), concerned=("drone_1",)),
     End("supervisor", AT_ONCE_S + LINK_S),
     End("run", LAND_S + LINK_S),
-    End("link", LAND_S + LINK_S, modes=(TRACK, TRACK)),  # nothing is heard of them any more
-    End("liaison", None, modes=(TRACK, TRACK), concerned=()),  # its successor is there within the drivers' patience
+    End("link", LAND_S + LINK_S, modes=(TRACK, TRACK)),  # no telemetry of them any more
+    End("liaison", None, modes=(TRACK, TRACK), concerned=()),  # its successor starts within the drivers' time-out
     End("liaison", None, "SIGSTOP", (HOVER, HOVER), resumes=True),
     End("all", FIRMWARE_S, modes=(TRACK, TRACK), stopped_s=FIRMWARE_S + STOPPED_S),
 ]

@@ -25,7 +25,7 @@ STOPPED = {
     "uniform floor": fault(FaultKind.UNIFORM_FLOOR),
     "ceiling picture frozen": fault(FaultKind.PICTURE_FROZEN, "ceiling"),
 }
-# These need stop nobody, and nothing unsafe may follow.
+# These need not stop a drone, but must cause nothing unsafe.
 BORNE = {
     "ceiling bumped": fault(FaultKind.CAMERA_BUMPED, "ceiling", 5.0),
     "ceiling picture black": fault(FaultKind.PICTURE_BLACK, "ceiling"),
@@ -46,7 +46,7 @@ def test_who_cannot_be_flown_stops_in_time(
 ) -> None:
     verdict = fly(sitl, tap, wrong, tmp_path)
     assert verdict["unsafe"] == {}, verdict
-    # One that hardly moved when the fault began is stopped before its motion could show it.
+    # A drone that hardly moved when the fault began is stopped before its motion could show it.
     stopped = verdict["modes"].get(wrong.entity, "TRACK") != "TRACK"
     assert stopped or verdict["hover_s"] + verdict["rest_s"] > 0.0, "the fault never showed, or nobody moved"
 

@@ -1,6 +1,6 @@
 """Our kinds against the conformance kit: flights of one real driver process and its emulator, in real time.
 
-A few flights of each, so that each flight is flown once; all of them: `groundstation vehicle check KIND`.
+Some flights for each kind, so that each flight is flown once; all of them: `groundstation vehicle check KIND`.
 """
 
 import subprocess

@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[2]
 
 
 class Environment:
-    """A virtual environment, and a folder in which its programs run as a user elsewhere would run them."""
+    """A virtual environment, and a working directory as of a user elsewhere."""
 
     def __init__(self, folder: Path) -> None:
         self.home = folder / "home"
@@ -28,7 +28,7 @@ class Environment:
         self._variables = {**clean, "HOME": str(self.home), "XDG_CACHE_HOME": str(self.home / ".cache")}
 
     def run(self, name: str, *arguments: str, accepted: tuple[int, ...] = (0,)) -> str:
-        """Return what a program prints; fails unless it ends with an accepted exit code."""
+        """Return a program's output; fails unless it ends with an accepted exit code."""
         command = [str(self.programs / name), *arguments]
         done = subprocess.run(
             command, cwd=self.home, env=self._variables, capture_output=True, text=True, timeout=400, check=False
@@ -39,14 +39,14 @@ class Environment:
 
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory: pytest.TempPathFactory) -> Environment:
-    """An environment with the wheel, and with the dependencies of the one that runs the tests."""
+    """An environment with the wheel, and with the dependencies of the test's environment."""
     folder = tmp_path_factory.mktemp("wheel")
     build = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
     subprocess.run(build, cwd=ROOT, capture_output=True, timeout=100, check=True)
     (wheel,) = folder.glob("*.whl")
     environment = Environment(folder)
     environment.run("pip", "install", "--no-deps", "--no-index", str(wheel))
-    # Python reads no .pth files in a folder that a .pth file names: the editable checkout stays out of sight.
+    # Python reads no .pth files in a folder that a .pth file names: the editable checkout stays invisible.
     path_file = environment.site_packages / "dependencies.pth"
     path_file.write_text(sysconfig.get_path("purelib") + "\n", encoding="utf-8")
     return environment
@@ -66,7 +66,7 @@ def test_the_shipped_fields_are_there(installed: Environment, field: str) -> Non
 
 def test_the_demo_flies(installed: Environment) -> None:
     installed.run("python", "-m", "groundstation.runtime.compile_kernels")
-    # Fails the criterion that both topologies occur: so short a flight needs one.
+    # The run fails the criterion that both topologies occur: it is too short for more than one.
     arguments = ("--headless", "--duration", "10", "--output", "judged")
     installed.run("groundstation", "demo", *arguments, accepted=(0, 1))
     judged = json.loads((installed.home / "judged" / "report.json").read_text(encoding="utf-8"))

@@ -16,7 +16,7 @@ FILE = re.compile(r"```python\n# (puffin/\w+\.py)\n(.*?)```", re.DOTALL)
 
 @pytest.fixture
 def puffin(tmp_path):
-    """The environment of a shell in which the package of the page is installed."""
+    """Environment of a shell in which the package of the page is installed."""
     (tmp_path / "puffin").mkdir()
     (tmp_path / "puffin/__init__.py").touch()
     for name, text in FILE.findall(PAGE.read_text()):

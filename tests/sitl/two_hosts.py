@@ -1,7 +1,7 @@
 """A run on one host with its drones' drivers and cameras on another: two namespaces, a link with delay and loss.
 
 Run in a network namespace of its own, as root there: `unshare --user --map-root-user --net python two_hosts.py ...`.
-The clock of the other host is 895 s ahead. Prints what became of it as a line of JSON.
+The clock of the other host is 895 s ahead. Prints the result as a line of JSON.
 """
 
 import json
@@ -27,7 +27,7 @@ from groundstation.bus.zenoh_bus import ZenohBus
 from groundstation.supervisor import site
 
 AHEAD_S = 895
-# A drone that hovers drifts, and sways when it is told to stop.
+# A hovering drone drifts, and swings at a stop command.
 HOVERS_M_S = 0.3
 HERE, THERE = "10.77.0.1", "10.77.0.2"
 HOST = "lab_pc_2"
@@ -35,13 +35,13 @@ DEVICES = ("drones.drone_1", "drones.drone_2", "cameras.ceiling")
 
 
 class TwoHosts:
-    """This namespace is the run's host; the other host is in one of its own, with a clock of its own."""
+    """This namespace is the run's host; the other host is in its own, with its own clock."""
 
     def __init__(self, folder: Path, delay_s: float, loss: float) -> None:
         ip("link set lo up")
         self.beyond = Namespace()
         self.link = FarLink(self.beyond, (HERE, THERE), delay_s, loss)
-        # Devices are near the host that speaks to them: a link of its own, without delay.
+        # Devices are near their host: a link of its own, without delay.
         ip(f"link add near type veth peer name near netns {self.beyond.path}")
         for last in (1, 11, 12, 50, 51, 52):
             ip(f"addr add 10.78.0.{last}/24 dev near")
@@ -71,7 +71,7 @@ class TwoHosts:
             )
 
     def start(self, order: dict[str, Any]) -> "tuple[subprocess.Popen[bytes], SitlRun]":
-        """Start the other host and the run; neither is left alone."""
+        """Start the other host and the run; if one fails, end both."""
         host = self.start_host()
         try:
             return host, self.start_run(order)
@@ -80,7 +80,7 @@ class TwoHosts:
             raise
 
     def start_run(self, order: dict[str, Any]) -> SitlRun:
-        """Start the demo, with the ordered devices on the other host."""
+        """Start the demo, with the listed devices on the other host."""
         settings = [f"{device}.host={HOST}" for device in order.get("devices", DEVICES)] + [f"bus.listen={HERE}"]
         options = [part for setting in settings for part in ("--set", setting)]
         figures = ("--duration", str(order["duration_s"]), "--seed", str(order.get("seed", 1)))
@@ -88,7 +88,7 @@ class TwoHosts:
 
 
 def fly(two: TwoHosts, order: dict[str, Any]) -> dict[str, Any]:
-    """Fly the demo to its end and return what the report says, and the offset that was measured."""
+    """Fly the demo to its end and return the report's figures, and the measured clock offset."""
     host, run = two.start(order)
     try:
         offsets = bus_of(run).subscribe([CLOCK])
@@ -108,14 +108,14 @@ def fly(two: TwoHosts, order: dict[str, Any]) -> dict[str, Any]:
 
 
 def kill(two: TwoHosts, order: dict[str, Any]) -> dict[str, Any]:
-    """Break something in flight; return when the drones stood and how they had flown [s, m].
+    """Break something in flight; return when the drones stopped and how they had flown [s, m].
 
     kill: the victim; signal: "SIGKILL", or "SIGSTOP" for one that freezes; resume: order RESUME at the end.
     """
     host, run = two.start(order)
     victims = {"liaison": lambda: [run.pid(f"liaison_{HOST}")], "supervisor": lambda: [run.process.pid]}
     victims |= {"host": lambda: [host.pid], "driver": lambda: [named(host.pid)["drone_1"]]}
-    # Not what stands for the drones themselves, and for the bus by which they are watched here.
+    # Except the processes that simulate the drones, and the bus for observation here.
     spared = ("sim_bridge", "router")
     victims["run"] = lambda: [run.process.pid] + [p.pid for p in run.record.processes if p.name not in spared]
     victims["all"] = lambda: [host.pid, *named(host.pid).values()]
@@ -128,7 +128,7 @@ def kill(two: TwoHosts, order: dict[str, Any]) -> dict[str, Any]:
             two.link.cut.set()
         else:
             pids = victims[order["kill"]]()
-            # None of them sees another one end: drivers speak within a millisecond of their supervisor's death.
+            # None of them sees another one end: drivers send within a millisecond of their supervisor's death.
             for number in (signal.SIGSTOP, signal.Signals[order.get("signal", "SIGKILL")]):
                 for pid in pids:
                     os.kill(pid, number)
@@ -156,20 +156,20 @@ def kill(two: TwoHosts, order: dict[str, Any]) -> dict[str, Any]:
 
 
 def resumed(run: SitlRun) -> list[str]:
-    """Order RESUME from a shell of the run's host; return the modes of its drones a second later."""
+    """Give RESUME from a shell of the run's host; return the modes of its drones a second later."""
     subprocess.run([*COMMAND, "resume"], cwd=run.folder, check=True, stdout=subprocess.DEVNULL, timeout=20.0)
     rest(run, 1.0)
     return [run.mode(name) for name in run.record.drones]
 
 
 def stopped_s(run: SitlRun, drone: str, since: float) -> float:
-    """Return when a drone last flew faster than one that hovers [s after]; for judging only."""
+    """Return the last time at which a drone flew faster than a hovering one [s after]; for judging only."""
     flown = ((at - since, math.hypot(*m.velocity_m_s[:2])) for at, m in run.truth(drone) if at > since)
     return max((after_s for after_s, speed_m_s in flown if speed_m_s > HOVERS_M_S), default=0.0)
 
 
 def bus_of(run: SitlRun) -> ZenohBus:
-    """Return the bus that a run is watched on."""
+    """Return the bus on which a run is observed."""
     assert run._bus is not None
     return run._bus
 
@@ -183,13 +183,13 @@ def rest(run: SitlRun, seconds: float) -> None:
 
 
 def named(pid: int) -> dict[str, int]:
-    """Return the children of a process by the names that they were started with."""
+    """Return the child processes of a process by their start-up names."""
     pids = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
     return {Path(f"/proc/{one}/cmdline").read_text().split("\0")[3]: int(one) for one in pids}
 
 
 def end(pid: int) -> None:
-    """End the other host's command, and what it started."""
+    """End the other host's command, and its child processes."""
     with suppress(OSError):
         children = named(pid).values()
         os.kill(pid, signal.SIGKILL)
@@ -198,7 +198,7 @@ def end(pid: int) -> None:
 
 
 def main() -> None:
-    """Read an order as JSON, fly, print the result as JSON."""
+    """Read the flight's specification as JSON, fly, print the result as JSON."""
     order = json.loads(sys.argv[1])
     folder = Path(order.get("folder") or tempfile.mkdtemp(prefix="two-hosts-"))
     two = TwoHosts(folder, order.get("delay_s", 0.02), order.get("loss", 0.01))

@@ -1,8 +1,8 @@
 """Kills and freezes of all processes, alone and in pairs, at the wire: `make wire-faults PART=K/N`, needs CAP_NET_RAW.
 
-Each case is a flight of its own. A drone that lost its speaker or its tracker must be told to hover within 0.5 s and to
-land within 3.5 s, and nothing may move it after that; no process may be left. Exit code 1: a case was not so. Results
-are printed line by line, so that a part that is cut short is worth what it did.
+Each case is a flight of its own. A drone that lost its sender or its tracker must receive hover within 0.5 s and LAND
+within 3.5 s, and no motion after that; no process may be left. Exit code 1: a case failed. Results are printed line by
+line, so that an interrupted part keeps its results.
 """
 
 import argparse
@@ -22,7 +22,7 @@ from wire_tap import WireTap
 HOVER_S, LAND_S = 0.5, 3.5
 PROCESSES = ("supervisor", "guardian", "router", "tracker", "drone_1", "drone_2", "recorder", "ceiling",
              "drone_1_camera", "console")  # fmt: skip
-# Whoever loses one of these has nobody who may move its drones.
+# The processes without which nothing may move the drones.
 MOVERS = frozenset({"supervisor", "router", "tracker"})
 KINDS = {"killed": signal.SIGKILL, "frozen": signal.SIGSTOP}
 Case = tuple[tuple[str, str], ...]
@@ -42,13 +42,13 @@ def part_of(all_cases: list[Case], part: str) -> list[Case]:
 
 
 def concerned(case: Case, drones: tuple[str, ...]) -> tuple[str, ...]:
-    """Return which drones must come down."""
+    """Return the drones that must land."""
     names = {name for name, _ in case}
     return drones if names & MOVERS else tuple(drone for drone in drones if drone in names)
 
 
 def fly(case: Case, folder: Path, tap: WireTap) -> dict[str, object]:
-    """Fly one case; returns what was measured of each drone, and `wrong`: what should not be."""
+    """Fly one case; returns the measurements of each drone, and `wrong`: its faults."""
     run = SitlRun(folder, "sitl", "lab")
     try:
         run.until_tracking()
@@ -69,7 +69,7 @@ def fly(case: Case, folder: Path, tap: WireTap) -> dict[str, object]:
 
 
 def measured(tap: WireTap, address: str, broken: float) -> dict[str, float | None]:
-    """Return when a drone was first stopped, last moved and first landed [s after the fault]."""
+    """Return the times of a drone's first stop, last motion and first LAND [s after the fault]."""
     times = {
         "hover_s": tap.first_stop(address, broken),
         "moved_s": tap.last_motion(address, broken, broken + 60.0),
@@ -79,7 +79,7 @@ def measured(tap: WireTap, address: str, broken: float) -> dict[str, float | Non
 
 
 def faults_of(drone: str, times: dict[str, float | None]) -> list[str]:
-    """Return what came too late for a drone that must come down."""
+    """Return the late actions of a drone that must land."""
     wrong = []
     for name, limit_s in (("hover_s", HOVER_S), ("land_s", LAND_S)):
         value = times[name]
@@ -91,7 +91,7 @@ def faults_of(drone: str, times: dict[str, float | None]) -> list[str]:
 
 
 def _until_down(run: SitlRun, tap: WireTap, addresses: dict[str, str], broken: float) -> None:
-    """Wait until the drones that must come down are told to land, and stand if anybody says so; 12 s at most."""
+    """Wait until the drones that must land have received LAND, and landed if their telemetry shows it; 12 s at most."""
     while time.monotonic() < broken + 12.0:
         run.listen()
         told = all(tap.first_landing(address, broken) is not None for address in addresses.values())
@@ -101,7 +101,7 @@ def _until_down(run: SitlRun, tap: WireTap, addresses: dict[str, str], broken: f
 
 
 def _end(run: SitlRun, case: Case, pids: dict[str, int]) -> list[str]:
-    """Wake what was frozen, stop the run, and return who is left."""
+    """Wake frozen processes, stop the run, and return the remaining ones."""
     for name, kind in case:
         if kind == "frozen" and pids[name] in run.survivors():
             os.kill(pids[name], signal.SIGCONT)

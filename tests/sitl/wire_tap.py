@@ -22,7 +22,7 @@ _PROGRAM = (
 
 
 class WireTap:
-    """Notes (time of arrival [s], moves, lands) of each datagram, by the drone's address; needs CAP_NET_RAW."""
+    """Records (time of arrival [s], moves, lands) of each datagram, by the drone's address; needs CAP_NET_RAW."""
 
     def __init__(self) -> None:
         self.heard: defaultdict[str, list[tuple[float, bool, bool]]] = defaultdict(list)
@@ -54,15 +54,15 @@ class WireTap:
         self.heard[socket.inet_ntoa(frame[30:34])].append((now, moves, lands))
 
     def last_motion(self, address: str, since: float, until: float) -> float | None:
-        """Return when the drone was last told to move in a span of time [s after its start]."""
+        """Return the time of the drone's last motion command in a span of time [s after its start]."""
         return max((at - since for at, moves, _ in self.heard[address] if since <= at < until and moves), default=None)
 
     def first_stop(self, address: str, since: float) -> float | None:
-        """Return when the drone was first told to hover or to land [s after]."""
+        """Return the time of the drone's first hover or landing command [s after]."""
         return next((at - since for at, moves, _ in self.heard[address] if at >= since and not moves), None)
 
     def first_landing(self, address: str, since: float) -> float | None:
-        """Return when the drone was first told to land [s after]."""
+        """Return the time of the drone's first landing command [s after]."""
         return next((at - since for at, _, lands in self.heard[address] if at >= since and lands), None)
 
     def close(self) -> None:

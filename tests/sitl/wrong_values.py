@@ -22,7 +22,7 @@ from groundstation.settings.resolved import resolved_field
 from sim_bridge.fault_kinds import Fault, FaultKind
 from sim_bridge.study.faults.judge import Judge
 
-# Both drones track by then on a slow machine too; what must follow takes 3.5 s once the fault shows.
+# Both drones track by then on a slow machine too; the reaction takes at most 3.5 s once the fault shows.
 START_S, _WATCHED_S = 30.0, 12.0
 _PERIOD_S = 0.05
 _NOTICED_M_S = 0.15
@@ -30,7 +30,7 @@ _SAYS_STILL = frozenset({FaultKind.VELOCITY_STUCK, FaultKind.UNIFORM_FLOOR})
 
 
 def fly(sitl: Callable[..., SitlRun], tap: WireTap, fault: Fault, folder: Path) -> dict[str, Any]:
-    """Fly the lab until the fault was watched long enough; returns the judge's verdict, and what was said."""
+    """Fly the lab until the fault was observed long enough; returns the judge's verdict, and the events."""
     scenario = folder / "fault.yaml"
     row = fault.model_dump(mode="json", exclude_none=True)
     scenario.write_text(json.dumps({"schema_version": 1, "cameras": {"fps": 6}, "faults": [row]}))
@@ -47,13 +47,13 @@ def fly(sitl: Callable[..., SitlRun], tap: WireTap, fault: Fault, folder: Path) 
 
 
 def _begun_s(run: SitlRun) -> float | None:
-    """Return when the simulator said that its fault begins; None: not yet."""
+    """Return the simulator's start time of its fault; None: not yet."""
     heard = [entry for (topic, _), entries in run.history.items() if topic == EVENT.name for entry in entries]
     return next((at_s for at_s, m in heard if isinstance(m, Event) and m.text.endswith(" begins")), None)
 
 
 def _verdict(run: SitlRun, tap: WireTap, fault: Fault, tracking_s: float, begun_s: float) -> dict[str, Any]:
-    """Judge from TRACK on. What is believed is not on the wire: here nobody counts as unlocalised."""
+    """Judge from TRACK on. The belief is not on the wire: here no drone counts as unlocalised."""
     field = resolved_field(load_field(find_field("lab")))
     limits = {name: drone.limits.max_speed_m_s for name, drone in field.drones.items()}
     judge = Judge(msgspec.to_builtins(field.room.fence), limits, _PERIOD_S, root="ceiling")
@@ -82,20 +82,20 @@ def _row(state: TruthState) -> Array:
 
 
 def _moves(heard: list[tuple[float, bool, bool]], now_s: float) -> bool:
-    """Return whether the last datagram that reached a drone told it a velocity."""
+    """Return whether the last datagram to a drone had a velocity."""
     last = bisect_right(heard, now_s, key=lambda entry: entry[0]) - 1
     return last >= 0 and heard[last][1]
 
 
 def _follows(run: SitlRun, drone: str, now_s: float) -> bool:
-    """Return whether a drone's driver follows setpoints: one that brakes a blind drone tells it to move as well."""
+    """Return whether a drone's driver follows setpoints: one that brakes a drone without floor sends motion as well."""
     known = run.history[VEHICLE_STATUS.name, drone]
     _, status = known[max(0, bisect_right(known, now_s, key=lambda entry: entry[0]) - 1)]
     return isinstance(status, VehicleStatus) and status.mode == "TRACK" and not status.braked
 
 
 def _shows(fault: Fault, state: TruthState | None) -> bool:
-    """Return whether a wrong value differs from the truth by more than noise explains; others show at once."""
+    """Return whether a wrong value differs from the truth by more than noise explains; other faults show at once."""
     if state is None or fault.kind not in _SAYS_STILL:
         return True
     yaw = state.attitude_rad[2] + math.radians(fault.direction_deg)

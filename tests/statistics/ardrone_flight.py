@@ -1,6 +1,7 @@
 """A real AR.Drone's flight as its driver would publish it, with simulated cameras that observe motion capture truth.
 
-The data are described in their README; cameras are drawn: white noise, a target at rest, dark spells of the ceiling.
+The data are described in their README; the cameras are simulated: white noise, a target at rest, dark periods of the
+ceiling camera.
 """
 
 import itertools
@@ -31,12 +32,12 @@ FRAME_S, TICK_S, STATUS_S = 1 / 15, 0.02, 0.2
 VIDEO_LATE_S = {CEILING: 0.06, DRONE: 0.12}
 SEEN_M = 2.5
 TARGET_M, TARGET_YAW_RAD, TARGET_HEIGHT_M = (1.0, -1.9), 0.4, 0.1
-# Deviations of the place [m], [m per square metre of range], and of the heading [rad]: as the planner has them.
+# Standard deviations of position [m], [m per square metre of range], and heading [rad]: the planner's.
 NOISE = {CEILING: (0.015, 0.0, 0.035), DRONE: (0.02, 0.004, 0.05)}
 
 
 def ns(t: float) -> int:
-    """Return a time of the recording on the clock of the messages."""
+    """Return a time of the recording on the messages' clock."""
     return START_NS + round(t * 1e9)
 
 
@@ -58,7 +59,7 @@ class Recording:
         return np.array([np.interp(t, times, column) for column in columns])
 
     def reported(self, t: float) -> tuple[float, float]:
-        """Return roll and pitch as navdata has them."""
+        """Return roll and pitch from navdata."""
         roll, pitch = (
             np.interp(t, self.arrays["nav_time_s"], column) for column in self.arrays["nav_rotation_deg"].T[:2]
         )
@@ -83,7 +84,7 @@ def read_recording(folder: Path) -> Recording:
 
 
 class _Published:
-    """A bus that keeps what a driver says."""
+    """A bus that records a driver's messages."""
 
     def __init__(self) -> None:
         self.messages: list[Message] = []
@@ -97,7 +98,7 @@ class _Published:
 
 
 def driver_messages(recording: Recording, inertial: bool = True) -> list[tuple[float, Message]]:
-    """Return what the AR.Drone's driver publishes, with times of arrival; inertial False: navdata in demo mode."""
+    """Return the messages of the AR.Drone's driver, with times of arrival; inertial False: navdata in demo mode."""
     a, bus = recording.arrays, _Published()
     publisher: Any = NavdataPublisher(ArDroneDriverSettings(name=DRONE, address="10.0.0.1"), bus)  # type: ignore[arg-type]
     arrivals: list[tuple[float, Message]] = []
@@ -143,13 +144,13 @@ class Cameras:
         self._optical = base_from_tilted_optical(math.radians(drone.camera.tilt_down_deg))
 
     def ceiling(self, t: float) -> RelativeObservation:
-        """Return the ceiling's sighting of the drone."""
+        """Return the ceiling camera's observation of the drone."""
         pose = self._truth(t)
         point = pose[:3] + rotation_from_euler(*pose[3:]) @ self._marker - self._ceiling
         return self._message(CEILING, DRONE, t, self._looking @ point, float(pose[5]), (0.0, 0.0))
 
     def onboard(self, t: float) -> RelativeObservation | None:
-        """Return the drone's sighting of the target, if it is before its camera and near."""
+        """Return the drone's observation of the target, if it is before its camera and near."""
         pose = self._truth(t)
         base = rotation_from_euler(*pose[3:])
         point = self._optical.T @ (base.T @ (np.array([*TARGET_M, TARGET_HEIGHT_M]) - pose[:3]) - self._camera)
@@ -226,13 +227,13 @@ def field_for_flight(field: ResolvedField) -> ResolvedField:
 
 @dataclass(frozen=True)
 class Dark:
-    """The last so many seconds of each period the ceiling sees nothing."""
+    """The ceiling camera is dark for the last so many seconds of each period."""
 
     dark_s: float = 0.0
     period_s: float = 1.0
 
     def hides(self, t: float) -> bool:
-        """Return whether the ceiling sees nothing; it sees until the belief is judged."""
+        """Return whether the ceiling camera is dark; it sees until the belief is judged."""
         seen_s = self.period_s - self.dark_s
         return t >= JUDGED_FROM_S and (t - JUDGED_FROM_S) % self.period_s >= seen_s
 
@@ -255,7 +256,7 @@ def fly(
     recording: Recording, field: ResolvedField, dark: Dark, seed: int = 1, inertial: bool = True, askew: bool = False,
     begun_s: float = 0.0,
 ) -> Score:  # fmt: skip
-    """Feed the flight, from a time on, to a tracker and return how far its belief was from the truth."""
+    """Feed the flight, from a time on, to a tracker and return the errors of its belief."""
     lab = field_for_flight(field)
     tracker, score = tracker_from_field(lab, CLOCK, 1), Score(recording)
     due, judged_from_s = begun_s, max(JUDGED_FROM_S, begun_s + FOUND_S)

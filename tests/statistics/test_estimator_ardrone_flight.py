@@ -1,6 +1,7 @@
 """The tracker on a real AR.Drone's flight in moving air: position of a resting target seen by the leaning drone.
 
-The drone's navdata call it level while it leans 5 to 10 degrees, and its magnetic heading wanders by 7 degrees in 20 s.
+The drone's navdata report it level while it leans by 5 to 10 degrees, and its magnetic heading wanders by 7 degrees in
+20 s.
 """
 
 from collections.abc import Callable
@@ -44,7 +45,7 @@ def test_the_target_is_held_while_the_ceiling_is_dark(
 def test_the_belief_says_how_well_it_knows_where_the_ceiling_camera_hangs_a_little_wrong(
     recording: Recording, lab_field: ResolvedField
 ) -> None:
-    """Its place and its attitude are wrong as the field says they may be: drone and target share that error."""
+    """Its position and attitude err as much as the field allows: drone and target share that error."""
     flights = [fly(recording, lab_field, Dark(), seed, askew=True) for seed in (1, 2, 3)]
     found = figures([row for flight in flights for row in flight.errors])
     print(found)
@@ -70,5 +71,5 @@ def test_a_tracker_that_is_started_in_flight_knows_as_much(
 
 @pytest.mark.slow
 def test_without_an_imu_the_lean_goes_to_the_target(recording: Recording, lab_field: ResolvedField) -> None:
-    """What the IMU is worth: the same flight with navdata in demo mode."""
+    """The value of the IMU: the same flight with navdata in demo mode."""
     assert figures(fly(recording, lab_field, Dark(), inertial=False).errors).target_m >= 0.06

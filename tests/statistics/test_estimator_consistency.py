@@ -1,13 +1,13 @@
-"""Is the belief as good as it says? Normalised errors over seeded flights of the honest scenario: delays, drop-outs,
-2 % gross outliers.
+"""Consistency of the belief: normalised errors over seeded flights of the honest scenario.
 
-Errors within a flight last (a ceiling camera hangs wrong all along), so flights are the samples: judged is the mean
-over flights of a flight's mean NEES, or NIS, per degree of freedom. Its two-sided 95 % t-interval is stated; it must
-be narrow enough for the band 0.8..1.3 to mean something.
+The scenario has delays, drop-outs and 2 % gross outliers. Errors within a flight are correlated (a ceiling camera has
+one mounting error all along), so flights are the samples: the test judges the mean over flights of a flight's mean
+NEES, or NIS, per degree of freedom. It states its two-sided 95 % t-interval, which must be narrow enough for the band
+0.8..1.3 to mean something.
 
-The lab is flown as it is shipped. It leaves its target room for turns on the spot, so its velocity is known better
-there than is said, by design; whether a target's whole state is believed as it should be is judged with one that moves
-as it is believed to (decision 0206).
+The lab is flown as shipped. Its target model leaves room for turns on the spot, so its velocity is known better there
+than stated, by design; the consistency of a target's whole state is judged with one that moves by its model (decision
+0206).
 """
 
 import math
@@ -27,10 +27,10 @@ from sim_bridge.world.noise import generator_of
 from sim_bridge.world.world import TICK_S
 
 pytestmark = pytest.mark.statistics
-# So that a target that wanders by it stays in the room.
+# So that a target that moves by this density stays in the room.
 GENTLE_M_S2 = 0.2
 DURATION_S, OUTLIERS = 25.0, 0.02
-# So many flights; the interval of few is wide.
+# Number of flights; the interval of few is wide.
 MANY = 50
 FLIGHTS = [pytest.param(16, id="16"), pytest.param(MANY, id="50", marks=pytest.mark.exhaustive)]
 FIRST_SEED = 100
@@ -39,7 +39,7 @@ Reports = list[dict[str, Any]]
 
 
 class Wanderer:
-    """A target that is moved by white acceleration of a density [m^2/s^3], by nothing else, once it has departed."""
+    """A target moved only by white acceleration of a density [m^2/s^3], once it has departed."""
 
     def __init__(self, density: float, rng: np.random.Generator) -> None:
         self._kick_m_s, self._rng = math.sqrt(density * TICK_S), rng
@@ -60,7 +60,7 @@ class Wanderer:
 
 
 def with_wanderer(study: Study, field: ResolvedField, seed: int) -> Study:
-    """Return a study whose target moves by just what its filter believes."""
+    """Return a study whose target moves exactly by its filter's model."""
     assert field.target is not None
     believed = parameters_from_field(field).entities[field.target.name]
     assert isinstance(believed, ConstantVelocityTarget)
@@ -75,7 +75,7 @@ def fly(field: ResolvedField, seeds: range, duration_s: float, outliers: float) 
 
 
 def judge(reports: Reports, field: ResolvedField, names: tuple[str, ...]) -> None:
-    """Few flights are outside when the whole interval of their mean is; many when their mean is."""
+    """Few flights fail when the whole interval of their mean is outside; many when their mean is."""
     found = summary(reports, field)
     stated = {name: f"{found[name]} (95 %, {found[name].flights} flights)" for name in names}
     print(stated)

@@ -1,7 +1,7 @@
 """Closed loops compared with the paper's heuristic and the authors' program, over seeds.
 
-Margins are those of the issue; with the seeds used here the standard error of the ratios is below 0.02 (they repeat
-bit for bit on one machine, but rounding may differ between CPUs). Ten of ten successes say 74 % at 95 % confidence;
+Margins are those of the issue; with the seeds used here the standard error of the ratios is below 0.02 (they repeat bit
+for bit on one machine, but rounding may differ between CPUs). Ten of ten successes mean 74 % at 95 % confidence;
 `groundstation experiment` runs the full 50 seeds.
 """
 

@@ -22,9 +22,9 @@ FLIGHTS = 64
 
 @pytest.fixture(scope="module")
 def field() -> ResolvedField:
-    """The planner at 4 Hz: it takes most of the time, and the loop under test goes by belief and odometry.
+    """The field with its planner at 4 Hz, which takes most of the time; the loop under test uses belief and odometry.
 
-    The target is believed as gentle as the scenario's is, as in test_estimator_consistency.
+    The target's model is as gentle as the scenario's target, as in test_estimator_consistency.
     """
     from groundstation.settings.load import load_field
     from groundstation.settings.resolved import resolved_field
@@ -37,7 +37,7 @@ def fly(field: ResolvedField, seeds: range, duration_s: float) -> list[dict[str,
 
 
 def test_short_flights_are_near_consistent(field: ResolvedField) -> None:
-    """A coarse alarm: double counting would show as an error many times the believed one.
+    """A coarse alarm: double counting would show as an error many times its standard deviation.
 
     Three flights: in one all headings are off by the turn of one camera (seed 1: 0.5 deg, where 0.2 are believed).
     """

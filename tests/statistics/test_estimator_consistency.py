@@ -127,7 +127,7 @@ def test_flights_with_outliers_hold_the_target(flights: Reports) -> None:
 def test_a_target_that_moves_as_it_is_believed_to_is_known_as_well_as_is_said(
     lab_field: ResolvedField, count: int
 ) -> None:
-    """What is left is the filter's own: delays, rewinds, the mounting's states, what robots know of each other."""
+    """The remaining errors are the filter's: delays, rewinds, the mounting's states, correlations between robots."""
     assert lab_field.target is not None
     field = structs.replace(lab_field, target=structs.replace(lab_field.target, acceleration_std_m_s2=GENTLE_M_S2))
     reports = []

@@ -59,7 +59,7 @@ def contrast(one: str, other: str) -> float:
 
 
 def grounds(theme: str) -> dict[str, str]:
-    """Return what the page draws on in a theme, as its style sheet says."""
+    """Return the page's background colours in a theme, from its style sheet."""
     selector = ":root" if theme == "light" else r':root\[data-theme="dark"\]'
     found = re.search(selector + r" \{(.*?)\}", (STATIC / "style.css").read_text(), re.DOTALL)
     assert found
@@ -119,7 +119,7 @@ def test_names_take_colours_in_order_and_begin_anew() -> None:
 
 
 def test_the_page_has_no_table_of_its_own() -> None:
-    """All that it knows of colours is the theme: what names somebody comes with the scene."""
+    """The page knows only the colours of the theme: those of entities come with the scene."""
     written = {
         shade.lower() for path in STATIC.rglob("*.js") if "vendor" not in path.parts
         for shade in re.findall(r"#[0-9a-fA-F]{6}\b", path.read_text())

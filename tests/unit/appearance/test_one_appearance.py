@@ -28,7 +28,7 @@ HEADER = m.Header(0, "c", "team", "tracker", 1)
 
 @pytest.fixture(scope="module")
 def field(lab_field: ResolvedField) -> ResolvedField:
-    """The shipped field with its drones in an order of its own: no view may sort them."""
+    """The shipped field with its drones in another order: no view may sort them."""
     return msgspec.structs.replace(lab_field, drones=dict(reversed(lab_field.drones.items())))
 
 

@@ -23,7 +23,7 @@ STANDING_M = 0.1
 
 
 class Lab:
-    """Two drones that stand, rise and swing about a target that drives; cameras and odometry with a little noise."""
+    """Two drones that stand, rise and swing about a driving target; cameras and odometry with a little noise."""
 
     def __init__(self, field: ResolvedField, wrong: WrongFigures, seed: int = 1, seconds: float = SECONDS) -> None:
         self.seconds = seconds

@@ -12,7 +12,7 @@ SEEN = 900  # a minute at 15 Hz
 
 
 def recorded(truth_ms: float, seed: int = 1, alike: int = 1, sharpness: float = 1e-4) -> Callable[[float], Costs]:
-    """Return observations of which each, or so many in a row alike, would have its own delay about the truth."""
+    """Return observations of which each, or each run of so many, has its own delay about the truth."""
     rng = np.random.default_rng(seed)
     own_ms = truth_ms + np.repeat(rng.normal(0.0, sharpness**-0.5, SEEN // alike), alike)
 
@@ -43,7 +43,7 @@ def test_where_errors_are_alike_for_a_second_it_is_as_unsure_as_it_scatters() ->
 
 
 def test_only_what_was_used_under_every_delay_is_compared() -> None:
-    """An observation that is too late under some delay must not make that delay the cheaper one."""
+    """An observation that is too late under some delay must not make that delay cheaper."""
     cost = recorded(20.0)
 
     def refused(later_ms: float) -> Costs:

@@ -62,7 +62,7 @@ def test_late_telemetry_changes_no_setting(lab_field: ResolvedField) -> None:
 
 
 def test_a_ceiling_camera_that_is_turned_shows_by_the_pads_alone(lab_field: ResolvedField) -> None:
-    """The whole world turns with it: two drones on their pads say so, to 0.65 deg, and no flight tells more."""
+    """The whole world turns with it: two drones on their pads show it, to 0.65 deg, and a flight adds nothing."""
     found = calibrated(lab_field, {("ceiling", "yaw"): 3.0})
     assert [(one.who, one.what) for one in found.found] == [("ceiling", "yaw")]
     assert found.found[0].error == pytest.approx(3.0, abs=0.3) and 0.5 < found.found[0].std < 0.8
@@ -105,7 +105,7 @@ def test_a_recording_in_which_no_fixed_camera_saw_a_drone_is_refused(lab_field: 
 
 
 def test_what_a_flight_hardly_shows_is_named_with_what_it_is_not_told_apart_from(lab_field: ResolvedField) -> None:
-    """A fixed camera that hangs aside sees nearly what one sees that is tilted."""
+    """A fixed camera that is displaced sees nearly the same as one that is tilted."""
     figures = {(one.who, one.part): one for one in calibrated(lab_field, {}).figures}
     for place, turn in (("x", "pitch"), ("y", "roll")):
         assert figures["ceiling", place].beside == ("ceiling", turn)

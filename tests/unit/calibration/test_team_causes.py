@@ -18,7 +18,7 @@ SURVEYED = np.array([0.01, 0.01, 0.01])
 
 @dataclass(frozen=True)
 class Linear:
-    """A recording that is as its linear model says; share: how much of the evidence a fit finds of it."""
+    """A recording that follows its linear model; share: the part of the evidence that a fit finds."""
 
     information: Array
     pull: Vector

@@ -29,7 +29,7 @@ def test_all_filters_have_the_same_belief_on_the_same_data():
     differences = estimator_bench.same_belief(team_of(minimal_parameters(6)), seed=4)
     assert differences["numpy"] < 1e-9
     assert differences["filterpy"] < 1e-9
-    # Linearised once per frame: close, and not the same filter.
+    # Linearised once per frame: close, but not the same filter.
     assert 1e-9 < differences["numpy-batch"] < 5e-3
 
 
@@ -74,7 +74,7 @@ def test_the_command_reports_rows_and_agreement():
 
 
 def test_every_filter_is_timed_equally_often(monkeypatch):
-    """The least of many times is less than the least of a few: a peer that was timed less often would seem slower."""
+    """The minimum of many times is smaller than that of a few: a peer timed less often would seem slower."""
     timed: list[int] = []
     monkeypatch.setattr(estimator_bench.LeastTime, "add", lambda row, *_: timed.append(id(row)))
     with np.errstate(invalid="ignore"):

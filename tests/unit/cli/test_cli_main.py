@@ -162,7 +162,7 @@ def test_mixed_installations_are_refused(monkeypatch: pytest.MonkeyPatch, tmp_pa
 
 
 def test_start_up_imports_nothing_heavy() -> None:
-    """`land` must be quick: click and the table are all that is loaded before its module is."""
+    """`land` must be quick: only click and the table are loaded before its module."""
     code = "import sys, groundstation.__main__, groundstation.cli.main; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True).stdout
     heavy = {"numpy", "pydantic", "ruamel.yaml", "zenoh", "msgspec", "rich", "scipy", "numba", "cv2", "matplotlib"}
@@ -176,7 +176,7 @@ def test_what_stops_goes_first_and_with_it_its_bus(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(cli, "main", lambda: done.append("carried out"))
     monkeypatch.setattr(sys, "argv", ["groundstation", verb])
     program.main()
-    lasts = verb == "deadman"  # and drones hold when it is late
+    lasts = verb == "deadman"  # and drones hold if it is late
     assert done == (["first True"] if VERBS[verb].family == "Stop" and not lasts else []) + ["carried out"]
 
 
@@ -297,7 +297,7 @@ def test_the_first_page_names_a_dozen_commands(capsys: pytest.CaptureFixture[str
 
 @pytest.mark.parametrize("encoding", ["utf-8:strict", "latin-1"])
 def test_what_a_terminal_cannot_show_is_no_fault(tmp_path: Path, encoding: str) -> None:
-    """Where a locale is set, python is strict on stdout: a path that was typed as bytes ended in a traceback."""
+    """With a locale, Python encodes stdout strictly: a path typed as bytes ended in a traceback."""
     typed = os.fsencode(tmp_path) + b"/\xff"
     command = [os.fsencode(sys.executable), b"-m", b"groundstation", b"config", b"init", typed]
     told = {**os.environ, "PYTHONIOENCODING": encoding}

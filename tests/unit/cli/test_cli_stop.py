@@ -21,7 +21,7 @@ from groundstation.supervisor.runtime_file import ProcessRecord, RuntimeRecord
 
 
 class FakeTeam:
-    """A router and drones that answer as far as they are told to."""
+    """A router, and drones that acknowledge as far as configured."""
 
     def __init__(self, answers: dict[str, list[tuple[AckStage, str]]]) -> None:
         with socket.socket() as probe:

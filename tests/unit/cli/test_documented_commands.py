@@ -34,7 +34,7 @@ MODULE = re.compile(r"python -m ([\w.]+)")
 
 
 def shown(text: str) -> Iterator[str]:
-    """Yield the lines of code of a Markdown text; what prose breaks over two lines is one."""
+    """Yield the lines of code of a Markdown text; code that prose breaks over two lines is one."""
     for block in FENCED.findall(text):
         yield from re.sub(r"\s#.*", "", block.replace("\\\n", " ")).splitlines()
     prose = FENCED.sub("", text)
@@ -56,7 +56,7 @@ VERBS = dict(commands(cli.groundstation, ""))
 
 
 def mistakes(line: str) -> Iterator[str]:
-    """Yield what cannot be typed in the arguments of `groundstation`."""
+    """Yield the invalid parts in the arguments of `groundstation`."""
     words = shlex.split(line.split("  ")[0].split(" (")[0].split(" && ")[0].split(" | ")[0])
     command: click.Command = cli.groundstation
     while words and isinstance(command, click.Group):
@@ -78,7 +78,7 @@ def mistakes(line: str) -> Iterator[str]:
 
 
 def no_parts(words: list[str]) -> Iterator[str]:
-    """Yield what is no part of a field that ships, where such a one is flown."""
+    """Yield names that are no part of a shipped field, where a command uses one."""
     named = [words[place + 1] for place, word in enumerate(words) if word == "--real" and place + 1 < len(words)]
     field = SHIPPED / f"{Path(words[0]).stem}.yaml" if named else SHIPPED
     if field.is_file():

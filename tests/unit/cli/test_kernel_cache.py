@@ -39,7 +39,7 @@ def test_the_place_of_compiled_kernels_is_set_before_numba_is_there(command: str
 def test_where_nothing_can_be_kept_is_told_at_once(
     use: Callable[[], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A re-run compiled for minutes at each call, and said nothing of it."""
+    """A re-run compiled for minutes at each call, without a message."""
     (tmp_path / "taken").write_text("")
     monkeypatch.setattr(numba_cache, "activate", lambda *_: tmp_path / "taken" / "cache")
     with pytest.raises(GroundStationError, match="let NUMBA_CACHE_DIR name a folder"):

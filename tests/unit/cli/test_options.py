@@ -37,7 +37,7 @@ MEANINGS = {
 
 
 def options_of(command: click.Command, context: click.Context, path: str = "") -> Iterator[tuple[str, click.Option]]:
-    """Yield all options that are shown, with the command that has them."""
+    """Yield all visible options, with their command."""
     yield from ((path, p) for p in command.params if isinstance(p, click.Option) and not p.hidden)
     if isinstance(command, click.Group):
         for name in command.list_commands(context):
@@ -48,7 +48,7 @@ def options_of(command: click.Command, context: click.Context, path: str = "") -
 
 @pytest.fixture(scope="module")
 def shared() -> dict[str, dict[str, click.Option]]:
-    """Return the options that two or more commands have: by name, then by command."""
+    """Return the options of two or more commands: by name, then by command."""
     found: dict[str, dict[str, click.Option]] = {}
     for command, option in options_of(cli.groundstation, click.Context(cli.groundstation)):
         for name in option.opts:

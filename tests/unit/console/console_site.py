@@ -24,7 +24,7 @@ Test = Callable[["Site"], Awaitable[None]]
 
 
 def land(**other: Any) -> str:
-    """Return the message of a page that orders everybody down now."""
+    """Return a page's message that commands all drones to land now."""
     order = {"type": "order", "verb": "LAND", "drones": [], "run": RUN, "at_ms": clock.now_ns() / 1e6, "age_ms": 0}
     return json.dumps(order | other)
 
@@ -43,7 +43,7 @@ class Site:
         self.end: RunEnd | None = None
 
     async def request(self, raw_path: str, method: str = "GET", **headers: str) -> tuple[int, str, bytes]:
-        """Speak HTTP by hand: a library would tidy the path up before it is sent."""
+        """Send HTTP by hand: a library would normalise the path first."""
         reader, writer = await asyncio.open_connection("127.0.0.1", self.port)
         lines = [f"{method} {raw_path} HTTP/1.1", f"Host: {headers.pop('host', f'127.0.0.1:{self.port}')}"]
         lines += [f"{name.replace('_', '-')}: {value}" for name, value in headers.items()]
@@ -61,7 +61,7 @@ class Site:
         return connect(f"ws://127.0.0.1:{self.port}/ws", origin=chosen, max_size=None, **options)  # type: ignore[arg-type]
 
     async def closed(self, page: ClientConnection) -> tuple[int, str]:
-        """Return code and reason with which the server closes; telemetry on the way is passed over."""
+        """Return code and reason with which the server closes; earlier telemetry is skipped."""
         with pytest.raises(ConnectionClosed):
             async with asyncio.timeout(5):
                 while True:

@@ -27,7 +27,7 @@ LAX.check_hostname, LAX.verify_mode = False, ssl.CERT_NONE  # as a person does w
 
 
 class Tablet:
-    """A device that was not here before."""
+    """A device without an earlier visit."""
 
     def __init__(self, port: int) -> None:
         self.site, self.cookie = f"https://{ADDRESS}:{port}", ""

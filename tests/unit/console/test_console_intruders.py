@@ -71,7 +71,7 @@ def test_there_is_room_for_so_many(monkeypatch: pytest.MonkeyPatch) -> None:
         await until(lambda: len(site.server.sessions.viewers) == 5)
         async with site.connect() as one_more:
             assert await site.closed(one_more) == (1013, "5 viewers are connected already")
-        # The operator whose page comes back finds a place, and nobody who only says he is.
+        # The operator whose page returns gets a place; a client that only claims to be the operator does not.
         hello = {"type": "hello", "token": await site.token(), "client": "abcd"}
         await pages[0].send(json.dumps(hello))
         await pages[0].send(json.dumps({"type": "takeover"}))

@@ -73,7 +73,7 @@ class Room:
 
 
 def order(verb: m.Verb, run: str = RUN, late_ms: float = 0.0, age_ms: float = 0.0, ref: str = "") -> CommandRequest:
-    """Return what a page sends; late_ms: how old it is by the server's clock, age_ms: by the page's own count."""
+    """Return a page's message; late_ms: its age by the server's clock, age_ms: by the page's own count."""
     return CommandRequest(verb, (), run, clock.now_ns() / 1e6 - late_ms, age_ms, ref)
 
 
@@ -121,14 +121,14 @@ def test_a_stop_of_another_run_or_of_long_ago_stops_nobody(verb: m.Verb, bad: di
     room.sessions.handle(viewer, order(verb, ref="mine", **bad))
     assert room.commands() == []
     assert reason in room.says(viewer) and '"ref":"mine"' in room.says(viewer)
-    # A page that reckons the server's time as too late must not make its orders live longer.
+    # A page that estimates the server's time too late must not prolong its commands' lifetime.
     room.sessions.handle(viewer, order(verb, late_ms=-60_000, age_ms=4900))
     assert [command.verb for command in room.commands()] == [verb]
 
 
 def test_a_restarted_console_serves_the_same_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    assert run_id("runs/a") == run_id(str(tmp_path / "runs/a"))  # as the runtime file has it
+    assert run_id("runs/a") == run_id(str(tmp_path / "runs/a"))  # as in the runtime file
     assert run_id("runs/a") != run_id("runs/a-2")
 
 
@@ -138,7 +138,7 @@ def test_an_order_is_followed_to_its_end() -> None:
     (command,) = room.commands()
     assert room.desk.summary()[0]["state"] == "sent"
     room.ack(command, "drone_1", m.AckStage.EFFECTIVE)
-    assert room.desk.summary()[0]["state"] == "sent"  # one drone has said nothing
+    assert room.desk.summary()[0]["state"] == "sent"  # one drone has not answered
     room.ack(command, "drone_2", m.AckStage.RECEIVED)
     assert room.desk.summary()[0]["state"] == "heard"
     room.ack(command, "drone_2", m.AckStage.EFFECTIVE)
@@ -299,7 +299,7 @@ def test_only_a_simulated_target_is_steered() -> None:
 def test_viewers_that_lag_are_spared(monkeypatch: pytest.MonkeyPatch) -> None:
     room = Room()
     viewer = room.viewer(1)
-    room.sessions.handle(viewer, FramesHandled(10**9))  # nobody has seen what was not sent
+    room.sessions.handle(viewer, FramesHandled(10**9))  # a viewer cannot have shown frames that were not sent
     assert viewer._seen == 0
     for number in range(70):
         viewer.say(f"{number}")

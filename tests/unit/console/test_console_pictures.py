@@ -50,7 +50,7 @@ def test_detections_belong_to_their_picture(lab_field: ResolvedField) -> None:
 
 def test_pictures_come_at_five_a_second_on_the_average() -> None:
     desk, jitter = PictureDesk({}), np.random.default_rng(1)
-    # Five a second, seen in turns of 50 ms; then fifteen.
+    # Five a second, polled every 50 ms; then fifteen.
     for rate_hz, at_most in ((5, 101), (15, 102)):
         stamps = [
             round(NS_PER_S * (10 + k / rate_hz + jitter.uniform(0, 0.03))) // 50_000_000 * 50_000_000

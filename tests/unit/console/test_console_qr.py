@@ -10,7 +10,7 @@ LIGHT = {"\u2588": (255, 255), "\u2580": (255, 0), "\u2584": (0, 255), " ": (0, 
 
 
 def shown(text: str) -> np.ndarray:
-    """Return the modules that a terminal shows, 255 for light."""
+    """Return the modules in the terminal's output, 255 for light."""
     lines = [line.removeprefix("\x1b[97;40m").removesuffix("\x1b[0m") for line in qr_text(text).splitlines()]
     halves = [[[LIGHT[glyph][half] for glyph in line] for half in (0, 1)] for line in lines]
     return np.array(halves, np.uint8).reshape(2 * len(lines), -1)

@@ -120,7 +120,7 @@ def test_viewers_hear_how_the_run_ended_before_they_are_cut_off() -> None:
             await page.recv()
             end = m.Event(header=site.drone.header(m.RUN), severity=m.Severity.INFO, text="run ended: all is well")
             site.drone.publish(t.EVENT, end)
-            site.over = True  # in the same moment: the event is still on its way
+            site.over = True  # at the same moment: the event is still on its way
             heard = []
             with pytest.raises(ConnectionClosed):
                 async with asyncio.timeout(5):
@@ -234,7 +234,7 @@ def test_a_port_in_use_is_no_obstacle() -> None:
 
 
 def test_nothing_is_loaded_from_elsewhere() -> None:
-    """The page works without any network but loopback: no address of anything else is in its files."""
+    """The page works without any network but loopback: its files contain no other address."""
     for path, file in load_pages("x", "y").items():
         text = file.content.decode()
         if path.startswith("/vendor/"):

@@ -91,7 +91,7 @@ def test_a_board_tells_what_changed_since() -> None:
     assert json.loads(board.since(first)) == {"b": 3}
     assert json.loads(board.since(board.turn)) == {}
     assert json.loads(board.since(0)) == {"a": 1, "b": 3}
-    # Two viewers at the same place share the bytes.
+    # Two viewers with the same state share the bytes.
     assert board.since(first) is board.since(first)
 
 
@@ -206,7 +206,7 @@ def test_the_last_switch_of_topology_stays_with_its_reason() -> None:
 
 
 def test_a_viewer_gets_all_that_was_added_since_its_last_frame() -> None:
-    """One that is slow as well: else trails and curves had holes in a fast replay."""
+    """Slow ones too: otherwise trails and curves had gaps in a fast replay."""
     board = Snapshot()
     for turn in range(1, 4):
         board.begin()

@@ -20,7 +20,7 @@ RUN = "run-1"
 
 
 class Console:
-    """A console that is turned by hand, with one page."""
+    """A console run step by step, with one page."""
 
     def __init__(self, exchange: MemoryExchange, source: str) -> None:
         scene = bare_scene("lab", ("drone_1",), False)
@@ -53,7 +53,7 @@ async def _nothing(_: object) -> None:
 
 
 class Run:
-    """The run's own console and one of another shell, with somebody who holds the lease."""
+    """The run's own console and one of another shell, with a lease holder."""
 
     def __init__(self) -> None:
         exchange = MemoryExchange()

@@ -11,7 +11,7 @@ import pytest
 _JS = Path(__file__).parents[3] / "groundstation" / "console" / "static" / "js"
 pytestmark = pytest.mark.skipif(shutil.which("node") is None, reason="node is not installed")
 
-# As much of a browser as these modules touch.
+# The part of a browser that these modules use.
 _BROWSER = """
 const spoken = [];
 const quiet = { getItem: () => null, setItem: () => {} };
@@ -31,7 +31,7 @@ const heard = (charges) => Object.fromEntries(Object.entries(charges).map(([name
 
 @pytest.fixture
 def said(tmp_path: Path) -> Any:
-    """Return what runs a script beside the page's modules, and returns what it leaves in `result`."""
+    """Return a function that runs a script with the page's modules, and returns its `result`."""
     folder = tmp_path / "js"
     shutil.copytree(_JS, folder)
     (folder / "package.json").write_text('{"type": "module"}')

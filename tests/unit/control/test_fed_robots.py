@@ -24,7 +24,7 @@ from groundstation.settings.resolved import resolved_field
 FIELD = resolved_field(load_field(Path(__file__).parents[3] / "config/mixed-team.yaml"))
 SENSORS, CONTROL = sensors_from_field(FIELD), control_from_field(FIELD)
 TICK_S, LAG_S, DELAY_S = 0.02, 0.5, 0.2
-# As a real PX4 (SIH) was believed out of sight, and as its driver stops and lands it.
+# Figures of a real PX4 (SIH): its belief out of view, and its driver's stop and landing.
 SEEN_STD_M, GROWTH_M_S, NEEDED_STD_M, HOVERS_S, LANDS_S = 0.02, 0.08, 0.07, 0.3, 0.7
 TARGET = (1.0, 0.45, 0.2, 0.05)
 
@@ -56,14 +56,14 @@ def seen(pose: np.ndarray) -> bool:
 
 
 class Flight:
-    """A vehicle that follows velocities with a lag, its belief, and what its driver makes of that."""
+    """A vehicle that follows velocities with a lag, its belief, and its driver's reaction."""
 
     def __init__(self, place: tuple[float, ...], velocity: tuple[float, float]) -> None:
         self.pose, self.velocity = np.array([*place, 0.7]), np.array(velocity)
         self.tied_s = self.lost_s = 0.0
 
     def step(self, planned: tuple[float, float]) -> bool:
-        """Return whether it goes on; its driver lands it before its place is known too badly."""
+        """Return whether it flies on; its driver lands it before its position is too uncertain."""
         unseen_s = self.tied_s + DELAY_S
         sight = Sight(
             0.1, {"drone_2": unseen_s}, untied_s={"drone_2": unseen_s},
@@ -95,7 +95,7 @@ class Flight:
 def test_who_left_every_view_is_back_in_one_before_it_lands(
     place: tuple[float, ...], velocity: tuple[float, float], planned: tuple[float, float]
 ) -> None:
-    """Places, velocities and plans of three flights of a PX4 in step with the room that ended in a landing."""
+    """Positions, velocities and plans of three flights of a PX4 in step with the room that ended in a landing."""
     flight = Flight(place, velocity)
     while not seen(flight.pose):
         assert flight.step(planned), f"landed {flight.tied_s:.1f} s after it was last seen, at {flight.pose[:2]}"
@@ -103,14 +103,14 @@ def test_who_left_every_view_is_back_in_one_before_it_lands(
 
 
 def test_it_turns_back_at_full_speed_whatever_drift_was_measured_of_it() -> None:
-    """A copter that crept back at 0.05 m/s, since it had drifted that way before, landed at the border of the view."""
+    """A copter that returned at only 0.05 m/s, because of an earlier drift, landed at the border of the view."""
     sight = Sight(0.1, {"drone_2": 0.6}, untied_s={"drone_2": 0.6}, drifts_m_s={"drone_2": np.array([-0.2, 0.0, 0.0])})
     out = told(np.array([-0.31, -0.4, 1.25, 0.7]), np.array([0.1, 0.1]), sight, SEEN_STD_M).velocity_m_s
     assert world_from_stabilized(np.array(out), 0.7)[0] == pytest.approx(-CONTROL.return_speed_m_s)
 
 
 def test_it_goes_on_inwards_where_it_is_believed_in_view_and_not_seen() -> None:
-    """Who is not seen in the middle of a view is not there: its belief goes by a velocity that is wrong."""
+    """A robot that is not seen in the middle of a view is not there: its belief follows a wrong velocity."""
     sight = Sight(0.1, {"drone_2": 0.8}, untied_s={"drone_2": 0.8})
     out = told(np.array([-0.75, -0.4, 1.2, 0.7]), np.array([0.3, -0.2]), sight, SEEN_STD_M).velocity_m_s
     wanted = world_from_stabilized(np.array(out), 0.7)
@@ -138,7 +138,7 @@ def test_who_is_in_the_view_makes_room_for_it() -> None:
 
 @pytest.mark.parametrize(("untied_s", "climbs"), [(0.3, True), (0.5, False)])
 def test_it_does_not_climb_out_of_the_view_that_it_looks_for(untied_s: float, climbs: bool) -> None:
-    """Of a real PX4 the border of the view went before it: it rose from 1.17 to 1.44 m, where the view is narrower."""
+    """The view's border receded before a real PX4: it rose from 1.17 to 1.44 m, where the view is narrower."""
     pose, sight = np.array([-0.8, -0.3, 1.17, 0.7]), Sight(0.1, {"drone_2": untied_s}, untied_s={"drone_2": untied_s})
     found = setpoints_from_plan(
         plan(np.zeros(2), pose, climb_m=0.9), belief(pose, SEEN_STD_M), ("drone_2",), CONTROL, SENSORS, sight
@@ -162,7 +162,7 @@ def test_who_holds_its_place_by_itself_flies_on_unseen() -> None:
 
 @pytest.mark.parametrize("x", [-0.02, 0.02])
 def test_between_two_views_it_goes_on_to_the_one_that_it_flies_to(x: float) -> None:
-    """The nearest one changes with each estimate, and it would stay between them until it lands."""
+    """The nearest view changes with each estimate, and it would stay between them until it lands."""
     sight = Sight(
         0.1, {"drone_2": 1.0}, untied_s={"drone_2": 1.0}, velocities_m_s={"drone_2": np.array([0.2, 0.0, 0.0])}
     )
@@ -180,7 +180,7 @@ def test_on_the_way_back_it_goes_on_to_the_view_that_it_flies_to(x: float) -> No
 
 
 def test_who_flies_on_our_estimate_stops_before_the_border_behind_which_nobody_sees_it() -> None:
-    """Copters that looked for the target left the views at 0.5 m/s, and landed before they were back."""
+    """Copters that searched for the target left the views at 0.5 m/s, and landed before they were back."""
     near, tied = np.array([-1.7, -0.70, 1.2, 0.0]), Sight(0.1, untied_s={"drone_2": 0.1})
     border_m = min(view.y_m[0] for view in SENSORS.root_views(1.2 + SENSORS.marker_height_m["drone_2"]))
     for name, slowest in (("drone_2", border_m + 0.70), ("drone_1", -0.5)):
@@ -226,7 +226,7 @@ def test_it_does_not_step_out_of_the_views_to_climb_past_another(name: str, asid
 
 
 def test_brought_inside_it_climbs_on() -> None:
-    """As the one above, in the middle of a view, and its plan still sends it outwards."""
+    """Like the one above, in the middle of a view, while its plan still leads outwards."""
     pose, tied, lag_s = np.array([-1.2, -0.74, 0.83, 0.0]), Sight(0.1, untied_s={"drone_2": 0.1}), 0.67
     velocity, turns = np.array([0.1, -0.2, 0.0]), 0
     while pose[2] < 1.4:

@@ -31,7 +31,7 @@ def belief(x, y, yaw=0.0, z=1.0):
 
 
 class Flight:
-    """A robot without lag that drifts, its estimate, and what it is sent."""
+    """A robot without lag that drifts, its estimate, and its setpoints."""
 
     def __init__(self, mode="HOVER", drift=(0.0, 0.0), yaw=0.7):
         self.hovering, self.now_ns, self.drift, self.yaw = Hovering(), 5 * S, drift, yaw
@@ -128,7 +128,7 @@ def test_a_further_order_holds_the_place_of_that_moment():
     flight = Flight("HOVER")
     flight.run(2.0)
     flight.place = np.array((0.3, 0.0))
-    flight.hovering.take(status("HOVER"), flight.now_ns)  # the same order, told again
+    flight.hovering.take(status("HOVER"), flight.now_ns)  # the same command, repeated
     assert flight.step().holds
     flight.hovering.take(status("HOLD"), flight.now_ns)
     there = flight.place
@@ -147,7 +147,7 @@ def test_who_tracks_lands_or_was_stopped_by_a_failsafe_is_not_held(other):
 
 @pytest.mark.parametrize("off_m", [0.8, -0.8, 0.25])
 def test_who_leaves_its_height_is_brought_back_to_it(off_m):
-    """Something under the ultrasound of a drone lifts it by its height; when that is gone it sinks as far."""
+    """An object under a drone's ultrasound raises it by its height; after the object it sinks as much."""
     flight = Flight()
     flight.run(2.0)
     flight.height_m += off_m

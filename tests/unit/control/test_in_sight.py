@@ -20,7 +20,7 @@ Place = tuple[float, float, float]
 
 
 class Views:
-    """Views that are narrower by half of the height, each way."""
+    """Views that get narrower by half of the height, in each direction."""
 
     def __init__(self, *floor: Rectangle) -> None:
         self._floor = floor
@@ -71,7 +71,7 @@ def test_far_from_a_border_it_flies_its_plan(views: Views) -> None:
 
 @pytest.mark.parametrize("views", [ONE, TWO, THREE])
 def test_it_does_not_enter_a_gap_to_stay_there(views: Views) -> None:
-    """A real PX4 went into it at 0.1 m/s."""
+    """A real PX4 entered it at 0.1 m/s."""
     assert kept(views, (-0.25, 0.2, 1.0), (0.15, 0.1), 1.0) == pytest.approx((0.05, 0.1, 1.0))
 
 
@@ -87,7 +87,7 @@ def test_before_a_gap_that_is_too_wide_at_its_height_it_waits_and_sinks() -> Non
 
 @pytest.mark.parametrize(("speed", "crosses"), [(0.0, False), (0.5, True)])
 def test_it_enters_a_gap_only_as_fast_as_takes_it_through_in_time(speed: float, crosses: bool) -> None:
-    """A real vehicle that started at the border was unseen for up to 1.5 s."""
+    """A real vehicle that started at the border was out of view for up to 1.5 s."""
     moving = Sight(helped_s=ALONE.helped_s, velocities_m_s={"fed": np.array([speed, 0.0, 0.0])})
     vx, _, level_m = kept(TWO, (-0.26, 0.2, 1.1), (0.6, 0.0), 1.1, moving)  # 0.5 m wide
     assert (vx == pytest.approx(MOST_M_S)) == crosses
@@ -95,7 +95,7 @@ def test_it_enters_a_gap_only_as_fast_as_takes_it_through_in_time(speed: float, 
 
 
 def test_a_vehicle_that_follows_late_stops_before_the_border() -> None:
-    """A real one that was held from where it was, and not from where it would stop, flew out of its view."""
+    """A real one, limited by its position instead of its stopping point, flew out of its view."""
     x, speed, step_s = -0.9, 0.4, 0.05
     for _ in range(round(5.0 / step_s)):
         moving = Sight(velocities_m_s={"fed": np.array([speed, 0.0, 0.0])})
@@ -119,7 +119,7 @@ def test_whom_others_tell_where_it_is_crosses_a_wide_gap_as_planned() -> None:
 @pytest.mark.parametrize("sight", [ALONE, HELPED])
 @pytest.mark.parametrize(("moving", "across"), [(0.3, 1.0), (-0.3, -1.0)])
 def test_in_the_midst_of_a_short_gap_it_goes_on_whatever_it_plans(sight: Sight, moving: float, across: float) -> None:
-    """A plan turned round there, and the vehicle stood until it was landed."""
+    """A plan reversed there, and the vehicle stood until it was landed."""
     sight = Sight(helped_s=sight.helped_s, velocities_m_s={"fed": np.array([moving, 0.0, 0.0])})
     for wanted in (0.5, 0.0, -0.5):
         vx, vy, level_m = kept(TWO, (0.02, 0.2, 1.0), (wanted, 0.1), 1.5, sight)

@@ -54,7 +54,7 @@ def lookout_of_the_lab() -> Lookout:
 
 
 def look_in_vain(lookout: Lookout) -> None:
-    """Take 2.8 s of pictures without the target, longer than it may be hidden."""
+    """Take 2.8 s of pictures without the target, longer than an occlusion may last."""
     for tick in range(1, 140):
         now_s = 0.02 * (tick + 1)
         header = Header(round(now_s * 1e9), "c", "drone_1", "drone_1_camera", tick)
@@ -103,7 +103,7 @@ def test_a_target_that_comes_into_view_again_is_said_to_be_seen() -> None:
 
 
 def test_a_picture_that_shows_a_target_elsewhere_hides_it_from_nobody() -> None:
-    """The filter may refuse the sighting; it is seen all the same."""
+    """The filter may refuse the observation; the target is seen all the same."""
     lookout = lookout_of_the_lab()
     lookout.take(driver_in("TRACK"))
     lookout.advance(belief(0.02), {"drone_1": 0.1, "turtlebot": 0.1}, {"drone_1": 0.1})
@@ -116,7 +116,7 @@ def test_a_picture_that_shows_a_target_elsewhere_hides_it_from_nobody() -> None:
 
 
 def test_a_search_begins_as_late_as_the_last_sighting_and_not_as_the_last_searched_picture() -> None:
-    """Which may be a second older, or just have come: a target that was carried off then was looked for later."""
+    """That picture may be a second older, or just have come: the search for a displaced target then began later."""
     lookout = lookout_of_the_lab()
     lookout.take(driver_in("TRACK"))
     lookout.see(sighting("drone_1", 0.5))

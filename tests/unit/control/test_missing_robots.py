@@ -38,7 +38,7 @@ def missed(
     observer: str = "ceiling",
     found: tuple[str, ...] = ("drone_2",),
 ) -> tuple[list[str], MissingRobots]:
-    """Return whom ten pictures without drone_1, or with others found, let miss."""
+    """Return the missing robots after ten pictures without drone_1, or with the found ones."""
     said: list[str] = []
     watch = MissingRobots(replace(SENSORS, obstacles=obstacles), NAMES)
     for tick in range(1, 11):
@@ -62,8 +62,8 @@ def test_one_that_should_be_seen_is_missed_once_and_until_it_is_seen() -> None:
     [
         ((2.5, 0.2, 1.6, 0.0), (-0.8, 0.0, 1.6, 0.0), 2.0, 0.05),  # out of view
         ((0.5, 0.2, 1.1, 0.0), (0.4, 0.2, 1.9, 0.0), 2.0, 0.05),  # below another
-        ((0.5, 0.2, 1.6, 0.0), (-0.8, 0.0, 1.6, 0.0), 0.3, 0.05),  # seen just now, by whomever
-        ((0.9, 0.4, 1.6, 0.0), (-0.8, 0.0, 1.6, 0.0), 2.0, 0.4),  # not known well enough to be sure
+        ((0.5, 0.2, 1.6, 0.0), (-0.8, 0.0, 1.6, 0.0), 0.3, 0.05),  # observed just now, by any camera
+        ((0.9, 0.4, 1.6, 0.0), (-0.8, 0.0, 1.6, 0.0), 2.0, 0.4),  # too uncertain for a decision
     ],
 )
 def test_one_that_may_well_not_be_seen_is_not_missed(
@@ -103,7 +103,7 @@ BELOW = np.array([0.4, 0.2, 1.0])
 
 
 def beside_the_line(share: float, aside_m: float) -> tuple[float, ...]:
-    """Return a place on the line from the ceiling camera to BELOW, and so far beside it."""
+    """Return a place on the line from the ceiling camera to BELOW, displaced sideways by this much."""
     line = BELOW - EYE
     across = np.cross(line, (0.0, 0.0, 1.0))
     return (*(EYE + share * line + aside_m * across / np.linalg.norm(across)).tolist(), 0.0)

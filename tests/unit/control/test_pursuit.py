@@ -49,7 +49,7 @@ def test_both_sweep_apart_from_each_other_and_see_most_of_the_room(lab_field: Re
 
 
 def test_a_place_beyond_the_first_turn_draws_a_robot_there(lab_field: ResolvedField, lattice: Lattice) -> None:
-    """Three metres away: with the views of one turn alone, no stand would show it."""
+    """Three metres away: by the views of one turn alone, no stand would show it."""
     chances = np.zeros(GRID.shape)
     chances[int(np.argmin(np.abs(GRID.ys))), int(np.argmin(np.abs(GRID.xs - 3.3)))] = 1.0
     outlook = chosen(lab_field, lattice, chances)

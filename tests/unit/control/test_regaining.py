@@ -88,7 +88,7 @@ def test_who_relays_goes_on_with_its_plan() -> None:
 
 
 def test_the_nearest_gets_back_what_the_lowest_level_cannot_reach() -> None:
-    """drone_2 is the lowest and 5 m away; a topology says who looks at whom, not who sees what."""
+    """drone_2 is the lowest and 5 m away; a topology assigns observers, whatever they can see."""
     far = wanted(belief(np.array([2.4, 0.0, 1.6, 0.2]), np.array([3.0, 0.0, 0.0, 0.0])), 0.5, "drone_1/drone_2")
     assert far["drone_1"].velocity_m_s[0] < -0.2
     assert far["drone_2"].velocity_m_s[:2] == pytest.approx((0.0, 0.1))

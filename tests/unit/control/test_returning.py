@@ -56,7 +56,7 @@ def test_who_is_known_worse_or_drifts_faster_has_less_time_out_of_sight() -> Non
     assert fresh == pytest.approx(min((CONTROL.return_limit_m - 0.05) / CONTROL.drift_m_s, CONTROL.return_within_s))
     assert fresh > known_worse > drifting
     assert drifting == pytest.approx((CONTROL.return_limit_m - 0.3) / 0.0625)
-    assert time_left_s(0.1, 14.0, CONTROL) == pytest.approx(1.0)  # odometry may be worse than it says
+    assert time_left_s(0.1, 14.0, CONTROL) == pytest.approx(1.0)  # odometry may be worse than its stated accuracy
 
 
 def test_a_drone_far_out_flies_back_by_its_uncertainty_and_its_way() -> None:
@@ -104,7 +104,7 @@ def test_excursions_of_a_drone_whose_odometry_is_wrong_end_sooner() -> None:
 
 @pytest.mark.parametrize(("error_m_s", "back_s"), [(0.2, 0.8), (0.25, 0.34), (0.5, 0.0)])
 def test_who_would_be_lost_unseen_stays_where_it_could_come_back_from(error_m_s: float, back_s: float) -> None:
-    """Known to 0.02 m it reaches 0.48 m after 0.46 m / error; of that time 1.5 s are for turning and being found."""
+    """Known to 0.02 m it reaches 0.48 m after 0.46 m / error; of that time 1.5 s are for turning and being observed."""
     at = belief(np.array([1.2, 0.0, 1.6, 0.0]), 0.02)
     outwards = within_reach(np.array([0.5, 0.0]), "drone_1", at, CONTROL, SENSORS, error_m_s, np.zeros(2))
     inwards = within_reach(np.array([-0.4, 0.1]), "drone_1", at, CONTROL, SENSORS, error_m_s, np.zeros(2))
@@ -127,7 +127,7 @@ def test_a_view_that_it_reaches_in_time_may_be_crossed_to(error_m_s: float, cros
 
 
 def test_who_is_known_too_little_already_is_held_to_the_view() -> None:
-    """No time is left to fly on unseen."""
+    """No time is left to fly on out of view."""
     at = belief(np.array([1.2, 0.0, 1.6, 0.0]), 0.6)
     border_m = SENSORS.root_views(1.6 + SENSORS.marker_height_m["drone_1"])[0].x_m[1] - VIEW_INSET_M
     held = within_reach(np.array([0.5, 0.0]), "drone_1", at, CONTROL, SENSORS, 0.4, np.zeros(2))

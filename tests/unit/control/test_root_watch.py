@@ -38,7 +38,7 @@ def test_what_a_root_sees_is_passed_on_along_sightings_in_either_direction() -> 
 
 
 def test_what_others_tell_of_one_is_not_what_it_told_them() -> None:
-    """One that is in view and sees a target that nobody else sees would not be known by it outside of the view."""
+    """Otherwise a robot in view that alone sees a target would locate itself by that target outside of the view."""
     watch = RootWatch(["ceiling"], CARRIED)
     alone = [used("ceiling", "drone_1"), used("drone_1", "turtlebot"), used("drone_1", "turtlebot")]
     watch.advance(TICK_NS, alone, flying=True)
@@ -99,7 +99,7 @@ def sighting(observer: str = "ceiling") -> RelativeObservation:
 
 
 def silent_after(message: Message | None, ticks: int, roots: tuple[str, ...] = ("ceiling",)) -> list[str]:
-    """Return what is told while roots that have worked say only this, each tick."""
+    """Return the watch's output while roots that have worked send only this message, each tick."""
     watch, told = RootWatch(roots, CARRIED), []
     for root in roots:
         watch.hear(frame() if root == "mocap" else picture(observer=root), TICK_NS)
@@ -121,7 +121,7 @@ def test_one_that_finds_robots_in_a_picture_that_hangs_is_silent() -> None:
 
 
 def hangs_after_s(root: str, others: tuple[str, ...] = (), also_new: bool = False) -> float | None:
-    """Return how long after its last new sighting a root that only repeats itself leaves nothing to go by [s]."""
+    """Return the time from the last new observation of a repeating root until nothing locates the team [s]."""
     watch = RootWatch((root, *others), CARRIED)
     watch.hear(sighting(root), 0)
     for tick in range(1, 31):

@@ -70,7 +70,7 @@ def fly(
     parameters: SearchParameters = SEARCH,
     control: ControlParameters = CONTROL,
 ) -> tuple[float, float, Search]:
-    """Return when two drones that fly from stand to stand see a target at rest, and how near their stands came."""
+    """Return when two drones that fly from stand to stand see a target at rest, and their stands' least distance."""
     search, rng = new_search(parameters, control=control), np.random.default_rng(1)
     height_m = control.search_height_m
     poses = {name: np.array([-0.5, y, height_m, 0.0]) for name, y in zip(NAMES, (0.5, -0.5), strict=True)}
@@ -99,7 +99,7 @@ def fly(
 
 
 def test_a_target_at_rest_is_found_wherever_it_stands_and_stands_are_apart() -> None:
-    """Though its marker is found less far away than the search believes; chance decides which place takes long."""
+    """Although its marker is found at less distance than the search assumes; chance decides which place takes long."""
     places = ((2.8, 1.8), (-3.5, -2.5), (3.5, -2.5), (-3.6, 0.0), (0.0, 2.6), (2.0, -1.0))
     flights = [fly(place, limit_s=90.0) for place in places]
     assert max(one[0] for one in flights) < 75.0
@@ -109,10 +109,10 @@ def test_a_target_at_rest_is_found_wherever_it_stands_and_stands_are_apart() -> 
 @pytest.mark.slow
 @pytest.mark.study
 def test_targets_all_over_the_room_are_found_sooner_from_where_more_of_it_is_seen() -> None:
-    """Single places say little: a search that meets a wall of chance goes round the room once more."""
+    """Single places show little: a search that misses by chance goes round the room once more."""
     places = np.random.default_rng(11).uniform((-3.8, -2.8), (3.8, 2.8), (50, 2)).tolist()
     found_s = [fly((x, y))[0] for x, y in places]
-    higher = replace(CONTROL, search_height_m=1.6)  # the first level's height, where searches flew before
+    higher = replace(CONTROL, search_height_m=1.6)  # the first level's height, at which searches flew before
     higher_s = [fly((x, y), control=higher)[0] for x, y in places]
     assert np.mean(found_s) < 17.0  # turning on arrival only: 32 s at six places
     assert np.mean(found_s) < np.mean(higher_s) - 2.0
@@ -223,9 +223,9 @@ def test_a_target_that_pictures_do_not_show_may_be_hidden_and_then_is_no_longer_
 
 
 def given_up_after_s(bearing_deg: float, sooner_s: float) -> float:
-    """Return after which time unseen a target at (1, 0) is given up.
+    """Return the time unseen after which a target at (1, 0) is given up.
 
-    bearing_deg: of drone_2 from there; drone_1's is 180; sooner_s: how long before drone_1 drone_2 saw it last.
+    bearing_deg: of drone_2 from there; drone_1's is 180; sooner_s: how much earlier than drone_1 drone_2 saw it last.
     """
     search, bearing = new_search(), math.radians(bearing_deg)
     poses = {

@@ -48,12 +48,12 @@ def test_only_a_flight_of_some_seconds_is_judged_and_its_last_forty(lab_field: R
 
 
 def test_a_flight_whose_start_was_missed_is_judged_later(lab_field: ResolvedField) -> None:
-    """Started again in the air: of 8 to 14 s without a pad, one in eight healthy flights had a wrong lens or delay."""
+    """Of healthy flights of 8 to 14 s, joined in the air without a pad, one in eight had a wrong lens or delay."""
     assert first_flown(Window(lab_field, "c"), 0) == 20
 
 
 def first_flown(window: Window, since_s: int) -> int | None:
-    """Fly on until 100 s; returns when there was something to judge first."""
+    """Fly on until 100 s; returns the time of the first stretch to be judged."""
     first = None
     for second in range(since_s, 100):
         window.take("k", status(second, FlightState.FLYING), second * S)
@@ -92,7 +92,7 @@ def test_what_a_camera_showed_since_it_hung_does_not_count_once_that_is_known(la
 
 
 def hanging(message: Message, at_s: float) -> Message:
-    """Return a message as it comes again and again from a picture or an autopilot that hangs."""
+    """Return a message as a frozen picture or autopilot repeats it."""
     header = msgspec.structs.replace(message.header, stamp_ns=round(at_s * S), seq=round(1e3 * at_s))
     return msgspec.structs.replace(message, header=header)
 
@@ -120,7 +120,7 @@ def test_what_hangs_is_absurd_or_comes_from_the_future_does_not_count(
 
 
 def fed(diagnosis: Diagnosis, exchange: MemoryExchange, lab: Lab) -> int:
-    """Send a flight of the lab through the bus; returns when it ended [ns]."""
+    """Send a flight of the lab through the bus; returns its end [ns]."""
     buses = {name: MemoryBus(exchange, "lab", name) for name in ("ceiling", *lab.field.drones)}
     now_ns = 0
     for now_ns, inputs in lab.flown().ticks:

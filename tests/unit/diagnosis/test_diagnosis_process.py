@@ -17,7 +17,7 @@ TURNS = 3
 
 
 class FakeChild:
-    """Lets a process turn a few times, and notes what it says."""
+    """Lets a process run a few turns, and records its messages."""
 
     supervisor_alive = True
     turns = Child.turns

@@ -71,7 +71,7 @@ def test_two_causes_are_told_apart_and_what_is_too_small_is_not_told() -> None:
 def test_a_late_velocity_is_told_on_the_evidence_that_a_calibration_asks_for(
     part: str, sizes: tuple[float, ...]
 ) -> None:
-    """42 ms lead by e^6.6 here, 60 ms by e^15: that of pictures is told, that of velocities not."""
+    """42 ms lead by e^6.6 here, 60 ms by e^15: enough to report a picture delay, not a velocity delay."""
     H, one = np.diag([1.5e4]), Suspicion("a", part, np.eye(1), np.array([0.06]))
     found = []
     for size in (0.042, 0.06):
@@ -93,7 +93,7 @@ def test_what_explains_it_as_well_is_named_beside_it() -> None:
 def test_a_charge_stands_only_where_the_paths_that_fit_without_it_explain_the_flight_worse(
     lab_field: ResolvedField, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of eight seconds begun in flight, a linear model alone was sure of a camera 64 ms off; it was right."""
+    """Eight seconds into a flight joined in the air, a linear model alone blamed a right camera for a 64 ms error."""
     flown = Lab(lab_field, WrongFigures({("ceiling", "delay"): 50.0})).flown()
     (charges,) = verdict_on(flown, lab_field).causes  # type: ignore[union-attr]
     assert charges[0].lead > math.log(100.0)

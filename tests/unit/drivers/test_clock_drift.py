@@ -13,7 +13,7 @@ BOOTED = 1_700_000_000_000 * MS
 
 
 def heard(seconds: float, ppm: float = 0.0, jitter_ms: float = 0.0, late_ms: float = 0.0) -> ClockDrift:
-    """Hear 100 packets a second, one of them late, of a clock that goes ppm faster."""
+    """Receive 100 packets a second, one of them late, with a clock that is fast by ppm."""
     clock, rng = ClockDrift(), np.random.default_rng(3)
     for number in range(round(100 * seconds)):
         made_ns = BOOTED + 10 * MS * number

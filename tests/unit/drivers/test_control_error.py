@@ -22,7 +22,7 @@ def view(x=0.0, y=0.0, state=FlightState.FLYING):
 
 
 def fly(command, answer, seconds=8.0, seen=lambda t: None):
-    """Return (when it was first said to stray, what was said) for a command and velocities as functions of time."""
+    """Return (time of the first alarm, its text) for a setpoint and velocities as functions of time."""
     monitor = ControlErrorMonitor()
     for turn in range(round(seconds / TURN_S)):
         at_s = turn * TURN_S
@@ -70,10 +70,10 @@ def test_healthy_vehicles_under_commands_that_change_often_give_no_alarm(gain):
 @pytest.mark.parametrize(
     ("command", "velocity", "by_s"),
     [
-        ((0.5, 0.0), (0.0, 0.0), 2.5),  # held back, or a velocity that says 0 with noise
-        ((0.3, 0.0), (-0.3, 0.0), 1.8),  # turned round
+        ((0.5, 0.0), (0.0, 0.0), 2.5),  # blocked, or a velocity of 0 with noise
+        ((0.3, 0.0), (-0.3, 0.0), 1.8),  # sign reversed
         ((0.3, 0.0), (0.0, 0.4), 2.2),  # axes swapped
-        ((0.0, 0.0), (0.6, 0.0), 1.0),  # it drifts away while it should hover
+        ((0.0, 0.0), (0.6, 0.0), 1.0),  # it drifts away although it should hover
         ((0.3, 0.0), (0.9, 0.0), 1.0),  # three times as fast
     ],
 )
@@ -122,6 +122,6 @@ def test_the_speed_is_the_faster_of_what_is_reported_and_seen():
 @pytest.mark.parametrize("back", [(0.15, -0.1, 0.0), None])
 def test_a_hovering_vehicle_that_is_brought_back_does_what_it_is_told(back):
     asked = WatchdogDecision(DriverMode.HOLD, Action.HOVER, back_m_s=back)
-    forward, left = (2.2 * 0.15, 2.2 * -0.1)  # within the tolerance of what it is told, and beyond that of standing
+    forward, left = (2.2 * 0.15, 2.2 * -0.1)  # within the tolerance of its setpoint, but beyond that of standing
     at_s, _ = fly(lambda _: asked, lambda _: (forward, left))
     assert (at_s is None) == (back is not None)

@@ -93,7 +93,7 @@ def test_the_separation_itself_is_far_enough():
 
 
 def aloft(*entities):
-    """Return what each of a and b says of being crowded, with both in the air."""
+    """Return the warnings of a and b about each other, with both in the air."""
     both = []
     for name in "ab":
         neighbours = Neighbours(name, None, 0.6)

@@ -42,7 +42,7 @@ def at_s(sample):
 
 
 def judge(samples, limits=ARDRONE, state=FLYING):
-    """Return when each sensor was first SUSPECT and BAD, and all that was said."""
+    """Return when each sensor was first SUSPECT and BAD, and all texts."""
     first: dict[Any, Any] = {}
     monitor, said = MotionMonitor(limits), set()
     for sample in samples:
@@ -54,7 +54,7 @@ def judge(samples, limits=ARDRONE, state=FLYING):
 
 
 def broken(fault, **options):
-    """Yield a flight whose samples are put through `fault(sample, the one at which it began)` from 4 s on."""
+    """Yield a flight whose samples pass `fault(sample, the one at which it began)` from 4 s on."""
     began = None
     for sample in healthy(8.0, **options):
         if at_s(sample) < FAULT_S:
@@ -134,7 +134,7 @@ def test_each_fault_is_found_in_time_and_doubted_before(limits, period_ms, fault
 @pytest.mark.parametrize(("limits", "late_s", "worst"), [(ARDRONE, 0.6, Health.BAD), (ARDRONE, 0.4, Health.SUSPECT),
                                                          (MAVLINK, 0.6, Health.SUSPECT)])  # fmt: skip
 def test_a_velocity_that_our_own_loop_follows_must_be_younger(limits, late_s, worst):
-    """An AR.Drone's loop is closed over the link; an autopilot closes its own, and stamps what it sends."""
+    """An AR.Drone's loop is closed over the link; an autopilot closes its own, and stamps its messages."""
     monitor, found = MotionMonitor(limits), []
     for k in range(100):
         at_ns = S + k * 20 * MS
@@ -152,7 +152,7 @@ def test_a_stuck_imu_is_no_reason_to_stop():
 
 
 def test_a_level_vehicle_may_be_slow_for_longer():
-    """Without a tilt that would move it a standstill is likelier true."""
+    """Without a tilt that would move it, a standstill is more likely true."""
     level = [sample._replace(pitch_rad=sample.pitch_rad * 0.02) for sample in broken(stuck_at_zero, tilt_deg=0.0)]
     first, _ = judge(level)
     assert first[Sensor.VELOCITY, Health.BAD] == pytest.approx(FAULT_S + ARDRONE.stuck_alone_s, abs=0.05)
@@ -170,7 +170,7 @@ def test_one_jump_is_doubted_and_forgotten():
 
 @pytest.mark.parametrize("period_ms", [5, 10])
 def test_an_ardrone_cannot_change_its_velocity_by_a_third_of_a_metre_per_second_at_once(period_ms):
-    """One jumped by 0.33 m/s as its ceiling camera went black, and drew the belief of the whole team along."""
+    """One jumped by 0.33 m/s as its ceiling camera went black, and pulled the belief of the whole team along."""
 
     def jump(sample, _):
         return sample._replace(velocity_m_s=(sample.velocity_m_s[0] + 0.33, sample.velocity_m_s[1]))
@@ -272,7 +272,7 @@ def test_the_recorded_flight_gives_no_alarm(real_data):
             tuple(force.tolist()),
             round(at * 1e9),
         )
-        # Judged from half a second before the ultrasound sees it fly.
+        # Judged from half a second before the ultrasound measures flight.
         doubts += monitor.update(sample, FLYING if height > 0 or at > 4.1 else FlightState.LANDED).findings
     assert not doubts and times[-1] > 45.0
 

@@ -14,11 +14,11 @@ LEAN_M_S2 = 9.80665 * math.tan(LEAN_RAD)
 
 
 def held(watch, values, every_ms=10, begins_ms=1000):
-    """Return for how long each value had stood when it came [s]."""
+    """Return for how long each value had been constant at its arrival [s]."""
     return [watch.update((begins_ms + i * every_ms) * MS, value) for i, value in enumerate(values)]
 
 
-# -- what repeats -----------------------------------------------------------------------------------------------------
+# -- repetition -------------------------------------------------------------------------------------------------------
 
 
 def test_the_fourth_of_equal_values_stands_since_the_first():
@@ -40,7 +40,7 @@ def test_what_was_before_a_reset_does_not_count():
 
 
 def stood(watch, velocities, lean_rad=LEAN_RAD, begins_ms=1000):
-    """Return (for how long it had stood, change of speed by the tilt) at each velocity."""
+    """Return (how long it had been constant, change of speed by the tilt) at each velocity."""
     return [watch.update((begins_ms + i * 10) * MS, speed, lean_rad) for i, speed in enumerate(velocities)]
 
 
@@ -59,7 +59,7 @@ def test_the_change_of_speed_is_counted_anew_where_the_velocity_moved_or_the_wat
     assert stood(watch, [0.4] * 4, begins_ms=1100)[-1] == pytest.approx((0.03, 0.01 * LEAN_M_S2))
 
 
-# -- its clock --------------------------------------------------------------------------------------------------------
+# -- the vehicle's clock ----------------------------------------------------------------------------------------------
 
 
 def test_a_clock_stands_since_it_last_moved():
@@ -93,14 +93,14 @@ def test_a_clock_that_starts_over_goes_on_each_time_and_may_still_be_late():
 
 
 def test_what_is_late_as_its_clock_starts_over_is_still_late():
-    """Fresh for 4 s, then a second late, while a clock of 4 s starts over twice; the first freshest count for 11 s."""
+    """Fresh for 4 s, then a second late, while a clock of 4 s wraps twice; the first freshest count for 11 s."""
     watch = ClockWatch(wrap_s=4.0)
     told = [watch.update((100 + at_s) * S, (at_s % 4) * S)[1] for at_s in range(4)]
     told += [watch.update((100 + at_s) * S, ((at_s - 1) % 4) * S)[1] for at_s in range(5, 12)]
     assert told == pytest.approx([0.0] * 4 + [1.0] * 7)
 
 
-# -- what is told of it -----------------------------------------------------------------------------------------------
+# -- reported texts ---------------------------------------------------------------------------------------------------
 
 
 def test_a_reason_is_told_of_what_is_bad_enough_and_asked_for():

@@ -43,7 +43,7 @@ def test_nothing_is_made_of_positions_that_nobody_sees_well(fields):
     assert seen_velocity([(0.5 * i / 50, 0.0) for i in range(100)], **fields)[-1] is None
 
 
-WIDE: dict[str, Any] = {"covariance": (0.15**2,) * 16}  # nothing tells how it moves, and pictures are 0.15 s under way
+WIDE: dict[str, Any] = {"covariance": (0.15**2,) * 16}  # it has no motion telemetry, and pictures are 0.15 s late
 
 
 def test_a_silent_vehicle_is_seen_where_its_last_picture_showed_it():
@@ -82,7 +82,7 @@ KNOWN: dict[str, Any] = {"converged": True, "age_s": 0.1, "covariance": (1e-4,) 
 
 
 def seen_at(*places: tuple[int, float], epoch: int = 1, seen: SeenVelocity | None = None, **fields: Any):
-    """Return who saw a vehicle at (time [ns], x [m])."""
+    """Return observations of a vehicle at (time [ns], x [m])."""
     seen = seen or SeenVelocity()
     for at_ns, x in places:
         values = KNOWN | fields

@@ -12,7 +12,7 @@ STEP_S = 1 / 30
 
 
 def flown(asked, seconds, seed=0):
-    """Return the way that was let through (forward, left) after each step [m]."""
+    """Return the distance let through (forward, left) after each step [m]."""
     bound, random_of, way, ways = WayBack(), random.Random(seed), (0.0, 0.0, 0.0), []
     for step in range(round(seconds / STEP_S)):
         velocity = bound.step(round((1 + step * STEP_S) * S), asked(step * STEP_S, random_of))
@@ -56,7 +56,7 @@ def test_the_way_back_is_open_at_the_limit():
 
 
 def obeys_for(bound, velocity, since_s, step_s=STEP_S):
-    """Return how long it lets a velocity through without a break [s], at most 60."""
+    """Return how long a velocity is let through without a break [s], at most 60."""
     for step in range(1, round(60 / step_s)):
         if bound.step(round((since_s + step * step_s) * S), velocity) is None:
             return (step - 1) * step_s

@@ -32,7 +32,7 @@ FOXGLOVE = {
 
 @pytest.fixture(scope="module")
 def said() -> dict[str, str]:
-    """Type by topic of all that is said of a made-up run."""
+    """Return the type by topic of all messages of a synthetic run."""
     scene, found = Ros2Scene(Ros2Codec(), field_of(DRONES, 8765)), dict[str, str]()
     for stamp_ns, sample in SyntheticRun().samples(0.0, 1.0):
         key = keys.parse(sample.key)
@@ -57,7 +57,7 @@ def test_rviz_shows_topics_as_what_they_are(said: dict[str, str]) -> None:
 
 
 def shown_by(name: str, panel: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    """Yield (topic, type that such a panel shows)."""
+    """Yield (topic, type) of a panel's content."""
     kind = name.partition("!")[0]
     yield from ((topic, FOXGLOVE[role]) for role, topic in panel.get("imageMode", {}).items())
     if "topicToRender" in panel:

@@ -95,7 +95,7 @@ def test_a_process_that_the_supervisor_speaks_for_is_named_as_when_it_speaks() -
 
 
 def flight() -> list[m.Message]:
-    """A message of each topic of a made-up run."""
+    """Return a message of each topic of a synthetic run."""
     seen: dict[Topic, m.Message] = {}
     for _, sample in SyntheticRun().samples(0.0, 11.0):
         key = keys.parse(sample.key)
@@ -172,7 +172,7 @@ def test_keys_tokens_and_attachments_are_those_of_rmw_zenoh() -> None:
 
 
 def test_nothing_of_ours_stands_where_the_robots_own_node_speaks() -> None:
-    """Else an estimate passes for a robot's odometry: with its own driver, whose silence it hides, and with others."""
+    """Otherwise an estimate passes for a robot's odometry: to its own driver, whose silence it hides, and to others."""
     shared = {"/tf", "/tf_static", "/diagnostics", "/rosout"}
     said = advertised(resolved_field(load_field(find_field("lab"))), truth=True)
     assert {name for name in said if not name.startswith("/skein/")} == shared
@@ -197,7 +197,7 @@ def test_a_bag_holds_what_its_own_reader_decodes(tmp_path: Path) -> None:
     assert described["version"] == 8, "the newest one that Humble reads"
     counts = {one["topic_metadata"]["name"]: one["message_count"] for one in described["topics_with_message_count"]}
     assert counts == Counter(one.channel.topic for one in read)
-    # By the numbers of rmw: 1 is transient local, which tf2 asks of static frames, 2 volatile.
+    # By the numbers of rmw: 1 is transient local, which tf2 requires of static frames, 2 volatile.
     offered = {one["topic_metadata"]["name"]: offers(one) for one in described["topics_with_message_count"]}
     assert {topic: one["durability"] for topic, one in offered.items()} == dict.fromkeys(topics, 2) | {"/tf_static": 1}
     assert {one["reliability"] for one in offered.values()} == {1}

@@ -44,7 +44,7 @@ def test_foxglove_draws_the_volume_beside_room_and_fence() -> None:
     from groundstation.engineering_views.foxglove_scene import FoxgloveScene
 
     bare = msgspec.structs.replace(FIELD, motion_capture={})
-    whole, fewer = (FoxgloveScene(one)._static for one in (FIELD, bare))  # what is in every update
+    whole, fewer = (FoxgloveScene(one)._static for one in (FIELD, bare))  # content of every update
     assert len(whole) == len(fewer) + 6  # two rings and four edges
 
 

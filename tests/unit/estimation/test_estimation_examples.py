@@ -41,7 +41,7 @@ def test_the_example_on_real_data_runs(monkeypatch: pytest.MonkeyPatch, real_dat
 
 @pytest.fixture
 def tests_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[Path, str], dict[str, Any]]:
-    """Save a page's model beside the models, as it says, and return what its test defines."""
+    """Save a page's model beside the models, as the page requires, and return the test that it defines."""
 
     def saved(page: Path, name: str) -> dict[str, Any]:
         model, test = examples_of(page)

@@ -32,7 +32,7 @@ class Vehicle:
         self, seconds: float, standing: bool = False, roll: float | None = None, turn: float = 0.0,
         acceleration: tuple[float, float] = (0.0, 0.0), magnetic: float = 0.0,
     ) -> None:  # fmt: skip
-        """Fly on; roll: what it shall be, at once; turn [rad/s]; magnetic: rate of the error of its own heading."""
+        """Fly on; roll: its next value, at once; turn [rad/s]; magnetic: rate of the error of its own heading."""
         rates = np.zeros(3)
         for step in range(round(seconds * 1e9) // STEP_NS):
             self.now += STEP_NS
@@ -74,7 +74,7 @@ def _three(values: np.ndarray) -> Vector3:
 
 @pytest.fixture
 def flying() -> Vehicle:
-    """Three seconds on the ground taught it the bias."""
+    """A flying vehicle that learnt its bias in three seconds on the ground."""
     vehicle = Vehicle()
     vehicle.run(3.0, standing=True)
     return vehicle
@@ -156,7 +156,7 @@ def test_without_time_on_the_ground_the_heading_teaches_the_bias_slowly() -> Non
 
 
 def test_in_flight_a_fixed_camera_tells_the_bias_of_the_heading_and_accelerometers_that_of_the_tilt() -> None:
-    """Taken up in the air: nothing was learnt on the ground."""
+    """Joined in the air: nothing was learnt on the ground."""
     vehicle, rng = Vehicle(), np.random.default_rng(5)
     for _ in range(300):
         vehicle.run(1 / 15, turn=0.2)
@@ -249,7 +249,7 @@ def test_a_blow_is_no_gravity(flying: Vehicle) -> None:
 
 
 def test_odometry_that_comes_late_counts_no_reset() -> None:
-    """One of before the last reset, heard again, would void the heading's increments before and after it."""
+    """A message from before the last reset, received again, would void the heading's increments before and after it."""
     intake = AttitudeIntake({"drone_1": 1.0})
 
     def resets(at_s: float, reset: int) -> int:

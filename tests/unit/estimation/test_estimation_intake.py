@@ -31,7 +31,7 @@ COVARIANCE = tuple(np.diag([1e-4, 1e-4, 4e-4, 1e-3]).ravel().tolist())
 
 
 class Desk:
-    """An intake before a filter with one drone, a target and a ceiling camera; messages with numbers of their own."""
+    """An ingest with a filter of one drone, a target and a ceiling camera; each message has its own number."""
 
     def __init__(self) -> None:
         entities: dict[str, MotionModel] = {
@@ -73,7 +73,7 @@ class Desk:
 
 
 def forced(message: Any, changes: dict[str, Any]) -> Any:
-    """A message with values that its constructor would refuse."""
+    """Return a message with values that its constructor would refuse."""
     for name, value in changes.items():
         msgspec.structs.force_setattr(message, name, value)
     return message
@@ -149,7 +149,7 @@ def test_a_clock_whose_offset_jumps_by_an_hour_counts_again_when_it_is_right() -
 
 
 def test_a_duplicate_is_known_at_any_rate_and_an_old_one_is_late() -> None:
-    """2,000 messages within the rewind: more than are remembered where they come slowly."""
+    """2,000 messages within the rewind: more than are remembered at a low rate."""
     desk = Desk()
     first = desk.odometry(400 * MS)
     assert desk.take(first) is Verdict.ACCEPTED
@@ -206,7 +206,7 @@ def test_a_sensor_that_repeats_itself_is_frozen_and_thaws() -> None:
 
 
 def test_a_picture_that_hangs_is_frozen_whatever_its_detector_makes_of_it() -> None:
-    """Seen at the wire: two poses in turn, 0.2 um apart, for the search began where the belief had the marker."""
+    """Observed at the wire: two poses in turn, 0.2 um apart, for the search began where the belief had the marker."""
     desk = Desk()
     ages = [(500 - 50 * k) * MS for k in range(10)]
     poses = [(0.1, 0.2, 2.9349272622 - 1e-7 * (k % 2)) for k in range(10)]

@@ -26,7 +26,7 @@ TOO_HIGH_M = 0.7
 
 
 class Room:
-    """A drone that hovers at the origin, known by the ceiling camera, before a target of which nothing is known."""
+    """A drone that hovers at the origin, located by the ceiling camera, before an unknown target."""
 
     def __init__(self) -> None:
         drone = OdometryRobot(marker_position_m=(0.0, 0.0, 0.0))
@@ -41,7 +41,7 @@ class Room:
         self.filter.set_airborne("drone", True, self.now, self.now)
 
     def known(self) -> "Room":
-        """Return the room once the ceiling camera has seen the drone a few times."""
+        """Return the room after some observations of the drone by the ceiling camera."""
         for _ in range(10):
             self.run(0.1)
             self.below()
@@ -62,11 +62,11 @@ class Room:
         return self.filter.take_corrections()[-1]
 
     def below(self, error: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Correction:
-        """Let the ceiling camera see the drone, displaced by an error [world]."""
+        """Add the ceiling camera's observation of the drone, displaced by an error [world]."""
         return self.see("ceiling", "drone", np.array((error[0], -error[1], 4.2 - FLIGHT_M - error[2])), 0.0)
 
     def ahead(self, x: float, y: float = 0.0, too_high_m: float = 0.0) -> Correction:
-        """Let the drone see the target at a place [world]."""
+        """Add the drone's observation of the target at a place [world]."""
         return self.see("drone", "rover", TILTED.T @ np.array((x, y, MARKER_M + too_high_m - FLIGHT_M)), None)
 
     @property
@@ -94,7 +94,7 @@ def test_a_first_sighting_of_a_target_that_contradicts_its_observer_changes_noth
 
 
 def test_the_gate_is_that_of_the_surplus_row_alone() -> None:
-    """The row along the vertical is orthogonal to what a shift of the target in the plane changes."""
+    """The row along the vertical is orthogonal to the target's shift in the plane."""
     c = Room().known().ahead(0.9, 0.2, TOO_HIGH_M)
     variance = UP @ np.array(c.covariance).reshape(3, 3) @ UP
     assert c.nis == pytest.approx((UP @ np.array(c.residual)) ** 2 / variance, rel=1e-3)
@@ -105,7 +105,7 @@ def test_the_gate_is_that_of_the_surplus_row_alone() -> None:
 
 
 def test_sightings_that_keep_contradicting_the_observer_are_believed_with_care() -> None:
-    """As those that keep contradicting the subject are: five in a row, over 0.6 s. They pull no further than a gate."""
+    """Like repeated contradictions of the subject: five in a row, over 0.6 s. They pull no further than a gate."""
     room = Room().known()
     spread_m = math.sqrt(room.belief.covariance_of("drone")[2, 2])
     verdicts: list[Verdict] = []
@@ -129,7 +129,7 @@ def test_a_contradiction_does_not_count_once_the_target_has_joined() -> None:
 
 
 def test_a_re_initialising_sighting_that_contradicts_its_observer_waits_for_the_next() -> None:
-    """A target is carried off by 2 m; of the sightings that insist on it, the one that would be enough is wrong."""
+    """A target is carried off by 2 m; of the repeated observations, the one that would suffice is wrong."""
     room = Room().known()
     for _ in range(5):
         room.run(0.1)
@@ -149,7 +149,7 @@ def test_a_re_initialising_sighting_that_contradicts_its_observer_waits_for_the_
 
 @pytest.mark.parametrize("error", [(0.0, 0.0, 0.7), (0.7, -0.5, 0.6)])
 def test_a_wild_first_sighting_of_a_robot_moves_no_mounting_and_gives_way_to_the_next(error: tuple) -> None:
-    """It has a row for each of the robot's unknowns: none is left over to say anything of the camera."""
+    """It has a row for each of the robot's unknowns: none is left to give information about the camera."""
     room = Room()
     room.run(0.1)
     mounting = room.belief.mean_of("ceiling")

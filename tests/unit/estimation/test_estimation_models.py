@@ -65,7 +65,7 @@ NAMES = list(ENTITIES)
 
 
 def random_state(seed: int, yaw: float) -> tuple[np.ndarray, Rows[EntityMemory]]:
-    """A state with every heading at `yaw`, and inputs of all driven entities."""
+    """Return a state with every heading at `yaw`, and inputs of all driven entities."""
     rng = np.random.default_rng(seed)
     state = empty_state(TABLES, [True] * len(NAMES))
     mean, memory = state.means[0], state.memory
@@ -132,7 +132,7 @@ def test_prediction_jacobian_is_that_of_the_mean(yaw: float, dt: float) -> None:
 
 @pytest.mark.parametrize("rate", [0.0, 1e-9, 2e-4, -3e-3, 0.7])
 def test_turning_is_exact_at_any_rate(rate: float) -> None:
-    """Against a thousand small steps, also where series replace quotients."""
+    """Compared with a thousand small steps, also where series replace quotients."""
     part = TABLES.part(NAMES.index("turning"))
     mean, memory = random_state(3, 0.0)
     memory["active"] = 0
@@ -147,7 +147,7 @@ def test_turning_is_exact_at_any_rate(rate: float) -> None:
 
 
 def observed(mean: np.ndarray, sensor: str, subject: str, rows: int, roll: float = 0.05, pitch: float = -0.08):
-    """h(x) and its Jacobian by the whole state, through the filter's own linearisation."""
+    """Return h(x) and its Jacobian by the whole state, through the filter's own linearisation."""
     number = list(SENSORS).index(sensor)
     observer = NAMES.index(SENSORS[sensor].carrier)
     event = EventRow.row(
@@ -235,7 +235,7 @@ def test_a_marker_leans_by_what_its_vehicle_says_and_by_the_error_of_it() -> Non
 
 def test_a_range_is_that_from_the_tag_to_the_anchor_and_its_bias() -> None:
     mean, _ = random_state(0, 0.7)
-    mean[TABLES.part(NAMES.index("full"))][:6] = (0.4, -0.2, 1.1, 0.7, -0.02, 0.03)  # it leans more than it says
+    mean[TABLES.part(NAMES.index("full"))][:6] = (0.4, -0.2, 1.1, 0.7, -0.02, 0.03)  # it leans more than it reports
     mean[TABLES.part(NAMES.index("anchor"))] = 0.07
     h, _, _ = observed(mean, "radio", "full", 1)
     tag = np.array([0.4, -0.2, 1.1]) + rotation_from_euler(0.04, -0.08, 0.7) @ (0.12, -0.05, 0.06)
@@ -262,7 +262,7 @@ def locate(address: int, belief: Belief, sensor: SensorRow, event: EventRow, z: 
 @pytest.mark.parametrize(("sensor", "subject", "rows"), [p for p in PAIRS if p[1] != "post" and p[0] != "radio"])
 def test_an_observation_without_noise_gives_back_the_place(sensor: str, subject: str, rows: int, yaw: float) -> None:
     mean, _ = random_state(5, yaw)
-    mean[TABLES.part(NAMES.index("ground")).start + 8 :][:3] = 0.0  # biases: what is located is located without them
+    mean[TABLES.part(NAMES.index("ground")).start + 8 :][:3] = 0.0  # biases: located entities do not depend on them
     z = np.zeros(4)
     z[:rows], _, event = observed(mean, sensor, subject, rows)
     number, pose = list(SENSORS).index(sensor), np.zeros(4)

@@ -19,7 +19,7 @@ from groundstation.kernel import kernel
 
 
 def wide(P):
-    """P with zeros to a multiple of 8 rows, as the filter keeps it."""
+    """Return P with zeros to a multiple of 8 rows, as the filter keeps it."""
     n = len(P)
     padded = np.zeros((-(-n // 8) * 8,) * 2)
     padded[:n, :n] = P
@@ -35,7 +35,7 @@ def nothing_deferred(n):
 
 
 def put_off(belief, deferred, R, H, y):
-    """One dense correction through the compiled kernels, without making it; returns the NIS."""
+    """Defer one dense correction through the compiled kernels; returns the NIS."""
     rows, n = len(H), len(belief.mean)
     W, HPH, factor = np.zeros((4, n)), np.empty((rows, rows)), np.zeros((rows, rows))
     jacobian = Jacobian(np.zeros((4, H.shape[1])), np.arange(H.shape[1]))
@@ -49,7 +49,7 @@ def put_off(belief, deferred, R, H, y):
 
 
 def correct(P, R, H, y):
-    """One dense correction of P through the compiled kernels; returns the mean and the NIS."""
+    """Apply one dense correction of P through the compiled kernels; returns the mean and the NIS."""
     n, padded = len(P), wide(P)
     belief, deferred = belief_of(np.zeros(len(padded)), padded), nothing_deferred(len(padded))
     nis = put_off(belief, deferred, R, H, y)
@@ -114,7 +114,7 @@ def test_corrections_that_are_put_off_are_those_made_at_once() -> None:
     mean, P = rng.normal(size=n), root @ root.T + np.eye(n)
     at_once, later = belief_of(mean.copy(), P.copy()), belief_of(mean.copy(), P.copy())
     deferred, none = nothing_deferred(n), nothing_deferred(n)
-    for k in range(30):  # more rows than can be put off
+    for k in range(30):  # more rows than can be deferred
         H, R, y = rng.normal(size=(1 + k % 4, n)), np.eye(1 + k % 4), rng.normal(size=1 + k % 4)
         nis = put_off(later, deferred, R.copy(), H, y)
         assert nis == pytest.approx(put_off(at_once, none, R.copy(), H, y), rel=1e-9)
@@ -223,7 +223,7 @@ def test_nothing_is_inverted() -> None:
 
 @pytest.mark.parametrize("dim", [3, 4, 5, 6, 7, 8, 13])
 def test_a_state_of_any_size_is_corrected(dim: int) -> None:
-    """P is worked off in blocks of 8 by 8; what does not fill them is no less corrected."""
+    """P is processed in blocks of 8 by 8; incomplete blocks are corrected as well."""
     rng = np.random.default_rng(dim)
     root = rng.normal(size=(dim, dim))
     P, H, R, y = root @ root.T, rng.normal(size=(3, dim)), 0.1 * np.eye(3), rng.normal(size=3)

@@ -20,9 +20,9 @@ PLACES = {"a": (-1.0, 0.0), "b": (1.0, 0.3)}
 
 
 class Team:
-    """Two drones that hover below a ceiling camera, which sees both at 10 Hz, each displaced as it is said.
+    """Two drones that hover below a ceiling camera, which observes both at 10 Hz with given displacements.
 
-    Of one that is silent nothing is seen or heard; unseen: neither is seen.
+    A silent one is neither observed nor sends telemetry; unseen: neither is observed.
     """
 
     def __init__(self) -> None:
@@ -80,7 +80,7 @@ def test_a_robot_is_contradicted_until_it_is_believed_elsewhere() -> None:
 
 
 def test_a_robot_is_contradicted_no_longer_than_until_a_sighting_moves_it() -> None:
-    """What is beyond the gate, but not far beyond, is used: the belief follows the sightings from then on."""
+    """A value beyond the gate, but not far beyond, is used: from then on the belief follows the observations."""
     team = Team().watch(0.3, a=(0.8, 0.0))
     refused, (x, _) = len(team.refused), team.place("a")
     assert team.filter.contradicted("a")

@@ -33,7 +33,7 @@ FOUR = tuple(np.diag([1e-4, 1e-4, 4e-4, 1e-3]).ravel().tolist())
 
 
 class Room:
-    """A filter with two ceiling cameras, two drones and what else a test needs; time runs as the test says."""
+    """A filter with two ceiling cameras, two drones and further entities of a test, on a manual clock."""
 
     def __init__(self, **more: MotionModel) -> None:
         drone = OdometryRobot(marker_position_m=(0.0, 0.0, 0.0))
@@ -94,7 +94,7 @@ def test_what_leaves_takes_its_correlations_along_and_changes_nobody_else() -> N
 
 
 def test_a_camera_that_comes_back_is_as_new_and_correlates_by_what_it_sees() -> None:
-    """Against a room whose camera was never there before."""
+    """Compared with a room whose camera was never there before."""
     rooms = [Room(), Room()]
     rooms[1].filter.set_present("east", False, START, START)
     rooms[0].run(0.1)
@@ -148,11 +148,11 @@ def test_two_targets_have_a_block_each() -> None:
     assert belief.mean_of("first")[1] - belief.mean_of("second")[1] == pytest.approx(-0.6 - 0.39, abs=0.03)
     assert belief.mean_of("second")[4] == pytest.approx(0.7, abs=0.05)
     cross = belief.covariance[np.ix_(entries(belief, "first"), entries(belief, "second"))]
-    assert cross[0, 0] > 1e-5  # what is wrong about the observer is wrong about both
+    assert cross[0, 0] > 1e-5  # an error of the observer is common to both
 
 
 def follow(target: MotionModel, seed: int = 0) -> tuple[float, list[float], FixedLagFilter]:
-    """The RMSE of a target that goes straight, turns at 1 rad/s and goes straight, seen at 10 Hz to 2 cm."""
+    """Return the RMSE of a target that goes straight, turns at 1 rad/s and goes straight, seen at 10 Hz to 2 cm."""
     rng, room = np.random.default_rng(seed), Room(rover=target)
     room.run(0.05)
     room.below("west", "a", (0.0, 0.0, 1.5))
@@ -196,7 +196,7 @@ def test_two_equal_modes_are_one_model_cross_covariances_included() -> None:
 def test_a_step_in_the_floor_does_not_move_the_vehicle() -> None:
     """Hovers unseen at 1.3 m; a box of 0.4 m passes below for 3 s."""
     room = Room()
-    for _ in range(2):  # a first sighting is believed once a second one agrees
+    for _ in range(2):  # a first observation is accepted once a second one agrees
         room.run(0.3, height_m=1.3)
         room.below("west", "a", (0.0, 0.0, 1.3))
     room.run(2.0, height_m=1.3)
@@ -263,7 +263,7 @@ def test_a_heading_is_a_measurement_of_the_carrier_itself() -> None:
 
 
 def test_a_vehicles_own_position_is_never_fused() -> None:
-    """It flies on our estimate: its position is ours come back, and would count twice."""
+    """It flies on our estimate: its position is our own estimate, and would count twice."""
     beliefs = []
     for position in ((0.0, 0.0, 1.3), (40.0, -30.0, 9.0), None):
         room = Room()

@@ -18,7 +18,7 @@ def fly(
     watch: LatenessWatch, late_s: float, seconds: float = 40.0, turns: float = 1.0, observer: str = "ceiling",
     subjects: tuple[str, ...] = ("drone_1",), reset_every_s: float = 1e9,
 ) -> None:  # fmt: skip
-    """Headings at 100 Hz, pictures at 15 Hz that arrive 0.12 s after their stamp; `late_s` older than stamped."""
+    """Feed headings at 100 Hz, pictures at 15 Hz that arrive 0.12 s after their stamp; `late_s` older than stamped."""
     rng = np.random.default_rng(1)
     due = 0.0
     for tick in range(round(100 * seconds)):

@@ -27,7 +27,7 @@ def circling(name: str, at_s: float) -> np.ndarray:
 
 
 def turned(angle_deg: float) -> np.ndarray:
-    """A camera's turn about an axis between right and down in its picture."""
+    """Return a camera's turn about an axis between right and down in its picture."""
     angle, x, y = math.radians(angle_deg), 0.6, 0.8
     cross = np.array([[0.0, 0.0, y], [0.0, 0.0, -x], [-y, x, 0.0]])
     return np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * cross @ cross
@@ -38,9 +38,9 @@ def mount_watch(field: ResolvedField) -> MountWatch:
 
 
 class Room:
-    """What a ceiling camera sees of two drones, and what these report of their velocities.
+    """A ceiling camera's observations of two drones, and the drones' reported velocities.
 
-    lie: what is added to a drone's velocity [m/s; world]. hangs_s: from when until when the last picture is repeated.
+    lie: error of a drone's velocity [m/s; world]. hangs_s: from when until when the last picture is repeated.
     """
 
     def __init__(self, field: ResolvedField, place: Place = circling, lie: dict[str, float] | None = None) -> None:
@@ -170,7 +170,7 @@ def agreed(observer: str, subject: str) -> Correction:
 def test_who_agree_among_each_other_are_not_both_lost(
     lab_field: ResolvedField, beside: tuple[Correction, ...], culprits: list[str]
 ) -> None:
-    """After a bump that put all out of its view, the camera sees one of them again."""
+    """After a bump that put all drones out of its view, the camera sees one of them again."""
     watch, told = mount_watch(lab_field), list[Notice]()
     for picture in range(8):
         now_s = 10.0 + picture / 15.0

@@ -31,7 +31,7 @@ PAD_YAW, POSE = 0.8, (0.5, -0.4, 1.2)
 
 
 class Desk:
-    """An intake before a filter with one drone among five anchors; the drone hovers at POSE and reports yaw 0.3."""
+    """An ingest with a filter of one drone among five anchors; the drone hovers at POSE and reports yaw 0.3."""
 
     def __init__(self) -> None:
         robot = RangedRobot(RADIO, PAD_YAW, math.radians(10), math.radians(1))
@@ -73,7 +73,7 @@ class Desk:
         return self.intake.take("range/uwb", message, self.now)
 
     def fly(self, rounds: int, **how: Any) -> None:
-        """Let odometry come at 50 Hz and ranges at 10 Hz."""
+        """Feed odometry at 50 Hz and ranges at 10 Hz."""
         for _ in range(rounds):
             for _ in range(5):
                 self.now += 20 * MS
@@ -164,7 +164,7 @@ def test_rounds_of_another_time_place_nobody(desk: Desk, age_ms: int, verdict: V
     assert "drone" not in desk.filter.belief().layout
     desk.fly(10)
     rounds = [desk.round(at=(POSE[0] - 1.5, POSE[1], POSE[2])) for _ in range(10)]
-    for k, told in enumerate(rounds):  # a link that stood still brings all of them at once
+    for k, told in enumerate(rounds):  # a link that stalled delivers all of them at once
         header = msgspec.structs.replace(told.header, stamp_ns=desk.now - age_ms * MS + 100 * k * MS)
         assert desk.take(msgspec.structs.replace(told, header=header)) is verdict
     desk.filter.advance(desk.now)

@@ -17,7 +17,7 @@ from groundstation.estimation.parameters import WORLD_FROM_DOWN, EstimatorParame
 MS = 1_000_000
 START = 7_000_000 * MS
 UP_M, STD_M, SPEED_STD = 4.0, 0.02, 0.05
-Says = Callable[[float], float]  # what it says [m/s], by its true speed
+Says = Callable[[float], float]  # its reported velocity [m/s], by its true speed
 
 
 class Desk:
@@ -77,7 +77,7 @@ class Desk:
 
     @property
     def spread(self) -> float:
-        """Deviation of the velocity [m/s], both axes together."""
+        """Return the standard deviation of the velocity [m/s], both axes together."""
         return math.sqrt(np.trace(self.filter.belief().covariance_of("cart")[2:4, 2:4]))
 
     def rms(self, seconds: float) -> float:
@@ -136,7 +136,7 @@ def test_without_sightings_it_counts_for_a_second_only(desk: Desk) -> None:
 
 
 def test_a_target_that_lies_moves_nobody_else(desk: Desk) -> None:
-    """The camera's mounting is known by sightings of the target too; what it says does not change it by a bit."""
+    """Observations of the target also determine the camera's mounting; the report does not change it by a bit."""
     desk.speed = 0.4
     desk.drive(3.0)
     before = desk.filter.belief()
@@ -153,7 +153,7 @@ def test_a_target_that_lies_moves_nobody_else(desk: Desk) -> None:
 
 @pytest.mark.parametrize("says", [lambda v: 0.0, lambda v: 0.5 * v, lambda v: 1.5 * v, lambda v: v + 0.3])
 def test_a_wrong_one_is_dropped_and_told_once_and_the_cameras_win(desk: Desk, says: Says) -> None:
-    """Wheels that are stuck, of another radius, that slip; the target begins to move while it lies already."""
+    """Wheels that are stuck, of another radius, that slip; the target starts to move under a wrong report."""
     desk.drive(2.0, says)
     for speed in np.linspace(0.0, 0.4, 17):
         desk.speed = float(speed)

@@ -85,7 +85,7 @@ def test_when_every_place_is_excluded_it_may_be_anywhere_again() -> None:
 
 
 def left_at_the_prediction(after_s: float) -> float:
-    """Return the probability near where a target was predicted after pictures of all around there, 6 a second."""
+    """Return the probability near a target's predicted place after pictures of all around there, 6 a second."""
     room, around = lost_at(GRID, (0.0, 0.0), 0.01 * np.eye(2)), seen_within(0.0, 0.0, 1.0)
     for _ in range(round(after_s * 6)):
         room = room.uncovered(1.0 / 6.0).emptied(around)
@@ -113,7 +113,7 @@ def test_who_comes_out_from_behind_something_stands_or_goes_on() -> None:
 
 @pytest.mark.parametrize("place", [(900.0, 0.0), (-1e5, 3e4), (4.5, -3.5)])
 def test_a_target_that_was_predicted_beyond_the_walls_is_looked_for_in_the_room(place: tuple[float, float]) -> None:
-    """An estimate that ran off, or a decoy: no chance may become none of all."""
+    """An estimate that ran off, or a decoy: no probability may become none at all."""
     room = lost_at(GRID, place, 0.04 * np.eye(2))
     assert np.isfinite(room.chances).all() and room.chances.sum() == pytest.approx(1.0)
     row, column = np.unravel_index(int(room.chances.argmax()), GRID.shape)

@@ -35,7 +35,7 @@ def test_a_silent_robot_was_seen_as_well_as_it_was_though_its_belief_grows() -> 
 
 
 def test_a_robot_that_turned_as_it_fell_silent_is_believed_where_it_is_seen() -> None:
-    """It has turned by 0.08 rad more when the next picture shows it, which knows its heading to half a degree."""
+    """It has turned by 0.08 rad more at the next picture, which measures its heading to half a degree."""
     sharp = tuple(np.diag([1e-4, 1e-4, 4e-4, 1e-4]).ravel().tolist())
     joint = FixedLagFilter(PARAMETERS)
     joint.set_airborne("a", True, START, START)

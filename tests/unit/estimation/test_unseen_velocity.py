@@ -27,13 +27,13 @@ from groundstation.settings.resolved import resolved_field
 STEP_S = 0.01
 BEGIN_NS = 5_000_000_000_000
 NOISE = tuple(np.diag([1e-4, 1e-4, 4e-4, 1e-3]).ravel().tolist())
-# Of a real PX4, each axis, after this long (docs/reference/mavlink.md 2.1): change of its velocity's error [m/s], and
-# how far a place that goes by its velocity, less the error when it was last seen, is off [m].
+# Measured on a real PX4, each axis, after this time (docs/reference/mavlink.md 2.1): change of its velocity's error
+# [m/s], and error of a position integrated from its velocity, less the velocity error when it was last observed [m].
 MEASURED = {1.0: (0.15, 0.09), 2.0: (0.19, 0.24)}
 
 
 def deviations(model: OdometryRobot, seconds: float) -> tuple[float, float]:
-    """Return those of the velocity's error [m/s] and of the place [m] after a time unseen; both are exact at first."""
+    """Return standard deviations of velocity error [m/s] and position [m] after a time unseen; both start exact."""
     tables = tables_from_parameters(EstimatorParameters({"one": model}))
     state = empty_state(tables, [True])
     state.memory["active"] = 1
@@ -67,7 +67,7 @@ def test_who_was_seen_just_now_does_not_walk_yet() -> None:
 
 @pytest.mark.parametrize("target", [ConstantVelocityTarget(), ManoeuvringTarget()], ids=["one mode", "two modes"])
 def test_time_unseen_passes_once_however_many_modes_the_target_has(target: MotionModel) -> None:
-    """Between two pictures, 0.1 s apart, nothing walks."""
+    """Between two pictures, 0.1 s apart, the error does not change."""
     deviation = []
     for walk in (0.0, 0.15):
         robot = OdometryRobot(slow_states=SLOW_STATES, velocity_bias_std_m_s=0.03, velocity_walk=walk)

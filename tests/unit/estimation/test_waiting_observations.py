@@ -33,7 +33,7 @@ WAITING = replace(AT_ONCE, wait_s=0.095)
 
 
 class Flight:
-    """A robot under a camera, its velocity 30 and its height 85 ms old when they arrive, pictures 5 ms."""
+    """A robot under a camera; on arrival its velocity is 30 and its height 85 ms old, pictures 5 ms."""
 
     def __init__(self, parameters: EstimatorParameters) -> None:
         self.joint, self.now, self._rng = FixedLagFilter(parameters), START, np.random.default_rng(7)
@@ -65,7 +65,7 @@ class Flight:
 
 def test_what_waited_gives_the_same_belief() -> None:
     flights = [Flight(parameters) for parameters in (AT_ONCE, WAITING)]
-    for _ in range(2):  # nothing is carried on in which the present beliefs differ by rounding
+    for _ in range(2):  # rounding differences of the present beliefs do not accumulate
         for flight in flights:
             flight.fly(700)
             flight.fly(200, seen=False)

@@ -9,7 +9,7 @@ TURN_NS = S // 40
 
 
 def watch(seconds, seen_m_s, holds=True, silent=True, watched=None):
-    """Return the watch after so long, and what it says then."""
+    """Return the watch after this time, and its output then."""
     watched, said = watched or AdriftWatch(), False
     for turn in range(round(seconds * 40)):
         said = watched.step(S + turn * TURN_NS, holds, silent, seen_m_s)

@@ -8,7 +8,7 @@ S = 1_000_000_000
 
 
 def told(heights: list[float], every_s: float, begins_s: float = 10.0) -> list[bool]:
-    """Return whether a blind drone that is to land sinks at each of some heights."""
+    """Return whether a drone without floor in view that is to land sinks at each of some heights."""
     descent = BlindDescent()
     return [descent.step(round((begins_s + i * every_s) * S), True, True, height) for i, height in enumerate(heights)]
 

@@ -247,5 +247,5 @@ def test_waiting_says_nothing_about_flying():
 
 @pytest.mark.parametrize(("percent", "charge"), [(0, 0.0), (73, 0.73), (100, 1.0), (101, None), (4_000_000_000, None)])
 def test_a_charge_that_is_no_share_is_not_known(percent: int, charge: float | None) -> None:
-    """Garbage counted as a full battery; one whose charge is not known does not take off."""
+    """Garbage counted as a full battery; a drone with unknown charge does not take off."""
     assert charge_from_demo(options.Demo(battery_percent=percent)) == charge

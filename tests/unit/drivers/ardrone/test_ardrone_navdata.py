@@ -25,7 +25,7 @@ def test_unknown_tags_are_kept_and_skipped():
 
 
 def test_packets_of_one_length_may_hold_different_options():
-    """What one of them was cut into says nothing of the next: sizes, tags, and where the checksum is."""
+    """The decoded layout of one says nothing about the next: sizes, tags, and the checksum's place."""
     cuts = [((1, b"abcd"), (2, b"efghij")), ((1, b"abcdef"), (2, b"ghij")), ((1, b"abcd"), (3, b"efghij"))]
     for options_in in (*cuts, *cuts):
         datagram = navdata.encode(Navdata(0, 1, 0, options_in))

@@ -17,8 +17,8 @@ CAMERA_TICKS, CAMERA_NOISE_M_S = 22, 0.04
 def fly(drift_of, seen_of, seconds=20.0, wanted=0.3, seed=1):
     """Return the true speeds of a drone that answers its tilt after 0.1 s.
 
-    drift_of: time -> error of the odometry [m/s]; seen_of: time, mean speed of the last half second -> what cameras
-    say of it, or None.
+    drift_of: time -> error of the odometry [m/s]; seen_of: time, mean speed of the last half second -> the cameras'
+    velocity, or None.
     """
     rng, loop = random.Random(seed), VelocityLoop(ArDroneLimits())
     late, speed, speeds = deque([0.0] * 4), 0.0, []
@@ -42,7 +42,7 @@ def fly(drift_of, seen_of, seconds=20.0, wanted=0.3, seed=1):
 
 
 def drifting(now_s):
-    """By 0.09 m/s each second, up to 0.6."""
+    """Drift of 0.09 m/s each second, up to 0.6."""
     return -min(0.6, 0.09 * max(0.0, now_s - 5.0))
 
 
@@ -50,13 +50,13 @@ def test_cameras_hold_a_drone_whose_odometry_drifts() -> None:
     blind = fly(drifting, lambda now_s, mean: None)
     seen = fly(drifting, lambda now_s, mean: mean)
     assert max(blind) > 0.75
-    assert max(seen) < 0.55  # what is tolerated, and what drifts in the time that cameras need
+    assert max(seen) < 0.55  # the tolerance, and the drift within the time that cameras need
     assert abs(sum(seen[-200:]) / 200 - 0.3) < 0.05
 
 
 @pytest.mark.parametrize(("hangs_s", "most_m_s"), [(0.5, 0.35), (1.0, 0.55)])
 def test_a_picture_that_hangs_carries_nobody_off(hangs_s: float, most_m_s: float) -> None:
-    """Cameras say that it stands, for longer than it takes to find that out, and then nothing."""
+    """Cameras report that it stands still, for longer than the detection takes, and then nothing."""
     speeds = fly(lambda now_s: 0.0, lambda now_s, mean: mean if now_s < 8 else 0.0 if now_s < 8 + hangs_s else None)
     assert max(speeds[round(8 / TICK_S) :]) < most_m_s
 

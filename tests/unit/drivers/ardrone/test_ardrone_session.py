@@ -56,9 +56,9 @@ class Tcp:
 
 
 class Drone:
-    """Stores a CONFIG and raises bit 6; loses a CONFIG that comes while it is up; CTRL 5 clears it. Answers late.
+    """Stores a CONFIG and raises bit 6; loses a CONFIG that arrives while it is set; CTRL 5 clears it. Answers late.
 
-    deaf_to: keys that it acknowledges and does not store, with how often.
+    deaf_to: keys that it acknowledges and does not store, with the number of times.
     """
 
     def __init__(self, uplink=1, downlink=1, state=BOOTSTRAP, ids=True, **deaf_to):

@@ -34,8 +34,8 @@ def fly(
 ):  # fmt: skip
     """Return the true velocities along x for a wanted velocity as a function of time.
 
-    sensed: the accelerometers are told, with their gain error and noise; wall_s: held back for so long at first; wind:
-    push of the air from second 3 on [m/s^2], of which the firmware leans against the share `braced` by itself.
+    sensed: the accelerometers are fed, with their gain error and noise; wall_s: blocked for this time at first; wind:
+    push of the air from second 3 on [m/s^2], of which the firmware itself counters the share `braced`.
     """
     rng, loop, tilt = random.Random(seed), VelocityLoop(ArDroneLimits()), Tilt()
     late = deque([0.0] * round(delay_s / TICK_S))
@@ -77,7 +77,7 @@ def test_the_model_answers_like_the_recorded_drone():
 @pytest.mark.parametrize("delay_s", [0.02, 0.04])
 @pytest.mark.parametrize("drag", [0.2, 0.5])
 def test_a_step_of_half_a_metre_per_second(gain, delay_s, drag):
-    """90 % in 1.2 s, at most 15 % over, though the odometry is off by the calibration error of its scale."""
+    """90 % in 1.2 s, at most 15 % over, although the odometry has the calibration error of its scale."""
     for seed in range(3):
         speed = fly(lambda t: 0.5, 6.0, gain, delay_s, drag, seed=seed)
         assert next(i for i, v in enumerate(speed) if v >= 0.45) * TICK_S <= 1.2
@@ -106,14 +106,14 @@ def test_a_constant_tilt_error_is_integrated_away():
 
 @pytest.mark.parametrize("sensed", [True, False])
 def test_being_held_back_does_not_wind_it_up(sensed):
-    """Held back by a wall for 10 s, then released: it must not shoot off."""
+    """Blocked by a wall for 10 s, then released: it must not shoot off."""
     speeds = fly(lambda t: 0.5, 14.0, wall_s=10.0, sensed=sensed)
     assert max(speeds) <= 1.2
     assert abs(sum(speeds[-200:]) / 200 - 0.5) <= 0.12
 
 
 def test_a_standing_drone_teaches_what_its_accelerometers_show_when_level():
-    """A bias of 0.3 m/s^2, as on the recorded AR.Drone 2, must not move a hovering one."""
+    """A bias of 0.3 m/s^2, as on the recorded AR.Drone 2, must not move a hovering drone."""
     loop = VelocityLoop(ArDroneLimits())
     for _ in range(400):
         loop.stand((0.3, -0.2), 1 / 40)
@@ -123,7 +123,7 @@ def test_a_standing_drone_teaches_what_its_accelerometers_show_when_level():
 
 
 def test_one_that_goes_blind_as_it_stops_is_braked_from_the_speed_it_told_last():
-    """Its own hover ends with its flow; begun from zero, as before, it glided on at 0.17 m/s until it had landed."""
+    """Its own hover ends with its flow. With an estimate begun from zero it glided at 0.17 m/s until it had landed."""
     loop = VelocityLoop(ArDroneLimits())
     for speed in (0.4, 0.38, 0.35, 0.32, 0.3):
         assert loop.hold((speed, -speed, 0.0), 1 / 40).hover
@@ -170,7 +170,7 @@ def test_left_is_negative_roll_and_forward_positive_pitch():
 
 
 def fly_blindly(wanted, seconds, reported, sensed=True, heeds=True, noise=0.0, wind=0.0):
-    """Return the true speeds when the odometry says one thing for ever, and when the loop contradicted it [s].
+    """Return the true speeds with constant odometry, and the time at which the loop contradicted it [s].
 
     wind: push of the air [m/s^2].
     """
@@ -198,7 +198,7 @@ def fly_blindly(wanted, seconds, reported, sensed=True, heeds=True, noise=0.0, w
 @pytest.mark.parametrize("noise", [0.0, 0.03])
 @pytest.mark.parametrize("wanted", [0.3, 0.6])
 def test_a_velocity_stuck_at_0_cannot_wind_up_tilt(wanted, noise, sensed):
-    """Whoever trusts it flew 1.76 m/s: tilt is bounded by what drag explains, and the contradiction is noticed."""
+    """Trusting it gave 1.76 m/s: tilt is bounded by the drag, and the contradiction is detected."""
     speeds, _ = fly_blindly(wanted, 20.0, 0.0, sensed, heeds=False, noise=noise)
     assert max(speeds) <= 1.3, "if nobody heeds it, for ever"
     speeds, found_s = fly_blindly(wanted, 20.0, 0.0, sensed, noise=noise)
@@ -207,7 +207,7 @@ def test_a_velocity_stuck_at_0_cannot_wind_up_tilt(wanted, noise, sensed):
 
 @pytest.mark.parametrize(("wanted", "reported", "within_s"), [(0.0, 0.5, 1.0), (0.3, 0.8, 0.5), (0.3, -0.2, 1.1)])
 def test_a_speed_that_nobody_asked_for_is_noticed_within_a_second(wanted, reported, within_s):
-    """A drone that its drifting velocity led off was 0.8 m beside its belief until the driver stopped it."""
+    """A drone led off by its drifting velocity was 0.8 m beside its belief until the driver stopped it."""
     _, found_s = fly_blindly(wanted, 5.0, reported, noise=0.03)
     assert found_s is not None and found_s <= within_s
 
@@ -216,7 +216,7 @@ def test_a_speed_that_nobody_asked_for_is_noticed_within_a_second(wanted, report
 def test_a_velocity_stuck_at_0_in_wind_is_noticed_in_time(wind):
     speeds, found_s = fly_blindly(0.5, 20.0, 0.0, noise=0.03, wind=wind)
     assert found_s <= 2.0
-    # Most of it is the wind's: nobody braces a drone that does not see its motion.
+    # Most of it is the wind's: the firmware does not counter it without flow.
     assert max(abs(speed) for speed in speeds[: round(found_s / TICK_S)]) <= 1.5
 
 
@@ -252,11 +252,11 @@ def test_a_healthy_flight_is_never_contradicted(sensed, contradictions):
 
 
 def stop_blindly(push, seen_s, wrong=0.0, drift=0.0, cameras=False, told_s=9.0, offset=0.0):
-    """Fly 0.5 m/s, seen until seen_s, then with a speed that is off by `wrong` for 0.7 s, then brake for 4 s.
+    """Fly 0.5 m/s, with flow until seen_s, then for 0.7 s with a speed that is off by `wrong`, then brake for 4 s.
 
-    Return the true speeds of the last second; push: of the air from the brake on [m/s^2]; drift: error of the speed
-    that is seen in flight [m/s]; cameras: whether they see the drone; told_s: the accelerometers are told for so long
-    after seen_s; offset: of theirs [m/s^2], as the standing drone has shown.
+    Return the true speeds of the last second; push: of the air from the brake on [m/s^2]; drift: error of the measured
+    speed in flight [m/s]; cameras: whether they see the drone; told_s: the accelerometers are fed for this time after
+    seen_s; offset: theirs [m/s^2], as the standing drone has shown.
     """
     rng, loop, tilt = random.Random(1), VelocityLoop(ArDroneLimits()), Tilt()
     for _ in range(400):
@@ -295,7 +295,7 @@ def test_a_drone_that_sees_no_floor_is_braked_by_what_it_knows(seen_s, push):
 @pytest.mark.parametrize("push", [0.0, 0.15, -0.15])
 @pytest.mark.parametrize("offset", [0.0, 0.2, -0.2])
 def test_one_that_falls_silent_besides_is_braked_by_what_its_accelerometers_showed_last(push, offset):
-    """From 0.5 m/s: told to hold its place without a floor it came to rest on the floor, 6.5 s later."""
+    """From 0.5 m/s: commanded to hold its place without a floor it came to rest on the floor, 6.5 s later."""
     assert max(abs(speed) for speed in stop_blindly(push, 4.0, told_s=0.9, offset=offset)) <= 0.15
 
 
@@ -305,6 +305,6 @@ def test_a_speed_that_contradicts_the_requests_is_no_guide_to_braking():
 
 @pytest.mark.parametrize("wrong", [0.0, -0.9])
 def test_cameras_tell_a_drone_that_sees_no_floor_its_speed(wrong):
-    """Its speed had drifted by 0.3 m/s before: it would still do that."""
+    """Its speed had drifted by 0.3 m/s before: it would keep that speed."""
     assert max(abs(speed) for speed in stop_blindly(0.0, 4.0, wrong, drift=0.3)) >= 0.15
     assert max(abs(speed) for speed in stop_blindly(0.0, 4.0, wrong, drift=0.3, cameras=True)) <= 0.08

@@ -18,7 +18,7 @@ def heights(values, period_ms=15):
 
 
 def test_a_take_off_is_let_through():
-    """The recorded one: 0.27 m first, 0.62 m 0.41 s later, 0.82 m at its peak."""
+    """The recorded take-off: 0.27 m first, 0.62 m 0.41 s later, 0.82 m at its peak."""
     rise = [0.274 + 0.342 * i / 27 for i in range(28)] + [0.62 + 0.2 * i / 30 for i in range(30)]
     watch, let = heights(rise)
     assert all(let) and watch.refused == 0
@@ -53,7 +53,7 @@ def test_a_scan_is_told_once_with_its_remedy_and_its_end():
 
 
 def told_by(watch, numbers, flies=True):
-    """Take a number each 20 ms."""
+    """Feed a number each 20 ms."""
     return [watch.step(i * 20 * MS, number, flies) for i, number in enumerate(numbers)]
 
 

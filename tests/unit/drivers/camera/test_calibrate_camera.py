@@ -39,7 +39,7 @@ def rays_of_pixels():
 
 
 def drawn(pose):
-    """Return a picture of the 9x6 board: rays of the pixels cut with the board's plane, four to a pixel."""
+    """Return a picture of the 9x6 board: pixel rays intersected with the board's plane, four to a pixel."""
     roll, pitch, yaw, x, y, z = pose
     turn, shift = rotation_from_euler(roll, pitch, yaw), np.array([x, y, z])
     rays, at = rays_of_pixels(), turn.T @ shift
@@ -66,7 +66,7 @@ def board_pictures():
 
 @pytest.fixture
 def calibrated(tmp_path, capsys):
-    """Run `calibrate camera`, and return exit code, output, and the file that it wrote."""
+    """Run `calibrate camera`; return exit code, output, and the written file."""
 
     def call(source, *options):
         file = tmp_path / "out" / "lens.yaml"
@@ -90,7 +90,7 @@ def test_the_published_calibration_is_reproduced_with_its_recipe(calibrated, rea
 
 
 def test_our_own_recipe_fits_the_photographs_better_than_the_published_lens(calibrated, real_data):
-    """The published figures hang on corners that slipped in a window of 23 px (1.2 px in left02)."""
+    """The published figures use corners that shifted in a window of 23 px (1.2 px in left02)."""
     folder = real_data("camera_calibration")
     code, _, file = calibrated(folder)
     assert code == 0 and file["views"] == 13

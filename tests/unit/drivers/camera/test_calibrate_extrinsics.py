@@ -79,7 +79,7 @@ def markers(places=PLACES):
 
 @pytest.fixture
 def measured(capsys):
-    """Run `calibrate extrinsics`; returns exit code, what it printed as YAML, and all it said."""
+    """Run `calibrate extrinsics`; returns exit code, its YAML, and its whole output."""
 
     def call(*arguments):
         code = run(["calibrate", "extrinsics", *arguments])
@@ -98,7 +98,7 @@ def test_a_turned_ceiling_camera_is_placed_from_pictures(tmp_path, measured):
     assert 0.001 <= std_m < 0.02 and 0.01 <= std_deg < 0.5
     assert np.allclose(lines["position_m"], CEILING.translation, atol=4 * std_m)
     assert np.allclose(lines["rotation_deg"], TURN_DEG, atol=4 * std_deg)
-    # And these lines are what a field file takes.
+    # These lines are valid in a field file.
     from groundstation.settings.room import WorldCameraSettings
 
     lens = json.loads((tmp_path / "lens.yaml").read_text())
@@ -208,7 +208,7 @@ def test_the_check_holds_until_a_camera_was_moved(tmp_path, capsys):
     assert run(["calibrate", "check", lab_with(tmp_path, {"ceiling": (folder, moved, TURN_DEG)}), *said]) == 1
     out = capsys.readouterr().out
     assert "ceiling: has marker 1" in out and "calibrate extrinsics" in out
-    # The lens alone does not mind where the camera hangs, but it minds another lens.
+    # Another mounting is no contradiction to the lens alone, but another lens is.
     assert run(["calibrate", "check", folder, "--calibration", calibration, "--frames=1"]) == 0
     other_lens(tmp_path, distortion=[-0.9, 0.0, 0.0, 0.0, 0.0])
     assert run(["calibrate", "check", folder, "--calibration", calibration, "--frames=1"]) == 1
@@ -249,7 +249,7 @@ def test_the_check_says_what_is_missing(tmp_path, capsys):
 
 
 def recorded(tmp_path, pictures, turn=TURN_DEG):
-    """Write a run of a lab whose ceiling camera saw these pictures, five a second; returns its folder."""
+    """Write a run of a lab whose ceiling camera took these pictures, five a second; returns its folder."""
     field = load_field(Path(lab_with(tmp_path, {"ceiling": ("/dev/video0", CEILING, turn)})))
     folder = tmp_path / "run"
     folder.mkdir()
@@ -273,7 +273,7 @@ def test_a_recording_is_checked_by_its_first_pictures(tmp_path, capsys):
     assert run(["calibrate", "check", run_dir, *said]) == 0
     out = capsys.readouterr().out
     assert "holds: ceiling: has marker 3" in out and "DOES NOT" not in out
-    # Its pictures alone say by which field they were seen, and a marker elsewhere is told.
+    # Its pictures alone identify their field, and a marker elsewhere is reported.
     (raw,) = Path(run_dir).glob("raw*.mcap")
     assert run(["calibrate", "check", str(raw), "--frames=2", "--marker=3=-0.7,-0.5"]) == 1
     assert "DOES NOT HOLD: ceiling: has marker 3 20." in capsys.readouterr().out

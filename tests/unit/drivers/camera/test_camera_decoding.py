@@ -13,7 +13,7 @@ from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 
 
 def test_a_picture_that_asks_to_be_turned_is_measured_as_it_was_exposed() -> None:
-    """As phones send theirs: EXIF tag 0x112 with 6, a quarter of a turn; the lens is that of the sensor."""
+    """As phones send theirs: EXIF tag 0x112 with 6, a quarter turn; the lens is that of the sensor."""
     grey = np.zeros((360, 640), np.uint8)
     grey[:90, :160] = 255
     whole, jpeg = cv2.imencode(".jpg", grey)

@@ -27,7 +27,7 @@ from sim_bridge.render.spec import BoardSpec, BodyShape, Mount, PictureQuality, 
 
 @dataclass
 class Rig:
-    """The driver between a source and somebody who listens."""
+    """The driver between a source and a subscriber."""
 
     camera: driver.CameraDriver
     child: FakeChild
@@ -95,7 +95,7 @@ def test_an_observation_carries_exposure_time_attitude_and_names(rig, jpeg):
 
 @pytest.mark.parametrize(("told", "searches"), [(None, 4), (0.1, 4), (0.8, 15)])
 def test_a_driver_that_hears_of_a_target_that_nobody_sees_searches_often(rig, told, searches):
-    """Every second picture; without the news twice a second, for there is nothing in view."""
+    """Every second picture; without that information twice a second, for there is nothing in view."""
     start_ns = clock.now_ns()
     for k in range(30):
         grey = encoded(np.full((360, 640), 100 + k, np.uint8))
@@ -117,7 +117,7 @@ def test_a_marker_is_as_old_as_the_row_that_shows_it(rig, jpeg):
 
 
 def test_a_picture_that_hangs_is_one_picture_and_is_told(rig, jpeg):
-    """Its sightings carry its first exposure, whatever the detector makes of it; it tells nobody's absence."""
+    """Its observations carry its first exposure, whatever the detector finds; it proves nobody's absence."""
     start_ns = clock.now_ns() - 4 * NS_PER_S
     for k in range(50):
         rig.source.push(jpeg, start_ns + k * 66_666_667)

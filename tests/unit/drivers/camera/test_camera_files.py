@@ -108,7 +108,7 @@ def test_an_absent_device_is_named():
 
 @pytest.mark.parametrize("pixel_format", ["yuyv422", "yuv420p", "gray", "bgr24"])
 def test_raw_pictures_of_a_device_are_read(tmp_path, pixel_format):
-    """A file stands in for a camera of this machine: its pictures come the same way, uncompressed."""
+    """A file stands in for a camera of this machine: its pictures arrive uncompressed, in the same way."""
     path = write_video(tmp_path / "raw.nut", "rawvideo", count=3, pixel_format=pixel_format)
     reader = device(str(path), None)
     reader._form, reader._choices = None, ({},)

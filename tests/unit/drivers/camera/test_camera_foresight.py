@@ -153,7 +153,7 @@ def test_a_camera_fixed_in_the_world_expects_robots():
 
 
 def test_boards_are_found_at_once_where_the_belief_has_them():
-    """No full search has run yet: the windows of the belief find both boards in the first pictures."""
+    """No full search has run yet: the windows from the belief find both boards in the first pictures."""
     renderer, eyes = renderer_of(), foresight()
     pipeline = Pipeline(FRONT, MARKERS, DetectorSettings(), search_rate_hz=2.0, search_phase_s=10.0)
     for k in range(2):
@@ -180,7 +180,7 @@ def test_the_belief_follows_a_camera_that_turns_fast():
 
 
 def unseen(stamp_ns, age_s, search="", mode="SEARCH"):
-    """Return an estimate whose target no camera has seen for so long, or that is searched for."""
+    """Return an estimate whose target no camera has seen for this time, or that is searched for."""
     bot = EntityEstimate("bot", "target", (9.0, 9.0), (0.01, 0.0, 0.0, 0.01), (0.0, 0.0), True, age_s)
     away = EntityEstimate(
         "drone_2", "robot", (9.0, 9.0, 1.0, 0.0), tuple((0.01 * np.eye(4)).ravel()), (0.0,) * 3, True, 5
@@ -197,11 +197,11 @@ def unseen(stamp_ns, age_s, search="", mode="SEARCH"):
     [
         (unseen(0, 0.3), ()),
         (unseen(0, 0.8), ("bot",)),
-        (unseen(0, 60.0), ()),  # nobody flies who could search, or the tracker would say so
+        (unseen(0, 60.0), ()),  # no drone can search, or the tracker would report it
         (unseen(0, 0.0, "bot"), ("bot",)),
         (unseen(0, 0.0, "bot", "LOST"), ("bot",)),
         (unseen(0, 0.0, "somebody"), ()),
-        (unseen(-400_000_000, 0.8), ()),  # too old to say anything
+        (unseen(-400_000_000, 0.8), ()),  # too old to be used
     ],
 )
 def test_targets_that_no_camera_sees_are_sought(told, sought):
@@ -213,7 +213,7 @@ def test_targets_that_no_camera_sees_are_sought(told, sought):
 
 @pytest.mark.parametrize(("fixed", "sought"), [(True, {"drone_2"}), (False, set())])
 def test_robots_that_a_fixed_camera_should_see_are_sought(fixed, sought):
-    """How often it misses one tells the tracker that it is not where it is believed; drones miss each other all day."""
+    """Repeated misses show the tracker that it is not at its believed place; drones miss each other all day."""
     mount = MountSettings(position_m=(0.0, 0.0, 4.2), looking="down") if fixed else MOUNT
     eyes = Foresight(mount, "ceiling" if fixed else "drone_1", MARKERS, FRONT)
     place = state(0.0, 0.0, 1.3) if fixed else state(1.5, 0.0, 0.5)
@@ -225,7 +225,7 @@ def test_robots_that_a_fixed_camera_should_see_are_sought(fixed, sought):
 
 
 def test_a_target_that_no_camera_sees_is_found_though_the_belief_has_it_elsewhere():
-    """It was carried before this camera, which would look at whole pictures twice a second."""
+    """It was carried before this camera, which would search whole pictures twice a second."""
     renderer = renderer_of()
     found: dict[tuple[str, ...], int] = {}
     for sought in ((), ("bot",)):

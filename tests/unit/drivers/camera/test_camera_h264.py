@@ -163,7 +163,7 @@ def test_frames_that_waited_together_say_nothing_of_the_delay_but_the_last():
 
 
 def test_a_clock_that_is_put_forward_a_little_is_learnt_anew_at_once():
-    """By two seconds, as by a camera that gets the time from the network: its pictures were dated by their arrival."""
+    """By two seconds, as in a camera with network time: its pictures were stamped by their arrival."""
     clock = SenderClock()
     for index in range(100):
         clock.settle([index * 66 * MS], (index * 66 + 100) * MS)

@@ -28,7 +28,7 @@ def test_heads_with_bare_line_feeds():
 
 
 def test_a_picture_without_a_length_does_not_wait_for_the_next_one():
-    """As a few lines of Python on a small computer send it: each boundary comes with the picture behind it."""
+    """As sent by a few lines of Python on a small computer: each boundary comes with the picture after it."""
     _, coded = cv2.imencode(".jpg", np.arange(64 * 64, dtype=np.uint8).reshape(64, 64))
     thumbnail = b"Exif\0\0" + JPEG
     jpeg = coded.tobytes()

@@ -36,7 +36,7 @@ def found_corners(picture):
 
 
 def test_all_boards_are_found_and_refined_to_a_fifth_of_a_pixel(photographs):
-    """13 of 13; the residual is that of an own calibration with these corners, its lens model included."""
+    """13 of 13; the residual is that of a calibration from these corners, its lens model included."""
     pictures = [read_grey(path) for path in photographs]
     corners = [found_corners(picture) for picture in pictures]
     assert len(corners) == 13
@@ -56,7 +56,7 @@ def test_a_picture_without_a_board_has_no_corners():
 
 @pytest.mark.parametrize("name", ["left01.jpg", "left03.jpg", "left05.jpg", "left12.jpg"])
 def test_our_lens_explains_real_corners(name, real_data):
-    """A flat board seen through the published calibration: a homography of undistorted corners leaves little over."""
+    """A flat board through the published calibration: a homography of undistorted corners leaves little residual."""
     corners = found_corners(read_grey(real_data("camera_calibration") / name))
     rays = LENS.normalised_from_pixels(corners)
     plane = np.array([[x, y] for y in range(6) for x in range(9)], dtype=np.float64)

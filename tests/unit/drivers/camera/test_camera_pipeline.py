@@ -64,7 +64,7 @@ def gravity(mount=TILTED, observer=(0.0, 0.0), subject=(0.0, 0.0), known=True):
 
 
 def look(pipeline, renderer, states, mount=TILTED, observer=(0.0, 0.0), pictures=3):
-    """Show the same scene a few times (far identities need two readings); return the last sightings by entity."""
+    """Show the same scene a few times (far identities need two readings); return the last observations by entity."""
     sightings = []
     for k in range(pictures):
         picture = renderer.render(np.array(states))
@@ -103,7 +103,7 @@ def test_yaw_is_relative_to_the_observers_heading_even_when_it_is_tilted():
 
 
 class Trial:
-    """Boards at a given range, anywhere in the picture, any heading; what was reported and how wrong it was."""
+    """Boards at a given range, anywhere in the picture, any heading; reported poses and their errors."""
 
     def __init__(self, scenario, range_m, poses, seed=0, attitude_std_deg=1.0):
         renderer, random = make_renderer(scenario=scenario), np.random.default_rng(seed)
@@ -162,7 +162,7 @@ def test_covariance_is_honest_and_gravity_leaves_no_flips():
 
 
 def test_without_attitudes_the_other_pose_is_kept_or_right():
-    """Nobody knows the attitudes, levelness is assumed loosely: an undecided case must say so."""
+    """The attitudes are unknown, levelness is assumed loosely: an undecided case must be reported as such."""
     renderer, random, seen = make_renderer(scenario=REAL), np.random.default_rng(8), 0
     for _ in range(12):
         heading = random.uniform(-3, 3)

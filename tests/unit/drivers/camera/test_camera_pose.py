@@ -85,7 +85,7 @@ def test_the_floor_keeps_a_perfect_fit_from_claiming_certainty():
 
 
 def test_an_upright_board_before_a_level_camera_stays_ambiguous():
-    """Two mirror attitudes that gravity does not tell apart: both are handed on."""
+    """Gravity does not distinguish its two mirror attitudes: both are reported."""
     random = np.random.default_rng(4)
     level = base_from_tilted_optical(0.0)
     upright = rotation_from_euler(0.0, 0.0, math.radians(155)) @ np.array([[0, 0, 1.0], [1, 0, 0], [0, 1, 0]])

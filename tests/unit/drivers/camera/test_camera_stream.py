@@ -165,7 +165,7 @@ _PART = b"--frame\r\nContent-Type: image/jpeg\r\nContent-Length: %d\r\n\r\n"
 
 @pytest.mark.parametrize("kind", [b"multipart/x-mixed-replace;boundary=frame", b"application/octet-stream"])
 def test_a_stream_in_chunks_is_read(kind):
-    """As an ESP32 sends it: head, picture and boundary each a chunk; ffmpeg calls it a stream of octets."""
+    """As sent by an ESP32: head, picture and boundary each a chunk; ffmpeg calls it a stream of octets."""
     jpeg = JPEG % 1
     chunks = b"".join(b"%x\r\n%s\r\n" % (len(part), part) for part in (_PART % len(jpeg), jpeg, b"\r\n"))
     head = b"HTTP/1.1 200 OK\r\nContent-Type: %s\r\nTransfer-Encoding: chunked\r\n\r\n" % kind
@@ -191,7 +191,7 @@ def test_the_reader_logs_in_with_the_address_s_user_and_password():
 
 
 def _answer_in_turn(listener, answers):
-    """Answer one connection after the other; returns what they asked."""
+    """Answer one connection after the other; returns their requests."""
     requests = []
     listener.settimeout(5.0)
     for answer in answers:

@@ -20,7 +20,7 @@ def test_equal_pictures_in_a_row_are_as_old_as_the_first():
 
 
 def fly(shift_px, swing_deg, seconds=3.0, aloft=True):
-    """Return for each picture how much older than itself it is said to be [s]; shift_px: of the marker, by time [s]."""
+    """Return the reported excess age of each picture [s]; shift_px: of the marker, by time [s]."""
     rng, steady, ages = np.random.default_rng(3), SteadyMarkers(FOCAL_PX), []
     for k in range(round(seconds * 15)):
         at_s, now_ns = k / 15, 10**12 + k * PICTURE_NS
@@ -41,9 +41,9 @@ def test_a_marker_that_stands_while_its_camera_tilts_shows_that_the_picture_hang
     "live",
     [
         {"shift_px": lambda at_s: 1.2 * at_s * 15, "swing_deg": 5.0},  # it moves
-        {"shift_px": lambda at_s: 12.0 * math.sin(4.2 * at_s), "swing_deg": 2.5},  # as the tilt says
-        {"shift_px": lambda _: 0.0, "swing_deg": 0.3},  # hardly any tilt: nobody can tell
-        {"shift_px": lambda _: 0.0, "swing_deg": 5.0, "aloft": False},  # what stands may shake its sensors
+        {"shift_px": lambda at_s: 12.0 * math.sin(4.2 * at_s), "swing_deg": 2.5},  # as the tilt predicts
+        {"shift_px": lambda _: 0.0, "swing_deg": 0.3},  # hardly any tilt: no decision is possible
+        {"shift_px": lambda _: 0.0, "swing_deg": 5.0, "aloft": False},  # a standing drone may shake its sensors
     ],
 )
 def test_a_living_picture_is_its_own_age(live):

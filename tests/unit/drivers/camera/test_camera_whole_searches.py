@@ -14,7 +14,7 @@ Sought = Callable[[float], bool]
 def searches(
     seconds: float, sought: Sought, *, sees: bool = False, misses: bool = True, cost_s: float = 0.01, phase_s: float = 0
 ) -> list[float]:
-    """Return when pictures at 15 Hz are searched [s]."""
+    """Return the times at which pictures at 15 Hz are searched whole [s]."""
     plan, found = WholeSearches(SearchRates.of(DetectorSettings(), 2.0), phase_s), []
     for k in range(round(15 * seconds)):
         if plan.is_due(k * FRAME_NS, sees, sought(k / 15)):
@@ -43,7 +43,7 @@ def test_a_search_begins_as_soon_as_a_target_is_sought() -> None:
 
 @pytest.mark.parametrize(("cost_s", "most"), [(0.03, 0.16), (0.06, 0.16), (0.17, 0.35)])
 def test_what_searches_cost_bounds_how_many_there_are(cost_s: float, most: float) -> None:
-    """A sixth of a processor, or what the search for nothing in particular costs."""
+    """A sixth of a processor, or the cost of the untargeted search."""
     found = searches(20.0, lambda _: True, cost_s=cost_s)
     assert cost_s * len(found) / 20.0 <= most
     assert len(found) >= len(searches(20.0, lambda _: False, cost_s=cost_s))
@@ -63,7 +63,7 @@ def test_a_marker_that_got_lost_is_searched_for_soon() -> None:
 
 
 def test_a_camera_that_sees_nobody_any_more_says_so_at_once() -> None:
-    """The tracker takes one that has not said anything for 1.5 s for dead, and holds the team."""
+    """The tracker considers a camera without messages for 1.5 s dead, and holds the team."""
     plan = WholeSearches(SearchRates.of(DetectorSettings(), 2.0), 0.0)
     assert plan.is_due(0, sees=True, sought=False)
     plan.done(0, misses=False, cost_s=0.01)

@@ -34,7 +34,7 @@ def test_a_picture_without_contrast_is_not_called_blurred() -> None:
 
 
 def test_light_that_fades_is_no_blurred_edge() -> None:
-    """A camera of a standing drone has the floor before its lens, brighter towards the wall."""
+    """A standing drone's camera has the floor before its lens, brighter towards the wall."""
     fading = np.tile(np.linspace(60.0, 190.0, 640), (360, 1))
     noise = np.random.default_rng(1).normal(0.0, 2.0, fading.shape)
     assert quality_of(np.clip(fading + noise, 0, 255).astype(np.uint8)).edge_px is None

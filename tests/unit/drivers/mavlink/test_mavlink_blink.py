@@ -15,7 +15,7 @@ from groundstation.settings.sections import driver_sections
 
 
 class Link:
-    """A link with vehicles of these systems and base modes behind it."""
+    """A link to vehicles with these systems and base modes."""
 
     def __init__(self, modes):
         self.modes, self.sent, self.closed = modes, [], False
@@ -33,7 +33,7 @@ class Link:
 
 @pytest.fixture
 def blink(monkeypatch):
-    """Return what makes drone_2 of the mixed team blink on a link with vehicles by system id."""
+    """Return the function that makes drone_2 of the mixed team blink on a link with vehicles by system id."""
     (section,) = (one for one in driver_sections(load_field(find_field("mixed-team"))) if "drone_2" in one.entities
                   and one.kind == "mavlink")  # fmt: skip
     monkeypatch.setattr(blinking, "_LASTS_S", 0.0)

@@ -16,7 +16,7 @@ YAW = 0.7
 
 
 class Vehicle:
-    """Flies what it is told with a lag of 0.4 s, by a velocity of its own [world]."""
+    """Follows its setpoints with a lag of 0.4 s, by a velocity of its own [world]."""
 
     def __init__(self):
         self.now_ns = S
@@ -24,7 +24,7 @@ class Vehicle:
         self.velocity = [0.0, 0.0]
         self.error = (0.0, 0.0)
         self.lie = (0.0, 0.0)
-        self.missing = (0.0, 0.0)  # what it flies less than told, by its own velocity as well
+        self.missing = (0.0, 0.0)  # shortfall, in its own velocity as well
         self.feedback = DriftFeedback()
         self.seen = True
 
@@ -136,7 +136,7 @@ def test_at_lift_off_a_sudden_error_is_corrected_at_once():
 
 
 def test_an_error_that_changes_evenly_is_corrected_by_what_it_is_by_now():
-    """The belief knows of an error 0.45 s late."""
+    """The belief contains an error 0.45 s late."""
     feedback, grows_m_s2, late_s = DriftFeedback(), 0.2, 0.45
     for turn in range(200):
         learnt = grows_m_s2 * (turn * 0.02 - late_s)
@@ -149,7 +149,7 @@ def test_an_error_that_changes_evenly_is_corrected_by_what_it_is_by_now():
 
 
 class Climber:
-    """Rises at 0.1 m/s, its own word off by an error; cameras tell its height, the belief's rate is its word."""
+    """Rises at 0.1 m/s, its own climb rate off by an error; cameras measure its height, the belief uses its rate."""
 
     def __init__(self):
         self.feedback, self.now_ns, self.height_m = DriftFeedback(), S, 0.8
@@ -168,7 +168,7 @@ class Climber:
 
 
 def test_an_error_of_a_climb_rate_is_found_by_heights_within_half_a_second():
-    """A real PX4's sways from -0.2 to +0.2 m/s within two seconds: a correction that is late adds to it."""
+    """A real PX4's sways from -0.2 to +0.2 m/s within two seconds: a late correction adds to it."""
     climber = Climber()
     climber.rise(*[-0.2] * 150)
     assert climber.corrected == pytest.approx(-0.2, abs=0.02)
@@ -204,7 +204,7 @@ def test_an_error_of_a_climb_rate_counts_from_lift_off_on():
 
 
 def test_an_error_beyond_what_is_corrected_is_corrected_as_far():
-    """Nothing is as far off as the whole error: a correction that ends at a limit is a step of that size."""
+    """Without any correction the error is largest, and a correction dropped at a limit is a step of that size."""
     vehicle = Vehicle()
     vehicle.fly(1.0)
     corrected = []
@@ -218,12 +218,12 @@ def test_an_error_beyond_what_is_corrected_is_corrected_as_far():
 
 
 def test_without_the_tracker_no_more_is_corrected_than_is_left_of_an_error_and_no_place_is_held():
-    """Of a measured estimator's error 0.73, 0.33 and 0.09 are left 0.5, 1 and 1.5 s after it was seen."""
+    """Of a measured estimator's error 0.73, 0.33 and 0.09 remain 0.5, 1 and 1.5 s after its observation."""
     vehicle = Vehicle()
     vehicle.error = (0.3, 0.0)
     vehicle.fly(3.0)
     vehicle.seen, left = False, []
-    vehicle.fly(0.4)  # what was seen last was 0.1 s old
+    vehicle.fly(0.4)  # the last observation was 0.1 s old
     for _ in range(3):
         left.append(math.hypot(*vehicle.feedback.drift(vehicle.now_ns)) / 0.3)
         vehicle.fly(0.5)
@@ -285,7 +285,7 @@ def test_a_vehicle_that_drifts_as_its_hover_begins_is_held_a_second_later():
 
 
 def test_a_vehicle_whose_velocity_nobody_knows_holds_its_place_by_pictures():
-    """Ten a second, 0.2 s late; told to stand by its own velocity alone it flies off at what that is wrong by."""
+    """Ten a second, 0.2 s late; holding by its own velocity alone it flies off at that velocity's error."""
     vehicle = Vehicle()
     vehicle.seen, vehicle.error = False, (-0.15, 0.05)
     shown = []

@@ -9,7 +9,7 @@ MS = 1_000_000
 
 
 def hear(lift, seconds, landed, climb_m_s=0.0, begin_m=0.0, starting=True, from_s=0.0):
-    """Tell it 50 times a second what a vehicle that climbs steadily says; returns when it had lifted first [s]."""
+    """Feed it the telemetry of a steady climb 50 times a second; returns the time of lift-off [s]."""
     for turn in range(round(seconds * 50)):
         elapsed_s = turn / 50
         lift.hear(round((from_s + elapsed_s) * 1000) * MS, starting, landed, begin_m + climb_m_s * elapsed_s, climb_m_s)
@@ -74,7 +74,7 @@ def test_what_cameras_see_of_its_height_counts_before_its_own_word():
 
 
 def climbs_by_its_own_word(lift, age_s, height_m=0.12):
-    """For a second it says 0.13 m/s, and is seen where it stands; returns whether it has lifted."""
+    """For a second it reports 0.13 m/s, and is observed in its place; returns whether it has lifted."""
     for turn in range(26, 76):
         lift.hear(turn * 20 * MS, True, Landed.IN_AIR, height_m, 0.13)
         lift.see(turn * 20 * MS, (1.0, 2.0, 0.06), age_s)
@@ -82,7 +82,7 @@ def climbs_by_its_own_word(lift, age_s, height_m=0.12):
 
 
 def test_its_own_climb_rate_does_not_lift_it_where_cameras_see_it_stand():
-    """A real PX4 (SIH) said 0.13 m/s on the floor, and was called airborne 1.9 s before it was."""
+    """A real PX4 (SIH) reported 0.13 m/s on the floor, and counted as airborne 1.9 s too early."""
     lift = LiftOff()
     stands(lift, 0.06)
     assert not climbs_by_its_own_word(lift, age_s=0.2)

@@ -14,7 +14,7 @@ TAKE_OFF_M = 0.8
 
 
 class Climb:
-    """A vehicle that follows its setpoints; seen: the tracker knows where it is; sluggish: by 1 m/s^2, not at once."""
+    """Follows its setpoints; seen: the tracker knows its position; sluggish: by 1 m/s^2, not at once."""
 
     def __init__(self, flavour, seen, sluggish=False):
         vehicle = VehicleSettings(name="v", system_id=1, flavour=flavour.name.lower(), take_off_m=TAKE_OFF_M)
@@ -95,7 +95,7 @@ def test_a_track_in_the_climb_ends_it_since_heights_are_the_trackers_from_then_o
     climb = Climb(flavour, seen=True)
     climb.rise_to(0.3)
     for _ in range(40):
-        climb.turn(DriverMode.TRACK, Action.FLY)  # told to stay where it is
+        climb.turn(DriverMode.TRACK, Action.FLY)  # commanded to stay where it is
     assert climb.height_m == pytest.approx(0.3, abs=0.05)
 
 
@@ -114,14 +114,14 @@ def test_an_ardupilot_that_ends_its_take_off_is_told_nothing_and_so_not_judged_b
 
 
 def stands(orders, seconds, action, mode, reported=(0.2, 0.0, 0.1), at_m=(0.0, 0.0)):
-    """Have it stand somewhere, motors on, with a velocity of its own; returns what it was told last."""
+    """Let it stand somewhere, motors on, with a velocity of its own; returns its last setpoint."""
     told = None
     for turn in range(round(seconds * 20)):
         now_ns = 10**9 + turn * 50_000_000
         place = EntityEstimate("v", "robot", (*at_m, 0.02, 0.0), SURE, (0.0, 0.0, 0.0), True, 0.1)
         orders.see(now_ns, place, reported)
         decision = WatchdogDecision(mode, action)
-        # PX4 says that it flies long before it does.
+        # PX4 reports flight long before it flies.
         landed = Landed.IN_AIR if action is Action.TAKE_OFF and turn > 20 else Landed.ON_GROUND
         told = orders.step(now_ns, decision, ARMED, guided_mode(Flavour.PX4), landed, 0.0) or told
     return told

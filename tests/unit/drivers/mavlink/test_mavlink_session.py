@@ -22,7 +22,7 @@ MS = 1_000_000
 
 
 def read_all(strange: set[str], seconds: float) -> MavlinkSession:
-    """A vehicle that answers for every parameter but the strange ones."""
+    """A vehicle that answers for every parameter but the unknown ones."""
     session, requests = MavlinkSession(1, Flavour.ARDUPILOT, {}, 255, GlobalOrigin()), Requests(1)
     values = {n.name: n.value for n in needed(Flavour.ARDUPILOT, 255)}
     for turn in range(round(seconds * 100)):
@@ -121,7 +121,7 @@ def test_no_version_told_at_all_is_another_version() -> None:
 
 
 class Streamer:
-    """A vehicle that grants each stream, and sends those that it is not told to keep back."""
+    """A vehicle that grants each stream, and sends all but those to be withheld."""
 
     def __init__(self) -> None:
         rates: dict[type, float] = {ExtendedSysState: 5.0, BatteryStatus: 1.0, Attitude: 0.0}
@@ -131,7 +131,7 @@ class Streamer:
         self._turn = 0
 
     def live(self, seconds: float) -> list[int]:
-        """Return the numbers of the messages whose rate was asked for meanwhile."""
+        """Return the ids of the messages whose rate was requested meanwhile."""
         before = len(self.asked)
         for _ in range(round(seconds * 50)):
             self._turn += 1
@@ -147,7 +147,7 @@ class Streamer:
 
 
 def test_a_stream_that_does_not_come_or_has_ended_is_asked_for_again() -> None:
-    """A restart of less than 2 s, another station's rates, or an answer that was another request's: no silence."""
+    """A restart of less than 2 s, another station's rates, or the answer to another request: no silence."""
     vehicle = Streamer()
     vehicle.kept_back = {ExtendedSysState}  # granted, as far as the answer tells
     assert sorted(vehicle.live(2.0)) == sorted(map(id_of, (ExtendedSysState, BatteryStatus, Attitude)))

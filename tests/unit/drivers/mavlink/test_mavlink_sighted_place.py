@@ -18,7 +18,7 @@ PLACE, YAW = (1.2, -0.5, 0.8), 0.3
 
 
 class _Silent:
-    """A link on which nobody is heard."""
+    """A link without telemetry."""
 
     rejected: ClassVar[Counter[str]] = Counter()
 

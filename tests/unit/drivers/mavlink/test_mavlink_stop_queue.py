@@ -11,7 +11,7 @@ MS = 1_000_000
 
 
 def played(stops, until_ns):
-    """Return (time, stop) of all that passed; stops: (time, kind), and each is the bytes of its number."""
+    """Return (time, stop) of all forwarded stops; stops: (time, kind), each with its number as bytes."""
     queue, passed, left = StopQueue(), [], list(enumerate(stops))
     for now_ns in range(0, until_ns, MS):
         while left and left[0][1][0] <= now_ns:

@@ -13,7 +13,7 @@ STEP_S = 0.02
 
 
 def learnt(seen, seconds, asked=lambda at_s: (0.4, 0.0), first_s=0.0):
-    """Return what is missing after each step, of a vehicle at rest that is told and seen every 20 ms."""
+    """Return the learnt shortfall after each step, for a vehicle at rest with setpoint and observation every 20 ms."""
     undershoot, missing = Undershoot(), []
     undershoot.tell(100 * S, (0.0, 0.0))
     for step in range(1, round(seconds / STEP_S) + 1):

@@ -94,7 +94,7 @@ def test_nothing_is_fed_while_sightings_contradict_the_estimate(feed: VisionFeed
 
 
 def see(feed: VisionFeed, now_ns: int, x: float, age_s: float, std_m: float = 0.02) -> None:
-    """Hear of a vehicle that tells no motion: its covariance has grown since it was seen."""
+    """Receive a vehicle without motion telemetry: its covariance has grown since it was observed."""
     covariance = tuple(0.15**2 if place % 5 == 0 else 0.0 for place in range(16))
     place = (x, PAD[1], 0.5, 0.3)
     entity = EntityEstimate("drone", "robot", place, covariance, (0.0,) * 3, True, age_s, 0.0, False, (age_s, std_m))

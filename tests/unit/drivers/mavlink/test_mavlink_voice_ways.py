@@ -29,7 +29,7 @@ def descriptors() -> int:
 
 @pytest.fixture
 def device(tmp_path):
-    """A place where lines can be plugged in."""
+    """A folder in which serial lines can be plugged in."""
     ends: list[int] = []
 
     def plug() -> int:

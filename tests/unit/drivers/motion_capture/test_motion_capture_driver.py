@@ -58,7 +58,7 @@ def a_port() -> int:
 
 @dataclass
 class Rig:
-    """Emulated system, driver, and somebody who listens; `run` lets both turn, the emulator by hand."""
+    """Emulated system, driver, and a subscriber; `run` advances both, the emulator on a manual clock."""
 
     system: NatnetEmulator
     driver: MotionCaptureDriver
@@ -190,7 +190,7 @@ def test_a_system_that_was_started_anew_is_asked_again(rig) -> None:
 
 
 def test_names_that_the_system_changes_are_asked_for_anew(rig) -> None:
-    """As in Motive, where the operator ticks another set of bodies: two exchange their ids, one is new."""
+    """As in Motive, when the operator selects other bodies: two exchange their ids, one is new."""
     rig.run(60)
     rig.system._ids = {"drone_1": 2, "drone_2": 1}
     frame_of = rig.system._frame

@@ -33,7 +33,7 @@ def test_its_simulated_system_is_read_as_any_other(monkeypatch: pytest.MonkeyPat
     frames = polled(source, 3)
     source.close()
     assert len(frames) >= 3 and source.detail == ""
-    # Rotations are (x, y, z, w) here, and (w, x, y, z) in the words of that system.
+    # Rotations are (x, y, z, w) here, and (w, x, y, z) in that system.
     assert frames[0].poses == {
         "cf1": ((1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0)),
         "cf2": ((0.0, -1.0, 0.5), (-0.5, 0.5, 0.5, 0.5)),
@@ -43,7 +43,7 @@ def test_its_simulated_system_is_read_as_any_other(monkeypatch: pytest.MonkeyPat
 def test_qualisys_is_reached_at_the_port_of_its_address() -> None:
     with closing(socket.create_server(("127.0.0.1", 0))) as system:
         system.settimeout(10.0)
-        # The port is the system's base port; numbers with the low byte first are spoken at the next one.
+        # The port is the system's base port; the little-endian protocol uses the next one.
         base = system.getsockname()[1] - 1
         source = open_source(parse_source(f"qualisys://127.0.0.1:{base}"))
         system.accept()[0].close()

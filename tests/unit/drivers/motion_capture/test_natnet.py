@@ -24,7 +24,7 @@ def frame_3_1() -> bytes:
 
 
 def frame_4_1() -> bytes:
-    """A frame of Motive 3.1: each section has its size behind its count."""
+    """A frame of Motive 3.1: each section has its size after its count."""
     parts = [(1, MARKER_SET), (0, b""), (2, BODY + LOST), (0, b""), (0, b""), (0, b""), (0, b""), (0, b"")]
     body = struct.pack("<i", 42) + b"".join(struct.pack("<ii", n, len(part)) + part for n, part in parts)
     body += struct.pack("<II", 0, 0) + struct.pack("<dQQQIIhi", 0.42, 1000, 1010, 1050, 0, 0, 0, 0)

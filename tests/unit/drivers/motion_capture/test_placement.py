@@ -55,7 +55,7 @@ def test_numbers_that_are_no_rotation_give_no_pose(quaternion: tuple[float, floa
 
 @pytest.mark.parametrize("far_m", [1e17, 1.7e308])
 def test_a_place_beyond_any_room_is_no_pose(far_m: float) -> None:
-    """One such pose made the sum of a body's jumps 0, so that it was believed wherever it came back."""
+    """One such pose made the sum of a body's jumps 0, so that any position was accepted on its return."""
     body = BodySection(name="a", entity="drone_1")
     assert Placement(section()).entity_pose(body, (far_m, 0.0, 0.0), NORTH) is None
 

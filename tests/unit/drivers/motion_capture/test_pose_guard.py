@@ -8,7 +8,7 @@ MS, S = 1_000_000, 1_000_000_000
 
 
 class Says:
-    """A guard, and a publisher that speaks 50 times a second; its clock is an hour behind ours."""
+    """A guard, and a publisher at 50 Hz with a clock one hour behind ours."""
 
     def __init__(self) -> None:
         self.guard, self.now_ns = PoseGuard(), 10_000 * S

@@ -58,7 +58,7 @@ class FakeChild:
 
 @dataclass
 class Rig:
-    """Emulated gateway, driver, and somebody who listens; `run` lets both turn, the gateway by hand."""
+    """Emulated gateway, driver, and a subscriber; `run` advances both, the gateway on a manual clock."""
 
     gateway: RangeGateway
     driver: RangingDriver
@@ -144,7 +144,7 @@ def broken(kind: FaultKind, entity: str, **rest: float) -> Fault:
 
 @pytest.mark.parametrize("rig", [(broken(FaultKind.RANGES_FROZEN, "uwb", end_s=2.5),)], indirect=True)
 def test_rounds_that_repeat_themselves_are_silence(rig: Rig) -> None:
-    """A position that stands while the drone flies would win against its own velocity."""
+    """A constant position of a flying drone would overrule its own velocity."""
     rig.driver.turn()
     before = [one for one in rig.run(100) if isinstance(one, RangeObservation)]
     rig.run(60)

@@ -21,7 +21,7 @@ ON_ITS_BACK = (1.0, 0.0, 0.0, 0.0)
 
 
 class FakeLink:
-    """A router whose node takes everything."""
+    """A router with a node that accepts everything."""
 
     trouble = ""
 
@@ -38,7 +38,7 @@ class FakeLink:
 
 
 class Node:
-    """A node that says what it is told to, and the driver that hears it, 20 times a second."""
+    """A node that sends the given messages, and the driver that receives them, 20 times a second."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.now_ns = 1_000_000_000
@@ -102,7 +102,7 @@ def test_in_flight_what_is_refused_counts_as_silence_with_its_reason(node: Node)
 def test_a_twist_in_the_axes_of_the_room_is_no_twist_of_the_vehicle(node: Node) -> None:
     view = node.say(STANDING, frame="odom", own_frame="odom")
     assert not view.fresh and "twist in the axes of the room" in view.unsound
-    assert node.say(STANDING, frame="", own_frame="").fresh  # who names none may mean what is usual
+    assert node.say(STANDING, frame="", own_frame="").fresh  # without a name, the usual frame may be meant
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,7 @@ S = 1_000_000_000
 
 
 class Told:
-    """A watch that is told heights ten times a second."""
+    """A watch that receives heights ten times a second."""
 
     def __init__(self) -> None:
         self.watch, self.now_ns = FlightWatch(0.8), 0

@@ -31,7 +31,7 @@ DRONE = SiteDrone.model_validate(
 
 
 class Flight:
-    """The driver's object between a bus and a vehicle that hears everything, without a loop."""
+    """The driver's object between a bus and a vehicle that receives everything, without a loop."""
 
     def __init__(self) -> None:
         order = subject_of("tello").order()
@@ -46,7 +46,7 @@ class Flight:
     def told(
         self, action: Action, velocity=(0.0, 0.0, 0.0), turn=0.0, state=STATE, back=None
     ) -> tuple[bytes, FlightState]:
-        """Return what the vehicle is sent for a decision, and what the driver then says of its flight."""
+        """Return the messages to the vehicle for a decision, and the driver's flight state afterwards."""
         now_ns = time.monotonic_ns()
         self.tello._ready = True
         self.tello.heard = Heard(now_ns, now_ns, state, velocity_from_state(state))
@@ -71,7 +71,7 @@ def test_who_hovers_is_brought_back_as_it_would_fly(flight: Flight) -> None:
 
 
 class Rig:
-    """The emulator with a partner, in a world without others and without a clock."""
+    """The emulator with a client, alone in its world and without a clock."""
 
     def __init__(self) -> None:
         scenario: Scenario = parse_scenario(json.dumps({"mavlink": {"air_unrest_m_s2": 0.0}}))
@@ -169,12 +169,12 @@ def test_it_says_when_it_hovers(flight):
 
 
 def test_one_that_says_that_it_stands_is_told_to_land_all_the_same(flight):
-    """Its word may be wrong."""
+    """Its report may be wrong."""
     assert flight.told(Action.LAND, state=dataclasses.replace(STATE, tof=10, height=0))[0] == b"land"
 
 
 def test_a_take_off_that_is_called_off_is_followed_by_land(flight):
-    """It stands still when it is told, and would rise all the same."""
+    """It stands still at the command, and would take off all the same."""
     standing = dataclasses.replace(STATE, tof=10, height=0, time=0)
     flight.tello.heard = Heard(1, 0, standing)
 
@@ -249,7 +249,7 @@ def test_the_fail_safe_lands_one_that_flies_away(rig):
 
 
 def test_one_that_stands_and_gets_no_echo_from_the_floor_does_not_count_as_airborne():
-    """As logs of several real vehicles have it before the first flight."""
+    """As in logs of several real vehicles before the first flight."""
     said = (
         b"mid:-1;x:0;y:0;z:0;mpry:0,0,0;pitch:0;roll:0;yaw:0;vgx:0;vgy:0;vgz:0;templ:59;temph:63;tof:6553;h:0;"
         b"bat:91;baro:60.84;time:0;agx:-3.00;agy:14.00;agz:-1008.00;\r\n"

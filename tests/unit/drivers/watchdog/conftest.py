@@ -15,7 +15,7 @@ STEP = 33 * MS
 
 
 class Bench:
-    """A watchdog with a vehicle that obeys, driven step by step under a clock of our own."""
+    """A watchdog with an obedient vehicle, run step by step on a manual clock."""
 
     def __init__(self, state=FlightState.LANDED, clears=False, **limits):
         self.watchdog = Watchdog(WatchdogLimits(**limits), "clock")
@@ -59,7 +59,7 @@ class Bench:
         return replace(seen, speed_m_s=self.speed, seen=self.seen, stray=self.stray, clears=self.clears).plausible
 
     def see(self):
-        """Let the watchdog know what the vehicle says, as its host does before it hands over orders."""
+        """Give the vehicle's state to the watchdog, as its host does before it passes on commands."""
         self.watchdog.see(self.view, self.upstream)
 
     def run(self, seconds):
@@ -107,5 +107,5 @@ class Bench:
 
 @pytest.fixture
 def new_bench():
-    """Build a bench; takes the vehicle's state and the limits that differ."""
+    """Build a bench from the vehicle's state and the differing limits."""
     return Bench

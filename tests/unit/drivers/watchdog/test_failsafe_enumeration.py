@@ -20,9 +20,9 @@ TABLE = failsafes(WatchdogLimits())
 
 @dataclass(frozen=True)
 class Deviation:
-    """What is wrong in which share of each period; when the vehicle must not fly any more, and when it must be landing.
+    """A fault in a share of each period; times after which the vehicle must not fly, and must be landing.
 
-    values: attributes of the bench that differ. These times are promises of the documentation, not the table's own.
+    values: attributes of the bench that differ. These times are promises of the documentation, not those of the table.
     """
 
     values: dict[str, Any]
@@ -90,7 +90,7 @@ def named(reason, conditions):
     return any(re.match(re.escape(row.text).replace(r"\{why\}", ".+"), reason) for row in rows)
 
 
-# Who is not heard cannot say what else is wrong.
+# A silent vehicle cannot report other faults.
 HIDES = {"fresh": {"state"}, "unsound": {"state"}, "tracker_speaks": {"epoch", "converged"}, "epoch": {"converged"}}
 
 
@@ -113,7 +113,7 @@ def soonest(deviations, which):
 
 
 def run(bench, deviations, resume_s):
-    """Fly 16 s; whoever asks to go on at `resume_s` may, if he is let. Yields (seconds, decision, resumed)."""
+    """Fly 16 s; a RESUME at `resume_s` succeeds if permitted. Yields (seconds, decision, resumed)."""
     usual = {name: getattr(bench, name) for one in deviations for name in one.values}
     resumed = False
     for turn in range(round(LONG_S / TURN_S)):
@@ -166,7 +166,7 @@ def test_two_deviations_stop_at_least_as_soon_as_each(new_bench, first):
     for second in others:
         pair = [DEVIATIONS[first], DEVIATIONS[second]]
         if pair[0].values.keys() & pair[1].values.keys():
-            continue  # one would hide the other
+            continue  # one would mask the other
         judge(fly(new_bench(), DriverMode.TRACK), pair)
 
 
@@ -178,7 +178,7 @@ def test_a_resume_in_between_is_refused_or_undone_by_a_named_row_only(new_bench,
         judge(fly(new_bench(), DriverMode.TRACK), [DEVIATIONS[name]], resume_s)
 
 
-# Who orders RESUME after a pause, or adopts another tracker, has ended that.
+# A RESUME after a pause, or the adoption of another tracker, ends that.
 PERSISTENT = [name for name, one in DEVIATIONS.items() if one.land_s is not None and not {*one.conditions} & {*TRACKER}]
 
 

@@ -27,7 +27,7 @@ def waiting(bench):
 def test_it_is_brought_back_while_it_holds(new_bench):
     bench = hovering(new_bench())
     assert bench.decision.mode is DriverMode.HOLD and bench.decision.action is Action.HOVER
-    assert bench.decision.back_m_s == pytest.approx((0.2, 0.0, 0.0))  # 0.3 m/s were asked for
+    assert bench.decision.back_m_s == pytest.approx((0.2, 0.0, 0.0))  # 0.3 m/s were requested
 
 
 def test_it_is_brought_back_while_it_waits_for_track(new_bench):

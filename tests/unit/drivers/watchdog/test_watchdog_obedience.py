@@ -13,7 +13,7 @@ S = 1_000_000_000
 TURN = 100 * MS  # coarser than the sender's, to sweep in seconds; finer than the gap that suspends TRACK
 NEVER, SPEAKS = "never heard", "speaks"
 SILENT_S = {"silent for 0.4 s": 0.4, "silent for 2.4 s": 2.4}
-SAID = tuple(state for state in FlightState if state is not FlightState.LOST)  # LOST is the host's word
+SAID = tuple(state for state in FlightState if state is not FlightState.LOST)  # LOST is set by the host
 
 
 def turns(bench, seconds):
@@ -79,7 +79,7 @@ OBEYED = {
 
 
 def reach(bench, history, tracker):
-    """Bring the bench there; returns when the tracker was last heard [ns], or None."""
+    """Bring the bench into that state; returns the tracker's last time [ns], or None."""
     bench.tracker_speaks = tracker is not NEVER
     HISTORIES[history](bench)
     heard_ns = bench.now
@@ -90,7 +90,7 @@ def reach(bench, history, tracker):
 
 
 def beats_orders(before, decision, said, silent_s, paused_s):
-    """Return whether the reason of a decision is one that beats an order, and is true; said: states since the order."""
+    """Return whether a decision's reason overrides a command, and is true; said: states since the command."""
     grounds = {
         (DriverMode.CUT, "the vehicle reports an emergency"): FlightState.EMERGENCY in said,
         (DriverMode.LANDING, "the vehicle lands by itself"): FlightState.LANDING in said,
@@ -125,7 +125,7 @@ def test_an_accepted_order_stands_for_a_second_or_what_undid_it_is_named(new_ben
             decision = bench.step(TURN if turn else 0)
             bench.state = later
             if decision.mode not in OBEYED[verb]:
-                # Of a tracker that was never heard no vehicle here has been in the air for long enough.
+                # Without any tracker message, no vehicle here has been in the air for long enough.
                 silent_s = 0.0 if speaks or heard_ns is None else (bench.now - heard_ns) / S
                 paused_s = min(silent_s, turn * TURN / S)
                 case = (verb, first, later, turn, decision.mode, decision.reason)

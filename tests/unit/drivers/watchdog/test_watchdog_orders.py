@@ -37,7 +37,7 @@ def test_take_off_track_and_land(new_bench):
 
 
 def test_a_vehicle_that_says_in_flight_that_it_has_landed_is_told_to_land(new_bench):
-    """Its word may be wrong, and nobody else would end its flight."""
+    """Its report may be wrong, and nobody else would end its flight."""
     bench = new_bench().fly()
     bench.state = FlightState.LANDED
     decision = bench.step()
@@ -197,7 +197,7 @@ def test_a_drone_that_starts_after_its_take_off_was_cancelled_is_landed_for_that
     bench.step()
     bench.order(verb, issuer="anyone")
     bench.step()
-    bench.state = FlightState.TAKING_OFF  # the order to start was on its way
+    bench.state = FlightState.TAKING_OFF  # the start command was on its way
     decision = bench.step()
     assert decision.action is Action.LAND
     assert "without a standing take-off order" in decision.reason and "anyone" in decision.reason

@@ -44,7 +44,7 @@ def setpoint(epoch=1, converged=True, seq=5, stamp=NOW):
 
 
 def watchdog_in(mode, setpoints="live", lease=True, aged_s=0.1):
-    """Return a watchdog in a mode, entered `aged_s` ago, with everything else as its arguments say."""
+    """Return a watchdog in a mode, entered `aged_s` ago, with everything else as in its arguments."""
     dog = Watchdog(WatchdogLimits(), "clock")
     dog.mode, dog.reason = mode, "test"
     dog._entered_ns = dog._take_off_ended_ns = NOW - int(aged_s * S)
@@ -101,7 +101,7 @@ CUT         CUT        CUT        CUT        CUT        CUT        CUT        CU
 
 
 def test_mode_and_action_by_what_the_vehicle_says():
-    """Everybody is heard, a setpoint is live: rows are modes, columns the vehicle's state."""
+    """All senders are alive, a setpoint is live: rows are modes, columns the vehicle's state."""
     lines = [" " * 12 + " ".join(f"{state:<10}" for state in STATES)]
     for mode in DriverMode:
         decisions = [step(watchdog_in(mode), view(state)) for state in STATES]
@@ -124,7 +124,7 @@ CUT         TAKING_OFF refused    refused    refused    refused    CUT
 
 
 def test_mode_by_command():
-    """With a live lease; the vehicle says what fits the mode."""
+    """With a live lease and a vehicle state that fits the mode."""
     says = {
         DriverMode.LANDED: FlightState.LANDED,
         DriverMode.CUT: FlightState.EMERGENCY,
@@ -155,7 +155,7 @@ foreign            hover      hover      hover      land
 
 
 def test_action_in_track_by_how_long_something_is_missing():
-    """One thing fails, everything else is as it should be: rows are what fails, columns for how long."""
+    """One thing fails, everything else is in order: rows are the failing thing, columns the duration."""
     lines = [" " * 19 + " ".join(f"{f'{age} s':<10}" for age in OLD_S)]
     for what in ("telemetry", *list(UPSTREAMS)[1:], "battery", "expired", "foreign"):
         cells = []

@@ -74,7 +74,7 @@ def test_a_kernel_reads_and_writes_records_and_tuples_through_an_address():
 
 @runtime_checkable
 class Compiled(Protocol):
-    """What numba makes of a function."""
+    """numba's compilation result of a function."""
 
     py_func: Callable[..., Any]
 
@@ -111,14 +111,14 @@ def test_a_kernel_takes_no_array_of_another_layout():
 
 
 class Own(Record):
-    """What one kind of Device has."""
+    """Fields of one kind of Device."""
 
     gain: float
     number: int
 
 
 class Device(Record):
-    """A row within which there is another, and words of its own kind."""
+    """A row that contains another row, and array words for the fields of its own kind."""
 
     size: int
     reading: Reading
@@ -137,7 +137,7 @@ def trace(R: Matrix) -> float:
 
 @kernel()
 def amplify(devices: RowsStack[Device], copied: Rows[Device]) -> float:
-    """Write through all the ways into rows; return what a table made in here holds."""
+    """Write through all kinds of access to rows; return the contents of a table made in here."""
     made = np.zeros(devices.shape[1], _DEVICE)
     for i in range(devices.shape[1]):
         device = devices[1, i]

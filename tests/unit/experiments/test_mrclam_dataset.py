@@ -30,7 +30,7 @@ def write(folder: Path, name: str, rows: Sequence[tuple[float, ...]], packed: bo
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """Six seconds of five robots in a row that drive along x at 0.1 m/s and read landmark 7 and robot 1."""
+    """Six seconds of five robots in a row that drive along x at 0.1 m/s and observe landmark 7 and robot 1."""
     write(tmp_path, "Barcodes", [(float(k), float(v)) for k, v in BARCODES.items()], packed=True)
     write(tmp_path, "Landmark_Groundtruth", [(k, *place, 0.001, 0.001) for k, place in LANDMARKS.items()])
     for number in range(1, 6):
@@ -42,7 +42,7 @@ def folder(tmp_path: Path) -> Path:
         for t in ticks[::3]:
             dx, dy = LANDMARKS[7][0] - 0.1 * t, LANDMARKS[7][1] - y
             readings.append((100 + t, BARCODES[7], dx, math.atan2(dy, dx)))
-            readings.append((100 + t, 999, 1.0, 0.0))  # a barcode that nobody has
+            readings.append((100 + t, 999, 1.0, 0.0))  # a barcode of no subject
         write(tmp_path, f"Robot{number}_Measurement", readings)
     return tmp_path
 

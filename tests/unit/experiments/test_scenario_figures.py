@@ -98,7 +98,7 @@ def test_a_scenario_that_never_found_its_target_has_a_row() -> None:
 
 
 def test_both_sides_know_the_same_strategies() -> None:
-    from sim_bridge.study.scenarios.strategies import STRATEGIES as SIMULATED  # here: it compiles kernels
+    from sim_bridge.study.scenarios.strategies import STRATEGIES as SIMULATED  # imported here: it compiles kernels
 
     assert tuple(SIMULATED) == STRATEGIES
 

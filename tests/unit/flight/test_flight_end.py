@@ -22,7 +22,7 @@ from groundstation.supervisor.terminal import Terminal
 
 
 class Stage:
-    """What a flight needs of a supervisor: one drone that says where it is, and whatever stops the run."""
+    """A flight's view of a supervisor: one drone with telemetry, and a cause that stops the run."""
 
     def __init__(self, state: m.FlightState, failure: str = "", start: Exception | None = None) -> None:
         exchange = MemoryExchange()

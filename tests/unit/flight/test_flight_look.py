@@ -21,7 +21,7 @@ from groundstation.supervisor.terminal import Terminal
 
 
 class Unfinished:
-    """Checks that go on for ever and have found nothing so far."""
+    """Checks that never end and have no findings so far."""
 
     def __init__(self, _bus: object, _field: object, _cautions: object) -> None:
         pass
@@ -37,7 +37,7 @@ class Unfinished:
 
 
 class Silent(Unfinished):
-    """Checks that see everything and hear no drone."""
+    """Checks that see everything and receive no drone's telemetry."""
 
     def complete(self, _now_ns: int) -> bool:
         return True
@@ -53,7 +53,7 @@ class Silent(Unfinished):
 
 
 class Broken:
-    """A run whose drone stands ready, and that ends in the third turn of the look."""
+    """A run whose drone is ready on the ground, and that ends in the third turn of the checks."""
 
     def __init__(self, failure: str) -> None:
         exchange = MemoryExchange()

@@ -27,7 +27,7 @@ _LONGEST_S = 2.0
 
 
 class Ends(NamedTuple):
-    """The two ends of a keyboard: what the run reads, and where a test types (descriptors)."""
+    """The two ends of a keyboard: the run's input, and the test's output (descriptors)."""
 
     read: int
     typed: int

@@ -28,7 +28,7 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class RunElsewhere:
-    """The liaison of a run, on a thread; says the end when the host is ready."""
+    """The liaison of a run, on a thread; announces the end when the host is ready."""
 
     def __init__(self, exchange: MemoryExchange, version: str) -> None:
         section = LiaisonSection(HOST, version, load_field(LAB, ()).model_dump_json())
@@ -58,7 +58,7 @@ def make(
     handlers = {number: signal.getsignal(number) for number in SIGNALS}
     root = logging.getLogger()
     kept, level = list(root.handlers), root.level
-    monkeypatch.setattr(logging, "raiseExceptions", logging.raiseExceptions)  # it is turned off in flight
+    monkeypatch.setattr(logging, "raiseExceptions", logging.raiseExceptions)  # it is switched off in flight
 
     def open_bus(endpoint: str, site: str, source: str, *_: object, identity: Identity | None = None) -> MemoryBus:
         return MemoryBus(exchange, site, source, identity.run if identity else "")
@@ -133,7 +133,7 @@ def test_another_version_is_not_served_and_the_run_says_why(
 
 
 class NoticeBoard:
-    """A terminal that remembers, and ends the wait once it has been told enough."""
+    """A terminal that records its texts, and ends the wait after enough of them."""
 
     def __init__(self, enough: int) -> None:
         self.said: list[str] = []

@@ -71,7 +71,7 @@ def test_without_a_limit_or_a_folder_nothing_happens(tmp_path: Path) -> None:
 
 
 def test_what_was_cut_out_of_a_run_is_nobodys_to_remove(tmp_path: Path) -> None:
-    """A cut lies beside its run under a name like one, and was made to be kept."""
+    """A cut is beside its run under a similar name, and was made to be kept."""
     flown = tmp_path / "20261120T100000Z-lab"
     flown.mkdir()
     write_run(flown, load_field(find_field("lab"), ()).model_dump_json().encode(), 0.5)

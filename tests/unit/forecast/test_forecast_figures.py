@@ -71,7 +71,7 @@ def test_without_the_ceiling_camera_nobody_is_told_where_he_is(lab_field: Resolv
     assert places <= set(lost.untold)
     assert lost.worst_m is not None and lost.worst_m.std > 5.0
     assert {name.split(".")[1] for name, _ in lost.worst_m.parts} <= {"x", "y"}
-    assert lost.rank <= whole.rank - 3  # the room may be shifted along two axes, and turned
+    assert lost.rank <= whole.rank - 3  # the room may be shifted along two axes, and rotated
 
 
 def test_a_drone_that_looks_away_leaves_the_target_missing(lab_field: ResolvedField, team: Team) -> None:

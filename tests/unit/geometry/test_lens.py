@@ -13,7 +13,7 @@ from groundstation.settings import room
 
 PLAIN = CameraIntrinsics(640, 360, 460.0, 460.0, 319.5, 179.5)
 FRONT = CameraIntrinsics(640, 360, 460.0, 460.0, 319.5, 179.5, (-0.30, 0.08, 0.0, 0.0, 0.0))
-# The calibration that ships for the real front camera, and one with every coefficient in use.
+# The shipped calibration of the real front camera, and one with every coefficient in use.
 STRONG = CameraIntrinsics(640, 360, 569.9, 568.5, 331.4, 135.2, (-0.527, 0.274, 0.0004, 0.0002, 0.0))
 MIXED = CameraIntrinsics(640, 480, 536.0, 530.0, 342.0, 235.0, (-0.266, -0.0386, 0.0018, -0.0003, 0.238))
 

@@ -106,7 +106,7 @@ def test_a_detector_that_fails_costs_the_picture_and_not_the_camera(monkeypatch:
     monkeypatch.setattr(plug_ins.tag_family("LAB_TAGS"), "finder", lambda: broken, raising=False)
     marker = MarkerSettings(entity="bot", tag=TagSettings(dictionary="LAB_TAGS", id=4, size_mm=168.0))
     pipeline = Pipeline(FRONT, (marker,), DetectorSettings(), search_rate_hz=2.0)
-    # The driver counts what a picture raises as ValueError, and takes the next.
+    # The driver counts a picture's ValueError, and goes on with the next.
     with pytest.raises(ValueError, match="tags LAB_TAGS: IndexError: out of tags"):
         pipeline.process(np.zeros((360, 640), np.uint8), 0, lambda _: pose.Gravity(np.eye(3), 0.0, 0.0, False))
 

@@ -20,7 +20,7 @@ CAST = Cast(
 
 
 class World:
-    """A bus with a screen on it, and shorthands to speak as the other processes."""
+    """A bus with a screen on it, and shorthands to publish as the other processes."""
 
     def __init__(self) -> None:
         exchange = MemoryExchange()

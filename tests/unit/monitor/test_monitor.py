@@ -111,7 +111,7 @@ def test_the_plan_is_shown_beside_its_alternatives(world: World) -> None:
 
 def test_a_command_is_not_confirmed_until_each_drone_has_answered(world: World) -> None:
     answer = m.CommandAck(header=world.header("drone_1"), command_id="7", verb=m.Verb.LAND, stage=m.AckStage.EFFECTIVE)
-    world.say(t.COMMAND_ACK, answer)  # overtakes its command
+    world.say(t.COMMAND_ACK, answer)  # arrives before its command
     world.say(t.COMMAND, m.Command(header=world.header("team"), id="7", verb=m.Verb.LAND, scope=(), issuer="me"))
     text = world.text()
     assert "drone_1 effective" in text

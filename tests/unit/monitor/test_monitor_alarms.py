@@ -79,7 +79,7 @@ def test_an_unknown_battery_is_an_alarm_once_the_vehicle_speaks(world: World) ->
 
 @pytest.mark.parametrize(
     ("mode", "state"), [("TRACK", m.FlightState.LANDING), ("LANDING", m.FlightState.FLYING)]
-)  # told to land, it says a moment later that it does
+)  # after the command to land, it reports landing a moment later
 def test_a_low_battery_that_lands_its_drone_is_no_grave_alarm_any_more(
     world: World, mode: str, state: m.FlightState
 ) -> None:

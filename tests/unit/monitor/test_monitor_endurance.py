@@ -32,7 +32,7 @@ def test_a_charge_that_drops_at_once_is_no_drain_before_half_a_minute_has_passed
 
 @pytest.mark.parametrize("drain_per_min", [0.04, 0.0833, 0.2])
 def test_a_figure_never_jumps(drain_per_min: float) -> None:
-    """A battery says its charge in whole points, twice a second here: the figure goes by an eighth at most at once."""
+    """A battery reports whole points, twice a second here: the figure changes by an eighth at most at once."""
     minutes = []
     for half_seconds in range(180):
         level = round(0.9 - drain_per_min * half_seconds / 120.0, 2)
@@ -46,8 +46,8 @@ def test_a_figure_never_jumps(drain_per_min: float) -> None:
     ("take_off", "minutes"),
     [
         (None, None),
-        (TakeOff(9 * MIN, 0.66), None),  # not two points are spent
-        (TakeOff(9 * MIN + 40_000_000_000, 0.8), None),  # not half a minute has passed
+        (TakeOff(9 * MIN, 0.66), None),  # less than two points are spent
+        (TakeOff(9 * MIN + 40_000_000_000, 0.8), None),  # less than half a minute has passed
         (TakeOff(8 * MIN, 0.85), 5.0),  # ten points a minute, fifty are left
     ],
 )

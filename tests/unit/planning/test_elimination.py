@@ -15,7 +15,7 @@ SIZES = [1, 2, 4, 5, 7, 8, 9, 12, 13, 27, 31, 32, 64, 101]
 
 
 def definite(size: int, seed: int = 0) -> Any:
-    """Return a positive definite matrix, padded by ones, with anything below its diagonal, and the same symmetric."""
+    """Return a positive definite matrix, padded by ones, arbitrary below its diagonal, and its symmetric form."""
     generator = np.random.default_rng([size, seed])
     matrix, factor = np.eye(padded(size)), generator.normal(size=(size, size))
     matrix[:size, :size] = factor @ factor.T + size * np.eye(size)

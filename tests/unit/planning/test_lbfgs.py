@@ -22,13 +22,13 @@ def minimised(function: Function, start: Array, most: int = 60) -> tuple[Descent
 
 
 def bowl(x: Array) -> tuple[float, Array]:
-    """Lowest at (0.3, -0.4), and steeper one way than the other."""
+    """Lowest at (0.3, -0.4), and steeper in one direction than in the other."""
     at, weights = np.array([0.3, -0.4]), np.array([1.0, 30.0])
     return 1.0 + float(weights @ (x - at) ** 2), 2.0 * weights * (x - at)
 
 
 def lamp(x: Array) -> tuple[float, Array]:
-    """Nearly flat, and curved downwards, but for a narrow well about 0.9: what is to be seen is far away."""
+    """Nearly flat, and curved downwards, but for a narrow well about 0.9: the minimum is far away."""
     depth = np.exp(-((x - 0.9) ** 2) / 0.04)
     return 2.0 - float(depth.sum()), depth * (x - 0.9) / 0.02
 

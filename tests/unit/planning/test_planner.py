@@ -66,7 +66,7 @@ def test_who_is_nearer_to_a_far_target_goes_below() -> None:
 
 
 def test_heights_are_chosen_between_the_lowest_and_the_highest() -> None:
-    """Who leans sees wrong by its height above the target: near it, both go down as far as they may."""
+    """A tilt causes an error that grows with the height above the target: near it, both go down as far as they may."""
     low, high = PARAMETERS.heights_m
     near, far = plan(NEAR, FLAT), plan(FAR, STRING)
     assert all(low <= height <= high for result in (near, far) for height in result.heights.values())
@@ -74,7 +74,7 @@ def test_heights_are_chosen_between_the_lowest_and_the_highest() -> None:
 
 
 class OfAnotherPackage:
-    """Plans without the argument `held`, and does not say that it takes it."""
+    """Plans without the argument `held`, and does not accept it."""
 
     def plan(self, at: JointBelief, current: Topology, *_: Any) -> PlanResult:
         return plan(at, current)
@@ -95,7 +95,7 @@ class Unaware(Planner):
 
 
 class Aware(Planner):
-    """Shows who it is told is held."""
+    """Shows the robots passed as held."""
 
     def plan(self, *_: Any, held: frozenset[str] = frozenset()) -> PlanResult:
         raise ValueError(held)
@@ -246,7 +246,7 @@ def test_paper_mode_has_no_hysteresis_and_no_warm_start() -> None:
 
 
 def test_an_observer_settles_about_as_far_behind_as_above() -> None:
-    """One robot under the ceiling camera, a resting target: fly the plan until it rests."""
+    """One robot under the ceiling camera, a target at rest: fly the plan until it rests."""
     pose, planner, warm = np.array([-1.2, 0.3, 1.5, 0.0]), Planner(PARAMETERS, SENSORS), None
     for tick in range(150):
         at = belief({"drone_1": tuple(pose)}, (0.2, 0.0, 0.0, 0.0), stamp_s=0.1 * tick)

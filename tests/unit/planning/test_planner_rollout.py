@@ -107,7 +107,7 @@ def seen_by(case: Case, edge: EdgeRow, places: Array, yaws: Array, height: Array
 
 
 def textbook(case: Case, u: Array) -> float:
-    """Uncertainty by dense matrices and Kalman gains: F P F' + Q, then all measurements stacked."""
+    """Return the uncertainty by dense matrices and Kalman gains: F P F' + Q, then all measurements stacked."""
     cost, options, n = case.cost, case.cost.options, case.n
     poses, moving, edges = cost.poses, cost.targets, cost.edges
     dt, discount, P, total = options.step_s, options.discount, cost.prior.copy(), 0.0
@@ -163,7 +163,7 @@ def test_the_uncertainty_is_that_of_a_dense_textbook_filter(n: int, layout: str,
         u = np.random.default_rng(100 + seed).uniform(-1, 1, 4 * n) * one.scale
         report = one.report()
         evaluate(u, one.cost, False, np.empty(u.size), report)
-        # What is far beyond a range is left out: that costs 1e-6 at most.
+        # Edges far beyond a range are left out: that costs 1e-6 at most.
         assert report[0] == pytest.approx(textbook(one, u), rel=1e-6)
 
 
@@ -179,7 +179,7 @@ def test_the_gradient_is_exact(n: int, layout: str, targets: int, boxes: Rows[Bo
         for j in range(u.size):
             e = np.zeros(u.size)
             e[j] = 3e-6
-            # Fourth order, and too short a step to meet one of the penalties' kinks (the cost is once differentiable).
+            # Fourth order, and too short a step to meet a kink of the penalties (the cost is once differentiable).
             near, far = one.value(u + e) - one.value(u - e), one.value(u + 2 * e) - one.value(u - 2 * e)
             differences[j] = (8 * near - far) / 36e-6
         assert np.abs(g - differences).max() <= 1e-6 * np.abs(g).max()
@@ -255,7 +255,7 @@ def test_the_budget_bounds_the_evaluations_and_never_worsens() -> None:
 
 
 def test_a_first_cost_that_is_not_finite_ends_the_search_where_it_began() -> None:
-    """There is no gradient to follow: any further point would be made of uninitialised memory."""
+    """There is no gradient to follow: any further point would come from uninitialised memory."""
     one = case(2, "flat", 3)
     one.cost.prior[0, 0] = math.nan
     x, cost, evaluations = search(one, np.full(8, 0.25), 60, 1e-6)

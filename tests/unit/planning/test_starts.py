@@ -25,7 +25,7 @@ HALL = replace(
 
 
 def end_of_start_in_view(robot_x_m: float, target_x_m: float) -> float:
-    """Return where along x a robot gets that faces a target at rest and starts to look at it, in a world-fixed view."""
+    """Return the final x of a robot that faces a target at rest and starts to look at it, in a world-fixed view."""
     ahead = math.copysign(1.0, target_x_m - robot_x_m)
     scene = PlanningScene(
         robots=("drone_1",),

@@ -6,7 +6,7 @@ from groundstation.planning.time_budget import TimeBudget
 
 
 class Clock:
-    """A clock that only the planner's work moves on."""
+    """A clock that advances only by the planner's work."""
 
     def __init__(self) -> None:
         self.now_s = 100.0
@@ -16,7 +16,7 @@ class Clock:
 
 
 def spent(budget_s: float, gaps_s: list[float]) -> float:
-    """Return what a planner takes that works through gaps between its questions, the last again and again."""
+    """Return the time taken by a planner with these gaps between its checks, the last one repeated."""
     clock = Clock()
     budget = TimeBudget(budget_s, clock)
     for turn in range(1000):

@@ -42,7 +42,7 @@ def test_a_bad_picture_is_named_with_its_remedy(
 
 
 def findings_of(field: ResolvedField, rate_hz: float, **told: Any) -> list[Finding]:
-    """What is found of a drone that stands, well but for what is told besides."""
+    """Return the findings about a drone on the ground, healthy except for these facts."""
     header = Header(0, "here", "drone_1", "drone_1", 1)
     status = VehicleStatus(
         header=header, flight_state=FlightState.LANDED, mode="LANDED", battery=0.9, rate_hz=rate_hz, **told

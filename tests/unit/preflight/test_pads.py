@@ -16,13 +16,13 @@ from groundstation.preflight.judge import open_musts, pad_findings
 from groundstation.preflight.stand import PadSighting, marker_centres, stand_of
 from groundstation.preflight.suspicions import opinion
 
-SPREAD = np.array([0.0025, 0.0025, 0.022, 0.0045])  # of one sighting from 4 m, as rendered pictures have it
+SPREAD = np.array([0.0025, 0.0025, 0.022, 0.0045])  # of one observation from 4 m, as in rendered pictures
 SIGHTINGS = 12
 
 
 @dataclass(frozen=True)
 class Truth:
-    """How the room differs from the field: shares of prints ("": all), degrees, metres."""
+    """Differences of the room from the field: shares of prints ("": all), degrees, metres."""
 
     shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
     turn_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -33,7 +33,7 @@ class Truth:
 
 
 def seen(site: ResolvedField, truth: Truth, seed: int) -> list[PadSighting]:
-    """Return what the ceiling camera sees: mounted, placed and measured as well as people and pictures do."""
+    """Return the ceiling camera's observations, with usual errors of mounting, placing and measuring."""
     rng, stand = np.random.default_rng(seed), stand_of(site)
     camera = stand.cameras["ceiling"]
     place = camera.position_m + truth.shift + camera.position_std_m * rng.standard_normal(3)
@@ -136,7 +136,7 @@ def test_two_things_wrong_at_once_are_not_forced_into_one(lab_field: ResolvedFie
 
 
 def test_distances_of_boards_of_few_pixels_blame_nothing(lab_field: ResolvedField) -> None:
-    """Squares of 3.2 px are measured 3 % too near in a room that is as the field says."""
+    """Squares of 3.2 px are measured 3 % too near in a room that matches the field."""
     small = {
         name: replace(drone, marker=replace(drone.marker, square_mm=10.6)) for name, drone in lab_field.drones.items()
     }

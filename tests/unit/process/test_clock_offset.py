@@ -16,7 +16,7 @@ def trip(at_ns: int, out_ns: int, back_ns: int, offset_ns: int = OFFSET_NS, held
 
 
 def way_ns(dice: random.Random) -> int:
-    """Return how long a message takes: 20 ms, a queue, and now and then the repetition of a lost packet."""
+    """Return a message's transit time: 20 ms, a queue, and now and then the repetition of a lost packet."""
     return 20 * MS + round(dice.expovariate(1.0) * MS) + (200 * MS if dice.random() < 0.01 else 0)
 
 

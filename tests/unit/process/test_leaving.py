@@ -13,7 +13,7 @@ leaving = LeavingSignal()
 leaving.install()
 print("ready", flush=True)
 """
-# What is raised in a destructor is ignored by the interpreter, as an interrupt that lands there would be.
+# The interpreter ignores exceptions in a destructor, such as an interrupt that arrives there.
 _IN_A_DESTRUCTOR = """
 class Slow:
     def __del__(self):

@@ -12,12 +12,12 @@ from groundstation.process.priority import LARGEST, go_first, take_share
 
 
 def inherited() -> int:
-    """What a process that is started now begins with."""
+    """Return the nice value of a process started now."""
     return os.getpriority(os.PRIO_PROCESS, 0)
 
 
 def policies(*, heirs: bool) -> tuple[bool, int, int]:
-    """What a thread got by asking, its own policy, and that of a thread it started."""
+    """A thread's result of the request, its own policy, and that of a thread that it started."""
     found: list[tuple[bool, int, int]] = []
 
     def ask() -> None:
@@ -49,7 +49,7 @@ def test_where_it_may_not_it_goes_on(monkeypatch) -> None:
 
 
 def nice_of(nice: int = LARGEST, *, own_session: bool, refused: bool = False) -> tuple[str, str, str]:
-    """What a process got by asking, its nice value, and that of its session."""
+    """A process's result of the request, its nice value, and that of its session."""
     script = (
         "import os; from groundstation.process import priority;"
         + refused * "priority._may_have_more = lambda: False;"

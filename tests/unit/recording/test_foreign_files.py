@@ -7,7 +7,7 @@ import pytest
 from groundstation.cli.main import run
 from groundstation.recording.foreign import kind_of_content
 
-# The first bytes of each form, put together by hand from its description.
+# The first bytes of each format, assembled by hand from its description.
 FILES = {
     "lab.pcap": (b"\xd4\xc3\xb2\xa1\x02\x00\x04\x00" + bytes(16), "a network capture; Wireshark opens it"),
     "lab_ns.pcap": (b"\x4d\x3c\xb2\xa1\x02\x00\x04\x00" + bytes(16), "a network capture"),

@@ -24,7 +24,7 @@ OFFSET = 1_700_000_000 * S
 
 
 def record(folder, *speakers):
-    """Write a recording of what the speakers put into the logs of a bus."""
+    """Write a recording of the messages that the speakers put into the logs of a bus."""
     bus = MemoryBus(MemoryExchange(), "lab", "mavlink")
     queue = bus.subscribe([RAW_RX, RAW_TX])
     for entity, speak in speakers:

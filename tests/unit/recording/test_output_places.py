@@ -61,7 +61,7 @@ def _refusal(*arguments: object) -> tuple[ExitCode, str]:
     ids=" ".join,
 )
 def test_a_place_that_cannot_be_is_wrong_usage(cut_off: Path, tmp_path: Path, command: tuple[str, ...]) -> None:
-    """A full disk is a fault; a place below a file was named wrongly, and ends each command with the same code."""
+    """A full disk is a fault; a path below a file is a usage error, and ends each command with the same code."""
     (tmp_path / "taken").write_text("")
     code, text = _refusal(*command, cut_off, "-o", tmp_path / "taken" / "out")
     assert code is ExitCode.SETTINGS and "taken/out" in text and "name another place" in text
@@ -106,7 +106,7 @@ def test_half_a_sheet_is_not_left_to_be_printed(
 def test_a_copy_that_cannot_be_made_is_named_by_its_own_place(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Python names the file that is copied: an operator was told that the program's own file had no room."""
+    """Python names the copied source: an operator read that the program's own file had no space."""
 
     def half(source: Path, target: Path) -> None:
         target.write_text("half")

@@ -28,7 +28,7 @@ from groundstation.settings.load import load_field
 
 
 class FakeChild:
-    """Notes what the recorder says of itself."""
+    """Records the recorder's reports about itself."""
 
     def __init__(self, bus: MemoryBus) -> None:
         self.bus = bus

@@ -228,7 +228,7 @@ def test_what_cannot_be_read_is_refused_by_name(command: tuple[str, ...], tmp_pa
     assert code is ExitCode.SETTINGS and "is it a run folder" in text
     code, text = _refusal(*command, tmp_path / "absent")
     assert code is ExitCode.SETTINGS
-    os.mkfifo(tmp_path / "pipe")  # which nobody writes to
+    os.mkfifo(tmp_path / "pipe")  # without a writer
     assert _refusal(*command, tmp_path / "pipe") == (ExitCode.SETTINGS, f"{tmp_path / 'pipe'}: is a pipe, not a file")
     there = ["empty.mcap", "folder", "foreign.mcap", "pipe", "text.mcap"]
     assert sorted(path.name for path in tmp_path.iterdir()) == there

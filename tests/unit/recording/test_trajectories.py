@@ -19,7 +19,7 @@ def body(name: str, x: float) -> Transform:
 
 
 def lived(trajectories: Trajectories, from_step: int, to_step: int, *names: str) -> list[dict[str, list[float]]]:
-    """Return what was handed out, as the x of its poses: each body is at its step."""
+    """Return the published trajectories, as the x of their poses: each body is at its step number."""
     found = []
     for step in range(from_step, to_step):
         given = trajectories.take(step * STEP_NS, [body(name, float(step)) for name in names])

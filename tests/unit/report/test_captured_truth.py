@@ -69,7 +69,7 @@ def still(times_s: Array, x: float) -> EstimateTrack:
 
 
 def test_nobody_knows_where_a_body_was_that_was_not_seen() -> None:
-    """It went 4 m aside in a gap of two seconds: a line between its ends is no truth, nor is where it was last."""
+    """It went 4 m aside in a gap of two seconds: neither a line between its ends nor its last position is truth."""
     heard = [*(poses(t / 10, 0.0) for t in range(11)), *(poses(3.0 + t / 10, 4.0) for t in range(11))]
     seen = captured_tracks(heard, {})["drone_1"]
     times = np.array([-0.2, 0.55, 1.0, 2.0, 3.0, 3.5, 4.2])
@@ -103,7 +103,7 @@ def test_drones_come_near_each_other_only_where_both_were_seen(lab_field: Resolv
 
 
 def test_a_drone_that_was_seen_on_its_pad_only_is_not_called_landed(lab_field: ResolvedField) -> None:
-    """The system ended before the take-off; what the drone said last is that it flies."""
+    """The system ended before the take-off; the drone last reported flight."""
     ended = track(0.0, 0.1, 0.2, on_ground=True)
     said = {name: [status(0.0, FlightState.LANDED)] for name in lab_field.drones}
     data = RunData(lab_field, RunFacts(), truth=dict.fromkeys(lab_field.drones, ended), vehicles=said)

@@ -26,7 +26,7 @@ KIDNAP = {"lost_s": 12}
 
 
 def flight(lab_field: ResolvedField, expected: Any, *, lost: tuple[float, float], off_m: float = 0.0) -> RunData:
-    """Return a flight that tracks for 40 s, with the target believed 3 m away meanwhile and off_m away else."""
+    """Return a flight that tracks for 40 s, with a target error of 3 m during that time and of off_m otherwise."""
     header = Header(0, "c", "drone_1", "drone_1", 1)
     away = np.where(np.searchsorted(lost, GRID, side="right") == 1, 3.0, off_m)
     places = np.column_stack((away, np.zeros(len(GRID))))
@@ -94,7 +94,7 @@ def test_where_a_search_is_expected_errors_count_from_when_the_target_was_found(
 
 
 def reasons(field: ResolvedField, **covered: float) -> list[str]:
-    """Return why a flight failed by the last of its targets, each covered for a share of the time."""
+    """Return the reasons of a flight's failure by its last target, each covered for a share of the time."""
     data = flight(field, None, lost=(15.0, 28.0))
     figures = figures_of(data)
     (bad,) = figures.targets.values()

@@ -30,7 +30,7 @@ def jpeg(grey: int) -> bytes:
 
 @pytest.fixture
 def run_dir(tmp_path: Path) -> Path:
-    """Two cameras with a picture each second from 10 s on, brighter as time goes; one of the pictures is damaged."""
+    """Two cameras with a picture each second from 10 s on, of rising brightness; one of the pictures is damaged."""
     bus = MemoryBus(MemoryExchange(), "lab", "tester")
     queue = bus.subscribe([IMAGE], capacity=64)
     for second in range(10, 16):

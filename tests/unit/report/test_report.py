@@ -220,7 +220,7 @@ def _failed(folder: Path, flight: Flight) -> set[str]:
 
 def test_a_missing_estimate_counts_one_metre(tmp_path: Path) -> None:
     report = judge(gather(fly(tmp_path, Flight(target_missing=(15.0, 20.0)))), tmp_path)
-    # 0.5 s of the gap are still covered by the last estimate, which drifts away from the target meanwhile.
+    # The last estimate, which drifts away from the target meanwhile, still covers 0.5 s of the gap.
     assert report.figures.target_lost_s == pytest.approx(4.5, abs=0.11)
     assert report.figures.target_rmse_m == pytest.approx(math.sqrt((15.5 * 0.01 + 4.5) / 20), rel=0.05)
     assert {criterion.name for criterion in report.criteria if not criterion.ok} == {"target_rmse_m", "target_lost_s"}

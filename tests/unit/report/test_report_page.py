@@ -122,7 +122,7 @@ def test_links_name_the_longest_silence_and_the_worst_quality() -> None:
             (0.0, 0.9, 1.0, 200.0, 0), (0.2, 0.9, 0.4, 150.0, 3), (2.2, 0.8, 0.9, 200.0, 1),
         )
     ]  # fmt: skip
-    heard_s = {"drone_1": np.array([0.0, 0.01, 1.51, 1.52])}  # silent for 1.5 s while its driver goes on telling
+    heard_s = {"drone_1": np.array([0.0, 0.01, 1.51, 1.52])}  # silent for 1.5 s while its driver continues
     (found,) = links(run_with(vehicles={"drone_1": statuses}, heard_s=heard_s))
     assert found.longest_silence_s == pytest.approx(1.5)
     assert links(run_with(vehicles={"drone_1": statuses}))[0].longest_silence_s is None
@@ -172,7 +172,7 @@ def test_comparison_lists_every_figure_with_its_change(tmp_path: Path) -> None:
 
 
 def test_a_run_of_any_name_has_its_pages(tmp_path: Path) -> None:
-    """A name that is no UTF-8 cannot stand in a page, and is replaced there."""
+    """A name that is no UTF-8 cannot be in a page, and is replaced there."""
     data, folder = sample_run(tmp_path, "run\udcff")
     report = judge(data, folder)
     write_page(data, report, tmp_path / "report.html")

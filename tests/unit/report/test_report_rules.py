@@ -172,7 +172,7 @@ def test_a_starved_simulated_run_that_fails_says_nothing_and_one_that_passes_cou
     unsafe = Criterion("max_fence_violation_m", 0.1, "<=", 0.0, ok=False)
     assert invalidity(figures, [met]) == ""
     assert invalidity(figures, [met, missed]) == "other programs kept it from the processor for 4 s"
-    assert invalidity(figures, [missed, unsafe]) == ""  # that must not happen on any computer
+    assert invalidity(figures, [missed, unsafe]) == ""  # must not happen on any computer
     assert invalidity(msgspec.structs.replace(figures, starved_s=1.0), [missed]) == ""
     assert invalidity(msgspec.structs.replace(figures, sim_overrun_percent=None), [missed]) == ""
 

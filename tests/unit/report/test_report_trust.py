@@ -27,7 +27,7 @@ def header(source: str = "tracker", entity: str = "team") -> m.Header:
 def innovations(
     scale: float = 1.0, refused: float = 0.0, until_s: float = 20.0, subject: str = "drone_1"
 ) -> list[TimedMessage[m.Innovation]]:
-    """Return 15 a second of the ceiling camera, whose squared errors are `scale` times those that it claims."""
+    """Return 15 innovations a second of the ceiling camera, with squared errors `scale` times the stated ones."""
     rng = random.Random(1)
     found = []
     for i in range(round(15 * until_s)):
@@ -110,7 +110,7 @@ def test_a_doubt_names_its_cause_and_remedy(series: dict[str, object], words: tu
 
 
 def test_a_link_of_which_a_plan_expected_next_to_nothing_need_not_see() -> None:
-    """A topology permits a camera to see whom it has outside of its picture."""
+    """A topology permits a camera to observe robots outside of its picture."""
     trust = trust_of(run_with(plans=planned("ceiling", "drone_2", information=6.0)))
     assert trust.links == [] and trust.doubts == []
 
@@ -141,7 +141,7 @@ def test_what_the_diagnosis_suspected_is_a_doubt() -> None:
 def test_silence_of_a_diagnosis_that_reached_no_verdict_is_a_doubt(
     tracked_s: float, verdicts: int, ran: bool, told: bool
 ) -> None:
-    """On a machine that is too busy it gets no share of the processor, and everything looks healthy."""
+    """On a machine that is too busy it gets no processor time, and everything looks healthy."""
     ack = m.CommandAck(
         header=header("drone_1", "drone_1"), command_id="1", verb=m.Verb.TRACK, stage=m.AckStage.ACCEPTED
     )

@@ -26,9 +26,9 @@ CAMERAS = {"ceiling": FixedCamera(CEILING_M, (0.0, 0.0, -1.0))}
 
 
 class Drone:
-    """A driver with its drone: takes off in half a second, answers every order.
+    """A driver with its drone: takes off in half a second, answers every command.
 
-    marker: whose marker the drone carries; reports: whether it measures its height.
+    marker: name of the marker on the drone; reports: whether it measures its height.
     """
 
     def __init__(
@@ -49,7 +49,7 @@ class Drone:
         self.heard: list[Verb] = []
         self.change: tuple[int, FlightState, Command] | None = None
         self.last: dict[str, AckStage] = {}
-        self.lost: AckStage | None = None  # of this stage the first answer does not arrive
+        self.lost: AckStage | None = None  # the first answer of this stage does not arrive
 
     def turn(self, now_ns: int) -> None:
         for received in self.commands.drain():

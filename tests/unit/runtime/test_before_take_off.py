@@ -35,7 +35,7 @@ MS = 1_000_000
 
 
 class Lab:
-    """Two drones on their pads and a ceiling camera; higher_m: the camera hangs higher than the field says."""
+    """Two drones on their pads and a ceiling camera; higher_m: its height above the field's value."""
 
     def __init__(self, field: ResolvedField, higher_m: float = 0.0) -> None:
         exchange = MemoryExchange()

@@ -11,7 +11,7 @@ Pairs = dict[tuple[str, str], float]
 
 
 class Flight:
-    """Sightings at 10 Hz with a NIS per degree of freedom of choice."""
+    """Observations at 10 Hz with a given NIS per degree of freedom."""
 
     def __init__(self) -> None:
         self.watch, self.now_ns = ConsistencyWatch(NAMES), 1_000_000_000_000

@@ -11,12 +11,12 @@ from groundstation.runtime.latency_watch import PictureAge
 @pytest.mark.parametrize(
     ("offset_s", "std_s", "told"),
     [
-        # Three deviations are worth 25 to 1 where so little is known: a drone's late telemetry blamed the ceiling.
+        # Three deviations are worth 25 to 1 with so little data: a drone's late telemetry blamed the ceiling camera.
         (-0.071, 0.022, False),
         (-0.090, 0.022, True),
         (0.040, 0.006, True),
         (0.020, 0.006, False),
-        (0.014, 0.002, False),  # sure, and harmless
+        (0.014, 0.002, False),  # certain, and harmless
     ],
 )
 def test_a_wrong_age_is_told_by_100_to_1(

@@ -30,7 +30,7 @@ class Both:
         self.offsets = self.bus.subscribe([CLOCK])
 
     def turn(self, own: OwnState | None, supervision: Supervision | None = Supervision.WATCHES, turns: int = 1) -> None:
-        """Let both ends turn; None: that end stands still."""
+        """Run one turn of both ends; None: that end is frozen."""
         for _ in range(turns):
             self.now_ns += 50 * MS
             if own is not None:

@@ -39,7 +39,7 @@ def member(
         (UP, 0.8, None, False),
         (UP, 2.0, 0.8, False),
         (UP, 0.3, 0.1, False),
-        (UP, None, 0.36, True),  # an autopilot, at the lowest take-off height that a field may ask for
+        (UP, None, 0.36, True),  # an autopilot, at the lowest take-off height of a field
         (UP, None, 0.1, False),
         (CLIMBS, 0.6, 0.6, False),
     ],
@@ -57,7 +57,7 @@ def test_a_drone_that_was_not_seen_is_left_out_for_what_was_seen() -> None:
 
 
 def watched(seconds: float, one: Said, two: Said, watch: LiftOffWatch | None = None) -> tuple[str, float]:
-    """Return (what the watch of drone_1 says, after how long [s]); each drone: state, reported height, rise."""
+    """Return (output of drone_1's watch, time [s]); each drone: state, reported height, rise."""
     watch = watch or LiftOffWatch()
     for number in range(round(seconds * 20) + 1):
         now_ns = NOW + number * 50 * MS
@@ -104,7 +104,7 @@ def test_a_marker_that_stays_down_alone_is_named_in_a_few_seconds(
         ((UP, 0.8, 0.8), (STANDS, None, 0.0)),
         ((UP, 0.8, 0.8), (STANDS, None, 0.7)),  # a person carries the other one
         ((UP, 2.5, 0.8), (STANDS, None, 0.7)),  # an echo: it is left out for it, nobody is exchanged
-        ((UP, 0.8, None), (STANDS, None, 0.0)),  # no camera: it lands for being unseen
+        ((UP, 0.8, None), (STANDS, None, 0.0)),  # no camera: it lands because it is not observed
         ((UP, 0.8, None), (UP, 0.8, 0.8)),
         ((UP, 0.8, None), (FlightState.LANDING, 0.5, 0.5)),  # left out just before
         ((UP, 0.8, None), (FlightState.LOST, None, 0.8)),

@@ -17,7 +17,7 @@ SLOT = 2
 
 
 class Heir:
-    """The slot of a process in the block of heartbeats, which the next one gets."""
+    """A process's slot in the heartbeat block, which its successor gets."""
 
     def __init__(self, block: HeartbeatBlock) -> None:
         self._block = block

@@ -17,7 +17,7 @@ def test_a_driver_that_starts_anew_and_hears_nothing_lands_no_drone(scene: Scene
     flying = scene.add("drone_1")
     flying.state = FlightState.FLYING
     list(scene.run(0.1))
-    flying.state = FlightState.UNKNOWN  # as its driver says that was started anew
+    flying.state = FlightState.UNKNOWN  # as reported by its restarted driver
     list(scene.run(0.5))
     assert not scene.operator.landed(scene.now_ns)
     assert scene.operator.team.airborne(scene.now_ns) == ("drone_1",)

@@ -16,7 +16,7 @@ UP, DOWN = FlightState.HOVERING, FlightState.LANDED
 
 
 class Desk:
-    """An operator over drones that say what they are told to say, and another shell."""
+    """An operator of drones with given telemetry, and another shell."""
 
     def __init__(self, run="", **states):
         exchange = MemoryExchange()
@@ -49,7 +49,7 @@ class Desk:
         self.send(self.command(verb, *scope, identity=identity))
 
     def confirm(self, *stages, refused=()):
-        """Let every drone answer the newest order of the operator."""
+        """Let every drone answer the newest command of the operator."""
         command = self.orders()[-1]
         for name in command.scope or tuple(self.drones):
             bus, _ = self.drones[name]
@@ -200,7 +200,7 @@ def test_drivers_are_told_when_a_start_was_asked_for():
     asked = desk.command(Verb.RESUME, OPERATOR, age_s=0.5)
     desk.send(asked)
     (order,) = desk.orders()
-    assert order.header.stamp_ns == asked.header.stamp_ns  # a stop that they heard in between overtakes it
+    assert order.header.stamp_ns == asked.header.stamp_ns  # a stop that they received in between overtakes it
 
 
 def test_a_request_that_lay_somewhere_for_too_long_is_refused():
@@ -236,7 +236,7 @@ def test_a_stop_of_all_drones_by_name_is_one_of_the_team_and_a_stop_of_some_is_n
     for verb, scope, identity in ((Verb.HOLD, ("drone_1", "drone_2"), "b"), (Verb.LAND, (), "c"), (Verb.HOLD, (), "d")):
         desk.ask(verb, *scope, identity=identity)
         phases.append(desk.operator.phase)
-    # The last: a landing is not taken back.
+    # The last: a landing is not cancelled.
     assert phases == [TeamPhase.TRACKING, TeamPhase.HELD, TeamPhase.LANDING, TeamPhase.LANDING]
     assert sum("by cli_1" in line for line in desk.said) == 2
 

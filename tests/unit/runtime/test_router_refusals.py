@@ -18,7 +18,7 @@ STRANGER = "2026-11-21T16:58:00Z  WARN acc-0 ThreadId(05) zenoh_link_tls::unicas
 
 @contextmanager
 def reading() -> Iterator[RouterRefusals]:
-    """Within a test only: pytest takes standard output itself between its phases."""
+    """Within a test only: pytest redirects standard output itself between its phases."""
     refusals = RouterRefusals()
     try:
         yield refusals
@@ -36,7 +36,7 @@ def denied(who: str, key: str, what: str = "Put") -> str:
 
 
 def declared(who: str, key: str) -> str:
-    """What is written when a key is declared, by a subscriber too."""
+    """Text written when a key is declared, by a subscriber too."""
     return "".join(denied(who, key, what) for what in ("Query", "Reply", "Put", "Delete"))
 
 

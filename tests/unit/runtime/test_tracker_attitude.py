@@ -25,7 +25,7 @@ COVARIANCE = tuple(np.diag([1e-4, 1e-4, 4e-4, 1e-3]).ravel().tolist())
 
 
 class Hover:
-    """drone_1 hovers in wind and says that it is level; its IMU says more."""
+    """drone_1 hovers in wind and reports level; its IMU shows the tilt."""
 
     def __init__(self, field: ResolvedField) -> None:
         self.tracker = tracker_from_field(field, "here", 1)

@@ -145,7 +145,7 @@ def test_everything_that_others_wait_for_is_published(lab: Lab) -> None:
 
 def test_drones_hover_once_the_planner_is_silent(lab: Lab) -> None:
     lab.run(60, pause_s=0.002)
-    lab.tracking.close()  # as good as a planner that hangs: what is submitted never comes back
+    lab.tracking.close()  # like a planner that hangs: a submitted task never returns
     lab.messages()
     lab.run(75)
     setpoints: list[VelocitySetpoint] = lab.messages()["setpoint"]
@@ -195,7 +195,7 @@ def unseen(lab: Lab) -> list[str]:
 
 
 def test_a_drone_that_nobody_sees_is_named_when_odometry_is_trusted_no_more(lab_field: ResolvedField) -> None:
-    """However good its position still is by its odometry: after three times the limit, never before twice."""
+    """However good its position still is by odometry: after three times the limit, never before twice."""
     lab = Lab(hurried(lab_field))
     lab.run(25)
     lab.run(round(4.0 * 50), look=False)
@@ -237,7 +237,7 @@ def test_late_ticks_are_counted_and_not_made_up_for() -> None:
     deadlines.start_tick(5 * MS)
     deadlines.start_tick(31 * MS)  # 11 ms late
     assert (deadlines.ticks, deadlines.overruns) == (2, 1)
-    deadlines.start_tick(140 * MS)  # 100 ms late: five ticks were slept through
+    deadlines.start_tick(140 * MS)  # 100 ms late: five ticks were missed
     assert deadlines.overruns == 1 + 6
     assert deadlines.next_ns > 140 * MS
     deadlines.start_tick(deadlines.next_ns)

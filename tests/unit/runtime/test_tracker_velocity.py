@@ -34,7 +34,7 @@ def honest(velocity: np.ndarray) -> np.ndarray:
 
 
 class Flight:
-    """drone_1 flies to and fro in the ceiling's view; what it tells of its velocity [m/s, true scale] is chosen."""
+    """drone_1 flies to and fro in the ceiling camera's view; its reported velocity [m/s, true scale] is chosen."""
 
     def __init__(self, field: ResolvedField) -> None:
         self.tracker = tracker_from_field(field, "here", 1)
@@ -53,7 +53,7 @@ class Flight:
         assert self.tracker.ingest(f"{type(message).__name__}/{message.header.entity}", message, self.now) is None
 
     def run(self, seconds: float, told: Told = honest, speed: float = 0.0, look: bool = True) -> float:
-        """Fly on; returns the largest error of the believed place [m]."""
+        """Fly on; returns the largest position error of the belief [m]."""
         self.errors_m = []
         for _ in range(round(seconds * 100)):
             self.now, self.ticks = self.now + 10 * MS, self.ticks + 1
@@ -130,7 +130,7 @@ def test_after_a_lie_the_dark_is_known_to_be_darker(flight: Flight) -> None:
 
 
 def test_a_velocity_that_was_seen_to_be_wrong_is_not_right_because_nobody_looks(flight: Flight) -> None:
-    """It drifts off by 3 cm/s each second, too slowly to surprise anybody; then the robot leaves the camera's view."""
+    """It drifts by 3 cm/s each second, too slowly to be surprising; then the robot leaves the camera's view."""
     began = flight.ticks
 
     def drifting(velocity: np.ndarray) -> np.ndarray:
@@ -162,7 +162,7 @@ def test_whom_nobody_sees_must_know_its_velocity(flight: Flight, limit: dict[str
 
 @pytest.mark.parametrize("fed", [False, True])
 def test_who_is_re_initialised_twice_hovers_unless_it_flies_on_our_estimate(flight: Flight, fed: bool) -> None:
-    """One that does would be told its place no more: it flies off, and lands."""
+    """Otherwise such a vehicle would lose its position updates: it flies off, and lands."""
     flight.run(2.0)
     tracker = flight.tracker
     control = replace(tracker.parameters.control, fed=frozenset(["drone_1"] if fed else []))
@@ -174,7 +174,7 @@ def test_who_is_re_initialised_twice_hovers_unless_it_flies_on_our_estimate(flig
 
 
 def test_who_sees_what_the_room_knows_of_is_localised_by_it(flight: Flight) -> None:
-    """drone_1, which nobody sees, sees a target that something else knows of, which the ceiling sees."""
+    """drone_1, unseen, sees a target that is located by another observer, which the ceiling camera sees."""
     tracker = flight.tracker
     tracker._localisation = Localisation(replace(tracker.parameters.safety, max_velocity_error_m_s=0.001))
     flight.run(0.7, look=False)

@@ -76,7 +76,7 @@ def test_what_one_view_of_a_sweep_shows_counts_as_seen_for_the_next() -> None:
 
 
 def test_the_largest_marker_must_be_in_the_picture_and_the_smallest_be_read() -> None:
-    """Half the diagonal of a board, 3.5 squares, is what a place must be within the picture."""
+    """A place must be half the diagonal of a board, 3.5 squares, within the picture."""
     options = ["defaults.marker.square_mm=30", "target.marker.square_mm=80"]
     suite = sensors_from_field(resolved_field(load_field(Path(__file__).parents[3] / "config/lab.yaml", options)))
     assert suite.onboard["drone_1"].view.border_m == pytest.approx(3.5 * 0.080)

@@ -16,14 +16,14 @@ def share(eye: Array, point: Array, width: float = 0.05) -> float:
 
 
 def ways(count: int, seed: int) -> list[tuple[Array, Array]]:
-    """Return eyes and points about the boxes, as cameras and markers are: eyes above."""
+    """Return eyes and points about the boxes, like cameras and markers: eyes above."""
     rng = np.random.default_rng(seed)
     low, high, up = np.array([-2.0, -2.0, 0.1]), np.array([2.0, 2.0, 1.2]), np.array([0.0, 0.0, 1.0])
     return [(rng.uniform(low, high) + up, rng.uniform(low, high)) for _ in range(count)]
 
 
 def is_hidden(eye: Array, point: Array) -> bool:
-    """Return whether any of many points of the way lies in a box."""
+    """Return whether any of many points on the line is inside a box."""
     on_way = eye + np.linspace(0.0, 1.0, 2000)[:, None] * (point - eye)
     return any(
         bool((np.abs(on_way - np.array(box.middle_m)) < np.array(box.size_m) / 2).all(axis=1).any())
@@ -35,7 +35,7 @@ def test_a_sharp_edge_hides_what_boxes_are_in_between() -> None:
     found = [(is_hidden(*way), share(*way, width=1e-4)) for way in ways(1500, 1)]
     assert sum(hidden for hidden, _ in found) > 200
     wrong = sum((free < 0.5) is not hidden for hidden, free in found)
-    assert wrong <= 2  # ways that graze an edge within the step of the sampling
+    assert wrong <= 2  # lines that graze an edge within the sampling step
 
 
 def test_the_slopes_are_those_of_differences() -> None:

@@ -94,7 +94,7 @@ PLACES = [(0.0, 0.0, 1.2), (0.1, -0.1, 1.4), (0.3, 0.35, 1.5), (-0.9, 0.0, 1.5),
 
 @pytest.mark.parametrize("point", PLACES)
 def test_availability_without_caution_is_expected_under_the_covariance(point: tuple[float, float, float]) -> None:
-    """Against sampling, for places and directions that are known so well."""
+    """Compared with sampling, for positions and directions of that uncertainty."""
     at_mean, soft = availability(ONBOARD, point)[0], Softness(caution=0.0)
     for blur, turn, tolerance in ((0.01, 0.0, 0.07), (0.04, 0.01, 0.2)):
         std = math.sqrt(blur + turn * float(np.dot(point, point)))
@@ -107,7 +107,7 @@ def test_availability_without_caution_is_expected_under_the_covariance(point: tu
 
 @pytest.mark.parametrize("point", PLACES)
 def test_a_view_is_counted_on_as_far_inside_as_its_place_is_in_doubt(point: tuple[float, float, float]) -> None:
-    """An error of place lasts: at the very edge a marker is seen all the time or never, not every other time."""
+    """A position error lasts: at the very edge a marker is seen all the time or never, not every other time."""
     doubt_m, soft = 0.1, Softness(tail_share=0.0)
     row, distance = camera_rows([ONBOARD], soft)[0], math.hypot(*point)
     inside = margin(limits_of(row), *point, distance).a - 1.5 * doubt_m

@@ -71,7 +71,7 @@ Reader = Callable[[str], CalibrationSettings]
 
 @pytest.fixture
 def lens_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Reader:
-    """Return what a calibration file `lens.yaml` with a text says."""
+    """Return the lens of a calibration file `lens.yaml` with a text."""
     monkeypatch.chdir(tmp_path)
 
     def read(text: str) -> CalibrationSettings:

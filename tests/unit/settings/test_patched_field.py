@@ -47,7 +47,7 @@ def test_the_patch_alone_is_short() -> None:
 
 
 def test_an_alias_elsewhere_keeps_what_it_says(tmp_path: Path) -> None:
-    """Two drones that share a mounting by a YAML alias: only the one that was measured is changed."""
+    """Two drones share a mounting by a YAML alias: only the measured one is changed."""
     text = (CONFIG / "lab.yaml").read_text(encoding="utf-8").replace("cameras/", f"{CONFIG}/cameras/")
     resolved = load_field(CONFIG / "lab.yaml")
     first, second = (f'camera: {{source: "{resolved.drones[name].camera.source}"}}' for name in ("drone_1", "drone_2"))

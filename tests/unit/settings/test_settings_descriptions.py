@@ -12,7 +12,7 @@ from groundstation.settings.json_schema import field_file_schema
 
 
 def keys_of(schema: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield path and content of every property, at whatever depth."""
+    """Yield path and content of every property, at any depth."""
     for name, part in [("", schema), *schema.get("$defs", {}).items()]:
         for key, content in part.get("properties", {}).items():
             yield f"{name}.{key}", content
@@ -41,7 +41,7 @@ def test_every_section_says_what_it_is() -> None:
     [("_m", "[m"), ("_m_s", "[m/s]"), ("_s", "[s]"), ("_ms", "[ms]"), ("_deg", "[deg"), ("_mm", "[mm]")],
 )
 def test_a_description_gives_the_unit_of_its_key(suffix: str, unit: str) -> None:
-    """`_s` is a second, and the end of `_m_s` and `_deg_s`, which are not."""
+    """`_s` is a second, but not as the end of `_m_s` and `_deg_s`."""
     others = {"_s": ("_m_s", "_deg_s")}.get(suffix, ())
     keys = [(path, content["description"]) for path, content in keys_of(field_file_schema())]
     wrong = [

@@ -18,7 +18,7 @@ GOOD = (FIXTURE / "lab.yaml").read_text(encoding="utf-8")
 
 @pytest.fixture
 def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A folder with a good `lab.yaml` in it, as working directory."""
+    """A folder with a valid `lab.yaml` in it, as working directory."""
     shutil.copytree(FIXTURE / "cameras", tmp_path / "cameras")
     (tmp_path / "lab.yaml").write_text(GOOD, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
@@ -36,7 +36,7 @@ def problems(*options: str, name: str = "lab.yaml") -> list[str]:
 
 
 def broken(old: str, new: str, at: str = "") -> list[str]:
-    """Return the problems after one replacement, with `@` for the line on which `at` (or the new text) stands."""
+    """Return the problems after one replacement, with `@` for the line of `at` (or of the new text)."""
     assert GOOD.count(old) >= 1, old
     text = GOOD.replace(old, new, 1)
     Path("lab.yaml").write_text(text, encoding="utf-8")

@@ -79,7 +79,7 @@ def test_the_target_says_what_it_is(tmp_path: Path) -> None:
 
 
 def test_what_cannot_be_is_asked_again_and_no_answer_is_lost(tmp_path: Path) -> None:
-    """More pads than the camera sees, and a board that nobody looks down on."""
+    """More pads than the camera can see, and a board that no camera looks down on."""
     room = ["8", "6", "4.5", "http://10.0.0.5/mjpg"]
     team = ["9", "1", "", "", "", "turtlebot_2", "3", "turtlebot_2", "0.4", "y", ""]
     result = CliRunner().invoke(new, [str(tmp_path / "hall")], input="\n".join([*room, *team]))

@@ -68,7 +68,7 @@ SILENCE = SafetySettings(setpoint_lifetime_ms=250, land_after_s=4.0, unseen_land
 
 
 def test_every_limit_reaches_every_driver() -> None:
-    """One that a driver's section left out would be flown with the driver's default."""
+    """A limit absent from a driver's section would have the driver's default in flight."""
     field = load_field(CONFIG / "mixed-team.yaml")
     assert not LIMITS.model_dump().items() & LimitSettings().model_dump().items()
     team = {name: drone.model_copy(update={"limits": LIMITS}) for name, drone in field.drones.items()}

@@ -59,12 +59,12 @@ def as_json(value: Any) -> Any:
 
 def test_both_sides_have_the_same_keys_types_and_defaults() -> None:
     judged, read = set(facts(Field)), set(facts(ResolvedField))
-    # What a target's base fills in may be left out of the file, and is always there for those who read it.
+    # Values from a target's base may be absent in the file, and are always present for readers.
     differing = {line for line in judged ^ read if not re.search(rf"\.target(s\[1\]|\[0\])\.({_BY_BASE})\b", line)}
-    # What only one kind of vehicle has stands together, and is read by its driver and its emulator.
+    # Settings of only one vehicle kind are in one group, and are read by its driver and its emulator.
     own = "|".join([*OF_KINDS, "sections"])
     differing = {line for line in differing if not re.match(rf"field\.drones\[1\]\.({own})\b", line)}
-    # What older files call `certified` is translated when they are read; recordings keep it.
+    # `certified` of older files is translated on reading; recordings keep it.
     differing = {line for line in differing if not line.startswith("field.planner.mode: ")}
     assert not differing
     assert "field.drones[1].limits.max_speed_m_s: default 0.6" in read

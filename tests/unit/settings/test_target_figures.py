@@ -23,7 +23,7 @@ FIELDS = ("lab.yaml", "mixed-team.yaml", "two-targets.yaml")
 
 
 def turns_on_the_spot(seconds: float) -> np.ndarray:
-    """A Kobuki, 0.5 m/s and 0.5 m/s^2: goes for 3 s, stops, turns by a little more than a right angle; 100 Hz."""
+    """A Kobuki, 0.5 m/s and 0.5 m/s^2: drives for 3 s, stops, turns by a little more than a right angle; 100 Hz."""
     place, speed, heading, path = np.zeros(2), 0.0, 0.0, []
     for k in range(round(100 * seconds)):
         goes = k % 420 < 300
@@ -35,7 +35,7 @@ def turns_on_the_spot(seconds: float) -> np.ndarray:
 
 
 def follow(field: ResolvedField, name: str) -> tuple[float, float]:
-    """Return rmse [m] of the prediction at each sighting (15 Hz, 2 cm), and the share of sightings beyond the gate."""
+    """Return rmse [m] of the prediction at each observation (15 Hz, 2 cm), and the share of them beyond the gate."""
     target = parameters_from_field(field).entities[name]
     entities = {"ceiling": FixedMount((0.0, 0.0, HEIGHT_M), 0.004, 0.01), name: target}
     joint = FixedLagFilter(EstimatorParameters(entities, {"eye": MountedCamera("ceiling", WORLD_FROM_DOWN)}))
@@ -63,7 +63,7 @@ def test_a_turtlebot_that_turns_on_the_spot_is_followed_with_the_figure_of_a_shi
 
 
 def test_estimator_and_planner_take_the_same_share_of_it_for_usual(lab_field: ResolvedField) -> None:
-    """0.26 of the figure over all the time; the planner's manoeuvres last 0.5 s."""
+    """0.26 of the figure on time average; the planner's manoeuvres last 0.5 s."""
     usual = math.sqrt(0.07) * lab_field.tracked["turtlebot"].acceleration_std_m_s2
     target = parameters_from_field(lab_field).entities["turtlebot"]
     assert isinstance(target, ConstantVelocityTarget)

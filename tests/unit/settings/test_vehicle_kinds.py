@@ -84,14 +84,14 @@ def field() -> Field:
 
 @pytest.fixture
 def unknown(field: Field) -> Field:
-    """The field with a drone of a kind that nobody knows, as if its plug-in were gone since it was read."""
+    """The field with a drone of an unknown kind, as if its plug-in were removed after reading."""
     name, drone = next((n, d) for n, d in field.drones.items() if d.kind == "mavlink")
     return field.model_copy(update={"drones": field.drones | {name: drone.model_copy(update={"kind": "zeppelin"})}})
 
 
 @pytest.fixture
 def plug_ins(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """A foreign package that is installed: a module and the entry points that its installation wrote."""
+    """An installed foreign package: a module and the entry points from its installation."""
     (tmp_path / "blimp_kind.py").write_text(FOREIGN)
     install(tmp_path, "lab-blimp", ENTRIES)
     monkeypatch.syspath_prepend(tmp_path)
@@ -223,17 +223,17 @@ def test_an_unsound_kind_is_named_and_the_rest_works(tmp_path: Path) -> None:
     sys.modules.pop("odd_kinds", None)
 
 
-# Shared code that still names a kind, and why. The list may only shrink.
+# Shared code that still names a kind, with the reason. The list may only shrink.
 NAMED = {
     "groundstation/cli/bench.py",  # benches of one codec and one link, by their names
     "groundstation/cli/tlog.py",  # a log format of one protocol
-    "sim_bridge/standalone.py",  # emulators for programs of others
+    "sim_bridge/standalone.py",  # emulators for third-party programs
 }
 KIND_WORD = re.compile(r"ardrone|mavlink", re.IGNORECASE)
 
 
 def code_of(path: Path) -> str:
-    """Return a file without docstrings and comments: words may explain by example."""
+    """Return a file without docstrings and comments, whose texts may use examples."""
     text = re.sub(r'""".*?"""', "", path.read_text(), flags=re.DOTALL)
     return re.sub(r"#.*", "", text)
 

@@ -12,7 +12,7 @@ BOX = {"x_m": (-1.0, 1.0), "y_m": (-1.0, 1.0), "z_m": (-0.1, 2.0)}
 
 
 class Room:
-    """What an eye reads of a world: one drone inside of the box, one outside, a target."""
+    """A sensor model's view of a world: one drone inside of the box, one outside, a target."""
 
     bodies = ("drone_1", "drone_2", "cart")
 
@@ -23,7 +23,7 @@ class Room:
 
 
 class Layout:
-    """What an eye reads of a site."""
+    """A sensor model's view of a site."""
 
     def __init__(self, **system: object) -> None:
         self.motion_capture = {"mocap": SiteCapture.model_validate({"volume_m": BOX, "pose_std_m": 1e-6} | system)}

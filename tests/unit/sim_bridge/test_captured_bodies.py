@@ -15,7 +15,7 @@ HALF = 0.5 * 0.4
 
 
 class Hall:
-    """A system that sees drone_1 go along x; times in ms."""
+    """A system that observes drone_1 on its way along x; times in ms."""
 
     def __init__(self) -> None:
         exchange = MemoryExchange()

@@ -61,7 +61,7 @@ def test_reflections_are_too_long_and_as_often_as_told() -> None:
 
 
 class Room:
-    """What an eye reads of a world: two drones."""
+    """A sensor model's view of a world: two drones."""
 
     bodies = ("drone_1", "drone_2")
 

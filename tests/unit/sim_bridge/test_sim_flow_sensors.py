@@ -23,7 +23,7 @@ EXACT = DroneScenario(
 
 
 def sensors(seed: int, figures: DroneScenario, speed_m_s: float = 0.0) -> tuple[FlowSensors, Airframe]:
-    """Return sensors of a body that is held at 1.5 m, and it."""
+    """Return the sensors of a body that is held at 1.5 m, and the body."""
     body = Airframe(0.4, -0.2, 0.7)
     body.z, body.on_ground = 1.5, False
     body.vx, body.vy = speed_m_s * math.cos(body.yaw), speed_m_s * math.sin(body.yaw)

@@ -16,7 +16,7 @@ TICK_S = 0.005
 
 @dataclass
 class Puppet:
-    """A drone held in the air by hand."""
+    """A drone held in the air at chosen poses."""
 
     airframe: Airframe = field(default_factory=lambda: Airframe(0.0, 0.0, 0.7))
     battery: float = 0.9
@@ -70,7 +70,7 @@ def test_height_is_34_mm_rms(long_hover: np.ndarray) -> None:
 def test_attitude_is_1_degree_rms_with_5_s_correlation(long_hover: np.ndarray) -> None:
     attitude = np.degrees(long_hover[:, :, 1:3])
     assert rms(attitude) == pytest.approx(1.0, rel=0.2)
-    # the mean of each run is removed, which shortens what 60 s can show
+    # the mean of each run is removed, which shortens the correlation visible in 60 s
     times = [correlation_s(attitude[run, :, axis]) for run in range(12) for axis in range(2)]
     assert 2.5 < float(np.mean(times)) < 6.5
 

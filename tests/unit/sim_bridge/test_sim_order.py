@@ -276,7 +276,7 @@ def test_cameras_are_told_their_faults_and_carried_by_the_body_behind_an_address
 
 
 class Process:
-    """The bridge's process as far as its loop uses it."""
+    """Stand-in for the bridge's process, as used by its loop."""
 
     name, stop_requested, supervisor_alive = "sim_bridge", False, True
 

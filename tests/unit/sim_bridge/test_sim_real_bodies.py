@@ -62,7 +62,7 @@ def order(folder: Path, real: dict[str, Any], **scenario: Any) -> LaunchSpec:
 
 
 class Process:
-    """The bridge's process as far as its loop uses it."""
+    """Stand-in for the bridge's process, as used by its loop."""
 
     name, stop_requested, supervisor_alive = "sim_bridge", False, True
 
@@ -103,7 +103,7 @@ def port() -> int:
 
 @pytest.fixture
 def firmware(tmp_path: Path, port: int) -> Iterator[tuple[Harness, Process, socket.socket]]:
-    """A bridge that follows drone_1, and the socket of the firmware that tells where it is."""
+    """A bridge that follows drone_1, and the socket of the firmware that sends its pose."""
     process: Any = Process()
     real = {"drone_1": {"source": "autopilot", "address": ["127.0.0.1", port]}}
     harness = Harness(process, order(tmp_path, real))
@@ -158,7 +158,7 @@ def test_a_vehicle_does_not_move_when_its_simulator_is_placed_on_its_globe(
     mind = FrameEncoder(SYSTEM, 1)
     still = (0.0, 0.0, 0.0)
     teller.send(mind.encode(Attitude(1, *still, *still)))
-    for place in ((0.0, 0.0, 0.0), (1.0, 0.0, -1.0)):  # what it reports itself, before and after it has flown
+    for place in ((0.0, 0.0, 0.0), (1.0, 0.0, -1.0)):  # its own reports, before and after its flight
         teller.send(mind.encode(LocalPositionNed(2, *place, *still)))
         turn(harness, 0.05)
     before = harness.world.states()[0][:3].copy()

@@ -24,7 +24,7 @@ _net = count(1)
 
 
 class Room:
-    """One vehicle of the hangar, turned by hand."""
+    """One standalone vehicle, stepped by hand."""
 
     def __init__(self, kind: str, indoor: bool = False) -> None:
         name = f"{kind}@127.93.4.{next(_net)}"
@@ -109,7 +109,7 @@ def test_a_scenario_gives_it_errors_and_habits() -> None:
 
 
 def test_a_program_finds_a_shipped_scenario_by_its_name() -> None:
-    """MAVLink 1 until it is greeted is a habit of this one."""
+    """This scenario has MAVLink 1 until the first contact."""
     address = f"127.93.4.{next(_net)}"
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as waiting:
         waiting.bind(("127.0.0.1", 0))

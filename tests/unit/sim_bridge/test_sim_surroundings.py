@@ -70,7 +70,7 @@ def test_an_obstacle_under_the_ceiling_camera_hides_the_drone(
 
 
 def test_a_camera_tells_headings_by_the_mounting_that_the_field_has(lab_field: ResolvedField) -> None:
-    """A detector knows no other: what the camera is turned by stands in each heading, as it does in each place."""
+    """A detector uses the field's mounting only: the camera's rotation error is in each heading and position."""
     values = msgspec.to_builtins(lab_field)
     values["cameras"]["ceiling"]["attitude_std_deg"] = 5.0
     values["drones"]["drone_2"]["camera"]["attitude_std_deg"] = 5.0

@@ -25,7 +25,7 @@ PATHS = (
 
 
 def driven(scenario: TargetScenario, seconds: float, seed: int = 1) -> np.ndarray:
-    """Rows of the truth board, 200 Hz."""
+    """Return rows of the truth board, 200 Hz."""
     robot = Unicycle(scenario, TICK_S, generator_of(seed, "target"), HALF_ROOM)
     rows = []
     for _ in range(round(seconds / TICK_S)):

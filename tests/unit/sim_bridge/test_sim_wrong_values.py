@@ -103,7 +103,7 @@ def test_on_the_floor_an_obstacle_changes_nothing() -> None:
 
 
 class Drone:
-    """An emulated AR.Drone that flies, and its edge."""
+    """A flying emulated AR.Drone, and its `ArDroneEdge`."""
 
     def __init__(self, *faults: Fault, **scenario: Any) -> None:
         figures = DroneScenario(**scenario)

@@ -52,7 +52,7 @@ def killed_when_ready(child):
 
 
 def flying(child):
-    """Speak to a drone 30 times a second, whatever happens above."""
+    """Send to a drone 30 times a second, whatever happens to its parents."""
     drone = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     child.ready()
     while not child.stop_requested:

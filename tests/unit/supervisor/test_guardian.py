@@ -33,7 +33,7 @@ LAND_AFTER_S, LANDING_S = 1.0, 0.4
 
 
 class FakeDrone:
-    """A UDP port on loopback that notes (time [s], datagram)."""
+    """A UDP port on loopback that records (time [s], datagram)."""
 
     def __init__(self) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -62,7 +62,7 @@ def drone() -> Iterator[FakeDrone]:
 
 
 def table(drone: FakeDrone, entry: str, **options: object) -> tuple[ProcessSpec, ...]:
-    """Return a guardian that is content early, and a driver of a dummy's kind."""
+    """Return a guardian with a short landing time, and a driver of a dummy's kind."""
     words = FailsafeDatagrams("127.0.0.1", drone.port, b"hover", b"land", LAND_AFTER_S)
     section = json.dumps({"port": drone.port})
     guardian, driver = guarded(
@@ -117,7 +117,7 @@ SCRIPT = """
 
 
 class SupervisedRun:
-    """A supervisor in a process of its own; `pids` are those of its children by name."""
+    """A supervisor in its own process; `pids` are those of its children by name."""
 
     def __init__(self, folder: Path, rows: tuple[ProcessSpec, ...]) -> None:
         command = [sys.executable, "-c", textwrap.dedent(SCRIPT), str(folder), pickle.dumps(rows).hex()]
@@ -136,7 +136,7 @@ class SupervisedRun:
 
     def close(self) -> None:
         tasks = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children")
-        with suppress(OSError):  # those that were started again
+        with suppress(OSError):  # the restarted ones
             self.pids |= {f"child {pid}": int(pid) for pid in tasks.read_text().split()}
         self.process.kill()
         self.process.communicate()

@@ -27,10 +27,10 @@ def ago(ms: int) -> DriverSigns:
         (ago(400), 7, 7),
         (replace(ago(10), gone=True), 0, NOW - 10 * MS),
         (replace(ago(10), gone=True), 7, 7),
-        (replace(ago(900), ended=True, state=SlotState.STOPPING), 7, 0),  # it has landed what it flew
+        (replace(ago(900), ended=True, state=SlotState.STOPPING), 7, 0),  # it has landed its drone
         (replace(ago(10), state=SlotState.STOPPING), 0, NOW - 10 * MS),  # it crashed
         (replace(ago(900), state=SlotState.STARTING, worked=False), 0, 0),  # it never flew
-        (replace(ago(10), state=SlotState.STARTING, worked=False), 7, 7),  # started again: it has not got the word yet
+        (replace(ago(10), state=SlotState.STARTING, worked=False), 7, 7),  # restarted: it has no message yet
         (replace(ago(10), state=SlotState.STOPPING, worked=False, ended=True), 7, 7),  # it never met the drone
         (DriverSigns(), 7, 7),
         (replace(ago(10), state=SlotState.DEGRADED), 7, 0),

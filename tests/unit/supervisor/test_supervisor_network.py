@@ -26,7 +26,7 @@ def runtime(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(params=["0.0.0.0", "::"])
 def wildcard(request: pytest.FixtureRequest) -> Iterator[int]:
-    """A port that somebody listens on everywhere, as web servers and Zenoh's routers do."""
+    """A port with a listener on all addresses, as web servers and Zenoh's routers have."""
     both = request.param == "::"
     family = socket.AF_INET6 if both else socket.AF_INET
     with socket.create_server((request.param, 0), family=family, dualstack_ipv6=both) as server:

@@ -88,11 +88,11 @@ def test_who_waits_for_a_core_is_not_replaced_as_one_that_hangs(
     monkeypatch.setattr(supervisor.events, "event", lambda *words: heard.append(words[2]))
     monkeypatch.setattr(managed_process, "all_waited_ns", lambda pid: time.monotonic_ns())
     pid, begin = camera.pid, time.monotonic()
-    os.kill(pid, signal.SIGSTOP)  # it does not beat, and the kernel says that it waits
+    os.kill(pid, signal.SIGSTOP)  # no heartbeat, and the kernel reports that it waits
     until(supervisor, lambda: time.monotonic() > begin + 1.2)
     assert camera.pid == pid and not camera.kill_reason
     assert heard == ["gets no core of the processor: this computer is too busy"]
-    until(supervisor, lambda: camera.pid != pid and camera.is_up)  # but not for ever
+    until(supervisor, lambda: camera.pid != pid and camera.is_up)  # but with a time limit
 
 
 def test_a_freeze_of_the_supervisor_itself_is_nobodys_fault(make: Callable[..., Supervisor]) -> None:

@@ -123,7 +123,7 @@ def test_a_device_that_may_still_answer_is_waited_for(grace_s: float | None, up:
     ceiling = SimpleNamespace(spec=row, is_up=True, begins=False, life=1, state=SlotState.DEGRADED)
 
     def taken() -> list[str]:
-        waiting.take_up()  # who dies of its first work is not up: only the second look counts
+        waiting.take_up()  # a process that dies of its first work is not up: only the second check counts
         return [process.spec.name for process in waiting.take_up()]
 
     waiting = Waiting([ceiling], 0.0, grace_s)  # type: ignore[list-item]

@@ -13,7 +13,7 @@ GRACE_S = 5.0
 
 @pytest.fixture
 def driver() -> Any:
-    """What `Waiting` asks of a process: alive, and not up yet."""
+    """Stand-in for a process of `Waiting`: alive, and not up yet."""
     spec = SimpleNamespace(name="ceiling", start_limit_s=60.0)
     return SimpleNamespace(spec=spec, is_up=False, begins=True, life=1, state=SlotState.EMPTY, detail="")
 
@@ -23,7 +23,7 @@ def given_up_at(waiting: Waiting, until_s: float) -> float | None:
 
 
 def test_one_that_imports_slowly_is_waited_for(driver: Any) -> None:
-    """A second run on a full machine: its cameras took 10 s to import and were ready 23 s after the start."""
+    """A second run on a fully loaded machine: its cameras took 10 s to import and were ready 23 s after the start."""
     waiting = Waiting([driver], 0.0, GRACE_S)
     assert given_up_at(waiting, 30.0) is None
     driver.is_up, driver.state = True, SlotState.READY

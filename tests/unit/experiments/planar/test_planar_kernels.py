@@ -117,7 +117,7 @@ def test_equal_segments_cost_what_one_costs() -> None:
 
 @pytest.mark.parametrize("process", [1e-3, 1e-12])
 def test_extreme_variances_against_covariance_form(process: float) -> None:
-    """The short form of the predict would lose 6 digits where the process noise is tiny: the planner switches."""
+    """The short form of the prediction would lose 6 digits with tiny process noise: the planner switches."""
     parameters = PlanarParameters(robot_noise_m2_s=process, target_noise_m2_s=process)
     mean, _, level = bench_belief(6, "two-level", 1, parameters)
     for exponents in ([6] * 7, [-9] * 7, [-9, 6, -3, 0, 3, -6, 6], [6, 6, 6, 0, 0, 0, -9]):
@@ -146,7 +146,7 @@ def _joseph_cost(mean: Any, covariance: Any, level: Any, parameters: PlanarParam
 
 @pytest.mark.parametrize("softness_m", [4e-4, 1e-5])
 def test_a_reading_may_end_as_sharply_as_a_step(softness_m: float) -> None:
-    """Far within the range the exponent left what the series of exp is made for, and nobody saw anything."""
+    """Far within the range the exponent left the series' interval of exp, and the target counted as unseen."""
     parameters = PlanarParameters(softness_m=softness_m)
     mean, x = np.array([[0.3, 0.1], [0.45, 0.2], [0.6, 0.3]]), np.zeros(4)
     numpy = numpy_adjoint.Rollout(mean, 0.01 * np.eye(3), (0, 1), parameters).cost(x)
@@ -156,6 +156,6 @@ def test_a_reading_may_end_as_sharply_as_a_step(softness_m: float) -> None:
 
 
 def test_distances_must_be_rounded_at_zero() -> None:
-    """Above the sensor an unrounded distance has no gradient: NaN ended the descent where it began."""
+    """Above the sensor an unrounded distance has no gradient: NaN ended the descent at its start."""
     with pytest.raises(ValueError, match="epsilon_m must be positive"):
         PlanarParameters(epsilon_m=0.0)

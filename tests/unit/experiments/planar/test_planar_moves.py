@@ -17,7 +17,7 @@ PARAMETERS = PlanarParameters()
 
 
 def moves(belief: Any, parameters: PlanarParameters = PARAMETERS, segments: int = 1) -> list[Any]:
-    """Return what is said of each move and what is true: cost, then the gradients' largest difference and entry."""
+    """Return predicted and true values of each move: cost, then the gradients' largest difference and entry."""
     mean, covariance, level = belief
     robots = len(level)
     problem, work = make_problem(mean, covariance, parameters, segments), make_workspace(robots, parameters.steps)

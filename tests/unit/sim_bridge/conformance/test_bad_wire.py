@@ -16,7 +16,7 @@ VEHICLE, STRANGER, HOST = "127.44.3.11", "127.44.3.111", "127.44.3.1"
 
 @contextmanager
 def ends():
-    """A wire, the vehicle's socket and the driver's, connected to each other."""
+    """A wire, with the vehicle's and the driver's sockets connected to each other."""
     with ExitStack() as stack:
         vehicle, driver = (stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) for _ in range(2))
         vehicle.bind((VEHICLE, 0))

@@ -43,7 +43,7 @@ def odometry(at_ns, velocity):
 
 
 def flown(turned_rad=0.0, told=1.0):
-    """Return a square that a vehicle of heading 0.4 rad flew, turned by an angle; told: of its velocity."""
+    """Return a square flown with heading 0.4 rad, turned by an angle; told: share of its reported velocity."""
     record, at_ns, place, yaw = Record(), S, [0.0, 0.0], 0.4
     for mark, (ahead, aside) in LEGS.items():
         begin = at_ns
@@ -140,7 +140,7 @@ def test_a_driver_that_is_silent_for_long_fails():
 
 
 def hovering(rate_rad_s):
-    """Return what is seen of a vehicle that stands in the air and turns on the spot."""
+    """Return the samples of a vehicle that hovers and turns on the spot."""
     still = Moment(S, (0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), False, True, 0.9)
     turns = [(0.0, 0.0, math.remainder(rate_rad_s * i / 100, math.tau)) for i in range(250)]
     moments = [replace(still, at_ns=S + i * S // 100, attitude=one) for i, one in enumerate(turns)]
@@ -154,7 +154,7 @@ def test_a_hover_that_spins_is_no_hover():
 
 
 def drifting(gathers_m_s2, stands=True):
-    """Return what is seen of a vehicle that is told to hover, brakes from 0.4 m/s, and gathers speed again."""
+    """Return the samples of a vehicle with a hover command that brakes from 0.4 m/s, and accelerates again."""
     moments = []
     for i in range(250):
         speed = abs(max(0.0 if stands else 0.3, 0.4 - 0.004 * i) - gathers_m_s2 * max(0.0, i / 100 - 1.0))
@@ -180,7 +180,7 @@ def test_only_who_flies_on_our_positions_may_gather_speed_without_them(kind, rec
 
 
 def limited(share):
-    """Return the flight under low limits by a vehicle that goes to a share of each."""
+    """Return the flight under low limits by a vehicle that reaches a share of each."""
     record, at_ns, yaw = Record(), S, 0.0
     speed, climb, turn = 0.3 * share, 0.2 * share, math.radians(30.0) * share
     for mark, velocity, rate in (
@@ -244,14 +244,14 @@ def test_the_plug_in_makes_a_test_of_each_check(tmp_path):
 
 
 def test_no_check_passes_where_nothing_was_flown():
-    """A check that finds nothing to look at must not be green."""
+    """A check without data must not pass."""
     empty = Record(failure="it fell")
     passed = [one.name for one in CHECKS.values() if one.flight and verdict(empty, one.name).end != "failed"]
     assert passed == []
 
 
 def test_no_check_passes_where_the_driver_said_nothing():
-    """The vehicle flew through all of it, and no message came."""
+    """The vehicle flew throughout, without any message."""
     record, at_ns = flown(), 100 * S
     record.messages.clear()
     still = Moment(at_ns, (0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), False, True, 0.9)

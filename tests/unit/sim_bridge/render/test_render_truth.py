@@ -56,7 +56,7 @@ def cast(pose, window, code=5, square_m=0.044):
 
 
 def test_corners_agree_with_rays_to_hundredths_of_a_pixel():
-    """The same corner finder on both pictures: what differs is the renderer's own error."""
+    """The same corner finder on both pictures: the difference is the renderer's own error."""
     renderer, random, gaps = make(), np.random.default_rng(3), list[np.ndarray]()
     while len(gaps) < 25:
         x, y = random.uniform([1.2, -0.6], [2.6, 0.6])
@@ -157,5 +157,5 @@ def test_a_tag_is_drawn_where_projection_says(dictionary):
     finder = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, dictionary)))
     corners, ids, _ = finder.detectMarkers(renderer.render(np.array(states)))
     assert np.ravel(ids).tolist() == [7]
-    # Whole pixels: this finder does not refine. The order of the corners is what matters here.
+    # Whole pixels: this finder does not refine. Only the order of the corners matters here.
     assert np.reshape(corners, (4, 2)) == pytest.approx(truth, abs=1.6)

@@ -20,7 +20,7 @@ def scenario() -> Scenario:
 
 
 class Lab:
-    """The lab with a drone in the air that looks at the target, and what its camera says of it."""
+    """The lab with a drone in the air that looks at the target, and its camera's observations."""
 
     def __init__(self, field: ResolvedField) -> None:
         site, told = parse_site(msgspec.to_builtins(field)), scenario()
@@ -35,7 +35,7 @@ class Lab:
         self.frames = 0
 
     def look(self, count: int) -> tuple[int, int | None]:
-        """Return in how many of some pictures all was searched, and the first that shows the target."""
+        """Return the number of pictures searched whole, and the first one that shows the target."""
         searches, first = 0, None
         for k in range(count):
             stamp_ns = self.frames * FRAME_NS
@@ -48,7 +48,7 @@ class Lab:
         return searches, first
 
     def hear(self, place: tuple[float, float] | None, age_s: float, *searched: str) -> None:
-        """Tell the camera where the target is believed, for the next second."""
+        """Give the camera the target's believed position, for the next second."""
         covariance = tuple(0.0004 if row == column else 0.0 for row in range(4) for column in range(4))
         mean = (0.0, 0.0, 1.3, 0.0)
         entities = [EntityEstimate("drone_1", "robot", mean, covariance, (0.0, 0.0, 0.0), True, 0.1)]

@@ -18,7 +18,7 @@ FIELD: dict[str, Any] = {
 
 
 def test_drivers_know_the_pads_that_were_drawn() -> None:
-    """They refuse to start where somebody flies, and feed an autopilot its pad until it is seen."""
+    """They refuse to start near a flying drone, and send an autopilot its pad until it is observed."""
     drones = draw(FIELD, Scenario(), 7, (11.0, 20.0)).field["drones"]
     alone = json.dumps({"name": "drone_1", "pad_m": [9.0, 9.0]})
     fleet = json.dumps({"link": {}, "vehicles": [{"name": "px4_1", "pad_m": [9.0, 9.0], "pad_yaw_rad": 9.0}]})

@@ -19,7 +19,7 @@ FIELD: dict[str, Any] = {
 @pytest.mark.timeout(60)
 @pytest.mark.parametrize(("drones", "seed"), [(3, 683), (4, 39)])
 def test_pads_that_leave_no_room_for_another_are_drawn_anew(drones: int, seed: int) -> None:
-    """Two that lie well cover the whole floor before the camera: the campaign looked for a third for ever."""
+    """Two well-placed pads cover the whole floor before the camera: the campaign searched for a third for ever."""
     team = {f"drone_{number}": {"kind": "ardrone"} for number in range(drones)}
     flown = draw({**FIELD, "drones": team}, Scenario(), seed, (11.0, 20.0))
     pads = [drone["pad_m"] for drone in flown.field["drones"].values()]

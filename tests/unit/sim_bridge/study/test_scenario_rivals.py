@@ -51,7 +51,7 @@ def test_without_a_topology_every_camera_counts_on_everybody() -> None:
 
 @pytest.mark.parametrize("strategy", ["no-topology", "sampling", "lattice"])
 def test_each_does_better_than_hovering_where_it_looks_away(strategy: str) -> None:
-    """drone_2 looks away from a target that drone_1 sees: any search finds something cheaper than to stay so."""
+    """drone_2 looks away from a target that drone_1 sees: any search finds something cheaper than hovering."""
     at = belief((0.6, 0.0))
     builder = EveryPair(PLANNER.parameters, PLANNER.sensors)
     problem = builder.build(scene_from_belief(at, STRING.robots), STRING)

@@ -36,7 +36,7 @@ def fault(kind: str, **more: Any) -> Fault:
     return Fault(kind=FaultKind(kind), **given)
 
 
-# -- what is drawn --------------------------------------------------------------------------------------------------
+# -- random draws ---------------------------------------------------------------------------------------------------
 
 
 def test_a_seed_is_one_flight_and_seeds_differ() -> None:
@@ -60,7 +60,7 @@ def test_pads_are_apart() -> None:
         assert math.dist(*pads) >= 1.1
 
 
-# -- judged by truth ------------------------------------------------------------------------------------------------
+# -- judgement by truth ---------------------------------------------------------------------------------------------
 
 
 def row(x: float, y: float, vx: float = 0.0, ground: bool = False) -> Any:
@@ -107,7 +107,7 @@ def test_to_fly_on_a_wrong_belief_is_unsafe_and_to_hover_is_not() -> None:
 
 
 def flown(stops_s: float, rests_s: float) -> Any:
-    """A drone that moves at 0.3 m/s until it rests, and is told to until it stops."""
+    """A drone that moves at 0.3 m/s until it rests, with setpoints to move until it stops."""
     return {
         "rows": lambda t: row(-1.0 + 0.3 * (min(t, rests_s) - 5.0), 0.0, 0.3 * (t < rests_s)),
         "told": lambda t: t < stops_s,
@@ -176,7 +176,7 @@ def test_nothing_is_due_after_a_fault_that_need_not_stop_or_healed_at_once() -> 
         assert judged(**flown(99.0, 99.0), faults=(harmless,))["unsafe"] == {}
 
 
-# -- from when on it shows ------------------------------------------------------------------------------------------
+# -- time at which a fault shows ------------------------------------------------------------------------------------
 
 
 def test_a_stuck_velocity_shows_once_the_drone_moves() -> None:
@@ -249,7 +249,7 @@ def test_the_local_bus_hands_messages_over_as_they_are() -> None:
 
 
 class Eye:
-    """Sees one thing after the other."""
+    """Gives one observation after the other."""
 
     name, period_s = "a", 0.1
 
@@ -283,7 +283,7 @@ def test_wrong_pictures_at_message_level(kind: str, seen: list[float]) -> None:
     found = []
     for t in (0.5, 1.0, 2.0, 3.0):
         world: Any = SimpleNamespace(time_s=t, drones=())
-        eye.n = round(t)  # what an honest picture would show
+        eye.n = round(t)  # content of an honest picture
         found += camera.look(world, int(t * 1e9), "c")
     assert [one.position_m[0] for one in found] == seen
     assert len({(one.header.stamp_ns, one.header.seq) for one in found}) == len(found)

@@ -1,4 +1,4 @@
-"""Commands that the buttons publish on the bus, and what the page says about them."""
+"""Commands that the buttons publish on the bus, and the page's texts about them."""
 
 from typing import Any
 

@@ -96,7 +96,7 @@ def test_cut_motors_held_while_the_next_run_appears_does_not_cut_it(stage: Any) 
 def test_a_stop_lives_for_five_seconds(stage: Any, asleep: bool) -> None:
     page = cut_off(stage, run="run-1")
     page.there("land-all").click()
-    if asleep:  # performance.now() stands still, and nothing runs
+    if asleep:  # performance.now() stands still, and no script runs
         page.page.evaluate("() => { const wall = Date.now; Date.now = () => wall() + 6000; }")
     else:
         page.page.wait_for_timeout(5500)

@@ -1,4 +1,4 @@
-"""Two labs' worth of vehicles with the same addresses, each behind an adapter of its own; prints what reached whom.
+"""Two sets of vehicles with the same addresses, each behind its own adapter; prints the datagrams that each received.
 
 Run in a network namespace of its own, as root there: `unshare --user --map-root-user --net python one_address.py`. The
 vehicles of each adapter live in a further namespace at its other end; both ends have the same addresses.

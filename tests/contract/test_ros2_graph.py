@@ -1,4 +1,4 @@
-"""The ROS 2 bridge on a ROS-like Zenoh router: a foreign client lists its topics and decodes them."""
+"""The ROS 2 bridge on a ROS-like Zenoh router: a foreign client lists the topics and decodes them."""
 
 import time
 from collections.abc import Iterator

@@ -1,5 +1,8 @@
-"""What sensors, streams, clocks and people do to the estimator in flight: a verdict with its reason, and a belief that
-holds, or is put right within seconds for that entity alone. Hovering flights at message level, honest noise."""
+"""Faults of sensors, streams, clocks and people, and the estimator's response in flight.
+
+It gives a verdict with its reason; the belief holds, or is corrected within seconds for that entity alone. Hovering
+flights at message level, honest noise.
+"""
 
 from collections import defaultdict
 from collections.abc import Callable

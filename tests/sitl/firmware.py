@@ -32,7 +32,7 @@ def ports_of(flavour: str, system: int) -> tuple[int, int]:
 class Firmware:
     """One running binary; parameters: set before the first start; speed: its clock's maximum rate, real time = 1.
 
-    `end` keeps what was set since.
+    `end` keeps the parameters set since.
     """
 
     def __init__(

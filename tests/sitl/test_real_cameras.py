@@ -103,5 +103,5 @@ def test_a_printed_board_is_seen_by_the_camera_and_flies_nowhere(tmp_path: Path,
             case Estimate() as estimate:
                 believed |= {entity.name for entity in estimate.entities}
     assert len(seen) > 3 and "drone_2" not in believed
-    # The ceiling hangs at (-1.7, 0, 4.2); the marker lies 0.14 m above the floor. Optical: right, down, forward.
+    # The ceiling camera is at (-1.7, 0, 4.2); the marker 0.14 m above the floor. Optical: right, down, forward.
     assert np.median(seen, axis=0) == pytest.approx((PAD_M[0] + 1.7, -PAD_M[1], 4.06), abs=0.12)

@@ -110,7 +110,7 @@ def fly(two: TwoHosts, order: dict[str, Any]) -> dict[str, Any]:
 def kill(two: TwoHosts, order: dict[str, Any]) -> dict[str, Any]:
     """Break something in flight; return when the drones stopped and how they had flown [s, m].
 
-    kill: the victim; signal: "SIGKILL", or "SIGSTOP" for one that freezes; resume: order RESUME at the end.
+    kill: the victim; signal: "SIGKILL", or "SIGSTOP" for one that freezes; resume: give RESUME at the end.
     """
     host, run = two.start(order)
     victims = {"liaison": lambda: [run.pid(f"liaison_{HOST}")], "supervisor": lambda: [run.process.pid]}

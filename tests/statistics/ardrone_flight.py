@@ -127,7 +127,7 @@ def _status(bus: _Published, t: float) -> VehicleStatus:
 
 
 class Cameras:
-    """What the ceiling and the drone's own camera see of the truth; askew: the ceiling hangs as badly as it may."""
+    """Ceiling and drone cameras on the truth; askew: the ceiling camera has the greatest allowed mounting error."""
 
     def __init__(self, recording: Recording, field: ResolvedField, seed: int, askew: bool = False) -> None:
         self._truth, self._reported = recording.truth, recording.reported

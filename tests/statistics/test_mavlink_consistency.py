@@ -39,7 +39,8 @@ def fly(field: ResolvedField, seeds: range, duration_s: float) -> list[dict[str,
 def test_short_flights_are_near_consistent(field: ResolvedField) -> None:
     """A coarse alarm: double counting would show as an error many times its standard deviation.
 
-    Three flights: in one all headings are off by the turn of one camera (seed 1: 0.5 deg, where 0.2 are believed).
+    Three flights: in one all headings are off by the rotation of one camera (seed 1: 0.5 deg, with a standard deviation
+    of 0.2).
     """
     found = summary(fly(field, range(1, 4), 4.0), field)
     assert 0.2 <= found["anees robots"].mean <= 1.8
@@ -49,13 +50,13 @@ def test_short_flights_are_near_consistent(field: ResolvedField) -> None:
 @pytest.mark.slow
 @pytest.mark.timeout(3000)
 def test_flights_with_the_loop_closed(field: ResolvedField) -> None:
-    """Flights of 20 s, some 3 s of CPU each; band 0.8..1.3 for what the means may be, of 50 flights +- 0.3 at most.
+    """Flights of 20 s, some 3 s of CPU each; band 0.8..1.3 for the means, of 50 flights +- 0.3 at most.
 
-    One flight's mean scatters by 0.5, so that of 32 by 0.09: 0.69 and 0.79 were found of the same code.
+    One flight's mean scatters by 0.5, so that of 32 by 0.09: the same code gave 0.69 and 0.79.
 
-    A mean is outside when its whole 95 % interval is: 0.79 +- 0.14 cannot be told from 0.8. No mean may be outside of
-    0.7..1.4, whatever its interval. Shorter flights would judge a parked target (15 s: 0.79): it departs 3 s after the
-    slowest take-off.
+    A mean is outside when its whole 95 % interval is: 0.79 +- 0.14 does not differ from 0.8 significantly. No mean may
+    be outside of 0.7..1.4, whatever its interval. Shorter flights would judge a parked target (15 s: 0.79): it departs
+    3 s after the slowest take-off.
     """
     reports = fly(field, range(100, 100 + FLIGHTS), 20.0)
     found = summary(reports, field)

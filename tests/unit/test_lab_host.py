@@ -65,7 +65,7 @@ def _container_program() -> str | None:
 
 @pytest.fixture(scope="module")
 def image() -> tuple[str, str]:
-    """What builds and runs images, and the tag of ours; with BUILDAH_ISOLATION=chroot it builds in a container too."""
+    """The program that builds and runs images, and our tag; with BUILDAH_ISOLATION=chroot also in a container."""
     program = _container_program()
     if program is None:
         pytest.skip("no podman and no docker that answers")

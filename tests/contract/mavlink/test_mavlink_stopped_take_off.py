@@ -1,4 +1,4 @@
-"""A take-off that somebody else stops: the driver does not request it again."""
+"""A take-off stopped from elsewhere: the driver does not request it again."""
 
 from drivers.mavlink.wire.flight import CommandLong
 from drivers.mavlink.wire.names import FORCE, CopterMode, Flavour, MavCmd, Px4Auto, Px4Main, px4_mode

@@ -54,7 +54,7 @@ def test_an_answer_to_its_order_is_told() -> None:
         (11, ack(MavCmd.NAV_LAND, 0)),
         (11, ack(MavCmd.NAV_LAND, 11)),  # PX4 answers itself
         (11, ack(MavCmd.REQUEST_MESSAGE, 254)),  # it only observes
-        (1, ack(MavCmd.NAV_LAND, 254)),  # a vehicle of somebody else
+        (1, ack(MavCmd.NAV_LAND, 254)),  # another operator's vehicle
     ],
 )
 def test_what_is_no_second_master_is_not_told(system: int, message: Message) -> None:

@@ -102,10 +102,10 @@ def test_a_signed_vehicle_obeys_driver_supervisor_and_guardian_in_any_order(vehi
 @pytest.mark.parametrize(
     ("flying", "restarted", "speaking"),
     [
-        (-3600, -3600, -3600),  # put back in flight
-        (3600, 3600, 3600),  # put forward, and the driver started anew since
-        (3600, 0, 0),  # put forward and back
-        (3600, 3600, 0),  # put forward, the driver started anew, put back
+        (-3600, -3600, -3600),  # clock set back in flight
+        (3600, 3600, 3600),  # clock set forward, and the driver restarted since
+        (3600, 0, 0),  # clock set forward and back
+        (3600, 3600, 0),  # clock set forward, the driver restarted, the clock set back
     ],
 )
 def test_who_speaks_for_a_driver_is_heard_though_the_clock_was_set_in_flight(

@@ -1,4 +1,4 @@
-"""A stop cancels earlier start commands, by the sender's clock."""
+"""A stop cancels earlier start commands, by the clock of their sender."""
 
 import pytest
 

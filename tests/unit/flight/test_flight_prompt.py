@@ -34,7 +34,7 @@ class Ends(NamedTuple):
 
 
 class Waiting:
-    """A run whose drone stands; a page presses a button at the first turn, the keyboard Enter at the fifth."""
+    """A run whose drone is on the ground; a page presses a button at the first turn, the keyboard Enter at turn 5."""
 
     def __init__(self, keyboard: Ends, pressed: m.Verb, typed: bytes = b"\n") -> None:
         exchange = MemoryExchange()

@@ -1,4 +1,4 @@
-"""Pre-flight findings about each camera's pictures."""
+"""Pre-flight findings about each camera's pictures, the links and the vehicles."""
 
 from typing import Any
 

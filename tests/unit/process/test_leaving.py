@@ -1,4 +1,4 @@
-"""A read-only program exits at one signal, whatever it is doing."""
+"""A program that only observes exits at one signal, whatever it is doing."""
 
 import signal
 import subprocess

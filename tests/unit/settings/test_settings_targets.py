@@ -1,4 +1,4 @@
-"""Target settings of a field file reach the estimator."""
+"""Target settings of a field file reach estimator, planner and cameras."""
 
 import math
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Allowed parameter values: by value, range and other parameters; and defaults for those absent in the field file."""
+"""Allowed parameter values: by value, range and other parameters; and differing values of the field file."""
 
 import pytest
 

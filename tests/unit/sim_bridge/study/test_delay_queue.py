@@ -1,4 +1,4 @@
-"""Delayed messages arrive in the order of their times, and in the order of sending at equal times."""
+"""Delayed messages arrive in the order of their due times, and once; at equal times in the order of sending."""
 
 from sim_bridge.study.delay_queue import DelayQueue
 

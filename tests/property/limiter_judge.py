@@ -50,8 +50,8 @@ def _turned(vectors: Array, angles: Array) -> Array:
 def judge(states: TeamStates, told: Told, robot: int) -> Counter[str]:
     """Assert the promises for one robot's setpoints; returns the number of states by outcome.
 
-    "hovers": unfit to fly; "open": the wish leads nowhere; "bent": a wall is in its way; "held off": a wall asks for
-    motion against a drift; "squeezed": the walls ask for more than a vehicle can do.
+    "hovers": unfit to fly; "open": no wall limits the wish; "bent": a wall limits the wish; "held off": a wall requires
+    motion against a drift; "squeezed": the walls require more than a vehicle can do.
     """
     velocity, rate = told.velocities[:, robot], told.yaw_rates[:, robot]
     unfit = states.unfit(robot)

@@ -2,8 +2,8 @@
 
 FLAVOURS: px4, ardupilot, or px4,ardupilot for both in one flight.
 
-The fault ends the flight: `dark` takes the cameras, `kill` the driver, `guarded` the driver with the guardian as fail-
-safe sender, `none` nothing. HOVER: duration of the hover before TRACK [s].
+The fault ends the flight: `dark` takes the cameras, `kill` the driver, `guarded` the driver while the guardian sends the
+fail-safe commands, `none` nothing. HOVER: duration of the hover before TRACK [s].
 """
 
 import json

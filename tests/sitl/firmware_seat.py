@@ -106,7 +106,7 @@ class Seat:
     # -- the study's link ---------------------------------------------------------------------------------------------
 
     def obey(self, velocity: tuple[float, float, float], yaw_rate: float, now_s: float) -> None:
-        """Accept a setpoint of the tracker; while the study hovers, only setpoints that hold its place come."""
+        """Accept a setpoint of the tracker; while the study hovers, only setpoints that hold its place arrive."""
         header, holds = self.bus.header(self.name), self.mode in ("HOVER", "HOLD")
         setpoint = VelocitySetpoint(
             header=header, velocity_m_s=velocity, yaw_rate_rad_s=yaw_rate, lifetime_ms=300, epoch=1, holds=holds

@@ -57,7 +57,7 @@ class Rogues:
             bus._session.put(key, payload, attachment=attachment)
 
     def garbage(self) -> None:
-        """Put everything that is no message under keys of every topic, also in the names of our own processes."""
+        """Publish everything but valid messages under keys of every topic, also in the names of our own processes."""
         for topic in TOPICS.values():
             for entity in ("drone_1", "team", "tracker", "nobody"):
                 for source in ("cli_1", "supervisor", "tracker", "drone_1"):

@@ -33,7 +33,7 @@ def is_given_up(rig) -> bool:
 
 
 def stop(rig, mode):
-    """Change the vehicle's mode as somebody else, for good."""
+    """Change the vehicle's mode from elsewhere, permanently."""
     firmware = begin(rig)
     firmware.enter(mode)
     rig.run(4.0)

@@ -191,7 +191,7 @@ def test_who_flies_on_our_estimate_stops_before_the_border_behind_which_nobody_s
 def test_a_plan_does_not_lift_it_out_of_the_views_and_brings_it_inside_first() -> None:
     """Three times of three a real PX4 that took off towards the border was lifted over it, and landed 3 s after TRACK.
 
-    Its own velocity was off by 0.35 m/s by then, which is as much as the hold at a border makes good.
+    Its own velocity was off by 0.35 m/s by then, as much as the hold at a border can correct.
     """
     tied = Sight(0.1, untied_s={"drone_2": 0.1})
     views = SENSORS.root_views(1.5 + SENSORS.marker_height_m["drone_2"])

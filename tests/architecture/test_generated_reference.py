@@ -1,4 +1,4 @@
-"""The generated pages of the reference leave nothing out, and everything in them has a text."""
+"""The generated reference is complete, and every entry has a description."""
 
 import re
 from pathlib import Path

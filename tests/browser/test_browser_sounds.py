@@ -1,4 +1,4 @@
-"""Speech, sounds and vibration for each event; muting never disables a stop."""
+"""Speech, sounds and vibration for each event; muting never silences those of a stop."""
 
 from typing import Any
 

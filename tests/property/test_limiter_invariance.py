@@ -1,4 +1,4 @@
-"""The output limiter's half-spaces: the nearest velocity, and fence and separation kept against an unsaid drift.
+"""The output limiter's half-spaces: the nearest velocity; fence and separation kept against an unreported drift.
 
 `make limiter-states` draws ten million states.
 """

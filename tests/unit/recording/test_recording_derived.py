@@ -1,4 +1,4 @@
-"""Data for viewers in recordings beside our own messages: all frames, and events as log lines."""
+"""Data for viewers in recordings beside our own messages: all coordinate frames, and events as log lines."""
 
 import json
 import math

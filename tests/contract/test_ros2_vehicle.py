@@ -1,4 +1,4 @@
-"""Driver, fail-safe sender and emulator of a vehicle behind a ROS 2 node, through a router on loopback."""
+"""Driver, failsafe sender and emulator of a vehicle behind a ROS 2 node, through a router on loopback."""
 
 import time
 from collections.abc import Callable, Iterator

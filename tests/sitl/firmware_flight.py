@@ -3,7 +3,7 @@
 FLAVOURS: px4, ardupilot, or px4,ardupilot for both in one flight.
 
 The fault ends the flight: `dark` takes the cameras, `kill` the driver, `guarded` the driver while the guardian sends
-fail-safe commands, `none` nothing. HOVER: duration of the hover before TRACK [s].
+failsafe commands, `none` nothing. HOVER: duration of the hover before TRACK [s].
 """
 
 import json

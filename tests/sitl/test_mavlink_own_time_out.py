@@ -1,4 +1,4 @@
-"""A driver process killed or frozen in flight without a fail-safe sender: the vehicles stop by themselves."""
+"""A driver process killed or frozen in flight without a failsafe sender: the vehicles stop by themselves."""
 
 import math
 import os

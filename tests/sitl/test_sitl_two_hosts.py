@@ -22,7 +22,7 @@ LINK_S = 0.5  # 20 ms, a repeated packet, and 0.2 s without an answer: then the 
 AT_ONCE_S = 1.5  # a dead supervisor: brake for a second, then land
 FIRMWARE_S = 2.5  # an AR.Drone's own time-out: it hovers after 2 s, and the emulated one lands
 DOWN_S = 5.0  # from the order to the floor
-STOPPED_S = 2.0  # hover after 0.3 s, or 0.4 s with a fail-safe sender; then it brakes
+STOPPED_S = 2.0  # hover after 0.3 s, or 0.4 s with a failsafe sender; then it brakes
 
 
 def why_impossible() -> str:

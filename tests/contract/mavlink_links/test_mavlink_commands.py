@@ -179,7 +179,7 @@ def test_a_key_that_others_can_read_is_none(tmp_path, mode):
 
 
 def test_a_companion_that_calls_from_elsewhere_does_not_take_the_address_of_its_autopilot():
-    """A companion has the vehicle's system id; commands and fail-safe frames are not for it."""
+    """A companion has the vehicle's system id; commands and failsafe frames are not for it."""
     link = UdpLink(LinkSettings(target="udpin:127.0.0.1:0"))
     companion = FrameEncoder(11, 191).encode(telemetry.Heartbeat(18, 8, 0, 0, 4))
     autopilot = FrameEncoder(11, 1).encode(telemetry.Heartbeat(2, 12, 1, 0, 3))

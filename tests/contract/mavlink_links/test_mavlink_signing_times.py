@@ -77,7 +77,7 @@ def test_our_times_go_on_from_what_a_vehicle_knows(vehicle, now):
 
 
 def test_a_clock_that_is_set_in_flight_moves_our_times_by_nothing(vehicle, now, monkeypatch):
-    """A fail-safe sender signs by the same clock, and does not know the driver's last timestamp."""
+    """A failsafe sender signs by the same clock, and does not know the driver's last timestamp."""
     link = UdpLink(LinkSettings(target=f"udpout:127.0.0.1:{vehicle.getsockname()[1]}"), Signing(KEY, now))
     real, stamps = time.time, []
     for hours in (0, 1, 1, -1):

@@ -1,4 +1,4 @@
-"""Fail-safe frames in place of a dead driver arrive on every kind of link: signed, called by the vehicle, serial."""
+"""Failsafe frames in place of a dead driver arrive on every kind of link: signed, called by the vehicle, serial."""
 
 import dataclasses
 import json
@@ -33,7 +33,7 @@ S = 1_000_000_000
 
 
 def words_of(tmp_path, **mavlink):
-    """Return the fail-safe frames of the mixed team's MAVLink drivers, for another address."""
+    """Return the failsafe frames of the mixed team's MAVLink drivers, for another address."""
     field = load_field(FIELD)
     for name, drone in field.drones.items():
         if drone.kind == "mavlink":

@@ -1,4 +1,4 @@
-"""AR.Drone settings reach its driver and its fail-safe datagrams; emulator ports do not."""
+"""AR.Drone settings reach its driver and its failsafe datagrams; emulator ports do not."""
 
 import dataclasses
 import json

@@ -1,4 +1,4 @@
-"""The fail-safe sender with a broken or full serial line, with a network adapter, and for many vehicles."""
+"""The failsafe sender with a broken or full serial line, with a network adapter, and for many vehicles."""
 
 import json
 import os

@@ -145,8 +145,8 @@ class Fault(Section):
     """When it heals [s after the simulator is ready]; none: it does not."""
     value: Annotated[float, Field(ge=-1000, le=1000)] | None = None
     """Size of the fault, as `kind` explains; none: 0.5 s, 0 m/s, 0.5 times, 0.1 m/s^2, 0.5 m/s, 1 deg/s, 30 deg, a
-    charge of 1, 0.4 m (body_jumped, ranges_long: 0.5 m), 1 m/s^2, 5 deg, each for the kind of that unit; battery_drop needs
-    a value."""
+    charge of 1, 0.4 m (body_jumped, ranges_long: 0.5 m), 1 m/s^2, 5 deg, each for the kind of that unit; battery_drop
+    needs a value."""
     direction_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
     """Direction of value: velocities counter-clockwise from forward, wind from world x; the axis that a camera turns
     about counter-clockwise from its image's right."""

@@ -50,9 +50,9 @@ class FaultKind(StrEnum):
 
 
 class Part(Enum):
-    """What can have a fault: any vehicle, one whose emulator has it (`VehicleKind.emulated_faults`), a camera, the
-    marker of a drone or target, a motion capture system, its body on a drone or target, a ranging system, a
-    drone's radio for it, or a target that tells its odometry."""
+    """Parts that can have a fault: any vehicle, one whose emulator has it (`VehicleKind.emulated_faults`), a camera,
+    the marker of a drone or target, a motion capture system, its body on a drone or target, a ranging system, a
+    drone's radio for it, or a target that reports its odometry."""
 
     VEHICLE = auto()
     ABLE_VEHICLE = auto()
@@ -119,36 +119,36 @@ class Fault(Section):
     """One fault of a drone, camera or marker."""
 
     kind: FaultKind
-    """navdata_silent: a vehicle sends nothing; at_deaf: it hears nothing; camera_cut: a camera's connection is closed
-    and refused; camera_stall: it stays open, without pictures; battery_drop: the charge falls to value;
-    propeller_blocked: an AR.Drone's cut-out stops its motors, an emergency until it is free; telemetry_frozen: what a
-    vehicle sends comes, and repeats its contents; telemetry_delayed: it is value old [s]; velocity_stuck,
+    """navdata_silent: a vehicle sends nothing; at_deaf: it receives nothing; camera_cut: a camera's connection is
+    closed and refused; camera_stall: it stays open, without pictures; battery_drop: the charge falls to value;
+    propeller_blocked: an AR.Drone's cut-out stops its motors, an emergency until it is free; telemetry_frozen: a
+    vehicle's telemetry repeats its contents; telemetry_delayed: it is value old [s]; velocity_stuck,
     velocity_scaled, velocity_drifting, velocity_jumping: the reported horizontal velocity is value [m/s], value times
-    what it should be, grows by value [m/s^2], is off by value [m/s]; heading_drifting, heading_jumping: the reported
+    the correct one, grows by value [m/s^2], is off by value [m/s]; heading_drifting, heading_jumping: the reported
     heading turns by value [deg/s], is off by value [deg]; battery_stuck: the reported charge is value;
     uniform_floor: an AR.Drone's optical flow finds nothing, neither for its reports nor for its hover;
     obstacle_below: something value high [m] stands under its ultrasound; wind: air pushes by value [m/s^2], and an
-    AR.Drone's reported tilt does not say how far it leans against it; ids_swapped: two vehicles have each other's
+    AR.Drone's reported tilt does not show how far it leans against it; ids_swapped: two vehicles have each other's
     address or id, from the start; camera_bumped: a camera is turned by value [deg]; picture_frozen, picture_black: its
     pictures come, and repeat the last one, are black; wrong_board: the entity carries the board of the other;
     capture_silent, capture_frozen: a motion capture system sends nothing, repeats its last frame; body_jumped: all
     systems have the entity's body value [m] aside; bodies_swapped: they name two bodies for each other; ranges_silent,
     ranges_frozen: a ranging system sends nothing, repeats each drone's last round; ranges_long: those of a drone are
     value [m] too long, as behind a wall; odometry_silent, odometry_frozen, odometry_scaled: a target's own odometry
-    ends, repeats its contents, tells value times the speed of its wheels."""
+    ends, repeats its contents, reports value times the speed of its wheels."""
     entity: str
     """The drone, camera (of a drone's camera: the drone), motion capture or ranging system; for boards and bodies a
-    drone or target; for odometry a target that tells its own."""
+    drone or target; for odometry a target that reports its own."""
     start_s: Annotated[float, Field(ge=0)]
     """When it breaks [s after the simulator is ready]."""
     end_s: Annotated[float, Field(ge=0)] | None = None
     """When it heals [s after the simulator is ready]; none: it does not."""
     value: Annotated[float, Field(ge=-1000, le=1000)] | None = None
-    """How much, as `kind` explains; none: 0.5 s, 0 m/s, 0.5 times, 0.1 m/s^2, 0.5 m/s, 1 deg/s, 30 deg, a charge of 1,
-    0.4 m (body_jumped, ranges_long: 0.5 m), 1 m/s^2, 5 deg, each for the kind of that unit; battery_drop must be
-    told."""
+    """Size of the fault, as `kind` explains; none: 0.5 s, 0 m/s, 0.5 times, 0.1 m/s^2, 0.5 m/s, 1 deg/s, 30 deg, a
+    charge of 1, 0.4 m (body_jumped, ranges_long: 0.5 m), 1 m/s^2, 5 deg, each for the kind of that unit; battery_drop
+    needs a value."""
     direction_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
-    """Where value points: velocities counter-clockwise from forward, wind from world x; the axis that a camera turns
+    """Direction of value: velocities counter-clockwise from forward, wind from world x; the axis that a camera turns
     about counter-clockwise from its image's right."""
     other: str | None = None
     """ids_swapped, wrong_board, bodies_swapped: the other vehicle; the drone or target whose board or body it is."""

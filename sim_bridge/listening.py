@@ -1,4 +1,4 @@
-"""Opens ports of the simulator, and words the error for ports that it cannot have."""
+"""Opens ports of the simulator, and composes the error message for ports in use."""
 
 import socket
 

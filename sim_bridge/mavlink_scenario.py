@@ -1,4 +1,4 @@
-"""What a scenario says of emulated MAVLink vehicles: its section `mavlink`, named by their kind."""
+"""The section `mavlink` of a scenario: errors of emulated MAVLink vehicles; their kind names it."""
 
 from typing import Annotated
 
@@ -27,9 +27,9 @@ class CopterScenario(Section):
     """Error of the estimated horizontal velocity at lift-off, one sigma per axis [m/s]: of a PX4. An ArduPilot has a
     twentieth of it."""
     one_partner: bool = False
-    """true: it answers only the first that spoke to it, until it is started again, as PX4's UDP link does."""
+    """true: it answers only its first sender, until it is started again, as PX4's UDP link does."""
     mavlink_1_until_greeted: bool = False
-    """true: it speaks MAVLink 1 until it hears MAVLink 2, as PX4 with MAV_PROTO_VER 0 does."""
+    """true: it speaks MAVLink 1 until it receives MAVLink 2, as PX4 with MAV_PROTO_VER 0 does."""
     gyro_bias_deg_s: Annotated[float, Field(ge=0, le=5)] = 0.05
     """Bias of the gyroscopes, one sigma [deg/s]."""
     battery: Annotated[tuple[Share, Share], AfterValidator(rising)] = (0.85, 1.0)

@@ -51,7 +51,7 @@ def true_lens(told: Lens, errors: bool, rng: np.random.Generator) -> CameraIntri
 
 
 def as_measured(point: Array, true: CameraIntrinsics, told: CameraIntrinsics) -> Array:
-    """Return a marker's place (3) [m; optical] as a detector computes it with the lens `told`, not the true one."""
+    """Return a marker's place (3) [m; optical] as a detector computes it with the lens `told`, that of the field."""
     if true == told:
         return point
     across = told.normalised_from_pixels(true.project(point))

@@ -40,15 +40,15 @@ Share = Annotated[float, Field(ge=0, le=1)]
 
 
 class TargetScenario(Section):
-    """A simulated target, a TurtleBot unless told otherwise."""
+    """A simulated target, by default a TurtleBot."""
 
     path: Annotated[Path, Field(discriminator="shape")] = FigureEight()
-    """What the target drives along."""
+    """Path of the target."""
     base: Literal["turtlebot_2", "person", "rc_car"] = "turtlebot_2"
-    """What it can do at most. turtlebot_2: 0.7 m/s, 0.5 m/s^2, 180 deg/s; person: 1.5 m/s, 2 m/s^2, 360 deg/s;
+    """Limits of its motion. turtlebot_2: 0.7 m/s, 0.5 m/s^2, 180 deg/s; person: 1.5 m/s, 2 m/s^2, 360 deg/s;
     rc_car: 3 m/s, 4 m/s^2, 180 deg/s."""
     kidnaps: tuple[Kidnap, ...] = ()
-    """When somebody carries it away."""
+    """Times at which somebody carries it away."""
     departs_after_team_s: Annotated[float, Field(ge=0, le=86_400)] | None = 3.0
     """The target stays parked at the start of its path until this long after all drones took off [s]; none: it drives
     from the beginning."""
@@ -59,7 +59,7 @@ class TargetScenario(Section):
 
 
 def _beside(scenario: TargetScenario, rank: int) -> TargetScenario:
-    """Return the scenario of the rank-th target (0: the first) where one is told for all, so that none meet.
+    """Return the scenario of the rank-th target (0: the first) from the one given for all, so that none meet.
 
     On an eight each is some way ahead of the one before (half a turn ahead, they would meet where the path crosses
     itself); those that wait or walk at random start 1 m apart; along walls each starts in a corner of its own, and
@@ -98,8 +98,8 @@ Firmware = Annotated[str, AfterValidator(_known_firmware)]
 class DroneScenario(Section):
     """Every emulated AR.Drone: firmware, errors of its navdata, battery, disturbances.
 
-    Tellos and vehicles behind ROS 2, which nobody measured, err by the same figures: velocity (its gain about 1),
-    height, tilt, heading, rates; and have their battery and the unrest of the air from here.
+    Tellos and vehicles behind ROS 2, which have not been measured, get the same errors: velocity (its gain about 1),
+    height, tilt, heading, rates; their battery and the unrest of the air are set here, too.
     """
 
     firmware: Firmware = "ar2-2.3"
@@ -187,7 +187,7 @@ class CameraScenario(Section):
     jpeg_quality: Annotated[int, Field(ge=5, le=100)] = 85
     """Quality of the JPEGs."""
     floor: Literal["carpet", "wood", "concrete", "tiles"] = "carpet"
-    """What lies on the floor."""
+    """Kind of floor."""
 
 
 class CommonScenario(Section):
@@ -198,19 +198,19 @@ class CommonScenario(Section):
     seed: Annotated[int, Field(ge=0)] = 1
     """Seed of all random figures; --seed overrides it."""
     target: TargetScenario = TargetScenario()
-    """What the target does; with several, what each does that `targets` leaves out: one behind the other on the path,
+    """Behaviour of the target; of several, of those that `targets` leaves out: one behind the other on the path,
     or 1 m apart."""
     targets: dict[str, TargetScenario] = Field(default={})
-    """What single targets do, by name."""
+    """Behaviour of single targets, by name."""
     drones: DroneScenario = DroneScenario()
-    """Every emulated AR.Drone. What all vehicles with optical flow have counts for Tellos and ROS 2 vehicles as
+    """Every emulated AR.Drone. Errors common to vehicles with optical flow apply to Tellos and ROS 2 vehicles as
     well."""
     cameras: CameraScenario = CameraScenario()
     """Every emulated camera."""
     faults: tuple[Fault, ...] = ()
-    """What breaks, and when."""
+    """Faults and their times."""
     obstacles: tuple[Obstacle, ...] = ()
-    """People and things that hide what is behind them."""
+    """People and things that hide markers behind them."""
     floor_zones: tuple[FloorZone, ...] = ()
     """Parts of the floor over which optical flow is off."""
     link_bursts: LinkBursts = LinkBursts()
@@ -220,7 +220,7 @@ class CommonScenario(Section):
     it."""
 
     def of_targets(self, names: Iterable[str]) -> dict[str, TargetScenario]:
-        """Return what each target of a field does."""
+        """Return the scenario of each target of a field."""
         return {name: self.targets.get(name) or _beside(self.target, rank) for rank, name in enumerate(names)}
 
     def of_kind(self, key: str, model: type[_Figures]) -> _Figures:
@@ -231,11 +231,11 @@ class CommonScenario(Section):
 
 
 def _section_of_kind(kind: VehicleKind, reference: str) -> tuple[Any, Any]:
-    """Return type and default of a section; of one that cannot be used, what refuses every scenario that has it."""
+    """Return type and default of a section; for an unusable one, a type that refuses every scenario with it."""
     try:
         model = resolve_name(reference)
         return model, Field(default=model(), description=str(model.__doc__))
-    except Exception as error:  # noqa: BLE001 - a plug-in is anybody's program: its failure is told where it is used
+    except Exception as error:  # noqa: BLE001 - a plug-in is foreign code: its failure is reported where it is used
         told = {"kind": kind.name, "why": f"{type(error).__name__}: {error}"}
 
     def refuse(_: object) -> None:

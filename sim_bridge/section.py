@@ -1,4 +1,4 @@
-"""What every section of a scenario file is: closed, immutable, finite, explained by its docstrings."""
+"""Base class of a scenario file's sections: closed, immutable, finite, explained by its docstrings."""
 
 from pydantic import BaseModel, ConfigDict
 

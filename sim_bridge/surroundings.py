@@ -1,4 +1,4 @@
-"""What stands about in the simulated room and disturbs flight and sight: the sections of a scenario that say so."""
+"""Sections of a scenario: obstacles, zones of the floor, radio bursts, and expected results."""
 
 from typing import Annotated, Literal
 
@@ -13,14 +13,14 @@ Seconds = Annotated[float, Field(ge=0.02, le=60)]
 
 
 class Obstacle(Section):
-    """An upright box along the room's axes that hides what is behind it: furniture, a person. Nothing collides."""
+    """An upright box along the room's axes that hides markers behind it: furniture, a person. Nothing collides."""
 
     size_m: tuple[Length, Length, Length] = (0.5, 0.5, 1.75)
     """Its size along world x, y and z [m]; it stands on the floor."""
     path: Annotated[Path, Field(discriminator="shape")] = Standstill()
-    """Where it stands, or what its middle moves along."""
+    """Place of its middle, or the path along which that moves."""
     base: Literal["turtlebot_2", "person", "rc_car"] = "person"
-    """What limits its motion, as of targets."""
+    """Limits of its motion, as of targets."""
 
 
 class FloorZone(Section):
@@ -31,7 +31,7 @@ class FloorZone(Section):
     y_m: Side
     """Its extent along world y [m]."""
     flow_bias_m_s: tuple[Flow, Flow]
-    """What is added to the reported velocity [x, y in m/s; world]."""
+    """Error added to the reported velocity [x, y in m/s; world]."""
 
 
 class LinkBursts(Section):

@@ -1,4 +1,4 @@
-"""Where a simulated target can drive: the sections of a scenario that say so."""
+"""Paths of simulated targets: sections of a scenario."""
 
 from typing import Annotated, Literal, Self
 

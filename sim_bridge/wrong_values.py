@@ -8,7 +8,7 @@ from dataclasses import replace
 from sim_bridge.fault_kinds import Fault, FaultKind
 from sim_bridge.world.readings import Readings
 
-# honest reading, value, direction [rad], time since it broke [s] -> what is reported instead
+# correct reading, value, direction [rad], time since the fault began [s] -> reported reading
 Change = Callable[[Readings, float, float, float], Readings]
 
 

@@ -1,4 +1,4 @@
-"""One flight of the kit: room, bus, driver and all that talk to it, with the verbs that scripts use."""
+"""One flight of the kit: room, bus, driver and its peers, with the verbs that scripts use."""
 
 import importlib
 import os
@@ -101,19 +101,19 @@ class Bench:
         addresses = self._block.addresses(_SLOT) if stop.called else ((self.subject.address, stop.port),)
 
         def say(word: str) -> None:
-            with suppress(OSError):  # a lost link is no error there either: words are repeated
+            with suppress(OSError):  # a lost link is no error there either: the datagrams are repeated
                 self._voice.say(stop.hover if word == "hover" else stop.land, addresses)
 
         yield say
 
     def speak(self, word: str, seconds: float) -> None:
-        """Send one stop word for a dead driver, ten times a second for a while."""
+        """Send "hover" or "land" for a dead driver, ten times a second for a while."""
         with self.voice() as say, self.mark(f"told to {word}"):
             for _ in range(round(10 * seconds)):
                 say(word)
                 time.sleep(0.1)
 
-    # -- what a script waits for --------------------------------------------------------------------------------------
+    # -- conditions that a script waits for ---------------------------------------------------------------------------
 
     @property
     def now(self) -> Moment:

@@ -1,4 +1,4 @@
-"""One check: a sentence that must hold for every kind of vehicle, its flight, and the function that judges it."""
+"""The type of a check: a sentence that must hold for every kind of vehicle, its flight, and its function."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,9 +21,9 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """name: its identifier; text: what must hold; flight: its script, "" for the kind's object alone.
+    """name: its identifier; text: the requirement; flight: its script, "" for the kind's object alone.
 
-    judge: raises AssertionError with what was seen instead, or NotApplicable.
+    judge: raises AssertionError with the actual result, or NotApplicable.
     """
 
     name: str

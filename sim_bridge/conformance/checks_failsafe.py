@@ -108,7 +108,7 @@ def old_sequence_moves_nothing(case: Case) -> None:
 
 @check("epochs")
 def other_source_moves_nothing(case: Case) -> None:
-    """Setpoints of anybody but the tracker move nothing, and are counted."""
+    """Setpoints from any sender but the tracker move nothing, and are counted."""
     still(case, "other source")
     counted = case.record.heard(VEHICLE_STATUS, "epoch far ahead")[-1].message.rejected
     assert counted.get("setpoint_other_source"), f"refused: {counted}"
@@ -123,7 +123,7 @@ def epoch_far_ahead_moves_nothing(case: Case) -> None:
 
 @check("epochs")
 def unconverged_moves_nothing(case: Case) -> None:
-    """Setpoints of a tracker that does not know where the vehicle is move nothing."""
+    """Setpoints of a tracker whose estimate has not converged move nothing."""
     still(case, "not converged")
 
 
@@ -178,7 +178,7 @@ def frozen_supervisor_brakes(case: Case) -> None:
 
 @check("orphaned")
 def supervisor_is_obeyed_again(case: Case) -> None:
-    """When the supervisor goes on within a second, setpoints count again."""
+    """When the supervisor continues within a second, setpoints count again."""
     assert case.record.motion("supervisor again")[-1].speed > 0.15, "it stands"
 
 
@@ -197,7 +197,7 @@ def orphan_ends(case: Case) -> None:
 
 @check("unheard")
 def unheard_vehicle_brakes(case: Case) -> None:
-    """A vehicle that falls silent is told to hover: after 1.2 s it has lost half of its speed."""
+    """A vehicle that falls silent is commanded to hover: after 1.2 s it has lost half of its speed."""
     brakes(case, "silent vehicle", 1.2)
 
 
@@ -216,7 +216,7 @@ def unheard_vehicle_lands(case: Case) -> None:
 
 @check("unheard")
 def heard_again_it_is_known(case: Case) -> None:
-    """When it speaks again its state is known again: it stands."""
+    """When its telemetry returns its state is known again: LANDED."""
     said = case.record.heard(VEHICLE_STATUS, "heard again")[-1].message.flight_state
     assert said == "LANDED", f"it is called {said}"
 
@@ -265,13 +265,13 @@ def impossible_velocity_stops_it(case: Case) -> None:
 
 @check("jumping")
 def impossible_velocity_is_not_flown_by(case: Case) -> None:
-    """What it is told meanwhile never makes it faster than its limit and a half."""
+    """Meanwhile no command makes it faster than one and a half times its limit."""
     speed = max(one.speed for one in case.record.motion("jumping"))
     assert speed < 0.9, f"{speed:.2f} m/s"
 
 
 @check("jumping")
 def operator_is_told_why(case: Case) -> None:
-    """The operator is told why it landed."""
+    """An event gives the operator the reason for the landing."""
     texts = [one.message.text for one in case.record.heard(EVENT, "jumping")]
     assert any("LANDING" in text or "HOVER" in text for text in texts), f"events: {texts}"

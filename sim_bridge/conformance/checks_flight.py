@@ -115,7 +115,7 @@ def speed_limit_is_kept(case: Case) -> None:
 
 @check("square")
 def hovers_still(case: Case) -> None:
-    """Told to stand, it drifts less than 0.3 m in 1.5 s."""
+    """At zero velocity it drifts less than 0.3 m in 1.5 s."""
     motion = case.record.motion("still")
     drift = math.dist(motion[0].position, motion[-1].position)
     assert drift < 0.3, f"{drift:.2f} m"
@@ -186,7 +186,7 @@ def flies_again(case: Case) -> None:
 
 @check("square")
 def flight_states_follow(case: Case) -> None:
-    """LANDED, then aloft, then LANDED: what is reported follows what is true within 1.5 s."""
+    """LANDED, then aloft, then LANDED: the reported state follows the true one within 1.5 s."""
     begin, end = case.record.span("landed")
     after = [one.message.flight_state for one in case.record.heard(VEHICLE_STATUS) if begin + 1.4e9 <= one.at_ns <= end]
     assert set(after) <= {"LANDED"}, f"after the landing: {after}"

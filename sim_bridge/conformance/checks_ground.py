@@ -46,7 +46,7 @@ def status_comes_five_times_a_second(case: Case) -> None:
 
 @check("stand")
 def status_tells_the_charge(case: Case) -> None:
-    """The charge is told as a share, within 3 % of the true one."""
+    """The charge is reported as a share, within 3 % of the true one."""
     told = case.record.heard(VEHICLE_STATUS, "standing")[-1].message.battery
     true = case.record.motion("standing")[-1].battery
     assert told is not None and abs(told - true) < 0.03, f"told {told}, true {true:.2f}"
@@ -54,7 +54,7 @@ def status_tells_the_charge(case: Case) -> None:
 
 @check("stand")
 def status_tells_the_rate(case: Case) -> None:
-    """The rate of telemetry that it tells is positive, and is that of what it records."""
+    """The reported rate of telemetry is finite and above 1 Hz."""
     told = case.record.heard(VEHICLE_STATUS, "standing")[-1].message.rate_hz
     assert math.isfinite(told) and told > 1.0, f"{told:.1f} Hz told"
 
@@ -75,7 +75,7 @@ def take_off_needs_a_lease(case: Case) -> None:
 
 @check("stand")
 def take_off_needs_the_holder(case: Case) -> None:
-    """TAKEOFF of anybody but the lease's holder is refused."""
+    """TAKEOFF from any sender but the lease's holder is refused."""
     _refused(case, "take off by a stranger")
 
 
@@ -114,13 +114,13 @@ def setpoints_lift_nothing(case: Case) -> None:
 
 @check("stand")
 def hover_datagram_lifts_nothing(case: Case) -> None:
-    """The kind's hover datagram, said to a standing vehicle beside its driver, starts no motor."""
+    """The kind's hover datagram, sent to a standing vehicle beside its driver, starts no motor."""
     _stays(case, "told to hover")
 
 
 @check("stand")
 def land_datagram_lifts_nothing(case: Case) -> None:
-    """The kind's land datagram, said to a standing vehicle beside its driver, starts no motor."""
+    """The kind's land datagram, sent to a standing vehicle beside its driver, starts no motor."""
     _stays(case, "told to land")
 
 
@@ -142,7 +142,7 @@ def stop_on_the_ground_ends_the_driver(case: Case) -> None:
 
 @check("stand")
 def refusals_are_events(case: Case) -> None:
-    """The operator is told who was refused what."""
+    """Refusals are reported to the operator as events."""
     texts = [one.message.text for one in case.record.heard(EVENT)]
     assert any("refused" in text for text in texts), f"events: {texts}"
 
@@ -157,7 +157,7 @@ def datagrams_are_recorded(case: Case) -> None:
 
 @check("damaged")
 def damaged_datagrams_end_no_driver(case: Case) -> None:
-    """The driver lives through thousands of damaged datagrams from its vehicle's own port."""
+    """The driver survives thousands of damaged datagrams from its vehicle's own port."""
     case.record.span("damaged")
     sent = case.record.facts["sent damaged"]
     assert case.record.facts["alive"], f"it ended after {sent:.0f}: {case.record.log[-400:]}"

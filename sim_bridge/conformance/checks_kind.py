@@ -89,7 +89,7 @@ def sections_are_described(case: Case) -> None:
 
 @check()
 def sections_are_strict(case: Case) -> None:
-    """Its sections refuse keys that they do not know."""
+    """Its sections refuse unknown keys."""
     for name, model in case.subject.kind.sections.items():
         assert issubclass(model, KindSection), f"{name} is no KindSection"
         assert model.model_config.get("extra") == "forbid", f"{name} takes any key"
@@ -113,7 +113,7 @@ def everybody_has_one_process(case: Case) -> None:
 
 @check()
 def section_is_json(case: Case) -> None:
-    """What the driver is handed is a JSON object, the same each time."""
+    """The driver's section is a JSON object, the same each time."""
     first, second = (case.subject.kind.processes([case.subject.order()])[0].section for _ in range(2))
     assert isinstance(json.loads(first), dict), f"it is {first[:60]}"
     assert first == second, "it differs from call to call"
@@ -143,7 +143,7 @@ def _replaced(
 
 @check()
 def address_reaches_the_driver(case: Case) -> None:
-    """The driver is handed the vehicle's name, and its address or where it is waited for."""
+    """The driver's section has the vehicle's name and, unless the vehicle calls, its address."""
     section = case.subject.kind.processes([case.subject.order()])[0].section
     assert NAME in section, "its name is not in the section"
     stop = case.subject.kind.stop([case.subject.order()])

@@ -13,7 +13,7 @@ from sim_bridge.conformance.script import script
 # About half of the default limits, and twice that is asked.
 NARROW = DroneLimits(max_speed_m_s=0.3, max_climb_m_s=0.2, max_yaw_rate_deg_s=30.0)
 _ASKED_TURN_RAD_S = 2.0 * math.radians(NARROW.max_yaw_rate_deg_s)
-# What gusts and gain may add, and the least share of the limit that must be reached.
+# Greatest share of the limit, with gusts and gain, and the least share that must be reached.
 _MOST, _LEAST = 1.25, 0.5
 _SETTLES_S = 1.2
 
@@ -53,7 +53,7 @@ def speed_limit_is_flown(case: Case) -> None:
 
 @check("limits")
 def climb_limit_is_flown(case: Case) -> None:
-    """Asked for twice the climb rate that the field file allows, up and down, it keeps to what that allows."""
+    """Asked for twice the climb rate that the field file allows, up and down, it keeps to that limit."""
     for mark in ("too fast up", "too fast down"):
         _keeps(float(np.mean([abs(one.velocity[2]) for one in _settled(case, mark)])), NARROW.max_climb_m_s, "m/s")
 

@@ -165,14 +165,14 @@ def _imu(case: Case, mark: str) -> list[Heard]:
 
 @check("square")
 def accelerometers_point_up(case: Case) -> None:
-    """The specific force of a hovering vehicle, where it is told, is 9.81 m/s^2 up."""
+    """The specific force of a hovering vehicle, where it is reported, is 9.81 m/s^2 up."""
     force = np.mean([one.message.specific_force_m_s2 for one in _imu(case, "still")], axis=0)
     assert abs(force[2] - _GRAVITY_M_S2) < 0.8 and np.hypot(force[0], force[1]) < 1.0, f"{force.round(2)}"
 
 
 @check("square")
 def gyroscopes_turn_the_right_way(case: Case) -> None:
-    """The body rate about z, where it is told, is positive in a counter-clockwise turn."""
+    """The body rate about z, where it is reported, is positive in a counter-clockwise turn."""
     rate = float(np.median([one.message.angular_velocity_rad_s[2] for one in _imu(case, "turn")]))
     assert 0.6 * TURN_RAD_S < rate < 1.4 * TURN_RAD_S, f"{rate:.2f} rad/s"
 
@@ -199,14 +199,14 @@ def _rate(case: Case, axis: int, marks: Sequence[str]) -> float:
 
 @check("square")
 def gyroscopes_roll_the_right_way(case: Case) -> None:
-    """The body rate about x, where it is told, is positive as the right side goes down."""
+    """The body rate about x, where it is reported, is positive as the right side goes down."""
     correlation = _rate(case, 0, ("left", "right"))
     assert correlation > 0.3, f"correlation with the true rate {correlation:.2f}"
 
 
 @check("square")
 def gyroscopes_pitch_the_right_way(case: Case) -> None:
-    """The body rate about y, where it is told, is positive as the nose goes down."""
+    """The body rate about y, where it is reported, is positive as the nose goes down."""
     correlation = _rate(case, 1, ("forward", "back"))
     assert correlation > 0.3, f"correlation with the true rate {correlation:.2f}"
 
@@ -231,7 +231,7 @@ def _lean(attitude: Sequence[float]) -> tuple[float, float]:
 
 @check("square")
 def commands_are_sent_often(case: Case) -> None:
-    """In TRACK the vehicle is spoken to at 10 Hz at least."""
+    """In TRACK the vehicle is sent datagrams at 10 Hz at least."""
     count = 0
     for one in case.record.heard(RAW_TX, "forward"):
         payload, offset = one.received.payload, 0

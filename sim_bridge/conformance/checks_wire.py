@@ -33,7 +33,7 @@ def _lossy(bench: Bench) -> None:
 
 @script()
 def _stranger(bench: Bench) -> None:
-    """Another address repeats what the vehicle said on the ground; then only that address speaks as the vehicle."""
+    """Another address repeats the vehicle's datagrams from the ground; then all its datagrams come from there."""
     track_ahead(bench)
     wire = bench.room.wire
     with bench.mark("a stranger beside it"):
@@ -75,7 +75,7 @@ def loss_ends_no_tracking(case: Case) -> None:
 
 @check("lossy")
 def loss_changes_no_way(case: Case) -> None:
-    """Over such a wire it still flies ahead, back, and turns, by 0.6 to 1.35 of what is asked."""
+    """Over such a wire it still flies ahead, back, and turns, by 0.6 to 1.35 of the command."""
     for mark, sign in (("lossy ahead", 1.0), ("lossy back", -1.0)):
         begin, end = case.record.span(mark)
         first, last = case.record.at(begin), case.record.at(end + 1_100_000_000)
@@ -94,7 +94,7 @@ def loss_keeps_no_vehicle_up(case: Case) -> None:
 
 @check("stranger")
 def stranger_is_not_believed(case: Case) -> None:
-    """Another address that repeats the vehicle's words from the ground changes nothing: it tracks on."""
+    """Another address that repeats the vehicle's datagrams from the ground changes nothing: it stays in TRACK."""
     heard = case.record.heard(VEHICLE_STATUS, "a stranger beside it")
     modes, states = {one.message.mode for one in heard}, {one.message.flight_state for one in heard}
     assert modes == {"TRACK"} and states <= {"FLYING", "HOVERING"}, f"modes {modes}, states {states}"
@@ -104,7 +104,7 @@ def stranger_is_not_believed(case: Case) -> None:
 
 @check("stranger")
 def stranger_is_not_taken_for_it(case: Case) -> None:
-    """A vehicle whose words come from another address only is LOST, and is landed."""
+    """A vehicle whose datagrams come from another address only is LOST, and is landed."""
     if not case.record.facts.get("said", 1.0):
         raise NotApplicable(_UNSEEN)
     said = [one.message.flight_state for one in case.record.heard(VEHICLE_STATUS, "a stranger alone")]
@@ -122,7 +122,7 @@ def stranger_is_told_nothing(case: Case) -> None:
 
 @check("damaged_aloft")
 def damage_aloft_ends_no_driver(case: Case) -> None:
-    """The driver lives through damaged datagrams in flight, without an error that it did not declare."""
+    """The driver survives damaged datagrams in flight, without an error that it did not declare."""
     case.record.span("landing under damage")
     if not case.record.facts["sent damaged"]:
         raise NotApplicable(_UNSEEN)
@@ -144,7 +144,7 @@ def damage_aloft_is_counted(case: Case) -> None:
 
 @check("damaged_aloft")
 def damage_aloft_makes_nothing_faster(case: Case) -> None:
-    """Meanwhile it is never faster than its limit and a half."""
+    """Meanwhile it is never faster than one and a half times its limit."""
     motion = case.record.motion("damage aloft") + case.record.motion("silence under damage")
     speed = max(one.speed for one in motion)
     assert speed < 1.5 * case.subject.limits.max_speed_m_s, f"{speed:.2f} m/s"

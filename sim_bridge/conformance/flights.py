@@ -201,7 +201,7 @@ def _orphaned(bench: Bench) -> None:
 
 @script()
 def _unheard(bench: Bench) -> None:
-    """The vehicle says nothing any more, and still hears."""
+    """The vehicle sends nothing any more, and still receives."""
     track_ahead(bench)
     bench.emulator.silent = True
     bench.spend("silent vehicle", 1.5)
@@ -228,13 +228,13 @@ def _cut(bench: Bench) -> None:
 
 @script(Fault(kind=FaultKind.TELEMETRY_FROZEN, entity=NAME, start_s=FAULT_S))
 def _frozen(bench: Bench) -> None:
-    """From a moment on the vehicle repeats its last report."""
+    """From one moment on the vehicle repeats its last report."""
     _fly_into(bench, "frozen")
 
 
 @script(Fault(kind=FaultKind.VELOCITY_JUMPING, entity=NAME, start_s=FAULT_S, value=3.0))
 def _jumping(bench: Bench) -> None:
-    """From a moment on the velocity that it reports is off by 3 m/s."""
+    """From one moment on its reported velocity is off by 3 m/s."""
     _fly_into(bench, "jumping")
 
 

@@ -1,4 +1,4 @@
-"""All checks of one kind: flights are flown when the first check asks for them, each once."""
+"""All checks of one kind: each flight is flown once, when its first check needs it."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass

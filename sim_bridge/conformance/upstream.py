@@ -1,4 +1,4 @@
-"""Plays supervisor, operator and tracker for the driver; this tracker knows the truth."""
+"""Stand-ins for supervisor, operator and tracker; this tracker publishes the true states."""
 
 import itertools
 import math
@@ -37,7 +37,7 @@ _STILL = (0.0, 0.0, 0.0)
 
 
 class Upstream:
-    """Publishes every 20 ms from a thread, by its present attributes.
+    """Publishes every 20 ms from a thread, according to its attributes.
 
     leases, beats, sees, speaks: whether leases, beats of the supervisor, estimates, setpoints are sent; wanted:
     velocity [m/s; base_stabilized] and turn [rad/s] of the setpoints; converged, epoch: their fields.
@@ -115,7 +115,7 @@ class Upstream:
             heard.extend(Heard(time.monotonic_ns(), received) for received in subscription.drain())
 
     def say(self, name: str, setpoint: VelocitySetpoint, seq: int | None = None) -> None:
-        """Publish one unusual setpoint as the tracker or, by name "stranger", as somebody else."""
+        """Publish one unusual setpoint as the tracker or, by name "stranger", as another sender."""
         if seq is not None:
             setpoint = msgspec.structs.replace(setpoint, header=msgspec.structs.replace(setpoint.header, seq=seq))
         with self._lock:

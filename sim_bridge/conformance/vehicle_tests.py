@@ -26,7 +26,7 @@ def kit(request: pytest.FixtureRequest) -> Kit:
 
 
 def test_vehicle(kit: Kit, check: Check) -> None:
-    """The kind does what the check says."""
+    """The kind passes the check."""
     verdict = kit.judge(check)
     if verdict.end == "does not apply":
         pytest.skip(verdict.why)

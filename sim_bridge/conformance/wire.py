@@ -1,7 +1,7 @@
 """The wire between driver and emulated vehicle, with faults: damage, loss, disorder, a stranger's address.
 
-Each way in which Python sends or receives a datagram, asyncio's too, ends in a method of `socket.socket`; there
-the sockets at the vehicle's address are watched, of whatever thread. Streams are left alone.
+All datagrams that Python sends or receives, asyncio's too, pass through a method of `socket.socket`. Those methods are
+wrapped for the sockets at the vehicle's address, in all threads. Streams are left alone.
 """
 
 import random
@@ -22,10 +22,10 @@ _KEPT = 100
 
 
 class Wire:
-    """Watches the datagrams of one vehicle while it is entered; what is set here holds from the next datagram on.
+    """A context that alters the datagrams of one vehicle; its attributes apply from the next datagram on.
 
     copies: damaged datagrams that follow each one of the vehicle; loss, swap: shares [0..1] of the datagrams of both
-    directions that are lost, and that the next one overtakes; estranged: what the vehicle says comes from the
+    directions that are lost, and that the next one overtakes; estranged: the vehicle's datagrams come from the
     stranger's address instead of its own. said, damaged: datagrams of the vehicle so far, and damaged copies.
     """
 

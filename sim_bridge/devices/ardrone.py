@@ -32,8 +32,8 @@ _RECEIVE_BUFFER = 1 << 20
 class ArDroneEmulator:
     """The sockets of one drone of the world: `receive`, then a step of the world, then `send`, once per tick.
 
-    `silent` stops the navdata, `deaf` drops what arrives, `wrong` changes what is reported (faults). Times are
-    the world's, so a bridge that was frozen does not see 2 s of silence that nobody kept.
+    `silent` stops the navdata, `deaf` drops received datagrams, `wrong` changes the reported values (faults). Times
+    are the world's, so a frozen bridge does not count its own pause as 2 s of silence.
     """
 
     def __init__(

@@ -1,8 +1,8 @@
 """The part of FTP that clients of an AR.Drone use: anonymous, passive, reading `version.txt`.
 
-WIRE: port 5551 serves `version.txt` ("2.3.3"), by which the SDK tells the generations apart; port 21 the data
-partition, which PS-Drone only wants to see open (docs/reference/ardrone.md 1). A server of a library would want a
-thread and write access of its own; this one shares the emulator's loop and has nothing to write to.
+WIRE: port 5551 serves `version.txt` ("2.3.3"), by which the SDK distinguishes the generations; port 21 the data
+partition, of which PS-Drone only checks that it is open (docs/reference/ardrone.md 1). A server of a library would need
+a thread and write access of its own; this one shares the emulator's loop and writes nothing.
 """
 
 from collections.abc import Callable, Mapping

@@ -20,7 +20,7 @@ class CommandLink(Enum):
 
 
 class CommandSession:
-    """The session of whoever sends commands; times are of the emulator's clock [ns]."""
+    """The session of the present sender of commands; times are of the emulator's clock [ns]."""
 
     def __init__(self) -> None:
         self.at_sequence = 0

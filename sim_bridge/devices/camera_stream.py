@@ -1,7 +1,7 @@
 """The network side of an emulated camera: MJPEG over HTTP.
 
 WIRE: multipart/x-mixed-replace with a JPEG per part, Content-Type and Content-Length, as IP cameras and mjpg-streamer
-send it. Nothing tells the exposure time: the receiver has to know the camera's delay.
+send it. The exposure time is not sent: the receiver has to know the camera's delay.
 """
 
 from sim_bridge.devices.stream_server import Client, StreamServer

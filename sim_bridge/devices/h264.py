@@ -22,7 +22,7 @@ class GreyStream:
     def __init__(self, size: tuple[int, int], fps: float, bit_rate: float) -> None:
         self._index = 0
         self._codec = _codec(size, fps, bit_rate)
-        # One frame for all pictures: the encoder copies what it is given.
+        # One frame for all pictures: the encoder copies its input.
         self._frame = av.VideoFrame(*size, "yuv420p")
         luma, *colours = (np.asarray(memoryview(plane)) for plane in self._frame.planes)
         self._luma = luma.reshape(size[1], -1)[:, : size[0]]

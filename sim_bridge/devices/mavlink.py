@@ -36,7 +36,7 @@ _LAST_OLD = 255
 
 @dataclass(frozen=True, slots=True)
 class LinkHabits:
-    """one_partner: answers only the first that spoke to it; old_until_greeted: MAVLink 1 until it hears MAVLink 2."""
+    """one_partner: answers only its first sender; old_until_greeted: MAVLink 1 until it receives MAVLink 2."""
 
     one_partner: bool = False
     old_until_greeted: bool = False
@@ -45,9 +45,9 @@ class LinkHabits:
 class MavlinkEmulator:
     """Socket and firmware of one body of the world: `receive`, a step of the world, then `send`, once per tick.
 
-    calls: an address that it speaks to unasked; video: its description of its camera. `silent` stops what
-    it sends, `deaf` drops what arrives, `wrong` changes what is reported (faults), `habits` are those of its link.
-    signing: only rightly signed frames count, and all of ours are signed. Times are the world's.
+    calls: an address that it sends to unasked; video: its description of its camera. `silent` stops its
+    output, `deaf` drops received datagrams, `wrong` changes the reported values (faults), `habits` are those of its
+    link. signing: only correctly signed frames count, and all of ours are signed. Times are the world's.
     """
 
     def __init__(

@@ -32,7 +32,7 @@ _OK: Answer = (MavResult.ACCEPTED, "")
 class AutopilotFirmware:
     """One autopilot around a body of the world, with overrides by flavour. texts: (severity, line) to send.
 
-    transmitter: it hears a pilot's.
+    transmitter: it receives a pilot's.
     """
 
     flavour: Flavour

@@ -21,7 +21,7 @@ class MavlinkIdentity(BaseModel):
 
 
 def identity_of(drone: SiteDrone) -> MavlinkIdentity:
-    """Return the identity of a MAVLink vehicle; raises SettingsError if its settings do not tell it."""
+    """Return the identity of a MAVLink vehicle; raises SettingsError if its settings lack it."""
     section: dict[str, Any] = drone.section("mavlink")
     if not section:
         raise SettingsError([f"kind: {drone.kind} has no mavlink section"])

@@ -112,7 +112,7 @@ class Speaker:
             # WIRE (ArduPilot, GCS.cpp): a fence that does not exist is healthy; else MAVProxy reports a breach.
             healthy |= SensorBits.GEOFENCE
         else:
-            # WIRE (PX4 1.16): what is not there is healthy.
+            # WIRE (PX4 1.16): a sensor that is not present counts as healthy.
             healthy |= SensorBits.RC_RECEIVER
         return t.SysStatus(present, present, healthy, 300, self._millivolts, 500, self._percent)
 

@@ -45,7 +45,7 @@ def open_at(
 ) -> MavlinkEmulator:  # fmt: skip
     """Return the emulator of a MAVLink vehicle that listens at an address, under the scenario's section of its kind.
 
-    calls: the address that it speaks to unasked; None: the field's driver, if that waits for its vehicles (`listen`).
+    calls: the address that it sends to unasked; None: the field's driver, if that waits for its vehicles (`listen`).
     """
     identity, section = identity_of(drone), scenario.of_kind("mavlink", CopterScenario)
     if calls is None and identity.listen:

@@ -47,5 +47,5 @@ class Satellites:
 
     @property
     def origin(self) -> tuple[int, int, int]:
-        """Return where the room lies [deg x 1e7, mm]."""
+        """Return the room's place on Earth [deg x 1e7, mm]."""
         return (*self.degrees(0.0, 0.0), self.altitude_mm(STANDING_HEIGHT_M))

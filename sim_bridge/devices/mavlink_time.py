@@ -26,7 +26,7 @@ class SenderClock:
         if self._offset_ns is None:
             self._offset_ns = offset
         elif abs(offset - self._offset_ns) > _JUMP_NS:
-            # A clock that jumped is believed only after several answers in a row.
+            # A jump of the sender's clock is accepted only after several answers in a row.
             self._odd += 1
             if self._odd >= _STUBBORN:
                 self._offset_ns, self._odd = offset, 0

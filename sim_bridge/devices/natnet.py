@@ -1,6 +1,6 @@
 """An emulated motion capture system: a NatNet server that streams the poses of all bodies.
 
-WIRE (docs/reference/natnet.md 2): a client that asked to connect is sent frames for as long as it is heard.
+WIRE (docs/reference/natnet.md 2): a client that asked to connect is sent frames as long as it keeps sending.
 """
 
 from contextlib import suppress

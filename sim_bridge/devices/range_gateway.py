@@ -1,6 +1,6 @@
 """An emulated gateway of ranges: measures every drone in turn against all anchors, and sends to its clients.
 
-WIRE (docs/reference/ranges.md 2): a client that asks is sent ranges for as long as it is heard.
+WIRE (docs/reference/ranges.md 2): a client that asks is sent ranges as long as it keeps sending.
 """
 
 from collections.abc import Callable, Iterable

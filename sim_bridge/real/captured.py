@@ -9,7 +9,7 @@ from groundstation.geometry.angles import euler_from_quaternion
 from groundstation.time_units import NS_PER_S
 from sim_bridge.world.puppet import OutsidePose
 
-# Longest time between two frames that tell a velocity, and longest time for which a frame is extrapolated by it [s].
+# Longest time between two frames that give a velocity, and longest time for which a frame is extrapolated by it [s].
 _APART_S, _CARRIED_S = 0.2, 0.1
 
 _Stamped = tuple[int, BodyPose]

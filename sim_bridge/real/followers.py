@@ -21,7 +21,7 @@ class PoseFeed(Protocol):
         """Return the newest pose, None if nothing new arrived."""
 
     def close(self) -> None:
-        """Release what it holds."""
+        """Release its resources."""
 
 
 class EstimateFeed:

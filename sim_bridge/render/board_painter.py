@@ -47,7 +47,7 @@ class BoardPainter:
         self._table = table
         self._mips = [_with_coverage(*card.raster(texels)) for texels in _MIP_TEXELS]
         x0, x1, y0, y1 = card.extent
-        # The middles of the four edges first: they tell the scale.
+        # The middles of the four edges first: they give the scale.
         rim = [(x0, (y0 + y1) / 2), (x1, (y0 + y1) / 2), ((x0 + x1) / 2, y0), ((x0 + x1) / 2, y1)]
         rim += [(x, y) for x in (x0, x1) for y in (y0, y1)]
         self._rim = np.column_stack((np.array(rim), np.zeros(len(rim)))) * self._unit_m
@@ -114,7 +114,7 @@ class BoardPainter:
         # Enlarging a smooth map by two gives the rays a quarter pixel to all four sides of each centre.
         size = (_OVERSAMPLING * x.shape[1], _OVERSAMPLING * x.shape[0])
         fine_u, fine_v = (cv2.resize(part, size, interpolation=cv2.INTER_LINEAR) for part in (u, v))
-        # What lies beyond the card's border is 0 in every layer.
+        # Beyond the card's border every layer is 0.
         fine = cv2.remap(texture, fine_u, fine_v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
         layers = cv2.resize(fine, (x.shape[1], x.shape[0]), interpolation=cv2.INTER_AREA)
         # numpy takes seven times as long to pick layers.

@@ -19,8 +19,8 @@ from sim_bridge.render.spec import Outage, OutageKind, RenderSpec
 from sim_bridge.truth import TruthBoard
 
 _IDLE_S = 0.05
-# TCP: what is lost is sent again when its time-out has passed, at least 200 ms on Linux (RFC 6298 asks for more), and
-# what comes after it waits.
+# TCP: lost data are sent again after a time-out, at least 200 ms on Linux (RFC 6298 asks for more), and later data
+# wait for them.
 _REPEATED_AFTER_MS = 200.0
 
 

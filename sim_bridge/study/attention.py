@@ -1,4 +1,4 @@
-"""Decides by the camera driver's own rules where it searches a picture: all over, or where it expects markers."""
+"""The camera driver's own rules for searching a picture: all of it, or the places of expected markers."""
 
 from collections import Counter
 from collections.abc import Collection, Sequence

@@ -43,7 +43,7 @@ def nis(report: Mapping[str, Any], observers: Iterable[str]) -> float:
 
 
 def summary(reports: Sequence[Mapping[str, Any]], field: ResolvedField) -> dict[str, Interval]:
-    """Return the figures that tell whether the belief is accurate and consistent, over the flights of one field."""
+    """Return figures of the belief's accuracy and consistency, over the flights of one field."""
     robots, targets, cameras = tuple(field.drones), tuple(field.tracked), tuple(field.cameras)
     values = {
         "target_rmse_m": [report["target_rmse_m"] for report in reports],

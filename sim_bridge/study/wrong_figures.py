@@ -19,10 +19,10 @@ _PAD = ("pad_x", "pad_y", "pad_yaw")
 
 @dataclass(frozen=True, slots=True)
 class WrongFigures:
-    """True minus told figures, by (entity, part): m, deg, ms, shares.
+    """True figures minus those of the field file, by (entity, part): m, deg, ms, shares.
 
     Parts: x, y, z, roll, pitch, yaw of a fixed camera; pan, tilt, ahead, left, up of a drone's; focal and delay of any;
-    print of a drone or target; pad_x, pad_y, pad_yaw of where a drone stands. exchanged: who carries whose marker;
+    print of a drone or target; pad_x, pad_y, pad_yaw of a drone's true place. exchanged: carrier and owner of a marker;
     covariance_share: stated share of the sightings' covariance.
     """
 
@@ -31,7 +31,7 @@ class WrongFigures:
     covariance_share: float = 1.0
 
     def world(self, told: ResolvedField) -> ResolvedField:
-        """Return the field as the world really is; lenses, prints and delays are in the sightings instead."""
+        """Return the field with the true figures; lenses, prints and delays are in the sightings instead."""
         cameras, drones = dict(told.cameras), dict(told.drones)
         for (who, part), error in self.errors.items():
             if who in cameras and part in _FIXED:

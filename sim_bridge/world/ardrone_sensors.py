@@ -24,7 +24,7 @@ from sim_bridge.world.recorded_errors import (
 LIFT_OFF_SEEN_M = 0.25  # the ultrasound reads nothing below
 _MAGNETOMETER_SEEN_M = 0.22  # switched in a moment before
 GROUND_ECHO_M = 0.243  # its reading on the floor
-# Echoes of a neighbour's ultrasound: their share, and the largest difference from the height of one that is believed.
+# Echoes of a neighbour's ultrasound: their share, and the largest difference from the height of an accepted one.
 _FOREIGN_ECHOES, _BELIEVED_M = 0.25, 0.15
 
 

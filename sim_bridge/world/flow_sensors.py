@@ -1,7 +1,7 @@
 """The sensors of a vehicle that flies by its own optical flow (Tello, robots of ROS 2): true state in, readings out.
 
-Nobody measured these kinds against motion capture. They have the errors of AR.Drones, by the same figures of the
-scenario, but for those of AR.Drones only: the jump of the heading, the ultrasound, and a velocity reported too small.
+These kinds have not been measured against motion capture. They have the errors of AR.Drones, by the same figures of the
+scenario, except those of AR.Drones only: the jump of the heading, the ultrasound, and a velocity reported too small.
 """
 
 import math

@@ -176,7 +176,7 @@ class MavlinkCopter:
         return limited[0], limited[1], limited[2]
 
     def _pursue(self, wanted: Vector3, turn: float, wake: Vector3) -> None:
-        # The autopilot knows its velocity and heading only by its estimate.
+        # The autopilot has only its estimate of velocity and heading.
         response, estimate = self._response, self.estimate
         c, s = math.cos(estimate.yaw), math.sin(estimate.yaw)
         vx, vy, vz = estimate.velocity

@@ -1,1 +1,1 @@
-"""Flights of a lab whose field file is wrong, and what `calibrate team` makes of them."""
+"""Flights of a lab whose field file is wrong, and the result of `calibrate team` on them."""

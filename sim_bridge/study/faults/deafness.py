@@ -1,4 +1,4 @@
-"""Measures, by truth alone, how far drones that hear no command fly on until their own link watchdogs stop them."""
+"""Measures, by truth alone, the way of drones that receive no command until their own link watchdogs stop them."""
 
 import math
 from collections.abc import Collection, Mapping
@@ -10,10 +10,10 @@ from groundstation.arrays import Array
 
 @dataclass(slots=True)
 class DeafSpell:
-    """One spell in which a flying drone heard no command.
+    """One spell in which a flying drone received no command.
 
     speed_m_s, tilt_deg: at its begin, by the last command; fastest_m_s, flown_m: until the drone stood
-    or heard again, flown_m from its place at the begin.
+    or received commands again, flown_m from its place at the begin.
     """
 
     drone: str
@@ -33,11 +33,11 @@ class DeafSpells:
 
     @property
     def out_of_reach(self) -> Collection[str]:
-        """Return the drones that fly and hear no command: nobody on the ground can stop them."""
+        """Return the flying drones that receive no command: the ground cannot stop them."""
         return self._lasting.keys()
 
     def see(self, now_s: float, aloft: Mapping[str, Array], deaf: Collection[str]) -> None:
-        """Take one moment. aloft: rows of the truth board of flying drones; deaf: drones that hear nothing."""
+        """Record one moment. aloft: rows of the truth board of flying drones; deaf: drones that receive nothing."""
         self._lasting = {name: kept for name, kept in self._lasting.items() if name in deaf and name in aloft}
         for name in deaf:
             if (row := aloft.get(name)) is None:

@@ -15,7 +15,7 @@ from sim_bridge.world.world import World
 
 
 class FixedSystems:
-    """Motion capture and ranging systems that the tracker hears, and targets that report their motion.
+    """Motion capture and ranging systems that the tracker uses, and targets that report their motion.
 
     They shift neither the cameras' exposures nor each other's: a flight without one of them is otherwise the same.
     """

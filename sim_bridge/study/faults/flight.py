@@ -54,7 +54,7 @@ TRACKING_BY_S = 30.0
 
 
 class Arrivals:
-    """The tracker's inbox: the messages that have arrived and that it heeds."""
+    """The tracker's inbox: the arrived messages that it uses."""
 
     def __init__(self, bus: LocalBus, heeds: Callable[[Message], bool]) -> None:
         self._heeds = heeds

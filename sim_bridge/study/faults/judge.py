@@ -57,7 +57,7 @@ class Judge:
         self.separation_m, self.fence_m, self.speed_m_s, self.lost_s = math.inf, 0.0, 0.0, 0.0
         self.first: dict[str, float] = {}
         self._deafness = DeafSpells()
-        # Bounds that were first broken by drones that heard no command.
+        # Bounds that were first broken by drones that received no command.
         self._unreached: set[str] = set()
 
     def see(
@@ -68,9 +68,10 @@ class Judge:
         believed: Mapping[str, Array | None],
         deaf: Collection[str] = (),
     ) -> None:
-        """Take one moment.
+        """Record one moment.
 
-        truth: rows of the truth board; told: drones that get a velocity; believed: x, y of each; deaf: those unreached.
+        truth: rows of the truth board; told: drones that get a velocity; believed: estimated x, y of each; deaf: those
+        that receive nothing.
         """
         aloft = {name: row for name, row in truth.items() if name in self._flown and not row[12]}
         self._deafness.see(now_s, aloft, deaf)
@@ -109,10 +110,10 @@ class Judge:
                 self._unreached.add(what)
 
     def verdict(self, faults: tuple[Fault, ...], observable_s: tuple[float | None, ...]) -> dict[str, Any]:
-        """Return the figures; unsafe: what was violated, with the time at which [s].
+        """Return the figures; unsafe: the violated bounds, with their times [s].
 
-        unreached: of these, those by a drone that heard nothing, while nothing else had gone wrong yet: nobody on the
-        ground could stop it. Of two drones that came together both must have heard nothing: one could have given way.
+        unreached: of these, those by a drone that received nothing, while nothing else had gone wrong yet: the ground
+        could not stop it. If two drones came together, both must have received nothing: one could have given way.
         """
         hover, rest = 0.0, 0.0
         for flown, since_s in self._due(zip(faults, observable_s, strict=True)):

@@ -63,7 +63,7 @@ class MemorySocket:
         """Nothing to set."""
 
     def fileno(self) -> int:
-        """Return -1: the operating system does not know it."""
+        """Return -1: it is no socket of the operating system."""
         return -1
 
     def waits(self) -> bool:

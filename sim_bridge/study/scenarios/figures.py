@@ -23,7 +23,7 @@ class TrackingErrors:
     errors: defaultdict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
 
     def take(self, truth: Mapping[str, Array], believed: Mapping[str, Array | None]) -> None:
-        """Take one moment: rows of the truth board, and the believed place of each target."""
+        """Record one moment: rows of the truth board, and the estimated place of each target."""
         for name, place in believed.items():
             off = math.inf if place is None else float(np.hypot(*(place[:2] - truth[name][:2])))
             self.errors[name].append(off)

@@ -52,7 +52,7 @@ class ScenarioFlight(FaultFlight):
         return along_an_edge(message, self.tracking.tracker.topology, self.world.targets)
 
     def watch(self) -> None:
-        """Compare the believed places of the targets with the truth."""
+        """Compare the estimated places of the targets with the truth."""
         world = self.world
         truth = dict(zip(world.bodies, world.states(), strict=True))
         self._errors.take(truth, {name: self.believed(name) for name in world.targets})

@@ -38,7 +38,7 @@ def says_that_it_stands(case: Case) -> None:
 
 
 @check("stand")
-def status_comes_five_times_a_second(case: Case) -> None:
+def status_comes_at_4_hz(case: Case) -> None:
     """Status comes at 4 Hz at least."""
     rate = len(case.record.heard(VEHICLE_STATUS, "standing")) / 2.0
     assert rate >= 4.0, f"{rate:.1f} Hz"

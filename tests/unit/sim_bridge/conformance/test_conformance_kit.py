@@ -257,7 +257,7 @@ def test_no_check_passes_where_the_driver_said_nothing():
     still = Moment(at_ns, (0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), False, True, 0.9)
     record.moments += [replace(still, at_ns=at_ns + i * S // 100) for i in range(500)]
     told = [
-        *("says_that_it_stands", "status_comes_five_times_a_second", "status_tells_the_charge", "odometry_is_fresh"),
+        *("says_that_it_stands", "status_comes_at_4_hz", "status_tells_the_charge", "odometry_is_fresh"),
         *("odometry_comes_often", "heading_is_told", "track_is_answered", "hold_is_answered", "resume_is_answered"),
         *("refusals_are_events", "datagrams_are_recorded", "operator_is_told_why", "unheard_vehicle_is_lost", "lands"),
         *("commands_are_sent_often", "flight_states_follow", "take_off_ends_in_hover"),

@@ -84,7 +84,9 @@ def report(violations: list[Import]) -> str:
         pytest.param(("drivers.mavlink.wire",), {"pymavlink"}, NO_EFFECTS, id="wire of MAVLink"),
     ],
 )
-def test_what_computes_only_computes(packages: tuple[str, ...], libraries: set[str], never: set[str]) -> None:
+def test_computing_packages_import_only_libraries_without_side_effects(
+    packages: tuple[str, ...], libraries: set[str], never: set[str]
+) -> None:
     imports = of(*packages)
     assert imports, "there is no such package"
     allowed = (sys.stdlib_module_names - never) | libraries

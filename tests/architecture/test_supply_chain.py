@@ -76,7 +76,7 @@ def test_the_lists_are_the_pins() -> None:
     assert set().union(*map(hashes_of, LISTS)) == pins(), "make hashes"
 
 
-def test_what_tests_import_is_installed_by_make_test() -> None:
+def test_imports_of_tests_are_installed_by_make_test() -> None:
     """Modules that tests import at collection are installed; one missing import would stop the whole run."""
     local = {path.stem for folder in ("tests", "docs", ".ci") for path in (ROOT / folder).rglob("*")}
     own = {path.name for path in ROOT.iterdir()} | local | sys.stdlib_module_names

@@ -109,7 +109,7 @@ def test_a_suspected_figure_stands_with_its_time_until_it_is_withdrawn(stage: An
     page.wait(lambda s: "Suspected" not in page.there("banners").inner_text())
 
 
-def test_what_only_the_page_noticed_is_a_past_alarm_as_well(stage: Any) -> None:
+def test_alarms_raised_by_the_page_itself_are_logged_too(stage: Any) -> None:
     SITUATIONS["all_is_well"](stage.flight)
     page = stage.open()
     stage.console.send_signal(signal.SIGSTOP)

@@ -81,7 +81,7 @@ def test_watch_says_who_lands_by_itself_why_and_when(stage: Any) -> None:
     assert page.there("banner-tracker").inner_text().startswith("TRACKER SILENT")
 
 
-def test_who_is_not_heard_is_told_alike_everywhere(stage: Any) -> None:
+def test_silent_drones_are_described_alike_in_all_captions(stage: Any) -> None:
     SITUATIONS["all_are_held"](stage.flight)
     page = stage.open()
     page.wait(lambda s: page.there("hold").inner_text() == "HOLD\nboth hover already")
@@ -96,7 +96,7 @@ def test_who_is_not_heard_is_told_alike_everywhere(stage: Any) -> None:
         assert page.there(f"{name}-land").inner_text() == "Land\nif it hears"
 
 
-def test_who_has_no_light_looks_for_nobody(stage: Any) -> None:
+def test_a_drone_in_the_dark_is_not_shown_as_searching(stage: Any) -> None:
     SITUATIONS["the_target_is_lost"](stage.flight)
     page = stage.open()
     stage.flight.dark = True
@@ -121,7 +121,7 @@ def test_a_start_says_who_goes_on_and_whether_it_can(stage: Any) -> None:
     assert "RESUME" not in page.there("verdict").inner_text()
 
 
-def test_who_crashed_is_not_sent_up_while_others_fly(stage: Any) -> None:
+def test_a_crashed_drone_cannot_take_off_while_others_fly(stage: Any) -> None:
     SITUATIONS["all_is_well"](stage.flight)
     page = stage.open()
     stage.flight.crashed, stage.flight.modes["drone_2"] = {"drone_2"}, "CUT"
@@ -176,7 +176,7 @@ def test_a_battery_that_lands_well_charged_does_not_count_while_others_fly(stage
     page.wait(lambda s: page.there("worst-battery").inner_text() == "14 % drone_2")
 
 
-def test_who_asked_the_terminal_is_who_ordered_it(stage: Any) -> None:
+def test_orders_passed_on_by_the_terminal_are_attributed_to_their_sender(stage: Any) -> None:
     SITUATIONS["all_are_held"](stage.flight)
     page = stage.open()
     page.wait(lambda s: page.there("resume").is_enabled())

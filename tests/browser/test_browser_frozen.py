@@ -59,7 +59,7 @@ def watched() -> Iterator[tuple[Stage, DevTools]]:
         browser.close()
 
 
-def test_what_was_pressed_on_a_frozen_page_is_not_given_when_it_goes_on(watched: tuple[Stage, DevTools]) -> None:
+def test_clicks_on_a_frozen_page_give_no_commands_after_it_resumes(watched: tuple[Stage, DevTools]) -> None:
     stage, tools = watched
     stage.flight.modes["drone_1"] = "HOLD"
     page = stage.open()

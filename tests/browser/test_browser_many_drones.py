@@ -48,7 +48,7 @@ def test_each_of_eight_has_its_card_in_sight_and_words_that_have_room(large_stag
             assert width < 1000 or page.page.evaluate(BELOW) == [], (arrange, width)
 
 
-def test_what_eight_do_is_counted_and_who_is_lost_named(large_stage: Any) -> None:
+def test_activities_of_eight_drones_are_counted_and_lost_ones_named(large_stage: Any) -> None:
     page, flight = large_stage.open(), large_stage.flight
     all_at_once(flight)
     page.wait(lambda s: page.there("team-mode").inner_text() == "LANDING")
@@ -68,7 +68,7 @@ def test_what_eight_do_is_counted_and_who_is_lost_named(large_stage: Any) -> Non
     page.wait(lambda s: lost.search(page.there("verdict").inner_text()))
 
 
-def test_who_has_the_colour_of_another_has_another_sign(large_stage: Any) -> None:
+def test_drones_of_one_colour_have_different_signs(large_stage: Any) -> None:
     page = large_stage.open()
     chip = "(name) => document.querySelector(`[data-testid=card-${name}] .chip`).innerHTML"
     signs = [page.page.evaluate(chip, name) for name in large_stage.flight.drones]

@@ -87,7 +87,7 @@ def test_a_must_keeps_take_off_shut_until_it_is_mended_or_somebody_insists(floor
     page.there("preflight").wait_for(state="hidden")  # they fly, and the map is shown
 
 
-def test_what_is_mended_opens_take_off(floor: Stage) -> None:
+def test_a_resolved_finding_enables_take_off(floor: Stage) -> None:
     floor.flight.findings = (BATTERY, PADS)
     page = floor.open()
     eventually(page.there("take-off").is_disabled, what="TAKE OFF is shut")

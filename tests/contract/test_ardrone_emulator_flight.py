@@ -197,7 +197,7 @@ def test_odd_but_harmless_lines_keep_the_link(bench: Any, line: bytes) -> None:
 
 
 @pytest.mark.parametrize("line", [b"AT*REF=900,512\n", b"AT*REF=900,512", b"at*ref=900,512\r", b"AT*REF=900,0.5\r"])
-def test_what_a_real_codec_ignores_is_ignored(bench: Any, line: bytes) -> None:
+def test_at_lines_ignored_by_the_real_codec_are_ignored(bench: Any, line: bytes) -> None:
     bench.connect()
     bench.raw(line)
     bench.tick()

@@ -60,7 +60,7 @@ def test_random_bytes_neither_raise_nor_pile_up():
     assert len(reader._buffer) < 4_100_000
 
 
-def test_what_is_written_has_the_header_of_the_real_drone(capture):
+def test_encoded_frames_have_the_header_of_the_real_drone(capture):
     first = FrameReader().feed(capture)[0]
     assert (first.stream, first.slices, first.slice_index, first.parameter_sizes) == (1, 1, 0, (14, 10))
     position = struct.unpack_from("<Q", capture, 32)[0]

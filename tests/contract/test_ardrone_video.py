@@ -137,7 +137,7 @@ def test_the_configuration_chooses_size_camera_and_rate():
 
 
 @pytest.mark.parametrize("header", [64, 68])
-def test_what_is_drawn_is_what_the_driver_sees_with_its_time(header):
+def test_the_driver_receives_each_rendered_picture_once_and_in_order(header):
     with serving() as server, reading(server.port) as source:
         wait_for(lambda: server.clients == 1 and source.connected)
         for index, one in enumerate(encoded(20, header=header)):

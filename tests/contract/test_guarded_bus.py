@@ -230,7 +230,7 @@ def until_told(refused: Callable[[], list[str]]) -> list[str]:
     return []
 
 
-def test_who_publishes_what_it_may_not_is_named(told: tuple[Join, Callable[[], list[str]]]) -> None:
+def test_a_member_that_publishes_without_the_right_is_named(told: tuple[Join, Callable[[], list[str]]]) -> None:
     join, refused = told
     tracker, driver, liar = join("tracker"), join("drone_1"), join("drone_2", "tracker")
     heard_by = driver.subscribe([topics.SETPOINT], entity="drone_1")

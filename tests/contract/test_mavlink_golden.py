@@ -196,7 +196,7 @@ def test_signed_frames():
     assert FrameDecoder().decode(signed(0, payload, 50, 5)).message is not None
 
 
-def test_what_we_sign_is_signed_as_described():
+def test_our_signatures_follow_the_protocols_description():
     stamp = 30_000_000_000_000
     raw = FrameEncoder(255, 190, Signing(KEY, stamp)).encode(telemetry.Heartbeat(6, 8, 0, 0, 4))
     assert len(raw) == 34 and raw[2] == 1

@@ -66,7 +66,7 @@ def test_a_foreign_client_lists_and_decodes(router: str) -> None:
         foreign.close()
 
 
-def test_what_a_field_will_tell_is_listed_before_its_first_message(router: str) -> None:
+def test_topics_of_a_field_are_listed_before_their_first_message(router: str) -> None:
     field = resolved_field(load_field(find_field("lab")))
     foreign = opened(mode="client", connect={"endpoints": [router]})
     bridge = Ros2View(router, 7, "jazzy", field, Timeline(clock.clock_id(), clock.unix_offset_ns()))

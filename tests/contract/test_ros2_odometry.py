@@ -213,7 +213,7 @@ def test_one_that_stands_may_repeat_itself() -> None:
     assert {says.next(**still) for _ in range(100)} == {""}
 
 
-def test_what_is_late_or_faster_than_a_base_can_be_is_refused() -> None:
+def test_late_or_impossibly_fast_odometry_is_refused() -> None:
     says = Says()
     assert {says.next() for _ in range(20)} == {""}
     assert says.next(age_ms=400) == "late" and says.next() == ""

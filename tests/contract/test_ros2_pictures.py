@@ -141,7 +141,9 @@ def test_stamps_of_the_sender_free_arrivals_of_jitter(node: Node, source: FrameS
         (compressed(".jpg", "h264", b"\0\0\0\1x"), "its pictures are h264: only JPEG and PNG are read"),
     ],
 )
-def test_what_cannot_be_read_is_named(node: Node, source: FrameSource, message: tuple[str, bytes], words: str) -> None:
+def test_unreadable_image_messages_are_named(
+    node: Node, source: FrameSource, message: tuple[str, bytes], words: str
+) -> None:
     node.say(message)
     until(lambda: not source.connected)
     assert words in source.detail and str(node.port) in source.detail

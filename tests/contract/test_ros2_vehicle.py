@@ -145,7 +145,7 @@ def test_a_voice_without_a_router_says_so() -> None:
         voice.close()
 
 
-def test_what_is_missing_on_the_other_side_is_named() -> None:
+def test_a_missing_router_or_subscriber_is_named() -> None:
     room = Room(velocity_type="twist_stamped")
     port = room.section.port
     wrong = room.settings.model_copy(update={"ros2": Ros2Section(port=port, namespace="drone_1", domain=3)})

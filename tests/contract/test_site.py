@@ -156,7 +156,7 @@ def test_a_host_speaks_as_itself_and_as_the_devices_that_the_field_gives_it(run:
     }
 
 
-def test_who_was_not_admitted_before_the_run_or_was_expelled_says_nothing(home: Path, run: Run, port: int) -> None:
+def test_commands_of_hosts_not_admitted_before_the_run_are_not_delivered(home: Path, run: Run, port: int) -> None:
     admit(home, "late", port)
     late = Identity(str(site.folder("joined", "lab")), "host-late", "run-7")
     bus = zenoh_bus.open_bus(f"tls/{ELSEWHERE}:{port}", "lab", "cli_late_1", 2.0, late)
@@ -185,7 +185,7 @@ def identity_of(host: str) -> Identity:
     return Identity(str(site.folder("joined", "lab")), f"host-{host}", "")
 
 
-def test_who_is_let_in_and_whom_nobody_awaits_has_no_reason(home: Path, run: Run, port: int) -> None:
+def test_admitted_hosts_and_absent_routers_give_no_reason_of_refusal(home: Path, run: Run, port: int) -> None:
     assert why_closed(run.elsewhere, identity_of("laptop")) == ""
     assert why_closed(f"tls/{ELSEWHERE}:1", identity_of("laptop")) == ""
     assert list(site.closed_doors()) == []

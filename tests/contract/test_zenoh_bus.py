@@ -88,7 +88,7 @@ def test_a_reader_that_never_drains_stalls_nobody(endpoint: str) -> None:
         assert len(stalled.drain_samples()) == 10
 
 
-def test_who_wants_fewer_gets_fewer_of_each_key_and_all_of_others(endpoint: str) -> None:
+def test_a_rate_limit_thins_its_own_keys_only(endpoint: str) -> None:
     thinned = {keys.expression("lab", topics.ESTIMATE, name): 10.0 for name in ("team_a", "team_b")}
     with (
         closing(zenoh_bus.open_bus(endpoint, "lab", "a")) as a,

@@ -18,7 +18,7 @@ TEXT = st.text(st.characters(min_codepoint=32, max_codepoint=255, exclude_charac
 
 @given(U32, U32, U32, OPTIONS)
 @settings(max_examples=50, deadline=None)
-def test_what_is_encoded_is_decoded(state, sequence, vision, payloads):
+def test_encoded_navdata_is_decoded_unchanged(state, sequence, vision, payloads):
     packet = Navdata(state, sequence, vision, payloads)
     assert navdata.decode(navdata.encode(packet)) == packet
 

@@ -36,7 +36,7 @@ def unit(rng: np.random.Generator, count: int) -> Array:
 
 
 @pytest.mark.parametrize("walls", [1, 2, 3, 6, 14, 24])
-def test_what_is_returned_is_allowed_and_nothing_allowed_is_nearer(walls: int) -> None:
+def test_the_returned_velocity_is_the_nearest_allowed_one(walls: int) -> None:
     rng = np.random.default_rng(walls)
     for _ in range(60):
         inside = rng.normal(size=3) * 0.3

@@ -90,7 +90,7 @@ def test_garbage_after_a_cut(whole: bytes, folder: Path, share: float, garbage: 
     _read_everything(path)
 
 
-def test_what_a_longer_file_holds_a_shorter_one_does_not_exceed(whole: bytes, folder: Path) -> None:
+def test_a_shorter_cut_never_holds_more_messages_than_a_longer_one(whole: bytes, folder: Path) -> None:
     path, counts = folder / "state.mcap", []
     for size in range(len(whole) // 8, len(whole) + 1, len(whole) // 8):
         path.write_bytes(whole[:size])

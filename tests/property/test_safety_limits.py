@@ -148,7 +148,9 @@ def test_an_open_way_changes_nothing() -> None:
         ("not finite", 0.0, 0.03, replace(WISH, velocity_m_s=(0.1, math.inf, 0.0))),
     ],
 )
-def test_what_is_unfit_hovers_and_says_why(reason: str, now_s: float, std: float, wish: Setpoint) -> None:
+def test_unfit_beliefs_and_setpoints_become_a_hover_with_a_reason(
+    reason: str, now_s: float, std: float, wish: Setpoint
+) -> None:
     limited = limit_setpoint("a", wish, belief(POSES, std), round(now_s * 1e9), SAFETY)
     assert limited.limited_by == (reason,)
     assert limited.setpoint.velocity_m_s == (0.0, 0.0, 0.0)

@@ -86,7 +86,7 @@ def test_an_input_that_was_not_recorded_is_named(flown: Path, tmp_path: Path) ->
     assert f"{lost[0].key} number 1000" in output
 
 
-def test_what_was_lost_of_the_outputs_is_no_difference(flown: Path, tmp_path: Path, verdict: Any) -> None:
+def test_lost_output_messages_are_no_difference(flown: Path, tmp_path: Path, verdict: Any) -> None:
     some = rewritten(
         flown,
         tmp_path / "some",
@@ -159,7 +159,9 @@ def test_the_truth_is_for_judging_only(flown: Path, tmp_path: Path, verdict: Any
         (("odometry", "observation", "vehicle_status", "searched_picture"), "nothing to re-run with"),
     ],
 )
-def test_what_cannot_be_repeated_says_why(flown: Path, tmp_path: Path, topics: tuple[str, ...], reason: str) -> None:
+def test_a_recording_that_cannot_be_rerun_is_refused_with_a_reason(
+    flown: Path, tmp_path: Path, topics: tuple[str, ...], reason: str
+) -> None:
     code, output = code_of(rewritten(flown, tmp_path / "less", without(*topics)), "--recompute")
     assert code == -1 and reason in output
 

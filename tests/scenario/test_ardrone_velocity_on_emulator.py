@@ -255,7 +255,7 @@ def deaf(flight, seconds=4.0):
     ],
     ids=["even flight", "half a step", "a step", "a stop", "turning back"],
 )
-def test_what_a_drone_does_that_hears_nothing_any_more(before, then, after_s, speed_m_s, flown_m):
+def test_speed_and_distance_of_a_drone_that_receives_no_commands(before, then, after_s, speed_m_s, flown_m):
     """It keeps its tilt until its own watchdog acts after 2 s; the safety page states these figures."""
     flight = Flight(1).take_off()
     flight.record(3.0, (before, 0.0, 0.0))

@@ -196,7 +196,7 @@ def test_wild_sightings_by_the_dozen_move_nobody(lab_field: ResolvedField) -> No
 
 
 @pytest.mark.parametrize("name", [*DRONES, "turtlebot"])
-def test_who_joins_by_a_wild_sighting_is_put_right_by_the_next(lab_field: ResolvedField, name: str) -> None:
+def test_initialisation_by_an_outlier_is_corrected_by_the_next_observation(lab_field: ResolvedField, name: str) -> None:
     """Otherwise an overconfident robot drags along its observers and the ceiling camera's mounting."""
     used = []
 
@@ -257,7 +257,7 @@ def test_outliers_among_first_sightings_bend_no_height(lab_field: ResolvedField,
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_who_was_carried_off_is_found_again_among_outliers(lab_field: ResolvedField, seed: int) -> None:
+def test_displaced_entities_are_relocated_among_outliers(lab_field: ResolvedField, seed: int) -> None:
     flight = Abused(lab_field, as_it_is, seed, outliers=0.1).fly(BEGIN_S)
     target = flight.world.targets["turtlebot"]
     target.place(target.x - 0.3, target.y)

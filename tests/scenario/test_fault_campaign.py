@@ -39,7 +39,7 @@ def test_a_silent_drone_is_stopped_and_landed_by_its_driver(silent: dict[str, An
     assert "no telemetry from the vehicle" in silent["reasons"]["drone_1"]
 
 
-def test_what_was_broken_is_said_with_the_rest(silent: dict[str, Any]) -> None:
+def test_injected_faults_are_listed_among_the_events(silent: dict[str, Any]) -> None:
     assert "fault navdata_silent of drone_1 begins" in silent["events"]
     assert any(line.startswith("drone_1 LANDING: no telemetry") for line in silent["events"])
 

@@ -210,7 +210,7 @@ def test_a_drone_that_is_put_elsewhere_again_and_again_stands_still(seed: int, k
 @pytest.mark.slow
 @pytest.mark.study
 @pytest.mark.parametrize(("changes", "kinds", "seed", "unsafe"), UNSAFE.values(), ids=UNSAFE)
-def test_what_is_known_to_be_unsafe_does_no_more_than_that(
+def test_flights_known_as_unsafe_are_unsafe_in_that_way_only(
     changes: list[str], kinds: list[str], seed: int, unsafe: set[str]
 ) -> None:
     """A flight that is safe belongs to the list above."""

@@ -110,7 +110,7 @@ def test_configuration_chooses_bottom_camera_and_size():
         assert large[-1].picture.grey().std() < contrast + 8
 
 
-def test_what_tcp_loses_comes_late_and_holds_up_what_follows():
+def test_pictures_lost_by_tcp_are_late_and_delay_the_following():
     spec = make_spec("none", 0, frame_loss=0.3, video_jitter_ms=0.0, video_delay_ms=100.0)
     link = FrameDelay(spec)
     exposures = [k * 66_000_000 for k in range(400)]

@@ -168,7 +168,7 @@ faults:
 """
 
 
-def test_what_never_answers_is_named_and_the_rest_flies(sitl: Start, tmp_path: Path) -> None:
+def test_silent_devices_are_named_and_the_other_drone_flies(sitl: Start, tmp_path: Path) -> None:
     shipped = Path(__file__).parents[2] / "config" / "scenarios" / "realistic.yaml"
     scenario = tmp_path / "faults.yaml"
     scenario.write_text(shipped.read_text().replace("faults: []\n", FAULTS))
@@ -190,7 +190,7 @@ def _heals(run: Any, camera: str, since: float) -> bool:
     return "no picture" in told and "pictures arrive" in told.partition("no picture")[2]
 
 
-def test_what_comes_to_a_drivers_port_from_elsewhere_is_counted(sitl: Start) -> None:
+def test_datagrams_from_foreign_addresses_are_counted(sitl: Start) -> None:
     run = sitl()
     run.until_tracking()
     ports = _ports(run)

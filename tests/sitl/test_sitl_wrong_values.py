@@ -41,7 +41,7 @@ BORNE = {
 
 
 @pytest.mark.parametrize("wrong", STOPPED.values(), ids=STOPPED)
-def test_who_cannot_be_flown_stops_in_time(
+def test_a_drone_with_wrong_values_stops_in_time(
     sitl: Callable[..., SitlRun], tap: WireTap, wrong: Fault, tmp_path: Path
 ) -> None:
     verdict = fly(sitl, tap, wrong, tmp_path)

@@ -53,7 +53,7 @@ def test_each_statement_outside_kernels_is_counted_once():
 
 
 @pytest.mark.parametrize(("calls", "expected"), [((1,), 9), ((-1,), 4), ((0,), 8), ((1, 0, -1), 12)])
-def test_what_runs_is_counted(calls, expected):
+def test_executed_statements_are_counted(calls, expected):
     statements, hits = probed(*calls)
     assert sum(n for n, hit in zip(statements, hits, strict=True) if hit) == expected
 
@@ -93,7 +93,7 @@ def test_a_repetition_adds_to_what_ran_before():
     assert added == Measured({"a": b"\1\1", "b": b"\0\0", "c": b"\1"}, 3)
 
 
-def test_what_ran_in_one_of_several_processes_counts():
+def test_statements_run_in_any_process_count():
     parts = [Measured({"a": b"\1\0", "b": b"\1"}, 3), Measured({"a": b"\0\1", "c": b"\0"}, 1)]
     assert Measured.joined(parts) == Measured({"a": b"\1\1", "b": b"\1", "c": b"\0"}, 4)
 

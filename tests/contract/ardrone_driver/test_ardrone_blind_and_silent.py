@@ -18,7 +18,7 @@ def turn_for(rig, seconds, settle=True):
 
 @pytest.mark.parametrize("then", ["silent", "frozen"])
 @pytest.mark.parametrize(("lie", "braked"), [("stuck", True), ("", False)])
-def test_who_was_blind_before_its_last_word_is_braked_on(rig, monkeypatch, lie, then, braked):
+def test_a_drone_that_saw_no_floor_before_falling_silent_is_braked(rig, monkeypatch, lie, then, braked):
     rig.take_off()
     rig.tracking = True
     rig.order(Verb.TRACK)

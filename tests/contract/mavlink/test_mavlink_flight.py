@@ -45,7 +45,7 @@ def test_it_takes_off_hovers_flies_and_lands(rig):
     assert (Verb.TAKEOFF, "EFFECTIVE") in stages and (Verb.LAND, "EFFECTIVE") in stages
 
 
-def test_what_is_published_is_what_it_measures_and_never_our_own_position(rig):
+def test_published_telemetry_is_measured_and_never_our_own_position(rig):
     rig.track_on()
     rig.wanted = ((0.3, -0.2, 0.0), 0.3)
     for topic in (ODOMETRY, IMU, VEHICLE_STATUS):
@@ -230,7 +230,7 @@ def test_pilots_mode_change_is_not_fought(rig):
 
 
 @pytest.mark.parametrize("verb", [Verb.RESUME, Verb.TRACK])
-def test_what_a_pilot_took_is_given_back_by_an_order_and_not_by_setpoints_that_come_again(rig, verb):
+def test_a_pilots_takeover_ends_by_command_not_by_new_setpoints(rig, verb):
     """The tracker pauses for less than the time that requires RESUME; that does not take the vehicle from a pilot."""
     rig.track_on()
     firmware = rig.emulator.firmware

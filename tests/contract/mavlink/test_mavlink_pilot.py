@@ -30,7 +30,7 @@ def lose_positions(rig):
     rig.run(2.5)
 
 
-def test_what_flies_by_sticks_is_not_landed_by_a_failsafe(rig):
+def test_a_vehicle_flown_by_sticks_is_not_landed_by_a_failsafe(rig):
     take_over(rig, _STICKS[rig.flavour])
     lose_positions(rig)
     assert not landings(rig)
@@ -60,7 +60,7 @@ def test_it_is_landed_in_a_mode_that_needs_a_position(rig):
 
 
 @pytest.mark.parametrize("heard", [True, False])
-def test_who_takes_over_from_a_landing_keeps_it_by_a_transmitter_only(rig, heard):
+def test_a_pilots_takeover_of_a_landing_needs_a_transmitter(rig, heard):
     rig.track_on()
     firmware = rig.emulator.firmware
     firmware.transmitter = heard
@@ -81,7 +81,7 @@ def test_an_operators_landing_is_sent_to_a_pilot_too(rig):
     assert landings(rig)
 
 
-def test_who_is_heard_but_tells_no_velocity_is_told_as_that(rig):
+def test_a_vehicle_without_velocity_is_not_reported_as_silent(rig):
     """A real ArduCopter stops sending LOCAL_POSITION_NED in flight once its estimator has no position."""
     rig.track_on()
     rig.emulator.speaker.builders[LocalPositionNed] = lambda: None

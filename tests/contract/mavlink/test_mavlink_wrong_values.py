@@ -198,7 +198,7 @@ def test_one_that_says_no_more_whether_it_flies_is_landed(rig):
     rig.until(lambda: rig.body.on_ground, 10.0)
 
 
-def test_what_is_bad_is_not_published(rig):
+def test_wrong_odometry_is_not_published_but_imu_samples_are(rig):
     rig.track_on()
     Liar(rig.link).set(LocalPositionNed, vx=0.0, vy=0.0)
     rig.run(1.0)

@@ -57,13 +57,13 @@ def test_an_answer_to_its_order_is_told() -> None:
         (1, ack(MavCmd.NAV_LAND, 254)),  # another operator's vehicle
     ],
 )
-def test_what_is_no_second_master_is_not_told(system: int, message: Message) -> None:
+def test_messages_of_no_second_ground_station_are_not_reported(system: int, message: Message) -> None:
     heard = stations()
     heard.hear(frame(system, message))
     assert not heard.news
 
 
-def test_who_rides_along_through_us_may_be_answered() -> None:
+def test_answers_to_a_station_forwarded_by_us_are_not_reported() -> None:
     heard = stations(11)
     heard.hear(frame(11, ack(MavCmd.NAV_LAND, 254), 1))
     assert not heard.news

@@ -177,7 +177,7 @@ def test_a_pose_reaches_the_vehicle_it_is_of_and_no_other(hangar, opened, port):
         assert [m.x for m in messages if isinstance(m, flight.VisionPositionEstimate)] == [system / 4]
 
 
-def test_what_goes_over_the_port_is_told_to_the_byte(hangar, opened):
+def test_the_recording_contains_the_original_frames_of_every_link(hangar, opened):
     """On every link, the recording and its .tlog contain the original frames."""
     _, _, (address, port) = hangar.add("px4", 7)
     told = []

@@ -53,7 +53,7 @@ def test_a_vehicle_that_calls_with_an_old_time_is_told_ours_and_heard_then(vehic
     link.close()
 
 
-def test_what_is_wrongly_signed_is_not_greeted(vehicle, now):
+def test_wrongly_signed_messages_are_not_greeted(vehicle, now):
     port = free_port(kind=socket.SOCK_DGRAM)
     link = UdpLink(LinkSettings(target=f"udpin:127.0.0.1:{port}"), Signing(KEY, now))
     vehicle.sendto(FrameEncoder(11, 1, Signing(bytes(32), now - 24 * HOUR)).encode(BEAT), ("127.0.0.1", port))

@@ -32,7 +32,7 @@ def test_a_second_link_to_the_same_vehicle_is_opened_all_the_same(vehicle):
     second.close()
 
 
-def test_who_speaks_mavlink_1_is_greeted_once_a_second_and_not_believed(vehicle):
+def test_mavlink_1_frames_are_refused_but_answered_once_a_second(vehicle):
     port = free_port(kind=socket.SOCK_DGRAM)
     link = UdpLink(LinkSettings(target=f"udpin:127.0.0.1:{port}"))
     old = dialect.MAVLink(None, 1, 1)

@@ -108,7 +108,7 @@ def test_a_signed_vehicle_obeys_driver_supervisor_and_guardian_in_any_order(vehi
         (3600, 3600, 0),  # clock set forward, the driver restarted, the clock set back
     ],
 )
-def test_who_speaks_for_a_driver_is_heard_though_the_clock_was_set_in_flight(
+def test_failsafe_frames_are_accepted_after_the_clock_was_set_in_flight(
     vehicle, key_file, tmp_path, monkeypatch, flying, restarted, speaking
 ):
     (words, *_), _ = words_of(tmp_path, key_file=key_file, link="pymavlink")
@@ -136,7 +136,7 @@ def test_who_speaks_for_a_driver_is_heard_though_the_clock_was_set_in_flight(
     guardian.close()
 
 
-def test_who_speaks_for_a_driver_is_heard_though_the_computers_clock_is_slow(vehicle, port, key_file, tmp_path):
+def test_failsafe_frames_are_accepted_although_the_computers_clock_is_slow(vehicle, port, key_file, tmp_path):
     """The vehicle knows the time of another ground station, which flew it before; the driver has received that time."""
     (words, *_), _ = words_of(tmp_path, key_file=key_file, link="pymavlink")
     ahead = stamp_at(time.time()) + 360_000_000

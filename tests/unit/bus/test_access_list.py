@@ -64,7 +64,7 @@ def test_a_target_speaks_of_its_own_motion_and_nothing_else() -> None:
 
 
 @pytest.mark.parametrize("topic", [SETPOINT, LEASE])
-def test_what_moves_a_drone_has_one_sender(topic: Topic) -> None:
+def test_topics_that_move_a_drone_have_one_sender(topic: Topic) -> None:
     assert len(topic.senders) == 1
 
 

@@ -45,7 +45,7 @@ def test_newest_keeps_one_sample_per_key() -> None:
     assert sorted((item.key.source, item.header.seq) for item in subscription.drain()) == [("one", 2), ("two", 2)]
 
 
-def test_what_is_refused_is_counted_by_reason() -> None:
+def test_refused_messages_are_counted_by_reason() -> None:
     subscription = Subscription()
     good_key = "gs/@v1/lab/drone_1/event/sender"
     subscription.offer(Sample(good_key, b"{"))

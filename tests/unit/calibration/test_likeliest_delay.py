@@ -55,7 +55,7 @@ def test_only_what_was_used_under_every_delay_is_compared() -> None:
 
 
 @pytest.mark.parametrize("seconds", [0.0, 8.0])
-def test_what_lasts_too_short_tells_nothing(seconds: float) -> None:
+def test_a_short_recording_yields_no_delay(seconds: float) -> None:
     cost = recorded(0.0)
 
     def short(later_ms: float) -> Costs:

@@ -104,7 +104,7 @@ def test_a_recording_in_which_no_fixed_camera_saw_a_drone_is_refused(lab_field: 
         calibrate_team(Flown(blind, CLOCK), lab_field)
 
 
-def test_what_a_flight_hardly_shows_is_named_with_what_it_is_not_told_apart_from(lab_field: ResolvedField) -> None:
+def test_figures_hardly_observable_are_named_with_the_figure_they_resemble(lab_field: ResolvedField) -> None:
     """A fixed camera that is displaced sees nearly the same as one that is tilted."""
     figures = {(one.who, one.part): one for one in calibrated(lab_field, {}).figures}
     for place, turn in (("x", "pitch"), ("y", "roll")):

@@ -40,7 +40,7 @@ def suspicions() -> list[Suspicion]:
     return [*single, Suspicion("", "size", np.ones((3, 1)), np.array([0.5]))]
 
 
-def test_what_is_within_its_survey_has_no_cause() -> None:
+def test_figures_within_survey_accuracy_have_no_cause() -> None:
     H = np.diag([1e6, 1e6, 1e6])
     found, sigma = found_in(H, [0.01, -0.01, 0.005], suspicions())
     assert found == () and not freed(found).any()
@@ -65,7 +65,7 @@ def test_causes_that_explain_it_as_well_are_rivals() -> None:
     }
 
 
-def test_what_explains_nothing_by_a_fit_is_no_cause_however_sure_the_linear_model_is() -> None:
+def test_a_figure_that_improves_no_fit_is_no_cause() -> None:
     H = np.diag([1e5, 1e5, 1e5])
     assert found_in(H, [0.0, 0.2, 0.0], suspicions())[0] != ()
     assert found_in(H, [0.0, 0.2, 0.0], suspicions(), share=1e-3)[0] == ()
@@ -89,7 +89,7 @@ def test_every_figure_of_the_lab_has_a_survey_and_a_suspicion(lab_field: Resolve
     )
 
 
-def test_what_the_field_says_of_mountings_and_lenses_counts(lab_field: ResolvedField) -> None:
+def test_accuracies_of_mountings_and_lenses_are_taken_from_the_field(lab_field: ResolvedField) -> None:
     drone, before = lab_field.drones["drone_1"], Figures(lab_field, tuple(lab_field.drones))
     std = LensStd(fx_px=9.2, fy_px=4.6, cx_px=1.0, cy_px=1.0, k1=0.01, k2=0.01, p1=0.0, p2=0.0, k3=0.0)
     lens = msgspec.structs.replace(drone.camera.calibration, fx_px=460.0, fy_px=460.0, std=std)

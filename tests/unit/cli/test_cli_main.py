@@ -170,7 +170,7 @@ def test_start_up_imports_nothing_heavy() -> None:
 
 
 @pytest.mark.parametrize("verb", VERBS)
-def test_what_stops_goes_first_and_with_it_its_bus(monkeypatch: pytest.MonkeyPatch, verb: str) -> None:
+def test_stop_commands_and_their_bus_run_at_raised_priority(monkeypatch: pytest.MonkeyPatch, verb: str) -> None:
     done: list[str] = []
     monkeypatch.setattr(program, "go_first", lambda *, heirs: done.append(f"first {heirs}"))
     monkeypatch.setattr(cli, "main", lambda: done.append("carried out"))
@@ -296,7 +296,7 @@ def test_the_first_page_names_a_dozen_commands(capsys: pytest.CaptureFixture[str
 
 
 @pytest.mark.parametrize("encoding", ["utf-8:strict", "latin-1"])
-def test_what_a_terminal_cannot_show_is_no_fault(tmp_path: Path, encoding: str) -> None:
+def test_characters_that_a_terminal_cannot_show_are_no_error(tmp_path: Path, encoding: str) -> None:
     """With a locale, Python encodes stdout strictly: a path typed as bytes ended in a traceback."""
     typed = os.fsencode(tmp_path) + b"/\xff"
     command = [os.fsencode(sys.executable), b"-m", b"groundstation", b"config", b"init", typed]

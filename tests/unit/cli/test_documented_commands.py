@@ -89,7 +89,7 @@ def no_parts(words: list[str]) -> Iterator[str]:
 
 
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
-def test_what_a_document_shows_can_be_typed(path: Path) -> None:
+def test_commands_shown_in_documents_are_valid(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
     wrong = []
     for line in shown(text):

@@ -57,7 +57,7 @@ def test_compiling_is_told_and_done_once(
     assert not capsys.readouterr().err
 
 
-def test_what_is_named_twice_is_computed_once() -> None:
+def test_options_named_twice_are_used_once() -> None:
     assert choices("paper, certified,paper", ("paper", "certified"), "--strategies") == ["paper", "certified"]
     assert numbers("2,5,2", "--robots", 1, 100) == [2, 5]
 
@@ -67,7 +67,7 @@ def test_a_list_of_nothing_is_refused() -> None:
         choices(" ,", ("paper",), "--strategies")
 
 
-def test_what_is_no_recording_is_refused_before_kernels_are_compiled(
+def test_files_that_are_no_recording_are_refused_before_kernels_compile(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(kernels, "use_flying_kernels", lambda: pytest.fail("compiled for nothing"))

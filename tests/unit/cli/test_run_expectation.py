@@ -9,7 +9,7 @@ from groundstation.cli.main import run
 
 
 @pytest.mark.parametrize(("scenario", "expected"), [("kidnap-3m", {"lost_s": 12}), ("realistic", None)])
-def test_what_a_scenario_expects_is_recorded_with_the_run(
+def test_a_scenarios_expectation_is_passed_to_the_recorded_run(
     monkeypatch: pytest.MonkeyPatch, scenario: str, expected: Any
 ) -> None:
     flown: list[Any] = []

@@ -18,7 +18,7 @@ def test_an_alarm_is_logged_when_it_ends_with_its_last_words_and_its_times() -> 
     assert log.as_json() == [past]
 
 
-def test_what_wavers_is_one_alarm_and_asked_for_what_it_ever_did() -> None:
+def test_a_flickering_alarm_is_one_entry_that_still_asks() -> None:
     log = AlarmLog()
     log.note([Alarm("drone_1 link", "drone_1: weak link, 29%", advice="To do: LAND it.")], 1 * S)
     log.note([], 2 * S)
@@ -28,7 +28,7 @@ def test_what_wavers_is_one_alarm_and_asked_for_what_it_ever_did() -> None:
     assert [(past["began"], past["ended"], past["asks"]) for past in log.as_json()] == [(1000.0, 4000.0, True)]
 
 
-def test_what_comes_back_later_is_another_alarm_and_the_last_one_stands_first() -> None:
+def test_a_later_recurrence_is_another_alarm_and_newest_come_first() -> None:
     log, lost = AlarmLog(), Alarm("turtlebot lost", "turtlebot: not seen for 3 s", grave=False)
     for second, standing in ((1, [lost]), (2, []), (5, [lost]), (6, [])):
         log.note(standing, second * S)

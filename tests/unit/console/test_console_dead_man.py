@@ -160,7 +160,7 @@ def broken(*_: object, **__: object) -> None:
     raise OSError("the terminal is gone")
 
 
-def test_what_is_no_gamepad_is_refused(tmp_path: Path) -> None:
+def test_files_that_are_no_gamepad_are_refused(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("no joystick")
     for path, words in (
         (tmp_path / "notes.txt", "no gamepad"),

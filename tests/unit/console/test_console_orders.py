@@ -97,7 +97,7 @@ def test_starts_go_to_the_lease_holder_fresh_or_not_at_all() -> None:
     assert command.scope == ("operator", "drone_2") and command.expires_ns > 0
 
 
-def test_who_takes_off_against_the_checks_is_named_in_the_order() -> None:
+def test_the_viewer_who_overrides_the_checks_is_named_in_the_command() -> None:
     room = Room()
     room.lease()
     page = room.viewer(1)
@@ -146,7 +146,7 @@ def test_an_order_is_followed_to_its_end() -> None:
     assert given["state"] == "confirmed" and given["ref"] == "r" and given["by"] == "viewer 1" and given["team"]
 
 
-def test_what_is_not_heard_is_repeated_and_in_the_end_not_confirmed() -> None:
+def test_an_unanswered_command_is_repeated_then_not_confirmed() -> None:
     room = Room()
     room.give(m.Verb.LAND)
     (command,) = room.commands()

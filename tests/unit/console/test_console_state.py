@@ -228,7 +228,7 @@ def test_a_viewer_gets_all_that_was_added_since_its_last_frame() -> None:
     assert json.loads(board.since(1)) == {}
 
 
-def test_what_was_never_seen_can_still_be_said() -> None:
+def test_an_infinite_age_is_sent_as_a_large_number() -> None:
     state, board = ConsoleState(Cast("lab", {}, ("turtlebot",)), 0), Snapshot()
     state.ingest([received(t.ESTIMATE, estimate(age_s=1e300))])
     board.begin()

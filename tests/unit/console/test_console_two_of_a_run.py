@@ -82,7 +82,7 @@ def run() -> Iterator[Run]:
     made.other.close()
 
 
-def test_who_starts_at_one_console_is_the_operator_at_the_other(run: Run) -> None:
+def test_the_operator_of_one_console_is_shown_at_the_other(run: Run) -> None:
     run.own.order(m.Verb.TRACK)
     run.turn()
     assert (run.own.operator, run.other.operator) == ("viewer 1", "console")
@@ -91,7 +91,7 @@ def test_who_starts_at_one_console_is_the_operator_at_the_other(run: Run) -> Non
     assert run.heard() == [m.Verb.TRACK]
 
 
-def test_who_takes_over_at_another_console_replaces_the_operator_by_the_next_start(run: Run) -> None:
+def test_a_takeover_at_another_console_takes_effect_with_its_next_start(run: Run) -> None:
     run.own.order(m.Verb.TRACK)
     run.turn()
     run.other.server.sessions.handle(run.other.page, TakeOver())

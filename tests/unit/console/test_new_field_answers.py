@@ -63,6 +63,6 @@ def test_a_mistake_is_named(tmp_path: Path, changes: dict[str, Any], problem: st
 
 
 @pytest.mark.parametrize("frame", [b"", b"[]", b"\xff", form(order="erase"), form(drones=[["balloon", "a", "b"]])])
-def test_what_no_form_sends_is_refused(frame: bytes) -> None:
+def test_answers_that_no_form_sends_are_refused(frame: bytes) -> None:
     with pytest.raises(MessageError):
         decode(frame)

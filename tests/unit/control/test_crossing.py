@@ -80,7 +80,7 @@ def test_how_far_one_gets_unseen_in_a_second(leaves_m: float, speed: float, most
     assert unseen_way_m(leaves_m, speed, most, 0.7, 1.0) == pytest.approx(way_m, abs=0.01)
 
 
-def test_who_is_held_stops_at_the_border_and_slides_along_it() -> None:
+def test_a_held_robot_stops_at_the_border_and_slides_along_it() -> None:
     assert hold(WEST, at(-0.5, 0.0), at(0.6, 0.3), 0.5) == pytest.approx([0.2, 0.3])
     assert hold(WEST, at(0.5, 0.0), at(0.6, 0.3), 0.5) == pytest.approx([-0.5, 0.3])
 
@@ -102,7 +102,7 @@ def test_who_is_held_stops_at_the_border_and_slides_along_it() -> None:
         "only back over one border",
     ],
 )
-def test_who_is_outside_flies_straight_in(
+def test_a_robot_outside_a_view_flies_straight_in(
     place: np.ndarray, velocity: np.ndarray, most: float, wanted: tuple[float, float]
 ) -> None:
     assert into(EAST, place, velocity, most) == pytest.approx(wanted)

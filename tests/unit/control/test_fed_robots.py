@@ -92,7 +92,7 @@ class Flight:
         "its plan turned round in the midst of the gap",
     ],
 )
-def test_who_left_every_view_is_back_in_one_before_it_lands(
+def test_a_robot_out_of_view_returns_before_it_is_landed(
     place: tuple[float, ...], velocity: tuple[float, float], planned: tuple[float, float]
 ) -> None:
     """Positions, velocities and plans of three flights of a PX4 in step with the room that ended in a landing."""
@@ -117,7 +117,7 @@ def test_it_goes_on_inwards_where_it_is_believed_in_view_and_not_seen() -> None:
     assert wanted[0] == pytest.approx(-CONTROL.return_speed_m_s) and wanted[1] > 0.3
 
 
-def test_who_is_in_the_view_makes_room_for_it() -> None:
+def test_a_robot_in_the_view_makes_room_for_a_returning_one() -> None:
     """A real PX4 stood still in front of the view, 3 cm from its border: another vehicle kept it off."""
     here, there = np.array([-0.5, -0.3, 1.3, 0.0]), np.array([-1.2, -0.1, 1.3, 0.0])
     layout = StateLayout().with_entity("drone_2", EntityKind.ROBOT, ROBOT_CORE)
@@ -146,14 +146,14 @@ def test_it_does_not_climb_out_of_the_view_that_it_looks_for(untied_s: float, cl
     assert found["drone_2"].velocity_m_s[2] == pytest.approx(0.4 if climbs else -0.18)
 
 
-def test_who_is_told_where_it_is_by_what_it_sees_flies_its_plan() -> None:
+def test_a_robot_located_by_its_own_observations_flies_its_plan() -> None:
     pose = np.array([-0.1, -0.55, 1.4, 0.7])
     sight = Sight(0.1, {"drone_2": 3.0}, untied_s={"drone_2": 0.3}, helped_s={"drone_2": 0.3})
     out = told(pose, np.array([0.3, 0.1]), sight, SEEN_STD_M).velocity_m_s
     assert world_from_stabilized(np.array(out), 0.7)[:2] == pytest.approx([0.3, 0.1])
 
 
-def test_who_holds_its_place_by_itself_flies_on_unseen() -> None:
+def test_a_vehicle_with_its_own_position_flies_on_out_of_view() -> None:
     pose = np.array([-0.1, 0.55, 1.3, 0.7])
     sight = Sight(0.1, {"drone_1": 1.0}, untied_s={"drone_1": 1.0})
     out = told(pose, np.array([0.3, 0.1]), sight, SEEN_STD_M, "drone_1").velocity_m_s
@@ -179,7 +179,7 @@ def test_on_the_way_back_it_goes_on_to_the_view_that_it_flies_to(x: float) -> No
     assert out.velocity_m_s[0] > 0.3
 
 
-def test_who_flies_on_our_estimate_stops_before_the_border_behind_which_nobody_sees_it() -> None:
+def test_a_vehicle_on_our_estimate_stops_before_leaving_all_views() -> None:
     """Copters that searched for the target left the views at 0.5 m/s, and landed before they were back."""
     near, tied = np.array([-1.7, -0.70, 1.2, 0.0]), Sight(0.1, untied_s={"drone_2": 0.1})
     border_m = min(view.y_m[0] for view in SENSORS.root_views(1.2 + SENSORS.marker_height_m["drone_2"]))
@@ -247,7 +247,7 @@ def test_a_search_does_not_lift_it_out_of_its_view() -> None:
         assert (found["drone_2"].velocity_m_s[2] > 0.0) is rises
 
 
-def test_who_searches_and_is_not_told_where_it_is_returns() -> None:
+def test_a_searching_robot_without_position_updates_returns() -> None:
     pose, sight = np.array([-1.7, -0.9, 1.2, 0.0]), Sight(9.0, {"drone_2": 0.5}, untied_s={"drone_2": 0.5})
     found = setpoints_from_plan(None, belief(pose, SEEN_STD_M), ("drone_2",), CONTROL, SENSORS, sight)
     assert found["drone_2"].phase is FlightMode.RETURN

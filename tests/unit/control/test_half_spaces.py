@@ -8,7 +8,7 @@ from groundstation.control.half_spaces import TOLERANCE_M_S, project
 NORMALS = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
 
-def test_what_is_allowed_is_left_as_it_is() -> None:
+def test_an_allowed_velocity_is_unchanged() -> None:
     wanted = np.array([0.1, -0.2, 0.7])
     found, met = project(wanted, NORMALS, np.array([0.2, 0.2, 0.0]))
     assert found.tolist() == wanted.tolist() and met == []

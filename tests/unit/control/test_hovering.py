@@ -68,7 +68,7 @@ def test_a_drift_does_not_carry_it_off(mode):
     assert max(flight.ways) <= 0.2 + 1e-9
 
 
-def test_who_stays_near_its_place_is_left_alone():
+def test_a_drone_near_its_hover_place_is_not_moved():
     flight = Flight()
     flight.run(2.0)
     flight.place = np.array((0.06, 0.07))
@@ -88,7 +88,7 @@ def test_it_is_brought_back_by_eight_tenths_of_the_way_a_second_at_two_decimetre
     assert flight.ways[-1] == pytest.approx(speed_m_s)
 
 
-def test_who_is_brought_back_is_left_alone_again_within_three_centimetres():
+def test_correction_ends_within_three_centimetres_of_the_hover_place():
     flight = Flight()
     flight.run(2.0)
     flight.place = np.array((0.2, 0.0))
@@ -116,7 +116,7 @@ def test_a_belief_that_jumps_moves_nobody_far():
 
 
 @pytest.mark.parametrize("seen_s", [{}, {"a": 1.1}])
-def test_whose_place_is_doubted_hovers_by_itself(seen_s):
+def test_a_drone_with_a_doubtful_position_is_not_moved(seen_s):
     flight = Flight(drift=(0.05, 0.0))
     flight.run(3.0)
     flight.seen_s = seen_s
@@ -137,7 +137,7 @@ def test_a_further_order_holds_the_place_of_that_moment():
 
 
 @pytest.mark.parametrize("other", [status("TRACK"), status("LANDING"), status("HOVER", failsafe="strays")])
-def test_who_tracks_lands_or_was_stopped_by_a_failsafe_is_not_held(other):
+def test_drones_in_tracking_landing_or_failsafe_are_not_held(other):
     flight = Flight()
     flight.hovering.take(other, flight.now_ns)
     assert flight.hovering.held({"a": PLANNED}, flight.now_ns, belief(1.0, 1.0), {"a": 0.0}) == {"a": PLANNED}
@@ -146,7 +146,7 @@ def test_who_tracks_lands_or_was_stopped_by_a_failsafe_is_not_held(other):
 
 
 @pytest.mark.parametrize("off_m", [0.8, -0.8, 0.25])
-def test_who_leaves_its_height_is_brought_back_to_it(off_m):
+def test_a_drone_off_its_hover_height_is_brought_back(off_m):
     """An object under a drone's ultrasound raises it by its height; after the object it sinks as much."""
     flight = Flight()
     flight.run(2.0)
@@ -156,7 +156,7 @@ def test_who_leaves_its_height_is_brought_back_to_it(off_m):
     assert max(map(abs, flight.climbs)) <= 0.2 + 1e-9 and not any(flight.ways)
 
 
-def test_who_keeps_its_height_by_itself_is_left_alone():
+def test_a_drone_near_its_hover_height_is_not_moved():
     flight = Flight()
     flight.run(2.0)
     flight.height_m = 1.19
@@ -176,7 +176,7 @@ def test_the_fence_pushes_down_who_hovers():
     assert sent.holds and sent.setpoint.velocity_m_s == (0.0, 0.0, -0.1)
 
 
-def test_what_the_limiter_asks_for_is_sent_without_its_climb():
+def test_velocities_of_the_limiter_are_sent_without_their_climb():
     flight = Flight()
     pushed = Limited(replace(PLANNED, velocity_m_s=(0.0, -0.05, 0.02)), ("separation",))
     sent = flight.hovering.sent({"a": pushed}, {"a": 0.1})["a"]

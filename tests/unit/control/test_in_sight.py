@@ -106,12 +106,12 @@ def test_a_vehicle_that_follows_late_stops_before_the_border() -> None:
     assert x > -0.3
 
 
-def test_whom_others_tell_where_it_is_crosses_a_short_gap_if_it_wants_into_its_midst() -> None:
+def test_a_robot_located_by_others_crosses_short_gaps_if_planned_halfway() -> None:
     for wanted, told in ((0.15, MOST_M_S), (0.08, 0.05)):
         assert kept(TWO, (-0.25, 0.2, 1.0), (wanted, 0.0), 1.0, HELPED)[0] == pytest.approx(told)
 
 
-def test_whom_others_tell_where_it_is_crosses_a_wide_gap_as_planned() -> None:
+def test_a_robot_located_by_others_crosses_a_wide_gap_as_planned() -> None:
     assert kept(TWO, (-0.55, 0.2, 1.5), (0.2, 0.0), 1.7, HELPED) == pytest.approx((0.2, 0.0, 1.7))
     assert kept(TWO, (0.1, 0.2, 1.5), (-0.1, 0.0), 1.7, HELPED) == pytest.approx((-0.1, 0.0, 1.7))
 
@@ -150,7 +150,7 @@ def test_it_climbs_only_where_there_is_a_view_higher_up_as_well() -> None:
     assert kept(TWO, (-0.3, 0.2, 1.0), (0.0, 0.0), 1.5) == pytest.approx((-0.15, 0.0, 1.0))
 
 
-def test_who_flies_by_itself_is_not_held() -> None:
+def test_a_vehicle_with_its_own_position_is_not_held() -> None:
     now = moment(ONE, (-1.0, 0.0, 1.0), others={"other": (0.5, 0.2, 1.0)})
     assert _flat(kept_in_sight("other", (0.6, 0.1), 2.0, 9.0, now)) == (0.6, 0.1, 2.0)
 

@@ -32,7 +32,7 @@ def test_a_sighting_that_joins_nobody_is_not_told() -> None:
     assert Joinings().take(1, [Correction("ceiling", "drone_1", Verdict.ACCEPTED, "", nis=3.0)]) == []
 
 
-def test_who_is_placed_by_ranges_is_told_of_and_unsettled_alike() -> None:
+def test_initialisations_by_ranges_are_reported_and_count_as_unsettled() -> None:
     watch = Joinings()
     first, second = watch.take(1, [], [("uwb", "drone_1", False), ("uwb", "drone_1", True)])
     assert (first.severity, first.text) == (Severity.INFO, "drone_1 localised by uwb")

@@ -127,7 +127,7 @@ def test_a_search_begins_as_late_as_the_last_sighting_and_not_as_the_last_search
         assert (lookout.targets["turtlebot"].room is not None) is doubted
 
 
-def test_who_must_not_observe_targets_shows_none() -> None:
+def test_observations_by_cameras_that_must_not_observe_targets_are_ignored() -> None:
     lookout = lookout_of_the_lab()
     lookout.take(driver_in("TRACK"))
     lookout.advance(belief(0.02), {"drone_1": 0.1, "turtlebot": 0.1}, {"drone_1": 0.1})
@@ -153,7 +153,7 @@ def test_nobody_is_said_to_search_who_lands_or_holds() -> None:
     assert [search.target for search in lookout.searches(round(2.84e9))] == ["turtlebot"]
 
 
-def test_who_follows_no_setpoints_is_held_while_another_does() -> None:
+def test_a_robot_that_follows_no_setpoints_is_held_while_another_does() -> None:
     two = Lookout(
         search_from_field(LAB), control_from_field(LAB), sensors_from_field(LAB), ("drone_1", "drone_2"), ("turtlebot",)
     )

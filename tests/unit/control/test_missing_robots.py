@@ -83,7 +83,7 @@ HERE, THERE = (0.5, 0.2, 1.6, 0.0), (-0.8, 0.0, 1.6, 0.0)
 
 
 @pytest.mark.parametrize(("age_s", "missed_one"), [(0.6, False), (0.61, True), (math.inf, False)])
-def test_who_was_seen_just_now_or_never_is_not_missed(age_s: float, missed_one: bool) -> None:
+def test_a_robot_seen_just_now_or_never_is_not_missing(age_s: float, missed_one: bool) -> None:
     assert bool(missed(HERE, THERE, age_s)[0]) is missed_one
 
 
@@ -114,7 +114,7 @@ def beside_the_line(share: float, aside_m: float) -> tuple[float, ...]:
     [(0.6, 0.4, []), (0.6, 0.6, ["drone_1"]), (1.3, 0.0, ["drone_1"]), (-0.2, 0.0, ["drone_1"])],
     ids=["in the line of sight", "beside it", "behind", "above the camera"],
 )
-def test_whoever_may_stand_before_it_hides_it(share: float, aside_m: float, said: list[str]) -> None:
+def test_a_robot_possibly_hidden_by_another_is_not_missing(share: float, aside_m: float, said: list[str]) -> None:
     assert missed((*BELOW.tolist(), 0.0), beside_the_line(share, aside_m))[0] == said
 
 

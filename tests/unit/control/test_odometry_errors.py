@@ -33,7 +33,7 @@ def test_a_sound_odometry_is_expected_to_be_as_its_deviation_says() -> None:
     assert errors.advance(belief(60.0, 0.0))["drone_1"] == pytest.approx(STD_M_S)
 
 
-def test_who_left_the_belief_begins_anew() -> None:
+def test_a_robot_that_left_the_belief_starts_without_error() -> None:
     errors = OdometryErrors()
     errors.advance(belief(1.0, 0.4))
     assert errors.advance(belief(1.1, 0.0, ())) == {}

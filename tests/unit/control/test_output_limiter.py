@@ -40,7 +40,7 @@ def test_a_belief_that_is_old_or_from_the_future_moves_nobody(age_ms: int, stale
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
 @pytest.mark.parametrize(("factor", "uncertain"), [(0.99, False), (1.01, True)])
-def test_who_is_not_known_well_enough_along_any_axis_hovers(axis: int, factor: float, uncertain: bool) -> None:
+def test_a_robot_uncertain_along_any_axis_hovers(axis: int, factor: float, uncertain: bool) -> None:
     variances = [0.0009] * 3
     variances[axis] = factor * SAFETY.max_position_std_m**2
     found = limited(variances=(variances[0], variances[1], variances[2]))
@@ -51,7 +51,7 @@ def test_a_covariance_that_is_none_moves_nobody() -> None:
     assert limited(variances=(0.0009, -1e-6, 0.0009)).limited_by == ("uncertain",)
 
 
-def test_what_was_wanted_of_one_that_hovers_is_kept_if_it_is_a_velocity() -> None:
+def test_the_wanted_velocity_of_a_limited_robot_is_kept_if_finite() -> None:
     assert limited(MOST_AGE_MS + 10).wanted_m_s == WANTED
     broken = limited(wanted=(math.nan, 0.0, 0.0))
     assert broken.limited_by == ("not finite",) and broken.wanted_m_s is None

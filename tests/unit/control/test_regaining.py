@@ -81,7 +81,7 @@ def test_one_that_does_not_backs_off_turns_and_keeps_its_height() -> None:
     assert vz == pytest.approx(0.0)
 
 
-def test_who_relays_goes_on_with_its_plan() -> None:
+def test_a_relaying_robot_keeps_its_plan() -> None:
     out = wanted(belief(np.array([0.0, 0.0, 1.6, 0.2]), np.array([0.5, 0.0, 0.0, 0.0])), 0.5, "drone_2/drone_1")
     assert out["drone_1"].velocity_m_s[0] < -0.4
     assert out["drone_2"].velocity_m_s[:2] == pytest.approx((0.0, 0.1))

@@ -50,7 +50,7 @@ def test_the_way_back_into_a_view_without_width_is_that_to_its_middle() -> None:
     assert float(way_back_m(np.array([3.0, 4.0]), Rectangle((0.0, 0.0), (0.0, 0.0)))) == pytest.approx(5.0, abs=1e-5)
 
 
-def test_who_is_known_worse_or_drifts_faster_has_less_time_out_of_sight() -> None:
+def test_uncertainty_and_drift_shorten_the_time_out_of_view() -> None:
     fresh, known_worse = time_left_s(0.05, 0.0, CONTROL), time_left_s(0.3, 0.0, CONTROL)
     drifting = time_left_s(0.3, 4.0, CONTROL)  # 0.25 m in 4 s
     assert fresh == pytest.approx(min((CONTROL.return_limit_m - 0.05) / CONTROL.drift_m_s, CONTROL.return_within_s))
@@ -77,7 +77,7 @@ def test_an_odometry_that_is_known_to_be_wrong_leaves_less_time_out_of_sight() -
     assert not is_lost("drone_1", far, CONTROL, SENSORS, unseen_s=1.0, velocity_error_m_s=0.25)
 
 
-def test_who_should_be_in_view_and_is_not_seen_flies_to_its_middle_before_it_is_lost() -> None:
+def test_an_unseen_robot_expected_in_view_is_lost_after_velocity_errors() -> None:
     near = belief(np.array([0.3, 0.0, 1.6, 0.0]), 0.3)
     assert is_lost("drone_1", near, CONTROL, SENSORS, unseen_s=3.0, velocity_error_m_s=0.25)
     assert not is_lost("drone_1", near, CONTROL, SENSORS, unseen_s=3.0)
@@ -103,7 +103,7 @@ def test_excursions_of_a_drone_whose_odometry_is_wrong_end_sooner() -> None:
 
 
 @pytest.mark.parametrize(("error_m_s", "back_s"), [(0.2, 0.8), (0.25, 0.34), (0.5, 0.0)])
-def test_who_would_be_lost_unseen_stays_where_it_could_come_back_from(error_m_s: float, back_s: float) -> None:
+def test_a_robot_stays_within_reach_of_a_return_into_view(error_m_s: float, back_s: float) -> None:
     """Known to 0.02 m it reaches 0.48 m after 0.46 m / error; of that time 1.5 s are for turning and being observed."""
     at = belief(np.array([1.2, 0.0, 1.6, 0.0]), 0.02)
     outwards = within_reach(np.array([0.5, 0.0]), "drone_1", at, CONTROL, SENSORS, error_m_s, np.zeros(2))
@@ -126,7 +126,7 @@ def test_a_view_that_it_reaches_in_time_may_be_crossed_to(error_m_s: float, cros
     assert found[0] == pytest.approx(0.5) if crosses else found[0] < 0.0
 
 
-def test_who_is_known_too_little_already_is_held_to_the_view() -> None:
+def test_a_robot_too_uncertain_to_leave_is_held_to_the_view() -> None:
     """No time is left to fly on out of view."""
     at = belief(np.array([1.2, 0.0, 1.6, 0.0]), 0.6)
     border_m = SENSORS.root_views(1.6 + SENSORS.marker_height_m["drone_1"])[0].x_m[1] - VIEW_INSET_M

@@ -29,7 +29,7 @@ def ages_s(watch: RootWatch) -> list[float]:
     return [round(watch.age_s(name), 3) for name in CARRIED]
 
 
-def test_what_a_root_sees_is_passed_on_along_sightings_in_either_direction() -> None:
+def test_location_by_a_fixed_camera_propagates_along_observations_both_ways() -> None:
     watch = RootWatch(["ceiling"], CARRIED)
     watch.advance(
         TICK_NS, [used("ceiling", "drone_1"), used("drone_1", "turtlebot"), used("drone_2", "turtlebot")], flying=True
@@ -37,7 +37,7 @@ def test_what_a_root_sees_is_passed_on_along_sightings_in_either_direction() -> 
     assert ages_s(watch) == [0.0, 0.0, 0.0]
 
 
-def test_what_others_tell_of_one_is_not_what_it_told_them() -> None:
+def test_a_robot_is_not_located_by_its_own_information() -> None:
     """Otherwise a robot in view that alone sees a target would locate itself by that target outside of the view."""
     watch = RootWatch(["ceiling"], CARRIED)
     alone = [used("ceiling", "drone_1"), used("drone_1", "turtlebot"), used("drone_1", "turtlebot")]

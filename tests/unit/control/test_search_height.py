@@ -36,7 +36,7 @@ def test_it_is_a_height_that_plans_fly() -> None:
     assert search_height_m(msgspec.structs.replace(LAB, planner=one)) == 1.7
 
 
-def test_who_returns_and_who_searches_fly_at_that_height() -> None:
+def test_returning_and_searching_robots_fly_at_the_search_height() -> None:
     assert control_from_field(LAB).search_height_m == search_height_m(LAB)
 
 

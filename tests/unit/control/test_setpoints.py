@@ -116,7 +116,7 @@ def test_without_a_fresh_target_they_go_to_the_stands_of_the_search(age: float |
         assert pose == pytest.approx([stand.x, stand.y, CONTROL.search_height_m, stand.yaw], abs=0.05)
 
 
-def test_who_has_nowhere_to_search_waits_in_view() -> None:
+def test_a_robot_without_a_place_to_search_waits_in_view() -> None:
     at = belief((2.0, 0.5, 1.6, 0.0), (-0.5, -0.5, 1.6, 0.0))
     out = setpoints_from_plan(None, at, NAMES, CONTROL, SENSORS)
     assert out["drone_1"].phase is FlightMode.SEARCH
@@ -156,7 +156,7 @@ def test_a_lost_robot_flies_back_towards_the_middle_of_the_view() -> None:
 
 
 @pytest.mark.parametrize(("unseen_s", "gives_way"), [(20.0, True), (0.1, False)])
-def test_who_tracks_makes_room_for_one_that_comes_back_with_a_doubtful_place(unseen_s: float, gives_way: bool) -> None:
+def test_a_tracking_robot_gives_way_to_an_uncertain_returning_one(unseen_s: float, gives_way: bool) -> None:
     yaw = 1.0
     at = belief((1.6, 0.3, 1.5, 0.0), (0.0, 0.0, 1.5, yaw), robot_std=0.3)
     out = setpoints_from_plan(plan((1.5, 1.5)), at, NAMES, CONTROL, SENSORS, Sight(0.1, {"drone_1": unseen_s}))
@@ -181,7 +181,7 @@ def test_nobody_makes_room_for_one_that_lands() -> None:
     assert out["drone_2"].velocity_m_s[:2] == pytest.approx((0.0, 0.1))
 
 
-def test_who_follows_no_setpoints_searches_nothing_and_others_keep_off_its_place() -> None:
+def test_robots_that_follow_no_setpoints_do_not_search_and_are_avoided() -> None:
     asked: list[list[str]] = []
 
     def search(robots: Sequence[str], _targets: Collection[str]) -> dict[str, Stand]:

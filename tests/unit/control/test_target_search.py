@@ -133,7 +133,7 @@ def test_a_searcher_turns_all_the_time_towards_what_it_has_not_seen() -> None:
 
 
 @pytest.mark.parametrize("known", [None, (1.0, 0.0)])
-def test_who_looks_for_a_target_that_was_tracked_turns_faster(known: tuple[float, float] | None) -> None:
+def test_a_search_for_a_previously_tracked_target_turns_faster(known: tuple[float, float] | None) -> None:
     search, ages_s = new_search(), (0.0, 2.0) if known else (math.inf, math.inf)
     poses = {
         "drone_1": np.array([-0.5, 0.5, CONTROL.search_height_m, 0.0]),
@@ -164,7 +164,7 @@ def test_pictures_are_searched_as_far_as_a_full_search_finds_markers() -> None:
     assert after.chances[row, behind] > before.chances[row, behind]
 
 
-def test_what_a_cupboard_hides_is_not_searched_by_a_picture_of_it() -> None:
+def test_floor_hidden_by_an_obstacle_does_not_count_as_searched() -> None:
     poses, maps = {"drone_1": np.array([0.0, 0.0, 1.6, 0.0])}, []
     for boxes in ((), (Box((1.3, 0.0), (0.2, 1.6, 1.3)),)):
         search = new_search(sensors=replace(SENSORS, obstacles=boxes))

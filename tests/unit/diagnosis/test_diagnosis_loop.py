@@ -62,7 +62,7 @@ def first_flown(window: Window, since_s: int) -> int | None:
     return first
 
 
-def test_what_another_clock_stamped_tells_nothing(lab_field: ResolvedField) -> None:
+def test_messages_stamped_by_another_clock_are_ignored(lab_field: ResolvedField) -> None:
     window = Window(lab_field, "c")
     for second in range(20):
         window.take("k", status(second, FlightState.FLYING, "elsewhere"), second * S)
@@ -77,7 +77,7 @@ def sighting(at_s: float, picture_s: float, camera: str = "drone_1_camera") -> M
     )  # fmt: skip
 
 
-def test_what_a_camera_showed_since_it_hung_does_not_count_once_that_is_known(lab_field: ResolvedField) -> None:
+def test_observations_of_a_frozen_camera_are_removed_once_that_is_known(lab_field: ResolvedField) -> None:
     window = Window(lab_field, "c")
     for tenth in range(200):
         at_s = tenth / 10
@@ -98,9 +98,7 @@ def hanging(message: Message, at_s: float) -> Message:
 
 
 @pytest.mark.parametrize("kind", [Odometry, RelativeObservation])
-def test_what_hangs_is_absurd_or_comes_from_the_future_does_not_count(
-    lab_field: ResolvedField, kind: type[Message]
-) -> None:
+def test_frozen_absurd_or_future_measurements_are_ignored(lab_field: ResolvedField, kind: type[Message]) -> None:
     rows = Lab(lab_field, WrongFigures({})).flown().ticks
     sample = next(message for _, inputs in rows for _, message in inputs if isinstance(message, kind))
     absurd = {"velocity_m_s": (1e200, 0.0, 0.0)} if kind is Odometry else {"position_m": (1e200, 0.0, 1.0)}
@@ -145,7 +143,7 @@ def test_a_wrong_figure_is_told_to_operator_and_tracker(
     assert diagnosis.overflowed == 0
 
 
-def test_what_is_suspected_is_said_again_for_consoles_that_come_later(
+def test_a_suspicion_is_repeated_for_consoles_that_start_later(
     lab_field: ResolvedField, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(clock, "clock_id", lambda: "c")

@@ -81,7 +81,7 @@ def test_a_late_velocity_is_told_on_the_evidence_that_a_calibration_asks_for(
     assert tuple(found) == sizes
 
 
-def test_what_explains_it_as_well_is_named_beside_it() -> None:
+def test_equally_likely_causes_are_named_together() -> None:
     direction = np.array([1.0, 1.0, 0.0])
     H = 1e6 * np.outer(direction, direction)
     (charges,) = weighed(H, H @ np.array([0.05, 0.0, 0.0]), SURVEYED, suspicions()).causes

@@ -58,7 +58,7 @@ def conversation(interface: str) -> Conversation:
 
 
 @pytest.mark.parametrize("open_one", [ardrone, tello, mavlink, mavlink_voice, conversation])
-def test_whoever_speaks_to_a_vehicle_uses_its_adapter_or_says_that_there_is_none(
+def test_vehicle_links_use_their_network_adapter_or_report_its_absence(
     open_one: Callable[[str], ArDroneLink], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     chosen: list[str] = []

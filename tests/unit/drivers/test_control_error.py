@@ -84,7 +84,7 @@ def test_a_vehicle_that_does_something_else_is_found_in_time(command, velocity, 
     assert "reported" in said and f"{math.hypot(*command):.1f} m/s asked" in said
 
 
-def test_what_cameras_see_convicts_a_velocity_that_lies():
+def test_camera_observations_reveal_a_wrong_velocity():
     at_s, said = fly(lambda t: told(0.3), lambda t: (0.3, 0.0), seen=lambda t: (1.2, 0.0))
     assert at_s is not None and at_s <= 1.2 and "1.2 m/s seen by cameras" in said
     assert fly(lambda t: told(0.3), lambda t: (0.3, 0.0), seen=lambda t: (0.5, 0.15)) == (None, "")

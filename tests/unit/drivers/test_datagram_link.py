@@ -62,7 +62,7 @@ def test_it_speaks_from_its_first_port_and_hears_only_the_vehicle(vehicle: socke
     assert heard == [b"known"]
 
 
-def test_what_is_refused_is_counted_by_its_reason_and_a_fault_of_the_taker_ends_nothing(vehicle: socket.socket) -> None:
+def test_refused_datagrams_are_counted_and_errors_of_the_recipient_survived(vehicle: socket.socket) -> None:
     last = threading.Event()
 
     def take(now_ns: int, data: bytes) -> bool:

@@ -35,7 +35,7 @@ def test_the_last_256_are_remembered() -> None:
     assert all(book.answered(command(str(number))) is not None for number in range(1, 257))
 
 
-def test_what_was_effective_is_told_once_and_remembered_so() -> None:
+def test_an_effective_command_is_reported_once_and_remembered() -> None:
     book = AckBook()
     book.answer(command("a"), "")
     assert book.effective(DriverMode.LANDING, view(FlightState.FLYING), flies=False) == ()
@@ -84,7 +84,7 @@ def test_a_command_is_effective_once_the_vehicle_shows_it(
 
 
 @pytest.mark.parametrize("verb", [Verb.LAND, Verb.CUT_MOTORS, Verb.TAKEOFF, Verb.HOLD])
-def test_what_a_silent_vehicle_said_last_shows_nothing(verb: Verb) -> None:
+def test_the_last_telemetry_of_a_silent_vehicle_confirms_no_command(verb: Verb) -> None:
     book = AckBook()
     book.answer(command("a", verb), "")
     for state in FlightState:
@@ -101,7 +101,7 @@ def test_what_a_silent_vehicle_said_last_shows_nothing(verb: Verb) -> None:
         (Verb.CUT_MOTORS, DriverMode.CUT, True),
     ],
 )
-def test_who_no_longer_flies_forgets_what_moves(verb: Verb, mode: DriverMode, kept: bool) -> None:
+def test_commands_to_move_are_forgotten_in_landing_and_cut(verb: Verb, mode: DriverMode, kept: bool) -> None:
     book = AckBook()
     book.enter(mode)
     book.answer(command("a", verb), "")

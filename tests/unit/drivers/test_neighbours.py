@@ -50,7 +50,7 @@ def test_a_doubtful_place_counts_as_nearer():
     assert neighbours.obstacle(S)
 
 
-def test_who_flies_and_nobody_knows_where_keeps_others_down():
+def test_a_flying_neighbour_without_position_prevents_take_off():
     neighbours = watch()
     assert neighbours.obstacle(S) == "b is in the air, and nobody knows where"
     neighbours.see(S, [believed("b", 3.0)])
@@ -64,7 +64,7 @@ def test_who_flies_and_nobody_knows_where_keeps_others_down():
 
 
 @pytest.mark.parametrize("state", [FlightState.LANDED, FlightState.EMERGENCY])
-def test_who_stands_is_in_nobodys_way(state):
+def test_a_standing_neighbour_is_no_obstacle(state):
     neighbours = watch()
     neighbours.hear(status("b", state))
     neighbours.hear(status("a", FlightState.FLYING))
@@ -137,7 +137,7 @@ def test_a_place_counts_for_three_tenths_of_a_second(later_ms, known):
     assert (b.crowded(S + later_ms * S // 1000) != "") == known
 
 
-def test_who_is_not_crowded_says_nothing():
+def test_drones_far_apart_give_no_separation_warning():
     assert crowded(believed("a", 0.0), believed("b", 2.0)) == ("", "")
     assert crowded(believed("a", 0.0)) == ("", "")
 

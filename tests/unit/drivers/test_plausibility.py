@@ -180,7 +180,7 @@ def test_an_ardrone_cannot_change_its_velocity_by_a_third_of_a_metre_per_second_
     assert (Sensor.VELOCITY, Health.BAD) not in first and any("its velocity jumps by 0." in reason for reason in said)
 
 
-def test_what_recovers_is_good_again_after_a_second():
+def test_recovered_telemetry_is_good_after_a_second():
     monitor = MotionMonitor(ARDRONE)
     good_s = []
     for sample in healthy(12.0):
@@ -220,7 +220,7 @@ def test_on_the_floor_repeats_count_only_where_noise_would_show():
     assert judge(still, ARDRONE, FlightState.LANDED) == ({}, set())
 
 
-def test_what_froze_on_the_floor_is_believed_again_a_second_after_it_moves_on():
+def test_telemetry_frozen_on_the_floor_is_good_soon_after_recovery():
     monitor, good_s = MotionMonitor(ARDRONE), list[float]()
     began = next(healthy(1.0))
     for sample in healthy(8.0):

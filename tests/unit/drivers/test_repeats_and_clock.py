@@ -32,7 +32,7 @@ def test_a_value_that_did_not_come_for_longer_than_the_gap_stands_anew():
     assert held(RepeatWatch(gap_s=0.1), [1.0] * 5, every_ms=101) == [0.0] * 5
 
 
-def test_what_was_before_a_reset_does_not_count():
+def test_values_before_a_reset_do_not_count():
     watch = RepeatWatch()
     held(watch, [1.0] * 4)
     watch.reset()
@@ -75,7 +75,7 @@ def test_lateness_is_against_the_freshest_of_five_to_ten_seconds():
     assert told == pytest.approx([0.0] + [0.3] * 11 + [0.0, 0.0, 0.2])
 
 
-def test_who_goes_back_by_more_than_three_seconds_was_started_again():
+def test_a_clock_set_back_over_three_seconds_counts_as_a_restart():
     watch = ClockWatch()
     watch.update(100 * S, 50 * S)
     assert watch.update(101 * S, 47 * S) == pytest.approx((0.0, 4.0))
@@ -92,7 +92,7 @@ def test_a_clock_that_starts_over_goes_on_each_time_and_may_still_be_late():
     assert watch.update(136 * S, 4 * S) == pytest.approx((0.0, 2.0)), "half a second back is no turn"
 
 
-def test_what_is_late_as_its_clock_starts_over_is_still_late():
+def test_lateness_is_kept_when_the_clock_wraps():
     """Fresh for 4 s, then a second late, while a clock of 4 s wraps twice; the first freshest count for 11 s."""
     watch = ClockWatch(wrap_s=4.0)
     told = [watch.update((100 + at_s) * S, (at_s % 4) * S)[1] for at_s in range(4)]

@@ -72,7 +72,7 @@ def test_half_a_metre_is_let_through_at_full_speed_and_a_metre_from_one_side_to_
 
 
 @pytest.mark.parametrize("across", [(0.2, 0.0, 0.0), (0.0, 0.2, 0.0), (0.0, 0.0, -0.2)])
-def test_what_was_let_through_is_forgotten_by_a_decimetre_a_second(across):
+def test_the_used_distance_is_restored_by_a_decimetre_a_second(across):
     """A second of standing, and a gap that counts as 0.2 s, free 0.12 m, which last 1.2 s."""
     bound = WayBack()
     bound.step(S, across)

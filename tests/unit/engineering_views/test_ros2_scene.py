@@ -104,7 +104,7 @@ def flight() -> list[m.Message]:
     return list(seen.values())
 
 
-def test_what_is_listed_as_shown_is_shown_and_nothing_else() -> None:
+def test_the_topics_shown_are_exactly_those_listed() -> None:
     made, said = scene(), set()
     for message in sorted(flight(), key=lambda one: isinstance(one, m.Estimate)):
         topic = next(topic for topic in TOPICS.values() if topic.type is type(message))

@@ -230,7 +230,7 @@ def test_a_vehicle_with_a_new_battery_teaches_its_new_bias(flying: Vehicle) -> N
     assert abs(flying.yaw_error_deg(since)) < 1.5 and flying.tilt_error_deg < 0.7
 
 
-def test_who_was_turned_over_once_is_level_as_before(flying: Vehicle) -> None:
+def test_attitude_recovers_after_a_full_roll(flying: Vehicle) -> None:
     for _ in range(50):
         flying.now += STEP_NS
         flying.roll += math.tau / 50

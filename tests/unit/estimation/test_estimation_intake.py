@@ -244,9 +244,7 @@ def test_only_who_has_to_be_known_before_its_lift_off_joins_while_it_takes_off(e
         (FlightState.UNKNOWN, "CONNECTING", False),
     ],
 )
-def test_who_lands_or_was_lost_in_the_air_is_known_to_a_tracker_that_begins_then(
-    state: FlightState, mode: str, known: bool
-) -> None:
+def test_airborne_robots_are_known_to_a_tracker_started_later(state: FlightState, mode: str, known: bool) -> None:
     desk = Desk()
     status = VehicleStatus(header=desk.header("drone", 100 * MS), flight_state=state, mode=mode)
     assert desk.take(status) is Verdict.ACCEPTED
@@ -254,7 +252,7 @@ def test_who_lands_or_was_lost_in_the_air_is_known_to_a_tracker_that_begins_then
     assert desk.filter.airborne("drone") is known
 
 
-def test_who_stood_and_is_no_longer_heard_does_not_fly() -> None:
+def test_a_standing_robot_that_falls_silent_is_not_airborne() -> None:
     desk = Desk()
     for age_ns, state in ((200 * MS, FlightState.LANDED), (100 * MS, FlightState.LOST)):
         desk.take(VehicleStatus(header=desk.header("drone", age_ns), flight_state=state, mode="LANDED"))

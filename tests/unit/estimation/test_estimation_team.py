@@ -72,7 +72,7 @@ def entries(belief: JointBelief, *names: str) -> list[int]:
     return [i for name in names for i in range(belief.layout.block(name).start, belief.layout.block(name).slice.stop)]
 
 
-def test_what_leaves_takes_its_correlations_along_and_changes_nobody_else() -> None:
+def test_removing_a_camera_leaves_the_other_estimates_unchanged() -> None:
     room = Room()
     room.run(0.1)
     place = (0.5, 0.1, 1.5)

@@ -57,7 +57,7 @@ def test_a_camera_on_a_drone_is_dated_by_the_drones_that_it_sees() -> None:
     assert one.sensor == "drone_2" and one.offset_s == pytest.approx(0.04, abs=0.005)
 
 
-def test_who_does_not_turn_tells_nothing_and_neither_do_targets_or_sightings_without_heading() -> None:
+def test_lateness_needs_turning_robots_observed_with_heading() -> None:
     watch = LatenessWatch()
     fly(watch, 0.04, turns=0.0)
     assert watch.told() == ()

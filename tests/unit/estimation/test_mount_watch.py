@@ -167,7 +167,7 @@ def agreed(observer: str, subject: str) -> Correction:
         "both, one by its other pose", "both apart",
     ],
 )  # fmt: skip
-def test_who_agree_among_each_other_are_not_both_lost(
+def test_robots_that_agree_with_each_other_convict_the_bumped_camera(
     lab_field: ResolvedField, beside: tuple[Correction, ...], culprits: list[str]
 ) -> None:
     """After a bump that put all drones out of its view, the camera sees one of them again."""

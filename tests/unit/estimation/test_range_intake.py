@@ -110,14 +110,14 @@ def test_a_drone_joins_where_ranges_put_it_with_the_heading_of_its_pad(desk: Des
     assert np.allclose(pose(desk)[:3], POSE, atol=0.06) and desk.filter.age_s("drone") < 0.2
 
 
-def test_who_stands_does_not_join(desk: Desk) -> None:
+def test_standing_robots_are_not_initialised_by_ranges(desk: Desk) -> None:
     desk.status(FlightState.LANDED)
     desk.fly(2)
     assert "drone" not in desk.filter.belief().layout
     assert {one.reason for one in desk.filter.take_corrections()} == {"the subject does not fly"}
 
 
-def test_who_turned_on_the_pad_before_the_take_off_has_the_pads_heading_still_after_a_turn_in_the_air(
+def test_the_initial_heading_follows_turns_on_the_pad_and_in_the_air(
     desk: Desk,
 ) -> None:
     desk.take_off()

@@ -104,7 +104,7 @@ def test_an_honest_report_makes_the_velocity_surer_and_is_believed(desk: Desk) -
     assert desk.intake.reports.heeds("cart") and desk.told == []
 
 
-def test_who_says_that_it_stands_is_known_to_stand_in_both_axes(desk: Desk) -> None:
+def test_a_reported_standstill_reduces_velocity_uncertainty_in_both_axes(desk: Desk) -> None:
     alone = desk.spread
     desk.drive(2.0, truly)
     assert desk.spread < 0.6 * alone
@@ -179,7 +179,7 @@ def test_one_that_comes_right_is_used_again_and_later_each_time(desk: Desk) -> N
     assert 2.0 <= waits[0] < 3.5 and 4.0 <= waits[1] < 6.5 and 8.0 <= waits[2] < 12.0
 
 
-def test_what_cannot_be_is_refused(desk: Desk) -> None:
+def test_implausible_late_or_unknown_motion_reports_are_refused(desk: Desk) -> None:
     assert desk.report(2000.0) is Verdict.IMPLAUSIBLE and desk.report(0.1, std=0.0) is Verdict.IMPLAUSIBLE
     late = ReportedMotion(
         header=Header(desk.now - 700 * MS, "here", "cart", "cart", 9999), velocity_m_s=(0.0, 0.0), std_m_s=0.05

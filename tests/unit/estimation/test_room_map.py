@@ -93,14 +93,14 @@ def left_at_the_prediction(after_s: float) -> float:
     return room.mass_near((0.0, 0.0), 0.01 * np.eye(2), 2.0, 0.5)
 
 
-def test_what_nobody_sees_for_a_moment_may_be_hidden_and_is_not_for_long() -> None:
+def test_the_chance_that_an_unseen_target_is_hidden_decays_with_time() -> None:
     given_up_below = 0.3  # control/search_parameters.py
     assert left_at_the_prediction(1.0) > given_up_below
     assert left_at_the_prediction(2.0) < given_up_below
     assert left_at_the_prediction(4.0) < 0.15
 
 
-def test_who_comes_out_from_behind_something_stands_or_goes_on() -> None:
+def test_hidden_target_probability_is_split_into_standing_and_moving() -> None:
     room = lost_at(GRID, (0.0, 0.0), 0.01 * np.eye(2))
     later = room.uncovered(HIDDEN_S)
     assert later.hidden.sum() == pytest.approx(room.hidden.sum() / np.e)
@@ -132,7 +132,7 @@ def test_one_that_drives_on_as_it_did_is_not_given_up_by_time_alone(speed_m_s: f
     assert room.mass_near((way_m - 1.0, 0.0), 0.05 * np.eye(2), 2.0, 0.5) > 0.35
 
 
-def test_what_is_not_predicted_any_more_drives_about_where_it_was() -> None:
+def test_a_target_no_longer_predicted_moves_about_its_last_place() -> None:
     room = lost_at(GRID, (1.0, 0.0), 0.01 * np.eye(2))
     about = room.given_up()
     assert about.chances == pytest.approx(room.chances)

@@ -51,7 +51,7 @@ def test_a_robot_that_turned_as_it_fell_silent_is_believed_where_it_is_seen() ->
     assert [one.verdict for one in joint.take_corrections()[-6:]] == [Verdict.ACCEPTED] * 6
 
 
-def test_who_was_never_seen_has_no_sighting() -> None:
+def test_entities_never_seen_have_no_observation() -> None:
     joint = FixedLagFilter(PARAMETERS)
     joint.advance(START)
     assert joint.sighting("a") is None and joint.sighting("t") is None

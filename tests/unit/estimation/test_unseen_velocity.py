@@ -45,7 +45,7 @@ def deviations(model: OdometryRobot, seconds: float) -> tuple[float, float]:
     return math.sqrt(P[at, at]), math.sqrt(P[0, 0])
 
 
-def test_who_flies_on_our_estimate_is_known_as_well_as_was_measured() -> None:
+def test_uncertainty_of_a_vehicle_on_our_estimate_matches_measured_drift() -> None:
     model = parameters_from_field(resolved_field(load_field(find_field("mixed-team")))).entities["drone_2"]
     assert isinstance(model, OdometryRobot)
     for seconds, (error_m_s, off_m) in MEASURED.items():
@@ -59,7 +59,7 @@ def test_a_kind_whose_error_does_not_walk_coasts_as_before() -> None:
     assert deviations(still, 1.0)[0] == pytest.approx(0.03 * math.sqrt(1.0 - math.exp(-0.4)))
 
 
-def test_who_was_seen_just_now_does_not_walk_yet() -> None:
+def test_the_velocity_walk_begins_some_time_after_the_last_observation() -> None:
     walks = OdometryRobot(slow_states=SLOW_STATES, velocity_bias_std_m_s=0.03, velocity_walk=0.15)
     still = OdometryRobot(slow_states=SLOW_STATES, velocity_bias_std_m_s=0.03)
     assert deviations(walks, 0.15) == deviations(still, 0.15)

@@ -63,7 +63,7 @@ class Flight:
         ]
 
 
-def test_what_waited_gives_the_same_belief() -> None:
+def test_waiting_observations_give_the_same_belief() -> None:
     flights = [Flight(parameters) for parameters in (AT_ONCE, WAITING)]
     for _ in range(2):  # rounding differences of the present beliefs do not accumulate
         for flight in flights:
@@ -96,7 +96,7 @@ def test_an_observation_counts_once_the_odometry_of_its_time_is_there() -> None:
     assert flight.joint.belief().covariance_of("a")[0, 0] < known
 
 
-def test_who_leaves_does_not_wait() -> None:
+def test_an_entity_that_left_is_not_restored_by_waiting_observations() -> None:
     flight = Flight(WAITING)
     flight.fly(600)
     assert "t" in flight.joint.belief().layout

@@ -38,7 +38,7 @@ def lab() -> ResolvedField:
         (("turtlebot", "print", 0.05), ("target", "marker", "square_mm"), 44.44, 1.05 / 1.01 - 1.0),
     ],
 )
-def test_what_a_setting_leaves_wrong(
+def test_a_corrected_setting_leaves_only_the_remaining_error(
     lab: ResolvedField, error: tuple[str, str, float], path: tuple[str, ...], value: Any, left: float
 ) -> None:
     found = {(who, part): size for who, part, size in errors_left([error], lab, with_changes(lab, {path: value}))}
@@ -91,7 +91,7 @@ def test_rows_are_those_whose_field_file_alone_is_wrong() -> None:
     assert not {"a wrong pad", "markers exchanged", "ceiling bumped", "a drone's telemetry"} & set(found)
 
 
-def test_what_is_proposed_is_written_into_the_field_and_flown_again(
+def test_proposed_settings_are_written_into_the_field_and_flown_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     flown: list[dict[str, Any]] = []

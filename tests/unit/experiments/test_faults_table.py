@@ -53,7 +53,7 @@ def test_totals_name_false_alarms_and_where_time_goes() -> None:
     assert summary["cpu_s_per_flight"] == 4.5
 
 
-def test_what_nobody_could_stop_is_counted_as_unsafe_and_named() -> None:
+def test_unsafe_flights_that_nobody_could_stop_are_counted_and_named() -> None:
     spells = [{"flown_m": flown_m, "fastest_m_s": 0.5 + flown_m / 2} for flown_m in (0.2, 0.6, 1.5)]
     unsafe = {"fence": 15.0, "speed": 14.0}
     flights = [

@@ -25,7 +25,7 @@ def test_flights_that_state_too_little_have_a_row_of_their_own() -> None:
     assert table([whole, less])[2].split() == ["0.25", "1", "1", "0.90", "0.10", "0.00", "0", "1", "3"]
 
 
-def test_who_did_not_fly_is_told_and_has_no_figures() -> None:
+def test_missions_not_flown_are_listed_without_figures() -> None:
     (row,) = rows_of([{"seed": 7, "covariance_share": 1.0, "flown": False}])
     assert (row["flights"], row["not_flown"], row["separation_m"]) == (0, [7], None)
     assert table([row])[1].split() == ["1.00", "0", "0", "-", "-", "-", "0", "0", "7"]

@@ -82,7 +82,7 @@ def test_dark_spells_and_the_room_s_other_half_show_nothing(folder: Path) -> Non
         (lambda f: write(f, "Robot1_Odometry", [(5.0, 0.1, 0.0)]), "do not overlap in time"),
     ],
 )
-def test_what_is_wrong_with_a_folder_is_named(folder: Path, break_it, said: str) -> None:
+def test_errors_of_a_data_set_folder_are_named(folder: Path, break_it, said: str) -> None:
     break_it(folder)
     with pytest.raises(GroundStationError, match=said):
         read_dataset(folder)

@@ -45,7 +45,7 @@ def test_a_target_that_was_never_found_has_no_error() -> None:
     assert errors_of(None, 2.0)["rmse_m"] is None
 
 
-def test_what_was_missed_is_named_with_its_limit() -> None:
+def test_missed_criteria_are_named_with_their_limits() -> None:
     expected = ScenarioExpectation(rmse_m=0.05, lost_s=0.0, found_s=10.0)
     flown = {"found_s": None, "rmse_m": 0.1, "lost_s": 0.0, "landings": 1, "violations": ["fence 0.10 m"]}
     assert shortfalls(flown, expected) == [
@@ -117,7 +117,7 @@ def test_scenarios_of_one_name_are_rows_of_their_own_and_one_named_twice_is_flow
     assert _labelled(named) == {"a/hard.yaml": "a/hard.yaml", "b/hard.yaml": "b/hard.yaml", "corner": "corner"}
 
 
-def test_what_only_pictures_show_is_told_to_change_nothing_at_message_level(
+def test_picture_settings_without_effect_at_message_level_are_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     dark = tmp_path / "dark.yaml"

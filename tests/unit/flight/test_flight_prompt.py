@@ -173,7 +173,7 @@ def test_a_computer_that_slept_in_flight_lands_real_drones(keyboard: Ends, asks:
     assert ("slept for 12 s in flight" in flight._fly(operator)) == asks
 
 
-def test_who_was_landed_one_by_one_is_not_said_to_have_landed_by_itself() -> None:
+def test_drones_landed_singly_are_not_reported_as_landed_by_themselves() -> None:
     said: list[str] = []
     terminal = cast(Terminal, SimpleNamespace(say=said.append))
     flight = loop.Flight(cast(Supervisor, SimpleNamespace()), cast(FlightPlan, None), terminal)

@@ -81,7 +81,7 @@ def test_a_real_ardrone_has_an_emulated_camera_of_its_own(team: Field) -> None:
         ),
     ],
 )  # fmt: skip
-def test_what_makes_no_sense_is_refused_with_a_remedy(team: Field, options: list[str], problem: str) -> None:
+def test_invalid_real_options_are_refused_with_a_remedy(team: Field, options: list[str], problem: str) -> None:
     with pytest.raises(OperatorMistake, match=problem):
         parse_real(team, [*options, "turtlebot"] if "nothing is left" in problem else options)
 

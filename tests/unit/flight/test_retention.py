@@ -70,7 +70,7 @@ def test_without_a_limit_or_a_folder_nothing_happens(tmp_path: Path) -> None:
     assert names(tmp_path) == ["20261120T100000Z-lab"]
 
 
-def test_what_was_cut_out_of_a_run_is_nobodys_to_remove(tmp_path: Path) -> None:
+def test_cuts_of_a_run_are_never_deleted(tmp_path: Path) -> None:
     """A cut is beside its run under a similar name, and was made to be kept."""
     flown = tmp_path / "20261120T100000Z-lab"
     flown.mkdir()

@@ -77,7 +77,7 @@ def test_several_markers_are_several_pages_after_the_notes(tmp_path):
         (("--id", "6", "--dictionary", "DICT_APRILTAG_36H11", "--size-mm", "300"), "at most --size-mm 168 fits"),
     ],
 )
-def test_what_cannot_be_printed_is_refused_with_the_remedy(tmp_path, arguments, says):
+def test_unprintable_markers_are_refused_with_a_remedy(tmp_path, arguments, says):
     assert says in print_pdf(tmp_path, *arguments, code=2)
 
 

@@ -122,7 +122,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("dictionary", "number", "refused"), REFUSED)
-def test_what_cannot_be_used_is_named_at_its_line(dictionary: str, number: int, refused: str) -> None:
+def test_unusable_tags_are_named_at_their_line(dictionary: str, number: int, refused: str) -> None:
     with pytest.raises(SettingsError, match=refused):
         load_field(LAB, options(dictionary, number))
 

@@ -65,7 +65,7 @@ def test_a_broken_one_is_named_and_the_others_work() -> None:
     open_source(parse_source("natnet://127.0.0.1")).close()
 
 
-def test_what_nobody_reads_is_refused_with_the_schemes_there_are() -> None:
+def test_unknown_source_schemes_are_refused_with_the_valid_ones() -> None:
     with pytest.raises(SettingsError, match=r"motion_capture.mocap.source: must be an address .*anchors://, torn://"):
         load_field(ROOT / "config" / "mocap-lab.yaml", ["motion_capture.mocap.source=radar://1.2.3.4"])
 

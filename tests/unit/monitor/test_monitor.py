@@ -118,7 +118,7 @@ def test_a_command_is_not_confirmed_until_each_drone_has_answered(world: World) 
     assert "drone_2 NOT CONFIRMED" in text
 
 
-def test_what_is_asked_of_the_operator_waits_for_no_drone(world: World) -> None:
+def test_requests_to_the_operator_need_no_answer_of_a_drone(world: World) -> None:
     asked = m.Command(
         header=world.header("operator"), id="8", verb=m.Verb.TAKEOFF, scope=(m.OPERATOR, "drone_1"), issuer="me"
     )

@@ -37,7 +37,7 @@ def test_an_alarm_keeps_what_it_is_about_while_its_figures_change(world: World) 
         assert {alarm.about for alarm in alarms_of(world.state, NOW)} == {"drone_1 silent", "turtlebot lost"}
 
 
-def test_what_asks_for_an_act_stands_first_then_what_is_grave(world: World) -> None:
+def test_alarms_that_need_an_act_come_first_then_grave_ones(world: World) -> None:
     world.vehicle("drone_1", battery=0.18)
     world.vehicle("drone_2", age_s=4.0)
     world.estimate(target_age_s=6.0, age_s=0.5)
@@ -54,7 +54,7 @@ def test_what_asks_for_an_act_stands_first_then_what_is_grave(world: World) -> N
     assert "nothing heard for 4 s" in world.text()
 
 
-def test_what_keeps_a_drone_from_its_plan_is_an_alarm_with_what_follows(world: World) -> None:
+def test_a_failsafe_hover_or_landing_is_an_alarm_with_its_consequence(world: World) -> None:
     world.vehicle("drone_1", detail="not seen by any camera for too long", lands_in_s=6.2, braked=True)
     world.vehicle("drone_2", detail="hovers: its velocity is stuck", braked=True)
     world.text()
@@ -108,7 +108,7 @@ def test_a_drone_that_stands_with_a_low_battery_asks_for_nothing_now(world: Worl
     assert (alarm.text, alarm.asks) == ("drone_1: battery 10%", False)
 
 
-def test_who_is_lost_in_flight_goes_before_the_battery_of_one_that_stands(world: World) -> None:
+def test_a_drone_lost_in_flight_precedes_a_standing_drones_battery(world: World) -> None:
     world.vehicle("drone_2", "LANDED", battery=0.1, flight_state=m.FlightState.LANDED)
     world.vehicle("drone_1")
     world.estimate(drone_age_s=4.0)
@@ -192,7 +192,7 @@ def test_a_drone_that_is_heard_and_not_believed_is_not_called_silent(
     assert (alarm.text, alarm.grave, alarm.asks) == (f"drone_1: {words}", True, asks)
 
 
-def test_who_crashed_is_to_be_left_alone_while_others_fly(world: World) -> None:
+def test_a_crashed_drones_alarm_says_keep_away_while_others_fly(world: World) -> None:
     world.vehicle("drone_1", "CUT", flight_state=m.FlightState.EMERGENCY)
     world.estimate()
     world.text()

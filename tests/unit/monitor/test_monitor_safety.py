@@ -28,7 +28,7 @@ def test_it_is_safe_while_nothing_is_wrong_and_the_reason_says_how_long(world: W
     assert judged(world) == Safety(Level.SAFE, reason)
 
 
-def test_who_lands_does_not_count_for_how_long_batteries_last(world: World) -> None:
+def test_landing_drones_are_ignored_in_the_battery_forecast(world: World) -> None:
     both(world)
     world.vehicle("drone_1", battery=0.65)
     world.vehicle("drone_2", "LANDING", battery=0.4, flight_state=m.FlightState.LANDING)
@@ -46,7 +46,7 @@ def test_it_is_safe_while_nobody_flies(world: World) -> None:
     assert judged(world) == Safety(Level.SAFE, "No alarms. Nobody flies.")
 
 
-def test_who_was_never_heard_is_to_be_watched(world: World) -> None:
+def test_a_drone_never_heard_makes_the_safety_level_watch(world: World) -> None:
     world.vehicle("drone_1")
     assert judged(world) == Safety(Level.WATCH, "Not every drone has been heard yet.")
 
@@ -71,7 +71,7 @@ def test_trouble_is_to_be_watched_or_acted_on(world: World, trouble: dict[str, o
     assert ("To do: " in said.reason) is (level is Level.ACT) and said.reason.startswith("drone_1")
 
 
-def test_what_asks_for_an_act_decides_beside_what_is_graver(world: World) -> None:
+def test_an_alarm_that_needs_an_act_decides_over_graver_ones(world: World) -> None:
     both(world)
     world.vehicle("drone_1", link_quality=0.5)
     world.vehicle("drone_2", age_s=4.0)

@@ -57,7 +57,7 @@ def plan(
     return Planner(parameters, sensors).plan(at, current, None, lambda: False)
 
 
-def test_who_is_nearer_to_a_far_target_goes_below() -> None:
+def test_the_robot_nearer_to_a_far_target_takes_the_lower_level() -> None:
     eager = replace(PARAMETERS, min_dwell_s=0.0)
     turned = belief({"drone_1": (1.9, -0.2, 1.2, 0.2), "drone_2": (0.7, 0.3, 2.1, -0.2)}, (2.8, 0.0, 0.1, 0.0))
     for at, below, expected in ((FAR, "drone_2", STRING), (turned, "drone_1", Topology.parse("drone_2/drone_1"))):

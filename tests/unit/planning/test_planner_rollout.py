@@ -185,7 +185,7 @@ def test_the_gradient_is_exact(n: int, layout: str, targets: int, boxes: Rows[Bo
         assert np.abs(g - differences).max() <= 1e-6 * np.abs(g).max()
 
 
-def test_what_stands_in_the_way_costs_and_never_helps() -> None:
+def test_obstacles_increase_the_cost_and_never_reduce_it() -> None:
     hidden = 0
     for seed in range(10):
         one = case(2, "string", seed)

@@ -35,5 +35,5 @@ def test_a_single_long_gap_is_forgotten() -> None:
     assert spent(0.04, [0.012, 0.0005]) > 0.036
 
 
-def test_who_is_late_already_stops_at_once() -> None:
+def test_a_planner_already_late_stops_at_once() -> None:
     assert spent(0.01, [0.015]) == pytest.approx(0.015)

@@ -124,7 +124,7 @@ def test_the_supervisor_does_not_wait_for_an_opinion_of_a_large_team(lab_field: 
     assert time.process_time() - began_s < 1.0
 
 
-def test_what_cannot_be_told_apart_is_told_together(lab_field: ResolvedField) -> None:
+def test_indistinguishable_causes_are_reported_together(lab_field: ResolvedField) -> None:
     finding = only(lab_field, Truth(shift=(0.2, 0.0, 0.0)))
     assert "cannot be told apart here" in finding.found and "tilted" in finding.found
 

@@ -20,7 +20,7 @@ class Clocks:
         return self.watch.slept_s()
 
 
-def test_what_it_slept_before_is_not_told_and_a_sleep_once() -> None:
+def test_a_sleep_is_reported_once_and_none_before_the_start() -> None:
     clocks = Clocks()
     assert clocks.wait(0.0) == 0.0
     assert clocks.wait(10.0) == 0.0, "it was busy, or frozen, and awake"

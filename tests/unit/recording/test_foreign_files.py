@@ -42,7 +42,7 @@ def test_a_folder_of_a_bag_is_named(command: list[str], tmp_path: Path, capsys: 
     assert "this is a ROS bag" in capsys.readouterr().err
 
 
-def test_what_is_cut_off_within_its_mark_is_nothing_known() -> None:
+def test_a_truncated_file_signature_is_not_identified() -> None:
     assert kind_of_content(b"ULo") == kind_of_content(b"") == kind_of_content(bytes(16)) == ""
 
 

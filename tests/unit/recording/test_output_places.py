@@ -76,7 +76,7 @@ def test_a_run_of_any_name_can_be_exported(whole: Path, tmp_path: Path) -> None:
     assert _error("export", "--rrd", folder, "-o", tmp_path / "flight.rrd") is None
 
 
-def test_what_was_there_stays_where_the_disk_is_full(tmp_path: Path) -> None:
+def test_a_full_disk_leaves_the_old_file(tmp_path: Path) -> None:
     place = tmp_path / "lens.yaml"
     place.write_text("old")
     told = r"lens\.yaml: No space left on device: make room"

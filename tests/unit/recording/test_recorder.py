@@ -157,7 +157,7 @@ def test_low_disk_warns_then_drops_pictures_only(
     assert len(list(open_recording(tmp_path / "state.mcap").raw_records())) == 3
 
 
-def test_what_is_said_while_the_writer_loads_is_recorded(
+def test_messages_sent_while_the_writer_loads_are_recorded(
     sender: tuple[MemoryBus, FakeChild], now: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     bus, child = sender

@@ -194,7 +194,7 @@ def test_a_damaged_chunk_costs_its_own_messages_only(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("content", [b"", b"\x89MCAP", b"not a recording at all"])
-def test_what_is_no_recording_is_refused_by_name(tmp_path: Path, content: bytes) -> None:
+def test_files_that_are_no_recording_are_refused_by_name(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "x.mcap"
     path.write_bytes(content)
     with pytest.raises(RecordingError, match=r"x\.mcap: not an MCAP"):

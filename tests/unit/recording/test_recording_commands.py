@@ -212,7 +212,7 @@ def _foreign(path: Path) -> None:
 
 
 @pytest.mark.parametrize("command", [("info",), ("recover",), ("cut",), ("export", "--csv")])
-def test_what_cannot_be_read_is_refused_by_name(command: tuple[str, ...], tmp_path: Path) -> None:
+def test_unreadable_files_are_refused_by_name(command: tuple[str, ...], tmp_path: Path) -> None:
     cases = {
         "empty.mcap": (b"", "not an MCAP recording (the file is empty)"),
         "text.mcap": (b"time,x,y\n" * 9, "not an MCAP recording"),

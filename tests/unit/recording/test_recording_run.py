@@ -110,7 +110,7 @@ def test_records_come_in_order_of_time_from_any_moment(run_dir: Path) -> None:
 
 
 @pytest.mark.parametrize("at_s", [0.0, 0.013, 1.99, 3.4, 99.0])
-def test_what_was_known_at_a_moment_is_the_last_that_was_said_before(run_dir: Path, at_s: float) -> None:
+def test_latest_messages_before_a_time_are_the_last_of_each_key(run_dir: Path, at_s: float) -> None:
     run = open_run(run_dir)
     at_ns = run.start_ns + round(at_s * NS_PER_S)
     expected = {}

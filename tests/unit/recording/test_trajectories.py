@@ -35,7 +35,7 @@ def test_the_last_ten_seconds_are_handed_out_once_a_second() -> None:
     assert found[15]["drone_1"] == [float(step) for step in range(50, 151, 2)]
 
 
-def test_who_is_estimated_no_more_fades_away() -> None:
+def test_the_trajectory_of_a_body_no_longer_estimated_fades() -> None:
     trajectories = Trajectories()
     lived(trajectories, 0, 50, "drone_1", "drone_2")
     found = lived(trajectories, 50, 200, "drone_1")

@@ -143,6 +143,6 @@ def test_a_cut_is_judged_by_no_expectation(lab_field: ResolvedField, tmp_path: P
 
 
 @pytest.mark.parametrize("name", ["kidnap-3m", "corner", "dying-drone", "four-drones", "realistic"])
-def test_what_shipped_scenarios_expect_can_be_read(lab_field: ResolvedField, tmp_path: Path, name: str) -> None:
+def test_expectations_of_shipped_scenarios_are_readable(lab_field: ResolvedField, tmp_path: Path, name: str) -> None:
     told = load_scenario(SHIPPED / "scenarios" / f"{name}.yaml").get("expected")
     assert judge(flight(lab_field, told, lost=(0.0, 0.0)), tmp_path).damage == ()

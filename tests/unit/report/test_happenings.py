@@ -112,7 +112,7 @@ def test_an_ordered_landing_is_no_failsafe():
         assert happenings(flown) == []
 
 
-def test_who_comes_down_without_order_and_driver_is_named():
+def test_a_landing_without_command_and_driver_is_unexplained():
     flown = data((1, UP, "TRACK", ""), (6, DOWN, "CONNECTING", ""), commands=[(8.0, m.Verb.LAND, ())])
     assert [(item.time_s, item.cause) for item in landings(happenings(flown))] == [(6.0, UNEXPLAINED)]
     of_another = data((1, UP, "TRACK", ""), (6, DOWN, "LANDED", ""), commands=[(5.0, m.Verb.LAND, ("b",))])
@@ -200,7 +200,7 @@ def test_a_flight_without_truth_fails_where_a_drone_never_said_that_it_landed(la
     assert criterion.ok is landed
 
 
-def test_who_never_flew_has_no_landing_to_be_judged():
+def test_a_drone_that_never_flew_has_no_landing_criterion():
     figures = figures_of(data((1, DOWN, "LANDED", ""), (2, LOST, "CONNECTING", "")))
     assert figures.landed is None
     assert "landed" not in {one.name for one in criteria_of(figures, UNKNOWN_FIELD, RunFacts())}

@@ -36,7 +36,7 @@ class _Writer:
         self._run.close()
 
 
-def test_what_the_supervisor_says_of_an_absent_process_is_no_life_of_it(tmp_path: Path) -> None:
+def test_supervisor_reports_of_an_absent_process_are_no_restart(tmp_path: Path) -> None:
     writer = _Writer(tmp_path)
     for second in range(3):
         writer.status(second, "tracker", "supervisor", pid=0)

@@ -238,7 +238,7 @@ def test_a_run_that_was_broken_off_before_it_flew_failed_for_that_reason_alone(t
     assert judge(_data(events=[ended]), tmp_path).reasons == (text.removeprefix(m.RUN_ENDED),)
 
 
-def test_what_a_recording_that_breaks_off_does_not_show_is_not_judged(tmp_path: Path) -> None:
+def test_a_landing_missing_from_a_truncated_recording_is_not_judged(tmp_path: Path) -> None:
     flying = {"a": _truth([True, False]), "b": _truth([True, False])}
     cut = judge(_data(truth=flying, damage=["state.mcap: cut off at byte 9"]), tmp_path)
     assert cut.figures.landed is None

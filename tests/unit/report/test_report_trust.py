@@ -115,7 +115,7 @@ def test_a_link_of_which_a_plan_expected_next_to_nothing_need_not_see() -> None:
     assert trust.links == [] and trust.doubts == []
 
 
-def test_what_the_tracker_suspected_in_flight_is_told_once() -> None:
+def test_repeated_warnings_of_the_tracker_are_one_doubt() -> None:
     warning = m.Event(
         header=header(entity="ceiling"), severity=m.Severity.WARNING, text="ceiling was bumped", remedy="fix it"
     )
@@ -126,7 +126,7 @@ def test_what_the_tracker_suspected_in_flight_is_told_once() -> None:
     assert trust.doubts == ["told in flight, at 7 s: ceiling was bumped; fix it"]
 
 
-def test_what_the_diagnosis_suspected_is_a_doubt() -> None:
+def test_warnings_of_the_diagnosis_are_doubts() -> None:
     warning = m.Event(
         header=header("diagnosis", "drone_1"), severity=m.Severity.WARNING, text="its lens is 3 % longer", remedy="do"
     )

@@ -128,7 +128,7 @@ def test_an_open_must_refuses_the_take_off_with_cause_and_remedy(lab_field: Reso
     assert lab.operator.phase is TeamPhase.GROUND and lab.said[-1].startswith("TAKE-OFF REFUSED: pads:")
 
 
-def test_who_insists_takes_off_and_is_named_on_the_record(lab_field: ResolvedField) -> None:
+def test_a_take_off_by_override_is_recorded_with_its_issuer(lab_field: ResolvedField) -> None:
     lab = Lab(lab_field, higher_m=0.3)
     lab.turn()
     assert lab.ask(anyway=True).stage is AckStage.ACCEPTED
@@ -153,7 +153,7 @@ def test_the_list_is_told_again_while_nobody_flies(lab_field: ResolvedField) -> 
     assert lists.drain() == []
 
 
-def test_who_flew_in_this_run_may_stand_anywhere(lab_field: ResolvedField) -> None:
+def test_drones_that_flew_in_this_run_may_stand_anywhere(lab_field: ResolvedField) -> None:
     lab = Lab(lab_field, higher_m=0.3)
     lab.turn()
     lab.states = dict.fromkeys(lab.states, FlightState.HOVERING)
@@ -186,7 +186,7 @@ def test_a_look_ends_where_nothing_arrives(lab_field: ResolvedField) -> None:
     assert looking.nobody and told.endswith("before take-off: 2 must be mended; nobody would take off")
 
 
-def test_what_a_field_file_is_warned_about_is_told_and_forbids_nothing(lab_field: ResolvedField) -> None:
+def test_cautions_of_the_field_file_are_findings_that_forbid_nothing(lab_field: ResolvedField) -> None:
     path = Path(__file__).parents[3] / "config" / "lab.yaml"
     foolish = load_field(path, ("types.ardrone_2.camera.tilt_down_deg=-45",))
     lab = Lab(lab_field)
@@ -226,7 +226,7 @@ def test_a_battery_is_judged_by_where_it_lands(lab_field: ResolvedField, battery
     assert [one.level for one in found] == ([] if level is None else [level])
 
 
-def test_what_a_silent_driver_said_last_is_not_how_it_is_now(lab_field: ResolvedField) -> None:
+def test_the_last_status_of_a_silent_driver_is_no_longer_valid(lab_field: ResolvedField) -> None:
     lab = Lab(lab_field)
     lab.turn()
     assert all(one.level is Level.OK for one in lab.checks.findings(lab.now_ns))

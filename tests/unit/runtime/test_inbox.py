@@ -9,7 +9,7 @@ from groundstation.runtime import inbox
 from groundstation.runtime.inbox import Inbox
 
 
-def test_what_is_left_out_after_a_stall_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_messages_dropped_after_a_stall_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(inbox, "_MAX_PER_TICK", 3)
     exchange = MemoryExchange()
     taken, driver = Inbox(MemoryBus(exchange, "lab", "tracker")), MemoryBus(exchange, "lab", "drone_1")

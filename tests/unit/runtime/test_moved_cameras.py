@@ -43,7 +43,7 @@ def mounts(lab_field: ResolvedField) -> MountWatch:
     return tracker_from_field(lab_field, "here", 0).mounts
 
 
-def test_what_one_tracker_found_the_next_one_knows(block: HeartbeatBlock, lab_field: ResolvedField) -> None:
+def test_a_restarted_tracker_recalls_the_moved_cameras(block: HeartbeatBlock, lab_field: ResolvedField) -> None:
     first = tracker_from_field(lab_field, "here", 0).mounts
     known = MovedCameras(Heir(block), first)
     assert known.recall(0) == []

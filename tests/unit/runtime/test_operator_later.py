@@ -46,7 +46,7 @@ def test_a_later_take_off_of_one_leaves_the_others_tracking_whatever_comes_of_it
     assert scene.operator.phase is TeamPhase.TRACKING
 
 
-def test_who_flies_already_is_none_of_a_later_take_off_of_all_seen_or_not(scene: Scene) -> None:
+def test_a_later_take_off_of_all_excludes_drones_already_flying(scene: Scene) -> None:
     flying = scene.add("drone_1")
     scene.pass_(0.2)
     scene.operator.take_off(scene.now_ns, ("drone_1",))

@@ -89,7 +89,7 @@ def test_only_what_moves_drones_again_is_tracking(verb, phase):
 
 
 @pytest.mark.parametrize("verb", [Verb.TRACK, Verb.RESUME])
-def test_what_every_drone_refuses_leaves_the_team_on_the_ground(verb):
+def test_a_command_refused_by_all_leaves_the_team_grounded(verb):
     desk = Desk(drone_1=DOWN)
     desk.ask(verb, OPERATOR)
     desk.confirm(refused=("drone_1",))

@@ -35,7 +35,7 @@ def test_all_robots_at_once_are_the_cameras_fault_and_that_is_said_once() -> Non
     assert len(w.take([given_up("drone_1"), given_up("drone_2")], 30 * S)) == 1, "still so, much later"
 
 
-def test_who_is_not_given_up_yet_counts_among_those_of_the_camera() -> None:
+def test_robots_with_deferred_re_initialisation_count_against_the_camera() -> None:
     w = watch()
     assert w.take([given_up("drone_1")], S) == []
     (notice,) = w.take([put_off("drone_2")] * 5, S + S // 10)

@@ -53,7 +53,7 @@ def test_a_key_put_without_declaring_it_is_named() -> None:
         assert refusals.take(2 * S) == []
 
 
-def test_who_only_declares_is_not_accused_and_known_by_name_when_he_puts() -> None:
+def test_a_refused_declaration_is_reported_only_with_a_refused_message() -> None:
     with reading() as refusals:
         say(declared(DRONE, KEY))
         assert refusals.take(S) == []

@@ -100,7 +100,7 @@ def hover(lab_field: ResolvedField) -> Hover:
     return Hover(lab_field)
 
 
-def test_what_a_leaning_drone_sees_is_levelled_by_its_imu(hover: Hover) -> None:
+def test_observations_of_a_tilted_drone_are_levelled_by_its_imu(hover: Hover) -> None:
     hover.run(2.0)
     assert hover.target_error_m < 0.02
     assert set(hover.verdicts) == {None}

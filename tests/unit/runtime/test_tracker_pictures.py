@@ -25,7 +25,7 @@ def test_a_picture_from_the_future_keeps_nobody_from_searching(tracking: Flight)
     assert tracking.tracker.lookout.missing == ("turtlebot",)
 
 
-def test_what_a_drone_saw_is_its_own_whatever_it_calls_its_camera(tracking: Flight) -> None:
+def test_observations_belong_to_their_drone_whatever_camera_they_name(tracking: Flight) -> None:
     tracking.corrections.clear()
     for _ in range(10):
         tracking.run(0.02, look=False, onboard=False)

@@ -151,7 +151,7 @@ def test_an_honest_velocity_is_as_good_as_before(flight: Flight) -> None:
 
 
 @pytest.mark.parametrize("limit", [{"max_velocity_error_m_s": 0.001}, {"max_known_velocity_error_m_s": 1e-6}])
-def test_whom_nobody_sees_must_know_its_velocity(flight: Flight, limit: dict[str, Any]) -> None:
+def test_an_unseen_robot_with_uncertain_velocity_is_not_converged(flight: Flight, limit: dict[str, Any]) -> None:
     flight.run(2.0)
     tracker = flight.tracker
     assert tracker.converged("drone_1")
@@ -161,7 +161,7 @@ def test_whom_nobody_sees_must_know_its_velocity(flight: Flight, limit: dict[str
 
 
 @pytest.mark.parametrize("fed", [False, True])
-def test_who_is_re_initialised_twice_hovers_unless_it_flies_on_our_estimate(flight: Flight, fed: bool) -> None:
+def test_repeated_re_initialisation_stops_all_but_vehicles_on_our_estimate(flight: Flight, fed: bool) -> None:
     """Otherwise such a vehicle would lose its position updates: it flies off, and lands."""
     flight.run(2.0)
     tracker = flight.tracker
@@ -173,7 +173,7 @@ def test_who_is_re_initialised_twice_hovers_unless_it_flies_on_our_estimate(flig
     assert tracker.converged("drone_1") is fed
 
 
-def test_who_sees_what_the_room_knows_of_is_localised_by_it(flight: Flight) -> None:
+def test_an_unseen_robot_is_localised_by_a_target_that_others_locate(flight: Flight) -> None:
     """drone_1, unseen, sees a target that is located by another observer, which the ceiling camera sees."""
     tracker = flight.tracker
     tracker._localisation = Localisation(replace(tracker.parameters.safety, max_velocity_error_m_s=0.001))

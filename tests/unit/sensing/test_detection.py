@@ -63,7 +63,7 @@ def test_a_footprint_turns_with_the_heading_and_agrees_with_the_map() -> None:
         assert math.cos(math.atan2(xs[row], xs[column]) - pose[3]) > 0.8
 
 
-def test_what_one_view_of_a_sweep_shows_counts_as_seen_for_the_next() -> None:
+def test_cells_seen_in_one_view_count_as_seen_in_the_next() -> None:
     print_, chances = footprint_of(ONBOARD, 0.2, 1.45, 0.4, SENSORS.softness), np.full((41, 41), 1.0)
     before, cells = chances.copy(), (np.stack((print_.rows, print_.columns)), print_.chances, print_.first)
     at, turns = np.full((1, 2), 20, dtype=np.int64), np.array([[3, 3], [3, 4], [3, 9]], dtype=np.int64)

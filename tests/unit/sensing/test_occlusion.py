@@ -52,7 +52,7 @@ def test_the_slopes_are_those_of_differences() -> None:
     assert steep > 30
 
 
-def test_who_comes_out_from_behind_a_box_is_seen_ever_better() -> None:
+def test_the_visible_share_grows_as_a_marker_leaves_an_occlusion() -> None:
     eye = np.array([0.3, -2.0, 1.2])
     shares = [share(eye, np.array([x, 1.0, 0.4])) for x in np.linspace(0.3, 2.0, 60)]
     assert shares[0] < 0.05

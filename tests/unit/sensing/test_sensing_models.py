@@ -124,7 +124,7 @@ def test_a_marker_seen_too_obliquely_is_not_found() -> None:
     assert availability(level, level.optical_from_base @ steep)[0] > 0.4
 
 
-def test_what_is_lost_still_pulls() -> None:
+def test_availability_out_of_view_has_a_gradient_towards_the_axis() -> None:
     out = availability(ONBOARD, (0.0, -6.0, -5.0))
     assert float(np.linalg.norm(out[1:4])) > 1e-6
     assert out[1:4] @ np.array([0.0, 6.0, 7.0]) > 0  # towards the axis

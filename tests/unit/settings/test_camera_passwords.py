@@ -41,7 +41,7 @@ def test_each_driver_gets_its_own_password_and_nobody_else_any(field: Field, tmp
     assert sources == dict(zip(("ceiling", "drone_1_camera"), SOURCES.values(), strict=True))
 
 
-def test_what_is_written_of_a_field_is_a_field_without_password(field: Field) -> None:
+def test_written_forms_of_a_field_contain_no_password(field: Field) -> None:
     for text in (yaml_of(field), summary_of(field), field.model_dump_json(), repr(field.model_dump())):
         assert SECRET not in text and "operator" not in text
         assert "192.168.1.50:8080/video.mjpg" in text and "192.168.1.51/live@2" in text

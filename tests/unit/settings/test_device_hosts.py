@@ -56,7 +56,7 @@ def test_a_host_may_speak_as_itself_and_its_devices_and_as_nobody_else(field: Fi
     assert not any("drone_2" in key or f"/{SETPOINT.name}/" in key for key in said)
 
 
-def test_who_was_not_admitted_runs_nothing(field: Field, tmp_path: Path) -> None:
+def test_a_host_that_is_not_admitted_runs_no_process(field: Field, tmp_path: Path) -> None:
     site.expel(field.site, "pc_2")
     with pytest.raises(OperatorMistake, match=r"site admit .* pc_2 10\.77\.0\.1"):
         process_table(field, "tls/127.0.0.1:1", tmp_path, simulation=None, monitor=False)
@@ -80,7 +80,7 @@ def test_emulated_devices_of_another_host_are_where_it_can_reach_them(field: Fie
         ((LISTEN, "drones.drone_1.host=PC"), "drones.drone_1.host"),
     ],
 )
-def test_what_cannot_be_is_refused_with_the_remedy(options: tuple[str, ...], words: str) -> None:
+def test_invalid_host_settings_are_refused_with_a_remedy(options: tuple[str, ...], words: str) -> None:
     with pytest.raises(SettingsError, match=words):
         load_field(LAB, options)
 

@@ -134,7 +134,7 @@ def test_opencvs_published_calibration_is_read(real_data: Callable[[str], Path])
         (KALIBR, "cam0:", "cam1: {intrinsics: [1, 1, 0, 0]}\ncam0:", "lens.yaml:1: holds 2 cameras (cam1, cam0)"),
     ],
 )
-def test_what_is_not_our_lens_is_refused_in_one_line(lens_of: Reader, text: str, old: str, new: str, told: str) -> None:
+def test_foreign_lens_models_are_refused_in_one_line(lens_of: Reader, text: str, old: str, new: str, told: str) -> None:
     assert text.count(old) == 1
     with pytest.raises(SettingsError) as caught:
         lens_of(text.replace(old, new))

@@ -52,7 +52,7 @@ FOOLISH = [
 
 
 @pytest.mark.parametrize(("centre", "height"), [("[2, 1]", 0.8), ("[3.85, 0]", 2.0)])
-def test_what_drones_fly_over_or_never_reach_is_no_cause_for_caution(centre: str, height: float) -> None:
+def test_obstacles_below_or_beyond_the_drones_give_no_caution(centre: str, height: float) -> None:
     option = f"room.obstacles={{table: {{centre_m: {centre}, size_m: [0.2, 1, {height}]}}}}"
     assert cautions_of(LAB, [option]) == cautions_of(LAB)
 

@@ -121,7 +121,7 @@ def test_a_fault_of_one_drone_does_not_hide_those_between_drones() -> None:
 
 
 @pytest.mark.usefixtures("lab")
-def test_what_is_missing_is_missed_where_it_belongs() -> None:
+def test_a_missing_key_is_reported_at_its_place() -> None:
     Path("lab.yaml").write_text(GOOD.replace("    marker: {code: 1}\n", ""), encoding="utf-8")
     line = line_of(GOOD, "  drone_1:")
     assert problems() == [f"lab.yaml:{line}: drones.drone_1.marker.code: is required"]
@@ -134,7 +134,7 @@ def test_what_is_missing_is_missed_where_it_belongs() -> None:
 
 
 @pytest.mark.usefixtures("lab")
-def test_what_a_calibration_lacks_is_missed_in_its_own_file() -> None:
+def test_a_key_missing_in_a_calibration_is_reported_in_its_file() -> None:
     for name in ("ceiling", "ardrone_front"):
         place = Path("cameras") / f"{name}.yaml"
         kept = place.read_text(encoding="utf-8")

@@ -17,7 +17,7 @@ SOURCE = "http://192.168.1.50:8080/video.mjpg"
 
 
 @pytest.mark.parametrize(("size", "drones"), [((8, 6, 4.5), 3), ((6, 4, 3.2), 1), ((20, 15, 8), 9)])
-def test_what_is_written_is_a_good_field(tmp_path: Path, size: tuple[float, float, float], drones: int) -> None:
+def test_the_written_field_file_is_valid(tmp_path: Path, size: tuple[float, float, float], drones: int) -> None:
     answers = "\n".join([*map(str, size), "", str(drones), *(["", "", ""] * drones), "", "", "y", ""])
     result = CliRunner().invoke(new, [str(tmp_path / "hall")], input=answers)
     assert result.exit_code == 0, result.output
@@ -78,7 +78,7 @@ def test_the_target_says_what_it_is(tmp_path: Path) -> None:
     assert (target.base, target.marker.height_m, target.max_speed_m_s) == ("person", BASES["person"], 1.5)
 
 
-def test_what_cannot_be_is_asked_again_and_no_answer_is_lost(tmp_path: Path) -> None:
+def test_impossible_answers_are_asked_again_and_the_others_kept(tmp_path: Path) -> None:
     """More pads than the camera can see, and a board that no camera looks down on."""
     room = ["8", "6", "4.5", "http://10.0.0.5/mjpg"]
     team = ["9", "1", "", "", "", "turtlebot_2", "3", "turtlebot_2", "0.4", "y", ""]

@@ -94,7 +94,7 @@ def test_several_targets_reach_estimator_planner_and_every_camera() -> None:
         ("targets:  ", "target: {name: third, marker: {code: 9}}\ntargets:  ", "targets: must not stand beside target"),
     ],
 )
-def test_what_is_wrong_with_several_targets_is_named(tmp_path: Path, old: str, new: str, expected: str) -> None:
+def test_errors_in_settings_of_several_targets_are_named(tmp_path: Path, old: str, new: str, expected: str) -> None:
     found = problems_of(tmp_path, old, new)
     assert len(found) == 1
     assert expected in found[0] and found[0].startswith(f"{tmp_path}/two.yaml:")

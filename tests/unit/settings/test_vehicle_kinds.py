@@ -114,7 +114,7 @@ def test_each_kind_gets_last_words_of_its_own_protocol(field: Field, tmp_path: P
         assert words.hover.startswith(begin) and words.land.startswith(begin), name
 
 
-def test_who_flies_on_our_positions_is_landed_sooner_without_its_driver(tmp_path: Path) -> None:
+def test_vehicles_on_our_estimate_are_landed_sooner_without_their_driver(tmp_path: Path) -> None:
     def land_after_s(*options: str) -> dict[str, float]:
         field = load_field(CONFIG / "mixed-team.yaml", options=options)
         words = failsafe_datagrams(field, tmp_path)

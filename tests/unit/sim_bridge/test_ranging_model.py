@@ -46,7 +46,7 @@ def test_distances_are_the_transponders_and_end_at_the_reach() -> None:
     assert len(found["e"]) == 0
 
 
-def test_what_lasts_is_an_anchors_and_a_pairs() -> None:
+def test_lasting_errors_belong_to_anchors_and_to_pairs() -> None:
     radios = Radios(system(bias_std_m=0.1), errors=True, rng=np.random.default_rng(3))
     one = [errors(rounds(radios, 2000))[name].mean() for name in "abcd"]
     other = [errors(rounds(radios, 2000, "drone_2"))[name].mean() for name in "abcd"]

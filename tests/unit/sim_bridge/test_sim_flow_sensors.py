@@ -74,7 +74,7 @@ def test_without_errors_they_tell_the_truth() -> None:
 
 
 @pytest.mark.parametrize("kind", ["tello", "ros2"])
-def test_what_is_claimed_of_them_covers_their_errors(hover: np.ndarray, kind: str) -> None:
+def test_stated_accuracies_cover_the_emulated_errors(hover: np.ndarray, kind: str) -> None:
     habits = kind_named(kind).habits
     assert rms(hover[:, :, 0]) < CLAIMED.velocity_std_m_s
     assert rms(hover[:, :, 2] - 1.5) < CLAIMED.height_std_m

@@ -205,7 +205,7 @@ def test_a_body_without_fresh_pose_is_nowhere_and_an_event_says_so(
     assert said == {"drone_2", "turtlebot"}, "no truth is made up"
 
 
-def test_what_another_vehicle_says_moves_nobody(firmware: tuple[Harness, Process, socket.socket]) -> None:
+def test_telemetry_of_another_vehicle_moves_no_body(firmware: tuple[Harness, Process, socket.socket]) -> None:
     harness, _, teller = firmware
     teller.send(FrameEncoder(SYSTEM + 1, 1).encode(sim_state(0.0, 0.0, 0.0, yaw=0.0)))
     teller.send(b"no frame at all")

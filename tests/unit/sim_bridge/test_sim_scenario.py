@@ -24,7 +24,7 @@ def test_the_default_scenario_is_honest() -> None:
     assert weaker_than_reality(parse_scenario(json.dumps(read("realistic.yaml")))) == []
 
 
-def test_what_a_scenario_leaves_out_is_as_honest_as_the_default_one() -> None:
+def test_keys_missing_in_a_scenario_have_realistic_defaults() -> None:
     data = read("realistic.yaml")
     data["cameras"]["fps"] = 15  # docs/decisions/0138: fewer are harder, and fit two slow cores
     assert parse_scenario(json.dumps(data)) == Scenario()

@@ -16,7 +16,7 @@ def name() -> str:
     return f"{os.getpid()}-test"
 
 
-def test_what_is_written_is_read(name: str) -> None:
+def test_written_states_are_read_unchanged(name: str) -> None:
     board = TruthBoard.create(name, ("a", "b"))
     reader = TruthBoard.attach(name, ("a", "b"))
     states = np.arange(2.0 * WIDTH).reshape(2, WIDTH)

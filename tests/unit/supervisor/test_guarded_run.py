@@ -59,7 +59,7 @@ def test_members_come_back_to_a_restarted_router(run: Supervisor) -> None:
         until(run, lambda: inbox.waiting)
 
 
-def test_what_a_killed_run_left_is_removed(run: Supervisor) -> None:
+def test_certificates_of_a_killed_run_are_removed(run: Supervisor) -> None:
     (record,) = runtime_file.live_records()
     folder = Path(record.identities)
     runtime_file.remove(record)

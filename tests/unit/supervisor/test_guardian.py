@@ -227,7 +227,7 @@ def test_lands_a_drone_whose_driver_is_killed_during_the_stop(
     assert not any(process.running for process in supervisor.processes)
 
 
-def test_who_cannot_be_killed_is_left_behind(
+def test_a_driver_that_cannot_be_killed_is_left_behind(
     start: Callable[..., Supervisor], drone: FakeDrone, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("groundstation.supervisor.supervisor._KERNEL_S", 0.2)

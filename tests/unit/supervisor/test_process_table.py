@@ -25,7 +25,7 @@ def test_each_role_has_one_row_that_is_killed_only_after_its_silence_was_noticed
         assert row.silence_limit_s <= row.hang_limit_s < row.start_limit_s, row.role
 
 
-def test_what_a_flight_waits_for_has_more_of_a_full_processor_than_what_nobody_does() -> None:
+def test_processes_that_a_flight_waits_for_have_higher_priority() -> None:
     shares = {row.role: row.nice for row in ROWS}
     assert shares["router"] == shares["tracker"] == shares["driver"] < shares["camera"] < shares["monitor"]
     assert shares["console"] == shares["camera"] == shares["recorder"] == 0, "that of any other program"

@@ -30,7 +30,7 @@ def test_a_failure_is_told_by_its_last_line() -> None:
         kernels.compile_first(lambda _: None, lambda: False, _command("raise RuntimeError('no space')"))
 
 
-def test_what_could_not_be_kept_is_not_compiled(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_kernels_are_not_compiled_without_a_usable_cache(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file" / "kernels"))
     said: list[str] = []
@@ -40,7 +40,7 @@ def test_what_could_not_be_kept_is_not_compiled(monkeypatch: pytest.MonkeyPatch,
 
 
 @pytest.mark.parametrize("late", [True, False])
-def test_what_is_late_or_unwanted_ends_with_its_children(tmp_path: Path, late: bool) -> None:
+def test_a_late_or_cancelled_compilation_ends_with_its_children(tmp_path: Path, late: bool) -> None:
     mark = tmp_path / "child"
     child = f"open({str(mark)!r}, 'w').write(str(__import__('os').getpid())); __import__('time').sleep(60)"
     command = _command(f"import subprocess, sys; subprocess.run([sys.executable, '-c', {child!r}])")

@@ -79,7 +79,7 @@ def test_frozen_process_gets_last_words_then_is_replaced(make: Callable[..., Sup
             drone.recv(100)
 
 
-def test_who_waits_for_a_core_is_not_replaced_as_one_that_hangs(
+def test_a_process_waiting_for_a_core_is_not_restarted_as_hanging(
     make: Callable[..., Supervisor], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     supervisor = make(spec("ceiling", "obedient", silence_limit_s=0.4, hang_limit_s=0.6))

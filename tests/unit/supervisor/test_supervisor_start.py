@@ -42,9 +42,7 @@ def test_starts_router_first_and_stops_in_order(make: Callable[..., Supervisor])
 
 
 @pytest.mark.parametrize("hurry", [False, True])
-def test_what_shows_the_end_stays_until_the_run_is_judged_unless_somebody_hurries(
-    make: Callable[..., Supervisor], hurry: bool
-) -> None:
+def test_the_console_stays_until_the_run_is_judged_unless_hurried(make: Callable[..., Supervisor], hurry: bool) -> None:
     supervisor = make(spec("drone_1", "obedient"), spec("console", "obedient", shows_end=True))
     start(supervisor)
     router, driver, console = supervisor.processes
@@ -98,7 +96,7 @@ def test_optional_process_is_retried_with_back_off_and_does_not_hold_the_start(
 
 
 @pytest.mark.parametrize(("awaited", "up"), [(True, True), (False, False)])
-def test_what_imports_slowly_holds_the_start_where_it_is_awaited_and_alarms_nobody(
+def test_a_slow_process_delays_the_start_only_if_awaited(
     make: Callable[..., Supervisor], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, awaited: bool, up: bool
 ) -> None:
     monkeypatch.setattr("groundstation.supervisor.start._OPTIONAL_GRACE_S", 0.5)

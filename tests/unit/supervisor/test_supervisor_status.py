@@ -12,7 +12,7 @@ from groundstation.supervisor import status
 from groundstation.supervisor.status import StatusPublisher
 
 
-def test_who_was_not_started_yet_has_not_ended() -> None:
+def test_a_process_not_yet_started_is_not_reported_as_ended() -> None:
     exchange = MemoryExchange()
     heard = MemoryBus(exchange, "lab", "console").subscribe([PROCESS_STATUS])
     table: list[Any] = [
@@ -31,7 +31,7 @@ def test_who_was_not_started_yet_has_not_ended() -> None:
     }
 
 
-def test_what_the_run_does_not_use_others_use(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_processor_use_beyond_the_run_is_attributed_to_others(monkeypatch: pytest.MonkeyPatch) -> None:
     exchange = MemoryExchange()
     heard = MemoryBus(exchange, "lab", "console").subscribe([PROCESS_STATUS])
     publisher = StatusPublisher(MemoryBus(exchange, "lab", "supervisor"))

@@ -33,7 +33,7 @@ A, B = b"AT*REF=1,290717696", b"AT*PCMD=2,0,0,0,0,0"
     ],
 )
 @pytest.mark.parametrize("strict", [False, True])
-def test_what_a_drone_obeys(datagram, names, strict):
+def test_at_datagrams_are_decoded_as_by_a_real_drone(datagram, names, strict):
     assert [command.name for command in at.decode_datagram(datagram, strict)] == names
 
 

@@ -27,7 +27,7 @@ def test_from_there_it_sinks_on_for_a_moment_whatever_its_height_says() -> None:
     assert not descent.step(3 * S, True, True, 1.0)
 
 
-def test_who_sees_the_floor_when_it_is_low_is_told_to_land() -> None:
+def test_a_low_drone_that_sees_the_floor_is_landed() -> None:
     descent = BlindDescent()
     assert descent.step(S, True, True, LOWEST_M)
     assert not descent.step(S + 1, True, False, LOWEST_M)
@@ -44,14 +44,14 @@ def test_only_who_is_blind_is_to_land_and_tells_its_height_sinks(
     assert BlindDescent().step(S, lands, blind, height_m) is sinks
 
 
-def test_who_sees_again_on_the_way_is_told_to_land_for_good() -> None:
+def test_a_drone_that_regains_the_floor_is_landed_for_good() -> None:
     descent = BlindDescent()
     assert descent.step(S, True, True, 1.0)
     assert not descent.step(S + 1, True, False, 1.0)
     assert not descent.step(S + 2, True, True, 1.0)
 
 
-def test_whatever_does_not_sink_is_told_to_land() -> None:
+def test_a_drone_that_does_not_descend_is_landed() -> None:
     assert told([1.0] * 5, 0.4) == [True] * 4 + [False]
     assert told([1.0, 0.95, 0.92, 0.91, 0.905, 0.7], 0.4) == [True] * 4 + [False] * 2, "0.1 m in 1.2 s are asked"
     assert told([1.0, 0.95, 0.91, 0.89, 0.88, 0.81, 0.78, 0.78], 0.4) == [True] * 8

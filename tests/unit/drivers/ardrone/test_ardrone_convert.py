@@ -107,7 +107,7 @@ def test_non_finite_imu_and_climb_are_refused():
         motion_from_navdata(packet(altitude=options.Altitude(vz_mm_s=math.nan)))
 
 
-def test_what_no_drone_reaches_is_refused():
+def test_implausible_rates_accelerations_and_heights_are_refused():
     for bad in (
         options.PhysMeasures(rates_deg_s=(0.0, 3e38, 0.0)),
         options.PhysMeasures(accelerations_mg=(-3e38, 0.0, 0.0)),

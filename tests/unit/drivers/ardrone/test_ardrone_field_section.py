@@ -34,6 +34,6 @@ def test_ports_reach_the_driver_and_the_fail_safe_but_no_simulation():
 
 
 @pytest.mark.parametrize("own", [{"hull": "none"}, {"ultrasound_hz": 30}, {"at_port": 0}, {"flat_trim": "never"}])
-def test_what_no_drone_has_is_refused(own):
+def test_settings_that_no_drone_has_are_refused(own):
     with pytest.raises(ValidationError):
         ArDroneOwn(**own)

@@ -55,7 +55,7 @@ def test_mean_rates_turn_as_far_as_all_samples_did(bus: _Bus, publisher: Navdata
     assert samples[5].specific_force_m_s2[0] == pytest.approx(0.05), "of eight samples, four each"
 
 
-def test_what_an_imu_said_while_it_was_bad_is_in_no_mean(bus: _Bus, publisher: NavdataPublisher) -> None:
+def test_samples_of_a_bad_imu_are_in_no_mean(bus: _Bus, publisher: NavdataPublisher) -> None:
     stuck = HealthReport((Finding(Sensor.IMU, Health.BAD, "its IMU is stuck"),))
     publisher.publish(_PERIOD_NS, _motion(0.0))
     for i in range(2, 20):

@@ -136,7 +136,7 @@ def test_lost_datagrams_only_delay():
     assert drone.stored["control:altitude_max"] == "3000"
 
 
-def test_what_was_acknowledged_but_not_stored_is_found_by_reading_back():
+def test_a_setting_acknowledged_but_not_stored_is_sent_again():
     drone = Drone(control__altitude_max=1)
     session = session_for(drone)
     assert run(session, drone) is not None
@@ -230,7 +230,7 @@ SETTINGS = ArDroneDriverSettings(
 )
 
 
-def test_what_is_configured_is_within_what_the_drone_accepts():
+def test_configured_values_are_within_the_limits_of_the_drone():
     keys = {wish.key: wish.value for wish in wishes(SETTINGS, Identity(Model.AR2), True)}
     assert keys["control:euler_angle_max"] == "0.174533"
     assert keys["control:control_vz_max"] == "200"

@@ -26,7 +26,7 @@ def test_every_bit_stands_where_the_sheet_has_it():
 
 
 @pytest.mark.parametrize(("bit", "name"), BRINGS_DOWN.items())
-def test_what_brings_a_drone_down_is_read_from_its_bit(bit, name):
+def test_each_emergency_bit_has_its_name(bit, name):
     assert bit_names(2**bit) == (name,)
 
 

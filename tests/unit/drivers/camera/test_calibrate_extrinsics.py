@@ -144,7 +144,7 @@ def test_an_onboard_camera_is_placed_on_the_bench(tmp_path, measured):
     assert 0.01 <= lines["attitude_std_deg"] < 2.0 and 0.001 <= lines["position_std_m"] < 0.05
 
 
-def test_what_does_not_tell_is_refused_with_what_is_missing(tmp_path, measured):
+def test_insufficient_floor_markers_are_refused_with_a_reason(tmp_path, measured):
     picture = drawn(CEILING, LENS, {1: (*PLACES[1], 0.0, 0.3)})
     folder, calibration = files_for(tmp_path, LENS, picture, 1)
     code, _, said = measured(folder, "--calibration", calibration, *markers())

@@ -66,7 +66,7 @@ def test_an_old_camera_without_qop_gets_no_count() -> None:
         b'WWW-Authenticate: Digest realm="cam", nonce="1", algorithm=SHA-512-256',
     ],
 )
-def test_what_cannot_be_answered(head: bytes) -> None:
+def test_challenges_that_cannot_be_answered_are_ignored(head: bytes) -> None:
     assert challenge_of(head) is None
 
 

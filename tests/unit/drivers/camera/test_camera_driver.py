@@ -277,7 +277,7 @@ def test_wrong_sections_are_named(change, named):
         driver.run(child)
 
 
-def test_whom_a_camera_reports():
+def test_expected_markers_follow_from_mount_and_observed_entities():
     ceiling = {"name": "ceiling", "mount": {"parent": "world", "looking": "down"}}
     assert [m.entity for m in settings().expected_markers] == ["bot"]
     assert [m.entity for m in settings(**ceiling).expected_markers] == ["drone_1"]

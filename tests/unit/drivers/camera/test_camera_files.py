@@ -93,7 +93,7 @@ def test_a_folder_is_shown_by_name_without_what_is_no_picture(tmp_path):
         (os.mkfifo, "neither a file nor a folder"),
     ],
 )
-def test_what_is_wrong_with_a_file_is_said(tmp_path, make, complaint):
+def test_errors_of_video_files_and_folders_are_named(tmp_path, make, complaint):
     path = tmp_path / "flight.mp4"
     make(path)
     with opened(path) as source:

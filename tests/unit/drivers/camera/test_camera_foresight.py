@@ -124,7 +124,7 @@ def test_the_estimate_nearest_to_the_exposure_counts_and_old_ones_do_not():
     assert eyes.at(600_000_000, None) == {}
 
 
-def test_what_is_behind_or_turned_away_is_certainly_not_in_view():
+def test_markers_behind_the_camera_or_turned_away_are_not_in_view():
     eyes = foresight()
     behind = [state(0, 0, 2.0), state(-3.0, 0.0, 1.0), state(-2.0, 0.0, 0.0)]
     eyes.add(belief(behind))

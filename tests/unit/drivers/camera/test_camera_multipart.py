@@ -55,7 +55,7 @@ def test_lower_case_headers_and_noise_between_parts():
     assert MultipartParser(b"frame").feed(stream) == [JPEG, OTHER]
 
 
-def test_what_is_no_jpeg_is_rejected_and_the_next_one_found():
+def test_a_part_without_jpeg_is_rejected_and_the_next_one_found():
     parser = MultipartParser(b"frame")
     assert parser.feed(sized(b"<html>no</html>") + sized(JPEG)) == [JPEG]
     assert parser.rejected == 1

@@ -42,7 +42,7 @@ def test_the_size_of_a_jpeg_is_in_its_head(shape, progressive):
         b"\x89PNG\r\n\x1a\n",
     ],
 )
-def test_what_is_no_whole_jpeg_has_no_size(data):
+def test_incomplete_jpegs_have_no_size(data):
     assert whole_size(data) is None
 
 

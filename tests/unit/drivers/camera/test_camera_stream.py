@@ -40,7 +40,7 @@ def read_until(client, mark):
     return data
 
 
-def test_what_goes_over_the_wire():
+def test_a_streamed_picture_has_the_expected_bytes():
     with streaming() as stream, connect(stream.port) as client:
         head = read_until(client, b"\r\n\r\n")
         assert head.startswith(b"HTTP/1.0 200 OK\r\n")

@@ -32,7 +32,7 @@ def test_a_camera_that_hears_of_nothing_lost_searches_seldom(sees: bool, misses:
     assert len(found) >= 5.0 / (each_s + 0.067)
 
 
-def test_what_no_camera_sees_is_sought_in_every_second_picture() -> None:
+def test_entities_unseen_by_any_camera_are_sought_in_every_second_picture() -> None:
     assert len(searches(4.0, lambda _: True, sees=True)) == 30
 
 
@@ -42,7 +42,7 @@ def test_a_search_begins_as_soon_as_a_target_is_sought() -> None:
 
 
 @pytest.mark.parametrize(("cost_s", "most"), [(0.03, 0.16), (0.06, 0.16), (0.17, 0.35)])
-def test_what_searches_cost_bounds_how_many_there_are(cost_s: float, most: float) -> None:
+def test_the_number_of_searches_is_bounded_by_their_cost(cost_s: float, most: float) -> None:
     """A sixth of a processor, or the cost of the untargeted search."""
     found = searches(20.0, lambda _: True, cost_s=cost_s)
     assert cost_s * len(found) / 20.0 <= most

@@ -71,7 +71,7 @@ def test_a_place_is_held_although_its_velocity_grows_wrong():
     assert math.hypot(*vehicle.feedback.drift(vehicle.now_ns)[:2]) == pytest.approx(0.5, abs=0.05)
 
 
-def test_what_it_is_to_fly_is_its_true_velocity():
+def test_setpoints_are_flown_at_the_true_velocity():
     vehicle = Vehicle()
     vehicle.fly(0.5)
     vehicle.error = (-0.3, 0.3)
@@ -89,7 +89,7 @@ def test_a_vehicle_that_flies_slower_than_told_by_its_own_velocity_too_is_told_m
     assert vehicle.feedback.drift(vehicle.now_ns) == pytest.approx((0.0, 0.0, 0.0)), "its report is right"
 
 
-def test_what_it_is_told_more_is_limited():
+def test_the_velocity_correction_is_limited():
     vehicle = Vehicle()
     vehicle.missing = (0.8, 0.0)
     vehicle.fly(8.0, (0.4, 0.0, 0.0))
@@ -299,7 +299,7 @@ def test_a_vehicle_whose_velocity_nobody_knows_holds_its_place_by_pictures():
     assert math.hypot(*vehicle.place[:2]) < 0.3
 
 
-def test_who_is_brought_back_holds_the_place_to_which_it_came():
+def test_a_vehicle_moved_while_hovering_holds_its_new_place():
     vehicle = Vehicle()
     for _ in range(150):
         vehicle.step()

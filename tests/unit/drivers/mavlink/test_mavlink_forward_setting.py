@@ -11,7 +11,7 @@ from sim_bridge.conformance.subject import subject_of
 
 
 @pytest.mark.parametrize("wrong", ["udp:127.0.0.1:99999", "udp:127.0.0.1:0", "udp:300.1.1.1:14550", "tcp:127.0.0.1:1"])
-def test_what_is_no_address_and_port_is_refused_before_a_frame_is_sent_there(wrong: str) -> None:
+def test_invalid_forward_addresses_are_refused(wrong: str) -> None:
     with pytest.raises(ValidationError, match=r"port|address|pattern"):
         Mavlink(flavour="px4", system_id=1, forward=wrong)
     with pytest.raises(ValidationError, match=r"port|address|pattern"):

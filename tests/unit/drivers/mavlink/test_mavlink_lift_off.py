@@ -40,7 +40,7 @@ def test_a_jolt_is_no_climb():
     assert not lift.lifted
 
 
-def test_who_was_not_asked_to_take_off_flies_when_it_says_so():
+def test_a_vehicle_without_a_takeoff_command_flies_by_its_own_report():
     lift = LiftOff()  # a driver that was started again in flight
     assert hear(lift, 0.1, Landed.IN_AIR, begin_m=1.2, starting=False) == 0.0
 
@@ -62,7 +62,7 @@ def stands(lift, height_m, starting=True):
         lift.see(turn * 20 * MS, (1.0, 2.0, height_m + (0.03 if turn % 2 else -0.03)), 0.2)
 
 
-def test_what_cameras_see_of_its_height_counts_before_its_own_word():
+def test_observed_height_counts_before_the_reported_flight_state():
     lift = LiftOff()
     stands(lift, 0.06)
     assert lift.stood == pytest.approx((1.0, 2.0, 0.06), abs=0.002)
@@ -89,13 +89,13 @@ def test_its_own_climb_rate_does_not_lift_it_where_cameras_see_it_stand():
     assert climbs_by_its_own_word(lift, age_s=0.2, height_m=0.45), "its word alone counts at last"
 
 
-def test_what_cameras_saw_a_while_ago_does_not_hold_it_on_the_floor():
+def test_old_observations_do_not_prevent_the_detection_of_a_lift_off():
     lift = LiftOff()
     stands(lift, 0.06)
     assert climbs_by_its_own_word(lift, age_s=0.8)
 
 
-def test_whom_cameras_see_in_the_air_first_has_its_own_word():
+def test_a_vehicles_report_decides_lift_off_if_first_observed_airborne():
     lift = LiftOff()
     hear(lift, 1.0, Landed.ON_GROUND)
     for turn in range(20):

@@ -140,7 +140,7 @@ def test_on_the_floor_an_error_of_its_velocity_is_corrected_before_it_leans_agai
     assert told.vz == pytest.approx(-0.4), "what its climb rate sways by there is left alone"
 
 
-def test_what_was_not_asked_to_take_off_is_not_corrected_on_the_floor():
+def test_drift_is_not_corrected_on_the_floor_without_a_takeoff_command():
     orders = px4()
     stands(orders, 1.0, Action.IDLE, DriverMode.LANDED)
     assert orders.drift.drift(2 * 10**9) == (0.0, 0.0, 0.0)

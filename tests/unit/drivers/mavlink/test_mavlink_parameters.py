@@ -34,7 +34,7 @@ def test_large_values_are_told_in_full():
     assert text.startswith("ARMING_CHECK is 1, needs 1048574 (")
 
 
-def test_what_is_missing_is_named_with_what_it_needs():
+def test_a_missing_parameter_is_named_with_its_needed_value():
     assert difference(of("EKF2_HGT_REF"), {}) == "EKF2_HGT_REF is missing, needs 3 (height comes from outside)"
 
 
@@ -50,7 +50,7 @@ def test_the_field_file_has_the_last_word_and_a_warning():
     assert "EKF2_MAG_TYPE 0 instead of 5" in overridden(Flavour.PX4, {"EKF2_MAG_TYPE": 0})
 
 
-def test_what_it_has_besides_is_checked_without_a_warning():
+def test_additional_parameters_are_checked_without_a_warning():
     assert difference(of("MPC_XY_VEL_MAX", MPC_XY_VEL_MAX=1.5), {"MPC_XY_VEL_MAX": 12}).startswith(
         "MPC_XY_VEL_MAX is 12"
     )

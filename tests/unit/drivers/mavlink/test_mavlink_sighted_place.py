@@ -61,7 +61,7 @@ def test_a_flying_vehicle_holds_the_place_where_the_picture_showed_it(vehicle: M
     assert forward < -0.05 and left > 0.0, "back to where it was seen at rest, in its own axes"
 
 
-def test_what_its_velocity_errs_by_is_not_learnt_from_pictures(vehicle: MavlinkVehicle) -> None:
+def test_velocity_errors_are_not_estimated_from_pictures(vehicle: MavlinkVehicle) -> None:
     vehicle.orders.lift.lifted = True
     for step in range(20):
         now_ns = NOW + step * 100 * MS

@@ -18,12 +18,12 @@ def quality(sequences):
     return traffic.rates(S + len(sequences) * MS)[1]
 
 
-def test_what_is_lost_is_missing():
+def test_lost_frames_lower_the_link_quality():
     kept = [n for n in range(900) if n % 5]
     assert quality(kept) == pytest.approx(0.8, abs=0.01)
 
 
-def test_what_is_overtaken_is_not_lost():
+def test_reordered_frames_are_not_lost():
     rng = np.random.default_rng(1)
     order = np.argsort(np.arange(900) + rng.uniform(0.0, 6.0, 900))
     assert quality(order) == pytest.approx(1.0, abs=0.01)

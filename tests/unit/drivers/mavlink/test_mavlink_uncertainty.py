@@ -18,7 +18,7 @@ def odometry(velocity, tilt):
     return OdometryMessage(1, 1, 1, 0, 0, 0, (1, 0, 0, 0), 0, 0, 0, 0, 0, 0, tuple(pose), tuple(motion))
 
 
-def test_what_it_states_counts_for_three_seconds():
+def test_stated_uncertainty_is_valid_for_three_seconds():
     stated = StatedUncertainty()
     stated.hear(S, odometry(0.04, 4e-4))
     assert stated.velocity_std_m_s(2 * S) == pytest.approx(0.2)

@@ -53,7 +53,7 @@ def test_an_estimate_elsewhere_does_not_count_while_it_stands(feed: VisionFeed) 
     assert place(feed, NOW + 33 * MS, aloft=False) == (*PAD, 0.0)
 
 
-def test_who_was_carried_back_is_fed_its_pad_once_cameras_see_it_there(feed: VisionFeed) -> None:
+def test_a_vehicle_carried_back_is_sent_its_pad_once_observed_there(feed: VisionFeed) -> None:
     for step in range(3):
         believe(feed, NOW + 33 * MS * step, PAD[0] + 2.0, PAD[1], 0.3)
         feed.pose(NOW + 33 * MS * step, aloft=step < 2)
@@ -114,7 +114,7 @@ def test_a_vehicle_that_tells_no_motion_is_fed_where_its_last_picture_showed_it(
 
 
 @pytest.mark.parametrize(("age_s", "std_m"), [(0.45, 0.02), (0.2, 0.06)], ids=["long ago", "badly"])
-def test_who_was_not_seen_well_and_lately_is_not_fed(feed: VisionFeed, age_s: float, std_m: float) -> None:
+def test_no_pose_is_sent_after_old_or_uncertain_observations(feed: VisionFeed, age_s: float, std_m: float) -> None:
     believe(feed, NOW + 33 * MS, *PAD, 0.5)
     see(feed, NOW + 600 * MS, 1.2, age_s, std_m)
     assert place(feed, NOW + 600 * MS, aloft=True) is None

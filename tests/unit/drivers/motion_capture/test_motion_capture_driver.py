@@ -147,7 +147,7 @@ def broken(kind: FaultKind, **more: object) -> tuple[Fault, ...]:
     ],
     indirect=["rig"],
 )
-def test_what_cannot_be_true_is_told_once_and_not_observed_until_it_is_over(rig, who, why) -> None:
+def test_impossible_poses_are_reported_once_and_not_observed(rig, who, why) -> None:
     rig.run(80)
     during = rig.run(40)
     assert not [one for one in told(during, RelativeObservation) if one.subject in who]

@@ -59,7 +59,7 @@ def test_a_count_that_nobody_can_mean_is_refused() -> None:
         natnet.decode_frame(bytes(payload), (3, 1))
 
 
-def test_what_the_emulator_says_is_what_motive_says() -> None:
+def test_emulated_frames_are_decoded_as_those_of_motive() -> None:
     bodies = (natnet.Body(7, (1.0, 2.0, 3.0), (0.0, 0.0, 0.5, 0.5)),)
     for version in ((3, 1), (4, 1)):
         datagram = natnet.encode_frame(natnet.Frame(42, bodies, 1000, 1050), version)

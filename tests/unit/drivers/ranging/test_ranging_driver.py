@@ -198,7 +198,7 @@ def test_strangers_and_what_nobody_carries_are_counted(rig: Rig) -> None:
         (b'{"transponder": "' + b"t" * 200 + b'", "m": {"a": 1}}', "damaged"),
     ],
 )
-def test_what_is_no_round_is_refused_by_its_reason(datagram: bytes, reason: str) -> None:
+def test_invalid_ranging_rounds_are_refused_with_a_reason(datagram: bytes, reason: str) -> None:
     with pytest.raises(WireError) as refused:
         decode(datagram)
     assert refused.value.reason == reason

@@ -80,9 +80,7 @@ def node(monkeypatch: pytest.MonkeyPatch) -> Node:
         (replace(STANDING, position=(0.0, 0.0, math.inf)), "no number"),
     ],
 )
-def test_what_is_no_motion_never_reaches_the_watchdog_and_says_why(
-    node: Node, wrong: vehicle.OdometryMessage, reason: str
-) -> None:
+def test_invalid_odometry_is_refused_with_a_reason(node: Node, wrong: vehicle.OdometryMessage, reason: str) -> None:
     for _ in range(20):
         view = node.say(wrong)
     assert not view.fresh and view.flight_state is FlightState.UNKNOWN
@@ -113,7 +111,7 @@ def test_a_twist_in_the_axes_of_the_room_is_no_twist_of_the_vehicle(node: Node) 
         (replace(STANDING, velocity=(3.0, 0.0, 0.0)), "3.0 m/s where it stands"),
     ],
 )
-def test_what_cannot_be_true_of_a_standing_vehicle_keeps_it_on_the_floor(
+def test_impossible_odometry_of_a_standing_vehicle_prevents_take_off(
     node: Node, wrong: vehicle.OdometryMessage, words: str
 ) -> None:
     assert node.say(STANDING).not_ready == ""

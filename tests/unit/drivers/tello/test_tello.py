@@ -65,7 +65,7 @@ def flight():
     flight.close()
 
 
-def test_who_hovers_is_brought_back_as_it_would_fly(flight: Flight) -> None:
+def test_corrections_in_hover_are_commanded_as_velocities_in_flight(flight: Flight) -> None:
     flies, _ = flight.told(Action.FLY, (0.1, -0.15, 0.0))
     assert flight.told(Action.HOVER, back=(0.1, -0.15, 0.0))[0] == flies != flight.told(Action.HOVER)[0]
 
@@ -188,7 +188,7 @@ def test_a_take_off_that_is_called_off_is_followed_by_land(flight):
     assert told(Action.IDLE) == b"land"
 
 
-def test_what_it_answers_to_an_order_that_it_refuses_is_told(flight):
+def test_the_answer_to_a_refused_command_is_reported(flight):
     flight.told(Action.TAKE_OFF, state=dataclasses.replace(STATE, height=0, tof=0, time=0))
     flight.tello._hear_answer(time.monotonic_ns(), b"error Motor stop\r\n")
     assert flight.tello.health(time.monotonic_ns()).detail == "it answers 'error motor stop' when told to take off"

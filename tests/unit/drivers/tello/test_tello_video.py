@@ -59,7 +59,7 @@ def test_a_picture_that_fills_its_datagrams_ends_all_the_same() -> None:
     assert [bool(assembly.feed(datagram)) for datagram in cut(full)] == [False, False, True]
 
 
-def test_what_is_no_video_is_counted() -> None:
+def test_bytes_that_are_no_video_are_counted() -> None:
     assembly = Assembly(WHOLE_BYTES)
     assert assembly.feed(b"ok") is None and assembly.skipped == 2
     for _ in range(1000):

@@ -65,7 +65,7 @@ def test_a_tracker_that_was_started_again_brings_nobody_back(new_bench):
     ],
     ids=str,
 )  # fmt: skip
-def test_what_would_stop_a_tracking_vehicle_leaves_a_hovering_one_alone(new_bench, wrong):
+def test_conditions_that_stop_tracking_prevent_moves_of_a_hovering_vehicle(new_bench, wrong):
     bench = hovering(new_bench())
     for name, value in wrong.items():
         setattr(bench, name, value)
@@ -73,7 +73,7 @@ def test_what_would_stop_a_tracking_vehicle_leaves_a_hovering_one_alone(new_benc
     assert bench.decision.back_m_s is None
 
 
-def test_who_was_stopped_by_a_failsafe_is_left_alone(new_bench):
+def test_a_vehicle_stopped_by_a_failsafe_is_not_moved(new_bench):
     bench = new_bench().fly()
     bench.stray = "1.0 m/s seen by cameras, 0.0 m/s asked"
     bench.step()

@@ -69,7 +69,7 @@ def test_a_restarted_driver_lands_the_sooner_the_longer_others_braked(braked_s, 
     assert lands_s <= (landing[0] - steps[0]) / S < lands_s + 0.07
 
 
-def test_what_is_braked_lands_as_soon_as_that_is_over():
+def test_a_braked_vehicle_lands_once_braking_is_over():
     dog, view = Watchdog(WatchdogLimits(), "clock", braked_ns=400 * MS), VehicleView(FlightState.FLYING, True, 0.9, "")
     told = [dog.step(at, view, Upstream()).action for at in (S, S + 600 * MS - 1, S + 600 * MS)]
     assert told == [Action.HOVER, Action.HOVER, Action.LAND]

@@ -105,7 +105,7 @@ def test_a_share_is_lost_to_the_vehicle(way):
     assert 850 < heard < 950
 
 
-def test_what_is_overtaken_comes_next():
+def test_an_overtaken_datagram_comes_next():
     with ends() as (wire, vehicle, driver):
         wire.swap = 0.3
         for number in range(200):

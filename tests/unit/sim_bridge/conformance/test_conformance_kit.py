@@ -228,7 +228,7 @@ def test_a_vehicle_is_made_as_its_kind_s_example_says_and_otherwise():
         ("tello", ["tello.full_speed_m_s=-3"], "full_speed_m_s"),
     ],
 )
-def test_what_cannot_be_judged_is_named(kind, options, text):
+def test_invalid_kinds_and_options_are_named(kind, options, text):
     with pytest.raises(SettingsError, match=text):
         subject_of(kind, options)
 

@@ -3,7 +3,7 @@
 from sim_bridge.study.delay_queue import DelayQueue
 
 
-def test_what_is_due_comes_in_order_and_once() -> None:
+def test_due_messages_come_in_order_and_once() -> None:
     queue = DelayQueue[str]()
     for due_ns, item in ((30, "late"), (10, "early"), (20, "first of two"), (20, "second of two"), (31, "later")):
         queue.send(due_ns, item)

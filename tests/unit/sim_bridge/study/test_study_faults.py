@@ -139,7 +139,7 @@ DEAF = fault("at_deaf", end_s=14.0)
     ],
     ids=["too fast", "hears again", "was too fast", "something else is wrong", "out", "the other one hears"],
 )
-def test_what_nobody_on_the_ground_could_stop_is_unsafe_and_named(
+def test_violations_that_nobody_could_stop_are_unsafe_and_named(
     rows: Any, faults: tuple[Fault, ...], unsafe: list[str], unreached: list[str]
 ) -> None:
     verdict = judged(rows, faults=faults, deaf=lambda t: ["a"] * (10.0 <= t < 14.0))

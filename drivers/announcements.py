@@ -1,4 +1,4 @@
-"""Events about a vehicle for the operator: its modes, silence and refusals, each told once per change."""
+"""Events about a vehicle for the operator: its modes, silence and refusals, each reported once per change."""
 
 from collections.abc import Mapping
 

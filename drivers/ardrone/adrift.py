@@ -1,4 +1,4 @@
-"""Detects a silent AR.Drone that drifts off though it was told to hold its place. Pure.
+"""Detects a silent AR.Drone that drifts off though commanded to hold its place. Pure.
 
 A silent drone does not report whether its optical flow sees the floor. Cameras show it: sound firmware brakes from full
 speed in a second.

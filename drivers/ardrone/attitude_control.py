@@ -1,4 +1,4 @@
-"""Chooses what an AR.Drone is told: to hold its place by itself, the velocity loop's attitude, or one that brakes it.
+"""Chooses an AR.Drone's command: to hold its place by itself, the velocity loop's attitude, or a braking attitude.
 
 Pure. A drone holds its place by the optical flow by which it measures its velocity. Where that fails while it hovers or
 lands, the driver brakes it.

@@ -44,7 +44,7 @@ _EVEN_M_S = 0.1  # within this the two fit equally well
 # [1/s], sideways and upwards: a climb rate answers within 0.35 s, and the error of a climb rate that is not yet known
 # costs its share of this in height.
 _HOLD_GAIN, _HOLD_UP_GAIN = 0.8, 2.0
-# Below the control error's tolerance for a vehicle that is told to stand still.
+# Below the control error's tolerance for a vehicle commanded to stand still.
 _HOLD_M_S = 0.2
 _SEEN_S = 0.5
 # A vehicle told to stop has stopped once it is this slow for this long, at least two pictures, and after this long at

@@ -39,7 +39,7 @@ def speaks_as_we(frame: ReceivedFrame, own: tuple[int, int], rejected: Counter[s
 
 
 class OtherStations:
-    """What is heard of other ground stations on a link; `news` has (text, remedy) for the operator, each told once.
+    """Detects other ground stations on a link; `news` has (text, remedy) for the operator, each reported once.
 
     own: our system id; riders: vehicles that another ground station may stop through us, whose answers are expected.
     """

@@ -1,4 +1,4 @@
-"""Settings of a vehicle behind a ROS 2 node: its section of the field file, and what its driver is told."""
+"""Settings of a vehicle behind a ROS 2 node: its section of the field file, and its driver's section."""
 
 from typing import Annotated, Literal
 

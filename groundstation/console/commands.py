@@ -1,4 +1,4 @@
-"""Commands of the page: sent as by the command line, repeated until heard, followed until confirmed."""
+"""Commands of the page: sent as by the command line, repeated until acknowledged, followed until confirmed."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field

@@ -31,7 +31,7 @@ NO_CAMERAS: Mapping[str, WorldCamera] = MappingProxyType({})
 
 
 class ConsoleState:
-    """Takes messages in and puts the sections of the board; pure but for what it is given."""
+    """Takes messages in and puts the sections of the board; pure but for the objects passed to it."""
 
     def __init__(self, cast: Cast, started_ns: int, cameras: Mapping[str, WorldCamera] = NO_CAMERAS) -> None:
         self.standing = StandingDrones(cameras, cast.drones)

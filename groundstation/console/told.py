@@ -1,4 +1,4 @@
-"""How the page is told of each message: sections of the board, as JSON has them. Pure."""
+"""Converts messages to the page's sections of the board, as JSON values. Pure."""
 
 from collections.abc import Iterable
 from dataclasses import asdict

@@ -1,4 +1,4 @@
-"""Whether the drone that reports flight is the one whose marker rose. Pure.
+"""Checks that the drone that reports flight is the one whose marker rose. Pure.
 
 Reports are assigned to a drone by address, sightings by marker. If the two disagree, the addresses or the markers of
 two drones are exchanged, and the tracker would steer one drone by sightings of the other.

@@ -19,7 +19,7 @@ _COMPUTER = 0  # no process has this number
 
 
 class StatusPublisher:
-    """Publishes once a second: the supervisor, the router (nothing else runs in it), and whoever is down."""
+    """Publishes once a second: the supervisor, the router (nothing else runs in it), and dead processes."""
 
     def __init__(self, bus: Bus) -> None:
         self._bus = bus

@@ -85,7 +85,7 @@ class MjpegReader:
 
 
 class _Body:
-    """What a connection carries behind the head of its answer."""
+    """The body of an HTTP answer: the bytes behind its head."""
 
     def __init__(self, connection: socket.socket, chunks: ChunkedBody | None, rest: bytes) -> None:
         self._connection, self._chunks = connection, chunks

@@ -1,4 +1,4 @@
-"""What a link makes of bytes and messages: frames decoded and encoded in its own name, signed if it has a key."""
+"""Decodes a link's frames, and encodes messages as frames in its own name, signed if it has a key."""
 
 from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.signing_clock import SigningClock

@@ -1,4 +1,4 @@
-"""What a topology with one robot moved costs where the current one is best, from the current one's adjoint.
+"""Cost of a topology with one robot moved, at the current topology's optimum, from the current one's adjoint.
 
 The cost is sum_k max_y (2 e_k^T y - y^T M_k y), M_k the smoothing information of the steps up to k, and y = M_k^-1 e_k
 are the adjoint's columns. A moved robot changes its own edges: its entries of y are found anew, all others stay. What

@@ -1,4 +1,4 @@
-// Who is where: ellipses, drones, target, trails, velocities, the truth.
+// Entities on the map: ellipses, drones, target, trails, velocities, the truth.
 
 import { bodyToWorld, ellipse95 } from "./geometry.js";
 import { colourOf, ink, isAgain } from "./palette.js";

@@ -104,7 +104,7 @@ function showVehicle(name, { root, values, mode, detail }) {
   showDuty(detail, name, silent);
 }
 
-// Who does as planned is green; who searches, or is kept from its plan, is not.
+// A drone that does as planned is green; one that searches, or is kept from its plan, is not.
 function levelOf(status) {
   const mode = modeOf(status);
   return mode !== status.mode || (mode === "TRACK" && modeWord(mode) !== mode) ? "warn" : LEVELS[mode] ?? "wait";

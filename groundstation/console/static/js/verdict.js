@@ -1,4 +1,4 @@
-// What the team does and who is lost, in a line that is always there, below the alarms.
+// The line below the alarms, always shown: the team's activity and the lost entities.
 
 import { joined, seconds } from "./dom.js";
 import { ready, refusalOf, waiting } from "./effects.js";
@@ -34,7 +34,7 @@ function deeds() {
   return parts.length ? `${parts.join("; ")}.` : "";
 }
 
-// Who should be seen: the target, and who flies.
+// The entities that should be seen: the target, and flying drones.
 function sought() {
   const floor = new Set([...standing(), ...doing("CONNECTING")]);
   return [...droneNames().filter((name) => !floor.has(name)), ...store.scene.targets.map(({ name }) => name)];

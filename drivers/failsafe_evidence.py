@@ -120,7 +120,7 @@ def timed(at: Situation) -> dict[Condition, float]:
     if heard_ns is None:
         lasted = {Condition.UNSEEN: at.since_s(at.take_off_ended_ns)}
     else:
-        # A person who orders TRACK before the tracker is heard again means it: the pause counts from that order.
+        # TRACK ordered before the tracker is heard again is deliberate: the pause counts from that order.
         pause_s = at.since_s(max(heard_ns, at.entered_ns))
         lasted = {Condition.TRACKER_SILENT: at.since_s(heard_ns), Condition.TRACKER_PAUSED: pause_s}
     for condition, lasted_s in (

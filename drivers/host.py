@@ -111,7 +111,7 @@ class VehicleHost:
                     self._localised_ns = now_ns - round(entity.unlocalised_s * NS_PER_S)
 
     def _near(self, now_ns: int, aloft: bool) -> tuple[str, str]:
-        """Return who is too near to the pad of this vehicle, if it stands, and to it, if it flies; "" if nobody is."""
+        """Return the neighbour too near to this vehicle's pad, if it stands, and to it, if it flies; "" if none is."""
         for received in self._statuses.drain():
             if isinstance(received.message, VehicleStatus):
                 self._neighbours.hear(received.message)

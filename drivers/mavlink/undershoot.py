@@ -31,7 +31,7 @@ class Undershoot:
         self._told_ns = self._heard_ns = 0
 
     def tell(self, now_ns: int, asked_m_s: Vector2) -> None:
-        """Note the velocity that is asked [world], without corrections."""
+        """Note the requested velocity [world], without corrections."""
         self._expected = towards(self._expected, asked_m_s, share_of(now_ns - self._told_ns, _RESPONSE_S))
         self._asked, self._told_ns = asked_m_s, now_ns
 

@@ -62,7 +62,7 @@ export function startEffect(verb) {
 // Whether its own emergency stop has cut its motors: an order to take off may do no more than end that.
 export const isCutOff = (name) => store.s.vehicles?.[name]?.flight === "EMERGENCY";
 
-// What a stop of the team would do now, to whom, and to whom not; "" while nobody is heard.
+// The effect that a stop of the team would have now, for each drone; "" without telemetry from any drone.
 export function effectOf(verb) {
   const flying = up();
   if (!modes().length) return "";
@@ -72,7 +72,7 @@ export function effectOf(verb) {
   return verb === "LAND" ? landing(flying) : hover(flying);
 }
 
-// Whom a stop may not reach: it is sent all the same.
+// Drones that a stop may not reach: it is sent all the same.
 function unheard(verb, flying) {
   const deaf = flying.filter(isUnheard), heard = flying.filter((name) => !isUnheard(name));
   const word = verb === "CUT_MOTORS" ? "fall" : verb === "HOLD" && holding(heard.length ? heard : deaf).length ? "hover" : "land";
@@ -80,7 +80,7 @@ function unheard(verb, flying) {
   return told([does(heard, `${word}s`, word), does(deaf, "if it hears", "if they hear")]);
 }
 
-// What a stop of one drone would do now.
+// The effect that a stop of one drone would have now.
 export function effectOnOne(verb, name) {
   if (!modeNow(name)) return "";
   if (!up([name]).length) return "no use: stands";
@@ -90,7 +90,7 @@ export function effectOnOne(verb, name) {
   return isLost(name) ? "lands if unseen" : isIdle(verb, [name]) ? "hovers already" : "hovers here";
 }
 
-// Who is lost hovers as well, until it is landed for it.
+// A lost drone hovers as well, until a failsafe lands it.
 function hover(flying) {
   const held = holding(), lost = held.filter(isLost), seen = held.filter((name) => !isLost(name)), bound = flying.filter((name) => !held.includes(name));
   if (bound.length === droneNames().length) return does(bound, "lands anyway", "land anyway");

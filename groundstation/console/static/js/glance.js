@@ -31,7 +31,7 @@ export function teamMode() {
   if (!done.length) return [all.length ? "ON GROUND" : "–", "calm"];
   const named = done.map(([mode]) => modeWord(mode)), level = levelOf(...done[0]);
   if (soon.length) return [named[0], level, `${some(soon)} ${soon.length > 1 ? "land" : "lands"} in ${first}`];
-  // Where not all have room beside each other: who is in the most careful mode, and what others do.
+  // Without room for all: the drones in the most careful mode, and the modes of the others.
   const together = named.join(" + "), careful = doing(done[0][0]);
   if (together.length > LETTERS) return [named[0], level, `${some(careful)}; ${all.length - careful.length > 1 ? "others" : "the other"} ${named.slice(1).join(", ")}`];
   return [together, level, done.map(([mode]) => some(doing(mode))).filter(Boolean).join(" + ")];
@@ -41,13 +41,13 @@ const CAREFUL = [["CUT", "bad"], ["LANDING", "warn"], ["TAKING_OFF", "warn"], ["
 
 const levelOf = (mode, level) => (mode !== "TRACK" || modeWord(mode) === mode ? level : "warn");
 
-// What a mode is for now: who is to track a target that is lost searches for it.
+// The word shown for a mode: a drone in TRACK searches while the target is lost.
 export function modeWord(mode) {
   if (mode !== "TRACK") return mode === "CUT" ? "MOTORS OFF" : mode.replace("_", " ");
   return trackerSilent() ? "NO TRACKER" : !lostTarget() ? mode : doing(mode).every(isBlind) ? "BLIND" : "SEARCH";
 }
 
-// In how many seconds a failsafe will land it, if nothing changes; "" if none is near.
+// Time until a failsafe lands the drone, if nothing changes; "" if none is near.
 export function landsIn(name) {
   const left = store.s.vehicles?.[name]?.lands_in_s ?? null;
   return left === null ? "" : `${Math.max(1, Math.round(left))} s`;
@@ -80,7 +80,7 @@ function some(names) {
   return names.length > FEW ? `${names.length} of ${all} drones` : names.join(", ");
 }
 
-// Who is up forms the team until TRACK begins the task; one that still stands is about to follow.
+// Airborne drones form the team until TRACK begins the task; a drone that still stands is about to follow.
 export function stage() {
   const all = modes();
   if (runOver()) return "over";

@@ -11,7 +11,7 @@ import { colourOf, isAgain } from "./palette.js";
 import { ageS, entity, estimateAge, runOver, SEEN_S, seenBy, store, trackerSilent, unseenS } from "./store.js";
 
 const STALE_S = 1;
-// In these modes one that is lost is told as that.
+// In these modes a lost drone is shown as lost.
 const STRAYS = new Set(["TRACK", "HOVER", "HOLD"]);
 const LEVELS = { TRACK: "good", HOVER: "good", HOLD: "warn", TAKING_OFF: "warn", LANDING: "warn", CUT: "bad", LANDED: "calm", CONNECTING: "calm" };
 const NARROW = matchMedia("(max-width: 1380px)"), LOW = matchMedia("(max-height: 990px)");

@@ -18,7 +18,7 @@ _MAX_LINE_BYTES = 256
 
 
 def split_answer(data: bytes) -> tuple[bytes, bytes] | None:
-    """Return head and what is behind it, or None while the head has not ended."""
+    """Return the head and the bytes behind it, or None while the head has not ended."""
     end = HEAD_END.search(data)
     return None if end is None else (data[: end.start()], data[end.end() :])
 

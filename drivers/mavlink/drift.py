@@ -197,7 +197,7 @@ class DriftFeedback:
         return self._corrected(now_ns, self._drift)
 
     def correction(self, now_ns: int) -> Vector3:
-        """Return what to add to a command [m/s; base_stabilized]: drift, extrapolated to now, and undershoot."""
+        """Return the correction of a command [m/s; base_stabilized]: drift, extrapolated to now, and undershoot."""
         (x, y), (missing_x, missing_y) = self._drift_by_now(), self._undershoot.missing
         return self._corrected(now_ns, (x + missing_x, y + missing_y))
 

@@ -71,7 +71,7 @@ class CommandDesk:
         self._lease = lease
 
     def lease_holder(self, now_ns: int) -> str:
-        """Return who holds a live operator lease, or ""."""
+        """Return the holder of a live operator lease, or ""."""
         return self._lease.holder if self._lease is not None and self._lease.expires_ns > now_ns else ""
 
     def give(self, verb: Verb, drones: tuple[str, ...], given: Given, now_ns: int) -> str:

@@ -81,7 +81,7 @@ class ConsoleState:
         self.history.step(now_ns, estimate, plan, nis, truth)
 
     def doing(self) -> dict[str, str]:
-        """Return what each drone says it does."""
+        """Return each drone's reported action."""
         return {name: seen.message.detail or seen.message.mode for name, seen in self.monitor.vehicles.items()}
 
     def put(self, board: Snapshot, now_ns: int) -> None:

@@ -55,7 +55,7 @@ class Interrupts:
         self._put_aside = True
 
     def clear(self) -> str:
-        """Empty the descriptor after it woke a poll; return what the operator should be told, or ""."""
+        """Empty the descriptor after it woke a poll; return a notice for the operator, or ""."""
         with suppress(BlockingIOError):
             os.read(self.descriptor, 512)
         told, self._put_aside = NOT_PUT_ASIDE * self._put_aside, False

@@ -242,7 +242,7 @@ def _imbalance(robot: int, at: Optimum, links: Links) -> float:
 def moved_cost(
     to: IntVector, at: Optimum, cost: float, problem: PlanarProblem, gradient: Vector
 ) -> tuple[float, float]:
-    """Return at least what a topology costs at the current one's optimum [m^2], and write its gradient there.
+    """Return a lower bound of a topology's cost at the current one's optimum [m^2], and write its gradient there.
 
     cost: the current topology's there. The second number grows with what the first one lacks. `to` moves one robot.
     """

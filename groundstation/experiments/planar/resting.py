@@ -59,7 +59,7 @@ def learn(
 def resting_cost(
     level: IntVector, at: Optimum, cost: float, problem: PlanarProblem, tolerance: float, doubt: Matrix
 ) -> float:
-    """Return what a topology costs at the current one's optimum [m^2], at least; NaN where it may be better elsewhere.
+    """Return a lower bound of a topology's cost at the current optimum [m^2]; NaN if it may be better elsewhere.
 
     cost: the current topology's; tolerance: of the projected gradient over that cost.
     """

@@ -98,8 +98,8 @@ export function showBanners() {
   showMore(behind.map(({ rank }) => rank), !first || fitted(first));
 }
 
-// What the other alarms are about, where that has room beside the first; tried anew only where the room may be another, or a
-// screen reader would hear it with every beat.
+// The subjects of the other alarms, where they have room beside the first; tried anew only where the room may be another,
+// or a screen reader would hear it with every beat.
 function showAlso(banner, subjects) {
   const [title, more, also] = [banner.children[0], banner.children[1], banner.lastElementChild];
   const key = [title.textContent.length, more.textContent, subjects, innerWidth, document.body.className, byId("alarms").className].join();

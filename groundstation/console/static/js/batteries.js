@@ -1,4 +1,4 @@
-// What the batteries hold and how long they are good for, as the console's process works it out for all pages.
+// The charge of the batteries and how long they last, as the console's process computes it for all pages.
 
 import { aloft, modeNow, standing, up } from "./glance.js";
 import { droneNames, store } from "./store.js";

@@ -1,4 +1,4 @@
-// What the bar says of the whole team, worked out of the newest of everything.
+// The bar's summary of the whole team, from the newest messages.
 
 import { joined } from "./dom.js";
 import { ageS, droneNames, estimateAge, isTarget, entities, entity, runOver, store, trackerSilent, unseenS } from "./store.js";
@@ -20,7 +20,7 @@ export const aloft = () => up().length;
 export const standing = (names = droneNames()) => names.filter((name) => ["LANDED", "CUT"].includes(modeNow(name)));
 export const targetAgeS = () => Math.min(...entities().filter(({ name }) => isTarget(name)).map((body) => body.age_s + estimateAge()), Infinity);
 
-// What they do who do not stand, the most careful first: [words, level, who does each if not all do the same].
+// Modes of the drones not on the ground, most careful first: [words, level, who does each if not all do the same].
 export function teamMode() {
   const all = statuses().map(modeOf), silent = droneNames().filter(isUnheard);
   if (runOver()) return ["RUN OVER", "calm"];
@@ -62,7 +62,7 @@ export const unseenLeftS = (name) => Math.max(0, store.scene.unseen_land_s - uns
 // Not seen for so long that it is searched for, or soon lands.
 export const isLost = (name) => (entity(name)?.age_s ?? Infinity) + estimateAge() > (store.scene?.lost_after_s ?? 3);
 export const lostTarget = () => (store.scene?.targets ?? []).every(({ name }) => isLost(name));
-// Who does this now, among those that are heard of.
+// The drones in this mode now, among those with telemetry.
 export const doing = (mode) => droneNames().filter((name) => modeOf(store.s.vehicles?.[name]) === mode);
 
 export const NAMED = 4; // more drones than this are counted
@@ -94,7 +94,7 @@ const forms = ({ mode, detail }) => mode === "HOVER" && !waits(detail);
 // After an order or a failsafe a drone hovers until RESUME.
 export const waits = (detail) => detail.includes("RESUME");
 
-// What a stage is called now: who has lost the target searches for it, and nobody may be left who follows it.
+// The present name of a stage: a team that lost the target searches for it, and no drone may be left in TRACK.
 export function stageWord(name) {
   if (name !== "track" || stage() !== "track") return name;
   if (doing("TRACK").length) return lostTarget() ? "search" : name;

@@ -42,7 +42,7 @@ export function buildTeam() {
 
 const TITLES = { battery: "battery", rate: "telemetry", link: "link", heard: "last heard", seen: "last seen", position: "position [m]", ellipse: "95 % sure within [m]", speed: "speed", by: "seen by" };
 const BELIEF = ["position", "ellipse", "speed"];
-// What stays on a screen that is read from 3 m, and on a low one.
+// The figures kept on a screen that is read from 3 m, and on a low one.
 const CHIEF = new Set(["battery", "seen"]), FIRST = { drone: new Set(["battery", "link", "heard", "seen"]), target: new Set(["seen", "speed", "by"]) };
 const WIDE = new Set(["position", "ellipse", "by"]);
 
@@ -121,7 +121,7 @@ function showDuty(node, name, silent) {
   node.classList.toggle("low", Boolean(landsIn(name) || silent));
 }
 
-// What share of the packets or of the signal arrives, as the driver says it.
+// The share of the packets or of the signal that arrives, as the driver reports it.
 function showLink(node, share) {
   const level = share === null || share === undefined ? "unknown" : share < 0.3 ? "empty" : share < 0.6 ? "low" : "full";
   text(node, level === "unknown" ? "?" : `${(100 * share).toFixed(0)} %${{ full: "", low: " weak", empty: " bad!" }[level]}`);

@@ -235,7 +235,7 @@ class Watchdog:
         return WatchdogDecision(self.mode, Action.FLY, velocity, turn, self.reason, acks, ns, None, self._entered_ns)
 
     def _asked_back(self, setpoint: VelocitySetpoint | None) -> Vector3 | None:
-        """Return the velocity back to the place where it was told to hover; None for whom a failsafe might stop."""
+        """Return the velocity back to the place where it was commanded to hover; None if a failsafe might stop it."""
         waits = self.mode in (DriverMode.HOVER, DriverMode.HOLD) and not self.failsafe
         if setpoint is None or not setpoint.holds or not waits or self.vehicle.flight_state not in UP:
             return None

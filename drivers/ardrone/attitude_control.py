@@ -21,7 +21,7 @@ _DOUBTED_NS = 1_300 * NS_PER_MS
 
 
 class MotionReport(NamedTuple):
-    """What a drone tells of its motion.
+    """A drone's report of its motion.
 
     fresh: it was heard a moment ago; told: and not with old contents; repeats: its velocity is no measurement; blind:
     fresh, and it sees nothing of its motion, though all else that it tells is sound; flowless: blind, and it believes

@@ -31,7 +31,7 @@ from groundstation.time_units import NEVER_NS, NS_PER_MS, NS_PER_S
 
 RATE_HZ = 30.0
 _STATUS_PERIOD_NS, _FLUSH_PERIOD_NS, _FLOOD_NS = 200 * NS_PER_MS, 100 * NS_PER_MS, 10 * NS_PER_MS
-# How long a driver that is to exit stays for a vehicle that it cannot hear.
+# How long a driver that is to exit waits for a silent vehicle.
 _GIVE_UP_NS = 10 * NS_PER_S
 
 

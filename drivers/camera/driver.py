@@ -163,7 +163,7 @@ class CameraDriver:
             observation = convert.observation_from_sighting(sighting, header, settings.name, attitude, picture_ns)
             self._child.bus.publish(OBSERVATION, observation)
             self._health.reported += 1
-        if self._pipeline.searched and picture_ns == exposure_ns:  # an old picture does not tell who is missing now
+        if self._pipeline.searched and picture_ns == exposure_ns:  # old pictures do not show who is missing now
             header = self._child.bus.header(settings.observer, exposure_ns)
             found = tuple(sighting.entity for sighting in sightings)
             searched = SearchedPicture(header=header, observer=settings.observer, camera=settings.name, found=found)

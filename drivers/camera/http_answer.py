@@ -1,4 +1,4 @@
-"""The answer of an HTTP camera: its head, what it says of the stream, and bodies sent in chunks. Pure.
+"""The answer of an HTTP camera: its head, the stream's properties, and bodies sent in chunks. Pure.
 
 WIRE: RFC 9112 sections 5 to 7. Cameras on an ESP32 and ffmpeg send chunks even to a client that speaks HTTP/1.0.
 """

@@ -21,7 +21,7 @@ class _Open:
 
 
 class Requests:
-    """Requests by key. Call `ask` as long as the wish stands; it repeats no request in progress.
+    """Requests by key. Call `ask` as long as the request is wanted; it repeats none in progress.
 
     failures: requests refused or never answered, for the operator; drained by the driver.
     """

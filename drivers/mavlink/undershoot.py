@@ -1,4 +1,4 @@
-"""Learns by how much a vehicle misses its commanded velocity, as cameras see it. Pure.
+"""Learns a vehicle's shortfall from its commanded velocity, as cameras see it. Pure.
 
 An autopilot whose tilt is wrong by a degree leans that much too little, until its own integrator has learnt it: a real
 PX4 flew 0.2 m/s of 0.4 for several seconds after lift-off (docs/reference/mavlink.md 2.1). Its reported velocity is

@@ -40,7 +40,7 @@ class Role(StrEnum):
 DEVICES = frozenset({Role.DRIVER, Role.CAMERA, Role.TARGET})
 """Roles that speak of their own vehicles, cameras and targets only."""
 WITNESSES = frozenset({Role.RECORDER, Role.CONSOLE, Role.MONITOR, Role.SIM_BRIDGE, Role.VIEW})
-"""Roles that may hear ground truth and the simulator; nothing that estimates or flies is among them."""
+"""Roles that may receive ground truth and the simulator's messages; none of them estimates or flies."""
 PROCESSES = frozenset(Role) - {Role.CLI, Role.VIEW}
 """Roles of the processes that a run starts."""
 
@@ -49,8 +49,8 @@ PROCESSES = frozenset(Role) - {Role.CLI, Role.VIEW}
 class Member:
     """One certificate of a run, with its role and member.
 
-    name: the certificate's common name; who has several roles by one certificate is several members. sources: the
-    sources that it may speak as, key chunks in which `$*` stands for any ending. entities: what a device speaks of.
+    name: the certificate's common name; one with several roles is several members. sources: permitted sources of its
+    messages, key chunks in which `$*` stands for any ending. entities: the subjects of a device's messages.
     """
 
     name: str
@@ -74,7 +74,7 @@ SHELLS = (
     Member(shell(Role.CONSOLE), Role.CONSOLE, ("console_$*",)),
     Member(shell(Role.VIEW), Role.VIEW, ("view_$*", "monitor_$*")),
 )
-"""What the owner of a run may join it as, from any shell."""
+"""Members as which the owner of a run may join it from any shell."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,7 +30,7 @@ class StopMark:
 
     @classmethod
     def of(cls, stop: Command, now_ns: int, clock: str) -> "StopMark":
-        """Return the mark of a stop that was heard now; one from another clock than ours is as old as its arrival."""
+        """Return the mark of a stop that arrived now; one from another clock than ours counts from its arrival."""
         given_ns = min(now_ns, stop.header.stamp_ns) if stop.header.clock == clock else now_ns
         return cls(given_ns, f"{stop.verb} by {stop.issuer} came after it")
 

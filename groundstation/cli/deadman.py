@@ -133,7 +133,7 @@ def heed_signals(handle: Handle) -> None:
         signal.signal(number, leave)
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lose)
-    signal.signal(signal.SIGTTOU, signal.SIG_IGN)  # in the background it would be stopped for what it shows
+    signal.signal(signal.SIGTTOU, signal.SIG_IGN)  # in the background its output would stop it
 
 
 def watch(bus: "Bus", drones: tuple[str, ...], handle: Handle, man: DeadMan, go_on: Callable[[], bool]) -> None:

@@ -62,7 +62,7 @@ def security_headers(host: str) -> list[tuple[bytes, bytes]]:
 
 
 class Door:
-    """Distinguishes programs of the user who runs this server from those of others, who must show a code.
+    """Access check: programs of this server's user are admitted; those of other users must show a code.
 
     code: shown by others, once as `/?code=`, then as a cookie; code_file: where its owner finds it.
     """

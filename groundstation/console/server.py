@@ -60,7 +60,7 @@ _KEEPING_S = 3.0
 # Small, so that frames wait here, where the newest wins, not in the kernel.
 _SEND_BUFFER_BYTES = 64 * 1024
 _NEWEST = (ESTIMATE,)
-# Looked at in every other turn: arrows and crosses at 10 Hz are enough, and decoding is most of what this process does.
+# Read in every other turn: arrows and crosses at 10 Hz are enough, and decoding is most of this process's work.
 _LESS_OFTEN = (
     PLAN,
     VEHICLE_STATUS,

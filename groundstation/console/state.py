@@ -85,7 +85,7 @@ class ConsoleState:
         return {name: seen.message.detail or seen.message.mode for name, seen in self.monitor.vehicles.items()}
 
     def put(self, board: Snapshot, now_ns: int) -> None:
-        """Put what changed on the board."""
+        """Put the changed values on the board."""
         board.put("estimate", told.estimate(self.monitor.estimate))
         board.put("setpoints", {name: told.setpoint(seen) for name, seen in self.setpoints.items()})
         if self.truth:
@@ -99,7 +99,7 @@ class ConsoleState:
             self.put_seldom(board, now_ns)
 
     def put_often(self, board: Snapshot, now_ns: int) -> None:
-        """Put what changes ten times a second."""
+        """Put the values that change ten times a second."""
         known = self.monitor
         vehicles = known.vehicles.items()
         board.put(
@@ -110,7 +110,7 @@ class ConsoleState:
         board.put("switch", told.switch(self.switch))
         board.put("sightings", [[*edge, stamp_ns / 1e6] for edge, stamp_ns in known.sightings.items()])
         board.put("events", [told.event(seen) for seen in list(known.events)[-_EVENTS:]])
-        # As often as what the page works out itself: an alarm that is over must not stand beside that.
+        # As often as the values computed by the page: an ended alarm must not be shown beside newer ones.
         alarms = alarms_of(known, now_ns)
         self.alarm_log.note(alarms, now_ns)
         board.put("alarms", [told.alarm(alarm) for alarm in alarms])

@@ -16,7 +16,7 @@ _ALTERNATIVES = 8
 
 
 def alarm(alarm: Alarm) -> dict[str, Any]:
-    """An alarm; told: when it was told [ms]."""
+    """An alarm; told: when it was reported [ms]."""
     values = asdict(alarm)
     told_ns = values.pop("told_ns")
     return {**values, "asks": alarm.asks, "told": None if told_ns is None else told_ns / 1e6}
@@ -33,7 +33,7 @@ def rounded(values: Iterable[float], digits: int = 4) -> list[float]:
 
 
 def estimate(seen: StampedMessage[m.Estimate] | None) -> dict[str, Any] | None:
-    """Where everybody is believed to be; None before the first estimate."""
+    """The estimates of all entities; None before the first estimate."""
     if seen is None:
         return None
     entities = [
@@ -60,7 +60,7 @@ def search_map(seen: m.SearchMap) -> dict[str, Any]:
 
 
 def setpoint(seen: StampedMessage[m.VelocitySetpoint]) -> dict[str, Any]:
-    """What a drone was told to fly."""
+    """The setpoint of a drone."""
     setpoint = seen.message
     return {
         "at": milliseconds(seen),
@@ -77,7 +77,7 @@ def truth(seen: StampedMessage[m.TruthState]) -> dict[str, Any]:
 
 
 def vehicle(seen: StampedMessage[m.VehicleStatus]) -> dict[str, Any]:
-    """What a drone says of itself, but its battery."""
+    """The reports of a drone on itself, but its battery."""
     status = seen.message
     return {
         "at": milliseconds(seen),
@@ -93,7 +93,7 @@ def vehicle(seen: StampedMessage[m.VehicleStatus]) -> dict[str, Any]:
 
 
 def battery(battery: Battery) -> dict[str, Any]:
-    """What a battery holds, and for how long."""
+    """Charge of a battery, and the remaining time."""
     left = battery.endurance
     minutes = None if left is None else round(left.minutes, 1)
     words = "" if left is None else left.words

@@ -1,4 +1,4 @@
-"""A dead supervisor is noticed within milliseconds, whatever killed it."""
+"""Detects a dead supervisor within milliseconds, for any cause of death."""
 
 import os
 import select

@@ -1,4 +1,4 @@
-"""Finds a free port, and who holds one, by the kernel's tables of sockets and the descriptors of processes."""
+"""Finds a free port, or a port's holder, by the kernel's tables of sockets and the descriptors of processes."""
 
 import errno
 import os

@@ -9,7 +9,7 @@ from groundstation.report.tracks import ProcessTrack, RunData
 
 TRACKER = "tracker"
 _PID, _TICKS, _OVERRUNS, _OVERFLOWED = range(4)
-# Alone on a computer of two cores, nobody waits for a core for more than a tenth of a second; what others use is 0.1.
+# Alone on a computer of two cores, nobody waits for a core for more than a tenth of a second; other programs use 0.1.
 _WAITED, _OTHERS_CPU = 0.3, 0.5
 
 

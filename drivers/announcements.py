@@ -28,7 +28,7 @@ _INTRUSIONS = {
 
 
 class Announcements:
-    """Events of one vehicle. heard_ns: when it was last heard; initially when its driver started."""
+    """Events of one vehicle. heard_ns: time of its last telemetry; initially of its driver's start."""
 
     def __init__(self, child: HostProcess, vehicle: Vehicle, mode: DriverMode, reason: str) -> None:
         self._child, self._vehicle = child, vehicle

@@ -28,7 +28,7 @@ _log = logging.getLogger(__name__)
 class DatagramLink:
     """Ports of this computer, each with a taker of its datagrams; the first one sends to the vehicle.
 
-    All are connected to the vehicle's one port: only that is heard, and several vehicles may share a port of ours.
+    All are connected to the vehicle's one port: only that is received, and several vehicles may share a port of ours.
     Takers are called from the reader thread, which starts at once. Raises DriverError for a port or an address that is
     not available.
     """

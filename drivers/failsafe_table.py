@@ -91,7 +91,7 @@ class Failsafe:
         return lasted_s is not None and mode in self.modes and lasted_s >= self.after_s
 
 
-# A vehicle's action while nothing else is asked of it.
+# A vehicle's action without another command.
 _TRACK = frozenset({DriverMode.TRACK})
 _STANDS = frozenset({DriverMode.LANDED, DriverMode.CUT})
 _UNCONVERGED = "the tracker does not know well enough where it is"

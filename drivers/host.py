@@ -181,7 +181,7 @@ class VehicleHost:
             self._answer(ack)
 
     def _refuse_strangers(self, now_ns: int, command: Command) -> None:
-        """Count and report a command from somebody without the right to give it; repetitions count once."""
+        """Count and report a command from a sender without the right to give it; repetitions count once."""
         reason = "" if self.watchdog.has_answered(command) else self.watchdog.lease.refusal(now_ns, command)
         if reason:
             self._count("command", "unauthorised")

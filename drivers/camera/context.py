@@ -20,7 +20,7 @@ _ALOFT_M = 0.4
 
 
 class Surroundings:
-    """Listens to odometry and estimates; answers for the time of an exposure."""
+    """Subscribes to odometry and estimates, and gives their values at the time of an exposure."""
 
     def __init__(self, bus: Bus, settings: CameraDriverSettings) -> None:
         self._settings = settings

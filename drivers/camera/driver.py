@@ -196,7 +196,7 @@ class CameraDriver:
         return first_ns
 
     def _hanging(self) -> str:
-        """Return in words that the picture hangs, or nothing; that of a standing vehicle may be black for long."""
+        """Return a text if the picture hangs, else ""; that of a standing vehicle may be black for long."""
         shows = self._settings.mount.in_world or self._pipeline.tracked
         hangs = self._hangs_s >= _HANGS_S and shows
         return "its picture does not change: it hangs, or nothing moves and it has no noise" if hangs else ""

@@ -153,7 +153,7 @@ class DetectorSettings(_Section):
 class CameraDriverSettings(_Section):
     """All that `drivers.camera.driver.run` needs.
 
-    name: of the camera on the bus; observer: whom sightings are attributed to (the carrier, or the camera's own name
+    name: of the camera on the bus; observer: the observer in sightings (the carrier, or the camera's own name
     when it is fixed in the world; derived when empty); observes: entities to report (empty: all markers, but for a
     world-fixed camera robots only); search_phase_s: staggers the full searches of several cameras; start_within_s,
     stall_after_s: how long the first picture, and any later one, may take before the operator is warned.

@@ -16,7 +16,7 @@ from groundstation.vectors import Vector2
 
 # Velocities of the belief have noise of 0.05 m/s.
 _SMOOTHING_S = 0.12
-# The belief learns of an error half a second late (sightings are late, and it takes time to learn); an error that grows
+# The belief shows an error half a second late (sightings are late, and learning takes time); an error that grows
 # with a tilt has changed by then as much as it did in that time before.
 _LATELY_S = 0.6
 # An error of the climb rate sways within a second or two (docs/reference/mavlink.md 2.1). Heights show it sooner than

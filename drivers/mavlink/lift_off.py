@@ -8,7 +8,7 @@ from drivers.mavlink.wire.names import Landed
 from groundstation.bus.messages import Vector3
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
-# An estimator that is fed the pad's position shows little of its height, and its climb sooner.
+# An estimator that is sent the pad's position shows little of its height, and its climb sooner.
 _RISEN_M, _CLIMBING_M_S, _CLIMBING_NS = 0.1, 0.1, 300 * NS_PER_MS
 # Three times the error of a height seen by cameras.
 _SEEN_RISEN_M = 0.1

@@ -1,7 +1,7 @@
 """Judges whether a pilot lands a vehicle that we want to land: their sticks take precedence. Pure.
 
-Only modes that fly by sticks, without a position, count, and only while the vehicle receives a transmitter: no other
-mode needs a pilot, and without our positions the vehicle would not hold its place in them.
+Only modes that fly by sticks, without a position, count, and only while the vehicle receives a transmitter: in other
+modes there may be no pilot, and without our positions the vehicle would not hold its place.
 """
 
 from drivers.mavlink.wire.names import Flavour, flies_by_sticks

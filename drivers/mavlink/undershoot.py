@@ -24,7 +24,7 @@ _GAP_S = 0.1
 
 
 class Undershoot:
-    """missing: the velocity to add to commands [m/s; world] so that the vehicle flies what was asked; 0.25 at most."""
+    """missing: the velocity to add to commands [m/s; world] so that the vehicle flies them; 0.25 at most."""
 
     def __init__(self) -> None:
         self.missing, self._asked, self._expected = _STILL, _STILL, _STILL

@@ -28,7 +28,7 @@ RATE_HZ = 20.0
 _FRESH_NS = 300 * NS_PER_MS
 # Charges come seldom; an older one counts as unknown.
 _CHARGE_NS = 30 * NS_PER_S
-_STANDING_M = 0.08  # the base of a standing vehicle, as its kind says
+_STANDING_M = 0.08  # the base of a standing vehicle, as in its kind
 # Orders are repeated until they are obeyed; a standing vehicle gets zero velocity once a second.
 _PAUSE_NS = {Order.TAKE_OFF: 2 * NS_PER_S, Order.LAND: NS_PER_S // 2, Order.CUT: NS_PER_S // 2, None: NS_PER_S}
 # A take-off that is called off may still begin for this long after its order.

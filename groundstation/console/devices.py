@@ -57,7 +57,7 @@ class Devices:
 
     @property
     def url(self) -> str:
-        """Where devices find the console; "" while it is nowhere."""
+        """The console's address for devices; "" while it has none."""
         with suppress(OSError):
             return (self._folder / _URL).read_text()
         return ""

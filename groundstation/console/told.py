@@ -45,7 +45,7 @@ def estimate(seen: StampedMessage[m.Estimate] | None) -> dict[str, Any] | None:
             "cov": rounded((entity.covariance[0], entity.covariance[1], entity.covariance[len(entity.mean) + 1]), 7),
             "velocity": rounded(entity.velocity_m_s, 3),
             "converged": entity.converged,
-            # Never seen is infinite in the filter, which JSON cannot say.
+            # Never seen is infinite in the filter, which JSON cannot express.
             "age_s": round(min(entity.age_s, 1e6), 2),
         }
         for entity in seen.message.entities
@@ -71,7 +71,7 @@ def setpoint(seen: StampedMessage[m.VelocitySetpoint]) -> dict[str, Any]:
 
 
 def truth(seen: StampedMessage[m.TruthState]) -> dict[str, Any]:
-    """Where a body of the simulation is."""
+    """The true place of a simulated body."""
     truth = seen.message
     return {"at": milliseconds(seen), "position": rounded(truth.position_m, 3), "yaw": round(truth.attitude_rad[2], 4)}
 
@@ -107,7 +107,7 @@ def battery(battery: Battery) -> dict[str, Any]:
 
 
 def camera(seen: StampedMessage[m.CameraStatus]) -> dict[str, Any]:
-    """How a camera delivers."""
+    """The health of a camera."""
     status = seen.message
     return {
         "at": milliseconds(seen),
@@ -120,7 +120,7 @@ def camera(seen: StampedMessage[m.CameraStatus]) -> dict[str, Any]:
 
 
 def process(seen: StampedMessage[m.ProcessStatus]) -> dict[str, Any]:
-    """How a process keeps up."""
+    """State, CPU use and deadlines of a process."""
     status = seen.message
     late = status.overruns / status.ticks if status.ticks else 0.0
     return {
@@ -162,7 +162,7 @@ def _option(topology: str, cost_m2: float) -> dict[str, Any]:
 
 
 def plan(seen: StampedMessage[m.Plan] | None) -> dict[str, Any] | None:
-    """The topology chosen with its rivals; None before the first plan."""
+    """The chosen topology with its alternatives; None before the first plan."""
     if seen is None:
         return None
     plan = seen.message

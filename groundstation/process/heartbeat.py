@@ -132,11 +132,11 @@ class HeartbeatBlock:
         return self._words[slot * _WORDS_PER_SLOT + _WORKED] != 0
 
     def has_ended(self, slot: int) -> bool:
-        """Return whether the holder of a slot said that its work is done."""
+        """Return whether the holder of a slot reported that its work is done."""
         return self._words[slot * _WORDS_PER_SLOT + _ENDED] != 0
 
     def silent_since_ns(self, slot: int) -> int:
-        """Return since when others speak for the holder of a slot [ns]; 0: it speaks itself."""
+        """Return since when others have sent for the holder of a slot [ns]; 0: nobody does."""
         return self._words[slot * _WORDS_PER_SLOT + _SILENT_SINCE]
 
     def set_clock_offset(self, offset_ns: int) -> None:

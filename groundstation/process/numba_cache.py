@@ -71,7 +71,7 @@ def is_complete(folder: Path) -> bool:
 
 
 def mark_complete(folder: Path) -> None:
-    """Remember that they are: the folder alone may be another checkout's, or half filled by a stopped compilation."""
+    """Record that they all are: the folder alone may be another checkout's, or half filled by a stopped compilation."""
     with suppress(OSError):  # then it is looked through once more next time
         folder.mkdir(parents=True, exist_ok=True)
         _mark(folder).touch()

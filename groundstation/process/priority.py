@@ -53,7 +53,7 @@ def take_share(nice: int = LARGEST) -> bool:
 
 
 def _may_have_more() -> bool:
-    """Ask for the largest share, which is had from then on if there is the right to it."""
+    """Take the largest share, if permitted; return whether it is."""
     try:
         os.setpriority(os.PRIO_PROCESS, 0, LARGEST)
     except PermissionError:
@@ -62,7 +62,7 @@ def _may_have_more() -> bool:
 
 
 def _set(nice: int, own_session: bool) -> None:
-    with suppress(PermissionError):  # it was started with less than this
+    with suppress(PermissionError):  # its share was smaller at the start
         os.setpriority(os.PRIO_PROCESS, 0, nice)
     for _ in range(_TURNS if own_session and _AUTOGROUP.exists() else 0):
         with suppress(BlockingIOError):

@@ -80,7 +80,7 @@ class ConsistencyWatch:
             self._froze_at[message.header.entity, kind] = now_ns
 
     def take(self, corrections: Iterable[Correction], now_ns: int) -> None:
-        """Take corrections; one that brought its subject into the belief says nothing of the belief before."""
+        """Take corrections; one that initialised its subject is no evidence on the belief before."""
         for c in corrections:
             if c.nis is not None and c.residual and not c.joined and {c.observer, c.subject} <= self._alarms.keys():
                 edge = self._edges.setdefault((c.observer, c.subject), _Edge())

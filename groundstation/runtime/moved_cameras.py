@@ -1,4 +1,4 @@
-"""Hands on which cameras were moved, from a tracker to the one that is started in its place, in flight."""
+"""Passes the moved cameras on from a tracker to its successor, in flight."""
 
 from typing import Protocol
 

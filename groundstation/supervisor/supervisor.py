@@ -267,7 +267,7 @@ class Supervisor:
     def stop(self) -> None:
         """Stop all processes but those that show the end, in order, each with its deadline (hurried: all at once)."""
         self._stopping = True
-        self._block.set_state(SUPERVISOR_SLOT, SlotState.STOPPING)  # from now on the guardian speaks for dead drivers
+        self._block.set_state(SUPERVISOR_SLOT, SlotState.STOPPING)  # from now on the guardian sends for dead drivers
         for order in StopOrder:
             running = [p for p in self.processes if p.running]
             group = [p for p in running if p.spec.stop_order is order and not p.spec.shows_end]

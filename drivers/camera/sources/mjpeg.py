@@ -26,7 +26,7 @@ _MAX_HEAD_BYTES = 8192
 
 
 class MjpegReader:
-    """Asks for a stream and cuts it into JPEGs; login: "user:password", or "" if none is needed."""
+    """Requests a stream and cuts it into JPEGs; login: "user:password", or "" if none is needed."""
 
     decoder: PictureDecoder | None = None
 

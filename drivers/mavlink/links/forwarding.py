@@ -1,4 +1,4 @@
-"""Shows a link to a second ground station (QGroundControl, MAVProxy) too, which may send queries and stops."""
+"""Forwards a link to a second ground station (QGroundControl, MAVProxy), which may send queries and stops."""
 
 import logging
 import select

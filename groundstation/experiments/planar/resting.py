@@ -1,4 +1,4 @@
-"""Finds the neighbours that are best where the current topology is: no step of theirs helps, within the tolerance.
+"""Finds neighbours with the same optimal controls as the current topology: no step helps, within the tolerance.
 
 In a large team most survivors of the bounds are found to be such, each with one evaluation. `moved` gives the same
 result up to the square of a robot's share; its error is taken from an evaluated move between the same levels.
@@ -35,7 +35,7 @@ def learn(
 ) -> int:  # fmt: skip
     """Measure, once, the error of `moved` for a kind of move, by one that was evaluated; return evaluations.
 
-    found: how many topologies were best where the current one is, this one too; exact, cost: of this one and of the
+    found: number of topologies with the current one's optimum, this one too; exact, cost: of this one and of the
     current one, both there [m^2]. doubt (2n, 2): errors of cost and gradient over the current cost, for each kind of
     move, and for an imbalance of 1; infinite where nothing is known.
     """

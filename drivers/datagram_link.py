@@ -94,7 +94,7 @@ class DatagramLink:
         self._log.flush()
 
     def close(self) -> None:
-        """Stop the reader, close the ports, and publish what waits."""
+        """Stop the reader, close the ports, and publish the raw datagrams that wait."""
         self._closing.set()
         self._reader.join(timeout=1.0)
         self._close_sockets()

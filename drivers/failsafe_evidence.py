@@ -13,7 +13,7 @@ _STREAM_S = 0.15
 # The most credit that a condition has when it is met anew, however long ago the last check was.
 _FIRST_S = 0.05
 # A coming reaction is reported once its condition has lasted for _LASTING_S and it is due within _NEAR_S; after
-# _FAULT_S it is reported however far off it is. Slow take-offs are usual: they are overdue at the end only.
+# _FAULT_S it is reported however far off it is. Slow take-offs are usual, and only reported near the end.
 _LASTING_S, _NEAR_S, _FAULT_S = 0.3, 3.0, 3.0
 _USUAL = frozenset({Condition.TAKE_OFF_OVERDUE})
 

@@ -198,7 +198,7 @@ class VehicleHost:
         for ack in decision.acks:
             self._answer(ack)
         if self._announcements.tell_mode(decision, self.watchdog.failsafe):
-            # A status with a changed mode must not wait: it tells the tracker who is airborne.
+            # A status with a changed mode must not wait: it tells the tracker which drones are airborne.
             self._next_status_ns = 0
         self._announcements.tell_silence(now_ns, view, decision.mode)
         if now_ns >= self._next_flush_ns:

@@ -71,7 +71,7 @@ def _own(order: VehicleOrder) -> ArDroneOwn:
 
 def _settings(order: VehicleOrder) -> ArDroneDriverSettings:
     drone, own = order.drone, _own(order)
-    # WIRE: neighbours must not hear each other's ultrasound: 22.22 Hz (7) and 25 Hz (8) in turn.
+    # WIRE: neighbours must not receive each other's ultrasound: 22.22 Hz (7) and 25 Hz (8) in turn.
     rate_hz = own.ultrasound_hz or (25 if order.index % 2 else 22)
     limits = ArDroneLimits(**vehicle_limits(drone.limits).model_dump(), max_tilt_deg=drone.limits.max_tilt_deg)
     return ArDroneDriverSettings(

@@ -52,7 +52,7 @@ def run(child: HostProcess) -> int:
 class CameraDriver:
     """Turns pictures of one source into messages; `turn` is one pass of its loop (at most 20 ms of waiting).
 
-    `counts` holds what was refused, by reason.
+    `counts` holds the refusals, by reason.
     """
 
     def __init__(self, child: HostProcess, settings: CameraDriverSettings, source: FrameSource) -> None:

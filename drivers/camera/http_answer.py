@@ -63,7 +63,7 @@ class ChunkedBody:
         return bytes(body)
 
     def _step(self, body: bytearray) -> bool:
-        """Consume one line, or what is there of a chunk; False when more bytes are needed."""
+        """Consume one line, or the present part of a chunk; False when more bytes are needed."""
         if self._left:
             part = self._buffer[: self._left]
             body += part

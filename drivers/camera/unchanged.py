@@ -32,7 +32,7 @@ class UnchangedPictures:
 class SteadyMarkers:
     """Recognises a hanging camera whose encoder still runs, so that no two pictures are equal.
 
-    It carries a vehicle in the air whose tilt changes, yet all markers stand still. focal_px: of the camera.
+    All markers stand still although its vehicle is in the air and its tilt changes. focal_px: of the camera.
     """
 
     def __init__(self, focal_px: float) -> None:

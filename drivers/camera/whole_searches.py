@@ -57,7 +57,7 @@ class WholeSearches:
     def done(self, stamp_ns: int, misses: bool, cost_s: float) -> None:
         """Record that a picture was searched, and the cost [s of CPU].
 
-        misses: an expected marker is not in view, though its estimate is not elsewhere.
+        misses: an expected marker is not in view, and its estimate is not elsewhere.
         """
         rate_hz = 0.5 * self._rates.idle_hz if misses else self._rates.tracked_hz
         self._cost_s, self._done_ns = cost_s, stamp_ns

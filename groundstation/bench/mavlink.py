@@ -86,7 +86,7 @@ class _TimedLink:
 
     @property
     def called_from(self) -> tuple[tuple[str, int], ...]:
-        """Addresses at which the vehicles were last heard."""
+        """The last addresses of the vehicles."""
         return self.link.called_from
 
     @property

@@ -55,7 +55,7 @@ def activate(packages: Iterable[str] = FLIGHT) -> Path:
 
 
 def require_writable(folder: Path) -> None:
-    """Raise GroundStationError where nothing can be kept: each start would compile for minutes, and say nothing."""
+    """Raise GroundStationError where nothing can be kept: each start would compile for minutes, silently."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):

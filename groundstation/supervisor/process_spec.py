@@ -17,7 +17,7 @@ class Restart(StrEnum):
 class StopOrder(IntEnum):
     """Shut-down goes through these in order; within one, processes stop together.
 
-    `start.py` starts those from CONNECTS on first, because all others speak through them.
+    `start.py` starts those from CONNECTS on first, because all others communicate through them.
     """
 
     DECIDES = 0

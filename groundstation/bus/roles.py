@@ -49,8 +49,8 @@ PROCESSES = frozenset(Role) - {Role.CLI, Role.VIEW}
 class Member:
     """One certificate of a run, with its role and member.
 
-    name: the certificate's common name; one with several roles is several members. sources: permitted sources of its
-    messages, key chunks in which `$*` stands for any ending. entities: the subjects of a device's messages.
+    name: the certificate's common name; a certificate with several roles is several members. sources: permitted
+    sources of its messages, key chunks in which `$*` stands for any ending. entities: subjects of a device's messages.
     """
 
     name: str

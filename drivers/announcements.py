@@ -1,4 +1,4 @@
-"""Events about a vehicle for the operator: its modes, silence and refusals, each told once per change."""
+"""Events about a vehicle for the operator: its modes, silence and refusals, each reported once per change."""
 
 from collections.abc import Mapping
 
@@ -28,7 +28,7 @@ _INTRUSIONS = {
 
 
 class Announcements:
-    """Events of one vehicle. heard_ns: when it was last heard; initially when its driver started."""
+    """Events of one vehicle. heard_ns: time of its last telemetry; initially of its driver's start."""
 
     def __init__(self, child: HostProcess, vehicle: Vehicle, mode: DriverMode, reason: str) -> None:
         self._child, self._vehicle = child, vehicle
@@ -39,7 +39,7 @@ class Announcements:
         self.heard_ns = self._unconfigured_ns = clock.now_ns()
 
     def tell_mode(self, decision: WatchdogDecision, failsafe: str) -> bool:
-        """Tell a new mode or reason.
+        """Report a new mode or reason.
 
         Returns whether the mode has changed. failsafe: the row of the table that caused it.
         """
@@ -51,18 +51,18 @@ class Announcements:
         return before[0] is not decision.mode
 
     def tell_refusal(self, now_ns: int, command: Command, reason: str) -> None:
-        """Tell of a command from somebody without the right to give it, at most once a second."""
+        """Report a command from a sender without the right to give it, at most once a second."""
         if now_ns >= self._next_refusal_ns:
             self._next_refusal_ns = now_ns + _REFUSAL_PERIOD_NS
             self._event(Severity.WARNING, f"{command.verb} of {command.header.source} refused: {reason}")
 
     def tell_intrusions(self, now_ns: int, rejected: Mapping[str, int]) -> None:
-        """Tell of refused messages from outside of the run; rejected: their numbers so far, by reason."""
+        """Report refused messages from outside of the run; rejected: their numbers so far, by reason."""
         if refused := self._intrusions.news(now_ns, rejected):
             self._event(Severity.WARNING, f"{self._vehicle.name} refused {refused}")
 
     def tell_silence(self, now_ns: int, view: VehicleView, mode: DriverMode) -> None:
-        """Tell when the vehicle falls silent or answers again, and whether the driver is ready."""
+        """Report when the vehicle falls silent or answers again, and whether the driver is ready."""
         name, address = self._vehicle.name, self._vehicle.address
         if view.fresh:
             self.heard_ns = now_ns

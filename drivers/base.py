@@ -19,7 +19,7 @@ _Settings = TypeVar("_Settings", bound=BaseModel)
 class LinkHealth:
     """State of a driver's link; rejected: datagrams dropped, by reason; clock: None if no time is reported.
 
-    firmware: of the vehicle, with its version; "": unknown. asks_time: whether it asks for our time; None: it need not.
+    firmware: of the vehicle, with its version; "": unknown. asks_time: whether it requests our time; None: it need not.
     """
 
     link_quality: float | None = None
@@ -77,7 +77,7 @@ class HostProcess(Protocol):
 
     @property
     def spoken_for_ns(self) -> int:
-        """Return for how long others have told the vehicle to hover in this driver's place [ns]; 0: nobody does."""
+        """Return for how long others have commanded a hover in this driver's place [ns]; 0: nobody does."""
 
     def beat(self) -> None:
         """Signal that the main loop turns."""
@@ -98,10 +98,10 @@ class HostProcess(Protocol):
         """End a sleep early, the one under way or the next; from any thread."""
 
     def note_addresses(self, addresses: Sequence[tuple[str, int]]) -> None:
-        """Record the last addresses of vehicles that call us, for the process that speaks to them after this one."""
+        """Record the last addresses of vehicles that call us, for the process that commands them after this one."""
 
     def leave(self, number: int) -> None:
-        """Record a number (0 to 2^62) for who speaks to the vehicles after this process."""
+        """Record a number (0 to 2^62) for the process that commands the vehicles after this one."""
 
     def event(self, severity: Severity | str, text: str, remedy: str = "", entity: str | None = None) -> None:
         """Publish an event."""

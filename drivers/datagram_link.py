@@ -28,7 +28,7 @@ _log = logging.getLogger(__name__)
 class DatagramLink:
     """Ports of this computer, each with a taker of its datagrams; the first one sends to the vehicle.
 
-    All are connected to the vehicle's one port: only that is heard, and several vehicles may share a port of ours.
+    All are connected to the vehicle's one port: only that is received, and several vehicles may share a port of ours.
     Takers are called from the reader thread, which starts at once. Raises DriverError for a port or an address that is
     not available.
     """
@@ -94,7 +94,7 @@ class DatagramLink:
         self._log.flush()
 
     def close(self) -> None:
-        """Stop the reader, close the ports, and publish what waits."""
+        """Stop the reader, close the ports, and publish the raw datagrams that wait."""
         self._closing.set()
         self._reader.join(timeout=1.0)
         self._close_sockets()

@@ -10,10 +10,10 @@ from groundstation.time_units import NS_PER_S
 
 # An older setpoint is not part of a continuous stream.
 _STREAM_S = 0.15
-# The most credit that a condition has when it is met anew, however long nobody looked.
+# The most credit that a condition has when it is met anew, however long ago the last check was.
 _FIRST_S = 0.05
-# What is told of a reaction to come: its condition has lasted for so long, and it is so near; a fault that has lasted
-# for longer is told however far off that is. A take-off takes its time: it is overdue at the end only.
+# A coming reaction is reported once its condition has lasted for _LASTING_S and it is due within _NEAR_S; after
+# _FAULT_S it is reported however far off it is. Slow take-offs are usual, and only reported near the end.
 _LASTING_S, _NEAR_S, _FAULT_S = 0.3, 3.0, 3.0
 _USUAL = frozenset({Condition.TAKE_OFF_OVERDUE})
 
@@ -120,7 +120,7 @@ def timed(at: Situation) -> dict[Condition, float]:
     if heard_ns is None:
         lasted = {Condition.UNSEEN: at.since_s(at.take_off_ended_ns)}
     else:
-        # A person who orders TRACK before the tracker is heard again means it: the pause counts from that order.
+        # A TRACK command given while the tracker is silent is deliberate: the pause counts from that order.
         pause_s = at.since_s(max(heard_ns, at.entered_ns))
         lasted = {Condition.TRACKER_SILENT: at.since_s(heard_ns), Condition.TRACKER_PAUSED: pause_s}
     for condition, lasted_s in (
@@ -144,7 +144,7 @@ class Outlook:
 
 
 def _is_told(row: Failsafe, lasted_s: float) -> bool:
-    """Return whether an operator should know by now that a row will act."""
+    """Return whether the coming reaction of a row is to be reported to the operator by now."""
     near = row.after_s - lasted_s <= _NEAR_S
     return lasted_s >= _LASTING_S and (near or (lasted_s >= _FAULT_S and row.condition not in _USUAL))
 
@@ -193,7 +193,7 @@ class Evidence:
         return self.charged_s.get(condition, 0.0) if condition in self.holding else None
 
     def soonest(self, mode: DriverMode, reaction: Reaction) -> Outlook | None:
-        """Return which row with a reaction acts first if nothing changes, and when; None: none is to be told."""
+        """Return which row with a reaction acts first if nothing changes, and when; None: none is to be reported."""
         waits = [
             Outlook(row, max(0.0, row.after_s - lasted_s))
             for row in self._table

@@ -91,7 +91,7 @@ class Failsafe:
         return lasted_s is not None and mode in self.modes and lasted_s >= self.after_s
 
 
-# A vehicle's action while nothing else is asked of it.
+# A vehicle's action without another command.
 _TRACK = frozenset({DriverMode.TRACK})
 _STANDS = frozenset({DriverMode.LANDED, DriverMode.CUT})
 _UNCONVERGED = "the tracker does not know well enough where it is"
@@ -146,7 +146,7 @@ def _landings(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
         Failsafe(Condition.UNLOCATED, land, "no position from the cameras", limits.lost_land_s, modes=FREE),
         Failsafe(Condition.STRAYS, land, "it does not do what it is told: {why}", limits.stray_land_s, modes=FREE),
         Failsafe(Condition.TOO_FAST, land, "{why}", limits.fast_land_s, "", SLOWLY, modes=FREE),
-        # Who hovers is moved apart, who tracks as well: this is for when that fails.
+        # Hovering and tracking drones are moved apart: this is for when that fails.
         Failsafe(Condition.CROWDED, land, "{why}", limits.crowded_land_s, "", SLOWLY, modes=FREE),
     )  # fmt: skip
 

@@ -31,7 +31,7 @@ from groundstation.time_units import NEVER_NS, NS_PER_MS, NS_PER_S
 
 RATE_HZ = 30.0
 _STATUS_PERIOD_NS, _FLUSH_PERIOD_NS, _FLOOD_NS = 200 * NS_PER_MS, 100 * NS_PER_MS, 10 * NS_PER_MS
-# How long a driver that is to exit stays for a vehicle that it cannot hear.
+# How long a driver that is to exit waits for a silent vehicle.
 _GIVE_UP_NS = 10 * NS_PER_S
 
 
@@ -111,7 +111,7 @@ class VehicleHost:
                     self._localised_ns = now_ns - round(entity.unlocalised_s * NS_PER_S)
 
     def _near(self, now_ns: int, aloft: bool) -> tuple[str, str]:
-        """Return who is too near to the pad of this vehicle, if it stands, and to it, if it flies; "" if nobody is."""
+        """Return the neighbour too near to this vehicle's pad, if it stands, and to it, if it flies; "" if none is."""
         for received in self._statuses.drain():
             if isinstance(received.message, VehicleStatus):
                 self._neighbours.hear(received.message)
@@ -181,7 +181,7 @@ class VehicleHost:
             self._answer(ack)
 
     def _refuse_strangers(self, now_ns: int, command: Command) -> None:
-        """Count and report a command from somebody without the right to give it; repetitions count once."""
+        """Count and report a command from a sender without the right to give it; repetitions count once."""
         reason = "" if self.watchdog.has_answered(command) else self.watchdog.lease.refusal(now_ns, command)
         if reason:
             self._count("command", "unauthorised")
@@ -198,7 +198,7 @@ class VehicleHost:
         for ack in decision.acks:
             self._answer(ack)
         if self._announcements.tell_mode(decision, self.watchdog.failsafe):
-            # A status with a changed mode must not wait: it tells the tracker who is airborne.
+            # A status with a changed mode must not wait: it tells the tracker which drones are airborne.
             self._next_status_ns = 0
         self._announcements.tell_silence(now_ns, view, decision.mode)
         if now_ns >= self._next_flush_ns:

@@ -9,7 +9,7 @@ from groundstation.time_units import NS_PER_S
 _STALE_NS = NS_PER_S
 _FRESH_NS = NS_PER_S * 3 // 10
 _SIGMAS = 2.0
-# Of two that are too near the lower one lands, for nobody sinks through another; of two as high as each other one
+# Of two that are too near the lower one lands, so that none sinks through another; of two at the same height the one
 # whose name comes later. Heights are known to 0.1 m.
 _AS_HIGH_M = 0.2
 

@@ -1,4 +1,4 @@
-"""A vehicle's velocity by what cameras see, whatever it reports. Pure."""
+"""A vehicle's velocity as cameras see it, independent of its reports. Pure."""
 
 import math
 from collections import deque

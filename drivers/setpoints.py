@@ -14,7 +14,7 @@ _LONGEST_LEAP = 1_000_000
 
 @dataclass(slots=True)
 class SetpointGate:
-    """Remembers the newest setpoint and when the authorised epoch was last heard. Only the first sender is accepted.
+    """Remembers the newest setpoint, and when the authorised epoch last sent. Only the first sender is accepted.
 
     max_lifetime_ns caps the lifetime that a setpoint claims. epoch: the authorised one (None: the first that comes is
     authorised). last_heard_ns: receipt of the last live setpoint of that epoch.

@@ -16,7 +16,7 @@ _STATUS_PERIOD_NS = 500 * NS_PER_MS
 
 @dataclass(frozen=True, slots=True)
 class StreamNames:
-    """The words in which events speak of a stream.
+    """The words for a stream in events.
 
     kind, name: of the sensor; piece: its unit ("frame"); source: where it comes from; remedy: against silence; refused:
     remedy against unusable pieces.

@@ -64,7 +64,7 @@ class VehicleLimits(DriverSection):
 
 
 class SilenceLimits(DriverSection):
-    """How long silence is borne, and how far drones keep apart.
+    """Communication time-outs, and the separation of drones.
 
     setpoint_lifetime_ms caps the lifetime that a setpoint may claim.
     """

@@ -12,7 +12,7 @@ from groundstation.process.ports import why_refused
 def open_udp(local: Address, interface: str = "", peer: Address | None = None) -> socket.socket:
     """Return a datagram socket on an own address ("": any) and port (0: any free), through one adapter ("": any).
 
-    With a peer it hears only that one, and several sockets may share the port, each with a peer of its own. Raises
+    With a peer it receives from that only, and several sockets may share the port, each with a peer of its own. Raises
     DriverError if the port is taken (naming its holder), the peer unreachable, or the adapter unknown.
     """
     one = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)

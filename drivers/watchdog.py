@@ -1,4 +1,4 @@
-"""Decides who may move a vehicle, and on its present action: one state machine for all kinds of vehicles.
+"""Decides who may move a vehicle, and its present action: one state machine for all kinds of vehicles.
 
 Pure: `now_ns` and inputs in, a decision out. Priority: CUT_MOTORS > LAND > HOLD > setpoint > TAKEOFF. LAND latches
 until a new TAKEOFF. Stops without an order follow the table of `failsafe_table.py`. Tables:
@@ -46,8 +46,8 @@ class Watchdog:
     """Authority over one vehicle. Feed it with `accept_*`, then call `step` at the sender's rate.
 
     mode, reason: see `WatchdogDecision`; failsafe: condition of the row that caused the mode, or "". The last states of
-    vehicle and upstream are kept between steps. braked_ns: for how long others had told the vehicle to hover when this
-    driver started.
+    vehicle and upstream are kept between steps. braked_ns: for how long others had commanded a hover when this driver
+    started.
     """
 
     def __init__(self, limits: WatchdogLimits, clock: str, run: str = "", braked_ns: int = 0) -> None:
@@ -199,7 +199,7 @@ class Watchdog:
 
     @property
     def explanation(self) -> str:
-        """Return why the vehicle does what it does now, in words; where it obeys an order still, why it will land."""
+        """Return why the vehicle acts as it does, in words; if it still obeys a command, why it will land."""
         if self._braked_by is not None:
             return f"hovers: {self._text_of(self._braked_by)}"
         outlook = None if self.failsafe else self._landing
@@ -235,7 +235,7 @@ class Watchdog:
         return WatchdogDecision(self.mode, Action.FLY, velocity, turn, self.reason, acks, ns, None, self._entered_ns)
 
     def _asked_back(self, setpoint: VelocitySetpoint | None) -> Vector3 | None:
-        """Return the velocity back to the place where it was told to hover; None for whom a failsafe might stop."""
+        """Return the velocity back to the place where it was commanded to hover; None if a failsafe might stop it."""
         waits = self.mode in (DriverMode.HOVER, DriverMode.HOLD) and not self.failsafe
         if setpoint is None or not setpoint.holds or not waits or self.vehicle.flight_state not in UP:
             return None
@@ -304,7 +304,7 @@ class Watchdog:
 
     def _action(self, now_ns: int) -> Action:
         match self.mode:
-            case DriverMode.CONNECTING:  # a vehicle that we do not hear may still hear us
+            case DriverMode.CONNECTING:  # a silent vehicle may still receive commands
                 return Action.LAND if now_ns < self._land_until_ns else Action.WAIT
             case DriverMode.LANDED:
                 if self.vehicle.clears and self._clears_in_time(now_ns):

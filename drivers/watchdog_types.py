@@ -50,7 +50,7 @@ class WatchdogLimits:
     """Times and limits of the watchdog [s].
 
     resume_within_s: silence of vehicle or supervisor longer than this needs a RESUME; tracker_resume_within_s: likewise
-    of the tracker, whatever broke on the way from it; gap_s: likewise a pause of our own loop; brake_s: hover before
+    of the tracker, or of any part between it and here; gap_s: likewise a pause of our own loop; brake_s: hover before
     landing when it is unknown what the vehicle was doing. tolerated_speed_m_s: actual speed that gusts and noise
     explain while at most max_speed_m_s is commanded; beyond it for fast_brake_s the vehicle brakes, for fast_resume_s
     it needs a RESUME, for fast_land_s it lands. stray_land_s: likewise while it strays from its commands: from 1 m/s it
@@ -95,13 +95,13 @@ class VehicleView:
     """The vehicle's state by its reports; fresh: telemetry is younger than 0.3 s.
 
     not_ready: why it may not take off, or "". configured: the driver has prepared it for flight; a driver of a standing
-    vehicle is not READY before. unsound: why its reported motion cannot be true, or ""; its telemetry then counts as
-    silent. velocity_m_s: the reported one, scaled to the true one; None if it reports none. speed_m_s, stray: computed
-    by the host: horizontal speed, and how the vehicle strays from its commands, or ""; seen: whether cameras show its
-    speed; unseen_s: how long it may not have been where it is believed, by the tracker; near: airborne vehicle too near
-    to its pad, or ""; crowded: why it makes way for another that is too near in flight, or "". lost_s: how long it has
+    vehicle is not READY before. unsound: why its reported motion cannot be true, or ""; it then counts as silent.
+    velocity_m_s: the reported one, scaled to the true one; None if it reports none. speed_m_s, stray: computed by the
+    host: horizontal speed, and how the vehicle strays from its commands, or ""; seen: whether cameras show its speed;
+    unseen_s: how long its estimate may have been wrong, by the tracker; near: airborne vehicle too near to its pad,
+    or ""; crowded: why it makes way for another that is too near in flight, or "". lost_s: how long it has
     lacked a position that it needs. clears: whether a separate order ends its emergency without starting motors.
-    mute: what it does not tell although it is heard, or "".
+    mute: the report that it lacks although telemetry arrives, or "".
     """
 
     flight_state: FlightState = FlightState.UNKNOWN
@@ -123,12 +123,12 @@ class VehicleView:
 
     @property
     def plausible(self) -> "VehicleView":
-        """Return the view to act upon: a vehicle whose values cannot be true counts as silent."""
+        """Return the view to act upon: a vehicle with implausible values counts as silent."""
         return replace(self, fresh=False) if self.unsound and self.fresh else self
 
     @property
     def silence(self) -> str:
-        """Return why the vehicle is not heard, in words; valid while the view is not fresh."""
+        """Return why the vehicle counts as silent, in words; valid while the view is not fresh."""
         if self.unsound:
             return f"its sensors cannot be believed: {self.unsound}"
         return self.mute or "no telemetry from the vehicle"

@@ -1,4 +1,4 @@
-"""Bounds how the tracker brings a hovering vehicle back to its place, whatever the tracker asks for. Pure."""
+"""Limits how fast and how far the tracker moves a hovering vehicle back to its place. Pure."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Detects a silent AR.Drone that drifts off though it was told to hold its place. Pure.
+"""Detects a silent AR.Drone that drifts off though commanded to hold its place. Pure.
 
 A silent drone does not report whether its optical flow sees the floor. Cameras show it: sound firmware brakes from full
 speed in a second.
@@ -16,9 +16,9 @@ _ADRIFT_M_S = 0.12
 
 
 class AdriftWatch:
-    """Tells when the driver must brake the drone.
+    """Detects when the driver must brake a drone that drifts.
 
-    From detection on, as long as cameras see it, that is while it is silent and must stand.
+    It must from the detection on, as long as cameras see the drone while it is silent and must hold its place.
     """
 
     def __init__(self) -> None:
@@ -28,7 +28,7 @@ class AdriftWatch:
     def step(self, now_ns: int, holds: bool, silent: bool, seen_m_s: tuple[float, float] | None) -> bool:
         """Return whether it is adrift.
 
-        holds: it is told to hold its place; silent: it reports nothing new; seen_m_s: its velocity by cameras.
+        holds: its command is to hold its place; silent: it reports nothing new; seen_m_s: its velocity by cameras.
         """
         if not holds or not silent:
             self._since_ns, self.adrift = None, False

@@ -1,4 +1,4 @@
-"""Chooses what an AR.Drone is told: to hold its place by itself, the velocity loop's attitude, or one that brakes it.
+"""Chooses an AR.Drone's command: to hold its place by itself, the velocity loop's attitude, or a braking attitude.
 
 Pure. A drone holds its place by the optical flow by which it measures its velocity. Where that fails while it hovers or
 lands, the driver brakes it.
@@ -14,19 +14,19 @@ from drivers.watchdog_types import Action, WatchdogDecision
 from groundstation.bus.messages import Vector3
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
-# A blind drone that falls silent or freezes is braked on by the loop's knowledge, until it would land for that.
+# A blind drone that falls silent or freezes is braked further by the loop's observer, until it would land for that.
 _BRAKED_ON_NS = 3 * NS_PER_S
 # A pause of this length makes the drone wait for RESUME.
 _DOUBTED_NS = 1_300 * NS_PER_MS
 
 
 class MotionReport(NamedTuple):
-    """What a drone tells of its motion.
+    """A drone's report of its motion.
 
-    fresh: it was heard a moment ago; told: and not with old contents; repeats: its velocity is no measurement; blind:
-    fresh, and it sees nothing of its motion, though all else that it tells is sound; flowless: blind, and it believes
-    to stand; velocity_m_s: true (scaled), FLU; force_m_s2: specific force forward and left, None if it tells none;
-    height_m: above the floor, likewise.
+    fresh: telemetry arrived a moment ago; told: fresh, with new contents; repeats: its velocity is no measurement;
+    blind: fresh, and its optical flow fails, though all its other reports are sound; flowless: blind, and it reports
+    that it stands still; velocity_m_s: true (scaled), FLU; force_m_s2: specific force forward and left, None if not
+    reported; height_m: above the floor, likewise.
     """
 
     fresh: bool
@@ -52,7 +52,7 @@ class AttitudeControl:
         self._doubted_ns = -_DOUBTED_NS
 
     def is_doubted(self, now_ns: int) -> bool:
-        """Return whether the drone's velocity contradicted a moment ago what was asked for."""
+        """Return whether the drone's velocity contradicted its command a moment ago."""
         return now_ns - self._doubted_ns < _DOUBTED_NS
 
     def step(self, now_ns: int, decision: WatchdogDecision, report: MotionReport) -> AttitudeRequest:
@@ -81,7 +81,7 @@ class AttitudeControl:
         return report.blind or was_blind or adrift
 
     def _guided(self, now_ns: int, decision: WatchdogDecision, report: MotionReport, dt_s: float) -> AttitudeRequest:
-        """Return the attitude of a drone that flies as told, or holds its place by itself."""
+        """Return the attitude of a drone that follows its setpoint, or holds its place by itself."""
         holds = decision.action is Action.HOVER
         back = decision.back_m_s if holds else None
         if holds and report.fresh and back is None:

@@ -1,7 +1,7 @@
 """Lands an AR.Drone whose optical flow sees no floor. Pure.
 
-Its firmware would land it level: it stops by the optical flow that fails, and moving air carries it off. So the driver
-lets it sink and brakes it on, until it is low enough for the firmware to land it, lower than its ultrasound tells.
+The firmware brakes by optical flow. Without it the drone would land level, and moving air would carry it off. So the
+driver lets it sink and keeps braking it, to below the least height of its ultrasound; then the firmware lands it.
 """
 
 from groundstation.time_units import NS_PER_MS, NS_PER_S
@@ -10,14 +10,14 @@ LOWEST_M = 0.35
 # From there it sinks on by time: by 0.12 m at the usual 0.4 m/s.
 _ON_NS = 300 * NS_PER_MS
 _LONGEST_NS = 6 * NS_PER_S
-# A drone told to sink answers after 0.7 s. One that does not sink is landed by its firmware.
+# A drone commanded to sink does so after 0.7 s. One that does not sink is landed by its firmware.
 _LOWER_M, _LOWER_WITHIN_NS = 0.1, 1_200 * NS_PER_MS
 
 
 class BlindDescent:
-    """Tells while a landing drone sinks under its driver's braking.
+    """Decides whether a landing drone sinks under its driver's braking.
 
-    Never again once the firmware was told to land it.
+    Never again after the firmware was commanded to land it.
     """
 
     def __init__(self) -> None:

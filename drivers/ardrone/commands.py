@@ -39,7 +39,7 @@ def _reference(action: Action, emergency: bool, flight_state: FlightState) -> At
             # The emergency button is pressed once more, and the drone stays down.
             return at.ref(start=False, select=emergency)
         case Action.FLY | Action.HOVER:
-            # Stay up, but never take off: a drone that stands, or that others told to land, is not lifted again.
+            # Stay up, but never take off: a drone that stands, or that others landed, is not lifted again.
             return at.ref(start=flight_state not in (FlightState.LANDED, FlightState.LANDING))
         case Action.CUT:
             return at.ref(start=False, select=not emergency)

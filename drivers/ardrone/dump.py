@@ -45,6 +45,6 @@ def _same(key: str, wanted: str, stored: str) -> bool:
 
 
 def category(key: str) -> str:
-    """Return the set a key is stored in (common, applis, profiles, sessions), or "" for one we do not know."""
+    """Return the set a key is stored in (common, applis, profiles, sessions), or "" for an unknown one."""
     known = CONFIGURATION.get(key)
     return "" if known is None else known.category.value

@@ -71,7 +71,7 @@ def _own(order: VehicleOrder) -> ArDroneOwn:
 
 def _settings(order: VehicleOrder) -> ArDroneDriverSettings:
     drone, own = order.drone, _own(order)
-    # WIRE: neighbours must not hear each other's ultrasound: 22.22 Hz (7) and 25 Hz (8) in turn.
+    # WIRE: neighbours must not receive each other's ultrasound: 22.22 Hz (7) and 25 Hz (8) in turn.
     rate_hz = own.ultrasound_hz or (25 if order.index % 2 else 22)
     limits = ArDroneLimits(**vehicle_limits(drone.limits).model_dump(), max_tilt_deg=drone.limits.max_tilt_deg)
     return ArDroneDriverSettings(
@@ -98,7 +98,7 @@ def _video(order: VehicleOrder) -> Video | None:
 
 
 def _stop(orders: Sequence[VehicleOrder]) -> StopDatagrams:
-    # WIRE: sequence number 1 resets the drone's count, so it obeys the one who speaks after its driver. Hovering is
+    # WIRE: sequence number 1 resets the drone's count, so it obeys the next sender after its driver. Hovering is
     # PCMD without flags, and no REF: a start bit would lift a drone that stands.
     hover = at.encode_datagram([at.pcmd(at.ProgressiveMotion())], 1)
     land = at.encode_datagram([at.ref(start=False), at.pcmd(at.ProgressiveMotion())], 1)
@@ -106,7 +106,7 @@ def _stop(orders: Sequence[VehicleOrder]) -> StopDatagrams:
 
 
 def _check(orders: Sequence[VehicleOrder]) -> Iterator[tuple[str, Finding]]:
-    """The calibration of a drone's own video has the size that its settings ask for."""
+    """Yield a finding where the calibration of a drone's own video has another size than its settings."""
     for order in orders:
         if not order.drone.camera.source.startswith("ardrone://"):
             continue

@@ -100,7 +100,7 @@ class ArDroneLink:
     def send(self, commands: Sequence[AtCommand], restart: bool) -> None:
         """Send commands in one datagram, with consecutive numbers, or from 1 on restart.
 
-        WIRE: number 1 is always accepted, so a drone gets number 1 until it is heard.
+        WIRE: number 1 is always accepted, so a drone gets number 1 until its first packet.
         """
         if restart:
             self._sequence = 1

@@ -12,7 +12,7 @@ from groundstation.geometry.angles import quaternion_from_euler
 
 # The climb rate is the derivative of an ultrasound altitude.
 _CLIMB_STD_M_S = 0.15
-# It is not reported while the ultrasound hears another drone.
+# It is not reported while the ultrasound receives another drone's.
 _VOID_CLIMB_STD_M_S = 2.0
 
 

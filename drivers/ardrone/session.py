@@ -31,7 +31,7 @@ _SETTLE_NS = 300 * NS_PER_MS
 _ROUNDS = 3
 _RETRY_NS = 5 * NS_PER_S
 _FLAT_TRIMS = 3
-# A drone may for a while report the mode that it was told to leave.
+# A drone may for a while report the mode that it was commanded to leave.
 _FORGOTTEN_NS = NS_PER_S
 
 

@@ -1,4 +1,4 @@
-"""Watches whether an AR.Drone 2 hears its commands, by the number of the last one that it reports as obeyed. Pure.
+"""Watches whether an AR.Drone 2 receives its commands, by the number of the last one that it obeyed. Pure.
 
 WIRE (docs/reference/ardrone.md 4.4, 2.3): REFERENCES ends with ui_seq, the sequence number of the last PCMD. Navdata
 may come at full rate while the other direction is dead; the drone then keeps flying its last PCMD.
@@ -29,11 +29,11 @@ class UplinkWatch:
 
     @property
     def cut(self) -> bool:
-        """Return whether the operator was told that commands do not arrive, and this still holds."""
+        """Return whether commands do not arrive and this was reported to the operator."""
         return self._told
 
     def step(self, now_ns: int, obeyed: int, flies: bool) -> Notice | None:
-        """Take the newest number that a drone reported, while it is heard; returns an event for the operator.
+        """Take the newest number that a drone reported, while telemetry arrives; returns an event for the operator.
 
         A drone whose number never changes does not report it, and is not judged.
         """

@@ -200,7 +200,7 @@ class Axis:
     def bounded(self, acceleration_m_s2: float, wanted_m_s: float, outside_m_s2: float, dt_s: float) -> float:
         """Return the permitted part of an acceleration: no more than the drag at the wanted speed.
 
-        Commands make a drone fly `flown_m_s` in the surrounding air, whatever speed is measured. That may exceed the
+        Commands make a drone fly `flown_m_s` in the surrounding air, at any measured speed. That may exceed the
         wanted speed only a little, so that a measured speed of 0 does not wind up tilt.
         """
         gains, wind, most_m_s2 = self._gains, self._wind_m_s2, self._gains.disturbance_m_s2

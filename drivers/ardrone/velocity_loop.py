@@ -113,7 +113,7 @@ class VelocityLoop:
     ) -> AttitudeRequest:
         """Return the attitude that stops a drone whose velocity is wrong, from its last correct speed.
 
-        Its own hover is no brake then: the firmware stops by the same optical flow. seen_m_s: velocity forward and left
+        Its own hover does not brake then: the firmware uses the same optical flow. seen_m_s: velocity forward and left
         by cameras; without it the error of that last speed stays. climb_m_s: climb meanwhile, within limits.
         """
         dt_s = min(max(dt_s, 0.0), _LONGEST_STEP_S)

@@ -15,12 +15,12 @@ from groundstation.bus.topics import ESTIMATE, ODOMETRY
 from groundstation.geometry.rotations import rotation_from_euler
 
 _LEVEL = (0.0, 0.0)
-# A vehicle whose height sensor says less may stand.
+# Below this measured height a vehicle may be standing.
 _ALOFT_M = 0.4
 
 
 class Surroundings:
-    """Listens to odometry and estimates; answers for the time of an exposure."""
+    """Subscribes to odometry and estimates, and gives their values at the time of an exposure."""
 
     def __init__(self, bus: Bus, settings: CameraDriverSettings) -> None:
         self._settings = settings
@@ -73,7 +73,7 @@ class Surroundings:
         return self._foresight.at(exposure_ns, self.attitude(exposure_ns))
 
     def sought(self, exposure_ns: int, predictions: Predictions) -> Collection[str]:
-        """Return the entities for which whole pictures are searched often; none while the tracker is not heard."""
+        """Return the entities for which whole pictures are searched often; none while the tracker is silent."""
         return self._foresight.sought(exposure_ns, predictions)
 
     def drop_m(self, entity: str, exposure_ns: int) -> float | None:

@@ -14,7 +14,7 @@ _HASHES = {"MD5": hashlib.md5, "SHA-256": hashlib.sha256}
 
 @dataclass(frozen=True, slots=True)
 class Challenge:
-    """What a camera asks to be answered; algorithm: MD5 or SHA-256; qop: whether it wants that of `auth`."""
+    """A camera's authentication challenge; algorithm: MD5 or SHA-256; qop: whether it wants that of `auth`."""
 
     realm: str
     nonce: str

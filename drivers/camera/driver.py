@@ -52,7 +52,7 @@ def run(child: HostProcess) -> int:
 class CameraDriver:
     """Turns pictures of one source into messages; `turn` is one pass of its loop (at most 20 ms of waiting).
 
-    `counts` holds what was refused, by reason.
+    `counts` holds the refusals, by reason.
     """
 
     def __init__(self, child: HostProcess, settings: CameraDriverSettings, source: FrameSource) -> None:
@@ -163,7 +163,7 @@ class CameraDriver:
             observation = convert.observation_from_sighting(sighting, header, settings.name, attitude, picture_ns)
             self._child.bus.publish(OBSERVATION, observation)
             self._health.reported += 1
-        if self._pipeline.searched and picture_ns == exposure_ns:  # an old picture does not tell who is missing now
+        if self._pipeline.searched and picture_ns == exposure_ns:  # old pictures do not show who is missing now
             header = self._child.bus.header(settings.observer, exposure_ns)
             found = tuple(sighting.entity for sighting in sightings)
             searched = SearchedPicture(header=header, observer=settings.observer, camera=settings.name, found=found)
@@ -196,7 +196,7 @@ class CameraDriver:
         return first_ns
 
     def _hanging(self) -> str:
-        """Return in words that the picture hangs, or nothing; that of a standing vehicle may be black for long."""
+        """Return a text if the picture hangs, else ""; that of a standing vehicle may be black for long."""
         shows = self._settings.mount.in_world or self._pipeline.tracked
         hangs = self._hangs_s >= _HANGS_S and shows
         return "its picture does not change: it hangs, or nothing moves and it has no noise" if hangs else ""

@@ -1,4 +1,4 @@
-"""The answer of an HTTP camera: its head, what it says of the stream, and bodies sent in chunks. Pure.
+"""The answer of an HTTP camera: its head, the stream's properties, and bodies sent in chunks. Pure.
 
 WIRE: RFC 9112 sections 5 to 7. Cameras on an ESP32 and ffmpeg send chunks even to a client that speaks HTTP/1.0.
 """
@@ -18,7 +18,7 @@ _MAX_LINE_BYTES = 256
 
 
 def split_answer(data: bytes) -> tuple[bytes, bytes] | None:
-    """Return head and what is behind it, or None while the head has not ended."""
+    """Return the head and the bytes behind it, or None while the head has not ended."""
     end = HEAD_END.search(data)
     return None if end is None else (data[: end.start()], data[end.end() :])
 
@@ -63,7 +63,7 @@ class ChunkedBody:
         return bytes(body)
 
     def _step(self, body: bytearray) -> bool:
-        """Consume one line, or what is there of a chunk; False when more bytes are needed."""
+        """Consume one line, or the present part of a chunk; False when more bytes are needed."""
         if self._left:
             part = self._buffer[: self._left]
             body += part

@@ -1,4 +1,4 @@
-"""How well a picture is exposed and focused, whatever it shows. Pure."""
+"""Exposure and focus of a picture, independent of its content. Pure."""
 
 import math
 from dataclasses import dataclass

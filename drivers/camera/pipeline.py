@@ -36,7 +36,7 @@ def _unknown_drop(_entity: str) -> float | None:
 class Pipeline:
     """Finds, follows, identifies and measures the expected markers of one camera.
 
-    `counts`: what was found, missed and refused since the start, by name; `searched`: whether the last picture was
+    `counts`: markers found, missed and refused since the start, by name; `searched`: whether the last picture was
     wholly searched. cpu_s: returns the CPU time of this thread [s]; others: markers of the field that this camera does
     not report.
     """
@@ -244,10 +244,10 @@ class Pipeline:
         return Sighting(expected.entity, track.margin, choice, track.corners)
 
     def _resolved(self, sightings: list[Sighting], predictions: Mapping[str, Prediction | None]) -> list[Sighting]:
-        """Return one sighting per entity; of two boards with one code, one is the other's alternative.
+        """Return one sighting per entity; a second board with the same code becomes an alternative.
 
-        The one nearer to where the belief has it comes first, and the estimator decides. Without a belief they cannot
-        be told apart, and both are withheld; so are three.
+        The one nearer to the estimated place comes first, and the estimator decides. Without an estimate they cannot
+        be distinguished, and both are withheld; so are three.
         """
         by_entity: defaultdict[str, list[Sighting]] = defaultdict(list)
         for sighting in sightings:

@@ -108,7 +108,7 @@ def choose(
 ) -> PoseChoice:
     """Return the pose that fits corners and gravity best; keeps the other one if neither rules it out.
 
-    floor_px: least standard deviation believed of a corner. Costs are in chi-square units.
+    floor_px: least standard deviation assumed of a corner. Costs are in chi-square units.
     """
     freedom = 2 * len(points) - 6
     variance = min(pose.squared_error for pose in poses) / freedom + floor_px**2

@@ -109,8 +109,8 @@ class Foresight:
         """Return the entities for which whole pictures are searched often unless they are in view.
 
         These are targets that no camera saw at the exposure: the tracker searches for them, or has just lost them. For
-        a world-fixed camera they are also the robots that `predictions` have in its picture: by missing one repeatedly
-        the tracker learns that it is not where it is believed.
+        a world-fixed camera they are also the robots that `predictions` have in its picture: if it misses one
+        repeatedly, the tracker learns that the robot's estimate is wrong.
         """
         estimate = self._nearest(stamp_ns)
         if estimate is None:
@@ -203,7 +203,7 @@ def _seen(
     centre_px = np.array(pixel)
     if not intrinsics.contains(centre_px, -_SIGMAS * std_px):
         return True, None
-    # The marker lies level; its heading does not change its largest and least extent.
+    # The marker is level; its heading does not change its largest and least extent.
     most, least = _singular_values(jacobian @ rotation[:2].T)
     return True, Prediction(centre_px, most * reach_m, least * reach_m / _RADIUS_SQUARES, std_px)
 

@@ -135,9 +135,9 @@ class MountSettings(_Section):
 class DetectorSettings(_Section):
     """Figures of the detector; the defaults are measured (reference: vision).
 
-    corner_floor_px: least standard deviation believed of a corner; tracked_search_rate_hz: full searches while every
+    corner_floor_px: least standard deviation assumed of a corner; tracked_search_rate_hz: full searches while every
     expected marker is tracked; sought_search_rate_hz: while something is not in view that is sought (a target that no
-    camera sees, a robot that a fixed one should); search_share: what share of a processor's time those may take;
+    camera sees, a robot that a fixed one should); search_share: the share of a processor's time that those may take;
     ambiguity_cost: cost difference (chi-square units) below which both poses are reported.
     """
 
@@ -153,7 +153,7 @@ class DetectorSettings(_Section):
 class CameraDriverSettings(_Section):
     """All that `drivers.camera.driver.run` needs.
 
-    name: of the camera on the bus; observer: whom sightings are attributed to (the carrier, or the camera's own name
+    name: of the camera on the bus; observer: the observer in sightings (the carrier, or the camera's own name
     when it is fixed in the world; derived when empty); observes: entities to report (empty: all markers, but for a
     world-fixed camera robots only); search_phase_s: staggers the full searches of several cameras; start_within_s,
     stall_after_s: how long the first picture, and any later one, may take before the operator is warned.

@@ -29,11 +29,11 @@ _ANY_ADAPTER = frozenset({SourceKind.RTSP, SourceKind.ROS2})
 
 @dataclass(frozen=True, slots=True)
 class SourceAddress:
-    """A source taken apart.
+    """The parsed address of a source.
 
     path: of the stream with its query, of the topic, of the device, of the file or folder; host: of a plug-in, its
     scheme; login: "user:password", or "" for none; interface: the network adapter that it is behind, or "" for any;
-    domain: of ROS 2; vehicle: whose own video it is, the scheme of its kind.
+    domain: of ROS 2; vehicle: for a vehicle's own video, the scheme of its kind.
     """
 
     kind: SourceKind

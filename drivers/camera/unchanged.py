@@ -16,7 +16,7 @@ _LASTING_NS, _TURNED_PX = 800 * NS_PER_MS, 4.0
 
 
 class UnchangedPictures:
-    """Recognises pictures that repeat their predecessor to the last pixel; what lives, or moves, never does."""
+    """Recognises pictures that equal their predecessor in every pixel; a working camera's never do."""
 
     def __init__(self) -> None:
         self._picture: Image | None = None
@@ -30,9 +30,9 @@ class UnchangedPictures:
 
 
 class SteadyMarkers:
-    """Recognises a hanging camera whose encoder goes on, so that no two pictures are equal: all markers stand still.
+    """Recognises a hanging camera whose encoder still runs, so that no two pictures are equal.
 
-    On a vehicle in the air, that is, whose tilt changes meanwhile. focal_px: of the camera.
+    All markers stand still although its vehicle is in the air and its tilt changes. focal_px: of the camera.
     """
 
     def __init__(self, focal_px: float) -> None:
@@ -48,7 +48,7 @@ class SteadyMarkers:
 
         corners (n, 2) [px] of the markers in the picture; tilt_rad: roll and pitch, None for a vehicle on the floor.
         """
-        if not corners and tilt_rad is not None:  # overlooked or out of view: what comes next tells
+        if not corners and tilt_rad is not None:  # missed or out of view: the next pictures decide
             return exposure_ns
         centres = {entity: seen.mean(axis=0) for entity, seen in corners.items()}
         moved = [math.dist(at, self._centres[who]) > _STEADY_PX for who, at in centres.items() if who in self._centres]

@@ -11,11 +11,11 @@ from groundstation.time_units import NS_PER_S
 
 @dataclass(frozen=True, slots=True)
 class SearchRates:
-    """How often a camera searches whole pictures [Hz], and what that may cost.
+    """How often a camera searches whole pictures [Hz], and the permitted cost.
 
-    idle_hz: while nothing is in view, so that a camera that sees nobody is not taken for a dead one; half of it while
-    something is in view and something else is missing; tracked_hz: while nothing is missing; sought_hz: while something
-    sought is not in view; share: of a processor's time then, unless `idle_hz` costs more.
+    idle_hz: while no marker is in view, so that the camera is not taken for a dead one; half of it while one is in view
+    and another is missing; tracked_hz: while none is missing; sought_hz: while a sought one is not in view; share: of a
+    processor's time then, unless `idle_hz` costs more.
     """
 
     tracked_hz: float
@@ -55,9 +55,9 @@ class WholeSearches:
         return blind or (sought and waited_ns >= self._eager_ns) or stamp_ns >= self._next_ns
 
     def done(self, stamp_ns: int, misses: bool, cost_s: float) -> None:
-        """Take in that a picture was searched, and what that cost [s of CPU].
+        """Record that a picture was searched, and the cost [s of CPU].
 
-        misses: an expected marker is not in view, and the belief does not have it elsewhere.
+        misses: an expected marker is not in view, and its estimate is not elsewhere.
         """
         rate_hz = 0.5 * self._rates.idle_hz if misses else self._rates.tracked_hz
         self._cost_s, self._done_ns = cost_s, stamp_ns

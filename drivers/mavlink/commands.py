@@ -1,7 +1,7 @@
 """Turns watchdog decisions into requests to PX4 and ArduPilot: modes, arming, take-off, setpoints, landing. Pure.
 
-Each setpoint of the tracker goes out once, at most setpoint_hz times a second. A hovering vehicle is told to hold the
-place where it comes to rest if the tracker knows that place, and where the tracker brings it; else to keep zero
+Each setpoint of the tracker goes out once, at most setpoint_hz times a second. A hovering vehicle is commanded to hold
+the place where it comes to rest, or to which the tracker brings it, if the tracker knows that place; else zero
 velocity. Our own loop sends: when it stands still, nothing is sent and the vehicle's own time-out acts.
 """
 
@@ -49,7 +49,7 @@ def _sideways(back_m_s: Vector3 | None) -> tuple[float, float] | None:
 
 
 class Orders:
-    """Makes the requests to one vehicle. events: (severity, text) for the operator; said: what it says."""
+    """Makes the requests to one vehicle. events: (severity, text) for the operator; said: its texts."""
 
     def __init__(self, vehicle: VehicleSettings, flavour: Flavour, requests: Requests) -> None:
         self.events: deque[tuple[int, str]] = deque(maxlen=32)
@@ -198,7 +198,7 @@ class Orders:
             self._landing_ns = decision.entered_ns
             self._requests.accepted.discard("landing")
             self.pilot.start_over()
-        # Who ordered a landing gets it, but once: a pilot may take over from it, or from what a failsafe would do.
+        # A commanded landing is enforced until accepted once; after that, or in a failsafe, a pilot may take over.
         begun = bool(decision.failsafe) or "landing" in self._requests.accepted
         if armed and begun and self.pilot.lands(now_ns, custom_mode):
             self._requests.drop("landing")
@@ -225,8 +225,8 @@ class Orders:
             self._yield(now_ns, "was started anew while it takes off")
 
     def _watch_start(self, now_ns: int, armed: bool, guided: bool, custom_mode: int) -> None:
-        # Only a pilot, a second ground station or the autopilot itself ends what has begun: a second request would make
-        # it climb against their stop.
+        # Only a pilot, a second ground station or the autopilot itself ends a begun take-off: a second request would
+        # make it climb against their stop.
         if armed and (guided or "arming" in self._requests.accepted):
             self._started = True
         if self._started and not (armed and guided) and not self._taken_over:

@@ -33,7 +33,7 @@ _RAD_S_FROM_MRAD_S = 0.001
 _MOST_M_S, _MOST_RAD_S, _MOST_M_S2, _MOST_M = 30.0, 60.0, 400.0, 10_000.0
 _STILL_M_S = 0.15
 _IN_EMERGENCY, _POWEROFF = 6, 7  # MAV_STATE; 8 is FLIGHT_TERMINATION
-# An estimator may be reset once, by the first position that it is fed; time_boot_ms wraps after 49 days.
+# An estimator may be reset once, by the first position that it gets; time_boot_ms wraps after 49 days.
 LIMITS = PlausibilityLimits(speed_m_s=8.0, tilt_rad=math.radians(50.0), jump_m_s=0.6)
 
 
@@ -98,7 +98,7 @@ def sample_from_local(
 
 
 def position_from_local(message: LocalPositionNed) -> Vector3:
-    """Return the estimated position [m; the frame that we fed]: for the driver's own use only, never to be fused."""
+    """Return the estimated position [m; the frame of our poses]: for the driver's own use only, never to be fused."""
     _sane("position", _MOST_M, message.x, message.y, message.z)
     return message.x, -message.y, -message.z
 

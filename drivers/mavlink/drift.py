@@ -1,7 +1,7 @@
 """Corrects an autopilot's velocity error as cameras see it, and holds places by the belief. Pure.
 
-An autopilot obeys a velocity by its own estimate: with an error of 0.3 m/s it flies off at that speed while told to
-stand still (docs/reference/mavlink.md 2.1). The tracker knows both velocities, so the commands are corrected. Nothing
+An autopilot follows a velocity by its own estimate: with an error of 0.3 m/s it flies off at that speed on a command
+of 0 (docs/reference/mavlink.md 2.1). The tracker knows both velocities, so the commands are corrected. Nothing
 here moves a vehicle by itself: without the tracker's estimate the correction fades, and hovering is zero velocity
 again.
 """
@@ -16,7 +16,7 @@ from groundstation.vectors import Vector2
 
 # Velocities of the belief have noise of 0.05 m/s.
 _SMOOTHING_S = 0.12
-# The belief learns of an error half a second late (sightings are late, and it takes time to learn); an error that grows
+# The belief shows an error half a second late (sightings are late, and learning takes time); an error that grows
 # with a tilt has changed by then as much as it did in that time before.
 _LATELY_S = 0.6
 # An error of the climb rate sways within a second or two (docs/reference/mavlink.md 2.1). Heights show it sooner than
@@ -44,11 +44,11 @@ _EVEN_M_S = 0.1  # within this the two fit equally well
 # [1/s], sideways and upwards: a climb rate answers within 0.35 s, and the error of a climb rate that is not yet known
 # costs its share of this in height.
 _HOLD_GAIN, _HOLD_UP_GAIN = 0.8, 2.0
-# Below the control error's tolerance for a vehicle that is told to stand still.
+# Below the control error's tolerance for a vehicle commanded to stand still.
 _HOLD_M_S = 0.2
 _SEEN_S = 0.5
-# A vehicle told to stop has stopped once it is this slow for this long, at least two pictures, and after this long at
-# most: one that still moves then drifts.
+# A vehicle commanded to stop has stopped once it is this slow for this long, at least two pictures, and after this
+# long at most: one that still moves then drifts.
 _STOPPED_M_S, _PACE_NS, _STOPS_WITHIN_NS = 0.1, 500 * NS_PER_MS, NS_PER_S
 _STILL: Vector3 = (0.0, 0.0, 0.0)
 
@@ -79,7 +79,7 @@ class Obedience:
 
 
 class ClimbError:
-    """The error of the climb rate, from the drift of believed height against the integrated reported rate.
+    """The error of the climb rate, from the drift of estimated height against the integrated reported rate.
 
     error_m_s: reported less true climb rate.
     """
@@ -155,7 +155,7 @@ class DriftFeedback:
         self._stands = False
 
     def tell(self, now_ns: int, asked_m_s: Vector3) -> None:
-        """Note the velocity [base_stabilized] that is asked of it, without the correction."""
+        """Note the velocity command [base_stabilized], without the correction."""
         forward, left = asked_m_s[:2]
         self._undershoot.tell(now_ns, self._in_world(forward, left))
         drift = self._corrected(now_ns, self._drift_by_now())
@@ -197,7 +197,7 @@ class DriftFeedback:
         return self._corrected(now_ns, self._drift)
 
     def correction(self, now_ns: int) -> Vector3:
-        """Return what to add to a command [m/s; base_stabilized]: drift, extrapolated to now, and undershoot."""
+        """Return the correction of a command [m/s; base_stabilized]: drift, extrapolated to now, and undershoot."""
         (x, y), (missing_x, missing_y) = self._drift_by_now(), self._undershoot.missing
         return self._corrected(now_ns, (x + missing_x, y + missing_y))
 
@@ -212,7 +212,7 @@ class DriftFeedback:
         return self._at_ns is not None and (lifts_off or not doubted)
 
     def _corrected(self, now_ns: int, drift: Vector2) -> Vector3:
-        """Return the part of a drift [world] that is believed and corrected [base_stabilized]."""
+        """Return the part of a drift [world] that is corrected [base_stabilized]."""
         if not self._corrects(now_ns):
             return _STILL
         fades = math.exp(-max(0.0, (now_ns - self._seen_ns) / NS_PER_S - _LASTS_S) / _FORGETS_S)

@@ -9,7 +9,7 @@ from drivers.mavlink.wire.names import MavCmd
 from drivers.mavlink.wire.verification import Signing
 from drivers.vehicle_settings import VehicleLimits
 
-# Its positions end with its driver: told to stand still it slides off ever faster (docs/reference/mavlink.md 2.1).
+# Without its driver it gets no positions: in a hover it drifts ever faster (docs/reference/mavlink.md 2.1).
 # Without these datagrams it would land as soon: COM_OF_LOSS_T.
 HOVERS_S = 0.5
 # The ids that ground stations have.

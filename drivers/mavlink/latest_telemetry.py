@@ -18,7 +18,7 @@ class LatestTelemetry:
     """The last reports; times 0: never. moved_ns, attitude_ns: of the last velocity and attitude.
 
     asked_ns: of the last request for our time; disarmed_ns: since when heartbeats report again that its motors stand.
-    transmitter: it hears a pilot's transmitter.
+    transmitter: it receives a pilot's transmitter.
     """
 
     heard_ns: int = 0

@@ -8,7 +8,7 @@ from drivers.mavlink.wire.names import Landed
 from groundstation.bus.messages import Vector3
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
-# An estimator that is fed the pad's position shows little of its height, and its climb sooner.
+# An estimator that is sent the pad's position shows little of its height, and its climb sooner.
 _RISEN_M, _CLIMBING_M_S, _CLIMBING_NS = 0.1, 0.1, 300 * NS_PER_MS
 # Three times the error of a height seen by cameras.
 _SEEN_RISEN_M = 0.1
@@ -20,7 +20,7 @@ _OLD_NS = 6 * NS_PER_S
 
 
 def credible(landed: int, age_ns: int, motors_flew: bool) -> int:
-    """Return the MAV_LANDED_STATE to believe, given the reported one and its age; UNDEFINED if that is too old.
+    """Return the MAV_LANDED_STATE to act upon, given the reported one and its age; UNDEFINED if that is too old.
 
     motors_flew: it has lifted off, and its motors turn. ON_GROUND then counts as landing, until it disarms: its
     detector may err, and a vehicle in the air must not be taken for a standing one.
@@ -31,10 +31,10 @@ def credible(landed: int, age_ns: int, motors_flew: bool) -> int:
 
 
 class LiftOff:
-    """Finds the moment of lift-off; a vehicle that was not ordered to take off has lifted when it reports so.
+    """Finds the moment of lift-off; without a take-off command a vehicle has lifted when it reports so.
 
-    lifted: it is off the floor; stood: mean of its first places by the tracker, where it stood [world], None if the
-    tracker told none.
+    lifted: it is off the floor; stood: mean of its first places by the tracker, where it stood [world], None if there
+    were none.
     """
 
     def __init__(self) -> None:

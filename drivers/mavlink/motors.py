@@ -1,13 +1,13 @@
 """Notices that a vehicle's motors were stopped in flight, which not every autopilot reports as a fall. Pure.
 
-WIRE (ArduCopter 4.6.2): disarmed by force 1.2 m above the floor it says ON_GROUND at once, while it falls.
+WIRE (ArduCopter 4.6.2): disarmed by force 1.2 m above the floor it reports ON_GROUND at once, while it falls.
 """
 
 from groundstation.time_units import NS_PER_MS
 
 # Beyond the error of a height that cameras see as it touches down.
 _ALOFT_M = 0.5
-# A heartbeat tells of it up to a second late; after a landing motors turn for longer before they stop.
+# A heartbeat reports it up to a second late; after a landing motors turn for longer before they stop.
 _FELL_NS = 1_300 * NS_PER_MS
 
 

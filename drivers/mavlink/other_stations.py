@@ -1,7 +1,7 @@
 """Notices that another ground station commands the vehicles of a link: its heartbeats, and answers to its commands.
 
-Autopilots and routers pass on what they hear on their other links. Two masters fight, and the heartbeat of the other
-one hides the death of ours from the autopilot's own failsafe.
+Autopilots and routers forward frames from their other links. The commands of two stations conflict, and the heartbeat
+of the other one hides the death of ours from the autopilot's own failsafe.
 """
 
 from collections import Counter, deque
@@ -39,7 +39,7 @@ def speaks_as_we(frame: ReceivedFrame, own: tuple[int, int], rejected: Counter[s
 
 
 class OtherStations:
-    """What is heard of other ground stations on a link; `news` has (text, remedy) for the operator, each told once.
+    """Detects other ground stations on a link; `news` has (text, remedy) for the operator, each reported once.
 
     own: our system id; riders: vehicles that another ground station may stop through us, whose answers are expected.
     """

@@ -22,7 +22,7 @@ class Needed:
     """One parameter: the value that `setup` writes, its type on the wire, and its purpose.
 
     accepted: lowest and highest value that are acceptable too; others: acceptable single values; flown: a wider range
-    that permits a take-off, but that `setup` changes and the operator is told of; aliases: its names in other releases.
+    that permits a take-off, but is reported to the operator and changed by `setup`; aliases: names in other releases.
     """
 
     name: str

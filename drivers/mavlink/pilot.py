@@ -1,7 +1,7 @@
-"""Judges whether a pilot lands a vehicle that we want to land: their sticks have the last word. Pure.
+"""Judges whether a pilot lands a vehicle that we want to land: their sticks take precedence. Pure.
 
-Only modes that fly by sticks, without a position, and only while the vehicle hears a transmitter: nobody sits behind
-any other mode, and without our positions it would not hold its place in them.
+Only modes that fly by sticks, without a position, count, and only while the vehicle receives a transmitter: in other
+modes there may be no pilot, and without our positions the vehicle would not hold its place.
 """
 
 from drivers.mavlink.wire.names import Flavour, flies_by_sticks
@@ -12,7 +12,7 @@ _CERTAIN_NS = 1_500 * NS_PER_MS
 
 
 class LandingPilot:
-    """transmitter: the vehicle hears one."""
+    """Detects a landing by a pilot; transmitter: the vehicle receives one."""
 
     def __init__(self, flavour: Flavour) -> None:
         self.transmitter = False
@@ -33,7 +33,7 @@ class LandingPilot:
         return True
 
     def is_news(self, now_ns: int) -> bool:
-        """Return once in a landing that this has lasted long enough to be told."""
+        """Return True once in a landing, when this has lasted long enough to be reported."""
         if self._told or self._since_ns is None or now_ns - self._since_ns < _CERTAIN_NS:
             return False
         self._told = True

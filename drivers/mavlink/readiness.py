@@ -21,7 +21,7 @@ class Readiness:
         self._settling = Settling()
 
     def why_not(self, now_ns: int, known: LatestTelemetry) -> str:
-        """Return what prevents its take-off, in words, or ""."""
+        """Return the reason that prevents its take-off, in words, or ""."""
         detail = self._session.detail(self._requests)
         if detail:
             return detail

@@ -21,7 +21,7 @@ class _Open:
 
 
 class Requests:
-    """Requests by key. Call `ask` as long as the wish stands; it repeats no request in progress.
+    """Requests by key. Call `ask` as long as the request is wanted; it repeats none in progress.
 
     failures: requests refused or never answered, for the operator; drained by the driver.
     """
@@ -72,7 +72,7 @@ class Requests:
             return
         key, request = sent[0], self._open[sent[0]]
         if ack.result == MavResult.IN_PROGRESS:
-            # It was heard, so no try failed. It is sent again all the same, for it may be a stop.
+            # The request arrived, so no try failed. It is sent again all the same, for it may be a stop.
             request.due_ns, request.tries = now_ns + _RETRY_NS, 1
             return
         del self._open[key]

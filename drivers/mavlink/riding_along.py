@@ -124,7 +124,7 @@ def _goes_nowhere(message: flight.CommandLong | flight.CommandInt) -> bool:
 def made_good(message: Message, system: int, flavour: Flavour) -> Message | None:
     """Return the message that must follow a stop so that we notice it, or None.
 
-    WIRE (docs/reference/mavlink.md 5.11): an ArduPilot that is paused stays in GUIDED, deaf to velocities until the
+    WIRE (docs/reference/mavlink.md 5.11): an ArduPilot that is paused stays in GUIDED, and ignores velocities until the
     mode is entered anew: we would not know, and no RESUME of ours would end it.
     """
     pauses = isinstance(message, flight.CommandLong | flight.CommandInt) and message.command == MavCmd.DO_PAUSE_CONTINUE

@@ -59,7 +59,7 @@ def streams(flavour: Flavour, odometry_hz: float, imu_hz: float) -> dict[type[Me
 
 
 class MavlinkSession:
-    """The requests still to be made of one vehicle; starts over when it was silent for 2 s, or its clock began anew.
+    """The requests still to be made of one vehicle; starts over after a silence of 2 s, or when its clock began anew.
 
     problems: parameters that forbid a take-off. detail: the awaited step, or "". notes: for the operator; drained by
     the driver. overrides: parameters set by the field file. pinned: the serial number of the only vehicle that may take
@@ -169,7 +169,7 @@ class MavlinkSession:
             self._note_doubtful(wanted, {message.param_id: value})
 
     def _note_change(self, wanted: parameters.Needed, name: str, before: float, value: float) -> None:
-        """Report a value that somebody else changed: autopilots tell it on all their links."""
+        """Report a value that somebody else changed: autopilots report it on all their links."""
         needs = "" if wanted.takes(value) else f", needs {wanted.wish} ({wanted.reason})"
         self.notes.append(f"somebody changed its parameter {name} from {before:.7g} to {value:.7g}{needs}")
 

@@ -34,9 +34,9 @@ def _has_a_port(target: str) -> str:
 class VisionFeedback(DriverSection):
     """Poses sent to the autopilot from the tracker's estimate, and the effect of their loss.
 
-    rate_hz: of the messages; max_std_m: a worse known position is none (what no camera keeps sharp gets there within
-    some 5 s); max_age_s: nor is one of a vehicle that itself was not seen for so long; hover_after_s, land_after_s:
-    without any; jump_m: beyond what it can have flown.
+    rate_hz: of the messages; max_std_m: a less certain position is not sent (without sightings it is so within some
+    5 s); max_age_s: nor is that of a vehicle not seen itself for so long; hover_after_s, land_after_s: without any
+    pose; jump_m: distance beyond that which it can have flown.
     """
 
     rate_hz: Annotated[float, Field(ge=5, le=50)] = 30.0
@@ -67,7 +67,7 @@ class GlobalOrigin(DriverSection):
 class LinkSettings(DriverSection):
     """How a port is reached.
 
-    target: `udpout:ADDRESS:PORT` speaks first; `udpin:ADDRESS:PORT` waits there, for many vehicles at once;
+    target: `udpout:ADDRESS:PORT` sends first; `udpin:ADDRESS:PORT` waits there, for many vehicles at once;
     `serial:DEVICE:BAUD`. ADDRESS%ADAPTER: through that network adapter only. key_file: 32 bytes, raw or as 64 hex
     digits; then only signed frames count (pymavlink alone).
     """

@@ -1,6 +1,6 @@
 """Judges whether a PX4 that has just got positions has passed its own checks. Pure.
 
-WIRE (docs/reference/mavlink.md 2): PX4's heartbeat says MAV_STATE_UNINIT until it could be armed in its present mode.
+WIRE (docs/reference/mavlink.md 2): PX4's heartbeat has MAV_STATE_UNINIT until it could be armed in its present mode.
 Its estimator takes some 3 s to settle on first positions. Later that state means little: without a remote control, or
 in OFFBOARD without setpoints, PX4 reports it forever and arms all the same.
 """
@@ -19,7 +19,7 @@ class Settling:
         self._over = False
 
     def is_over(self, now_ns: int, status: int) -> bool:
-        """Take the state in its heartbeat while it has positions; return whether it may be told to arm."""
+        """Take the state in its heartbeat while it has positions; return whether it may be commanded to arm."""
         if now_ns - self._last_ns > _GAP_NS:
             self._since_ns, self._over = now_ns, False
         self._last_ns = now_ns

@@ -36,7 +36,7 @@ class Texts:
                     del self._pieces[next(iter(self._pieces))]
                 return None
             text = "".join(self._pieces.pop(message.id))
-        text = text.rstrip()  # WIRE (PX4): a tab at the end says that the text is also sent as an event
+        text = text.rstrip()  # WIRE (PX4): a tab at the end marks a text also sent as an event
         self._heard.append((now_ns, (message.severity, text)))
         return message.severity, text
 
@@ -50,7 +50,7 @@ class Texts:
 
 
 class Explanations:
-    """Remembers the last texts of a vehicle: what it said as it left our mode explains that; later ones do not."""
+    """Remembers the last texts of a vehicle: only those sent as it left our mode explain that."""
 
     def __init__(self) -> None:
         self._texts: deque[tuple[int, str]] = deque(maxlen=8)

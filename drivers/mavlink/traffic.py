@@ -4,7 +4,7 @@ import threading
 
 from drivers.arrivals import Arrivals
 
-# A loss of half a turn of the counter cannot be told from a restart; datagrams are not reordered by more than this.
+# A loss of half a turn of the counter looks like a restart; datagrams are not reordered by more than this.
 _HALF_TURN, _OVERTAKEN = 128, 32
 
 

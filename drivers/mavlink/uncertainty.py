@@ -13,7 +13,7 @@ from groundstation.time_units import NS_PER_S
 # WIRE (ESTIMATOR_STATUS): below 0.5 under normal operation, above 1 a measurement is refused.
 _NORMAL_RATIO = 0.5
 _REFUSED_STD_M_S = 0.5
-# WIRE (docs/reference/mavlink.md 2.1): 0.3 to 0.9 m/s after lift-off, whatever its covariances are.
+# WIRE (docs/reference/mavlink.md 2.1): 0.3 to 0.9 m/s after lift-off, at any covariances.
 _LIFT_OFF_STD_M_S = 0.5
 # The error of an estimator levelled by positions alone is g times its tilt over a bandwidth of some 1.6 rad/s.
 _TILT_PER_VELOCITY = 0.08

@@ -1,4 +1,4 @@
-"""Learns by how much a vehicle misses its commanded velocity, as cameras see it. Pure.
+"""Learns a vehicle's shortfall from its commanded velocity, as cameras see it. Pure.
 
 An autopilot whose tilt is wrong by a degree leans that much too little, until its own integrator has learnt it: a real
 PX4 flew 0.2 m/s of 0.4 for several seconds after lift-off (docs/reference/mavlink.md 2.1). Its reported velocity is
@@ -24,14 +24,14 @@ _GAP_S = 0.1
 
 
 class Undershoot:
-    """missing: the velocity to add to commands [m/s; world] so that the vehicle flies what was asked; 0.25 at most."""
+    """missing: the velocity to add to commands [m/s; world] so that the vehicle flies them; 0.25 at most."""
 
     def __init__(self) -> None:
         self.missing, self._asked, self._expected = _STILL, _STILL, _STILL
         self._told_ns = self._heard_ns = 0
 
     def tell(self, now_ns: int, asked_m_s: Vector2) -> None:
-        """Note the velocity that is asked [world], without corrections."""
+        """Note the requested velocity [world], without corrections."""
         self._expected = towards(self._expected, asked_m_s, share_of(now_ns - self._told_ns, _RESPONSE_S))
         self._asked, self._told_ns = asked_m_s, now_ns
 

@@ -141,7 +141,7 @@ class MavlinkVehicle:
                 return replace(known, landed=message.landed_state, landed_ns=now_ns)
             case telemetry.SysStatus():
                 healthy = message.onboard_control_sensors_health
-                # WIRE (PX4): the health of what is not there is good as well.
+                # WIRE (PX4): a sensor that is not there is reported as healthy too.
                 heard = message.onboard_control_sensors_present & healthy & SensorBits.RC_RECEIVER
                 known = replace(known, healthy=healthy, transmitter=bool(heard))
                 return _charged(now_ns, message.battery_remaining, known)
@@ -302,7 +302,7 @@ class MavlinkVehicle:
         return LinkHealth(quality, rate_hz, rejected, detail, clocks, firmware, self._asks_time(now_ns))
 
     def _asks_time(self, now_ns: int) -> bool | None:
-        """Return whether a PX4 asks for our time, ten times a second as it should; ArduPilot need not."""
+        """Return whether a PX4 requests our time, ten times a second as it should; ArduPilot need not (None)."""
         return None if self.flavour is not Flavour.PX4 else now_ns - self.telemetry.asked_ns < _ASKS_NS
 
     def flush(self) -> None:

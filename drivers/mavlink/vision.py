@@ -1,12 +1,11 @@
 """Poses for an autopilot from the tracker's estimate, and the time without one. Pure.
 
-On the floor the vehicle is fed the pad of the field file, or its last landing place: the tracker has no estimate of a
-landed robot. Once the take-off has begun there is one, which is fed if it continues from there; one at the pad shows
-that the vehicle was carried back there. A position that
-observations do not keep accurate is not fed: it would be the autopilot's own dead reckoning. Its covariance decides,
-not who was seen: sightings by its own camera localise a vehicle as well. A vehicle whose telemetry is silent or not
-believed is fed only the places at which it was seen. Nothing is fed while sightings far from the estimate are being
-weighed.
+On the floor the vehicle is sent the pad of the field file, or its last landing place: the tracker has no estimate of a
+landed robot. Once the take-off has begun there is one, which is sent if it continues from there; one at the pad shows
+that the vehicle was carried back there. A position that observations do not keep accurate is not sent: it would be the
+autopilot's own dead reckoning. The covariance decides this, not whether cameras see the vehicle: sightings by its own
+camera localise it as well. A vehicle whose telemetry is silent or implausible is sent only the places at which it was
+seen. Nothing is sent while sightings far from the estimate are being weighed.
 """
 
 import math

@@ -38,7 +38,7 @@ class MavlinkVoice:
             self._socket.setblocking(False)
 
     def go_on_from(self, left: int) -> None:
-        """Sign with times newer than the newest that the driver sent or heard (`MavlinkLink.newest_stamp`)."""
+        """Sign with times newer than the newest that the driver sent or received (`MavlinkLink.newest_stamp`)."""
         self._stamp = max(self._stamp, left + 1)
 
     def say(self, datagram: bytes, addresses: Sequence[Address]) -> None:
@@ -46,7 +46,7 @@ class MavlinkVoice:
         if self._key:
             # WIRE (docs/reference/mavlink.md 5.9): times must grow for each sender and link, and a new link may begin
             # at most a minute before the newest time that the vehicle knows: one that its
-            # driver sent or heard. The clock is for a driver that left nothing.
+            # driver sent or received. The clock is for a driver that recorded nothing.
             self._stamp = max(self._stamp, self._clock.stamp())
             datagram, self._stamp = signed_anew(datagram, self._key, self._speaker, self._stamp)
         if self._socket is None:

@@ -19,7 +19,7 @@ from groundstation.vectors import Interval, Vector3
 
 @dataclass(frozen=True, slots=True)
 class PoseProtocol:
-    """A protocol for poses: its usual port, what reads it, and what its address may have beside a host.
+    """A protocol for poses: its usual port, its reader, and the parts that its address may have beside a host.
 
     reader: "module:class", made from a SystemAddress, a `drivers.motion_capture.sources.Source`; paths: a path and a
     query; any_port: another port than the usual one.
@@ -119,8 +119,8 @@ class MotionCaptureSection(DriverSection):
     """One system.
 
     position_m, yaw_deg: its origin and heading [world]; up: its vertical axis; delay_ms: from sending to arrival;
-    volume_m: where it sees bodies, along x, y, z [world]; observed: entities that the tracker is told of (the others
-    are published as poses only); std: of a pose that it reports.
+    volume_m: where it sees bodies, along x, y, z [world]; observed: entities with observations for the tracker (the
+    others are published as poses only); std: of a pose that it reports.
     """
 
     name: Name

@@ -85,7 +85,7 @@ class NatnetSource:
             self._frames.close()
 
     def _ask(self, now_ns: int) -> None:
-        # A restarted system knows no clients: it streams only to those that ask.
+        # A restarted system has no clients: it streams only to those that request it.
         asks = self._asks or now_ns - self._framed_ns >= _ASK_AGAIN_NS
         if asks and now_ns - self._asked_ns >= _ASK_AGAIN_NS:
             self._asked_ns = now_ns

@@ -42,7 +42,7 @@ class HealthReport:
 
     def of(self, *sensors: Sensor) -> Health:
         """Return the worst health of some sensors."""
-        if not self.findings:  # true of most reports, and each packet asks several times
+        if not self.findings:  # as in most reports; called several times per packet
             return Health.GOOD
         return max((one.health for one in self.findings if one.sensor in sensors), default=Health.GOOD)
 

@@ -1,8 +1,8 @@
 """Monitors one vehicle: takes samples of its motion, gives the health of its sensors. Pure.
 
-On the floor values may stand still, and attitudes may be anything: only telemetry that repeats altogether, or without
-its clock, counts there, or a vehicle that says that it stands could be sent up and never say otherwise. During take-off
-or landing it may touch the floor, and only its velocity may stand still.
+On the floor values may stand still, and attitudes may be anything. There only telemetry that repeats altogether, or
+whose clock stands, counts as wrong: otherwise a vehicle whose report "standing" is frozen could be sent up. During
+take-off or landing it may touch the floor, and only its velocity may stand still.
 """
 
 import math
@@ -106,7 +106,7 @@ class MotionMonitor:
             judged += _repeated(Sensor.TELEMETRY, frozen_s, limits.frozen_s, _FROZEN)
         return judged
 
-    # -- what repeats -------------------------------------------------------------------------------------------------
+    # -- repetitions -------------------------------------------------------------------------------------------------
 
     def _judge_repeats(self, sample: MotionSample, flies: bool) -> list[_Judged]:
         limits, stamp_ns = self.limits, sample.stamp_ns

@@ -43,7 +43,7 @@ class RangingSection(DriverSection):
     """One system.
 
     anchors: their places [m; world]; volume_m: where robots are likely, along x, y, z [world]; range_std_m, bias_std_m:
-    of one range, and of what lasts of it; delay_ms: from the measurement to the arrival.
+    of one range, and of its lasting error; delay_ms: from the measurement to the arrival.
     """
 
     name: Name

@@ -7,13 +7,13 @@ _HEIR_NS = NS_PER_S
 
 
 class PublisherTie:
-    """Ties a topic to the first publisher heard, until that one is silent for a second."""
+    """Ties a topic to its first publisher, until that one is silent for a second."""
 
     def __init__(self) -> None:
         self._publisher, self._heard_ns = b"", 0
 
     def silent(self, now_ns: int) -> bool:
-        """Return whether the publisher was not heard for a second, or ever."""
+        """Return whether the publisher has been silent for a second, or always."""
         return not self._heard_ns or now_ns - self._heard_ns >= _HEIR_NS
 
     def is_second(self, publisher: bytes, now_ns: int) -> bool:
@@ -21,7 +21,7 @@ class PublisherTie:
         return publisher != self._publisher and not self.silent(now_ns)
 
     def hear(self, publisher: bytes, now_ns: int) -> bool:
-        """Tie the topic to a publisher that was heard; returns whether it is another one than before."""
+        """Tie the topic to a publisher that sent; returns whether it is another one than before."""
         changed = publisher != self._publisher
         self._publisher, self._heard_ns = publisher, now_ns
         return changed

@@ -22,7 +22,7 @@ Hear = Callable[[str, bytes, bytes], None]
 
 
 class RouterSession:
-    """One client; expressions: what `hear` is called with, on a thread of the network.
+    """One client; expressions: keys whose messages `hear` gets, on a thread of the network.
 
     joined: called on another thread when the router is there, again where that failed; declares what else is needed.
     """
@@ -74,7 +74,7 @@ class RouterSession:
         self._joining.join(_PATIENCE_S)
         self.is_open = False
         for one in self._declared:
-            with suppress(zenoh.ZError):  # the router left before us
+            with suppress(zenoh.ZError):  # the router left first
                 one.undeclare()
         self._leave()
 

@@ -28,8 +28,8 @@ RATE_HZ = 20.0
 _FRESH_NS = 300 * NS_PER_MS
 # Charges come seldom; an older one counts as unknown.
 _CHARGE_NS = 30 * NS_PER_S
-_STANDING_M = 0.08  # the base of a standing vehicle, as its kind says
-# Orders are repeated until they are obeyed; a standing vehicle is told once a second not to move.
+_STANDING_M = 0.08  # the base of a standing vehicle, as in its kind
+# Orders are repeated until they are obeyed; a standing vehicle gets zero velocity once a second.
 _PAUSE_NS = {Order.TAKE_OFF: 2 * NS_PER_S, Order.LAND: NS_PER_S // 2, Order.CUT: NS_PER_S // 2, None: NS_PER_S}
 # A take-off that is called off may still begin for this long after its order.
 _BEGINS_NS = 5 * NS_PER_S
@@ -166,7 +166,7 @@ class Ros2Vehicle:
             self._log.sent(now_ns, recorded(self._settings.ros2.topic(name), payload))
 
     def health(self, now_ns: int) -> LinkHealth:
-        """Return rate and refusals of the link, and in flight what prevents it from hearing or obeying."""
+        """Return rate and refusals of the link, and in flight the reason if it does not receive or obey."""
         silent = now_ns - self._heard_ns > _FRESH_NS
         asked = _ORDERS.get(self._asked)
         refused = "" if asked is None else self._link.refused.get(asked, "")

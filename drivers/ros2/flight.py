@@ -14,7 +14,7 @@ _STANDS_NS = 500 * NS_PER_MS
 _LEANS_RAD, _MOVES_M_S = math.radians(50.0), 1.0
 # Share of the take-off height at which a take-off counts as finished.
 _UP = 0.7
-# While a vehicle is told one of these, a low height may be a low flight.
+# While a vehicle is commanded one of these, a low height may be a low flight.
 _FLOWN = frozenset({Action.FLY, Action.HOVER})
 
 
@@ -22,8 +22,8 @@ _FLOWN = frozenset({Action.FLY, Action.HOVER})
 class FlightWatch:
     """Follows one vehicle; take_off_m: the height that its take-off climbs to.
 
-    Lower than 0.2 m and still for 0.5 s it stands, unless it was told to fly: a drifting height must not turn a flying
-    vehicle into a standing one, which nobody would land.
+    Lower than 0.2 m and still for 0.5 s it stands, unless it was commanded to fly: a drifting height must not turn a
+    flying vehicle into a standing one, which would not be landed.
     """
 
     take_off_m: float

@@ -1,4 +1,4 @@
-"""Settings of a vehicle behind a ROS 2 node: its section of the field file, and what its driver is told."""
+"""Settings of a vehicle behind a ROS 2 node: its section of the field file, and its driver's section."""
 
 from typing import Annotated, Literal
 
@@ -8,7 +8,7 @@ from drivers.rmw_zenoh.address import LAST_DOMAIN, ROUTER_PORT
 from drivers.vehicle_settings import VehicleDriverSettings
 from groundstation.vehicles import KindSection
 
-# The type hash of Humble, which knows none.
+# The type hash of Humble, which has none.
 NO_HASH = "TypeHashNotSupported"
 
 TopicName = Annotated[str, Field(pattern=r"^/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*$")]

@@ -27,7 +27,7 @@ _MARGIN = 1.5
 
 
 def run(child: HostProcess) -> int:
-    """Hear one target until a stop is requested; returns the exit code."""
+    """Receive from one target until a stop is requested; returns the exit code."""
     driver = OdometryDriver(child, read_section(OdometrySection, child.section, "odometry"))
     try:
         while not child.stop_requested and child.supervisor_alive:

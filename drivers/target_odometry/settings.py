@@ -44,8 +44,8 @@ def emulated_source(text: str, host: str, port: int) -> str:
 class OdometrySection(DriverSection):
     """One target's odometry.
 
-    name: of the stream; target: who speaks; delay_ms: from the measurement to the arrival; max_speed_m_s: what the
-    target cannot exceed.
+    name: of the stream; target: its name; delay_ms: from the measurement to the arrival; max_speed_m_s: a speed that
+    the target cannot exceed.
     """
 
     name: Name

@@ -23,7 +23,7 @@ KIND = VehicleKind(
     # Its velocity is the optical flow's, in steps of 0.1 m/s, its climb rate likewise.
     habits=ErrorHabits(0.5, 5.0, 0.7, 0.05, 0.0, reports_climb=True, tells_attitude=True, tells_steps=True),
     processes=a_process_each(_settings),
-    # Sticks in the middle never lift one that stands. The vehicle obeys whoever speaks.
+    # Sticks in the middle never lift one that stands. The vehicle obeys every sender.
     stop=lambda orders: StopDatagrams(COMMAND_PORT, rc(0, 0, 0, 0), LAND),
     sections={"tello": TelloSection},
     required=frozenset({"tello"}),

@@ -1,4 +1,4 @@
-"""Settings of a Tello: its section of the field file, and what its driver is told."""
+"""Settings of a Tello: its section of the field file, and its driver's section."""
 
 from typing import Annotated
 

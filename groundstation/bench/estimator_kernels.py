@@ -30,7 +30,7 @@ def correct_frame(
 
 @kernel()
 def expect(belief: Belief, sensors: Rows[SensorRow], events: Rows[EventRow], row: int, out: Rows[Prediction]) -> None:
-    """Write what a camera expects of one event into the only row of a table, for the peers in Python."""
+    """Write the predicted observation of one event into the only row of a table, for the peers in Python."""
     expected, event = out[0], events[row]
     expected.size = event.size
     for i in range(expected.h.shape[0]):

@@ -29,7 +29,7 @@ from groundstation.process.ports import free_port
 _START_S = 25.0
 _SETTLE_S = 1.0
 _SETPOINT_S = 0.05
-_APART_M = 5.0  # who is too near to another lands
+_APART_M = 5.0  # a vehicle too near to another lands
 _STANDING = (1e-4, *(0.0,) * 4, 1e-4, *(0.0,) * 4, 1e-4, *(0.0,) * 4, 1e-4)
 
 
@@ -86,7 +86,7 @@ class _TimedLink:
 
     @property
     def called_from(self) -> tuple[tuple[str, int], ...]:
-        """Addresses at which the vehicles were last heard."""
+        """The last addresses of the vehicles."""
         return self.link.called_from
 
     @property

@@ -146,7 +146,7 @@ def naive_calls(robots: int, evaluations: float) -> float:
 
 
 def peak_memory_mb() -> float:
-    """Return the largest resident size of this process so far [MB]; 0 if the system does not tell it.
+    """Return the largest resident size of this process so far [MB]; 0 if the system does not report it.
 
     Not ru_maxrss, which a child inherits from the process that started it.
     """

@@ -41,7 +41,7 @@ def _context(identity: Identity) -> ssl.SSLContext:
 def _knock(context: ssl.SSLContext, raw: socket.socket, host: str) -> str:
     try:
         with context.wrap_socket(raw, server_hostname=host) as guarded:
-            guarded.recv(1)  # in TLS 1.3 a refusal follows the handshake; an admitted member hears nothing yet
+            guarded.recv(1)  # in TLS 1.3 a refusal follows the handshake; an admitted member gets nothing yet
     except ssl.SSLCertVerificationError as error:
         return _mistrust(error, host)
     except ssl.SSLError as error:

@@ -8,19 +8,19 @@ class Role(StrEnum):
     """Purpose of a member of the bus."""
 
     SUPERVISOR = "supervisor"
-    """The run's main process: watches the others, and is the operator's hands."""
+    """The run's main process: watches the others, and contains the operator."""
     TRACKER = "tracker"
     """Estimates and plans."""
     DRIVER = "driver"
-    """Speaks for its vehicles."""
+    """Serves its vehicles."""
     CAMERA = "camera"
-    """Speaks for one camera."""
+    """Serves one camera."""
     TARGET = "target"
-    """Speaks of one target's own motion."""
+    """Reports one target's own motion."""
     DIAGNOSIS = "diagnosis"
-    """Says which figure of the field is wrong."""
+    """Reports which figure of the field is wrong."""
     RECORDER = "recorder"
-    """Writes all of it down."""
+    """Writes the recording."""
     CONSOLE = "console"
     """Serves the operator's page."""
     MONITOR = "monitor"
@@ -28,19 +28,19 @@ class Role(StrEnum):
     SIM_BRIDGE = "sim_bridge"
     """Emulates devices and publishes the truth."""
     LIAISON = "liaison"
-    """Speaks with one other host, for the supervisor."""
+    """Communicates with one other host, for the supervisor."""
     HOST = "host"
     """Runs devices of the field on another host."""
     CLI = "cli"
     """A command in another shell."""
     VIEW = "view"
-    """Listens only."""
+    """Subscribes only."""
 
 
 DEVICES = frozenset({Role.DRIVER, Role.CAMERA, Role.TARGET})
-"""Roles that speak of their own vehicles, cameras and targets only."""
+"""Roles that publish about their own vehicles, cameras and targets only."""
 WITNESSES = frozenset({Role.RECORDER, Role.CONSOLE, Role.MONITOR, Role.SIM_BRIDGE, Role.VIEW})
-"""Roles that may hear ground truth and the simulator; nothing that estimates or flies is among them."""
+"""Roles that may receive ground truth and the simulator's messages; none of them estimates or flies."""
 PROCESSES = frozenset(Role) - {Role.CLI, Role.VIEW}
 """Roles of the processes that a run starts."""
 
@@ -49,8 +49,8 @@ PROCESSES = frozenset(Role) - {Role.CLI, Role.VIEW}
 class Member:
     """One certificate of a run, with its role and member.
 
-    name: the certificate's common name; who has several roles by one certificate is several members. sources: the
-    sources that it may speak as, key chunks in which `$*` stands for any ending. entities: what a device speaks of.
+    name: the certificate's common name; a certificate with several roles is several members. sources: permitted
+    sources of its messages, key chunks in which `$*` stands for any ending. entities: subjects of a device's messages.
     """
 
     name: str
@@ -74,7 +74,7 @@ SHELLS = (
     Member(shell(Role.CONSOLE), Role.CONSOLE, ("console_$*",)),
     Member(shell(Role.VIEW), Role.VIEW, ("view_$*", "monitor_$*")),
 )
-"""What the owner of a run may join it as, from any shell."""
+"""Members as which the owner of a run may join it from any shell."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Rates at which a process that only shows samples takes them, by key."""
+"""Rates, by key, at which a process receives samples that it only shows."""
 
 from collections.abc import Iterable, Mapping
 

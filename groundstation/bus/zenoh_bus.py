@@ -1,6 +1,6 @@
 """The bus over Zenoh: one router listens, every other process is a client of it (a star).
 
-The only module that imports zenoh and the only place where its configuration is built. What flies speaks TLS with a
+The only module that imports zenoh and the only place where its configuration is built. A run uses TLS with a
 certificate at both ends and an access list at the router; without an identity everything is plain, for tests and
 benches of other things.
 """
@@ -27,22 +27,22 @@ from groundstation.errors import GroundStationError
 _log = logging.getLogger(__name__)
 
 # Setpoints go out at once, each in a batch of its own (express; docs/reference/zenoh.md 3).
-# Sensor samples share a batch with what waits: an idle link sends them as soon, and after a stall of the router a batch
-# takes all of them, where single batches run out at 16 and the recorder lost what the tracker had got.
+# Sensor samples share a batch with others that wait: an idle link sends them as soon. After a stall of the router a
+# batch takes all of them; single batches run out at 16, and the recorder then lost samples that the tracker had got.
 _PRIORITY = {
     Quality.CONTROL: ("REAL_TIME", True),
     Quality.SENSOR: ("DATA_HIGH", False),
     Quality.STATE: ("DATA", False),
     Quality.BULK: ("DATA_LOW", False),
 }
-# Batches that wait for a link before what follows is dropped; 2 by default, 16 is the most there can be. A replay needs
+# Batches that wait for a link before further ones are dropped; 2 by default, 16 at most. A replay needs
 # every message that the tracker got. Setpoints keep the short queue.
 _QUEUED_BATCHES = {"data_high": 16, "data": 16, "data_low": 16}
 
 
 AUTHORITY, CERTIFICATE, KEY = "authority.pem", ".pem", ".key"
 REFUSED_BY = "zenoh_link_tls"
-# The crate that reports who was refused at the door; what the access list denies is told only with all that it allows.
+# The crate that reports refused connections; it reports denials of the access list only together with all permissions.
 _LOGGED = f"error,{REFUSED_BY}=warn"
 _DENIED_BY = "zenoh::net::routing::interceptor::access_control"
 ALL: Mapping[str, float] = MappingProxyType({})
@@ -204,7 +204,7 @@ def open_bus(
 ) -> ZenohBus:
     """Connect to the router, retrying until the time-out; raises GroundStationError naming the endpoint.
 
-    identity: what a guarded router asks for; at_most_hz: by key, how many samples a second are let in.
+    identity: required by a guarded router; at_most_hz: by key, how many samples a second are let in.
     """
     configuration = _configuration("client", endpoint) | {"downsampling": _thinned(at_most_hz)}
     if identity is not None:

@@ -83,7 +83,7 @@ def _require_output(path: Path, force: bool) -> Path:
 
 
 class CalibrationSession:
-    """Collects views of one source until they suffice; tells the operator which views are still missing."""
+    """Collects views of one source until they suffice; reports the views that are still missing."""
 
     def __init__(self, pattern: "Pattern", enough: int, judged: Path | None) -> None:
         self._pattern, self._enough, self._judged = pattern, enough, judged

@@ -34,7 +34,7 @@ _ME = "deadman"
 _TURN_S = 0.02
 _FAREWELL_NS = 2 * NS_PER_S
 _KEYBOARD_PATIENCE_NS = 900 * NS_PER_MS
-_GAMEPAD_PATIENCE_NS = NEVER_NS  # it reports itself when it is let go
+_GAMEPAD_PATIENCE_NS = NEVER_NS  # it reports its release
 # WIRE: linux/joystick.h js_event: time u32, value s16, type u8 (1 = button, 0x80 = initial state), number u8.
 _EVENT = struct.Struct("<IhBB")
 _BUTTON = 1
@@ -133,7 +133,7 @@ def heed_signals(handle: Handle) -> None:
         signal.signal(number, leave)
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lose)
-    signal.signal(signal.SIGTTOU, signal.SIG_IGN)  # in the background it would be stopped for what it shows
+    signal.signal(signal.SIGTTOU, signal.SIG_IGN)  # in the background its output would stop it
 
 
 def watch(bus: "Bus", drones: tuple[str, ...], handle: Handle, man: DeadMan, go_on: Callable[[], bool]) -> None:

@@ -1,4 +1,4 @@
-"""`demo`: the lab of the method's Fig. 2 in the simulator, with the honest scenario."""
+"""`demo`: the lab of the method's Fig. 2 in the simulator, with the realistic scenario."""
 
 from typing import Any
 

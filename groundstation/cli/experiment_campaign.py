@@ -127,7 +127,7 @@ PICTURES_ONLY = (
     "jpeg_quality",
     "floor",
 )
-"""What a scenario says of cameras that only pictures show, which nobody draws at message level."""
+"""Keys of a scenario's cameras that matter in pictures only, which are not drawn at message level."""
 
 
 @cache

@@ -1,4 +1,4 @@
-"""Prepares compiled kernels for commands: chooses their cache, and tells that compiling takes a while."""
+"""Prepares compiled kernels for commands: chooses their cache, and reports that compiling takes a while."""
 
 import click
 

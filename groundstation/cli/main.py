@@ -41,7 +41,7 @@ def _command(name: str, verb: CommandRow) -> click.Command:
 
 
 class VerbGroup(click.Group):
-    """A click group whose commands are imported one at a time, so that `land` does not wait for what it never uses."""
+    """A click group whose commands are imported one at a time, so that `land` does not wait for unused ones."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the verbs in the order of the table."""
@@ -53,7 +53,7 @@ class VerbGroup(click.Group):
         return None if verb is None else _command(cmd_name, verb)
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Read the arguments; `help VERB` asks for what `VERB --help` prints, `help all` for every command."""
+        """Read the arguments; `help VERB` prints the same as `VERB --help`, `help all` for every command."""
         if args == ["help", "all"]:
             ctx.obj, args = "all", ["help"]
         return super().parse_args(ctx, [*args[1:], "--help"] if args[:1] == ["help"] else args)

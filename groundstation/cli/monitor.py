@@ -50,7 +50,7 @@ def choose(name: str | None) -> "RuntimeRecord":
 
 
 def cast_of(record: "RuntimeRecord") -> "Cast":
-    """Return drones and targets of a run, as far as its present recording tells them."""
+    """Return drones and targets of a run, as far as its present recording has them."""
     from groundstation.field.resolved import field_from_json
     from groundstation.monitor.state import Cast, cast_from_field
     from groundstation.recording.reader import attached_field

@@ -44,7 +44,7 @@ def new(directory: Path, page: bool) -> None:
     path = directory.resolve()
     path = path / f"{path.name}.yaml"
     refuse_existing([path])
-    if why := unwritable(path.parent):  # told before the first question
+    if why := unwritable(path.parent):  # reported before the first question
         raise OperatorMistake(f"{path.parent}: {why}")
     (_ask_on_page if page else _ask)(path)
     shown, typed = directory / path.name, shlex.quote(str(directory / path.name))

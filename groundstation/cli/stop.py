@@ -25,7 +25,7 @@ from groundstation.supervisor.joining import join
 from groundstation.supervisor.runtime_file import RuntimeRecord
 
 # A router that died is back by then; drones hover without one. A living one may be busy, and a signal is the last
-# resort: drivers that get it land and exit, whatever the order was.
+# resort: drivers that get it land and exit, for every verb.
 _CONNECT_S = 2.0
 
 

@@ -52,7 +52,7 @@ def list_() -> None:
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def check(kind: str, options: tuple[str, ...], only: str, damaged: int, as_json: bool) -> int:
     """Check KIND: its driver flies its emulator in real time on loopback addresses, for about six minutes."""
-    # The simulator is never imported by what flies.
+    # Flight software never imports the simulator.
     command = [sys.executable, "-m", "sim_bridge.conformance", kind, "--only", only, "--damaged", str(damaged)]
     for option in options:
         command += ["--with", option]

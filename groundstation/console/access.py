@@ -29,7 +29,7 @@ def refusal(scope: Mapping[str, Any], names: frozenset[str] = _LOOPBACK_NAMES) -
     if _hostname(f"http://{host}") not in names:
         return "the Host header names no address of this server"
     if scope["type"] == "websocket":
-        # Browsers let any page open a WebSocket to anywhere, and always say which page it was.
+        # Browsers let any page open a WebSocket to anywhere, and always send the origin of that page.
         page = f"{scope['scheme'].replace('ws', 'http')}://{host}"
         return "" if headers.get(b"origin", "") == page else "the Origin is not this page"
     if scope["method"] not in _SAFE_METHODS:
@@ -62,7 +62,7 @@ def security_headers(host: str) -> list[tuple[bytes, bytes]]:
 
 
 class Door:
-    """Distinguishes programs of the user who runs this server from those of others, who must show a code.
+    """Access check: programs of this server's user are admitted; those of other users must show a code.
 
     code: shown by others, once as `/?code=`, then as a cookie; code_file: where its owner finds it.
     """

@@ -21,7 +21,7 @@ from groundstation.console.viewer import PageConnection
 from groundstation.errors import MessageError
 
 MAX_VIEWERS = 100
-# Places beyond these for pages of the operator, who is asked for only then, and a bound on how many are asked at once.
+# Further places for the operator's pages, admitted only when all are taken, and a bound on pages asked at once.
 _OPERATORS_PLACES = 4
 _ASKED = 20
 _ANSWER_S = 1.0

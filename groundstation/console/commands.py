@@ -1,4 +1,4 @@
-"""Commands of the page: sent as by the command line, repeated until heard, followed until confirmed."""
+"""Commands of the page: sent as by the command line, repeated until acknowledged, followed until confirmed."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -24,7 +24,7 @@ _NOBODY: Mapping[str, str] = MappingProxyType({})
 class Followed:
     """One command on the bus, with its answers; `by`: the viewer who gave it, `ref`: that page's own id of it.
 
-    instead: what each who has not done it said it was doing when its time was out.
+    instead: the reported activity, at the time-out, of each drone that has not done it.
     """
 
     book: AwaitedAnswers
@@ -52,7 +52,7 @@ class Given:
 
 
 class CommandDesk:
-    """Sends commands, and follows these and everybody else's.
+    """Sends commands, and follows these and those of all others.
 
     Stops go to the drones at once. Starts go to the run's operator, who holds the lease and takes off one by one.
     """
@@ -71,7 +71,7 @@ class CommandDesk:
         self._lease = lease
 
     def lease_holder(self, now_ns: int) -> str:
-        """Return who holds a live operator lease, or ""."""
+        """Return the holder of a live operator lease, or ""."""
         return self._lease.holder if self._lease is not None and self._lease.expires_ns > now_ns else ""
 
     def give(self, verb: Verb, drones: tuple[str, ...], given: Given, now_ns: int) -> str:
@@ -94,7 +94,7 @@ class CommandDesk:
         return ""
 
     def hear(self, message: Command | CommandAck, now_ns: int) -> None:
-        """Follow a command of anybody, and every answer."""
+        """Follow a command of any issuer, and every answer."""
         if isinstance(message, CommandAck):
             followed = self._orders.get(message.command_id)
             if followed is not None:
@@ -108,7 +108,7 @@ class CommandDesk:
             self._keep(followed)
 
     def step(self, now_ns: int, doing: Mapping[str, str] = _NOBODY) -> None:
-        """Repeat what was not answered; close what is settled or out of time. doing: what each drone says it does."""
+        """Repeat unanswered commands; close settled and late ones. doing: the reported activity of each drone."""
         for order in self._orders.values():
             patience_ns = patience_s(order.book.command.verb) * NS_PER_S
             if not order.closed and now_ns - order.given_ns > patience_ns:
@@ -135,7 +135,7 @@ class CommandDesk:
         for identity, old in list(self._orders.items()):
             same = (old.book.command.issuer, old.book.command.verb, old.book.command.scope)
             if not old.by and same == (new.issuer, new.verb, new.scope):
-                del self._orders[identity]  # said again by somebody who repeats himself with new ids
+                del self._orders[identity]  # a repetition by an issuer that uses new ids
         self._orders[followed.book.command.id] = followed
         self._make_room()
 

@@ -20,9 +20,9 @@ class Grip(StrEnum):
 
 @dataclass(slots=True)
 class DeadMan:
-    """Pure: call `press` when the handle is felt, `step` often; they return the due stop, if any.
+    """Pure: call `press` at each sign that the handle is held, `step` often; they return the due stop, if any.
 
-    patience_ns: permitted time without feeling the handle. A keyboard repeats a held key, but only after some 0.5 s.
+    patience_ns: permitted time without a sign. A keyboard repeats a held key, but only after some 0.5 s.
     """
 
     patience_ns: int

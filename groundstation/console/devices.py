@@ -57,7 +57,7 @@ class Devices:
 
     @property
     def url(self) -> str:
-        """Where devices find the console; "" while it is nowhere."""
+        """The console's address for devices; "" while it has none."""
         with suppress(OSError):
             return (self._folder / _URL).read_text()
         return ""
@@ -82,7 +82,7 @@ class Devices:
             # In both directions: a clock that was set back must not keep an invitation alive.
             fresh = abs(time.time() - path.stat().st_mtime) < _INVITATION_LIVES_S
             role = path.read_bytes()
-            path.unlink()  # of two who show it at once, one finds it gone
+            path.unlink()  # if two show it at once, one finds it gone
         except OSError:
             return b""
         if not fresh:

@@ -1,5 +1,5 @@
 """One operator at a time among the viewers, of this console and of others; anybody may stop, and anybody may take over,
-in plain sight.
+visibly to all.
 """
 
 from dataclasses import dataclass

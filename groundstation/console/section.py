@@ -23,7 +23,7 @@ class ConsoleSection(msgspec.Struct, frozen=True):
 
 
 def devices_of(identities: str) -> Path:
-    """Return the folder of a run's invitations and devices; it lies with the run's certificates and goes with them."""
+    """Return the folder of a run's invitations and devices; it is beside the certificates and removed with them."""
     return Path(identities) / "devices"
 
 

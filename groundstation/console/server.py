@@ -60,7 +60,7 @@ _KEEPING_S = 3.0
 # Small, so that frames wait here, where the newest wins, not in the kernel.
 _SEND_BUFFER_BYTES = 64 * 1024
 _NEWEST = (ESTIMATE,)
-# Looked at in every other turn: arrows and crosses at 10 Hz are enough, and decoding is most of what this process does.
+# Read in every other turn: arrows and crosses at 10 Hz are enough, and decoding is most of this process's work.
 _LESS_OFTEN = (
     PLAN,
     VEHICLE_STATUS,
@@ -169,7 +169,7 @@ class ConsoleServer:
         return self._each.overflowed
 
     async def serve(self, go_on: Callable[[int, int], bool], end: Callable[[], RunEnd | None] = lambda: None) -> None:
-        """Serve until `go_on(turns, late turns)`, asked in each turn, says no; then show `end` to the open pages."""
+        """Serve until `go_on(turns, late turns)`, called in each turn, returns False; then show `end` to open pages."""
         servers = [serve(self.app.asgi, self._listener, protocol(self.half_open))]
         if self._network is not None and self.app.network is not None:
             http = protocol(self.half_open, self.peers)

@@ -13,7 +13,7 @@ _encoder = msgspec.json.Encoder(decimal_format="number")
 class Snapshot:
     """Sections are encoded once for all viewers; a viewer gets those that changed since its last frame.
 
-    So a slow viewer costs nothing, and misses only values that newer ones have replaced; what is added is not replaced.
+    So a slow viewer costs nothing, and misses only values that newer ones have replaced; added items are not replaced.
     """
 
     def __init__(self) -> None:
@@ -50,7 +50,7 @@ class Snapshot:
             self._composed.clear()
 
     def since(self, turn: int) -> bytes:
-        """Return the JSON object of all sections that changed after a turn (-1: all, but for what was added)."""
+        """Return the JSON object of all sections that changed after a turn (-1: all, without added items)."""
         composed = self._composed.get(turn)
         if composed is None:
             parts = [

@@ -31,7 +31,7 @@ NO_CAMERAS: Mapping[str, WorldCamera] = MappingProxyType({})
 
 
 class ConsoleState:
-    """Takes messages in and puts the sections of the board; pure but for what it is given."""
+    """Takes messages in and puts the sections of the board; pure but for the objects passed to it."""
 
     def __init__(self, cast: Cast, started_ns: int, cameras: Mapping[str, WorldCamera] = NO_CAMERAS) -> None:
         self.standing = StandingDrones(cameras, cast.drones)
@@ -81,11 +81,11 @@ class ConsoleState:
         self.history.step(now_ns, estimate, plan, nis, truth)
 
     def doing(self) -> dict[str, str]:
-        """Return what each drone says it does."""
+        """Return each drone's reported action."""
         return {name: seen.message.detail or seen.message.mode for name, seen in self.monitor.vehicles.items()}
 
     def put(self, board: Snapshot, now_ns: int) -> None:
-        """Put what changed on the board."""
+        """Put the changed values on the board."""
         board.put("estimate", told.estimate(self.monitor.estimate))
         board.put("setpoints", {name: told.setpoint(seen) for name, seen in self.setpoints.items()})
         if self.truth:
@@ -99,7 +99,7 @@ class ConsoleState:
             self.put_seldom(board, now_ns)
 
     def put_often(self, board: Snapshot, now_ns: int) -> None:
-        """Put what changes ten times a second."""
+        """Put the values that change ten times a second."""
         known = self.monitor
         vehicles = known.vehicles.items()
         board.put(
@@ -110,7 +110,7 @@ class ConsoleState:
         board.put("switch", told.switch(self.switch))
         board.put("sightings", [[*edge, stamp_ns / 1e6] for edge, stamp_ns in known.sightings.items()])
         board.put("events", [told.event(seen) for seen in list(known.events)[-_EVENTS:]])
-        # As often as what the page works out itself: an alarm that is over must not stand beside that.
+        # As often as the values computed by the page: an ended alarm must not be shown beside newer ones.
         alarms = alarms_of(known, now_ns)
         self.alarm_log.note(alarms, now_ns)
         board.put("alarms", [told.alarm(alarm) for alarm in alarms])

@@ -1,4 +1,4 @@
-"""How the page is told of each message: sections of the board, as JSON has them. Pure."""
+"""Converts messages to the page's sections of the board, as JSON values. Pure."""
 
 from collections.abc import Iterable
 from dataclasses import asdict
@@ -16,7 +16,7 @@ _ALTERNATIVES = 8
 
 
 def alarm(alarm: Alarm) -> dict[str, Any]:
-    """An alarm; told: when it was told [ms]."""
+    """An alarm; told: when it was reported [ms]."""
     values = asdict(alarm)
     told_ns = values.pop("told_ns")
     return {**values, "asks": alarm.asks, "told": None if told_ns is None else told_ns / 1e6}
@@ -33,7 +33,7 @@ def rounded(values: Iterable[float], digits: int = 4) -> list[float]:
 
 
 def estimate(seen: StampedMessage[m.Estimate] | None) -> dict[str, Any] | None:
-    """Where everybody is believed to be; None before the first estimate."""
+    """The estimates of all entities; None before the first estimate."""
     if seen is None:
         return None
     entities = [
@@ -45,7 +45,7 @@ def estimate(seen: StampedMessage[m.Estimate] | None) -> dict[str, Any] | None:
             "cov": rounded((entity.covariance[0], entity.covariance[1], entity.covariance[len(entity.mean) + 1]), 7),
             "velocity": rounded(entity.velocity_m_s, 3),
             "converged": entity.converged,
-            # Never seen is infinite in the filter, which JSON cannot say.
+            # Never seen is infinite in the filter, which JSON cannot express.
             "age_s": round(min(entity.age_s, 1e6), 2),
         }
         for entity in seen.message.entities
@@ -60,7 +60,7 @@ def search_map(seen: m.SearchMap) -> dict[str, Any]:
 
 
 def setpoint(seen: StampedMessage[m.VelocitySetpoint]) -> dict[str, Any]:
-    """What a drone was told to fly."""
+    """The setpoint of a drone."""
     setpoint = seen.message
     return {
         "at": milliseconds(seen),
@@ -71,13 +71,13 @@ def setpoint(seen: StampedMessage[m.VelocitySetpoint]) -> dict[str, Any]:
 
 
 def truth(seen: StampedMessage[m.TruthState]) -> dict[str, Any]:
-    """Where a body of the simulation is."""
+    """The true place of a simulated body."""
     truth = seen.message
     return {"at": milliseconds(seen), "position": rounded(truth.position_m, 3), "yaw": round(truth.attitude_rad[2], 4)}
 
 
 def vehicle(seen: StampedMessage[m.VehicleStatus]) -> dict[str, Any]:
-    """What a drone says of itself, but its battery."""
+    """The reports of a drone on itself, but its battery."""
     status = seen.message
     return {
         "at": milliseconds(seen),
@@ -93,7 +93,7 @@ def vehicle(seen: StampedMessage[m.VehicleStatus]) -> dict[str, Any]:
 
 
 def battery(battery: Battery) -> dict[str, Any]:
-    """What a battery holds, and for how long."""
+    """Charge of a battery, and the remaining time."""
     left = battery.endurance
     minutes = None if left is None else round(left.minutes, 1)
     words = "" if left is None else left.words
@@ -107,7 +107,7 @@ def battery(battery: Battery) -> dict[str, Any]:
 
 
 def camera(seen: StampedMessage[m.CameraStatus]) -> dict[str, Any]:
-    """How a camera delivers."""
+    """The health of a camera."""
     status = seen.message
     return {
         "at": milliseconds(seen),
@@ -120,7 +120,7 @@ def camera(seen: StampedMessage[m.CameraStatus]) -> dict[str, Any]:
 
 
 def process(seen: StampedMessage[m.ProcessStatus]) -> dict[str, Any]:
-    """How a process keeps up."""
+    """State, CPU use and deadlines of a process."""
     status = seen.message
     late = status.overruns / status.ticks if status.ticks else 0.0
     return {
@@ -162,7 +162,7 @@ def _option(topology: str, cost_m2: float) -> dict[str, Any]:
 
 
 def plan(seen: StampedMessage[m.Plan] | None) -> dict[str, Any] | None:
-    """The topology chosen with its rivals; None before the first plan."""
+    """The chosen topology with its alternatives; None before the first plan."""
     if seen is None:
         return None
     plan = seen.message

@@ -37,7 +37,7 @@ def real_time_right() -> Finding:
 
 
 def clock_source(path: Path = _CLOCK) -> Finding | None:
-    """Return a finding on the kernel's clock source, or None if it does not tell it."""
+    """Return a finding on the kernel's clock source, or None if it does not report it."""
     if not path.exists():
         return None
     name = path.read_text().strip()

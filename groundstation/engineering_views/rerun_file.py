@@ -54,7 +54,7 @@ def _write(run: RecordedRun, path: Path) -> tuple[int, list[str]]:
         count += 1
     try:
         stream.flush()
-    except RuntimeError as error:  # the library tells neither path nor cause
+    except RuntimeError as error:  # the library names neither path nor cause
         raise OutputError(f"{path.parent}: the file cannot be written ({error}); is the disk full?") from error
     finally:
         stream.disconnect()

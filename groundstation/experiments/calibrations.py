@@ -7,7 +7,7 @@ from groundstation.experiments.culprit_rows import WrongLab
 
 RMSE_M, ANEES = 0.04, (0.5, 2.0)
 BARS = {"turn": 0.3, "place": 0.01, "focal": 0.005, "print": 0.005, "delay": 5.0}
-"""What may be left wrong: deg, m, shares, ms."""
+"""Permitted remaining errors: deg, m, shares, ms."""
 _UNITS = {"turn": (1.0, "deg"), "place": (100.0, "cm"), "delay": (1.0, "ms")}
 _PERCENT = (100.0, "%")
 _KINDS = dict.fromkeys(("roll", "pitch", "yaw", "pan", "tilt"), "turn") | dict.fromkeys(

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 STAND_S = 4.0
-"""How long the team stands on its pads before it is judged and ordered to take off."""
+"""How long the team stands on its pads before it is judged and commanded to take off."""
 
 WrongFigure = tuple[str, str, float]
-"""Who, which part, true minus told: m, deg, ms, shares."""
+"""Entity, part, true minus configured value: m, deg, ms, shares."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +136,7 @@ def _failures(ceiling: str, one: str) -> Iterable[WrongLab]:
 
 
 def size_told(lab: WrongLab, line: str) -> float | None:
-    """Return the size told by a line that accuses the right culprit, NaN if it tells none; None for another culprit."""
+    """Return the size in a line that accuses the right culprit, NaN without a size; None for another culprit."""
     found = re.match(lab.says, line) if lab.says else None
     if found is None:
         return None

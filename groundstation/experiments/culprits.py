@@ -8,7 +8,7 @@ from groundstation.experiments.culprit_rows import WrongLab, size_told
 
 WITHIN_S = 20.0
 SIZE_SHARE = 0.25
-# Texts that accuse an entity; other warnings tell consequences.
+# Texts that accuse an entity; other warnings report consequences.
 _ACCUSES = ("explains best", "contradicts the belief", "its pictures seem", "was bumped")
 _EXCUSED = "probably not its fault"
 _REFUTED = "no longer suspected"
@@ -27,9 +27,9 @@ def accusations(flight: Mapping[str, Any]) -> list[tuple[float, str]]:
 def verdict_on(lab: WrongLab, flight: Mapping[str, Any]) -> dict[str, Any]:
     """Return the verdict on one flight.
 
-    end: "refused" (rightly, before the take-off), "right" (told in flight, in time), "late", "wrong" (another one was
-    accused first, or this one before it was wrong), "silent"; of a healthy lab "silent" or "false alarm". size_error:
-    relative error of the told size; said: the first accusation.
+    end: "refused" (rightly, before the take-off), "right" (reported in flight, in time), "late", "wrong" (another one
+    was accused first, or this one before it was wrong), "silent"; of a healthy lab "silent" or "false alarm".
+    size_error: relative error of the reported size; said: the first accusation.
     """
     said, on_pads = accusations(flight), flight["on_pads"]
     first = said[0] if said else None

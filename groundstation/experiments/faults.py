@@ -68,7 +68,7 @@ def totals(flights: Sequence[Mapping[str, Any]], timing: Sequence[Mapping[str, f
 
 
 def _deaf(spells: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return the number of spells in which a drone heard nothing, and its way and speed in them: median and most."""
+    """Return the number of spells without commands to a drone, and its distance and speed in them: median and most."""
     figures: dict[str, Any] = {"spells": len(spells)}
     for key in ("flown_m", "fastest_m_s") if spells else ():
         values = [spell[key] for spell in spells]

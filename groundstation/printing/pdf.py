@@ -10,7 +10,7 @@ _POINTS_PER_MM = 72.0 / 25.4
 
 @dataclass
 class Page:
-    """One page: its size [mm], and what was drawn on it so far."""
+    """One page: its size [mm], and its content so far."""
 
     width_mm: float
     height_mm: float

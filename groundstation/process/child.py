@@ -194,7 +194,7 @@ class Child:
 
     @property
     def left(self) -> int:
-        """Return what the process before this one left, 0 for nothing."""
+        """Return the number that the process before this one recorded, 0 for none."""
         return 0 if self._block is None else self._block.left(self.spec.heartbeat_index)
 
     def starting(self, detail: str) -> None:

@@ -1,6 +1,6 @@
 """Measures the offset of another host's clock by the quickest round trips. Pure; times in ns.
 
-A round trip bounds the offset by half of its delay whatever the network did, and the quickest of each second is nearly
+A round trip bounds the offset by half of its delay in any network, and the quickest of each second is nearly
 free of queues. The remaining error, half of the difference between the two ways, cannot be measured.
 """
 

@@ -84,7 +84,7 @@ class HeartbeatBlock:
             self._words[base + _WORKED] = 1
 
     def end(self, slot: int) -> None:
-        """Record that the work of this process is done: its vehicle stands, or could no longer be heard."""
+        """Record that the work of this process is done: its vehicle stands, or its telemetry ended."""
         self._words[slot * _WORDS_PER_SLOT + _ENDED] = 1
 
     def set_silent_since(self, slot: int, since_ns: int) -> None:
@@ -110,12 +110,12 @@ class HeartbeatBlock:
         self._words[slot * _WORDS_PER_SLOT + _LEFT] = number
 
     def left(self, slot: int) -> int:
-        """Return what the former holder of a slot left to this one, 0 for nothing."""
+        """Return the number that the former holder of a slot left to this one, 0 for none."""
         return self._words[slot * _WORDS_PER_SLOT + _LEFT]
 
     def clear(self, slot: int) -> None:
-        """Forget the former holder of a slot, before its successor starts; not since when others speak for it,
-        nor where its vehicles are, nor what it left."""
+        """Forget the former holder of a slot, before its successor starts; keep since when others send for it,
+        its vehicles' addresses, and its number for the successor."""
         base = slot * _WORDS_PER_SLOT
         self._words[base : base + _SILENT_SINCE] = memoryview(bytes(_SILENT_SINCE * 8)).cast("q")
 
@@ -132,11 +132,11 @@ class HeartbeatBlock:
         return self._words[slot * _WORDS_PER_SLOT + _WORKED] != 0
 
     def has_ended(self, slot: int) -> bool:
-        """Return whether the holder of a slot said that its work is done."""
+        """Return whether the holder of a slot reported that its work is done."""
         return self._words[slot * _WORDS_PER_SLOT + _ENDED] != 0
 
     def silent_since_ns(self, slot: int) -> int:
-        """Return since when others speak for the holder of a slot [ns]; 0: it speaks itself."""
+        """Return since when others have sent for the holder of a slot [ns]; 0: nobody does."""
         return self._words[slot * _WORDS_PER_SLOT + _SILENT_SINCE]
 
     def set_clock_offset(self, offset_ns: int) -> None:

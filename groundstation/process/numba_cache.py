@@ -55,7 +55,7 @@ def activate(packages: Iterable[str] = FLIGHT) -> Path:
 
 
 def require_writable(folder: Path) -> None:
-    """Raise GroundStationError where nothing can be kept: each start would compile for minutes, and say nothing."""
+    """Raise GroundStationError where nothing can be kept: each start would compile for minutes, silently."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
@@ -71,14 +71,14 @@ def is_complete(folder: Path) -> bool:
 
 
 def mark_complete(folder: Path) -> None:
-    """Remember that they are: the folder alone may be another checkout's, or half filled by a stopped compilation."""
+    """Record that they all are: the folder alone may be another checkout's, or half filled by a stopped compilation."""
     with suppress(OSError):  # then it is looked through once more next time
         folder.mkdir(parents=True, exist_ok=True)
         _mark(folder).touch()
 
 
 def _mark(folder: Path) -> Path:
-    checkout = hashlib.sha256(bytes(Path(__file__).parents[1])).hexdigest()[:16]  # numba keys what it keeps by path too
+    checkout = hashlib.sha256(bytes(Path(__file__).parents[1])).hexdigest()[:16]  # numba's keys include the path
     return folder / f"complete-{checkout}"
 
 
@@ -90,7 +90,7 @@ def _begin_with(flying: Path, folder: Path) -> None:
     try:
         shutil.copytree(flying, copy)
         copy.rename(folder)
-    except (OSError, shutil.Error):  # another process was first, or the disk is full: what lacks is compiled
+    except (OSError, shutil.Error):  # another process was first, or the disk is full: missing kernels are compiled
         shutil.rmtree(copy, ignore_errors=True)
 
 
@@ -109,7 +109,7 @@ class ParallelCompilation:
         self._process = subprocess.Popen([sys.executable, "-c", statement], stdin=subprocess.DEVNULL)
 
     def finish(self) -> bool:
-        """Wait for it; returns whether it did all. Whatever it did not compile is compiled where it is imported."""
+        """Wait for it; returns whether it compiled all. The remaining kernels are compiled where they are imported."""
         try:
             return self._process.wait(_COMPILE_LIMIT_S) == 0
         except subprocess.TimeoutExpired:

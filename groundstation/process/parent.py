@@ -1,4 +1,4 @@
-"""A dead supervisor is noticed within milliseconds, whatever killed it."""
+"""Detects a dead supervisor within milliseconds, for any cause of death."""
 
 import os
 import select
@@ -6,7 +6,7 @@ from contextlib import suppress
 
 
 class ParentWatch:
-    """Knows whether the process that started this one still lives.
+    """Watches whether the process that started this one still lives.
 
     Uses a pidfd, which becomes readable when the parent ends and cannot be fooled by a reused pid. Where the
     kernel has none, a changed parent pid is noticed when asked.

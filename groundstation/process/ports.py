@@ -1,4 +1,4 @@
-"""Finds a free port, and who holds one, by the kernel's tables of sockets and the descriptors of processes."""
+"""Finds a free port, or a port's holder, by the kernel's tables of sockets and the descriptors of processes."""
 
 import errno
 import os
@@ -55,7 +55,7 @@ def port_of(endpoint: str) -> int:
 
 
 def holder_of(address: str, port: int, kind: socket.SocketKind = socket.SOCK_STREAM) -> Holder:
-    """Return who keeps others from binding an address and port: it holds that address, or all of them."""
+    """Return the process that prevents binding an address and port: it holds that address, or all of them."""
     everywhere = ("0.0.0.0", "::")
     inodes = {
         f"socket:[{held.inode}]"

@@ -1,4 +1,4 @@
-"""Loops with deadlines go first, and what all wait for gets a larger share, where the system lets them."""
+"""Real-time priority for loops with deadlines, a larger share for processes that others wait for, if permitted."""
 
 import os
 import time
@@ -6,7 +6,7 @@ from contextlib import suppress
 from enum import IntEnum
 from pathlib import Path
 
-LARGEST = -5  # of what flies; what only emulates can have more (docs/decisions/0137)
+LARGEST = -5  # of flight processes; emulators can have more (docs/decisions/0137)
 _AUTOGROUP = Path("/proc/self/autogroup")
 _TURNS, _TURN_S = 40, 0.05  # the kernel lets ordinary users change one session each 0.1 s, all of them together
 
@@ -38,10 +38,9 @@ def go_first(rank: Rank = Rank.TICK, *, heirs: bool = False) -> bool:
 def take_share(nice: int = LARGEST) -> bool:
     """Give this thread and all that it starts from now on a share of the processor: a larger one for nice below 0.
 
-    A large one is for what others wait for and that never computes for long (docs/decisions/0137). Returns whether it
-    is allowed. Where not, all that is not LARGEST takes less instead, so that the proportions hold.
-    Linux shares the processor out by session first (autogroup), and nice acts within one: a session of its own gets
-    both.
+    A large one is for processes that others wait for and that never compute for long (docs/decisions/0137). Returns
+    whether it is allowed. If not, all others than LARGEST take less instead, so that the proportions hold. Linux shares
+    the processor out by session first (autogroup), and nice acts within one: a session of its own gets both.
     """
     own_session = os.getsid(0) == os.getpid()
     with suppress(OSError):
@@ -54,7 +53,7 @@ def take_share(nice: int = LARGEST) -> bool:
 
 
 def _may_have_more() -> bool:
-    """Ask for the largest share, which is had from then on if there is the right to it."""
+    """Take the largest share, if permitted; return whether it is."""
     try:
         os.setpriority(os.PRIO_PROCESS, 0, LARGEST)
     except PermissionError:
@@ -63,7 +62,7 @@ def _may_have_more() -> bool:
 
 
 def _set(nice: int, own_session: bool) -> None:
-    with suppress(PermissionError):  # it was started with less than this
+    with suppress(PermissionError):  # its share was smaller at the start
         os.setpriority(os.PRIO_PROCESS, 0, nice)
     for _ in range(_TURNS if own_session and _AUTOGROUP.exists() else 0):
         with suppress(BlockingIOError):

@@ -8,7 +8,7 @@ from pathlib import Path
 _PROC = Path("/proc")
 _TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 _IDLE = slice(3, 5)  # idle, and idle while a disk works
-_COUNTED = slice(0, 8)  # from user to steal; what guests use counts as user already
+_COUNTED = slice(0, 8)  # from user to steal; guests' time counts as user already
 
 
 class OwnUse:
@@ -29,7 +29,7 @@ class OwnUse:
 
 
 def waited_ns(task: str = "self") -> int:
-    """Return for how long a task was ready to run and had no core [ns]; 0 if the kernel does not tell.
+    """Return for how long a task was ready to run and had no core [ns]; 0 if the kernel does not report it.
 
     task: its folder below /proc; "self" is this process's main thread.
     """
@@ -47,7 +47,7 @@ def all_waited_ns(pid: int) -> int:
 
 
 def busy_s() -> float | None:
-    """Return the time that all cores of this computer were busy, since it started [s]; None if it does not tell."""
+    """Return the time that all cores of this computer were busy, since it started [s]; None if it is not reported."""
     try:
         head, *times = (_PROC / "stat").read_text().partition("\n")[0].split()
         counted = [int(each) for each in times[_COUNTED]]

@@ -1,4 +1,4 @@
-"""Makes standard input and output reliable for a program, whatever started it."""
+"""Makes standard input and output reliable for a program, however it was started."""
 
 import os
 import sys

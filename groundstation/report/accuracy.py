@@ -16,7 +16,7 @@ class Accuracy(msgspec.Struct, frozen=True):
     """Accuracy of one entity's estimates over an interval.
 
     rmse_m, max_error_m, lost_s (error > 0.5 m) count a missing or stale estimate as 1 m; covered: share of time with
-    an estimate; anees: mean normalised squared error over its dimension (1 = honest covariance, > 1 = overconfident);
+    an estimate; anees: mean normalised squared error over its dimension (1 = right covariance, > 1 = overconfident);
     judged: share of the interval for which the truth is known; all other figures are of that part.
     """
 

@@ -19,7 +19,7 @@ MAX_MISSED_PERCENT = 1.0
 MIN_RATE_SHARE = 0.98
 MAX_SIM_OVERRUN_PERCENT = 1.0
 MAX_STARVED_S = 1.0
-# Share of the time; and what runs beside a flight, at low priority.
+# Share of the time; and processes beside a flight, at low priority.
 _MOST_WAITED = 0.3
 _IN_NO_HURRY = frozenset({"diagnosis", "recorder", "console"})
 _SAFE = frozenset({"max_fence_violation_m", "min_separation_m", "landed"})

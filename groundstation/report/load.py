@@ -9,7 +9,7 @@ from groundstation.report.tracks import ProcessTrack, RunData
 
 TRACKER = "tracker"
 _PID, _TICKS, _OVERRUNS, _OVERFLOWED = range(4)
-# Alone on a computer of two cores, nobody waits for a core for more than a tenth of a second; what others use is 0.1.
+# Alone on a computer of two cores, nobody waits for a core for more than a tenth of a second; other programs use 0.1.
 _WAITED, _OTHERS_CPU = 0.3, 0.5
 
 
@@ -79,7 +79,7 @@ def starved_s(data: RunData, start_s: float, end_s: float) -> float:
 
 
 def waited(data: RunData, start_s: float, end_s: float) -> dict[str, float]:
-    """Return the share of a time for which each process waited for a core; processes that say nothing are left out."""
+    """Return the share of a time for which each process waited for a core; only for processes that report it."""
     shares: dict[str, float] = {}
     for name, track in sorted(data.processes.items()):
         during = track.waited[(track.time_s > start_s) & (track.time_s <= end_s)]

@@ -19,7 +19,7 @@ class RunFigures(msgspec.Struct, frozen=True, kw_only=True):
 
     target_*: of several targets, those of the worst; target: all figures of the one with the largest error; found: of
     each target from when it was found, None if it never was.
-    failsafe_landings: which drones a failsafe landed or cut, when and why. truth: what the errors are measured against,
+    failsafe_landings: which drones a failsafe landed or cut, when and why. truth: the reference of the errors,
     a motion capture system of the field or the simulator, "" for nothing. starved_s: how long other programs of the
     computer kept processes of the run from it; waited: the share of the time for which each waited for a core.
     """

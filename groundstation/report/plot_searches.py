@@ -1,4 +1,4 @@
-"""Maps of searches: believed places of the target, its true place, and the places of the drones."""
+"""Maps of searches: probable places of the target, its true place, and the places of the drones."""
 
 import numpy as np
 from matplotlib.axes import Axes

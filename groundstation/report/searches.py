@@ -1,4 +1,4 @@
-"""Searches for a lost target: begin and end of each, and maps of the target's believed place."""
+"""Searches for a lost target: begin and end of each, and maps of the target's probable place."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -114,7 +114,7 @@ class ProcessTrack:
     """Statuses of one process: time (n), cpu share (n), pid, ticks, overruns, overflowed (n each).
 
     waited: share of the time for which it had no core (n); others_cpu: cores that other programs used (n), nan where
-    it does not tell.
+    it is not reported.
     """
 
     time_s: Array

@@ -20,7 +20,7 @@ _MOVED_SIGMAS = 3.0
 _LATE_MS, _LATE_SIGMAS = 20.0, 3.0
 # Least time for which a plan counts on a link, and largest age of an observation of it.
 _PLANNED_S, _SEEN_S, _SEEN_PERCENT = 5.0, 0.5, 50.0
-# A plan lists all permitted edges; it counts on those that would tell a place to 0.1 m [1/m^2].
+# A plan lists all permitted edges; it counts on those that would determine a place to 0.1 m [1/m^2].
 _COUNTED_ON = 100.0
 _PLAN_LASTS_S = 1.0
 _TRACKER, _DIAGNOSIS = "tracker", "diagnosis"

@@ -33,7 +33,7 @@ KIND_WORDS = {
     OTHER: "another topology",
     NONE: NOBODY,
 }
-"""What the kinds of topologies are called."""
+"""Names of the kinds of topologies."""
 _SECONDS_OF = "topology_seconds."
 
 

@@ -1,4 +1,4 @@
-"""What the tracker publishes: estimate, belief, setpoints, plan, innovations, journal, orders to land."""
+"""Publishes the tracker's results: estimate, belief, setpoints, plan, innovations, journal, orders to land."""
 
 from collections.abc import Iterable, Mapping
 

@@ -5,7 +5,7 @@ from groundstation.bus.messages import OPERATOR, Command, Verb
 from groundstation.time_units import NS_PER_S
 
 TEAM = "team"
-# A start that was not heard by then is dropped: executed later, it would surprise people.
+# A start that has not arrived by then is dropped: executed later, it would surprise people.
 START_LIVES_NS = 5 * NS_PER_S
 _PATIENCE_S = {Verb.LAND: 20.0, Verb.TAKEOFF: 60.0, Verb.TRACK: 8.0, Verb.RESUME: 8.0}
 _PATIENCE_DEFAULT_S = 5.0

@@ -80,14 +80,14 @@ class ConsistencyWatch:
             self._froze_at[message.header.entity, kind] = now_ns
 
     def take(self, corrections: Iterable[Correction], now_ns: int) -> None:
-        """Take corrections; one that brought its subject into the belief says nothing of the belief before."""
+        """Take corrections; one that initialised its subject is no evidence on the belief before."""
         for c in corrections:
             if c.nis is not None and c.residual and not c.joined and {c.observer, c.subject} <= self._alarms.keys():
                 edge = self._edges.setdefault((c.observer, c.subject), _Edge())
                 edge.take(min(c.nis / len(c.residual), _MOST), now_ns)
 
     def notices(self, now_ns: int, cause: str = "") -> list[Notice]:
-        """Return new and ended warnings; cause: what explains contradictions, if known."""
+        """Return new and ended warnings; cause: the explanation of contradictions, if known."""
         return self._contradictions(now_ns, cause) + self._freezes(now_ns)
 
     def _contradictions(self, now_ns: int, cause: str) -> list[Notice]:
@@ -133,7 +133,7 @@ class ConsistencyWatch:
 def _culprit(pair: tuple[str, str], far: Collection[tuple[str, str]], live: Collection[tuple[str, str]]) -> str:
     """Return the entity to blame for a contradicting pair: the observer if it contradicts alone, or elsewhere as well.
 
-    If all that see a subject contradict the belief of it, the subject is named: nobody can tell which of them is right.
+    If all observers of a subject contradict its estimate, the subject is named: the culprit cannot be determined.
     """
     observer, subject = pair
     rivals = [other for other in live if other[1] == subject and other[0] != observer]

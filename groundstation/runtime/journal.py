@@ -1,4 +1,4 @@
-"""The tracker's journal: what each tick took in and which plan it adopted (replayed by groundstation.replay)."""
+"""The tracker's journal: inputs and adopted plan of each tick (replayed by groundstation.replay)."""
 
 from dataclasses import dataclass
 

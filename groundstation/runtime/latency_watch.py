@@ -1,4 +1,4 @@
-"""Warns the operator when a camera's pictures are older or newer than its delay setting says; no action follows."""
+"""Warns the operator when a camera's pictures are older or newer than its configured delay; no action follows."""
 
 import math
 

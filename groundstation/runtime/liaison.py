@@ -1,7 +1,7 @@
-"""The liaison process: speaks for the supervisor with one other host that runs devices of the field.
+"""The liaison process: communicates for the supervisor with one other host that runs devices of the field.
 
-It sends the host its order of what to run, answers its time requests, and falls silent to it when the supervisor does.
-To the supervisor it stands for all devices there: it is unwell while the host is, and ends when they have ended.
+It sends the host its order, answers its time requests, and falls silent to it when the supervisor does. To the
+supervisor it represents all devices there: it is unwell while the host is, and ends when they have ended.
 """
 
 from importlib.metadata import version
@@ -43,7 +43,7 @@ class LiaisonSection(msgspec.Struct, frozen=True):
 class Liaison:
     """The exchange with one host; times are of the run's clock.
 
-    If two processes use its name, only the first is heard until it is silent. doubled: whether a second was just heard.
+    If two processes use its name, only the first counts until it is silent. doubled: whether a second has just sent.
     """
 
     def __init__(self, bus: Bus, section: LiaisonSection) -> None:
@@ -93,7 +93,7 @@ class Liaison:
         return self._newest is not None and self._newest.run == self._bus.run
 
     def silent(self, now_ns: int) -> bool:
-        """Return whether nothing was heard of the host for a while."""
+        """Return whether the host has been silent for a while."""
         return now_ns - self._heard_ns > _SILENT_NS
 
     def state(self, now_ns: int) -> tuple[Lifecycle, str]:

@@ -1,4 +1,4 @@
-"""Whether the drone that reports flight is the one whose marker rose. Pure.
+"""Checks that the drone that reports flight is the one whose marker rose. Pure.
 
 Reports are assigned to a drone by address, sightings by marker. If the two disagree, the addresses or the markers of
 two drones are exchanged, and the tracker would steer one drone by sightings of the other.
@@ -17,7 +17,7 @@ RISEN_M = 0.25
 # m: a marker on the floor is off by twice the tolerance. An autopilot's height is a barometer's or our own belief sent
 # back, and is never published (drivers/mavlink/publisher.py): of those vehicles only the rise counts.
 AGREES_M = 0.4
-# A vehicle whose estimator is fed another one's height climbs without end, at up to 1 m/s in the simulator.
+# A vehicle whose estimator is sent another one's height climbs without end, at up to 1 m/s in the simulator.
 _OTHER_ROSE_NS = NS_PER_S // 2
 _NOTHING_ROSE_NS = 3 * NS_PER_S
 # A vehicle that reports no height may report flight as soon as its skids are free: PX4 took 2 s from there to RISEN_M

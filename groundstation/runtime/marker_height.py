@@ -36,7 +36,7 @@ class MarkerHeight:
         self._sightings.append((now_ns, height_m))
 
     def forget(self) -> None:
-        """Start anew: past places of the marker say nothing of its present one."""
+        """Start anew: past places of the marker do not count any more."""
         self._sightings.clear()
 
     def at(self, now_ns: int) -> float | None:

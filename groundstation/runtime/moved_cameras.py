@@ -1,4 +1,4 @@
-"""Hands on which cameras were moved, from a tracker to the one that is started in its place, in flight."""
+"""Passes the moved cameras on from a tracker to its successor, in flight."""
 
 from typing import Protocol
 
@@ -13,7 +13,7 @@ class Heir(Protocol):
 
     @property
     def left(self) -> int:
-        """Return what the process before this one left, 0 for nothing."""
+        """Return the number that the process before this one recorded, 0 for none."""
 
     def leave(self, number: int) -> None:
         """Record a number for the process that is started in place of this one."""
@@ -28,13 +28,13 @@ class MovedCameras:
         self._noted = heir.left
 
     def recall(self, now_ns: int) -> list[Notice]:
-        """Take over what the tracker before this one knew; returns the notices for the operator."""
+        """Restore the moved cameras known to the tracker before this one; returns the notices for the operator."""
         if not self._noted:
             return []
         return self._mounts.recall([name for bit, name in enumerate(self._names) if self._noted >> bit & 1], now_ns)
 
     def note(self) -> None:
-        """Record what this tracker knows."""
+        """Record the moved cameras that this tracker knows."""
         moved = self._mounts.moved
         known = sum(1 << bit for bit, name in enumerate(self._names) if name in moved)
         if known != self._noted:

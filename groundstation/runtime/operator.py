@@ -99,7 +99,7 @@ class Operator:
         self._give(Verb.TRACK, drones or self.team.up, now_ns, request)
 
     def land(self, now_ns: int) -> None:
-        """Land all drones; whatever else is in progress ends."""
+        """Land all drones, and end everything else in progress."""
         # Not judged by the phase: another shell's LAND sets it as well, and may have been lost on its way to the
         # drones.
         if not self._given.lands_all:
@@ -113,7 +113,7 @@ class Operator:
         return not self.team.airborne(now_ns)
 
     def _end_starts(self, stop: Command, now_ns: int) -> None:
-        """Cancel starts for a stop of the whole team, and tell the shells that requested them."""
+        """Cancel starts for a stop of the whole team, and answer the shells that requested them."""
         why = StopMark.of(stop, now_ns, clock.clock_id()).words
         if self._sequence_request is not None:
             self._requests.answer(self._sequence_request, AckStage.REFUSED, why)

@@ -101,7 +101,7 @@ class Recorder:
 
     def _report(self, series: "FileSeries") -> None:
         for trouble in series.take_troubles():
-            # A warning: it stands in the file that goes on, so the report tells of the hole before it.
+            # A warning: it stands in the file that goes on, so the report names the gap before it.
             severity = Severity.WARNING if trouble.recovered else Severity.ERROR
             remedy = (
                 "" if trouble.recovered else f"make room in {self._folder}, leave it there; the flight is not affected"

@@ -21,7 +21,7 @@ def is_request(message: object) -> bool:
 def asked_ns(start: Command | None) -> int | None:
     """Return when a start was requested [ns; our boot clock]; None for other commands, and for stamps of another clock.
 
-    Drivers need it to refuse a start that is older than a stop they heard.
+    Drivers need it to refuse a start that is older than a stop that they received.
     """
     if start is None or start.verb.stops or start.header.clock != clock.clock_id():
         return None
@@ -29,7 +29,7 @@ def asked_ns(start: Command | None) -> int | None:
 
 
 class Requests:
-    """Remembers the last answer to each request, the stops that were heard, and the last stop of each drone."""
+    """Remembers the last answer to each request, the stops that arrived, and the last stop of each drone."""
 
     def __init__(self, bus: Bus, drones: Collection[str]) -> None:
         self._bus = bus

@@ -20,7 +20,7 @@ _LINGER_NS = 25 * NS_PER_S
 
 
 class RouterSection(msgspec.Struct, frozen=True):
-    """The router's section: where to listen, and whom to let in (None: everybody).
+    """The router's section: its endpoint, and the admitted members (None: all).
 
     also: further endpoints, for other hosts. name_refusals: whether events name members that publish without the right
     to.
@@ -33,7 +33,7 @@ class RouterSection(msgspec.Struct, frozen=True):
 
 
 def run(child: Child) -> int:
-    """Route until told to stop. When the supervisor dies, stay until the landing has had its time."""
+    """Route until a stop is requested. When the supervisor dies, stay until the landing has had its time."""
     section = msgspec.json.decode(child.section, type=RouterSection)
     refusals = RouterRefusals()
     session = open_router(

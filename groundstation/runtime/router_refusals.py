@@ -1,4 +1,4 @@
-"""What the router refused: Zenoh reports it on standard output only."""
+"""The router's refusals, which Zenoh reports on standard output only."""
 
 import fcntl
 import logging
@@ -87,8 +87,8 @@ class RouterRefusals:
             return
         if name := _NAME.search(who[0]):
             self._members[who[1]] = name[1].decode()
-            # A member that declares a key, if only to subscribe, is told all rights to it in one block: nothing was
-            # put.
+            # When a member declares a key, if only to subscribe, all its missing rights are logged in one block:
+            # nothing was put.
             if who[0] + _DENIED.replace(b"Put", b"Reply") + key in before:
                 return
         self._denied[self._members.get(who[1], "a member")] = _described(key.decode(errors="replace"))

@@ -1,6 +1,6 @@
 """Take-off one by one: the next drone starts once the one before is seen in flight, and none after a likely mix-up.
 
-A state machine without clock or bus: `step` gets the time and returns what to order.
+A state machine without clock or bus: `step` gets the time and returns the commands.
 """
 
 from collections.abc import Collection
@@ -47,8 +47,8 @@ class _Step(Enum):
 class TakeOff:
     """One take-off of the given drones, except those that fly already; finished when no drone is waiting.
 
-    up: drones that flew already or were seen in flight; left_out: the others, with reasons; mistake: what ended the
-    sequence early.
+    up: drones that flew already or were seen in flight; left_out: the others, with reasons; mistake: the
+    likely mix-up that ended the sequence early.
     """
 
     def __init__(
@@ -118,7 +118,7 @@ class TakeOff:
 
     def _lift_off(self, now_ns: int, progress: Progress | None) -> TakeOffCommand | None:
         if progress is not None and progress.stage is AckStage.REFUSED:
-            # Some reasons pass (lease not heard yet, trim not done): ask again for a while.
+            # Some reasons pass (no lease received yet, trim not done): ask again for a while.
             self._refusal = f"refused: {progress.reason}"
             self._go_to(_Step.CONNECT, now_ns, keep_time=True)
             return None
@@ -130,7 +130,7 @@ class TakeOff:
         if is_seen_in_flight(member, now_ns):
             self.up.append(self._waiting.pop(0))
             self._next(now_ns)
-            self._ordered_ns = now_ns  # the next one's driver must hear first where this one flies
+            self._ordered_ns = now_ns  # the next one's driver must first receive this one's place
         elif self._late(now_ns, self._limits.unseen_s):
             return self._leave_out(why_unseen(member, now_ns, self._limits.unseen_s), now_ns, land=True)
         return None

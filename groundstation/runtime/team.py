@@ -1,4 +1,4 @@
-"""What the operator knows of each drone: its own reports, and the height at which fixed sensors see it."""
+"""State of each drone for the operator: its own reports, and the height at which fixed sensors see it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -56,7 +56,7 @@ class Member:
     measured_ns: int = 0
 
     def connected(self, now_ns: int) -> bool:
-        """Return whether its driver reports, and hears the drone."""
+        """Return whether its driver reports, and receives telemetry."""
         return self.fresh(now_ns) and self.state not in UNHEARD
 
     def fresh(self, now_ns: int) -> bool:
@@ -75,7 +75,7 @@ class Member:
 
     @property
     def stood(self) -> bool:
-        """Return whether it is no longer heard, and stood until then."""
+        """Return whether it is silent, and stood until then."""
         return stood_last(self.state, self.mode)
 
     @property
@@ -137,7 +137,7 @@ class TeamStatus:
             member.heard_ns = now_ns
 
     def _see(self, observer: str, subject: str, position_m: Vector3, now_ns: int) -> None:
-        # Only fixed cameras know their own height, whatever is wrong with the drones.
+        # Only fixed cameras know their own height independently of the drones' faults.
         camera, member = self._cameras.get(observer), self.members.get(subject)
         if camera is not None and member is not None:
             member.marker.see(now_ns, camera.height_of(position_m))
@@ -158,7 +158,7 @@ class TeamStatus:
         return tuple(name for name, member in self.members.items() if member.up)
 
     def airborne(self, now_ns: int) -> tuple[str, ...]:
-        """Return the drones not known to stand: a drone that was heard once and then lost counts as flying.
+        """Return the drones not known to stand: a drone that connected once and then was lost counts as flying.
 
         Except one that last stood, without an order to take off: its battery is empty.
         """

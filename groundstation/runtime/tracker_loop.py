@@ -1,4 +1,4 @@
-"""The tracker's loop: one tick takes in what arrived, advances the belief, and publishes the results."""
+"""The tracker's loop: one tick takes in new messages, advances the belief, and publishes the results."""
 
 from collections import Counter
 from collections.abc import Callable

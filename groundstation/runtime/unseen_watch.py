@@ -20,8 +20,7 @@ class UnseenWatch:
     def step(self, now_ns: int, ages_s: Mapping[str, float]) -> list[str]:
         """Return the robots to name now; ages_s: for how long each airborne robot has not been localised.
 
-        Infinite: never since it flies, or not since its belief was given up; its time then goes on counting from
-        before.
+        Infinite: never since it flies, or not since its belief was given up; then the earlier count continues.
 
         A name is repeated once a second for as long as it applies.
         """

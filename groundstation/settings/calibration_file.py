@@ -1,4 +1,4 @@
-"""Calibration files on their own (config/cameras/*.yaml): read one, write one."""
+"""Reads and writes calibration files (config/cameras/*.yaml)."""
 
 import datetime
 import json

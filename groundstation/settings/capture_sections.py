@@ -5,7 +5,7 @@ from groundstation.settings.motion_capture import MotionCaptureSettings, RigidBo
 from groundstation.settings.schema import Field
 from groundstation.settings.values import Vector3
 
-# A drone that is pushed, falls or is carried is faster than it is asked to be.
+# A drone that is pushed, falls or is carried is faster than commanded.
 _MARGIN = 2.0
 
 

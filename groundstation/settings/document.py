@@ -1,4 +1,4 @@
-"""YAML 1.2 documents as trees whose nodes all know their line in the file."""
+"""YAML 1.2 documents as trees, with each node's line in the file."""
 
 import os
 import re

@@ -1,4 +1,4 @@
-"""Tells whether a point is in a world-fixed camera's picture."""
+"""Checks whether a point is in a world-fixed camera's picture."""
 
 import numpy as np
 

@@ -58,7 +58,7 @@ class NewRoom(NamedTuple):
 
     @property
     def fence_top_m(self) -> float:
-        """Height that no drone leaves upwards [m]."""
+        """Height of the fence's top [m]."""
         return round(self.height_m - _CEILING_M, 2)
 
     def half_view_m(self, height_m: float) -> Place:

@@ -25,7 +25,7 @@ def on_pads(field: Field, scenario: Mapping[str, Any]) -> list[str]:
 
 
 def _starts(scenario: Mapping[str, Any], targets: list[str]) -> dict[str, tuple[float, float]]:
-    """Return the first places of targets, as far as the scenario tells them; of a path for all, the first target's."""
+    """Return the first places of targets, as far as the scenario has them; of a path for all, the first target's."""
     own, common = scenario.get("targets", {}), scenario.get("target", {})
     paths = {name: own[name].get("path", {}) for name in targets if name in own}
     if targets[0] not in own:

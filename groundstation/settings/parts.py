@@ -11,7 +11,7 @@ from groundstation.settings.room import RoomSettings, WorldCameraSettings
 from groundstation.settings.target import OneOfTargets, TargetSettings, TrackedBody
 
 Finding = tuple[KeyPath, str]
-"""The path at fault, and what is wrong with it."""
+"""The path at fault, and the fault."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Settings of ranging systems: radios (UWB and others) that tell how far a robot is from anchors."""
+"""Settings of ranging systems: radios (UWB and others) that measure a robot's distances to anchors."""
 
 from typing import Annotated
 

@@ -57,7 +57,7 @@ HostName = Annotated[str, Field(pattern=r"^([a-z][a-z0-9_]{0,15})?$")]
 Vector2 = Annotated[tuple[float, float], of_length(2)]
 Vector3 = Annotated[tuple[float, float, float], of_length(3)]
 _Offset = Annotated[float, Field(ge=-2, le=2)]
-OnVehicle = Annotated[tuple[_Offset, _Offset, _Offset], of_length(3)]  # a typing error in a place tears the estimate
+OnVehicle = Annotated[tuple[_Offset, _Offset, _Offset], of_length(3)]  # a typing error in a place spoils the estimate
 Interval = Annotated[Vector2, AfterValidator(_rising)]
 VideoDelay = Annotated[float, Field(ge=0, le=2000)]
 Readout = Annotated[float, Field(ge=0, le=100)]

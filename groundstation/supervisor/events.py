@@ -40,7 +40,7 @@ class ProcessEvents:
             self.bus.publish(EVENT, Event(header=header, severity=severity, text=text, remedy=remedy))
 
     def told(self, text: str) -> None:
-        """Tell the operator something about the run, here and in the events of its pages; "" tells nothing."""
+        """Report something about the run to the operator, here and in the events of its pages; "": nothing."""
         if not text:
             return
         self._terminal.say(text)

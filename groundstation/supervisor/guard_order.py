@@ -35,7 +35,7 @@ def guarded(table: tuple[ProcessSpec, ...]) -> tuple[ProcessSpec, ...]:
     if not posts:
         return table
     order = GuardOrder(posts)
-    # If its driver died during the stop, a drone is told to hover, and then to land, before the guardian ends.
+    # If its driver died during the stop, a drone is commanded to hover, and then to land, before the guardian ends.
     stop_limit_s = max(post.words.land_after_s for post in posts) + order.landing_s + _MARGIN_S
     section = msgspec.json.encode(order).decode()
     return (replace(GUARDIAN, section=section, stop_limit_s=stop_limit_s), *table)

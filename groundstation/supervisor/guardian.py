@@ -1,7 +1,7 @@
 """The guardian process: stops and lands drones that have lost both their driver and the supervisor.
 
 It holds the prepared datagrams, reads the heartbeat block, and needs neither bus nor router. It starts first and stops
-last; without a supervisor it ends by itself once every drone has been told to land for long enough.
+last; without a supervisor it ends by itself once LAND has been sent to every drone for long enough.
 """
 
 import logging

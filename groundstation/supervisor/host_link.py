@@ -59,11 +59,11 @@ class HostLink:
         return self._supervision is Supervision.ENDS
 
     def watches(self, now_ns: int) -> bool:
-        """Return whether the run's supervisor was heard just now and is not frozen."""
+        """Return whether the run's supervisor has just sent and is not frozen."""
         return self._supervision is not Supervision.SILENT and now_ns - self.heard_ns < _HEARD_NS
 
     def silent_s(self, now_ns: int) -> float:
-        """Return how long the run's host has not been heard [s]."""
+        """Return how long the run's host has been silent [s]."""
         return (now_ns - self.heard_ns) / NS_PER_S
 
     def turn(self, now_ns: int, own: OwnState) -> None:

@@ -1,7 +1,6 @@
 """Signals of the supervisor: Ctrl-C, SIGTERM and a closed terminal alike ask to land and stop; a second hurries.
 
-Ctrl-\\ asks for it as well. Ctrl-Z is answered by a line, and does nothing else: who watches over drones in the air
-cannot be put aside.
+Ctrl-\\ asks for it as well. Ctrl-Z only prints a line: a supervisor with drones in the air cannot be suspended.
 """
 
 import os
@@ -55,7 +54,7 @@ class Interrupts:
         self._put_aside = True
 
     def clear(self) -> str:
-        """Empty the descriptor after it woke a poll; return what the operator should be told, or ""."""
+        """Empty the descriptor after it woke a poll; return a notice for the operator, or ""."""
         with suppress(BlockingIOError):
             os.read(self.descriptor, 512)
         told, self._put_aside = NOT_PUT_ASIDE * self._put_aside, False
@@ -72,7 +71,7 @@ class Interrupts:
 def put_aside_by_nobody() -> Iterator[None]:
     """Ignore Ctrl-Z while a process is started, which inherits that: a handler is not inherited. Main thread only."""
     kept = signal.getsignal(signal.SIGTSTP)
-    if not callable(kept):  # nobody answers to it, and what is ignored is inherited anyway
+    if not callable(kept):  # no handler is set, and an ignored signal is inherited anyway
         yield
         return
     signal.signal(signal.SIGTSTP, signal.SIG_IGN)

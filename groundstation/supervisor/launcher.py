@@ -47,7 +47,7 @@ class Launcher:
     def launch(self, spec: ProcessSpec, slot: int, life: int, spoken_since_ns: int = 0) -> subprocess.Popen[bytes]:
         """Start a process; `life` counts its starts and raises the epoch of a numbered one.
 
-        spoken_since_ns: since when others have told its drone to hover; 0: nobody does.
+        spoken_since_ns: since when others have commanded its drone to hover; 0: nobody does.
         """
         section = json.loads(spec.section)
         if spec.numbered:

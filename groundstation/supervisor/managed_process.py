@@ -165,7 +165,7 @@ def _has_ended(pid: int) -> bool:
 
 
 def exit_text(code: int, farewell: str = "") -> str:
-    """Return an exit code in words, with what the process said last of a failure."""
+    """Return an exit code in words, with the process's last text on a failure."""
     if code < 0:
         with suppress(ValueError):
             return f"killed by {signal.Signals(-code).name}"

@@ -61,7 +61,7 @@ def claim(folder: Path, bus_port: int, outside: str = "") -> Network:
     emulated devices of other hosts, as A.B.C.0/24. Raises GroundStationError when there is no network or no port.
     """
     reachable = _prefix(outside) if outside else ""
-    in_use = networks_in_use()  # by another user's run, whose locks are elsewhere
+    in_use = networks_in_use()  # used by another user's run too, whose locks are elsewhere
     for a, b in _CANDIDATES:
         prefix = f"127.{a}.{b}"
         if prefix in in_use or (lock := _lock(folder / f"{prefix}.lock")) is None:
@@ -116,7 +116,7 @@ def require_free(endpoint: str) -> None:
 
 
 def require_free_udp(use: str, address: str, port: int) -> None:
-    """Raise GroundStationError if a UDP port cannot be had, naming who has it; use: of the port, as the text begins."""
+    """Raise GroundStationError if a UDP port cannot be had, naming its holder; use: of the port, as the text begins."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.bind((address, port))

@@ -17,7 +17,7 @@ class Restart(StrEnum):
 class StopOrder(IntEnum):
     """Shut-down goes through these in order; within one, processes stop together.
 
-    `start.py` starts those from CONNECTS on first, because all others speak through them.
+    `start.py` starts those from CONNECTS on first, because all others communicate through them.
     """
 
     DECIDES = 0
@@ -33,8 +33,8 @@ class FailsafeDatagrams:
     """Datagrams of supervisor or guardian for a drone whose driver died or hangs, in the drone's own protocol.
 
     hover is repeated until the driver is READY again; land_after_s after its last beat it is land instead. voice:
-    "module:function" that makes their transport from `way` and a speaker's number, "" for UDP. called: whether vehicles
-    call the driver, so that their address is where they were last heard. interface: network adapter of plain UDP, ""
+    "module:function" that makes their transport from `way` and a sender's number, "" for UDP. called: whether vehicles
+    call the driver, so that their address is that of their last datagram. interface: network adapter of plain UDP, ""
     for any.
     """
 

@@ -79,7 +79,7 @@ class DriverSigns:
 
 
 def signs_of(block: HeartbeatBlock, slot: int, *, gone: bool = False) -> DriverSigns:
-    """Return the signs of life in a slot; gone: the kernel says that its process is dead."""
+    """Return the signs of life in a slot; gone: the kernel reports that its process is dead."""
     return DriverSigns(block.state(slot), block.beat_ns(slot), block.has_worked(slot), block.has_ended(slot), gone)
 
 

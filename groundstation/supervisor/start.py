@@ -29,7 +29,7 @@ class Start:
     def run(self) -> None:
         """Compile missing kernels, start one rank after the other; returns when the run can begin.
 
-        Devices come last: emulated ones answer once the simulator is up, and would be told of as silent before.
+        Devices come last: emulated ones answer once the simulator is up, and would be reported as silent before.
 
         Raises GroundStationError when a required process cannot be started, fails or is late, Interrupted when the
         operator stops it.

@@ -19,7 +19,7 @@ _COMPUTER = 0  # no process has this number
 
 
 class StatusPublisher:
-    """Publishes once a second: the supervisor, the router (nothing else runs in it), and whoever is down."""
+    """Publishes once a second: the supervisor, the router (nothing else runs in it), and dead processes."""
 
     def __init__(self, bus: Bus) -> None:
         self._bus = bus
@@ -50,7 +50,7 @@ class StatusPublisher:
         self._bus.publish(PROCESS_STATUS, ProcessStatus(header=header, state=state, pid=pid, cpu=cpu, **more))
 
     def _others(self, now_ns: int, ours: float) -> float | None:
-        """Return how many cores other programs used; ours: what this run used. Neither knows children of children."""
+        """Return how many cores other programs used; ours: what this run used. Both ignore grandchildren."""
         busy = busy_s()
         return None if busy is None else max(0.0, self._share_since(_COMPUTER, now_ns, busy) - ours)
 

@@ -101,7 +101,7 @@ class Supervisor:
         certify(self._identities, self.run.site, ports.host_of(self.run.endpoint), self.run.listen, names)
 
     def connect(self) -> None:
-        """Join the bus, whose router is up, and take priority from now on: drones that do not hear this loop hover."""
+        """Join the bus, whose router is up, and take priority from now on: drones hover if this loop stops."""
         run = self.run
         take_share()  # for the threads of its bus
         self.bus = self.events.bus = open_bus(run.endpoint, run.site, run.source, identity=self._identity())
@@ -216,7 +216,7 @@ class Supervisor:
         self._speak_for(process, f"silent for {heard_s:.2f} s", now_ns)
         late_s = process.spec.hang_limit_s
         late = heard_s >= late_s
-        # A new one would wait for a core as well. A driver must not come back and contradict who speaks for it.
+        # A new one would wait for a core as well. A driver must not come back and contradict its substitute.
         if late and starved and process.spec.failsafe_datagrams is None and heard_s < _STARVED_FOR * late_s:
             self._tell_starved(process, now_ns)
         else:
@@ -267,7 +267,7 @@ class Supervisor:
     def stop(self) -> None:
         """Stop all processes but those that show the end, in order, each with its deadline (hurried: all at once)."""
         self._stopping = True
-        self._block.set_state(SUPERVISOR_SLOT, SlotState.STOPPING)  # from now on the guardian speaks for dead drivers
+        self._block.set_state(SUPERVISOR_SLOT, SlotState.STOPPING)  # from now on the guardian sends for dead drivers
         for order in StopOrder:
             running = [p for p in self.processes if p.running]
             group = [p for p in running if p.spec.stop_order is order and not p.spec.shows_end]

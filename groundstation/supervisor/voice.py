@@ -21,10 +21,10 @@ class Voice(Protocol):
 
 @runtime_checkable
 class Successor(Voice, Protocol):
-    """A voice that goes on from what the driver left (`Child.leave`)."""
+    """A voice that continues from the number that the driver recorded (`Child.leave`)."""
 
     def go_on_from(self, left: int) -> None:
-        """Take the number that the driver left, 0 for nothing; called each time before it speaks for the driver."""
+        """Take the number that the driver recorded, 0 for none; called each time before it sends for the driver."""
 
 
 class UdpVoice:

@@ -139,10 +139,10 @@ class VehicleKind:
 
     name: the word for `kind` in the field file. summary: a line for people. driver: "module:function" of the driver
     process. sections: keys of the field file that only this kind has; required: those that must be given.
-    processes: vehicles that share a driver process, with its settings; stop: datagrams to vehicles of one process if it
-    is dead. check: (drone, finding) for each fault between the sections of this kind. standing_m: height of the
-    base above the floor before take-off, and its deviation; the default suits small vehicles. camera: scheme
-    of the vehicle's own video, "" if it has none; camera_port: its usual port; reader: "module:attribute" of its
+    processes: vehicles that share a driver process, with its settings; stop: datagrams to vehicles of one dead process.
+    check: (drone, finding) for each fault between the sections of this kind. standing_m: height of the base above the
+    floor before take-off, and its deviation; the default suits small vehicles. camera: scheme of the vehicle's own
+    video, "" if it has none; camera_port: its usual port; reader: "module:attribute" of its
     source, called with address and interface like the sources of `drivers.camera`. has_serial_number: the
     driver knows the vehicle's own. has_interface: driver and failsafe datagrams use the drone's network adapter
     and no other. shares_address: its vehicles may have one address, and `check` tells them apart. moved: changes of
@@ -154,9 +154,9 @@ class VehicleKind:
     firmware; scenario: sections of a scenario file that only its emulator reads, each as "module:class" of a
     sim_bridge.section.Section. true_pose: "module:function" of a receiver of true poses from the simulator behind a
     real firmware (a sim_bridge.real.followers.PoseFeed), "" if there is none. blink: "module:function" that
-    lets a standing vehicle be seen or heard, called with its driver's section and its name, returns what it did and
-    raises DriverError; "" if it cannot. flight_time_s: what a new
-    battery of the usual size lasts at most, None where vehicles of one kind differ or nobody tells.
+    makes a standing vehicle visible or audible, called with its driver's section and its name, returns a text on it and
+    raises DriverError; "" if it cannot. flight_time_s: longest flight time with a new battery of the usual size, None
+    where vehicles of one kind differ or it is unknown.
     """
 
     name: str

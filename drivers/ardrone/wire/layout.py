@@ -46,7 +46,7 @@ class OptionLayout(Generic[Value]):
         self.size = start + self._struct.size
 
     def is_in(self, payload: bytes) -> bool:
-        """Return whether a firmware that sent this payload knows the layout at all."""
+        """Return whether a firmware that sent this payload has the layout at all."""
         if self._exact:
             return len(payload) + _HEAD == self.size
         return not self._optional or len(payload) + _HEAD >= self.size

@@ -145,7 +145,7 @@ def _extent(data: bytearray, offset: int = 0) -> tuple[int, int]:
     header_size, payload_size, control = fields[3], fields[4], fields[14]
     if header_size not in _SIZES or payload_size > _LARGEST_PAYLOAD:
         raise WireError("pave_size", f"header {header_size}, payload {payload_size}")
-    if control & _ADVERTISEMENT:  # WIRE: tells of a frame that is stored; nothing follows
+    if control & _ADVERTISEMENT:  # WIRE: announces a stored frame; nothing follows
         return header_size, header_size
     return header_size, header_size + payload_size
 

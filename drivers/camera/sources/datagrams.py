@@ -56,7 +56,7 @@ class DatagramReader:
                 assembly.skipped = 0
 
     def _find(self, drain: Drain) -> socket.socket | None:
-        """Return a socket that hears only this vehicle, once it sends.
+        """Return a socket that receives from this vehicle only, once it sends.
 
         The kernel passes other datagrams to other sockets. The port that it sends from is undocumented, and only a
         datagram shows to which of our addresses it sends.

@@ -36,7 +36,7 @@ class FileReader:
         """Yield every picture as fast as it is requested: its due time [s], its name, and the picture."""
         if not self._path.exists():
             raise DriverError("there is no such file or folder")
-        if not self._path.is_file() and not self._path.is_dir():  # opening a pipe would wait for who writes to it
+        if not self._path.is_file() and not self._path.is_dir():  # opening a pipe would wait for a writer
             raise DriverError("it is neither a file nor a folder")
         yield from self._folder() if self._path.is_dir() else self._video()
 

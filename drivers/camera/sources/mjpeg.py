@@ -26,7 +26,7 @@ _MAX_HEAD_BYTES = 8192
 
 
 class MjpegReader:
-    """Asks for a stream and cuts it into JPEGs; login: "user:password", or "" if none is needed."""
+    """Requests a stream and cuts it into JPEGs; login: "user:password", or "" if none is needed."""
 
     decoder: PictureDecoder | None = None
 
@@ -85,7 +85,7 @@ class MjpegReader:
 
 
 class _Body:
-    """What a connection carries behind the head of its answer."""
+    """The body of an HTTP answer: the bytes behind its head."""
 
     def __init__(self, connection: socket.socket, chunks: ChunkedBody | None, rest: bytes) -> None:
         self._connection, self._chunks = connection, chunks

@@ -52,7 +52,7 @@ class Reader(Protocol):
 class Drain:
     """The `FrameSource` around a reader; reconnects with back-off for as long as it is open.
 
-    `rejected` counts what was refused, by reason.
+    `rejected` counts refusals, by reason.
     """
 
     def __init__(self, reader: Reader) -> None:

@@ -1,6 +1,6 @@
 """Pictures that a ROS 2 node publishes, by a client of its Zenoh router (`ros2://HOST:PORT/TOPIC?domain=N`).
 
-It only listens. Stamps are of the sender's clock: they serve to remove jitter, not as times.
+It only subscribes. Stamps are of the sender's clock: they serve to remove jitter, not as times.
 """
 
 import struct
@@ -27,7 +27,7 @@ _DDS = "::msg::dds_::"
 
 
 class Ros2Reader:
-    """Hears one topic: sensor_msgs/CompressedImage (JPEG, PNG) or Image (mono8, rgb8, bgr8)."""
+    """Subscribes to one topic: sensor_msgs/CompressedImage (JPEG, PNG) or Image (mono8, rgb8, bgr8)."""
 
     def __init__(self, host: str, port: int, topic: str, domain: int) -> None:
         self._endpoint, self._expression = f"tcp/{host}:{port}", graph.heard_key(domain, topic)

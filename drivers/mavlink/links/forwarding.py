@@ -1,4 +1,4 @@
-"""Shows a link to a second ground station (QGroundControl, MAVProxy) too, which may send queries and stops."""
+"""Forwards a link to a second ground station (QGroundControl, MAVProxy), which may send queries and stops."""
 
 import logging
 import select
@@ -37,9 +37,9 @@ def with_riders(transport: Transport, vehicles: Mapping[int, VehicleSettings], t
 
 
 class ForwardedLink(Transport):
-    """Another transport, shown to riders; a thread of its own listens to them.
+    """Forwards another transport to riders, and receives from them in a thread of its own.
 
-    A rider's frames are judged by `riding_along.passage_of`; what is refused or goes beyond 50 frames a second is
+    A rider's frames are judged by `riding_along.passage_of`; refused ones, and those beyond 50 a second, are
     counted in `rejected` ("rider_..."). Every stop passes unless an equal one follows within 20 ms; of repetitions
     within a second only the first is reported.
     """
@@ -71,7 +71,7 @@ class ForwardedLink(Transport):
         return self._transport.newest_stamp
 
     def receive_raw(self) -> list[tuple[Heard, bytes]]:
-        """Wait up to 0.1 s; return what arrived, and show it to the vehicle's rider."""
+        """Wait up to 0.1 s; return the arrived data, and forward it to the vehicle's rider."""
         found = self._transport.receive_raw()
         for heard, raw in found:
             rider = self._riders.get(heard.frame.system)
@@ -134,7 +134,7 @@ class ForwardedLink(Transport):
     def _take(self, rider: Rider) -> None:
         try:
             data, source = rider.socket.recvfrom(MAX_DATAGRAM)
-        except OSError:  # nobody is there: this answers what was shown
+        except OSError:  # nobody is there: the error answers a forwarded datagram
             return
         if source[0] != rider.target[0]:
             self.rejected["rider_address"] += 1
@@ -147,7 +147,7 @@ class ForwardedLink(Transport):
 
     def _take_frame(self, rider: Rider, raw: bytes) -> None:
         if not may_pass(number_of(raw), rider.allowed):
-            return  # true of most: its own position, heartbeats, echoes of what it hears
+            return  # as most are: its own position, heartbeats, echoes of received frames
         try:
             self._judge(rider, raw, rider.decoder.decode(raw))
         except WireError as error:  # a stop may follow it

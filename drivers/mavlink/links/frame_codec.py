@@ -1,4 +1,4 @@
-"""What a link makes of bytes and messages: frames decoded and encoded in its own name, signed if it has a key."""
+"""Decodes a link's frames, and encodes messages as frames in its own name, signed if it has a key."""
 
 from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.signing_clock import SigningClock
@@ -17,11 +17,11 @@ class FrameCodec:
 
     @property
     def newest_stamp(self) -> int:
-        """Return the newest time of signing, heard or sent; 0 without a key."""
+        """Return the newest time of signing, received or sent; 0 without a key."""
         return max(self._decoder.newest_stamp, self._encoder.newest_stamp)
 
     def encode(self, message: Message) -> bytes:
-        """Return the next frame, signed by a steady clock, but not older than times that the vehicles have heard.
+        """Return the next frame, signed by a steady clock, but not older than times that the vehicles have received.
 
         WIRE (docs/reference/mavlink.md 5.9): a restarted vehicle ignores senders whose time is more than a minute
         older than the newest that it knows, which may come from another ground station or a clock that was ahead.

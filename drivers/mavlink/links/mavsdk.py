@@ -178,7 +178,7 @@ class MavsdkLink:
 
     @property
     def called_from(self) -> tuple[Address, ...]:
-        """Return where the vehicles were last heard, if the link waits for them."""
+        """Return the last addresses of the vehicles, if the link waits for them."""
         return self._transport.called_from
 
     @property

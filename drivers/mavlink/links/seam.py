@@ -24,17 +24,17 @@ class MavlinkLink(Protocol):
 
     @property
     def called_from(self) -> tuple[Address, ...]:
-        """Return where the vehicles were last heard, on a link that they call themselves; empty on others."""
+        """Return the last addresses of the vehicles, on a link that they call themselves; empty on others."""
 
     @property
     def newest_stamp(self) -> int:
-        """Return the newest time of signing, heard or sent [10 us since 2015-01-01 UTC]; 0 on an unsigned link."""
+        """Return the newest time of signing, received or sent [10 us since 2015-01-01 UTC]; 0 on an unsigned link."""
 
     def receive(self) -> list[Heard]:
         """Wait up to 0.1 s; return the messages received."""
 
     def send(self, system: int, message: Message) -> None:
-        """Send to one vehicle; never blocks; a message to a vehicle that was never heard may be lost."""
+        """Send to one vehicle; never blocks; a message to a vehicle that never sent may be lost."""
 
     def close(self) -> None:
         """Close the port."""

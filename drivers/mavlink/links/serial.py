@@ -67,7 +67,7 @@ class SerialLink(Transport):
 
     @property
     def newest_stamp(self) -> int:
-        """Return the newest time of signing, heard or sent; 0 without a key."""
+        """Return the newest time of signing, received or sent; 0 without a key."""
         return self._codec.newest_stamp
 
     def receive_raw(self) -> list[tuple[Heard, bytes]]:

@@ -32,10 +32,10 @@ _log = logging.getLogger(__name__)
 
 
 def _bind_as_ever(sock: socket.socket, target: str) -> None:
-    """Send from the same port each time: until it restarts, PX4 answers the first port that spoke to it."""
+    """Send from the same port each time: until it restarts, PX4 answers the first port that sent to it."""
     try:
         sock.bind(("", _FIRST_OWN_PORT + zlib.crc32(target.encode()) % _OWN_PORTS))
-    except OSError:  # another program speaks to that vehicle already
+    except OSError:  # another program sends to that vehicle already
         sock.bind(("", 0))
 
 
@@ -70,12 +70,12 @@ class UdpLink(Transport):
 
     @property
     def called_from(self) -> tuple[Address, ...]:
-        """Return where the vehicles were last heard, if the link waits for them."""
+        """Return the last addresses of the vehicles, if the link waits for them."""
         return () if self._peer else tuple(dict.fromkeys(address for address, _ in self._addresses.copy().values()))
 
     @property
     def newest_stamp(self) -> int:
-        """Return the newest time of signing, heard or sent; 0 without a key."""
+        """Return the newest time of signing, received or sent; 0 without a key."""
         return self._codec.newest_stamp
 
     def receive_raw(self) -> list[tuple[Heard, bytes]]:
@@ -174,7 +174,7 @@ class UdpLink(Transport):
         return known[0] if known is not None else self._peer
 
     def send_raw(self, system: int, data: bytes) -> None:
-        """Send whole frames in one datagram to where the vehicle was last heard."""
+        """Send whole frames in one datagram to the vehicle's last address."""
         address = self._address_of(system)
         if address is None:
             return

@@ -1,6 +1,6 @@
 """Frames: split a datagram, decode and encode one message, sign it. No sockets, no clock.
 
-pymavlink's dialect knows layout and order, and signs; `verification.py` decides which frames are decoded at all.
+pymavlink's dialect has layout and order, and signs; `verification.py` decides which frames are decoded at all.
 """
 
 import re
@@ -100,7 +100,7 @@ class FrameDecoder:
 
     @property
     def newest_stamp(self) -> int:
-        """Return the newest time of signing that was heard, or the one from which we began."""
+        """Return the newest time of signing that was received, or the one from which we began."""
         return self._verifier.newest
 
     def decode(self, frame: bytes) -> ReceivedFrame:

@@ -16,7 +16,7 @@ ESTIMATOR_VISION = 2
 
 
 class MavSeverity(IntEnum):
-    """MAV_SEVERITY: 0 emergency .. 7 debug; the two limits for what the operator is told."""
+    """MAV_SEVERITY: 0 emergency .. 7 debug; the two limits for texts reported to the operator."""
 
     ERROR = 3
     WARNING = 4

@@ -13,7 +13,7 @@ class ParamRequestRead(NamedTuple):
 
 
 class ParamRequestList(NamedTuple):
-    """Ask for all parameters."""
+    """Request all parameters."""
 
     target_system: int
     target_component: int
@@ -76,7 +76,7 @@ class SetGpsGlobalOrigin(NamedTuple):
 
 
 class RequestDataStream(NamedTuple):
-    """The old way to ask for rates (MAVProxy, dronekit)."""
+    """The old request for rates (MAVProxy, dronekit)."""
 
     target_system: int
     target_component: int
@@ -86,7 +86,7 @@ class RequestDataStream(NamedTuple):
 
 
 class MissionRequestList(NamedTuple):
-    """Ask how many mission items there are."""
+    """Request the number of mission items."""
 
     target_system: int
     target_component: int
@@ -103,7 +103,7 @@ class MissionCount(NamedTuple):
 
 
 class MissionRequestInt(NamedTuple):
-    """Ask for one mission item."""
+    """Request one mission item."""
 
     target_system: int
     target_component: int

@@ -188,7 +188,7 @@ class HomePosition(NamedTuple):
 
 
 class GpsGlobalOrigin(NamedTuple):
-    """Where the estimator's origin lies: degrees x 1e7, mm."""
+    """Place of the estimator's origin: degrees x 1e7, mm."""
 
     latitude: int
     longitude: int

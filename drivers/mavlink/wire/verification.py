@@ -1,4 +1,4 @@
-"""Verifies frames before anything is learned from them: signature, checksum, time of signing. No decoding.
+"""Verifies frames before their content is used: signature, checksum, time of signing. No decoding.
 
 A frame of any kind that pymavlink's widest dialect knows can be verified, whether or not this project uses it; a frame
 of another kind cannot, because its checksum needs a seed from its definition.
@@ -22,7 +22,7 @@ from drivers.mavlink.wire.signature import (
     old_frame_size,
 )
 
-# WIRE (pymavlink): a sender that was not heard before may sign with a time up to a minute old [10 us].
+# WIRE (pymavlink): a new sender may sign with a time up to a minute old [10 us].
 _NEW_SENDER_LAG = 6_000_000
 # WIRE (docs/reference/mavlink.md 5.10): the seed comes from a message's definition: other dialects fail.
 _CRC_EXTRA = {number: bytes([kind.crc_extra]) for number, kind in widest.mavlink_map.items()}
@@ -45,7 +45,7 @@ def number_of(frame: bytes) -> int:
 class Verifier:
     """Verifies the frames of one link: the checksum, and with a key the signature and the order of its times.
 
-    newest: the newest time of signing that was heard, or the one from which we began [10 us since 2015-01-01 UTC].
+    newest: the newest time of signing that was received, or the one from which we began [10 us since 2015-01-01 UTC].
     """
 
     def __init__(self, signing: Signing | None = None) -> None:

@@ -24,7 +24,7 @@ _MOST = 10_000
 
 
 class WireError(ValueError):
-    """A datagram that cannot be read; `reason` is a word to count it by, `told` what to tell of it, or ""."""
+    """A datagram that cannot be read; `reason` is a word to count it by, `told` a text for the operator, or ""."""
 
     def __init__(self, reason: str, told: str = "") -> None:
         super().__init__(reason)
@@ -97,7 +97,7 @@ def decode_server(payload: bytes) -> Server:
     if len(payload) < _OLD_SERVER_BYTES:
         raise WireError("short")
     version = (payload[_VERSION_AT], payload[_VERSION_AT + 1])
-    if version < _OLDEST:  # whose description ends here
+    if version < _OLDEST:  # its description ends here
         raise WireError("version", "it streams NatNet {}.{}; versions from 3.0 (Motive 2) on are read".format(*version))
     if len(payload) < _SERVER.size:
         raise WireError("short")

@@ -6,7 +6,7 @@ LARGEST = 1400
 _MOST_ANCHORS, _LONGEST_NAME = 64, 100
 _FARTHEST_M, _OLDEST_MS = 1000.0, 1000.0
 
-# WIRE (docs/reference/ranges.md 2): what a client sends once a second.
+# WIRE (docs/reference/ranges.md 2): a client sends this once a second.
 ASK = b'{"ranges": 1}'
 
 

@@ -29,12 +29,12 @@ def heard_key(domain: int, topic: str, kind: str = "*") -> str:
 
 
 def node_token(domain: int, session: str, node: str) -> str:
-    """Return the token that says that a node lives."""
+    """Return the liveliness token of a node."""
     return f"{_ADMIN_SPACE}/{domain}/{session}/0/0/{_NODE}/{_ENCLAVE}/{_NAMESPACE}/{node}"
 
 
 def publisher_token(domain: int, session: str, node: str, number: int, topic: str, kind: str, type_hash: str) -> str:
-    """Return the token that says that a node publishes a topic; numbers of a session differ."""
+    """Return the liveliness token of a node's publisher of a topic; numbers of a session differ."""
     name = topic.replace("/", "%")
     entity = f"{_ADMIN_SPACE}/{domain}/{session}/0/{number}/{_PUBLISHER}/{_ENCLAVE}/{_NAMESPACE}/{node}"
     return f"{entity}/{name}/{dds_type(kind)}/{type_hash}/{_QOS}"

@@ -11,7 +11,7 @@ from drivers.rmw_zenoh.wire.cdr import CdrReader, CdrWriter, WireError
 Vector3 = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
-# The same in every distribution with type hashes; a test checks them with rosbags, which knows no services.
+# The same in every distribution with type hashes; a test checks them with rosbags, which has no services.
 HASHES = {
     "geometry_msgs/msg/Twist": "RIHS01_9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a",
     "geometry_msgs/msg/TwistStamped": "RIHS01_5f0fcd4f81d5d06ad9b4c4c63e3ea51b82d6ae4d0558f1d475229b1121db6f64",

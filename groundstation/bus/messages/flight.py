@@ -40,13 +40,13 @@ _ALOFT = frozenset({"HOVER", "TRACK", "HOLD", "LANDING"})
 def known_state(before: FlightState, said: FlightState) -> FlightState:
     """Return the state of a drone from the one that its driver reports and the one known before.
 
-    A driver restarted in flight reports UNKNOWN until it hears the drone, which may still fly: LOST.
+    A driver restarted in flight reports UNKNOWN until the first telemetry of the drone, which may still fly: LOST.
     """
     return FlightState.LOST if said is FlightState.UNKNOWN and before in AIRBORNE | {FlightState.LOST} else said
 
 
 def stood_last(state: FlightState, mode: str) -> bool:
-    """Return whether a lost drone stood when it was last heard, by state and mode of its VehicleStatus.
+    """Return whether a lost drone stood at its last telemetry, by state and mode of its VehicleStatus.
 
     No take-off was ordered since. Most often its battery is empty.
     """
@@ -54,7 +54,7 @@ def stood_last(state: FlightState, mode: str) -> bool:
 
 
 def flies(state: FlightState, mode: str) -> bool | None:
-    """Return whether a vehicle flies, by state and mode of its VehicleStatus; None: these do not tell.
+    """Return whether a vehicle flies, by state and mode of its VehicleStatus; None: unknown by these.
 
     A lost one flies if its driver had it in the air. During a take-off it is not known when it leaves the ground.
     """

@@ -7,7 +7,7 @@ from groundstation.bus.messages.process import Lifecycle
 
 
 class Supervision(StrEnum):
-    """State of the run's supervisor, as other hosts are told."""
+    """State of the run's supervisor, as reported to other hosts."""
 
     WATCHES = "WATCHES"
     """It watches over the run."""

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 from rosbags.typesys import Stores, get_typestore
 
 DISTRIBUTIONS = ("humble", "jazzy", "lyrical")
-# WIRE (docs/reference/ros2.md 1): Humble's rmw_zenoh knows no type hashes.
+# WIRE (docs/reference/ros2.md 1): Humble's rmw_zenoh has no type hashes.
 _NO_HASH = "TypeHashNotSupported"
 
 

@@ -48,7 +48,7 @@ def enough_hz(site: str, field: ResolvedField | None) -> Mapping[str, float]:
 class Ros2View:
     """Publishes until closed. It subscribes to nothing: no ROS 2 program can move a drone through it.
 
-    truth: whether it shows true states, which only a simulator tells: they are a third of all messages.
+    truth: whether it shows true states, which only a simulator sends: they are a third of all messages.
     """
 
     PERIOD_S = 0.1

@@ -1,7 +1,7 @@
 """One set of files as arrays: `NAME.dat` or `NAME.dat.xz` in a folder.
 
 Leung, Halpern, Barfoot, Liu, The UTIAS multi-robot cooperative localization and mapping dataset, IJRR 30(8), 2011.
-Measurements name barcodes; `Barcodes.dat` tells their owners. "Odometry" is the commanded speed.
+Measurements name barcodes; `Barcodes.dat` has their owners. "Odometry" is the commanded speed.
 """
 
 import lzma

@@ -113,7 +113,7 @@ class _Sensor(NamedTuple):
 
 
 def _informed(tailed: bool) -> Callable[..., None]:
-    """Return what writes information and slope of a step's edges, from the squared distances where the slope goes."""
+    """Return the writer of information and slope of a step's edges; `slope` holds their squared distances before."""
 
     def write(b: Any, slope: Any, information: Any, i: Any, count: Any, sensor: Any) -> None:
         reach, steepness, weight = sensor.range_m, sensor.steepness, sensor.weight

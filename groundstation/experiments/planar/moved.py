@@ -1,8 +1,8 @@
-"""What a topology with one robot moved costs where the current one is best, from the current one's adjoint.
+"""Cost of a topology with one robot moved, at the current topology's optimum, from the current one's adjoint.
 
 The cost is sum_k max_y (2 e_k^T y - y^T M_k y), M_k the smoothing information of the steps up to k, and y = M_k^-1 e_k
-are the adjoint's columns. A moved robot changes its own edges: its entries of y are found anew, all others stay. What
-results is never above the cost there, and differs from it by the square of what the others' entries would have changed.
+are the adjoint's columns. A moved robot changes its own edges: its entries of y are found anew, all others stay. The
+result is never above the cost there, and the difference is quadratic in the neglected change of the other entries.
 """
 
 import math
@@ -59,7 +59,7 @@ def evaluate(level: IntVector, controls: Vector, problem: PlanarProblem, work: W
 
 @kernel()
 def _hold(i: int, at: Optimum, problem: PlanarProblem, work: Workspace) -> None:
-    """Write how firmly step i holds each entity: by what is known of it, its neighbouring steps, and its edges."""
+    """Write each entity's diagonal information at step i: of its belief, the neighbouring steps, and its edges."""
     held, order, observers, sensor = at.held, work.order, work.observers, at.level.shape[0] + 1
     for a in range(order.shape[0]):
         stiffness = 1.0 / problem.variance[a]
@@ -101,7 +101,7 @@ def moved_robot(before: IntVector, after: IntVector) -> int:
 
 @kernel()
 def _mark(level: IntVector, robot: int, own: int, last: int, edges: Vector) -> None:
-    """Write 1 for whom a robot on level `own` has an edge with, else 0."""
+    """Write 1 for each entity that a robot on level `own` shares an edge with, else 0."""
     n = level.shape[0]
     for b in range(n):
         edges[b] = 1.0 if b != robot and abs(level[b] - own) == 1 else 0.0
@@ -110,7 +110,7 @@ def _mark(level: IntVector, robot: int, own: int, last: int, edges: Vector) -> N
 
 @kernel(contract=True)
 def _links(robot: int, to: int, at: Optimum, problem: PlanarProblem) -> Links:
-    """Return a robot's links, with what they carry at the optimum."""
+    """Return a robot's links, with distance and information at the optimum."""
     constants, steps, count, last = problem.constants, problem.steps, at.level.shape[0] + 2, 0
     links = Links(
         np.empty(count), np.empty(count), np.empty((steps, count)), np.empty((steps, count)), np.empty((steps, count)),
@@ -164,7 +164,7 @@ def _moved_cost(robot: int, cost: float, at: Optimum, links: Links, problem: Pla
                 right[0] -= coupling
                 left -= coupling
             total += lost - left * y[robot]
-        # What is left is the least of a form in the robot's own entries, which only neighbouring steps couple.
+        # There remains the minimum of a quadratic form in the robot's own entries that couples neighbouring steps only.
         for i in range(1, used):
             factor = stiffness / diagonal[i - 1]
             diagonal[i] -= factor * stiffness
@@ -180,7 +180,7 @@ def _moved_cost(robot: int, cost: float, at: Optimum, links: Links, problem: Pla
 def _pull(
     robot: int, at: Optimum, links: Links, problem: PlanarProblem, own: Matrix, edges: Vector, sign: float
 ) -> None:
-    """Add to each entity's pull what its edge with the robot adds to dc/dposition, per metre of their difference."""
+    """Add to each entity's pull the share of its edge with the robot in dc/dposition, per metre of their difference."""
     constants, steps, count = problem.constants, problem.steps, at.level.shape[0] + 2
     sigma2, square = constants.sigma_m * constants.sigma_m, constants.range_m * constants.range_m
     steepness, tail, slope = 1.0 / constants.softness_m, constants.tail * square / sigma2, np.empty(count)
@@ -242,9 +242,9 @@ def _imbalance(robot: int, at: Optimum, links: Links) -> float:
 def moved_cost(
     to: IntVector, at: Optimum, cost: float, problem: PlanarProblem, gradient: Vector
 ) -> tuple[float, float]:
-    """Return at least what a topology costs at the current one's optimum [m^2], and write its gradient there.
+    """Return a lower bound of a topology's cost at the current one's optimum [m^2], and write its gradient there.
 
-    cost: the current topology's there. The second number grows with what the first one lacks. `to` moves one robot.
+    cost: the current topology's there. The second number grows with the gap of the bound. `to` moves one robot.
     """
     robot = moved_robot(at.level, to)
     links = _links(robot, int(to[robot]), at, problem)

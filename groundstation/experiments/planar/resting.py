@@ -1,7 +1,7 @@
-"""Finds the neighbours that are best where the current topology is: no step of theirs helps, within the tolerance.
+"""Finds neighbours with the same optimal controls as the current topology: no step helps, within the tolerance.
 
-In a large team that is what most survivors of the bounds are found to be, each with one evaluation. `moved` says the
-same within the square of a robot's share; how far it is believed, it has shown on a move between the same levels.
+In a large team most survivors of the bounds are found to be such, each with one evaluation. `moved` gives the same
+result up to the square of a robot's share; its error is taken from an evaluated move between the same levels.
 """
 
 import math
@@ -14,14 +14,14 @@ from groundstation.experiments.planar.records import Optimum, PlanarProblem, Wor
 from groundstation.kernel import kernel
 from groundstation.planning.lbfgs import projected_gradient
 
-_FEW = 4  # topologies that must be found to be such before it pays to ask
+_FEW = 4  # topologies that must be found to be such before the estimate pays
 _DOUBT = 3.0  # times the errors that were found for a like move
 _EXACT = 1e-4  # error of a cost, over the current one, up to which it is taken
 
 
 @kernel()
 def _kind(before: IntVector, after: IntVector) -> int:
-    """Return which robots a move is alike for: those that leave the same level to the same side; -1 for no move."""
+    """Return the kind of a move: alike for robots that leave the same level to the same side; -1 for no move."""
     robot = moved_robot(before, after)
     if robot < 0:
         return -1
@@ -33,9 +33,9 @@ def learn(
     level: IntVector, exact: float, found: int, at: Optimum, cost: float, problem: PlanarProblem, work: Workspace,
     doubt: Matrix,
 ) -> int:  # fmt: skip
-    """Find out, once, how far a kind of move is to be believed, from one that was evaluated; return evaluations.
+    """Measure, once, the error of `moved` for a kind of move, by one that was evaluated; return evaluations.
 
-    found: how many topologies were best where the current one is, this one too; exact, cost: of this one and of the
+    found: number of topologies with the current one's optimum, this one too; exact, cost: of this one and of the
     current one, both there [m^2]. doubt (2n, 2): errors of cost and gradient over the current cost, for each kind of
     move, and for an imbalance of 1; infinite where nothing is known.
     """
@@ -59,7 +59,7 @@ def learn(
 def resting_cost(
     level: IntVector, at: Optimum, cost: float, problem: PlanarProblem, tolerance: float, doubt: Matrix
 ) -> float:
-    """Return what a topology costs at the current one's optimum [m^2], at least; NaN where it may be better elsewhere.
+    """Return a lower bound of a topology's cost at the current optimum [m^2]; NaN if it may be better elsewhere.
 
     cost: the current topology's; tolerance: of the projected gradient over that cost.
     """

@@ -1,12 +1,12 @@
-// What stands behind the strip of alarms: the others that last, and those that are over. Both open over the page, one at a
-// time, so that nothing moves.
+// The lists behind the strip of alarms: the other lasting alarms, and past ones. Both open over the page, one at a time,
+// so that nothing moves.
 
 import { byId, el, text } from "./dom.js";
 import { ownPast } from "./own_alarms.js";
 import { momentWords } from "./playback.js";
 import { store } from "./store.js";
 
-// What is to be done about an alarm: the word that leads it, and how it is counted.
+// The action that an alarm asks for: its leading word, and the words to count such alarms with.
 const RANKS = { ACT: "to act on", WATCH: "to watch", notice: "" };
 let shown = "";
 

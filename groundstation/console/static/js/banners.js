@@ -15,7 +15,7 @@ const SHOWN = 4, NOTICE_MS = 8000, LEVELS = { SAFE: "good", WATCH: "warn", ACT: 
 const MEANS = { SAFE: "no problem", WATCH: "a problem, but\nno need to act", ACT: "a problem:\nact now" };
 const COLOURS = { ACT: "grave", WATCH: "mild" };  // an alarm's is that of its word
 const WIDE = matchMedia("(min-width: 1400px)"), ROOM = 110; // letters
-// Without the tracker: it is told already, and who is lost is not known.
+// Alarms left out without the tracker: its silence is shown already, and it is not known which drones are lost.
 const MOOT = /^process tracker silent$| lost$/;
 const notices = [];
 
@@ -98,8 +98,8 @@ export function showBanners() {
   showMore(behind.map(({ rank }) => rank), !first || fitted(first));
 }
 
-// What the other alarms are about, where that has room beside the first; tried anew only where the room may be another, or a
-// screen reader would hear it with every beat.
+// The subjects of the other alarms, where they have room beside the first; tried anew only where the room may be another,
+// or a screen reader would hear it with every beat.
 function showAlso(banner, subjects) {
   const [title, more, also] = [banner.children[0], banner.children[1], banner.lastElementChild];
   const key = [title.textContent.length, more.textContent, subjects, innerWidth, document.body.className, byId("alarms").className].join();

@@ -1,4 +1,4 @@
-// What the batteries hold and how long they are good for, as the console's process works it out for all pages.
+// The charge of the batteries and how long they last, as the console's process computes it for all pages.
 
 import { aloft, modeNow, standing, up } from "./glance.js";
 import { droneNames, store } from "./store.js";
@@ -16,7 +16,7 @@ export function lastsWords(name) {
 
 const share = ({ battery }) => (battery === null ? "unknown" : `${(100 * battery).toFixed(0)} %`);
 
-// Whose battery counts: of who flies, if anybody does; and not of who lands with a good one, while others fly on.
+// The batteries that count: of flying drones, if any; not of one that lands with a good battery while others fly on.
 function counted() {
   const flying = up(), on = flying.filter((name) => modeNow(name) !== "LANDING" || store.s.vehicles[name].charge !== "good");
   return on.length ? on : flying.length ? flying : droneNames();

@@ -1,4 +1,4 @@
-// What all layers of the map draw with: lines in world coordinates, words with a halo, arrows.
+// Drawing helpers of all layers of the map: lines in world coordinates, words with a halo, arrows.
 
 import { ink } from "./palette.js";
 

@@ -1,4 +1,4 @@
-// What a drone does now and why, in a sentence or two, and what limits it.
+// A drone's present action and its reason, in a sentence or two, and its limits.
 
 import { joined, seconds } from "./dom.js";
 import { isCutOff } from "./effects.js";
@@ -47,7 +47,7 @@ function tracked(name, plan, room) {
   return whole.length > room ? told("") : whole;
 }
 
-// Who watches no target watches drones for the sake of their places; the only target was just named.
+// A drone that watches no target watches drones for the sake of their places; the only target was just named.
 function watching(names, targets) {
   if (targets.length === 1 && names.length === 1 && names[0] === targets[0]) return "it";
   const purpose = names.every((name) => droneNames().includes(name)) ? ` for ${names.length > 1 ? "their places" : `${names[0]}'s place`}` : "";
@@ -56,7 +56,7 @@ function watching(names, targets) {
 
 const watcher = (name) => (droneNames().includes(name) || name.endsWith("camera") ? name : `${name} camera`);
 
-// Who stays lost lands; one that nobody sees may be known by whom it sees itself.
+// A drone that stays lost lands; the place of an unseen drone may be known by its own observations of others.
 function unseen(name) {
   const age = unseenS(name), [where, end] = seenBy(name).length ? [", though in view", "found"] : ["", "seen"];
   if (isLost(name)) return `Lost${where}: lands within ${unseenLeftS(name).toFixed(0)}\u00a0s, unless ${end}`;
@@ -77,7 +77,7 @@ function orderedBy(who, name, doing) {
 }
 
 const NEEDED = /; RESUME is needed$/;
-// What it does until a failsafe lands it.
+// The drone's action until a failsafe lands it.
 const GOES_ON = { TRACK: "follows its plan", HOLD: "hovers", HOVER: "hovers" };
 
 // The driver's own reason; what it is the reason for, where it does not say so, and who ordered what "landing for" says.

@@ -1,4 +1,4 @@
-// What a start or a stop would do now, or why a start can do nothing: in the few words that a button has room for.
+// The effect of a start or a stop now, or why a start has none: in the few words that a button has room for.
 
 import { aloft, isLost, isUnheard, lostTarget, modeNow, modes, standing, up, waits } from "./glance.js";
 import { droneNames, store, trackerSilent } from "./store.js";
@@ -36,7 +36,7 @@ export function waiting(names = droneNames()) {
 const SHORT = 8; // letters of a name that has room on a button
 const nameOf = (name) => (name.length > SHORT ? "1" : name);
 
-// Who does what: "drone_1 hovers", "both hover", "all 4 hover", "2 hover".
+// Drones with their action: "drone_1 hovers", "both hover", "all 4 hover", "2 hover".
 function does(names, one, many) {
   if (names.length < 2) return names.length ? `${nameOf(names[0])} ${one}` : "";
   return `${names.length < droneNames().length ? names.length : names.length > 2 ? `all ${names.length}` : "both"} ${many}`;
@@ -48,10 +48,10 @@ function told(parts, others = "others land") {
   return (all.length > 2 ? [all[0], others] : all).join(";\n");
 }
 
-// Who would follow TRACK.
+// The drones that would follow TRACK.
 export const ready = () => droneNames().filter((name) => modeNow(name) === "HOVER");
 
-// What a start of the team would do now, to whom.
+// The effect that a start of the team would have now, with the drones concerned.
 export function startEffect(verb) {
   if (verb === "TAKEOFF") return standing().some(isCutOff) ? does(standing(), "rises, if able", "rise, if able") : does(standing(), "rises, hovers", "rise, one by one");
   const who = verb === "RESUME" ? waiting() : ready();
@@ -62,7 +62,7 @@ export function startEffect(verb) {
 // Whether its own emergency stop has cut its motors: an order to take off may do no more than end that.
 export const isCutOff = (name) => store.s.vehicles?.[name]?.flight === "EMERGENCY";
 
-// What a stop of the team would do now, to whom, and to whom not; "" while nobody is heard.
+// The effect that a stop of the team would have now, for each drone; "" without telemetry from any drone.
 export function effectOf(verb) {
   const flying = up();
   if (!modes().length) return "";
@@ -72,7 +72,7 @@ export function effectOf(verb) {
   return verb === "LAND" ? landing(flying) : hover(flying);
 }
 
-// Whom a stop may not reach: it is sent all the same.
+// Drones that a stop may not reach: it is sent all the same.
 function unheard(verb, flying) {
   const deaf = flying.filter(isUnheard), heard = flying.filter((name) => !isUnheard(name));
   const word = verb === "CUT_MOTORS" ? "fall" : verb === "HOLD" && holding(heard.length ? heard : deaf).length ? "hover" : "land";
@@ -80,7 +80,7 @@ function unheard(verb, flying) {
   return told([does(heard, `${word}s`, word), does(deaf, "if it hears", "if they hear")]);
 }
 
-// What a stop of one drone would do now.
+// The effect that a stop of one drone would have now.
 export function effectOnOne(verb, name) {
   if (!modeNow(name)) return "";
   if (!up([name]).length) return "no use: stands";
@@ -90,7 +90,7 @@ export function effectOnOne(verb, name) {
   return isLost(name) ? "lands if unseen" : isIdle(verb, [name]) ? "hovers already" : "hovers here";
 }
 
-// Who is lost hovers as well, until it is landed for it.
+// A lost drone hovers as well, until a failsafe lands it.
 function hover(flying) {
   const held = holding(), lost = held.filter(isLost), seen = held.filter((name) => !isLost(name)), bound = flying.filter((name) => !held.includes(name));
   if (bound.length === droneNames().length) return does(bound, "lands anyway", "land anyway");
@@ -116,7 +116,7 @@ export function isIdle(verb, names = droneNames()) {
 
 // Whether a failsafe is about to land it: whether its fault is over, only its driver knows.
 const isBound = (name) => (store.s.vehicles[name].lands_in_s ?? null) !== null;
-// Whom HOLD holds: neither a landing nor what leads to one by itself is stopped by it.
+// The drones that HOLD holds: it stops neither a landing nor an imminent failsafe landing.
 const holding = (names = droneNames()) => up(names).filter((name) => modeNow(name) !== "LANDING" && !isBound(name));
 
 export const STOPS = new Set(["HOLD", "LAND", "CUT_MOTORS"]);

@@ -1,4 +1,4 @@
-// What the run came to. The page keeps the report itself: it is read long after the console has gone.
+// The result of the run. The page keeps the report itself: it is read long after the console has gone.
 
 import { byId, el } from "./dom.js";
 import { send } from "./link.js";
@@ -8,7 +8,7 @@ const WORDS = { passed: "PASSED", failed: "FAILED", invalid: "INVALID: its figur
 let kept = "", keptFor = "";
 
 const result = () => (replaying() ? undefined : store.s.result);
-// What the strip of alarms says of it; "" until the run is judged.
+// The result in the strip of alarms; "" until the run is judged.
 export const resultWords = () => WORDS[result()?.verdict] ?? "";
 
 // Fetches the report once, and tells the console that it may go.

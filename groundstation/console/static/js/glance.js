@@ -1,4 +1,4 @@
-// What the bar says of the whole team, worked out of the newest of everything.
+// The bar's summary of the whole team, from the newest messages.
 
 import { joined } from "./dom.js";
 import { ageS, droneNames, estimateAge, isTarget, entities, entity, runOver, store, trackerSilent, unseenS } from "./store.js";
@@ -20,7 +20,7 @@ export const aloft = () => up().length;
 export const standing = (names = droneNames()) => names.filter((name) => ["LANDED", "CUT"].includes(modeNow(name)));
 export const targetAgeS = () => Math.min(...entities().filter(({ name }) => isTarget(name)).map((body) => body.age_s + estimateAge()), Infinity);
 
-// What they do who do not stand, the most careful first: [words, level, who does each if not all do the same].
+// Modes of the drones not on the ground, most careful first: [words, level, who does each if not all do the same].
 export function teamMode() {
   const all = statuses().map(modeOf), silent = droneNames().filter(isUnheard);
   if (runOver()) return ["RUN OVER", "calm"];
@@ -31,7 +31,7 @@ export function teamMode() {
   if (!done.length) return [all.length ? "ON GROUND" : "–", "calm"];
   const named = done.map(([mode]) => modeWord(mode)), level = levelOf(...done[0]);
   if (soon.length) return [named[0], level, `${some(soon)} ${soon.length > 1 ? "land" : "lands"} in ${first}`];
-  // Where not all have room beside each other: who is in the most careful mode, and what others do.
+  // Without room for all: the drones in the most careful mode, and the modes of the others.
   const together = named.join(" + "), careful = doing(done[0][0]);
   if (together.length > LETTERS) return [named[0], level, `${some(careful)}; ${all.length - careful.length > 1 ? "others" : "the other"} ${named.slice(1).join(", ")}`];
   return [together, level, done.map(([mode]) => some(doing(mode))).filter(Boolean).join(" + ")];
@@ -41,13 +41,13 @@ const CAREFUL = [["CUT", "bad"], ["LANDING", "warn"], ["TAKING_OFF", "warn"], ["
 
 const levelOf = (mode, level) => (mode !== "TRACK" || modeWord(mode) === mode ? level : "warn");
 
-// What a mode is for now: who is to track a target that is lost searches for it.
+// The word shown for a mode: a drone in TRACK searches while the target is lost.
 export function modeWord(mode) {
   if (mode !== "TRACK") return mode === "CUT" ? "MOTORS OFF" : mode.replace("_", " ");
   return trackerSilent() ? "NO TRACKER" : !lostTarget() ? mode : doing(mode).every(isBlind) ? "BLIND" : "SEARCH";
 }
 
-// In how many seconds a failsafe will land it, if nothing changes; "" if none is near.
+// Time until a failsafe lands the drone, if nothing changes; "" if none is near.
 export function landsIn(name) {
   const left = store.s.vehicles?.[name]?.lands_in_s ?? null;
   return left === null ? "" : `${Math.max(1, Math.round(left))} s`;
@@ -62,7 +62,7 @@ export const unseenLeftS = (name) => Math.max(0, store.scene.unseen_land_s - uns
 // Not seen for so long that it is searched for, or soon lands.
 export const isLost = (name) => (entity(name)?.age_s ?? Infinity) + estimateAge() > (store.scene?.lost_after_s ?? 3);
 export const lostTarget = () => (store.scene?.targets ?? []).every(({ name }) => isLost(name));
-// Who does this now, among those that are heard of.
+// The drones in this mode now, among those with telemetry.
 export const doing = (mode) => droneNames().filter((name) => modeOf(store.s.vehicles?.[name]) === mode);
 
 export const NAMED = 4; // more drones than this are counted
@@ -80,7 +80,7 @@ function some(names) {
   return names.length > FEW ? `${names.length} of ${all} drones` : names.join(", ");
 }
 
-// Who is up forms the team until TRACK begins the task; one that still stands is about to follow.
+// Airborne drones form the team until TRACK begins the task; a drone that still stands is about to follow.
 export function stage() {
   const all = modes();
   if (runOver()) return "over";
@@ -94,7 +94,7 @@ const forms = ({ mode, detail }) => mode === "HOVER" && !waits(detail);
 // After an order or a failsafe a drone hovers until RESUME.
 export const waits = (detail) => detail.includes("RESUME");
 
-// What a stage is called now: who has lost the target searches for it, and nobody may be left who follows it.
+// The present name of a stage: a team that lost the target searches for it, and no drone may be left in TRACK.
 export function stageWord(name) {
   if (name !== "track" || stage() !== "track") return name;
   if (doing("TRACK").length) return lostTarget() ? "search" : name;

@@ -1,4 +1,4 @@
-// How high everybody flies: the room from the side, beside the map.
+// Heights of all drones: the room from the side, beside the map.
 
 import { label } from "./canvas.js";
 import { colourOf, ink, isAgain } from "./palette.js";

@@ -161,7 +161,7 @@ addEventListener("keydown", (event) => {
   else if (key === "escape") byId("about").close();
 });
 
-// What tests read; nothing here can be changed to any effect.
+// State that tests read; changing it has no effect.
 window.__console = {
   get state() {
     return {

@@ -1,4 +1,4 @@
-// Who is where: ellipses, drones, target, trails, velocities, the truth.
+// Entities on the map: ellipses, drones, target, trails, velocities, the truth.
 
 import { bodyToWorld, ellipse95 } from "./geometry.js";
 import { colourOf, ink, isAgain } from "./palette.js";
@@ -10,7 +10,7 @@ import { withShortNames } from "./names.js";
 import { ageS, entities, entity, estimateAge, isTarget, store } from "./store.js";
 
 const ARROW_S = 1.5, OLD_S = 2;
-// Who has not been seen for long is greyed even while the tracker speaks.
+// Entities not seen for long are greyed even while the tracker publishes.
 const fade = (body) => (body.age_s > OLD_S ? 0.45 : 1);
 
 export function drawTrails(g, view) {

@@ -1,4 +1,4 @@
-// What does not move: floor, grid, fence, pads.
+// The parts of the map that do not move: floor, grid, fence, pads.
 
 import { fenceColour, ink } from "./palette.js";
 import { label, path } from "./canvas.js";

@@ -1,4 +1,4 @@
-// What cameras see: footprints, and the sensing graph with the information that each link brings.
+// The cameras' sensing: footprints, and the sensing graph with the information that each link brings.
 
 import { bodyToWorld, footprint, thickness } from "./geometry.js";
 import { colourOf, ink } from "./palette.js";
@@ -95,7 +95,7 @@ export function drawGraph(g, view) {
   }
 }
 
-// How well one reading tells a place: the standard deviation that its information [1/m²] amounts to.
+// The precision of one measurement: the standard deviation that its information [1/m²] amounts to.
 function precision(information) {
   const metres = 1 / Math.sqrt(information);
   return metres < 1 ? `${(100 * metres).toFixed(0)} cm` : `${metres.toFixed(1)} m`;

@@ -61,7 +61,7 @@ function forgetShown() {
   own = own.filter((order) => !shown.has(order.ref) && sinceMs(order.since) < KEPT_MS);
 }
 
-// What the server has not shown when the connection breaks, it may never have had.
+// The server may never have received a stop that it has not shown when the connection breaks.
 function doubt() {
   for (const order of own) if (order.state === "sent" && STOPS.has(order.verb)) put(order, "doubtful", `the connection broke: it is sent again ${meanwhile(order.verb)}`);
 }

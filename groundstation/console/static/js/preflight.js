@@ -1,4 +1,4 @@
-// What the checks before a take-off find, graded, with its remedy; and what of it forbids a take-off.
+// The findings of the checks before a take-off, graded, with remedies; and those that forbid a take-off.
 
 import { byId, el, text } from "./dom.js";
 import { aloft } from "./glance.js";
@@ -11,7 +11,7 @@ const findings = () => store.s.preflight?.findings ?? [];
 const isTold = () => !runOver() && !aloft() && (replaying() || ageS(store.s.preflight?.at) < OLD_S);
 const graded = (level) => findings().filter((one) => one.level === level);
 
-// What forbids a take-off of these drones: what concerns only others does not.
+// The findings that forbid a take-off of these drones: those about other drones do not.
 export function openMusts(names = droneNames()) {
   const others = droneNames().filter((name) => !names.includes(name));
   return isTold() ? graded("MUST").filter(({ subject }) => !others.includes(subject)) : [];

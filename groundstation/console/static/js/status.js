@@ -21,7 +21,7 @@ export function showHealth() {
   if (!health || health.nis === null) { text(pill, health ? "no innovations yet" : ""); delete pill.dataset.level; return; }
   const good = health.nis >= health.low && health.nis <= health.high, far = health.nis > 2 * health.high;
   pill.className = "pill num";
-  // What a silent tracker was like says nothing of what it is like.
+  // The last figures of a silent tracker say nothing of its present state.
   pill.dataset.level = estimateAge() > OLD_S ? "wait" : good ? "good" : far ? "bad" : "warn";
   text(pill, `${estimateAge() > OLD_S ? "was: " : ""}NIS ${health.nis.toFixed(2)} ${good ? "consistent" : health.nis > health.high ? "overconfident" : "cautious"} · ${(100 * (health.accepted ?? 0)).toFixed(0)} % accepted`);
   pill.title = `95 % bounds ${health.low.toFixed(2)} to ${health.high.toFixed(2)}`;

@@ -37,7 +37,7 @@ function onlyNames(table) {
 // A replay's time stands still, runs and jumps: it is what the newest frame says.
 export const now = () => held ?? (replaying() ? store.serverMs : performance.now() + (store.offset ?? 0));
 let held = null;
-// What is shown together is of one time: else a drone falls silent between the bar and its card.
+// Values shown together are of one time: else a drone falls silent between the bar and its card.
 export function atOneTime(show) {
   held = now();
   try { show(); } finally { held = null; }
@@ -83,7 +83,7 @@ export const isTarget = (name) => (store.scene?.targets ?? []).some((target) => 
 // Footprints are drawn at one height: that of the highest target's marker.
 export const targetHeight = () => Math.max(0, ...(store.scene?.targets ?? []).map((target) => target.height_m));
 export const droneNames = () => (store.scene?.drones ?? []).map((drone) => drone.name);
-// How long ago a body corrected the belief; of one that the belief does not hold, how long ago it was in a picture.
+// Time since an observation of a body corrected the belief; for one not in the belief, since it was in a picture.
 export function unseenS(name) {
   const body = entity(name), pictures = (store.s.sightings ?? []).filter(([, subject]) => subject === name);
   return body ? body.age_s + estimateAge() : Math.min(...pictures.map(([, , at]) => ageS(at)), Infinity);

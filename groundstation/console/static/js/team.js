@@ -11,7 +11,7 @@ import { colourOf, isAgain } from "./palette.js";
 import { ageS, entity, estimateAge, runOver, SEEN_S, seenBy, store, trackerSilent, unseenS } from "./store.js";
 
 const STALE_S = 1;
-// In these modes one that is lost is told as that.
+// In these modes a lost drone is shown as lost.
 const STRAYS = new Set(["TRACK", "HOVER", "HOLD"]);
 const LEVELS = { TRACK: "good", HOVER: "good", HOLD: "warn", TAKING_OFF: "warn", LANDING: "warn", CUT: "bad", LANDED: "calm", CONNECTING: "calm" };
 const NARROW = matchMedia("(max-width: 1380px)"), LOW = matchMedia("(max-height: 990px)");
@@ -42,7 +42,7 @@ export function buildTeam() {
 
 const TITLES = { battery: "battery", rate: "telemetry", link: "link", heard: "last heard", seen: "last seen", position: "position [m]", ellipse: "95 % sure within [m]", speed: "speed", by: "seen by" };
 const BELIEF = ["position", "ellipse", "speed"];
-// What stays on a screen that is read from 3 m, and on a low one.
+// The figures kept on a screen that is read from 3 m, and on a low one.
 const CHIEF = new Set(["battery", "seen"]), FIRST = { drone: new Set(["battery", "link", "heard", "seen"]), target: new Set(["seen", "speed", "by"]) };
 const WIDE = new Set(["position", "ellipse", "by"]);
 
@@ -104,7 +104,7 @@ function showVehicle(name, { root, values, mode, detail }) {
   showDuty(detail, name, silent);
 }
 
-// Who does as planned is green; who searches, or is kept from its plan, is not.
+// A drone that does as planned is green; one that searches, or is kept from its plan, is not.
 function levelOf(status) {
   const mode = modeOf(status);
   return mode !== status.mode || (mode === "TRACK" && modeWord(mode) !== mode) ? "warn" : LEVELS[mode] ?? "wait";
@@ -121,7 +121,7 @@ function showDuty(node, name, silent) {
   node.classList.toggle("low", Boolean(landsIn(name) || silent));
 }
 
-// What share of the packets or of the signal arrives, as the driver says it.
+// The share of the packets or of the signal that arrives, as the driver reports it.
 function showLink(node, share) {
   const level = share === null || share === undefined ? "unknown" : share < 0.3 ? "empty" : share < 0.6 ? "low" : "full";
   text(node, level === "unknown" ? "?" : `${(100 * share).toFixed(0)} %${{ full: "", low: " weak", empty: " bad!" }[level]}`);

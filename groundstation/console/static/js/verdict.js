@@ -1,4 +1,4 @@
-// What the team does and who is lost, in a line that is always there, below the alarms.
+// The line below the alarms, always shown: the team's activity and the lost entities.
 
 import { joined, seconds } from "./dom.js";
 import { ready, refusalOf, waiting } from "./effects.js";
@@ -19,7 +19,7 @@ const NEXT = {
   LANDING: "A drone that has landed stays down until a new TAKE OFF.",
 };
 
-// Whom a failsafe lands, told together where it is at the same time: [names, [words of one, of several]].
+// The drones that a failsafe lands, grouped by the time: [names, [words of one, of several]].
 function landings(soon) {
   return [...new Set(soon.map(landsIn))].map((time) => [soon.filter((name) => landsIn(name) === time), [`lands by itself in ${time}`, `land by themselves in ${time}`]]);
 }
@@ -34,7 +34,7 @@ function deeds() {
   return parts.length ? `${parts.join("; ")}.` : "";
 }
 
-// Who should be seen: the target, and who flies.
+// The entities that should be seen: the target, and flying drones.
 function sought() {
   const floor = new Set([...standing(), ...doing("CONNECTING")]);
   return [...droneNames().filter((name) => !floor.has(name)), ...store.scene.targets.map(({ name }) => name)];
@@ -52,7 +52,7 @@ function unseenFor(names) {
 // In pictures, and not localised.
 const isUnplaced = (name) => !entity(name) && unseenS(name) <= store.scene.lost_after_s;
 
-// Who can be seen without the tracker.
+// The entities that cameras see, known without the tracker.
 function inPictures() {
   const all = sought(), seen = all.filter((name) => seenBy(name).length);
   return seen.length ? `; cameras still see ${seen.length === all.length ? "all" : namedOrCounted(seen)}` : "";
@@ -65,14 +65,14 @@ function lost() {
   return `${unseen.length ? `Lost: ${unseenFor(unseen)}` : `Nobody is lost${unseenYet()}`}.${yet}`;
 }
 
-// Who would be lost next.
+// The entities that would be lost next.
 function unseenYet() {
   const unseen = sought().filter((name) => unseenS(name) > SEEN_S && !isLost(name));
   const left = Math.max(0, store.scene.lost_after_s - Math.max(...unseen.map(unseenS)));
   return unseen.length ? ` (${namedOrCounted(unseen)} not seen just now: ${unseen.length > 1 ? "the first " : ""}counts as lost in ${seconds(left)})` : "";
 }
 
-// What lets those go on that wait for it.
+// The command that lets waiting drones go on.
 function start() {
   const task = lostTarget() ? "search" : "track", stay = waiting().filter((name) => !landsIn(name)), them = (names) => (names.length > 1 ? "them" : names[0]);
   if (stay.length && !refusalOf("RESUME")) return `RESUME lets ${them(stay)} ${task}.`;
@@ -80,14 +80,14 @@ function start() {
   return refusalOf("TRACK") || !next.length ? "" : `TRACK lets ${them(next)} ${task}.`;
 }
 
-// What a take-off waits for, or what it would be.
+// The finding that a take-off waits for, or the meaning of TAKE OFF now.
 function takeOff() {
   const [first] = openMusts();
   if (first) return `TAKE OFF waits: ${mustWords(first)}.`;
   return store.s.flight?.flown ? "TAKE OFF flies again." : "TAKE OFF begins the flight.";
 }
 
-// What follows where all who fly do the same.
+// The next step if all flying drones are in the same mode.
 const next = () => (new Set(up().map(modeNow)).size === 1 ? NEXT[modeNow(up()[0])] : undefined);
 
 export function verdict() {
@@ -97,7 +97,7 @@ export function verdict() {
   return [deeds(), lost(), next() ?? start()].filter(Boolean).join(" ");
 }
 
-// Who lands by itself, why and when, in two short lines; "" if nobody will.
+// The drones that will land by themselves, why and when, in two short lines; "" if none will.
 export function landingWords() {
   const bound = up().filter((name) => landsIn(name) && !isUnheard(name)), [soonest] = [...bound].sort((a, b) => parseInt(landsIn(a)) - parseInt(landsIn(b)));
   if (soonest) {

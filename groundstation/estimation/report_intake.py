@@ -131,7 +131,7 @@ class ReportIntake:
     def _believe(self, name: str, trust: _Trust) -> None:
         trust.heeded, trust.refused, trust.ahead = True, 0, (0.0, 0.0)
         trust.probation_s = min(2.0 * trust.probation_s, _LONGEST_S)
-        text = f"{name} reports the motion that cameras see again: its reports are used"
+        text = f"{name} agrees with the cameras again: its reports are used"
         self._notices.append(Notice(Severity.INFO, text, entity=name))
 
 

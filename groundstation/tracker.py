@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter, defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -63,6 +63,7 @@ class Tracker:
         self._plan_stale = False
         self._drifts: defaultdict[str, DriftWatch] = defaultdict(DriftWatch)
         self._belief = self.filter.belief()
+        self._unlocalised_s: Mapping[str, float] = {}
         self._corrections: list[Correction] = []
         self._notices: list[Notice] = []
         self._robots = tuple(n for n, m in parameters.estimator.entities.items() if m.kind is EntityKind.ROBOT)
@@ -140,6 +141,7 @@ class Tracker:
         if self.holding and self.airborne and all(self.converged(name) for name in self.airborne):
             self.holding = False
         self._watch_plan(now_ns)
+        self._unlocalised_s = self._find_unlocalised()
         return self._belief
 
     def take_corrections(self) -> list[Correction]:
@@ -172,12 +174,15 @@ class Tracker:
         age = min((self.filter.age_s(name) for name in self._targets), default=math.inf)
         return age if math.isfinite(age) else None
 
-    def unlocalised_s(self) -> dict[str, float]:
+    def unlocalised_s(self) -> Mapping[str, float]:
         """Return for how long each airborne robot may have been elsewhere than estimated [s]; infinite: never seen.
 
         A robot known well enough and missed by no camera is localised, even if seen long ago; but odometry is
         trusted no longer than for twice the time within which a robot flies back.
         """
+        return self._unlocalised_s
+
+    def _find_unlocalised(self) -> dict[str, float]:
         missed, trusted_s = self.lookout.missed_s, 2.0 * self.parameters.control.return_within_s
         ages_s = {name: self.filter.age_s(name) for name in self.airborne}
         return {
@@ -288,5 +293,6 @@ class Tracker:
         self.holding = True
         self.current = None
         self.epoch += 1
+        self._unlocalised_s = self._find_unlocalised()
         remedy = "drones hover; RESUME once they are localised again, or land them"
         self._notices.append(Notice(Severity.ERROR, f"estimator fault: {text}", remedy))

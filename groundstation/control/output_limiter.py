@@ -93,15 +93,21 @@ def _held_off(wall: _Wall, drift: Vector3, parameters: SafetyParameters) -> _Wal
 
 def _nearest(wanted: Array, walls: list[_Wall], limits: MotionLimits) -> tuple[Array, list[int]]:
     """Return the nearest velocity [world] that walls and limits allow, and the walls that limited it on the way."""
+    x, y, z = wanted.tolist()
+    if _is_slow(wanted, limits) and all(dot(wall.normal, (x, y, z)) <= wall.most for wall in walls):
+        return wanted, []  # usually so, and arrays for it would take five times as long
     normals, most = np.array([wall.normal for wall in walls]), np.array([wall.most for wall in walls])
     velocity, met = project(wanted, normals, most)
-    across, climbs = math.hypot(velocity[0], velocity[1]), abs(velocity[2])
-    slow = across <= limits.max_speed_m_s + _ROUNDING_M_S and climbs <= limits.max_climb_m_s + _ROUNDING_M_S
-    if not slow:  # two pushing walls at an acute angle meet far away
+    if not _is_slow(velocity, limits):  # two pushing walls at an acute angle meet far away
         speed = np.full(len(_ROUND), limits.max_speed_m_s * math.cos(math.pi / len(_ROUND)))
         climb = np.full(2, limits.max_climb_m_s)
         velocity, _ = project(wanted, np.concatenate((normals, _ROUND, _UP_DOWN)), np.concatenate((most, speed, climb)))
     return velocity, met
+
+
+def _is_slow(velocity: Array, limits: MotionLimits) -> bool:
+    across, climbs = math.hypot(velocity[0], velocity[1]), abs(velocity[2])
+    return bool(across <= limits.max_speed_m_s + _ROUNDING_M_S and climbs <= limits.max_climb_m_s + _ROUNDING_M_S)
 
 
 def _turning(wall: _Wall, rate: float, reaction_s: float) -> _Wall:

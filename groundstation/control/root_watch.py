@@ -40,8 +40,10 @@ class RootWatch:
         self._heard_ns: dict[str, int] = {}
         self._telling: set[str] = set()
         self._hanging: set[str] = set()
+        self._ages_s: dict[str, float] = {}
         self._now_ns = 0
         self._told = False
+        self._silent: bool | None = None
 
     @property
     def is_silent(self) -> bool:
@@ -50,10 +52,13 @@ class RootWatch:
         A root that never reports empty pictures may just have no robot in view; it is judged only while it repeats
         itself.
         """
-        return bool(self._roots) and all(map(self._says_nothing, self._roots))
+        if self._silent is None:
+            self._silent = bool(self._roots) and all(map(self._says_nothing, self._roots))
+        return self._silent
 
     def hear(self, message: Message, now_ns: int) -> None:
         """Take a message that was not refused."""
+        self._silent = None
         match message:
             case SearchedPicture() if message.observer in self._roots:
                 self._note(message.observer, now_ns, works=not message.found)
@@ -69,10 +74,13 @@ class RootWatch:
         """Take a message that was refused because its sensor hangs; new sightings of the same picture come with it."""
         if isinstance(message, RelativeObservation | RangeObservation) and message.observer in self._roots:
             self._hanging.add(message.observer)
+            self._silent = None
 
     def advance(self, now_ns: int, corrections: Iterable[Correction], *, flying: bool) -> list[Notice]:
         """Take what the filter used since the last call; returns the notices for the operator."""
         self._now_ns = now_ns
+        self._ages_s.clear()
+        self._silent = None
         for one in corrections:
             if one.verdict in _USED and one.subject in self._carried:
                 self._tie(one, now_ns - round(one.latency_ms * NS_PER_MS))
@@ -81,7 +89,9 @@ class RootWatch:
 
     def age_s(self, name: str) -> float:
         """Return the age [s] of a root's newest sighting that reached an entity, directly or not; or infinity."""
-        return self._since_s(max(self._rooted_ns.get(name, {}).values(), default=None))
+        if name not in self._ages_s:
+            self._ages_s[name] = self._since_s(max(self._rooted_ns.get(name, {}).values(), default=None))
+        return self._ages_s[name]
 
     def helped_age_s(self, name: str) -> float:
         """Return the same of sightings that reached it through others alone: they still count where no root sees it."""

@@ -1,6 +1,7 @@
 """Views of world-fixed cameras at search height, and the uncertainty of a robot's place."""
 
 import math
+from functools import cache
 
 import numpy as np
 
@@ -34,19 +35,23 @@ def velocity_error_m_s(belief: JointBelief, name: str) -> float:
 
     0 where the belief has no such states: in its core, and for vehicles without them.
     """
-    variances = belief.covariance_of(name).diagonal()
-    entries = _velocity_errors(belief, name)
-    return math.sqrt(max((float(belief.mean_of(name)[i] ** 2 + variances[i]) for i in entries), default=0.0))
+    entries, mean, covariance = _velocity_errors(belief, name), belief.mean_of(name), belief.covariance_of(name)
+    return math.sqrt(max((float(mean[i] ** 2 + covariance[i, i]) for i in entries), default=0.0))
 
 
 def known_velocity_error_m_s(belief: JointBelief, name: str) -> float:
     """Return the mean alone of a reported velocity's error, as learnt by the filter: the larger of both axes [m/s]."""
-    return max((abs(float(belief.mean_of(name)[i])) for i in _velocity_errors(belief, name)), default=0.0)
+    mean = belief.mean_of(name)
+    return max((abs(float(mean[i])) for i in _velocity_errors(belief, name)), default=0.0)
 
 
-def _velocity_errors(belief: JointBelief, name: str) -> list[int]:
-    labels = belief.layout.block(name).labels
-    return [labels.index(label) for label in _VELOCITY_ERRORS if label in labels]
+def _velocity_errors(belief: JointBelief, name: str) -> tuple[int, ...]:
+    return _places_of_errors(belief.layout.block(name).labels)
+
+
+@cache
+def _places_of_errors(labels: tuple[str, ...]) -> tuple[int, ...]:
+    return tuple(labels.index(label) for label in _VELOCITY_ERRORS if label in labels)
 
 
 def is_localised(belief: JointBelief, name: str, unseen_s: float, parameters: SafetyParameters) -> bool:

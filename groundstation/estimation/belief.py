@@ -22,7 +22,9 @@ class JointBelief:
     def __post_init__(self) -> None:
         n = self.layout.dim
         for name, shape in (("mean", (n,)), ("covariance", (n, n))):
-            value = np.array(getattr(self, name), dtype=np.float64)
+            value = np.asarray(getattr(self, name), dtype=np.float64)
+            if value.flags.writeable:  # somebody may still write into it
+                value = value.copy()
             if value.shape != shape or not np.isfinite(value).all():
                 raise ValueError(f"{name} must be finite with shape {shape}")
             value.setflags(write=False)
@@ -43,7 +45,9 @@ class JointBelief:
         without: names of those that are left out too.
         """
         layout, kept = _core_of(self.layout, frozenset(without))
-        return JointBelief(self.mean[kept[1][0]], self.covariance[kept], layout, self.stamp_ns)
+        mean, covariance = self.mean[kept[1][0]], self.covariance[kept]
+        mean.flags.writeable = covariance.flags.writeable = False
+        return JointBelief(mean, covariance, layout, self.stamp_ns)
 
 
 @lru_cache(maxsize=64)

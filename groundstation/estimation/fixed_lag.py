@@ -29,6 +29,7 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _FORGOTTEN_NS = 60 * NS_PER_S  # after such a pause (a suspended host) no belief is worth predicting
 FUTURE_NS = 100 * NS_PER_MS  # a measurement further ahead of now than this is an error of a clock
+_Presence = tuple[list[int], list[float], list[int]]
 _IDLE_STEPS = 10  # steps that may pass between two calls of `advance` before `add_*` advances by itself
 
 
@@ -49,6 +50,7 @@ class FixedLagFilter:
         self._sensor_index = {name: i for i, name in enumerate(parameters.sensors)}
         self._tables, self._event_kernels = tables_from_parameters(parameters), event_kernels()
         self._now_ns: int
+        self._present: _Presence | None
         self._last: int
         self._step_ns = round(parameters.step_s * NS_PER_S)
         self._lag_ns = round(parameters.max_lateness_s * NS_PER_S)
@@ -188,8 +190,9 @@ class FixedLagFilter:
 
     def age_s(self, name: str) -> float:
         """Return the time since an entity was last corrected by an observation; infinite if it has not joined."""
-        memory = self._state.memory[self._index[name]]
-        return self._seconds(self._now_ns) - float(memory["corrected_at"]) if memory["active"] else math.inf
+        active, corrected_at, _ = self._presence
+        index = self._index[name]
+        return self._seconds(self._now_ns) - corrected_at[index] if active[index] else math.inf
 
     def sighting(self, name: str) -> tuple[float, float] | None:
         """Return the time since an entity was last seen [s], and the deviation of its place then [m]; None: never."""
@@ -212,7 +215,7 @@ class FixedLagFilter:
 
     def airborne(self, robot: str) -> bool:
         """Return whether a robot flies, as far as is known."""
-        return bool(self._state.memory["admitted"][self._index[robot]])
+        return bool(self._presence[2][self._index[robot]])
 
     def velocity_of(self, robot: str) -> tuple[float, float, float]:
         """Return a joined robot's velocity [m/s; world] from its last odometry, corrected by its estimated errors."""
@@ -225,6 +228,14 @@ class FixedLagFilter:
     def mode_probabilities(self) -> tuple[float, ...]:
         """Return how likely each combination of modes is; one number where no target switches."""
         return tuple(self._state.weights.tolist())
+
+    @property
+    def _presence(self) -> _Presence:
+        """Return for each entity whether it is in the state, when it was last corrected, and whether it may join."""
+        if self._present is None:
+            memory = self._state.memory
+            self._present = memory["active"].tolist(), memory["corrected_at"].tolist(), memory["admitted"].tolist()
+        return self._present
 
     def _layout(self) -> tuple[StateLayout, tuple[IntArray, ...]]:
         """Return the layout over the entities that have joined, and its entries as indices of rows and columns."""
@@ -246,7 +257,7 @@ class FixedLagFilter:
         self._fresh: dict[int, tuple[str, str, float]] = {}
         self._moments = moments_of(self._state)
         self._velocities: dict[str, Vector3] = {}
-        self._started = False
+        self._present, self._started = None, False
         self._origin_ns = self._now_ns = self._last = self._dirty = 0
 
     def _change(self, name: str, kind: int, placed: Sequence[float], tie: str, stamp_ns: int, now_ns: int) -> Verdict:
@@ -272,8 +283,7 @@ class FixedLagFilter:
         self._start(now_ns)
         if self._step_of(now_ns) > self._last + _IDLE_STEPS:
             self.advance(now_ns)
-        if now_ns < self._now_ns:
-            now_ns = self._now_ns
+        now_ns = max(now_ns, self._now_ns)
         if stamp_ns < now_ns - self._lag_ns:
             return Verdict.LATE
         return Verdict.IMPLAUSIBLE if stamp_ns > now_ns + FUTURE_NS else Verdict.ACCEPTED
@@ -301,6 +311,7 @@ class FixedLagFilter:
         span = Span(first, last, waiting, self._seconds(now_ns))
         replay(self._event_kernels, self._tables, self._checkpoints, inputs, span, self._state, self._moments)
         self._velocities.clear()
+        self._present = None
         self._now_ns, self._last, self._dirty = now_ns, last, min(waiting, last)
         self._log.forget_before(self._origin_ns + (last - self._behind) * self._step_ns)
 

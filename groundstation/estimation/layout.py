@@ -18,26 +18,29 @@ ROBOT_CORE = ("x", "y", "z", "yaw")
 TARGET_CORE = ("x", "y", "vx", "vy")
 CARRIER_LABELS = (*ROBOT_CORE, "roll_error", "pitch_error")
 CORE_SIZE = 4
+_Slice = slice
 
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """One entity's entries: robots and cameras begin with x, y, z, yaw; targets with x, y, vx, vy [world]."""
+    """One entity's entries: robots and cameras begin with x, y, z, yaw; targets with x, y, vx, vy [world].
+
+    slice: its place in the state.
+    """
 
     name: str
     kind: EntityKind
     start: int
     labels: tuple[str, ...]
+    slice: _Slice = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "slice", slice(self.start, self.start + self.size))
 
     @property
     def size(self) -> int:
         """Return the number of entries."""
         return len(self.labels)
-
-    @property
-    def slice(self) -> slice:
-        """Return the block's place in the state."""
-        return slice(self.start, self.start + self.size)
 
 
 @dataclass(frozen=True, slots=True)

@@ -194,10 +194,10 @@ class SensorSuite:
         """
         found = []
         for camera in self.world.values():
-            right, _, axis = camera.optical_from_world
-            x, y, z = (
-                camera.position_m - axis * ((camera.position_m[2] - height_m) / axis[2]) * (1.0, 1.0, 0.0)
-            ).tolist()
+            right, _, axis = camera.optical_from_world.tolist()
+            x, y, z = camera.position_m
+            way = (z - height_m) / axis[2]
+            x, y = x - axis[0] * way, y - axis[1] * way
             across = (z - height_m) * camera.view.half_width_tan
             across -= camera.view.border_m * math.hypot(1.0, camera.view.half_width_tan)
             along = (z - height_m) * camera.view.half_height_tan

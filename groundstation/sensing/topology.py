@@ -97,6 +97,8 @@ class Topology:
     def reconciled(self, names: Iterable[str]) -> "Topology":
         """Return the topology for exactly these robots: missing ones removed, new ones added to the top level."""
         present = frozenset(names)
+        if present == self.robots:
+            return self
         levels = [level & present for level in self.levels if level & present]
         joining = present - self.robots
         if joining:

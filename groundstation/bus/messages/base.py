@@ -12,21 +12,17 @@ Whole = Annotated[int, msgspec.Meta(ge=-_WHOLE_LIMIT, le=_WHOLE_LIMIT - 1)]
 
 
 _ALWAYS = frozenset((str, bool, type(None)))  # types of values that cannot be out of range
+_FLOATS, _INTEGERS = frozenset((float,)), frozenset((int,))
 
 
 def _is_finite(value: Any) -> bool:
     kind = type(value)
     if kind in _ALWAYS:
         return True
-    if kind is tuple and value:
-        # Vectors, matrices and maps are most of what is checked.
-        kinds = set(map(type, value))
-        if kinds == {float}:  # no sum of them is finite if one of them is not
-            return math.isfinite(sum(value)) or all(map(math.isfinite, value))
-        if kinds == {int}:
-            return _is_whole(min(value)) and _is_whole(max(value))
     if kind is float:
         return math.isfinite(value)
+    if kind is tuple:
+        return not value or _all_finite(value)
     if kind is Header:
         return _is_whole(value.stamp_ns) and _is_whole(value.seq)
     if isinstance(value, float):
@@ -36,12 +32,21 @@ def _is_finite(value: Any) -> bool:
     if isinstance(value, str):
         return True
     if isinstance(value, tuple):
-        return all(map(_is_finite, value))
+        return _all_finite(value)
     if isinstance(value, msgspec.Struct):
         return all(map(_is_finite, astuple(value)))
     if isinstance(value, dict):
         return all(map(_is_finite, value.values()))
     return True
+
+
+def _all_finite(values: tuple[Any, ...]) -> bool:
+    kinds = set(map(type, values))  # vectors, matrices and maps are most of what is checked
+    if kinds == _FLOATS:  # no sum of them is finite if one of them is not
+        return math.isfinite(sum(values)) or all(map(math.isfinite, values))
+    if kinds == _INTEGERS:
+        return _is_whole(min(values)) and _is_whole(max(values))
+    return all(map(_is_finite, values))
 
 
 def _is_whole(value: int) -> bool:

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import cache
 from typing import ClassVar
 
 import numpy as np
@@ -108,6 +109,11 @@ def begin_odometry_robot(
     correct_height(belief, deferred, HeightEntries(start + Z, error, floor), height, p.height_variance, gate)
 
 
+@cache
+def _labels(slow_states: tuple[str, ...]) -> tuple[str, ...]:
+    return (*ROBOT_CORE, *(label for label in SLOW_STATES if label in slow_states))
+
+
 @dataclass(frozen=True, slots=True)
 class OdometryRobot:
     """A vehicle driven by its own velocity and heading increments; slow errors of its sensors are states.
@@ -152,7 +158,7 @@ class OdometryRobot:
     @property
     def labels(self) -> tuple[str, ...]:
         """Return the entries of the block."""
-        return (*ROBOT_CORE, *(label for label in SLOW_STATES if label in self.slow_states))
+        return _labels(self.slow_states)
 
     @property
     def place_m(self) -> Vector3:

@@ -22,6 +22,7 @@ from sitl_run import COMMAND, SitlRun
 
 _NODES = Path(__file__).with_name("ros2_nodes.py")
 _START_S, _TRACK_S, _SPAN_S, _WATCH_S, _LEAST = 30.0, 90.0, 2.0, 90.0, 16
+_ORDER_S = 4.0  # between orders, each of which starts an interpreter that a slow machine needs for its drones
 
 
 class Stage:
@@ -68,11 +69,11 @@ def _end(process: "subprocess.Popen[bytes]") -> None:
 def _watched(stage: Stage) -> dict[str, Any]:
     """Return the client's result; each command makes an event, which an earlier subscriber sees on /rosout."""
     watcher = stage.node("watcher", str(_WATCH_S), str(_LEAST))
-    for turn in range(int(_WATCH_S)):
-        if watcher.poll() is not None:
-            break
+    end_s, turn = time.monotonic() + _WATCH_S, 0
+    while watcher.poll() is None and time.monotonic() < end_s:
         subprocess.run([*COMMAND, ("hold", "resume")[turn % 2]], check=False, capture_output=True)
-        time.sleep(1.0)
+        turn += 1
+        time.sleep(_ORDER_S)
     watcher.wait(30)
     found: dict[str, Any] = json.loads(stage.lines("watcher")[-1])
     return found

@@ -64,8 +64,11 @@ def motion_from_navdata(packet: Navdata) -> NavdataMotion | None:
     Raises WireError (not_finite, implausible, option_size).
     """
     demo = packet.read(DEMO)
-    if demo is None:
-        return None
+    return None if demo is None else motion_from_demo(packet, demo)
+
+
+def motion_from_demo(packet: Navdata, demo: Demo) -> NavdataMotion:
+    """Return the motion in a packet and its DEMO option; raises WireError (not_finite, implausible, option_size)."""
     _require_sane(demo)
     altitude = packet.read(ALTITUDE)
     # WIRE: DEMO vz is 0 in every recording of a real drone; ALTITUDE's is the rate of the altitude, positive up.

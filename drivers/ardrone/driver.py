@@ -59,8 +59,7 @@ _log = logging.getLogger(__name__)
 class LatestNavdata(NamedTuple):
     """The newest telemetry of the drone; heard_ns 0: never; moved_ns: when it last reported motion.
 
-    Velocity as reported. obeyed: sequence number of the last PCMD that it reports as obeyed, if any; height_m: above
-    the floor, likewise.
+    Velocity as reported; height_m: above the floor, if reported; packet: the last that reported motion.
     """
 
     heard_ns: int = 0
@@ -71,8 +70,14 @@ class LatestNavdata(NamedTuple):
     battery: float | None = None
     model: Model = Model.UNKNOWN
     velocity_m_s: Vector3 = (0.0, 0.0, 0.0)
-    obeyed: int | None = None
     height_m: float | None = None
+    packet: Navdata | None = None
+
+    @property
+    def obeyed(self) -> int | None:
+        """Return the sequence number of the last PCMD that it reports as obeyed, if any."""
+        references = None if self.packet is None else self.packet.read(SPEED_REFERENCES)
+        return None if references is None else references.sequence
 
 
 class ArDrone:
@@ -120,14 +125,13 @@ class ArDrone:
                 _log.exception("%s: a packet could not be used", self.name)
 
     def _hear(self, now_ns: int, packet: Navdata) -> None:
-        motion, demo = convert.motion_from_navdata(packet), packet.read(DEMO)
-        heard = self.telemetry
+        heard, demo = self.telemetry, packet.read(DEMO)
         control_state = heard.control_state if demo is None else demo.control_state
         flight_state = convert.flight_state_from_navdata(packet.state, control_state)
-        if demo is None or motion is None:
+        if demo is None:
             self.telemetry = heard._replace(heard_ns=now_ns, state=packet.state, flight_state=flight_state)
             return
-        references = packet.read(SPEED_REFERENCES)
+        motion = convert.motion_from_demo(packet, demo)
         self.telemetry = LatestNavdata(
             heard_ns=now_ns,
             moved_ns=now_ns,
@@ -137,8 +141,8 @@ class ArDrone:
             battery=convert.charge_from_demo(demo),
             model=model_from_navdata(packet) if heard.model is Model.UNKNOWN else heard.model,
             velocity_m_s=motion.velocity_m_s,
-            obeyed=None if references is None else references.sequence,
             height_m=motion.height_m,
+            packet=packet,
         )
         sample = convert.sample_from_motion(now_ns, packet, motion)
         report = self._plausibility.update(sample, flight_state)
@@ -195,8 +199,9 @@ class ArDrone:
             self._uplink.reset()
             return
         heard, notices = self.telemetry, []
-        if heard.obeyed is not None and now_ns - heard.moved_ns < _FRESH_NS:
-            notices.append(self._uplink.step(now_ns, heard.obeyed, heard.flight_state in UP))
+        obeyed = heard.obeyed
+        if obeyed is not None and now_ns - heard.moved_ns < _FRESH_NS:
+            notices.append(self._uplink.step(now_ns, obeyed, heard.flight_state in UP))
         if now_ns >= self._next_rate_ns:
             self._next_rate_ns = now_ns + _RATE_PERIOD_NS
             notices.append(self._rate_watch.step(now_ns, self._link.rates(now_ns)[0]))

@@ -14,24 +14,26 @@ from groundstation.geometry.angles import quaternion_from_euler
 _CLIMB_STD_M_S = 0.15
 # It is not reported while the ultrasound receives another drone's.
 _VOID_CLIMB_STD_M_S = 2.0
+_NO_SUMS = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class _InertialMean:
     """Mean rates and specific force since last taken: their integral equals that of all samples."""
 
     def __init__(self) -> None:
-        self._sums, self._count = [0.0] * 6, 0
+        self._sums, self._count = _NO_SUMS, 0
 
     def add(self, rates: Vector3, force: Vector3) -> None:
         """Take a sample."""
-        for i, value in enumerate((*rates, *force)):
-            self._sums[i] += value
+        (wx, wy, wz), (fx, fy, fz) = rates, force
+        sums = self._sums
+        self._sums = (sums[0] + wx, sums[1] + wy, sums[2] + wz, sums[3] + fx, sums[4] + fy, sums[5] + fz)
         self._count += 1
 
     def take(self) -> tuple[Vector3, Vector3]:
         """Return (rates, force) and begin anew; at least one sample was added."""
         wx, wy, wz, fx, fy, fz = (total / self._count for total in self._sums)
-        self._sums, self._count = [0.0] * 6, 0
+        self._sums, self._count = _NO_SUMS, 0
         return (wx, wy, wz), (fx, fy, fz)
 
 

@@ -45,11 +45,13 @@ class OptionLayout(Generic[Value]):
         self._skip = start - _HEAD
         self.size = start + self._struct.size
 
-    def is_in(self, payload: bytes) -> bool:
-        """Return whether a firmware that sent this payload has the layout at all."""
-        if self._exact:
-            return len(payload) + _HEAD == self.size
-        return not self._optional or len(payload) + _HEAD >= self.size
+    def read(self, payload: bytes) -> Value | None:
+        """Return the value in a payload, or None if the firmware that sent it does not have the layout at all."""
+        if self._optional:
+            missing = self.size - _HEAD - len(payload)
+            if missing > 0 or (self._exact and missing):
+                return None
+        return self.decode(payload)
 
     def decode(self, payload: bytes) -> Value:
         """Return the value in a payload (option without its 4-byte head); surplus is ignored.

@@ -52,7 +52,7 @@ class Navdata(NamedTuple):
             if found is None:
                 return None
             payload = found
-        return layout.decode(payload) if layout.is_in(payload) else None
+        return layout.read(payload)
 
 
 def decode(datagram: bytes, strict: bool = True) -> Navdata:
@@ -146,10 +146,11 @@ def _check(datagram: bytes, offset: int, strict: bool) -> None:
 
 def checksum(data: bytes, end: int | None = None) -> int:
     """Return the plain sum of all bytes, or of those before `end`."""
-    end = len(data) if end is None else end
+    summed, total = data[:end], 0
     # The low half of an Adler-32 from 0 on is the sum modulo 65521, which a block cannot reach: faster than sum().
-    blocks = range(0, end, _BLOCK)
-    return sum(adler32(data[at : min(at + _BLOCK, end)], 0) & 0xFFFF for at in blocks)
+    for at in range(0, len(summed), _BLOCK):
+        total += adler32(summed[at : at + _BLOCK], 0) & 0xFFFF
+    return total
 
 
 def encode(navdata: Navdata) -> bytes:

@@ -5,7 +5,7 @@ its earlier velocity.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from drivers.watchdog_types import FREE, Action, VehicleView, WatchdogDecision
 from groundstation.bus.messages import UP
@@ -113,7 +113,7 @@ class ControlErrorMonitor:
         strays = strays or self._judge_one(self._seen, seen_m_s, turning, dt_s, wanted, "seen by cameras")
         speeds = [0.0 if reported is None else math.hypot(*reported)]
         speeds += [] if seen_m_s is None else [math.hypot(*seen_m_s) - SEEN.deviation_m_s / 2]
-        return replace(view, speed_m_s=max(speeds), stray=strays, seen=seen_m_s is not None)
+        return view._replace(speed_m_s=max(speeds), stray=strays, seen=seen_m_s is not None)
 
     def _judge_one(
         self, excess: Excess, velocity: tuple[float, float] | None, turning_m_s: float, dt_s: float,

@@ -1,6 +1,7 @@
 """Evidence for the failsafe table: which conditions hold now, for how long, and why. Pure."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from drivers.failsafe_table import Condition, Failsafe, Latch, Reaction
 from drivers.setpoints import SetpointGate
@@ -18,8 +19,7 @@ _LASTING_S, _NEAR_S, _FAULT_S = 0.3, 3.0, 3.0
 _USUAL = frozenset({Condition.TAKE_OFF_OVERDUE})
 
 
-@dataclass(frozen=True, slots=True)
-class Situation:
+class Situation(NamedTuple):
     """The watchdog's inputs at one moment; times in ns, gap_s: time for which the driver's own loop stood still.
 
     clearing: a take-off is clearing an emergency, within its time. paused_ns: last setpoint before a pause that needs

@@ -4,7 +4,6 @@ import itertools
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 from drivers.announcements import Announcements
 from drivers.base import HostProcess, Vehicle
@@ -85,7 +84,7 @@ class VehicleHost:
                 self._count("setpoint", self.watchdog.accept_setpoint(now_ns, received.message))
         decision = self.watchdog.step(now_ns, view, self._upstream())
         seen, why = self._seen.velocity(now_ns), self.watchdog.failsafe
-        self._told = decision = replace(decision, seen_m_s=seen, failsafe=why)
+        self._told = decision = decision._replace(seen_m_s=seen, failsafe=why)
         self.vehicle.apply(now_ns, decision)
         self._report(now_ns, view, decision)
         return decision
@@ -100,7 +99,7 @@ class VehicleHost:
             self._localised_ns = None
         unlocalised_s = 0.0 if self._localised_ns is None else (now_ns - self._localised_ns) / NS_PER_S
         near, crowded = self._near(now_ns, view.flight_state in AIRBORNE)
-        return replace(view, unseen_s=unlocalised_s, near=near, crowded=crowded)
+        return view._replace(unseen_s=unlocalised_s, near=near, crowded=crowded)
 
     def _hear_estimate(self, now_ns: int, estimate: Estimate) -> None:
         self._neighbours.see(now_ns, estimate.entities)

@@ -1,7 +1,8 @@
 """Vocabulary of the watchdog: modes, actions, inputs and answers."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
+from typing import NamedTuple
 
 from groundstation.bus.messages import AckStage, FlightState, Vector3, Verb
 from groundstation.field.behaviour import SafetyValues
@@ -90,8 +91,7 @@ class WatchdogLimits:
         return 1.3 * self.max_speed_m_s + 0.2
 
 
-@dataclass(frozen=True, slots=True)
-class VehicleView:
+class VehicleView(NamedTuple):
     """The vehicle's state by its reports; fresh: telemetry is younger than 0.3 s.
 
     not_ready: why it may not take off, or "". configured: the driver has prepared it for flight; a driver of a standing
@@ -124,7 +124,7 @@ class VehicleView:
     @property
     def plausible(self) -> "VehicleView":
         """Return the view to act upon: a vehicle with implausible values counts as silent."""
-        return replace(self, fresh=False) if self.unsound and self.fresh else self
+        return self._replace(fresh=False) if self.unsound and self.fresh else self
 
     @property
     def silence(self) -> str:
@@ -134,8 +134,7 @@ class VehicleView:
         return self.mute or "no telemetry from the vehicle"
 
 
-@dataclass(frozen=True, slots=True)
-class Upstream:
+class Upstream(NamedTuple):
     """State of tracker and supervisor, as the process sees it."""
 
     supervisor_alive: bool = True
@@ -153,8 +152,7 @@ class Ack:
     reason: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class WatchdogDecision:
+class WatchdogDecision(NamedTuple):
     """The present decision; velocity and yaw rate count for FLY only. `reason` explains the mode.
 
     setpoint_ns: stamp of the setpoint obeyed, for vehicles that get each setpoint once; 0 if none is. seen_m_s:

@@ -53,10 +53,11 @@ class MotionMean:
             self._waiting.clear()
         if waiting:
             count = len(waiting)
-            vx, vy, vz = (sum(motion.velocity_m_s[i] for motion in waiting) / count for i in range(3))
-            self._velocity = (vx, vy, vz)
+            forward, left, up = zip(*(motion.velocity_m_s for motion in waiting), strict=True)
+            self._velocity = (sum(forward) / count, sum(left) / count, sum(up) / count)
             forces = [motion.specific_force_m_s2 for motion in waiting if motion.specific_force_m_s2 is not None]
             self._force = None
             if forces:
-                self._force = (sum(f[0] for f in forces) / len(forces), sum(f[1] for f in forces) / len(forces))
+                forward, left, _ = zip(*forces, strict=True)
+                self._force = (sum(forward) / len(forces), sum(left) / len(forces))
         return self._velocity, self._force

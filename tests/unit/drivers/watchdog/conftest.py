@@ -1,7 +1,6 @@
 """A watchdog with an obedient vehicle, on a manual clock."""
 
 import itertools
-from dataclasses import replace
 
 import pytest
 
@@ -55,8 +54,8 @@ class Bench:
     @property
     def view(self):
         view = VehicleView(self.state, self.fresh, self.battery, self.not_ready, unsound=self.unsound)
-        seen = replace(view, unseen_s=self.unseen_s, lost_s=self.lost_s, near=self.near, crowded=self.crowded)
-        return replace(seen, speed_m_s=self.speed, seen=self.seen, stray=self.stray, clears=self.clears).plausible
+        seen = view._replace(unseen_s=self.unseen_s, lost_s=self.lost_s, near=self.near, crowded=self.crowded)
+        return seen._replace(speed_m_s=self.speed, seen=self.seen, stray=self.stray, clears=self.clears).plausible
 
     def see(self):
         """Give the vehicle's state to the watchdog, as its host does before it passes on commands."""

@@ -13,7 +13,7 @@ from drivers.ardrone.averages import MotionMean
 from drivers.ardrone.commands import orders_from_decision
 from drivers.ardrone.desired_config import ids_of, scale_from_settings, wishes
 from drivers.ardrone.identity import Model, model_from_navdata
-from drivers.ardrone.link import ArDroneLink
+from drivers.ardrone.link import ArDroneLink, Arrival
 from drivers.ardrone.publisher import NavdataPublisher
 from drivers.ardrone.queries import TcpInquirer
 from drivers.ardrone.rate_watch import RateWatch
@@ -43,6 +43,9 @@ _FRESH_NS = 300 * NS_PER_MS
 # Velocity reported by a drone that sees no floor: not its true one, so that its firmware's own braking fails as well.
 _NO_FLOW_M_S = 0.02
 _RATE_PERIOD_NS = 200 * NS_PER_MS
+# A packet of which nothing is to be published waits unread for the next one, 5 ms later: two at once take two thirds of
+# the time, since most of it is spent on bringing the code back into the processor's caches.
+_AT_ONCE = 2
 _FAULTS = int(StateBit.MOTORS | StateBit.SOFTWARE_FAULT | StateBit.VBAT_LOW)
 _NO_AR1_VIDEO = Notice(
     Severity.WARNING,
@@ -105,6 +108,7 @@ class ArDrone:
         self._plausibility = MotionMonitor(LIMITS)
         self._video_refused = False
         self._refused: Counter[str] = Counter()
+        self._unread: list[Arrival] = []
         self._closing = threading.Event()
         self._reader = threading.Thread(target=self._read, name="navdata", daemon=True)
         self._reader.start()
@@ -113,16 +117,26 @@ class ArDrone:
 
     def _read(self) -> None:
         while not self._closing.is_set():
-            received = self._link.receive()
-            if received is None:
-                continue
-            try:
-                self._hear(*received)
-            except WireError as error:
-                self._refused[error.reason] += 1
-            except Exception:  # noqa: BLE001 - the reader must outlive whatever a drone sends: count, log, go on
-                self._refused["internal"] += 1
-                _log.exception("%s: a packet could not be used", self.name)
+            arrival = self._link.receive()
+            if arrival is not None:
+                self._unread.append(arrival)
+                if len(self._unread) < _AT_ONCE and not self._publisher.would_be_due(arrival.stamp_ns):
+                    continue
+            for one in self._unread:
+                self._take(one)
+            self._unread.clear()
+
+    def _take(self, arrival: Arrival) -> None:
+        packet = self._link.packet_of(arrival)
+        if packet is None:
+            return
+        try:
+            self._hear(arrival.stamp_ns, packet)
+        except WireError as error:
+            self._refused[error.reason] += 1
+        except Exception:  # noqa: BLE001 - the reader must outlive whatever a drone sends: count, log, go on
+            self._refused["internal"] += 1
+            _log.exception("%s: a packet could not be used", self.name)
 
     def _hear(self, now_ns: int, packet: Navdata) -> None:
         heard, demo = self.telemetry, packet.read(DEMO)

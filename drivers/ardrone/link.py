@@ -5,6 +5,7 @@ import socket
 import threading
 from collections import Counter
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from drivers import vehicle_socket
 from drivers.ardrone.settings import ArDroneDriverSettings
@@ -47,6 +48,14 @@ class SequenceFilter:
         return True
 
 
+class Arrival(NamedTuple):
+    """A datagram as it arrived, unread."""
+
+    stamp_ns: int
+    datagram: bytes
+    source: tuple[str, int]
+
+
 class ArDroneLink:
     """Sockets on free ports, or those that the settings name, so that many drones fit on one host.
 
@@ -67,27 +76,34 @@ class ArDroneLink:
         self._filter = SequenceFilter()
         self.rejected: Counter[str] = Counter()
 
-    def receive(self) -> tuple[int, Navdata] | None:
-        """Wait up to 0.1 s for a packet; returns (receipt_ns, packet), or None if none was usable."""
+    def receive(self) -> Arrival | None:
+        """Wait up to 0.1 s for a datagram; returns None if none came."""
         try:
             if vehicle_socket.waits(self._navdata_socket, _POLL_S):
-                return self._judge(*self._navdata_socket.recvfrom(navdata.MAX_SIZE + 1))
-        except WireError as error:
-            self._reject(error.reason, str(error))
+                datagram, source = self._navdata_socket.recvfrom(navdata.MAX_SIZE + 1)
+                now_ns = clock.now_ns()
+                self._log.received(now_ns, datagram)
+                return Arrival(now_ns, datagram, source)
         except (OSError, ValueError) as error:  # ValueError: it was closed meanwhile
             self._reject("receive_failed", str(error))
         return None
 
-    def _judge(self, datagram: bytes, source: tuple[str, int]) -> tuple[int, Navdata]:
-        now_ns = clock.now_ns()
-        self._log.received(now_ns, datagram)
+    def packet_of(self, arrival: Arrival) -> Navdata | None:
+        """Return the packet in a datagram, or None if it is not usable; call it in the order of arrival."""
+        try:
+            return self._judge(*arrival)
+        except WireError as error:
+            self._reject(error.reason, str(error))
+            return None
+
+    def _judge(self, now_ns: int, datagram: bytes, source: tuple[str, int]) -> Navdata:
         if source != (self._settings.address, self._settings.navdata_port):
             raise WireError("foreign_address", f"{source[0]}:{source[1]}")
         packet = navdata.decode(datagram, self._settings.strict_checksum)
         with self._lock:
             if not self._filter.accept(now_ns, packet.sequence):
                 raise WireError("replayed", str(packet.sequence))
-        return now_ns, packet
+        return packet
 
     def _reject(self, reason: str, detail: str) -> None:
         self.rejected[reason] += 1

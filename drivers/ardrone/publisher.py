@@ -53,6 +53,10 @@ class NavdataPublisher:
             for sound, climb_std in ((True, _CLIMB_STD_M_S), (False, _VOID_CLIMB_STD_M_S))
         }
 
+    def would_be_due(self, stamp_ns: int) -> bool:
+        """Return whether a motion at that time would be published."""
+        return self._odometry.would_be_due(stamp_ns) or self._imu.would_be_due(stamp_ns)
+
     def publish(self, stamp_ns: int, motion: NavdataMotion, health: HealthReport = ALL_GOOD) -> None:
         """Publish due data that is not BAD; all motions are checked for jumps of the heading."""
         reset = self._heading.update(stamp_ns, motion)

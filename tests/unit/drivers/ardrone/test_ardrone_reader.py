@@ -1,0 +1,97 @@
+"""The reader thread: packets of which nothing is published are read two at once, and no message changes by that."""
+
+import threading
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from drivers.ardrone.driver import ArDrone
+from drivers.ardrone.link import Arrival
+from drivers.ardrone.publisher import NavdataPublisher
+from drivers.ardrone.settings import ArDroneDriverSettings
+from drivers.ardrone.wire import navdata, options
+from drivers.ardrone.wire.navdata import Navdata
+from groundstation.bus.messages import Header, Message
+from groundstation.time_units import NS_PER_MS
+
+_SOURCE = ("127.0.0.1", 5554)
+_HEALTHY, _FLY = 0x0F800000, 1
+
+
+class _Bus:
+    def __init__(self) -> None:
+        self.sent: list[Message] = []
+
+    def header(self, entity: str, stamp_ns: int) -> Header:
+        return Header(stamp_ns, "host", entity, entity, len(self.sent))
+
+    def publish(self, _topic: object, message: Message) -> None:
+        self.sent.append(message)
+
+
+class _IdleThread:
+    def __init__(self, **_: Any) -> None: ...
+    def start(self) -> None: ...
+    def join(self, timeout: float | None = None) -> None: ...
+
+
+@pytest.fixture
+def drone(monkeypatch: pytest.MonkeyPatch) -> Iterator[ArDrone]:
+    monkeypatch.setattr(threading, "Thread", _IdleThread)
+    bus: Any = _Bus()
+    made = ArDrone(ArDroneDriverSettings(name="drone_1", address="127.0.0.1", raw_datagrams=False), bus)
+    yield made
+    made.close()
+
+
+def arrival(number: int, state: int = _HEALTHY | _FLY) -> Arrival:
+    demo = options.DEMO.encode(options.Demo(altitude_mm=900, vx_mm_s=number, vy_mm_s=2 * number), 148)
+    phys = options.PHYS_MEASURES.encode(options.PhysMeasures(rates_deg_s=(number / 10, 0.0, 0.0)))
+    datagram = navdata.encode(Navdata(state, number, 0, ((0, demo), (3, phys))))
+    return Arrival((1000 + 5 * number) * NS_PER_MS, datagram, _SOURCE)
+
+
+def read(drone: ArDrone, *arrivals: Arrival | None) -> None:
+    waiting = iter(arrivals)
+    drone._link.receive = lambda: next(waiting)  # type: ignore[method-assign]
+    with pytest.raises(StopIteration):
+        drone._read()
+
+
+def test_a_packet_of_which_nothing_is_due_waits_for_the_next(drone: ArDrone) -> None:
+    arrivals = [arrival(number) for number in range(1, 8)]
+    heard = []
+    for one in arrivals:
+        read(drone, one)
+        heard.append(drone.telemetry.heard_ns)
+    stamps = [one.stamp_ns for one in arrivals]
+    assert heard == [*stamps[:3], stamps[2], stamps[4], stamps[4], stamps[6]]
+    assert drone._link.rates(stamps[6]) == (7.0, 1.0)
+
+
+def test_a_waiting_packet_is_read_when_no_other_comes(drone: ArDrone) -> None:
+    read(drone, *(arrival(number) for number in range(1, 5)))
+    assert drone.telemetry.heard_ns == arrival(3).stamp_ns
+    read(drone, None)
+    assert drone.telemetry.heard_ns == arrival(4).stamp_ns
+
+
+def test_a_status_packet_never_waits_long_and_a_damaged_one_is_counted(drone: ArDrone) -> None:
+    status = Arrival(1000 * NS_PER_MS, navdata.encode(Navdata(_HEALTHY, 1)), _SOURCE)
+    read(drone, status)
+    assert drone.telemetry.heard_ns == status.stamp_ns
+    read(drone, arrival(2)._replace(datagram=b"short"), arrival(3)._replace(source=("127.0.0.9", 1)))
+    assert drone._link.rejected == {"too_short": 1, "foreign_address": 1}
+
+
+def test_messages_are_those_of_packets_read_one_by_one(drone: ArDrone) -> None:
+    arrivals = [arrival(number) for number in range(1, 400) if number % 17]
+    together: Any = drone._publisher._bus
+    read(drone, *arrivals)
+    alone: Any = _Bus()
+    drone._publisher = NavdataPublisher(drone._settings, alone)
+    drone._plausibility.reset()
+    for one in arrivals:
+        drone._hear(one.stamp_ns, navdata.decode(one.datagram))
+    assert len(alone.sent) > 200 and alone.sent == together.sent

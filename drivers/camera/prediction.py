@@ -123,9 +123,14 @@ class Foresight:
 
     def _nearest(self, stamp_ns: int) -> Estimate | None:
         """Return the estimate nearest to an exposure, or None if all are long before or after."""
-        estimate = min(self._estimates, key=lambda e: abs(e.header.stamp_ns - stamp_ns), default=None)
-        near = estimate is not None and abs(estimate.header.stamp_ns - stamp_ns) <= _FARTHEST_NS
-        return estimate if near else None
+        nearest, least_ns = None, _FARTHEST_NS
+        for estimate in reversed(self._estimates):  # the newest first: their stamps rise, and exposures are recent
+            away_ns = abs(estimate.header.stamp_ns - stamp_ns)
+            if away_ns <= least_ns:
+                nearest, least_ns = estimate, away_ns
+            elif nearest is not None:
+                break
+        return nearest
 
     def _camera(self, carrier: EntityEstimate | None, seconds: float, attitude: Attitude | None) -> "_Camera | None":
         position = np.array(self._mount.position_m)

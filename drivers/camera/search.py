@@ -98,10 +98,13 @@ def saddle_points(picture: Image) -> Seeds:
         )
     smooth = cv2.GaussianBlur(picture, (0, 0), _SMOOTHING_PX)
     xx, yy, xy = (cv2.Sobel(smooth, cv2.CV_32F, dx, dy, ksize=3) for dx, dy in ((2, 0), (0, 2), (1, 1)))
-    strength = xy * xy - xx * yy
-    peak = (strength >= cv2.dilate(strength, np.ones((3, 3), np.uint8))) & (strength > _LEAST_STRENGTH)
-    rows, columns = np.nonzero(peak)
-    a, b, c, s = (image[rows, columns].astype(np.float64) for image in (xx, yy, xy, strength))
+    strength = xy * xy
+    strength -= xx * yy
+    around = cv2.dilate(strength, np.ones((3, 3), np.uint8))
+    strong = np.flatnonzero(strength > _LEAST_STRENGTH)
+    peak = strong[strength.ravel()[strong] >= around.ravel()[strong]]
+    rows, columns = np.divmod(peak, strength.shape[1])
+    a, b, c, s = (image.ravel()[peak].astype(np.float64) for image in (xx, yy, xy, strength))
     # Opposite curvatures of similar size; an edge has only one.
     keep = np.flatnonzero((a + b) ** 2 < 1.4 * s)
     keep = keep[np.argsort(-s[keep])[:_MOST_SEEDS]]

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 
 from groundstation.bus.topics import TOPICS, Plane, Topic
 from groundstation.errors import MessageError
@@ -34,6 +35,7 @@ def plane_expression(site: str, plane: Plane) -> str:
     return "/".join((_ROOT, site, *([plane.value] if plane else []), "**"))
 
 
+@lru_cache(maxsize=1024)  # a process hears the same few keys all the time
 def parse(text: str) -> Key:
     """Return the parts of a concrete key.
 

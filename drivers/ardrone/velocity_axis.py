@@ -171,25 +171,24 @@ class Axis:
     def _answer(self, dt_s: float) -> float:
         """Advance the model of the tilt by the command of a dead time ago; returns its mean acceleration."""
         gains, asked, mean = self._gains, self._under_way.popleft(), 0.0
-        step_s = dt_s / _SUBSTEPS
+        step_s, tilt, rate = dt_s / _SUBSTEPS, self._tilt, self._tilt_rate
+        stiffness, damping = gains.tilt_rad_s**2, 2 * gains.tilt_damping * gains.tilt_rad_s
         for _ in range(_SUBSTEPS):
-            pull = (
-                gains.tilt_rad_s**2 * (asked - self._tilt) - 2 * gains.tilt_damping * gains.tilt_rad_s * self._tilt_rate
-            )
-            self._tilt_rate += pull * step_s
-            self._tilt += self._tilt_rate * step_s
-            mean += self._tilt / _SUBSTEPS
+            rate += (stiffness * (asked - tilt) - damping * rate) * step_s
+            tilt += rate * step_s
+            mean += tilt / _SUBSTEPS
+        self._tilt, self._tilt_rate = tilt, rate
         return mean
 
     def wish(self, wanted_m_s: float, outside_m_s2: float, dt_s: float) -> float:
         """Return the acceleration to command by tilt [m/s^2], before it is limited."""
         gains, step_s = self._gains, dt_s / _SUBSTEPS
+        stiffness, damping = gains.reference_rad_s**2, 2 * gains.reference_damping * gains.reference_rad_s
+        reference, rate = self.reference_m_s, self._reference_rate
         for _ in range(_SUBSTEPS):
-            pull = gains.reference_rad_s**2 * (wanted_m_s - self.reference_m_s)
-            self._reference_rate += (
-                pull - 2 * gains.reference_damping * gains.reference_rad_s * self._reference_rate
-            ) * step_s
-            self.reference_m_s += self._reference_rate * step_s
+            rate += (stiffness * (wanted_m_s - reference) - damping * rate) * step_s
+            reference += rate * step_s
+        self.reference_m_s, self._reference_rate = reference, rate
         # Until a new command takes effect, earlier commands and outside pushes cause this much speed.
         lag_s = 2 * gains.tilt_damping / gains.tilt_rad_s
         coming = sum(self._under_way) * dt_s + self._tilt * lag_s + self._tilt_rate / gains.tilt_rad_s**2

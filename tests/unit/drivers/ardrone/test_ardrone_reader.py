@@ -40,7 +40,9 @@ class _IdleThread:
 def drone(monkeypatch: pytest.MonkeyPatch) -> Iterator[ArDrone]:
     monkeypatch.setattr(threading, "Thread", _IdleThread)
     bus: Any = _Bus()
-    made = ArDrone(ArDroneDriverSettings(name="drone_1", address="127.0.0.1", raw_datagrams=False), bus)
+    made = ArDrone(
+        ArDroneDriverSettings(name="drone_1", address="127.0.0.1", raw_datagrams=False, odometry_hz=100.0), bus
+    )
     yield made
     made.close()
 

@@ -159,8 +159,10 @@ class Harness:
         return f"{len(self.world.drones)} drones, {len(self._order.streams)} cameras{real}"
 
     def _all_landed(self) -> bool:
-        emulated = any(drone.autopilot.motors_on or drone.airborne for drone in self.world.drones.values())
-        return not emulated and not any(puppet.airborne for puppet in self.world.puppets.values())
+        for drone in self.world.drones.values():
+            if drone.autopilot.motors_on or drone.airborne:
+                return False
+        return not any(puppet.airborne for puppet in self.world.puppets.values())
 
     def _publish_truth(self, stamp_ns: int) -> None:
         bus, unseen = self._child.bus, self._order.unseen

@@ -45,7 +45,7 @@ class Stage:
         for emulator in self.emulators.values():
             emulator.send()
         if self._board is not None:
-            self._board.write(stamp_ns, self.world.states())
+            self._board.write(stamp_ns, self.world.rows())
 
     def tell_cameras(self) -> None:
         """Pass the drones' video configurations to the render processes."""

@@ -9,6 +9,8 @@ import os
 import struct
 import tempfile
 import time
+from collections.abc import Iterable
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +40,8 @@ class TruthBoard:
         self.bodies = bodies
         self._path = path
         self._owner = owner
-        size = _HEADER.size + 8 * WIDTH * len(bodies)
+        self._rows = struct.Struct(f"<{WIDTH * len(bodies)}d")
+        size = _HEADER.size + self._rows.size
         flags = os.O_RDWR | ((os.O_CREAT | os.O_EXCL) if owner else 0)
         descriptor = os.open(path, flags, 0o600)
         try:
@@ -60,12 +63,12 @@ class TruthBoard:
         """Open an existing board; raises FileNotFoundError, or ValueError when it holds other bodies."""
         return cls(_path(name), bodies, owner=False)
 
-    def write(self, stamp_ns: int, states: Array) -> None:
-        """Publish the states (n, 13) of the time `stamp_ns`."""
+    def write(self, stamp_ns: int, states: Iterable[Iterable[float]]) -> None:
+        """Publish the states (n rows of 13) of the time `stamp_ns`."""
         memory = self._memory
         counter = _COUNTER.unpack_from(memory, 0)[0]
         _HEADER.pack_into(memory, 0, counter + 1, stamp_ns)
-        memory[_HEADER.size :] = np.ascontiguousarray(states, dtype=np.float64).tobytes()
+        self._rows.pack_into(memory, _HEADER.size, *chain.from_iterable(states))
         _COUNTER.pack_into(memory, 0, counter + 2)
 
     def read(self) -> tuple[int, Array]:

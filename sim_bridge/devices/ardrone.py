@@ -2,7 +2,6 @@
 
 import selectors
 import socket
-from contextlib import suppress
 
 from groundstation.errors import GroundStationError
 from sim_bridge.devices.ardrone_control import FlightControl
@@ -88,17 +87,17 @@ class ArDroneEmulator:
     def send(self) -> None:
         """End a tick: watch the link, and send due output."""
         self._ticks += 1
-        control = self.control
-        control.watch(self._now_ns)
-        self._edge.step(self._now_ns)
+        control, now_ns = self.control, self._now_ns
+        control.watch(now_ns)
+        self._edge.step(now_ns)
         if control.dump_wanted or control.custom_dump_wanted:
             self._dump()
         listeners = list(control.audience)
         if not listeners:
             return
-        demo_due = self._ticks % DEMO_SUBSAMPLING == 0
-        due = demo_due if control.demo else self._ticks % self._subsampling == 0
-        status = control.status_wanted and (control.demo or control.audience.bootstrap)
+        demo_due, demo = self._ticks % DEMO_SUBSAMPLING == 0, control.demo
+        due = demo_due if demo else self._ticks % self._subsampling == 0
+        status = control.status_wanted and (demo or control.audience.bootstrap)
         control.status_wanted = False
         ready = [listener for listener in listeners if not listener.bootstrap]
         for listener in listeners:
@@ -177,8 +176,10 @@ class ArDroneEmulator:
 
     def _send(self, listener: Listener, packet: bytearray) -> None:
         if not self.silent:
-            with suppress(OSError):  # a full buffer or a vanished client loses packets, as radio does
+            try:
                 self._navdata.sendto(packet, listener.address)
+            except OSError:
+                return  # a full buffer or a vanished client loses packets, as radio does
 
 
 def _waiting(udp: socket.socket) -> list[tuple[bytes, tuple[str, int]]]:

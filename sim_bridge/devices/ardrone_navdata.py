@@ -7,8 +7,7 @@ from docs/reference/ardrone.md 4: it shares neither conversions nor layouts with
 import math
 import struct
 from dataclasses import dataclass
-
-import numpy as np
+from zlib import adler32
 
 from sim_bridge.devices.ardrone_firmware import DEFAULT, FIRMWARES, ArdroneFirmware
 from sim_bridge.world.airframe import GRAVITY_M_S2
@@ -41,6 +40,7 @@ _DEG = math.degrees(1.0)
 _MG = 1000.0 / GRAVITY_M_S2
 _MICROSECONDS_PER_TICK = 5000
 _PICTURES_PER_SECOND = 30
+_BLOCK = 256  # bytes: their sum is less than 65521
 
 
 @dataclass(slots=True)
@@ -70,7 +70,8 @@ class _Packet:
             self.at[tag] = offset
             offset += sizes[tag]
         self.buffer = bytearray(offset + _CHECKSUM.size)
-        self._body = np.frombuffer(self.buffer, dtype=np.uint8)[:offset]
+        body = memoryview(self.buffer)[:offset]
+        self._blocks = [body[start : start + _BLOCK] for start in range(0, offset, _BLOCK)]
         self._end = offset
         for tag, start in self.at.items():
             struct.pack_into("<HH", self.buffer, start, tag, sizes[tag])
@@ -84,7 +85,10 @@ class _Packet:
     def finish(self, word: int, sequence: int) -> bytearray:
         """Write header and checksum and return the packet."""
         _HEADER.pack_into(self.buffer, 0, 0x55667788, word, sequence & 0xFFFFFFFF, 1 if self.at else 0)
-        total = int(np.add.reduce(self._body, dtype=np.uint32))
+        total = 0
+        for block in self._blocks:
+            # The low half of an Adler-32 from 0 on is the plain sum modulo 65521: the fastest way to add bytes up.
+            total += adler32(block, 0) & 0xFFFF
         _CHECKSUM.pack_into(self.buffer, self._end, 0xFFFF, 8, total)
         return self.buffer
 
@@ -159,11 +163,9 @@ def _fill_measures(buffer: bytearray, at: dict[int, int], onboard: Readable, tic
     gx, gy, gz = onboard.gyros
     fx, fy, fz = onboard.accelerometers
     if _RAW in at:
-        # AR2: about 512 LSB per g around 2048; gyros 16.4 LSB per deg/s.
         _RAW_FIELDS.pack_into(
             buffer, at[_RAW] + 4,
-            *(max(0, min(4095, round(2048 + 52.2 * f))) for f in (fx, -fy, fz)),
-            *(max(-32768, min(32767, round(939.0 * g))) for g in (gx, -gy, -gz)),
+            _raw_force(fx), _raw_force(-fy), _raw_force(fz), _raw_rate(gx), _raw_rate(-gy), _raw_rate(-gz),
         )  # fmt: skip
         _WORD.pack_into(buffer, at[_RAW] + 20, round(11000 + 1400 * onboard.battery))
     if _PHYS in at:
@@ -172,6 +174,16 @@ def _fill_measures(buffer: bytearray, at: dict[int, int], onboard: Readable, tic
         )
     if _EULER in at:  # from the accelerometers alone
         _EULER_FIELDS.pack_into(buffer, at[_EULER] + 4, math.atan2(fx, fz) * _MDEG, math.atan2(fy, fz) * _MDEG)
+
+
+def _raw_force(force_m_s2: float) -> int:
+    # AR2: about 512 LSB per g around 2048.
+    return max(0, min(4095, round(2048 + 52.2 * force_m_s2)))
+
+
+def _raw_rate(rate_rad_s: float) -> int:
+    # AR2: 16.4 LSB per deg/s.
+    return max(-32768, min(32767, round(939.0 * rate_rad_s)))
 
 
 def _fill_height(buffer: bytearray, at: dict[int, int], onboard: Readable, height_mm: int) -> None:

@@ -15,6 +15,12 @@ from sim_bridge.devices.ardrone_session import CommandLink
 from sim_bridge.world.ardrone import Quadrotor
 from sim_bridge.world.ardrone_autopilot import Phase
 
+# Plain numbers: an enum takes longer to find a member than a word to be put together.
+_ALWAYS, _CAMERA = int(HEALTHY | StateBit.ALTITUDE), int(StateBit.CAMERA)
+_FLIES, _START = int(StateBit.FLY | StateBit.VISION), int(StateBit.USER_FEEDBACK_START)
+_ACK, _BATTERY = int(StateBit.COMMAND), int(StateBit.VBAT_LOW)
+_BOOTSTRAP, _DEMO = int(StateBit.NAVDATA_BOOTSTRAP), int(StateBit.NAVDATA_DEMO)
+_CUT, _ALIVE = Phase.CUT, CommandLink.ALIVE
 _MAJOR = {
     Phase.LANDED: ControlState.LANDED,
     Phase.TAKING_OFF: ControlState.TRANS_TAKEOFF,
@@ -31,26 +37,26 @@ def state_word(drone: Quadrotor, control: FlightControl, now_ns: int, bootstrap:
     """Return the 32 bits of a packet's header for a client that is, or is not, in its bootstrap."""
     autopilot, session = drone.autopilot, control.session
     link = session.link(now_ns)
-    word = HEALTHY | StateBit.ALTITUDE
+    word = _ALWAYS
     if control.firmware.generation == 2:
-        word |= StateBit.CAMERA  # WIRE: on an AR.Drone 1 the bit acknowledges a trim
+        word |= _CAMERA  # WIRE: on an AR.Drone 1 the bit acknowledges a trim
     if autopilot.motors_on or not drone.airframe.on_ground:
-        word |= StateBit.FLY | StateBit.VISION
+        word |= _FLIES
     if control.start:
-        word |= StateBit.USER_FEEDBACK_START
+        word |= _START
     if session.ack:
-        word |= StateBit.COMMAND
+        word |= _ACK
     if bootstrap:
-        word |= StateBit.NAVDATA_BOOTSTRAP
+        word |= _BOOTSTRAP
     elif control.demo:
-        word |= StateBit.NAVDATA_DEMO
+        word |= _DEMO
     if drone.battery <= BATTERY_LOW:
-        word |= StateBit.VBAT_LOW
-    if link is not CommandLink.ALIVE:
+        word |= _BATTERY
+    if link is not _ALIVE:
         word |= StateBit.COM_WATCHDOG
         if link is CommandLink.LOST:
             word |= StateBit.COM_LOST
-    if autopilot.phase is Phase.CUT:
+    if autopilot.phase is _CUT:
         word |= StateBit.EMERGENCY | (StateBit.CUTOUT if control.cut_out else StateBit.USER_EL)
     return int(word)
 

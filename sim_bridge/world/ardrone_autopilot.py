@@ -41,7 +41,8 @@ class Phase(Enum):
     CUT = auto()
 
 
-_STEERED = frozenset({Phase.HOVERING, Phase.FLYING, Phase.BRAKING})
+_STEERED = (Phase.HOVERING, Phase.FLYING, Phase.BRAKING)
+_AT_REST = (Phase.LANDED, Phase.CUT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +94,7 @@ class Autopilot:
     @property
     def motors_on(self) -> bool:
         """Return whether the propellers turn."""
-        return self.phase not in (Phase.LANDED, Phase.CUT)
+        return self.phase not in _AT_REST
 
     @property
     def since_s(self) -> float:
@@ -164,9 +165,10 @@ class Autopilot:
         """Advance the airframe by one tick; push: acceleration by the air [m/s^2; world]."""
         self._since_s += self._tick_s
         motion = self._delayed.push(self._wanted)
+        if self.phase in _STEERED:
+            self._step_flight(motion, push)
+            return
         match self.phase:
-            case Phase.LANDED:
-                return
             case Phase.CUT:
                 self._fall(push)
             case Phase.TAKING_OFF:
@@ -175,8 +177,6 @@ class Autopilot:
                 self._step_landing(push)
             case Phase.LOOPING:
                 self._step_flip(push)
-            case Phase.HOVERING | Phase.FLYING | Phase.BRAKING:
-                self._step_flight(motion, push)
 
     def _enter(self, phase: Phase) -> None:
         if phase is not self.phase:

@@ -28,12 +28,13 @@ class Inertia:
         """Return rates [rad/s] and specific force [m/s^2; base]; call it once per tick."""
         draw = self._draw
         if motors_on and not body.on_ground:
-            rates, (sx, sy, sz) = _FLYING
-            turned = [one.step() for one in self._shaken]
+            (rx, ry, rz), (sx, sy, sz) = _FLYING
+            tx, ty, tz = [one.step() for one in self._shaken]
         else:
-            rates, (sx, sy, sz) = _IDLING if motors_on else _STILL
-            turned = [draw(), draw(), draw()]
-        gx, gy, gz = (w + std * one for w, std, one in zip(body.body_rates(), rates, turned, strict=True))
+            (rx, ry, rz), (sx, sy, sz) = _IDLING if motors_on else _STILL
+            tx, ty, tz = draw(), draw(), draw()
+        wx, wy, wz = body.body_rates()
         fx, fy, fz = (0.0, 0.0, GRAVITY_M_S2) if body.on_ground else body.specific_force()
         gain = _ACCELEROMETER_GAIN
-        return (gx, gy, gz), (gain * fx + sx * draw(), gain * fy + sy * draw(), gain * fz + sz * draw())
+        turned = wx + rx * tx, wy + ry * ty, wz + rz * tz
+        return turned, (gain * fx + sx * draw(), gain * fy + sy * draw(), gain * fz + sz * draw())

@@ -1,5 +1,6 @@
 """Seeded random processes and delays, one plain float per tick."""
 
+import itertools
 import math
 import zlib
 from collections import deque
@@ -18,14 +19,14 @@ def generator_of(seed: int, name: str) -> np.random.Generator:
     return np.random.default_rng([seed, zlib.crc32(name.encode())])
 
 
-def _blocks(rng: np.random.Generator) -> Iterator[float]:
+def _blocks(rng: np.random.Generator) -> Iterator[list[float]]:
     while True:
-        yield from rng.standard_normal(_BLOCK).tolist()
+        yield rng.standard_normal(_BLOCK).tolist()
 
 
 def standard_normals(rng: np.random.Generator) -> Draw:
     """Return a function that draws one standard normal; it draws blocks, since single draws cost ten times more."""
-    return _blocks(rng).__next__
+    return itertools.chain.from_iterable(_blocks(rng)).__next__
 
 
 class GaussMarkov:

@@ -2,13 +2,14 @@
 
 import itertools
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from groundstation.time_units import NS_PER_MS
+from groundstation.vectors import Vector3
 from sim_bridge.scenario import Scenario
 from sim_bridge.site import Site, SiteDrone
 from sim_bridge.truth import WIDTH
@@ -104,8 +105,9 @@ class World:
         drones = self.drones
         for puppet in self.puppets.values():
             puppet.step()
-        together = len(drones) + len(self.puppets) > 1
-        wakes = {name: self._wake(name) for name in drones} if self._downwash and together else {}
+        others: list[tuple[str, Body | Puppet]] = [*drones.items(), *self.puppets.items()]
+        together = self._downwash and len(others) > 1
+        wakes = {name: _wake(name, drone, others) for name, drone in drones.items()} if together else {}
         if self._crosstalk and self.ticks % _CROSSTALK_TICKS == 0:
             self._disturbed = _disturbed(drones)
         for name, drone in drones.items():
@@ -140,10 +142,12 @@ class World:
 
         The array is reused by the next call.
         """
-        rows = self._states
-        for index, name in enumerate(self.bodies):
-            rows[index] = self._row(name)
-        return rows
+        self._states[:] = self.rows()
+        return self._states
+
+    def rows(self) -> list[tuple[float, ...]]:
+        """Return the rows of `states`."""
+        return [self._row(name) for name in self.bodies]
 
     def _row(self, name: str) -> tuple[float, ...]:
         if name in self.drones:
@@ -153,9 +157,8 @@ class World:
         return self.targets[name].row() if name in self.targets else _NOWHERE
 
     def _let_targets_depart(self) -> None:
-        if any(target.parked for target in self.targets.values()) and (
-            len(self.airborne) == len(self.drones) + len(self.puppets)
-        ):
+        parked = [target for target in self.targets.values() if target.parked]
+        if parked and len(self.airborne) == len(self.drones) + len(self.puppets):
             self._together_s += TICK_S
             for name, target in self.targets.items():
                 target.parked = target.parked and self._together_s < self._depart_after_s[name]
@@ -170,16 +173,16 @@ class World:
         """Return the drones whose body is of a class."""
         return {name: drone for name, drone in self.drones.items() if isinstance(drone, body)}
 
-    def _wake(self, name: str) -> tuple[float, float, float]:
-        below = self.drones[name].airframe
-        if below.on_ground:
-            return _STILL_AIR
-        strongest = _STILL_AIR
-        others: list[tuple[str, Body | Puppet]] = [*self.drones.items(), *self.puppets.items()]
-        for other, drone in others:
-            if other != name and (push := drone.wake_on(below)) and push[2] < strongest[2]:
-                strongest = push  # wakes do not add up
-        return strongest
+
+def _wake(name: str, drone: Body, bodies: Iterable[tuple[str, Body | Puppet]]) -> Vector3:
+    """Return the acceleration of one drone by the strongest downwash of the others."""
+    below, strongest = drone.airframe, _STILL_AIR
+    if below.on_ground:
+        return _STILL_AIR
+    for other, body in bodies:
+        if other != name and (push := body.wake_on(below)) and push[2] < strongest[2]:
+            strongest = push  # wakes do not add up
+    return strongest
 
 
 def _in(value: float, side: tuple[float, float]) -> bool:

@@ -11,7 +11,7 @@ from sim_bridge.devices.ardrone_navdata import NavdataWriter
 from sim_bridge.devices.ardrone_ports import Ports, open_shared_udp
 from sim_bridge.devices.ardrone_state import state_word
 from sim_bridge.devices.ardrone_subscribers import Listener
-from sim_bridge.devices.ardrone_video import VideoMode
+from sim_bridge.devices.ardrone_video_mode import VideoMode
 from sim_bridge.fault_kinds import Fault, FaultKind
 from sim_bridge.world.ardrone import Quadrotor
 from sim_bridge.world.ardrone_sensors import Onboard

@@ -91,7 +91,9 @@ class StreamServer:
             self._count += 1
             heapq.heappush(self._queue, (release_ns, self._count, payload, stands_alone))
             del self._queue[_MAX_QUEUED:]
-        self._wake()
+            is_next = self._queue[0][1] == self._count
+        if is_next:  # else the thread wakes before it is due
+            self._wake()
 
     def _wake(self) -> None:
         with suppress(OSError):

@@ -11,7 +11,8 @@ from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
 from groundstation.geometry.rotations import base_from_tilted_optical
 from groundstation.time_units import NS_PER_MS
-from sim_bridge.devices.ardrone_video import ArDroneVideoServer, VideoEncoder, VideoMode
+from sim_bridge.devices.ardrone_video import ArDroneVideoServer, VideoEncoder
+from sim_bridge.devices.ardrone_video_mode import VideoMode
 from sim_bridge.own_video import OwnVideo
 from sim_bridge.render.outputs import scaled
 from sim_bridge.render.spec import Mount, RenderSpec

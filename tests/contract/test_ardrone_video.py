@@ -21,7 +21,8 @@ from drivers.ardrone.wire.pave import FrameReader, PaveFrame
 from drivers.camera.sources.h264 import H264Decoder
 from drivers.camera.sources.opening import open_source
 from groundstation.errors import DriverError
-from sim_bridge.devices.ardrone_video import ArDroneVideoServer, VideoEncoder, VideoMode, parameter_sizes
+from sim_bridge.devices.ardrone_video import ArDroneVideoServer, VideoEncoder, parameter_sizes
+from sim_bridge.devices.ardrone_video_mode import VideoMode
 
 MODE_720P = VideoMode(codec=0x83)
 

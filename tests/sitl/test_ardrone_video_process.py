@@ -13,7 +13,7 @@ from drivers.camera.sources.frames import Packet
 from drivers.camera.sources.opening import open_source
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
-from sim_bridge.devices.ardrone_video import VideoMode
+from sim_bridge.devices.ardrone_video_mode import VideoMode
 from sim_bridge.own_video import OwnVideo
 from sim_bridge.render.outputs import scaled
 from sim_bridge.render.process import FrameDelay, run

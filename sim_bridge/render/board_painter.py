@@ -42,15 +42,16 @@ class BoardPainter:
     """Draws the printed card of one marker into pictures, from several resolutions."""
 
     def __init__(self, card: Card, intrinsics: CameraIntrinsics, table: LensTable) -> None:
-        self._unit_m = card.unit_m
         self._intrinsics = intrinsics
         self._table = table
-        self._mips = [_with_coverage(*card.raster(texels)) for texels in _MIP_TEXELS]
+        unit_from_marker = np.diag((1 / card.unit_m, 1 / card.unit_m, 1.0))
+        rasters = (card.raster(texels) for texels in _MIP_TEXELS)
+        self._mips = [(_with_coverage(grey), texel_from_unit @ unit_from_marker) for grey, texel_from_unit in rasters]
         x0, x1, y0, y1 = card.extent
         # The middles of the four edges first: they give the scale.
         rim = [(x0, (y0 + y1) / 2), (x1, (y0 + y1) / 2), ((x0 + x1) / 2, y0), ((x0 + x1) / 2, y1)]
         rim += [(x, y) for x in (x0, x1) for y in (y0, y1)]
-        self._rim = np.column_stack((np.array(rim), np.zeros(len(rim)))) * self._unit_m
+        self._rim = np.column_stack((np.array(rim), np.zeros(len(rim)))) * card.unit_m
         self._units = (x1 - x0) * (y1 - y0)
 
     def draw(
@@ -105,8 +106,8 @@ class BoardPainter:
         top: its first row in the picture, for the rolling shutter.
         """
         level = next((i for i, n in enumerate(_MIP_TEXELS) if n <= 1.3 * _OVERSAMPLING * spacing), len(_MIP_TEXELS) - 1)
-        texture, texel_from_unit = self._mips[level]
-        maps = [self._texels(x, y, pose, texel_from_unit) for pose in poses]
+        texture, texel_from_marker = self._mips[level]
+        maps = [_texels(x, y, pose, texel_from_marker) for pose in poses]
         u, v = maps[0]
         if len(maps) == 2:
             share = ((np.arange(len(x), dtype=np.float32) + top - PAD) / (self._table.height - 1))[:, None]
@@ -121,17 +122,18 @@ class BoardPainter:
         grey, coverage = (cv2.extractChannel(layers, layer) for layer in (_GREY, _COVERAGE))
         return cv2.merge((grey, coverage)).astype(np.float32)
 
-    def _texels(self, x: Float32, y: Float32, pose: Pose, texel_from_unit: Array) -> tuple[Float32, Float32]:
-        """Return the points [texels] at which the rays of a window meet the card."""
-        unit_from_marker = np.diag((1 / self._unit_m, 1 / self._unit_m, 1.0))
-        optical_from_plane = np.column_stack((pose.rotation[:, 0], pose.rotation[:, 1], pose.translation))
-        h = (texel_from_unit @ unit_from_marker @ np.linalg.inv(optical_from_plane)).astype(np.float32)
-        scale = 1.0 / (h[2, 0] * x + h[2, 1] * y + h[2, 2])
-        return (h[0, 0] * x + h[0, 1] * y + h[0, 2]) * scale, (h[1, 0] * x + h[1, 1] * y + h[1, 2]) * scale
+
+def _texels(x: Float32, y: Float32, pose: Pose, texel_from_marker: Array) -> tuple[Float32, Float32]:
+    """Return the points [texels] at which the rays of a window meet the card."""
+    optical_from_plane = pose.rotation.copy()
+    optical_from_plane[:, 2] = pose.translation
+    h = (texel_from_marker @ np.linalg.inv(optical_from_plane)).astype(np.float32)
+    scale = 1.0 / (h[2, 0] * x + h[2, 1] * y + h[2, 2])
+    return (h[0, 0] * x + h[0, 1] * y + h[0, 2]) * scale, (h[1, 0] * x + h[1, 1] * y + h[1, 2]) * scale
 
 
-def _with_coverage(picture: Image, texel_from_square: Array) -> tuple[Image, Array]:
-    return np.dstack((picture, picture, picture, np.full_like(picture, 255))), texel_from_square
+def _with_coverage(picture: Image) -> Image:
+    return np.dstack((picture, picture, picture, np.full_like(picture, 255)))
 
 
 def _warped(

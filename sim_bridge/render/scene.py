@@ -10,6 +10,8 @@ from groundstation.geometry.pose import Pose
 from groundstation.geometry.rotations import rotation_from_euler
 from sim_bridge.render.spec import BoardSpec, RenderSpec
 
+# No point of a body is farther from its base. (A board is not drawn if its middle is behind the camera.)
+_REACH_M = 1.0
 _POSITION, _VELOCITY, _ATTITUDE, _RATES = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)
 
 
@@ -56,7 +58,7 @@ class CameraScene:
 
 
 def compose_scene(spec: RenderSpec, states: Array) -> CameraScene:
-    """Return the scene before the camera, without its own carrier and without bodies of unknown place (NaN)."""
+    """Return the scene before the camera, without its own carrier, bodies behind it, and those of unknown place."""
     half_s, readout_s = spec.scenario.exposure_ms / 2000.0, spec.scenario.rolling_shutter_ms / 2000.0
     camera, *smear = _camera_poses(spec, states, (0.0, -half_s, half_s))
     rolling = None
@@ -71,6 +73,9 @@ def compose_scene(spec: RenderSpec, states: Array) -> CameraScene:
             continue
         base, offset = world_from_base(state), np.array(board.position_m)
         optical_from_base = optical_from_world.compose(base)
+        optical_from_marker = _shifted(optical_from_base, offset)
+        if max(optical_from_base.translation[2], optical_from_marker.translation[2]) < -_REACH_M:
+            continue
         place = base.apply(offset)
         velocity = base.rotation @ _across(state[_RATES], offset) + state[_VELOCITY]
         begin, end = (
@@ -84,7 +89,7 @@ def compose_scene(spec: RenderSpec, states: Array) -> CameraScene:
                 for at, seconds in zip(rolling, (-readout_s, readout_s), strict=True)
             )
             rows = first, last
-        sights.append(Sight(board, optical_from_base, _shifted(optical_from_base, offset), begin, end, rows))
+        sights.append(Sight(board, optical_from_base, optical_from_marker, begin, end, rows))
     farthest_first = tuple(sorted(sights, key=lambda sight: -sight.depth_m))
     return CameraScene(camera, farthest_first, (smear[0], smear[1]), rolling)
 
@@ -107,4 +112,5 @@ def _camera_poses(spec: RenderSpec, states: Array, moments_s: tuple[float, ...])
         return (mount.parent_from_optical,) * len(moments_s)
     state = states[spec.bodies.index(mount.body)]
     base = world_from_base(state)
-    return tuple(moved(base, state, seconds).compose(mount.parent_from_optical) for seconds in moments_s)
+    bases = (moved(base, state, seconds) if seconds else base for seconds in moments_s)
+    return tuple(one.compose(mount.parent_from_optical) for one in bases)

@@ -65,11 +65,12 @@ def _codec(size: tuple[int, int], fps: float, bit_rate: float) -> av.VideoCodecC
     kbits = round(codec.bit_rate / 1000)
     parameters = f"keyint={_IDR_PERIOD}:min-keyint=1:scenecut=0:vbv-maxrate={kbits}:vbv-bufsize={max(1, kbits // 2)}"
     # Real drones encode in hardware: better than x264's fastest preset at the same rate, so it is not the fastest.
+    # subme=0, motion by whole pixels, costs 0.2 dB of 0.9 and saves a fifth of the time.
     codec.options = {
         "preset": "superfast",
         "tune": "zerolatency",
         "profile": "baseline",
         "forced-idr": "1",
-        "x264-params": f"{parameters}:annexb=1:repeat-headers=1",
+        "x264-params": f"{parameters}:annexb=1:repeat-headers=1:subme=0",
     }
     return codec

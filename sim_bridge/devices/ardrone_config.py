@@ -7,6 +7,7 @@ from drivers.ardrone.wire.errors import WireError
 from sim_bridge.devices.ardrone_firmware import DEFAULT, FIRMWARES, ArdroneFirmware
 
 DEFAULT_ID = "00000000"
+_COMMON = Category.COMMON
 Ids = tuple[str, str, str]  # session, user, application: the order of CONFIG_IDS
 NO_IDS: Ids = (DEFAULT_ID,) * 3
 _SWITCHES = {
@@ -101,12 +102,11 @@ class Configuration:
         return key.access is not Access.CUSTOM or active != NO_IDS
 
     def _value(self, key: ConfigKey) -> Scalar:
-        if key.name in _SWITCHES:
-            return self._active[_SWITCHES[key.name]]
-        return self._set_of(key)[key.name]
+        switched = _SWITCHES.get(key.name)
+        return self._set_of(key)[key.name] if switched is None else self._active[switched]
 
     def _set_of(self, key: ConfigKey) -> dict[str, Scalar]:
-        if key.category is Category.COMMON:
+        if key.category is _COMMON:
             return self._common
         return self._sets[key.category][self._active[key.category]]
 

@@ -20,7 +20,8 @@ _ALWAYS, _CAMERA = int(HEALTHY | StateBit.ALTITUDE), int(StateBit.CAMERA)
 _FLIES, _START = int(StateBit.FLY | StateBit.VISION), int(StateBit.USER_FEEDBACK_START)
 _ACK, _BATTERY = int(StateBit.COMMAND), int(StateBit.VBAT_LOW)
 _BOOTSTRAP, _DEMO = int(StateBit.NAVDATA_BOOTSTRAP), int(StateBit.NAVDATA_DEMO)
-_CUT, _ALIVE = Phase.CUT, CommandLink.ALIVE
+_CUT, _TAKING_OFF, _FLYING, _HOVERING = Phase.CUT, Phase.TAKING_OFF, Phase.FLYING, Phase.HOVERING
+_ALIVE = CommandLink.ALIVE
 _MAJOR = {
     Phase.LANDED: ControlState.LANDED,
     Phase.TAKING_OFF: ControlState.TRANS_TAKEOFF,
@@ -65,11 +66,11 @@ def control_state(drone: Quadrotor, control: FlightControl, now_ns: int) -> int:
     """Return flight phase and minor state of the DEMO option."""
     autopilot, minor = drone.autopilot, 0
     phase = autopilot.phase
-    if phase is Phase.TAKING_OFF:
+    if phase is _TAKING_OFF:
         minor = TAKE_OFF_AUTO if drone.airborne else 0
-    elif phase is Phase.FLYING:
+    elif phase is _FLYING:
         minor = FLYING_COMBINED_YAW if control.combined_yaw else 0
-    elif phase is Phase.HOVERING:
+    elif phase is _HOVERING:
         if autopilot.calibrating:
             minor = HOVERING_MAGNETO_CALIB
         elif control.session.link(now_ns) is CommandLink.LOST:

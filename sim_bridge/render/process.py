@@ -18,7 +18,7 @@ from sim_bridge.render.outputs import Output, open_output
 from sim_bridge.render.spec import Outage, OutageKind, RenderSpec
 from sim_bridge.truth import TruthBoard
 
-_IDLE_S = 0.05
+_IDLE_S = 0.2
 # TCP: lost data are sent again after a time-out, at least 200 ms on Linux (RFC 6298 asks for more), and later data
 # wait for them.
 _REPEATED_AFTER_MS = 200.0

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 from enum import Enum, auto
+from typing import NamedTuple
 
 from sim_bridge.world.airframe import GRAVITY_M_S2, Airframe
 from sim_bridge.world.ardrone_animations import FLIP_KICK_M_S2, FLIP_KICK_S, FLIP_TURN_S, FLIPS, Animation, motion_at
@@ -55,8 +56,7 @@ class FlightLimits:
     height_m: float = 3.0
 
 
-@dataclass(frozen=True, slots=True)
-class MotionReferences:
+class MotionReferences(NamedTuple):
     """References while FLYING [rad, rad, m/s, rad/s; FLU]; coordinated: turns bank like an aircraft's."""
 
     roll_rad: float

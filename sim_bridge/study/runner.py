@@ -36,7 +36,6 @@ CLOCK = "study"
 _START_NS = 1_000 * NS_PER_S
 _ODOMETRY_LATENCY_NS = 4 * NS_PER_MS
 _PILOT_TICKS = 6
-_ODOMETRY_TICKS = 4  # 50 Hz, as drivers publish it
 _STATUS_TICKS = 40
 _SCORE_TICKS = 20
 _OBEYS = "TRACK"
@@ -184,8 +183,7 @@ class Study:
     def _sense(self) -> None:
         world, now_ns = self.world, self.now_ns
         for name, telemetry in self._telemetry.items():
-            due = world.ticks % _ODOMETRY_TICKS == 0
-            if due and (odometry := telemetry.odometry(now_ns)) is not None:
+            if (odometry := telemetry.odometry(now_ns)) is not None:
                 self._send(now_ns + _ODOMETRY_LATENCY_NS, f"odometry/{name}", odometry)
             if self.options.inertia and isinstance(telemetry, TelemetryPublisher):
                 self._send(now_ns + _ODOMETRY_LATENCY_NS, f"imu/{name}", telemetry.inertia(now_ns))

@@ -8,7 +8,6 @@ import rerun as rr
 
 from groundstation.bus import codec, keys
 from groundstation.bus.api import Sample
-from groundstation.bus.keys import Key
 from groundstation.engineering_views.rerun_file import APPLICATION
 from groundstation.engineering_views.rerun_scene import RerunScene, blueprint
 from groundstation.engineering_views.watch import LiveView
@@ -71,7 +70,6 @@ class RerunView(LiveView):
     ) -> None:
         self._server = server
         self._timeline = timeline
-        self._keys: dict[str, Key] = {}
         self._stream = rr.RecordingStream(APPLICATION, recording_id=name)
         if server is not None:
             self._stream.connect_grpc(server.url, default_blueprint=blueprint(field))
@@ -87,7 +85,7 @@ class RerunView(LiveView):
     def take(self, sample: Sample, now_ns: int) -> None:
         """Show a sample that arrived at a boot-clock time; samples that cannot be decoded are ignored."""
         try:
-            key = self._keys.get(sample.key) or self._keys.setdefault(sample.key, keys.parse(sample.key))
+            key = keys.parse(sample.key)
             if is_picture(key.topic):
                 header = codec.decode_header(key, sample.attachment)
                 shown_ns, _ = self._timeline.times(header.stamp_ns, header.clock, now_ns)

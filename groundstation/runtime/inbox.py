@@ -4,7 +4,6 @@ from collections import Counter
 
 from groundstation.bus import codec, keys
 from groundstation.bus.api import Bus
-from groundstation.bus.keys import Key
 from groundstation.bus.messages import Message
 from groundstation.bus.topics import (
     BODY_POSES,
@@ -34,7 +33,6 @@ class Inbox:
 
     def __init__(self, bus: Bus) -> None:
         self._subscription = bus.subscribe(TOPICS, capacity=CAPACITY)
-        self._keys: dict[str, Key] = {}
         self.refused: Counter[str] = Counter()
         self._skipped = 0
 
@@ -50,15 +48,7 @@ class Inbox:
         self._skipped += max(0, len(samples) - _MAX_PER_TICK)
         for sample in samples[-_MAX_PER_TICK:]:
             try:
-                ready.append((sample.key, codec.decode(self._key(sample.key), sample.payload)))
+                ready.append((sample.key, codec.decode(keys.parse(sample.key), sample.payload)))
             except MessageError as error:
                 self.refused[error.reason] += 1
         return ready
-
-    def _key(self, text: str) -> Key:
-        key = self._keys.get(text)
-        if key is None:
-            key = keys.parse(text)
-            if len(self._keys) < 1024:
-                self._keys[text] = key
-        return key

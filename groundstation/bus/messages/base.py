@@ -22,7 +22,7 @@ def _is_finite(value: Any) -> bool:
     if kind is float:
         return math.isfinite(value)
     if kind is tuple:
-        return not value or _all_finite(value)
+        return _all_finite(value)
     if kind is Header:
         return _is_whole(value.stamp_ns) and _is_whole(value.seq)
     if isinstance(value, float):

@@ -12,7 +12,6 @@ from drivers.rmw_zenoh.wire import graph
 from groundstation.bus import codec as bus_codec
 from groundstation.bus import keys
 from groundstation.bus.api import Bus, Sample, Subscription
-from groundstation.bus.keys import Key
 from groundstation.bus.thinning import rates_by_key
 from groundstation.bus.topics import ESTIMATE, EVENT, IMAGE, SETPOINT, TRUTH, VEHICLE_STATUS
 from groundstation.engineering_views.ros2.advertised import advertised
@@ -82,7 +81,6 @@ class Ros2View:
         self._tokens: list[Any] = [self._session.liveliness().declare_token(node)]
         # Before the first message of each: a tool lists a topic, and a subscriber waits for it, from the start.
         self._publishers = {topic: self._declare(topic, kind) for topic, kind in advertised(field, truth).items()}
-        self._keys: dict[str, Key] = {}
         self._next_static_ns = 0
 
     @property
@@ -107,7 +105,7 @@ class Ros2View:
             self._publish(message)
 
     def _messages(self, sample: Sample, now_ns: int) -> list[RosMessage]:
-        key = self._keys.get(sample.key) or self._keys.setdefault(sample.key, keys.parse(sample.key))
+        key = keys.parse(sample.key)
         if key.topic is IMAGE:
             header = bus_codec.decode_header(key, sample.attachment)
             stamp_ns, _ = self._timeline.times(header.stamp_ns, header.clock, now_ns)

@@ -1,5 +1,6 @@
 """Messages from 200 packets a second: every second odometry, and the mean of all IMU samples."""
 
+from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
 
@@ -9,20 +10,9 @@ from drivers.ardrone.convert import NavdataMotion
 from drivers.ardrone.publisher import NavdataPublisher
 from drivers.ardrone.settings import ArDroneDriverSettings
 from drivers.plausibility.health import Finding, Health, HealthReport, Sensor
-from groundstation.bus.messages import Header, ImuSample, Message, Odometry
+from groundstation.bus.messages import ImuSample, Odometry
 
 _PERIOD_NS = 5_000_000
-
-
-class _Bus:
-    def __init__(self) -> None:
-        self.sent: list[Message] = []
-
-    def header(self, entity: str, stamp_ns: int) -> Header:
-        return Header(stamp_ns, "host", entity, entity, len(self.sent))
-
-    def publish(self, _topic: object, message: Message) -> None:
-        self.sent.append(message)
 
 
 def _motion(turn_rad_s: float, force_m_s2: float = 0.0) -> NavdataMotion:
@@ -30,8 +20,8 @@ def _motion(turn_rad_s: float, force_m_s2: float = 0.0) -> NavdataMotion:
 
 
 @pytest.fixture
-def bus() -> _Bus:
-    return _Bus()
+def bus(new_bus: Callable[[], Any]) -> Any:
+    return new_bus()
 
 
 @pytest.fixture
@@ -39,7 +29,7 @@ def publisher(bus: Any) -> NavdataPublisher:
     return NavdataPublisher(ArDroneDriverSettings(name="drone_1", address="127.0.0.1"), bus)
 
 
-def test_mean_rates_turn_as_far_as_all_samples_did(bus: _Bus, publisher: NavdataPublisher) -> None:
+def test_mean_rates_turn_as_far_as_all_samples_did(bus: Any, publisher: NavdataPublisher) -> None:
     turned = {0: 0.0}
     for i in range(201):
         rate, before_ns = 0.01 * ((7 * i) % 13), i * _PERIOD_NS
@@ -55,7 +45,7 @@ def test_mean_rates_turn_as_far_as_all_samples_did(bus: _Bus, publisher: Navdata
     assert samples[5].specific_force_m_s2[0] == pytest.approx(0.05), "of eight samples, four each"
 
 
-def test_samples_of_a_bad_imu_are_in_no_mean(bus: _Bus, publisher: NavdataPublisher) -> None:
+def test_samples_of_a_bad_imu_are_in_no_mean(bus: Any, publisher: NavdataPublisher) -> None:
     stuck = HealthReport((Finding(Sensor.IMU, Health.BAD, "its IMU is stuck"),))
     publisher.publish(_PERIOD_NS, _motion(0.0))
     for i in range(2, 20):

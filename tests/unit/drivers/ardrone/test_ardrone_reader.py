@@ -1,7 +1,7 @@
 """The reader thread: packets of which nothing is published are read two at once, and no message changes by that."""
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
@@ -12,22 +12,10 @@ from drivers.ardrone.publisher import NavdataPublisher
 from drivers.ardrone.settings import ArDroneDriverSettings
 from drivers.ardrone.wire import navdata, options
 from drivers.ardrone.wire.navdata import Navdata
-from groundstation.bus.messages import Header, Message
 from groundstation.time_units import NS_PER_MS
 
 _SOURCE = ("127.0.0.1", 5554)
 _HEALTHY, _FLY = 0x0F800000, 1
-
-
-class _Bus:
-    def __init__(self) -> None:
-        self.sent: list[Message] = []
-
-    def header(self, entity: str, stamp_ns: int) -> Header:
-        return Header(stamp_ns, "host", entity, entity, len(self.sent))
-
-    def publish(self, _topic: object, message: Message) -> None:
-        self.sent.append(message)
 
 
 class _IdleThread:
@@ -37,12 +25,10 @@ class _IdleThread:
 
 
 @pytest.fixture
-def drone(monkeypatch: pytest.MonkeyPatch) -> Iterator[ArDrone]:
+def drone(monkeypatch: pytest.MonkeyPatch, new_bus: Callable[[], Any]) -> Iterator[ArDrone]:
     monkeypatch.setattr(threading, "Thread", _IdleThread)
-    bus: Any = _Bus()
-    made = ArDrone(
-        ArDroneDriverSettings(name="drone_1", address="127.0.0.1", raw_datagrams=False, odometry_hz=100.0), bus
-    )
+    settings = ArDroneDriverSettings(name="drone_1", address="127.0.0.1", raw_datagrams=False)
+    made = ArDrone(settings, new_bus())
     yield made
     made.close()
 
@@ -87,11 +73,11 @@ def test_a_status_packet_never_waits_long_and_a_damaged_one_is_counted(drone: Ar
     assert drone._link.rejected == {"too_short": 1, "foreign_address": 1}
 
 
-def test_messages_are_those_of_packets_read_one_by_one(drone: ArDrone) -> None:
+def test_messages_are_those_of_packets_read_one_by_one(drone: ArDrone, new_bus: Callable[[], Any]) -> None:
     arrivals = [arrival(number) for number in range(1, 400) if number % 17]
     together: Any = drone._publisher._bus
     read(drone, *arrivals)
-    alone: Any = _Bus()
+    alone = new_bus()
     drone._publisher = NavdataPublisher(drone._settings, alone)
     drone._plausibility.reset()
     for one in arrivals:

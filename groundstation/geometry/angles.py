@@ -27,6 +27,20 @@ def quaternion_from_euler(roll_rad: float, pitch_rad: float, yaw_rad: float) -> 
     )
 
 
+def quaternion_product(
+    a_from_b: tuple[float, float, float, float], b_from_c: tuple[float, float, float, float]
+) -> tuple[float, float, float, float]:
+    """Return wxyz of a_from_c."""
+    w, x, y, z = a_from_b
+    p, q, r, s = b_from_c
+    return (
+        w * p - x * q - y * r - z * s,
+        w * q + x * p + y * s - z * r,
+        w * r - x * s + y * p + z * q,
+        w * s + x * r - y * q + z * p,
+    )
+
+
 def euler_from_quaternion(wxyz: tuple[float, float, float, float]) -> tuple[float, float, float]:
     """Return the intrinsic z-y-x angles roll, pitch, yaw [rad] of parent_from_body, a unit quaternion."""
     w, x, y, z = wxyz

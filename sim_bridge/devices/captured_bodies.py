@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.arrays import Array
+from groundstation.geometry.angles import quaternion_from_euler, quaternion_product
 from groundstation.geometry.rotations import rotation_from_euler, rotation_x, rotation_z
 from sim_bridge.fault_kinds import Fault, FaultKind, standing
 from sim_bridge.mounting import surveyed
@@ -39,9 +40,16 @@ class CapturedBodies:
         self.system, self._name, self._states, self._rng = system, name, states, rng
         self._bodies = tuple(bodies)
         self._faults = tuple(faults)
-        self._upright = rotation_x(math.pi / 2) if system.up == "y" else np.eye(3)
-        self._world_from_system = rotation_z(math.radians(system.yaw_deg)) @ self._upright
-        self._rotation, self._origin = surveyed(system, errors, rng)
+        upright = rotation_x(math.pi / 2) if system.up == "y" else np.eye(3)
+        axes_from_world = (rotation_z(math.radians(system.yaw_deg)) @ upright).T
+        rotation, origin = surveyed(system, errors, rng)
+        self._turn = axes_from_world @ rotation.T
+        self._shift = self._turn @ origin + axes_from_world @ np.array(system.position_m)
+        self._turn_wxyz = quaternion_of(self._turn)
+        self._body_wxyz = {
+            entity: quaternion_of(rotation_z(math.radians(self._body(entity).yaw_deg)) @ upright)
+            for entity in self._bodies
+        }
         self._last: tuple[SeenBody, ...] | None = None
 
     @property
@@ -68,28 +76,28 @@ class CapturedBodies:
         """Return the rigid body on an entity from the entity's true state."""
         body, noise = self._body(entity), self._rng.standard_normal(6)
         place_std, turn_std = self.system.pose_std_m, math.radians(self.system.heading_std_deg)
-        base = rotation_from_euler(*(row[6:9] + turn_std * noise[3:]).tolist())
-        origin = row[:3] + base @ np.array(body.position_m) + place_std * noise[:3]
+        attitude = (row[6:9] + turn_std * noise[3:]).tolist()
+        origin = row[:3] + place_std * noise[:3]
+        if any(body.position_m):
+            origin += rotation_from_euler(*attitude) @ np.array(body.position_m)
         jumped = standing(self._faults, FaultKind.BODY_JUMPED, now_s, entity)
         if jumped is not None:
-            origin = origin + np.array([jumped.amount, 0.0, 0.0])
-        origin = self._rotation.T @ (origin - self._origin)
-        world_from_body = self._rotation.T @ base @ rotation_z(math.radians(body.yaw_deg))
-        system_from_world = self._world_from_system.T
-        place = system_from_world @ (origin - np.array(self.system.position_m))
-        turned = system_from_world @ world_from_body @ self._upright
+            origin[0] += jumped.amount
+        x, y, z = (self._turn @ origin - self._shift).tolist()
+        base_wxyz = quaternion_product(quaternion_from_euler(*attitude), self._body_wxyz[entity])
+        qw, qx, qy, qz = quaternion_product(self._turn_wxyz, base_wxyz)
         box = self.system.volume_m
-        spans = zip(row[:3], (box.x_m, box.y_m, box.z_m), strict=True)
+        spans = zip(row[:3].tolist(), (box.x_m, box.y_m, box.z_m), strict=True)
         inside = all(low <= value <= high for value, (low, high) in spans)
-        x, y, z = place.tolist()
-        return SeenBody(body.name or entity, (x, y, z), quaternion_of(turned), inside)
+        sign = math.copysign(1.0, qw)
+        return SeenBody(body.name or entity, (x, y, z), (sign * qx, sign * qy, sign * qz, sign * qw), inside)
 
     def _body(self, entity: str) -> SiteBody:
         return self.system.bodies.get(entity, SiteBody())
 
 
 def quaternion_of(rotation: Array) -> tuple[float, float, float, float]:
-    """Return (x, y, z, w) of a rotation (3, 3), by the eigenvector of its largest eigenvalue (Bar-Itzhack 2000)."""
+    """Return (w, x, y, z) of a rotation (3, 3), by the eigenvector of its largest eigenvalue (Bar-Itzhack 2000)."""
     r = rotation
     K = np.array(
         [
@@ -100,4 +108,4 @@ def quaternion_of(rotation: Array) -> tuple[float, float, float, float]:
         ]
     )
     x, y, z, w = np.linalg.eigh(K)[1][:, -1].tolist()
-    return (x, y, z, w) if w >= 0 else (-x, -y, -z, -w)
+    return w, x, y, z

@@ -15,6 +15,8 @@ from groundstation.bus.topics import ESTIMATE, ODOMETRY
 from groundstation.geometry.rotations import rotation_from_euler
 
 _LEVEL = (0.0, 0.0)
+# Samples that wait for a picture; an older one is no attitude at its exposure.
+_WAITING = 64
 # Below this measured height a vehicle may be standing.
 _ALOFT_M = 0.4
 
@@ -30,8 +32,8 @@ class Surroundings:
         self._targets = set(self._markers) - robots
         if not settings.mount.in_world:
             robots.add(settings.observer)
-        # Roll, pitch and height only; the newest sample per poll is a history fine enough.
-        self._odometry = [bus.subscribe([ODOMETRY], entity=name, newest=True) for name in sorted(robots)]
+        # Roll, pitch and height only; all samples since the last picture, for attitudes at its exposure.
+        self._odometry = [bus.subscribe([ODOMETRY], entity=name, capacity=_WAITING) for name in sorted(robots)]
         self._estimates = bus.subscribe([ESTIMATE], newest=True)
         self._attitudes = AttitudeHistory()
         self._heights: dict[str, float] = {}

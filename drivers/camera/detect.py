@@ -19,8 +19,12 @@ _FLAGS = cv2.CALIB_CB_ADAPTIVE_THRESH
 _REFINE = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 30, 0.005)
 # Half a refinement window at most [px]: enlarged pictures are sharp enough for all of it, others need no more.
 _MOST_HALF_ENLARGED_PX, _MOST_HALF_PX = 10, 8
+# The finder raises an error for smaller pictures, which hold no board.
+_LEAST_SIDE_PX = 20
 _LEAST_CONTRAST = 12.0
 _MOST_WRONG_SQUARES = 1
+# Corners that are followed lie on one plane to within noise and the lens's bend over a marker.
+_MOST_OFF_PLANE_PX, _MOST_OFF_PLANE_SQUARES = 0.5, 0.1
 _GRID = marker.corner_grid()
 _CENTRES, _BLACK = marker.square_centres()
 # Five points around each centre: a single sample would depend on one noisy pixel.
@@ -96,6 +100,8 @@ def find_board(picture: Image, window: Window, spacing: float) -> Find | None:
     """Return the board in the window with squares about `spacing` pixels wide, or None."""
     part = picture[window.top : window.bottom, window.left : window.right]
     enlarged, ratio = resized(part, enlargement(spacing))
+    if min(enlarged.shape) < _LEAST_SIDE_PX:
+        return None
     found, raw = cv2.findChessboardCorners(enlarged, (marker.CORNERS_X, marker.CORNERS_Y), flags=_FLAGS)
     if not found or raw is None:
         return None
@@ -103,16 +109,43 @@ def find_board(picture: Image, window: Window, spacing: float) -> Find | None:
     return ordered(picture, refined(picture, coarse))
 
 
+def follow_board(picture: Image, expected: Array) -> Find | None:
+    """Return the board whose corners (12, 2) [px] are expected to within a third of a square, or None.
+
+    It costs a third of `find_board`: its corners are refined from where they are expected, and must all be there and
+    lie on one plane.
+    """
+    reach = _least_distance(expected, marker.CORNERS_X)
+    if min(expected.min(), *(picture.shape[::-1] - expected.max(axis=0))) < reach + 3.0:  # partly outside
+        return None
+    fine, slipped = _refined(picture, expected, marker.CORNERS_X)
+    if fine is None or slipped.any():
+        return None
+    off = _mapped(homography(_GRID, fine), _GRID) - fine
+    if np.hypot(*off.T).max() > max(_MOST_OFF_PLANE_PX, _MOST_OFF_PLANE_SQUARES * spacing_px(fine)):
+        return None
+    return ordered(picture, fine)
+
+
 def refined(picture: Image, corners: Array, columns: int = marker.CORNERS_X) -> Array:
     """Return lattice corners (n, 2) refined to sub-pixels; `columns` of them make a row.
 
+    A corner that would slip away by a good part of a square stays where it was.
+    """
+    fine, slipped = _refined(picture, corners, columns)
+    return corners if fine is None else np.where(slipped[:, None], corners, fine)
+
+
+def _refined(picture: Image, corners: Array, columns: int) -> tuple[Array | None, Array]:
+    """Return refined corners, None outside of the picture, and which of them slipped by a good part of a square.
+
     Small squares are enlarged first: a window of a whole number of pixels is too coarse for them. It reaches 0.55
-    squares, never a neighbour. A corner that would slip away by a good part of a square stays where it was.
+    squares, never a neighbour.
     """
     reach = _least_distance(corners, columns)
     window = window_around(corners, reach + 2.0, picture.shape)
     if window is None:
-        return corners
+        return None, np.ones(len(corners), dtype=bool)
     part = picture[window.top : window.bottom, window.left : window.right]
     enlarged, ratio = resized(part, min(max(_WANTED_PX_PER_SQUARE / max(reach, 1.0), 1.0), _MOST_ENLARGEMENT))
     most = _MOST_HALF_ENLARGED_PX if ratio[0] < 1.0 else _MOST_HALF_PX
@@ -120,8 +153,7 @@ def refined(picture: Image, corners: Array, columns: int = marker.CORNERS_X) -> 
     start = ((corners - (window.left, window.top) + 0.5) / ratio - 0.5).astype(np.float32).reshape(-1, 1, 2)
     found = cv2.cornerSubPix(enlarged, start, (half, half), (-1, -1), _REFINE)
     fine = (np.asarray(found, np.float64).reshape(-1, 2) + 0.5) * ratio - 0.5 + (window.left, window.top)
-    slipped = np.hypot(*(fine - corners).T) > max(1.5, 0.3 * reach)
-    return np.where(slipped[:, None], corners, fine)
+    return fine, np.hypot(*(fine - corners).T) > max(1.5, 0.3 * reach)
 
 
 def resized(part: Image, scale: float) -> tuple[Image, Array]:

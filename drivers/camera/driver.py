@@ -27,7 +27,8 @@ from groundstation.errors import without_password
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _log = logging.getLogger(__name__)
-_POLL_S = 0.02
+# Longer than between two pictures: in flight only pictures wake it.
+_POLL_S = 0.08
 _LEVEL = (0.0, 0.0)
 # A picture that shows nothing new for so long is reported to hang [s].
 _HANGS_S = 3.0
@@ -50,7 +51,7 @@ def run(child: HostProcess) -> int:
 
 
 class CameraDriver:
-    """Turns pictures of one source into messages; `turn` is one pass of its loop (at most 20 ms of waiting).
+    """Turns pictures of one source into messages; `turn` is one pass of its loop (at most 80 ms of waiting).
 
     `counts` holds the refusals, by reason.
     """

@@ -124,8 +124,7 @@ class Pipeline:
         finds: Followed = []
         for track in self._tracks:
             prediction = self._prediction_of(track, predictions)
-            window = track.window(stamp_ns, picture.shape, prediction)
-            find = detect.find_board(picture, window, detect.spacing_px(track.corners)) if window else None
+            find = self._followed(track, picture, stamp_ns, prediction)
             if find is None or not track.accepts(find, stamp_ns, prediction) or _is_taken(find, finds):
                 track.miss()
                 self.counts["missed"] += 1
@@ -134,6 +133,16 @@ class Pipeline:
             self.counts["followed"] += 1
             finds.append((track, find))
         return finds
+
+    def _followed(
+        self, track: Track, picture: Image, stamp_ns: int, prediction: Prediction | None
+    ) -> detect.Find | None:
+        """Return the board of a track: where its corners are expected, else anywhere in the window around them."""
+        window = track.window(stamp_ns, picture.shape, prediction)
+        if window is None:
+            return None
+        find = detect.follow_board(picture, track.expected_corners(stamp_ns, prediction))
+        return find or detect.find_board(picture, window, detect.spacing_px(track.corners))
 
     def _look_where_expected(
         self, picture: Image, stamp_ns: int, predictions: Mapping[str, Prediction | None], finds: Followed

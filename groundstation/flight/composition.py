@@ -10,8 +10,10 @@ from typing import Any
 import msgspec
 
 from drivers.camera.source_address import parse_source
+from groundstation.bus import topics
 from groundstation.bus.access import AccessList
 from groundstation.bus.roles import SHELLS, Member, Role, certificate_name
+from groundstation.bus.thinning import rates_by_key
 from groundstation.console.section import enough_hz
 from groundstation.errors import OperatorMistake
 from groundstation.field.targets import odometry_name
@@ -46,6 +48,8 @@ _SENSOR_DRIVERS = {
     RANGING: "drivers.ranging.driver:run",
     ODOMETRY: "drivers.target_odometry.driver:run",
 }
+# Enough for a vehicle's roll and pitch at a picture's exposure, which are interpolated: below 1 mrad off.
+_ATTITUDES_HZ = 30.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,6 +175,7 @@ def router_section(
 
 def _driver(section: DriverSection, field: Field) -> ProcessSpec:
     sensor = _SENSOR_DRIVERS.get(section.kind)
+    attitudes = ((topics.ODOMETRY, field.drones, _ATTITUDES_HZ),) if section.kind == CAMERA else ()
     row = rows.DRONE if sensor is None else rows.TARGET if section.kind == ODOMETRY else rows.CAMERA
     spec = replace(
         row,
@@ -178,6 +183,7 @@ def _driver(section: DriverSection, field: Field) -> ProcessSpec:
         entry=sensor or kind_named(section.kind).driver,
         section=section.section,
         entities=section.entities,
+        at_most_hz=rates_by_key(field.site, attitudes),
     )
     if sensor is not None:
         return spec

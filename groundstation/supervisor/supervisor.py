@@ -12,7 +12,8 @@ from functools import partial
 from groundstation.bus.api import Subscription
 from groundstation.bus.messages import Lifecycle, ProcessStatus, Severity
 from groundstation.bus.roles import SHELLS, Identity
-from groundstation.bus.topics import PROCESS_STATUS
+from groundstation.bus.thinning import rates_by_key
+from groundstation.bus.topics import ODOMETRY, PROCESS_STATUS
 from groundstation.bus.zenoh_bus import ZenohBus, open_bus
 from groundstation.process import ports
 from groundstation.process.heartbeat import SUPERVISOR_SLOT, HeartbeatBlock, SlotState
@@ -35,6 +36,7 @@ _OWN_DELAY_NS = 200 * NS_PER_MS
 _HURRY_S = 1.0
 _QUIET_S = 0.3  # processes beat ten times a second
 _STARVED_FOR = 3.0  # times the limit of one that hangs
+_HEIGHTS_HZ = 12.5  # of drones that take off or have landed
 _TOLD_AGAIN_NS = 10 * NS_PER_S
 # A process that remains after a kill hangs in the kernel, on a device or a network disk.
 _KERNEL_S = 3.0
@@ -104,7 +106,9 @@ class Supervisor:
         """Join the bus, whose router is up, and take priority from now on: drones hover if this loop stops."""
         run = self.run
         take_share()  # for the threads of its bus
-        self.bus = self.events.bus = open_bus(run.endpoint, run.site, run.source, identity=self._identity())
+        heights = rates_by_key(run.site, ((ODOMETRY, run.drones, _HEIGHTS_HZ),))
+        self.bus = open_bus(run.endpoint, run.site, run.source, identity=self._identity(), at_most_hz=heights)
+        self.events.bus = self.bus
         self._statuses = self.bus.subscribe([PROCESS_STATUS], newest=True)
         self._publisher = StatusPublisher(self.bus)
         go_first()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from drivers.camera import convert, pose
-from drivers.camera.detect import find_board, spacing_px, window_around
+from drivers.camera.detect import Window, find_board, follow_board, spacing_px, window_around
 from drivers.camera.markers import decode, read_bar
 from drivers.camera.pipeline import Pipeline
 from drivers.camera.settings import DetectorSettings, MarkerSettings, MountSettings
@@ -199,6 +199,38 @@ def test_identities_are_never_wrong():
             assert reading.code == code
     assert read >= 95
     assert sure >= 85
+
+
+def followed_and_found(expected_off):
+    """Return a board's finds by both ways, and its true corners; it is expected that much off, in squares."""
+    renderer = make_renderer(codes={"bot": 5}, scenario=CLEAN)
+    states = np.array([state(0, 0, 1.4), state(1.2, 0.1, 0, 0.4)])
+    truth = compose_scene(renderer._spec, states).sights[0].optical_from_marker
+    corners = FRONT.project(truth.apply(Checkerboard(5, 44.0).corners()))
+    picture, spacing = renderer.render(states), spacing_px(corners)
+    window = window_around(corners, 1.6 * spacing, picture.shape)
+    expected = corners + spacing * np.array(expected_off)
+    return follow_board(picture, expected), find_board(picture, window, spacing), corners
+
+
+@pytest.mark.parametrize("off", [(0.0, 0.0), (0.2, 0.1), (-0.15, 0.2)])
+def test_a_board_that_is_about_where_it_is_expected_has_the_same_corners_as_one_that_is_searched(off):
+    followed, found, corners = followed_and_found(off)
+    assert np.hypot(*(followed.corners - found.corners).T).max() < 0.05
+    assert np.hypot(*(followed.corners - corners).T).max() < 0.3
+
+
+@pytest.mark.parametrize("off", [(0.6, 0.0), (1.0, 0.0), (1.0, 1.0), (2.0, 0.0), (20.0, 0.0), (-60.0, 0.0)])
+def test_a_board_elsewhere_is_left_to_the_search(off):
+    """A lattice that is a square or two off has the board's own corners in it."""
+    assert followed_and_found(off)[0] is None
+
+
+@pytest.mark.parametrize("shape", [(12, 12), (14, 60), (300, 13)])
+def test_a_window_too_small_for_a_board_holds_none(shape):
+    picture = np.random.default_rng(1).integers(0, 255, (360, 640), dtype=np.uint8)
+    assert find_board(picture, Window(5, 5, 5 + shape[1], 5 + shape[0]), 18.0) is None
+    assert find_board(picture, Window(5, 5, 5 + shape[1], 5 + shape[0]), 90.0) is None
 
 
 @pytest.mark.parametrize("code", marker.VALID_CODES)

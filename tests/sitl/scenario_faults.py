@@ -7,9 +7,9 @@ import pytest
 
 
 def faults(folder: Path, *lines: str) -> str:
-    """Write a scenario with these faults; returns its path."""
+    """Write a scenario with these faults and as few pictures as few_pictures.yaml has; returns its path."""
     path = folder / "faults.yaml"
-    path.write_text("schema_version: 1\nfaults:\n" + "".join(f"  - {{{line}}}\n" for line in lines))
+    path.write_text("schema_version: 1\ncameras: {fps: 6}\nfaults:\n" + "".join(f"  - {{{line}}}\n" for line in lines))
     return str(path)
 
 

@@ -210,6 +210,7 @@ def followed_and_found(expected_off):
     picture, spacing = renderer.render(states), spacing_px(corners)
     window = window_around(corners, 1.6 * spacing, picture.shape)
     expected = corners + spacing * np.array(expected_off)
+    assert window is not None
     return follow_board(picture, expected), find_board(picture, window, spacing), corners
 
 

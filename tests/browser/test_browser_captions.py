@@ -96,6 +96,14 @@ def test_silent_drones_are_described_alike_in_all_captions(stage: Any) -> None:
         assert page.there(f"{name}-land").inner_text() == "Land\nif it hears"
 
 
+def test_hold_tells_that_drones_land_without_the_tracker_also_while_one_is_not_heard(stage: Any) -> None:
+    SITUATIONS["all_is_well"](stage.flight)
+    page = stage.open()
+    stage.flight.frozen, stage.flight.mute = True, {"drone_2"}
+    said = "HOLD\ndrone_1 hovers,\nthen lands;\ndrone_2 if it hears"
+    page.wait(lambda s: page.there("hold").inner_text() == said)
+
+
 def test_a_drone_in_the_dark_is_not_shown_as_searching(stage: Any) -> None:
     SITUATIONS["the_target_is_lost"](stage.flight)
     page = stage.open()

@@ -77,7 +77,8 @@ function unheard(verb, flying) {
   const deaf = flying.filter(isUnheard), heard = flying.filter((name) => !isUnheard(name));
   const word = verb === "CUT_MOTORS" ? "fall" : verb === "HOLD" && holding(heard.length ? heard : deaf).length ? "hover" : "land";
   if (!heard.length) return does(deaf, `${word}s\nif it hears`, `${word}\nif they hear`);
-  return told([does(heard, `${word}s`, word), does(deaf, "if it hears", "if they hear")]);
+  const [one, many] = word === "hover" && trackerSilent() ? [",\nthen lands", ",\nthen land"] : ["", ""];
+  return told([does(heard, `${word}s${one}`, `${word}${many}`), does(deaf, "if it hears", "if they hear")]);
 }
 
 // The effect that a stop of one drone would have now.

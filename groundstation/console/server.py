@@ -11,7 +11,7 @@ import msgspec
 
 from groundstation.bus import clock
 from groundstation.bus.api import Bus, Received
-from groundstation.bus.messages import RUN, Command, CommandAck, Event, Lease, RelativeObservation
+from groundstation.bus.messages import ALL_DOWN, RUN, Command, CommandAck, Event, Lease, RelativeObservation
 from groundstation.bus.topics import (
     CAMERA_STATUS,
     COMMAND,
@@ -265,9 +265,9 @@ class ConsoleServer:
         self.board.put("orders", self.sessions.desk.summary())
         self.board.put("session", self.sessions.summary(now_ns))
         if self._end is not None:
-            at_ms = self._end.header.stamp_ns / 1e6
-            ended = {"text": self._end.text, "severity": self._end.severity, "at": at_ms, "closed": self.closed}
-            self.board.put("ended", ended)
+            words, at_ms = self._end.text, self._end.header.stamp_ns / 1e6
+            ended = {"text": words, "severity": self._end.severity, "at": at_ms, "closed": self.closed}
+            self.board.put("ended", ended | {"down": words.endswith(ALL_DOWN)})
         if self._result is not None:
             self.board.put("result", self._result.section())
         if self._player is not None:

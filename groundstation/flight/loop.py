@@ -3,7 +3,7 @@
 import time
 from dataclasses import dataclass
 
-from groundstation.bus.messages import RUN, RUN_ENDED, Event, Severity
+from groundstation.bus.messages import ALL_DOWN, RUN, RUN_ENDED, Event, Severity
 from groundstation.bus.topics import EVENT
 from groundstation.errors import GroundStationError
 from groundstation.flight.flight_plan import FlightPlan
@@ -230,7 +230,7 @@ class Flight:
 
 def end_of(outcome: FlightOutcome) -> tuple[Severity, str]:
     """Return severity and text of the end of a run."""
-    landing = "all drones are on the ground" if outcome.landed else "not every drone reported a landing"
+    landing = ALL_DOWN if outcome.landed else "not every drone reported a landing"
     if outcome.failure:
         return Severity.ERROR, f"{outcome.failure.splitlines()[0]}; {landing}"
     severity = Severity.INFO if outcome.landed else Severity.WARNING

@@ -72,6 +72,7 @@ def test_an_end_without_a_landing_is_grave(stage: Any) -> None:
     stage.flight.event(Severity.WARNING, "run ended: not every drone reported a landing", RUN)
     strip = page.there("banner-ended")
     strip.wait_for(timeout=20_000)
+    assert page.there("safety").inner_text() == "ACT"
     assert "grave" in strip.get_attribute("class")
     stage.flight.event(Severity.ERROR, "drone_1 LANDING: nothing heard of the supervisor", "drone_1")
     alarms = page.page.locator("[data-testid=banner-alarm]")  # an operator gives stops because of these
@@ -82,6 +83,15 @@ def test_an_end_without_a_landing_is_grave(stage: Any) -> None:
     eventually(lambda: all(stop.is_disabled() for stop in stops(page)), what="the stops are off")
     assert "groundstation land" in strip.inner_text()
     page.shot("run_ended_without_landing")
+
+
+def test_a_fault_that_ends_the_run_asks_for_nothing_once_all_have_landed(stage: Any) -> None:
+    page = ended_page(stage, Severity.ERROR, "tracker died; all drones are on the ground")
+    strip = page.there("banner-ended")
+    assert "mild" in strip.get_attribute("class")
+    assert "tracker died" in strip.inner_text() and "groundstation land" not in strip.inner_text()
+    assert page.there("safety").inner_text() == "WATCH"
+    assert page.there("safety-means").inner_text() == "a problem, but\nno need to act"
 
 
 def test_a_console_that_dies_is_no_end_of_the_run(stage: Any) -> None:

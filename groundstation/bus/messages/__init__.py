@@ -39,7 +39,7 @@ from groundstation.bus.messages.flight import (
 from groundstation.bus.messages.hosts import ClockOffset, HostAnswer, HostOrder, HostReport, Supervision
 from groundstation.bus.messages.plan import Alternative, Control, Edge, Plan, SolverReport
 from groundstation.bus.messages.preflight import Preflight, PreflightFinding
-from groundstation.bus.messages.process import RUN, RUN_ENDED, Event, Lifecycle, ProcessStatus, Severity
+from groundstation.bus.messages.process import ALL_DOWN, RUN, RUN_ENDED, Event, Lifecycle, ProcessStatus, Severity
 from groundstation.bus.messages.sensing import (
     BodyPose,
     BodyPoses,
@@ -57,6 +57,7 @@ from groundstation.vectors import Quaternion, Vector3
 
 __all__ = [
     "AIRBORNE",
+    "ALL_DOWN",
     "STANDING",
     "UNHEARD",
     "UP",

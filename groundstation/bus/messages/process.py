@@ -7,6 +7,8 @@ from groundstation.bus.messages.base import Message
 # The entity of the one event about a run as a whole: that it ends, and how.
 RUN = "run"
 RUN_ENDED = "run ended: "
+# The last words of such an event, where it is so.
+ALL_DOWN = "all drones are on the ground"
 
 
 class Severity(StrEnum):

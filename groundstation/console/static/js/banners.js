@@ -53,9 +53,10 @@ function together(alarms) {
   return all;
 }
 
-function ending({ severity, text: words }) {
-  const landed = severity === "INFO", title = [words[0].toUpperCase() + words.slice(1), resultWords()].filter(Boolean).join(". ");
-  return { kind: "ended", level: landed ? "calm" : "grave", title, more: runOver() ? "This run takes no more orders: the stop buttons are off." : "", shell: !landed, rank: landed ? undefined : "ACT" };
+// down: whether all drones are on the ground, whatever ended the run.
+function ending({ severity, text: words, down }) {
+  const calm = severity === "INFO", title = [words[0].toUpperCase() + words.slice(1), resultWords()].filter(Boolean).join(". ");
+  return { kind: "ended", level: calm ? "calm" : "grave", title, more: runOver() ? "This run takes no more orders: the stop buttons are off." : "", shell: !down, rank: calm ? undefined : down ? "WATCH" : "ACT" };
 }
 
 function silentTracker() {
@@ -67,7 +68,7 @@ function silentTracker() {
 // As the console's process judges it, but for what only this page can know.
 function safetyWord(own) {
   const { ended, safety } = store.s;
-  if (ended) return ended.severity === "INFO" ? "SAFE" : "ACT";
+  if (ended) return ended.severity === "INFO" ? "SAFE" : ended.down ? "WATCH" : "ACT";
   const level = own.length ? "ACT" : safety?.level ?? "WATCH";
   return level === "SAFE" && trackerSilent() ? "WATCH" : level;
 }
@@ -76,7 +77,7 @@ export function showBanners() {
   const own = ownAlarms(), all = banners(own), word = safetyWord(own);
   text(byId("safety"), word);
   const over = store.s.ended && word === "SAFE" && "all are on\nthe ground", unheard = !store.s.safety && !store.s.ended && word === "WATCH" && "nothing is\nheard yet";
-  text(byId("safety-means"), over || unheard || (word === "WATCH" && !replaying() && store.scene && landingWords()) || MEANS[word]);
+  text(byId("safety-means"), over || unheard || (word === "WATCH" && !replaying() && !store.s.ended && store.scene && landingWords()) || MEANS[word]);
   byId("safety-box").dataset.level = LEVELS[word];
   document.body.dataset.safety = word;
   noteOwnAlarms(own);

@@ -27,7 +27,7 @@ from groundstation.errors import without_password
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _log = logging.getLogger(__name__)
-# Longer than between two pictures: in flight only pictures wake it.
+# Most pictures come sooner, and then nothing else wakes it.
 _POLL_S = 0.08
 _LEVEL = (0.0, 0.0)
 # A picture that shows nothing new for so long is reported to hang [s].

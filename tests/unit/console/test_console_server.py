@@ -127,7 +127,7 @@ def test_viewers_hear_how_the_run_ended_before_they_are_cut_off() -> None:
                     while True:
                         heard.append(json.loads(await page.recv()))
             at_ms = end.header.stamp_ns / 1e6
-            ended = {"text": "run ended: all is well", "severity": "INFO", "at": at_ms, "closed": False}
+            ended = {"text": "run ended: all is well", "severity": "INFO", "at": at_ms, "closed": False, "down": False}
             assert heard[-1]["s"]["ended"] == ended
 
     run(test)

@@ -60,7 +60,9 @@ def make(
     kept, level = list(root.handlers), root.level
     monkeypatch.setattr(logging, "raiseExceptions", logging.raiseExceptions)  # it is switched off in flight
 
-    def open_bus(endpoint: str, site: str, source: str, *_: object, identity: Identity | None = None) -> MemoryBus:
+    def open_bus(
+        endpoint: str, site: str, source: str, *_: object, identity: Identity | None = None, **_more: object
+    ) -> MemoryBus:
         return MemoryBus(exchange, site, source, identity.run if identity else "")
 
     for module in (hosting, supervisor):

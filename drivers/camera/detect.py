@@ -118,7 +118,7 @@ def follow_board(picture: Image, expected: Array) -> Find | None:
     reach = _least_distance(expected, marker.CORNERS_X)
     if min(expected.min(), *(picture.shape[::-1] - expected.max(axis=0))) < reach + 3.0:  # partly outside
         return None
-    fine, slipped = _refined(picture, expected, marker.CORNERS_X)
+    fine, slipped = _refined(picture, expected, reach)
     if fine is None or slipped.any():
         return None
     off = _mapped(homography(_GRID, fine), _GRID) - fine
@@ -132,17 +132,17 @@ def refined(picture: Image, corners: Array, columns: int = marker.CORNERS_X) -> 
 
     A corner that would slip away by a good part of a square stays where it was.
     """
-    fine, slipped = _refined(picture, corners, columns)
+    fine, slipped = _refined(picture, corners, _least_distance(corners, columns))
     return corners if fine is None else np.where(slipped[:, None], corners, fine)
 
 
-def _refined(picture: Image, corners: Array, columns: int) -> tuple[Array | None, Array]:
+def _refined(picture: Image, corners: Array, reach: float) -> tuple[Array | None, Array]:
     """Return refined corners, None outside of the picture, and which of them slipped by a good part of a square.
 
+    reach: least distance of neighbours [px].
     Small squares are enlarged first: a window of a whole number of pixels is too coarse for them. It reaches 0.55
     squares, never a neighbour.
     """
-    reach = _least_distance(corners, columns)
     window = window_around(corners, reach + 2.0, picture.shape)
     if window is None:
         return None, np.ones(len(corners), dtype=bool)

@@ -138,11 +138,9 @@ class Pipeline:
         self, track: Track, picture: Image, stamp_ns: int, prediction: Prediction | None
     ) -> detect.Find | None:
         """Return the board of a track: where its corners are expected, else anywhere in the window around them."""
-        window = track.window(stamp_ns, picture.shape, prediction)
-        if window is None:
-            return None
         find = detect.follow_board(picture, track.expected_corners(stamp_ns, prediction))
-        return find or detect.find_board(picture, window, detect.spacing_px(track.corners))
+        window = None if find else track.window(stamp_ns, picture.shape, prediction)
+        return detect.find_board(picture, window, detect.spacing_px(track.corners)) if window else find
 
     def _look_where_expected(
         self, picture: Image, stamp_ns: int, predictions: Mapping[str, Prediction | None], finds: Followed

@@ -4,12 +4,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from sitl_run import FEW_PICTURES
 
 
 def faults(folder: Path, *lines: str) -> str:
     """Write a scenario with these faults and as few pictures as few_pictures.yaml has; returns its path."""
     path = folder / "faults.yaml"
-    path.write_text("schema_version: 1\ncameras: {fps: 6}\nfaults:\n" + "".join(f"  - {{{line}}}\n" for line in lines))
+    path.write_text(FEW_PICTURES.read_text() + "faults:\n" + "".join(f"  - {{{line}}}\n" for line in lines))
     return str(path)
 
 

@@ -20,7 +20,6 @@ from groundstation.supervisor import runtime_file
 from groundstation.supervisor.joining import join
 
 COMMAND = (sys.executable, "-m", "groundstation")
-LITTLE_RECORDED = ("--set", "recording.raw_datagrams=false", "--set", "recording.pictures=none")
 FEW_PICTURES = Path(__file__).parents[1] / "fixtures" / "few_pictures.yaml"
 
 

@@ -22,22 +22,17 @@ class SpareTime:
         idle, total = (after - then for after, then in zip(_ticks(), self._before, strict=True))
         return idle / max(1, total)
 
-    @contextmanager
-    def needed(self) -> Iterator[None]:
-        """Skip a test that fails within, if the processors had no idle time since this object was created."""
-        try:
-            yield
-        except AssertionError as fault:
-            if self.share < ENOUGH:
-                pytest.skip(f"the machine was full ({self.share:.0%} idle), so nothing is shown: {fault}")
-            raise
-
 
 @contextmanager
 def needing_processors() -> Iterator[None]:
     """Skip a test that fails within, if the processors had no idle time meanwhile."""
-    with SpareTime().needed():
+    spare = SpareTime()
+    try:
         yield
+    except AssertionError as fault:
+        if spare.share < ENOUGH:
+            pytest.skip(f"the machine was full ({spare.share:.0%} idle), so nothing is shown: {fault}")
+        raise
 
 
 def _ticks() -> tuple[int, int]:

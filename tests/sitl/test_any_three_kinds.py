@@ -34,10 +34,8 @@ def field_of(folder: Path, team: tuple[str, ...]) -> Path:
 
 @pytest.mark.parametrize("team", list(itertools.combinations(TYPES, 3)), ids="+".join)
 def test_three_kinds_track_together(sitl: Start, tmp_path: Path, team: tuple[str, ...]) -> None:
-    scenario = tmp_path / "six_pictures.yaml"
-    scenario.write_text("schema_version: 1\ncameras: {fps: 6}\n")
     few = ("--set", "planner.rate_hz=5", "--set", "recording.image_fps=1")
-    run = sitl("sitl", str(field_of(tmp_path, team)), "--duration", "45", "--scenario", str(scenario), *few)
+    run = sitl("sitl", str(field_of(tmp_path, team)), "--duration", "45", *few)
     run.wait(220)
     report: dict[str, Any] = json.loads((run.run_dir / "report.json").read_text())
     if not report["valid"]:

@@ -20,7 +20,6 @@ from sim_bridge.site import SiteCapture
 sys.path.insert(0, str(Path(__file__).parent))  # for the helper modules of this folder
 from firmware import VARIABLES, Firmware, binary_of
 from real_parts import STAND_IN, Run, field, heights, stand_in, started, true_poses
-from sitl_run import LITTLE_RECORDED
 from spare_time import needing_processors
 
 __all__ = ["stand_in", "started"]  # fixtures
@@ -28,6 +27,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.sitl, pytest.mark.timeout(400)]
 SYSTEM = 8
 # The whole team beside a firmware takes 2.3 cores (in step any computer can fly it: test_firmware_in_step.py).
 TWO_DRONES = ("--set", "drones.drone_3=null")
+LITTLE_RECORDED = ("--set", "recording.raw_datagrams=false", "--set", "recording.pictures=none")
 
 
 @pytest.mark.usefixtures("stand_in")

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from spare_time import SpareTime
 
 pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(300)]
 
@@ -50,7 +49,6 @@ def flown(folder: Path, **order: Any) -> dict[str, Any]:
 
 
 def test_all_drivers_and_cameras_on_another_host_behind_a_bad_link(tmp_path: Path) -> None:
-    spare = SpareTime()
     told = flown(tmp_path, duration_s=20, delay_s=0.02, loss=0.01)
     report = told["report"]
     assert told["host_code"] == 0, told["host_text"]
@@ -60,8 +58,7 @@ def test_all_drivers_and_cameras_on_another_host_behind_a_bad_link(tmp_path: Pat
     assert 0.02 <= told["error_s"] < 0.03 and 0.005 < told["lost"] < 0.02
     if not report["valid"]:
         pytest.skip(f"{'; '.join(report['reasons'])}: no figure counts")
-    with spare.needed():
-        assert report["target_rmse_m"] <= 0.04, told["text"]
+    assert report["target_rmse_m"] <= 0.04, told["text"]
 
 
 Modes = frozenset[str]

@@ -94,6 +94,7 @@ class Study:
         self.site = parse_site(msgspec.to_builtins(self._wrong.world(field)))
         self.world = World(self.site, scenario, options.seed, real, real)
         self.tracker: Tracker = tracker_from_field(field, CLOCK, epoch=1)
+        self._estimates: tuple[EntityEstimate, ...] = ()  # of the tracker's last tick
         if field.planner.plug_in:
             parameters = self.tracker.parameters
             self.tracker.planner = plug_ins.planner(field.planner.plug_in, parameters.planner, parameters.sensors)
@@ -165,10 +166,8 @@ class Study:
         world = self.world
         mark = time.perf_counter()
         world.step()
-        if self._links:
-            estimates = self.tracker.estimates()
-            for link in self._links.values():
-                link.step(world.time_s, estimates)
+        for link in self._links.values():
+            link.step(world.time_s, self._estimates)
         self._sense()
         self.spent_s["world"] += time.perf_counter() - mark
         tracking = world.time_s >= self.options.take_off_s + self.options.stand_s
@@ -214,7 +213,7 @@ class Study:
         tracker = self.tracker
         header = Header(tracker.belief.stamp_ns, CLOCK, "team", "tracker", self.world.ticks)
         searches = tracker.lookout.searches(self.now_ns)
-        return Estimate(header=header, entities=tracker.estimates(), epoch=tracker.epoch, searches=searches)
+        return Estimate(header=header, entities=self._estimates, epoch=tracker.epoch, searches=searches)
 
     def _tell(self, sensor: RangingEye | OdometryEar, now_ns: int) -> None:
         for told in sensor.look(self.world, now_ns, CLOCK):
@@ -233,6 +232,7 @@ class Study:
         for key, message in self._arrived():
             tracker.ingest(key, message, now_ns)
         tracker.advance(now_ns)
+        self._estimates = tracker.estimates()
         self.spent_s["filter"] += time.perf_counter() - mark
         for correction in tracker.take_corrections():
             self.score.note(correction)

@@ -11,6 +11,7 @@ DEMO_ARGS ?=
 # REPEAT=--last-failed repeats only what failed, in each of the test targets; parts of them then run in turn.
 REPEAT ?=
 PYTEST = $(BIN)/python -m pytest $(REPEAT)
+jobs = --jobs $(if $(REPEAT),1,$(1)) --keep-going --output-sync=none
 
 INTEROP := .interop
 PARTS := waiting units others
@@ -20,7 +21,7 @@ WAITING := $(wildcard tests/contract/test_*.py) tests/contract/ardrone_driver te
 	tests/replay/test_replay_playback.py tests/sitl tests/unit/console tests/unit/supervisor \
 	tests/unit/cli/test_cli_stop.py tests/unit/cli/test_cli_bench_report.py
 
-.PHONY: help install demo test test-waiting test-units test-others raise-floors test-slow slow-timed slow-flights slow-pages-1 slow-pages-2 slow-scenarios slow-studies slow-largest test-exhaustive fuzz test-firmware mutants limiter-states wire-faults soak check format docs hashes sbom audit interop clean
+.PHONY: help install demo test test-waiting test-units test-others raise-floors test-slow slow-flights slow-pages-1 slow-pages-2 slow-scenarios slow-studies slow-largest test-exhaustive fuzz test-firmware mutants limiter-states wire-faults soak check format docs hashes sbom audit interop clean
 
 install: $(STAMP)  ## the product, in .venv, with compiled kernels (also: make alone)
 
@@ -34,7 +35,7 @@ demo: $(STAMP)  ## one flight in the simulator; DEMO_ARGS=...
 # at their ends. What runs is measured, and each package has a floor (tests/coverage/floors.toml); make raise-floors
 # raises them.
 test: $(STAMP)-test  ## the fast tests
-	$(MAKE) --jobs $(if $(REPEAT),1,3) --keep-going --output-sync=none $(PARTS:%=test-%)
+	$(MAKE) $(call jobs,3) $(PARTS:%=test-%)
 	$(BIN)/python tests/coverage/floors.py $(COVERAGE)
 
 test-waiting: $(STAMP)-test
@@ -51,16 +52,13 @@ test-units test-others: test-%: $(STAMP)-test
 raise-floors: $(STAMP)-test  ## set the coverage floors to the last run's figures
 	$(BIN)/python tests/coverage/floors.py $(COVERAGE) --raise
 
-# Flights are judged by the clock, and pages by how soon they show what they are told: flights come first, then pages,
-# in two halves. What only computes runs beside both, where they leave time, and is printed at its end. The largest
-# flights fill two slow cores and have them to themselves.
+# Flights are judged by the clock: what only computes runs beside them, where they leave time, and is printed at its end.
+# Pages are judged by how soon they show what they are told: they follow, in two halves. The largest flights fill two
+# slow cores and have them to themselves.
 test-slow: $(STAMP)-test-slow  ## flights in real time, browser, programs of other projects; make interop first
-	code=0; $(MAKE) --jobs $(if $(REPEAT),1,4) --keep-going --output-sync=none slow-timed slow-scenarios slow-studies || code=$$?; \
+	code=0; $(MAKE) $(call jobs,3) slow-flights slow-scenarios slow-studies || code=$$?; \
+	$(MAKE) $(call jobs,2) slow-pages-1 slow-pages-2 || code=$$?; \
 	$(MAKE) slow-largest && exit $$code
-
-slow-timed:
-	code=0; $(MAKE) slow-flights || code=$$?; \
-	$(MAKE) slow-pages-1 slow-pages-2 && exit $$code
 
 slow-flights: $(STAMP)-test-slow
 	$(PYTEST) -m "slow and not page and not study and not largest and not firmware and not exhaustive" --timeout 900 tests

@@ -22,7 +22,13 @@ numba_cache.activate(numba_cache.EVERYTHING)
 
 ROOT = Path(__file__).parents[1]
 CONFIG = ROOT / "config"
-BESIDE_FLIGHTS = {"browser": "page", "property": "study", "replay": "study", "statistics": "study"}
+BESIDE_FLIGHTS = {
+    "browser": "page",
+    "calibration": "study",
+    "property": "study",
+    "replay": "study",
+    "statistics": "study",
+}
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -8,10 +8,18 @@ from accessibility import violations
 from groundstation.bus.messages import Severity
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
+DESK, PHONE = (1440, 900), (390, 844)
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("size", [(1440, 900), (390, 844)])
+@pytest.mark.parametrize(
+    ("size", "scheme"),
+    [
+        (DESK, "light"),
+        (PHONE, "dark"),
+        pytest.param(DESK, "dark", marks=pytest.mark.exhaustive),
+        pytest.param(PHONE, "light", marks=pytest.mark.exhaustive),
+    ],
+)
 def test_a_flight_with_alarms_and_old_orders(stage: Any, size: tuple[int, int], scheme: str) -> None:
     page = stage.open(color_scheme=scheme)
     page.page.set_viewport_size({"width": size[0], "height": size[1]})

@@ -15,7 +15,7 @@ from groundstation.bus.messages import RUN, Severity
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 SIZES = ((1440, 900), (1024, 768), (390, 844), (2560, 1440))
-# The situations are checked at all sizes; a whole flight at a desk's and a phone's, at the others on demand.
+# Checked at a desk's and a phone's, at the others on demand.
 FLOWN = [
     pytest.param(size, marks=() if size in ((1440, 900), (390, 844)) else pytest.mark.exhaustive) for size in SIZES
 ]
@@ -241,7 +241,8 @@ TOLD = {
 }
 
 
-def test_every_situation_is_told_in_one_way_and_moves_nothing(stage: Any) -> None:
+@pytest.mark.parametrize("sizes", [SIZES[::2], pytest.param(SIZES, marks=pytest.mark.exhaustive)], ids=len)
+def test_every_situation_is_told_in_one_way_and_moves_nothing(stage: Any, sizes: tuple[tuple[int, int], ...]) -> None:
     SITUATIONS["all_is_well"](stage.flight)
     page = stage.open(script=REMEMBER)
     places = [page.there(name) for name in ("safety", "banners", "verdict", "hold", "drone_1-mode", "drone_2-mode")]
@@ -251,7 +252,7 @@ def test_every_situation_is_told_in_one_way_and_moves_nothing(stage: Any) -> Non
 
     page.wait(lambda s: told("all_is_well"))
     stands = {}
-    for size in SIZES:
+    for size in sizes:
         resize(page, size)
         stands[size] = boxes(page)
     for name, arrange in SITUATIONS.items():
@@ -260,11 +261,11 @@ def test_every_situation_is_told_in_one_way_and_moves_nothing(stage: Any) -> Non
         arrange(stage.flight)
         page.wait(lambda s, name=name: told(name))
         page.page.wait_for_timeout(700)  # until observations of the previous situation no longer count
-        for size in SIZES:
+        for size in sizes:
             resize(page, size)
             assert whole(page) == [], (name, size)
             assert moved(page, stands[size]) == {}, (name, size)
-        resize(page, SIZES[0])
+        resize(page, sizes[0])
         page.shot(f"situation_{name}")
 
 
@@ -299,7 +300,11 @@ def test_the_wall_is_read_from_three_metres(stage: Any) -> None:
 
 
 # A phone on its side, a desk's page at 300 %, and the narrowest phone.
-@pytest.mark.parametrize("size", [(844, 390), (480, 300), (320, 568)], ids=str)
+@pytest.mark.parametrize(
+    "size",
+    [(320, 568), *(pytest.param(size, marks=pytest.mark.exhaustive) for size in ((844, 390), (480, 300)))],
+    ids=str,
+)
 def test_a_low_or_narrow_screen_has_the_stops_and_reaches_the_team(stage: Any, size: tuple[int, int]) -> None:
     SITUATIONS["all_is_well"](stage.flight)
     page = stage.open()

@@ -28,7 +28,7 @@ def debugged(browser: Any, tmp_path: Path, free_port: int) -> Iterator[Debugged]
     context.close()
 
 
-@pytest.mark.parametrize("wall", [False, True])
+@pytest.mark.parametrize("wall", [pytest.param(False, marks=pytest.mark.exhaustive), True])
 def test_the_console_and_the_wall(stage: Any, debugged: Debugged, wall: bool) -> None:
     stage.open()
     debugged.page.goto(stage.url)

@@ -18,7 +18,10 @@ pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 CONFIG = Path(__file__).parents[2] / "config"
 LONG = "the_longest_name_that_a_drone_may_have_in"  # 41 letters; its camera has the same name with _camera
-SIZES = ((390, 844), (1024, 768), (1440, 900), (2560, 1440))
+SIZES = [
+    *((390, 844), (1440, 900)),
+    *(pytest.param(size, marks=pytest.mark.exhaustive) for size in ((1024, 768), (2560, 1440))),
+]
 
 
 @pytest.fixture

@@ -132,6 +132,7 @@ def test_a_reloaded_and_a_second_page_see_the_same(replay: Callable[..., Seen]) 
     page.wait(lambda s: not s["playback"]["ended"])
 
 
+@pytest.mark.exhaustive
 def test_how_it_looks(replay: Callable[..., Seen], recorded: Recorded) -> None:
     page = replay()
     page.page.keyboard.press("End")

@@ -33,7 +33,7 @@ def now(page: Seen) -> str:
     return str(page.page.locator("#stages [aria-current]").inner_text())
 
 
-@pytest.mark.parametrize("size", [(1440, 900), (1024, 768), (390, 844)])
+@pytest.mark.parametrize("size", [(1440, 900), pytest.param((1024, 768), marks=pytest.mark.exhaustive), (390, 844)])
 def test_the_stage_is_named_at_every_size(floor: Stage, size: tuple[int, int]) -> None:
     page = floor.open(viewport={"width": size[0], "height": size[1]})
     place = page.there("stages").bounding_box()

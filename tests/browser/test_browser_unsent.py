@@ -92,7 +92,9 @@ def test_cut_motors_held_while_the_next_run_appears_does_not_cut_it(stage: Any) 
     assert "for another run" in page.there("orders").inner_text()
 
 
-@pytest.mark.parametrize("asleep", [False, True], ids=["awake", "asleep"])
+@pytest.mark.parametrize(
+    "asleep", [pytest.param(False, id="awake"), pytest.param(True, id="asleep", marks=pytest.mark.exhaustive)]
+)
 def test_a_stop_lives_for_five_seconds(stage: Any, asleep: bool) -> None:
     page = cut_off(stage, run="run-1")
     page.there("land-all").click()

@@ -88,6 +88,7 @@ def test_mavsdk_finds_no_mission_and_flies_by_satellites(hangar: Any) -> None:
     assert max(flown) == pytest.approx(2.5, abs=0.3) and flown[-1] < 0.1
 
 
+@pytest.mark.exhaustive
 def test_mavproxy_lists_no_mission_and_flies_by_satellites(hangar: Any, interpreter: Any, tmp_path: Path) -> None:
     python, drones = interpreter("mavproxy"), hangar(1, kind="ardupilot")
     command = [str(python), str(python.with_name("mavproxy.py")), f"--master=udpout:{drones.addresses[0]}:14550"]

@@ -25,6 +25,8 @@ from sim_bridge.study.faults.vehicles import Section
 from sim_bridge.study.scenarios.flight import ScenarioFlight, as_drawn
 
 pytestmark = [pytest.mark.slow, pytest.mark.study]
+# A search of the whole room, a carried target, a sharp turn, a wall in the view, bad autopilots.
+TELLING = ("corner", "kidnap-2m", "sharp-turns-0.7", "occluder", "unkind-autopilots")
 
 
 def order(name: str, *options: str) -> tuple[Drawn, list[Section]]:
@@ -37,14 +39,15 @@ def order(name: str, *options: str) -> tuple[Drawn, list[Section]]:
 
 
 @pytest.mark.timeout(3000)
-def test_scenarios_end_as_their_files_expect(tmp_path: Path) -> None:
-    """One seed of each: target found in time and tracked, no drone lands."""
-    command = [sys.executable, "-m", "groundstation", "experiment", "scenarios", "--scheduler", "none"]
+@pytest.mark.parametrize("names", [TELLING, pytest.param((), id="all", marks=pytest.mark.exhaustive)], ids=" ".join)
+def test_scenarios_end_as_their_files_expect(names: tuple[str, ...], tmp_path: Path) -> None:
+    """One seed of each, or of all: target found in time and tracked, no drone lands."""
+    command = [sys.executable, "-m", "groundstation", "experiment", "scenarios", *names, "--scheduler", "none"]
     flown = subprocess.run([*command, "-o", str(tmp_path)], capture_output=True, text=True, check=False)
     results = tmp_path / "scenarios.json"
     assert results.exists(), flown.stderr
     rows = json.loads(results.read_text())["rows"]
-    assert len(rows) >= 20
+    assert len(rows) >= (len(names) or 20)
     assert not {row["scenario"]: row["missed"] for row in rows if row["missed"]}
 
 

@@ -89,6 +89,7 @@ def arguments(pid: int) -> bytes:
     return b""
 
 
+@pytest.mark.exhaustive
 def test_a_run_leaves_no_password_behind(
     tmp_path: Path, cameras: list[LockedCamera], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -57,6 +57,7 @@ def flood(rider, place):
         time.sleep(max(0.0, began + (number + 1) / A_SECOND - time.monotonic()))
 
 
+@pytest.mark.exhaustive
 @needing_processors()
 def test_a_flood_neither_delays_setpoints_nor_hides_a_stop(hangar, port, rider, tmp_path):
     with ridden(hangar, port, tmp_path, rider.getsockname()[1]) as flight:

@@ -190,6 +190,7 @@ def _heals(run: Any, camera: str, since: float) -> bool:
     return "no picture" in told and "pictures arrive" in told.partition("no picture")[2]
 
 
+@pytest.mark.exhaustive
 def test_datagrams_from_foreign_addresses_are_counted(sitl: Start) -> None:
     run = sitl()
     run.until_tracking()

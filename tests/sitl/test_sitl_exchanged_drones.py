@@ -12,6 +12,7 @@ pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(240)]
 EXCHANGED = (sys.executable, str(Path(__file__).with_name("exchanged_drones.py")))
 
 
+@pytest.mark.exhaustive
 def test_exchanged_drones_land_before_anything_is_tracked(sitl: Callable[..., Any]) -> None:
     run = sitl("--duration", "20", program=EXCHANGED)
     assert run.wait(150) == 4, run.text

@@ -20,12 +20,11 @@ from sim_bridge.scenario import parse_scenario
 from sim_bridge.study.scenarios.figures import SEPARATION_M, TrackingErrors, shortfalls
 from sim_bridge.surroundings import ScenarioExpectation
 
-pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.exhaustive, pytest.mark.timeout(600)]
 Start = Callable[..., Any]
 SEEDS, TOLERANCE = 3, 0.3
 # None with obstacles: rendered pictures do not show them.
-ON_DEMAND = ("random-walk", "anywhere", "sharp-turns-0.5", "frame-loss")
-NAMES = ["kidnap-2m", *(pytest.param(name, marks=pytest.mark.exhaustive) for name in ON_DEMAND)]
+NAMES = ("kidnap-2m", "random-walk", "anywhere", "sharp-turns-0.5", "frame-loss")
 
 
 def expectation_of(name: str) -> ScenarioExpectation:

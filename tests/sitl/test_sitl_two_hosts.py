@@ -83,8 +83,8 @@ class End:
     resumes: bool = False
 
 
-SLOW = [End("host", AT_ONCE_S)]
-ON_DEMAND = [
+ENDS = [
+    End("host", AT_ONCE_S),
     End("driver", LAND_S, "SIGSTOP", (DOWN, TRACK), concerned=("drone_1",)),
     End("host", LAND_S + LINK_S, "SIGSTOP"),
     End("driver", LAND_S, modes=(DOWN, TRACK), concerned=("drone_1",)),
@@ -95,9 +95,9 @@ ON_DEMAND = [
     End("liaison", None, "SIGSTOP", (HOVER, HOVER), resumes=True),
     End("all", FIRMWARE_S, modes=(TRACK, TRACK), stopped_s=FIRMWARE_S + STOPPED_S),
 ]
-ENDS = [*SLOW, *(pytest.param(end, marks=pytest.mark.exhaustive) for end in ON_DEMAND)]
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("end", ENDS, ids=lambda end: f"{end.victim}-{end.signal}")
 def test_every_end_of_a_host_ends_as_that_of_its_processes(tmp_path: Path, end: End) -> None:
     told = flown(tmp_path, duration_s=60, kill=end.victim, signal=end.signal, resume=end.resumes)

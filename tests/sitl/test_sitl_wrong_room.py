@@ -37,6 +37,7 @@ def test_a_wrong_room_is_refused_on_the_floor(sitl: Callable[..., Any], changes:
     assert max(state.position_m[2] for name in ("drone_1", "drone_2") for _, state in run.truth(name)) < 0.1
 
 
+@pytest.mark.exhaustive
 def test_a_take_off_in_a_wrong_room_by_override_is_recorded(sitl: Callable[..., Any]) -> None:
     run = sitl("--duration", "10", "--anyway", program=room(ASIDE))
     run.wait(150)

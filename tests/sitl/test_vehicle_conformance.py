@@ -15,7 +15,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.sitl, pytest.mark.timeout(300)]
     ("kind", "options", "flights"),
     [
         ("tello", [], "stand,kind"),
-        ("ardrone", [], "killed"),
+        pytest.param("ardrone", [], "killed", marks=pytest.mark.exhaustive),
         pytest.param("mavlink", [], "epochs", marks=pytest.mark.exhaustive),
         ("mavlink", ["--with", "mavlink.flavour=ardupilot"], "limits"),
         pytest.param("mavlink", ["--with", "mavlink.flavour=ardupilot"], "orphaned", marks=pytest.mark.exhaustive),

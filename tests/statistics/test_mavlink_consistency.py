@@ -17,7 +17,9 @@ from sim_bridge.study.summary import anees, interval, summary
 pytestmark = pytest.mark.statistics
 FIELD = Path(__file__).parents[2] / "config" / "mixed-team.yaml"
 FED_BACK = ("drone_2", "drone_3")
-FLIGHTS = 64
+# Number of flights; the interval of few is wide.
+MANY = 64
+FLIGHTS = [pytest.param(16, id="16"), pytest.param(MANY, id="64", marks=pytest.mark.exhaustive)]
 
 
 @pytest.fixture(scope="module")
@@ -49,16 +51,17 @@ def test_short_flights_are_near_consistent(field: ResolvedField) -> None:
 
 @pytest.mark.slow
 @pytest.mark.timeout(3000)
-def test_flights_with_the_loop_closed(field: ResolvedField) -> None:
-    """Flights of 20 s, some 3 s of CPU each; band 0.8..1.3 for the means, of 50 flights +- 0.3 at most.
+@pytest.mark.parametrize("count", FLIGHTS)
+def test_flights_with_the_loop_closed(field: ResolvedField, count: int) -> None:
+    """Flights of 20 s, some 8 s of CPU each; band 0.8..1.3 for the means, of 50 flights +- 0.3 at most.
 
     One flight's mean scatters by 0.5, so that of 32 by 0.09: the same code gave 0.69 and 0.79.
 
-    A mean is outside when its whole 95 % interval is: 0.79 +- 0.14 does not differ from 0.8 significantly. No mean may
-    be outside of 0.7..1.4, whatever its interval. Shorter flights would judge a parked target (15 s: 0.79): it departs
-    3 s after the slowest take-off.
+    A mean is outside when its whole 95 % interval is: 0.79 +- 0.14 does not differ from 0.8 significantly. Of many
+    flights no mean may be outside of 0.7..1.4, whatever its interval. Shorter flights would judge a parked target
+    (15 s: 0.79): it departs 3 s after the slowest take-off.
     """
-    reports = fly(field, range(100, 100 + FLIGHTS), 20.0)
+    reports = fly(field, range(100, 100 + count), 20.0)
     found = summary(reports, field)
     found["anees fed back"] = interval(anees(report, FED_BACK) for report in reports)
     found["anees fed back xy"] = interval(anees(report, FED_BACK, " xy") for report in reports)
@@ -66,6 +69,7 @@ def test_flights_with_the_loop_closed(field: ResolvedField) -> None:
     stated = {name: f"{value} (95 %, {value.flights} flights)" for name, value in found.items()}
     print(stated)
     for value in judged.values():
-        assert value.half <= 0.3 * math.sqrt(50 / FLIGHTS) and 0.7 <= value.mean <= 1.4, stated
+        assert value.half <= 0.3 * math.sqrt(50 / count), stated
+        assert count < MANY or 0.7 <= value.mean <= 1.4, stated
         assert value.mean + value.half >= 0.8 and value.mean - value.half <= 1.3, stated
     assert max(report["target_rmse_m"] for report in reports) <= 0.15

@@ -109,13 +109,14 @@ class EntityMemory(Record):
     slow_v*: the smoothed velocity; commanded_*: the last command of a CommandedRobot; odometry_age_s: since the last
     velocity; attitude_std [rad], yaw_std [rad per root second]: errors as stated by the odometry (0: the model's own
     count); last_yaw, last_reset, has_yaw: the vehicle's own heading [rad; odom] at the step before, received yaw_age_s
-    ago. velocity_x, _y, _z: how they change [m/s; world], as last predicted; velocity_doubt [m/s]: deviation that a
-    fixed camera's surprises add to the error of the reported velocity; noted_error [m/s]: by how much that error was
-    recently seen to exceed that of a sound sensor; unseen_s: time predicted since the last sighting. wild: observations
-    far beyond the gate, the last of them at wild_at; refused: observations by which it would have joined if they had
-    not contradicted their observer; corrected_at: last use of an observation; seen_variance: of the worse of x and y
-    [m^2] right after it. gave_up, gave_up_at, gave_up_whom: number of robots recently re-initialised by this one's
-    sightings, the last time, and the last robot.
+    ago; turn_rate [rad/s]: mean until then; turned [rad]: what it is taken to have turned since. velocity_x, _y, _z:
+    how they change [m/s; world], as last predicted; velocity_doubt [m/s]: deviation that a fixed camera's surprises add
+    to the error of the reported velocity; noted_error [m/s]: by how much that error was recently seen to exceed that of
+    a sound sensor; unseen_s: time predicted since the last sighting. wild: observations far beyond the gate, the last
+    of them at wild_at; refused: observations by which it would have joined if they had not contradicted their observer;
+    corrected_at: last use of an observation; seen_variance: of the worse of x and y [m^2] right after it. gave_up,
+    gave_up_at, gave_up_whom: number of robots recently re-initialised by this one's sightings, the last time, and the
+    last robot.
     """
 
     active: int
@@ -138,6 +139,8 @@ class EntityMemory(Record):
     last_reset: float
     has_yaw: int
     yaw_age_s: float
+    turn_rate: float
+    turned: float
     velocity_x: float
     velocity_y: float
     velocity_z: float

@@ -10,6 +10,7 @@ from groundstation.kernel import kernel
 SILENT_DENSITY = 0.09
 # So is its turn: 0.15 rad/s, likewise [rad^2/s]. It is ordered to hover, but may have been turning at its last message.
 SILENT_TURN_DENSITY = 0.0225
+_TURNS_ON_S = 0.1  # without a heading
 _SILENT_S = 0.3  # after a longer pause between headings the vehicle was silent
 # Velocity is smoothed over this time for the estimates of its errors [s].
 SLOW_S = 1.0
@@ -37,18 +38,24 @@ def hold_velocity(odometry: CondensedOdometry, memory: EntityMemory, hold_s: flo
 def take_heading(odometry: CondensedOdometry, memory: EntityMemory, step: float) -> None:
     """Turn the vehicle's own heading into the yaw rate of this step, and hold roll and pitch.
 
-    An increment across a reset is void: the heading jumped, not the vehicle. Of an increment across a silence only the
-    part after the last sighting of the vehicle counts, which included the rest; the turn is assumed to be even.
+    Between two headings it turns on as before, and the next one corrects that. An increment across a reset is void: the
+    heading jumped, not the vehicle. Of an increment across a silence only the part after the last sighting of the
+    vehicle counts, which included the rest; the turn is assumed to be even.
     """
-    memory.yaw_rate = 0.0
     memory.yaw_age_s += step
     if odometry.newest_at < 0.0:
+        memory.yaw_rate = memory.turn_rate if memory.yaw_age_s <= _TURNS_ON_S else 0.0
+        memory.turned += memory.yaw_rate * step
         return
+    memory.yaw_rate = memory.turn_rate = 0.0
     if memory.has_yaw != 0 and memory.last_reset == odometry.newest_reset:
-        memory.yaw_rate = wrap(odometry.newest_yaw - memory.last_yaw) / step
+        increment = wrap(odometry.newest_yaw - memory.last_yaw)
+        memory.yaw_rate = (increment - memory.turned) / step
         if memory.yaw_age_s > _SILENT_S:
             memory.yaw_rate *= min(1.0, memory.unseen_s / memory.yaw_age_s)
-    memory.yaw_age_s = 0.0
+        else:
+            memory.turn_rate = increment / memory.yaw_age_s
+    memory.yaw_age_s = memory.turned = 0.0
     memory.held_roll, memory.held_pitch = odometry.newest_roll, odometry.newest_pitch
     memory.attitude_std, memory.yaw_std = odometry.newest_attitude_std, odometry.newest_yaw_std
     memory.last_yaw, memory.last_reset, memory.has_yaw = odometry.newest_yaw, odometry.newest_reset, 1

@@ -58,6 +58,6 @@ class ArDroneDriverSettings(VehicleDriverSettings):
     limits: ArDroneLimits = ArDroneLimits()
     flight: FlightConfiguration = FlightConfiguration()
     video: Video | None = None
-    odometry_hz: Annotated[float, Field(gt=0, le=200)] = 100.0
+    odometry_hz: Annotated[float, Field(gt=0, le=200)] = 50.0
     imu_hz: Annotated[float, Field(ge=0, le=200)] = 25.0
     strict_checksum: bool = True

@@ -54,15 +54,15 @@ def test_a_packet_of_which_nothing_is_due_waits_for_the_next(drone: ArDrone) -> 
         read(drone, one)
         heard.append(drone.telemetry.heard_ns)
     stamps = [one.stamp_ns for one in arrivals]
-    assert heard == [*stamps[:3], stamps[2], stamps[4], stamps[4], stamps[6]]
+    assert heard == [*stamps[:2], stamps[1], stamps[3], stamps[3], *stamps[5:]]
     assert drone._link.rates(stamps[6]) == (7.0, 1.0)
 
 
 def test_a_waiting_packet_is_read_when_no_other_comes(drone: ArDrone) -> None:
-    read(drone, *(arrival(number) for number in range(1, 5)))
-    assert drone.telemetry.heard_ns == arrival(3).stamp_ns
+    read(drone, *(arrival(number) for number in range(1, 4)))
+    assert drone.telemetry.heard_ns == arrival(2).stamp_ns
     read(drone, None)
-    assert drone.telemetry.heard_ns == arrival(4).stamp_ns
+    assert drone.telemetry.heard_ns == arrival(3).stamp_ns
 
 
 def test_a_status_packet_never_waits_long_and_a_damaged_one_is_counted(drone: ArDrone) -> None:
@@ -82,4 +82,4 @@ def test_messages_are_those_of_packets_read_one_by_one(drone: ArDrone, new_bus: 
     drone._plausibility.reset()
     for one in arrivals:
         drone._hear(one.stamp_ns, navdata.decode(one.datagram))
-    assert len(alone.sent) > 200 and alone.sent == together.sent
+    assert len(alone.sent) > 140 and alone.sent == together.sent

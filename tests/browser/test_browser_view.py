@@ -252,7 +252,7 @@ def test_a_router_that_comes_back_brings_everything_back(stage: Any) -> None:
 def test_a_slow_viewer_slows_nobody(stage: Any) -> None:
     fast, slow = stage.open(), stage.open()
     dialogs: list[Any] = []
-    slow.page.on("dialog", dialogs.append)
+    slow.page.on("dialog", lambda dialog: dialogs.append(dialog))  # playwright marks the function
     slow.page.evaluate("() => { setTimeout(() => alert('nothing else runs in this page'), 0); }")
     before = fast.state()
     after = fast.wait(lambda s: s["nowMs"] - before["nowMs"] > 3000)

@@ -57,9 +57,10 @@ def test_flights_with_the_loop_closed(field: ResolvedField, count: int) -> None:
 
     One flight's mean scatters by 0.5, so that of 64 by 0.06: the same code gave 0.69 and 0.78.
 
-    A mean is outside when its whole 95 % interval is: 0.79 +- 0.14 does not differ from 0.8 significantly. Of many
-    flights no mean may be outside of 0.7..1.4, whatever its interval. Shorter flights would judge a parked target
-    (15 s: 0.79): it departs 3 s after the slowest take-off.
+    A mean is outside when its whole 95 % interval is: 0.79 +- 0.14 does not differ from 0.8 significantly. No mean may
+    be outside of 0.7..1.4, whatever its interval. Few flights tell only whether the belief is too sure: squared errors
+    are skewed, so that most samples of few are too small (16 of these: 0.58, all: 0.74). Shorter flights would judge a
+    parked target (15 s: 0.79): it departs 3 s after the slowest take-off.
     """
     reports = fly(field, range(100, 100 + count), 20.0)
     found = summary(reports, field)
@@ -70,6 +71,6 @@ def test_flights_with_the_loop_closed(field: ResolvedField, count: int) -> None:
     print(stated)
     for value in judged.values():
         assert value.half <= 0.3 * math.sqrt(50 / count), stated
-        assert count < MANY or 0.7 <= value.mean <= 1.4, stated
-        assert value.mean + value.half >= 0.8 and value.mean - value.half <= 1.3, stated
+        assert value.mean <= 1.4 and value.mean - value.half <= 1.3, stated
+        assert count < MANY or (value.mean >= 0.7 and value.mean + value.half >= 0.8), stated
     assert max(report["target_rmse_m"] for report in reports) <= 0.15

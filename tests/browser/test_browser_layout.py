@@ -14,11 +14,8 @@ from groundstation.bus.messages import RUN, Severity
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
-SIZES = ((1440, 900), (1024, 768), (390, 844), (2560, 1440))
-# Checked at a desk's and a phone's, at the others on demand.
-FLOWN = [
-    pytest.param(size, marks=() if size in ((1440, 900), (390, 844)) else pytest.mark.exhaustive) for size in SIZES
-]
+USUAL, FURTHER = ((1440, 900), (390, 844)), ((1024, 768), (2560, 1440))  # a desk's and a phone's; on demand
+SIZES = [*USUAL, *(pytest.param(size, marks=pytest.mark.exhaustive) for size in FURTHER)]
 
 
 def resize(page: Seen, size: tuple[int, int]) -> None:
@@ -37,7 +34,7 @@ def ten_alarms(flight: FakeFlight) -> None:
     flight.detail["drone_1"] = "not seen by any camera for too long"
 
 
-@pytest.mark.parametrize("size", FLOWN)
+@pytest.mark.parametrize("size", SIZES)
 def test_nothing_moves_while_alarms_and_orders_come(stage: Any, size: tuple[int, int]) -> None:
     page = stage.open()
     SITUATIONS["all_is_well"](stage.flight)
@@ -71,7 +68,7 @@ def whole(page: Seen) -> list[str]:
     return [*clipped(page.page), *overhanging(page.page), *covered(page.page), *small(page.page), *wide]
 
 
-@pytest.mark.parametrize("size", FLOWN)
+@pytest.mark.parametrize("size", SIZES)
 def test_no_text_is_cut_off_from_the_flight_to_the_end_of_the_run(stage: Any, size: tuple[int, int]) -> None:
     page = stage.open()
     resize(page, size)
@@ -99,7 +96,7 @@ def test_the_whole_team_is_in_sight(stage: Any) -> None:
     """Mode, battery and stops of each drone, without scrolling; on a phone above the stops for all."""
     page = stage.open()
     ten_alarms(stage.flight)
-    for size in SIZES:
+    for size in USUAL + FURTHER:
         resize(page, size)
         phone = page.there("land-all").bounding_box()["y"] > size[1] / 2
         edge = page.there("land-all").bounding_box()["y"] if phone else size[1]
@@ -241,7 +238,7 @@ TOLD = {
 }
 
 
-@pytest.mark.parametrize("sizes", [SIZES[::2], pytest.param(SIZES, marks=pytest.mark.exhaustive)], ids=len)
+@pytest.mark.parametrize("sizes", [USUAL, pytest.param(USUAL + FURTHER, marks=pytest.mark.exhaustive)], ids=len)
 def test_every_situation_is_told_in_one_way_and_moves_nothing(stage: Any, sizes: tuple[tuple[int, int], ...]) -> None:
     SITUATIONS["all_is_well"](stage.flight)
     page = stage.open(script=REMEMBER)

@@ -76,8 +76,8 @@ slow-pages-1 slow-pages-2 slow-scenarios slow-studies: slow-%: $(STAMP)-test-slo
 	$(BESIDE) $(PYTEST) --timeout 1800 -o cache_dir=.pytest_cache/$* -m $(SLOW) >.pytest_cache/$*/log 2>&1 || code=$$?; \
 	cat .pytest_cache/$*/log; exit $$code
 
-# More cases of what test-slow shows, e.g. every flight of each kind of vehicle, and the long recordings: an hour.
-test-exhaustive: $(STAMP)-test-slow  ## more cases of these: an hour
+# More cases of what test-slow shows, e.g. every flight of each kind of vehicle, and the long recordings: two hours.
+test-exhaustive: $(STAMP)-test-slow  ## more cases of these: two hours
 	$(PYTEST) -m "exhaustive and not firmware" --timeout 3000 tests
 
 # Real firmware: the SITL binaries that $$SKEIN_PX4 and $$SKEIN_ARDUCOPTER name. Stand-ins for them fly in test-slow.

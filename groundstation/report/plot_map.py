@@ -120,6 +120,6 @@ def _legend(data: RunData) -> list[Line2D | Patch]:
 
 def _world_view(data: RunData) -> str:
     """Return the legend of the dotted boxes."""
-    cameras = ["ceiling view\nat slot heights"] if data.resolved.cameras else []
+    cameras = ["ceiling view\nat level heights"] if data.resolved.cameras else []
     systems = {"motion capture": data.resolved.motion_capture, "ranging": data.resolved.ranging}
     return "\n".join([*cameras, *(name for name, given in systems.items() if given)])

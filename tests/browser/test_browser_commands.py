@@ -108,6 +108,8 @@ def test_cut_motors_wants_a_second_of_pressing(stage: Any) -> None:
 def test_one_operator_at_a_time(stage: Any) -> None:
     stage.flight.modes = dict.fromkeys(stage.flight.modes, "LANDED")
     first, second = stage.open(), stage.open()
+    for page in (first, second):
+        page.slow_down(4)  # a start that takes two seconds, on a busy machine, is dropped
     first.there("take-off").click()
     first.wait(lambda s: verbs(stage) == ["TAKEOFF"])
     (command,) = stage.flight.commands

@@ -17,6 +17,8 @@ from sim_bridge.study.summary import anees, interval, summary
 pytestmark = pytest.mark.statistics
 FIELD = Path(__file__).parents[2] / "config" / "mixed-team.yaml"
 FED_BACK = ("drone_2", "drone_3")
+# Errors of two mountings, constant in each flight, dominate these: most samples of few flights are too small.
+SKEWED = ("anees robots xy", "anees fed back xy")
 # Number of flights; the interval of few is wide.
 MANY = 128
 FLIGHTS = [pytest.param(16, id="16"), pytest.param(MANY, id="128", marks=pytest.mark.exhaustive)]
@@ -58,9 +60,9 @@ def test_flights_with_the_loop_closed(field: ResolvedField, count: int) -> None:
     One flight's mean scatters by 0.5, so that of 64 by 0.06: the same code gave 0.69 and 0.78.
 
     A mean is outside when its whole 95 % interval is: 0.79 +- 0.14 does not differ from 0.8 significantly. No mean may
-    be outside of 0.7..1.4, whatever its interval. Few flights tell only whether the belief is too sure: squared errors
-    are skewed, so that most samples of few are too small (16 of these: 0.58, all: 0.74). Shorter flights would judge a
-    parked target (15 s: 0.79): it departs 3 s after the slowest take-off.
+    be outside of 0.7..1.4, whatever its interval. Of the skewed ones few flights tell only whether the belief is too
+    sure (16 of these: 0.58, all: 0.74). Shorter flights would judge a parked target (15 s: 0.79): it departs 3 s after
+    the slowest take-off.
     """
     reports = fly(field, range(100, 100 + count), 20.0)
     found = summary(reports, field)
@@ -69,8 +71,9 @@ def test_flights_with_the_loop_closed(field: ResolvedField, count: int) -> None:
     judged = {name: value for name, value in found.items() if name.startswith(("anees", "nis"))}
     stated = {name: f"{value} (95 %, {value.flights} flights)" for name, value in found.items()}
     print(stated)
-    for value in judged.values():
+    for name, value in judged.items():
         assert value.half <= 0.3 * math.sqrt(50 / count), stated
         assert value.mean <= 1.4 and value.mean - value.half <= 1.3, stated
-        assert count < MANY or (value.mean >= 0.7 and value.mean + value.half >= 0.8), stated
+        few = count < MANY and name in SKEWED
+        assert few or (value.mean >= 0.7 and value.mean + value.half >= 0.8), stated
     assert max(report["target_rmse_m"] for report in reports) <= 0.15

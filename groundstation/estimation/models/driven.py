@@ -11,6 +11,7 @@ SILENT_DENSITY = 0.09
 # So is its turn: 0.15 rad/s, likewise [rad^2/s]. It is ordered to hover, but may have been turning at its last message.
 SILENT_TURN_DENSITY = 0.0225
 _TURNS_ON_S = 0.1  # without a heading
+_FASTEST_TURN = 4.0  # of a vehicle [rad/s]; beyond, its heading jumped, which is not continued
 _SILENT_S = 0.3  # after a longer pause between headings the vehicle was silent
 # Velocity is smoothed over this time for the estimates of its errors [s].
 SLOW_S = 1.0
@@ -54,7 +55,8 @@ def take_heading(odometry: CondensedOdometry, memory: EntityMemory, step: float)
         if memory.yaw_age_s > _SILENT_S:
             memory.yaw_rate *= min(1.0, memory.unseen_s / memory.yaw_age_s)
         else:
-            memory.turn_rate = increment / memory.yaw_age_s
+            mean_rate = increment / memory.yaw_age_s
+            memory.turn_rate = mean_rate if abs(mean_rate) <= _FASTEST_TURN else 0.0
     memory.yaw_age_s = memory.turned = 0.0
     memory.held_roll, memory.held_pitch = odometry.newest_roll, odometry.newest_pitch
     memory.attitude_std, memory.yaw_std = odometry.newest_attitude_std, odometry.newest_yaw_std

@@ -67,3 +67,13 @@ def test_a_heading_that_jumped_is_no_turn() -> None:
     before = turner.turned_rad
     assert turner.step(2.0, reset=1) == before
     assert turner.step(None, reset=1) == before
+
+
+def test_a_jump_that_nobody_counted_is_taken_once_and_not_continued() -> None:
+    turner = Turner()
+    for k in range(20):
+        turner.step(RATE_RAD_S * STEP_S * k if k % 2 == 0 else None)
+    jumped = turner.step(RATE_RAD_S * STEP_S * 20 + 1.0)
+    assert jumped == pytest.approx(RATE_RAD_S * STEP_S * 20 + 1.0)
+    for _ in range(20):
+        assert turner.step(None) == jumped

@@ -113,7 +113,8 @@ class Study:
             n: CopterLink(n, c, CLOCK, lifetime) for n, c in world.of(MavlinkCopter).items()
         }
         self._telemetry: dict[str, TelemetryPublisher | FlownLink] = {
-            n: TelemetryPublisher(n, d, world.onboard[n], CLOCK) for n, d in world.of(Quadrotor).items()
+            name: TelemetryPublisher(name, drone, world.onboard[name], CLOCK, phase)
+            for phase, (name, drone) in enumerate(world.of(Quadrotor).items())
         }
         self._telemetry |= self._links
         self._pilots = {

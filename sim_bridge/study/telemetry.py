@@ -18,22 +18,30 @@ _STATES = {
     Phase.CUT: FlightState.EMERGENCY,
 }
 _JUMP_RAD = math.radians(20.0)
+_PERIOD_TICKS = 4  # 50 Hz, as its driver publishes
 _COVARIANCE = (0.0025, 0.0, 0.0, 0.0, 0.0025, 0.0, 0.0, 0.0, 0.01)
 
 
 class TelemetryPublisher:
-    """Builds odometry and status messages of one drone; counts heading jumps as resets, as a driver does."""
+    """Builds odometry and status messages of one drone; counts heading jumps as resets, as a driver does.
 
-    def __init__(self, name: str, drone: Quadrotor, onboard: Onboard, clock: str) -> None:
+    phase: its tick among those of a period, so that the drones of a team do not all publish at the same time.
+    """
+
+    def __init__(self, name: str, drone: Quadrotor, onboard: Onboard, clock: str, phase: int = 0) -> None:
+        self._ticks = phase
         self._name, self._drone, self._onboard, self._clock = name, drone, onboard, clock
         self._yaw, self._reset, self._seq = onboard.yaw, 0, 0
 
-    def odometry(self, stamp_ns: int) -> Odometry:
-        """Return the reading of this tick."""
+    def odometry(self, stamp_ns: int) -> Odometry | None:
+        """Return the reading of this tick, if one is due; call it once per tick."""
         onboard = self._onboard
         if abs(math.remainder(onboard.yaw - self._yaw, math.tau)) > _JUMP_RAD:
             self._reset += 1
         self._yaw = onboard.yaw
+        self._ticks += 1
+        if self._ticks % _PERIOD_TICKS:
+            return None
         return Odometry(
             header=self._header(stamp_ns),
             velocity_m_s=(onboard.vx, onboard.vy, 0.0),

@@ -6,6 +6,7 @@ import pytest
 from clipping import clipped, covered, overhanging
 from fake_flight import DRONES, TARGET, FakeFlight
 from fonts import REMEMBER, small
+from on_demand import on_demand
 from places import boxes, moved
 from seen_page import Seen
 from situations import SITUATIONS
@@ -15,7 +16,7 @@ from groundstation.bus.messages import RUN, Severity
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 USUAL, FURTHER = ((1440, 900), (390, 844)), ((1024, 768), (2560, 1440))  # a desk's and a phone's; on demand
-SIZES = [*USUAL, *(pytest.param(size, marks=pytest.mark.exhaustive) for size in FURTHER)]
+SIZES = [*USUAL, *on_demand(FURTHER)]
 
 
 def resize(page: Seen, size: tuple[int, int]) -> None:
@@ -297,11 +298,7 @@ def test_the_wall_is_read_from_three_metres(stage: Any) -> None:
 
 
 # A phone on its side, a desk's page at 300 %, and the narrowest phone.
-@pytest.mark.parametrize(
-    "size",
-    [(320, 568), *(pytest.param(size, marks=pytest.mark.exhaustive) for size in ((844, 390), (480, 300)))],
-    ids=str,
-)
+@pytest.mark.parametrize("size", [(320, 568), *on_demand([(844, 390), (480, 300)])], ids=str)
 def test_a_low_or_narrow_screen_has_the_stops_and_reaches_the_team(stage: Any, size: tuple[int, int]) -> None:
     SITUATIONS["all_is_well"](stage.flight)
     page = stage.open()

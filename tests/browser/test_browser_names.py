@@ -10,6 +10,7 @@ from clipping import clipped, covered
 from conftest import Stage
 from fake_flight import FakeFlight
 from fonts import REMEMBER, small
+from on_demand import on_demand
 from seen_page import Seen
 
 from groundstation.bus.messages import Severity
@@ -18,10 +19,7 @@ pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 CONFIG = Path(__file__).parents[2] / "config"
 LONG = "the_longest_name_that_a_drone_may_have_in"  # 41 letters; its camera has the same name with _camera
-SIZES = [
-    *((390, 844), (1440, 900)),
-    *(pytest.param(size, marks=pytest.mark.exhaustive) for size in ((1024, 768), (2560, 1440))),
-]
+SIZES = [(390, 844), (1440, 900), *on_demand([(1024, 768), (2560, 1440)])]
 
 
 @pytest.fixture

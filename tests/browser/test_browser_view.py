@@ -11,6 +11,7 @@ from urllib.parse import urlsplit
 import pytest
 from clipping import clipped
 from fake_flight import DRONES, FakeFlight
+from on_demand import on_demand
 
 
 def slowness() -> float:
@@ -178,9 +179,7 @@ def test_battery_colours_at_their_thresholds(stage: Any) -> None:
     page.wait(lambda s: "charge!" in page.there("drone_1-battery").inner_text())
 
 
-@pytest.mark.parametrize(
-    "width", [*(pytest.param(width, marks=pytest.mark.exhaustive) for width in (1440, 1180)), 950, 390]
-)
+@pytest.mark.parametrize("width", [*on_demand([1440, 1180]), 950, 390])
 def test_alarms_on_the_cards_are_never_cut_off(stage: Any, width: int) -> None:
     page = stage.open()
     page.page.set_viewport_size({"width": width, "height": 900})

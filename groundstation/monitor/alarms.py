@@ -42,7 +42,7 @@ _CALL = f"{_TO_DO}check its marker and the light; drive it into the middle of th
 _DOWN = {
     FlightState.EMERGENCY: (
         "EMERGENCY, its motors are off",
-        f"{_TO_DO}keep away while others fly, or LAND ALL; then set it upright on its pad.",
+        f"{_TO_DO}stay away until all have landed (LAND ALL); then set it upright on its pad.",
     ),
     FlightState.LOST: ("its driver no longer hears it", f"{_TO_DO}check its battery and its link."),
 }
@@ -125,7 +125,7 @@ def _lands(status: VehicleStatus) -> bool:
 def _failsafe(name: str, status: VehicleStatus) -> Iterator[Alarm]:
     """Yield alarms about a condition that keeps a drone from its plan, or will land it."""
     if status.lands_in_s is not None:
-        advice = "Nothing to do: that comes by itself unless this ends. HOLD does not stop it."
+        advice = "Nothing to do: it lands by itself unless this ends. HOLD does not stop it."
         why, soon_s = status.detail.removeprefix("hovers: ").removesuffix("; RESUME is needed"), status.lands_in_s
         yield Alarm(f"{name} lands", f"{name} lands in {max(1, round(soon_s))} s: {why}", advice=advice)
     elif status.braked:
@@ -160,7 +160,7 @@ def _battery(name: str, status: VehicleStatus, battery: Battery) -> Iterator[Ala
 
 def _link(name: str, share: float | None) -> Iterator[Alarm]:
     if share is not None and share < WEAK_LINK:
-        advice = f"{_TO_DO}press Land on its card, or clear the way to it. Without a link it lands by itself."
+        advice = f"{_TO_DO}press Land on its card, or move what shields its radio. Without a link it lands by itself."
         yield Alarm(f"{name} link", f"{name}: weak link, {share:.0%} arrives", share < BAD_LINK, advice)
 
 

@@ -137,10 +137,12 @@ def test_a_crashed_drone_cannot_take_off_while_others_fly(stage: Any) -> None:
     page.wait(lambda s: page.there("take-off").inner_text() == "TAKE OFF\ndrone_2 must be checked")
     assert page.there("take-off").is_disabled() and page.there("drone_2-takeoff").is_disabled()
     assert page.there("drone_2-takeoff").inner_text() == "Take off\ncheck it first"
-    down = "Is on the floor, motors off: "
-    assert page.there("drone_2-duty").inner_text() == f"{down}its own emergency stop."
+    assert page.there("drone_2-duty").inner_text() == "Is on the floor: it cut its motors itself."
+    assert page.there("hold").inner_text() == "HOLD\ndrone_1 hovers;\ndrone_2 is down"
+    assert page.there("drone_2-land").inner_text() == "Land\nno use: is down"
     stage.flight.detail["drone_2"] = "motors cut by operator"
-    page.wait(lambda s: page.there("drone_2-duty").inner_text().startswith(f"{down}CUT MOTORS ordered at the terminal"))
+    ordered = "Is on the floor, motors off: CUT MOTORS ordered at the terminal"
+    page.wait(lambda s: page.there("drone_2-duty").inner_text().startswith(ordered))
     stage.flight.modes["drone_1"] = "LANDED"
     page.wait(lambda s: page.there("drone_2-takeoff").inner_text() == "Take off\nrises, if able")
 
@@ -170,8 +172,25 @@ def test_without_the_tracker_nobody_is_said_to_be_lost(stage: Any) -> None:
     stage.flight.frozen = True
     page.wait(lambda s: page.there("banner-tracker").is_visible())
     assert "lost" not in page.there("banners").inner_text()
+    assert page.there("drone_2-seen").inner_text() == "in view"
     stage.flight.modes = dict.fromkeys(DRONES, "LANDED")
     page.wait(lambda s: page.there("banner-tracker").inner_text().endswith("Nothing to do: nobody flies."))
+
+
+def test_a_card_states_what_a_drone_does_now_and_why(stage: Any) -> None:
+    page = stage.open()
+    for situation, name, words in (
+        ("the_target_is_lost", "drone_1", "Looks for turtlebot, which nobody sees"),
+        (
+            "one_is_unseen_and_will_land",
+            "drone_1",
+            "Tracks turtlebot, then lands: not seen by any camera for too long.",
+        ),
+        ("one_stands_with_an_unknown_battery", "drone_2", "Stands, motors off. Reason for landing: its battery is unk"),
+    ):
+        SITUATIONS["all_is_well"](stage.flight)
+        SITUATIONS[situation](stage.flight)
+        page.wait(lambda s, at=f"{name}-duty", said=words: page.there(at).inner_text().startswith(said))
 
 
 def test_a_battery_that_lands_well_charged_does_not_count_while_others_fly(stage: Any) -> None:

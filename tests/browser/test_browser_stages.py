@@ -87,6 +87,17 @@ def test_a_must_keeps_take_off_shut_until_it_is_mended_or_somebody_insists(floor
     page.there("preflight").wait_for(state="hidden")  # they fly, and the map is shown
 
 
+def test_a_drone_left_out_for_a_must_may_not_rise_when_it_is_ordered_up_later(floor: Stage) -> None:
+    floor.flight.findings = (BATTERY, PADS)
+    page = floor.open()
+    eventually(page.there("take-off").is_disabled, what="TAKE OFF is shut")
+    floor.flight.findings, floor.flight.modes["drone_2"] = (), "TRACK"
+    eventually(
+        lambda: page.there("take-off").inner_text() == "TAKE OFF\ndrone_1 rises, if able", what="what may happen"
+    )
+    assert page.there("drone_1-takeoff").inner_text() == "Take off\nrises, if able"
+
+
 def test_a_resolved_finding_enables_take_off(floor: Stage) -> None:
     floor.flight.findings = (BATTERY, PADS)
     page = floor.open()

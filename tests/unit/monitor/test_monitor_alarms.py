@@ -192,13 +192,13 @@ def test_a_drone_that_is_heard_and_not_believed_is_not_called_silent(
     assert (alarm.text, alarm.grave, alarm.asks) == (f"drone_1: {words}", True, asks)
 
 
-def test_a_crashed_drones_alarm_says_keep_away_while_others_fly(world: World) -> None:
+def test_a_crashed_drones_alarm_says_stay_away_while_others_fly(world: World) -> None:
     world.vehicle("drone_1", "CUT", flight_state=m.FlightState.EMERGENCY)
     world.estimate()
     world.text()
     (alarm,) = alarms_of(world.state, NOW)
     assert alarm.text == "drone_1: EMERGENCY, its motors are off"
-    assert alarm.asks and "keep away while others fly, or LAND ALL" in alarm.advice
+    assert alarm.asks and "stay away until all have landed (LAND ALL)" in alarm.advice
 
 
 def test_each_alarm_says_first_whether_there_is_anything_to_do(world: World) -> None:

@@ -2,7 +2,7 @@
 
 import { moment, sinceMs } from "./clock.js";
 import { byId, el, seconds, text } from "./dom.js";
-import { effectOf, effectOnOne, isCutOff, isIdle, refusalOf, startEffect } from "./effects.js";
+import { effectOf, effectOnOne, isIdle, mayFail, refusalOf, startEffect } from "./effects.js";
 import { me, send } from "./link.js";
 import { give, mayGive, OVER, ownOrders, roleText, startOwnOrders } from "./own_orders.js";
 import { forbidden } from "./preflight.js";
@@ -96,7 +96,7 @@ function showStarts(why) {
   for (const node of document.querySelectorAll("[data-takeoff]")) {
     const reason = why ?? startRefusal("TAKEOFF", [node.dataset.takeoff]);
     enable(node, reason);
-    text(node.querySelector("small"), reason ? inFewer(reason[0]) : isCutOff(node.dataset.takeoff) ? "rises, if able" : "rises, hovers");
+    text(node.querySelector("small"), reason ? inFewer(reason[0]) : mayFail(node.dataset.takeoff) ? "rises, if able" : "rises, hovers");
   }
   enable(byId("anyway"), why ?? twice(refusalOf("TAKEOFF")));
 }

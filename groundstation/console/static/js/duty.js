@@ -1,9 +1,8 @@
 // A drone's present action and its reason, in a sentence or two, and its limits.
 
 import { joined, seconds } from "./dom.js";
-import { isCutOff } from "./effects.js";
-import { isBlind, isLost, standing, unseenLeftS } from "./glance.js";
-import { ageS, droneNames, SEEN_S, seenBy, store, trackerSilent, unseenS } from "./store.js";
+import { isBlind, isCutOff, isLost, standing, unseenLeftS } from "./glance.js";
+import { ageS, droneNames, isSeen, SEEN_S, seenBy, store, trackerSilent, unseenS } from "./store.js";
 import { askedBy, ordered } from "./who.js";
 
 const FRESH_S = 1;
@@ -36,15 +35,26 @@ function tracked(name, plan, room) {
   const watched = [...new Set([...planned, ...inView])];
   const limits = limitsOf(plan.controls.find(({ robot }) => robot === name));
   const [, who] = store.s.vehicles[name].detail.match(/^tracking for (.+)$/) ?? [];
-  const search = isBlind(name) ? "has no light to look for" : "looks for";
-  const task = sought.length ? `${search} ${joined(sought)}` : `tracks ${joined(targets)}`;
-  const how = watched.length ? `: watches ${watching(watched, targets)}` : sought.length ? "" : ": moves to where it will see it";
+  const task = taskOf(name, targets, sought);
+  const looks = watchWords(name, watched, targets), how = looks ? `: ${looks}` : sought.length ? "" : ": moves to where it will see it";
   const known = isLost(name) ? "" : watchers.length ? `Seen by ${joined(watchers.map(watcher))}.` : `${unseen(name)}.`;
   const does = (order) => (isLost(name) ? `${unseen(name)}. Until then it ${task}.` : sentence(`${task}${order}${how}`));
   const told = (order) => [does(order), known, limits && `Slowed by ${limits}.`].filter(Boolean).join(" ");
   // Where a card has no room for who asked, the list of orders says it.
-  const whole = told(who && !isBlind(name) ? `, ${orderedBy(who, name, "tracking")}` : "");
+  const why = sought.length ? ", which nobody sees" : who ? `, ${orderedBy(who, name, "tracking")}` : "";
+  const whole = told(isBlind(name) ? "" : why);
   return whole.length > room ? told("") : whole;
+}
+
+function taskOf(name, targets = store.scene.targets.map((target) => target.name), sought = targets.filter(isLost)) {
+  const search = isBlind(name) ? "has no light to look for" : "looks for";
+  return sought.length ? `${search} ${joined(sought)}` : `tracks ${joined(targets)}`;
+}
+
+// Whom it watches, and whom it does not see yet although the plan relies on it.
+function watchWords(name, watched, targets) {
+  const seen = watched.filter((subject) => isSeen(name, subject)), awaited = watched.filter((subject) => !seen.includes(subject));
+  return [seen.length && `watches ${watching(seen, targets)}`, awaited.length && `is to watch ${watching(awaited, targets)}`].filter(Boolean).join(", ");
 }
 
 // A drone that watches no target watches drones for the sake of their places; the only target was just named.
@@ -78,14 +88,14 @@ function orderedBy(who, name, doing) {
 
 const NEEDED = /; RESUME is needed$/;
 // The drone's action until a failsafe lands it.
-const GOES_ON = { TRACK: "follows its plan", HOLD: "hovers", HOVER: "hovers" };
+const GOES_ON = { TRACK: taskOf, HOLD: () => "hovers", HOVER: () => "hovers" };
 
 // The driver's own reason; what it is the reason for, where it does not say so, and who ordered what "landing for" says.
 function reasonOf(name, { mode, detail, lands_in_s, braked }) {
   if (standing([name]).length) return stands(name, detail);
   const [, doing, who] = detail.match(ORDERS) ?? [];
   if (who) return `${ORDERED[doing]} ${orderedBy(who, name, doing)}`;
-  if (lands_in_s !== null && !braked && mode in GOES_ON && detail) return `${GOES_ON[mode]}, then lands: ${detail.replace(NEEDED, "")}`;
+  if (lands_in_s !== null && !braked && mode in GOES_ON && detail) return `${GOES_ON[mode](name)}, then lands: ${detail.replace(NEEDED, "")}`;
   if (mode === "LANDING" && detail && !detail.startsWith("land")) return `lands: ${detail}`;
   return mode === "HOVER" && NEEDED.test(detail) ? `hovers: ${detail.replace(NEEDED, "")}. RESUME lets it go on` : detail;
 }
@@ -94,8 +104,8 @@ function reasonOf(name, { mode, detail, lands_in_s, braked }) {
 function stands(name, detail) {
   const [, why] = detail.match(/^landed \((.+)\)$/) ?? [], [, doing, who] = (why ?? detail).match(ORDERS) ?? [];
   if (doing === "motors cut") return `is on the floor, motors off: CUT MOTORS ${orderedBy(who, name, doing)}`;
-  if (isCutOff(name)) return "is on the floor, motors off: its own emergency stop";
-  return why ? `stands, motors off. It landed: ${who ? orderedBy(who, name, doing) : why}` : `stands with its motors off${detail && `: ${detail}`}`;
+  if (isCutOff(name)) return "is on the floor: it cut its motors itself";
+  return why ? `stands, motors off. ${who ? `It landed, ${orderedBy(who, name, doing)}` : `Reason for landing: ${why}`}` : `stands with its motors off${detail && `: ${detail}`}`;
 }
 
 // In TRACK what the plan has it do, unless its driver knows better; else the driver's own reason. room: letters.

@@ -1,6 +1,7 @@
 // The effect of a start or a stop now, or why a start has none: in the few words that a button has room for.
 
-import { aloft, isLost, isUnheard, lostTarget, modeNow, modes, standing, up, waits } from "./glance.js";
+import { aloft, isCutOff, isLost, isUnheard, lostTarget, modeNow, modes, standing, up, waits } from "./glance.js";
+import { wasForbidden } from "./preflight.js";
 import { droneNames, store, trackerSilent } from "./store.js";
 
 // Why a start would be refused or do nothing now; "" if it would not. Stops are never withheld while a run goes on.
@@ -51,16 +52,16 @@ function told(parts, others = "others land") {
 // The drones that would follow TRACK.
 export const ready = () => droneNames().filter((name) => modeNow(name) === "HOVER");
 
+// Whether it may stay on the floor although it is ordered to take off.
+export const mayFail = (name) => isCutOff(name) || wasForbidden(name);
+
 // The effect that a start of the team would have now, with the drones concerned.
 export function startEffect(verb) {
-  if (verb === "TAKEOFF") return standing().some(isCutOff) ? does(standing(), "rises, if able", "rise, if able") : does(standing(), "rises, hovers", "rise, one by one");
+  if (verb === "TAKEOFF") return standing().some(mayFail) ? does(standing(), "rises, if able", "rise, if able") : does(standing(), "rises, hovers", "rise, one by one");
   const who = verb === "RESUME" ? waiting() : ready();
   const how = who.some(isBound) ? ", if able" : verb === "RESUME" ? " again" : "";
   return does(who, ...(lostTarget() ? ["searches", "search"] : ["tracks", "track"]).map((word) => `${word}${how}`));
 }
-
-// Whether its own emergency stop has cut its motors: an order to take off may do no more than end that.
-export const isCutOff = (name) => store.s.vehicles?.[name]?.flight === "EMERGENCY";
 
 // The effect that a stop of the team would have now, for each drone; "" without telemetry from any drone.
 export function effectOf(verb) {
@@ -84,7 +85,7 @@ function unheard(verb, flying) {
 // The effect that a stop of one drone would have now.
 export function effectOnOne(verb, name) {
   if (!modeNow(name)) return "";
-  if (!up([name]).length) return "no use: stands";
+  if (!up([name]).length) return isCutOff(name) ? "no use: is down" : "no use: stands";
   if (isUnheard(name)) return "if it hears";
   if (verb === "LAND") return isIdle(verb, [name]) ? "lands already" : "lands here";
   if (!holding([name]).length) return "lands anyway";
@@ -98,9 +99,15 @@ function hover(flying) {
   const yet = isIdle("HOLD") ? " already" : "";
   if (trackerSilent()) return told([does(held, `hovers${yet},\nthen lands`, `hover${yet},\nthen land`), does(bound, "lands anyway", "land anyway")]);
   const how = isIdle("HOLD") ? " already" : held.length === droneNames().length ? " in place" : "";
-  if (!lost.length) return told([does(held, `hovers${how}`, `hover${how}`), does(bound, "lands anyway", "land anyway"), does(standing(), "stands", "stand")], "others land or stand");
+  if (!lost.length) return told([does(held, `hovers${how}`, `hover${how}`), does(bound, "lands anyway", "land anyway"), ...left()], "others land or stand");
   if (lost.length < flying.length) return told([does(seen, "hovers", "hover"), does(lost, "lands if unseen", "land if unseen"), does(bound, "lands anyway", "land anyway")]);
   return does(lost, "hovers; it lands\nif it stays unseen", "hover; they land\nif they stay unseen");
+}
+
+// The drones on the floor: one whose motors were cut there may lie on its side.
+function left() {
+  const down = standing().filter(isCutOff);
+  return [does(down, "is down", "are down"), does(standing().filter((name) => !down.includes(name)), "stands", "stand")];
 }
 
 function landing(flying) {

@@ -17,6 +17,9 @@ export function openMusts(names = droneNames()) {
   return isTold() ? graded("MUST").filter(({ subject }) => !others.includes(subject)) : [];
 }
 
+// Whether the last checks forbade its take-off: in the air they are made anew when it is ordered.
+export const wasForbidden = (name) => graded("MUST").some(({ subject }) => subject === name);
+
 // Why these may not take off: [in few words, in more]; null if they may.
 export function forbidden(names) {
   const [first] = openMusts(names);

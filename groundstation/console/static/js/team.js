@@ -4,7 +4,7 @@ import { batteryWords, lastsWords } from "./batteries.js";
 import { byId, el, seconds, svg, text } from "./dom.js";
 import { ellipse95 } from "./geometry.js";
 import { dutyOf } from "./duty.js";
-import { aloft, doing, isBlind, isLost, landsIn, modeOf, modeWord, namedOrCounted, up } from "./glance.js";
+import { aloft, doing, isBlind, isCutOff, isLost, landsIn, modeOf, modeWord, namedOrCounted, up } from "./glance.js";
 import { withShortNames } from "./names.js";
 import { give } from "./own_orders.js";
 import { colourOf, isAgain } from "./palette.js";
@@ -155,6 +155,13 @@ function beliefWords(name, body, age, lost) {
 // A fixed camera sees it, and no filter has it: it does not fly.
 const standsInSight = (name) => (store.s.standing ?? []).some((one) => one.name === name);
 
+// When it was last seen, with its level. Ages come from the tracker: of a silent one's bodies only the pictures tell.
+function seenWords(name, body, age) {
+  if (trackerSilent() && seenBy(name).length) return ["in view", ""];
+  if (!body && standsInSight(name)) return [isCutOff(name) ? "it is down" : "it stands", ""];
+  return Number.isFinite(age) ? [`${seconds(age)} ago`, age > 3 ? "empty" : age > 1 ? "low" : ""] : ["not yet", ""];
+}
+
 function showBelief(name, { root, values, mode, detail, drone }) {
   const body = entity(name), age = unseenS(name);
   const old = estimateAge() > STALE_S;
@@ -167,9 +174,9 @@ function showBelief(name, { root, values, mode, detail, drone }) {
     text(detail, withShortNames((words || lost) && dark ? `Lost for ${seconds(age)}: nobody can look for it, the drones' pictures are dark.` : words ? `${Number.isFinite(age) ? "Lost" : "Not found yet"}: ${words}.` : beliefWords(name, body, age, lost)));
     root.classList.toggle("stale", estimateAge() > STALE_S || !store.connected);
   }
-  const stands = !body && standsInSight(name), seen = Number.isFinite(age) && !stands;
-  text(values.seen, seen ? `${seconds(age)} ago` : stands ? "it stands" : "not yet");
-  values.seen.className = !seen ? "" : age > 3 ? "empty" : age > 1 ? "low" : "";
+  const [seen, level] = seenWords(name, body, age);
+  text(values.seen, seen);
+  values.seen.className = level;
   text(values.by, withShortNames(seenBy(name).join(", ") || "nobody"));
   if (!body) { for (const field of ["position", "ellipse", "speed"]) text(values[field], "unknown"); return; }
   const { major, minor } = ellipse95(body.cov);

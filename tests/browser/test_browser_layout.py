@@ -135,7 +135,7 @@ def test_the_bar_says_how_long_the_worst_battery_lasts(stage: Any) -> None:
     page.wait(lambda s: page.there("battery-lasts").inner_text() == "worst battery, good for ~3 min")
     stage.flight.battery["drone_1"] = 0.52  # it has spent more
     page.wait(lambda s: page.there("worst-battery").inner_text() == "52 % drone_1")
-    assert page.there("battery-lasts").inner_text() == "worst battery, good for ~1 min"
+    assert page.there("battery-lasts").inner_text() == "drains fastest, good for ~1 min"
     stage.flight.modes["drone_2"] = "LANDED"
     page.wait(lambda s: "good for" not in page.there("card-drone_2").inner_text())  # on the ground while others fly
     assert "good for ~1 min" in page.there("card-drone_1").inner_text()

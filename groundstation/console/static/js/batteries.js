@@ -28,7 +28,9 @@ export function worstBattery() {
   if (!all.length) return null;
   const [[name, status]] = all.sort(([, a], [, b]) => RANKS.indexOf(a.charge) - RANKS.indexOf(b.charge)
     || (a.minutes ?? Infinity) - (b.minutes ?? Infinity) || a.battery - b.battery);
-  const what = names.length === droneNames().length ? "worst battery" : names.length < up().length ? "worst flying on" : "worst in the air", lasts = lastsWords(name);
+  const least = names.length === droneNames().length ? "worst battery" : names.length < up().length ? "worst flying on" : "worst in the air", lasts = lastsWords(name);
+  // Named although another one has no more charge: that one lasts longer.
+  const what = lasts && all.some(([, other]) => other.battery <= status.battery && other.minutes > status.minutes + 1) ? "drains fastest" : least;
   return { name, words: share(status), level: LEVELS[status.charge], title: lasts ? `${what}, ${lasts}` : what };
 }
 

@@ -113,7 +113,7 @@ function draw(name, target) {
     g.font = `700 ${14 * Math.min(2, devicePixelRatio || 1)}px system-ui, "DejaVu Sans", sans-serif`;
     g.lineWidth = 4;
     g.strokeStyle = "#000";
-    const words = `${mark.subject} ${mark.range_m.toFixed(1)} m`;
+    const words = `${mark.subject} ${mark.range_m.toFixed(1)} m away`;
     const long = g.measureText(words).width, place = besideRing(u, v, r + 5, long, width, height);
     while (written.some(([x, y, other]) => place[0] < x + other && x < place[0] + long && Math.abs(place[1] - y) < LINE_PX)) place[1] += LINE_PX;
     written.push([...place, long]);

@@ -1,7 +1,8 @@
 """A MAVLink vehicle with driver and autopilot at message level: odometry, setpoints, poses fed back.
 
 The loop is closed as in flight: the tracker's belief aids the vehicle's estimate, whose velocity comes back as
-odometry. Of the driver's code only its drift feedback and its deviations of the attitude are used.
+odometry. Of the driver's code the choice of positions to send, the drift feedback and the deviations of the attitude
+are used.
 """
 
 import math
@@ -9,7 +10,8 @@ import math
 from drivers.mavlink.drift import DriftFeedback
 from drivers.mavlink.settings import VisionFeedback
 from drivers.mavlink.uncertainty import StatedUncertainty
-from groundstation.bus.messages import EntityEstimate, FlightState, Header, Odometry, VehicleStatus
+from drivers.mavlink.vision import VisionFeed
+from groundstation.bus.messages import EntityEstimate, Estimate, FlightState, Header, Odometry, VehicleStatus
 from groundstation.vectors import Vector3
 from sim_bridge.world.mavlink_copter import MavlinkCopter, Steering
 from sim_bridge.world.world import TICK_S
@@ -17,7 +19,6 @@ from sim_bridge.world.world import TICK_S
 _PERIOD_TICKS = 4  # 50 Hz
 _VISION_TICKS = 7  # 28.6 Hz
 _VISION = VisionFeedback()
-_COASTED_S = 0.4
 _STAND_S, _TAKE_OFF_M, _CLIMB_M_S = 2.0, 0.8, 0.4
 _COVARIANCE = (0.0025, 0.0, 0.0, 0.0, 0.0025, 0.0, 0.0, 0.0, 0.05)
 _ATTITUDE_STD_RAD = math.radians(0.3)
@@ -29,16 +30,14 @@ class CopterLink:
     def __init__(self, name: str, copter: MavlinkCopter, clock: str, lifetime_s: float) -> None:
         self._name, self._copter, self._clock, self._lifetime_s = name, copter, clock, lifetime_s
         self._until_s = -math.inf
-        self._ticks = self._seq = self._resets = 0
+        self._ticks = self._seq = 0
         self._heading = 0.0
         self._climbing = True
         self.landed = False
-        self._fed: Vector3 | None = None
-        self._fed_ns = 0
         self._doubt_rad = _ATTITUDE_STD_RAD
         self._drift, self._stated = DriftFeedback(), StatedUncertainty()
         body = copter.airframe
-        self._pad, self._pad_yaw = (body.x, body.y, body.z), body.yaw
+        self._vision = VisionFeed(name, clock, _VISION, (body.x, body.y), body.yaw)
 
     def obey(self, velocity: Vector3, yaw_rate: float, now_s: float) -> None:
         """Take a setpoint [base_stabilized]."""
@@ -81,20 +80,18 @@ class CopterLink:
         self._copter.fly((x + correction[0], y + correction[1], z + correction[2]), yaw_rate)
 
     def _feed(self, estimates: tuple[EntityEstimate, ...], now_ns: int) -> None:
-        position, yaw = self._pad, self._pad_yaw
-        if self._copter.airborne:
-            mine = [e for e in estimates if e.name == self._name and _is_good(e)]
-            if not mine:
-                return
-            self._drift.hear(now_ns, mine[0], self._reported())
+        """Send the position that the driver would send now."""
+        header, airborne = Header(now_ns, self._clock, "team", "tracker", self._ticks), self._copter.airborne
+        good = self._vision.hear(now_ns, Estimate(header=header, entities=estimates, epoch=1))
+        if good is not None and airborne:
+            self._drift.hear(now_ns, good, self._reported())
             self._stated.see_drift(now_ns, self._drift.size_m_s)
             self._doubt_rad = max(_ATTITUDE_STD_RAD, self._stated.attitude_std_rad(now_ns))
-            position, yaw = (mine[0].mean[0], mine[0].mean[1], mine[0].mean[2]), mine[0].mean[3]
-        coasted = self._copter.airborne and now_ns - self._fed_ns > _COASTED_S * 1e9
-        if self._fed is not None and (coasted or math.dist(position, self._fed) > 0.3):
-            self._resets += 1
-        self._fed, self._fed_ns = position, now_ns
-        self._copter.estimate.aid(position, yaw, self._resets)
+        if (seen := self._vision.sighted) is not None and airborne:
+            self._drift.see_place(now_ns, seen.position_m, seen.yaw_rad)
+        if (pose := self._vision.pose(now_ns, airborne)) is not None:
+            x, y, z = pose.position_m
+            self._copter.estimate.aid((x, y, z), pose.yaw_rad, self._vision.resets)
 
     def odometry(self, stamp_ns: int) -> Odometry | None:
         """Return the reading of this tick, if one is due."""
@@ -125,9 +122,3 @@ class CopterLink:
     def _header(self, stamp_ns: int) -> Header:
         self._seq += 1
         return Header(stamp_ns, self._clock, self._name, self._name, self._seq)
-
-
-def _is_good(estimate: EntityEstimate) -> bool:
-    worst = max(estimate.covariance[i] for i in (0, 5, 10))
-    known = estimate.converged and worst <= _VISION.max_std_m**2
-    return known and not estimate.contradicted and estimate.age_s <= _VISION.max_age_s

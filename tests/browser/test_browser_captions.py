@@ -139,7 +139,7 @@ def test_a_crashed_drone_cannot_take_off_while_others_fly(stage: Any) -> None:
     assert page.there("drone_2-takeoff").inner_text() == "Take off\ncheck it first"
     assert page.there("drone_2-duty").inner_text() == "Is on the floor: it cut its motors itself."
     assert page.there("hold").inner_text() == "HOLD\ndrone_1 hovers;\ndrone_2 is down"
-    assert page.there("drone_2-land").inner_text() == "Land\nno use: is down"
+    assert page.there("drone_2-land").inner_text() == "Land\nno use: down"
     stage.flight.detail["drone_2"] = "motors cut by operator"
     ordered = "Is on the floor, motors off: CUT MOTORS ordered at the terminal"
     page.wait(lambda s: page.there("drone_2-duty").inner_text().startswith(ordered))

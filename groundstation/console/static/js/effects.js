@@ -85,7 +85,7 @@ function unheard(verb, flying) {
 // The effect that a stop of one drone would have now.
 export function effectOnOne(verb, name) {
   if (!modeNow(name)) return "";
-  if (!up([name]).length) return isCutOff(name) ? "no use: is down" : "no use: stands";
+  if (!up([name]).length) return isCutOff(name) ? "no use: down" : "no use: stands";
   if (isUnheard(name)) return "if it hears";
   if (verb === "LAND") return isIdle(verb, [name]) ? "lands already" : "lands here";
   if (!holding([name]).length) return "lands anyway";

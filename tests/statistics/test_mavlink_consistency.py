@@ -61,7 +61,7 @@ def test_flights_with_the_loop_closed(field: ResolvedField, count: int) -> None:
 
     A mean is outside when its whole 95 % interval is: 0.79 +- 0.14 does not differ from 0.8 significantly. No mean may
     be outside of 0.7..1.4, whatever its interval. Of the skewed ones few flights tell only whether the belief is too
-    sure (16 of these: 0.58, all: 0.74). Shorter flights would judge a parked target (15 s: 0.79): it departs 3 s after
+    sure (16 of these: 0.61, all: 0.78). Shorter flights would judge a parked target (15 s: 0.79): it departs 3 s after
     the slowest take-off.
     """
     reports = fly(field, range(100, 100 + count), 20.0)

@@ -90,8 +90,7 @@ class CopterLink:
         if (seen := self._vision.sighted) is not None and airborne:
             self._drift.see_place(now_ns, seen.position_m, seen.yaw_rad)
         if (pose := self._vision.pose(now_ns, airborne)) is not None:
-            x, y, z = pose.position_m
-            self._copter.estimate.aid((x, y, z), pose.yaw_rad, self._vision.resets)
+            self._copter.estimate.aid(pose.position_m, pose.yaw_rad, self._vision.resets)
 
     def odometry(self, stamp_ns: int) -> Odometry | None:
         """Return the reading of this tick, if one is due."""

@@ -29,9 +29,8 @@ class TelemetryPublisher:
     """
 
     def __init__(self, name: str, drone: Quadrotor, onboard: Onboard, clock: str, phase: int = 0) -> None:
-        self._ticks = phase
         self._name, self._drone, self._onboard, self._clock = name, drone, onboard, clock
-        self._yaw, self._reset, self._seq = onboard.yaw, 0, 0
+        self._yaw, self._reset, self._seq, self._ticks = onboard.yaw, 0, 0, phase
 
     def odometry(self, stamp_ns: int) -> Odometry | None:
         """Return the reading of this tick, if one is due; call it once per tick."""

@@ -29,13 +29,13 @@ const sentence = (words) => words ? `${words[0].toUpperCase()}${words.slice(1)}$
 function tracked(name, plan, room) {
   const relied = (plan.edges ?? []).filter(([, , information]) => information >= RELIED_ON);
   const watchers = seenBy(name);
-  const targets = store.scene.targets.map((target) => target.name), sought = targets.filter(isLost);
+  const targets = targetNames(), sought = targets.filter(isLost);
   const planned = relied.filter(([observer, subject]) => observer === name && !sought.includes(subject)).map(([, subject]) => subject);
   const inView = targets.filter((target) => !sought.includes(target) && seenBy(target).includes(name));
   const watched = [...new Set([...planned, ...inView])];
   const limits = limitsOf(plan.controls.find(({ robot }) => robot === name));
   const [, who] = store.s.vehicles[name].detail.match(/^tracking for (.+)$/) ?? [];
-  const task = taskOf(name, targets, sought);
+  const task = taskOf(name);
   const looks = watchWords(name, watched, targets), how = looks ? `: ${looks}` : sought.length ? "" : ": moves to where it will see it";
   const known = isLost(name) ? "" : watchers.length ? `Seen by ${joined(watchers.map(watcher))}.` : `${unseen(name)}.`;
   const does = (order) => (isLost(name) ? `${unseen(name)}. Until then it ${task}.` : sentence(`${task}${order}${how}`));
@@ -46,7 +46,10 @@ function tracked(name, plan, room) {
   return whole.length > room ? told("") : whole;
 }
 
-function taskOf(name, targets = store.scene.targets.map((target) => target.name), sought = targets.filter(isLost)) {
+const targetNames = () => store.scene.targets.map((target) => target.name);
+
+function taskOf(name) {
+  const targets = targetNames(), sought = targets.filter(isLost);
   const search = isBlind(name) ? "has no light to look for" : "looks for";
   return sought.length ? `${search} ${joined(sought)}` : `tracks ${joined(targets)}`;
 }

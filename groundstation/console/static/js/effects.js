@@ -1,6 +1,6 @@
 // The effect of a start or a stop now, or why a start has none: in the few words that a button has room for.
 
-import { aloft, isCutOff, isLost, isUnheard, lostTarget, modeNow, modes, standing, up, waits } from "./glance.js";
+import { aloft, isCutOff, isDown, isLost, isUnheard, lostTarget, modeNow, modes, standing, up, waits } from "./glance.js";
 import { wasForbidden } from "./preflight.js";
 import { droneNames, store, trackerSilent } from "./store.js";
 
@@ -85,7 +85,7 @@ function unheard(verb, flying) {
 // The effect that a stop of one drone would have now.
 export function effectOnOne(verb, name) {
   if (!modeNow(name)) return "";
-  if (!up([name]).length) return isCutOff(name) ? "no use: down" : "no use: stands";
+  if (!up([name]).length) return isDown(name) ? "no use: down" : "no use: stands";
   if (isUnheard(name)) return "if it hears";
   if (verb === "LAND") return isIdle(verb, [name]) ? "lands already" : "lands here";
   if (!holding([name]).length) return "lands anyway";
@@ -104,9 +104,8 @@ function hover(flying) {
   return does(lost, "hovers; it lands\nif it stays unseen", "hover; they land\nif they stay unseen");
 }
 
-// The drones on the floor: one whose motors were cut there may lie on its side.
 function left() {
-  const down = standing().filter(isCutOff);
+  const down = standing().filter(isDown);
   return [does(down, "is down", "are down"), does(standing().filter((name) => !down.includes(name)), "stands", "stand")];
 }
 

@@ -4,7 +4,7 @@ import { bodyToWorld, ellipse95 } from "./geometry.js";
 import { colourOf, ink, isAgain } from "./palette.js";
 import { drawArrow, label, path } from "./canvas.js";
 import { seconds } from "./dom.js";
-import { isCutOff, isLost } from "./glance.js";
+import { isDown, isLost } from "./glance.js";
 import { NAME, around, keepClear, note } from "./labels.js";
 import { withShortNames } from "./names.js";
 import { ageS, entities, entity, estimateAge, isTarget, store } from "./store.js";
@@ -97,7 +97,7 @@ export function drawStanding(g, view) {
     drawDrone(g, x, y, yaw ?? 0, Math.max(13, 0.27 * view.scale), name);
     g.globalAlpha = alpha;
     keepClear(x, y, bodyRadius(view) / 2);
-    note(g, NAME, name, withShortNames(`${name} ${isCutOff(name) ? "is down" : "stands"}`), around(x, y, bodyRadius(view), 14), colourOf(name), 14, 500);
+    note(g, NAME, name, withShortNames(`${name} ${isDown(name) ? "is down" : "stands"}`), around(x, y, bodyRadius(view), 14), colourOf(name), 14, 500);
   }
 }
 

@@ -4,7 +4,7 @@ import { batteryWords, lastsWords } from "./batteries.js";
 import { byId, el, seconds, svg, text } from "./dom.js";
 import { ellipse95 } from "./geometry.js";
 import { dutyOf } from "./duty.js";
-import { aloft, doing, isBlind, isCutOff, isLost, landsIn, modeOf, modeWord, namedOrCounted, up } from "./glance.js";
+import { aloft, doing, isBlind, isDown, isLost, landsIn, modeOf, modeWord, namedOrCounted, up } from "./glance.js";
 import { withShortNames } from "./names.js";
 import { give } from "./own_orders.js";
 import { colourOf, isAgain } from "./palette.js";
@@ -158,7 +158,7 @@ const standsInSight = (name) => (store.s.standing ?? []).some((one) => one.name 
 // When it was last seen, with its level. Ages come from the tracker: of a silent one's bodies only the pictures tell.
 function seenWords(name, body, age) {
   if (trackerSilent() && seenBy(name).length) return ["in view", ""];
-  if (!body && standsInSight(name)) return [isCutOff(name) ? "it is down" : "it stands", ""];
+  if (!body && standsInSight(name)) return [isDown(name) ? "it is down" : "it stands", ""];
   return Number.isFinite(age) ? [`${seconds(age)} ago`, age > 3 ? "empty" : age > 1 ? "low" : ""] : ["not yet", ""];
 }
 

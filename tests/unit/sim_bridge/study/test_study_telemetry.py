@@ -10,13 +10,12 @@ from groundstation.bus.messages import Odometry
 from sim_bridge.study.telemetry import TelemetryPublisher
 from sim_bridge.world.world import TICK_NS, TICK_S
 
-SENSORS: Any = SimpleNamespace(vx=0.1, vy=0.0, yaw=0.0, roll=0.0, pitch=0.0, height=0.8)
 HZ = ArDroneDriverSettings.model_fields["odometry_hz"].default
 
 
 def published(jump_at: int | None = None, phase: int = 0, ticks: int = 200) -> dict[int, Odometry]:
     """Return what is published at each tick; the heading jumps by half a radian at one of them."""
-    sensors = SimpleNamespace(**vars(SENSORS))
+    sensors = SimpleNamespace(vx=0.1, vy=0.0, yaw=0.0, roll=0.0, pitch=0.0, height=0.8)
     publisher = TelemetryPublisher("drone_1", cast(Any, None), cast(Any, sensors), "study", phase)
     heard = {}
     for tick in range(ticks):

@@ -35,6 +35,7 @@ def tracked(tmp_path_factory: pytest.TempPathFactory, lab_field: ResolvedField) 
 
 
 @pytest.mark.slow
+@pytest.mark.exhaustive
 @pytest.mark.timeout(3000)
 def test_the_delays_of_cameras_are_found_and_a_wrong_setting_shows(tracked: Path, tmp_path: Path) -> None:
     def later(record: RawRecord) -> bytes:

@@ -127,7 +127,7 @@ def _failsafe(name: str, status: VehicleStatus) -> Iterator[Alarm]:
     if status.lands_in_s is not None:
         advice = "Nothing to do: it lands by itself unless this ends. HOLD does not stop it."
         why, soon_s = status.detail.removeprefix("hovers: ").removesuffix("; RESUME is needed"), status.lands_in_s
-        yield Alarm(f"{name} lands", f"{name} lands in {max(1, round(soon_s))} s: {why}", advice=advice)
+        yield Alarm(f"{name} lands", f"{name} starts to land in {max(1, round(soon_s))} s: {why}", advice=advice)
     elif status.braked:
         advice = "Nothing to do: it follows its plan again when this ends."
         yield Alarm(f"{name} braked", f"{name} {status.detail}", False, advice)

@@ -195,18 +195,19 @@ class FakeFlight(threading.Thread):
     def _see(self, s: float, tick: int) -> None:
         stamp_ns = time.monotonic_ns() - 20_000_000
         for name in self.drones:
-            self._observe(name, f"{name}_camera", TARGET, (0.15 * math.sin(s), 0.1 * math.cos(s), 1.6), stamp_ns)
+            at = (0.15 * math.sin(s), 0.1 * math.cos(s), 1.6)
+            self._observe(name, f"{name}_camera", TARGET, at, stamp_ns)
             if tick % 12 == 0:
-                self._picture(
-                    f"{name}_camera", (640, 360), 460.0, (0.15 * math.sin(s), 0.1 * math.cos(s), 1.6), stamp_ns
-                )
+                board = None if TARGET in self.unseen_s else at
+                self._picture(f"{name}_camera", (640, 360), 460.0, board, stamp_ns)
         for camera in self.cameras:
             for name in self.drones:
                 x, y, z, _ = self.drone_at(name, s)
                 self._observe(camera, camera, name, (x, -y, 4.2 - z), stamp_ns)
             if tick % 12 == 0:
                 x, y, z, _ = self.drone_at(self.drones[0], s)
-                self._picture(camera, (1280, 720), 1179.0, (x, -y, 4.2 - z), stamp_ns)
+                board = (x, -y, 4.2 - z) if self.sees(camera, self.drones[0]) else None
+                self._picture(camera, (1280, 720), 1179.0, board, stamp_ns)
 
     def _observe(self, observer: str, camera: str, subject: str, at: tuple[float, float, float], stamp_ns: int) -> None:
         if not self.sees(observer, subject):
@@ -225,7 +226,7 @@ class FakeFlight(threading.Thread):
         bus.publish(t.OBSERVATION, observation)
 
     def _picture(
-        self, camera: str, size: tuple[int, int], focal: float, at: tuple[float, float, float], stamp_ns: int
+        self, camera: str, size: tuple[int, int], focal: float, at: tuple[float, float, float] | None, stamp_ns: int
     ) -> None:
         bus = self.bus(camera)
         bus.publish_bytes(t.IMAGE, bus.header(camera, stamp_ns), paint(size, focal, at))

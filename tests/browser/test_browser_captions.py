@@ -72,11 +72,11 @@ def test_watch_says_who_lands_by_itself_why_and_when(stage: Any) -> None:
     stage.flight.unseen_s = {"drone_1": 10.0, "drone_2": 9.0, TARGET: 10.0}
     page.wait(lambda s: re.fullmatch(r"unseen: both\nland within (20|19) s", means.inner_text()))
     stage.flight.lands_in_s["drone_1"] = 6.0
-    page.wait(lambda s: means.inner_text() == "unseen: one\nlands in 6 s")
+    page.wait(lambda s: means.inner_text() == "unseen: one\nlanding in 6 s")
     stage.flight.unseen_s = {}
-    page.wait(lambda s: means.inner_text() == "one lands in 6 s\nby itself")
+    page.wait(lambda s: means.inner_text() == "one starts to\nland in 6 s")
     SITUATIONS["the_tracker_is_silent"](stage.flight)
-    page.wait(lambda s: means.inner_text() == "no tracker: both\nland in 1 s")
+    page.wait(lambda s: means.inner_text() == "no tracker: both\nlanding in 1 s")
     assert page.there("team-mode").inner_text() == "LANDS IN 1 s"
     assert page.there("banner-tracker").inner_text().startswith("TRACKER SILENT")
 

@@ -190,7 +190,7 @@ def test_each_drone_says_what_it_does_and_why(stage: Any) -> None:
     stage.flight.lands_in_s["drone_1"] = 1.8
     stage.flight.braked.add("drone_1")
     page.wait(lambda s: duty.inner_text() == "Hovers: no telemetry from the vehicle.")
-    page.wait(lambda s: "drone_1 lands in 2 s: no telemetry" in page.there("banner-alarm").first.inner_text())
+    page.wait(lambda s: "drone_1 starts to land in 2 s: no telemetry" in page.there("banner-alarm").first.inner_text())
     assert page.there("drone_1-mode").inner_text() == "lands in 2 s"
     assert page.there("hold").inner_text() == "HOLD\ndrone_2 hovers;\ndrone_1 lands anyway"
     assert page.there("drone_1-hold").inner_text() == "Hold\nlands anyway"
@@ -216,11 +216,12 @@ TOLD = {
     ),
     "all_are_held": ("SAFE", "No alarms", "RESUME lets them track.", "both hover already", "hold", "hold"),
     "one_is_unseen_and_will_land": (
-        *("WATCH", "drone_1 lands in 6 s", "Lost: drone_1, not seen for 4 s"),
+        *("WATCH", "drone_1 starts to land in 6 s", "Lost: drone_1, not seen for 4 s"),
         *("drone_2 hovers;\ndrone_1 lands anyway", "lands in 6 s", "track"),
     ),
     "the_tracker_is_silent": (
-        *("WATCH", "TRACKER SILENT", "in 1 s. The tracker is silent: who is lost is not known; cameras still see all."),
+        *("WATCH", "TRACKER SILENT"),
+        "in 1 s. No tracker tells if anyone is lost; cameras still see all.",
         *("both land anyway", "lands in 1 s", "lands in 1 s"),
     ),
     "one_has_a_stuck_sensor": (

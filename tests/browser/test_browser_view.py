@@ -216,6 +216,19 @@ def test_link_telemetry_and_age_colours_at_their_thresholds(stage: Any) -> None:
     assert "stale" not in (page.there("card-drone_2").get_attribute("class") or "")
 
 
+def test_words_in_a_picture_stand_off_rings_and_other_words(stage: Any) -> None:
+    """Two rings in a picture with little room: left of, right of or below each is no place for the second's words."""
+    place = """async ([ring, written, rings]) => {
+        const { placeFor } = await import("/js/cameras.js");
+        return placeFor(ring, 150, [256, 142], written, rings);
+    }"""
+    page, upper, lower = stage.open(), [102, 50, 12], [170, 110, 18]
+    x, y = page.page.evaluate(place, [lower, [], [upper, lower]])
+    assert (x, y) == (95, 92), "above its ring: there is no room below"
+    assert page.page.evaluate(place, [upper, [[x, y, 150]], [upper, lower]]) == [27, 38]
+    assert page.page.evaluate(place, [[20, 70, 12], [], [[20, 70, 12]]]) == [32, 75], "right of it, where there is room"
+
+
 def test_a_mixed_team_below_two_cameras(mixed_stage: Any) -> None:
     page = mixed_stage.open()
     state = page.wait(

@@ -59,7 +59,7 @@ def test_a_failsafe_hover_or_landing_is_an_alarm_with_its_consequence(world: Wor
     world.vehicle("drone_2", detail="hovers: its velocity is stuck", braked=True)
     world.text()
     first, second = alarms_of(world.state, NOW)
-    assert (first.text, first.grave) == ("drone_1 lands in 6 s: not seen by any camera for too long", True)
+    assert (first.text, first.grave) == ("drone_1 starts to land in 6 s: not seen by any camera for too long", True)
     assert "HOLD does not stop it" in first.advice
     assert (second.text, second.grave) == ("drone_2 hovers: its velocity is stuck", False)
 
@@ -122,7 +122,7 @@ def test_a_battery_that_lands_its_drone_within_seconds_asks_for_nothing(world: W
     world.text()
     alarms = alarms_of(world.state, NOW)
     assert [alarm.text for alarm in alarms] == [
-        "drone_1 lands in 2 s: battery below its limit", "drone_1: battery 14%, it lands",
+        "drone_1 starts to land in 2 s: battery below its limit", "drone_1: battery 14%, it lands",
     ]  # fmt: skip
     assert not any(alarm.asks for alarm in alarms)
 
@@ -144,7 +144,7 @@ def test_a_drone_that_nobody_sees_is_lost_unless_its_landing_says_so(world: Worl
     world.text()
     assert [alarm.advice for alarm in alarms_of(world.state, NOW)] == ["Nothing to do: it lands."]
     world.vehicle("drone_1", detail="not seen by any camera for too long", lands_in_s=6.0)
-    assert _alarms(world) == ["drone_1 lands in 6 s: not seen by any camera for too long"]
+    assert _alarms(world) == ["drone_1 starts to land in 6 s: not seen by any camera for too long"]
 
 
 @pytest.mark.parametrize(

@@ -100,9 +100,9 @@ function draw(name, target) {
   if (!found) return;
   target.marked = target.stamp;
   // Marks are in pixels of the calibration, which need not be those of the picture.
-  const zoom = width / found.width, written = [];
-  for (const mark of found.marks) {
-    const [u, v, r] = [mark.u * zoom, mark.v * zoom, Math.max(8, mark.r * zoom)], tint = colourInPicture(mark.subject);
+  const zoom = width / found.width, written = [], rings = found.marks.map((mark) => [mark.u * zoom, mark.v * zoom, Math.max(8, mark.r * zoom)]);
+  for (const [index, mark] of found.marks.entries()) {
+    const [u, v, r] = rings[index], tint = colourInPicture(mark.subject);
     for (const [style, line] of [["#000", 5], [tint, 2.5]]) {
       g.strokeStyle = style;
       g.lineWidth = line;
@@ -114,8 +114,7 @@ function draw(name, target) {
     g.lineWidth = 4;
     g.strokeStyle = "#000";
     const words = `${mark.subject} ${mark.range_m.toFixed(1)} m away`;
-    const long = g.measureText(words).width, place = besideRing(u, v, r + 5, long, width, height);
-    while (written.some(([x, y, other]) => place[0] < x + other && x < place[0] + long && Math.abs(place[1] - y) < LINE_PX)) place[1] += LINE_PX;
+    const long = g.measureText(words).width, place = placeFor([u, v, r + 5], long, [width, height], written, rings);
     written.push([...place, long]);
     g.strokeText(words, ...place);
     g.fillStyle = tint;
@@ -124,13 +123,15 @@ function draw(name, target) {
   }
 }
 
-// Where words stand wholly within the picture and off the ring: right of it, left, else below or above.
-function besideRing(u, v, r, long, width, height) {
-  const baseline = Math.min(Math.max(v + 5, LINE_PX), height - 6);
-  if (u + r + long <= width - 4) return [Math.max(u + r, 4), baseline];
-  if (u - r - long >= 4) return [Math.min(u - r, width - 4) - long, baseline];
-  const left = Math.min(Math.max(u - long / 2, 4), width - long - 4);
-  return [left, v + r + LINE_PX <= height - 6 ? v + r + LINE_PX : v - r];
+// Where words stand wholly within the picture, beside their ring: right of it, left, below or above, off other words and
+// rings if possible.
+export function placeFor([u, v, r], long, [width, height], written, rings) {
+  const baseline = Math.min(Math.max(v + 5, LINE_PX), height - 6), middle = Math.min(Math.max(u - long / 2, 4), width - long - 4);
+  const all = [[Math.max(u + r, 4), baseline], [Math.min(u - r, width - 4) - long, baseline], [middle, v + r + LINE_PX], [middle, v - r]];
+  const within = all.filter(([x, y]) => x >= 4 && x + long <= width - 4 && y >= LINE_PX && y <= height - 6);
+  const free = ([x, y]) => !written.some(([left, line, other]) => x < left + other && left < x + long && Math.abs(y - line) < LINE_PX)
+    && !rings.some(([cx, cy, size]) => x < cx + size && cx - size < x + long && y - LINE_PX < cy + size && cy - size < y);
+  return within.find(free) ?? within[0] ?? [middle, baseline];
 }
 
 export function showCameras() {

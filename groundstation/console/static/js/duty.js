@@ -32,11 +32,11 @@ function tracked(name, plan, room) {
   const targets = targetNames(), sought = targets.filter(isLost);
   const planned = relied.filter(([observer, subject]) => observer === name && !sought.includes(subject)).map(([, subject]) => subject);
   const inView = targets.filter((target) => !sought.includes(target) && seenBy(target).includes(name));
-  const watched = [...new Set([...planned, ...inView])];
+  const watched = [...new Set([...planned.filter((subject) => isSeen(name, subject)), ...inView])];
   const limits = limitsOf(plan.controls.find(({ robot }) => robot === name));
   const [, who] = store.s.vehicles[name].detail.match(/^tracking for (.+)$/) ?? [];
   const task = taskOf(name);
-  const looks = watchWords(name, watched, targets), how = looks ? `: ${looks}` : sought.length ? "" : ": moves to where it will see it";
+  const how = watched.length ? `: watches ${watching(watched, targets)}` : sought.length ? "" : `: moves to where it will see ${watching(planned.slice(0, 1), targets)}`;
   const known = isLost(name) ? "" : watchers.length ? `Seen by ${joined(watchers.map(watcher))}.` : `${unseen(name)}.`;
   const does = (order) => (isLost(name) ? `${unseen(name)}. Until then it ${task}.` : sentence(`${task}${order}${how}`));
   const told = (order) => [does(order), known, limits && `Slowed by ${limits}.`].filter(Boolean).join(" ");
@@ -54,16 +54,10 @@ function taskOf(name) {
   return sought.length ? `${search} ${joined(sought)}` : `tracks ${joined(targets)}`;
 }
 
-// Whom it watches, and whom it does not see yet although the plan relies on it.
-function watchWords(name, watched, targets) {
-  const seen = watched.filter((subject) => isSeen(name, subject)), awaited = watched.filter((subject) => !seen.includes(subject));
-  return [seen.length && `watches ${watching(seen, targets)}`, awaited.length && `is to watch ${watching(awaited, targets)}`].filter(Boolean).join(", ");
-}
-
 // A drone that watches no target watches drones for the sake of their places; the only target was just named.
 function watching(names, targets) {
-  if (targets.length === 1 && names.length === 1 && names[0] === targets[0]) return "it";
-  const purpose = names.every((name) => droneNames().includes(name)) ? ` for ${names.length > 1 ? "their places" : `${names[0]}'s place`}` : "";
+  if (!names.length || (targets.length === 1 && names.length === 1 && names[0] === targets[0])) return "it";
+  const purpose = names.every((name) => droneNames().includes(name)) ? `, to know where ${names.length > 1 ? "they are" : `${names[0]} is`}` : "";
   return `${joined(names)}${purpose}`;
 }
 

@@ -1,6 +1,6 @@
 // The effect of a start or a stop now, or why a start has none: in the few words that a button has room for.
 
-import { aloft, isCutOff, isDown, isLost, isUnheard, lostTarget, modeNow, modes, standing, up, waits } from "./glance.js";
+import { aloft, isCutOff, isDown, isLost, isUnheard, lostTarget, modeNow, modeOf, modes, standing, up, waits } from "./glance.js";
 import { wasForbidden } from "./preflight.js";
 import { droneNames, store, trackerSilent } from "./store.js";
 
@@ -89,7 +89,7 @@ export function effectOnOne(verb, name) {
   if (isUnheard(name)) return "if it hears";
   if (verb === "LAND") return isIdle(verb, [name]) ? "lands already" : "lands here";
   if (!holding([name]).length) return "lands anyway";
-  return isLost(name) ? "lands if unseen" : isIdle(verb, [name]) ? "hovers already" : "hovers here";
+  return isLost(name) ? "lands if unseen" : isIdle(verb, [name]) ? "hovers already" : modeOf(store.s.vehicles[name]) === "HOVER" ? "until RESUME" : "hovers here";
 }
 
 // A lost drone hovers as well, until a failsafe lands it.

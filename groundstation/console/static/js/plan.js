@@ -2,6 +2,7 @@
 
 import { byId, el, seconds, svg, text } from "./dom.js";
 import { limitsOf } from "./duty.js";
+import { lostTarget } from "./glance.js";
 import { colourOf, ink } from "./palette.js";
 import { layers } from "./map.js";
 import { DRAWN_S } from "./map_sensing.js";
@@ -29,10 +30,10 @@ export function showPlan() {
   showTimeline();
 }
 
-// Below the sensing graph, for as long as that is drawn: since when it is as it is, and why.
+// Below the sensing graph, for as long as that is drawn and the target is known: since when it is as it is, and why.
 export function showSwitch() {
   const change = store.s.switch, node = byId("switch");
-  node.hidden = !change || !layers.graph || ageS(store.s.plan?.at) > DRAWN_S;
+  node.hidden = !change || !layers.graph || lostTarget() || ageS(store.s.plan?.at) > DRAWN_S;
   if (change) text(node, `Who watches whom changed ${seconds(ageS(change.at))} ago: ${change.reason}`);
 }
 

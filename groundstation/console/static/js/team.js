@@ -149,7 +149,7 @@ function beliefWords(name, body, age, lost) {
   if (!body) return "";
   if (lost) return `Lost: nobody has seen it for ${seconds(age)}. ${doing("TRACK").length ? `${namedOrCounted(doing("TRACK"))} ${doing("TRACK").length > 1 ? "look" : "looks"} for it.` : ""}`.trim();
   if (age > SEEN_S) return `Not seen for ${seconds(age)}: it may be hidden near (${body.mean.slice(0, 2).map((value) => value.toFixed(1)).join(", ")}).`;
-  return doing("TRACK").length ? "Seen: the team tracks it." : aloft() ? "Seen; nobody follows it now." : "Seen.";
+  return doing("TRACK").length ? `Seen: ${namedOrCounted(doing("TRACK"))} ${doing("TRACK").length > 1 ? "track" : "tracks"} it.` : aloft() ? "Seen; nobody follows it now." : "Seen.";
 }
 
 // A fixed camera sees it, and no filter has it: it does not fly.
@@ -164,10 +164,10 @@ function seenWords(name, body, age) {
 
 function showBelief(name, { root, values, mode, detail, drone }) {
   const body = entity(name), age = unseenS(name);
-  const old = estimateAge() > STALE_S;
+  const old = estimateAge() > STALE_S, lost = age > store.scene.lost_after_s;
   for (const field of BELIEF) values[field]?.parentElement.classList.toggle("old", old);
   if (!drone) {
-    const lost = age > store.scene.lost_after_s, dark = doing("TRACK").length && doing("TRACK").every(isBlind);
+    const dark = doing("TRACK").length && doing("TRACK").every(isBlind);
     const [search, words] = trackerSilent() ? [] : store.s.estimate?.searches?.[name] ?? [];
     text(mode, runOver() ? "run over" : trackerSilent() ? "place unknown" : Number.isFinite(age) && lost && !aloft() ? "not seen" : search || (lost && body) || !body ? (Number.isFinite(age) ? "lost" : "not found yet") : age > SEEN_S ? "not seen" : doing("TRACK").length ? "tracked" : "seen");
     mode.dataset.level = runOver() ? "calm" : !body || trackerSilent() ? "wait" : lost ? "bad" : search ? "warn" : age > SEEN_S ? "warn" : "good";
@@ -182,5 +182,5 @@ function showBelief(name, { root, values, mode, detail, drone }) {
   const { major, minor } = ellipse95(body.cov);
   text(values.position, body.mean.slice(0, drone ? 3 : 2).map((value) => value.toFixed(2)).join("  "));
   text(values.ellipse, `${major.toFixed(2)} × ${minor.toFixed(2)}${body.converged ? "" : ", too unsure to fly by"}`);
-  text(values.speed, `${Math.hypot(...body.velocity.slice(0, 2)).toFixed(2)} m/s`);
+  text(values.speed, !drone && (lost || trackerSilent()) ? "unknown" : `${Math.hypot(...body.velocity.slice(0, 2)).toFixed(2)} m/s`);
 }

@@ -21,7 +21,7 @@ const NEXT = {
 
 // The drones that a failsafe lands, grouped by the time: [names, [words of one, of several]].
 function landings(soon) {
-  return [...new Set(soon.map(landsIn))].map((time) => [soon.filter((name) => landsIn(name) === time), [`lands by itself in ${time}`, `land by themselves in ${time}`]]);
+  return [...new Set(soon.map(landsIn))].map((time) => [soon.filter((name) => landsIn(name) === time), [`starts to land by itself in ${time}`, `start to land by themselves in ${time}`]]);
 }
 
 function deeds() {
@@ -59,7 +59,7 @@ function inPictures() {
 }
 
 function lost() {
-  if (trackerSilent()) return `The tracker is silent: who is lost is not known${inPictures()}.`;
+  if (trackerSilent()) return `No tracker tells if anyone is lost${inPictures()}.`;
   const gone = sought().filter(isLost), unplaced = gone.filter(isUnplaced), unseen = gone.filter((name) => !isUnplaced(name));
   const yet = unplaced.length ? ` It is not known yet where ${joined(unplaced)} ${unplaced.length > 1 ? "are" : "is"}.` : "";
   return `${unseen.length ? `Lost: ${unseenFor(unseen)}` : `Nobody is lost${unseenYet()}`}.${yet}`;
@@ -101,19 +101,16 @@ export function verdict() {
 export function landingWords() {
   const bound = up().filter((name) => landsIn(name) && !isUnheard(name)), [soonest] = [...bound].sort((a, b) => parseInt(landsIn(a)) - parseInt(landsIn(b)));
   if (soonest) {
-    const soon = bound.filter((name) => landsIn(name) === landsIn(soonest)), why = trackerSilent() ? "no tracker" : soon.every(isLost) ? "unseen" : "";
-    return landingOf(soon, why, `in ${landsIn(soonest)}`);
+    const time = landsIn(soonest), soon = bound.filter((name) => landsIn(name) === time), why = trackerSilent() ? "no tracker" : soon.every(isLost) ? "unseen" : "";
+    return why ? `${why}: ${howMany(soon)}\nlanding in ${time}` : `${howMany(soon)} ${soon.length > 1 ? "start" : "starts"} to\nland in ${time}`;
   }
   const on = up().filter((name) => modeNow(name) !== "LANDING"), unheard = on.filter(isUnheard), gone = on.filter(isLost);
-  if (unheard.length) return landingOf(unheard, "not heard");
-  if (trackerSilent()) return on.length ? landingOf(on, "no tracker") : "";
-  return gone.length ? landingOf(gone, "unseen", `within ${Math.min(...gone.map(unseenLeftS)).toFixed(0)} s`) : "";
+  if (unheard.length) return hovering(unheard, "not heard");
+  if (trackerSilent()) return on.length ? hovering(on, "no tracker") : "";
+  return gone.length ? `unseen: ${howMany(gone)}\n${gone.length > 1 ? "land" : "lands"} within ${Math.min(...gone.map(unseenLeftS)).toFixed(0)} s` : "";
 }
 
-// Without a time it hovers first, for as long as only its driver knows.
-function landingOf(names, why, time) {
-  const many = names.length > 1, who = !many ? "one" : names.length < droneNames().length ? names.length : names.length > 2 ? `all ${names.length}` : "both";
-  const lands = many ? "land" : "lands";
-  if (!time) return `${why}: ${who}\n${many ? "hover" : "hovers"}, then ${lands}`;
-  return why ? `${why}: ${who}\n${lands} ${time}` : `${who} ${lands} ${time}\nby ${many ? "themselves" : "itself"}`;
-}
+const howMany = ({ length }) => (length === 1 ? "one" : length < droneNames().length ? length : length > 2 ? `all ${length}` : "both");
+
+// For how long it hovers first, only its driver knows.
+const hovering = (names, why) => `${why}: ${howMany(names)}\n${names.length > 1 ? "hover, then land" : "hovers, then lands"}`;

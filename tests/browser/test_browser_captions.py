@@ -81,6 +81,22 @@ def test_watch_says_who_lands_by_itself_why_and_when(stage: Any) -> None:
     assert page.there("banner-tracker").inner_text().startswith("TRACKER SILENT")
 
 
+def test_a_page_states_the_present(stage: Any) -> None:
+    """A drone is to be watched that nobody watches yet; one hovers already; a target is lost."""
+    SITUATIONS["all_is_well"](stage.flight)
+    page = stage.open()
+    SITUATIONS["one_has_a_stuck_sensor"](stage.flight)
+    page.wait(lambda s: page.there("drone_2-hold").inner_text() == "Hold\nuntil RESUME")
+    page.wait(lambda s: page.there("turtlebot-duty").inner_text() == "Seen: drone_1 tracks it.")
+    page.wait(lambda s: page.there("turtlebot-speed").inner_text().endswith(" m/s"))
+    SITUATIONS["all_is_well"](stage.flight)
+    SITUATIONS["the_target_is_lost"](stage.flight)
+    page.wait(lambda s: page.there("turtlebot-speed").inner_text() == "unknown")
+    looks = "Looks for turtlebot, which nobody sees. Seen by ceiling camera."
+    page.wait(lambda s: page.there("drone_1-duty").inner_text() == looks)
+    assert page.page.locator("#switch").is_hidden()
+
+
 def test_silent_drones_are_described_alike_in_all_captions(stage: Any) -> None:
     SITUATIONS["all_are_held"](stage.flight)
     page = stage.open()

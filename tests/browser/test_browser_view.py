@@ -227,6 +227,8 @@ def test_words_in_a_picture_stand_off_rings_and_other_words(stage: Any) -> None:
     assert (x, y) == (95, 92), "above its ring: there is no room below"
     assert page.page.evaluate(place, [upper, [[x, y, 150]], [upper, lower]]) == [27, 38]
     assert page.page.evaluate(place, [[20, 70, 12], [], [[20, 70, 12]]]) == [32, 75], "right of it, where there is room"
+    close_up = [128, 71, 200]
+    assert page.page.evaluate(place, [close_up, [], [close_up]]) == [53, 76], "within a very wide ring"
 
 
 def test_a_mixed_team_below_two_cameras(mixed_stage: Any) -> None:

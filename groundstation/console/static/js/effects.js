@@ -37,10 +37,13 @@ export function waiting(names = droneNames()) {
 const SHORT = 8; // letters of a name that has room on a button
 const nameOf = (name) => (name.length > SHORT ? "1" : name);
 
+// "one", "both", "all 4", or "2" of more.
+export const howMany = ({ length }) => (length === 1 ? "one" : length < droneNames().length ? length : length > 2 ? `all ${length}` : "both");
+
 // Drones with their action: "drone_1 hovers", "both hover", "all 4 hover", "2 hover".
 function does(names, one, many) {
   if (names.length < 2) return names.length ? `${nameOf(names[0])} ${one}` : "";
-  return `${names.length < droneNames().length ? names.length : names.length > 2 ? `all ${names.length}` : "both"} ${many}`;
+  return `${howMany(names)} ${many}`;
 }
 
 // A button has room for two deeds; of more, the first is named.

@@ -147,9 +147,10 @@ function beliefWords(name, body, age, lost) {
   if (trackerSilent()) return `${seenBy(name).length ? "In pictures, but its place" : "Its place"} is not known: the tracker is silent.`;
   if (lost && Number.isFinite(age) && !aloft()) return `Not seen for ${seconds(age)}: nobody flies to look for it.`;
   if (!body) return "";
-  if (lost) return `Lost: nobody has seen it for ${seconds(age)}. ${doing("TRACK").length ? `${namedOrCounted(doing("TRACK"))} ${doing("TRACK").length > 1 ? "look" : "looks"} for it.` : ""}`.trim();
+  const trackers = doing("TRACK"), they = (one, many) => `${namedOrCounted(trackers)} ${trackers.length > 1 ? many : one} it.`;
+  if (lost) return `Lost: nobody has seen it for ${seconds(age)}. ${trackers.length ? they("looks for", "look for") : ""}`.trim();
   if (age > SEEN_S) return `Not seen for ${seconds(age)}: it may be hidden near (${body.mean.slice(0, 2).map((value) => value.toFixed(1)).join(", ")}).`;
-  return doing("TRACK").length ? `Seen: ${namedOrCounted(doing("TRACK"))} ${doing("TRACK").length > 1 ? "track" : "tracks"} it.` : aloft() ? "Seen; nobody follows it now." : "Seen.";
+  return trackers.length ? `Seen: ${they("tracks", "track")}` : aloft() ? "Seen; nobody follows it now." : "Seen.";
 }
 
 // A fixed camera sees it, and no filter has it: it does not fly.

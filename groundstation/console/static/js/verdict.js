@@ -1,7 +1,7 @@
 // The line below the alarms, always shown: the team's activity and the lost entities.
 
 import { joined, seconds } from "./dom.js";
-import { ready, refusalOf, waiting } from "./effects.js";
+import { howMany, ready, refusalOf, waiting } from "./effects.js";
 import { aloft, doing, isBlind, isLost, isUnheard, landsIn, lostTarget, modeNow, modes, NAMED, namedOrCounted, stage, standing, unseenLeftS, up } from "./glance.js";
 import { mustWords, openMusts } from "./preflight.js";
 import { droneNames, entity, SEEN_S, seenBy, store, trackerSilent, unseenS } from "./store.js";
@@ -109,8 +109,6 @@ export function landingWords() {
   if (trackerSilent()) return on.length ? hovering(on, "no tracker") : "";
   return gone.length ? `unseen: ${howMany(gone)}\n${gone.length > 1 ? "land" : "lands"} within ${Math.min(...gone.map(unseenLeftS)).toFixed(0)} s` : "";
 }
-
-const howMany = ({ length }) => (length === 1 ? "one" : length < droneNames().length ? length : length > 2 ? `all ${length}` : "both");
 
 // For how long it hovers first, only its driver knows.
 const hovering = (names, why) => `${why}: ${howMany(names)}\n${names.length > 1 ? "hover, then land" : "hovers, then lands"}`;

@@ -10,18 +10,21 @@ _SHOWN_SEEDS = 8
 
 
 def rows_of(flights: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Return one row for flights with correct covariances of sightings, and one for those with understated ones.
+    """Return a row each for flights in which nothing is wrong, sightings state too little, or velocities are off.
 
-    flights: number flown; violations: seeds that left the fence or came too close, with the time [s];
-    landed_before: seeds in which a drone landed without the order; standing: seeds in which one still flew at the end.
+    flights: number flown; drones: sizes of their teams; violations: seeds that left the fence or came too close, with
+    the time [s]; landed_before: seeds in which a drone landed without the order; not_landed: seeds in which one still
+    flew at the end.
     """
     rows = []
-    for share in sorted({flight["covariance_share"] for flight in flights}, reverse=True):
-        mine = [flight for flight in flights if flight["covariance_share"] == share]
+    for share, drift_m_s in sorted({_wrong(flight) for flight in flights}, key=lambda wrong: (-wrong[0], wrong[1])):
+        mine = [flight for flight in flights if _wrong(flight) == (share, drift_m_s)]
         flown = [flight for flight in mine if flight["flown"]]
         rows.append(
             {
                 "covariance_share": share,
+                "drift_m_s": drift_m_s,
+                "drones": sorted({flight["drones"] for flight in flown}),
                 "flights": len(flown),
                 "not_flown": [flight["seed"] for flight in mine if not flight["flown"]],
                 **{key: worst(flown, key, pick) for key, pick in _WORST},
@@ -33,22 +36,24 @@ def rows_of(flights: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     return rows
 
 
+def _wrong(flight: Mapping[str, Any]) -> tuple[float, float]:
+    return flight["covariance_share"], flight["drift_m_s"]
+
+
 def _broken(flight: Mapping[str, Any]) -> dict[str, float]:
     return {what: at_s for what, at_s in flight["unsafe"].items() if what in ("fence", "separation")}
 
 
 def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return the rows as lines of text."""
-    columns = "{:>10s} {:>7s} {:>10s} {:>6s} {:>8s} {:>7s} {:>6s} {:>8s}  {}"
-    lines = [
-        columns.format(
-            "covariance", "flights", "violations", "sep m", "fence m", "lost s", "landed", "airborne", "seeds"
-        )
-    ]
+    columns = "{:>10s} {:>9s} {:>7s} {:>10s} {:>6s} {:>8s} {:>7s} {:>6s} {:>8s}  {}"
+    heads = ("flights", "violations", "sep m", "fence m", "lost s", "landed", "airborne", "seeds")
+    lines = [columns.format("covariance", "drift m/s", *heads)]
     for row in rows:
         figures = ["-" if row[key] is None else f"{row[key]:.2f}" for key, _ in _WORST]
         seeds = " ".join(map(str, [*row["violations"], *row["not_flown"]][:_SHOWN_SEEDS]))
         counts = [str(len(row[key])) for key in ("landed_before", "not_landed")]
-        share, violations = f"{row['covariance_share']:.2f}", str(len(row["violations"]))
-        lines.append(columns.format(share, str(row["flights"]), violations, *figures, *counts, seeds).rstrip())
+        wrong = [f"{row[key]:.2f}" for key in ("covariance_share", "drift_m_s")]
+        violations = str(len(row["violations"]))
+        lines.append(columns.format(*wrong, str(row["flights"]), violations, *figures, *counts, seeds).rstrip())
     return lines

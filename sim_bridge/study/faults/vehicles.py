@@ -88,6 +88,19 @@ def devices_of(
     return devices
 
 
+def of_team(sections: Iterable[Section], drones: Mapping[str, Any]) -> list[Section]:
+    """Return the sections of these drones' drivers, and all others: sensors of the team, a target's odometry."""
+    kept = []
+    for kind, section in sections:
+        plain = json.loads(section)
+        if "vehicles" in plain:
+            plain["vehicles"] = [vehicle for vehicle in plain["vehicles"] if vehicle["name"] in drones]
+            kept += [(kind, json.dumps(plain))] if plain["vehicles"] else []
+        elif kind != "ardrone" or plain["name"] in drones:
+            kept.append((kind, section))
+    return kept
+
+
 def on_pads(sections: Iterable[Section], drones: Mapping[str, Mapping[str, Any]]) -> list[Section]:
     """Return the sections with the pads of these drones (plain values), which drivers check before a start."""
     return [(kind, json.dumps(_on_pads(json.loads(section), drones))) for kind, section in sections]

@@ -1,9 +1,10 @@
-"""Draws the flight of a seed of the missions: a room, the pads, and the target's path."""
+"""Draws the flight of a seed of the missions: a room, the team and its pads, the target's path, unreported drifts."""
 
 from typing import Any
 
 import numpy as np
 
+from sim_bridge.fault_kinds import Fault, FaultKind
 from sim_bridge.scenario import Scenario
 from sim_bridge.study.faults.draw import Drawn, random_eight, random_pads
 from sim_bridge.target_paths import AlongWalls, Anywhere, Path, RandomWalk, Sprint, Waypoints
@@ -14,17 +15,39 @@ _LENGTH_M, _WIDTH_M = (6.0, 12.0), (5.0, 8.0)
 _FENCE_INSET_M, _TARGET_INSET_M = 0.3, 0.6
 _SPEED_M_S = (0.15, 0.6)
 _POINTS = 5
+_LEAST_TEAM = 2
 
 
-def draw_mission(field: dict[str, Any], base: Scenario, seed: int) -> Drawn:
-    """Return the flight of a seed: without faults, but with the sensor errors of a scenario."""
+def draw_mission(field: dict[str, Any], base: Scenario, seed: int, drift_m_s: float = 0.0) -> Drawn:
+    """Return the flight of a seed: without faults, but with the sensor errors of a scenario.
+
+    drift_m_s: error of every drone's reported velocity, constant in its frame, in a direction of its own.
+    """
     rng = generator_of(seed, "mission")
     sized = {**field, "room": _room(field["room"], rng)}
     told = {**sized, "drones": random_pads(sized, rng)}
     path = _path(told, rng)
     waits = {"departs_after_team_s": None} if isinstance(path, AlongWalls | Anywhere) else {}
     target = base.target.model_copy(update={"path": path, **waits})
-    return Drawn(told, base.model_copy(update={"target": target, "faults": (), "seed": seed}), seed)
+    team = _team(told["drones"], rng)
+    faults = tuple(_drift(name, drift_m_s, rng) for name in team) if drift_m_s else ()
+    drawn = base.model_copy(update={"target": target, "faults": faults, "seed": seed})
+    return Drawn({**told, "drones": team}, drawn, seed)
+
+
+def _team(drones: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
+    """Return the drones that fly: two at least."""
+    if len(drones) <= _LEAST_TEAM:
+        return drones
+    flying = set(rng.permutation(list(drones))[: int(rng.integers(_LEAST_TEAM, len(drones) + 1))])
+    return {name: drone for name, drone in drones.items() if name in flying}
+
+
+def _drift(name: str, speed_m_s: float, rng: np.random.Generator) -> Fault:
+    direction_deg = float(rng.uniform(-180.0, 180.0))
+    return Fault(
+        kind=FaultKind.VELOCITY_JUMPING, entity=name, start_s=0.0, value=speed_m_s, direction_deg=direction_deg
+    )
 
 
 def _room(room: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:

@@ -5,10 +5,11 @@ from typing import Any
 from groundstation.experiments.missions import rows_of, table
 
 
-def flown(seed: int, share: float = 1.0, **figures: Any) -> dict[str, Any]:
+def flown(seed: int, share: float = 1.0, drift: float = 0.0, **figures: Any) -> dict[str, Any]:
     whole = {"separation_m": 0.9, "fence_m": 0.0, "unlocalised_s": 0.0, "unsafe": {}}
     ends = {"landed_before": [], "landed": True}
-    return {"seed": seed, "covariance_share": share, "flown": True, **whole, **ends, **figures}
+    wrong = {"covariance_share": share, "drift_m_s": drift, "drones": 2}
+    return {"seed": seed, **wrong, "flown": True, **whole, **ends, **figures}
 
 
 def test_a_broken_bound_counts_and_another_fault_does_not() -> None:
@@ -22,10 +23,16 @@ def test_flights_that_state_too_little_have_a_row_of_their_own() -> None:
     whole, less = rows_of([flown(1), flown(3, 0.25, fence_m=0.1, unsafe={"fence": 31.0}, landed=False)])
     assert whole["violations"] == {} and whole["not_landed"] == []
     assert less["violations"] == {3: {"fence": 31.0}} and less["not_landed"] == [3]
-    assert table([whole, less])[2].split() == ["0.25", "1", "1", "0.90", "0.10", "0.00", "0", "1", "3"]
+    assert table([whole, less])[2].split() == ["0.25", "0.00", "1", "1", "0.90", "0.10", "0.00", "0", "1", "3"]
 
 
 def test_missions_not_flown_are_listed_without_figures() -> None:
-    (row,) = rows_of([{"seed": 7, "covariance_share": 1.0, "flown": False}])
+    (row,) = rows_of([flown(7) | {"flown": False}])
     assert (row["flights"], row["not_flown"], row["separation_m"]) == (0, [7], None)
-    assert table([row])[1].split() == ["1.00", "0", "0", "-", "-", "-", "0", "0", "7"]
+    assert table([row])[1].split() == ["1.00", "0.00", "0", "0", "-", "-", "-", "0", "0", "7"]
+
+
+def test_drifting_flights_have_a_row_of_their_own_and_rows_name_the_sizes_of_teams() -> None:
+    whole, drifting = rows_of([flown(1, drift=0.05, drones=3), flown(2), flown(4, drift=0.05), flown(5)])
+    assert (whole["drift_m_s"], whole["flights"], whole["drones"]) == (0.0, 2, [2])
+    assert (drifting["drift_m_s"], drifting["flights"], drifting["drones"]) == (0.05, 2, [2, 3])

@@ -105,7 +105,7 @@ class VehicleHost:
         self._neighbours.see(now_ns, estimate.entities)
         for entity in estimate.entities:
             if entity.name == self.vehicle.name:
-                self._seen.hear(now_ns, estimate.epoch, entity)
+                self._seen.take(now_ns, estimate.epoch, entity)
                 if math.isfinite(entity.unlocalised_s):
                     self._localised_ns = now_ns - round(entity.unlocalised_s * NS_PER_S)
 
@@ -113,7 +113,7 @@ class VehicleHost:
         """Return the neighbour too near to this vehicle's pad, if it stands, and to it, if it flies; "" if none is."""
         for received in self._statuses.drain():
             if isinstance(received.message, VehicleStatus):
-                self._neighbours.hear(received.message)
+                self._neighbours.take(received.message)
         return ("", self._neighbours.crowded(now_ns)) if aloft else (self._neighbours.obstacle(now_ns), "")
 
     def is_finished(self, now_ns: int) -> bool:

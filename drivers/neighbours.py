@@ -23,7 +23,7 @@ class Neighbours:
         self._sinking: set[str] = set()
         self._believed: dict[str, tuple[int, EntityEstimate]] = {}
 
-    def hear(self, status: VehicleStatus) -> None:
+    def take(self, status: VehicleStatus) -> None:
         """Take the status of any vehicle; one that flew and is lost counts as flying."""
         name, state = status.header.entity, status.flight_state
         if state is FlightState.LANDING or status.mode == "LANDING":

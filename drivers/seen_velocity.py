@@ -32,7 +32,7 @@ class SeenVelocity:
         self._epoch: int | None = None
         self._heard_ns = 0
 
-    def hear(self, now_ns: int, epoch: int, entity: EntityEstimate) -> None:
+    def take(self, now_ns: int, epoch: int, entity: EntityEstimate) -> None:
         """Take the tracker's estimate of the vehicle."""
         at_ns = _place_ns(now_ns, entity) if entity.converged else None
         if at_ns is None or epoch != self._epoch:

@@ -106,7 +106,7 @@ class Tracker:
                 self._hovering.take(message, now_ns)
         if verdict is Verdict.ACCEPTED:
             if not moved:
-                self._roots.hear(message, now_ns)
+                self._roots.take(message, now_ns)
             if isinstance(message, RelativeObservation) and message.header.clock == self._clock:
                 self.mounts.see(message)
                 self.lookout.see(message)
@@ -266,7 +266,7 @@ class Tracker:
         limited = self._hovering.sent(limited, sure_s)
         for name in drifts.keys() & limited.keys():
             velocity = np.array(limited[name].setpoint.velocity_m_s)
-            self._drifts[name].tell(world_from_stabilized(velocity, float(belief.mean_of(name)[3])))
+            self._drifts[name].note_command(world_from_stabilized(velocity, float(belief.mean_of(name)[3])))
         return limited
 
     def _is_plan_stale(self, now_ns: int) -> bool:

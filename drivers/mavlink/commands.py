@@ -96,7 +96,7 @@ class Orders:
             self.lift.see(now_ns, (good.mean[0], good.mean[1], good.mean[2]), good.age_s)
         if reported_m_s is None or not (lifted or self.starting):
             return False
-        self.drift.hear(now_ns, good, reported_m_s)
+        self.drift.take(now_ns, good, reported_m_s)
         return True
 
     def step(
@@ -136,7 +136,7 @@ class Orders:
 
     def _climbed(self, now_ns: int, landed: int, reported_m: float, climb_m_s: float) -> float:
         """Return the height above the floor [m]: from the tracker, else the vehicle's own since lift-off."""
-        risen_m = self.lift.hear(now_ns, self.starting, landed, reported_m, climb_m_s)
+        risen_m = self.lift.take(now_ns, self.starting, landed, reported_m, climb_m_s)
         if self.lift.lifted:
             self.drift.lift()
         elif self.starting:
@@ -311,5 +311,5 @@ class Orders:
         vehicle = self._vehicle
         allowed, _ = vehicle.limits.within(velocity_m_s, yaw_rate)
         correction = self.drift.correction(now_ns)
-        self.drift.tell(now_ns, allowed)
+        self.drift.note_command(now_ns, allowed)
         return setpoint_from_velocity(vehicle.system_id, now_ns, velocity_m_s, yaw_rate, vehicle.limits, correction)

@@ -65,12 +65,12 @@ class Obedience:
         self._told_ns = self._heard_ns = 0
         self._reported_off = self._seen_off = 0.0
 
-    def tell(self, now_ns: int, velocity: Vector2) -> None:
+    def note_command(self, now_ns: int, velocity: Vector2) -> None:
         """Note the velocity sent [m/s; base_stabilized]."""
         share = share_of(now_ns - self._told_ns, _RESPONSE_S)
         self._expected, self._told_ns = towards(self._expected, velocity, share), now_ns
 
-    def hear(self, now_ns: int, reported: Vector2, seen: Vector2) -> bool:
+    def take(self, now_ns: int, reported: Vector2, seen: Vector2) -> bool:
         """Take its reported and its seen velocity; return whether it flies by the reported one."""
         share, self._heard_ns = share_of(now_ns - self._heard_ns, _JUDGED_S), now_ns
         self._reported_off += share * (math.dist(reported, self._expected) - self._reported_off)
@@ -88,7 +88,7 @@ class ClimbError:
         self.error_m_s = 0.0
         self._height_m, self._at_ns = 0.0, 0
 
-    def hear(self, now_ns: int, height_m: float, reported_m_s: float) -> None:
+    def take(self, now_ns: int, height_m: float, reported_m_s: float) -> None:
         """Take a height [world] that cameras keep accurate, and the climb rate reported meanwhile."""
         elapsed_s, self._at_ns = (now_ns - self._at_ns) / NS_PER_S, now_ns
         expected_m = self._height_m + elapsed_s * (reported_m_s - self.error_m_s)
@@ -154,14 +154,14 @@ class DriftFeedback:
         """Note that it has left the floor."""
         self._stands = False
 
-    def tell(self, now_ns: int, asked_m_s: Vector3) -> None:
+    def note_command(self, now_ns: int, asked_m_s: Vector3) -> None:
         """Note the velocity command [base_stabilized], without the correction."""
         forward, left = asked_m_s[:2]
-        self._undershoot.tell(now_ns, self._in_world(forward, left))
+        self._undershoot.note_command(now_ns, self._in_world(forward, left))
         drift = self._corrected(now_ns, self._drift_by_now())
-        self._obedience.tell(now_ns, (forward + drift[0], left + drift[1]))
+        self._obedience.note_command(now_ns, (forward + drift[0], left + drift[1]))
 
-    def hear(self, now_ns: int, estimate: EntityEstimate, reported_m_s: Vector3) -> None:
+    def take(self, now_ns: int, estimate: EntityEstimate, reported_m_s: Vector3) -> None:
         """Take a good estimate and the velocity [base_stabilized] that was reported last."""
         x, y, z, yaw = estimate.mean[:4]
         self._place, self._yaw_rad, self._believed_ns = (x, y, z), yaw, now_ns
@@ -170,12 +170,12 @@ class DriftFeedback:
         self._seen_ns = now_ns - round(estimate.age_s * NS_PER_S)
         vx, vy = estimate.velocity_m_s[:2]
         forward, left = reported_m_s[:2]
-        self._obeys = self._obedience.hear(now_ns, (forward, left), self._in_heading(vx, vy, 0.0)[:2])
-        self._climb.hear(now_ns, z, reported_m_s[2])
+        self._obeys = self._obedience.take(now_ns, (forward, left), self._in_heading(vx, vy, 0.0)[:2])
+        self._climb.take(now_ns, z, reported_m_s[2])
         reported_x, reported_y = self._in_world(forward, left)
         self._correct(now_ns, (reported_x - vx, reported_y - vy))
         if self._corrects(now_ns) and not self._stands:
-            self._undershoot.hear(now_ns, (vx, vy))
+            self._undershoot.take(now_ns, (vx, vy))
 
     def see_place(self, now_ns: int, place: Vector3, yaw_rad: float) -> None:
         """Take the place where a picture showed a vehicle of unknown velocity: it holds its place by that.

@@ -81,10 +81,10 @@ class Fleet:
                 _log.exception("a frame could not be used")
 
     def _hand_on(self, heard: Heard) -> None:
-        self._stations.hear(heard.frame)
+        self._stations.take(heard.frame)
         vehicle = self.vehicles.get(heard.frame.system)
         if vehicle is not None:
-            vehicle.hear(heard)
+            vehicle.take(heard)
         elif isinstance(heard.frame.message, Heartbeat) and heard.frame.message.autopilot != NO_AUTOPILOT:
             self.strangers[heard.frame.system] += 1
             self.link.rejected["unknown_system"] += 1

@@ -57,7 +57,7 @@ class LiftOff:
         self.stood = stood
         self.lifted = self.lifted or place[2] - stood[2] >= _SEEN_RISEN_M
 
-    def hear(self, now_ns: int, starting: bool, landed: int, height_m: float, climb_m_s: float) -> float:
+    def take(self, now_ns: int, starting: bool, landed: int, height_m: float, climb_m_s: float) -> float:
         """Take its reports, and whether it was ordered to take off; return its height above the floor by them [m]."""
         if landed == Landed.ON_GROUND or self._floor_m is None:
             self._floor_m = height_m

@@ -49,7 +49,7 @@ class OtherStations:
         self._told: set[tuple[int, ...]] = set()
         self.news: deque[tuple[str, str]] = deque(maxlen=_MOST)
 
-    def hear(self, frame: ReceivedFrame) -> None:
+    def take(self, frame: ReceivedFrame) -> None:
         """Take any verified frame of the link."""
         match frame.message:
             case Heartbeat(type=kind) if kind == GCS_TYPE and frame.system not in (self._own, *self._names):

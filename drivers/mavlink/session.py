@@ -140,7 +140,7 @@ class MavlinkSession:
             return f"reading parameter {name}"
         return f"it does not know parameter {name}: is its firmware {_CHECKED_WITH}?"
 
-    def hear(self, now_ns: int, kind: type[Message]) -> None:
+    def take(self, now_ns: int, kind: type[Message]) -> None:
         """Note that a message of a kind arrived; called on the reader's thread."""
         if kind in self._rates:
             self._stream_ns[kind] = now_ns

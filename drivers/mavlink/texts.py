@@ -25,7 +25,7 @@ class Texts:
         self._pieces: dict[int, list[str]] = {}
         self._heard: deque[tuple[int, Said]] = deque(maxlen=32)
 
-    def hear(self, now_ns: int, message: Statustext) -> Said | None:
+    def take(self, now_ns: int, message: Statustext) -> Said | None:
         """Take a piece; return the text that it completes, if any. A lost piece is left out."""
         text = message.text
         if message.id:
@@ -55,7 +55,7 @@ class Explanations:
     def __init__(self) -> None:
         self._texts: deque[tuple[int, str]] = deque(maxlen=8)
 
-    def hear(self, now_ns: int, text: str) -> None:
+    def take(self, now_ns: int, text: str) -> None:
         """Take a whole text."""
         self._texts.append((now_ns, text))
 
@@ -81,7 +81,7 @@ class BootClock:
         self.restarted = False
         self._last: tuple[int, int] | None = None
 
-    def hear(self, now_ns: int, boot_ms: int) -> int:
+    def take(self, now_ns: int, boot_ms: int) -> int:
         """Take a stamp; return its jump [ms], or 0; a gap in the link is no jump."""
         before, self._last = self._last, (now_ns, boot_ms)
         if before is None:

@@ -35,7 +35,7 @@ class StatedUncertainty:
         self._floor_ns: int | None = None
         self._drift_m_s = 0.0
 
-    def hear(self, now_ns: int, message: OdometryMessage | EstimatorStatus | EkfStatusReport) -> None:
+    def take(self, now_ns: int, message: OdometryMessage | EstimatorStatus | EkfStatusReport) -> None:
         """Take the autopilot's own deviations."""
         match message:
             case OdometryMessage():

@@ -30,12 +30,12 @@ class Undershoot:
         self.missing, self._asked, self._expected = _STILL, _STILL, _STILL
         self._told_ns = self._heard_ns = 0
 
-    def tell(self, now_ns: int, asked_m_s: Vector2) -> None:
+    def note_command(self, now_ns: int, asked_m_s: Vector2) -> None:
         """Note the requested velocity [world], without corrections."""
         self._expected = towards(self._expected, asked_m_s, share_of(now_ns - self._told_ns, _RESPONSE_S))
         self._asked, self._told_ns = asked_m_s, now_ns
 
-    def hear(self, now_ns: int, seen_m_s: Vector2) -> None:
+    def take(self, now_ns: int, seen_m_s: Vector2) -> None:
         """Take the velocity that cameras see [world]."""
         step, self._heard_ns = _GAIN * min((now_ns - self._heard_ns) / NS_PER_S, _GAP_S), now_ns
         if math.dist(self._asked, self._expected) > _STEADY_M_S:

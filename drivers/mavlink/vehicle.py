@@ -79,7 +79,7 @@ class MavlinkVehicle:
 
     # -- reader thread ------------------------------------------------------------------------------------------------
 
-    def hear(self, heard: Heard) -> None:
+    def take(self, heard: Heard) -> None:
         """Take a frame of this vehicle; unusable frames are counted."""
         self._traffic.count(heard.stamp_ns, heard.frame.component, heard.frame.sequence)
         if heard.frame.component != AUTOPILOT_COMPONENT or heard.frame.message is None:
@@ -91,7 +91,7 @@ class MavlinkVehicle:
 
     def _take(self, now_ns: int, message: tuple[object, ...]) -> None:
         known = replace(self.telemetry, heard_ns=now_ns)
-        self._session.hear(now_ns, type(message))
+        self._session.take(now_ns, type(message))
         match message:
             case telemetry.LocalPositionNed():
                 known = self._moved(now_ns, message, known)
@@ -117,7 +117,7 @@ class MavlinkVehicle:
         self.telemetry = known
 
     def _moved(self, now_ns: int, message: telemetry.LocalPositionNed, known: LatestTelemetry) -> LatestTelemetry:
-        if (jump_ms := self._boot_clock.hear(now_ns, message.time_boot_ms)) != 0:
+        if (jump_ms := self._boot_clock.take(now_ns, message.time_boot_ms)) != 0:
             self._refused["clock_jump"] += 1
             self._jumps.append(jump_ms)
         attitude = known.attitude_at(now_ns)
@@ -148,10 +148,10 @@ class MavlinkVehicle:
             case telemetry.BatteryStatus(id=0):  # the others feed a payload
                 return _charged(now_ns, message.battery_remaining, known)
             case telemetry.EkfStatusReport():
-                self._publisher.stated.hear(now_ns, message)
+                self._publisher.stated.take(now_ns, message)
                 return replace(known, ekf=message.flags)
             case telemetry.EstimatorStatus() | flight.OdometryMessage():
-                self._publisher.stated.hear(now_ns, message)
+                self._publisher.stated.take(now_ns, message)
             case telemetry.Statustext():
                 self.texts.append((now_ns, message))
             case flight.CommandAckMessage() if message.target_system in (0, self._ours):  # not a second station's
@@ -168,7 +168,7 @@ class MavlinkVehicle:
 
     def see(self, now_ns: int, estimate: Estimate) -> None:
         """Take the tracker's estimate."""
-        good, known = self.vision.hear(now_ns, estimate), self.telemetry
+        good, known = self.vision.take(now_ns, estimate), self.telemetry
         if self.orders.starting and not self.orders.lift.lifted and known.base_mode & ARMED:
             self._publisher.stated.leave_floor(now_ns)
         reported = known.velocity_m_s if known.tells_motion(now_ns) else None
@@ -266,9 +266,9 @@ class MavlinkVehicle:
         while self._session.notes:
             events.append((MavSeverity.WARNING, self._session.notes.popleft()))
         while self.texts:
-            said = self._said.hear(*self.texts.popleft())
+            said = self._said.take(*self.texts.popleft())
             if said is not None:
-                self.orders.said.hear(now_ns, said[1])
+                self.orders.said.take(now_ns, said[1])
                 events.append(said)
         while self._jumps:
             jump_s = self._jumps.popleft() / 1000

@@ -47,7 +47,7 @@ class VisionFeed:
         self._good_ns: int | None = None
         self._aloft_ns: int | None = None
 
-    def hear(self, now_ns: int, estimate: Estimate) -> EntityEstimate | None:
+    def take(self, now_ns: int, estimate: Estimate) -> EntityEstimate | None:
         """Take the tracker's estimate; return that of this vehicle if it is good enough to fly on now."""
         self.sighted = None
         for entity in estimate.entities:

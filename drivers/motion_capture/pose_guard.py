@@ -33,7 +33,7 @@ class PoseGuard:
             topic = self._topics[body] = _Topic(frame)
         if topic.tie.is_second(publisher, arrival_ns):
             return "second publisher"
-        topic.tie.hear(publisher, arrival_ns)
+        topic.tie.take(publisher, arrival_ns)
         if frame != topic.frame:
             return "another frame"
         if stamp_ns and topic.clock.update(arrival_ns, stamp_ns)[1] > _LATE_S:

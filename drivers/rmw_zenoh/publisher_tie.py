@@ -20,7 +20,7 @@ class PublisherTie:
         """Return whether this is not the publisher that the topic is tied to."""
         return publisher != self._publisher and not self.silent(now_ns)
 
-    def hear(self, publisher: bytes, now_ns: int) -> bool:
+    def take(self, publisher: bytes, now_ns: int) -> bool:
         """Tie the topic to a publisher that sent; returns whether it is another one than before."""
         changed = publisher != self._publisher
         self._publisher, self._heard_ns = publisher, now_ns

@@ -69,7 +69,7 @@ class Ros2Vehicle:
                 self._rejected["second_publisher"] += 1
             else:
                 self._take(now_ns, vehicle.decode_odometry(payload))
-                self._tie.hear(publisher, now_ns)
+                self._tie.take(publisher, now_ns)
                 self._refused = ""
         except WireError as error:
             self._rejected[error.reason.replace(" ", "_")] += 1

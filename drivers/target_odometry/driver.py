@@ -106,7 +106,7 @@ class OdometryGuard:
         """Return why a message is not used, in words, or ""."""
         if self._tie.is_second(publisher, arrival_ns):
             return "second publisher"
-        if self._tie.hear(publisher, arrival_ns):
+        if self._tie.take(publisher, arrival_ns):
             self._clock.reset()
         if math.hypot(*message.velocity[:2]) > self._fastest_m_s:
             return "too fast"

@@ -154,7 +154,7 @@ def watch(bus: "Bus", drones: tuple[str, ...], handle: Handle, man: DeadMan, go_
             left_ns = now_ns if leaves else 0
         for received in answers.drain():
             if isinstance(received.message, CommandAck):
-                desk.hear(received.message, now_ns)
+                desk.take(received.message, now_ns)
         desk.step(now_ns)
         line = _line(desk, man)
         if line != shown:

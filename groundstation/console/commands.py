@@ -93,7 +93,7 @@ class CommandDesk:
         self._bus.publish(COMMAND, command)
         return ""
 
-    def hear(self, message: Command | CommandAck, now_ns: int) -> None:
+    def take(self, message: Command | CommandAck, now_ns: int) -> None:
         """Follow a command of any issuer, and every answer."""
         if isinstance(message, CommandAck):
             followed = self._orders.get(message.command_id)

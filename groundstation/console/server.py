@@ -276,10 +276,10 @@ class ConsoleServer:
     def _hear(self, message: object, now_ns: int) -> None:
         match message:
             case Command():
-                self.sessions.desk.hear(message, now_ns)
-                self.sessions.hear(message)
+                self.sessions.desk.take(message, now_ns)
+                self.sessions.take(message)
             case CommandAck():
-                self.sessions.desk.hear(message, now_ns)
+                self.sessions.desk.take(message, now_ns)
             case Lease():
                 self.sessions.desk.hear_lease(message)
             case RelativeObservation():

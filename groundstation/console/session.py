@@ -107,7 +107,7 @@ class Sessions:
             "lease": self.desk.lease_holder(now_ns),
         }
 
-    def hear(self, order: Command) -> None:
+    def take(self, order: Command) -> None:
         """Pass the operator's place to another console at which a start was given; repetitions count once."""
         source, stamp_ns = order.header.source, order.header.stamp_ns
         foreign = source.split("_")[0] == Role.CONSOLE and source != self._bus.source

@@ -40,6 +40,6 @@ class DriftWatch:
         drift: Array = (now - before) * (NS_PER_S / (now_ns - before_ns))
         return drift
 
-    def tell(self, command_m_s: Array) -> None:
+    def note_command(self, command_m_s: Array) -> None:
         """Note the command of the robot from now on [m/s; world]."""
         self._command = command_m_s

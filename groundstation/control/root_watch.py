@@ -56,7 +56,7 @@ class RootWatch:
             self._silent = bool(self._roots) and all(map(self._says_nothing, self._roots))
         return self._silent
 
-    def hear(self, message: Message, now_ns: int) -> None:
+    def take(self, message: Message, now_ns: int) -> None:
         """Take a message that was not refused."""
         self._silent = None
         match message:

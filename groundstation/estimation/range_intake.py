@@ -57,7 +57,7 @@ class RangeIntake:
         joined, self._joined = self._joined, []
         return joined
 
-    def hear(self, message: Odometry, stamp_ns: int) -> None:
+    def take_heading(self, message: Odometry, stamp_ns: int) -> None:
         """Take a vehicle's own heading."""
         name = message.header.entity
         heading, robot = self._headings.get(name), self._ranged.get(name)

@@ -40,7 +40,7 @@ class Looking:
         self.forbidden = any(one.level is Level.MUST for one in self._findings)
         return True
 
-    def tell(self, *, whole: bool) -> Iterator[str]:
+    def report(self, *, whole: bool) -> Iterator[str]:
         """Publish the findings and return them as lines; whole: including those that are OK."""
         self._checks.publish(self._findings, self._found_ns)
         yield from lines(one for one in self._findings if whole or one.level is not Level.OK)

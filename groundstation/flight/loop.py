@@ -111,7 +111,7 @@ class Flight:
         self._looking = looking = Looking(checks, self._supervisor.run.drones, self._turn(operator))
         while not self._breaks_off():
             if looking.finished(self._turn(operator)):
-                for line in looking.tell(whole=self._plan.look_only):
+                for line in looking.report(whole=self._plan.look_only):
                     self._say(line)
                 self._forbidden = looking.forbidden or (self._plan.look_only and looking.nobody)
                 return self._plan.look_only

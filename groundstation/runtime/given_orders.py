@@ -63,7 +63,7 @@ class GivenOrders:
         self._bus.publish(COMMAND, command)
         return book
 
-    def hear(self, ack: CommandAck) -> bool:
+    def take(self, ack: CommandAck) -> bool:
         """Take a driver's answer; return whether it belongs to an order that is being followed."""
         answered = [order.book for order in self._orders if order.book.note(ack)]
         for book in answered:

@@ -149,7 +149,7 @@ class Operator:
 
     def _hear_ack(self, ack: CommandAck, now_ns: int) -> None:
         starts = not ack.verb.stops and ack.verb is not Verb.TAKEOFF and ack.stage in _OBEYED
-        if self._given.hear(ack) and starts:
+        if self._given.take(ack) and starts:
             self.phase, self.tracking_since_ns = TeamPhase.TRACKING, self.tracking_since_ns or now_ns
 
     def _hear_command(self, command: Command, now_ns: int) -> None:

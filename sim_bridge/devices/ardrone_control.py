@@ -44,7 +44,7 @@ class FlightControl:
     def obey_datagram(self, datagram: bytes, now_ns: int) -> None:
         """Take one datagram of the AT port."""
         session = self.session
-        session.hear(now_ns)
+        session.take(now_ns)
         self._ids = None
         for command in at.decode_datagram(datagram):
             if session.accept(command.sequence):

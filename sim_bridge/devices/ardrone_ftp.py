@@ -54,7 +54,7 @@ class _Dialogue:
         }
         control.send(b"220 ready\r\n")
 
-    def hear(self, data: bytes) -> None:
+    def take(self, data: bytes) -> None:
         """Take bytes of commands."""
         self._line += data
         while b"\n" in self._line and self._control.open:
@@ -151,7 +151,7 @@ class _Dialogue:
 class _DataConversation:
     """Nothing is ever read from a data connection."""
 
-    def hear(self, data: bytes) -> None:
+    def take(self, data: bytes) -> None:
         """Ignore an upload."""
 
     def end(self) -> None:

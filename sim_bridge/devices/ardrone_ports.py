@@ -52,7 +52,7 @@ class _Deaf:
     def __init__(self, connection: Connection) -> None:
         pass
 
-    def hear(self, data: bytes) -> None:
+    def take(self, data: bytes) -> None:
         """Ignore the input."""
 
     def end(self) -> None:

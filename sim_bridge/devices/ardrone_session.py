@@ -32,7 +32,7 @@ class CommandSession:
         self._ack_packets = 0
         self._ack_cleared = False
 
-    def hear(self, now_ns: int) -> None:
+    def take(self, now_ns: int) -> None:
         """Note an AT datagram of any content: any traffic feeds the watchdogs."""
         if self._last_at_ns is not None:
             self.mean_gap_ms = (now_ns - self._last_at_ns) // 1_000_000

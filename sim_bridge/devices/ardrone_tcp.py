@@ -18,7 +18,7 @@ Selector = selectors.BaseSelector
 class Conversation(Protocol):
     """The protocol of one connection."""
 
-    def hear(self, data: bytes) -> None:
+    def take(self, data: bytes) -> None:
         """Take the client's bytes."""
 
     def end(self) -> None:
@@ -75,7 +75,7 @@ class Connection:
             if not data:
                 self.close()
             elif self.conversation is not None:
-                self.conversation.hear(data)
+                self.conversation.take(data)
 
     def _flush(self) -> None:
         if not self.open:

@@ -96,9 +96,9 @@ class MavlinkEmulator:
             except OSError:
                 return
             if not self.deaf:
-                self.hear(data, source)
+                self.take(data, source)
 
-    def hear(self, data: bytes, source: Address) -> None:
+    def take(self, data: bytes, source: Address) -> None:
         """Take one datagram; bytes that are no frame, or not signed correctly, are counted."""
         try:
             for raw in split(data):

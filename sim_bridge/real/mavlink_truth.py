@@ -55,11 +55,11 @@ class AutopilotTruth:
                 data, source = self._socket.recvfrom(MAX_DATAGRAM)
             except OSError:
                 break
-            newest = self.hear(data) or newest
+            newest = self.take(data) or newest
             self._ask(source, now_ns)
         return None if newest is None else self._placement.pose(newest)
 
-    def hear(self, data: bytes) -> TrueState | None:
+    def take(self, data: bytes) -> TrueState | None:
         """Return the newest true state in a datagram; other bytes and frames of other vehicles are counted."""
         newest: TrueState | None = None
         try:

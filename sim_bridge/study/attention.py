@@ -71,7 +71,7 @@ class Attention:
         self._stamp_ns = 0
         self.searching = False
 
-    def hear(self, estimate: Estimate) -> None:
+    def take(self, estimate: Estimate) -> None:
         """Take an estimate of the tracker."""
         self._foresight.add(estimate)
 

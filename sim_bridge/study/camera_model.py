@@ -112,9 +112,9 @@ class Eye:
         self._attention = Attention(mount_of(name, mount), name, markers, self._told_lens, phase_s(name, site))
         self._looked = False
 
-    def hear(self, estimate: Estimate) -> None:
+    def take(self, estimate: Estimate) -> None:
         """Take an estimate of the tracker, by which the camera's driver chooses its windows."""
-        self._attention.hear(estimate)
+        self._attention.take(estimate)
 
     @property
     def truth(self) -> tuple[Array, Array, CameraIntrinsics]:

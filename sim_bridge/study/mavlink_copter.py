@@ -76,15 +76,15 @@ class CopterLink:
     def _fly(self, velocity: Vector3, yaw_rate: float, now_s: float) -> None:
         now_ns = round(now_s * 1e9)
         (x, y, z), correction = velocity, self._drift.correction(now_ns)
-        self._drift.tell(now_ns, velocity)
+        self._drift.note_command(now_ns, velocity)
         self._copter.fly((x + correction[0], y + correction[1], z + correction[2]), yaw_rate)
 
     def _feed(self, estimates: tuple[EntityEstimate, ...], now_ns: int) -> None:
         """Send the position that the driver would send now."""
         header, airborne = Header(now_ns, self._clock, "team", "tracker", self._ticks), self._copter.airborne
-        good = self._vision.hear(now_ns, Estimate(header=header, entities=estimates, epoch=1))
+        good = self._vision.take(now_ns, Estimate(header=header, entities=estimates, epoch=1))
         if good is not None and airborne:
-            self._drift.hear(now_ns, good, self._reported())
+            self._drift.take(now_ns, good, self._reported())
             self._stated.see_drift(now_ns, self._drift.size_m_s)
             self._doubt_rad = max(_ATTITUDE_STD_RAD, self._stated.attitude_std_rad(now_ns))
         if (seen := self._vision.sighted) is not None and airborne:

@@ -194,7 +194,7 @@ class Study:
                 self._tell(eye, now_ns)
                 continue
             if isinstance(eye, Eye):
-                eye.hear(self._estimate())
+                eye.take(self._estimate())
             delay_ms = eye.lateness_ms
             if delay_ms is None:
                 delay_ms = self._scenario.cameras.video_delay_ms + self._rng.uniform(*self.options.detector_ms)

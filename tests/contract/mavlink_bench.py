@@ -38,7 +38,7 @@ class Bench:
         self.tick_count = 0
 
     def say(self, message):
-        self.emulator.hear(self.encoder.encode(message), GROUND)
+        self.emulator.take(self.encoder.encode(message), GROUND)
         return self.collect()
 
     def command(self, number, *params):

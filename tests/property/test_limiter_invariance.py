@@ -144,7 +144,7 @@ def fly_at_each_other(
         for i, name in enumerate("ab"):
             setpoint = Setpoint(tuple(wishes[i].tolist()), 0.0, FlightMode.TRACK)
             told[i] = limit_setpoint(name, setpoint, at, now_ns, SAFETY, said, drifts).setpoint.velocity_m_s
-            watches[i].tell(told[i])
+            watches[i].note_command(told[i])
         under_way.append(told)
         moves += dt / lag_s * (under_way.popleft() - moves)
         poses[:, :3] += dt * (moves + np.array([drift, -drift]))

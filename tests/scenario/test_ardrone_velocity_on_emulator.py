@@ -72,12 +72,12 @@ class Flight:
         self.ticks += 1
         self.drone.step((0.0, 0.0, 0.0))
         self.onboard.step(self.drone, self.drone.autopilot.motors_on)
-        self.hear()
+        self.take()
         if self.ticks >= self.next_send:
             self.next_send += SENDER_TICKS
             self.say(action, wanted, yaw_rate)
 
-    def hear(self):
+    def take(self):
         control, state, now_ns = self.control, self.state, self.ticks * TICK_NS
         control.watch(now_ns)
         state.word = state_word(self.drone, control, now_ns, self.listener.bootstrap)

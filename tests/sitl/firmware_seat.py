@@ -85,7 +85,7 @@ class Seat:
         self.fleet = Fleet(self.process, settings)
         (self.host,) = hosts_of(self.process, self.fleet, settings)
         self.vehicle = self.fleet.vehicles[self.system]
-        self.vehicle.hear = self._note_time(self.vehicle.hear)  # type: ignore[method-assign]
+        self.vehicle.take = self._note_time(self.vehicle.take)  # type: ignore[method-assign]
         where = ("127.0.0.1", ports_of(self.flavour, self.system)[1])
         self.truth = AutopilotTruth(self.name, where, self.system, Placement(self.drone.pad_m, self.drone.pad_yaw_rad))
         self.puppet = study.world.puppets[self.name]

@@ -214,7 +214,7 @@ class FaultFlight:
         for received in self._estimates.drain():
             if isinstance(received.message, Estimate):
                 for each in self._eyes.values():
-                    each.eye.hear(received.message)
+                    each.eye.take(received.message)
         for eye in self._exposures.due(world.time_s):
             delay_ms = self._drawn.scenario.cameras.video_delay_ms + self._rng.uniform(*_DETECTOR_MS)
             seen = eye.look(world, now_ns, clock.clock_id())

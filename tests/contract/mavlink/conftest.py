@@ -92,7 +92,7 @@ class DirectLink:
     def send(self, system, message):
         self.sent.append((clock.now_ns(), message))
         if not self.cut:
-            self.emulator.hear(self.encoder.encode(message), GROUND)
+            self.emulator.take(self.encoder.encode(message), GROUND)
 
     def close(self):
         pass
@@ -159,7 +159,7 @@ class Rig:
         self.emulator.send()
         if self.driving:
             for heard in self.link.receive():
-                self.vehicle.hear(heard)
+                self.vehicle.take(heard)
             if tick % 4 == 0:
                 self.track(now)
             for received in self.estimates.drain():

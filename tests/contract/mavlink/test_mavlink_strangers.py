@@ -59,7 +59,7 @@ def test_an_answer_to_a_second_ground_station_answers_no_request_of_ours(rig_of)
     assert requests.due(rig.hand.now)
     for target, accepted in ((254, set()), (255, {"arm"})):  # 255: us
         ack = CommandAckMessage(MavCmd.COMPONENT_ARM_DISARM, 0, 0, 0, target, 190)
-        rig.vehicle.hear(Heard(rig.hand.now, ReceivedFrame(11, 1, 0, ack)))
+        rig.vehicle.take(Heard(rig.hand.now, ReceivedFrame(11, 1, 0, ack)))
         while rig.vehicle._acks:
             requests.answer(rig.hand.now, rig.vehicle._acks.popleft())
         assert requests.accepted & {"arm"} == accepted

@@ -29,8 +29,8 @@ def ack(command: int, to: int) -> CommandAckMessage:
 def test_its_heartbeat_is_told_once() -> None:
     heard = stations()
     for _ in range(3):
-        heard.hear(frame(254, QGROUNDCONTROL))
-        heard.hear(frame(253, QGROUNDCONTROL))
+        heard.take(frame(254, QGROUNDCONTROL))
+        heard.take(frame(253, QGROUNDCONTROL))
     assert list(heard.news) == [
         (f"another ground station is on this link (system {system})", REMEDY) for system in (254, 253)
     ]
@@ -38,8 +38,8 @@ def test_its_heartbeat_is_told_once() -> None:
 
 def test_an_answer_to_its_order_is_told() -> None:
     heard = stations()
-    heard.hear(frame(11, ack(MavCmd.COMPONENT_ARM_DISARM, 254), 1))
-    heard.hear(frame(11, ack(MavCmd.NAV_LAND, 254), 1))
+    heard.take(frame(11, ack(MavCmd.COMPONENT_ARM_DISARM, 254), 1))
+    heard.take(frame(11, ack(MavCmd.NAV_LAND, 254), 1))
     assert list(heard.news) == [("drone_2 answers orders of another ground station (system 254)", REMEDY)]
 
 
@@ -59,22 +59,22 @@ def test_an_answer_to_its_order_is_told() -> None:
 )
 def test_messages_of_no_second_ground_station_are_not_reported(system: int, message: Message) -> None:
     heard = stations()
-    heard.hear(frame(system, message))
+    heard.take(frame(system, message))
     assert not heard.news
 
 
 def test_answers_to_a_station_forwarded_by_us_are_not_reported() -> None:
     heard = stations(11)
-    heard.hear(frame(11, ack(MavCmd.NAV_LAND, 254), 1))
+    heard.take(frame(11, ack(MavCmd.NAV_LAND, 254), 1))
     assert not heard.news
-    heard.hear(frame(12, ack(MavCmd.NAV_LAND, 254), 1))
+    heard.take(frame(12, ack(MavCmd.NAV_LAND, 254), 1))
     assert len(heard.news) == 1
 
 
 def test_a_flood_of_numbers_is_told_within_bounds() -> None:
     heard = stations()
     for system in range(20, 250):
-        heard.hear(frame(system, QGROUNDCONTROL))
+        heard.take(frame(system, QGROUNDCONTROL))
     assert len(heard.news) == 16
 
 

@@ -222,7 +222,7 @@ def test_the_charge_is_that_of_the_first_battery_whatever_a_payloads_says(hangar
         assert flying.turn(5.0, lambda: charge() == pytest.approx(0.4, abs=0.011)), charge()
         for percent in (90, 5):
             second = BatteryStatus(1, 0, 0, 0, (0,) * 10, 0, 0, 0, percent)
-            vehicle.hear(Heard(time.monotonic_ns(), ReceivedFrame(9, AUTOPILOT_COMPONENT, 0, second)))
+            vehicle.take(Heard(time.monotonic_ns(), ReceivedFrame(9, AUTOPILOT_COMPONENT, 0, second)))
             assert charge() == pytest.approx(0.4, abs=0.011)
     finally:
         flying.close()

@@ -36,10 +36,10 @@ class Ground:
         self.vehicle_says, self.station_says = FrameEncoder(11, 1), FrameEncoder(255, 190)
         self.link.send(11, HEARTBEAT)
         _, self.ours = self.vehicle.recvfrom(2048)
-        self.hear()
+        self.take()
         _, self._rider = self.station.recvfrom(2048)
 
-    def hear(self):
+    def take(self):
         """Let the vehicle send and our link receive."""
         self.vehicle.sendto(self.vehicle_says.encode(HEARTBEAT), self.ours)
         return eventually(self.link.receive)
@@ -97,7 +97,7 @@ def command(number, *values):
 
 
 def test_it_sees_what_the_vehicle_sends(ground):
-    ground.hear()
+    ground.take()
     assert message_of(ground.station) == HEARTBEAT
 
 

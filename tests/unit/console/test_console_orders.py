@@ -54,7 +54,7 @@ class Room:
     def ack(self, command: m.Command, entity: str, stage: m.AckStage, reason: str = "") -> None:
         header = m.Header(1, "c", entity, entity, 0)
         ack = m.CommandAck(header=header, command_id=command.id, verb=command.verb, stage=stage, reason=reason)
-        self.desk.hear(ack, self.now_ns)
+        self.desk.take(ack, self.now_ns)
 
     def viewer(self, number: int, token: str = "secret") -> PageConnection:
         async def nothing(_: object) -> None:
@@ -174,19 +174,19 @@ def test_everybody_s_orders_are_followed_even_if_answers_come_first() -> None:
     header = room.others.header("team")
     command = m.Command(header=header, id="x", verb=m.Verb.LAND, scope=("drone_1",), issuer="cli_1")
     room.ack(command, "drone_1", m.AckStage.EFFECTIVE)
-    room.desk.hear(command, room.now_ns)
-    room.desk.hear(command, room.now_ns)
+    room.desk.take(command, room.now_ns)
+    room.desk.take(command, room.now_ns)
     (given,) = room.desk.summary()
     assert given["state"] == "confirmed" and given["by"] == "cli_1"
     room.desk.step(room.now_ns + NS_PER_S)
     assert room.commands() == []  # others repeat their own
     for number in range(50):
         again = m.Command(header=header, id=f"{number}", verb=m.Verb.HOLD, scope=(), issuer="tracker")
-        room.desk.hear(again, room.now_ns)
+        room.desk.take(again, room.now_ns)
     assert len(room.desk.summary()) == 2
     for number in range(50):
         other = m.Command(header=header, id=f"{number}-b", verb=m.Verb.HOLD, scope=(), issuer=f"cli_{number}")
-        room.desk.hear(other, room.now_ns)
+        room.desk.take(other, room.now_ns)
     assert len(room.desk.summary()) == 8
 
 
@@ -194,7 +194,7 @@ def test_an_order_that_is_not_confirmed_says_what_was_done_instead() -> None:
     room = Room()
     header = room.others.header("team")
     command = m.Command(header=header, id="x", verb=m.Verb.TRACK, scope=(), issuer="cli_1")
-    room.desk.hear(command, room.now_ns)
+    room.desk.take(command, room.now_ns)
     room.ack(command, "drone_1", m.AckStage.EFFECTIVE)
     room.ack(command, "drone_2", m.AckStage.ACCEPTED)
     doing = {"drone_1": "tracking for cli_1", "drone_2": "hovers: the tracker sends it no velocity"}

@@ -102,10 +102,10 @@ def silent_after(message: Message | None, ticks: int, roots: tuple[str, ...] = (
     """Return the watch's output while roots that have worked send only this message, each tick."""
     watch, told = RootWatch(roots, CARRIED), []
     for root in roots:
-        watch.hear(frame() if root == "mocap" else picture(observer=root), TICK_NS)
+        watch.take(frame() if root == "mocap" else picture(observer=root), TICK_NS)
     for tick in range(1, ticks + 1):
         if message is not None:
-            watch.hear(message, tick * TICK_NS)
+            watch.take(message, tick * TICK_NS)
         told += [notice.text for notice in watch.advance(tick * TICK_NS, [], flying=True)]
     assert watch.is_silent == bool(told)
     return told
@@ -123,11 +123,11 @@ def test_one_that_finds_robots_in_a_picture_that_hangs_is_silent() -> None:
 def hangs_after_s(root: str, others: tuple[str, ...] = (), also_new: bool = False) -> float | None:
     """Return the time from the last new observation of a repeating root until nothing locates the team [s]."""
     watch = RootWatch((root, *others), CARRIED)
-    watch.hear(sighting(root), 0)
+    watch.take(sighting(root), 0)
     for tick in range(1, 31):
         watch.hear_frozen(sighting(root))
         for one in (*others, *([root] if also_new else [])):
-            watch.hear(sighting(one), tick * TICK_NS)
+            watch.take(sighting(one), tick * TICK_NS)
         watch.advance(tick * TICK_NS, [], flying=True)
         if watch.is_silent:
             return tick / 10
@@ -152,7 +152,7 @@ def test_a_root_that_hangs_matters_not_beside_one_that_works() -> None:
 def test_a_root_is_not_silent_before_anything_was_heard_nor_by_what_is_no_sighting() -> None:
     watch = RootWatch(["ceiling"], CARRIED)
     assert not watch.is_silent
-    watch.hear(sighting(), 0)
+    watch.take(sighting(), 0)
     watch.hear_frozen(picture("drone_1"))
     watch.advance(10 * TICK_NS, [], flying=True)
     assert not watch.is_silent
@@ -160,18 +160,18 @@ def test_a_root_is_not_silent_before_anything_was_heard_nor_by_what_is_no_sighti
 
 def test_a_root_that_hung_and_sees_somebody_again_works() -> None:
     watch = RootWatch(["ceiling"], CARRIED)
-    watch.hear(sighting(), 0)
+    watch.take(sighting(), 0)
     watch.hear_frozen(sighting())
     watch.advance(10 * TICK_NS, [], flying=True)
     assert watch.is_silent
-    watch.hear(sighting(), 10 * TICK_NS)
+    watch.take(sighting(), 10 * TICK_NS)
     assert not watch.is_silent
 
 
 def test_a_root_that_hung_for_a_moment_has_as_long_as_any_other() -> None:
     watch = RootWatch(["ceiling"], CARRIED)
     watch.hear_frozen(sighting())
-    watch.hear(sighting(), 0)
+    watch.take(sighting(), 0)
     watch.advance(6 * TICK_NS, [], flying=True)
     assert not watch.is_silent
 
@@ -179,7 +179,7 @@ def test_a_root_that_hung_for_a_moment_has_as_long_as_any_other() -> None:
 @pytest.mark.parametrize(("hangs", "limit_ms"), [(False, 1500), (True, 500)])
 def test_it_is_silent_after_a_second_and_a_half_or_half_a_second_if_it_hangs(hangs: bool, limit_ms: int) -> None:
     watch = RootWatch(["ceiling"], CARRIED)
-    watch.hear(picture(), 0)
+    watch.take(picture(), 0)
     if hangs:
         watch.hear_frozen(sighting())
     assert not watch.is_silent, "before the first tick"
@@ -220,20 +220,20 @@ def test_motion_capture_works_that_tracks_nobody_or_anybody(message: Message) ->
 
 def test_the_first_frame_counts_though_it_is_refused() -> None:
     watch = RootWatch(["mocap"], CARRIED)
-    watch.hear(frame("drone_1", refused=("drone_1",)), TICK_NS)
+    watch.take(frame("drone_1", refused=("drone_1",)), TICK_NS)
     watch.advance(6 * TICK_NS, [], flying=True)
     assert not watch.is_silent
 
 
 def test_a_root_that_never_says_that_it_sees_nobody_is_not_judged() -> None:
     watch = RootWatch(["uwb"], CARRIED)
-    watch.hear(sighting("uwb"), TICK_NS)
+    watch.take(sighting("uwb"), TICK_NS)
     assert watch.advance(100 * TICK_NS, [], flying=True) == []
     assert not watch.is_silent
 
 
 def test_nothing_is_told_while_nobody_flies() -> None:
     watch = RootWatch(["ceiling"], CARRIED)
-    watch.hear(picture(), TICK_NS)
+    watch.take(picture(), TICK_NS)
     assert watch.advance(100 * TICK_NS, [], flying=False) == []
     assert watch.is_silent

@@ -23,7 +23,7 @@ def believed(name, x_m, y_m=0.0, std_m=0.02, z_m=1.0, converged=True):
 
 def watch(state=FlightState.FLYING, pad_m=(0.0, 0.0)):
     neighbours = Neighbours("a", pad_m, 0.6)
-    neighbours.hear(status("b", state))
+    neighbours.take(status("b", state))
     return neighbours
 
 
@@ -57,17 +57,17 @@ def test_a_flying_neighbour_without_position_prevents_take_off():
     assert neighbours.obstacle(S) == "" == neighbours.obstacle(2 * S)
     assert neighbours.obstacle(2 * S + 1)
     neighbours.see(3 * S, [believed("b", 3.0)])
-    neighbours.hear(status("b", FlightState.LOST))
+    neighbours.take(status("b", FlightState.LOST))
     assert neighbours.obstacle(3 * S) == "" and neighbours.obstacle(5 * S)
-    neighbours.hear(status("b", FlightState.UNKNOWN))  # a driver that was started again
+    neighbours.take(status("b", FlightState.UNKNOWN))  # a driver that was started again
     assert neighbours.obstacle(5 * S)
 
 
 @pytest.mark.parametrize("state", [FlightState.LANDED, FlightState.EMERGENCY])
 def test_a_standing_neighbour_is_no_obstacle(state):
     neighbours = watch()
-    neighbours.hear(status("b", state))
-    neighbours.hear(status("a", FlightState.FLYING))
+    neighbours.take(status("b", state))
+    neighbours.take(status("a", FlightState.FLYING))
     assert neighbours.obstacle(S) == ""
 
 
@@ -98,7 +98,7 @@ def aloft(*entities):
     for name in "ab":
         neighbours = Neighbours(name, None, 0.6)
         for other in "ab":
-            neighbours.hear(status(other, FlightState.FLYING))
+            neighbours.take(status(other, FlightState.FLYING))
         neighbours.see(S, entities)
         both.append(neighbours)
     return both
@@ -145,9 +145,9 @@ def test_drones_far_apart_give_no_separation_warning():
 def test_nobody_makes_way_for_who_lands_or_stands_or_is_not_known():
     _, b = aloft(believed("a", 0.0), believed("b", 0.4))
     assert b.crowded(S) and not b.crowded(S + S // 2)
-    b.hear(status("a", FlightState.LANDING))
+    b.take(status("a", FlightState.LANDING))
     assert not b.crowded(S)
-    b.hear(status("a", FlightState.HOVERING))
+    b.take(status("a", FlightState.HOVERING))
     assert b.crowded(S)
-    b.hear(status("a", FlightState.LANDED))
+    b.take(status("a", FlightState.LANDED))
     assert not b.crowded(S)

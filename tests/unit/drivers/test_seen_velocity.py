@@ -20,7 +20,7 @@ def seen_velocity(positions, yaw=0.0, yaw_rate=0.0, **fields):
         entity = EntityEstimate(
             name="v", kind="robot", mean=(x, y, 0.8, heading), velocity_m_s=(0.0, 0.0, 0.0), **values
         )
-        seen.hear(turn * S // 50, 1, entity)
+        seen.take(turn * S // 50, 1, entity)
         velocities.append(seen.velocity(turn * S // 50))
     return velocities
 
@@ -61,7 +61,7 @@ def test_a_silent_vehicle_is_timed_by_its_pictures():
             name="v", kind="robot", mean=(place, 0.0, 0.8, 0.0), velocity_m_s=(0.0, 0.0, 0.0), converged=True,
             age_s=0.15 + late / 50, sighting=(0.15 + late / 50, 0.015), **WIDE
         )  # fmt: skip
-        seen.hear(turn * S // 50, 1, entity)
+        seen.take(turn * S // 50, 1, entity)
         if turn > 40:
             assert seen.velocity(turn * S // 50) == pytest.approx((1.0, 0.0), abs=1e-6)
 
@@ -87,7 +87,7 @@ def seen_at(*places: tuple[int, float], epoch: int = 1, seen: SeenVelocity | Non
     for at_ns, x in places:
         values = KNOWN | fields
         mean, standing = (x, 1.0, 0.8, 0.0), (0.0, 0.0, 0.0)
-        seen.hear(S + at_ns, epoch, EntityEstimate(name="v", kind="robot", mean=mean, velocity_m_s=standing, **values))
+        seen.take(S + at_ns, epoch, EntityEstimate(name="v", kind="robot", mean=mean, velocity_m_s=standing, **values))
     return seen
 
 
@@ -155,5 +155,5 @@ def test_forward_and_left_are_those_of_the_middle_of_the_window() -> None:
     for at_ns, yaw in ((0, 0.0), (200 * MS, 0.1), (400 * MS, math.pi / 2), (500 * MS, 3.0), (600 * MS, 2.0)):
         place = (0.3 * at_ns / S, 1.0 + 0.4 * at_ns / S, 0.8, yaw)
         one = EntityEstimate(name="v", kind="robot", mean=place, velocity_m_s=(0.0, 0.0, 0.0), **KNOWN)
-        seen.hear(S + at_ns, 1, one)
+        seen.take(S + at_ns, 1, one)
     assert seen.velocity(S + 600 * MS) == pytest.approx((0.4, -0.3))

@@ -169,7 +169,7 @@ def test_a_look_tells_operator_and_bus_what_must_be_mended(lab_field: ResolvedFi
     assert not looking.finished(lab.now_ns), "nothing was seen yet"
     lab.turn()
     assert looking.finished(lab.now_ns) and looking.forbidden
-    told = list(looking.tell(whole=False))
+    told = list(looking.report(whole=False))
     assert told[0].startswith("MUST") and told[-1] == "before take-off: 1 must be mended"
     lab.turn(1)
     events = [r.message for r in lab.heard.drain() if isinstance(r.message, Event)]
@@ -181,7 +181,7 @@ def test_a_look_ends_where_nothing_arrives(lab_field: ResolvedField) -> None:
     looking = Looking(checks, lab_field.drones, 0)
     assert not looking.finished(1000 * MS)
     assert looking.finished(9000 * MS)
-    told = "\n".join(looking.tell(whole=True))
+    told = "\n".join(looking.report(whole=True))
     assert "no sensor fixed in the world sends anything" in told and "nothing is heard of it" in told
     assert looking.nobody and told.endswith("before take-off: 2 must be mended; nobody would take off")
 
@@ -203,7 +203,7 @@ def test_a_look_tells_who_would_be_left_out(lab_field: ResolvedField, silent: tu
     lab.turn()
     assert looking.finished(lab.now_ns) and not looking.forbidden
     who = "drone_2 would be left out" if len(silent) == 1 else "nobody would take off"
-    assert list(looking.tell(whole=False))[-1] == f"before take-off: nothing must be mended; {who}"
+    assert list(looking.report(whole=False))[-1] == f"before take-off: nothing must be mended; {who}"
     assert looking.nobody is (len(silent) == 2)
     lab.states = dict.fromkeys(lab.states, FlightState.LANDED)
     lab.turn()

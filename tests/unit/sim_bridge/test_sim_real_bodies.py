@@ -283,8 +283,8 @@ def test_px4_s_true_state_is_read_in_its_units(truth: AutopilotTruth) -> None:
     q = (math.cos(half), 0.0, 0.0, math.sin(half))
     zeros = (0, 0, 0, 0, 0)
     mind = FrameEncoder(SYSTEM, 1)
-    truth.hear(mind.encode(HilStateQuaternion(1, q, 0.1, 0.2, 0.3, 474000000, 85000000, 488000, 0, 0, 0, *zeros)))
-    state = truth.hear(
+    truth.take(mind.encode(HilStateQuaternion(1, q, 0.1, 0.2, 0.3, 474000000, 85000000, 488000, 0, 0, 0, *zeros)))
+    state = truth.take(
         mind.encode(HilStateQuaternion(1, q, 0.1, 0.2, 0.3, 474000900, 85000000, 489500, 50, -20, 10, *zeros))
     )
     assert state is not None
@@ -296,12 +296,12 @@ def test_px4_s_true_state_is_read_in_its_units(truth: AutopilotTruth) -> None:
 def test_a_local_position_counts_until_something_exact_is_heard(truth: AutopilotTruth) -> None:
     mind = FrameEncoder(SYSTEM, 1)
     local = mind.encode(LocalPositionNed(5, 1.0, 2.0, -1.5, 0.1, 0.2, 0.3))
-    assert truth.hear(local) is None, "without an attitude it is no pose"
-    truth.hear(mind.encode(Attitude(5, 0.0, 0.1, 0.2, 0.0, 0.0, 0.0)))
-    state = truth.hear(local)
+    assert truth.take(local) is None, "without an attitude it is no pose"
+    truth.take(mind.encode(Attitude(5, 0.0, 0.1, 0.2, 0.0, 0.0, 0.0)))
+    state = truth.take(local)
     assert state is not None and state.position == pytest.approx((1.0, 2.0, -1.5))
     assert state.velocity == pytest.approx((0.1, 0.2, 0.3)) and state.attitude == pytest.approx((0.0, 0.1, 0.2))
-    truth.hear(mind.encode(sim_state(0.0, 0.0, 0.0, yaw=0.0)))
-    assert truth.hear(local) is None
+    truth.take(mind.encode(sim_state(0.0, 0.0, 0.0, yaw=0.0)))
+    assert truth.take(local) is None
     nan = mind.encode(sim_state(0.0, 0.0, math.nan, yaw=0.0))
-    assert truth.hear(nan) is None
+    assert truth.take(nan) is None

@@ -40,7 +40,7 @@ class Vehicle:
         else:
             feedback.let_go()
         told = (wanted[0] + drift[0], wanted[1] + drift[1])
-        feedback.tell(self.now_ns, wanted)
+        feedback.note_command(self.now_ns, wanted)
         goal = self._world(told)
         for axis in (0, 1):
             off = self.error[axis] + self.missing[axis]
@@ -51,7 +51,7 @@ class Vehicle:
                 "v", "robot", (*self.place, YAW), (1e-4,) * 16, (*self.velocity, 0.0), True, 0.1
             )  # fmt: skip
             reported = [v + e + lie for v, e, lie in zip(self.velocity, self.error, self.lie, strict=True)]
-            feedback.hear(self.now_ns, entity, (*self._world(reported, -1.0), 0.0))
+            feedback.take(self.now_ns, entity, (*self._world(reported, -1.0), 0.0))
 
     def fly(self, seconds, wanted=None):
         for _ in range(round(seconds * 50)):
@@ -141,8 +141,8 @@ def test_an_error_that_changes_evenly_is_corrected_by_what_it_is_by_now():
     for turn in range(200):
         learnt = grows_m_s2 * (turn * 0.02 - late_s)
         entity = EntityEstimate("v", "robot", (0.0, 0.0, 0.8, 0.0), (1e-4,) * 16, (0.1, 0.0, 0.0), True, 0.1)
-        feedback.tell(S + turn * STEP_NS, (0.1, 0.0, 0.0))
-        feedback.hear(S + turn * STEP_NS, entity, (0.1 + learnt, 0.0, 0.0))
+        feedback.note_command(S + turn * STEP_NS, (0.1, 0.0, 0.0))
+        feedback.take(S + turn * STEP_NS, entity, (0.1 + learnt, 0.0, 0.0))
     now = grows_m_s2 * 199 * 0.02
     assert feedback.correction(S + 199 * STEP_NS)[0] == pytest.approx(now, abs=0.03)
     assert feedback.drift(S + 199 * STEP_NS)[0] < now - 0.09, "what it was seen to be"
@@ -160,7 +160,7 @@ class Climber:
             self.height_m += 0.02 * 0.1
             place = (0.0, 0.0, self.height_m, 0.0)
             entity = EntityEstimate("v", "robot", place, (1e-4,) * 16, (0.0, 0.0, 0.1 + error), True, 0.1)
-            self.feedback.hear(self.now_ns, entity, (0.0, 0.0, 0.1 + error))
+            self.feedback.take(self.now_ns, entity, (0.0, 0.0, 0.1 + error))
 
     @property
     def corrected(self):
@@ -309,5 +309,5 @@ def test_a_vehicle_moved_while_hovering_holds_its_new_place():
         vehicle.place = [one + 0.02 * v for one, v in zip(vehicle.place[:2], (0.1, -0.05), strict=True)] + [0.8]
         vehicle.now_ns += STEP_NS
         entity = EntityEstimate("v", "robot", (*vehicle.place, YAW), (1e-4,) * 16, (0.0, 0.0, 0.0), True, 0.1)
-        vehicle.feedback.hear(vehicle.now_ns, entity, (0.0, 0.0, 0.0))
+        vehicle.feedback.take(vehicle.now_ns, entity, (0.0, 0.0, 0.0))
     assert math.hypot(*vehicle.feedback.hold(vehicle.now_ns)[:2]) < 0.01

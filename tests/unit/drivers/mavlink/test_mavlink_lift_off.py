@@ -12,7 +12,7 @@ def hear(lift, seconds, landed, climb_m_s=0.0, begin_m=0.0, starting=True, from_
     """Feed it the telemetry of a steady climb 50 times a second; returns the time of lift-off [s]."""
     for turn in range(round(seconds * 50)):
         elapsed_s = turn / 50
-        lift.hear(round((from_s + elapsed_s) * 1000) * MS, starting, landed, begin_m + climb_m_s * elapsed_s, climb_m_s)
+        lift.take(round((from_s + elapsed_s) * 1000) * MS, starting, landed, begin_m + climb_m_s * elapsed_s, climb_m_s)
         if lift.lifted:
             return elapsed_s
     return None
@@ -36,7 +36,7 @@ def test_a_jolt_is_no_climb():
     hear(lift, 1.0, Landed.ON_GROUND)
     for turn in range(20):
         climb_m_s = 0.4 if turn % 10 < 5 else -0.4  # 0.1 s each
-        lift.hear(10_000 * MS + turn * 20 * MS, True, Landed.IN_AIR, 0.0, climb_m_s)
+        lift.take(10_000 * MS + turn * 20 * MS, True, Landed.IN_AIR, 0.0, climb_m_s)
     assert not lift.lifted
 
 
@@ -49,16 +49,16 @@ def test_it_stays_lifted_until_it_stands_again():
     lift = LiftOff()
     hear(lift, 1.0, Landed.ON_GROUND)
     hear(lift, 1.0, Landed.TAKE_OFF, climb_m_s=0.4, from_s=1.0)
-    lift.hear(3_000 * MS, False, Landed.LANDING, 0.02, -0.1)
+    lift.take(3_000 * MS, False, Landed.LANDING, 0.02, -0.1)
     assert lift.lifted
-    assert lift.hear(4_000 * MS, False, Landed.ON_GROUND, 0.04, 0.0) == 0.0
+    assert lift.take(4_000 * MS, False, Landed.ON_GROUND, 0.04, 0.0) == 0.0
     assert not lift.lifted
 
 
 def stands(lift, height_m, starting=True):
     """The tracker has it on the floor for half a second, with errors of 3 cm."""
     for turn in range(25):
-        lift.hear(turn * 20 * MS, starting, Landed.ON_GROUND, 0.0, 0.0)
+        lift.take(turn * 20 * MS, starting, Landed.ON_GROUND, 0.0, 0.0)
         lift.see(turn * 20 * MS, (1.0, 2.0, height_m + (0.03 if turn % 2 else -0.03)), 0.2)
 
 
@@ -66,7 +66,7 @@ def test_observed_height_counts_before_the_reported_flight_state():
     lift = LiftOff()
     stands(lift, 0.06)
     assert lift.stood == pytest.approx((1.0, 2.0, 0.06), abs=0.002)
-    lift.hear(1_000 * MS, True, Landed.IN_AIR, 0.0, 0.0)
+    lift.take(1_000 * MS, True, Landed.IN_AIR, 0.0, 0.0)
     lift.see(1_000 * MS, (1.0, 2.0, 0.14), 0.2)
     assert not lift.lifted, "sightings err by 3 cm"
     lift.see(1_000 * MS, (1.1, 2.0, 0.17), 0.2)
@@ -76,7 +76,7 @@ def test_observed_height_counts_before_the_reported_flight_state():
 def climbs_by_its_own_word(lift, age_s, height_m=0.12):
     """For a second it reports 0.13 m/s, and is observed in its place; returns whether it has lifted."""
     for turn in range(26, 76):
-        lift.hear(turn * 20 * MS, True, Landed.IN_AIR, height_m, 0.13)
+        lift.take(turn * 20 * MS, True, Landed.IN_AIR, height_m, 0.13)
         lift.see(turn * 20 * MS, (1.0, 2.0, 0.06), age_s)
     return lift.lifted
 
@@ -99,7 +99,7 @@ def test_a_vehicles_report_decides_lift_off_if_first_observed_airborne():
     lift = LiftOff()
     hear(lift, 1.0, Landed.ON_GROUND)
     for turn in range(20):
-        lift.hear((1_000 + turn * 20) * MS, True, Landed.IN_AIR, 0.0, 0.13)
+        lift.take((1_000 + turn * 20) * MS, True, Landed.IN_AIR, 0.0, 0.13)
         lift.see((1_000 + turn * 20) * MS, (1.0, 2.0, 0.3), 0.1)
     assert lift.lifted
 
@@ -107,7 +107,7 @@ def test_a_vehicles_report_decides_lift_off_if_first_observed_airborne():
 def test_where_it_stood_is_that_of_this_take_off():
     lift = LiftOff()
     stands(lift, 0.06)
-    lift.hear(2_000 * MS, False, Landed.ON_GROUND, 0.0, 0.0)  # it landed on a table
+    lift.take(2_000 * MS, False, Landed.ON_GROUND, 0.0, 0.0)  # it landed on a table
     assert lift.stood is None
     stands(lift, 0.7)
     assert not lift.lifted and lift.stood == pytest.approx((1.0, 2.0, 0.7), abs=0.002)

@@ -169,7 +169,7 @@ def test_a_change_of_mode_is_explained_by_what_was_said_before_it_and_by_nothing
     for tenth in range(40):
         now_ns, left = 10**9 + tenth * 10**8, tenth >= 10
         if tenth in (9, 20):
-            orders.said.hear(now_ns, "Failsafe: Hold" if tenth == 9 else "something else")
+            orders.said.take(now_ns, "Failsafe: Hold" if tenth == 9 else "something else")
         orders.step(now_ns, decision, ARMED, 4 << 16 if left else guided_mode(Flavour.PX4), Landed.IN_AIR, 1.0)
     ((_, told),) = orders.events
     assert told.endswith("not ours to fly until RESUME (Failsafe: Hold)")

@@ -138,7 +138,7 @@ class Streamer:
             now_ns = 10_000 * MS + self._turn * 20 * MS
             for kind in {ExtendedSysState, BatteryStatus} - self.kept_back:
                 if self._turn % 10 == 0:
-                    self.session.hear(now_ns, kind)
+                    self.session.take(now_ns, kind)
             self.session.step(now_ns, 0, self.requests)
             for command in self.requests.due(now_ns):
                 self.asked.append(int(command.param1))

@@ -41,10 +41,10 @@ def test_a_restart_is_no_loss():
 
 def test_a_reason_that_is_old_says_so():
     texts = Texts()
-    texts.hear(S, Statustext(4, "Arm: gyros inconsistent"))
-    texts.hear(18 * S, Statustext(4, "Arm: not level"))
+    texts.take(S, Statustext(4, "Arm: gyros inconsistent"))
+    texts.take(18 * S, Statustext(4, "Arm: not level"))
     assert texts.reasons(0, "arm", 20 * S) == ["Arm: gyros inconsistent (19 s ago)", "Arm: not level"]
 
 
 def test_the_tab_at_the_end_of_a_px4s_text_is_not_told():
-    assert Texts().hear(S, Statustext(6, "Takeoff detected\t")) == (6, "Takeoff detected")
+    assert Texts().take(S, Statustext(6, "Takeoff detected\t")) == (6, "Takeoff detected")

@@ -20,7 +20,7 @@ def odometry(velocity, tilt):
 
 def test_stated_uncertainty_is_valid_for_three_seconds():
     stated = StatedUncertainty()
-    stated.hear(S, odometry(0.04, 4e-4))
+    stated.take(S, odometry(0.04, 4e-4))
     assert stated.velocity_std_m_s(2 * S) == pytest.approx(0.2)
     assert stated.attitude_std_rad(2 * S) == pytest.approx(0.02)
     assert stated.velocity_std_m_s(5 * S) == stated.attitude_std_rad(5 * S) == 0.0
@@ -29,13 +29,13 @@ def test_stated_uncertainty_is_valid_for_three_seconds():
 @pytest.mark.parametrize("unknown", [math.nan, 0.0, -1.0, 1e4, math.inf])
 def test_an_unknown_covariance_states_nothing(unknown):
     stated = StatedUncertainty()
-    stated.hear(S, odometry(unknown, unknown))
+    stated.take(S, odometry(unknown, unknown))
     assert stated.velocity_std_m_s(S) == stated.attitude_std_rad(S) == 0.0
 
 
 def test_a_large_doubt_is_one_and_not_none():
     stated = StatedUncertainty()
-    stated.hear(S, odometry(9.0, 9.0))
+    stated.take(S, odometry(9.0, 9.0))
     assert stated.velocity_std_m_s(S) == pytest.approx(2.0)
     assert math.degrees(stated.attitude_std_rad(S)) == pytest.approx(10.0)
 
@@ -43,8 +43,8 @@ def test_a_large_doubt_is_one_and_not_none():
 @pytest.mark.parametrize(("ratio", "std"), [(0.3, 0.0), (0.5, 0.0), (0.75, 0.25), (1.0, 0.5), (44.0, 0.5)])
 def test_a_filter_that_refuses_what_it_is_fed_is_doubted(ratio, std):
     px4, ardupilot = StatedUncertainty(), StatedUncertainty()
-    px4.hear(S, EstimatorStatus(0, 0, 0.1, ratio, 0, 0, 0, 0, 0, 0))
-    ardupilot.hear(S, EkfStatusReport(0, 0.1, ratio, 0, 0, 0))
+    px4.take(S, EstimatorStatus(0, 0, 0.1, ratio, 0, 0, 0, 0, 0, 0))
+    ardupilot.take(S, EkfStatusReport(0, 0.1, ratio, 0, 0, 0))
     assert px4.velocity_std_m_s(S) == ardupilot.velocity_std_m_s(S) == pytest.approx(std)
 
 

@@ -15,12 +15,12 @@ STEP_S = 0.02
 def learnt(seen, seconds, asked=lambda at_s: (0.4, 0.0), first_s=0.0):
     """Return the learnt shortfall after each step, for a vehicle at rest with setpoint and observation every 20 ms."""
     undershoot, missing = Undershoot(), []
-    undershoot.tell(100 * S, (0.0, 0.0))
+    undershoot.note_command(100 * S, (0.0, 0.0))
     for step in range(1, round(seconds / STEP_S) + 1):
         at_s = step * STEP_S
-        undershoot.tell(round((100.0 + at_s) * S), asked(at_s))
+        undershoot.note_command(round((100.0 + at_s) * S), asked(at_s))
         if at_s > first_s:
-            undershoot.hear(round((100.0 + at_s) * S), seen(at_s))
+            undershoot.take(round((100.0 + at_s) * S), seen(at_s))
         missing.append(undershoot.missing)
     return missing
 
@@ -48,9 +48,9 @@ def test_nothing_is_learnt_while_a_vehicle_still_follows_a_step():
 def test_a_pause_of_sightings_is_no_time_to_learn_in():
     undershoot = Undershoot()
     for step in range(1, 251):
-        undershoot.tell(100 * S + round(step * STEP_S * S), (0.4, 0.0))
-    undershoot.hear(105 * S, (0.3, 0.0))
-    undershoot.hear(155 * S, (0.3, 0.0))
+        undershoot.note_command(100 * S + round(step * STEP_S * S), (0.4, 0.0))
+    undershoot.take(105 * S, (0.3, 0.0))
+    undershoot.take(155 * S, (0.3, 0.0))
     assert undershoot.missing[0] == pytest.approx(2 * 0.7 * 0.1 * 0.1, rel=0.1)
 
 
@@ -58,9 +58,9 @@ def test_on_the_floor_it_is_forgotten():
     feedback = DriftFeedback()
     slow = EntityEstimate("v", "robot", (0.0, 0.0, 0.8, 0.0), (1e-4,) * 16, (0.2, 0.0, 0.0), True, 0.1)
     for step in range(1, 251):
-        feedback.tell(100 * S + round(step * STEP_S * S), (0.4, 0.0, 0.0))
-        feedback.hear(100 * S + round(step * STEP_S * S), slow, (0.2, 0.0, 0.0))
+        feedback.note_command(100 * S + round(step * STEP_S * S), (0.4, 0.0, 0.0))
+        feedback.take(100 * S + round(step * STEP_S * S), slow, (0.2, 0.0, 0.0))
     assert feedback.correction(105 * S)[0] > 0.2
     feedback.reset()
-    feedback.hear(105 * S, slow, (0.2, 0.0, 0.0))
+    feedback.take(105 * S, slow, (0.2, 0.0, 0.0))
     assert feedback.correction(105 * S) == pytest.approx((0.0, 0.0, 0.0), abs=0.02)

@@ -23,7 +23,7 @@ def believe(feed: VisionFeed, now_ns: int, x: float, y: float, z: float, contrad
     covariance = tuple(4e-4 if place % 5 == 0 else 0.0 for place in range(16))
     entity = EntityEstimate("drone", "robot", (x, y, z, 0.3), covariance, (0.0, 0.0, 0.0), True, 0.1, 0.0, contradicted)
     header = Header(now_ns, clock.clock_id(), "team", "tracker", 1)
-    feed.hear(now_ns, Estimate(header=header, entities=(entity,), epoch=1))
+    feed.take(now_ns, Estimate(header=header, entities=(entity,), epoch=1))
 
 
 def place(feed: VisionFeed, now_ns: int, aloft: bool) -> tuple[float, ...] | None:
@@ -99,7 +99,7 @@ def see(feed: VisionFeed, now_ns: int, x: float, age_s: float, std_m: float = 0.
     place = (x, PAD[1], 0.5, 0.3)
     entity = EntityEstimate("drone", "robot", place, covariance, (0.0,) * 3, True, age_s, 0.0, False, (age_s, std_m))
     header = Header(now_ns, clock.clock_id(), "team", "tracker", 1)
-    feed.hear(now_ns, Estimate(header=header, entities=(entity,), epoch=1))
+    feed.take(now_ns, Estimate(header=header, entities=(entity,), epoch=1))
 
 
 def test_a_vehicle_that_tells_no_motion_is_fed_where_its_last_picture_showed_it(feed: VisionFeed) -> None:

@@ -47,7 +47,7 @@ class Lab:
             self.frames += 1
         return searches, first
 
-    def hear(self, place: tuple[float, float] | None, age_s: float, *searched: str) -> None:
+    def take(self, place: tuple[float, float] | None, age_s: float, *searched: str) -> None:
         """Give the camera the target's believed position, for the next second."""
         covariance = tuple(0.0004 if row == column else 0.0 for row in range(4) for column in range(4))
         mean = (0.0, 0.0, 1.3, 0.0)
@@ -60,7 +60,7 @@ class Lab:
         searches = tuple(TargetSearch(name, "SEARCH", 1.0, (0.0, 0.0), 0.1, None, "") for name in searched)
         for k in range(0, 60, 3):
             header = Header((self.frames + k) * FRAME_NS, "c", "team", "tracker", k)
-            self.eye.hear(Estimate(header=header, entities=tuple(entities), epoch=1, searches=searches))
+            self.eye.take(Estimate(header=header, entities=tuple(entities), epoch=1, searches=searches))
 
 
 @pytest.fixture
@@ -75,13 +75,13 @@ def test_a_camera_that_hears_nothing_searches_twice_a_second(lab: Lab) -> None:
 
 
 def test_a_camera_that_sees_nobody_says_so_twice_a_second_wherever_the_belief_has_them(lab: Lab) -> None:
-    lab.hear((-3.0, -2.0), 0.1)
+    lab.take((-3.0, -2.0), 0.1)
     assert lab.look(60)[0] == 8
 
 
 def test_a_camera_that_sees_all_that_it_should_searches_seldom(lab: Lab) -> None:
     lab.world.targets["turtlebot"].place(*PLACE)
-    lab.hear(PLACE, 0.1)
+    lab.take(PLACE, 0.1)
     lab.look(10)
     assert lab.look(50)[0] <= 2
 
@@ -91,7 +91,7 @@ def test_a_target_that_no_camera_sees_is_found_in_the_second_picture(
     lab: Lab, place: tuple[float, float] | None, age_s: float, searched: tuple[str, ...]
 ) -> None:
     lab.look(1)
-    lab.hear(place, age_s, *searched)
+    lab.take(place, age_s, *searched)
     assert lab.look(59)[0] == 30
     lab.world.targets["turtlebot"].place(*PLACE)
     assert lab.look(3)[1] in (0, 1)
@@ -100,13 +100,13 @@ def test_a_target_that_no_camera_sees_is_found_in_the_second_picture(
 def test_a_marker_is_found_at_once_where_the_belief_has_it_and_only_there(lab: Lab) -> None:
     lab.look(1)
     lab.world.targets["turtlebot"].place(*PLACE)
-    lab.hear((PLACE[0] + 0.05, PLACE[1]), 0.1)
+    lab.take((PLACE[0] + 0.05, PLACE[1]), 0.1)
     assert lab.look(1) == (0, 0)
 
 
 def test_a_marker_is_not_found_at_once_where_the_belief_does_not_have_it(lab: Lab) -> None:
-    lab.hear((-3.0, -2.0), 0.1)
+    lab.take((-3.0, -2.0), 0.1)
     lab.look(5)
     lab.world.targets["turtlebot"].place(*PLACE)
-    lab.hear((-3.0, -2.0), 0.1)
+    lab.take((-3.0, -2.0), 0.1)
     assert lab.look(5) == (0, None)

@@ -22,7 +22,7 @@ from groundstation.vehicles import (
     VehicleOrder,
 )
 
-_VOICE = "drivers.mavlink.voice:MavlinkVoice"
+_TRANSPORT = "drivers.mavlink.failsafe_transport:MavlinkFailsafe"
 
 
 class Mavlink(KindSection):
@@ -127,7 +127,7 @@ def _stop(orders: Sequence[VehicleOrder]) -> StopDatagrams:
     hover, land = hover_and_land([_own(order).system_id for order in orders], signed=bool(mavlink.key_file))
     interface = orders[0].drone.interface
     way = json.dumps({"serial": mavlink.serial, "key_file": mavlink.key_file, "interface": interface})
-    return StopDatagrams(mavlink.port, hover, land, _VOICE, way, mavlink.listen, HOVERS_S)
+    return StopDatagrams(mavlink.port, hover, land, _TRANSPORT, way, mavlink.listen, HOVERS_S)
 
 
 def _check(orders: Sequence[VehicleOrder]) -> Iterator[tuple[str, Finding]]:

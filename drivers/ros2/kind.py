@@ -19,7 +19,7 @@ def _settings(order: VehicleOrder) -> Ros2DriverSettings:
 def _stop(orders: Sequence[VehicleOrder]) -> StopDatagrams:
     (order,) = orders
     way = _settings(order).model_dump_json()
-    return StopDatagrams(_own(order).port, HOVER, LAND, "drivers.ros2.voice:Ros2Voice", way)
+    return StopDatagrams(_own(order).port, HOVER, LAND, "drivers.ros2.failsafe_transport:Ros2Failsafe", way)
 
 
 def _check(orders: Sequence[VehicleOrder]) -> Iterator[tuple[str, Finding]]:

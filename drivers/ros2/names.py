@@ -1,11 +1,11 @@
-"""Keys and types of the messages sent to the router, for driver and failsafe voice alike. Pure."""
+"""Keys and types of the messages sent to the router, for driver and failsafe transport alike. Pure."""
 
 from enum import StrEnum
 
 from drivers.rmw_zenoh.wire import graph, vehicle
 from drivers.ros2.settings import NO_HASH, Ros2Section
 
-# The orders of the failsafe voice, which makes the messages itself.
+# The orders of the failsafe transport, which makes the messages itself.
 HOVER, LAND = b"hover", b"land"
 
 

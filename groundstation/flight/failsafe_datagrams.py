@@ -19,7 +19,7 @@ def failsafe_datagrams(field: Field, section: DriverSection) -> FailsafeDatagram
         stop.hover,
         stop.land,
         land_after_s,
-        stop.voice,
+        stop.transport,
         stop.way,
         stop.called,
         drone.interface,

@@ -9,8 +9,8 @@ from enum import IntEnum
 
 from groundstation.adapters import Address
 from groundstation.errors import GroundStationError
+from groundstation.supervisor.failsafe_transport import FailsafeTransport, Successor, open_transport
 from groundstation.supervisor.process_spec import FailsafeDatagrams
-from groundstation.supervisor.voice import Successor, Voice, open_voice
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _PERIOD_NS = 100 * NS_PER_MS
@@ -31,7 +31,7 @@ def unreachable(name: str, why: str) -> str:
 
 @dataclass(slots=True)
 class _Speech:
-    words: FailsafeDatagrams
+    datagrams: FailsafeDatagrams
     since_ns: int
     addresses: Sequence[Address]
     began_ns: int
@@ -42,16 +42,16 @@ class FailsafeSender:
 
     def __init__(self, speaker: Speaker = Speaker.SUPERVISOR) -> None:
         self._speaker = speaker
-        self._voices: dict[str, Voice] = {}
+        self._transports: dict[str, FailsafeTransport] = {}
         self._speaking: dict[str, _Speech] = {}
         self._next_ns = 0
 
-    def prepare(self, name: str, words: FailsafeDatagrams) -> str:
+    def prepare(self, name: str, datagrams: FailsafeDatagrams) -> str:
         """Open the transport to a driver's drone before it is needed; returns "" or the reason of a failure."""
-        if name in self._voices:
+        if name in self._transports:
             return ""
         try:
-            self._voices[name] = open_voice(words, self._speaker)
+            self._transports[name] = open_transport(datagrams, self._speaker)
         except (OSError, GroundStationError) as error:
             return str(error)
         return ""
@@ -59,7 +59,7 @@ class FailsafeSender:
     def begin(
         self,
         name: str,
-        words: FailsafeDatagrams,
+        datagrams: FailsafeDatagrams,
         since_ns: int,
         heard_at: Callable[[], Sequence[Address]] = tuple,
         left: Callable[[], int] = int,
@@ -70,14 +70,14 @@ class FailsafeSender:
         """
         if name in self._speaking:
             return False
-        why = self.prepare(name, words)
+        why = self.prepare(name, datagrams)
         if why:
             _log.error(unreachable(name, why))
-        voice = self._voices.get(name)
-        if isinstance(voice, Successor):
-            voice.go_on_from(left())
-        addresses = heard_at() if words.called else ((words.address, words.port),)
-        self._speaking[name] = _Speech(words, since_ns, addresses, time.monotonic_ns())
+        transport = self._transports.get(name)
+        if isinstance(transport, Successor):
+            transport.go_on_from(left())
+        addresses = heard_at() if datagrams.called else ((datagrams.address, datagrams.port),)
+        self._speaking[name] = _Speech(datagrams, since_ns, addresses, time.monotonic_ns())
         self._next_ns = 0
         return True
 
@@ -88,7 +88,7 @@ class FailsafeSender:
     def began_ns(self, name: str) -> int:
         """Return since when it has been sending for a driver [ns]; 0: it does not, or has no working transport."""
         speech = self._speaking.get(name)
-        return speech.began_ns if speech is not None and name in self._voices else 0
+        return speech.began_ns if speech is not None and name in self._transports else 0
 
     def send_due(self, now_ns: int) -> None:
         """Send due datagrams; a lost link is no error, they are repeated anyway."""
@@ -96,15 +96,15 @@ class FailsafeSender:
             return
         self._next_ns = now_ns + _PERIOD_NS
         for name, speech in self._speaking.items():
-            voice, words = self._voices.get(name), speech.words
-            if voice is not None:
-                too_long = now_ns - speech.since_ns >= words.land_after_s * NS_PER_S
+            transport, datagrams = self._transports.get(name), speech.datagrams
+            if transport is not None:
+                too_long = now_ns - speech.since_ns >= datagrams.land_after_s * NS_PER_S
                 with suppress(OSError):
-                    voice.say(words.land if too_long else words.hover, speech.addresses)
+                    transport.send(datagrams.land if too_long else datagrams.hover, speech.addresses)
 
     def close(self) -> None:
         """Stop sending; idempotent."""
         self._speaking.clear()
-        for voice in self._voices.values():
-            voice.close()
-        self._voices.clear()
+        for transport in self._transports.values():
+            transport.close()
+        self._transports.clear()

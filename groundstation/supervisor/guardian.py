@@ -19,7 +19,14 @@ from groundstation.process.heartbeat import SUPERVISOR_SLOT, HeartbeatBlock, Slo
 from groundstation.process.priority import go_first
 from groundstation.supervisor.failsafe_sender import FailsafeSender, Speaker, unreachable
 from groundstation.supervisor.guard_order import GuardOrder, Post
-from groundstation.supervisor.silence import DriverSigns, Guard, SupervisorSigns, SupervisorState, Word, signs_of
+from groundstation.supervisor.silence import (
+    DriverSigns,
+    FailsafeCommand,
+    Guard,
+    SupervisorSigns,
+    SupervisorState,
+    signs_of,
+)
 from groundstation.time_units import NS_PER_MS
 
 _PERIOD_NS = 40 * NS_PER_MS
@@ -93,7 +100,7 @@ class Guardian:
         before_ns = self._block.silent_since_ns(slot)
         decision = driver.guard.step(now_ns, driver.signs(), before_ns, supervisor, self._awake_since_ns)
         supervised = supervisor.state(now_ns) is SupervisorState.SPEAKS
-        if decision.word is Word.NONE:
+        if decision.command is FailsafeCommand.NONE:
             if self._sender.end(post.name):
                 _log.info("%s: the word is %s", post.name, "the supervisor's" if supervised else "the driver's")
         elif self._sender.begin(

@@ -32,7 +32,7 @@ class StopOrder(IntEnum):
 class FailsafeDatagrams:
     """Datagrams of supervisor or guardian for a drone whose driver died or hangs, in the drone's own protocol.
 
-    hover is repeated until the driver is READY again; land_after_s after its last beat it is land instead. voice:
+    hover is repeated until the driver is READY again; land_after_s after its last beat it is land instead. transport:
     "module:function" that makes their transport from `way` and a sender's number, "" for UDP. called: whether vehicles
     call the driver, so that their address is that of their last datagram. interface: network adapter of plain UDP, ""
     for any.
@@ -43,7 +43,7 @@ class FailsafeDatagrams:
     hover: bytes
     land: bytes
     land_after_s: float = 3.0
-    voice: str = ""
+    transport: str = ""
     way: str = ""
     called: bool = False
     interface: str = ""

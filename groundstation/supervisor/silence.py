@@ -21,7 +21,7 @@ HANG_NS = 800 * NS_PER_MS
 BRAKE_NS = NS_PER_S
 
 
-class Word(Enum):
+class FailsafeCommand(Enum):
     """The command for a drone without driver."""
 
     NONE = 0
@@ -100,11 +100,11 @@ def silent_since(signs: DriverSigns, before_ns: int, now_ns: int, awake_since_ns
     return before_ns or signs.beat_ns
 
 
-def word_at(since_ns: int, now_ns: int, land_after_s: float) -> Word:
+def command_at(since_ns: int, now_ns: int, land_after_s: float) -> FailsafeCommand:
     """Return the command for a drone without a driver since a time (0: it has one)."""
     if not since_ns:
-        return Word.NONE
-    return Word.LAND if now_ns - since_ns >= land_after_s * NS_PER_S else Word.HOVER
+        return FailsafeCommand.NONE
+    return FailsafeCommand.LAND if now_ns - since_ns >= land_after_s * NS_PER_S else FailsafeCommand.HOVER
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +115,7 @@ class GuardDecision:
     drone no longer needs a guardian.
     """
 
-    word: Word
+    command: FailsafeCommand
     since_ns: int
     kill: bool
     settled: bool
@@ -142,14 +142,14 @@ class Guard:
         if not supervised:
             since_ns = silent_since(signs, before_ns, now_ns, awake_since_ns, SILENCE_NS)
             since_ns = since_ns and self._as_driver_would(since_ns, before_ns, supervisor.beat_ns, state)
-        word = word_at(since_ns, now_ns, self._land_after_s)
-        self._land_since_ns = (self._land_since_ns or now_ns) if word is Word.LAND else 0
-        landed = word is Word.LAND and now_ns - self._land_since_ns >= self._landing_s * NS_PER_S
+        command = command_at(since_ns, now_ns, self._land_after_s)
+        self._land_since_ns = (self._land_since_ns or now_ns) if command is FailsafeCommand.LAND else 0
+        landed = command is FailsafeCommand.LAND and now_ns - self._land_since_ns >= self._landing_s * NS_PER_S
         # Before LAND is sent, a hanging driver is killed: it might wake up and take LAND back.
-        hangs = heard_silent_ns >= HANG_NS or word is Word.LAND
+        hangs = heard_silent_ns >= HANG_NS or command is FailsafeCommand.LAND
         lost = state in (SupervisorState.FROZEN, SupervisorState.DEAD)
         return GuardDecision(
-            word=Word.NONE if supervised else word,
+            command=FailsafeCommand.NONE if supervised else command,
             since_ns=since_ns,
             kill=lost and bool(since_ns) and signs.driving and hangs,
             settled=landed or (not since_ns and not signs.driving),

@@ -86,14 +86,14 @@ class DriverProcess:
 class StopDatagrams:
     """Datagrams that stop and land vehicles whose driver is dead, in their own protocol, and their port.
 
-    hover must never lift a standing vehicle. voice, way, called: as in supervisor.process_spec.FailsafeDatagrams.
+    hover must never lift a standing vehicle. transport, way, called: as in supervisor.process_spec.FailsafeDatagrams.
     hovers_s: for how long it can hover without its driver [s]; land is sent after that at the latest.
     """
 
     port: int
     hover: bytes
     land: bytes
-    voice: str = ""
+    transport: str = ""
     way: str = ""
     called: bool = False
     hovers_s: float = math.inf

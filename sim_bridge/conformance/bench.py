@@ -43,7 +43,7 @@ class Bench:
         self._folder = tempfile.TemporaryDirectory(prefix="conformance-")
         self._log = Path(self._folder.name) / "driver.log"
         self._lives: list[DriverLife] = []
-        self._voice: Any = None
+        self._failsafe: Any = None
         self.room = Room(subject.launch(faults), self.record)
         self._endpoint = f"tcp/127.0.0.1:{free_port()}"
         self._router = open_router(self._endpoint)
@@ -61,8 +61,8 @@ class Bench:
     ) -> None:
         for life in self._lives:
             life.close()
-        if self._voice is not None:
-            self._voice.close()
+        if self._failsafe is not None:
+            self._failsafe.close()
         self.up.close()
         self.room.__exit__()
         for bus in self._buses:
@@ -76,8 +76,8 @@ class Bench:
 
     def start_driver(self) -> DriverLife:
         """Start the driver, or start it again; its stop datagrams are prepared first, as in a run."""
-        if self._voice is None:
-            self._voice = _open(self.subject.kind.stop([self.subject.order()]))
+        if self._failsafe is None:
+            self._failsafe = _open(self.subject.kind.stop([self.subject.order()]))
         kind, process = self.subject.kind, self.subject.kind.processes([self.subject.order()])[0]
         self._block.clear(_SLOT)
         spec = ChildSpec(NAME, "driver", self._endpoint, SITE, str(self._block.path), _SLOT)
@@ -95,20 +95,20 @@ class Bench:
         self.record.exits.append(self.driver.exit_code if ended else None)
 
     @contextmanager
-    def voice(self) -> Iterator[Callable[[str], None]]:
+    def failsafe(self) -> Iterator[Callable[[str], None]]:
         """Yield a function that sends "hover" or "land" for a dead driver, as supervisor and guardian do."""
         stop = self.subject.kind.stop([self.subject.order()])
         addresses = self._block.addresses(_SLOT) if stop.called else ((self.subject.address, stop.port),)
 
         def say(word: str) -> None:
             with suppress(OSError):  # a lost link is no error there either: the datagrams are repeated
-                self._voice.say(stop.hover if word == "hover" else stop.land, addresses)
+                self._failsafe.send(stop.hover if word == "hover" else stop.land, addresses)
 
         yield say
 
     def speak(self, word: str, seconds: float) -> None:
         """Send "hover" or "land" for a dead driver, ten times a second for a while."""
-        with self.voice() as say, self.mark(f"told to {word}"):
+        with self.failsafe() as say, self.mark(f"told to {word}"):
             for _ in range(round(10 * seconds)):
                 say(word)
                 time.sleep(0.1)
@@ -248,13 +248,13 @@ class Bench:
 
 
 def _open(stop: StopDatagrams) -> Any:
-    if not stop.voice:
-        return _UdpVoice()
-    module, _, name = stop.voice.partition(":")
+    if not stop.transport:
+        return _UdpFailsafe()
+    module, _, name = stop.transport.partition(":")
     return getattr(importlib.import_module(module), name)(stop.way, _GUARDIAN)
 
 
-class _UdpVoice:
+class _UdpFailsafe:
     def __init__(self) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
 

@@ -152,7 +152,7 @@ def address_reaches_the_driver(case: Case) -> None:
 
 @check()
 def interface_reaches_driver_and_guardian(case: Case) -> None:
-    """A kind that says so hands the network adapter to its driver, and to a voice of its own."""
+    """A kind that says so hands the network adapter to its driver, and to a transport of its own."""
     kind = case.subject.kind
     if not kind.has_interface:
         raise NotApplicable("it does not choose its adapter (has_interface)")
@@ -160,7 +160,7 @@ def interface_reaches_driver_and_guardian(case: Case) -> None:
     behind = replace(order, drone=change(order.drone, interface="wlan97"))
     assert "wlan97" in kind.processes([behind])[0].section, "the adapter is not in the driver's section"
     stop = kind.stop([behind])
-    assert not stop.voice or "wlan97" in stop.way, f"{stop.voice} is not told the adapter"
+    assert not stop.transport or "wlan97" in stop.way, f"{stop.transport} is not told the adapter"
 
 
 @check()
@@ -176,8 +176,8 @@ def stop_datagrams_fit(case: Case) -> None:
 def stop_needs_no_vehicle(case: Case) -> None:
     """The stop datagrams are the same each time: they are prepared before anything flies."""
     first, second = (case.subject.kind.stop([case.subject.order()]) for _ in range(2))
-    if first.voice:
-        raise NotApplicable(f"{first.voice} makes them as it speaks")
+    if first.transport:
+        raise NotApplicable(f"{first.transport} makes them as it speaks")
     assert first == second, "they differ from call to call"
 
 

@@ -165,7 +165,7 @@ def _killed(bench: Bench) -> None:
     bench.speak("hover", 2.5)
     with bench.mark("new life"):
         bench.start_driver()
-        with bench.voice() as say:
+        with bench.failsafe() as say:
             for _ in range(100):
                 if bench.mode("LANDING") and bench.newest_after_start():
                     break
@@ -176,7 +176,7 @@ def _killed(bench: Bench) -> None:
     bench.take_off("take off after a new life")
     bench.driver.send(signal.SIGKILL)
     time.sleep(0.1)
-    with bench.mark("landed by others"), bench.voice() as say:
+    with bench.mark("landed by others"), bench.failsafe() as say:
         for number in range(150):
             say("land" if number > 5 else "hover")
             time.sleep(0.1)

@@ -9,9 +9,9 @@ from free_port import free_port
 
 from drivers.rmw_zenoh.wire import graph, vehicle
 from drivers.ros2.driver import Ros2Vehicle
+from drivers.ros2.failsafe_transport import Ros2Failsafe
 from drivers.ros2.names import HOVER, LAND
 from drivers.ros2.settings import Ros2DriverSettings, Ros2Section
-from drivers.ros2.voice import Ros2Voice
 from drivers.watchdog_types import Action, DriverMode, WatchdogDecision
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import FlightState
@@ -107,15 +107,15 @@ def test_a_take_off_that_is_called_off_is_followed_by_land() -> None:
         room.close()
 
 
-def test_the_voice_of_a_dead_driver_stops_and_lands_it() -> None:
+def test_the_transport_of_a_dead_driver_stops_and_lands_it() -> None:
     room = Room()
-    voice = Ros2Voice(room.settings.model_dump_json(), 3)
+    transport = Ros2Failsafe(room.settings.model_dump_json(), 3)
     try:
         room.until(room.ready)
         room.until(lambda: room.state is FlightState.FLYING, Action.TAKE_OFF)
         room.until(lambda: room.body.airframe.vx > 0.2, Action.FLY, (0.6, 0.0, 0.0))
         for _ in range(60):
-            voice.say(HOVER, ())
+            transport.send(HOVER, ())
             for _ in range(10):
                 room.turn()
             time.sleep(0.001)
@@ -123,26 +123,26 @@ def test_the_voice_of_a_dead_driver_stops_and_lands_it() -> None:
         assert room.body.airframe.velocity_stabilized()[0] < 0.15
         deadline = time.monotonic() + _PATIENCE_S
         while room.body.motors_on and time.monotonic() < deadline:
-            voice.say(LAND, ())
+            transport.send(LAND, ())
             room.turn()
             time.sleep(0.0005)
         assert not room.body.motors_on
     finally:
-        voice.close()
+        transport.close()
         room.close()
 
 
-def test_a_voice_without_a_router_says_so() -> None:
+def test_a_transport_without_a_router_says_so() -> None:
     settings = Ros2DriverSettings(
         name="drone_1", address=ADDRESS, pad_m=(0.0, 0.0), ros2=Ros2Section(port=free_port(ADDRESS))
     )
-    voice = Ros2Voice(settings.model_dump_json(), 2)
+    transport = Ros2Failsafe(settings.model_dump_json(), 2)
     try:
         for word in (HOVER, LAND):
             with pytest.raises(OSError, match="no ROS 2 Zenoh router"):
-                voice.say(word, ())
+                transport.send(word, ())
     finally:
-        voice.close()
+        transport.close()
 
 
 def test_a_missing_router_or_subscriber_is_named() -> None:

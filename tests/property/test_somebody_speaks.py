@@ -14,11 +14,11 @@ import pytest
 from groundstation.process.heartbeat import SlotState
 from groundstation.supervisor.silence import (
     DriverSigns,
+    FailsafeCommand,
     Guard,
     SupervisorSigns,
-    Word,
+    command_at,
     silent_since,
-    word_at,
 )
 
 MS = 1_000_000
@@ -27,7 +27,7 @@ RUN_MS = 8_000
 FOREVER = 10**9
 LAND_AFTER_S = 3.0
 FLY, HOVER, LAND = 0, 1, 2
-RANK = {Word.HOVER: HOVER, Word.LAND: LAND}
+RANK = {FailsafeCommand.HOVER: HOVER, FailsafeCommand.LAND: LAND}
 WARM_UP_MS = 4_000  # time of the faults; a stamp of 0 means "never"
 
 
@@ -153,7 +153,7 @@ class World:
             self.since = silent_since(self.signs(), self.since * MS, t * MS, self.supervisor_awake * MS, 400 * MS) // MS
             heard = self.signs().heard_silent_ns(t * MS, self.supervisor_awake * MS)
             self.gone |= self.since > 0 and heard >= 800 * MS
-        self.speak(t, "supervisor", word_at(self.since, t, LAND_AFTER_S / MS))
+        self.speak(t, "supervisor", command_at(self.since, t, LAND_AFTER_S / MS))
         self.watch_guardian(t)
 
     def watch_guardian(self, t: int) -> None:
@@ -173,11 +173,11 @@ class World:
         supervisor = SupervisorSigns(self.supervisor_beat * MS, alive=not self.supervisor.dead(t))
         decision = self.guard.step(t * MS, self.signs(), self.since * MS, supervisor, self.guardian_awake * MS)
         self.since = decision.since_ns // MS
-        self.speak(t, "guardian", decision.word)
+        self.speak(t, "guardian", decision.command)
         self.gone |= decision.kill
 
-    def speak(self, t: int, who: str, word: Word) -> None:
-        if word is not Word.NONE:
+    def speak(self, t: int, who: str, word: FailsafeCommand) -> None:
+        if word is not FailsafeCommand.NONE:
             self.say(t, who, RANK[word])
 
 

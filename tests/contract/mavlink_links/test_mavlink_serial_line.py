@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from drivers.mavlink.failsafe_transport import MavlinkFailsafe
 from drivers.mavlink.links.serial import SerialLink
 from drivers.mavlink.settings import LinkSettings
-from drivers.mavlink.voice import MavlinkVoice
 from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder
 from drivers.mavlink.wire.telemetry import Heartbeat
 
@@ -68,17 +68,17 @@ def test_a_radio_that_is_plugged_in_again_is_heard_and_spoken_to_again(tmp_path)
     plug.pull_out()
 
 
-def test_a_voice_finds_a_radio_that_is_plugged_in_again(tmp_path):
+def test_a_transport_finds_a_radio_that_is_plugged_in_again(tmp_path):
     plug = Plug(tmp_path / "ttyUSB0")
     plug.put_in()
-    voice = MavlinkVoice(json.dumps({"serial": f"{plug.place}:57600", "key_file": ""}), 2)
-    voice.say(b"land", ())
+    transport = MavlinkFailsafe(json.dumps({"serial": f"{plug.place}:57600", "key_file": ""}), 2)
+    transport.send(b"land", ())
     plug.pull_out()
     for _ in range(2):
         with pytest.raises(OSError):
-            voice.say(b"land", ())
+            transport.send(b"land", ())
     plug.put_in()
-    voice.say(b"land", ())
+    transport.send(b"land", ())
     assert os.read(plug.radio, 100) == b"land"
-    voice.close()
+    transport.close()
     plug.pull_out()

@@ -17,9 +17,9 @@ from drivers.ardrone.settings import ArDroneDriverSettings
 from drivers.camera.source_address import behind_adapter, parse_source
 from drivers.camera.sources.tcp import Line
 from drivers.datagrams import DatagramLog
+from drivers.mavlink.failsafe_transport import MavlinkFailsafe
 from drivers.mavlink.links.udp import UdpLink
 from drivers.mavlink.settings import LinkSettings
-from drivers.mavlink.voice import MavlinkVoice
 from drivers.tello.driver import Tello
 from drivers.tello.settings import TelloDriverSettings
 from groundstation.adapters import bind_to_adapter, connected, drops_strangers, send_to_all, split_zone, with_zone
@@ -49,15 +49,15 @@ def mavlink(interface: str) -> UdpLink:
     return UdpLink(LinkSettings(target=f"udpout:{with_zone('127.0.0.1', interface)}:14550"))
 
 
-def mavlink_voice(interface: str) -> MavlinkVoice:
-    return MavlinkVoice(json.dumps({"serial": "", "key_file": "", "interface": interface}), 2)
+def mavlink_failsafe(interface: str) -> MavlinkFailsafe:
+    return MavlinkFailsafe(json.dumps({"serial": "", "key_file": "", "interface": interface}), 2)
 
 
 def conversation(interface: str) -> Conversation:
     return Conversation(with_zone("127.0.0.1", interface))
 
 
-@pytest.mark.parametrize("open_one", [ardrone, tello, mavlink, mavlink_voice, conversation])
+@pytest.mark.parametrize("open_one", [ardrone, tello, mavlink, mavlink_failsafe, conversation])
 def test_vehicle_links_use_their_network_adapter_or_report_its_absence(
     open_one: Callable[[str], ArDroneLink], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -151,6 +151,6 @@ def test_one_address_that_fails_does_not_silence_those_after_it() -> None:
     with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as ear:
         ear.bind(("127.0.0.1", 0))
         ear.settimeout(2.0)
-        with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as voice, pytest.raises(OSError):
-            send_to_all(voice, [b"land"], [("127.0.0.1", 0), ear.getsockname()])
+        with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as transport, pytest.raises(OSError):
+            send_to_all(transport, [b"land"], [("127.0.0.1", 0), ear.getsockname()])
         assert ear.recv(10) == b"land"

@@ -247,7 +247,7 @@ def test_only_words_that_are_carried_count_as_spoken(monkeypatch: pytest.MonkeyP
         raise OSError("no such device")
 
     if not carried:
-        monkeypatch.setattr("groundstation.supervisor.failsafe_sender.open_voice", refused)
+        monkeypatch.setattr("groundstation.supervisor.failsafe_sender.open_transport", refused)
     sender = FailsafeSender()
     words = FailsafeDatagrams("127.0.0.1", 5556, b"hover", b"land", 20.0)
     assert sender.began_ns("drone_1") == 0

@@ -5,7 +5,14 @@ from dataclasses import replace
 import pytest
 
 from groundstation.process.heartbeat import SlotState
-from groundstation.supervisor.silence import DriverSigns, Guard, SupervisorSigns, Word, silent_since, word_at
+from groundstation.supervisor.silence import (
+    DriverSigns,
+    FailsafeCommand,
+    Guard,
+    SupervisorSigns,
+    command_at,
+    silent_since,
+)
 
 MS = 1_000_000
 S = 1_000 * MS
@@ -47,32 +54,32 @@ def test_silence_counts_only_while_somebody_was_awake_to_hear() -> None:
 
 
 def test_hover_then_land() -> None:
-    assert word_at(0, NOW, 3.0) is Word.NONE
-    assert word_at(NOW - 3 * S + 1, NOW, 3.0) is Word.HOVER
-    assert word_at(NOW - 3 * S, NOW, 3.0) is Word.LAND
+    assert command_at(0, NOW, 3.0) is FailsafeCommand.NONE
+    assert command_at(NOW - 3 * S + 1, NOW, 3.0) is FailsafeCommand.HOVER
+    assert command_at(NOW - 3 * S, NOW, 3.0) is FailsafeCommand.LAND
 
 
-def words(supervisor: SupervisorSigns, signs: DriverSigns, before: int = 0) -> tuple[Word, bool]:
+def words(supervisor: SupervisorSigns, signs: DriverSigns, before: int = 0) -> tuple[FailsafeCommand, bool]:
     decision = Guard(3.0, 10.0).step(NOW, signs, before, supervisor, 0)
-    return decision.word, decision.kill
+    return decision.command, decision.kill
 
 
 def test_the_supervisor_goes_before_the_guardian() -> None:
     for signs in (ago(0), ago(449), replace(DRIVES, gone=True)):
-        assert words(FRESH, signs) == (Word.NONE, False)
-    assert words(FRESH, ago(5_000), before=NOW - 5 * S) == (Word.NONE, False)
-    assert words(FRESH, ago(450)) == (Word.HOVER, False), "it is overdue: it has just woken up"
+        assert words(FRESH, signs) == (FailsafeCommand.NONE, False)
+    assert words(FRESH, ago(5_000), before=NOW - 5 * S) == (FailsafeCommand.NONE, False)
+    assert words(FRESH, ago(450)) == (FailsafeCommand.HOVER, False), "it is overdue: it has just woken up"
 
 
 @pytest.mark.parametrize("supervisor", [replace(FRESH, beat_ns=NOW - 300 * MS), replace(FRESH, alive=False)])
 def test_the_guardian_speaks_when_both_are_silent(supervisor: SupervisorSigns) -> None:
-    assert words(supervisor, ago(299)) == (Word.NONE, False)
-    assert words(supervisor, ago(300)) == (Word.HOVER, False)
-    assert words(supervisor, ago(799)) == (Word.HOVER, False)
-    assert words(supervisor, ago(800)) == (Word.HOVER, True)
-    assert words(supervisor, replace(ago(10), gone=True)) == (Word.HOVER, False)
-    assert words(supervisor, ago(5_000)) == (Word.LAND, True)
-    assert words(supervisor, replace(ago(5_000), gone=True)) == (Word.LAND, False)
+    assert words(supervisor, ago(299)) == (FailsafeCommand.NONE, False)
+    assert words(supervisor, ago(300)) == (FailsafeCommand.HOVER, False)
+    assert words(supervisor, ago(799)) == (FailsafeCommand.HOVER, False)
+    assert words(supervisor, ago(800)) == (FailsafeCommand.HOVER, True)
+    assert words(supervisor, replace(ago(10), gone=True)) == (FailsafeCommand.HOVER, False)
+    assert words(supervisor, ago(5_000)) == (FailsafeCommand.LAND, True)
+    assert words(supervisor, replace(ago(5_000), gone=True)) == (FailsafeCommand.LAND, False)
 
 
 def test_lands_when_a_living_driver_would_have_landed() -> None:
@@ -80,17 +87,17 @@ def test_lands_when_a_living_driver_would_have_landed() -> None:
     dies = replace(ago(10), gone=True)
     for silence_ms, alive, word in ((999, False, "HOVER"), (1_000, False, "LAND"), (2_999, True, "HOVER")):
         assert words(SupervisorSigns(NOW - silence_ms * MS, alive), dies)[0].name == word
-    assert words(SupervisorSigns(NOW - 3 * S), dies)[0] is Word.LAND
+    assert words(SupervisorSigns(NOW - 3 * S), dies)[0] is FailsafeCommand.LAND
     late = ago(350)
-    assert words(SupervisorSigns(NOW - 3 * S), late) == (Word.LAND, True), "ended before it can take LAND back"
+    assert words(SupervisorSigns(NOW - 3 * S), late) == (FailsafeCommand.LAND, True), "ended before it takes LAND back"
 
 
 def test_during_the_stop_the_guardian_lands_after_a_second_and_kills_nobody() -> None:
     stops = replace(FRESH, stops=True)
-    assert words(stops, ago(299)) == (Word.NONE, False)
-    assert words(stops, ago(900)) == (Word.HOVER, False)
-    assert words(stops, ago(1_000)) == (Word.LAND, False)
-    assert words(stops, ago(1_000), before=NOW - S) == (Word.HOVER, False), "as the supervisor began"
+    assert words(stops, ago(299)) == (FailsafeCommand.NONE, False)
+    assert words(stops, ago(900)) == (FailsafeCommand.HOVER, False)
+    assert words(stops, ago(1_000)) == (FailsafeCommand.LAND, False)
+    assert words(stops, ago(1_000), before=NOW - S) == (FailsafeCommand.HOVER, False), "as the supervisor began"
 
 
 def test_settled_once_nobody_drives_or_land_was_said_for_long_enough() -> None:

@@ -9,10 +9,10 @@ from groundstation.adapters import Address, bind_to_adapter, send_to_all
 from groundstation.supervisor.process_spec import FailsafeDatagrams
 
 
-class Voice(Protocol):
-    """Sends datagrams to all addresses of a link; `say` raises OSError on failure."""
+class FailsafeTransport(Protocol):
+    """Sends datagrams to all addresses of a link; `send` raises OSError on failure."""
 
-    def say(self, datagram: bytes, addresses: Sequence[Address]) -> None:
+    def send(self, datagram: bytes, addresses: Sequence[Address]) -> None:
         """Send a datagram to each address."""
 
     def close(self) -> None:
@@ -20,14 +20,14 @@ class Voice(Protocol):
 
 
 @runtime_checkable
-class Successor(Voice, Protocol):
-    """A voice that continues from the number that the driver recorded (`Child.leave`)."""
+class Successor(FailsafeTransport, Protocol):
+    """A transport that continues from the number that the driver recorded (`Child.leave`)."""
 
     def go_on_from(self, left: int) -> None:
         """Take the number that the driver recorded, 0 for none; called each time before it sends for the driver."""
 
 
-class UdpVoice:
+class UdpFailsafe:
     """Datagrams as they are, from a port of its own, through one network adapter ("": any); raises DriverError."""
 
     def __init__(self, interface: str = "") -> None:
@@ -35,7 +35,7 @@ class UdpVoice:
         bind_to_adapter(self._socket, interface)
         self._socket.setblocking(False)
 
-    def say(self, datagram: bytes, addresses: Sequence[Address]) -> None:
+    def send(self, datagram: bytes, addresses: Sequence[Address]) -> None:
         """Send a datagram to each address."""
         send_to_all(self._socket, (datagram,), addresses)
 
@@ -44,10 +44,10 @@ class UdpVoice:
         self._socket.close()
 
 
-def open_voice(words: FailsafeDatagrams, speaker: int) -> Voice:
+def open_transport(datagrams: FailsafeDatagrams, speaker: int) -> FailsafeTransport:
     """Return the transport of one link; raises the driver package's error for an unusable link."""
-    if not words.voice:
-        return UdpVoice(words.interface)
+    if not datagrams.transport:
+        return UdpFailsafe(datagrams.interface)
     # By name, as drivers are started: the supervisor knows no protocols.
-    make: Callable[[str, int], Voice] = resolve_name(words.voice)
-    return make(words.way, speaker)
+    make: Callable[[str, int], FailsafeTransport] = resolve_name(datagrams.transport)
+    return make(datagrams.way, speaker)

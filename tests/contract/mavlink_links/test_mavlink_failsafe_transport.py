@@ -13,9 +13,9 @@ from typing import Any
 import pytest
 
 from drivers.mavlink.failsafe import hover_and_land
+from drivers.mavlink.failsafe_transport import MavlinkFailsafe
 from drivers.mavlink.links.opening import open_link
 from drivers.mavlink.settings import LinkSettings
-from drivers.mavlink.voice import MavlinkVoice
 from drivers.mavlink.wire.flight import CommandLong, SetPositionTargetLocalNed
 from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder, split
 from drivers.mavlink.wire.signature import stamp_at
@@ -66,16 +66,16 @@ def test_words_to_many_vehicles_fit_a_usual_network_unfragmented(vehicle, key_fi
     """One lost fragment loses the whole datagram, and no vehicle would be stopped."""
     systems = list(range(1, 61))
     way = json.dumps({"serial": "", "key_file": key_file if signed else "", "interface": ""})
-    voice = MavlinkVoice(way, 2)
+    transport = MavlinkFailsafe(way, 2)
     for words in hover_and_land(systems, signed=signed):
-        voice.say(words, [vehicle.getsockname()])
+        transport.send(words, [vehicle.getsockname()])
         told: list[int] = []
         while len(told) < len(systems):
             datagram = vehicle.recv(65536)
             assert len(datagram) <= 1400
             told += [target_of(frame) for frame in split(datagram)]
         assert told == systems
-    voice.close()
+    transport.close()
 
 
 def test_a_signed_vehicle_obeys_driver_supervisor_and_guardian_in_any_order(vehicle, key_file, tmp_path):
@@ -213,7 +213,7 @@ def test_where_vehicles_called_from_outlives_their_driver(vehicle, port):
     link.receive()
     assert list(link.called_from) == [vehicle.getsockname()]
     link.close()
-    block = HeartbeatBlock.create(f"test-voice-{os.getpid()}", 3)
+    block = HeartbeatBlock.create(f"test-transport-{os.getpid()}", 3)
     block.set_addresses(1, link.called_from)
     block.beat(1)
     block.clear(1)
@@ -266,6 +266,9 @@ def test_an_emulated_signed_vehicle_lands_at_the_guardians_word(hangar, key_file
     assert heard and not emulator.rejected
 
 
-def test_the_guardians_voice_needs_no_dialect():
-    code = "import sys, drivers.mavlink.voice; sys.exit(any(name.startswith('pymavlink') for name in sys.modules))"
+def test_the_guardians_transport_needs_no_dialect():
+    code = (
+        "import sys, drivers.mavlink.failsafe_transport; "
+        "sys.exit(any(name.startswith('pymavlink') for name in sys.modules))"
+    )
     assert subprocess.run([sys.executable, "-c", code], check=False, timeout=20).returncode == 0

@@ -13,7 +13,7 @@ from drivers.ros2.settings import Ros2DriverSettings
 _PAUSE_S = 0.5
 
 
-class Ros2Voice:
+class Ros2Failsafe:
     """Sends HOVER and LAND; way: the driver's settings as JSON. It joins the router before it is needed."""
 
     def __init__(self, way: str, speaker: int) -> None:
@@ -21,7 +21,7 @@ class Ros2Voice:
         self._link = Ros2Link(settings.address, settings.ros2)
         self._landed_s = float("-inf")
 
-    def say(self, datagram: bytes, addresses: Sequence[tuple[str, int]]) -> None:
+    def send(self, datagram: bytes, addresses: Sequence[tuple[str, int]]) -> None:
         """Send HOVER (zero velocity) or LAND (at most twice a second); raises OSError without a router."""
         if datagram == HOVER:
             said = self._link.fly((0.0, 0.0, 0.0), 0.0)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.mavlink.voice import MavlinkVoice
+from drivers.mavlink.failsafe_transport import MavlinkFailsafe
 from groundstation.errors import DriverError
 
 
@@ -48,58 +48,58 @@ def device(tmp_path):
 
 def test_a_line_that_fails_is_opened_anew_once_it_is_there_again(device):
     path, plug = device
-    voice, end = MavlinkVoice(way(f"{path}:57600"), 2), plug()
-    voice.say(frame(1), [])
+    transport, end = MavlinkFailsafe(way(f"{path}:57600"), 2), plug()
+    transport.send(frame(1), [])
     assert os.read(end, 64) == frame(1)
     before = descriptors()
     os.close(end)
     with pytest.raises(OSError):
-        voice.say(frame(1), [])
+        transport.send(frame(1), [])
     assert descriptors() == before - 2, "its end, and its own"
     Path(path).unlink()
     with pytest.raises(OSError, match="cannot open"):
-        voice.say(frame(1), [])
+        transport.send(frame(1), [])
     end = plug()
-    voice.say(frame(2), [])
+    transport.send(frame(2), [])
     assert os.read(end, 64) == frame(2)
-    voice.close()
+    transport.close()
 
 
 def test_a_line_that_is_full_is_kept(device):
     path, plug = device
-    voice, end = MavlinkVoice(way(f"{path}:57600"), 2), plug()
+    transport, end = MavlinkFailsafe(way(f"{path}:57600"), 2), plug()
     with pytest.raises(BlockingIOError):
         for _ in range(1000):
-            voice.say(frame(200), [])
+            transport.send(frame(200), [])
     before, heard = descriptors(), b""
     deadline = time.monotonic() + 5.0
     while not heard.endswith(frame(9)) and time.monotonic() < deadline:
         heard = os.read(end, 65_536)
         with suppress(BlockingIOError):
-            voice.say(frame(9), [])
+            transport.send(frame(9), [])
     assert heard.endswith(frame(9))
     assert descriptors() == before
-    voice.close()
+    transport.close()
 
 
 def test_a_line_is_closed_once(device):
     path, plug = device
     plug()
-    voice, before = MavlinkVoice(way(f"{path}:57600"), 2), descriptors()
-    voice.say(frame(1), [])
-    voice.close()
-    voice.close()
+    transport, before = MavlinkFailsafe(way(f"{path}:57600"), 2), descriptors()
+    transport.send(frame(1), [])
+    transport.close()
+    transport.close()
     assert descriptors() == before
     os.fstat(0)
 
 
-def test_a_voice_waits_for_no_network_and_keeps_to_its_adapter():
-    voice = MavlinkVoice(way(interface="lo"), 2)
-    assert voice._socket is not None and not voice._socket.getblocking()
-    assert voice._socket.getsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, 16).startswith(b"lo\0")
-    voice.close()
+def test_a_transport_waits_for_no_network_and_keeps_to_its_adapter():
+    transport = MavlinkFailsafe(way(interface="lo"), 2)
+    assert transport._socket is not None and not transport._socket.getblocking()
+    assert transport._socket.getsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, 16).startswith(b"lo\0")
+    transport.close()
     with pytest.raises(DriverError, match="interface"):
-        MavlinkVoice(way(interface="no-such-adapter"), 2)
+        MavlinkFailsafe(way(interface="no-such-adapter"), 2)
 
 
 @pytest.mark.parametrize(
@@ -111,9 +111,9 @@ def test_as_many_whole_frames_go_together_as_fit_in_a_usual_network(payloads, si
     udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     udp.bind(("127.0.0.1", 0))
     udp.settimeout(2.0)
-    voice = MavlinkVoice(way(), 2)
-    voice.say(b"", [udp.getsockname()])
-    voice.say(b"".join(map(frame, payloads)), [udp.getsockname()])
+    transport = MavlinkFailsafe(way(), 2)
+    transport.send(b"", [udp.getsockname()])
+    transport.send(b"".join(map(frame, payloads)), [udp.getsockname()])
     assert [len(udp.recv(4096)) for _ in sizes] == sizes
-    voice.close()
+    transport.close()
     udp.close()

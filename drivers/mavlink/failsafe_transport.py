@@ -19,7 +19,7 @@ from groundstation.errors import DriverError
 _MOST_BYTES = 1200
 
 
-class MavlinkVoice:
+class MavlinkFailsafe:
     """Sends prepared frames; created before anything flies, because the key must be at hand when it is needed.
 
     way: JSON with `serial` (DEVICE:BAUD, or "" for UDP), `key_file` ("" for unsigned frames) and `interface` (network
@@ -41,7 +41,7 @@ class MavlinkVoice:
         """Sign with times newer than the newest that the driver sent or received (`MavlinkLink.newest_stamp`)."""
         self._stamp = max(self._stamp, left + 1)
 
-    def say(self, datagram: bytes, addresses: Sequence[Address]) -> None:
+    def send(self, datagram: bytes, addresses: Sequence[Address]) -> None:
         """Send frames to every address, or into the line; raises OSError if that fails."""
         if self._key:
             # WIRE (docs/reference/mavlink.md 5.9): times must grow for each sender and link, and a new link may begin

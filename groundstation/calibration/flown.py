@@ -8,10 +8,14 @@ from groundstation.bus.messages import Message, RelativeObservation
 
 @dataclass(frozen=True, slots=True)
 class Flown:
-    """The input messages of a tracker: (now [ns], messages with their keys) by tick, and the clock it read."""
+    """The input messages of a tracker: (now [ns], messages with their keys) by tick, and the clock it read.
+
+    off_pads: drones that may have left their pads before the first tick: where they stand is not known.
+    """
 
     ticks: tuple[tuple[int, tuple[tuple[str, Message], ...]], ...]
     clock: str
+    off_pads: frozenset[str] = frozenset()
 
     @property
     def duration_s(self) -> float:

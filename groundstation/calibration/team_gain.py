@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import msgspec
 import numpy as np
@@ -60,7 +60,7 @@ def redetected(flown: Flown, old: ResolvedField, new: ResolvedField) -> Flown:
         return _again(message, old, new) if isinstance(message, RelativeObservation) else message
 
     ticks = tuple((now, tuple((key, again(message)) for key, message in inputs)) for now, inputs in flown.ticks)
-    return Flown(ticks, flown.clock)
+    return replace(flown, ticks=ticks)
 
 
 def _again(o: RelativeObservation, old: ResolvedField, new: ResolvedField) -> RelativeObservation:

@@ -99,7 +99,7 @@ def team_record(flown: Flown, field: ResolvedField) -> TeamRecord:
     standing = dict.fromkeys(field.drones, True)
     rows: dict[str, list[tuple[float, ...]]] = {name: [] for name in field.drones}
     stands: dict[str, list[float]] = {name: [] for name in field.drones}
-    flew: set[str] = set()
+    flew = set(flown.off_pads)
     for message in _messages(flown):
         name, stamp_ns = message.header.entity, message.header.stamp_ns
         at_s = (stamp_ns - zero_ns) / NS_PER_S

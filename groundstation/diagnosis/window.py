@@ -32,6 +32,8 @@ class Window:
         self._rows: deque[tuple[int, tuple[tuple[str, Message], ...]]] = deque()
         self._flying: dict[str, bool] = {}
         self._stood: set[str] = set()
+        self._flew_before: set[str] = set()  # before the window began
+        self._missed_the_start = False
         self._hung_ns: dict[str, int] = {}
 
     def take(self, key: str, message: Message, now_ns: int) -> None:
@@ -45,13 +47,19 @@ class Window:
         if verdict:
             return
         if isinstance(message, VehicleStatus):
-            name = message.header.entity
-            self._flying[name] = message.flight_state not in _DOWN
-            if message.flight_state is FlightState.LANDED:
-                self._stood.add(name)
+            self._note(message)
         self._rows.append((now_ns, ((key, message),)))
         while self._rows[0][0] < now_ns - _LASTS_NS:
-            self._rows.popleft()
+            _, ((_, old),) = self._rows.popleft()
+            if isinstance(old, VehicleStatus) and old.flight_state not in _DOWN:
+                self._flew_before.add(old.header.entity)
+
+    def _note(self, status: VehicleStatus) -> None:
+        name, flies = status.header.entity, status.flight_state not in _DOWN
+        self._missed_the_start = self._missed_the_start or (flies and name not in self._flying)
+        self._flying[name] = flies
+        if status.flight_state is FlightState.LANDED:
+            self._stood.add(name)
 
     def _forget_hung(self, seen: RelativeObservation) -> None:
         """Drop a camera's sightings since the picture that it is now found to repeat."""
@@ -67,7 +75,9 @@ class Window:
         least_ns = _LEAST_NS if aloft <= self._stood else _LEAST_ALOFT_NS
         if not aloft or not self._rows or self._rows[-1][0] - self._rows[0][0] < least_ns:
             return None
-        return Flown(tuple(self._rows), self._clock)
+        # Who stood before the window began, while others flew, may have landed anywhere.
+        off_pads = set(self._flying) if self._missed_the_start else self._flew_before
+        return Flown(tuple(self._rows), self._clock, frozenset(off_pads))
 
 
 def _shown_after(message: Message, camera: str, picture_ns: int) -> bool:

@@ -2,6 +2,7 @@
 
 import threading
 import time
+from dataclasses import replace
 
 import msgspec
 import pytest
@@ -20,6 +21,7 @@ from groundstation.bus.messages import (
     VehicleStatus,
 )
 from groundstation.bus.topics import OBSERVATION, ODOMETRY, SUSPICION, VEHICLE_STATUS
+from groundstation.calibration.team_record import team_record
 from groundstation.diagnosis.judging import AtOnce, OnThread
 from groundstation.diagnosis.loop import Diagnosis
 from groundstation.diagnosis.suspects import Verdict
@@ -31,8 +33,8 @@ TOPIC_OF = {"status": VEHICLE_STATUS, "odometry": ODOMETRY, "observation": OBSER
 S = 1_000_000_000
 
 
-def status(at_s: float, state: FlightState, clock_id: str = "c") -> Message:
-    return VehicleStatus(header=Header(round(at_s * S), clock_id, "drone_1", "d", 1), flight_state=state, mode="TRACK")
+def status(at_s: float, state: FlightState, clock_id: str = "c", name: str = "drone_1") -> Message:
+    return VehicleStatus(header=Header(round(at_s * S), clock_id, name, "d", 1), flight_state=state, mode="TRACK")
 
 
 @pytest.mark.parametrize("end", [FlightState.LANDED, FlightState.EMERGENCY])
@@ -60,6 +62,35 @@ def first_flown(window: Window, since_s: int) -> int | None:
         if first is None and window.flown() is not None:
             first = second
     return first
+
+
+def test_a_drone_that_landed_long_ago_is_not_taken_to_stand_on_its_pad(lab_field: ResolvedField) -> None:
+    """It stood for the whole window of 40 s, but where it landed; the ceiling camera was blamed for the difference."""
+    window = Window(lab_field, "c")
+    for second in range(100):
+        first = FlightState.FLYING if 2 <= second < 30 else FlightState.LANDED
+        second_one = FlightState.LANDED if second < 2 else FlightState.FLYING
+        window.take("k", status(second, first), second * S)
+        window.take("k", status(second + 0.1, second_one, name="drone_2"), round((second + 0.1) * S))
+        if second == 60:
+            before = window.flown()
+    after = window.flown()
+    assert before is not None and after is not None
+    assert before.off_pads == {"drone_2", "drone_1"} and after.off_pads == {"drone_1", "drone_2"}
+    assert team_record(after, lab_field).stands == {}
+    assert team_record(replace(after, off_pads=frozenset()), lab_field).stands.keys() == {"drone_1"}
+
+
+def test_stands_before_the_first_flight_count_only_if_its_start_was_seen(lab_field: ResolvedField) -> None:
+    for first in (FlightState.LANDED, FlightState.FLYING):
+        window = Window(lab_field, "c")
+        window.take("k", status(0.0, first, name="drone_2"), 0)
+        for second in range(1, 31):
+            window.take("k", status(second, FlightState.LANDED), second * S)
+            window.take("k", status(second + 0.1, FlightState.FLYING, name="drone_2"), round((second + 0.1) * S))
+        flown = window.flown()
+        assert flown is not None
+        assert team_record(flown, lab_field).stands.keys() == ({"drone_1"} if first is FlightState.LANDED else set())
 
 
 def test_messages_stamped_by_another_clock_are_ignored(lab_field: ResolvedField) -> None:

@@ -208,9 +208,9 @@ class FixedLagFilter:
         """
         memory, within_s = self._state.memory[self._index[name]], self.parameters.divergence_s
         now, wild = self._seconds(self._now_ns), memory["wild"]
-        if memory["corrected_at"] > memory["wild_at"]:
+        if memory["corrected_at"] > wild["last"]:
             return False
-        lately = now - float(memory["wild_at"]) <= within_s and now - float(wild["since"]) <= 2.0 * within_s
+        lately = now - float(wild["last"]) <= within_s and now - float(wild["since"]) <= 2.0 * within_s
         return bool(wild["count"] >= 2 and lately)
 
     def airborne(self, robot: str) -> bool:

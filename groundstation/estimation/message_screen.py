@@ -81,6 +81,8 @@ class MessageScreen:
         attitude = (message.yaw_rad, message.roll_rad, message.pitch_rad)
         if len(message.velocity_m_s) != 3 or not _plausible(*message.velocity_m_s, *attitude, message.height_m or 0.0):
             return Verdict.IMPLAUSIBLE
+        if not _plausible(message.attitude_std_rad, *message.velocity_covariance):
+            return Verdict.IMPLAUSIBLE
         if stamp_ns > now_ns + FUTURE_NS:
             return Verdict.IMPLAUSIBLE
         values = (message.velocity_m_s, *attitude, message.height_m)

@@ -75,15 +75,16 @@ def fits_another(
 @kernel()
 def is_doubted(memory: EntityMemory, settings: Settings, at: float) -> bool:
     """Return whether the entity itself was seen far from its place, more than once and until just now."""
-    return memory.wild.count >= 2 and at - memory.wild_at <= settings.divergence_s
+    return memory.wild.count >= 2 and at - memory.wild.last <= settings.divergence_s
 
 
 @kernel()
 def insists(streak: Streak, settings: Settings, at: float) -> bool:
     """Count one more contradiction in a row; True when their number and duration suffice to accept them."""
-    if streak.count == 0:
-        streak.since = at
+    if streak.count == 0 or at - streak.last > _IN_A_ROW_S:
+        streak.count, streak.since = 0, at
     streak.count += 1
+    streak.last = at
     return at - streak.since >= settings.divergence_s and streak.count >= settings.divergence_count
 
 
@@ -96,9 +97,6 @@ def has_diverged(memory: EntityMemory, settings: Settings, at: float) -> bool:
     """
     if memory.unconfirmed != 0:
         return True
-    if at - memory.wild_at > _IN_A_ROW_S:
-        memory.wild.count = 0
-    memory.wild_at = at
     return insists(memory.wild, settings, at)
 
 

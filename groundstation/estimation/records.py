@@ -95,10 +95,11 @@ def own_parameters(record: type[Own]) -> Callable[[EntityRow | SensorRow], Own]:
 
 
 class Streak(Record):
-    """Contradictions in a row: their number, and the time of the first."""
+    """Contradictions in a row: their number, and the times of the first and the last."""
 
     count: int
     since: float
+    last: float
 
 
 class EntityMemory(Record):
@@ -112,8 +113,8 @@ class EntityMemory(Record):
     ago; turn_rate [rad/s]: mean until then; turned [rad]: what it is taken to have turned since. velocity_x, _y, _z:
     how they change [m/s; world], as last predicted; velocity_doubt [m/s]: deviation that a fixed camera's surprises add
     to the error of the reported velocity; noted_error [m/s]: by how much that error was recently seen to exceed that of
-    a sound sensor; unseen_s: time predicted since the last sighting. wild: observations far beyond the gate, the last
-    of them at wild_at; refused: observations by which it would have joined if they had not contradicted their observer;
+    a sound sensor; unseen_s: time predicted since the last sighting. wild: observations far beyond the
+    gate; refused: observations by which it would have joined if they had not contradicted their observer;
     corrected_at: last use of an observation; seen_variance: of the worse of x and y [m^2] right after it. gave_up,
     gave_up_at, gave_up_whom: number of robots recently re-initialised by this one's sightings, the last time, and the
     last robot.
@@ -148,7 +149,6 @@ class EntityMemory(Record):
     noted_error: float
     unseen_s: float
     wild: Streak
-    wild_at: float
     refused: Streak
     corrected_at: float
     seen_variance: float

@@ -23,8 +23,9 @@ from groundstation.time_units import NS_PER_S
 _UNSEEN_S = 1.0
 # Number of reports in a row beyond the gate, and their duration [s], after which the target's reports are dropped.
 _REFUSED, _REFUSED_S = 5, 0.5
-# Weight of the newest sighting in the mean of their offsets, and the mean [deviations] that contradicts.
-_SHARE, _AHEAD = 0.1, 1.4
+# Weight of the newest sighting in the mean of their offsets, its largest offset there, so that a misread marker alone
+# contradicts nothing, and the mean that contradicts [deviations].
+_SHARE, _FARTHEST, _AHEAD = 0.1, 4.0, 1.4
 # A comparison needs an innovation of no larger deviation [m/s].
 _TELLING_M_S = 0.25
 # Time for which all reports must agree [s]: at first, and at most.
@@ -88,7 +89,7 @@ class ReportIntake:
             if one.is_report:
                 self._judge(one, trust, now_ns)
             elif trust.heeded:
-                trust.ahead = _mean(trust.ahead, (0.0, 0.0) if one.joined else one.ahead)
+                trust.ahead = _mean(trust.ahead, (0.0, 0.0) if one.joined else _bounded(one.ahead))
                 if self._lag(one.subject, trust) > _AHEAD:
                     self._drop(one.subject, trust)
 
@@ -137,3 +138,8 @@ class ReportIntake:
 
 def _mean(mean: tuple[float, float], new: tuple[float, float]) -> tuple[float, float]:
     return mean[0] + _SHARE * (new[0] - mean[0]), mean[1] + _SHARE * (new[1] - mean[1])
+
+
+def _bounded(offset: tuple[float, float]) -> tuple[float, float]:
+    share = min(1.0, _FARTHEST / max(math.hypot(*offset), _FARTHEST))
+    return share * offset[0], share * offset[1]

@@ -43,6 +43,10 @@ class _Contradiction:
     after_s: float
     rows: deque[tuple[float, Vector]] = field(default_factory=lambda: deque(maxlen=15))
 
+    def is_over(self, now_s: float) -> bool:
+        """Return whether none of its sightings counts any more."""
+        return now_s - self.rows[-1][0] > _COUNTS_S
+
     def lasting(self, now_s: float) -> Vector | None:
         """Return its offset [m; camera_optical], if it is lasting and constant."""
         kept = [(at_s, gap) for at_s, gap in self.rows if now_s - at_s <= _COUNTS_S]
@@ -75,7 +79,7 @@ class TiedContradictions:
                 self._agreed_s[pair] = now_s
                 self._far.pop(pair, None)
             elif c.observer in self._cameras and c.subject in self._robots and c.reason in _CONTRADICTS:
-                if pair not in self._far:
+                if pair not in self._far or self._far[pair].is_over(now_s):
                     self._far[pair] = _Contradiction(now_s, now_s - self._agreed(pair))
                 self._far[pair].rows.append((now_s, np.array(c.residual[:3])))
 

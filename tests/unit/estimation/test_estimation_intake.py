@@ -113,6 +113,8 @@ BAD_ODOMETRY: list[tuple[dict[str, Any], Verdict]] = [
     ({"yaw_rad": math.nan}, Verdict.IMPLAUSIBLE),
     ({"pitch_rad": math.nan}, Verdict.IMPLAUSIBLE),
     ({"height_m": -math.inf}, Verdict.IMPLAUSIBLE),
+    ({"attitude_std_rad": 1e160}, Verdict.IMPLAUSIBLE),
+    ({"velocity_covariance": (1e300,) + (0.0,) * 8}, Verdict.IMPLAUSIBLE),
 ]
 
 

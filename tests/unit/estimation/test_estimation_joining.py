@@ -119,6 +119,16 @@ def test_sightings_that_keep_contradicting_the_observer_are_believed_with_care()
     assert math.sqrt(room.belief.covariance_of("rover")[:2, :2].max()) < 0.3
 
 
+def test_contradictions_minutes_apart_are_not_in_a_row() -> None:
+    room = Room().known()
+    for pause_s in (0.2, 0.2, 0.2, 6.0, 0.2, 0.2, 0.2):
+        room.run(pause_s)
+        room.below()
+        assert room.ahead(0.9, too_high_m=0.3).verdict is Verdict.IMPLAUSIBLE
+    room.run(0.2)
+    assert room.ahead(0.9, too_high_m=0.3).verdict is Verdict.INFLATED
+
+
 def test_a_contradiction_does_not_count_once_the_target_has_joined() -> None:
     room = Room().known()
     for too_high_m in (TOO_HIGH_M, TOO_HIGH_M, TOO_HIGH_M, TOO_HIGH_M, 0.0, TOO_HIGH_M):

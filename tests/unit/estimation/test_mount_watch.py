@@ -196,3 +196,31 @@ def test_one_that_was_just_where_it_should_be_is_not_lost_by_more_than_it_can_fl
             told += watch.advance(round((now_s - pause_s) * 1e9), {}, (agreed("ceiling", "drone_2"),), DRONES)
         told += watch.advance(round(now_s * 1e9), {}, (far("drone_2", (0.0, -gap_m, 0.0)),), DRONES)
     assert [notice.entity for notice in told] == culprits
+
+
+@pytest.mark.parametrize("away_s", [1.0, 12.0])
+def test_a_misread_marker_before_a_robot_was_away_says_nothing_about_its_return(
+    lab_field: ResolvedField, away_s: float
+) -> None:
+    """Its odometry was off meanwhile. The gap would be a jump if it had begun at the misread marker."""
+    watch, told = mount_watch(lab_field), list[Notice]()
+    misread = (agreed("ceiling", "drone_2"),), (far("drone_2", (1.5, 0.4, 0.1)),)
+    for tick, corrections in enumerate(misread):
+        told += watch.advance(round((10.0 - away_s + 0.1 * tick) * 1e9), {}, corrections, DRONES)
+    for picture in range(8):
+        now_s = 11.6 + picture / 15.0
+        watch.see(sighting("drone_2", now_s - 0.1, np.array((0.9, -0.4, 2.5))))
+        told += watch.advance(round(now_s * 1e9), {}, (far("drone_2", (0.0, -2.0, 0.0)),), DRONES)
+    assert told == []
+
+
+def test_a_misread_marker_long_ago_does_not_hide_a_bump(lab_field: ResolvedField) -> None:
+    watch, told = mount_watch(lab_field), list[Notice]()
+    watch.advance(round(5.0 * 1e9), {}, (far("drone_1", (1.5, 0.4, 0.1)),), DRONES)
+    watch.advance(round(8.0 * 1e9), {}, (agreed("ceiling", "drone_2"),), DRONES)
+    for picture in range(8):
+        now_s = 10.0 + picture / 15.0
+        for name, place in (("drone_1", (-0.8, 0.2, 2.6)), ("drone_2", (0.9, -0.4, 2.5))):
+            watch.see(sighting(name, now_s - 0.1, np.array(place)))
+        told += watch.advance(round(now_s * 1e9), {}, (far("drone_1"), far("drone_2")), DRONES)
+    assert [notice.entity for notice in told] == ["ceiling"]

@@ -164,6 +164,21 @@ def test_a_wrong_one_is_dropped_and_told_once_and_the_cameras_win(desk: Desk, sa
     assert desk.rms(4.0) < 0.03 and max(desk.errors[40:]) < 0.3 and desk.told == []
 
 
+def test_a_misread_marker_contradicts_no_report(desk: Desk) -> None:
+    desk.speed = 0.3
+    for away_m in (0.5, -1.0, 2.0):
+        desk.drive(3.0, truly)
+        desk.place[0] += away_m
+        desk.see()
+        desk.place[0] -= away_m
+        desk.filter.advance(desk.now)
+        (refused,) = [one for one in desk.filter.take_corrections() if not one.is_report]
+        assert refused.verdict is Verdict.IMPLAUSIBLE and math.hypot(*refused.ahead) > 10.0
+        desk.intake.reports.advance(desk.now, [refused])
+        assert desk.intake.reports.heeds("cart")
+    assert desk.told == []
+
+
 def test_one_that_comes_right_is_used_again_and_later_each_time(desk: Desk) -> None:
     desk.speed, waits = 0.4, []
     desk.drive(2.0)

@@ -66,9 +66,11 @@ class FailsafeSender:
     ) -> bool:
         """Start at once to send for a driver that has been silent since a time; returns whether that is new.
 
-        heard_at: last addresses of vehicles that call their link; left: the number that the driver left.
+        Repeated with an earlier time, land comes earlier. heard_at: last addresses of vehicles that call their link;
+        left: the number that the driver left.
         """
-        if name in self._speaking:
+        if (speech := self._speaking.get(name)) is not None:
+            speech.since_ns = min(speech.since_ns, since_ns)
             return False
         why = self.prepare(name, datagrams)
         if why:

@@ -21,6 +21,8 @@ from groundstation.supervisor.process_spec import FailsafeDatagrams
 from groundstation.supervisor.runtime_file import ProcessRecord, RuntimeRecord
 from groundstation.supervisor.terminal import Terminal
 
+S = 1_000_000_000
+
 
 @pytest.fixture
 def runtime(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
@@ -213,4 +215,18 @@ def test_last_words_repeat_and_then_land() -> None:
         assert {sent[ms] for ms in range(0, 3000, 100)} == {b"hover"}
         assert {sent[ms] for ms in range(3000, 4000, 100)} == {b"land"}
         assert sender.end("drone_1") and not sender.end("drone_1")
+    sender.close()
+
+
+def test_land_comes_earlier_once_its_time_is_set_earlier() -> None:
+    """As when the frozen supervisor is killed: nobody can take over again, and hovering on has no purpose."""
+    sender = FailsafeSender()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as drone:
+        drone.bind(("127.0.0.1", 0))
+        drone.settimeout(2)
+        words = FailsafeDatagrams("127.0.0.1", drone.getsockname()[1], b"hover", b"land", land_after_s=3.0)
+        for since_s, now_s, sent in ((4, 5.0, b"hover"), (4, 5.2, b"hover"), (2, 5.4, b"land"), (4, 5.6, b"land")):
+            sender.begin("drone_1", words, since_s * S)
+            sender.send_due(round(now_s * S))
+            assert drone.recv(100) == sent
     sender.close()

@@ -31,8 +31,8 @@ _CHARGE_NS = 30 * NS_PER_S
 _STANDING_M = 0.08  # the base of a standing vehicle, as in its kind
 # Orders are repeated until they are obeyed; a standing vehicle gets zero velocity once a second.
 _PAUSE_NS = {Order.TAKE_OFF: 2 * NS_PER_S, Order.LAND: NS_PER_S // 2, Order.CUT: NS_PER_S // 2, None: NS_PER_S}
-# A take-off that is called off may still begin for this long after its order.
-_BEGINS_NS = 5 * NS_PER_S
+# A take-off that is called off may still begin for this long after its order; a landing that seems to be over, go on.
+_LASTS_NS = 5 * NS_PER_S
 _ORDERS = {Action.TAKE_OFF: Order.TAKE_OFF, Action.LAND: Order.LAND, Action.CUT: Order.CUT}
 LIMITS = PlausibilityLimits(speed_m_s=8.0, tilt_rad=math.radians(50.0), jump_m_s=0.6)
 
@@ -49,7 +49,7 @@ class Ros2Vehicle:
         self._rejected: Counter[str] = Counter()
         self._asked = Action.WAIT
         self._said_ns: dict[Order | None, int] = {}
-        self._started_ns = -_BEGINS_NS
+        self._lands_until_ns = 0
         self._heard_ns = self._charge_ns = 0
         self._tie, self._charge, self._rate_hz = PublisherTie(), 0.0, 0.0
         self._refused, self._standing, self._height_m, self._was_ordered = "", "", 0.0, False
@@ -135,11 +135,12 @@ class Ros2Vehicle:
             case Action.CUT if self._flight.airborne or Order.CUT not in self._said_ns:
                 self._order(now_ns, Order.CUT)
             case Action.LAND:
+                self._lands_until_ns = now_ns + _LASTS_NS
                 self._order(now_ns, Order.LAND)
-            case Action.IDLE if now_ns - self._started_ns < _BEGINS_NS:
+            case Action.IDLE if now_ns < self._lands_until_ns:
                 self._order(now_ns, Order.LAND)
             case Action.TAKE_OFF if not self._flight.airborne:
-                self._started_ns = now_ns
+                self._lands_until_ns = now_ns + _LASTS_NS
                 self._order(now_ns, Order.TAKE_OFF)
             case Action.FLY:
                 self._fly(now_ns, *self._settings.limits.within(decision.velocity_m_s, decision.yaw_rate_rad_s))

@@ -11,6 +11,8 @@ from groundstation.time_units import NS_PER_MS
 
 _AIRBORNE_M, _STILL_M_S, _CLIMB_M_S = 0.2, 0.25, 0.15
 _STANDS_NS = 500 * NS_PER_MS
+# Meanwhile its height, averaged over a moment, changes by less than this: a slow descent is no stand.
+_MOMENT_NS, _RESTS_M = 200 * NS_PER_MS, 0.03
 _LEANS_RAD, _MOVES_M_S = math.radians(50.0), 1.0
 # Share of the take-off height at which a take-off counts as finished.
 _UP = 0.7
@@ -22,8 +24,8 @@ _FLOWN = frozenset({Action.FLY, Action.HOVER})
 class FlightWatch:
     """Follows one vehicle; take_off_m: the height that its take-off climbs to.
 
-    Lower than 0.2 m and still for 0.5 s it stands, unless it was commanded to fly: a drifting height must not turn a
-    flying vehicle into a standing one, which would not be landed.
+    Lower than 0.2 m and still for 0.5 s it stands. Time for which it was commanded to fly does not count: a drifting
+    height must not turn a flying vehicle into a standing one, which would not be landed.
     """
 
     take_off_m: float
@@ -31,18 +33,24 @@ class FlightWatch:
     heard: bool = False
     climbed: bool = False
     _low_since_ns: int | None = None
+    _rests_at_m: float = 0.0
+    _mean_m: float = 0.0
+    _at_ns: int = 0
 
     def see(self, now_ns: int, height_m: float, climb_m_s: float, asked: Action) -> None:
         """Take a height above its stand [m] and a climb rate [m/s]; asked: its present order."""
+        self._mean_m += min(1.0, (now_ns - self._at_ns) / _MOMENT_NS) * (height_m - self._mean_m)
+        self._at_ns = now_ns
         low = height_m < _AIRBORNE_M
-        if not low or abs(climb_m_s) > _CLIMB_M_S:
-            self._low_since_ns = None
+        rests = low and abs(climb_m_s) <= _CLIMB_M_S and abs(self._mean_m - self._rests_at_m) <= _RESTS_M
+        if not rests or asked in _FLOWN:
+            self._low_since_ns, self._rests_at_m = None, self._mean_m
         elif self._low_since_ns is None:
             self._low_since_ns = now_ns
         stands = self._low_since_ns is not None and now_ns - self._low_since_ns >= _STANDS_NS
         if not low:
             self.airborne = True
-        elif not self.heard or (stands and asked not in _FLOWN):
+        elif stands or not self.heard:
             self.airborne = False
         self.climbed = self.airborne and (self.climbed or asked is not Action.TAKE_OFF or self._is_up(height_m))
         self.heard = True

@@ -8,6 +8,7 @@ import pytest
 from drivers.rmw_zenoh.wire import vehicle
 from drivers.ros2 import driver as ros2_driver
 from drivers.ros2.driver import Ros2Vehicle
+from drivers.ros2.names import Order
 from drivers.ros2.settings import Ros2DriverSettings, Ros2Section
 from drivers.watchdog_types import Action, DriverMode, VehicleView, WatchdogDecision
 from groundstation.bus import clock
@@ -27,11 +28,13 @@ class FakeLink:
 
     def __init__(self, address: str, section: Ros2Section, node: str, hear: object) -> None:
         self.refused: dict[str, str] = {}
+        self.ordered: list[str] = []
 
     def fly(self, velocity: vehicle.Vector3, turn_rad_s: float) -> bytes:
         return b""
 
     def order(self, order: object) -> bytes:
+        self.ordered.append(str(order))
         return b""
 
     def close(self) -> None: ...
@@ -125,3 +128,19 @@ def test_a_vehicle_that_seems_to_fly_and_was_never_told_to_names_the_setting(nod
     assert "z = 0.42 m: if it stands, set ros2.standing_z_m" in node.driver.health(node.now_ns).detail
     node.driver.apply(node.now_ns, WatchdogDecision(DriverMode.TAKING_OFF, Action.TAKE_OFF))
     assert node.driver.health(node.now_ns).detail == ""
+
+
+def test_land_is_repeated_for_five_seconds_after_a_landing_seems_to_be_over(node: Node) -> None:
+    """Its height may be wrong: LANDED may be said of a vehicle that still descends."""
+    link = node.driver._link
+    assert isinstance(link, FakeLink)
+    node.say(STANDING)
+    node.driver.apply(node.now_ns, WatchdogDecision(DriverMode.LANDING, Action.LAND))
+    at_s = []
+    for turn in range(200):
+        before = len(link.ordered)
+        node.now_ns += 50 * MS
+        node.driver.apply(node.now_ns, WatchdogDecision(DriverMode.LANDED, Action.IDLE))
+        at_s += [0.05 * (turn + 1)] * (len(link.ordered) - before)
+    assert set(link.ordered) == {str(Order.LAND)}
+    assert 4.4 < max(at_s) < 5.0 and len(at_s) == 10

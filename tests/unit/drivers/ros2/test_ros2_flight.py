@@ -47,7 +47,7 @@ def test_a_flight_is_told_by_height_and_orders() -> None:
     assert told.watch.state(Action.HOVER, 0.4) is FlightState.FLYING
     assert told.see(0.5, 0.1, Action.LAND, -0.4) is FlightState.LANDING
     assert told.see(0.4, 0.0, Action.LAND) is FlightState.LANDING
-    assert told.see(0.3, 0.0, Action.LAND) is FlightState.LANDED
+    assert told.see(0.5, 0.0, Action.LAND) is FlightState.LANDED
 
 
 def test_a_vehicle_that_is_told_to_fly_is_not_called_standing() -> None:
@@ -55,7 +55,16 @@ def test_a_vehicle_that_is_told_to_fly_is_not_called_standing() -> None:
     told.see(0.1, 0.8, Action.HOVER)
     assert told.see(5.0, 0.05, Action.HOVER) is FlightState.HOVERING
     assert told.see(5.0, 0.05, Action.FLY) is FlightState.FLYING
-    assert told.see(0.7, 0.05, Action.LAND) is FlightState.LANDED
+    assert told.see(0.4, 0.05, Action.LAND) is FlightState.LANDING, "it only begins to descend"
+    assert told.see(0.4, 0.05, Action.LAND) is FlightState.LANDED
+
+
+def test_a_slow_descent_is_no_stand() -> None:
+    told = Told()
+    told.see(0.1, 0.8, Action.HOVER)
+    for step in range(20):
+        assert told.see(0.1, 0.19 - 0.01 * step, Action.LAND, -0.1) is FlightState.LANDING
+    assert told.see(0.7, 0.0, Action.LAND) is FlightState.LANDED
 
 
 def test_a_vehicle_that_flies_when_it_is_heard_first_flies() -> None:

@@ -33,7 +33,7 @@ from drivers.plausibility.motion import MotionMonitor
 from drivers.watchdog_types import Action, VehicleView, WatchdogDecision
 from groundstation.adapters import with_zone
 from groundstation.bus.api import Bus
-from groundstation.bus.messages import UP, FlightState, Severity, Vector3
+from groundstation.bus.messages import AIRBORNE, UP, FlightState, Severity, Vector3
 from groundstation.bus.notice import Notice
 from groundstation.time_units import NS_PER_MS
 
@@ -47,6 +47,7 @@ _RATE_PERIOD_NS = 200 * NS_PER_MS
 # the time, since most of it is spent on bringing the code back into the processor's caches.
 _AT_ONCE = 2
 _FAULTS = int(StateBit.MOTORS | StateBit.SOFTWARE_FAULT | StateBit.VBAT_LOW)
+_NO_MOTION = "its navdata hold its state alone, no motion: it was restarted, or another program configures it"
 _NO_AR1_VIDEO = Notice(
     Severity.WARNING,
     "this is an AR.Drone 1.0: its video (UVLC and P264 over UDP 5555) is out of scope and is left alone",
@@ -75,6 +76,11 @@ class LatestNavdata(NamedTuple):
     velocity_m_s: Vector3 = (0.0, 0.0, 0.0)
     height_m: float | None = None
     packet: Navdata | None = None
+
+    def is_fresh(self, now_ns: int) -> bool:
+        """Return whether it is newer than 0.3 s; in flight its motion counts, once that was reported."""
+        newest_ns = self.moved_ns if self.moved_ns and self.flight_state in AIRBORNE else self.heard_ns
+        return newest_ns > 0 and now_ns - newest_ns < _FRESH_NS
 
     @property
     def obeyed(self) -> int | None:
@@ -168,7 +174,8 @@ class ArDrone:
     def view(self, now_ns: int) -> VehicleView:
         """Return the drone's last report."""
         heard = self.telemetry
-        fresh = heard.heard_ns > 0 and now_ns - heard.heard_ns < _FRESH_NS
+        fresh = heard.is_fresh(now_ns)
+        mute = _NO_MOTION if not fresh and now_ns - heard.heard_ns < _FRESH_NS else ""
         configured = self._session.phase is SessionPhase.READY
         unsound = self._plausibility.report.reason(Health.BAD, LIMITS.essential)
         if not unsound and self._attitude.is_doubted(now_ns):
@@ -176,7 +183,7 @@ class ArDrone:
         not_ready = self._not_ready(heard)
         velocity = self._true(heard.velocity_m_s)
         return VehicleView(
-            heard.flight_state, fresh, heard.battery, not_ready, configured, unsound, velocity, clears=True
+            heard.flight_state, fresh, heard.battery, not_ready, configured, unsound, velocity, clears=True, mute=mute
         )
 
     def _true(self, velocity_m_s: Vector3) -> Vector3:

@@ -83,3 +83,21 @@ def test_messages_are_those_of_packets_read_one_by_one(drone: ArDrone, new_bus: 
     for one in arrivals:
         drone._hear(one.stamp_ns, navdata.decode(one.datagram))
     assert len(alone.sent) > 140 and alone.sent == together.sent
+
+
+@pytest.mark.parametrize(("state", "motion", "fresh"), [(_FLY, True, False), (_FLY, False, True), (0, True, True)])
+def test_in_flight_status_alone_is_no_telemetry_once_motion_was_reported(
+    drone: ArDrone, state: int, motion: bool, fresh: bool
+) -> None:
+    """As after its restart, or if another program configures it: velocity and battery would be those of before.
+
+    A driver that was restarted in flight hears status first, and must be able to land it.
+    """
+    if motion:
+        read(drone, arrival(1, _HEALTHY | state), arrival(2, _HEALTHY | state))
+    for number in range(3, 20):
+        status = navdata.encode(Navdata(_HEALTHY | state, number))
+        read(drone, Arrival((1000 + 60 * number) * NS_PER_MS, status, _SOURCE), None)
+    view = drone.view((1000 + 60 * 20) * NS_PER_MS)
+    assert view.fresh is fresh
+    assert ("no motion" in view.silence) is not fresh

@@ -113,6 +113,9 @@ class Orders:
         if action is Action.FLY and decision.entered_ns != self._ordered_ns:
             self._take_back(now_ns, decision.entered_ns)
         self._watch_mode(now_ns, action, armed, guided, custom_mode)
+        own_climb = action is Action.TAKE_OFF and self._flavour is Flavour.ARDUPILOT
+        if own_climb or not self.are_heeded(now_ns, custom_mode):
+            self.drift.forget_undershoot()
         match action:
             case Action.TAKE_OFF:
                 self._watch_start(now_ns, armed, guided, custom_mode)

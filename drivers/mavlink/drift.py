@@ -154,6 +154,10 @@ class DriftFeedback:
         """Note that it has left the floor."""
         self._stands = False
 
+    def forget_undershoot(self) -> None:
+        """Forget what is missing of the commands, while the vehicle does not fly by them."""
+        self._undershoot = Undershoot()
+
     def note_command(self, now_ns: int, asked_m_s: Vector3) -> None:
         """Note the velocity command [base_stabilized], without the correction."""
         forward, left = asked_m_s[:2]

@@ -113,6 +113,24 @@ def test_an_ardupilot_that_ends_its_take_off_is_told_nothing_and_so_not_judged_b
     assert not px4.orders.climbs_by_itself(px4.now_ns)
 
 
+@pytest.mark.parametrize(("flavour", "pilots"), [(Flavour.PX4, 3 << 16), (Flavour.ARDUPILOT, 5)])
+def test_what_a_pilot_flies_is_not_taken_for_missing_of_our_commands(flavour, pilots):
+    """It was asked to stand meanwhile; after RESUME it flew off by the difference, beyond the limiter's margin."""
+    orders, guided = Climb(flavour, True).orders, guided_mode(flavour)
+    told = []
+    for turn in range(450):
+        now_ns = 10**9 + turn * 20_000_000
+        flown_m_s = -1.0 if 100 <= turn < 250 else 0.0
+        place = EntityEstimate("v", "robot", (0.0, 0.0, 0.8, 0.0), SURE, (flown_m_s, 0.0, 0.0), True, 0.1)
+        orders.see(now_ns, place, (flown_m_s, 0.0, 0.0))
+        resumed = turn >= 300
+        decision = WatchdogDecision(DriverMode.TRACK, Action.FLY, setpoint_ns=turn + 1, entered_ns=1 + resumed)
+        mode = pilots if 100 <= turn < 300 else guided
+        setpoint = orders.step(now_ns, decision, ARMED, mode, Landed.IN_AIR, 0.8)
+        told += [setpoint.vx] if resumed and setpoint is not None else []
+    assert len(told) > 30 and max(map(abs, told)) < 0.01
+
+
 def stands(orders, seconds, action, mode, reported=(0.2, 0.0, 0.1), at_m=(0.0, 0.0)):
     """Let it stand somewhere, motors on, with a velocity of its own; returns its last setpoint."""
     told = None

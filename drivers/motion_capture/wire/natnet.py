@@ -10,8 +10,8 @@ from dataclasses import dataclass
 COMMAND_PORT = 1510
 CONNECT, SERVER_INFO, REQUEST_DESCRIPTIONS, DESCRIPTIONS, FRAME, KEEP_ALIVE = 0, 1, 4, 5, 7, 10
 Version = tuple[int, int]
-_OLDEST, _SIZED = (3, 0), (4, 1)
-"""Since 4.1 each section is preceded by its size."""
+_OLDEST, _SIZED, _TURNED = (3, 0), (4, 1), (4, 2)
+"""Since 4.1 each section is preceded by its size, since 4.2 the offset of a body has a rotation."""
 _HEAD, _COUNT = struct.Struct("<HH"), struct.Struct("<i")
 _BODY = struct.Struct("<i3f4ffh")
 _SERVER = struct.Struct("<256s4B4BQH?4B")
@@ -211,32 +211,34 @@ def decode_descriptions(payload: bytes, version: Version) -> dict[int, str]:
     reader, names = _Reader(payload, version), dict[int, str]()
     for _ in range(reader.count()):
         (kind,) = reader.take(_COUNT)
-        size = reader.count() if version >= _SIZED else -1
+        size = reader.take(_COUNT)[0] if version >= _SIZED else None
         begin = reader.at
         if kind == _RIGID_BODY:
             name = reader.text()
-            (identity,) = reader.take(_COUNT)
-            names[int(identity)] = name
-            reader.skip(_COUNT.size + _POINT_BYTES)
-            _skip_markers(reader)
-        elif kind == _MARKER_SET:
-            reader.text()
-            for _ in range(reader.count()):
-                reader.text()
-        elif size < 0:
-            break
-        if size >= 0:
+            names[int(reader.take(_COUNT)[0])] = name
+        if size is not None:  # WIRE (docs/reference/natnet.md 4): what follows the id differs by version
             reader.at = begin
             reader.skip(size)
+        elif not _skip_unsized(reader, kind):
+            break
     return names
 
 
-def _skip_markers(reader: _Reader) -> None:
-    markers = reader.count()
-    reader.skip(markers * (_POINT_BYTES + _LABEL_BYTES))
-    if reader.version >= (4, 0):
-        for _ in range(markers):
-            reader.text()
+def _skip_unsized(reader: _Reader, kind: int) -> bool:
+    """Leave out the rest of a description without a size; returns whether its kind is known."""
+    if kind == _RIGID_BODY:
+        reader.skip(_COUNT.size + _POINT_BYTES)
+        markers = reader.count()
+        reader.skip(markers * (_POINT_BYTES + _LABEL_BYTES))
+        names = markers if reader.version >= (4, 0) else 0
+    elif kind == _MARKER_SET:
+        reader.text()
+        names = reader.count()
+    else:
+        return False
+    for _ in range(names):
+        reader.text()
+    return True
 
 
 def encode_descriptions(names: Mapping[int, str], version: Version) -> bytes:
@@ -246,6 +248,7 @@ def encode_descriptions(names: Mapping[int, str], version: Version) -> bytes:
 
 def _described(names: Iterable[tuple[int, str]], version: Version) -> Iterable[bytes]:
     for identity, name in names:
-        own = name.encode() + b"\0" + struct.pack("<ii3fi", identity, -1, 0.0, 0.0, 0.0, 0)
+        turn = struct.pack("<4f", 0.0, 0.0, 0.0, 1.0) if version >= _TURNED else b""
+        own = name.encode() + b"\0" + struct.pack("<ii3f", identity, -1, 0.0, 0.0, 0.0) + turn + _COUNT.pack(0)
         size = _COUNT.pack(len(own)) if version >= _SIZED else b""
         yield _COUNT.pack(_RIGID_BODY) + size + own

@@ -87,20 +87,35 @@ def test_a_server_that_is_too_old_says_its_version_in_a_shorter_answer() -> None
 def described(version: tuple[int, int]) -> bytes:
     sized = version >= (4, 1)
     markers = b"all\0" + struct.pack("<i", 1) + b"m1\0"
-    body = b"cf1\0" + struct.pack("<ii3fi", 7, -1, 0, 0, 0, 1) + bytes(16)
+    turn = struct.pack("<4f", 0.0087, 0, 0, 0.99996) if version >= (4, 2) else b""
+    body = b"cf1\0" + struct.pack("<ii3f", 7, -1, 0, 0, 0) + turn + struct.pack("<i", 1) + bytes(16)
     body += b"m1\0" if version >= (4, 0) else b""
     parts = [(0, markers), (1, body), (5, b"camera\0" + bytes(28))] if sized else [(0, markers), (1, body)]
     sections = (struct.pack("<i", k) + (struct.pack("<i", len(p)) if sized else b"") + p for k, p in parts)
     return struct.pack("<i", len(parts)) + b"".join(sections)
 
 
-@pytest.mark.parametrize("version", [(3, 0), (4, 0), (4, 1), (4, 2)])
+@pytest.mark.parametrize("version", [(3, 0), (4, 0), (4, 1), (4, 2), (4, 3)])
 def test_bodies_are_named_by_their_descriptions(version: tuple[int, int]) -> None:
     assert natnet.decode_descriptions(described(version), version) == {7: "cf1"}
     for length in range(len(described(version)) - 1):
         if version < (4, 1) or length < 20:
             with pytest.raises(natnet.WireError):
                 natnet.decode_descriptions(described(version)[:length], version)
+
+
+@pytest.mark.parametrize("version", [(4, 0), (4, 1), (4, 2)])
+def test_emulated_descriptions_name_the_bodies(version: tuple[int, int]) -> None:
+    names = {7: "cf1", 8: "cf2"}
+    payload = natnet.message_of(natnet.encode_descriptions(names, version))[1]
+    assert natnet.decode_descriptions(payload, version) == names
+
+
+def test_a_description_of_impossible_size_is_refused() -> None:
+    for size in (-1, 10**6):
+        payload = struct.pack("<iii", 1, 1, size) + b"cf1\0" + struct.pack("<i", 7)
+        with pytest.raises(natnet.WireError, match="short"):
+            natnet.decode_descriptions(payload, (4, 1))
 
 
 def test_the_request_to_connect_is_that_of_a_natnet_client() -> None:

@@ -10,6 +10,7 @@ from pkgutil import resolve_name
 from typing import Any, Protocol
 
 from drivers.motion_capture.captured_frame import CapturedFrame
+from drivers.motion_capture.host_lookup import HostLookup
 from drivers.motion_capture.settings import OURS, SystemAddress
 from drivers.motion_capture.wire import natnet
 from groundstation import plug_ins
@@ -17,7 +18,7 @@ from groundstation.bus import clock
 from groundstation.errors import DriverError, SettingsError
 from groundstation.time_units import NS_PER_S
 
-_ASK_AGAIN_NS = NS_PER_S
+_ASK_AGAIN_NS = _LOOK_UP_AGAIN_NS = NS_PER_S
 _AGAIN_S = 1.0
 _KEEP_ALIVE_NS = NS_PER_S
 _LARGEST = 65535
@@ -61,19 +62,22 @@ class NatnetSource:
 
     def __init__(self, address: SystemAddress) -> None:
         self.rejected: Counter[str] = Counter()
-        self.detail = f"no answer from {address.host}:{address.port}"
-        self._place = (address.host, address.port)
+        self.detail = self._no_answer = f"no answer from {address.host}:{address.port}"
+        self._host, self._port, self._failed = HostLookup(address.host), address.port, ""
         self._requests = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._requests.setblocking(False)
         self._frames: socket.socket | None = None
         self._server: natnet.Server | None = None
         self._names: dict[int, str] = {}
         self._asks = True  # names are missing, or may belong to other bodies by now
-        self._asked_ns = self._alive_ns = self._framed_ns = 0
+        self._looked_up_ns = self._asked_ns = self._alive_ns = self._framed_ns = 0
 
     def poll(self, wait_s: float) -> list[CapturedFrame]:
         """Return the arrived frames, the oldest first; requests missing descriptions once a second."""
-        self._ask(clock.now_ns())
+        now_ns = clock.now_ns()
+        self._find_host(now_ns)
+        if self._host.found:
+            self._ask(now_ns)
         sockets = [one for one in (self._requests, self._frames) if one is not None]
         readable, _, _ = select.select(sockets, [], [], wait_s)
         return [frame for one in readable for frame in self._read(one)]
@@ -83,6 +87,15 @@ class NatnetSource:
         self._requests.close()
         if self._frames is not None:
             self._frames.close()
+
+    def _find_host(self, now_ns: int) -> None:
+        # A silent system may have another address by now.
+        if now_ns - max(self._framed_ns, self._looked_up_ns) >= _LOOK_UP_AGAIN_NS:
+            self._looked_up_ns = now_ns
+            self._host.look_up()
+        if self._host.failed != self._failed:
+            self._failed = self._host.failed
+            self.detail = self._failed or self._no_answer
 
     def _ask(self, now_ns: int) -> None:
         # A restarted system has no clients: it streams only to those that request it.
@@ -97,7 +110,7 @@ class NatnetSource:
 
     def _send(self, datagram: bytes) -> None:
         with suppress(OSError):  # a network that is down now may be up later
-            self._requests.sendto(datagram, self._place)
+            self._requests.sendto(datagram, (self._host.found[0], self._port))
 
     def _read(self, one: socket.socket) -> list[CapturedFrame]:
         frames = []
@@ -106,7 +119,7 @@ class NatnetSource:
                 datagram, sender = one.recvfrom(_LARGEST)
             except OSError:
                 break
-            if sender[0] != self._place[0]:
+            if sender[0] not in self._host.found:
                 self.rejected["stranger"] += 1
                 continue
             try:
@@ -146,7 +159,7 @@ class NatnetSource:
             frames.setblocking(False)
             frames.bind(("", port))
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as route:
-                route.connect(self._place)  # the interface that leads to the system
+                route.connect((self._host.found[0], self._port))  # the interface that leads to the system
                 local = route.getsockname()[0]
             membership = socket.inet_aton(group) + socket.inet_aton(local)
             frames.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)

@@ -8,12 +8,13 @@ from collections import Counter
 from contextlib import suppress
 
 from drivers import vehicle_socket
+from drivers.mavlink.links.datagram_cutter import DatagramCutter
 from drivers.mavlink.links.frame_codec import FrameCodec
 from drivers.mavlink.links.seam import Heard, Sniffer, Transport, ignore_bytes
 from drivers.mavlink.other_stations import speaks_as_we
 from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.wire.errors import WireError
-from drivers.mavlink.wire.frames import MAX_DATAGRAM, Message, ReceivedFrame, split
+from drivers.mavlink.wire.frames import MAX_DATAGRAM, Message, ReceivedFrame
 from drivers.mavlink.wire.names import AUTOPILOT_COMPONENT
 from drivers.mavlink.wire.signature import MAGIC_1
 from drivers.mavlink.wire.telemetry import OUR_HEARTBEAT
@@ -53,6 +54,7 @@ class UdpLink(Transport):
         self._peer = (address, int(port)) if way == "udpout" else None
         self._addresses: dict[int, tuple[tuple[str, int], int]] = {}
         self._codec, self._lock = FrameCodec(settings, signing), threading.Lock()
+        self._cutter = DatagramCutter(self._reject)
         self._sniffer, self._signed = sniffer, signing is not None
         self._greeted: dict[tuple[str, int], int] = {}
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -79,7 +81,7 @@ class UdpLink(Transport):
         return self._codec.newest_stamp
 
     def receive_raw(self) -> list[tuple[Heard, bytes]]:
-        """Wait up to 0.1 s for a datagram; return its frames, each with its bytes."""
+        """Wait up to 0.1 s for a datagram; return the frames that end in it, each with its bytes."""
         try:
             if not vehicle_socket.waits(self._socket, _POLL_S):
                 return []
@@ -95,19 +97,16 @@ class UdpLink(Transport):
         if self._peer is not None and source[0] != self._peer[0]:
             self._reject("foreign_address", f"{source[0]}:{source[1]}")
             return heard
-        try:
-            for raw in split(data, old=True):
-                if raw[0] == MAGIC_1:
-                    self._hear_old(now_ns, raw, source)
-                    continue
-                frame = self._decode(now_ns, raw, source)
-                if frame is None or speaks_as_we(frame, self._codec.own, self.rejected):
-                    continue
-                if self._is_at(now_ns, frame, source):
-                    self._sniffer(frame.system, now_ns, raw, True)
-                    heard.append((Heard(now_ns, frame), raw))
-        except WireError as error:
-            self._reject(error.reason, str(error))
+        for raw in self._cutter.take(now_ns, data, source):
+            if raw[0] == MAGIC_1:
+                self._hear_old(now_ns, raw, source)
+                continue
+            frame = self._decode(now_ns, raw, source)
+            if frame is None or speaks_as_we(frame, self._codec.own, self.rejected):
+                continue
+            if self._is_at(now_ns, frame, source):
+                self._sniffer(frame.system, now_ns, raw, True)
+                heard.append((Heard(now_ns, frame), raw))
         return heard
 
     def _hear_old(self, now_ns: int, raw: bytes, source: tuple[str, int]) -> None:

@@ -95,6 +95,18 @@ def _compare_sum(frame: bytes, end: int, number: int, system: int) -> None:
         raise WireError("checksum", f"message {number} from system {system}")
 
 
+def is_whole(frame: bytes) -> bool:
+    """Return whether a frame of MAVLink 1 or 2 is of a known kind and has the right checksum, genuine or not."""
+    try:
+        if frame[0] == MAGIC_1:
+            old_sender(frame)
+        else:
+            _check_sum(frame)
+    except WireError:
+        return False
+    return True
+
+
 def old_sender(frame: bytes) -> int:
     """Return the system that sent a whole frame of MAVLink 1; raises WireError (mavlink_2, size, or as for others).
 

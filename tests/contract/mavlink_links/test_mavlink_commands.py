@@ -206,6 +206,7 @@ def test_duplicates_strangers_and_rubbish_are_refused_by_name():
     assert len(link._judge(now + 4_000_000_000, beat, ("127.0.0.3", 1))) == 1
     assert link._judge(now, b"rubbish", ("127.0.0.3", 1)) == []
     assert len(link._judge(now, beat + beat[:-3], ("127.0.0.3", 1))) == 1
+    assert len(link._judge(now, beat, ("127.0.0.3", 1))) == 1, "the end of the frame before never came"
     own = FrameEncoder(255, 190).encode(telemetry.Heartbeat(6, 8, 0, 0, 4))
     assert link._judge(now, own, ("127.0.0.9", 1)) == []
     assert link.rejected == {"duplicate_system": 1, "no_frame": 1, "truncated": 1}

@@ -9,7 +9,9 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from drivers.mavlink.links.udp import UdpLink
 from drivers.mavlink.settings import LinkSettings
-from drivers.mavlink.wire.telemetry import Heartbeat
+from drivers.mavlink.wire.frames import FrameEncoder
+from drivers.mavlink.wire.telemetry import AttitudeQuaternion, Heartbeat
+from drivers.mavlink.wire.verification import Signing
 
 
 def test_a_link_that_is_opened_again_speaks_from_the_same_port(vehicle):
@@ -81,3 +83,54 @@ def test_a_frame_of_mavlink_2_is_heard_behind_one_of_mavlink_1_in_one_datagram(v
     assert [one.frame.system for one in link.receive()] == [7]
     assert link.rejected == {"mavlink_1": 2}
     link.close()
+
+
+def stream(*numbers: int, signing: Signing | None = None) -> bytes:
+    """Attitudes of one vehicle as they leave its serial port."""
+    encoder = FrameEncoder(7, 1, signing)
+    return b"".join(encoder.encode(AttitudeQuaternion(n, 1.0, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1)) for n in numbers)
+
+
+def heard_of(link: UdpLink, vehicle: socket.socket, port: int, data: bytes, size: int = 128) -> list[int]:
+    found = []
+    for begin in range(0, len(data), size):
+        vehicle.sendto(data[begin : begin + size], ("127.0.0.1", port))
+        found += [one.frame.message.time_boot_ms for one in link.receive()]
+    return found
+
+
+def test_no_frame_is_lost_behind_a_serial_bridge_that_cuts_frames(vehicle):
+    port = free_port(kind=socket.SOCK_DGRAM)
+    link = UdpLink(LinkSettings(target=f"udpin:127.0.0.1:{port}"))
+    assert heard_of(link, vehicle, port, stream(*range(50))) == list(range(50))
+    assert not link.rejected
+    link.close()
+
+
+def test_a_signed_link_refuses_frames_of_two_datagrams_by_the_same_rules(vehicle):
+    port = free_port(kind=socket.SOCK_DGRAM)
+    key, other = (Signing(bytes([byte]) * 32, 10**6) for byte in (1, 2))
+    link = UdpLink(LinkSettings(target=f"udpin:127.0.0.1:{port}"), signing=key)
+    genuine = stream(*range(20), signing=key)
+    assert heard_of(link, vehicle, port, genuine) == list(range(20))
+    assert heard_of(link, vehicle, port, genuine) == heard_of(link, vehicle, port, stream(*range(20))) == []
+    assert heard_of(link, vehicle, port, stream(*range(20), signing=other)) == []
+    assert link.rejected == {"replayed": 20, "unsigned": 20, "signature": 20}
+    link.close()
+
+
+def test_a_stranger_neither_completes_nor_hides_a_frame(vehicle):
+    """He sends the second half of a frame to both kinds of link, and the beginning of one that never ends."""
+    frame = stream(1)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+        stranger.bind(("127.0.0.1", 0))
+        port = free_port(kind=socket.SOCK_DGRAM)
+        link = UdpLink(LinkSettings(target=f"udpin:127.0.0.1:{port}"))
+        for sender, data in ((vehicle, frame[:20]), (stranger, frame[20:]), (stranger, b"\xfd\xff\x00")):
+            sender.sendto(data, ("127.0.0.1", port))
+            assert link.receive() == []
+        assert heard_of(link, vehicle, port, frame[20:]) == [1]
+        link.close()
+    out = UdpLink(LinkSettings(target="udpout:127.0.0.2:5"))
+    assert out._judge(0, frame[:20], ("127.0.0.7", 5)) == out._judge(0, frame[20:], ("127.0.0.2", 5)) == []
+    out.close()

@@ -1,6 +1,7 @@
 """A vehicle's texts for the operator, joined from pieces, and jumps of its clock. Pure."""
 
 from collections import deque
+from typing import NamedTuple
 
 from drivers.mavlink.wire.names import MavSeverity
 from drivers.mavlink.wire.telemetry import Statustext
@@ -9,43 +10,67 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 _PIECE = 50
 _JUMP_MS = 1000
 _PIECES = 8
+_NEXT_WITHIN_NS = NS_PER_S // 2
 _RECENT_S = 2
 # An older text explains no present event; ArduPilot's comes just after the heartbeat with the mode.
 _EXPLAINS_NS, _COMES_WITHIN_NS = 4 * NS_PER_S, 200 * NS_PER_MS
-Said = tuple[int, str]  # severity 0 emergency .. 7 debug, text
+
+
+class Said(NamedTuple):
+    """A whole text: when its first piece came, severity 0 emergency .. 7 debug."""
+
+    at_ns: int
+    severity: int
+    text: str
 
 
 class Texts:
     """Joins the pieces of long texts and remembers the last ones with their times.
 
-    WIRE (STATUSTEXT, MAVLink 2): pieces of one text share an id other than 0; all but the last are full.
+    WIRE (docs/reference/mavlink.md 5.13): a vehicle sends its texts one after another; all pieces but the last are
+    full, the last may be full too.
     """
 
     def __init__(self) -> None:
-        self._pieces: dict[int, list[str]] = {}
-        self._heard: deque[tuple[int, Said]] = deque(maxlen=32)
+        self._pieces: list[Statustext] = []
+        self._began_ns = self._came_ns = 0
+        self._heard: deque[Said] = deque(maxlen=32)
 
-    def take(self, now_ns: int, message: Statustext) -> Said | None:
-        """Take a piece; return the text that it completes, if any. A lost piece is left out."""
-        text = message.text
-        if message.id:
-            pieces = self._pieces.setdefault(message.id, [])
-            pieces.append(text)
-            if len(text) >= _PIECE and len(pieces) < _PIECES:
-                if len(self._pieces) > _PIECES:
-                    del self._pieces[next(iter(self._pieces))]
-                return None
-            text = "".join(self._pieces.pop(message.id))
-        text = text.rstrip()  # WIRE (PX4): a tab at the end marks a text also sent as an event
-        self._heard.append((now_ns, (message.severity, text)))
-        return message.severity, text
+    def whole(self, now_ns: int, pieces: deque[tuple[int, Statustext]]) -> list[Said]:
+        """Take all pieces from a queue with their times; return the texts that are whole by now, the oldest first.
+
+        A lost piece is left out.
+        """
+        said = []
+        while pieces:
+            said += self._take(*pieces.popleft())
+        return said + (self._ended() if now_ns - self._came_ns >= _NEXT_WITHIN_NS else [])
+
+    def _take(self, at_ns: int, piece: Statustext) -> list[Said]:
+        last = self._pieces[-1] if self._pieces else None
+        goes_on = last is not None and piece.id == last.id and piece.chunk_seq > last.chunk_seq
+        said = [] if goes_on else self._ended()
+        if not goes_on:
+            self._began_ns = at_ns
+        self._pieces.append(piece)
+        self._came_ns = at_ns
+        is_last = len(piece.text.encode()) < _PIECE or len(self._pieces) >= _PIECES
+        return said + self._ended() if is_last else said
+
+    def _ended(self) -> list[Said]:
+        """Return the text of all waiting pieces, if it has any letters."""
+        text = "".join(piece.text for piece in self._pieces).rstrip()  # WIRE (PX4): a tab marks one also sent as event
+        said = [Said(self._began_ns, self._pieces[0].severity, text)] if text else []
+        self._pieces.clear()
+        self._heard.extend(said)
+        return said
 
     def reasons(self, since_ns: int, word: str = "", now_ns: int | None = None) -> list[str]:
         """Return its distinct warnings since a time, oldest first; word: only those that contain it.
 
         now_ns: if given, add the age of those older than 2 s.
         """
-        newest = {text: at for at, (level, text) in self._heard if at >= since_ns and level <= MavSeverity.WARNING}
+        newest = {text: at for at, level, text in self._heard if at >= since_ns and level <= MavSeverity.WARNING}
         return [text + _age(at, now_ns) for text, at in newest.items() if word in text.lower()]
 
 

@@ -265,11 +265,9 @@ class MavlinkVehicle:
         events = self.orders.events
         while self._session.notes:
             events.append((MavSeverity.WARNING, self._session.notes.popleft()))
-        while self.texts:
-            said = self._said.take(*self.texts.popleft())
-            if said is not None:
-                self.orders.said.take(now_ns, said[1])
-                events.append(said)
+        for at_ns, severity, text in self._said.whole(now_ns, self.texts):
+            self.orders.said.take(at_ns, text)
+            events.append((severity, text))
         while self._jumps:
             jump_s = self._jumps.popleft() / 1000
             why = "it restarted, or two vehicles share its system id"

@@ -68,7 +68,7 @@ class MavlinkEmulator:
         self._clients: dict[Address, int] = {}
         self._ground_ns: int | None = None
         self._lists: dict[Address, int] = {}
-        self._ticks = self._long_texts = 0
+        self._ticks = self._texts = 0
         self._wrong = wrong or None
         self.habits = LinkHabits()
         self._greeted = False
@@ -156,16 +156,18 @@ class MavlinkEmulator:
         self._send_lists()
 
     def _say(self, severity: int, text: str) -> None:
+        # WIRE (docs/reference/mavlink.md 5.13): pieces of 50 characters. PX4 numbers every text, from 0; the last piece
+        # of an ArduPilot's long text is not full. PX4's tab: the text is also sent as an event.
         if self.firmware.flavour is Flavour.PX4:
-            text += "\t"  # WIRE (PX4 1.16): the text is also sent as an event
-        # WIRE (STATUSTEXT): 50 characters; longer ones go in pieces with an id, of which the last is not full.
-        if len(text) <= _TEXT_SIZE:
-            self._send_to_all(t.Statustext(severity, text))
-            return
-        self._long_texts = self._long_texts % 65535 + 1
-        for piece in range(len(text) // _TEXT_SIZE + 1):
+            text, number = text + "\t", self._texts
+            pieces = (len(text) - 1) // _TEXT_SIZE + 1
+        else:
+            number = self._texts % 65535 + 1 if len(text) > _TEXT_SIZE else 0
+            pieces = len(text) // _TEXT_SIZE + 1 if number else 1
+        self._texts = (self._texts + 1) % 65536
+        for piece in range(pieces):
             part = text[piece * _TEXT_SIZE : (piece + 1) * _TEXT_SIZE]
-            self._send_to_all(t.Statustext(severity, part, self._long_texts, piece))
+            self._send_to_all(t.Statustext(severity, part, number, piece))
 
     def _send_lists(self) -> None:
         names = self.firmware.parameters.names

@@ -1,11 +1,9 @@
-"""Link quality by sequence numbers: losses count, reordering does not; the age of a vehicle's telemetry."""
+"""Link quality by sequence numbers: losses count, reordering does not."""
 
 import numpy as np
 import pytest
 
-from drivers.mavlink.texts import Texts
 from drivers.mavlink.traffic import Traffic
-from drivers.mavlink.wire.telemetry import Statustext
 
 S = 1_000_000_000
 MS = 1_000_000
@@ -37,14 +35,3 @@ def test_of_reordered_frames_the_lost_ones_are_missing():
 
 def test_a_restart_is_no_loss():
     assert quality([*range(100), *range(200)]) == pytest.approx(1.0, abs=0.01)
-
-
-def test_a_reason_that_is_old_says_so():
-    texts = Texts()
-    texts.take(S, Statustext(4, "Arm: gyros inconsistent"))
-    texts.take(18 * S, Statustext(4, "Arm: not level"))
-    assert texts.reasons(0, "arm", 20 * S) == ["Arm: gyros inconsistent (19 s ago)", "Arm: not level"]
-
-
-def test_the_tab_at_the_end_of_a_px4s_text_is_not_told():
-    assert Texts().take(S, Statustext(6, "Takeoff detected\t")) == (6, "Takeoff detected")

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from drivers.mavlink.battery import Batteries
 from drivers.mavlink.convert import BaseAttitude
 from drivers.mavlink.turning import turned_on
 from drivers.mavlink.wire.names import ARMED, Landed
@@ -11,6 +12,7 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 # Longer than a vehicle with stopped motors takes to be on the floor and to report it.
 _FALLS_NS = 5 * NS_PER_S
 FRESH_NS = 300 * NS_PER_MS
+_NO_BATTERY = Batteries()
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,8 +36,7 @@ class LatestTelemetry:
     healthy: int = 0
     transmitter: bool = False
     ekf: int = 0
-    battery: float | None = None
-    battery_ns: int = 0
+    batteries: Batteries = _NO_BATTERY
     attitude: BaseAttitude | None = None
     attitude_ns: int = 0
     inertial: tuple[float, ...] = ()

@@ -32,8 +32,6 @@ from groundstation.time_units import NEVER_NS, NS_PER_MS, NS_PER_S
 
 _HEARTBEAT_NS = 4 * NS_PER_S
 _ASKS_NS = 3 * NS_PER_S
-# Requested twice a second; an older charge counts as unknown.
-_BATTERY_NS = 10 * NS_PER_S
 # A refusal is reported only after its STATUSTEXT: the COMMAND_ACK arrives first.
 _EXPLAIN_NS = 700 * NS_PER_MS
 _Value = service.ParamValue | telemetry.GpsGlobalOrigin | telemetry.AutopilotVersion
@@ -143,10 +141,12 @@ class MavlinkVehicle:
                 healthy = message.onboard_control_sensors_health
                 # WIRE (PX4): a sensor that is not there is reported as healthy too.
                 heard = message.onboard_control_sensors_present & healthy & SensorBits.RC_RECEIVER
-                known = replace(known, healthy=healthy, transmitter=bool(heard))
-                return _charged(now_ns, message.battery_remaining, known)
-            case telemetry.BatteryStatus(id=0):  # the others feed a payload
-                return _charged(now_ns, message.battery_remaining, known)
+                batteries = known.batteries.with_lowest(now_ns, message.battery_remaining)
+                return replace(known, healthy=healthy, transmitter=bool(heard), batteries=batteries)
+            case telemetry.BatteryStatus(id=0):  # the others may feed a payload
+                if news := known.batteries.news(message):
+                    self._session.notes.append(news)
+                return replace(known, batteries=known.batteries.with_first(now_ns, message))
             case telemetry.EkfStatusReport():
                 self._publisher.stated.take(now_ns, message)
                 return replace(known, ekf=message.flags)
@@ -193,7 +193,7 @@ class MavlinkVehicle:
             state = FlightState.TAKING_OFF if known.base_mode & ARMED else FlightState.LANDED
         velocity = self._true_velocity(now_ns, known) if self.orders.are_heeded(now_ns, known.custom_mode) else None
         not_ready = self._readiness.why_not(now_ns, known)
-        battery = known.battery if now_ns - known.battery_ns < _BATTERY_NS else None
+        battery = known.batteries.charge(now_ns)
         lost_s, mute = self.vision.lost_s(now_ns), "" if fresh else self._mute(now_ns, known)
         return VehicleView(
             state, fresh, battery, not_ready, unsound=unsound, velocity_m_s=velocity, lost_s=lost_s, mute=mute
@@ -309,8 +309,3 @@ class MavlinkVehicle:
 
     def close(self) -> None:
         """Do nothing: the link is the driver's."""
-
-
-def _charged(now_ns: int, percent: int, known: LatestTelemetry) -> LatestTelemetry:
-    # WIRE: -1 means unknown; a charge known a moment ago still holds.
-    return replace(known, battery=min(percent, 100) / 100, battery_ns=now_ns) if percent >= 0 else known

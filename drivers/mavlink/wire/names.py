@@ -77,6 +77,15 @@ class Landed(IntEnum):
     LANDING = 4
 
 
+class ChargeState(IntEnum):
+    """MAV_BATTERY_CHARGE_STATE: those below OK."""
+
+    LOW = 2
+    CRITICAL = 3
+    EMERGENCY = 4
+    FAILED = 5
+
+
 class SensorBits(IntFlag):
     """MAV_SYS_STATUS_SENSOR."""
 

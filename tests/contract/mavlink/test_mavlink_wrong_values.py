@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from drivers.mavlink.wire.flight import CommandLong
-from drivers.mavlink.wire.names import Landed, MavCmd, land_mode
+from drivers.mavlink.wire.names import ChargeState, Landed, MavCmd, land_mode
 from drivers.mavlink.wire.telemetry import (
     AttitudeQuaternion,
     BatteryStatus,
@@ -129,6 +129,30 @@ def test_a_battery_that_is_told_no_more_is_unknown_and_lands_it(rig_of):
     assert rig.mode == "TRACK"
     rig.until(lambda: rig.mode == "LANDING", 6.0)
     assert rig.host.watchdog.reason == "its battery is unknown"
+
+
+def test_a_battery_that_its_autopilot_judges_critical_lands_it_whatever_its_charge(rig):
+    """An ArduPilot's charge is 100 % at power-on; its voltage failsafe shows in charge_state only."""
+    rig.track_on()
+    liar = Liar(rig.link)
+    liar.set(BatteryStatus, charge_state=ChargeState.LOW)
+    rig.run(5.0)
+    assert rig.mode == "TRACK"
+    assert sum("its autopilot says that its battery is low" in text for text in rig.texts) == 1
+    liar.set(BatteryStatus, charge_state=ChargeState.CRITICAL)
+    rig.until(lambda: rig.mode == "LANDING", 6.0)
+    assert rig.host.watchdog.reason == "battery below its limit"
+    assert sum("its battery is critical" in text for text in rig.texts) == 1
+    rig.until(lambda: rig.body.on_ground and not rig.copter.motors_on, 10.0)
+
+
+def test_a_vehicle_whose_autopilot_judges_its_battery_failed_takes_off_not(rig):
+    rig.connect()
+    Liar(rig.link).set(BatteryStatus, charge_state=ChargeState.FAILED)
+    rig.run(3.0)
+    rig.order(Verb.TAKEOFF)
+    rig.run(2.0)
+    assert rig.mode == "LANDED" and not rig.copter.motors_on
 
 
 def test_a_vehicle_that_says_in_flight_that_it_stands_is_landed(rig):

@@ -96,9 +96,11 @@ def overload(figures: RunFigures) -> str:
 
 def _against_truth(figures: RunFigures, field: ResolvedField, expected: Expectation) -> Iterator[Criterion]:
     yield from _of_the_target(figures, expected)
-    judged = min((one.judged for one in figures.targets.values()), default=None)
-    if judged is not None and judged < 1.0:
-        yield _above("target_judged", judged, MIN_JUDGED)
+    if figures.targets:
+        # One that the truth never shows while it shows others was not judged at all.
+        judged = min(figures.targets[name].judged if name in figures.targets else 0.0 for name in field.tracked)
+        if judged < 1.0:
+            yield _above("target_judged", judged, MIN_JUDGED)
     yield _below("max_fence_violation_m", figures.max_fence_violation_m, 0.0)
     if len(field.drones) > 1:
         yield _above("min_separation_m", figures.min_separation_m, field.safety.min_separation_m)

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import msgspec
 
-from groundstation.bus.messages import STANDING, UP, Verb
+from groundstation.bus.messages import AIRBORNE, STANDING, UP, Verb
 from groundstation.report.tracks import RunData
 
 _ENDING = frozenset({"LANDING", "CUT"})
@@ -65,7 +65,7 @@ def _faults(data: RunData) -> Iterator[Happening]:
 
 def _reactions(data: RunData, drone: str) -> Iterator[Happening]:
     """Yield each entry into a mode by a failsafe, and each unexplained end of a flight."""
-    before, up_since_s, explained = ("", ""), None, False
+    before, left_s, up, explained = ("", ""), None, False, False
     for item in sorted(data.vehicles[drone], key=lambda item: item.time_s):
         status, now = item.message, (item.message.mode, item.message.failsafe)
         if status.failsafe and now != before:
@@ -74,13 +74,15 @@ def _reactions(data: RunData, drone: str) -> Iterator[Happening]:
             text = f"{status.mode} by failsafe {status.failsafe}: {status.detail}"
             yield Happening(item.time_s, drone, status.failsafe, text, ends)
         before = now
-        if status.flight_state in UP and up_since_s is None:
-            up_since_s, explained = item.time_s, False
-        elif status.flight_state in STANDING and up_since_s is not None:
-            if not explained and not _ordered(data, drone, up_since_s, item.time_s):
+        if status.flight_state in AIRBORNE and left_s is None:
+            left_s = item.time_s
+        if status.flight_state in UP and not up:
+            up, explained = True, False
+        elif status.flight_state in STANDING and left_s is not None:
+            if up and not explained and not _ordered(data, drone, left_s, item.time_s):
                 text = "came down without an order and without its driver"
                 yield Happening(item.time_s, drone, UNEXPLAINED, text, True)
-            up_since_s = None
+            left_s, up = None, False
 
 
 def _ordered(data: RunData, drone: str, start_s: float, end_s: float) -> bool:

@@ -1,24 +1,53 @@
-"""The part of a run that counts: from the first drone that may track to the command that ends it."""
+"""The parts of a run that count: from TRACK to the commands that end each flight of the team."""
 
 from groundstation.bus.messages import AckStage, Verb
 from groundstation.report.tracks import RunData
 
 _STARTED = (AckStage.ACCEPTED, AckStage.EFFECTIVE)
+_ENDS, _STARTS = (Verb.LAND, Verb.CUT_MOTORS), (Verb.TAKEOFF, Verb.TRACK)
+
+Span = tuple[float, float]
 
 
-def tracking_interval(data: RunData) -> tuple[float, float] | None:
-    """Return (start, end) [s], or None when no drone ever accepted TRACK.
+def tracking_spans(data: RunData) -> tuple[Span, ...]:
+    """Return (start, end) [s] of each flight; none when no drone ever accepted TRACK.
 
-    It ends with the LAND or CUT_MOTORS of the whole team, or else with the last message.
+    A flight ends once LAND or CUT_MOTORS was ordered to all of the team, at once or one by one, else with the last
+    message.
     """
-    starts = [ack.time_s for ack in data.acks if ack.message.verb is Verb.TRACK and ack.message.stage in _STARTED]
-    if not starts:
-        return None
-    start = min(starts)
-    team = set(data.drones)
+    spans = list[Span]()
+    for start in sorted(_accepted(data)):
+        if not spans or start > spans[-1][1]:
+            spans.append((start, _end(data, start)))
+    return tuple(spans)
+
+
+def tracking_interval(data: RunData) -> Span | None:
+    """Return the begin of the first flight and the end of the last [s], or None without a flight."""
+    spans = tracking_spans(data)
+    return (spans[0][0], spans[-1][1]) if spans else None
+
+
+def _accepted(data: RunData) -> list[float]:
+    """Return when each TRACK was first accepted [s]: answers are repeated."""
+    first = dict[str, float]()
+    for ack in data.acks:
+        if ack.message.verb is Verb.TRACK and ack.message.stage in _STARTED:
+            before = first.get(ack.message.command_id, ack.time_s)
+            first[ack.message.command_id] = min(before, ack.time_s)
+    return list(first.values())
+
+
+def _end(data: RunData, start: float) -> float:
+    team, down = set(data.drones), set[str]()
     for command in data.commands:
-        scope = set(command.message.scope)
-        ends = command.message.verb in (Verb.LAND, Verb.CUT_MOTORS) and (not scope or (bool(team) and scope >= team))
-        if ends and command.time_s >= start:
-            return start, command.time_s
-    return start, max(start, data.end_s)
+        verb, scope = command.message.verb, set(command.message.scope or team)
+        if command.time_s < start:
+            continue
+        if verb in _STARTS:
+            down -= scope
+        elif verb in _ENDS:
+            down |= scope
+            if down >= team:
+                return command.time_s
+    return max(start, data.end_s)

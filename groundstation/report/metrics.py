@@ -5,12 +5,13 @@ from collections import Counter
 import msgspec
 import numpy as np
 
+from groundstation.arrays import Array
 from groundstation.bus.messages import Severity, Verdict
 from groundstation.estimation.tracking_errors import TrackingFigures, tracking_figures
 from groundstation.report import load, safety, topology_use
 from groundstation.report.accuracy import RATE_HZ, Accuracy, accuracy, errors_at, time_grid
 from groundstation.report.happenings import happenings, landings
-from groundstation.report.interval import tracking_interval
+from groundstation.report.interval import tracking_interval, tracking_spans
 from groundstation.report.tracks import RunData
 
 
@@ -64,18 +65,20 @@ def figures_of(data: RunData) -> RunFigures:
     """Return the figures of a run."""
     interval = tracking_interval(data)
     start, end = interval or (0.0, 0.0)
-    targets, robots = _accuracies(data, interval)
+    spans = tracking_spans(data)
+    grid = np.concatenate([time_grid(*span) for span in spans]) if spans else np.empty(0)
+    targets, robots = _accuracies(data, grid) if spans else ({}, {})
     target = max(targets.values(), key=lambda one: one.rmse_m, default=None)
     planner = None if data.rerun else load.planner_ms(data)  # a re-run's plans have no real time
     ticks, missed, rate = load.tracker_deadlines(data)
     cores = load.cpu_cores(data)
     return RunFigures(
-        tracked_s=round(end - start, 3),
+        tracked_s=round(sum(until - since for since, until in spans), 3),
         target_rmse_m=target.rmse_m if target else None,
         target_lost_s=max((one.lost_s for one in targets.values()), default=None),
         target=target,
         targets=targets,
-        found={name: _found(data, name, start, end) for name in targets},
+        found={name: _found(data, name, grid) for name in targets},
         robots=robots,
         max_fence_violation_m=safety.max_fence_violation_m(data),
         min_separation_m=safety.min_separation_m(data),
@@ -104,11 +107,8 @@ def figures_of(data: RunData) -> RunFigures:
     )
 
 
-def _accuracies(data: RunData, interval: tuple[float, float] | None) -> tuple[dict[str, Accuracy], dict[str, Accuracy]]:
-    """Return the figures of all targets and of all robots."""
-    if interval is None:
-        return {}, {}
-    grid = time_grid(*interval)
+def _accuracies(data: RunData, grid: Array) -> tuple[dict[str, Accuracy], dict[str, Accuracy]]:
+    """Return the figures of all targets and of all robots at some times."""
     targets: dict[str, Accuracy] = {}
     robots: dict[str, Accuracy] = {}
     for name in data.tracked:
@@ -123,9 +123,9 @@ def _accuracies(data: RunData, interval: tuple[float, float] | None) -> tuple[di
     return targets, robots
 
 
-def _found(data: RunData, name: str, start: float, end: float) -> TrackingFigures | None:
+def _found(data: RunData, name: str, grid: Array) -> TrackingFigures | None:
     """Return the figures of a target from when it was found, over the times at which its truth is known."""
-    truth, grid = data.truth[name], time_grid(start, end)
+    truth = data.truth[name]
     errors = errors_at(grid[truth.known_at(grid)], truth, data.estimates.get(name), 2)
     return tracking_figures(np.linalg.norm(errors, axis=1), 1.0 / RATE_HZ)
 

@@ -2,6 +2,7 @@
 
 import math
 
+import msgspec
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -135,3 +136,8 @@ def test_a_flight_that_was_judged_for_less_than_half_of_its_time_does_not_pass(l
         found = {one.name: one for one in criteria_of(figures_of(data), lab_field, RunFacts())}
         assert found["target_rmse_m"].ok
         assert found["target_judged"].ok is good
+        two = msgspec.structs.replace(
+            lab_field, target=None, targets=dict.fromkeys(("turtlebot", "rover"), lab_field.target)
+        )
+        found = {one.name: one for one in criteria_of(figures_of(data), two, RunFacts())}
+        assert (found["target_judged"].value, found["target_judged"].ok) == (0.0, False), "nothing shows the rover"

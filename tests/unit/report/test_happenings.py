@@ -113,6 +113,11 @@ def test_an_ordered_landing_is_no_failsafe():
 
 
 def test_a_landing_without_command_and_driver_is_unexplained():
+    rises = data(
+        (1, m.FlightState.TAKING_OFF, "TAKING_OFF", ""), (3.03, UP, "LANDING", ""), (7, DOWN, "LANDED", ""),
+        commands=[(3.0, m.Verb.LAND, ())],
+    )  # fmt: skip
+    assert landings(happenings(rises)) == [], "ordered while it took off"
     flown = data((1, UP, "TRACK", ""), (6, DOWN, "CONNECTING", ""), commands=[(8.0, m.Verb.LAND, ())])
     assert [(item.time_s, item.cause) for item in landings(happenings(flown))] == [(6.0, UNEXPLAINED)]
     of_another = data((1, UP, "TRACK", ""), (6, DOWN, "LANDED", ""), commands=[(5.0, m.Verb.LAND, ("b",))])

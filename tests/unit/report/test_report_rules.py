@@ -1,5 +1,6 @@
 """The rules of the report one by one: definitions of tracking, switch, late, CPU."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,12 +11,12 @@ import pytest
 from groundstation.bus import messages as m
 from groundstation.field.drones import FieldDrone, OnboardCamera
 from groundstation.field.room import Fence, LensCalibration
-from groundstation.field.targets import DroneMarker
+from groundstation.field.targets import DroneMarker, Target, TargetMarker
 from groundstation.geometry.ellipse import semi_axes_95
 from groundstation.report import load, topology_use
 from groundstation.report.accuracy import accuracy
 from groundstation.report.criteria import Criterion, criteria_of, invalidity, overload
-from groundstation.report.interval import tracking_interval
+from groundstation.report.interval import tracking_interval, tracking_spans
 from groundstation.report.judge import judge
 from groundstation.report.metrics import figures_of
 from groundstation.report.run_facts import RunFacts
@@ -39,6 +40,7 @@ DRONE = FieldDrone(
     camera=OnboardCamera(source="/dev/video0", calibration=LENS),
     pad_m=(0.0, 0.0),
 )
+TARGET = Target(marker=TargetMarker(code=5))
 HEADER = m.Header(0, "here", "team", "tester", 0)
 
 
@@ -47,8 +49,8 @@ def _data(**content: object) -> RunData:
     return RunData(resolved, RunFacts(), end_s=100.0, **content)  # type: ignore[arg-type]
 
 
-def _ack(time_s: float, verb: m.Verb, stage: m.AckStage) -> TimedMessage[m.CommandAck]:
-    return TimedMessage(time_s, m.CommandAck(header=HEADER, command_id="x", verb=verb, stage=stage))
+def _ack(time_s: float, verb: m.Verb, stage: m.AckStage, name: str = "x") -> TimedMessage[m.CommandAck]:
+    return TimedMessage(time_s, m.CommandAck(header=HEADER, command_id=name, verb=verb, stage=stage))
 
 
 def _command(time_s: float, verb: m.Verb, *scope: str) -> TimedMessage[m.Command]:
@@ -117,6 +119,33 @@ def test_tracking_begins_with_the_first_drone_and_ends_with_the_teams_landing() 
     ]
     assert tracking_interval(_data(acks=acks, commands=commands)) == (5.0, 40.0)
     assert tracking_interval(_data(acks=acks, commands=commands[:3])) == (5.0, 100.0)
+
+
+def test_each_flight_of_a_run_counts_but_not_the_time_between_them() -> None:
+    acks = [
+        _ack(at_s, m.Verb.TRACK, m.AckStage.ACCEPTED, name) for at_s, name in ((5.0, "x"), (60.0, "y"), (41.0, "x"))
+    ]
+    commands = [_command(40.0, m.Verb.LAND), _command(55.0, m.Verb.TAKEOFF), _command(90.0, m.Verb.CUT_MOTORS)]
+    data = _data(acks=acks, commands=commands)
+    assert tracking_spans(data) == ((5.0, 40.0), (60.0, 90.0)) and tracking_interval(data) == (5.0, 90.0)
+    at_s = np.arange(0.0, 100.0, 0.05)
+    away_m = np.select([at_s < 40.0, at_s < 60.0], [0.0, 100.0], 0.4)
+    estimate = EstimateTrack(
+        "target", at_s, np.column_stack((away_m, 0.0 * at_s)), np.tile(np.eye(2), (len(at_s), 1, 1))
+    )
+    still = TruthTrack(at_s, np.zeros((len(at_s), 3)), np.zeros(len(at_s)), np.ones(len(at_s), bool))
+    resolved = msgspec.structs.replace(data.resolved, target=None, targets={"t": TARGET})
+    figures = figures_of(replace(data, resolved=resolved, truth={"t": still}, estimates={"t": estimate}))
+    assert figures.tracked_s == 65.0
+    assert figures.target_rmse_m == pytest.approx(0.4 * math.sqrt(30.0 / 65.0), abs=0.002)
+
+
+def test_drones_that_are_landed_one_by_one_end_a_flight_and_a_change_of_battery_does_not() -> None:
+    acks = [_ack(5.0, m.Verb.TRACK, m.AckStage.ACCEPTED)]
+    lands_a, lands_b = _command(20.0, m.Verb.LAND, "a"), _command(30.0, m.Verb.LAND, "b")
+    assert tracking_spans(_data(acks=acks, commands=[lands_a, lands_b])) == ((5.0, 30.0),)
+    again = _command(25.0, m.Verb.TAKEOFF, "a")
+    assert tracking_spans(_data(acks=acks, commands=[lands_a, again, lands_b])) == ((5.0, 100.0),)
 
 
 def test_a_robot_that_joins_is_no_switch() -> None:

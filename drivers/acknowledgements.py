@@ -7,11 +7,11 @@ _REMEMBERED_COMMANDS = 256
 
 
 class AckBook:
-    """Remembers answers by the command's id, and the accepted command that is not effective yet."""
+    """Remembers answers by the command's id, and the accepted commands that are not effective yet: all of one verb."""
 
     def __init__(self) -> None:
         self._answers: dict[str, Ack] = {}
-        self._pending: Command | None = None
+        self._pending: list[Command] = []
 
     def answered(self, command: Command) -> Ack | None:
         """Return the earlier answer to this command."""
@@ -25,22 +25,22 @@ class AckBook:
             self._answers.pop(next(iter(self._answers)))
         self._answers[command.id] = answer
         if not refusal:
-            self._pending = command
+            self._pending = [*(one for one in self._pending if one.verb is command.verb), command]
         return answer
 
     def enter(self, mode: DriverMode) -> None:
         """Drop the commands that can no longer become effective in a mode."""
-        if mode not in ALOFT and self._pending is not None and self._pending.verb not in (Verb.LAND, Verb.CUT_MOTORS):
-            self._pending = None
+        if mode not in ALOFT:
+            self._pending = [one for one in self._pending if one.verb in (Verb.LAND, Verb.CUT_MOTORS)]
 
     def effective(self, mode: DriverMode, vehicle: VehicleView, flies: bool) -> tuple[Ack, ...]:
         """Return the answers that are due; flies: whether a setpoint is obeyed."""
-        if self._pending is None or not _is_effective(self._pending.verb, mode, vehicle, flies):
+        if not self._pending or not _is_effective(self._pending[0].verb, mode, vehicle, flies):
             return ()
-        ack = Ack(self._pending.id, self._pending.verb, AckStage.EFFECTIVE)
-        self._pending = None
-        self._answers[ack.command_id] = ack
-        return (ack,)
+        acks = tuple(Ack(one.id, one.verb, AckStage.EFFECTIVE) for one in self._pending)
+        self._pending = []
+        self._answers |= {ack.command_id: ack for ack in acks}
+        return acks
 
 
 def _is_effective(verb: Verb, mode: DriverMode, vehicle: VehicleView, flies: bool) -> bool:

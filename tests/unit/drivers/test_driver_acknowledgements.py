@@ -45,6 +45,18 @@ def test_an_effective_command_is_reported_once_and_remembered() -> None:
     assert book.answered(command("a")) == done[0]
 
 
+def test_of_two_equal_commands_both_become_effective() -> None:
+    """Two operators order LAND before the touchdown; the first one's shell said that it was not confirmed."""
+    book = AckBook()
+    book.answer(command("other", Verb.HOLD), "")
+    book.answer(command("a"), "")
+    book.answer(command("b"), "")
+    told = book.effective(DriverMode.LANDED, view(FlightState.LANDED), flies=False)
+    assert told == (Ack("a", Verb.LAND, AckStage.EFFECTIVE), Ack("b", Verb.LAND, AckStage.EFFECTIVE))
+    assert (book.answered(command("a")), book.answered(command("b"))) == told
+    assert book.effective(DriverMode.LANDED, view(FlightState.LANDED), flies=False) == ()
+
+
 def test_a_refused_one_is_not_waited_for_and_does_not_end_the_wait_for_another() -> None:
     book = AckBook()
     book.answer(command("a"), "")

@@ -73,8 +73,15 @@ def _changed(figures: Figures, theta: Vector, key: Key, now: Any) -> Any:
         known = rotation_from_euler(*np.radians(figures.field.cameras[who].rotation_deg).tolist())
         return np.round(np.degrees(euler_from_rotation(turned @ known)), 3).tolist()
     if part in _NAMES or part.endswith("delay"):
-        return round(now + error * unit_of(part)[0], 2)
+        return _settable(part, round(now + error * unit_of(part)[0], 2))
     return round(now * (1.0 + error), 4)
+
+
+def _settable(part: str, value: float) -> float:
+    """Return the nearest value that the setting of a figure may have [deg or ms]."""
+    if part.endswith("delay"):
+        return max(0.0, value)
+    return round(math.remainder(value, 360.0), 2) if part == "pan" else max(-90.0, min(90.0, value))
 
 
 def with_changes(field: ResolvedField, new: Mapping[Path, Any]) -> ResolvedField:

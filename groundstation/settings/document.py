@@ -126,8 +126,13 @@ def _neighbours(path: Path) -> str:
     return f", did you mean {path.parent / near[0]}?" if near else ""
 
 
+def without_end(text: str) -> str:
+    """Return a document without the mark of its end (`---`, as ROS prints it), which would begin another."""
+    return _END.sub("\n", text)
+
+
 def parse(text: str, place: str, line: int | None = None) -> Node:
-    """Return the tree of one YAML document, behind which nothing but its end may follow (`---`, as ROS prints it).
+    """Return the tree of one YAML document, behind which nothing but the mark of its end may follow.
 
     line: fixes the line of all nodes (0 for options).
     """
@@ -136,7 +141,7 @@ def parse(text: str, place: str, line: int | None = None) -> Node:
 
     yaml = YAML(typ="safe", pure=True)
     try:
-        root = yaml.compose(_END.sub("\n", text))
+        root = yaml.compose(without_end(text))
         if root is None:
             raise SettingsError([f"{place}: is empty"])
         reader = _Reader(place, line, yaml.constructor)
@@ -217,8 +222,9 @@ class _Reader:
             return source.value
         try:
             return self._constructor.construct_object(source)
-        except ValueError:
+        except (ValueError, KeyError, IndexError):  # of an explicit tag, the latter two: !!bool maybe, !!int ''
+            what = "a number" if kind in ("int", "float") else f"a {kind}"
             self.problems.append(
-                f"{origin}: {dotted(origin.path)}: {without_password(source.value)[:40]!r} is not a number"
+                f"{origin}: {dotted(origin.path)}: {without_password(source.value)[:40]!r} is not {what}"
             )
             return None

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from groundstation.errors import OperatorMistake, SettingsError
+from groundstation.settings.document import without_end
 from groundstation.settings.load import load_field
 
 Changes = Mapping[tuple[str, ...], Any]
@@ -30,7 +31,7 @@ def patched(text: str, changes: Changes, resolved: Mapping[str, Any]) -> str:
     """
     from ruamel.yaml import YAML
 
-    tree = YAML().load(text)
+    tree = YAML().load(without_end(text))
     for path, value in changes.items():
         _placed(tree, path, value, resolved)
     return _written(tree)
@@ -47,8 +48,8 @@ def write_patched(target: Path, text: str, changes: Changes, resolved: Mapping[s
         raise OperatorMistake(f"{target}: cannot be written ({error.strerror})") from None
     except SettingsError as error:
         problem = error.problems[0].replace(str(tried), str(target))
-        remedy = "write it beside the field file, whose calibrations it names"
-        raise OperatorMistake(f"{target}: is not written, it could not be used ({problem}): {remedy}") from None
+        beside = ": write it beside the field file, whose calibrations it names" if "no such file" in problem else ""
+        raise OperatorMistake(f"{target}: is not written, it could not be used ({problem}){beside}") from None
     finally:
         with suppress(OSError):
             tried.unlink()

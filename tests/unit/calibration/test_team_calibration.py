@@ -1,5 +1,6 @@
 """Calibration of all team settings from one recording: finds each wrong one with its size, and no others."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -59,6 +60,26 @@ def test_late_telemetry_changes_no_setting(lab_field: ResolvedField) -> None:
     late = np.zeros(len(figures.keys))
     late[figures.place["drone_1", "own_delay"]] = 0.05
     assert changes(figures, late, late != 0.0) == {}
+
+
+@pytest.mark.parametrize(
+    ("part", "now", "setting", "wanted"),
+    [
+        ("pan", {"camera": {"pan_left_deg": 179.0}}, "pan_left_deg", -179.0),
+        ("tilt", {"camera": {"tilt_down_deg": 89.0}}, "tilt_down_deg", 90.0),
+        ("velocity_delay", {"odometry": {"velocity_delay_ms": 30.0}}, "velocity_delay_ms", 0.0),
+    ],
+)
+def test_new_values_are_such_as_can_be_set(
+    lab_field: ResolvedField, part: str, now: dict[str, dict[str, float]], setting: str, wanted: float
+) -> None:
+    ((section, values),) = now.items()
+    place = ("drones", "drone_1", section, setting)
+    field = with_changes(lab_field, {place: values[setting]})
+    figures = Figures(field, tuple(field.drones))
+    error = np.zeros(len(figures.keys))
+    error[figures.place["drone_1", part]] = -0.034 if part == "velocity_delay" else math.radians(2.0)
+    assert changes(figures, error, error != 0.0)[place] == wanted
 
 
 def test_a_ceiling_camera_that_is_turned_shows_by_the_pads_alone(lab_field: ResolvedField) -> None:

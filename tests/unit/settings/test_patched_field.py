@@ -36,6 +36,19 @@ def test_a_patch_that_loses_its_calibrations_is_told_with_the_remedy(tmp_path: P
         write_patched(tmp_path / "lab-new.yaml", text, {("drones", "drone_1", "pad_yaw_deg"): 1.0}, {})
 
 
+def test_a_value_that_the_field_refuses_is_told_without_a_remedy_for_something_else(tmp_path: Path) -> None:
+    text = (CONFIG / "lab.yaml").read_text(encoding="utf-8").replace("cameras/", f"{CONFIG}/cameras/")
+    with pytest.raises(OperatorMistake, match="must be <= 180") as refused:
+        write_patched(tmp_path / "new.yaml", text, {("drones", "drone_1", "camera", "pan_left_deg"): 182.0}, {})
+    assert "beside" not in str(refused.value)
+
+
+def test_a_field_file_with_the_mark_of_its_end_can_be_patched(tmp_path: Path) -> None:
+    text = (CONFIG / "lab.yaml").read_text(encoding="utf-8").replace("cameras/", f"{CONFIG}/cameras/") + "---\n"
+    write_patched(tmp_path / "new.yaml", text, {("drones", "drone_1", "camera", "pan_left_deg"): 2.0}, {})
+    assert load_field(tmp_path / "new.yaml").drones["drone_1"].camera.pan_left_deg == 2.0
+
+
 def test_the_patch_alone_is_short() -> None:
     assert fragment({("drones", "drone_1", "camera", "pan_left_deg"): 2.9}).split() == [
         "drones:",

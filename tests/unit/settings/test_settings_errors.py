@@ -167,6 +167,8 @@ def test_a_wrong_type_is_wrong_although_no_drone_uses_it() -> None:
         (b"a: [1, 2\nb: 3\n", None),
         (b"a: 'open\n", None),
         (b"a: !!python/object:os.system x\n", None),
+        (b"a: !!bool maybe\n", "lab.yaml:1: a: 'maybe' is not a bool"),
+        (b"a: !!int ''\n", "lab.yaml:1: a: '' is not a number"),
         (b"a: &x [*x]\n", None),
         (b"a: \x00\n", None),
         (b'a: "b\\nc"\n', "lab.yaml:1: a: holds a character that cannot be printed"),

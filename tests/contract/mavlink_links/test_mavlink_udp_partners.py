@@ -95,7 +95,8 @@ def heard_of(link: UdpLink, vehicle: socket.socket, port: int, data: bytes, size
     found = []
     for begin in range(0, len(data), size):
         vehicle.sendto(data[begin : begin + size], ("127.0.0.1", port))
-        found += [one.frame.message.time_boot_ms for one in link.receive()]
+        messages = [one.frame.message for one in link.receive()]
+        found += [message.time_boot_ms for message in messages if isinstance(message, AttitudeQuaternion)]
     return found
 
 

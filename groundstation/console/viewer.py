@@ -113,9 +113,11 @@ class PageConnection:
             self._turn = self._board.turn
             self._seq += 1
             await self._send_text(delta(self._seq, self._clock(), sections))
-        while self._pictures:
+        if self._pictures:
             camera = next(iter(self._pictures))
             await self._send_bytes(self._pictures.pop(camera))
+        if self._pictures:
+            self._wake.set()  # one at a time: on a link slower than the pictures, words and figures come in between
 
 
 def delta(seq: int, now_ns: int, sections: bytes) -> str:

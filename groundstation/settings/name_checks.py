@@ -11,7 +11,7 @@ from groundstation.settings.parts import Finding, Parts
 # Names of processes and of scopes on the bus: an entity of the same name would be taken for them. So would one that
 # starts with sim_ (the simulator) or ends with _camera (the driver of the camera that a drone carries).
 _RESERVED = frozenset(
-    {"team", "operator", "router", "tracker", "diagnosis", "recorder", "console", "monitor", "supervisor"}
+    {"team", "operator", "run", "router", "tracker", "diagnosis", "recorder", "console", "monitor", "supervisor"}
 )
 # Longest name on the bus, and suffixes that the ground station adds: _camera of a drone, _odometry of a target.
 _LONGEST_NAME, _ADDED = 48, {"drones": 7, "target": 9, "targets": 9}

@@ -133,6 +133,23 @@ def test_viewers_hear_how_the_run_ended_before_they_are_cut_off() -> None:
     run(test)
 
 
+def test_what_is_said_about_a_run_does_not_end_it() -> None:
+    """As after Ctrl-Z in its terminal: pages called the run over, and no order could be given any more."""
+
+    async def test(site: Site) -> None:
+        async with site.connect() as page:
+            await page.recv()
+            said = m.Event(header=site.drone.header(m.RUN), severity=m.Severity.INFO, text="Ctrl-Z does nothing here")
+            site.drone.publish(t.EVENT, said)
+            sections: dict[str, object] = {}
+            while "events" not in sections:
+                sections |= json.loads(await page.recv())["s"]
+            sections |= json.loads(await page.recv())["s"]
+            assert "ended" not in sections
+
+    run(test)
+
+
 @pytest.mark.parametrize("keeps", [True, False])
 def test_the_result_is_shown_until_the_page_keeps_it_or_it_took_too_long(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, keeps: bool
@@ -217,6 +234,39 @@ def test_a_viewer_that_does_not_answer_gets_a_window_full_and_then_the_newest() 
         assert viewer.skipped > 0
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
+
+    asyncio.run(test())
+
+
+def test_on_a_link_slower_than_the_pictures_figures_and_answers_still_arrive() -> None:
+    """New pictures come while one is sent: without a pause between them nothing else was sent any more."""
+
+    async def test() -> None:
+        board, texts = Snapshot(), []
+
+        async def keep(frame: str) -> None:
+            texts.append(frame)
+
+        async def send_slowly(frame: bytes) -> None:
+            await asyncio.sleep(0.01)
+            for camera in ("ceiling", "drone_1_camera"):
+                viewer.show(camera, frame)
+
+        board.begin()
+        viewer = PageConnection(1, board, keep, send_slowly)
+        viewer.watched = frozenset({"ceiling", "drone_1_camera"})
+        task = asyncio.create_task(viewer.run(lambda seq: json.dumps({"seq": seq})))
+        viewer.show("ceiling", b"picture")
+        for value in range(8):
+            board.begin()
+            board.put("a", value)
+            viewer.notice()
+            await asyncio.sleep(0.03)
+        viewer.say("urgent")
+        await asyncio.sleep(0.05)
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+        assert "urgent" in texts and len(texts) >= 8
 
     asyncio.run(test())
 

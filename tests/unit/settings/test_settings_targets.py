@@ -91,6 +91,7 @@ def test_several_targets_reach_estimator_planner_and_every_camera() -> None:
         ("marker: {code: 6,", "marker: {code: 5,", "targets.turtlebot_2.marker.code: marker code 5 is already that of"),
         ("  turtlebot_2:", "  drone_1:", "targets.drone_1: the name drone_1 is already that of a drone"),
         ("  turtlebot_2:", "  tracker:", "targets.tracker: the name tracker is taken by the ground station itself"),
+        ("  turtlebot_2:", "  run:", "targets.run: the name run is taken by the ground station itself"),
         ("targets:  ", "target: {name: third, marker: {code: 9}}\ntargets:  ", "targets: must not stand beside target"),
     ],
 )

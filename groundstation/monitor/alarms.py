@@ -7,6 +7,7 @@ from itertools import combinations
 
 from groundstation.bus.messages import (
     AIRBORNE,
+    STANDING,
     FlightState,
     Lifecycle,
     Severity,
@@ -39,11 +40,10 @@ _SWITCHED_OFF = "Nothing to do now: switch it on before it flies again."
 _SEARCH = "Nothing to do: the drones look for it."
 _RESTARTED = "Nothing to do: it is restarted if it hangs."
 _CALL = f"{_TO_DO}check its marker and the light; drive it into the middle of the room; or LAND ALL."
+_CUT = "CUT"
+_STAY_AWAY = f"{_TO_DO}stay away until all have landed (LAND ALL); then set it upright on its pad."
 _DOWN = {
-    FlightState.EMERGENCY: (
-        "EMERGENCY, its motors are off",
-        f"{_TO_DO}stay away until all have landed (LAND ALL); then set it upright on its pad.",
-    ),
+    FlightState.EMERGENCY: ("EMERGENCY, its motors are off", _STAY_AWAY),
     FlightState.LOST: ("its driver no longer hears it", f"{_TO_DO}check its battery and its link."),
 }
 
@@ -89,19 +89,40 @@ def alarms_of(state: MonitorState, now_ns: int) -> list[Alarm]:
 
 def _vehicles(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
     for name, seen in state.vehicles.items():
-        if seen.age_s(now_ns) > VEHICLE_SILENT_S:
-            silence = f"{name}: nothing heard for {seen.age_s(now_ns):.0f} s"
-            yield Alarm(f"{name} silent", silence, advice="Nothing to do: it hovers, then lands. Stops are sent to it.")
+        status, is_silent = seen.message, seen.age_s(now_ns) > VEHICLE_SILENT_S
+        if is_silent:
+            yield _silent(name, seen.age_s(now_ns), status)
         else:
-            yield from _failsafe(name, seen.message)
-        if stood_last(seen.message.flight_state, seen.message.mode):
+            yield from _failsafe(name, status)
+        if stood_last(status.flight_state, status.mode):
             yield Alarm(f"{name} LOST", f"{name}: not heard any more, it stood until then", False, _SWITCHED_OFF)
-        elif down := _DOWN.get(seen.message.flight_state):
-            words, advice = _not_believed(seen.message) if _is_heard_in_vain(seen.message) else down
-            yield Alarm(f"{name} {seen.message.flight_state}", f"{name}: {words}", advice=advice)
-        if flies(seen.message, state.take_offs.get(name)):
-            yield from _battery(name, seen.message, battery_of(state, name))
-        yield from _link(name, seen.message.link_quality)
+        elif down := _down(state, status):
+            words, advice = _not_believed(status) if _is_heard_in_vain(status) else down
+            yield Alarm(f"{name} {status.flight_state}", f"{name}: {words}", advice=advice)
+        if flies(status, state.take_offs.get(name)) and not is_silent:
+            yield from _battery(name, status, battery_of(state, name))
+            yield from _link(name, status.link_quality)
+
+
+def _silent(name: str, age_s: float, status: VehicleStatus) -> Alarm:
+    about, text = f"{name} silent", f"{name}: nothing heard for {age_s:.0f} s"
+    if status.flight_state in STANDING:
+        return Alarm(about, f"{text}, it stood until then", False, _SWITCHED_OFF)
+    return Alarm(about, text, advice="Nothing to do: it hovers, then lands. Stops are sent to it.")
+
+
+def _down(state: MonitorState, status: VehicleStatus) -> tuple[str, str] | None:
+    """Return words and advice for a vehicle that is down other than by landing, or None.
+
+    Of those whose motors were cut only an AR.Drone reports an emergency; others report that they stand.
+    """
+    if status.mode == _CUT and status.flight_state is FlightState.LANDED and _anybody_flies(state):
+        return "its motors were cut", _STAY_AWAY
+    return _DOWN.get(status.flight_state)
+
+
+def _anybody_flies(state: MonitorState) -> bool:
+    return any(flies(seen.message, state.take_offs.get(name)) for name, seen in state.vehicles.items())
 
 
 def _is_heard_in_vain(status: VehicleStatus) -> bool:
@@ -169,8 +190,9 @@ def _tracker(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
         return
     age = state.estimate.age_s(now_ns)
     if age > ESTIMATE_SILENT_S:
-        advice = "Nothing to do: drones hover, then land."
-        yield Alarm("tracker silent", f"tracker: no estimate for {age:.1f} s", advice=advice)
+        in_flight = _anybody_flies(state)
+        advice = "Nothing to do: drones hover, then land." if in_flight else "Nothing to do now: nobody flies."
+        yield Alarm("tracker silent", f"tracker: no estimate for {age:.1f} s", in_flight, advice)
 
 
 def _near(state: MonitorState, now_ns: int) -> Iterator[Alarm]:

@@ -71,6 +71,37 @@ def test_a_weak_link_is_an_alarm(world: World, share: float | None, grave: bool 
     assert [alarm.grave for alarm in alarms_of(world.state, NOW)] == ([] if grave is None else [grave])
 
 
+def test_a_weak_link_needs_no_act_of_who_stands_or_is_not_heard_any_more(world: World) -> None:
+    world.vehicle("drone_1", link_quality=0.2, flight_state=m.FlightState.LANDED, mode="LANDED")
+    world.vehicle("drone_2", link_quality=0.2, battery=0.18, age_s=600.0)
+    assert _alarms(world) == ["drone_2: nothing heard for 600 s"]
+
+
+def test_a_silent_driver_of_a_drone_that_stands_is_said_to_have_stood(world: World) -> None:
+    world.vehicle("drone_1", age_s=600.0, flight_state=m.FlightState.LANDED, mode="LANDED")
+    world.vehicle("drone_2", age_s=600.0, flight_state=m.FlightState.UNKNOWN, mode="CONNECTING")
+    world.estimate(age_s=0.5)
+    world.text()
+    found = {alarm.text: alarm for alarm in alarms_of(world.state, NOW)}
+    stood = found["drone_1: nothing heard for 600 s, it stood until then"]
+    assert not stood.grave and "hover" not in stood.advice
+    assert "it hovers, then lands" in found["drone_2: nothing heard for 600 s"].advice
+    assert "nobody flies" in found["tracker: no estimate for 0.5 s"].advice
+
+
+@pytest.mark.parametrize("others", [m.FlightState.FLYING, m.FlightState.LANDED])
+def test_motors_that_were_cut_ask_to_stay_away_while_others_fly(world: World, others: m.FlightState) -> None:
+    """A MAVLink vehicle whose motors were cut reports that it stands."""
+    world.vehicle("drone_1", flight_state=others)
+    world.vehicle("drone_2", flight_state=m.FlightState.LANDED, mode="CUT")
+    world.text()
+    asked = [alarm for alarm in alarms_of(world.state, NOW) if alarm.asks]
+    assert [alarm.text for alarm in asked] == (
+        ["drone_2: its motors were cut"] if others is m.FlightState.FLYING else []
+    )
+    assert safety_of(world.state, alarms_of(world.state, NOW)).level is (Level.ACT if asked else Level.SAFE)
+
+
 def test_an_unknown_battery_is_an_alarm_once_the_vehicle_speaks(world: World) -> None:
     world.vehicle("drone_1", battery=None, flight_state=m.FlightState.UNKNOWN)
     world.vehicle("drone_2", battery=None, flight_state=m.FlightState.LANDED)

@@ -1,4 +1,4 @@
-"""Page modules that need no browser, run by node: battery texts in the bar and in speech."""
+"""Page modules that need no browser, run by node: words in the bar, on buttons and in speech."""
 
 import json
 import shutil
@@ -13,17 +13,25 @@ pytestmark = pytest.mark.skipif(shutil.which("node") is None, reason="node is no
 
 # The part of a browser that these modules use.
 _BROWSER = """
-const spoken = [];
+const spoken = [], played = [];
 const quiet = { getItem: () => null, setItem: () => {} };
 Object.assign(globalThis, {
   window: globalThis, localStorage: quiet, sessionStorage: quiet,
   document: { querySelector: () => ({ content: "" }), getElementById: () => ({ setAttribute() {} }) },
   SpeechSynthesisUtterance: class { constructor(words) { this.words = words; } },
-  speechSynthesis: { cancel() {}, speak: ({ words }) => spoken.push(words) },
+  speechSynthesis: {
+    cancel: () => played.push("cut off"),
+    speak: ({ words }) => { spoken.push(words); played.push(words); },
+  },
 });
 globalThis.navigator ??= {};
+const beginning = performance.now();
+let passedMs = 0;
+performance.now = () => beginning + passedMs;
+const wait = (ms) => { passedMs += ms; };
 const { store } = await import("./store.js");
-store.scene = { drones: [{ name: "drone_1" }, { name: "drone_2" }], targets: [], lost_after_s: 3 };
+store.scene = { drones: [{ name: "drone_1" }, { name: "drone_2" }], targets: [], lost_after_s: 3, unseen_land_s: 30 };
+Object.assign(store, { connected: true, receivedAt: Infinity });
 const heard = (charges) => Object.fromEntries(Object.entries(charges).map(([name, [battery, charge]]) =>
   [name, { battery, charge, minutes: null, good_for: "", battery_min: 0.15 }]));
 """
@@ -68,3 +76,86 @@ def test_each_battery_that_runs_low_is_heard_whatever_is_known_of_the_others(sai
     const result = spoken;
     """
     assert said(script) == ["battery drone_1 low", "battery drone_2 empty", "battery drone_1 empty"]
+
+
+_ALARMS = """
+const { listen } = await import("./sounds.js");
+const alarm = (about, text) => ({ about, text, grave: true, asks: false, told: null, advice: "" });
+const beat = (alarms = [], orders = []) => { Object.assign(store.s, { alarms, orders }); listen(); wait(200); };
+const silent = (s) => alarm("drone_1 silent", `drone_1: nothing heard for ${s} s`);
+const hold = (id) => [{ id, verb: "HOLD", given_ms: performance.now(), rows: [] }];
+"""
+
+
+def test_an_alarm_sounds_once_while_its_figures_change(said: Any) -> None:
+    script = f"""{_ALARMS}
+    for (let s = 1; s < 9; s++) beat([silent(s)]);
+    beat();
+    beat([silent(10)]);
+    beat([alarm("tracker silent", "tracker: no estimate for 0.4 s"), silent(11)]);
+    for (let k = 0; k < 15; k++) beat();
+    beat([silent(1)]);
+    const result = spoken;
+    """
+    begins = "drone_1: nothing heard for 1 s"
+    assert said(script) == [begins, "tracker: no estimate for 0.4 s", begins]
+
+
+def test_an_alarm_that_stands_is_not_said_again_by_a_page_that_rarely_looks(said: Any) -> None:
+    script = f"""{_ALARMS}
+    for (const s of [1, 61, 121]) {{ beat([silent(s)]); wait(60000); }}
+    const result = spoken;
+    """
+    assert said(script) == ["drone_1: nothing heard for 1 s"]
+
+
+def test_a_stop_is_said_to_its_end_and_at_once(said: Any) -> None:
+    script = f"""{_ALARMS}
+    beat([silent(1)]);
+    beat([silent(2)], hold("a"));
+    beat([silent(3), alarm("drone_2 lands", "drone_2 starts to land in 9 s: unseen")]);
+    beat([], hold("b"));
+    const result = played;
+    """
+    alarms = "drone_1: nothing heard for 1 s", "drone_2 starts to land in 9 s: unseen"
+    assert said(script) == ["cut off", alarms[0], "cut off", "hold", alarms[1], "cut off", "hold"]
+
+
+def test_alarms_of_the_page_itself_are_heard(said: Any) -> None:
+    script = f"""{_ALARMS}
+    beat();
+    store.receivedAt = performance.now() - 900;
+    beat(); beat();
+    store.connected = false;
+    beat();
+    Object.assign(store, {{ connected: true, receivedAt: Infinity }});
+    const [given] = hold("a");
+    wait(5000);
+    beat([], [{{ ...given, rows: [{{ name: "drone_1", stage: "" }}] }}]);
+    store.s.ended = {{ text: "the run broke off: drone_1 may fly", severity: "ERROR", at: 0, down: false }};
+    beat(); beat();
+    const result = spoken;
+    """
+    silence, order = "CONSOLE SILENT for 0.9 s", "HOLD NOT CONFIRMED: no answer from drone_1"
+    assert said(script) == [silence, "NO CONNECTION TO THE CONSOLE", order, "the run broke off: drone_1 may fly"]
+
+
+def test_each_target_is_heard_to_be_lost_and_found(said: Any) -> None:
+    script = f"""{_ALARMS}
+    const unseen = (ages) => {{
+      const entities = Object.entries(ages).map(([name, age_s]) => ({{ name, age_s, mean: [0, 0] }}));
+      store.s.estimate = {{ at: performance.now(), entities, searches: {{}} }};
+      beat();
+    }};
+    store.scene.targets = [{{ name: "cart" }}, {{ name: "turtlebot" }}];
+    unseen({{ cart: 0.1, turtlebot: 1e6 }}); // never seen
+    unseen({{ cart: 0.1, turtlebot: 0.1 }});
+    unseen({{ cart: 0.1, turtlebot: 7 }});
+    unseen({{ cart: 7 }}); // the tracker has given up the other
+    wait(5000); beat(); // no tracker
+    unseen({{ cart: 7, turtlebot: 0.1 }});
+    store.scene.targets = [{{ name: "cart" }}];
+    unseen({{ cart: 0.1 }});
+    const result = spoken;
+    """
+    assert said(script) == ["turtlebot lost", "cart lost", "turtlebot found", "target found"]

@@ -1,7 +1,7 @@
 // The bar's summary of the whole team, from the newest messages.
 
 import { joined } from "./dom.js";
-import { ageS, droneNames, estimateAge, isTarget, entities, entity, runOver, store, trackerSilent, unseenS } from "./store.js";
+import { ageS, droneNames, estimateAge, isTarget, entity, runOver, store, trackerSilent, unseenS } from "./store.js";
 
 const HEARD_S = 1; // as in groundstation/monitor/alarms.py
 const RECORDING_SILENT_S = 3;
@@ -18,7 +18,6 @@ export const up = (names = droneNames()) => names.filter((name) => ALOFT.has(mod
 export const aloft = () => up().length;
 // Of these drones those that stand, and might take off.
 export const standing = (names = droneNames()) => names.filter((name) => ["LANDED", "CUT"].includes(modeNow(name)));
-export const targetAgeS = () => Math.min(...entities().filter(({ name }) => isTarget(name)).map((body) => body.age_s + estimateAge()), Infinity);
 
 // Modes of the drones not on the ground, most careful first: [words, level, who does each if not all do the same].
 export function teamMode() {

@@ -5,7 +5,8 @@ import { STOPS } from "./effects.js";
 import { mayGive, ownOrders } from "./own_orders.js";
 import { ageS, consoleSilent, estimateAge, now, replaying, runOver, silentS, store } from "./store.js";
 
-const KEPT = 50, BREAK_MS = 2000; // as groundstation/console/alarm_log.py has it
+const KEPT = 50; // this and the next as groundstation/console/alarm_log.py has them
+export const BREAK_MS = 2000;
 const UNHEARD_S = 0.8, FORGOTTEN_S = 30;
 const NOT_GIVEN = { unsent: "NOT SENT", dropped: "NOT SENT", refused: "REFUSED" };
 let episodes = [], keptFor = "";

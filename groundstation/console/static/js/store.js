@@ -88,6 +88,8 @@ export function unseenS(name) {
   const body = entity(name), pictures = (store.s.sightings ?? []).filter(([, subject]) => subject === name);
   return body ? body.age_s + estimateAge() : Math.min(...pictures.map(([, , at]) => ageS(at)), Infinity);
 }
+// What is unseen for longer was never seen: no infinite age comes through JSON.
+export const NEVER_S = 1e5;
 export const SEEN_S = 1;
 const inSight = (name) => (store.s.sightings ?? []).filter(([, subject, at]) => subject === name && ageS(at) < SEEN_S);
 export const seenBy = (name) => inSight(name).map(([observer]) => observer);

@@ -4,7 +4,7 @@ import { joined, seconds } from "./dom.js";
 import { howMany, ready, refusalOf, waiting } from "./effects.js";
 import { aloft, doing, isBlind, isLost, isUnheard, landsIn, lostTarget, modeNow, modes, NAMED, namedOrCounted, stage, standing, unseenLeftS, up } from "./glance.js";
 import { mustWords, openMusts } from "./preflight.js";
-import { droneNames, entity, SEEN_S, seenBy, store, trackerSilent, unseenS } from "./store.js";
+import { droneNames, entity, NEVER_S, SEEN_S, seenBy, store, trackerSilent, unseenS } from "./store.js";
 
 // Of one, of several.
 const DEEDS = {
@@ -39,8 +39,6 @@ function sought() {
   const floor = new Set([...standing(), ...doing("CONNECTING")]);
   return [...droneNames().filter((name) => !floor.has(name)), ...store.scene.targets.map(({ name }) => name)];
 }
-
-const NEVER_S = 1e5;
 
 // "drone_1 and turtlebot, not seen for 4 to 7 s".
 function unseenFor(names) {

@@ -160,9 +160,9 @@ def test_a_crashed_drone_cannot_take_off_while_others_fly(stage: Any) -> None:
     ordered = "Is on the floor, motors off: CUT MOTORS ordered at the terminal"
     page.wait(lambda s: page.there("drone_2-duty").inner_text().startswith(ordered))
     stage.flight.crashed = set()  # a vehicle that does not count cut motors as an emergency
-    page.wait(lambda s: page.there("take-off").inner_text() == "TAKE OFF\ndrone_2 rises, hovers")
+    page.wait(lambda s: s["sections"]["vehicles"]["drone_2"]["flight"] == "LANDED")
+    assert page.there("take-off").inner_text() == "TAKE OFF\ndrone_2 must be checked"
     assert page.there("hold").inner_text() == "HOLD\ndrone_1 hovers;\ndrone_2 is down"
-    stage.flight.crashed = {"drone_2"}
     stage.flight.modes["drone_1"] = "LANDED"
     page.wait(lambda s: page.there("drone_2-takeoff").inner_text() == "Take off\nrises, if able")
 

@@ -159,3 +159,31 @@ def test_each_target_is_heard_to_be_lost_and_found(said: Any) -> None:
     const result = spoken;
     """
     assert said(script) == ["turtlebot lost", "cart lost", "turtlebot found", "target found"]
+
+
+_TEAM = """
+const { effectOf, effectOnOne, mayFail, refusalOf, startEffect } = await import("./effects.js");
+const { dutyOf } = await import("./duty.js");
+const is = (mode, more = {}) => ({ mode, flight: mode === "CUT" ? "LANDED" : "FLYING", battery: 0.8, battery_min: 0.15,
+  at: performance.now(), detail: "", lands_in_s: null, braked: false, ...more });
+const seen = (names) => {
+  const entities = names.map((name) => ({ name, age_s: 0.1, mean: [0, 0, 1] }));
+  store.s.estimate = { at: performance.now(), entities, searches: {} };
+};
+"""
+
+
+@pytest.mark.parametrize("flight", ["LANDED", "EMERGENCY"])
+def test_a_drone_with_cut_motors_takes_off_only_after_a_look_at_it(said: Any, flight: str) -> None:
+    script = f"""{_TEAM}
+    seen(["drone_1"]);
+    store.s.vehicles = {{ drone_1: is("TRACK"), drone_2: is("CUT", {{ flight: "{flight}" }}) }};
+    const start = (...whom) => refusalOf("TAKEOFF", ...whom);
+    const captions = () => [start(), start(["drone_2"]), mayFail("drone_2"), dutyOf("drone_2")];
+    const result = [captions(), effectOf("HOLD"), effectOnOne("LAND", "drone_2")];
+    store.s.vehicles.drone_1 = is("LANDED", {{ flight: "LANDED" }});
+    result.push(start(["drone_2"]), startEffect("TAKEOFF"));
+    """
+    check, fell = "drone_2 must be checked", "Is on the floor: it cut its motors itself."
+    one, captions = [check, check, True, fell], ["drone_1 hovers;\ndrone_2 is down", "no use: down"]
+    assert said(script) == [one, *captions, "", "both rise, if able"]

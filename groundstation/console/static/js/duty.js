@@ -1,7 +1,7 @@
 // A drone's present action and its reason, in a sentence or two, and its limits.
 
 import { joined, seconds } from "./dom.js";
-import { isBlind, isCutOff, isLost, standing, unseenLeftS } from "./glance.js";
+import { isBlind, isDown, isLost, standing, unseenLeftS } from "./glance.js";
 import { ageS, droneNames, isSeen, SEEN_S, seenBy, store, trackerSilent, unseenS } from "./store.js";
 import { askedBy, ordered } from "./who.js";
 
@@ -101,7 +101,7 @@ function reasonOf(name, { mode, detail, lands_in_s, braked }) {
 function stands(name, detail) {
   const [, why] = detail.match(/^landed \((.+)\)$/) ?? [], [, doing, who] = (why ?? detail).match(ORDERS) ?? [];
   if (doing === "motors cut") return `is on the floor, motors off: CUT MOTORS ${orderedBy(who, name, doing)}`;
-  if (isCutOff(name)) return "is on the floor: it cut its motors itself";
+  if (isDown(name)) return "is on the floor: it cut its motors itself";
   return why ? `stands, motors off. ${who ? `It landed, ${orderedBy(who, name, doing)}` : `Reason for landing: ${why}`}` : `stands with its motors off${detail && `: ${detail}`}`;
 }
 

@@ -1,6 +1,6 @@
 // The effect of a start or a stop now, or why a start has none: in the few words that a button has room for.
 
-import { aloft, isCutOff, isDown, isLost, isUnheard, lostTarget, modeNow, modeOf, modes, standing, up, waits } from "./glance.js";
+import { aloft, isDown, isLost, isUnheard, lostTarget, modeNow, modeOf, modes, standing, up, waits } from "./glance.js";
 import { wasForbidden } from "./preflight.js";
 import { droneNames, store, trackerSilent } from "./store.js";
 
@@ -20,7 +20,7 @@ export function refusalOf(verb, names = droneNames()) {
 }
 
 function takeOffRefusal(names) {
-  const flying = up(names).length, stand = standing(names), batteries = stand.map((name) => store.s.vehicles[name]), down = stand.filter(isCutOff);
+  const flying = up(names).length, stand = standing(names), batteries = stand.map((name) => store.s.vehicles[name]), down = stand.filter(isDown);
   if (stand.length && stand.every(isUnheard)) return "not heard";
   if (down.length && aloft()) return does(down, "must be checked", "must be checked");
   if (!batteries.length) return flying === names.length ? "flying already" : flying ? "none stands" : "not heard yet";
@@ -56,7 +56,7 @@ function told(parts, others = "others land") {
 export const ready = () => droneNames().filter((name) => modeNow(name) === "HOVER");
 
 // Whether it may stay on the floor although it is ordered to take off.
-export const mayFail = (name) => isCutOff(name) || wasForbidden(name);
+export const mayFail = (name) => isDown(name) || wasForbidden(name);
 
 // The effect that a start of the team would have now, with the drones concerned.
 export function startEffect(verb) {

@@ -53,10 +53,9 @@ export function landsIn(name) {
 }
 
 export const isUnheard = (name) => Boolean(store.s.vehicles?.[name]) && ageS(store.s.vehicles[name].at) > HEARD_S;
-// Whether its own emergency stop has cut its motors: an order to take off may do no more than end that.
-export const isCutOff = (name) => store.s.vehicles?.[name]?.flight === "EMERGENCY";
-// Whether its motors were cut, by it or for it: it may lie on its side.
-export const isDown = (name) => isCutOff(name) || modeNow(name) === "CUT";
+// Whether its motors were cut, by it or for it: it may lie on its side, and an order to take off may do no more than end
+// its emergency. Only an AR.Drone calls that an emergency.
+export const isDown = (name) => store.s.vehicles?.[name]?.flight === "EMERGENCY" || modeNow(name) === "CUT";
 // Whether its own camera has no light to see by.
 export const isBlind = (name) => Boolean(store.s.cameras?.[`${name}_camera`]?.dark);
 // In how many seconds one that stays lost lands at the latest.

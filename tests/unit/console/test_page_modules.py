@@ -187,3 +187,62 @@ def test_a_drone_with_cut_motors_takes_off_only_after_a_look_at_it(said: Any, fl
     check, fell = "drone_2 must be checked", "Is on the floor: it cut its motors itself."
     one, captions = [check, check, True, fell], ["drone_1 hovers;\ndrone_2 is down", "no use: down"]
     assert said(script) == [one, *captions, "", "both rise, if able"]
+
+
+_LINK = """
+const sent = (kind) => sockets[0].sent.filter(({ type }) => type === kind), sockets = [];
+globalThis.location = { protocol: "http:", host: "127.0.0.1" };
+globalThis.Element = class {};
+globalThis.WebSocket = class {
+  static OPEN = 1;
+  readyState = 1;
+  sent = [];
+  constructor() { sockets.push(this); }
+  send(text) { this.sent.push(JSON.parse(text)); }
+};
+const { connect } = await import("./link.js");
+connect();
+const keydown = { preventDefault() {}, target: null };
+"""
+
+
+def test_each_seed_is_answered(said: Any) -> None:
+    script = f"""{_LINK}
+    const seed = (seq) => ({{ type: "seed", seq, now: 0, run: "", scene: store.scene, s: {{}},
+      history: {{ trails: {{}}, samples: [] }} }});
+    for (const seq of [1, 2, 3]) sockets[0].onmessage({{ data: JSON.stringify(seed(seq)) }});
+    const result = sent("seen").map(({{ seq }}) => seq);
+    """
+    assert said(script) == [1, 2, 3]
+
+
+def test_a_held_key_drives_a_target_by_the_clock_alone(said: Any) -> None:
+    script = f"""{_LINK}
+    const {{ startSteering }} = await import("./steer.js"), hears = {{}};
+    store.scene.truth = true;
+    startSteering({{ addEventListener: (kind, heard) => {{ hears[kind] = heard; }} }}, {{}});
+    for (let k = 0; k < 80; k++) hears.keydown({{ ...keydown, key: "ArrowUp", repeat: k > 0 }});
+    const one = sent("drive").length;
+    hears.keydown({{ ...keydown, key: "ArrowLeft" }});
+    await new Promise((over) => setTimeout(over, 350));
+    const held = sent("drive").length;
+    for (const key of ["ArrowUp", "ArrowLeft"]) hears.keyup({{ key }});
+    const result = [one, held, sent("drive").at(-1)];
+    """
+    one, held, last = said(script)
+    assert one == 1
+    assert 3 <= held <= 6
+    assert (last["speed_m_s"], last["turn_rad_s"]) == (0, 0)
+
+
+def test_a_held_key_steps_a_replay_twenty_times_a_second(said: Any) -> None:
+    script = f"""{_LINK}
+    const {{ playbackKey }} = await import("./playback.js");
+    store.scene.replay = {{ start_ms: 0, end_ms: 60000, marks: [] }};
+    const ours = [];
+    for (let k = 0; k < 81; k++) {{ ours.push(playbackKey({{ ...keydown, key: ".", repeat: k > 0 }})); wait(13); }}
+    for (let k = 0; k < 5; k++) playbackKey({{ ...keydown, key: ",", repeat: false }});
+    const result = [sent("step").filter(({{ ticks }}) => ticks > 0).length, sent("step").length, ours.every(Boolean),
+      playbackKey({{ ...keydown, key: "Tab", repeat: true }})];
+    """
+    assert said(script) == [21, 26, True, False]

@@ -90,6 +90,7 @@ function take(message) {
   switch (message.type) {
     case "seed":
       takeSeed(message);
+      send("seen", { seq: message.seq }); // a replay that jumps sends seeds only
       store.connected = true;
       tell("seed"); tell("state");
       break;

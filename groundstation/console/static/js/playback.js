@@ -5,9 +5,9 @@ import { send } from "./link.js";
 import { now, replaying, store } from "./store.js";
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10, 20];
-const SEEK_EVERY_MS = 100, JUMP_MS = 5000;
+const SEEK_EVERY_MS = 100, JUMP_MS = 5000, HELD_EVERY_MS = 50;
 const PRESS = new Set([" ", "Enter"]), MOVE = new Set(["ArrowLeft", "ArrowRight", "Home", "End"]);
-let dragging = false, sentAt = 0, later = 0;
+let dragging = false, sentAt = 0, later = 0, actedAt = -Infinity;
 
 const replay = () => store.scene.replay;
 const playback = () => store.s.playback ?? { at_ms: replay().start_ms, playing: false, speed: 1, ended: false };
@@ -100,24 +100,35 @@ function toMark(direction) {
   if (found !== undefined) seek(found);
 }
 
-// Returns whether the key was one of ours. Where a control has its own use for a key, it keeps it.
+// Returns whether the key was one of ours. One that is held acts no more often than the server takes messages, with room
+// for the page's answers.
 export function playbackKey(event) {
+  const action = actionOf(event), at = performance.now();
+  if (action && !(event.repeat && at - actedAt < HELD_EVERY_MS)) {
+    actedAt = at;
+    action();
+  }
+  return Boolean(action);
+}
+
+// Where a control has its own use for a key, it keeps it.
+function actionOf(event) {
   const within = (kinds) => event.target instanceof Element && event.target.closest(kinds);
-  if (within("button, summary, a") && PRESS.has(event.key)) return false;
-  if (within("input, select") && (PRESS.has(event.key) || MOVE.has(event.key))) return false;
+  if (within("button, summary, a") && PRESS.has(event.key)) return null;
+  if (within("input, select") && (PRESS.has(event.key) || MOVE.has(event.key))) return null;
   const { start_ms: start, end_ms: end } = replay();
   switch (event.key) {
-    case " ": if (!event.repeat) toggle(); return true;
-    case ",": send("step", { ticks: -1 }); return true;
-    case ".": send("step", { ticks: 1 }); return true;
-    case "ArrowLeft": seekSoon(playback().at_ms - JUMP_MS); return true;
-    case "ArrowRight": seekSoon(playback().at_ms + JUMP_MS); return true;
-    case "Home": seek(start); return true;
-    case "End": seek(end); return true;
-    case "<": faster(-1); return true;
-    case ">": faster(1); return true;
-    case "[": toMark(-1); return true;
-    case "]": toMark(1); return true;
-    default: return false;
+    case " ": return () => { if (!event.repeat) toggle(); };
+    case ",": return () => send("step", { ticks: -1 });
+    case ".": return () => send("step", { ticks: 1 });
+    case "ArrowLeft": return () => seekSoon(playback().at_ms - JUMP_MS);
+    case "ArrowRight": return () => seekSoon(playback().at_ms + JUMP_MS);
+    case "Home": return () => seek(start);
+    case "End": return () => seek(end);
+    case "<": return () => faster(-1);
+    case ">": return () => faster(1);
+    case "[": return () => toMark(-1);
+    case "]": return () => toMark(1);
+    default: return null;
   }
 }

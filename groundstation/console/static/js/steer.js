@@ -75,10 +75,17 @@ function place() {
 
 function key(event, view) {
   if (event.ctrlKey || event.altKey || event.metaKey) return;
-  if (event.key in KEYS && steerable() && me.role === "command") { event.preventDefault(); down.add(event.key); drive(); }
+  if (event.key in KEYS && steerable() && me.role === "command") { event.preventDefault(); press(event.key); }
   else if (event.key === "+" || event.key === "=") view.zoom(1.2);
   else if (event.key === "-") view.zoom(1 / 1.2);
   else if (event.key === "0") view.fit();
+}
+
+// A held key repeats itself, on some keyboards more often than the server takes messages: the first press counts.
+function press(name) {
+  if (down.has(name)) return;
+  down.add(name);
+  drive();
 }
 
 // While a key is down the order is repeated: what stops being repeated is a page that died, and is seen as such.

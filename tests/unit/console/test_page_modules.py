@@ -246,3 +246,36 @@ def test_a_held_key_steps_a_replay_twenty_times_a_second(said: Any) -> None:
       playbackKey({{ ...keydown, key: "Tab", repeat: true }})];
     """
     assert said(script) == [21, 26, True, False]
+
+
+def test_a_team_without_targets_does_not_search(said: Any) -> None:
+    script = f"""{_TEAM}
+    const {{ teamMode, stageWord }} = await import("./glance.js"), {{ verdict }} = await import("./verdict.js");
+    seen(["drone_1", "drone_2"]);
+    store.s.vehicles = {{ drone_1: is("TRACK"), drone_2: is("TRACK") }};
+    store.s.plan = {{ at: performance.now(), edges: [], controls: [] }};
+    const line = verdict().split(".")[0];
+    const result = [teamMode()[0], stageWord("track"), refusalOf("TRACK"), line, dutyOf("drone_1", 95)];
+    """
+    words = ["TRACK", "track", "tracking already", "drone_1 and drone_2 track the target"]
+    *captions, card = said(script)
+    assert captions == words
+    assert card.startswith("Tracks its target")
+
+
+@pytest.mark.parametrize("in_belief", [False, True])
+def test_no_seconds_are_stated_for_a_drone_that_nobody_has_ever_seen(said: Any, in_belief: bool) -> None:
+    script = f"""{_TEAM}
+    const {{ landingWords, verdict }} = await import("./verdict.js");
+    store.scene.targets = [{{ name: "turtlebot" }}];
+    seen(["turtlebot", "drone_2"]);
+    if ({str(in_belief).lower()}) store.s.estimate.entities.push({{ name: "drone_1", age_s: 1e6, mean: [0, 0, 1] }});
+    store.s.vehicles = {{ drone_1: is("HOVER", {{ detail: "hovers" }}), drone_2: is("TRACK") }};
+    const result = [landingWords(), dutyOf("drone_1"), verdict()];
+    store.s.estimate.entities.find(({{ name }}) => name === "drone_2").age_s = 10;
+    result.push(landingWords());
+    """
+    never, card, line, both = said(script)
+    assert (never, card) == ("unseen: one\nlands unless seen", "Hovers. Not seen yet: lands by itself, unless seen.")
+    assert "Lost: drone_1, not seen yet." in line
+    assert both == "unseen: both\nland unless seen"

@@ -2,7 +2,7 @@
 
 import { joined, seconds } from "./dom.js";
 import { isBlind, isDown, isLost, standing, unseenLeftS } from "./glance.js";
-import { ageS, droneNames, isSeen, SEEN_S, seenBy, store, trackerSilent, unseenS } from "./store.js";
+import { ageS, droneNames, isSeen, NEVER_S, SEEN_S, seenBy, store, trackerSilent, unseenS } from "./store.js";
 import { askedBy, ordered } from "./who.js";
 
 const FRESH_S = 1;
@@ -51,7 +51,7 @@ const targetNames = () => store.scene.targets.map((target) => target.name);
 function taskOf(name) {
   const targets = targetNames(), sought = targets.filter(isLost);
   const search = isBlind(name) ? "has no light to look for" : "looks for";
-  return sought.length ? `${search} ${joined(sought)}` : `tracks ${joined(targets)}`;
+  return sought.length ? `${search} ${joined(sought)}` : `tracks ${joined(targets) ?? "its target"}`;
 }
 
 // A drone that watches no target watches drones for the sake of their places; the only target was just named.
@@ -63,10 +63,12 @@ function watching(names, targets) {
 
 const watcher = (name) => (droneNames().includes(name) || name.endsWith("camera") ? name : `${name} camera`);
 
+const within = (name) => (Number.isFinite(unseenLeftS(name)) ? ` within ${unseenLeftS(name).toFixed(0)}\u00a0s` : " by itself");
+
 // A drone that stays lost lands; the place of an unseen drone may be known by its own observations of others.
 function unseen(name) {
   const age = unseenS(name), [where, end] = seenBy(name).length ? [", though in view", "found"] : ["", "seen"];
-  if (isLost(name)) return `Lost${where}: lands within ${unseenLeftS(name).toFixed(0)}\u00a0s, unless ${end}`;
+  if (isLost(name)) return `${age < NEVER_S ? "Lost" : "Not seen yet"}${where}: lands${within(name)}, unless ${end}`;
   if (age <= SEEN_S) return "Out of view: its own camera tells where it is";
   return `Itself not seen for ${seconds(age)}: counts as lost in ${seconds(Math.max(0, store.scene.lost_after_s - age))}`;
 }

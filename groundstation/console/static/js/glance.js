@@ -1,7 +1,7 @@
 // The bar's summary of the whole team, from the newest messages.
 
 import { joined } from "./dom.js";
-import { ageS, droneNames, estimateAge, isTarget, entity, runOver, store, trackerSilent, unseenS } from "./store.js";
+import { ageS, droneNames, estimateAge, isTarget, entity, NEVER_S, runOver, store, trackerSilent, unseenS } from "./store.js";
 
 const HEARD_S = 1; // as in groundstation/monitor/alarms.py
 const RECORDING_SILENT_S = 3;
@@ -58,12 +58,13 @@ export const isUnheard = (name) => Boolean(store.s.vehicles?.[name]) && ageS(sto
 export const isDown = (name) => store.s.vehicles?.[name]?.flight === "EMERGENCY" || modeNow(name) === "CUT";
 // Whether its own camera has no light to see by.
 export const isBlind = (name) => Boolean(store.s.cameras?.[`${name}_camera`]?.dark);
-// In how many seconds one that stays lost lands at the latest.
-export const unseenLeftS = (name) => Math.max(0, store.scene.unseen_land_s - unseenS(name));
+// In how many seconds one that stays lost lands at the latest; NaN for one that was never seen: only its driver knows.
+export const unseenLeftS = (name) => (unseenS(name) < NEVER_S ? Math.max(0, store.scene.unseen_land_s - unseenS(name)) : NaN);
 
 // Not seen for so long that it is searched for, or soon lands.
 export const isLost = (name) => (entity(name)?.age_s ?? Infinity) + estimateAge() > (store.scene?.lost_after_s ?? 3);
-export const lostTarget = () => (store.scene?.targets ?? []).every(({ name }) => isLost(name));
+// Whether all targets are lost: where there is none, nobody searches.
+export const lostTarget = () => Boolean(store.scene?.targets.length) && store.scene.targets.every(({ name }) => isLost(name));
 // The drones in this mode now, among those with telemetry.
 export const doing = (mode) => droneNames().filter((name) => modeOf(store.s.vehicles?.[name]) === mode);
 

@@ -105,7 +105,8 @@ export function landingWords() {
   const on = up().filter((name) => modeNow(name) !== "LANDING"), unheard = on.filter(isUnheard), gone = on.filter(isLost);
   if (unheard.length) return hovering(unheard, "not heard");
   if (trackerSilent()) return on.length ? hovering(on, "no tracker") : "";
-  return gone.length ? `unseen: ${howMany(gone)}\n${gone.length > 1 ? "land" : "lands"} within ${Math.min(...gone.map(unseenLeftS)).toFixed(0)} s` : "";
+  const left = Math.min(...gone.map(unseenLeftS));
+  return gone.length ? `unseen: ${howMany(gone)}\n${gone.length > 1 ? "land" : "lands"} ${Number.isFinite(left) ? `within ${left.toFixed(0)} s` : "unless seen"}` : "";
 }
 
 // For how long it hovers first, only its driver knows.

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from groundstation.estimation.belief import JointBelief
 from groundstation.geometry.angles import difference
 from groundstation.geometry.stabilized_frame import stabilized_from_world, world_from_stabilized
 from groundstation.planning.planner import PlanResult
-from groundstation.sensing.models import SensorSuite
+from groundstation.sensing.models import Rectangle, SensorSuite
 
 _STAND_GAIN, _TURN_GAIN = 1.0, 1.5  # of the distance and the turn to a stand [1/s]
 
@@ -179,7 +179,11 @@ def _stands(phases: Mapping[str, FlightMode], searching: Mapping[str, Stand], no
         for name in able
         if phases[name] is FlightMode.RETURN
     }
-    out = {name: searching[name] for name in able if phases[name] is FlightMode.SEARCH and name in searching}
+    out = {
+        name: _risen_in_view(name, searching[name], views[name], now)
+        for name in able
+        if phases[name] is FlightMode.SEARCH and name in searching
+    }
     idle = {
         name: return_stand(means[name], views[name])
         for name in able
@@ -187,6 +191,18 @@ def _stands(phases: Mapping[str, FlightMode], searching: Mapping[str, Stand], no
     }
     within = {name: None if name in out or name in held else view for name, view in views.items()}
     return apart(held | back | out | idle, places, within, now.parameters.column_m)
+
+
+def _risen_in_view(name: str, stand: Stand, view: Rectangle | None, now: Moment) -> Stand:
+    """Return the place for a search of a robot that flies on our estimate: in its view, until it is as high as one.
+
+    It climbs only there (`_search_level_m`), and from below it sees less than the search counts on.
+    """
+    low = float(now.belief.mean_of(name)[2]) < now.parameters.search_height_m - now.parameters.height_tolerance_m
+    if name not in now.parameters.fed or view is None or not low:
+        return stand
+    x, y = view.nearest(stand.x, stand.y)
+    return replace(stand, x=x, y=y)
 
 
 def _towards(name: str, stand: Stand, phase: FlightMode, now: Moment) -> Setpoint:

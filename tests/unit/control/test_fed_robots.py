@@ -12,6 +12,7 @@ from groundstation.control.flight_mode import FlightMode
 from groundstation.control.moment import Sight
 from groundstation.control.parameters import control_from_field
 from groundstation.control.setpoints import Setpoint, setpoints_from_plan
+from groundstation.control.stand import Stand
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, StateLayout
 from groundstation.geometry.stabilized_frame import stabilized_from_world, world_from_stabilized
@@ -245,6 +246,17 @@ def test_a_search_does_not_lift_it_out_of_its_view() -> None:
         found = setpoints_from_plan(None, belief(pose, SEEN_STD_M), ("drone_2",), CONTROL, SENSORS, Sight(9.0))
         assert found["drone_2"].phase is FlightMode.SEARCH
         assert (found["drone_2"].velocity_m_s[2] > 0.0) is rises
+
+
+def test_it_searches_in_its_view_until_it_has_risen_to_the_height_of_a_search() -> None:
+    """Sent out of its view while low it never rose, saw little of the floor, and sank at each border."""
+    sight = Sight(9.0, search=lambda robots, targets: {name: Stand(-1.7, -2.5, 0.0) for name in robots})
+    for height_m, goes_out in ((0.9, False), (CONTROL.search_height_m - 0.1, True)):
+        pose = np.array([-1.7, -0.25, height_m, 0.0])
+        found = setpoints_from_plan(None, belief(pose, SEEN_STD_M), ("drone_2",), CONTROL, SENSORS, sight)["drone_2"]
+        assert found.phase is FlightMode.SEARCH
+        assert (found.velocity_m_s[1] < -0.2) is goes_out
+        assert found.velocity_m_s[2] > 0.1
 
 
 def test_a_searching_robot_without_position_updates_returns() -> None:

@@ -161,7 +161,7 @@ class Lookout:
                 text = f"{name} is not found: {state.excluded:.0%} of the room was searched"
                 self._notices.append(Notice(Severity.ERROR, text, _CALL_REMEDY, name))
             elif state.mode is SearchMode.SEARCH:
-                place = state.room.likeliest() if state.room is not None else (0.0, 0.0)
+                place = self._search.likeliest(name)
                 text = f"{name} is not where it was expected: the team searches around ({place[0]:.1f}, {place[1]:.1f})"
                 self._notices.append(Notice(Severity.WARNING, text, "", name))
             else:

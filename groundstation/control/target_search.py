@@ -24,7 +24,7 @@ from groundstation.estimation.room_map import RoomGrid, RoomMap, lost_at, unknow
 from groundstation.sensing.detection import detection_map
 from groundstation.sensing.footprint import footprint_of
 from groundstation.sensing.models import SensorSuite
-from groundstation.sensing.occlusion import box_rows, sight_map
+from groundstation.sensing.occlusion import box_rows, outside_boxes, sight_map
 from groundstation.sensing.visibility import camera_rows
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
@@ -90,6 +90,8 @@ class Search:
             if name in parameters.observers
         }
         self._boxes = box_rows(sensors.obstacles)
+        # What is in a box is never seen: looking there would be in vain, and never end.
+        self._floor = outside_boxes(self._boxes, self.grid.xs, self.grid.ys, marker_m)
         self._lattice = lattice_of(self.grid, parameters)
         self._pictures: list[SearchedPicture] = []
         self._history = BeliefHistory()
@@ -113,6 +115,11 @@ class Search:
     def is_missing(self, name: str) -> bool:
         """Return whether a target is searched for."""
         return self.targets[name].mode is not SearchMode.TRACK
+
+    def likeliest(self, name: str) -> tuple[float, float]:
+        """Return the likeliest place of a target that is searched for [m; world]."""
+        room = self.targets[name].room
+        return (0.0, 0.0) if room is None else room.likeliest(self._floor)
 
     def shown_s(self, name: str, now_ns: int) -> float:
         """Return the time since a picture last showed a target [s]; infinite if none ever did."""
@@ -155,7 +162,7 @@ class Search:
         rooms = [room for name in targets if (room := self.targets[name].room) is not None]
         if not rooms or not robots:
             return NO_OUTLOOK
-        chances: Array = np.sum([room.in_view for room in rooms], axis=0) / len(rooms)
+        chances: Array = self._floor * np.sum([room.in_view for room in rooms], axis=0) / len(rooms)
         poses = {name: belief.mean_of(name)[:4] for name in robots}
         order = robots_in_order(robots, chances, poses, self.grid)
         footprints = {name: self._footprints[name] for name in order}
@@ -272,13 +279,13 @@ class Search:
         for name, state in self.targets.items():
             if state.room is None or state.mode is SearchMode.TRACK:
                 continue
-            excluded = state.room.excluded()
+            excluded = state.room.excluded(self._floor)
             lasted_s = (now_ns - state.since_ns) / NS_PER_S
             lost = state.mode is SearchMode.LOST or (lasted_s > p.lost_after_s and excluded > p.lost_excluded)
             self.targets[name] = replace(
                 state,
                 mode=SearchMode.LOST if lost else SearchMode.SEARCH,
-                place=state.room.likeliest(),
+                place=state.room.likeliest(self._floor),
                 excluded=excluded,
                 expected_s=expected_s,
             )

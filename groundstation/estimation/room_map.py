@@ -9,8 +9,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from groundstation.arrays import Array
+
+Cells = NDArray[np.bool_]
+"""Which cells of a grid count (rows: ys, columns: xs)."""
 
 MOST_CELLS = 2400
 STANDS_SHARE = 0.3
@@ -121,13 +125,13 @@ class RoomMap:
         near = (square <= sigmas**2) | (dx * dx + dy * dy <= least_m**2)
         return float(self.chances[near].sum())
 
-    def excluded(self) -> float:
-        """Return the share of the room that was searched: the chance that a standing target would have been found."""
-        return 1.0 - float(np.mean(self.overlooked))
+    def excluded(self, floor: Cells) -> float:
+        """Return the share of some cells that was searched: the chance to have found a target that stands there."""
+        return 1.0 - float(np.mean(self.overlooked[floor]))
 
-    def likeliest(self) -> tuple[float, float]:
-        """Return the centre of the likeliest cell of a target that nothing hides [m; world]."""
-        row, column = np.unravel_index(int(np.argmax(self.in_view)), self.grid.shape)
+    def likeliest(self, floor: Cells) -> tuple[float, float]:
+        """Return the centre of the likeliest of some cells for a target that nothing hides [m; world]."""
+        row, column = np.unravel_index(int(np.argmax(np.where(floor, self.in_view, -1.0))), self.grid.shape)
         return float(self.grid.xs[column]), float(self.grid.ys[row])
 
 

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from typing import Annotated, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from groundstation.arrays import Array, Matrix, Vector
 from groundstation.kernel import Record, Rows, kernel
@@ -118,3 +119,14 @@ def sight_map(boxes: Rows[BoxRow], eye: Vector, xs: Vector, ys: Vector, z: float
         for i in range(xs.shape[0]):
             free[j, i] = sight(boxes, SOFT_M, eye[0], eye[1], eye[2], xs[i], ys[j], z).a
     return free
+
+
+def outside_boxes(boxes: Rows[BoxRow], xs: Vector, ys: Vector, z: float) -> NDArray[np.bool_]:
+    """Return whether points at each place of a grid (rows: ys, columns: xs) at one height are in no box."""
+    outside = np.ones((len(ys), len(xs)), dtype=np.bool_)
+    for box in boxes:
+        if abs(z - box["middle"][2]) <= box["half"][2]:
+            along = np.abs(xs - box["middle"][0]) <= box["half"][0]
+            across = np.abs(ys - box["middle"][1]) <= box["half"][1]
+            outside &= ~(across[:, None] & along[None, :])
+    return outside

@@ -69,9 +69,10 @@ def fly(
     limit_s: float = 60.0,
     parameters: SearchParameters = SEARCH,
     control: ControlParameters = CONTROL,
+    sensors: SensorSuite = SENSORS,
 ) -> tuple[float, float, Search]:
     """Return when two drones that fly from stand to stand see a target at rest, and their stands' least distance."""
-    search, rng = new_search(parameters, control=control), np.random.default_rng(1)
+    search, rng = new_search(parameters, sensors, control), np.random.default_rng(1)
     height_m = control.search_height_m
     poses = {name: np.array([-0.5, y, height_m, 0.0]) for name, y in zip(NAMES, (0.5, -0.5), strict=True)}
     cameras = {name: camera_rows([SENSORS.onboard[name]], SENSORS.softness)[0] for name in NAMES}
@@ -201,6 +202,16 @@ def test_a_target_that_is_nowhere_is_said_to_be_lost_when_the_room_was_searched(
     assert after.excluded > 0.2 > before.excluded > 0.01
     assert before.expected_s is not None
     assert before.expected_s > 5.0
+
+
+def test_a_room_with_a_box_is_searched_around_it_and_to_its_end() -> None:
+    """What is in the box is never seen: drones circled it, and the search never ended."""
+    sensors = replace(SENSORS, obstacles=(Box((2.0, 0.0), (3.0, 2.6, 0.75)),))
+    search = fly((30.0, 0.0), 60.0, replace(SEARCH, lost_after_s=5.0), sensors=sensors)[2]
+    found = search.targets["turtlebot"]
+    assert found.mode is SearchMode.LOST and found.excluded > 0.9
+    assert found.place is not None and found.place == search.likeliest("turtlebot")
+    assert not (0.5 < found.place[0] < 3.5 and abs(found.place[1]) < 1.3)
 
 
 def test_a_target_that_pictures_do_not_show_may_be_hidden_and_then_is_no_longer_where_it_was() -> None:

@@ -94,7 +94,11 @@ class SafetyParameters:
 def control_from_field(field: ResolvedField) -> ControlParameters:
     """Return the setpoints' settings of a resolved field."""
     planner, safety = field.planner, field.safety
+    slowest_m_s = min((drone.limits.max_speed_m_s for drone in field.drones.values()), default=SEARCH_SPEED_M_S)
+    speed_m_s = min(SEARCH_SPEED_M_S, slowest_m_s)
     return ControlParameters(
+        return_speed_m_s=speed_m_s,
+        search_speed_m_s=speed_m_s,
         search_height_m=search_height_m(field),
         limits=limits_from_field(field),
         lost_after_s=field.estimator.lost_after_s,

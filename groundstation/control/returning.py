@@ -50,10 +50,12 @@ def return_stand(mean: Array, view: Rectangle | None, looks_s: float = 0.0) -> S
     """Return the middle of a world-fixed view, with the present heading; without a view, the robot's place.
 
     looks_s: time for which the robot should have been in view and was not: it turns, and circles the middle ever wider,
-    until a camera sees it or it sees a known entity.
+    until a camera sees it or it sees a known entity. Without a view it turns only: its place moves with it.
     """
     x, y, yaw = float(mean[0]), float(mean[1]), float(mean[3])
-    x, y = view.center if view else (x, y)
+    if view is None:
+        return Stand(x, y, yaw, _LOOK_RAD_S if looks_s > 0.0 else 0.0)
+    x, y = view.center
     if looks_s <= 0.0:
         return Stand(x, y, yaw)
     radius = min(_FARTHEST_LOOK_M, math.sqrt(_WIDENS_M * _LOOK_M_S * looks_s))

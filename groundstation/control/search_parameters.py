@@ -54,6 +54,7 @@ class SearchParameters:
 def search_from_field(resolved: ResolvedField) -> SearchParameters:
     """Return the settings of a resolved field."""
     room, planner = resolved.room, resolved.planner
+    slowest_m_s = min(drone.limits.max_speed_m_s for drone in resolved.drones.values())
     turn_rad_s = math.radians(min(drone.limits.max_yaw_rate_deg_s for drone in resolved.drones.values()))
     fixed: dict[str, WorldCamera | MotionCapture] = {**resolved.cameras, **resolved.sensing_capture}
     cameras = tuple(name for name, sensor in fixed.items() if "targets" in sensor.observes)
@@ -61,6 +62,7 @@ def search_from_field(resolved: ResolvedField) -> SearchParameters:
         room_m=(room.size_m[0], room.size_m[1]),
         fence_x_m=room.fence.x_m,
         fence_y_m=room.fence.y_m,
+        speed_m_s=min(SEARCH_SPEED_M_S, slowest_m_s),
         yaw_rate_rad_s=min(SEARCH_YAW_RATE_RAD_S, turn_rad_s),
         near_yaw_rate_rad_s=min(NEAR_YAW_RATE_RAD_S, turn_rad_s),
         observers=(*resolved.drones, *cameras),

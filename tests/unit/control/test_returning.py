@@ -11,7 +11,8 @@ from groundstation.control.excursion import Excursions, time_left_s, within_reac
 from groundstation.control.flight_mode import FlightMode
 from groundstation.control.moment import Sight
 from groundstation.control.parameters import control_from_field
-from groundstation.control.returning import is_lost
+from groundstation.control.returning import is_lost, return_stand
+from groundstation.control.search_parameters import search_from_field
 from groundstation.control.setpoints import setpoints_from_plan
 from groundstation.control.view import VIEW_INSET_M, velocity_error_m_s, way_back_m
 from groundstation.estimation.belief import JointBelief
@@ -44,6 +45,23 @@ def test_the_way_back_ends_where_it_enters_the_view() -> None:
         (-2.0, 2.0): math.hypot(2.0, 2.0) * 0.75,
     }
     assert way_back_m(np.array(list(ways)), VIEW) == pytest.approx(list(ways.values()))
+
+
+def test_without_a_view_a_missed_robot_turns_where_it_is() -> None:
+    """A circle about its own place, which moves with it, never closed: it flew across the room."""
+    stand = return_stand(np.array([1.0, -0.5, 1.2, 0.3]), None, 12.0)
+    assert (stand.x, stand.y) == (1.0, -0.5) and stand.yaw_rate > 0.3
+    around = return_stand(np.array([1.0, -0.5, 1.2, 0.3]), VIEW, 12.0)
+    assert math.hypot(around.x, around.y) > 0.4
+
+
+@pytest.mark.parametrize(("limit_m_s", "speed_m_s"), [(0.6, 0.5), (0.2, 0.2)])
+def test_returns_and_searches_count_on_no_more_than_the_slowest_drone_flies(limit_m_s: float, speed_m_s: float) -> None:
+    set_to = (f"drones.drone_2.limits.max_speed_m_s={limit_m_s}",)
+    field = resolved_field(load_field(Path(__file__).parents[3] / "config/lab.yaml", set_to))
+    control = control_from_field(field)
+    assert control.return_speed_m_s == control.search_speed_m_s == speed_m_s
+    assert search_from_field(field).speed_m_s == speed_m_s
 
 
 def test_the_way_back_into_a_view_without_width_is_that_to_its_middle() -> None:

@@ -1,8 +1,8 @@
-"""H.264 pictures cut into unnumbered datagrams: after a full one the picture goes on, a shorter one ends it. Pure."""
+"""H.264 pictures cut into unnumbered datagrams: a shorter one ends the picture, or the beginning of the next. Pure."""
 
 from typing import NamedTuple
 
-from drivers.camera.sources.nal_units import KEY_PICTURE, PICTURE, SEQUENCE_PARAMETERS, unit_types
+from drivers.camera.sources.nal_units import KEY_PICTURE, PICTURE, SEQUENCE_PARAMETERS, begins_picture, unit_types
 
 # Larger than any picture of a small camera: the ends of several were lost.
 _MOST_BYTES = 1 << 20
@@ -23,17 +23,23 @@ class Assembly:
         self._whole_bytes = whole_bytes
         self._data = bytearray()
 
-    def feed(self, datagram: bytes) -> AccessUnit | None:
-        """Return the access unit that a datagram completes."""
+    def feed(self, datagram: bytes) -> list[AccessUnit]:
+        """Return the access units that a datagram completes, oldest first."""
+        # The last datagram of a picture is as large as the others when its size happens to be a multiple of theirs.
+        done = self._ended() if self._data and begins_picture(datagram) else []
         self._data += datagram
-        if len(datagram) >= self._whole_bytes and len(self._data) <= _MOST_BYTES:
-            return None
+        if len(datagram) < self._whole_bytes or len(self._data) > _MOST_BYTES:
+            done += self._ended()
+        return done
+
+    def _ended(self) -> list[AccessUnit]:
+        """Return the picture that all bytes so far are; parameter sets go with the picture that follows."""
         data = bytes(self._data)
         kinds = set(unit_types(data))
         if not {PICTURE, KEY_PICTURE} & kinds and kinds and len(data) <= _MOST_BYTES:
-            return None  # parameter sets, which go with the picture that follows
+            return []
         self._data.clear()
         if not kinds or len(data) > _MOST_BYTES:
             self.skipped += len(data)
-            return None
-        return AccessUnit(data, KEY_PICTURE in kinds and SEQUENCE_PARAMETERS in kinds)
+            return []
+        return [AccessUnit(data, KEY_PICTURE in kinds and SEQUENCE_PARAMETERS in kinds)]

@@ -44,14 +44,13 @@ class DatagramReader:
             assembly, heard_s = Assembly(self._whole_bytes), time.monotonic()
             while not drain.closing:
                 try:
-                    unit = assembly.feed(udp.recv(_LARGEST))
+                    done = assembly.feed(udp.recv(_LARGEST))
                 except TimeoutError:
                     _none_since(heard_s)
                     continue
                 heard_s = time.monotonic()
-                if unit:
-                    now_ns = clock.now_ns()
-                    drain.keep([Unit(unit.data, now_ns, now_ns, unit.starts)])
+                now_ns = clock.now_ns()
+                drain.keep([Unit(unit.data, now_ns, now_ns, unit.starts) for unit in done])
                 self.rejected["bytes"] += assembly.skipped
                 assembly.skipped = 0
 

@@ -9,6 +9,7 @@ import numpy as np
 from av.codec.context import Flags
 
 from drivers.camera.sources.frames import Matrix, Picture, Unit
+from drivers.camera.sources.picture_numbers import PictureNumbers
 from groundstation.arrays import Image
 
 # Larger than any known camera; ffmpeg refuses a stream that claims more before it allocates memory.
@@ -45,22 +46,32 @@ class H264Decoder:
         self.rejected = rejected
         self._codec = _codec()
         self._waiting = True
+        self._numbers = PictureNumbers()
 
     def newest(self, units: Sequence[Unit]) -> tuple[Unit, Picture] | None:
         """Return the newest picture that can be decoded of these units, or None."""
         found: tuple[Unit, Picture] | None = None
         for unit in units[_newest_start(units) :]:
-            if unit.starts:
-                self._waiting = False
-            elif not unit.follows:
-                self._waiting = True
-            if self._waiting:
-                self.rejected["before_key_picture"] += 1
+            if reason := self._refusal(unit):
+                self.rejected[reason] += 1
                 continue
             frame = self._decode(unit)
             if frame is not None:
                 found = unit, VideoPicture(frame)
         return found
+
+    def _refusal(self, unit: Unit) -> str:
+        """Return why a unit is not decoded, or ""."""
+        if unit.starts:
+            self._waiting = False
+            self._numbers.begin()
+        elif not unit.follows:
+            self._waiting = True
+        if self._waiting:
+            return "before_key_picture"
+        # In the place of a lost picture ffmpeg takes the one before it, without an error.
+        self._waiting = not self._numbers.follows(unit.data)
+        return "after_lost_picture" if self._waiting else ""
 
     def _decode(self, unit: Unit) -> av.VideoFrame | None:
         try:

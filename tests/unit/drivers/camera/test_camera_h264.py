@@ -74,10 +74,19 @@ def test_nothing_is_shown_before_a_key_picture_nor_across_a_gap(stream):
 def test_a_damaged_picture_costs_those_up_to_the_next_key_picture(stream):
     decoder = H264Decoder(Counter())
     decoder.newest(units(stream[:3]))
-    damaged = [(b"\x00\x00\x00\x01\x61" + b"\xff" * 40, False), *stream[4:9]]
+    damaged = [(stream[3][0][:8] + b"\xaa" * 40, False), *stream[4:9]]
     assert decoder.newest(units(damaged)) is None
     assert decoder.rejected["h264"] == 1
     assert brightness(decoder.newest(units(stream[10:12]))) == 11
+
+
+def test_a_lost_picture_costs_those_up_to_the_next_key_picture(stream):
+    decoder = H264Decoder(Counter())
+    assert brightness(decoder.newest(units(stream[:3]))) == 2
+    for index in range(4, 10):
+        assert decoder.newest(units([stream[index]])) is None, "it refers to the lost one"
+    assert brightness(decoder.newest(units([stream[10]]))) == 10
+    assert decoder.rejected == {"after_lost_picture": 1, "before_key_picture": 5}
 
 
 def test_another_picture_size_begins_with_its_key_picture(stream):

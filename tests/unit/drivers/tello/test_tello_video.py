@@ -35,7 +35,7 @@ def units() -> list[bytes]:
 def test_pictures_survive_being_cut(units: list[bytes]) -> None:
     assembly, found = Assembly(WHOLE_BYTES), []
     for unit in units:
-        found += [done for datagram in cut(unit) if (done := assembly.feed(datagram))]
+        found += [done for datagram in cut(unit) for done in assembly.feed(datagram)]
     assert [one.data.rstrip(b"\0") for one in found] == [unit.rstrip(b"\0") for unit in units]
     assert [one.starts for one in found] == [True] + [False] * 5
     assert set(unit_types(units[0])) >= PARAMETERS | KEY and set(unit_types(units[1])) >= PICTURE
@@ -45,8 +45,8 @@ def test_parameter_sets_in_datagrams_of_their_own_begin_the_next_picture(units: 
     place = units[0].find(b"\0\0\1\x65")
     sets, key = units[0][:place], units[0][place:]
     assembly = Assembly(WHOLE_BYTES)
-    assert assembly.feed(sets) is None
-    done = [one for datagram in cut(key) if (one := assembly.feed(datagram))]
+    assert not assembly.feed(sets)
+    done = [one for datagram in cut(key) for one in assembly.feed(datagram)]
     assert [one.starts for one in done] == [True]
 
 
@@ -59,11 +59,32 @@ def test_a_picture_that_fills_its_datagrams_ends_all_the_same() -> None:
     assert [bool(assembly.feed(datagram)) for datagram in cut(full)] == [False, False, True]
 
 
+def filled(unit: bytes) -> list[bytes]:
+    """Return the datagrams of a picture whose size is made a multiple of theirs by a unit of filler."""
+    unit += b"\0\0\1\x0c" + b"\xff" * (-(len(unit) + 5) % WHOLE_BYTES) + b"\x80"
+    return [unit[place : place + WHOLE_BYTES] for place in range(0, len(unit), WHOLE_BYTES)]
+
+
+def test_a_picture_of_full_datagrams_only_ends_where_the_next_begins(units: list[bytes]) -> None:
+    assembly = Assembly(WHOLE_BYTES)
+    datagrams = [*cut(units[0]), *filled(units[1]), *filled(units[2]), *cut(units[3])]
+    found = [one for datagram in datagrams for one in assembly.feed(datagram)]
+    assert [list(unit_types(one.data)).count(1) for one in found] == [0, 1, 1, 1]
+    assert found[3].data == units[3]
+
+
+def test_two_pictures_can_end_with_one_datagram() -> None:
+    small, assembly = b"\0\0\0\1\x41\x9a\x55", Assembly(WHOLE_BYTES)
+    (full,) = filled(small)
+    assert not assembly.feed(full)
+    assert [one.data for one in assembly.feed(small)] == [full, small]
+
+
 def test_bytes_that_are_no_video_are_counted() -> None:
     assembly = Assembly(WHOLE_BYTES)
-    assert assembly.feed(b"ok") is None and assembly.skipped == 2
+    assert not assembly.feed(b"ok") and assembly.skipped == 2
     for _ in range(1000):
-        assert assembly.feed(b"\xff" * WHOLE_BYTES) is None
+        assert not assembly.feed(b"\xff" * WHOLE_BYTES)
     assert assembly.skipped > 1 << 20
 
 

@@ -25,8 +25,10 @@ class VideoPicture:
     frame: av.VideoFrame
 
     def grey(self) -> Image:
-        """Return its brightness (h, w) as the stream carries it."""
-        if not self.frame.format.name.startswith(_PLANAR):
+        """Return its brightness (h, w), of 8 bits as the stream carries it."""
+        form = self.frame.format
+        # Samples of more bits than 8 take two bytes each.
+        if not form.name.startswith(_PLANAR) or form.components[0].bits != 8:
             return np.asarray(self.frame.to_ndarray(format="gray"), dtype=np.uint8)
         plane = self.frame.planes[0]
         rows = np.frombuffer(memoryview(plane), np.uint8).reshape(plane.height, plane.line_size)

@@ -10,7 +10,7 @@ import pytest
 from drivers.ardrone.video import Assembly
 from drivers.ardrone.wire.pave import FrameReader, FrameType, PaveFrame
 from drivers.camera.sources.frames import Unit
-from drivers.camera.sources.h264 import H264Decoder
+from drivers.camera.sources.h264 import H264Decoder, VideoPicture
 from drivers.camera.sources.jitter_filter import SenderClock
 from groundstation.errors import DriverError
 
@@ -95,6 +95,15 @@ def test_another_picture_size_begins_with_its_key_picture(stream):
     found = decoder.newest(units(encoded(2, (320, 192))))
     assert found is not None and found[1].grey().shape == (192, 320)
     assert found[1].jpeg().startswith(b"\xff\xd8")
+
+
+@pytest.mark.parametrize("form", ["gray", "yuv420p", "nv12", "gray10le", "gray16le", "yuv420p10le", "yuv422p10le"])
+def test_brightness_is_read_whatever_the_bits_of_a_sample(form):
+    grey = np.add.outer(np.arange(96), np.arange(160)).astype(np.uint8) // 2 + 30
+    frame = av.VideoFrame.from_ndarray(grey, format="gray").reformat(format=form)
+    shown = VideoPicture(frame).grey()
+    assert shown.shape == grey.shape
+    assert np.abs(shown.astype(int) - grey).max() <= 16, "at most the difference of limited and full range"
 
 
 def test_pictures_of_a_real_drone(real_data):

@@ -36,10 +36,10 @@ def encoder():
 
 
 class Camera:
-    """Serves one client at a time with 25 pictures a second of rising brightness."""
+    """Serves one client at a time with 25 pictures a second of rising brightness; most: pictures, then silence."""
 
-    def __init__(self, in_band):
-        self.in_band = in_band
+    def __init__(self, in_band, most=1 << 20):
+        self.in_band, self.most = in_band, most
         self.clients = 0
         self.codec, self.number = encoder(), 0
         self.sets = [u for u in units_of(self.picture()) if u[0] & 0x1F in (7, 8)]
@@ -94,6 +94,8 @@ class Camera:
     def stream(self, connection):
         sequence = 0
         while not self.closing.wait(0.04):
+            if self.number > self.most:
+                continue
             parts = [u for u in units_of(self.picture()) if self.in_band or u[0] & 0x1F not in (7, 8)]
             for index, part in enumerate(parts):
                 last = 0x80 if index == len(parts) - 1 else 0
@@ -117,8 +119,8 @@ class Camera:
 
 
 @contextmanager
-def watching(in_band=True):
-    camera = Camera(in_band)
+def watching(**options):
+    camera = Camera(**{"in_band": True, **options})
     source = open_source(f"rtsp://127.0.0.1:{camera.port}/stream")
     try:
         yield camera, source
@@ -147,6 +149,12 @@ def test_pictures_and_access_units_come_as_they_were_sent():
         keys = [unit for unit in units if unit.starts]
         assert keys and all(has_parameters(unit.data) for unit in keys), "a recording can begin at each key picture"
         assert not any(has_parameters(unit.data) for unit in units if not unit.starts)
+
+
+def test_it_is_read_soon_after_it_is_opened():
+    with watching(most=30) as (camera, source):  # a key picture is the 20th
+        taken(source, 1)
+        assert camera.clients == 1
 
 
 def test_it_comes_back_when_the_camera_hangs_up():

@@ -106,6 +106,7 @@ def rtsp(url: str, name: str) -> ContainerReader:
         "reorder_queue_size": "0",
         "probesize": "500000",
         "analyzeduration": "0",
+        "fpsprobesize": "0",  # else it takes some 20 pictures more, to learn their rate
     }
     return ContainerReader(url, name, (options,))
 

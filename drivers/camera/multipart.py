@@ -1,7 +1,7 @@
 """Extracts JPEG frames from a multipart/x-mixed-replace byte stream; pure, bounded, never trusting the sender.
 
 WIRE: RFC 2046 section 5.1 as IP cameras implement it: boundaries with and without leading dashes, parts with and
-without Content-Length, lines that end in LF alone, any number of blank lines between parts.
+without Content-Length, lines that end in LF alone, any number of blank lines between parts and before pictures.
 """
 
 import re
@@ -94,6 +94,7 @@ class MultipartParser:
             self._emit(data.rstrip(b"\r\n"), len(self._buffer), frames)
 
     def _emit(self, body: bytes, end: int, frames: list[bytes]) -> None:
+        body = body.lstrip(b"\r\n")  # if the length does not count them, only the picture's end mark is missing
         if body.startswith(_JPEG_START):
             frames.append(body)
             del self._buffer[:end]

@@ -43,6 +43,16 @@ def test_a_picture_without_a_length_does_not_wait_for_the_next_one():
         assert not parser.rejected
 
 
+def test_blank_lines_before_the_picture():
+    for blank in (b"\r\n", b"\n", b"\r\n\r\n"):
+        parser = MultipartParser(b"frame")
+        not_counted, counted = sized(JPEG).replace(JPEG, blank + JPEG), sized(blank + JPEG)
+        without_length = b"--frame\r\nContent-Type: image/jpeg\r\n\r\n" + blank + JPEG + b"\r\n"
+        assert parser.feed(counted + without_length + sized(OTHER)) == [JPEG, JPEG, OTHER]
+        assert not parser.rejected
+        assert parser.feed(not_counted + sized(OTHER)) == [JPEG[: -len(blank)], OTHER]
+
+
 def test_byte_by_byte():
     parser, frames = MultipartParser(b"frame"), []
     for byte in sized(JPEG) + sized(OTHER):

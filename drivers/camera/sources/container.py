@@ -90,8 +90,9 @@ def _units(
         return []
     arrival_ns = clock.now_ns()
     settled_ns = arrival_ns
-    if packet.pts is not None and packet.time_base is not None:
-        (settled_ns,) = settled.settle([round(packet.pts * packet.time_base * NS_PER_S)], arrival_ns)
+    # With B-frames, times of display (pts) go back and forth: the filter needs those in the order of sending (dts).
+    if packet.dts is not None and packet.time_base is not None:
+        (settled_ns,) = settled.settle([round(packet.dts * packet.time_base * NS_PER_S)], arrival_ns)
     data = prepared(bytes(packet), packet.is_keyframe)
     return [Unit(data, arrival_ns, settled_ns, starts=packet.is_keyframe, follows=not packet.is_corrupt)]
 

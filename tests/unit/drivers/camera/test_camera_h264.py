@@ -196,3 +196,28 @@ def test_a_clock_that_jumps_or_stands_still_is_not_believed():
     assert clock.settle([100 * MS], 100_066 * MS) == [100_066 * MS]
     assert clock.settle([100 * MS], 100_132 * MS) == [100_132 * MS]
     assert clock.settle([90_000 * MS], 100_200 * MS) == [100_200 * MS]
+
+
+@pytest.mark.parametrize(("rate", "numbered_for"), [(24, 25), (14.8, 15), (12.5, 25), (30, 25)])
+def test_stamps_by_a_rate_that_the_camera_does_not_keep_are_not_believed(rate, numbered_for):
+    """As of cameras that halve their rate in the dark."""
+    random, clock, wrong_ms = np.random.default_rng(1), SenderClock(), []
+    for index in range(600):
+        usual_ms = index / rate * 1000 + 120
+        arrival_ms = usual_ms + float(random.uniform(-8, 8))
+        (settled,) = clock.settle([round(index / numbered_for * 1000 * MS)], round(arrival_ms * MS))
+        wrong_ms.append(settled / MS - usual_ms)
+    assert np.max(np.abs(wrong_ms[30:])) < 16, "twice the jitter"
+
+
+@pytest.mark.parametrize("rate", [15, 60, 120])
+@pytest.mark.parametrize("stall_ms", [1000, 1900])
+def test_pictures_that_waited_for_a_stall_say_nothing_of_the_delay(rate, stall_ms):
+    clock, wrong_ms = SenderClock(), []
+    for index in range(rate * 12):
+        exposed_ms = 1000 * index / rate
+        is_held = 6000 <= exposed_ms + 120 < 6000 + stall_ms
+        arrival_ms = 6000 + stall_ms if is_held else exposed_ms + 120
+        (settled,) = clock.settle([round(exposed_ms * MS)], round(arrival_ms * MS))
+        wrong_ms.append(settled / MS - exposed_ms - 120)
+    assert np.max(np.abs(wrong_ms)) < 1

@@ -36,10 +36,13 @@ def encoder():
 
 
 class Camera:
-    """Serves one client at a time with 25 pictures a second of rising brightness; most: pictures, then silence."""
+    """Serves one client at a time with 25 pictures a second of rising brightness.
 
-    def __init__(self, in_band, most=1 << 20):
-        self.in_band, self.most = in_band, most
+    most: pictures, then none; with_sound: goes on with sound alone.
+    """
+
+    def __init__(self, in_band, most=1 << 20, with_sound=False):
+        self.in_band, self.most, self.with_sound = in_band, most, with_sound
         self.clients = 0
         self.codec, self.number = encoder(), 0
         self.sets = [u for u in units_of(self.picture()) if u[0] & 0x1F in (7, 8)]
@@ -83,17 +86,24 @@ class Camera:
                     "m=video 0 RTP/AVP 96\r\na=rtpmap:96 H264/90000\r\n"
                     f"a=fmtp:96 packetization-mode=1;sprop-parameter-sets={sets}\r\na=control:track1\r\n"
                 )
+                if self.with_sound:
+                    body += "m=audio 0 RTP/AVP 0\r\na=rtpmap:0 PCMU/8000\r\na=control:track2\r\n"
                 head += f"Content-Base: {url}/\r\nContent-Type: application/sdp\r\nContent-Length: {len(body)}\r\n"
             elif method == "SETUP":
-                head += "Transport: RTP/AVP/TCP;unicast;interleaved=0-1\r\n"
+                channels = "2-3" if url.endswith("track2") else "0-1"
+                head += f"Transport: RTP/AVP/TCP;unicast;interleaved={channels}\r\n"
             connection.sendall(f"{head}\r\n{body}".encode())
             if method == "PLAY":
                 self.stream(connection)
                 return
 
     def stream(self, connection):
-        sequence = 0
+        sequence = sounds = 0
         while not self.closing.wait(0.04):
+            if self.with_sound:
+                rtp = struct.pack(">BBHII", 0x80, 0, sounds & 0xFFFF, sounds * 320, 2) + b"\xff" * 320
+                connection.sendall(b"$\x02" + struct.pack(">H", len(rtp)) + rtp)
+                sounds += 1
             if self.number > self.most:
                 continue
             parts = [u for u in units_of(self.picture()) if self.in_band or u[0] & 0x1F not in (7, 8)]
@@ -163,6 +173,12 @@ def test_it_comes_back_when_the_camera_hangs_up():
         camera.hang_up()
         wait_for(lambda: camera.clients == 2)
         taken(source, 3)
+
+
+def test_it_is_opened_again_when_only_its_sound_goes_on():
+    with watching(most=50, with_sound=True) as (camera, source):
+        taken(source, 3)
+        wait_for(lambda: camera.clients == 2)
 
 
 def test_an_absent_camera_is_named_without_its_password():

@@ -3,8 +3,10 @@
 The reader passes on packets as they come, H.264 and JPEG as received; nothing is decoded here.
 """
 
+import time
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
 
 import av
 
@@ -20,6 +22,8 @@ from groundstation.time_units import NS_PER_S
 
 _OPEN_LIMIT_S = 5.0
 _READ_LIMIT_S = 2.0
+# How often a device is asked for a picture: a part of the time between two.
+_LOOK_S = 0.002
 Choice = Mapping[str, str]
 
 
@@ -36,7 +40,7 @@ class ContainerReader:
         self._address, self._choices, self._form = address, choices, form
 
     def interrupt(self) -> None:
-        """Do nothing: every read ends by itself within 2 s."""
+        """Do nothing: no read waits for more than 2 s."""
 
     def read(self, drain: Drain) -> None:
         """Hand over packets until the drain closes."""
@@ -47,14 +51,8 @@ class ContainerReader:
             prepared = self._prepare(stream)
             drain.opened()
             settled = SenderClock()
-            try:
-                for packet in container.demux(stream):
-                    if drain.closing:
-                        return
-                    drain.keep(_units(packet, prepared, settled))
-            except av.FFmpegError as error:
-                raise DriverError(error.strerror or str(error)) from None
-        raise DriverError("the camera closed the stream")
+            for packet in _packets(container, stream, drain):
+                drain.keep(_units(packet, prepared, settled))
 
     def _open(self) -> "av.container.InputContainer":
         trouble = ""
@@ -83,9 +81,38 @@ class ContainerReader:
         return lambda data, _: data
 
 
-def _units(
-    packet: "av.Packet[av.VideoStream]", prepared: Callable[[bytes, bool], bytes], settled: SenderClock
-) -> list[Unit]:
+def _packets(
+    container: "av.container.InputContainer", stream: av.VideoStream, drain: Drain
+) -> Iterator["av.Packet[Any]"]:
+    """Yield the packets of a stream until the drain closes; raises DriverError after 2 s without any, and at the end.
+
+    Those of the other streams are read and dropped: the sound of a camera whose video hangs goes on.
+    """
+    came_s = time.monotonic()
+    while True:
+        try:
+            for packet in container.demux():
+                if packet.stream_index == stream.index:
+                    came_s = time.monotonic()
+                    yield packet
+                _require_video_since(came_s)
+                if drain.closing:
+                    return
+            raise DriverError("the camera closed the stream")
+        except av.BlockingIOError:  # a device that has no picture yet
+            _require_video_since(came_s)
+            if drain.wait(_LOOK_S):
+                return
+        except av.FFmpegError as error:
+            raise DriverError(error.strerror or str(error)) from None
+
+
+def _require_video_since(came_s: float) -> None:
+    if time.monotonic() - came_s > _READ_LIMIT_S:
+        raise DriverError(f"no picture for {_READ_LIMIT_S:g} s")
+
+
+def _units(packet: "av.Packet[Any]", prepared: Callable[[bytes, bool], bytes], settled: SenderClock) -> list[Unit]:
     if packet.size == 0:
         return []
     arrival_ns = clock.now_ns()
@@ -115,5 +142,7 @@ def rtsp(url: str, name: str) -> ContainerReader:
 def device(path: str, size: tuple[int, int] | None) -> ContainerReader:
     """Return the reader of a V4L2 device, asked for pictures of the calibrated size; JPEGs before raw pictures."""
     wanted = {} if size is None else {"video_size": f"{size[0]}x{size[1]}"}
-    choices: tuple[Choice, ...] = ({"input_format": "mjpeg", **wanted}, wanted, {})
+    # ffmpeg waits without limit, and uninterrupted, for the picture of a device that hangs.
+    asked = {"fflags": "4"}
+    choices: tuple[Choice, ...] = ({"input_format": "mjpeg", **wanted, **asked}, {**wanted, **asked}, asked)
     return ContainerReader(path, path, choices, form="v4l2")

@@ -278,8 +278,7 @@ class Pipeline:
 
 def _is_there(prediction: Prediction, finds: Followed) -> bool:
     """Return whether a board without a readable bar already stands where this marker is expected."""
-    reach = prediction.radius_px + prediction.std_px
-    return any(t.code is None and float(np.hypot(*(f.centre - prediction.centre))) < reach for t, f in finds)
+    return any(track.code is None and prediction.is_at(find.centre) for track, find in finds)
 
 
 def _is_taken_by(track: Track, fresh: Followed) -> bool:

@@ -53,6 +53,10 @@ class Prediction:
         """Return the radius of the search about its centre [px], wide enough for the uncertainty."""
         return self.radius_px + _MARGIN_SQUARES * self.spacing_px + _SIGMAS * self.std_px + _SLACK_PX
 
+    def is_at(self, centre: Array) -> bool:
+        """Return whether a marker with this centre [px] is where it is expected."""
+        return float(np.hypot(*(centre - self.centre))) < self.radius_px + self.std_px
+
     def window(self, shape: tuple[int, ...]) -> Window | None:
         """Return the window to look in; None if it is outside of the picture."""
         return window_around(self.centre[None], self.reach_px, shape)

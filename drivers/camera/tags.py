@@ -9,7 +9,7 @@ from drivers.camera import pose
 from drivers.camera.detect import Window, resized, window_around
 from drivers.camera.dictionaries import family_of
 from drivers.camera.prediction import Prediction
-from drivers.camera.settings import DetectorSettings, MarkerSettings
+from drivers.camera.settings import DetectorSettings, MarkerSettings, TagSettings
 from drivers.camera.sighting import Sighting
 from groundstation.arrays import Array, Image
 from groundstation.geometry.lens import CameraIntrinsics
@@ -24,10 +24,24 @@ _WANTED_PX, _MOST_ENLARGEMENT = 48.0, 4.0
 _MARGIN = 2.0
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class _Seen:
+    """A tag in an earlier picture: its corners (4, 2) [px], and when it was exposed."""
+
     corners: Array
     stamp_ns: int
+
+    def window(self, shape: tuple[int, ...]) -> Window | None:
+        """Return the window in which it will be again, or None when that is outside of the picture."""
+        return window_around(self.corners, self._reach_px, shape)
+
+    def may_be(self, corners: Array) -> bool:
+        """Return whether its tag may have moved to these corners since."""
+        return _distance_px(self.corners, corners) < self._reach_px
+
+    @property
+    def _reach_px(self) -> float:
+        return 0.8 * _side_px(self.corners) + 12.0
 
 
 class TagFinder:
@@ -42,7 +56,8 @@ class TagFinder:
         names = {tag.dictionary for _, tag in self._markers}
         self._families = {name: family_of(name) for name in sorted(names)}
         self._finders = {name: family.finder() for name, family in self._families.items()}
-        self._seen: dict[str, _Seen] = {}
+        # Each entity's places: a spare print of its tag has one too.
+        self._seen: dict[str, list[_Seen]] = {}
 
     @property
     def tracked(self) -> tuple[str, ...]:
@@ -57,41 +72,47 @@ class TagFinder:
         predictions: Mapping[str, Prediction | None],
         everywhere: bool,
     ) -> list[Sighting]:
-        """Return the sightings of tags: in their windows, and with `everywhere` in the whole picture."""
-        found = self._everywhere(picture) if everywhere else []
-        if not everywhere:
-            for marker, tag in self._markers:
-                window, side = self._window(marker.entity, stamp_ns, predictions, picture.shape)
-                if window is not None:
-                    finds = self._detect(picture, tag.dictionary, window, side)
-                    found += [(marker, corners) for number, corners in finds if number == tag.id]
-        for marker, corners in found:
-            self._seen[marker.entity] = _Seen(corners, stamp_ns)
-        self._seen = {e: seen for e, seen in self._seen.items() if stamp_ns - seen.stamp_ns <= _LIFETIME_NS}
-        sightings = (self._measured(marker, corners, gravity_of) for marker, corners in found)
+        """Return the sightings of tags: in their windows, and with `everywhere` in the whole picture.
+
+        Several prints with one identity give several sightings of their entity.
+        """
+        whole = self._everywhere(picture) if everywhere else {}
+        sightings, places = [], {}
+        for marker, tag in self._markers:
+            seen, known = self._seen.get(marker.entity, []), whole.get(marker.entity, [])
+            found = self._found(picture, tag, seen, predictions.get(marker.entity), known)
+            recent = [place for place in seen if stamp_ns - place.stamp_ns <= _LIFETIME_NS]
+            places[marker.entity] = [_Seen(corners, stamp_ns) for corners in found] + _vacant(recent, found)
+            sightings += [self._measured(marker, corners, gravity_of) for corners in found]
+        self._seen = {entity: those for entity, those in places.items() if those}
         return [sighting for sighting in sightings if sighting is not None]
 
-    def _window(
-        self, entity: str, stamp_ns: int, predictions: Mapping[str, Prediction | None], shape: tuple[int, ...]
-    ) -> tuple[Window | None, float]:
-        """Return the window to look in, and the approximate side of the tag [px]."""
-        seen, prediction = self._seen.get(entity), predictions.get(entity)
-        if seen is not None:
-            side = _side_px(seen.corners)
-            return window_around(seen.corners, 0.8 * side + 12.0, shape), side
-        if prediction is not None:
-            return prediction.window(shape), prediction.radius_px
-        return None, 1.0
+    def _found(
+        self, picture: Image, tag: TagSettings, places: list[_Seen], prediction: Prediction | None, known: list[Array]
+    ) -> list[Array]:
+        """Return the corners of all prints of a tag: those known from a search, in their places, where expected."""
+        found = _each_once(known)
+        for seen in places:
+            if not any(_is_same(seen.corners, corners) for corners in found):
+                finds = self._prints(picture, tag, seen.window(picture.shape), _side_px(seen.corners))
+                found = _each_once(found + finds)
+        if prediction is None or any(prediction.is_at(corners.mean(axis=0)) for corners in found):
+            return found
+        return _each_once(found + self._prints(picture, tag, prediction.window(picture.shape), prediction.radius_px))
 
-    def _everywhere(self, picture: Image) -> list[tuple[MarkerSettings, Array]]:
-        wanted = {(tag.dictionary, tag.id): marker for marker, tag in self._markers}
+    def _prints(self, picture: Image, tag: TagSettings, window: Window | None, side: float) -> list[Array]:
+        """Return the corners of a tag's prints in a window; side: their approximate size [px]."""
+        finds = self._detect(picture, tag.dictionary, window, side) if window is not None else []
+        return [corners for number, corners in finds if number == tag.id]
+
+    def _everywhere(self, picture: Image) -> dict[str, list[Array]]:
+        """Return the corners of all expected tags in the whole picture, by entity."""
         window = Window(0, 0, picture.shape[1], picture.shape[0])
-        return [
-            (wanted[name, number], corners)
-            for name in self._finders
-            for number, corners in self._detect(picture, name, window, _WANTED_PX)
-            if (name, number) in wanted
-        ]
+        finds = {name: self._detect(picture, name, window, _WANTED_PX) for name in self._finders}
+        return {
+            marker.entity: [corners for number, corners in finds[tag.dictionary] if number == tag.id]
+            for marker, tag in self._markers
+        }
 
     def _detect(self, picture: Image, name: str, window: Window, side: float) -> list[tuple[int, Array]]:
         """Return ids and corners (4, 2) [px] of the tags in a window."""
@@ -121,3 +142,27 @@ class TagFinder:
 
 def _side_px(corners: Array) -> float:
     return float(np.hypot(*(np.roll(corners, 1, axis=0) - corners).T).min())
+
+
+def _distance_px(one: Array, other: Array) -> float:
+    return float(np.hypot(*(one.mean(axis=0) - other.mean(axis=0))))
+
+
+def _is_same(one: Array, other: Array) -> bool:
+    """Return whether two finds are one print: their centres are nearer than half a side."""
+    return _distance_px(one, other) < 0.5 * _side_px(other)
+
+
+def _each_once(finds: list[Array]) -> list[Array]:
+    """Return finds without those that repeat an earlier one: windows may overlap."""
+    return [one for k, one in enumerate(finds) if not any(_is_same(one, other) for other in finds[:k])]
+
+
+def _vacant(places: list[_Seen], found: list[Array]) -> list[_Seen]:
+    """Return the places whose tags are not found: each find is that of the nearest place which it may be from."""
+    vacant = list(places)
+    for corners in found:
+        origins = [place for place in vacant if place.may_be(corners)]
+        if origins:
+            vacant.remove(min(origins, key=lambda place: _distance_px(place.corners, corners)))
+    return vacant

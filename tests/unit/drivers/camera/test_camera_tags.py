@@ -2,12 +2,14 @@
 
 import math
 
+import cv2
 import numpy as np
 import pytest
 
 from drivers.camera import pose
 from drivers.camera.convert import stabilized_from_optical
 from drivers.camera.pipeline import Pipeline
+from drivers.camera.prediction import Prediction
 from drivers.camera.settings import DetectorSettings, MarkerSettings, MountSettings, TagSettings
 from groundstation.errors import SettingsError
 from groundstation.geometry.angles import wrap
@@ -89,6 +91,57 @@ def test_another_id_is_not_reported():
     picture = renderer_of(FAMILIES[0]).render(np.array([state(0, 0, 1.6), state(1.2, 0.0, 0.0)]))
     for k in range(20):
         assert pipeline.process(picture, k * FRAME_NS, gravity) == []
+
+
+REAL, SPARE = (100, 60), (450, 250)
+
+
+def prints_at(places, seed):
+    """Return a picture with prints of one tag, of 48 px each, at these corners [px]."""
+    tag = cv2.aruco.generateImageMarker(cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50), 7, 48)
+    picture = np.full((360, 640), 200, np.uint8)
+    for x, y in places:
+        picture[y : y + 48, x : x + 48] = tag
+    noise = np.random.default_rng(seed).normal(0.0, 2.0, picture.shape)
+    return np.clip(cv2.GaussianBlur(picture, (0, 0), 0.7) + noise, 0, 255).astype(np.uint8)
+
+
+def looks_at(places, predictions, pictures=30):
+    """Return the sightings in each picture in which these prints are to be seen, and the finder's pipeline."""
+    pipeline = Pipeline(FRONT, (marker("DICT_4X4_50"),), DetectorSettings(), search_rate_hz=2.0)
+    looks = [pipeline.process(prints_at(places, k), k * FRAME_NS, gravity, predictions) for k in range(pictures)]
+    return looks, pipeline
+
+
+@pytest.mark.parametrize("places", [(REAL, SPARE), (SPARE, REAL), ((100, 60), (160, 60))])
+def test_a_spare_print_is_the_alternative_to_the_one_where_the_estimate_is(places):
+    """In every picture, also between full searches, and whichever OpenCV names first."""
+    expected = Prediction(np.array([REAL[0] + 24.0, REAL[1] + 24.0]), 34.0, 48.0, 8.0)
+    looks, pipeline = looks_at(places, {"bot": expected})
+    for sightings in looks:
+        (sighting,) = sightings
+        assert sighting.corners.mean(axis=0) == pytest.approx(expected.centre, abs=2.0)
+        apart_m = sighting.choice.alternative.position_m - sighting.choice.best.position_m
+        assert np.linalg.norm(apart_m) > 0.15
+    assert pipeline.counts["searches"] <= 3
+    assert len(pipeline.take_notices()) == 1
+
+
+@pytest.mark.parametrize("places", [(REAL, SPARE), (SPARE, REAL)])
+def test_without_an_estimate_neither_of_two_prints_is_reported(places):
+    looks, _ = looks_at(places, {})
+    assert not any(looks)
+
+
+def test_a_tag_is_found_where_the_estimate_is_though_a_spare_print_is_followed():
+    """The real one comes into view where no search has been; the spare one has been followed for a while."""
+    pipeline = Pipeline(FRONT, (marker("DICT_4X4_50"),), DetectorSettings(), search_rate_hz=2.0)
+    expected = {"bot": Prediction(np.array([REAL[0] + 24.0, REAL[1] + 24.0]), 34.0, 48.0, 8.0)}
+    for k in range(12):
+        pipeline.process(prints_at([SPARE], k), k * FRAME_NS, gravity, expected)
+    (sighting,) = pipeline.process(prints_at([SPARE, REAL], 12), 12 * FRAME_NS, gravity, expected)
+    assert sighting.corners.mean(axis=0) == pytest.approx(expected["bot"].centre, abs=2.0)
+    assert not pipeline.searched
 
 
 TAGGED = [

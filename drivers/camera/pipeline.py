@@ -118,7 +118,10 @@ class Pipeline:
         return marker.entity if marker is not None else None
 
     def _prediction_of(self, track: Track, predictions: Mapping[str, Prediction | None]) -> Prediction | None:
-        return predictions.get(self._entity_of(track) or "")
+        """Return where the belief expects a track's board; one that must be read again is expected as before."""
+        code = track.code if track.code is not None else track.pending
+        marker = self._expected.get(code) if code is not None else None
+        return predictions.get(marker.entity) if marker is not None else None
 
     def _follow(self, picture: Image, stamp_ns: int, predictions: Mapping[str, Prediction | None]) -> Followed:
         finds: Followed = []
@@ -161,13 +164,17 @@ class Pipeline:
                 self.counts["absent"] += 1
                 continue
             self.counts["foreseen"] += 1
-            finds.append((self._adopted(find, stamp_ns, prediction), find))
+            finds.append((self._adopted(find, stamp_ns, predictions), find))
 
-    def _adopted(self, find: detect.Find, stamp_ns: int, prediction: Prediction) -> Track:
-        """Return the track that lost this board, else a new one; its bar identifies it later."""
+    def _adopted(self, find: detect.Find, stamp_ns: int, predictions: Mapping[str, Prediction | None]) -> Track:
+        """Return the track that lost this board, else a new one; its bar identifies it later.
+
+        It may be another entity's than the one that was looked for: its own prediction counts.
+        """
         for track in self._tracks:
-            if track.misses and track.accepts(find, stamp_ns):
-                track.follow(find, stamp_ns, prediction)
+            own = self._prediction_of(track, predictions)
+            if track.misses and track.accepts(find, stamp_ns, own):
+                track.follow(find, stamp_ns, own)
                 return track
         self._tracks.append(Track(find.corners, stamp_ns))
         return self._tracks[-1]

@@ -20,6 +20,8 @@ _MOST_MISSES = 5
 _IDENTITY_NS = 2 * NS_PER_S
 
 
+# A board that is found farther from where it should be may be its neighbour: cards side by side are 4.8 squares apart.
+_SAME_SQUARES = 2.0
 # Below this margin a new board's code must be read twice: far away, one reading in seventy is wrong with margin > 1.
 _AT_ONCE_MARGIN = 2.0
 
@@ -28,6 +30,7 @@ _AT_ONCE_MARGIN = 2.0
 class Track:
     """One board: last corners (12, 2) [px] and their time, image velocity [px/s], identity if known.
 
+    pending: a code that another sure reading would confirm.
     foreseen: its centre by the belief in the picture of the last corners [px].
     """
 
@@ -59,17 +62,27 @@ class Track:
 
     def accepts(self, find: Find, stamp_ns: int, prediction: Prediction | None = None) -> bool:
         """Return whether a find may be this board: near where it should be and of about its size."""
-        shift = find.centre - self.expected_corners(stamp_ns, prediction).mean(axis=0)
         own, other = spacing_px(self.corners), spacing_px(find.corners)
-        return float(np.hypot(*shift)) < 2.5 * own + _MOST_UNREST_PX and 0.6 < other / own < 1.7
+        return self._off_px(find, stamp_ns, prediction) < 2.5 * own + _MOST_UNREST_PX and 0.6 < other / own < 1.7
 
     def follow(self, find: Find, stamp_ns: int, prediction: Prediction | None = None) -> None:
-        """Take over a new detection."""
+        """Take over a new detection.
+
+        One that is not where the board should be must be read before it has an identity; a sure reading that agrees
+        with the former one is enough.
+        """
+        jumps = self._off_px(find, stamp_ns, prediction) > _SAME_SQUARES * spacing_px(self.corners)
+        if jumps and self.code is not None:
+            self.code, self.margin, self.pending = None, 0.0, self.code
         seconds = (stamp_ns - self.stamp_ns) / NS_PER_S
         if seconds > 0.0:
             self.velocity = (find.corners - self.corners).mean(axis=0) / seconds
         self.corners, self.stamp_ns, self.misses = find.corners, stamp_ns, 0
         self.foreseen = prediction.centre if prediction is not None else None
+
+    def _off_px(self, find: Find, stamp_ns: int, prediction: Prediction | None) -> float:
+        """Return how far a find is from where the board should be [px]."""
+        return float(np.hypot(*(find.centre - self.expected_corners(stamp_ns, prediction).mean(axis=0))))
 
     def miss(self) -> None:
         """Remember that the board was not where it should be."""

@@ -258,7 +258,7 @@ class _UdpFailsafe:
     def __init__(self) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
 
-    def say(self, datagram: bytes, addresses: Sequence[tuple[str, int]]) -> None:
+    def send(self, datagram: bytes, addresses: Sequence[tuple[str, int]]) -> None:
         for address in addresses:
             self._socket.sendto(datagram, address)
 

@@ -150,7 +150,7 @@ def test_a_crashed_drone_cannot_take_off_while_others_fly(stage: Any) -> None:
     page = stage.open()
     stage.flight.crashed, stage.flight.modes["drone_2"] = {"drone_2"}, "CUT"
     stage.flight.detail["drone_2"] = "the vehicle reports an emergency"
-    page.wait(lambda s: page.there("take-off").inner_text() == "TAKE OFF\ndrone_2 must be checked")
+    page.wait(lambda s: page.there("take-off").inner_text() == "TAKE OFF\ncheck drone_2")
     assert page.there("take-off").is_disabled() and page.there("drone_2-takeoff").is_disabled()
     assert page.there("drone_2-takeoff").inner_text() == "Take off\ncheck it first"
     assert page.there("drone_2-duty").inner_text() == "Is on the floor: it cut its motors itself."
@@ -161,7 +161,7 @@ def test_a_crashed_drone_cannot_take_off_while_others_fly(stage: Any) -> None:
     page.wait(lambda s: page.there("drone_2-duty").inner_text().startswith(ordered))
     stage.flight.crashed = set()  # a vehicle that does not count cut motors as an emergency
     page.wait(lambda s: s["sections"]["vehicles"]["drone_2"]["flight"] == "LANDED")
-    assert page.there("take-off").inner_text() == "TAKE OFF\ndrone_2 must be checked"
+    assert page.there("take-off").inner_text() == "TAKE OFF\ncheck drone_2"
     assert page.there("hold").inner_text() == "HOLD\ndrone_1 hovers;\ndrone_2 is down"
     stage.flight.modes["drone_1"] = "LANDED"
     page.wait(lambda s: page.there("drone_2-takeoff").inner_text() == "Take off\nrises, if able")

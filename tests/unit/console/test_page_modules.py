@@ -184,7 +184,7 @@ def test_a_drone_with_cut_motors_takes_off_only_after_a_look_at_it(said: Any, fl
     store.s.vehicles.drone_1 = is("LANDED", {{ flight: "LANDED" }});
     result.push(start(["drone_2"]), startEffect("TAKEOFF"));
     """
-    check, fell = "drone_2 must be checked", "Is on the floor: it cut its motors itself."
+    check, fell = "check drone_2", "Is on the floor: it cut its motors itself."
     one, captions = [check, check, True, fell], ["drone_1 hovers;\ndrone_2 is down", "no use: down"]
     assert said(script) == [one, *captions, "", "both rise, if able"]
 

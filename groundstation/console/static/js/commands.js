@@ -102,14 +102,14 @@ function showStarts(why) {
 }
 
 // So that no reason reads as an effect.
-const SAYS_SO = /already$|instead$|first$|checked$|^mend|^run over|only$|connection$|charge$|unknown$/;
+const SAYS_SO = /already$|instead$|first$|^mend|^check|^run over|only$|connection$|charge$|unknown$/;
 const notNow = (words) => (SAYS_SO.test(words) ? words : `not now: ${words}`);
 
 // Why one drone may not take off, where a card has less room.
 const OF_ONE = {
   "another page may": "no: other page", "battery unknown": "no: battery?", "station not in charge": "not in charge", "not heard yet": "no: not heard",
 };
-const inFewer = (words) => OF_ONE[words] ?? (words.startsWith("mend") ? "mend: see list" : words.endsWith("checked") ? "check it first" : SAYS_SO.test(words) ? words : `no: ${words}`);
+const inFewer = (words) => OF_ONE[words] ?? (words.startsWith("mend") ? "mend: see list" : words.startsWith("check") ? "check it first" : SAYS_SO.test(words) ? words : `no: ${words}`);
 
 const startRefusal = (verb, names = droneNames()) => twice(refusalOf(verb, names)) ?? (verb === "TAKEOFF" ? forbidden(names) : null);
 

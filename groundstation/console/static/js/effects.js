@@ -22,7 +22,7 @@ export function refusalOf(verb, names = droneNames()) {
 function takeOffRefusal(names) {
   const flying = up(names).length, stand = standing(names), batteries = stand.map((name) => store.s.vehicles[name]), down = stand.filter(isDown);
   if (stand.length && stand.every(isUnheard)) return "not heard";
-  if (down.length && aloft()) return does(down, "must be checked", "must be checked");
+  if (down.length && aloft()) return `check ${down.length > 1 ? howMany(down) : nameOf(down[0])}`;
   if (!batteries.length) return flying === names.length ? "flying already" : flying ? "none stands" : "not heard yet";
   if (batteries.every(({ battery }) => battery === null)) return "battery unknown";
   return batteries.every(({ battery, battery_min: least }) => battery < least) ? "low battery" : "";

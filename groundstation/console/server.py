@@ -11,7 +11,7 @@ import msgspec
 
 from groundstation.bus import clock
 from groundstation.bus.api import Bus, Received
-from groundstation.bus.messages import ALL_DOWN, RUN, RUN_ENDED, Command, CommandAck, Event, Lease, RelativeObservation
+from groundstation.bus.messages import ALL_DOWN, Command, CommandAck, Event, Lease, RelativeObservation
 from groundstation.bus.topics import (
     CAMERA_STATUS,
     COMMAND,
@@ -284,8 +284,8 @@ class ConsoleServer:
                 self.sessions.desk.hear_lease(message)
             case RelativeObservation():
                 self._pictures.take_detection(message)
-            case Event(text=text) if message.header.entity == RUN and text.startswith(RUN_ENDED):
-                self._end = message if self._player is None else self._end
+            case Event(ends_run=True) if self._player is None:
+                self._end = message
             case _:
                 pass
 

@@ -91,11 +91,14 @@ class SafetyParameters:
         return self.limits.get(robot, _USUAL_LIMITS)
 
 
+def search_speed_m_s(field: ResolvedField) -> float:
+    """Return the speed of searches and ways back: no more than the slowest drone flies."""
+    return min([SEARCH_SPEED_M_S, *(drone.limits.max_speed_m_s for drone in field.drones.values())])
+
+
 def control_from_field(field: ResolvedField) -> ControlParameters:
     """Return the setpoints' settings of a resolved field."""
-    planner, safety = field.planner, field.safety
-    slowest_m_s = min((drone.limits.max_speed_m_s for drone in field.drones.values()), default=SEARCH_SPEED_M_S)
-    speed_m_s = min(SEARCH_SPEED_M_S, slowest_m_s)
+    planner, safety, speed_m_s = field.planner, field.safety, search_speed_m_s(field)
     return ControlParameters(
         return_speed_m_s=speed_m_s,
         search_speed_m_s=speed_m_s,

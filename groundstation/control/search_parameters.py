@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from groundstation.control.parameters import SEARCH_SPEED_M_S, SEARCH_YAW_RATE_RAD_S
+from groundstation.control.parameters import SEARCH_SPEED_M_S, SEARCH_YAW_RATE_RAD_S, search_speed_m_s
 from groundstation.control.search_ranges import search_ranges_m
 from groundstation.field.resolved import ResolvedField
 from groundstation.field.room import MotionCapture, WorldCamera
@@ -54,7 +54,6 @@ class SearchParameters:
 def search_from_field(resolved: ResolvedField) -> SearchParameters:
     """Return the settings of a resolved field."""
     room, planner = resolved.room, resolved.planner
-    slowest_m_s = min(drone.limits.max_speed_m_s for drone in resolved.drones.values())
     turn_rad_s = math.radians(min(drone.limits.max_yaw_rate_deg_s for drone in resolved.drones.values()))
     fixed: dict[str, WorldCamera | MotionCapture] = {**resolved.cameras, **resolved.sensing_capture}
     cameras = tuple(name for name, sensor in fixed.items() if "targets" in sensor.observes)
@@ -62,7 +61,7 @@ def search_from_field(resolved: ResolvedField) -> SearchParameters:
         room_m=(room.size_m[0], room.size_m[1]),
         fence_x_m=room.fence.x_m,
         fence_y_m=room.fence.y_m,
-        speed_m_s=min(SEARCH_SPEED_M_S, slowest_m_s),
+        speed_m_s=search_speed_m_s(resolved),
         yaw_rate_rad_s=min(SEARCH_YAW_RATE_RAD_S, turn_rad_s),
         near_yaw_rate_rad_s=min(NEAR_YAW_RATE_RAD_S, turn_rad_s),
         observers=(*resolved.drones, *cameras),

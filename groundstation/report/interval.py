@@ -1,5 +1,7 @@
 """The parts of a run that count: from TRACK to the commands that end each flight of the team."""
 
+from collections.abc import Sequence
+
 from groundstation.bus.messages import AckStage, Verb
 from groundstation.report.tracks import RunData
 
@@ -24,7 +26,11 @@ def tracking_spans(data: RunData) -> tuple[Span, ...]:
 
 def tracking_interval(data: RunData) -> Span | None:
     """Return the begin of the first flight and the end of the last [s], or None without a flight."""
-    spans = tracking_spans(data)
+    return whole(tracking_spans(data))
+
+
+def whole(spans: Sequence[Span]) -> Span | None:
+    """Return the begin of the first span and the end of the last [s], or None without any."""
     return (spans[0][0], spans[-1][1]) if spans else None
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import msgspec
 
-from groundstation.bus.messages import RUN, RUN_ENDED, Severity
+from groundstation.bus.messages import RUN_ENDED, Severity
 from groundstation.recording.part_names import shown
 from groundstation.recording.rerun import Rerun
 from groundstation.recording.stretch import Stretch
@@ -129,6 +129,5 @@ def judge(data: RunData, run_dir: Path) -> RunReport:
 
 def _broken_off(data: RunData) -> str:
     """Return the failure that ended the run, as it reported it."""
-    events = [timed.message for timed in data.events]
-    failures = [one.text for one in events if one.header.entity == RUN and one.severity is Severity.ERROR]
-    return next((text.removeprefix(RUN_ENDED) for text in failures if text.startswith(RUN_ENDED)), "")
+    ends = [timed.message for timed in data.events if timed.message.ends_run]
+    return next((one.text.removeprefix(RUN_ENDED) for one in ends if one.severity is Severity.ERROR), "")

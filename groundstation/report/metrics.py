@@ -11,7 +11,7 @@ from groundstation.estimation.tracking_errors import TrackingFigures, tracking_f
 from groundstation.report import load, safety, topology_use
 from groundstation.report.accuracy import RATE_HZ, Accuracy, accuracy, errors_at, time_grid
 from groundstation.report.happenings import happenings, landings
-from groundstation.report.interval import tracking_interval, tracking_spans
+from groundstation.report.interval import tracking_spans, whole
 from groundstation.report.tracks import RunData
 
 
@@ -63,9 +63,9 @@ _LOUD_EVENTS = 50
 
 def figures_of(data: RunData) -> RunFigures:
     """Return the figures of a run."""
-    interval = tracking_interval(data)
-    start, end = interval or (0.0, 0.0)
     spans = tracking_spans(data)
+    interval = whole(spans)
+    start, end = interval or (0.0, 0.0)
     grid = np.concatenate([time_grid(*span) for span in spans]) if spans else np.empty(0)
     targets, robots = _accuracies(data, grid) if spans else ({}, {})
     target = max(targets.values(), key=lambda one: one.rmse_m, default=None)

@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from groundstation.arrays import Array, BoolArray
 from groundstation.bus.messages import (
-    RUN,
-    RUN_ENDED,
     Belief,
     Command,
     CommandAck,
@@ -170,8 +168,7 @@ class RunData:
     @property
     def breaks_off(self) -> bool:
         """Return whether the recording is damaged and lacks the end of the run: a full disk, or a recorder's death."""
-        ended = (one.message.header.entity == RUN and one.message.text.startswith(RUN_ENDED) for one in self.events)
-        return bool(self.damage) and not any(ended)
+        return bool(self.damage) and not any(one.message.ends_run for one in self.events)
 
     @property
     def drones(self) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ from enum import StrEnum
 
 from groundstation.bus.messages.base import Message
 
-# The entity of the one event about a run as a whole: that it ends, and how.
+# The entity of events about a run as a whole. The text of one begins so: the run has ended, and how.
 RUN = "run"
 RUN_ENDED = "run ended: "
 # The last words of such an event, where it is so.
@@ -39,6 +39,11 @@ class Event(Message, frozen=True, kw_only=True):
         """Return the text with its entity before it, unless it begins with that."""
         entity = self.header.entity
         return self.text if self.text.startswith(entity) else f"{entity}: {self.text}"
+
+    @property
+    def ends_run(self) -> bool:
+        """Return whether it says that the run has ended."""
+        return self.header.entity == RUN and self.text.startswith(RUN_ENDED)
 
 
 class Lifecycle(StrEnum):

@@ -127,11 +127,13 @@ class MotionMonitor:
             for watch in self._velocity:
                 watch.reset()
             return judged
-        for watch, velocity, tilt in zip(self._velocity, sample.velocity_m_s, sample.lean_rad, strict=True):
-            held_s, change_m_s = watch.update(sample.stamp_ns, velocity, tilt)
+        axes = zip(self._velocity, sample.velocity_m_s, sample.lean_rad, strict=True)
+        held = [(*watch.update(sample.stamp_ns, velocity, tilt), velocity) for watch, velocity, tilt in axes]
+        stuck_m_s = math.hypot(*(velocity for held_s, _, velocity in held if held_s))
+        for held_s, change_m_s, _ in held:
             if held_s:
                 needed_s = limits.stuck_s if change_m_s >= limits.stuck_m_s else limits.stuck_alone_s
-                reason = f"reported velocity stuck at {abs(velocity):.2f} m/s"
+                reason = f"reported velocity stuck at {stuck_m_s:.2f} m/s"
                 judged += _repeated(Sensor.VELOCITY, held_s, needed_s, reason)
         return judged
 

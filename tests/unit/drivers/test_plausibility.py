@@ -76,6 +76,10 @@ def stuck_at_zero(sample, _):
     return sample._replace(velocity_m_s=(0.0, 0.0))
 
 
+def both_axes_stuck(sample, _):
+    return sample._replace(velocity_m_s=(-0.3, 0.4))
+
+
 def one_axis_stuck(sample, began):
     return sample._replace(velocity_m_s=(0.5, sample.velocity_m_s[1]))
 
@@ -116,6 +120,7 @@ def flickering(sample, _):
         (frozen, Sensor.TELEMETRY, 0.4, "all values repeat"),
         (frozen_but_for_the_clock, Sensor.TELEMETRY, 0.4, "all values repeat"),
         (stuck_at_zero, Sensor.VELOCITY, 0.8, "stuck at 0.00 m/s"),
+        (both_axes_stuck, Sensor.VELOCITY, 0.8, "stuck at 0.50 m/s"),
         (one_axis_stuck, Sensor.VELOCITY, 0.8, "stuck at 0.50 m/s"),
         (attitude_stuck, Sensor.ATTITUDE, 0.6, "attitude is stuck"),
         (clock_stands, Sensor.CLOCK, 0.4, "clock stands"),

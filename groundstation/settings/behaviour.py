@@ -43,7 +43,6 @@ def _one_row_more(rows: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...
 
 LevelHeights = Annotated[
     tuple[Annotated[tuple[Height, ...], AfterValidator(_falling)], ...],
-    Field(min_length=1),
     AfterValidator(_one_row_more),
 ]
 
@@ -86,10 +85,10 @@ class PlannerSettings(SettingsSection):
     """Share of the cost by which a new topology must be cheaper than the current one before the team changes."""
     initial_topology: Literal["flat", "string"] = "flat"
     """Topology after take-off. flat: all drones in one level; string: one drone per level."""
-    level_heights_m: LevelHeights
-    """Heights [m above the floor] with which the search begins. Row n holds n heights, top level first, for a topology
-    with n levels; one row per drone at least. All must lie above the target and inside the fence; the planner chooses
-    between the lowest and the highest."""
+    level_heights_m: LevelHeights = ()
+    """Heights [m above the floor] with which the search begins; left out, they follow from target, fence and
+    planned_range_m. Row n holds n heights, top level first, for a topology with n levels; one row per drone at least.
+    All must lie above the target and inside the fence; the planner chooses between the lowest and the highest."""
     planned_range_m: Annotated[float, Field(gt=0, le=20)] = 1.9
     """Distance [m] up to which the planner expects a drone's camera to detect a marker."""
     separation_m: Annotated[float, Field(gt=0, le=10)] = 1.0

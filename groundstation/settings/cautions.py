@@ -113,6 +113,17 @@ def _obstacles(field: Field) -> Iterator[Finding]:
             yield ("room", "obstacles", name), text
 
 
+def _heights(field: Field) -> Iterator[Finding]:
+    lowest, range_m = (
+        min(height for row in field.planner.level_heights_m for height in row),
+        field.planner.planned_range_m,
+    )
+    over_m = lowest - max((one.marker.height_m for one in field.tracked.values()), default=0.0)
+    if over_m >= range_m:
+        text = f"keep the drones {over_m:.1f} m over the target, and planned_range_m is {range_m:g}: they never see it"
+        yield ("planner", "level_heights_m"), text
+
+
 def _uncertainty(field: Field) -> Iterator[Finding]:
     limit = field.safety.max_position_std_m
     if limit < _LEAST_STD_M:
@@ -184,6 +195,7 @@ OF_A_FIELD: tuple[Caution, ...] = (
     _carried_cameras,
     _fence,
     _obstacles,
+    _heights,
     _uncertainty,
     _lenses,
     too_small,

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from groundstation.errors import OperatorMistake
 from groundstation.settings.cautions import RISEN_MARKER_M, RISEN_ROOM_M
+from groundstation.settings.level_heights import FENCE_MARGIN_M, LEAST_BAND_M, OVER_TARGET_M
 from groundstation.vehicles import Offer, VehicleKind, all_kinds
 
 Place = tuple[float, float]
@@ -21,8 +22,6 @@ _PAD_GAP_M = 1.0
 _TARGET_CODE = 5
 _LONGEST_SITE = 40
 _PLAIN = re.compile(r"[a-z0-9][\w.:/@?=&%+-]*[\w/]", re.ASCII)
-# Drones fly in a band below the fence's top: its least height, and its distance above the target's board.
-_TOP_MARGIN_M, _BAND_M, _LEAST_BAND_M, _LOWEST_FLIGHT_M, _ABOVE_BOARD_M = 0.3, 1.4, 0.2, 0.8, 0.4
 
 BASES = {"turtlebot_2": 0.4, "person": 1.4, "rc_car": 0.2}
 """Kinds of targets (`target.base`), each with a likely height of the board on it [m]."""
@@ -76,7 +75,7 @@ def site_of(folder: str) -> str:
 
 def check_target(room: NewRoom, target: NewTarget) -> None:
     """Raise OperatorMistake for a board that no drone can look down on."""
-    most = round(room.fence_top_m - _TOP_MARGIN_M - _LEAST_BAND_M - _ABOVE_BOARD_M, 2)
+    most = round(room.fence_top_m - FENCE_MARGIN_M - LEAST_BAND_M - OVER_TARGET_M, 2)
     if not 0.0 <= target.board_m <= most:
         raise OperatorMistake(
             f"no drone looks down on a board {target.board_m:g} m above the floor in a room {room.height_m:g} m high: "
@@ -134,7 +133,7 @@ def field_text(site: str, room: NewRoom, drones: list[NewDrone], target: NewTarg
     types = "".join(_type(name, *known[name]) for name in dict.fromkeys(drone.kind for drone in drones))
     parts = [_room(site, room), _DEFAULTS, f"types:\n{types}"]
     parts.append("drones:\n" + "".join(map(_drone, range(1, 1 + len(drones)), drones, pads(room, len(drones)))))
-    return "\n".join([*parts, _target(target), _planner(room, len(drones), target.board_m), _REST])
+    return "\n".join([*parts, _target(target), _REST])
 
 
 def _text(answer: str) -> str:
@@ -189,23 +188,6 @@ target:
   base: {target.base}            # its limits of motion; for another target: max_speed_m_s and its like
   marker: {{code: {_TARGET_CODE}, height_m: {target.board_m:g}, square_mm: 44}}
 """
-
-
-def _planner(room: NewRoom, drones: int, board_m: float) -> str:
-    top = room.fence_top_m - _TOP_MARGIN_M
-    low = max(_LOWEST_FLIGHT_M, top - _BAND_M, board_m + _ABOVE_BOARD_M)
-    rows = "".join(f"    - [{_heights(top, low, levels)}]\n" for levels in range(1, max(3, drones) + 1))
-    return f"""\
-planner:
-  level_heights_m:               # where the search for heights begins, by number of levels, top level first
-{rows}  planned_range_m: 1.9           # onboard cameras: range that the planner counts on
-"""
-
-
-def _heights(top: float, low: float, levels: int) -> str:
-    if levels == 1:
-        return f"{(top + low) / 2:.2f}"
-    return ", ".join(f"{top - (top - low) * level / (levels - 1):.2f}" for level in range(levels))
 
 
 _DEFAULTS = """\

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator
 from itertools import combinations
 
+from groundstation.settings.level_heights import FENCE_MARGIN_M, OVER_TARGET_M
 from groundstation.settings.parts import Finding, Parts
 
 _ROBOT_HEIGHT_M = 0.3
@@ -74,10 +75,13 @@ def _heights(parts: Parts) -> Iterator[Finding]:
     if parts.planner is None:
         return
     rows = parts.planner.level_heights_m
-    if parts.flying and len(rows) < len(parts.flying):
+    if not rows:
+        yield from _room_over_targets(parts)
+    elif len(rows) < len(parts.flying):
         yield (
             ("planner", "level_heights_m"),
-            f"must hold a row for each number of levels, 1 to {len(parts.flying)} drones (got {len(rows)})",
+            f"must hold a row for each number of levels, 1 to {len(parts.flying)} drones, or be left out "
+            f"(got {len(rows)})",
         )
     low = max((one.marker.height_m + _ROBOT_HEIGHT_M for _, one in parts.tracked.values()), default=0.0)
     high = math.inf
@@ -88,3 +92,12 @@ def _heights(parts: Parts) -> Iterator[Finding]:
             if not low <= height <= high:
                 path = ("planner", "level_heights_m", index, slot)
                 yield path, f"must be between {low:g} (over the target) and {high:g} (the fence) (got {height:g})"
+
+
+def _room_over_targets(parts: Parts) -> Iterator[Finding]:
+    """Yield a fence too low for flights over the targets, where no heights are given."""
+    least_m = max((one.marker.height_m for _, one in parts.tracked.values()), default=0.0)
+    least_m += OVER_TARGET_M + FENCE_MARGIN_M
+    if parts.room is not None and parts.room.fence.z_m[1] < least_m:
+        top = parts.room.fence.z_m[1]
+        yield ("room", "fence", "z_m"), f"must reach {least_m:g} m for drones to fly over the target (got {top:g})"

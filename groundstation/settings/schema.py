@@ -1,8 +1,9 @@
 """The resolved field: room, team, target and behaviour, as every process gets them."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import Field as Constraint
+from pydantic import model_validator
 
 from groundstation.settings.behaviour import (
     Bus,
@@ -13,6 +14,7 @@ from groundstation.settings.behaviour import (
     SafetySettings,
 )
 from groundstation.settings.drones import Drone
+from groundstation.settings.level_heights import LevelRows, derived_heights
 from groundstation.settings.motion_capture import MotionCaptureSettings, VolumeSettings
 from groundstation.settings.ranging import RangingSettings
 from groundstation.settings.room import RoomSettings, WorldCameraSettings
@@ -53,7 +55,7 @@ class Field(SettingsSection):
     """Several targets by name, in place of target."""
     estimator: EstimatorSettings = EstimatorSettings()
     """The joint estimator."""
-    planner: PlannerSettings
+    planner: PlannerSettings = PlannerSettings()
     """How the planner searches for the topology and the velocities."""
     safety: SafetySettings = SafetySettings()
     """Least distances, and how long a drone flies on without setpoints or sightings."""
@@ -63,6 +65,18 @@ class Field(SettingsSection):
     """The operator's web page."""
     bus: Bus = Bus()
     """The router of the run's messages."""
+
+    @model_validator(mode="after")
+    def _with_level_heights(self) -> Self:
+        """Write down the heights that follow from room and targets, so that every reader of the field has them."""
+        if not self.planner.level_heights_m:
+            object.__setattr__(self, "planner", self.planner.model_copy(update={"level_heights_m": self._heights()}))
+        return self
+
+    def _heights(self) -> LevelRows:
+        target_m = max((one.marker.height_m for one in self.tracked.values()), default=0.0)
+        team = sum(drone.enabled for drone in self.drones.values())
+        return derived_heights(self.room.fence.z_m[1], target_m, self.planner.planned_range_m, team)
 
     @property
     def volumes(self) -> dict[str, VolumeSettings]:

@@ -46,6 +46,7 @@ FOOLISH = [
         "defaults.marker.square_mm",
         "too small for ceiling (got 12): on a pad they have 3.4 px",
     ),
+    ("planner.level_heights_m=[[2.6],[2.7,2.5]]", "planner.level_heights_m", "2.1 m over the target"),
     ("planner.step_s=2e-4", "planner.step_s", "0.002 s ahead"),
     ("cameras.ceiling.source=/dev/video97", "cameras.ceiling.source", "not there on this machine"),
 ]

@@ -125,11 +125,11 @@ def test_a_missing_key_is_reported_at_its_place() -> None:
     Path("lab.yaml").write_text(GOOD.replace("    marker: {code: 1}\n", ""), encoding="utf-8")
     line = line_of(GOOD, "  drone_1:")
     assert problems() == [f"lab.yaml:{line}: drones.drone_1.marker.code: is required"]
-    Path("lab.yaml").write_text(GOOD.replace("planner:\n", "plannr:\n"), encoding="utf-8")
+    Path("lab.yaml").write_text(GOOD.replace("room:\n", "rooom:\n"), encoding="utf-8")
     found = problems()
     assert [problem.split(": ", 1)[1] for problem in found] == [
-        "planner: is required",
-        "plannr: unknown key, did you mean planner?",
+        "room: is required",
+        "rooom: unknown key, did you mean room?",
     ]
 
 

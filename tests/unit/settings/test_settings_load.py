@@ -141,7 +141,7 @@ def test_the_json_schema_knows_every_key_of_the_file() -> None:
     assert json.loads(json.dumps(schema)) == schema
     assert schema["$schema"].endswith("2020-12/schema")
     assert schema["additionalProperties"] is False
-    assert set(schema["required"]) == {"schema_version", "site", "room", "drones", "planner"}
+    assert set(schema["required"]) == {"schema_version", "site", "room", "drones"}
     fixed = ("cameras", "motion_capture", "ranging")
     assert schema["allOf"] == [{"anyOf": [{"required": [section]} for section in fixed]}]
     assert schema["anyOf"] == [{"required": ["target"]}, {"required": ["targets"]}]

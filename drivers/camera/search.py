@@ -15,7 +15,8 @@ from drivers.camera.detect import Find, Window, card_outline, enlargement, find_
 from groundstation.arrays import Array, Image
 from groundstation.geometry import board as marker
 
-_HALVE_ABOVE_PX = 800
+HALVE_ABOVE_PX = 800
+"""Width [px] above which a picture is halved before it is searched."""
 _SMOOTHING_PX = 1.2
 _MOST_SEEDS = 220
 _LEAST_STRENGTH = 250.0
@@ -91,7 +92,7 @@ def search(picture: Image, taken: list[Window], most: int = _MOST_WINDOWS) -> li
 
 def saddle_points(picture: Image) -> Seeds:
     """Return the strongest saddle points of a picture; large pictures are halved first."""
-    factor = 2 if picture.shape[1] > _HALVE_ABOVE_PX else 1
+    factor = 2 if picture.shape[1] > HALVE_ABOVE_PX else 1
     if factor == 2:
         picture = np.asarray(
             cv2.resize(picture, (picture.shape[1] // 2, picture.shape[0] // 2), interpolation=cv2.INTER_AREA), np.uint8

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from drivers.camera.search import HALVE_ABOVE_PX
 from groundstation.arrays import Array
 from groundstation.bus.messages import Estimate, Header, RelativeObservation, SearchedPicture
 from groundstation.geometry.board import Checkerboard
@@ -28,9 +29,10 @@ from sim_bridge.world.mavlink_copter import MavlinkCopter
 from sim_bridge.world.world import World
 
 _BORDER_PX = 6.0
-# Pixels per square that the detector needs: in a window about the last sighting or the belief, and without one
-# (docs/reference/vision.md 2).
-_WINDOW_PX, _SEARCH_PX = 5.5, 8.5
+# Pixels per square that the detector needs in a window about the last sighting or the belief; in a search of the whole
+# picture: of a camera that stands, a large picture of one, which is halved first (docs/reference/vision.md 8), and of a
+# camera that a searching robot turns.
+_WINDOW_PX, _STANDING_PX, _HALVED_PX, _TURNING_PX = 5.5, 5.5, 6.7, 8.5
 _FORGET_S = 0.4
 _STEEPEST_COS = math.cos(math.radians(72.0))
 # The detector estimates the variance of a pixel from the residuals of the pose and adds the square of a floor. On
@@ -100,6 +102,8 @@ class Eye:
             self._rotation, self._position = mounted(mount, cameras.mounting_errors, rng)
             self._told = world_from_downward_optical(mount.rotation_deg)
         self._mounted = self._rotation
+        standing_px = _HALVED_PX if lens.intrinsics.width_px > HALVE_ABOVE_PX else _STANDING_PX
+        self._search_px = standing_px if self._carrier is None else _TURNING_PX
         self._told_lens, self._lens = lens.intrinsics, true_lens(lens, cameras.mounting_errors, rng)
         fixed = self._carrier is None
         self._boards = tuple(
@@ -197,7 +201,7 @@ class Eye:
             return _WINDOW_PX
         if self._attention.expects(body, self._lens.pixel(*centre.tolist())):
             return _WINDOW_PX
-        return _SEARCH_PX if self._attention.searching else math.inf
+        return self._search_px if self._attention.searching else math.inf
 
     def _is_framed(self, points: Array) -> bool:
         """Return whether all points (n, 3) [optical] are in the picture, inside its border."""

@@ -61,13 +61,14 @@ def _targets(names: tuple[str, ...]) -> str:
 
 def _check(name: str, options: tuple[str, ...], scenario: str | None) -> list[str]:
     """Return the warnings about a field without mistakes; raises SettingsError with all mistakes."""
-    from groundstation.settings import drawing, parked
     from groundstation.settings.files import find_field, find_scenario
     from groundstation.settings.load import cautions_of, load_field
     from groundstation.settings.scenario import Room, load_scenario
+    from groundstation.settings.scenario_fit import made_for, misfits
 
     path = find_field(name)
     problems: list[str] = []
+    warnings: list[str] = []
     field = None
     try:
         field = load_field(path, options)
@@ -77,16 +78,15 @@ def _check(name: str, options: tuple[str, ...], scenario: str | None) -> list[st
     if scenario is not None:
         try:
             plain = load_scenario(find_scenario(scenario, path), room=Room(field) if field else None)
+            warnings += [f"{scenario}: {sentence}" for sentence in made_for(path, plain)]
             if field is not None:
-                paths = drawing.paths_of(plain, field.tracked)
-                foolish = drawing.beyond_walls(field, paths) + parked.on_pads(field, plain)
-                problems += [f"{scenario}: {sentence}" for sentence in foolish]
+                problems += [f"{scenario}: {sentence}" for sentence in misfits(field, plain)]
         except SettingsError as error:
             problems += error.problems
     if problems:
         raise SettingsError(problems)
     click.echo(f"{path}: good ({team})", err=True)
-    return cautions_of(path, options)
+    return cautions_of(path, options) + warnings
 
 
 @config.command(

@@ -150,10 +150,10 @@ def run_simulated(mode: str, field: str, asked: Rehearsal) -> int:
     from groundstation.flight.flight_plan import plan_of
     from groundstation.flight.real_parts import notes, parse_real
     from groundstation.report.run_facts import RunFacts
-    from groundstation.settings import drawing, parked
     from groundstation.settings.files import find_field, find_scenario
     from groundstation.settings.load import load_field
     from groundstation.settings.scenario import Room, load_scenario
+    from groundstation.settings.scenario_fit import made_for, misfits
     from groundstation.supervisor import network, runtime_file
 
     path, scenario, duration, seed = find_field(field), asked.scenario, asked.duration, asked.seed
@@ -169,8 +169,7 @@ def run_simulated(mode: str, field: str, asked: Rehearsal) -> int:
     chosen = load_scenario(find_scenario(scenario, path), room=Room(loaded, parts.bodies, parts.cameras))
     if seed is None:
         seed = int(chosen.get("seed", 1))
-    beyond = drawing.beyond_walls(loaded, drawing.paths_of(chosen, loaded.tracked))
-    for sentence in beyond + parked.on_pads(loaded, chosen):
+    for sentence in misfits(loaded, chosen) + made_for(path, chosen):
         click.echo(f"scenario {scenario}: {sentence}", err=True)
     net = network.claim(runtime_file.folder(), loaded.bus.port, asked.network)
     try:

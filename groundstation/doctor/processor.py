@@ -31,7 +31,8 @@ def real_time_right() -> Finding:
     found = "allowed" if allowed == [True] else "not allowed: on a busy machine setpoints come late"
     user = os.environ.get("USER") or "USER"
     remedy = (
-        f"add '{user} - rtprio 10' to /etc/security/limits.conf and log in again; in a container: --cap-add SYS_NICE"
+        f"add '{user} - rtprio 2' to /etc/security/limits.d/skein.conf and log in again; "
+        "in a container: --cap-add SYS_NICE"
     )
     return judged(allowed == [True], Level.SHOULD, "real-time priority", found, remedy)
 

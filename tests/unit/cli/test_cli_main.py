@@ -260,23 +260,6 @@ def test_config_init_starts_a_field_and_overwrites_nothing(tmp_path: Path, capsy
     assert (folder / "lab.yaml").read_text(encoding="utf-8") == "mine"
 
 
-def test_a_path_that_leaves_the_room_is_told_before_the_rehearsal(
-    lab: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    narrow = ("--set", "room.size_m=[8, 1.5, 4.5]", "--set", "room.fence.y_m=[-0.7, 0.7]")
-    assert cli.run(["config", "check", "lab.yaml", "--scenario", "realistic", *narrow]) == 2
-    assert "realistic: the path of turtlebot leaves the room" in capsys.readouterr().err
-
-
-def test_a_target_that_is_parked_on_a_pad_is_told_before_the_rehearsal(
-    lab: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    below = ("--set", "drones.drone_1.pad_m=[0.1, 0.1]")
-    assert cli.run(["config", "check", "lab.yaml", "--scenario", "realistic", *below]) == 2
-    told = "realistic: turtlebot is parked at (0.0, 0.0), 0.1 m from the pad of drone_1, and hides its marker"
-    assert told in capsys.readouterr().err
-
-
 def test_config_draw(lab: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.run(["config", "draw", "lab.yaml", "--scenario", "realistic", "--output", "room.svg"]) == 0
     text = (lab / "room.svg").read_text(encoding="utf-8")

@@ -3,12 +3,10 @@
 import logging
 import time
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from enum import IntEnum
 
 from groundstation.adapters import Address
-from groundstation.errors import GroundStationError
 from groundstation.supervisor.failsafe_transport import FailsafeTransport, Successor, open_transport
 from groundstation.supervisor.process_spec import FailsafeDatagrams
 from groundstation.time_units import NS_PER_MS, NS_PER_S
@@ -44,6 +42,7 @@ class FailsafeSender:
         self._speaker = speaker
         self._transports: dict[str, FailsafeTransport] = {}
         self._speaking: dict[str, _Speech] = {}
+        self._failing: set[str] = set()
         self._next_ns = 0
 
     def prepare(self, name: str, datagrams: FailsafeDatagrams) -> str:
@@ -52,8 +51,8 @@ class FailsafeSender:
             return ""
         try:
             self._transports[name] = open_transport(datagrams, self._speaker)
-        except (OSError, GroundStationError) as error:
-            return str(error)
+        except Exception as error:  # noqa: BLE001 - a transport may be another package's; the others go on
+            return str(error) or type(error).__name__
         return ""
 
     def begin(
@@ -101,8 +100,18 @@ class FailsafeSender:
             transport, datagrams = self._transports.get(name), speech.datagrams
             if transport is not None:
                 too_long = now_ns - speech.since_ns >= datagrams.land_after_s * NS_PER_S
-                with suppress(OSError):
-                    transport.send(datagrams.land if too_long else datagrams.hover, speech.addresses)
+                self._send(name, transport, datagrams.land if too_long else datagrams.hover, speech.addresses)
+
+    def _send(self, name: str, transport: FailsafeTransport, command: bytes, addresses: Sequence[Address]) -> None:
+        """Send one command; a transport that fails, another package's included, must not silence the others."""
+        try:
+            transport.send(command, addresses)
+        except OSError:
+            return
+        except Exception:  # noqa: BLE001 - it is logged once
+            if name not in self._failing:
+                _log.exception("the transport to %s failed", name)
+            self._failing.add(name)
 
     def close(self) -> None:
         """Stop sending; idempotent."""

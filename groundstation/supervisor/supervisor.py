@@ -237,7 +237,7 @@ class Supervisor:
         if words is None or self._stopping:
             return
         known = partial(self._block.addresses, process.slot), partial(self._block.left, process.slot)
-        if self._last_words.begin(process.spec.name, words, process.silent_since_ns or now_ns, *known):
+        if self._last_words.begin(process.spec.name, words, process.silent_since_ns, *known):
             self.events.event(Severity.WARNING, process, f"{why}: the supervisor tells its drone to hover")
 
     def _kill(self, process: ManagedProcess, reason: str, due: bool) -> None:
@@ -249,7 +249,8 @@ class Supervisor:
         if self._stopping:
             return
         why = process.kill_reason or exit_text(code, process.farewell)
-        self._speak_for(process, why, now_ns)
+        if process.silent_since_ns:  # one that ended its work, or never took it up, leaves nobody in the air
+            self._speak_for(process, why, now_ns)
         never_up = not process.ready_ns and process.life == 1
         if process.spec.restart is Restart.ENDS_RUN or (never_up and process.spec.required):
             self.fail(process, why)

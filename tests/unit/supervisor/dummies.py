@@ -60,3 +60,9 @@ def flying(child):
         drone.sendto(b"fly", ("127.0.0.1", json.loads(child.section)["port"]))
         child.sleep_until(time.monotonic_ns() + 33_000_000)
     return 0
+
+
+def ends_its_work(child):
+    child.ready()
+    turn(child)
+    return 0

@@ -8,7 +8,6 @@ another process.
 import os
 import shutil
 import stat
-import tempfile
 from contextlib import suppress
 from pathlib import Path
 
@@ -17,6 +16,9 @@ import msgspec
 from groundstation.bus.roles import Identity, Role, certificate_name, shell
 from groundstation.errors import GroundStationError
 from groundstation.process.stat_file import stat_of
+
+# Not tempfile.gettempdir(): with another TMPDIR, or a full /tmp, another shell would look elsewhere than the run did.
+_SHARED = Path("/tmp")
 
 
 class ProcessRecord(msgspec.Struct, frozen=True):
@@ -91,10 +93,7 @@ def start_time(pid: int) -> int | None:
 def folder() -> Path:
     """Return the folder of runtime files, made if needed; raises GroundStationError if it is someone else's."""
     given = os.environ.get("XDG_RUNTIME_DIR", "")
-    if given and os.access(given, os.W_OK):
-        path = Path(given) / "skein"
-    else:
-        path = Path(tempfile.gettempdir()) / f"skein-{os.getuid()}"
+    path = Path(given) / "skein" if given and os.access(given, os.W_OK) else _SHARED / f"skein-{os.getuid()}"
     try:
         path.mkdir(mode=0o700, exist_ok=True)
         status = path.lstat()

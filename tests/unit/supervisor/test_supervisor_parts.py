@@ -89,10 +89,24 @@ def test_a_folder_that_is_gone_is_an_os_error_to_who_writes_and_nothing_to_who_r
 ) -> None:
     one = record(os.getpid(), runtime_file.start_time(os.getpid()) or 0, str(tmp_path / "block"))
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "gone"))
-    monkeypatch.setattr("tempfile.gettempdir", lambda: str(tmp_path / "gone"))
+    monkeypatch.setattr(runtime_file, "_SHARED", tmp_path / "gone")
     with pytest.raises(OSError, match="gone"):
         runtime_file.write(one)
     runtime_file.remove(one)
+
+
+def test_shells_with_other_folders_for_temporary_files_find_the_same_run(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """As with a full /tmp, where Python chooses /var/tmp by itself."""
+    monkeypatch.delenv("XDG_RUNTIME_DIR", raising=False)
+    found = set()
+    for name in ("one", "other"):
+        (tmp_path / name).mkdir()
+        monkeypatch.setenv("TMPDIR", str(tmp_path / name))
+        monkeypatch.setattr("tempfile.tempdir", None)
+        found.add(runtime_file.folder())
+    assert found == {Path(f"/tmp/skein-{os.getuid()}")}
 
 
 def test_zombie_is_not_alive() -> None:

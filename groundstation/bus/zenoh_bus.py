@@ -92,6 +92,14 @@ def _secured(configuration: dict[str, Any], identity: Identity, end: str) -> dic
     return configuration
 
 
+def _require_certificate(identity: Identity) -> None:
+    """Raise GroundStationError if a run's certificates are gone, as after the last logout of a user without linger."""
+    path = Path(identity.folder) / f"{identity.name}{CERTIFICATE}"
+    if not path.is_file():
+        remedy = "land, and start the run again (loginctl enable-linger keeps the folder after a logout)"
+        raise GroundStationError(f"the certificate {path} of this run is gone: {remedy}")
+
+
 def _thinned(at_most_hz: Mapping[str, float]) -> list[dict[str, Any]]:
     """Return a rule for each key: those of one rule would share its rate."""
     return [
@@ -208,6 +216,7 @@ def open_bus(
     """
     configuration = _configuration("client", endpoint) | {"downsampling": _thinned(at_most_hz)}
     if identity is not None:
+        _require_certificate(identity)
         configuration = _secured(configuration, identity, "connect")
     deadline = time.monotonic() + timeout_s
     while True:

@@ -267,3 +267,9 @@ def test_a_stranger_is_told_once_in_ten_seconds(told: tuple[Join, Callable[[], l
         join("tracker", patience_s=0.0)
     (text,) = until_told(refused)
     assert "connections of programs that are not of this run" in text
+
+
+def test_a_run_whose_certificates_are_gone_says_so_and_not_that_no_router_answers(tmp_path: Path) -> None:
+    """As after the last logout of a user whose runtime folder does not stay."""
+    with pytest.raises(GroundStationError, match=r"the certificate .* of this run is gone: land"):
+        zenoh_bus.open_bus("tls/127.0.0.1:1", "lab", "tracker", 5.0, Identity(str(tmp_path), "tracker", "run-7"))

@@ -169,6 +169,7 @@ def _field_findings(
     from groundstation.geometry.lens import intrinsics_of
 
     places: dict[int, dict[str, tuple[Any, float]]] = {}
+    remedy = "check the camera and its address" if pictures is _of_camera else ""
     for name, camera in field.cameras.items():
         lens = intrinsics_of(camera.calibration)
         try:
@@ -177,7 +178,7 @@ def _field_findings(
             yield CheckFinding(f"{name}: {error}", False)
             continue
         except GroundStationError as error:
-            yield CheckFinding(f"{name}: {error}", False, "check the camera and its address")
+            yield CheckFinding(f"{name}: {error}", None, remedy)
             continue
         yield from _lens_findings(name, lens, seen, square_mm)
         for code, steady in seen.items():

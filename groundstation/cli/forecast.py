@@ -89,7 +89,7 @@ def _paths(settings: "Field", path: Path, target: str, drawn: str | None, scenar
 
     names = list(settings.tracked)
     paths: Paths = {name: [] for name in names}
-    if drawn:
+    if drawn is not None:
         paths[target] = _places(drawn)
     elif scenario:
         paths = drawing.paths_of(load_scenario(find_scenario(scenario, path)), names)

@@ -18,7 +18,7 @@ from groundstation.process.standard_streams import make_usable
 def _meant(word: str) -> str:
     from difflib import get_close_matches
 
-    near = get_close_matches(word, ["help", *all_verbs()], 1, 0.5)
+    near = get_close_matches(word.lower(), ["help", *all_verbs()], 1, 0.5)
     likely = meant(word.lower()) or (f"'{near[0]}'" if near else "")
     return f" Did you mean {likely}?" if likely else ""
 

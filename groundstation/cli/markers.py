@@ -10,6 +10,7 @@ from groundstation.printing import pdf, sheets
 from groundstation.recording.outputs import replaced_file
 
 _SQUARE_MM, _TAG_MM = 44.0, 168.0
+_SQUARES_MM, _TAGS_MM = (5.0, 200.0), (10.0, 1000.0)
 
 
 @click.group(epilog="Example: groundstation markers print --id 3 --size A4 -o marker.pdf")
@@ -83,8 +84,9 @@ def paper_size(text: str) -> tuple[float, float]:
 
 
 def _item(number: int, dictionary: str | None, size: float) -> sheets.Sheet:
-    if not 1.0 <= size <= 2000.0:
-        raise click.UsageError(f"a size of {size:g} mm: must be in 1..2000")
+    least, most = _SQUARES_MM if dictionary is None else _TAGS_MM
+    if not least <= size <= most:
+        raise click.UsageError(f"a size of {size:g} mm: must be in {least:g}..{most:g}, as a field file permits")
     try:
         if dictionary is None:
             return sheets.checkerboard(number, size)

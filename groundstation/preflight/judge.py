@@ -5,6 +5,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from groundstation.bus.messages import CameraStatus, VehicleStatus
 from groundstation.doctor.finding import Finding, Level
 from groundstation.field.resolved import ResolvedField
+from groundstation.preflight.blind_cameras import blind_cameras
 from groundstation.preflight.captured_pads import captured_pad_findings
 from groundstation.preflight.health import camera_findings, drone_findings
 from groundstation.preflight.stand import PadSighting, stand_of
@@ -46,6 +47,7 @@ def pad_findings(
     if not known and not flew:
         yield Finding(Level.MUST, SUBJECT, "no fixed camera sees any drone", remedy)
         return
+    yield from blind_cameras(field, known, flew)
     for name in unseen:
         yield Finding(Level.SHOULD, name, "no fixed camera sees its marker on the floor", remedy)
     if known:

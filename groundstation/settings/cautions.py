@@ -13,17 +13,18 @@ from groundstation.adapters import adapters, drops_strangers
 from groundstation.arrays import Array
 from groundstation.geometry.rotations import world_from_downward_optical
 from groundstation.settings.document import KeyPath
-from groundstation.settings.files import unwritable
+from groundstation.settings.files import is_there, unwritable
 from groundstation.settings.in_view import STANDING_MARKER_M, in_picture
 from groundstation.settings.marker_sizes import too_small
 from groundstation.settings.parts import Finding
 from groundstation.settings.room import CalibrationSettings, WorldCameraSettings
 from groundstation.settings.schema import Field
 from groundstation.settings.unlikely_figures import unlikely
+from groundstation.settings.volumes import anchor_cautions, volume_cautions
 
 # The markers of drones that have taken off; half of a board.
 RISEN_MARKER_M, RISEN_ROOM_M = 1.0, 0.15
-_FENCE_MARGIN_M, _FENCE_LEAST_M = 0.3, 1.0
+_FENCE_MARGIN_M, _FENCE_LEAST_M, _WALL_M = 0.3, 1.0, 0.2
 _LEAST_STD_M = 0.1
 _ABOVE_OBSTACLE_M = 0.3
 _LEAST_TILT_DEG = 5.0
@@ -84,6 +85,21 @@ def _carried_cameras(field: Field) -> Iterator[Finding]:
         if tilt < _LEAST_TILT_DEG:
             path = ("drones", name, "camera", "tilt_down_deg")
             yield path, f"lets it look level or up (got {tilt:g}): markers lie flat and are seen from above only"
+
+
+def _walls(field: Field) -> Iterator[Finding]:
+    """Yield sides of the fence nearer than an arm's length to a wall or, at the top, to a fixed camera."""
+    x, y, _ = field.room.size_m
+    fence = field.room.fence
+    for axis, (low, high), half in (("x_m", fence.x_m, x / 2), ("y_m", fence.y_m, y / 2)):
+        if (gap := min(low + half, half - high)) < _WALL_M:
+            yield (
+                ("room", "fence", axis),
+                f"comes within {max(0.0, gap):.2f} m of a wall: drones stop at it within 0.1 m",
+            )
+    lenses = [camera.position_m[2] for camera in field.cameras.values()]
+    if lenses and (gap := min(lenses) - fence.z_m[1]) < _WALL_M:
+        yield ("room", "fence", "z_m"), f"comes within {max(0.0, gap):.2f} m of a fixed camera's lens"
 
 
 def _fence(field: Field) -> Iterator[Finding]:
@@ -185,7 +201,7 @@ def _places(field: Field) -> Iterator[Finding]:
     sources += [(("drones", name, "camera", "source"), drone.camera.source) for name, drone in field.drones.items()]
     for path, source in sources:
         address = parse_source(source)
-        if address.kind in (SourceKind.DEVICE, SourceKind.FILE) and not Path(address.path).exists():
+        if address.kind in (SourceKind.DEVICE, SourceKind.FILE) and not is_there(Path(address.path)):
             yield path, f"is not there on this machine (got {address.path})"
 
 
@@ -193,6 +209,7 @@ OF_A_FIELD: tuple[Caution, ...] = (
     _views,
     _unseen_pads,
     _carried_cameras,
+    _walls,
     _fence,
     _obstacles,
     _heights,
@@ -200,5 +217,7 @@ OF_A_FIELD: tuple[Caution, ...] = (
     _lenses,
     too_small,
     unlikely,
+    volume_cautions,
+    anchor_cautions,
 )
 ALL: tuple[Caution, ...] = (*OF_A_FIELD, _addresses, _adapters, _places)  # of this computer as well

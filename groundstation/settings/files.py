@@ -54,9 +54,20 @@ def _refuse_folder(path: Path, what: str) -> None:
         raise SettingsError([f"{path}: is a folder, not a {what}; in it: {files or 'no .yaml file'}"])
 
 
+def is_there(path: Path) -> bool:
+    """Return whether a file or folder exists; a name too long for a file is none."""
+    try:
+        return path.exists()
+    except OSError:
+        return False
+
+
 def unwritable(folder: Path) -> str:
     """Return why nothing can be written to a folder, which need not be there yet; "" if it can."""
-    nearest = next(place for place in (folder, *folder.parents) if place.exists())
+    try:
+        nearest = next(place for place in (folder, *folder.parents) if place.exists())
+    except OSError as error:  # a name too long for a file
+        return f"cannot be written: {error.strerror}"
     return (
         ""
         if nearest.is_dir() and os.access(nearest, os.W_OK)

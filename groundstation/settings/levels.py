@@ -1,6 +1,7 @@
 """Resolves a field file: options, calibrations, then defaults < type < robot."""
 
 import json
+import re
 from collections.abc import Collection, Iterable
 from difflib import get_close_matches
 from pathlib import Path
@@ -13,6 +14,8 @@ from groundstation.settings.wording import problem
 # Sections of sensors fixed in the world, and all sections that are mappings of names.
 FIXED = ("cameras", "motion_capture", "ranging")
 NAMED = ("drones", *FIXED, "targets", "types")
+
+_INDEX = re.compile("[0-9]{1,5}")
 
 
 def with_options(tree: Node, options: Iterable[str], named: Collection[str] = ()) -> tuple[Node, list[str]]:
@@ -55,7 +58,7 @@ def _placed(tree: Node, path: KeyPath, value: Node, done: KeyPath, place: str) -
         return _moved(value, done)
     key, rest = path[0], path[1:]
     if isinstance(tree.value, list):
-        if not str(key).isdigit() or int(key) >= len(tree.value):
+        if not _INDEX.fullmatch(str(key)) or int(key) >= len(tree.value):
             raise SettingsError([f"{place}: {dotted(done)} is a list of {len(tree.value)}, {key!r} is not in it"])
         items = list(tree.value)
         items[int(key)] = _placed(items[int(key)], rest, value, (*done, int(key)), place)

@@ -1,5 +1,6 @@
 """Settings of a marker: a checkerboard with its code, or a tag of an ArUco or AprilTag dictionary."""
 
+import re
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
@@ -55,8 +56,16 @@ class MarkerSettings(SettingsSection):
         return [(place, _fault(fault.removeprefix(f"{place} ").split(" (got")[0]))] if fault else []
 
     @property
+    def pattern(self) -> str:
+        """Return what a picture shows of it, which no two markers of a field may share.
+
+        OpenCV's DICT_4X4_50 holds the first 50 tags of DICT_4X4_100, and so on.
+        """
+        return re.sub(r"^(DICT_\dX\d)_\d+ ", r"\1 ", self.identity)
+
+    @property
     def identity(self) -> str:
-        """Return the identity, which no two markers of a field may share."""
+        """Return its number, with its dictionary if it is a tag."""
         return str(self.code) if self.kind == "checkerboard" else f"{self.dictionary} {self.id}"
 
     @property

@@ -55,7 +55,7 @@ def _kind_of(path: KeyPath) -> str:
 
 def _distinct(parts: Parts) -> Iterator[Finding]:
     codes: list[tuple[KeyPath, object, str]] = [
-        (("drones", name, "marker", _key_of(drone.marker)), drone.marker.identity, name)
+        (("drones", name, "marker", _key_of(drone.marker)), drone.marker.pattern, name)
         for name, drone in parts.drones.items()
     ]
     sources: list[tuple[KeyPath, object, str]] = [
@@ -63,7 +63,7 @@ def _distinct(parts: Parts) -> Iterator[Finding]:
         for name, camera in parts.cameras.items()
     ]
     for path, (name, target) in parts.tracked.items():
-        codes.append(((*path, "marker", _key_of(target.marker)), target.marker.identity, name))
+        codes.append(((*path, "marker", _key_of(target.marker)), target.marker.pattern, name))
     sources += [
         (("drones", name, "camera", "source"), _placed(drone.video_source, drone.host), name)
         for name, drone in parts.drones.items()

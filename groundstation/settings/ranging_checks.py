@@ -1,10 +1,14 @@
 """Checks of ranging systems against the team and the room."""
 
+import math
 from collections.abc import Container, Iterable, Iterator, Mapping
+from itertools import combinations
 
 from groundstation.settings.document import KeyPath
 from groundstation.settings.ranging import RangingSettings
 from groundstation.settings.room import RoomSettings
+
+_APART_M = 0.1
 
 
 def findings_of_ranging(
@@ -20,6 +24,9 @@ def findings_of_ranging(
             if called in holders:
                 yield path, f"the transponder's name {called} is already that of {holders[called]}"
             holders.setdefault(called, drone)
+        for (near, here), (far, there) in combinations(system.anchors.items(), 2):
+            if math.dist(here, there) < _APART_M:
+                yield ("ranging", name, "anchors", far), f"is where {near} is"
         if room is not None:
             x, y, z = room.size_m
             for anchor, place in system.anchors.items():

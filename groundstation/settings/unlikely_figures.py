@@ -25,6 +25,8 @@ _DELAY = Likely(1.0, 5000.0, _SECONDS)
 _NOTHING = "with such a deviation what is measured counts for nothing"
 _CAMERA = {"video_delay_ms": _DELAY, "attitude_std_deg": Likely(0.01, 90.0, _RADIANS)}
 _SYSTEM = {"delay_ms": Likely(0.2, 5000.0, _SECONDS)}
+_CAPTURE = {"pose_std_m": Likely(1e-4, 0.5, "no system measures so well", _NOTHING)}
+_RANGES = {"range_std_m": Likely(0.005, 1.0, "no radio measures so well", _NOTHING)}
 _LIMITS = {
     "max_speed_m_s": Likely(0.05, 10.0, "drones would hardly move"),
     "max_climb_m_s": Likely(0.05, 10.0, "drones would hardly climb"),
@@ -36,6 +38,8 @@ _ODOMETRY = {
     "velocity_std_m_s": Likely(0.001, 1.0, "no vehicle knows it so well", _NOTHING),
     "height_std_m": Likely(0.001, 1.0, "no vehicle knows it so well", _NOTHING),
     "attitude_std_deg": Likely(0.05, 9.0, _RADIANS),
+    "yaw_rate_std_deg_s": Likely(0.02, 9.0, _RADIANS, _NOTHING),
+    "velocity_scale": Likely(0.4, 2.5, "is this the reported speed over the true one?", "no vehicle errs so much"),
 }
 _ESTIMATOR = {
     "max_lateness_s": Likely(0.05, 60.0, "pictures come later than that now and then, and would be refused"),
@@ -56,7 +60,7 @@ def unlikely(field: Field) -> Iterator[Finding]:
         yield from _outside((*path, "odometry"), drone.odometry, _ODOMETRY)
     for section, systems in (("motion_capture", field.motion_capture), ("ranging", field.ranging)):
         for name, system in systems.items():
-            yield from _outside((section, name), system, _SYSTEM)
+            yield from _outside((section, name), system, _SYSTEM | (_RANGES if section == "ranging" else _CAPTURE))
     yield from _outside(("estimator",), field.estimator, _ESTIMATOR)
     yield from _outside(("planner",), field.planner, _PLANNER)
     if (ahead_s := field.planner.horizon_steps * field.planner.step_s) < _LEAST_HORIZON_S:

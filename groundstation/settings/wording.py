@@ -147,7 +147,10 @@ def _descendants(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
             yield from _descendants(inner, f"{prefix}{name}.")
 
 
-_LINE = re.compile(r"(?:--set \S+|(?P<file>.+?):(?P<line>\d+)): (?:(?P<path>[\w.\[\]-]+): )?(?P<text>.*)", re.DOTALL)
+_LINE = re.compile(
+    r"(?:--set .+?(?=: [\w.\[\]-]+: )|--set \S+|(?P<file>.+?):(?P<line>\d+)): (?:(?P<path>[\w.\[\]-]+): )?(?P<text>.*)",
+    re.DOTALL,
+)
 
 
 class Told(NamedTuple):
@@ -174,6 +177,6 @@ def ordered(problems: list[str]) -> list[str]:
     def rank(text: str) -> tuple[str, int]:
         place, _, rest = text.partition(":")
         line = rest.split(":", 1)[0]
-        return place, int(line) if line.isdigit() else 0
+        return place, int(line) if re.fullmatch("[0-9]{1,9}", line) else 0
 
     return sorted(dict.fromkeys(problems), key=rank)

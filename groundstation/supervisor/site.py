@@ -3,6 +3,7 @@
 Kept in $XDG_CONFIG_HOME/skein, else ~/.config/skein: sites/SITE on the ground station's host, joined/SITE elsewhere.
 """
 
+import ipaddress
 import os
 import re
 import shutil
@@ -23,6 +24,7 @@ from groundstation.supervisor.authority import Authority, key_pem, make_identiti
 from groundstation.supervisor.runtime_file import ProcessRecord, RuntimeRecord
 
 _HOSTS = "hosts.json"
+_SITE = re.compile(r"[a-z][a-z0-9_]{0,47}")
 _HOST = re.compile(r"[a-z][a-z0-9_]{0,15}")
 _CONNECT_S, _LEASE_S, _STATUS_S = 1.0, 1.5, 0.5
 
@@ -46,6 +48,7 @@ def folder(kind: str, site: str) -> Path:
 
 def found(site: str) -> Path:
     """Make the authority of a site, which only its owner can read; returns its folder."""
+    _require_name(site)
     place = folder("sites", site)
     if place.exists():
         raise OperatorMistake(f"{site} has an authority already: {place} (remove it, and all hosts have to join anew)")
@@ -55,6 +58,21 @@ def found(site: str) -> Path:
     write_private(place / f"authority{KEY}", key_pem(authority.key))
     write_private(place / _HOSTS, b"[]")
     return place
+
+
+def _require_name(site: str) -> None:
+    if not _SITE.fullmatch(site):
+        raise OperatorMistake(f"{site!r}: a site is called as in its field: a-z first, then a-z, 0-9, _, 48 at most")
+
+
+def _require_address(endpoint: str) -> None:
+    address = endpoint.partition("/")[2].rpartition(":")[0]
+    try:
+        if ipaddress.IPv4Address(address).is_unspecified:
+            raise ValueError
+    except ValueError:
+        text = f"{address}: must be the ground station's IPv4 address, as in bus.listen, such as 192.168.1.10"
+        raise OperatorMistake(text) from None
 
 
 def authority_of(site: str) -> Authority:
@@ -92,11 +110,13 @@ def _member(host: str) -> Member:
 
 def admit(site: str, host: str, endpoint: str, file: Path) -> None:
     """Write a new host's admission, valid from the next run on. Raises OperatorMistake."""
+    _require_name(site)
     if not _HOST.fullmatch(host):
         raise OperatorMistake(f"{host}: a host is called by small letters, digits and _, 16 at most")
     authority, names = authority_of(site), _names(site)
     if host in names:
         raise OperatorMistake(f"{host} was admitted before: groundstation site expel {site} {host}, or another name")
+    _require_address(endpoint)
     certificate, key = authority.member(_member(host).name)
     admission = Admission(site, host, endpoint, authority.pem.decode(), certificate.decode(), key.decode())
     try:

@@ -247,6 +247,19 @@ def test_keys_are_for_their_owner_and_mistakes_are_named(home: Path, port: int) 
             wrong()
 
 
+@pytest.mark.parametrize("name", ["", "../../esc", "/tmp/esc", "a b", "Lab", "x" * 49])
+def test_a_site_is_called_as_in_a_field(home: Path, name: str) -> None:
+    with pytest.raises(OperatorMistake, match="a site is called as in its field"):
+        site.found(name)
+
+
+@pytest.mark.parametrize("address", ["not an address", "192.168.1.999", "0.0.0.0", ""])
+def test_nobody_is_admitted_to_an_address_that_is_none(home: Path, tmp_path: Path, address: str) -> None:
+    site.found("other")
+    with pytest.raises(OperatorMistake, match="must be the ground station's IPv4 address"):
+        site.admit("other", "laptop", f"tls/{address}:4717", tmp_path / "laptop.admission")
+
+
 def test_without_a_run_nothing_is_found(home: Path, port: int) -> None:
     assert list(site.runs()) == []
     admit(home, "laptop", port)

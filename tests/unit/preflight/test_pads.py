@@ -1,5 +1,6 @@
 """Observations of drones on the ground show which one setting of the field is wrong, or that none is."""
 
+import dataclasses
 import math
 import time
 from dataclasses import dataclass, field
@@ -153,6 +154,18 @@ def test_nobody_in_view_forbids_and_one_out_of_view_does_not(lab_field: Resolved
     unseen, well = pad_findings(lab_field, one)
     assert (unseen.subject, unseen.level, well.level) == ("drone_2", Level.SHOULD, Level.OK)
     assert list(pad_findings(lab_field, [], flew=("drone_1", "drone_2"))) == []
+
+
+def test_a_camera_that_sees_nobody_where_another_sees_drones_in_its_view_is_named(lab_field: ResolvedField) -> None:
+    ceiling = lab_field.cameras["ceiling"]
+    two = replace(lab_field, cameras={"ceiling": ceiling, "second": replace(ceiling, position_m=(0.5, 0.0, 4.2))})
+    sightings = seen(lab_field, Truth(), 1)
+    (blind,) = (one for one in pad_findings(two, sightings) if one.subject == "second")
+    assert blind.level is Level.SHOULD and "sees none of the drones that stand in its view (drone_1, dr" in blind.found
+    both = [*sightings, *(dataclasses.replace(one, camera="second") for one in sightings)]
+    assert not [one for one in pad_findings(two, both) if one.subject == "second"]
+    far = replace(two, cameras={"ceiling": ceiling, "second": replace(ceiling, position_m=(3.0, 0.0, 4.2))})
+    assert not [one for one in pad_findings(far, sightings) if one.subject == "second"]
 
 
 def test_a_must_of_one_drone_does_not_hold_the_others() -> None:

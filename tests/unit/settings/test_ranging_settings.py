@@ -30,6 +30,10 @@ FIELD = Path(__file__).parents[3] / "config" / "uwb-lab.yaml"
         ("ranging.uwb.source=udp://1.2.3.4", "ranging.uwb.source: must be the address of a gateway"),
         ("ranging.uwb.anchors={a1: [0.0, 0.0, 1.0]}", "ranging.uwb.anchors"),
         ("ranging.uwb.anchors.a1=[9.0, 0.0, 1.0]", "ranging.uwb.anchors.a1: must be inside the room"),
+        (
+            "ranging.uwb.anchors={a: [-3, -2, 2], b: [-3, -2, 2.05], c: [3, 2, 0.5], d: [-3, 2, 3]}",
+            "ranging.uwb.anchors.b: is where a is",
+        ),
         ("ranging.uwb.transponders.ghost={}", "ghost is no drone of the field"),
         ("ranging.uwb.transponders={drone_1: {name: a}, drone_2: {name: a}}", "the transponder's name a is already"),
         ("ranging.uwb.transponders={drone_1: {name: drone_2}}", "name drone_2 is already that of drone_2"),
@@ -42,6 +46,22 @@ def test_a_wrong_system_is_refused_with_its_place(option: str, told: str) -> Non
     with pytest.raises(SettingsError) as refused:
         load_field(FIELD, (option,))
     assert told in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("option", "place", "words"),
+    [
+        ("ranging.uwb.anchors={a: [-3, -2, 2], b: [3, -2, 2], c: [3, 2, 2], d: [-3, 2, 2]}", "anchors", "along z"),
+        ("ranging.uwb.anchors={a: [-3, 0, 0.2], b: [3, 0, 2], c: [3, 0, 4], d: [-3, 0, 2]}", "anchors", "along y"),
+        ("ranging.uwb.volume_m.x_m=[-3500, 3500]", "volume_m.x_m", "is this in metres?"),
+        ("ranging.uwb.volume_m.z_m=[0, 0.5]", "volume_m.z_m", "leaves out 1.1 m (got 0 to 0.5), where drones fly"),
+        ("ranging.uwb.volume_m.z_m=[1, 3]", "volume_m.z_m", "leaves out 0.14 m (got 1 to 3), where drones stand"),
+        ("ranging.uwb.range_std_m=1e-12", "range_std_m", "no radio measures so well"),
+    ],
+)
+def test_anchors_and_boxes_that_fly_badly_are_warned_of(option: str, place: str, words: str) -> None:
+    found = [(".".join(map(str, path)), text) for path, text in cautions(load_field(FIELD, (option,)))]
+    assert [path for path, _ in found] == [f"ranging.uwb.{place}"] and words in found[0][1]
 
 
 def test_a_transponder_of_a_drone_that_does_not_fly_is_free_for_another() -> None:

@@ -47,6 +47,10 @@ FOOLISH = [
         "too small for ceiling (got 12): on a pad they have 3.4 px",
     ),
     ("planner.level_heights_m=[[2.6],[2.7,2.5]]", "planner.level_heights_m", "2.1 m over the target"),
+    ("room.fence.x_m=[-4,3.7]", "room.fence.x_m", "within 0.00 m of a wall"),
+    ("room.fence.z_m=[0,4.15]", "room.fence.z_m", "within 0.05 m of a fixed camera"),
+    ("recording.directory=" + "x" * 300, "recording.directory", "File name too long"),
+    ("drones.drone_1.odometry.yaw_rate_std_deg_s=0.0017", "drones.drone_1.odometry.yaw_rate_std_deg_s", "in radians"),
     ("planner.step_s=2e-4", "planner.step_s", "0.002 s ahead"),
     ("cameras.ceiling.source=/dev/video97", "cameras.ceiling.source", "not there on this machine"),
 ]

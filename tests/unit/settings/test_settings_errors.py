@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from groundstation.errors import SettingsError
+from groundstation.settings.files import find_field
 from groundstation.settings.load import load_field
 
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "field"
@@ -288,3 +289,20 @@ def test_wrong_options_and_wrong_lines_are_named_together() -> None:
         "--set site=Lab",
         "lab.yaml",
     ]
+
+
+@pytest.mark.parametrize("index", ["²", "①", "9" * 5000, "-1", "2"])
+def test_an_index_that_is_none_is_refused_with_the_length_of_the_list(index: str) -> None:
+    with pytest.raises(SettingsError, match=r"is a list of 2, .* is not in it"):
+        load_field(find_field("lab"), [f"drones.drone_1.pad_m.{index}=1"])
+
+
+def test_dictionaries_that_begin_alike_share_their_tags() -> None:
+    """OpenCV's DICT_4X4_50 is the first half of DICT_4X4_100: one print would be seen as both."""
+    tags = {"drone_1": ("DICT_4X4_50", 7), "drone_2": ("DICT_4X4_100", 7)}
+    options = [
+        f"drones.{name}.marker={{kind: aruco, dictionary: {dictionary}, id: {number}, size_mm: 168}}"
+        for name, (dictionary, number) in tags.items()
+    ]
+    with pytest.raises(SettingsError, match="marker code DICT_4X4 7 is already that of drone_1"):
+        load_field(find_field("lab"), ["defaults.marker=null", *options])

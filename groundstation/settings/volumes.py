@@ -1,0 +1,60 @@
+"""Warnings about the boxes in which motion capture and ranging systems see drones, and about anchors in one plane."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from groundstation.settings.in_view import STANDING_MARKER_M
+from groundstation.settings.motion_capture import VolumeSettings
+from groundstation.settings.parts import Finding
+from groundstation.settings.schema import Field
+
+_BEYOND_ROOM_M = 1.0
+# Spread of anchors [m; root of the summed squares] along a direction below which ranges hardly tell places along it.
+_LEAST_SPREAD_M = 0.6
+
+
+def volume_cautions(field: Field) -> Iterator[Finding]:
+    """Yield boxes larger than the room, and boxes that do not hold the heights at which the drones stand and fly."""
+    boxes = {("motion_capture", name): one for name, one in field.motion_capture.items()}
+    seen = {path: one.volume_m for path, one in boxes.items() if path[1] != field.truth.get("from")}
+    seen |= {("ranging", name): one.volume_m for name, one in field.ranging.items()}
+    for path, box in seen.items():
+        yield from (((*path, "volume_m", axis), text) for axis, text in _outside_room(field, box))
+    if seen and not field.cameras:
+        yield from _blind_heights(field, seen)
+
+
+def anchor_cautions(field: Field) -> Iterator[Finding]:
+    """Yield systems whose anchors lie in one plane, or nearly so: places across it are hardly told, or mirrored."""
+    for name, system in field.ranging.items():
+        places = np.array([*system.anchors.values()])
+        _, spread_m, directions = np.linalg.svd(places - places.mean(axis=0))
+        if spread_m[-1] < _LEAST_SPREAD_M:
+            axis = "xyz"[int(np.argmax(np.abs(directions[-1])))]
+            text = f"lie nearly in one plane: places across it (mostly along {axis}) are hardly told, or mirrored"
+            yield ("ranging", name, "anchors"), text
+
+
+def _outside_room(field: Field, box: VolumeSettings) -> Iterator[tuple[str, str]]:
+    x, y, z = field.room.size_m
+    walls = {"x_m": (-x / 2, x / 2), "y_m": (-y / 2, y / 2), "z_m": (0.0, z)}
+    for axis, (low, high) in walls.items():
+        least, most = getattr(box, axis)
+        if least < low - _BEYOND_ROOM_M or most > high + _BEYOND_ROOM_M:
+            yield (
+                axis,
+                f"reaches beyond the room, {low:g} to {high:g} m (got {least:g} to {most:g}): is this in metres?",
+            )
+
+
+def _blind_heights(field: Field, boxes: dict[tuple[str, str], VolumeSettings]) -> Iterator[Finding]:
+    """Yield a height at which no system sees the drones, where no camera does either."""
+    planned = [height for row in field.planner.level_heights_m for height in row]
+    path, box = next(iter(boxes.items()))
+    for height_m, what in ((STANDING_MARKER_M, "stand"), (min(planned), "fly"), (max(planned), "fly")):
+        if not any(one.z_m[0] <= height_m <= one.z_m[1] for one in boxes.values()):
+            low, high = box.z_m
+            text = f"leaves out {height_m:g} m (got {low:g} to {high:g}), where drones {what}: nothing sees them there"
+            yield (*path, "volume_m", "z_m"), text
+            return

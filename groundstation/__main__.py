@@ -1,5 +1,7 @@
 """The program `groundstation`: before it imports anything, it raises its priority for a stop, and takes one thread."""
 
+import os
+import signal
 import sys
 
 from groundstation.process.one_thread import stay_on_one_thread
@@ -10,13 +12,21 @@ from groundstation.process.priority import go_first
 STOPS = ("hold", "land", "cut-motors")
 
 
+_INTERRUPTED = 130
+
+
 def main() -> None:
     """Entry point of the `groundstation` script."""
+    at_once = signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    if at_once:  # Ctrl-C during the imports: nothing has begun
+        signal.signal(signal.SIGINT, lambda *_: os._exit(_INTERRUPTED))
     if sys.argv[1:] and sys.argv[1] in STOPS:
         go_first(heirs=True)
     stay_on_one_thread()
     from groundstation.cli.main import main as carry_out
 
+    if at_once:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     carry_out()
 
 

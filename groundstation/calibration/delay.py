@@ -16,7 +16,7 @@ from groundstation.bus.messages import Message, Odometry, RelativeObservation
 from groundstation.calibration.camera_delays import onboard_cameras
 from groundstation.calibration.flown import Flown
 from groundstation.calibration.sensor_delay import LEAST_SEEN, Delay
-from groundstation.calibration.time_offset import Part, across, briefly, interpolated, rate_hz, shift_between
+from groundstation.calibration.time_offset import FAR_S, Part, across, briefly, interpolated, rate_hz, shift_between
 from groundstation.estimation.models import OdometryRobot
 from groundstation.estimation.parameters import parameters_from_field
 from groundstation.field.drones import FieldDrone
@@ -117,13 +117,13 @@ def _fixed_camera(name: str, camera: WorldCamera, tracks: Mapping[str, _Track], 
             mine = own[drone]
             turned = interpolated(mine.times, mine.heading[:, None])
             parts.append(Part(track.times, track.headings[:, None], turned, across(track.times)))
-    shift = shift_between(parts, scaled=False)
+    shift = shift_between(parts, scaled=False, within_s=FAR_S)
     if shift is None:
         return Delay(
             name,
             f"cameras.{name}.video_delay_ms",
             now_ms,
-            reason="it saw too little of any drone's turning",
+            reason="it saw too little of any drone's turning, or its delay is off by more than 0.4 s",
             flight=_TURN,
         )
     # A later exposure than assumed means a shorter transmission delay.

@@ -17,7 +17,9 @@ _WINDOW_S = 1.0
 _BRIEF_S = 0.13
 # Of those, this many count as one beyond their overlap, by the scatter over flights: pictures are not all equally late.
 _ALIKE = 4.0
-_GRID_S = np.arange(-0.10, 0.2001, 0.01)
+_STEP_S = 0.01
+NEAR_S, FAR_S = (-0.10, 0.20), (-0.40, 0.40)
+"""Ranges in which an offset is searched [s]: of telemetry, and of cameras on a network."""
 _REACH = 6
 _LEAST = 60
 _FREEDOM = 8.0
@@ -87,20 +89,23 @@ def interpolated(times: Array, values: Array) -> Callable[[Array, float], Array]
     return at
 
 
-def shift_between(parts: list[Part], scaled: bool) -> tuple[float, float] | None:
+def shift_between(
+    parts: list[Part], scaled: bool, within_s: tuple[float, float] = NEAR_S
+) -> tuple[float, float] | None:
     """Return the delay of the second of two records of the same motion, and one sigma [s].
 
-    scaled: up to a factor. None if there are too few data, or no minimum.
+    scaled: up to a factor; within_s: the range that is searched. None if there are too few data, or no minimum in it.
     """
     parts = [part for part in parts if len(part.change(part.values)) >= _LEAST]
     if not parts:
         return None
     # Each part is weighted by its own noise, and outliers far beyond it do not decide.
     noise = [np.median(_misfits(part, 0.0, scaled)) / part.values.shape[1] for part in parts]
+    grid_s = np.arange(within_s[0], within_s[1] + 0.5 * _STEP_S, _STEP_S)
     chi = np.array(
-        [sum(_robust(_misfits(p, delay, scaled) / n) for p, n in zip(parts, noise, strict=True)) for delay in _GRID_S]
+        [sum(_robust(_misfits(p, delay, scaled) / n) for p, n in zip(parts, noise, strict=True)) for delay in grid_s]
     )
-    found = least(_GRID_S, chi, _REACH)
+    found = least(grid_s, chi, _REACH)
     if found is None or found.curvature <= 0.0:
         return None
     # Differences overlap: this many of them count as one.

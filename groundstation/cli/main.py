@@ -154,14 +154,25 @@ def _tell(error: BaseException) -> None:
             click.echo(f"groundstation: {error}", err=True)
 
 
+def _of_a_bug(error: Exception) -> ExitCode:
+    """Print an error that nobody foresaw; an interrupt that a library made another error of is none."""
+    import traceback
+
+    cause: BaseException | None = error
+    while cause is not None:
+        if isinstance(cause, KeyboardInterrupt):
+            _tell(cause)
+            return ExitCode.INTERRUPTED
+        cause = cause.__cause__ or cause.__context__
+    traceback.print_exc()
+    return ExitCode.BUG
+
+
 def main() -> None:
     """Run the command of this process, and end it."""
     make_usable()
     try:
         code = run()
-    except Exception:  # noqa: BLE001  the outermost loop: a bug must not look like a failed run (exit code 1)
-        import traceback
-
-        traceback.print_exc()
-        code = ExitCode.BUG
+    except Exception as error:  # noqa: BLE001  the outermost loop: a bug must not look like a failed run (exit code 1)
+        code = _of_a_bug(error)
     sys.exit(int(code))

@@ -91,6 +91,8 @@ def _play(
     from groundstation.replay.playback_server import serve
 
     playback = Playback(source, speed or 1.0, from_s or 0.0, playing=not paused or until_end)
+    if from_s and from_s > playback.reel.duration_s:
+        raise click.UsageError(f"--from {from_s:g}: the recording has {playback.reel.duration_s:.1f} s")
     click.echo(f"replay of {source.name}: {playback.reel.duration_s:.1f} s")
     for damage in playback.reel.damage:
         click.echo(f"damaged, and shown as far as it is sound: {damage}")

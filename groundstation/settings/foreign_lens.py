@@ -128,7 +128,7 @@ def _require_our_model(tree: Node, keys: _Keys, held: Node, items: Sequence[Node
     """Refuse any other lens model: its coefficients would pass for ours, and all sightings would be wrong."""
     model = tree.get(keys.model)
     if model is not None and model.value not in _OUR_MODEL:
-        raise _refused(model, f"{model.value} is another model of a lens than plumb_bob: {_REMEDY}")
+        raise _refused(model, f"{model.plain()} is another model of a lens than plumb_bob: {_REMEDY}")
     fisheye = tree.get("fisheye_model")  # of OpenCV's sample
     if fisheye is not None and fisheye.value:
         raise _refused(fisheye, f"a fisheye's is another model of a lens than plumb_bob: {_REMEDY}")

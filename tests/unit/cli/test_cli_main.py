@@ -287,3 +287,18 @@ def test_characters_that_a_terminal_cannot_show_are_no_error(tmp_path: Path, enc
     done = subprocess.run(command, capture_output=True, timeout=60, check=False, env=told)
     assert done.returncode == 0, done.stderr
     assert rb"\udcff/lab.yaml" in done.stdout and not done.stderr
+
+
+def test_an_interrupt_that_a_library_turned_into_another_error_is_no_bug(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def compiles() -> int:
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt:
+            raise RuntimeError("no compiled object yet")  # noqa: B904 - as numba does
+
+    monkeypatch.setattr(cli, "run", compiles)
+    with pytest.raises(SystemExit) as ended:
+        cli.main()
+    assert ended.value.code == ExitCode.INTERRUPTED and "Traceback" not in capsys.readouterr().err

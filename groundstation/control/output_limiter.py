@@ -223,15 +223,26 @@ def _others(
         covariance = _relative_covariance(robot, other, belief)
         apart = difference(_place(other, belief), place)
         for gap in (difference(there, rest), apart):
-            distance = math.hypot(*gap)
-            # Points of rest of robots that fly at each other may coincide: the present direction is used then.
-            x, y, z = gap if distance > 1e-6 else apart
-            size = math.hypot(x, y, z)
-            normal = (x / size, y / size, z / size)
+            normal, distance = _towards(gap, apart)
             keep = parameters.min_separation_m + parameters.margin_m
             keep += parameters.sigmas * _spread(covariance, normal)
             walls.append(_Wall("separation", normal, max(0.0, distance - keep) / (2.0 * max(time, other_time))))
     return walls
+
+
+def _towards(gap: Vector3, apart: Vector3) -> tuple[Vector3, float]:
+    """Return the direction to another robot and how far the gap extends in it; apart: the gap between the places.
+
+    Points of rest of robots that fly at each other fast may coincide, or lie beyond each other. The gap between them
+    then shows no direction, or the wrong one, in which both would retreat towards each other: the present one is used,
+    and nothing is left of the distance.
+    """
+    distance = math.hypot(*gap)
+    if not (distance > 1e-6 and dot(gap, apart) > 0.0):
+        gap, distance = apart, 0.0
+    x, y, z = gap
+    size = math.hypot(x, y, z)
+    return (x / size, y / size, z / size), distance
 
 
 def _relative_covariance(robot: str, other: str, belief: JointBelief) -> list[Vector3]:

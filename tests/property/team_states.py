@@ -156,9 +156,14 @@ def _fence(states: TeamStates, robot: int) -> tuple[Array, Array, Array]:
 
 
 def _pair(states: TeamStates, robot: int, other: int) -> tuple[Array, Array, Array]:
-    """Return two rows, at the points of rest and at the positions, with half the speed for each robot."""
+    """Return two rows, at the points of rest and at the positions, with half the speed for each robot.
+
+    Where the points of rest lie beyond each other, as seen from the positions, nothing is left of their distance.
+    """
     (rest, time_s), (there, its_time_s) = states.rest(robot), states.rest(other)
-    gaps = np.stack((there - rest, states.poses[:, other, :3] - states.poses[:, robot, :3]), axis=1)
+    apart = states.poses[:, other, :3] - states.poses[:, robot, :3]
+    crossed = np.einsum("ni,ni->n", there - rest, apart) <= 0.0
+    gaps = np.stack((np.where(crossed[:, None], apart, there - rest), apart), axis=1)
     distances = np.linalg.norm(gaps, axis=2)
     normals = gaps / distances[..., None]
     both = np.zeros((*normals.shape[:2], states.covariances.shape[1]))
@@ -166,6 +171,7 @@ def _pair(states: TeamStates, robot: int, other: int) -> tuple[Array, Array, Arr
     spread = np.sqrt(np.einsum("nmi,nij,nmj->nm", both, states.covariances, both, optimize=True))
     kept = SAFETY.min_separation_m + SAFETY.margin_m + SAFETY.sigmas * spread
     times = 2.0 * np.maximum(time_s, its_time_s)
+    distances[crossed, 0] = 0.0
     return normals, distances - kept, np.broadcast_to(times[:, None], distances.shape)
 
 

@@ -16,6 +16,7 @@ from groundstation.control.setpoints import Setpoint
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.layout import ROBOT_CORE, EntityKind, StateLayout
 from groundstation.geometry.stabilized_frame import world_from_stabilized
+from groundstation.planning.parameters import MotionLimits
 
 SAFETY = SafetyParameters(fence=((-3.7, 3.7), (-2.7, 2.7), (0.0, 2.8)))
 LAYOUT = StateLayout().with_entity("a", EntityKind.ROBOT, ROBOT_CORE).with_entity("b", EntityKind.ROBOT, ROBOT_CORE)
@@ -120,6 +121,43 @@ def test_points_of_rest_that_coincide_open_no_way() -> None:
         limited = limit_setpoint(name, setpoint((0.5, 0.1, 0.0, 0.0)), belief(poses), 0, SAFETY, speeds)
         assert limited.setpoint.velocity_m_s == pytest.approx((0.0, 0.1, 0.0))
         assert "separation" in limited.limited_by
+
+
+def flight_apart(places: Array, velocities: Array, limited: bool) -> float:
+    """Fly two robots that both want straight away from each other; return their least distance [m]."""
+    dt, places, velocities = 0.05, places.copy(), velocities.copy()
+    safety = replace(SAFETY, fence=((-9.0, 9.0),) * 3, limits=dict.fromkeys("ab", MotionLimits(1.5, 1.5, 1.0)))
+    least = math.inf
+    for _ in range(40):
+        apart = places[1] - places[0]
+        least = min(least, float(np.linalg.norm(apart)))
+        away = -0.9 * apart / np.linalg.norm(apart)
+        at = belief(np.column_stack((places, np.zeros(2))))
+        known, drifts = dict(zip("ab", velocities.copy(), strict=True)), dict.fromkeys("ab", np.zeros(3))
+        for i, (name, wish) in enumerate((("a", away), ("b", -away))):
+            if limited:
+                told = limit_setpoint(name, setpoint((*wish.tolist(), 0.0)), at, 0, safety, known, drifts).setpoint
+                wish = np.array(told.velocity_m_s)
+            velocities[i] += dt / LAG_S * (wish - velocities[i])
+        places += dt * velocities
+    return least
+
+
+@given(
+    st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda v: math.hypot(*v) > 0.1),
+    st.floats(0.65, 2.0), st.floats(0.0, 1.4), st.floats(0.0, 1.4), st.tuples(*[st.floats(-0.2, 0.2)] * 3),
+)  # fmt: skip
+@example((1.0, 0.0, 0.0), 1.0, 1.2, 1.2, (0.0, 0.0, 0.0))  # their points of rest have passed each other
+@example((1.0, 0.0, 0.0), 1.0, 0.0, 1.4, (0.0, 0.0, 0.0))
+@settings(max_examples=60, deadline=None)
+def test_two_that_fly_apart_come_no_nearer_than_their_braking_takes(
+    towards: tuple[float, float, float], distance: float, fast: float, other: float, aside: tuple[float, float, float]
+) -> None:
+    direction = np.array(towards) / math.hypot(*towards)
+    places = np.array((0.0, 0.0, 1.4)) + np.outer((-0.5, 0.5), distance * direction)
+    velocities = np.outer((fast, -other), direction) + np.outer((0.5, -0.5), aside)
+    taken = flight_apart(places, velocities, limited=False)
+    assert flight_apart(places, velocities, limited=True) >= taken - 0.01
 
 
 def test_one_above_the_other_does_not_descend_onto_it() -> None:

@@ -58,7 +58,7 @@ class Tracker:
         self.mounts = MountWatch(parameters.estimator)
         self._joinings = Joinings()
         self._localisation = Localisation(parameters.safety)
-        self._hovering = Hovering()
+        self._hovering = Hovering(level=parameters.control.fed)
         self._topology = Topology(())
         self._plan_stale = False
         self._drifts: defaultdict[str, DriftWatch] = defaultdict(DriftWatch)
@@ -259,8 +259,9 @@ class Tracker:
             lookout.unsteered, {n: self._tied_age_s(n) for n in belief.layout.robots}, velocities,
             {n: self._roots.helped_age_s(n) for n in belief.layout.robots})  # fmt: skip
         wanted = setpoints_from_plan(self.current, belief, airborne, p.control, p.sensors, sight)
+        safety = self._hovering.within(p.safety)
         limited = {
-            name: limit_setpoint(name, setpoint, belief, now_ns, p.safety, velocities, drifts)
+            name: limit_setpoint(name, setpoint, belief, now_ns, safety, velocities, drifts)
             for name, setpoint in self._hovering.held(wanted, now_ns, belief, sure_s).items()
         }
         limited = self._hovering.sent(limited, sure_s)

@@ -1,16 +1,18 @@
 """Keeps hovering robots, on HOLD or until TRACK, at the place where each came to rest. Pure."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from groundstation.bus.messages import Vector3, VehicleStatus
 from groundstation.control.output_limiter import Limited
+from groundstation.control.parameters import SafetyParameters
 from groundstation.control.setpoints import Setpoint
 from groundstation.estimation.belief import JointBelief
 from groundstation.geometry.stabilized_frame import stabilized_from_world
+from groundstation.planning.parameters import MotionLimits
 from groundstation.time_units import NS_PER_MS
 
 _HOVERS = frozenset({"HOVER", "HOLD"})  # a driver's modes in which the drone hovers for an order
@@ -56,12 +58,14 @@ class _Stay:
 
 
 class Hovering:
-    """Use: `take` every status; at each tick pass all setpoints through `held` before they are limited, `sent` after.
+    """Use: `take` every status; at each tick pass all setpoints through `held`, limit them `within`, then `sent`.
 
-    A robot that a failsafe stopped hovers by itself, and so does one of doubtful place.
+    A robot that a failsafe stopped hovers by itself, and so does one of doubtful place. level: robots that hold their
+    height by our estimate, and of a way back obey the horizontal part only.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, level: Collection[str] = ()) -> None:
+        self._level = frozenset(level)
         self._stays: dict[str, _Stay] = {}
 
     def take(self, status: VehicleStatus, now_ns: int) -> None:
@@ -81,12 +85,19 @@ class Hovering:
         """
         return {name: self._held(name, one, now_ns, belief, seen_s) for name, one in wanted.items()}
 
-    def sent(self, limited: Mapping[str, Limited], seen_s: Mapping[str, float]) -> dict[str, Limited]:
-        """Return the setpoints to send after limiting: a hovering robot moves only while it is seen.
+    def within(self, safety: SafetyParameters) -> SafetyParameters:
+        """Return settings in which a hovering robot has the limits within which its driver moves it."""
+        return replace(safety, limits={**safety.limits, **{name: self._limits(name, safety) for name in self._stays}})
 
-        It keeps its height by itself unless it has left it, or would leave the fence.
-        """
-        return {name: self._sent(self._stays[name], one, _is_sure(name, seen_s)) if name in self._stays else one
+    def _limits(self, name: str, safety: SafetyParameters) -> MotionLimits:
+        # What the limiter finds must be what moves the robot: cut down after that, it could lead through a wall.
+        usual = safety.limits_of(name)
+        climb = 0.0 if name in self._level else min(_MOST_M_S, usual.max_climb_m_s)
+        return replace(usual, max_speed_m_s=min(_MOST_M_S, usual.max_speed_m_s), max_climb_m_s=climb)
+
+    def sent(self, limited: Mapping[str, Limited], seen_s: Mapping[str, float]) -> dict[str, Limited]:
+        """Return the setpoints to send after limiting: a hovering robot moves only while it is seen."""
+        return {name: _sent(one, _is_sure(name, seen_s)) if name in self._stays else one
                 for name, one in limited.items()}  # fmt: skip
 
     def _held(
@@ -99,14 +110,14 @@ class Hovering:
         if name in belief.layout and _is_sure(name, seen_s):
             x, y, z, yaw = belief.mean_of(name)[:4].tolist()
             forward, left, up = stabilized_from_world(np.array(stay.back(now_ns, x, y, z)), yaw).tolist()
-            velocity = (forward, left, up)
+            velocity = (forward, left, 0.0 if name in self._level else up)
         return replace(setpoint, velocity_m_s=velocity, yaw_rate_rad_s=0.0)
 
-    def _sent(self, stay: _Stay, limited: Limited, sure: bool) -> Limited:
-        forward, left, up = limited.setpoint.velocity_m_s if sure else _STILL
-        up = up if stay.levelling or "fence" in limited.limited_by else 0.0
-        setpoint = replace(limited.setpoint, velocity_m_s=(forward, left, up), yaw_rate_rad_s=0.0)
-        return replace(limited, setpoint=setpoint, holds=math.hypot(forward, left, up) > 0.0)
+
+def _sent(limited: Limited, sure: bool) -> Limited:
+    velocity = limited.setpoint.velocity_m_s if sure else _STILL
+    setpoint = replace(limited.setpoint, velocity_m_s=velocity, yaw_rate_rad_s=0.0)
+    return replace(limited, setpoint=setpoint, holds=math.hypot(*velocity) > 0.0)
 
 
 def _is_sure(name: str, seen_s: Mapping[str, float]) -> bool:

@@ -23,7 +23,7 @@ from groundstation.vectors import Vector3, difference, dot
 _NO_SIDE_M = 0.1
 # Number of sides of a polygon within the circle of the fastest horizontal velocities.
 _ROUND = np.array([(math.cos(a), math.sin(a), 0.0) for a in np.arange(16) * (2.0 * math.pi / 16)])
-# A velocity that was clipped to a limit may exceed it by this much.
+# A velocity that was clipped to a limit, or asked for at it, may exceed it by this much.
 _ROUNDING_M_S = 1e-10
 _UP_DOWN = np.array(((0.0, 0.0, 1.0), (0.0, 0.0, -1.0)))
 _AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -165,10 +165,10 @@ def _clip(robot: str, setpoint: Setpoint, parameters: SafetyParameters) -> tuple
     limits, names = parameters.limits_of(robot), []
     velocity = np.array(setpoint.velocity_m_s)
     speed = math.hypot(velocity[0], velocity[1])
-    if speed > limits.max_speed_m_s:
+    if speed > limits.max_speed_m_s + _ROUNDING_M_S:
         velocity[:2] *= limits.max_speed_m_s / speed
         names.append("speed")
-    if abs(velocity[2]) > limits.max_climb_m_s:
+    if abs(velocity[2]) > limits.max_climb_m_s + _ROUNDING_M_S:
         velocity[2] = math.copysign(limits.max_climb_m_s, velocity[2])
         names.append("climb")
     rate = setpoint.yaw_rate_rad_s

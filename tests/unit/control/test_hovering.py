@@ -9,7 +9,8 @@ import pytest
 from groundstation.bus.messages import FlightState, Header, VehicleStatus
 from groundstation.control.flight_mode import FlightMode
 from groundstation.control.hovering import Hovering
-from groundstation.control.output_limiter import Limited
+from groundstation.control.output_limiter import Limited, limit_setpoint
+from groundstation.control.parameters import SafetyParameters
 from groundstation.control.setpoints import Setpoint
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.layout import ROBOT_CORE, EntityKind, StateLayout
@@ -17,12 +18,13 @@ from groundstation.estimation.layout import ROBOT_CORE, EntityKind, StateLayout
 S = 1_000_000_000
 TICK_S = 0.02
 PLANNED = Setpoint((0.5, 0.1, 0.3), 0.4, FlightMode.TRACK)
+SAFETY = SafetyParameters(fence=((-3.0, 3.0), (-3.0, 3.0), (0.3, 2.6)))
 LAYOUT = StateLayout().with_entity("a", EntityKind.ROBOT, ROBOT_CORE)
 
 
-def status(mode="HOVER", failsafe=""):
+def status(mode="HOVER", failsafe="", name="a"):
     return VehicleStatus(
-        header=Header(0, "here", "a", "a", 0), flight_state=FlightState.FLYING, mode=mode, failsafe=failsafe
+        header=Header(0, "here", name, name, 0), flight_state=FlightState.FLYING, mode=mode, failsafe=failsafe
     )
 
 
@@ -176,9 +178,53 @@ def test_the_fence_pushes_down_who_hovers():
     assert sent.holds and sent.setpoint.velocity_m_s == (0.0, 0.0, -0.1)
 
 
-def test_velocities_of_the_limiter_are_sent_without_their_climb():
+def test_velocities_of_the_limiter_are_sent_whole_while_the_drone_is_seen():
     flight = Flight()
     pushed = Limited(replace(PLANNED, velocity_m_s=(0.0, -0.05, 0.02)), ("separation",))
     sent = flight.hovering.sent({"a": pushed}, {"a": 0.1})["a"]
-    assert sent.holds and sent.setpoint.velocity_m_s == (0.0, -0.05, 0.0) and sent.limited_by == ("separation",)
+    assert sent.holds and sent.setpoint.velocity_m_s == (0.0, -0.05, 0.02) and sent.limited_by == ("separation",)
     assert not flight.hovering.sent({"a": pushed}, {})["a"].holds
+
+
+def test_a_drone_that_holds_its_height_by_our_estimate_is_brought_back_across_only():
+    hovering = Hovering(level=("a",))
+    hovering.take(status(), 0)
+    hovering.held({"a": PLANNED}, 2 * S, belief(0.0, 0.0), {"a": 0.1})
+    back = hovering.held({"a": PLANNED}, 3 * S, belief(0.2, 0.0, z=1.5), {"a": 0.1})["a"]
+    assert back.velocity_m_s == pytest.approx((-0.16, 0.0, 0.0))
+
+
+def test_only_a_hovering_robot_is_limited_to_its_way_back():
+    hovering = Hovering(level=("b",))
+    for name in ("a", "b"):
+        hovering.take(status(name=name), 0)
+    safety = hovering.within(SAFETY)
+    told = {name: safety.limits_of(name) for name in ("a", "b", "c")}
+    assert {name: (one.max_speed_m_s, one.max_climb_m_s) for name, one in told.items()} == {
+        "a": (0.2, 0.2), "b": (0.2, 0.0), "c": (0.6, 0.4),
+    }  # fmt: skip
+    brought_back = replace(PLANNED, velocity_m_s=(0.12, 0.16 + 1e-15, 0.0), yaw_rate_rad_s=0.0)
+    assert limit_setpoint("a", brought_back, belief(0.0, 0.0), 0, safety).limited_by == ()
+
+
+@pytest.mark.parametrize("level", [(), ("a",), ("a", "b")])
+@pytest.mark.parametrize("aside_m", [0.05, 0.3])
+def test_two_that_hover_one_above_the_other_too_near_are_moved_apart(level, aside_m):
+    """What is sent satisfies the limiter's walls, also of a robot that obeys only the horizontal part."""
+    layout = LAYOUT.with_entity("b", EntityKind.ROBOT, ROBOT_CORE)
+    hovering, now_ns, seen_s = Hovering(level=level), 0, {"a": 0.1, "b": 0.1}
+    for name in ("a", "b"):
+        hovering.take(status(name=name), 0)
+    places, still = (
+        {"a": np.array((0.0, 0.0, 1.8)), "b": np.array((aside_m, 0.0, 1.25))},
+        dict.fromkeys("ab", np.zeros(3)),
+    )
+    for _ in range(600):
+        now_ns += S // 20
+        at = JointBelief(np.hstack([(*place, 0.0) for place in places.values()]), 9e-4 * np.eye(8), layout, now_ns)
+        safety, held = hovering.within(SAFETY), hovering.held(dict.fromkeys("ab", PLANNED), now_ns, at, seen_s)
+        limited = {n: limit_setpoint(n, held[n], at, now_ns, safety, still, still) for n in "ab"}
+        for name, told in hovering.sent(limited, seen_s).items():
+            forward, left, up = told.setpoint.velocity_m_s
+            places[name] += (forward / 20, left / 20, 0.0 if name in level else up / 20)
+    assert np.linalg.norm(places["a"] - places["b"]) > SAFETY.min_separation_m + 0.15

@@ -266,7 +266,8 @@ class Tracker:
         }
         limited = self._hovering.sent(limited, sure_s)
         for name in drifts.keys() & limited.keys():
-            velocity = np.array(limited[name].setpoint.velocity_m_s)
+            is_obeyed = limited[name].holds or name not in lookout.unmoved
+            velocity = np.array(limited[name].setpoint.velocity_m_s) if is_obeyed else np.zeros(3)
             self._drifts[name].note_command(world_from_stabilized(velocity, float(belief.mean_of(name)[3])))
         return limited
 

@@ -47,6 +47,7 @@ class Lookout:
         self._names = tuple(robots)
         self._hint_std_m = control.hint_std_m
         self._modes: dict[str, str] = {}
+        self._braked = set[str]()
         self._unseen = UnseenTargets()
         self._told = dict.fromkeys(targets, SearchMode.SEARCH)
         self._notices: list[Notice] = []
@@ -72,6 +73,11 @@ class Lookout:
         return tuple(name for name in self._names if self._modes.get(name, _OBEYS) != _OBEYS)
 
     @property
+    def unmoved(self) -> frozenset[str]:
+        """Return the robots that follow no setpoints, or in TRACK none for as long as a failsafe lets them hover."""
+        return frozenset((*self._braked, *self.unsteered))
+
+    @property
     def held(self) -> frozenset[str]:
         """Return the robots that follow no setpoints while others do; none before a flight begins, when all wait."""
         return frozenset(self.unsteered if len(self.unsteered) < len(self._names) else ())
@@ -86,6 +92,7 @@ class Lookout:
         match message:
             case VehicleStatus():
                 self._modes[message.header.entity] = message.mode
+                (self._braked.add if message.braked else self._braked.discard)(message.header.entity)
             case SearchedPicture() if in_our_time:
                 self._search.take(message)
                 self._robots.take(message)

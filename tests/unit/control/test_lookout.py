@@ -34,8 +34,9 @@ def belief(stamp_s: float) -> JointBelief:
     return JointBelief(mean, np.diag(variances), layout, round(stamp_s * 1e9))
 
 
-def driver_in(mode: str) -> VehicleStatus:
-    return VehicleStatus(header=Header(0, "c", "drone_1", "driver", 1), flight_state=FlightState.FLYING, mode=mode)
+def driver_in(mode: str, *, braked: bool = False) -> VehicleStatus:
+    header = Header(0, "c", "drone_1", "driver", 1)
+    return VehicleStatus(header=header, flight_state=FlightState.FLYING, mode=mode, braked=braked)
 
 
 def sighting(observer: str, stamp_s: float) -> RelativeObservation:
@@ -162,3 +163,13 @@ def test_a_robot_that_follows_no_setpoints_is_held_while_another_does() -> None:
     alone = lookout_of_the_lab()
     alone.take(driver_in("HOVER"))
     assert (alone.unsteered, alone.held) == (("drone_1",), frozenset())
+
+
+def test_a_robot_that_a_failsafe_brakes_is_steered_but_not_moved() -> None:
+    lookout = lookout_of_the_lab()
+    lookout.take(driver_in("TRACK", braked=True))
+    assert (lookout.unsteered, lookout.unmoved) == ((), frozenset({"drone_1"}))
+    lookout.take(driver_in("TRACK"))
+    assert lookout.unmoved == frozenset()
+    lookout.take(driver_in("HOVER"))
+    assert lookout.unmoved == frozenset({"drone_1"})

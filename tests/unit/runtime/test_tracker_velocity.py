@@ -17,6 +17,8 @@ from groundstation.bus.messages import (
     VehicleStatus,
     Verdict,
 )
+from groundstation.control.flight_mode import FlightMode
+from groundstation.control.setpoints import Setpoint
 from groundstation.control.view import Localisation
 from groundstation.estimation.measurement import Correction
 from groundstation.field.resolved import ResolvedField
@@ -186,3 +188,31 @@ def test_an_unseen_robot_is_localised_by_a_target_that_others_locate(flight: Fli
     assert tracker.converged("drone_1")
     (told,) = tracker.estimates()
     assert told.age_s == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(
+    ("state", "drift_m_s"),
+    [
+        ({"mode": "TRACK"}, -0.3),
+        ({"mode": "TRACK", "braked": True}, 0.0),
+        ({"mode": "HOVER", "failsafe": "strays"}, 0.0),
+        ({"mode": "TAKING_OFF"}, 0.0),
+        ({"mode": "HOVER"}, 0.0),
+    ],
+)
+def test_only_commands_that_the_driver_obeys_count_in_the_drift(
+    flight: Flight, monkeypatch: pytest.MonkeyPatch, state: dict[str, Any], drift_m_s: float
+) -> None:
+    """It stands still; what it was not told to do is no drift of it."""
+    drifts: list[float] = []
+
+    def forward(*given: Any) -> dict[str, Setpoint]:
+        drifts.append(float(given[5].drifts_m_s["drone_1"][0]))
+        return {"drone_1": Setpoint((0.3, 0.0, 0.0), 0.0, FlightMode.TRACK)}
+
+    monkeypatch.setattr("groundstation.tracker.setpoints_from_plan", forward)
+    flight.send(VehicleStatus(header=flight.header("drone_1"), flight_state=FlightState.FLYING, **state))
+    for _ in range(60):
+        flight.run(0.05)
+        flight.tracker.setpoints(flight.now)
+    assert drifts[-1] == pytest.approx(drift_m_s, abs=0.05)

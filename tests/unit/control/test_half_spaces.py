@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import linprog
 
 from groundstation.control.half_spaces import TOLERANCE_M_S, project
 
@@ -36,6 +37,36 @@ def test_where_there_is_too_little_room_as_little_as_it_takes_is_let_off(pushes:
 def test_two_that_push_at_each_other_let_one_stand() -> None:
     found, _ = project(np.array([0.5, 0.4, 0.1]), NORMALS, np.array([-0.2, -0.1, 0.3]))
     assert found == pytest.approx((0.0, 0.3, 0.1), abs=TOLERANCE_M_S)
+
+
+@pytest.mark.parametrize("floor", [-0.05, 0.05])
+@pytest.mark.parametrize("order", [(0, 1, 2, 3), (3, 2, 1, 0), (1, 0, 3, 2)])
+def test_a_wall_without_part_in_a_conflict_pushes_on(order: tuple[int, ...], floor: float) -> None:
+    """A room with too little height for the deviation of a height, and a drift towards one of its walls."""
+    rows = list(order)
+    normals = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])[rows]
+    found, _ = project(np.array([0.3, 0.1, 0.0]), normals, np.array([-0.2, -0.15, floor, 0.3])[rows])
+    assert found == pytest.approx((-0.2, 0.1, -max(0.0, floor)), abs=1e-3)
+
+
+def test_nothing_is_relaxed_more_than_all_together_would_be() -> None:
+    rng = np.random.default_rng(8)
+    for _ in range(200):
+        normals = rng.normal(size=(8, 3))
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        most = rng.uniform(-0.2, 0.1, 8)
+        found, _ = project(rng.normal(size=3) * 0.3, normals, most)
+        excess = (normals @ found - most)[most < 0.0]
+        eased, capped = (
+            np.column_stack((normals, np.where(most < 0.0, -1.0, 0.0))),
+            np.column_stack((normals, np.zeros(8))),
+        )
+        limits = np.concatenate((most, np.maximum(most, 0.0)))
+        least = linprog(
+            (0, 0, 0, 1), np.concatenate((eased, capped)), limits, bounds=[(None, None)] * 3 + [(0, None)]
+        ).fun
+        assert excess.max(initial=0.0) <= least + 0.2 / 256 + 1e-6
+        assert (normals @ found - np.maximum(most, 0.0)).max() <= 1e-6
 
 
 def test_a_wedge_that_pushes_out_is_obeyed_in_its_edge() -> None:

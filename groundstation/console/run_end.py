@@ -21,7 +21,7 @@ class _Judged(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class RunEnd:
-    """The end of a run. verdict: passed, failed or invalid, "" if not judged; command: the command that flies it again.
+    """The end of a run. verdict: passed, failed, invalid or not flown, "" if not judged; command: the command that flies it again.
 
     report: the page to keep, None if there is none.
     """

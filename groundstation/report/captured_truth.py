@@ -6,7 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from groundstation.arrays import Array
-from groundstation.bus.messages import AIRBORNE, UNHEARD, BodyPoses, VehicleStatus
+from groundstation.bus.messages import BodyPoses, VehicleStatus
+from groundstation.report.aloft import aloft_at
 from groundstation.report.tracks import TimedMessage, TruthTrack
 
 # Without a pose for this long, or for this many periods, a body's place is unknown.
@@ -37,9 +38,4 @@ def _yaw(w: float, x: float, y: float, z: float) -> float:
 
 
 def _track(table: Array, statuses: Sequence[TimedMessage[VehicleStatus]], max_gap_s: float) -> TruthTrack:
-    states = [(item.time_s, item.message.flight_state) for item in statuses]
-    said = sorted((time_s, state in AIRBORNE) for time_s, state in states if state not in UNHEARD)
-    times = np.array([time_s for time_s, _ in said])
-    aloft = np.array([False, *(flies for _, flies in said)])
-    on_ground = ~aloft[np.searchsorted(times, table[:, 0], side="right")]
-    return TruthTrack(table[:, 0], table[:, 1:4], table[:, 4], on_ground, max_gap_s)
+    return TruthTrack(table[:, 0], table[:, 1:4], table[:, 4], ~aloft_at(statuses, table[:, 0]), max_gap_s)

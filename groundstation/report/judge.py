@@ -15,6 +15,7 @@ from groundstation.report.criteria import Criterion, criteria_of, invalidity, ov
 from groundstation.report.expectation import expectation_of
 from groundstation.report.findings import Findings, findings_of
 from groundstation.report.metrics import RunFigures, figures_of
+from groundstation.report.not_flown import NotFlown, not_flown
 from groundstation.report.run_facts import RunFacts
 from groundstation.report.tracks import RunData
 from groundstation.report.wording import missed
@@ -28,8 +29,8 @@ class RunReport:
     """A judged run.
 
     invalid: why its figures mean nothing, "" if they count; rerun, stretch: what it repeats or is a part of;
-    broken_off: the failure that ended it, "" without; recorded_s: where the recording breaks off in flight, None
-    where it does not.
+    not_flown: how it is a run without a flight; broken_off: the failure that ended it, "" without; recorded_s: where
+    the recording breaks off in flight, None where it does not.
     """
 
     run_dir: Path
@@ -41,13 +42,14 @@ class RunReport:
     damage: tuple[str, ...]
     rerun: Rerun | None = None
     stretch: Stretch | None = None
+    not_flown: NotFlown | None = None
     broken_off: str = ""
     recorded_s: float | None = None
 
     @property
-    def no_flight(self) -> Rerun | Stretch | None:
-        """Return the run that it repeats or the part that it is, if it is no whole flight; else None."""
-        return self.rerun or self.stretch
+    def no_flight(self) -> Rerun | Stretch | NotFlown | None:
+        """Return the run that it repeats, the part that it is, or how nobody flew; None for a whole flight."""
+        return self.rerun or self.stretch or self.not_flown
 
     @property
     def name(self) -> str:
@@ -61,10 +63,14 @@ class RunReport:
 
     @property
     def passed(self) -> bool | None:
-        """Whether it is valid, recorded until the landing, and meets all criteria; None for no flight."""
+        """Whether it is valid, ended by no failure, recorded until the landing, and meets all criteria.
+
+        None for no flight.
+        """
         if self.no_flight is not None:
             return None
-        return self.valid and self.recorded_s is None and all(criterion.ok for criterion in self.criteria)
+        ended_well = not self.broken_off and self.recorded_s is None
+        return self.valid and ended_well and all(criterion.ok for criterion in self.criteria)
 
     @property
     def reasons(self) -> tuple[str, ...]:
@@ -72,17 +78,17 @@ class RunReport:
         if self.passed is not False:
             return ()
         if self.invalid:
-            return (self.invalid,)
-        if self.broken_off and not self.figures.tracked_s:
+            return tuple(filter(None, (self.broken_off, self.invalid)))
+        if self.broken_off and not self.figures.flew:
             return (self.broken_off,)  # without a flight every other criterion is missed for that reason
         off = self.recorded_s
         broken = "" if off is None else f"the recording breaks off after {off:.0f} s, before the run ended"
         missing = (missed(criterion) for criterion in self.criteria if not criterion.ok)
-        return tuple(filter(None, (broken, *missing, overload(self.figures))))
+        return tuple(filter(None, (self.broken_off, broken, *missing, overload(self.figures))))
 
     @property
     def verdict(self) -> str:
-        """Return passed, failed or invalid; re-run, what-if or cut if there is nothing to judge."""
+        """Return passed, failed or invalid; re-run, what-if, cut, check or not flown where nothing is judged."""
         if self.no_flight is not None:
             return self.no_flight.kind
         return "passed" if self.passed else "failed" if self.valid else "invalid"
@@ -109,7 +115,9 @@ class RunReport:
 def judge(data: RunData, run_dir: Path) -> RunReport:
     """Return the report of a run's data; writes nothing."""
     figures = figures_of(data)
-    is_flight = data.rerun is None and data.stretch is None
+    broken_off, recorded_s = _broken_off(data), data.end_s if data.breaks_off and figures.landed is None else None
+    without = not_flown(data.facts, flew=figures.flew, failed=bool(broken_off) or recorded_s is not None)
+    is_flight = data.rerun is None and data.stretch is None and without is None
     criteria = tuple(criteria_of(figures, data.resolved, data.facts)) if is_flight else ()
     unread = expectation_of(data.facts)[1] if is_flight else ""
     return RunReport(
@@ -122,8 +130,9 @@ def judge(data: RunData, run_dir: Path) -> RunReport:
         damage=(*([f"{run_facts.NAME}: {unread}"] if unread else []), *data.damage[:_DAMAGE_LINES]),
         rerun=data.rerun,
         stretch=data.stretch,
-        broken_off=_broken_off(data),
-        recorded_s=data.end_s if data.breaks_off and figures.landed is None else None,
+        not_flown=without,
+        broken_off=broken_off,
+        recorded_s=recorded_s,
     )
 
 

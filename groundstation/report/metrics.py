@@ -10,6 +10,7 @@ from groundstation.bus.messages import Severity, Verdict
 from groundstation.estimation.tracking_errors import TrackingFigures, tracking_figures
 from groundstation.report import load, safety, topology_use
 from groundstation.report.accuracy import RATE_HZ, Accuracy, accuracy, errors_at, time_grid
+from groundstation.report.aloft import anybody_flew
 from groundstation.report.happenings import happenings, landings
 from groundstation.report.interval import tracking_spans, whole
 from groundstation.report.tracks import RunData
@@ -20,11 +21,13 @@ class RunFigures(msgspec.Struct, frozen=True, kw_only=True):
 
     target_*: of several targets, those of the worst; target: all figures of the one with the largest error; found: of
     each target from when it was found, None if it never was.
-    failsafe_landings: which drones a failsafe landed or cut, when and why. truth: the reference of the errors,
-    a motion capture system of the field or the simulator, "" for nothing. starved_s: how long other programs of the
-    computer kept processes of the run from it; waited: the share of the time for which each waited for a core.
+    flew: whether any drone did. failsafe_landings: which drones a failsafe landed or cut, when and why. truth: the
+    reference of the errors, a motion capture system of the field or the simulator, "" for nothing. starved_s: how long
+    other programs of the computer kept processes of the run from it; waited: the share of the time for which each
+    waited for a core.
     """
 
+    flew: bool = True
     tracked_s: float
     target_rmse_m: float | None
     target_lost_s: float | None
@@ -73,6 +76,7 @@ def figures_of(data: RunData) -> RunFigures:
     ticks, missed, rate = load.tracker_deadlines(data)
     cores = load.cpu_cores(data)
     return RunFigures(
+        flew=bool(spans) or anybody_flew(data),
         tracked_s=round(sum(until - since for since, until in spans), 3),
         target_rmse_m=target.rmse_m if target else None,
         target_lost_s=max((one.lost_s for one in targets.values()), default=None),

@@ -6,15 +6,16 @@ from typing import Any
 import msgspec
 
 NAME = "run.json"
+_CHECK = "preflight"
 
 
 class RunFacts(msgspec.Struct, frozen=True, omit_defaults=True):
     """The command that started a run.
 
-    mode: demo, sitl or fly; command_unix_ns: when the operator gave the command (0: unknown, or the run asked before
-    the take-off); tracking_s: time of ordered tracking; kernels_lacked: whether they had to be compiled first, once per
-    version; real: real parts of a simulated run; command: as typed, without passwords; expected: the section of the
-    scenario's file, verbatim (`report/expectation.py` reads it).
+    mode: demo, sitl, fly or preflight; command_unix_ns: when the operator gave the command (0: unknown, or the run
+    asked before the take-off); tracking_s: time of ordered tracking; kernels_lacked: whether they had to be compiled
+    first, once per version; real: real parts of a simulated run; command: as typed, without passwords; expected: the
+    section of the scenario's file, verbatim (`report/expectation.py` reads it).
     """
 
     mode: str = ""
@@ -27,6 +28,11 @@ class RunFacts(msgspec.Struct, frozen=True, omit_defaults=True):
     real: tuple[str, ...] = ()
     command: str = ""
     expected: Any = None
+
+    @property
+    def is_check(self) -> bool:
+        """Return whether the command only checks what forbids a take-off: no drone flies."""
+        return self.mode == _CHECK
 
 
 def write(run_dir: Path, facts: RunFacts) -> None:

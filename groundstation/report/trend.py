@@ -45,7 +45,7 @@ class _Report(msgspec.Struct):
 def judged_runs(folder: Path) -> tuple[list[JudgedRun], list[str]]:
     """Return the runs of a folder in order of their names, which begin with their times, and unreadable reports.
 
-    Re-runs and cuts are left out: they are no flights.
+    Re-runs, cuts and runs in which nobody flew are left out: they are no flights.
     """
     runs, damage = [], []
     for path in sorted(folder.glob(f"*/{JSON_NAME}")):
@@ -55,7 +55,8 @@ def judged_runs(folder: Path) -> tuple[list[JudgedRun], list[str]]:
         except (OSError, msgspec.DecodeError) as error:
             damage.append(f"{shown(path)}: {error}")
             continue
-        if report.rerun is None and report.cut is None:
+        without = report.passed is None or report.run.is_check
+        if report.rerun is None and report.cut is None and not without:
             runs.append(_run(shown(path.parent.name), report, figures))
     return runs, damage
 

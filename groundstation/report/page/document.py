@@ -88,9 +88,10 @@ def _lead(report: RunReport) -> str:
     }  # fmt: skip
     words = " · ".join(f"{name} {escape(value)}" for name, value in known.items() if value)
     why = f" {report.invalid[0].upper()}{report.invalid[1:]}: the figures mean nothing." if report.invalid else ""
-    if report.no_flight:
+    if report.rerun or report.stretch:
         words = f"recorded flight: {words}"
-    badge = f'<p><span class="verdict {verdict}">{verdict.upper()}</span> <span class="dim">{words}.{why}</span></p>'
+    style = verdict.replace(" ", "-")
+    badge = f'<p><span class="verdict {style}">{verdict.upper()}</span> <span class="dim">{words}.{why}</span></p>'
     return badge + _reasons(report) + no_flight_note(report)
 
 
@@ -113,10 +114,11 @@ def _pictures(pictures: list[MomentPicture]) -> str:
 
 
 def no_flight_note(report: RunReport) -> str:
-    """Return the note that marks a re-run or a cut, "" for a flight."""
+    """Return the note that marks a re-run, a cut or a run in which nobody flew, "" for a flight."""
     if report.no_flight is None:
         return ""
-    return f'<p class="rerun"><b>{escape(report.name)}</b> is a {escape(report.no_flight.sentence)}.</p>'
+    told = report.not_flown.told_of if report.not_flown else f"is a {report.no_flight.sentence}"
+    return f'<p class="rerun"><b>{escape(report.name)}</b> {escape(told)}.</p>'
 
 
 def _room(data: RunData) -> str:

@@ -47,6 +47,8 @@ def criteria_table(report: RunReport) -> str:
     ]  # fmt: skip
     kind = report.no_flight.kind if report.no_flight else ""
     empty = f"A {kind} is no flight: no criterion applies." if kind else "No criterion applies."
+    if report.not_flown:
+        empty = "No drone flew: no criterion applies."
     return table(("verdict", "criterion", "value", "asked for", "why"), rows, empty)
 
 

@@ -14,6 +14,7 @@ from groundstation.bus import topics as t
 from groundstation.bus.api import Sample
 from groundstation.bus.codec import encode
 from groundstation.bus.keys import expression
+from groundstation.cli.main import run
 from groundstation.recording.capture import Capture
 from groundstation.recording.mcap_file import McapFile
 from groundstation.recording.preamble import Preamble
@@ -25,6 +26,7 @@ from groundstation.report.gather import gather
 from groundstation.report.judge import judge
 from groundstation.report.run_facts import RunFacts
 from groundstation.report.summary import summary
+from groundstation.report.trend import judged_runs
 from groundstation.settings.load import load_field
 
 S = 1_000_000_000
@@ -274,13 +276,20 @@ def test_a_start_may_compile_once_per_version(tmp_path: Path, before_s: int, fai
     assert {criterion.name for criterion in report.criteria if not criterion.ok} == failed
 
 
-def test_a_run_that_never_tracked_fails_and_says_so(tmp_path: Path) -> None:
+def test_a_run_in_which_nobody_flew_is_not_judged(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     tape = Tape(tmp_path)
     _statuses(tape, Flight(), 1.0)
     tape.close()
     report = build_report(tmp_path)
-    assert not report.passed
+    assert (report.passed, report.verdict, report.criteria, report.reasons) == (None, "not flown", (), ())
     assert report.figures.target_rmse_m is None
+    page = (tmp_path / "report.html").read_text()
+    assert "was not flown, as no drone took off" in page and "No drone flew: no criterion applies." in page
+    assert run(["report", str(tmp_path), "--no-plot"]) == 0
+    assert "NOT FLOWN, as no drone took off: nothing is judged" in capsys.readouterr().out
+    assert tmp_path.name not in {one.name for one in judged_runs(tmp_path.parent)[0]}
+    run_facts.write(tmp_path, RunFacts(mode="sitl", tracking_s=60.0))
+    assert judge(gather(tmp_path), tmp_path).verdict == "failed", "its command asked for a flight"
     assert (tmp_path / "trajectories.png").stat().st_size > 10_000
 
 

@@ -273,3 +273,14 @@ def test_a_landing_missing_from_a_truncated_recording_is_not_judged(tmp_path: Pa
     assert cut.figures.landed is None
     assert cut.reasons[0] == "the recording breaks off after 100 s, before the run ended"
     assert judge(_data(truth=flying), tmp_path).figures.landed is False
+
+
+def test_a_flight_that_a_failure_ended_fails_for_that_reason(tmp_path: Path) -> None:
+    text = "run ended: this computer slept for 12 s in flight: nobody watched over the drones; all drones have landed"
+    header = m.Header(0, "here", m.RUN, "supervisor", 0)
+    ended = TimedMessage(90.0, m.Event(header=header, severity=m.Severity.ERROR, text=text))
+    track, land = _ack(5.0, m.Verb.TRACK, m.AckStage.ACCEPTED), _command(80.0, m.Verb.LAND)
+    report = judge(_data(events=[ended], acks=[track], commands=[land]), tmp_path)
+    assert (report.passed, report.verdict) == (False, "failed")
+    assert report.reasons[0] == text.removeprefix(m.RUN_ENDED)
+    assert not replace(report, criteria=()).passed, "whatever else it met"

@@ -4,7 +4,7 @@ import { byId, el } from "./dom.js";
 import { send } from "./link.js";
 import { replaying, store } from "./store.js";
 
-const WORDS = { passed: "PASSED", failed: "FAILED", invalid: "INVALID: its figures cannot be trusted" };
+const WORDS = { passed: "PASSED", failed: "FAILED", invalid: "INVALID: its figures cannot be trusted", "not flown": "NOT FLOWN: no drone took off, so nothing is judged" };
 let kept = "", keptFor = "";
 
 const result = () => (replaying() ? undefined : store.s.result);

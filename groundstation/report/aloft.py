@@ -1,0 +1,31 @@
+"""When drones were in the air: by their own reports, which a truth with gaps does not replace."""
+
+from collections.abc import Collection, Iterable
+
+import numpy as np
+
+from groundstation.arrays import Array, BoolArray
+from groundstation.bus.messages import AIRBORNE, UNHEARD, FlightState, VehicleStatus
+from groundstation.report.tracks import RunData, TimedMessage
+
+
+def aloft_at(
+    statuses: Iterable[TimedMessage[VehicleStatus]], time_s: Array, states: Collection[FlightState] = AIRBORNE
+) -> BoolArray:
+    """Return for each time whether a drone was in one of some states (m): unchanged while it is silent, False before.
+
+    time_s: [s since the first message]; states: those in the air.
+    """
+    told = [(item.time_s, item.message.flight_state) for item in statuses]
+    said = sorted((at_s, state in states) for at_s, state in told if state not in UNHEARD)
+    times = np.array([at_s for at_s, _ in said])
+    aloft = np.array([False, *(flies for _, flies in said)])
+    found: BoolArray = aloft[np.searchsorted(times, time_s, side="right")]
+    return found
+
+
+def anybody_flew(data: RunData) -> bool:
+    """Return whether any drone was ever in the air, by its own report or by the truth."""
+    reported = (item.message.flight_state in AIRBORNE for said in data.vehicles.values() for item in said)
+    seen = (not data.truth[name].on_ground.all() for name in data.drones if name in data.truth)
+    return any(reported) or any(seen)

@@ -28,8 +28,8 @@ _RUNS = Path("runs")
 def report(recording: Path | None, as_json: bool, no_plot: bool, other: Path | None, trend: bool) -> int:
     """Rebuild report.html, report.json and trajectories.png of a run folder (default: the newest in ./runs).
 
-    Exit code 0 if the run passed, 1 if it did not. A comparison, and the report of a re-run (`replay --output`) or of a
-    cut, judge nothing and end with 0.
+    Exit code 0 if the run passed, 1 if it did not. A comparison, and the report of a re-run (`replay --output`), of a
+    cut or of a run in which no drone flew, judge nothing and end with 0.
     """
     from groundstation.report.build import build_report
 
@@ -126,11 +126,16 @@ def _run_dir(path: Path) -> Path:
 
 
 def newest_run(folder: Path) -> Path:
-    """Return the folder with the newest recording that is no cut of another; raises OperatorMistake for none."""
+    """Return the folder with the newest recording of a run; raises OperatorMistake for none.
+
+    A cut of another one is none, and neither is a check before a take-off.
+    """
     from groundstation.recording.stretch import is_stretch
+    from groundstation.report import run_facts
 
     recordings = sorted(folder.glob("*/state*.mcap"), key=lambda path: path.stat().st_mtime, reverse=True)
-    newest = next((path for path in recordings if not is_stretch(path)), None)
+    runs = (path for path in recordings if not run_facts.read(path.parent).is_check)
+    newest = next((path for path in runs if not is_stretch(path)), None)
     if newest is None:
         raise OperatorMistake(f"no recorded run in {folder.absolute()}: name a run folder")
     return newest.parent

@@ -9,6 +9,7 @@ from groundstation.recording.part_names import shown
 from groundstation.report.criteria import Criterion
 from groundstation.report.file_names import JSON_NAME
 from groundstation.report.run_facts import RunFacts
+from groundstation.report.wording import missed as in_words
 
 # Figures to compare from flight to flight, in the order of the page.
 FIGURES = (
@@ -24,13 +25,14 @@ FIGURES = (
 
 
 class JudgedRun(msgspec.Struct, frozen=True):
-    """A run with its verdict, its figures by name, and its missed criteria."""
+    """A run with its verdict, its figures by name, its missed criteria, and the reasons of its failure in words."""
 
     name: str
     facts: RunFacts
     verdict: str
     figures: dict[str, float | None]
     missed: tuple[Criterion, ...] = ()
+    reasons: tuple[str, ...] = ()
 
 
 class _Report(msgspec.Struct):
@@ -39,6 +41,7 @@ class _Report(msgspec.Struct):
     rerun: Any = None
     cut: Any = None
     criteria: tuple[Criterion, ...] = ()
+    reasons: tuple[str, ...] = ()
     run: RunFacts = RunFacts()
 
 
@@ -65,4 +68,6 @@ def _run(name: str, report: _Report, figures: dict[str, Any]) -> JudgedRun:
     verdict = "passed" if report.passed else "failed" if report.valid else "invalid"
     known = {figure: float(value) for figure in FIGURES if isinstance(value := figures.get(figure), int | float)}
     missed = tuple(one for one in report.criteria if not one.ok)
-    return JudgedRun(name, report.run, verdict, {figure: known.get(figure) for figure in FIGURES}, missed)
+    figures = {figure: known.get(figure) for figure in FIGURES}
+    # Reports of earlier versions have the criteria only.
+    return JudgedRun(name, report.run, verdict, figures, missed, report.reasons or tuple(map(in_words, missed)))

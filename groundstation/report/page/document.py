@@ -24,7 +24,6 @@ from groundstation.report.plot_style import STYLE
 from groundstation.report.searches import searches
 from groundstation.report.story import story
 from groundstation.report.tracks import RunData
-from groundstation.report.wording import missed
 
 _SVG = {**STYLE, "svg.fonttype": "path", "path.simplify_threshold": 0.5, "svg.hashsalt": "skein"}
 
@@ -96,10 +95,8 @@ def _lead(report: RunReport) -> str:
 
 
 def _reasons(report: RunReport) -> str:
-    """Return the reasons for a run's failure, in words, "" if it passed."""
-    if report.no_flight or report.passed:
-        return ""
-    return "".join(f"<p>{escape(missed(one))}.</p>" for one in report.criteria if not one.ok)
+    """Return the reasons for a run's failure, in words, "" if it passed; without what makes it invalid, said above."""
+    return "".join(f"<p>{escape(reason)}.</p>" for reason in report.reasons if reason != report.invalid)
 
 
 def _pictures(pictures: list[MomentPicture]) -> str:

@@ -10,7 +10,7 @@ from groundstation.report.page.document import holders, page
 from groundstation.report.page.tables import table
 from groundstation.report.plot_style import SERIES_COLORS
 from groundstation.report.trend import FIGURES, JudgedRun
-from groundstation.report.wording import missed, quantity, title, unit
+from groundstation.report.wording import quantity, title, unit
 
 NAME = "trend.html"
 
@@ -40,7 +40,7 @@ def _table(runs: Sequence[JudgedRun]) -> str:
             run.verdict,
             run.facts.mode,
             quantity("target_rmse_m", run.figures["target_rmse_m"]),
-            "; ".join(missed(one) for one in run.missed),
+            "; ".join(run.reasons),
         )
         for number, run in enumerate(runs, 1)
     ]

@@ -2,9 +2,11 @@
 
 import json
 import re
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -162,6 +164,18 @@ def test_page_needs_nothing_else_and_escapes_what_was_recorded(tmp_path: Path) -
     assert {"NIS", "Plan cost"} <= {chart["title"] for chart in charts}
     assert all(len(curve["values"]) == len(chart["time_s"]) for chart in charts for curve in chart["curves"])
     assert all(before < after for chart in charts for before, after in pairwise(chart["time_s"]))
+
+
+def test_page_names_a_failure_that_no_criterion_shows(tmp_path: Path) -> None:
+    data, folder = sample_run(tmp_path, "run")
+    report = judge(data, folder)
+    flown = msgspec.structs.replace(report.figures, flew=True)
+    failed = replace(report, figures=flown, not_flown=None, criteria=(), broken_off="a process died", recorded_s=19.8)
+    write_page(data, failed, folder / "report.html")
+    page = (folder / "report.html").read_text("utf-8")
+    assert "<p>a process died.</p><p>the recording breaks off after 20 s, before the run ended.</p>" in page
+    write_page(data, replace(failed, invalid="the simulator did not keep real time"), folder / "report.html")
+    assert (folder / "report.html").read_text("utf-8").count("he simulator did not keep real time") == 1
 
 
 def test_comparison_lists_every_figure_with_its_change(tmp_path: Path) -> None:

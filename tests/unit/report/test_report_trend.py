@@ -48,6 +48,12 @@ def test_the_page_draws_figures_and_says_why(folder: Path) -> None:
     assert '"values":[0.02,0.31,null]' in text
 
 
+def test_the_page_names_a_failure_that_no_criterion_shows(folder: Path) -> None:
+    write(folder, "20261120T140000Z-lab", passed=False, reasons=["a process died"], criteria=[])
+    write_trend(*judged_runs(folder), folder / NAME)
+    assert "a process died" in (folder / NAME).read_text()
+
+
 def test_a_damaged_report_is_named_and_the_others_count(folder: Path) -> None:
     (folder / "20261120T100000Z-lab" / "report.json").write_text("{")
     found = CliRunner().invoke(report_command, [str(folder), "--trend"], standalone_mode=False)

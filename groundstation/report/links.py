@@ -1,5 +1,7 @@
 """Quality of the links: rates of telemetry, longest gap, link quality, battery, refused datagrams of each vehicle."""
 
+from itertools import dropwhile
+
 import msgspec
 import numpy as np
 
@@ -9,7 +11,8 @@ from groundstation.report.tracks import RunData
 class VehicleLink(msgspec.Struct, frozen=True):
     """Link of one vehicle over the whole run; None: never reported. battery: first and last value, 0..1.
 
-    longest_silence_s: longest time between two of its measurements (its driver sends status all the while).
+    rate_hz_min: from its first telemetry on; longest_silence_s: longest time between two of its measurements (its
+    driver sends status all the while).
     """
 
     vehicle: str
@@ -39,7 +42,8 @@ def _link(data: RunData, name: str) -> VehicleLink:
     return VehicleLink(
         vehicle=name,
         rate_hz_p50=float(np.median(rates)),
-        rate_hz_min=min(rates),
+        # Before its first telemetry a vehicle that is still to be switched on reports 0.
+        rate_hz_min=min(dropwhile(lambda rate: rate <= 0.0, rates), default=0.0),
         longest_silence_s=float(np.diff(heard_s).max()) if len(heard_s) > 1 else None,
         link_quality_min=min(quality, default=None),
         battery=(battery[0], battery[-1]) if battery else None,

@@ -131,6 +131,15 @@ def test_links_name_the_longest_silence_and_the_worst_quality() -> None:
     assert (found.link_quality_min, found.battery, found.rejected) == (0.4, (0.9, 0.8), {"checksum": 3})
 
 
+@pytest.mark.parametrize(("rates", "least"), [((0.0, 0.0, 50.0, 48.0), 48.0), ((0.0, 50.0, 0.0), 0.0), ((0.0,), 0.0)])
+def test_the_least_rate_of_a_link_counts_from_its_first_telemetry(rates: tuple[float, ...], least: float) -> None:
+    statuses = [
+        TimedMessage(k, m.VehicleStatus(header=HEADER, flight_state=m.FlightState.LANDED, mode="LANDED", rate_hz=rate))
+        for k, rate in enumerate(rates)
+    ]
+    assert links(run_with(vehicles={"drone_1": statuses}))[0].rate_hz_min == least
+
+
 def test_held_values_expire_and_thinning_bounds_the_points() -> None:
     values = held(np.array([0.5, 1.0, 1.4, 3.0]), [1.0], [7.0], 0.5)
     assert np.isnan(values[[0, 3]]).all() and values[1:3].tolist() == [7.0, 7.0]

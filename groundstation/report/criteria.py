@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 
 import msgspec
+from msgspec.structs import replace
 
 from groundstation.field.resolved import ResolvedField
 from groundstation.report.expectation import Expectation, expectation_of
@@ -50,7 +51,10 @@ class Criterion(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 def criteria_of(figures: RunFigures, field: ResolvedField, facts: RunFacts) -> list[Criterion]:
-    """Return all criteria that apply: those against the truth need a simulator or motion capture."""
+    """Return all criteria that apply: those against the truth need a simulator or motion capture.
+
+    What motion capture measured of drones is judged although it never saw a target.
+    """
     expected = expectation_of(facts)[0]
     criteria = [
         *_promises(figures, facts, len(field.drones)),
@@ -59,14 +63,15 @@ def criteria_of(figures: RunFigures, field: ResolvedField, facts: RunFacts) -> l
         _under("tracker_missed_percent", figures.tracker_missed_percent, MAX_MISSED_PERCENT),
         _above("tracker_rate_hz", figures.tracker_rate_hz, MIN_RATE_SHARE * field.estimator.rate_hz),
     ]
-    if figures.sim_overrun_percent is not None or figures.target is not None:
-        criteria = [*_against_truth(figures, field, expected), *_of_the_demo(figures, facts), *criteria]
+    simulated = figures.sim_overrun_percent is not None
+    tracked = simulated or figures.target is not None
+    criteria = [*_of_safety(figures, field, tracked=tracked), *criteria]
+    if tracked:
+        criteria = [*_of_the_targets(figures, field, expected), *_of_the_demo(figures, facts), *criteria]
         cores = max(MAX_CPU_CORES, CPU_CORES_PER_DRONE * len(field.drones))
         criteria.append(_below("mean_cpu_cores", figures.mean_cpu_cores, cores))
-        if figures.sim_overrun_percent is not None or not field.truth:
+        if simulated or not field.truth:
             criteria.append(_below("sim_overrun_percent", figures.sim_overrun_percent, MAX_SIM_OVERRUN_PERCENT))
-    elif figures.landed is not None:
-        criteria.append(_landed(figures))
     return criteria
 
 
@@ -94,17 +99,28 @@ def overload(figures: RunFigures) -> str:
     return f"{name} waited for a core {flying[name]:.0%} of the time: this computer is too busy, or too small for it"
 
 
-def _against_truth(figures: RunFigures, field: ResolvedField, expected: Expectation) -> Iterator[Criterion]:
+def _of_the_targets(figures: RunFigures, field: ResolvedField, expected: Expectation) -> Iterator[Criterion]:
     yield from _of_the_target(figures, expected)
     if figures.targets:
         # One that the truth never shows while it shows others was not judged at all.
         judged = min(figures.targets[name].judged if name in figures.targets else 0.0 for name in field.tracked)
         if judged < 1.0:
             yield _above("target_judged", judged, MIN_JUDGED)
-    yield _below("max_fence_violation_m", figures.max_fence_violation_m, 0.0)
-    if len(field.drones) > 1:
+
+
+def _of_safety(figures: RunFigures, field: ResolvedField, *, tracked: bool) -> Iterator[Criterion]:
+    """Judge what was measured of fence, separation and landing; tracked: a truth of the targets asks for all three."""
+    if tracked or figures.max_fence_violation_m is not None:
+        yield _below("max_fence_violation_m", figures.max_fence_violation_m, 0.0)
+    if (tracked and len(field.drones) > 1) or figures.min_separation_m is not None:
         yield _above("min_separation_m", figures.min_separation_m, field.safety.min_separation_m)
-    yield _landed(figures)
+    judged = min(figures.drones_judged.values(), default=1.0)
+    if judged < 1.0:
+        # Where nobody measured it, a drone may have been beyond the fence.
+        worst = min(figures.drones_judged, key=lambda name: figures.drones_judged[name])
+        yield replace(_above("drones_judged", judged, MIN_JUDGED), why="" if judged >= MIN_JUDGED else worst)
+    if tracked or figures.landed is not None:
+        yield Criterion("landed", figures.landed, "==", True, figures.landed is True)
 
 
 def _of_the_target(figures: RunFigures, expected: Expectation) -> Iterator[Criterion]:
@@ -136,10 +152,6 @@ def _whose(figures: RunFigures, of_targets: Mapping[str, float]) -> str:
     worst = max(of_targets, key=lambda name: of_targets[name], default="")
     never = "never found" if worst and figures.targets[worst].covered == 0.0 else ""
     return ": ".join(part for part in (worst if len(of_targets) > 1 else "", never) if part)
-
-
-def _landed(figures: RunFigures) -> Criterion:
-    return Criterion("landed", figures.landed, "==", True, figures.landed is True)
 
 
 def _of_the_demo(figures: RunFigures, facts: RunFacts) -> Iterator[Criterion]:

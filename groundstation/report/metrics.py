@@ -10,7 +10,7 @@ from groundstation.bus.messages import Severity, Verdict
 from groundstation.estimation.tracking_errors import TrackingFigures, tracking_figures
 from groundstation.report import load, safety, topology_use
 from groundstation.report.accuracy import RATE_HZ, Accuracy, accuracy, errors_at, time_grid
-from groundstation.report.aloft import anybody_flew
+from groundstation.report.aloft import aloft_at, anybody_flew
 from groundstation.report.happenings import happenings, landings
 from groundstation.report.interval import tracking_spans, whole
 from groundstation.report.tracks import RunData
@@ -21,10 +21,10 @@ class RunFigures(msgspec.Struct, frozen=True, kw_only=True):
 
     target_*: of several targets, those of the worst; target: all figures of the one with the largest error; found: of
     each target from when it was found, None if it never was.
-    flew: whether any drone did. failsafe_landings: which drones a failsafe landed or cut, when and why. truth: the
-    reference of the errors, a motion capture system of the field or the simulator, "" for nothing. starved_s: how long
-    other programs of the computer kept processes of the run from it; waited: the share of the time for which each
-    waited for a core.
+    flew: whether any drone did. drones_judged: share of each drone's flights for which motion capture knows its place.
+    failsafe_landings: which drones a failsafe landed or cut, when and why. truth: the reference of the errors, a motion
+    capture system of the field or the simulator, "" for nothing. starved_s: how long other programs of the computer
+    kept processes of the run from it; waited: the share of the time for which each waited for a core.
     """
 
     flew: bool = True
@@ -37,6 +37,7 @@ class RunFigures(msgspec.Struct, frozen=True, kw_only=True):
     robots: dict[str, Accuracy]
     max_fence_violation_m: float | None
     min_separation_m: float | None
+    drones_judged: dict[str, float] = {}
     landed: bool | None
     failsafe_landings: list[str] = []
     topology_seconds: dict[str, float]
@@ -86,6 +87,7 @@ def figures_of(data: RunData) -> RunFigures:
         robots=robots,
         max_fence_violation_m=safety.max_fence_violation_m(data),
         min_separation_m=safety.min_separation_m(data),
+        drones_judged=safety.judged_shares(data),
         landed=safety.landed(data),
         failsafe_landings=[item.line for item in landings(happenings(data))],
         topology_seconds=topology_use.topology_seconds(data, start, end),
@@ -121,8 +123,11 @@ def _accuracies(data: RunData, grid: Array) -> tuple[dict[str, Accuracy], dict[s
             targets[name] = found
     for name in data.drones:
         truth = data.truth.get(name)
-        flying = grid[truth.airborne_at(grid)] if truth is not None else grid[:0]
-        if truth is not None and (found := accuracy(flying, truth, data.estimates.get(name), 3)) is not None:
+        if truth is None:
+            continue
+        # A truth with gaps does not tell for how long it flew: its own reports do.
+        aloft = truth.airborne_at(grid) if truth.is_simulated else aloft_at(data.vehicles.get(name, ()), grid)
+        if (found := accuracy(grid[aloft], truth, data.estimates.get(name), 3)) is not None:
             robots[name] = found
     return targets, robots
 

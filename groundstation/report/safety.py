@@ -6,6 +6,8 @@ import numpy as np
 
 from groundstation.bus.messages import STANDING, UNHEARD
 from groundstation.field.room import Fence
+from groundstation.report.accuracy import time_grid
+from groundstation.report.aloft import aloft_at
 from groundstation.report.tracks import RunData, TruthTrack
 
 # Contact with the floor lets a body sink by fractions of this; it is no breach of a fence.
@@ -43,6 +45,22 @@ def _closest(first: TruthTrack, second: TruthTrack) -> float | None:
         return None
     between = first.position_m[together] - second.position_at(first.time_s[together])
     return float(np.linalg.norm(between, axis=1).min())
+
+
+def judged_shares(data: RunData) -> dict[str, float]:
+    """Return the share of its flights for which the truth of each drone is known; of those that reported a flight.
+
+    Only if motion capture shows any drone: without, none is judged against a truth, and a simulator knows all.
+    """
+    tracks = {name: data.truth[name] for name in data.drones if name in data.truth}
+    if all(track.is_simulated for track in tracks.values()):
+        return {}
+    grid, found = time_grid(0.0, data.end_s), dict[str, float]()
+    for name in data.drones:
+        aloft = grid[aloft_at(data.vehicles.get(name, ()), grid)]
+        if len(aloft):
+            found[name] = float(np.mean(tracks[name].known_at(aloft))) if name in tracks else 0.0
+    return found
 
 
 def landed(data: RunData) -> bool | None:

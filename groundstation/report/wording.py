@@ -14,6 +14,7 @@ _TITLES = {
     "target_judged": ("share of the time with a truth of the target", ""),
     "max_fence_violation_m": ("beyond the fence", "m"),
     "min_separation_m": ("least separation", "m"),
+    "drones_judged": ("share of a drone's flight with a truth", ""),
     "landed": ("everybody landed", ""),
     "tracked_s": ("time tracked", "s"),
     "command_to_airborne_s": ("from the command to the air", "s"),

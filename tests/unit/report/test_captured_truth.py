@@ -141,3 +141,46 @@ def test_a_flight_that_was_judged_for_less_than_half_of_its_time_does_not_pass(l
         )
         found = {one.name: one for one in criteria_of(figures_of(data), two, RunFacts())}
         assert (found["target_judged"].value, found["target_judged"].ok) == (0.0, False), "nothing shows the rover"
+
+
+def aloft(field: ResolvedField, seen_s: float, place_m: float = 0.0) -> RunData:
+    """Return a flight of 20 s without a target: motion capture sees both drones, 0.2 m apart, for a time."""
+    said = {name: [status(0.0, FlightState.HOVERING), status(20.0, FlightState.LANDED)] for name in field.drones}
+    places = {name: (place_m + 0.2 * k, 0.0, 1.5) for k, name in enumerate(field.drones)}
+    bodies = tuple(BodyPose(name, place, (1.0, 0.0, 0.0, 0.0)) for name, place in places.items())
+    header = Header(0, "c", "mocap", "mocap", 1)
+    heard = [TimedMessage(t / 10, BodyPoses(header=header, bodies=bodies)) for t in range(int(10 * seen_s))]
+    return RunData(field, RunFacts(), end_s=21.0, truth=captured_tracks(heard, said), vehicles=said)
+
+
+def test_fence_and_separation_are_judged_although_the_target_was_never_seen(lab_field: ResolvedField) -> None:
+    """Neither was anything tracked: the drones only hovered."""
+    data = aloft(lab_field, 20.0, place_m=9.0)
+    found = {one.name: one for one in criteria_of(figures_of(data), lab_field, RunFacts())}
+    assert found["max_fence_violation_m"].value is not None and not found["max_fence_violation_m"].ok
+    assert not found["min_separation_m"].ok and found["landed"].ok
+    assert not found.keys() & {"target_rmse_m", "target_lost_s", "mean_cpu_cores"}, "there is no error of a target"
+
+
+def test_a_flight_that_nobody_measured_kept_no_fence(lab_field: ResolvedField) -> None:
+    data = aloft(lab_field, 20.0)
+    assert figures_of(data).drones_judged == dict.fromkeys(lab_field.drones, 1.0)
+    for seen_s, good in ((1.0, False), (14.0, True)):
+        short = aloft(lab_field, seen_s)
+        found = {one.name: one for one in criteria_of(figures_of(short), lab_field, RunFacts())}
+        assert found["max_fence_violation_m"].ok
+        assert found["drones_judged"].ok is good
+        assert abs(min(figures_of(short).drones_judged.values()) - seen_s / 20.0) < 0.02
+    del short.truth["drone_2"]
+    assert figures_of(short).drones_judged["drone_2"] == 0.0
+    assert figures_of(RunData(lab_field, RunFacts(), end_s=21.0, vehicles=data.vehicles)).drones_judged == {}
+
+
+def test_the_share_of_a_drone_that_is_judged_is_that_of_its_time_in_the_air(lab_field: ResolvedField) -> None:
+    header = Header(0, "c", "drone_1", "drone_1", 1)
+    data = aloft(lab_field, 4.0)
+    data.acks.append(
+        TimedMessage(0.0, CommandAck(header=header, command_id="1", verb=Verb.TRACK, stage=AckStage.EFFECTIVE))
+    )
+    data.commands.append(TimedMessage(20.0, Command(header=header, id="2", verb=Verb.LAND, scope=(), issuer="me")))
+    assert abs(figures_of(data).robots["drone_1"].judged - 0.2) < 0.02

@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterable
 import numpy as np
 
 from groundstation.arrays import Array, BoolArray
-from groundstation.bus.messages import AIRBORNE, UNHEARD, FlightState, VehicleStatus
+from groundstation.bus.messages import AIRBORNE, STANDING, UNHEARD, FlightState, VehicleStatus
 from groundstation.report.tracks import RunData, TimedMessage
 
 
@@ -29,3 +29,18 @@ def anybody_flew(data: RunData) -> bool:
     reported = (item.message.flight_state in AIRBORNE for said in data.vehicles.values() for item in said)
     seen = (not data.truth[name].on_ground.all() for name in data.drones if name in data.truth)
     return any(reported) or any(seen)
+
+
+def in_the_air(data: RunData) -> tuple[float, float] | None:
+    """Return the first take-off and the last landing [s], by the drones' reports; None if none reported a flight."""
+    flights = [flight for said in data.vehicles.values() if (flight := _flight(said, data.end_s))]
+    return (min(start for start, _ in flights), max(end for _, end in flights)) if flights else None
+
+
+def _flight(statuses: Iterable[TimedMessage[VehicleStatus]], end_s: float) -> tuple[float, float] | None:
+    told = [(item.time_s, item.message.flight_state) for item in statuses]
+    up = [at_s for at_s, state in told if state in AIRBORNE]
+    if not up:
+        return None
+    down = [at_s for at_s, state in told if state in STANDING and at_s > max(up)]
+    return min(up), min(down, default=end_s)

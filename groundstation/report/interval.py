@@ -1,12 +1,19 @@
-"""The parts of a run that count: from TRACK to the commands that end each flight of the team."""
+"""The parts of a run that count: from TRACK to the commands that end each flight of the team, else in the air."""
 
 from collections.abc import Sequence
 
+import numpy as np
+
+from groundstation.arrays import Array, BoolArray
 from groundstation.bus.messages import AckStage, Verb
+from groundstation.report.aloft import in_the_air
 from groundstation.report.tracks import RunData
 
 _STARTED = (AckStage.ACCEPTED, AckStage.EFFECTIVE)
 _ENDS, _STARTS = (Verb.LAND, Verb.CUT_MOTORS), (Verb.TAKEOFF, Verb.TRACK)
+
+# A process reports itself once a second: a shorter flight has no figures of its own.
+_LEAST_S = 3.0
 
 Span = tuple[float, float]
 
@@ -22,6 +29,26 @@ def tracking_spans(data: RunData) -> tuple[Span, ...]:
         if not spans or start > spans[-1][1]:
             spans.append((start, _end(data, start)))
     return tuple(spans)
+
+
+def flight_spans(data: RunData) -> tuple[Span, ...]:
+    """Return the parts of a run by which processes and planner are judged [s]: the time on the floor asks little.
+
+    Where it tracked for less than 3 s, from the first take-off to the last landing; without these the whole run.
+    """
+    aloft = in_the_air(data)
+    for spans in (tracking_spans(data), (aloft,) if aloft else ()):
+        if sum(end - start for start, end in spans) >= _LEAST_S:
+            return spans
+    return ((-np.inf, np.inf),)
+
+
+def within(time_s: Array, spans: Sequence[Span]) -> BoolArray:
+    """Return for each time whether it is in one of some spans (n)."""
+    found = np.zeros(len(time_s), dtype=bool)
+    for start, end in spans:
+        found |= (time_s >= start) & (time_s <= end)
+    return found
 
 
 def tracking_interval(data: RunData) -> Span | None:

@@ -1,10 +1,12 @@
 """The load of a run: CPU, deadlines, planner time, lost messages."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from groundstation.arrays import Array
+from groundstation.report.interval import Span, flight_spans, within
 from groundstation.report.tracks import ProcessTrack, RunData
 
 TRACKER = "tracker"
@@ -27,30 +29,37 @@ def cpu_cores(data: RunData) -> dict[str, float]:
     }
 
 
-def _rise(counters: Array, column: int) -> float:
-    """Return the total rise of a counter, which begins at zero again at restarts."""
-    if len(counters) == 0:
-        return 0.0
+def _steps(counters: Array, column: int) -> Array:
+    """Return the rises of a counter since the status before (n); at restarts it begins at zero again."""
     values, pids = counters[:, column], counters[:, _PID]
-    steps = np.where(pids[1:] == pids[:-1], np.diff(values), values[1:])
-    return float(values[0] + np.maximum(steps, 0.0).sum())
+    rises = np.where(pids[1:] == pids[:-1], np.diff(values), values[1:])
+    return np.concatenate((values[:1], np.maximum(rises, 0.0)))
+
+
+def _rise(counters: Array, column: int) -> float:
+    return float(_steps(counters, column).sum())
 
 
 def tracker_deadlines(data: RunData) -> tuple[int, int, float | None]:
-    """Return the tracker's ticks, missed deadlines, and tick rate [Hz] while it ticked (None if it never did)."""
-    track = data.processes.get(TRACKER)
+    """Return the tracker's ticks, missed deadlines, and tick rate [Hz] while it ticked (None if it never did).
+
+    They are those of the flights: on the floor it has little to do.
+    """
+    track, spans = data.processes.get(TRACKER), flight_spans(data)
     if track is None:
         return 0, 0, None
-    return int(_rise(track.counters, _TICKS)), int(_rise(track.counters, _OVERRUNS)), _rate(track)
+    counted = within(track.time_s, spans)
+    ticks, missed = (int(_steps(track.counters, column)[counted].sum()) for column in (_TICKS, _OVERRUNS))
+    return ticks, missed, _rate(track, spans)
 
 
-def _rate(track: ProcessTrack) -> float | None:
+def _rate(track: ProcessTrack, spans: Sequence[Span]) -> float | None:
     ticking = track.counters[:, _TICKS] > 0
-    if np.count_nonzero(ticking) < 2:
-        return None
     times, counters = track.time_s[ticking], track.counters[ticking]
-    rise = _rise(counters, _TICKS) - float(counters[0, _TICKS])
-    return float(rise / max(times[-1] - times[0], 1e-9))
+    counted = within(times, spans)[1:]  # each status covers the time since the previous one
+    if not counted.any():
+        return None
+    return float(_steps(counters, _TICKS)[1:][counted].sum() / max(np.diff(times)[counted].sum(), 1e-9))
 
 
 def overflowed(data: RunData) -> dict[str, int]:
@@ -89,10 +98,11 @@ def waited(data: RunData, start_s: float, end_s: float) -> dict[str, float]:
 
 
 def planner_ms(data: RunData) -> tuple[float, float] | None:
-    """Return median and 99th percentile of the planner's time [ms]."""
-    if not data.plans:
+    """Return median and 99th percentile of the planner's time in flight [ms]; None if it planned nothing there."""
+    flown = within(np.array([plan.time_s for plan in data.plans]), flight_spans(data))
+    if not flown.any():
         return None
-    seconds = [plan.message.solver.seconds for plan in data.plans]
+    seconds = np.array([plan.message.solver.seconds for plan in data.plans])[flown]
     median, high = np.percentile(seconds, [50, 99])
     return float(median * 1000), float(high * 1000)
 

@@ -57,12 +57,16 @@ def _command(time_s: float, verb: m.Verb, *scope: str) -> TimedMessage[m.Command
     return TimedMessage(time_s, m.Command(header=HEADER, id="x", verb=verb, scope=scope, issuer="me"))
 
 
-def _plan(time_s: float, text: str) -> TimedMessage[m.Plan]:
-    solver = m.SolverReport("ok", 1, 0.01, 1, 1)
+def _plan(time_s: float, text: str, seconds: float = 0.01) -> TimedMessage[m.Plan]:
+    solver = m.SolverReport("ok", 1, seconds, 1, 1)
     plan = m.Plan(
         header=HEADER, topology=text, cost=1.0, controls=(), edges=(), alternatives=(), solver=solver, mode="multistart"
     )
     return TimedMessage(time_s, plan)
+
+
+def _status(time_s: float, state: m.FlightState) -> TimedMessage[m.VehicleStatus]:
+    return TimedMessage(time_s, m.VehicleStatus(header=HEADER, flight_state=state, mode="HOVER"))
 
 
 def _track(times: np.ndarray, cpu: np.ndarray, counters: np.ndarray | None = None) -> ProcessTrack:
@@ -164,6 +168,27 @@ def test_counters_go_on_across_a_restart() -> None:
     data = _data(processes={"tracker": _track(np.array([1.0, 2.0, 3.0, 4.0]), np.zeros(4), counters)})
     ticks, missed, _rate = load.tracker_deadlines(data)
     assert (ticks, missed) == (160, 3)
+
+
+def test_planner_and_tracker_are_judged_in_flight_not_on_the_floor() -> None:
+    """Nine hundred quiet seconds on the pads hid a tracker that stood still for seven in the air."""
+    times = np.arange(1.0, 901.0)
+    flying = (times > 890.0) & (times <= 897.0)
+    ticks, missed = np.cumsum(np.where(flying, 10.0, 50.0)), np.cumsum(np.where(flying, 5.0, 0.0))
+    counters = np.column_stack((np.ones(900), ticks, missed, np.zeros(900)))
+    plans = [_plan(at_s, "a,b", 0.4 if slow else 0.003) for at_s, slow in zip(times, flying, strict=True)]
+    known = replace(_data(plans=plans), end_s=900.0)
+    known.processes["tracker"] = _track(times, np.zeros(900), counters)
+    orders = [_command(897.0, m.Verb.LAND)]
+    tracked = replace(known, acks=[_ack(890.5, m.Verb.TRACK, m.AckStage.ACCEPTED)], commands=orders)
+    said = [_status(890.5, m.FlightState.HOVERING), _status(897.0, m.FlightState.LANDED)]
+    for data in (tracked, replace(known, vehicles={"a": said})):
+        figures = figures_of(data)
+        assert (figures.tracker_ticks, figures.tracker_missed, figures.tracker_rate_hz) == (70, 35, 10.0)
+        assert figures.planner_p99_ms == pytest.approx(400.0)
+    resting = figures_of(known)
+    assert resting.tracker_missed_percent is not None and resting.tracker_missed_percent < 1.0
+    assert figures_of(replace(tracked, plans=plans[:800])).planner_p99_ms is None, "it planned nothing in flight"
 
 
 def test_cpu_is_averaged_over_the_whole_run() -> None:

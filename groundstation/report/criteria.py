@@ -30,6 +30,7 @@ AIRBORNE_S_PER_DRONE = 10.0
 USUAL_TEAM = 2
 MAX_COMPILING_S = 120.0
 MIN_TRACKED_SHARE = 0.98
+MIN_RECORDED_SHARE = 0.98
 TOPOLOGIES_AFTER_S = 30.0
 
 Value = float | bool | None
@@ -174,6 +175,8 @@ def max_airborne_s(drones: int, compiles: bool) -> float:
 def _promises(figures: RunFigures, facts: RunFacts, drones: int) -> Iterator[Criterion]:
     if facts.tracking_s is not None:
         yield _above("tracked_s", figures.tracked_s, MIN_TRACKED_SHARE * facts.tracking_s)
+    if figures.recorded_share is not None:
+        yield _above("recorded_share", figures.recorded_share, MIN_RECORDED_SHARE)
     if facts.command_unix_ns:
         limit = max_airborne_s(drones, facts.kernels_lacked)
         yield _below("command_to_airborne_s", figures.command_to_airborne_s, limit)

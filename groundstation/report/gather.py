@@ -25,6 +25,8 @@ _WANTED = (
     *(t.PROCESS_STATUS, t.SEARCH_MAP, t.SIM_STATUS, t.SUSPICION, t.TRUTH, t.VEHICLE_STATUS),
 )
 
+_TENTH_NS = 100_000_000
+
 
 def gather(run_dir: Path) -> RunData:
     """Return the data of a run folder; raises RecordingError when it holds no recording."""
@@ -65,6 +67,7 @@ class _Rows:
         self._processes: defaultdict[str, defaultdict[str, list[tuple[float, ...]]]]
         self._processes = defaultdict(lambda: defaultdict(list))
         self._heard: defaultdict[str, list[int]] = defaultdict(list)
+        self._recorded: set[int] = set()  # tenths of a second, UNIX
         self._sim: list[tuple[float, ...]] = []
         self._captured: list[TimedMessage[m.BodyPoses]] = []
 
@@ -72,6 +75,7 @@ class _Rows:
         """Sort a recording's records into rows. Of telemetry only the time counts, which needs no decoding."""
         data = self._data
         for raw in recording.raw_records(among((*_WANTED, t.ODOMETRY))):
+            self._recorded.add(raw.log_time_ns // _TENTH_NS)
             if raw.key.topic is t.ODOMETRY:
                 self._heard[raw.key.entity].append(raw.log_time_ns)
                 continue
@@ -139,6 +143,8 @@ class _Rows:
             data.processes[name] = ProcessTrack(table[:, 0], table[:, 1], table[:, 2:6], table[:, 6], table[:, 7])
         for name, times_ns in self._heard.items():
             data.heard_s[name] = (np.sort(np.array(times_ns, dtype=np.int64)) - data.start_unix_ns) / 1e9
+        tenths = np.array(sorted(self._recorded), dtype=np.int64)
+        data.recorded_s = (tenths * _TENTH_NS - data.start_unix_ns) / 1e9
         if self._sim:
             data.sim_counters = np.array(sorted(self._sim))[:, 1:]
         for timed in (data.commands, data.acks, data.plans, data.innovations, data.events):

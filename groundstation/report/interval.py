@@ -14,6 +14,7 @@ _ENDS, _STARTS = (Verb.LAND, Verb.CUT_MOTORS), (Verb.TAKEOFF, Verb.TRACK)
 
 # A process reports itself once a second: a shorter flight has no figures of its own.
 _LEAST_S = 3.0
+_HOLE_S = 1.0
 
 Span = tuple[float, float]
 
@@ -49,6 +50,23 @@ def within(time_s: Array, spans: Sequence[Span]) -> BoolArray:
     for start, end in spans:
         found |= (time_s >= start) & (time_s <= end)
     return found
+
+
+def recorded_share(data: RunData) -> float | None:
+    """Return the share of the flights of which anything is recorded; None without a flight, or if it is unknown.
+
+    A second without a message of any process is a hole: in flight some come every few hundredths.
+    """
+    aloft = in_the_air(data)
+    spans = tracking_spans(data) or ((aloft,) if aloft else ())
+    total_s = sum(end - start for start, end in spans)
+    if total_s <= 0.0 or not len(data.recorded_s):
+        return None
+    lost_s = 0.0
+    for start, end in spans:
+        silences = np.diff([start, *data.recorded_s[within(data.recorded_s, [(start, end)])], end])
+        lost_s += float(silences[silences > _HOLE_S].sum())
+    return 1.0 - lost_s / total_s
 
 
 def tracking_interval(data: RunData) -> Span | None:

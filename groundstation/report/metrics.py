@@ -12,7 +12,7 @@ from groundstation.report import load, safety, topology_use
 from groundstation.report.accuracy import RATE_HZ, Accuracy, accuracy, errors_at, time_grid
 from groundstation.report.aloft import aloft_at, anybody_flew
 from groundstation.report.happenings import happenings, landings
-from groundstation.report.interval import tracking_spans, whole
+from groundstation.report.interval import recorded_share, tracking_spans, whole
 from groundstation.report.tracks import RunData
 
 
@@ -21,14 +21,16 @@ class RunFigures(msgspec.Struct, frozen=True, kw_only=True):
 
     target_*: of several targets, those of the worst; target: all figures of the one with the largest error; found: of
     each target from when it was found, None if it never was.
-    flew: whether any drone did. drones_judged: share of each drone's flights for which motion capture knows its place.
-    failsafe_landings: which drones a failsafe landed or cut, when and why. truth: the reference of the errors, a motion
-    capture system of the field or the simulator, "" for nothing. starved_s: how long other programs of the computer
-    kept processes of the run from it; waited: the share of the time for which each waited for a core.
+    flew: whether any drone did. recorded_share: of the flights, without holes. drones_judged: share of each drone's
+    flights for which motion capture knows its place. failsafe_landings: which drones a failsafe landed or cut, when and
+    why. truth: the reference of the errors, a motion capture system of the field or the simulator, "" for nothing.
+    starved_s: how long other programs of the computer kept processes of the run from it; waited: the share of the time
+    for which each waited for a core.
     """
 
     flew: bool = True
     tracked_s: float
+    recorded_share: float | None = None
     target_rmse_m: float | None
     target_lost_s: float | None
     target: Accuracy | None
@@ -79,6 +81,7 @@ def figures_of(data: RunData) -> RunFigures:
     return RunFigures(
         flew=bool(spans) or anybody_flew(data),
         tracked_s=round(sum(until - since for since, until in spans), 3),
+        recorded_share=recorded_share(data),
         target_rmse_m=target.rmse_m if target else None,
         target_lost_s=max((one.lost_s for one in targets.values()), default=None),
         target=target,

@@ -140,7 +140,8 @@ class RunData:
     """The input of the report. `start_unix_ns` is the time of the first message, `end_s` of the last.
 
     belief: the last one. suspicions: at least one for each verdict of the diagnosis. rerun, stretch: what
-    it repeats or is a part of, if it is no whole flight. heard_s: times of each vehicle's telemetry.
+    it repeats or is a part of, if it is no whole flight. heard_s: times of each vehicle's telemetry. recorded_s: the
+    tenths of a second in which any message is recorded, in order; none: unknown.
     """
 
     resolved: ResolvedField
@@ -159,6 +160,7 @@ class RunData:
     events: list[TimedMessage[Event]] = field(default_factory=list)
     vehicles: dict[str, list[TimedMessage[VehicleStatus]]] = field(default_factory=dict)
     heard_s: dict[str, Array] = field(default_factory=dict)
+    recorded_s: Array = field(default_factory=lambda: np.empty(0))
     search_maps: dict[str, list[TimedMessage[SearchMap]]] = field(default_factory=dict)
     suspicions: list[TimedMessage[Suspicion]] = field(default_factory=list)
     damage: list[str] = field(default_factory=list)

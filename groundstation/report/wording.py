@@ -17,6 +17,7 @@ _TITLES = {
     "drones_judged": ("share of a drone's flight with a truth", ""),
     "landed": ("everybody landed", ""),
     "tracked_s": ("time tracked", "s"),
+    "recorded_share": ("share of the flight that is recorded", ""),
     "command_to_airborne_s": ("from the command to the air", "s"),
     "failsafe_landings": ("flights ended by a failsafe", ""),
     "planner_p50_ms": ("planning step, median", "ms"),

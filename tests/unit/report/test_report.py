@@ -48,6 +48,7 @@ class Flight:
     topology: Callable[[float], str] = field(default=lambda time_s: FLAT if time_s < 20.0 else STRING)
     missed_per_s: int = 0
     sim_late_per_s: int = 0
+    unrecorded_s: tuple[float, float] = (0.0, 0.0)
 
     @property
     def end_s(self) -> float:
@@ -97,6 +98,8 @@ def fly(folder: Path, flight: Flight) -> Path:
     tape = Tape(folder)
     for tick in range(round((flight.end_s + 4.0) * 50)):
         time_s = tick / 50
+        if flight.unrecorded_s[0] <= time_s < flight.unrecorded_s[1]:
+            continue
         _truth(tape, flight, time_s)
         if time_s < flight.estimator_stops_s:
             _estimate(tape, flight, time_s)
@@ -300,6 +303,18 @@ def test_a_recording_cut_in_flight_still_reports(tmp_path: Path) -> None:
     report = judge(gather(tmp_path), tmp_path)
     assert report.damage
     assert not report.passed
+
+
+def test_a_hole_in_the_recording_of_a_flight_fails_it(tmp_path: Path) -> None:
+    """A full disk: nothing is known of twelve seconds, so nothing bad is known of them either."""
+    report = judge(gather(fly(tmp_path, Flight(unrecorded_s=(14.0, 26.0)))), tmp_path)
+    assert report.figures.recorded_share == pytest.approx(0.4, abs=0.02)
+    assert any(reason.startswith("share of the flight that is recorded 0.39") for reason in report.reasons)
+
+
+def test_a_hole_before_the_flight_is_none_of_it(tmp_path: Path) -> None:
+    report = judge(gather(fly(tmp_path, Flight(unrecorded_s=(5.0, 9.0)))), tmp_path)
+    assert (report.figures.recorded_share, report.passed) == (1.0, True)
 
 
 def test_a_part_without_a_byte_is_named_and_the_others_are_judged(tmp_path: Path) -> None:

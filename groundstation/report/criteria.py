@@ -13,6 +13,8 @@ from groundstation.report.run_facts import RunFacts
 MAX_TARGET_RMSE_M = 0.20
 MAX_TARGET_LOST_S = 2.0
 MIN_JUDGED = 0.5
+MAX_TARGET_UNSEEN_S = 2.0
+MAX_DRONE_UNCERTAIN_S = 2.0
 MAX_CPU_CORES = 1.6
 CPU_CORES_PER_DRONE = 0.8
 MAX_PLANNER_P99_MS = 50.0
@@ -66,7 +68,8 @@ def criteria_of(figures: RunFigures, field: ResolvedField, facts: RunFacts) -> l
     ]
     simulated = figures.sim_overrun_percent is not None
     tracked = simulated or figures.target is not None
-    criteria = [*_of_safety(figures, field, tracked=tracked), *criteria]
+    by_estimates = () if simulated else _by_the_estimates(figures)
+    criteria = [*_of_safety(figures, field, tracked=tracked), *by_estimates, *criteria]
     if tracked:
         criteria = [*_of_the_targets(figures, field, expected), *_of_the_demo(figures, facts), *criteria]
         cores = max(MAX_CPU_CORES, CPU_CORES_PER_DRONE * len(field.drones))
@@ -122,6 +125,14 @@ def _of_safety(figures: RunFigures, field: ResolvedField, *, tracked: bool) -> I
         yield replace(_above("drones_judged", judged, MIN_JUDGED), why="" if judged >= MIN_JUDGED else worst)
     if tracked or figures.landed is not None:
         yield Criterion("landed", figures.landed, "==", True, figures.landed is True)
+
+
+def _by_the_estimates(figures: RunFigures) -> Iterator[Criterion]:
+    """Judge what the tracker itself said, of targets and drones whose truth nothing measured."""
+    if figures.target is None and figures.target_unseen_s is not None:
+        yield _below("target_unseen_s", figures.target_unseen_s, MAX_TARGET_UNSEEN_S)
+    if figures.max_fence_violation_m is None and figures.drone_uncertain_s is not None:
+        yield _below("drone_uncertain_s", figures.drone_uncertain_s, MAX_DRONE_UNCERTAIN_S)
 
 
 def _of_the_target(figures: RunFigures, expected: Expectation) -> Iterator[Criterion]:

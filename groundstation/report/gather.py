@@ -18,7 +18,15 @@ from groundstation.recording.rerun import rerun_of
 from groundstation.recording.stretch import stretch_of
 from groundstation.report import run_facts
 from groundstation.report.captured_truth import captured_tracks
-from groundstation.report.tracks import UNKNOWN_FIELD, EstimateTrack, ProcessTrack, RunData, TimedMessage, TruthTrack
+from groundstation.report.tracks import (
+    UNKNOWN_FIELD,
+    CertaintyTrack,
+    EstimateTrack,
+    ProcessTrack,
+    RunData,
+    TimedMessage,
+    TruthTrack,
+)
 
 _WANTED = (
     *(t.BELIEF, t.BODY_POSES, t.COMMAND, t.COMMAND_ACK, t.ESTIMATE, t.EVENT, t.INNOVATION, t.PLAN),
@@ -63,6 +71,7 @@ class _Rows:
         self._data = data
         self._truth: defaultdict[str, list[tuple[float, ...]]] = defaultdict(list)
         self._estimates: defaultdict[str, list[tuple[float, m.EntityEstimate]]] = defaultdict(list)
+        self._certainties: defaultdict[str, list[tuple[float, ...]]] = defaultdict(list)
         # By sender: the supervisor reports for a process that is absent, or never reports itself.
         self._processes: defaultdict[str, defaultdict[str, list[tuple[float, ...]]]]
         self._processes = defaultdict(lambda: defaultdict(list))
@@ -97,8 +106,12 @@ class _Rows:
             case m.BodyPoses() if message.header.entity == data.resolved.truth.get("from"):
                 self._captured.append(TimedMessage(time_s, message))
             case m.Estimate():
+                searched = {search.target for search in message.searches}
                 for entity in message.entities:
                     self._estimates[entity.name].append((time_s, entity))
+                    doubted = entity.contradicted or entity.name in searched
+                    known = (time_s, entity.age_s, entity.unlocalised_s, float(doubted))
+                    self._certainties[entity.name].append(known)
             case m.ProcessStatus():
                 counters = (message.pid, message.ticks, message.overruns, message.overflowed)
                 said = self._processes[message.header.entity][message.header.source]
@@ -137,6 +150,9 @@ class _Rows:
             data.truth = captured_tracks(self._captured, data.vehicles, system.rate_hz if system else 30.0)
         for name, entries in self._estimates.items():
             data.estimates[name] = _estimate_track(entries)
+        for name, rows in self._certainties.items():
+            table = np.array(sorted(rows))
+            data.certainties[name] = CertaintyTrack(table[:, 0], table[:, 1], table[:, 2], table[:, 3] > 0.5)
         for name, said in self._processes.items():
             # Never both: the supervisor's status of an absent process (no pid, ticks or CPU) is no figure of it.
             table = np.array(sorted(said.get(name) or (row for rows in said.values() for row in rows)))

@@ -11,6 +11,7 @@ from groundstation.estimation.tracking_errors import TrackingFigures, tracking_f
 from groundstation.report import load, safety, topology_use
 from groundstation.report.accuracy import RATE_HZ, Accuracy, accuracy, errors_at, time_grid
 from groundstation.report.aloft import aloft_at, anybody_flew
+from groundstation.report.certainty import drone_uncertain_s, target_unseen_s
 from groundstation.report.happenings import happenings, landings
 from groundstation.report.interval import recorded_share, tracking_spans, whole
 from groundstation.report.tracks import RunData
@@ -20,7 +21,7 @@ class RunFigures(msgspec.Struct, frozen=True, kw_only=True):
     """The figures of report.json; None where there was nothing to measure.
 
     target_*: of several targets, those of the worst; target: all figures of the one with the largest error; found: of
-    each target from when it was found, None if it never was.
+    each target from when it was found, None if it never was. target_unseen_s, drone_uncertain_s: by the estimates.
     flew: whether any drone did. recorded_share: of the flights, without holes. drones_judged: share of each drone's
     flights for which motion capture knows its place. failsafe_landings: which drones a failsafe landed or cut, when and
     why. truth: the reference of the errors, a motion capture system of the field or the simulator, "" for nothing.
@@ -33,6 +34,8 @@ class RunFigures(msgspec.Struct, frozen=True, kw_only=True):
     recorded_share: float | None = None
     target_rmse_m: float | None
     target_lost_s: float | None
+    target_unseen_s: float | None = None
+    drone_uncertain_s: float | None = None
     target: Accuracy | None
     targets: dict[str, Accuracy] = {}
     found: dict[str, TrackingFigures | None] = {}
@@ -84,6 +87,8 @@ def figures_of(data: RunData) -> RunFigures:
         recorded_share=recorded_share(data),
         target_rmse_m=target.rmse_m if target else None,
         target_lost_s=max((one.lost_s for one in targets.values()), default=None),
+        target_unseen_s=target_unseen_s(data, grid),
+        drone_uncertain_s=drone_uncertain_s(data, grid),
         target=target,
         targets=targets,
         found={name: _found(data, name, grid) for name in targets},

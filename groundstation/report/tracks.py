@@ -100,6 +100,19 @@ class EstimateTrack:
 
 
 @dataclass(frozen=True, slots=True)
+class CertaintyTrack:
+    """How well the tracker knew an entity, as it said: time (n), age of the last observation (n), unlocalised (n) [s].
+
+    doubted (n): a target is searched for, or sightings contradict a robot's place.
+    """
+
+    time_s: Array
+    age_s: Array
+    unlocalised_s: Array
+    doubted: BoolArray
+
+
+@dataclass(frozen=True, slots=True)
 class TimedMessage(Generic[T]):
     """A message and its time [s]."""
 
@@ -150,6 +163,7 @@ class RunData:
     end_s: float = 0.0
     truth: dict[str, TruthTrack] = field(default_factory=dict)
     estimates: dict[str, EstimateTrack] = field(default_factory=dict)
+    certainties: dict[str, CertaintyTrack] = field(default_factory=dict)
     processes: dict[str, ProcessTrack] = field(default_factory=dict)
     sim_counters: Array | None = None
     commands: list[TimedMessage[Command]] = field(default_factory=list)

@@ -12,6 +12,8 @@ _TITLES = {
     "target_found_s": ("target found after", "s"),
     "target_kept_rmse_m": ("target error (rms) while it was not lost", "m"),
     "target_judged": ("share of the time with a truth of the target", ""),
+    "target_unseen_s": ("target unseen, by the estimates", "s"),
+    "drone_uncertain_s": ("longest time with a drone's place unknown", "s"),
     "max_fence_violation_m": ("beyond the fence", "m"),
     "min_separation_m": ("least separation", "m"),
     "drones_judged": ("share of a drone's flight with a truth", ""),

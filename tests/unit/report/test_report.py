@@ -229,6 +229,9 @@ def test_a_missing_estimate_counts_one_metre(tmp_path: Path) -> None:
     assert report.figures.target_lost_s == pytest.approx(4.5, abs=0.11)
     assert report.figures.target_rmse_m == pytest.approx(math.sqrt((15.5 * 0.01 + 4.5) / 20), rel=0.05)
     assert {criterion.name for criterion in report.criteria if not criterion.ok} == {"target_rmse_m", "target_lost_s"}
+    assert report.figures.target_unseen_s == pytest.approx(4.5, abs=0.11), (
+        "where the truth is known it is judged by that"
+    )
 
 
 def test_a_tracker_that_falls_silent_counts_as_lost(tmp_path: Path) -> None:

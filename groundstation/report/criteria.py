@@ -25,7 +25,7 @@ MAX_STARVED_S = 1.0
 # Share of the time; and processes beside a flight, at low priority.
 _MOST_WAITED = 0.3
 _IN_NO_HURRY = frozenset({"diagnosis", "recorder", "console"})
-_SAFE = frozenset({"max_fence_violation_m", "min_separation_m", "landed"})
+_SAFE = frozenset({"max_fence_violation_m", "min_separation_m", "landed", "cuts_in_flight"})
 MAX_AIRBORNE_S = 40.0
 # Drones take off one by one. An emulated AR.Drone takes 5.2 s until it is seen in flight, on a full machine 7 s.
 AIRBORNE_S_PER_DRONE = 10.0
@@ -125,6 +125,9 @@ def _of_safety(figures: RunFigures, field: ResolvedField, *, tracked: bool) -> I
         yield replace(_above("drones_judged", judged, MIN_JUDGED), why="" if judged >= MIN_JUDGED else worst)
     if tracked or figures.landed is not None:
         yield Criterion("landed", figures.landed, "==", True, figures.landed is True)
+    if cut := figures.cuts_in_flight:
+        # Drones that fell are on the ground as well.
+        yield Criterion("cuts_in_flight", float(len(cut)), "==", 0.0, ok=False, why="; ".join(cut))
 
 
 def _by_the_estimates(figures: RunFigures) -> Iterator[Criterion]:

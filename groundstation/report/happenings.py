@@ -1,10 +1,12 @@
-"""Faults of the scenario and reactions of failsafes (rows of their table), by time; pure."""
+"""Faults of the scenario, reactions of failsafes (rows of their table) and falls that were ordered, by time; pure."""
 
 from collections.abc import Iterator
 
 import msgspec
+import numpy as np
 
-from groundstation.bus.messages import AIRBORNE, STANDING, UP, Verb
+from groundstation.bus.messages import AIRBORNE, OPERATOR, STANDING, UP, AckStage, Verb
+from groundstation.report.aloft import aloft_at
 from groundstation.report.tracks import RunData
 
 _ENDING = frozenset({"LANDING", "CUT"})
@@ -46,6 +48,30 @@ def landings(found: list[Happening]) -> list[Happening]:
         if item.ended_flight:
             first.setdefault(item.entity, item)
     return list(first.values())
+
+
+def cuts_in_flight(data: RunData) -> list[Happening]:
+    """Return the first order to each flying drone to cut its motors: it falls, whoever gave the order.
+
+    Flying: by its own last report. Cuts by a failsafe are among the landings.
+    """
+    first: dict[str, Happening] = {}
+    for item in data.commands:
+        order = item.message
+        if order.verb is not Verb.CUT_MOTORS or OPERATOR in order.scope:
+            continue
+        for drone in order.scope or data.vehicles:
+            flew = aloft_at(data.vehicles.get(drone, ()), np.array([item.time_s]))[0]
+            if flew and not _refused(data, drone, order.id):
+                text = f"motors cut in the air by {order.issuer}"
+                first.setdefault(drone, Happening(item.time_s, drone, "cut", text, ended_flight=True))
+    return list(first.values())
+
+
+def _refused(data: RunData, drone: str, command_id: str) -> bool:
+    """Return whether a drone's driver refused a command."""
+    said = (ack.message for ack in data.acks if ack.message.command_id == command_id)
+    return any(one.header.entity == drone and one.stage is AckStage.REFUSED for one in said)
 
 
 def _faults(data: RunData) -> Iterator[Happening]:

@@ -12,7 +12,7 @@ from groundstation.report import load, safety, topology_use
 from groundstation.report.accuracy import RATE_HZ, Accuracy, accuracy, errors_at, time_grid
 from groundstation.report.aloft import aloft_at, anybody_flew
 from groundstation.report.certainty import drone_uncertain_s, target_unseen_s
-from groundstation.report.happenings import happenings, landings
+from groundstation.report.happenings import cuts_in_flight, happenings, landings
 from groundstation.report.interval import recorded_share, tracking_spans, whole
 from groundstation.report.tracks import RunData
 
@@ -24,9 +24,9 @@ class RunFigures(msgspec.Struct, frozen=True, kw_only=True):
     each target from when it was found, None if it never was. target_unseen_s, drone_uncertain_s: by the estimates.
     flew: whether any drone did. recorded_share: of the flights, without holes. drones_judged: share of each drone's
     flights for which motion capture knows its place. failsafe_landings: which drones a failsafe landed or cut, when and
-    why. truth: the reference of the errors, a motion capture system of the field or the simulator, "" for nothing.
-    starved_s: how long other programs of the computer kept processes of the run from it; waited: the share of the time
-    for which each waited for a core.
+    why; cuts_in_flight: which fell because somebody ordered it. truth: the reference of the errors, a motion capture
+    system of the field or the simulator, "" for nothing. starved_s: how long other programs of the computer kept
+    processes of the run from it; waited: the share of the time for which each waited for a core.
     """
 
     flew: bool = True
@@ -45,6 +45,7 @@ class RunFigures(msgspec.Struct, frozen=True, kw_only=True):
     drones_judged: dict[str, float] = {}
     landed: bool | None
     failsafe_landings: list[str] = []
+    cuts_in_flight: list[str] = []
     topology_seconds: dict[str, float]
     topology_switches: int
     planner_p50_ms: float | None
@@ -98,6 +99,7 @@ def figures_of(data: RunData) -> RunFigures:
         drones_judged=safety.judged_shares(data),
         landed=safety.landed(data),
         failsafe_landings=[item.line for item in landings(happenings(data))],
+        cuts_in_flight=[item.line for item in cuts_in_flight(data)],
         topology_seconds=topology_use.topology_seconds(data, start, end),
         topology_switches=topology_use.switches(data, start, end),
         planner_p50_ms=planner[0] if planner else None,

@@ -18,6 +18,7 @@ _TITLES = {
     "min_separation_m": ("least separation", "m"),
     "drones_judged": ("share of a drone's flight with a truth", ""),
     "landed": ("everybody landed", ""),
+    "cuts_in_flight": ("drones that fell with their motors cut", ""),
     "tracked_s": ("time tracked", "s"),
     "recorded_share": ("share of the flight that is recorded", ""),
     "command_to_airborne_s": ("from the command to the air", "s"),

@@ -112,6 +112,31 @@ def test_an_ordered_landing_is_no_failsafe():
         assert happenings(flown) == []
 
 
+@pytest.mark.parametrize(
+    ("scope", "ordered_s", "falls"),
+    [((), 5.0, True), (("a",), 5.0, True), (("b",), 5.0, False), (("a", m.OPERATOR), 5.0, False), ((), 9.5, False)],
+    ids=["all", "it", "another", "a wish to the operator", "on the ground"],
+)
+def test_a_drone_whose_motors_were_cut_in_the_air_did_not_land_well(scope, ordered_s, falls):
+    """It is on the ground at the end, and no failsafe put it there."""
+    ordered = [(ordered_s, m.Verb.CUT_MOTORS, scope), (ordered_s + 0.1, m.Verb.CUT_MOTORS, scope)]
+    flown = data((1, UP, "TRACK", ""), (5.2 if falls else 9, DOWN, "CUT", ""), commands=ordered)
+    criteria = {one.name: one for one in criteria_of(figures_of(flown), UNKNOWN_FIELD, RunFacts())}
+    assert criteria["landed"].ok
+    assert ("cuts_in_flight" in criteria) is falls
+    if falls:
+        assert not criteria["cuts_in_flight"].ok
+        assert criteria["cuts_in_flight"].why == "5.0 s  a: motors cut in the air by me"
+
+
+def test_an_order_to_cut_that_the_driver_refused_cut_nothing():
+    flown = data((1, UP, "TRACK", ""), commands=[(5.0, m.Verb.CUT_MOTORS, ())])
+    refused = m.CommandAck(header=header("a"), command_id="x", verb=m.Verb.CUT_MOTORS, stage=m.AckStage.REFUSED)
+    assert len(figures_of(flown).cuts_in_flight) == 1
+    flown.acks.append(TimedMessage(5.1, refused))
+    assert figures_of(flown).cuts_in_flight == []
+
+
 def test_a_landing_without_command_and_driver_is_unexplained():
     rises = data(
         (1, m.FlightState.TAKING_OFF, "TAKING_OFF", ""), (3.03, UP, "LANDING", ""), (7, DOWN, "LANDED", ""),

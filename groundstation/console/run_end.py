@@ -21,9 +21,9 @@ class _Judged(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class RunEnd:
-    """The end of a run. verdict: passed, failed, invalid or not flown, "" if not judged; command: the command that flies it again.
+    """The end of a run. verdict: passed, failed, invalid or not flown, "" if not judged.
 
-    report: the page to keep, None if there is none.
+    command: the command that flies it again; report: the page to keep, None if there is none.
     """
 
     folder: Path

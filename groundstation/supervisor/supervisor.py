@@ -234,7 +234,7 @@ class Supervisor:
 
     def _speak_for(self, process: ManagedProcess, why: str, now_ns: int) -> None:
         words = process.spec.failsafe_datagrams
-        if words is None or self._stopping:
+        if words is None or self._stopping or not process.silent_since_ns:  # its work is done, or never began
             return
         known = partial(self._block.addresses, process.slot), partial(self._block.left, process.slot)
         if self._last_words.begin(process.spec.name, words, process.silent_since_ns, *known):
@@ -249,8 +249,7 @@ class Supervisor:
         if self._stopping:
             return
         why = process.kill_reason or exit_text(code, process.farewell)
-        if process.silent_since_ns:  # one that ended its work, or never took it up, leaves nobody in the air
-            self._speak_for(process, why, now_ns)
+        self._speak_for(process, why, now_ns)
         never_up = not process.ready_ns and process.life == 1
         if process.spec.restart is Restart.ENDS_RUN or (never_up and process.spec.required):
             self.fail(process, why)

@@ -10,6 +10,7 @@ from collections import deque
 from drivers.mavlink.convert import setpoint_from_velocity
 from drivers.mavlink.drift import DriftFeedback
 from drivers.mavlink.lift_off import LiftOff
+from drivers.mavlink.mode_watch import KEY, STREAM_FIRST_NS, ModeWatch
 from drivers.mavlink.motors import Motors
 from drivers.mavlink.pilot import LandingPilot
 from drivers.mavlink.requests import Requests
@@ -32,10 +33,7 @@ from drivers.watchdog_types import Action, DriverMode, WatchdogDecision
 from groundstation.bus.messages import EntityEstimate, Vector3
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
-_STREAM_FIRST_NS = 1_200 * NS_PER_MS
 _CLIMB_LIMIT_NS = 8 * NS_PER_S
-_TAKEN_OVER_NS = 1_500 * NS_PER_MS
-_REGAIN_NS = 1_400 * NS_PER_MS
 _STILL: Vector3 = (0.0, 0.0, 0.0)
 # The end of a climb is slower, so that it stops at the requested height.
 _CLIMBED, _CLIMB_GAIN, _LEAST_CLIMB_M_S = 0.95, 1.2, 0.12
@@ -67,19 +65,19 @@ class Orders:
         self._climb_until_ns = 0
         self._rises_to_take_off = self._stops_climbing = False
         self._told_ns = -1
-        self._guided_ns = self._regain_until_ns = 0
-        self._started = self._taken_over = False
+        self._mode = ModeWatch(flavour, requests)
+        self._started = False
         self._why = ""
         self._ordered_ns = self._landing_ns = -1
 
     def are_heeded(self, now_ns: int, custom_mode: int) -> bool:
         """Return whether the vehicle obeys our setpoints, not a pilot's or its own."""
-        return custom_mode == self._guided and not self._taken_over and not self.climbs_by_itself(now_ns)
+        return custom_mode == self._guided and not self._mode.taken_over and not self.climbs_by_itself(now_ns)
 
     @property
     def yields(self) -> str:
         """Return why it is not ours to fly, "" while it is."""
-        return self._why if self._taken_over and self._action in (Action.FLY, Action.HOVER) else ""
+        return self._why if self._mode.taken_over and self._action in (Action.FLY, Action.HOVER) else ""
 
     def climbs_by_itself(self, now_ns: int) -> bool:
         """Return whether the vehicle ends its take-off by itself, without setpoints."""
@@ -111,15 +109,17 @@ class Orders:
         if action is not self._action:
             self._enter(now_ns, action)
         if action is Action.FLY and decision.entered_ns != self._ordered_ns:
-            self._take_back(now_ns, decision.entered_ns)
-        self._watch_mode(now_ns, action, armed, guided, custom_mode)
+            self._ordered_ns = decision.entered_ns  # TRACK or RESUME; returning setpoints are no order
+            self._mode.take_back(now_ns)
+        if self._mode.is_lost(now_ns, guided, armed and action in (Action.FLY, Action.HOVER)):
+            self._yield(now_ns, f"is in {mode_name(self._flavour, custom_mode)}")
         own_climb = action is Action.TAKE_OFF and self._flavour is Flavour.ARDUPILOT
         if own_climb or not self.are_heeded(now_ns, custom_mode):
             self.drift.forget_undershoot()
         match action:
             case Action.TAKE_OFF:
                 self._watch_start(now_ns, armed, guided, custom_mode)
-                return None if self._taken_over else self._take_off(now_ns, armed, guided, landed, climbed_m)
+                return None if self._mode.taken_over else self._take_off(now_ns, armed, guided, landed, climbed_m)
             case Action.FLY:
                 return self._fly(now_ns, decision, guided)
             case Action.HOVER:
@@ -164,7 +164,7 @@ class Orders:
         self._rises_to_take_off, self._stops_climbing = starts, False
         if action is Action.TAKE_OFF:
             self.starting, self._climb_until_ns = True, now_ns + 2 * _CLIMB_LIMIT_NS
-            self._started = self._taken_over = False
+            self._started = self._mode.taken_over = False
             self._requests.accepted -= {"arming", "take-off"}  # once per start: a second request restarts its spool-up
             self._requests.drop("motor cut", "disarming", "landing")
         elif action is not Action.HOVER or self._action is not Action.TAKE_OFF:
@@ -172,27 +172,14 @@ class Orders:
         else:
             self.starting, self._climb_until_ns = False, now_ns + _CLIMB_LIMIT_NS
         if action in (Action.LAND, Action.CUT, Action.IDLE):
-            self._requests.drop("arming", "guided mode", "take-off")
+            self._requests.drop("arming", KEY, "take-off")
         if action is Action.LAND:
             self._requests.accepted.discard("landing")
         self._action, self._since_ns = action, now_ns
 
-    def _take_back(self, now_ns: int, ordered_ns: int) -> None:
-        """Request the mode again on an operator's TRACK or RESUME; returning setpoints are no order."""
-        self._ordered_ns, self._taken_over = ordered_ns, False
-        self._guided_ns, self._regain_until_ns = now_ns, now_ns + _REGAIN_NS
-
-    def _watch_mode(self, now_ns: int, action: Action, armed: bool, guided: bool, custom_mode: int) -> None:
-        # A mode that we did not request is a pilot's or the autopilot's own: we do not fight it.
-        if guided or not armed or action not in (Action.FLY, Action.HOVER):
-            self._guided_ns = now_ns
-            self._regain_until_ns = 0 if guided else self._regain_until_ns
-        elif not self._taken_over and now_ns - self._guided_ns > _TAKEN_OVER_NS:
-            self._yield(now_ns, f"is in {mode_name(self._flavour, custom_mode)}")
-
     def _yield(self, now_ns: int, why: str) -> None:
-        self._taken_over, self._why = True, f"it {why}: not ours to fly until RESUME"
-        self.events.append((MavSeverity.WARNING, self._why + self.said.of(self._guided_ns, now_ns)))
+        self._mode.taken_over, self._why = True, f"it {why}: not ours to fly until RESUME"
+        self.events.append((MavSeverity.WARNING, self._why + self.said.of(self._mode.guided_ns, now_ns)))
 
     def _land(
         self, now_ns: int, decision: WatchdogDecision, armed: bool, guided: bool, custom_mode: int
@@ -223,8 +210,8 @@ class Orders:
 
     def start_failed(self, now_ns: int) -> None:
         """Give up a take-off of a vehicle that was started anew meanwhile: its estimator has to settle first."""
-        if self._action is Action.TAKE_OFF and not self._taken_over:
-            self._requests.drop("arming", "guided mode", "take-off")
+        if self._action is Action.TAKE_OFF and not self._mode.taken_over:
+            self._requests.drop("arming", KEY, "take-off")
             self._yield(now_ns, "was started anew while it takes off")
 
     def _watch_start(self, now_ns: int, armed: bool, guided: bool, custom_mode: int) -> None:
@@ -232,9 +219,9 @@ class Orders:
         # make it climb against their stop.
         if armed and (guided or "arming" in self._requests.accepted):
             self._started = True
-        if self._started and not (armed and guided) and not self._taken_over:
+        if self._started and not (armed and guided) and not self._mode.taken_over:
             mode = f"is in {mode_name(self._flavour, custom_mode)}" if armed else "was disarmed"
-            self._requests.drop("arming", "guided mode", "take-off")
+            self._requests.drop("arming", KEY, "take-off")
             self._yield(now_ns, f"{mode} while it takes off")
 
     def _take_off(
@@ -242,7 +229,7 @@ class Orders:
     ) -> SetPositionTargetLocalNed | None:
         px4 = self._flavour is Flavour.PX4
         # WIRE (docs/reference/mavlink.md 5.2): PX4 needs a second of setpoints before OFFBOARD, and arms in it.
-        if px4 and now_ns - self._since_ns < _STREAM_FIRST_NS:
+        if px4 and now_ns - self._since_ns < STREAM_FIRST_NS:
             return self._send(now_ns, _STILL, 0.0)
         if not guided:
             self._ask_guided(now_ns)
@@ -272,7 +259,7 @@ class Orders:
         """Have a climb end at HOLD: no higher than its momentum takes it, and not back to the floor either."""
         if mode is not DriverMode.HOVER and self._rises_to_take_off:
             self._rises_to_take_off, self._stops_climbing = False, True
-            self._requests.drop("arming", "guided mode", "take-off")
+            self._requests.drop("arming", KEY, "take-off")
         if self._stops_climbing:
             self.drift.let_go()
             self._stops_climbing = climb_m_s > _STOPPED_M_S or now_ns - self._since_ns < _OBEYS_NS
@@ -286,15 +273,15 @@ class Orders:
             return None
         if now_ns < self._climb_until_ns:  # the vehicle has left the ground, and continues to its take-off height
             return self._climb(now_ns, climbed_m)
-        if not guided:
+        if not guided and not self._mode.is_promised(now_ns):
             return None
         height_m = self._floor_m + self._vehicle.take_off_m if self._rises_to_take_off else None
         return self._stand(now_ns, height_m, back)
 
     def _fly(self, now_ns: int, decision: WatchdogDecision, guided: bool) -> SetPositionTargetLocalNed | None:
-        if not guided and now_ns < self._regain_until_ns:
+        if not guided and self._mode.asks(now_ns):
             self._ask_guided(now_ns)
-        if self._taken_over or decision.setpoint_ns == self._told_ns:
+        if self._mode.taken_over or decision.setpoint_ns == self._told_ns:
             return None
         message = self._send(now_ns, decision.velocity_m_s, decision.yaw_rate_rad_s)
         if message is not None:
@@ -303,7 +290,7 @@ class Orders:
 
     def _ask_guided(self, now_ns: int) -> None:
         main = float(self._guided >> 16 if self._flavour is Flavour.PX4 else self._guided)
-        self._ask(now_ns, "guided mode", MavCmd.DO_SET_MODE, 1.0, main)
+        self._ask(now_ns, KEY, MavCmd.DO_SET_MODE, 1.0, main)
 
     def _ask(self, now_ns: int, key: str, command: MavCmd, *params: float) -> None:
         self._requests.ask(now_ns, key, command, *params)

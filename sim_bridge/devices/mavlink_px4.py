@@ -65,6 +65,16 @@ class Px4(AutopilotFirmware):
         self._climb_to_m = height
         return MavResult.ACCEPTED, ""
 
+    def set_mode(self, mode: int) -> Answer:
+        """Change the mode on request.
+
+        WIRE (docs/reference/mavlink.md 5.2): once armed, OFFBOARD is refused unless setpoints keep coming.
+        """
+        if mode == OFFBOARD and self.armed and self.setpoint_age_s > self.parameters["COM_OF_LOSS_T"]:
+            self.say(2, "Switching to Offboard is currently not available")
+            return MavResult.TEMPORARILY_REJECTED, "no offboard signal"
+        return super().set_mode(mode)
+
     def reposition(self, parameters: tuple[float, ...]) -> Answer:
         """Hold here if no place is named; WIRE (docs/reference/mavlink.md 5.11): QGroundControl's Pause."""
         if parameters[1] != 1.0 or not all(map(math.isnan, parameters[3:])):

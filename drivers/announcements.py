@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 from drivers.base import HostProcess, Vehicle
+from drivers.start_report import StartReport
 from drivers.watchdog_types import DriverMode, VehicleView, WatchdogDecision
 from groundstation.adapters import how_to_reach
 from groundstation.bus import clock
@@ -30,8 +31,8 @@ _INTRUSIONS = {
 class Announcements:
     """Events of one vehicle. heard_ns: time of its last telemetry; initially of its driver's start."""
 
-    def __init__(self, child: HostProcess, vehicle: Vehicle, mode: DriverMode, reason: str) -> None:
-        self._child, self._vehicle = child, vehicle
+    def __init__(self, child: HostProcess, vehicle: Vehicle, mode: DriverMode, reason: str, start: StartReport) -> None:
+        self._child, self._vehicle, self._start = child, vehicle, start
         self._told = (mode, reason)
         self._silent = False
         self._intrusions = Refusals(_INTRUSIONS)
@@ -80,7 +81,7 @@ class Announcements:
             told = f"{name}: {view.silence}" if heard else f"{name} does not answer at {address}"
             remedy = _UNSOUND if view.unsound else "" if heard else how_to_reach(address)
             self._event(Severity.ERROR, f"{told}; trying on", remedy)
-            self._child.degrade(told)
+            self._start.degrade(name, told)
 
     def _tell_start(self, now_ns: int, view: VehicleView, mode: DriverMode) -> None:
         """Report READY once the vehicle may take off, or at once if it flies and needs commands."""
@@ -88,9 +89,9 @@ class Announcements:
         if view.configured or view.flight_state in AIRBORNE:
             self._unconfigured_ns = now_ns
             if self._silent or mode is not DriverMode.CONNECTING:
-                self._child.ready(f"{name} at {address}")
+                self._start.ready(name, f"{name} at {address}", view.flight_state in AIRBORNE)
         elif now_ns - self._unconfigured_ns > _UNCONFIGURED_NS:
-            self._child.degrade(f"{name} at {address}: {view.not_ready}")
+            self._start.degrade(name, f"{name} at {address}: {view.not_ready}")
 
     def _event(self, severity: Severity, text: str, remedy: str = "") -> None:
         self._child.event(severity, text, remedy, self._vehicle.name)

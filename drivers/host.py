@@ -10,6 +10,7 @@ from drivers.base import HostProcess, Vehicle
 from drivers.control_error import ControlErrorMonitor
 from drivers.neighbours import Neighbours
 from drivers.seen_velocity import SeenVelocity
+from drivers.start_report import StartReport
 from drivers.watchdog import Watchdog
 from drivers.watchdog_types import Ack, Action, DriverMode, Upstream, VehicleView, WatchdogDecision, WatchdogLimits
 from groundstation.bus import clock
@@ -35,9 +36,14 @@ _GIVE_UP_NS = 10 * NS_PER_S
 
 
 class VehicleHost:
-    """One vehicle on the bus: feeds its watchdog, applies and publishes the decisions."""
+    """One vehicle on the bus: feeds its watchdog, applies and publishes the decisions.
 
-    def __init__(self, child: HostProcess, vehicle: Vehicle, limits: WatchdogLimits) -> None:
+    start: that of the process, if it has other vehicles too.
+    """
+
+    def __init__(
+        self, child: HostProcess, vehicle: Vehicle, limits: WatchdogLimits, start: StartReport | None = None
+    ) -> None:
         self.vehicle = vehicle
         self.watchdog = Watchdog(limits, clock.clock_id(), child.bus.run, child.spoken_for_ns)
         self._child = child
@@ -47,7 +53,8 @@ class VehicleHost:
         self._leases = self._bus.subscribe([LEASE], capacity=64)
         self._ignored: Counter[str] = Counter()
         self._next_status_ns = self._next_flush_ns = self._turned_ns = 0
-        self._announcements = Announcements(child, vehicle, self.watchdog.mode, self.watchdog.reason)
+        start = start or StartReport(child, [vehicle.name])
+        self._announcements = Announcements(child, vehicle, self.watchdog.mode, self.watchdog.reason, start)
         self._estimates = self._bus.subscribe([ESTIMATE], newest=True)
         self._seen, self._control_error = SeenVelocity(), ControlErrorMonitor()
         self._told: WatchdogDecision | None = None

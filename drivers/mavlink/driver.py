@@ -17,6 +17,7 @@ from drivers.mavlink.vehicle import MavlinkVehicle
 from drivers.mavlink.wire import frames
 from drivers.mavlink.wire.names import NO_AUTOPILOT, MavSeverity
 from drivers.mavlink.wire.telemetry import Heartbeat
+from drivers.start_report import StartReport
 from groundstation.bus.messages import Estimate, Severity
 from groundstation.bus.topics import ESTIMATE
 from groundstation.errors import DriverError
@@ -134,7 +135,8 @@ def share_interpreter(settings: MavlinkDriverSettings) -> None:
 
 def hosts_of(child: HostProcess, fleet: Fleet, settings: MavlinkDriverSettings) -> Sequence[VehicleHost]:
     """Return a host, with its own watchdog, for each vehicle; its setpoints wake the process."""
-    hosts = [VehicleHost(child, fleet.vehicles[v.system_id], settings.authority(v)) for v in settings.vehicles]
+    start = StartReport(child, [v.name for v in settings.vehicles])
+    hosts = [VehicleHost(child, fleet.vehicles[v.system_id], settings.authority(v), start) for v in settings.vehicles]
     for host in hosts:
         host.call_on_setpoints(child.wake)
     return hosts

@@ -79,8 +79,8 @@ class WatchdogLimits:
     fast_land_s: float = 1.6
     stray_land_s: float = 1.6
     blind_land_s: float = 1.6
-    lost_hover_s: float = 0.5
-    lost_land_s: float = 2.0
+    lost_hover_s: float = 0.3
+    lost_land_s: float = 0.7
     crowded_land_s: float = 2.0
     pad_m: tuple[float, float] | None = None
     min_separation_m: float = 0.6

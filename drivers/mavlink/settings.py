@@ -9,6 +9,8 @@ from pydantic_core import PydanticCustomError
 from drivers.vehicle_settings import DriverSection, Name, Positive, SilenceLimits, VehicleLimits, is_address
 from drivers.watchdog_types import WatchdogLimits
 
+_LIMITS = WatchdogLimits()
+
 
 def _is_reachable(forward: str) -> str:
     if forward:
@@ -34,16 +36,16 @@ def _has_a_port(target: str) -> str:
 class VisionFeedback(DriverSection):
     """Poses sent to the autopilot from the tracker's estimate, and the effect of their loss.
 
-    rate_hz: of the messages; max_std_m: a less certain position is not sent (without sightings it is so within some
-    5 s); max_age_s: nor is that of a vehicle not seen itself for so long; hover_after_s, land_after_s: without any
+    rate_hz: of the messages; max_std_m: a less certain position is not sent (without sightings it is so after about a
+    second); max_age_s: nor is that of a vehicle not seen itself for so long; hover_after_s, land_after_s: without any
     pose; jump_m: distance beyond that which it can have flown.
     """
 
     rate_hz: Annotated[float, Field(ge=5, le=50)] = 30.0
     max_std_m: Positive = 0.07
     max_age_s: Positive = 10.0
-    hover_after_s: Positive = 0.3
-    land_after_s: Positive = 0.7
+    hover_after_s: Positive = _LIMITS.lost_hover_s
+    land_after_s: Positive = _LIMITS.lost_land_s
     jump_m: Positive = 0.3
 
     @model_validator(mode="after")

@@ -174,7 +174,8 @@ class Evidence:
             more_s = elapsed_s if condition in before else min(elapsed_s, _FIRST_S)
             self.charged_s[condition] = self.charged_s.get(condition, 0.0) + more_s
         for condition, lasted_s in timed(at).items():
-            self.holding[condition], self.charged_s[condition] = "", lasted_s
+            why = at.vehicle.unlocated if condition is Condition.UNLOCATED else ""
+            self.holding[condition], self.charged_s[condition] = why, lasted_s
         self._pardoned_s = {
             condition: min(pardoned_s, self.charged_s[condition])
             for condition, pardoned_s in self._pardoned_s.items()

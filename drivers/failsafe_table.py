@@ -143,7 +143,7 @@ def _landings(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
                  "safety.unseen_land_after_s", EVENLY, modes=FREE),
         Failsafe(Condition.NOT_SEEN, land, "not seen by any camera for too long", limits.unseen_land_after_s,
                  "safety.unseen_land_after_s", modes=FREE),
-        Failsafe(Condition.UNLOCATED, land, "no position from the cameras", limits.lost_land_s, modes=FREE),
+        Failsafe(Condition.UNLOCATED, land, "no position {why}", limits.lost_land_s, modes=FREE),
         Failsafe(Condition.STRAYS, land, "it does not do what it is told: {why}", limits.stray_land_s, modes=FREE),
         Failsafe(Condition.TOO_FAST, land, "{why}", limits.fast_land_s, "", SLOWLY, modes=FREE),
         # Hovering and tracking drones are moved apart: this is for when that fails.
@@ -175,7 +175,7 @@ def _brakes(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
         (Condition.TELEMETRY_SILENT, "{why}", 0.0),
         (Condition.NO_SETPOINT, "the tracker sends it no velocity", 0.0),
         (Condition.UNCONVERGED, _UNCONVERGED, 0.0),
-        (Condition.UNLOCATED, "no position from the cameras", limits.lost_hover_s),
+        (Condition.UNLOCATED, "no position {why}", limits.lost_hover_s),
         (Condition.TOO_FAST, "{why}", limits.fast_brake_s),
     )
     return tuple(

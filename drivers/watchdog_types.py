@@ -100,7 +100,8 @@ class VehicleView(NamedTuple):
     host: horizontal speed, and how the vehicle strays from its commands, or ""; seen: whether cameras show its speed;
     unseen_s: how long its estimate may have been wrong, by the tracker; near: airborne vehicle too near to its pad,
     or ""; crowded: why it makes way for another that is too near in flight, or "". lost_s: how long it has
-    lacked a position that it needs. clears: whether a separate order ends its emergency without starting motors.
+    lacked a position that it needs; unlocated: whose, and since when, in words. clears: whether a separate order ends
+    its emergency without starting motors.
     mute: the report that it lacks although telemetry arrives, or "".
     """
 
@@ -118,6 +119,7 @@ class VehicleView(NamedTuple):
     near: str = ""
     crowded: str = ""
     lost_s: float = 0.0
+    unlocated: str = "from the cameras"
     clears: bool = False
     mute: str = ""
 

@@ -18,7 +18,7 @@ from drivers.mavlink.session import MavlinkSession, streams
 from drivers.mavlink.settings import MavlinkDriverSettings, VehicleSettings
 from drivers.mavlink.texts import BootClock, Texts
 from drivers.mavlink.traffic import Traffic
-from drivers.mavlink.vision import VisionFeed
+from drivers.mavlink.vision import FIRST_SIGHT_NS, VisionFeed
 from drivers.mavlink.wire import flight, service, telemetry
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.names import ARMED, AUTOPILOT_COMPONENT, Flavour, Landed, MavSeverity, SensorBits
@@ -58,8 +58,8 @@ class MavlinkVehicle:
         rates = streams(self.flavour, vehicle.odometry_hz, vehicle.imu_hz)
         self._ours, known, pinned = settings.link.system_id, dict(vehicle.parameters), vehicle.serial_number
         self._session = MavlinkSession(self.system, self.flavour, rates, self._ours, settings.origin, known, pinned)
-        pad = (vehicle.pad_m, vehicle.pad_yaw_rad)
-        self.vision = VisionFeed(vehicle.name, clock.clock_id(), settings.vision, *pad)
+        pad, first_ns = (vehicle.pad_m, vehicle.pad_yaw_rad), FIRST_SIGHT_NS[self.flavour]
+        self.vision = VisionFeed(vehicle.name, clock.clock_id(), settings.vision, *pad, first_ns)
         self.orders = Orders(vehicle, self.flavour, self._requests)
         self._vision_period_ns = round(1e9 / settings.vision.rate_hz)
         self._next_vision_ns = 0
@@ -196,8 +196,9 @@ class MavlinkVehicle:
         battery = known.batteries.charge(now_ns)
         lost_s, mute = self.vision.lost_s(now_ns), "" if fresh else self._mute(now_ns, known)
         return VehicleView(
-            state, fresh, battery, not_ready, unsound=unsound, velocity_m_s=velocity, lost_s=lost_s, mute=mute
-        )
+            state, fresh, battery, not_ready, unsound=unsound, velocity_m_s=velocity, lost_s=lost_s,
+            unlocated=self.vision.missed, mute=mute,
+        )  # fmt: skip
 
     def _mute(self, now_ns: int, known: LatestTelemetry) -> str:
         # WIRE (ArduCopter 4.6.2): without a position it ends its LOCAL_POSITION_NED, in flight as well.
@@ -293,7 +294,7 @@ class MavlinkVehicle:
         """Return rates, losses and refusals; refusals are of the whole link."""
         rate_hz, quality = self._traffic.rates(now_ns)
         lost_s, limit_s = self.vision.lost_s(now_ns), self._settings.vision.hover_after_s
-        lost = f"no position from the cameras for {lost_s:.1f} s" if lost_s >= limit_s else ""
+        lost = f"no position {self.vision.missed} for {lost_s:.1f} s" if lost_s >= limit_s else ""
         detail = lost or self.orders.yields or self._session.detail(self._requests)
         rejected = dict(self._link.rejected.copy() + self._refused)
         clocks, firmware = self._plausibility.clock.figures, self._session.firmware

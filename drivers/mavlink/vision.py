@@ -13,6 +13,7 @@ from dataclasses import replace
 
 from drivers.mavlink.convert import VisionPose
 from drivers.mavlink.settings import VisionFeedback
+from drivers.mavlink.wire.names import Flavour
 from drivers.seen_place import last_seen
 from groundstation.bus.messages import EntityEstimate, Estimate
 from groundstation.geometry.angles import difference
@@ -23,22 +24,26 @@ _JUMP_RAD = math.radians(15.0)
 _STANDING_VARIANCES = (0.05**2, 0.05**2, 0.02**2, math.radians(3.0) ** 2)
 # Without poses for longer than this an autopilot has drifted by its own velocity, and then refuses poses.
 _COASTED_NS = 400 * NS_PER_MS
-# After lift-off cameras need a while to find it; autopilots coast for 4.8 s or more (docs/reference/mavlink.md 1.1, 2).
-_FIRST_SIGHT_NS = 4 * NS_PER_S
+# After lift-off cameras need a while to find it. ArduPilot coasts for 8 s (docs/reference/mavlink.md 1.1), PX4 lands by
+# itself after 1 s (EKF2_NOAID_TOUT, docs/decisions/0298): our landing, 0.7 s after this time, has to come before that.
+FIRST_SIGHT_NS = {Flavour.PX4: 200 * NS_PER_MS, Flavour.ARDUPILOT: 4 * NS_PER_S}
 
 
 class VisionFeed:
     """The poses for one vehicle. resets: counts jumps, and pauses in flight, as autopilots require.
 
-    sighted: the place where a picture new in the last estimate showed it, while nothing better is known.
+    first_sight_ns: for how long after lift-off no position is missed; sighted: the place where a picture new in the
+    last estimate showed it, while nothing better is known.
     """
 
     def __init__(
-        self, name: str, clock: str, vision: VisionFeedback, pad_m: tuple[float, float], pad_yaw_rad: float
-    ) -> None:
+        self, name: str, clock: str, vision: VisionFeedback, pad_m: tuple[float, float], pad_yaw_rad: float,
+        first_sight_ns: int = FIRST_SIGHT_NS[Flavour.ARDUPILOT],
+    ) -> None:  # fmt: skip
         self.resets = 0
         self.sighted: VisionPose | None = None
         self._name, self._clock, self._vision = name, clock, vision
+        self._first_sight_ns = first_sight_ns
         self._pad = VisionPose(0, (*pad_m, 0.0), pad_yaw_rad, _STANDING_VARIANCES, (0.0, 0.0, 0.0))
         self._standing = self._pad
         self._last: VisionPose | None = None
@@ -121,5 +126,11 @@ class VisionFeed:
         """Return for how long a flying vehicle has been without a position from us."""
         if self._aloft_ns is None:
             return 0.0
-        since_ns = self._good_ns if self._good_ns is not None else self._aloft_ns + _FIRST_SIGHT_NS
+        since_ns = self._good_ns if self._good_ns is not None else self._aloft_ns + self._first_sight_ns
         return max(0.0, (now_ns - since_ns) / NS_PER_S)
+
+    @property
+    def missed(self) -> str:
+        """Return which position a flying vehicle lacks, in words."""
+        never = self._aloft_ns is not None and self._good_ns is None
+        return "from the cameras since it lifted off" if never else "from the cameras"

@@ -14,9 +14,8 @@ LAND = px4_mode(Px4Main.AUTO, Px4Auto.LAND)
 OFFBOARD = px4_mode(Px4Main.OFFBOARD)
 POSITION = px4_mode(Px4Main.POSITION)
 ALTITUDE = px4_mode(Px4Main.ALTITUDE)
-# Measured: 1.42 s for COM_OF_LOSS_T 1.0, 4.8 to 5.6 s for lost vision.
-_GRANULARITY_S = 0.42
-_VISION_LOST_S = 5.0
+# Measured: 1.42 s for COM_OF_LOSS_T 1.0; lost vision 4.8 to 5.6 s for EKF2_NOAID_TOUT 5 s, 1 s for 0.9 s.
+_GRANULARITY_S, _NOTICED_S = 0.42, 0.1
 _SPOOL_S = 1.0
 _CLIMB_M_S, _REACHED_M = 1.0, 0.1
 _LOSS_MODES = {0: POSITION, 1: ALTITUDE, 2: px4_mode(Px4Main.STABILIZED), 4: LAND, 5: HOLD}
@@ -117,8 +116,11 @@ class Px4(AutopilotFirmware):
         """Leave OFFBOARD when setpoints stop; level out when the position is lost."""
         if self.mode == OFFBOARD and self.setpoint_age_s > self.parameters["COM_OF_LOSS_T"] + _GRANULARITY_S:
             self._fail(_LOSS_MODES.get(int(self.parameters["COM_OBL_RC_ACT"]), POSITION))
-        if self.copter.estimate.aided_s > _VISION_LOST_S and self.mode not in (*_LEVEL, LAND):
-            self._fail(ALTITUDE)
+        unaided_s = self.parameters["EKF2_NOAID_TOUT"] * 1e-6 + _NOTICED_S
+        if self.copter.estimate.aided_s > unaided_s and self.mode not in (*_LEVEL, LAND):
+            # WIRE (docs/decisions/0168): OFFBOARD without a velocity is lost OFFBOARD; LAND then descends level.
+            lands = self.mode == OFFBOARD and self.parameters["COM_OBL_RC_ACT"] == 4
+            self._fail(LAND if lands else ALTITUDE)
         silent = ground_silence_s > self.parameters["COM_DL_LOSS_T"]
         if silent and self.parameters["NAV_DLL_ACT"] == 3 and self.mode != LAND:
             self._fail(LAND)

@@ -83,6 +83,7 @@ def test_px4_leaves_offboard_when_setpoints_stop(bench_of):
 
 def test_px4_drifts_in_altitude_mode_without_vision(bench_of):
     bench = bench_of("px4").up()
+    bench.firmware.parameters.values |= {"EKF2_NOAID_TOUT": 5_000_000, "COM_OBL_RC_ACT": 0}  # the factory's
     bench.seen = False
     bench.run(4.7)
     assert bench.firmware.mode == OFFBOARD
@@ -91,6 +92,27 @@ def test_px4_drifts_in_altitude_mode_without_vision(bench_of):
     assert bench.command(21) == 0 and bench.firmware.mode == LAND
     bench.run(6.0)
     assert not bench.firmware.armed and "Disarmed by landing" in bench.texts()
+
+
+def test_px4_as_set_up_lands_a_second_after_the_last_position(bench_of):
+    bench = bench_of("px4").up()
+    bench.seen = False
+    bench.run(0.9)
+    assert bench.firmware.mode == OFFBOARD
+    bench.run(0.2)
+    assert bench.firmware.mode == LAND and "Failsafe activated" in bench.texts()
+
+
+def test_px4_takes_offboard_in_the_air_only_while_setpoints_come(bench_of):
+    bench = bench_of("px4").up()
+    bench.firmware.enter(3 << 16)
+    bench.setpoint = None
+    bench.run(1.1)
+    assert bench.command(176, 1.0, 6.0) == 1 and bench.firmware.mode == 3 << 16
+    assert "Switching to Offboard is currently not available" in bench.run(0.1).texts()
+    bench.fly()
+    bench.run(0.2)
+    assert bench.command(176, 1.0, 6.0) == 0 and bench.firmware.mode == OFFBOARD
 
 
 @pytest.mark.parametrize(("timeout_s", "late_s"), [(3.0, 3.9), (0.5, 1.5)])

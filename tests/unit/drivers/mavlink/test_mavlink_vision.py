@@ -2,8 +2,10 @@
 
 import pytest
 
+from drivers.mavlink.parameters import needed
 from drivers.mavlink.settings import VisionFeedback
-from drivers.mavlink.vision import VisionFeed
+from drivers.mavlink.vision import FIRST_SIGHT_NS, VisionFeed
+from drivers.mavlink.wire.names import Flavour
 from groundstation.bus import clock
 from groundstation.bus.messages import EntityEstimate, Estimate, Header
 
@@ -135,3 +137,23 @@ def test_a_place_that_a_picture_showed_is_told_once_and_only_where_nothing_bette
     see(feed, NOW + 400 * MS, 1.3, age_s=0.2)
     believe(feed, NOW + 420 * MS, *PAD, 0.5)
     assert feed.sighted is None
+
+
+@pytest.mark.parametrize(("flavour", "lost_s"), [(Flavour.PX4, 0.8), (Flavour.ARDUPILOT, 0.0)])
+def test_a_px4_misses_its_first_position_soon_after_its_lift_off(flavour: Flavour, lost_s: float) -> None:
+    """EKF2_NOAID_TOUT lands it a second after the last: our landing, which says why, comes before that."""
+    feed = VisionFeed("drone", clock.clock_id(), VisionFeedback(), PAD, 0.3, FIRST_SIGHT_NS[flavour])
+    feed.pose(NOW, aloft=False)
+    assert feed.missed == "from the cameras"
+    assert place(feed, NOW, aloft=True) is None, "nobody knows that it is still over its pad"
+    assert feed.lost_s(NOW + 1000 * MS) == pytest.approx(lost_s)
+    assert feed.missed == "from the cameras since it lifted off"
+    believe(feed, NOW + 1000 * MS, *PAD, 0.5)
+    feed.pose(NOW + 1000 * MS, aloft=True)
+    assert feed.lost_s(NOW + 1100 * MS) == pytest.approx(0.1) and feed.missed == "from the cameras"
+
+
+def test_a_px4_that_nobody_finds_is_landed_before_it_lands_by_itself() -> None:
+    landed_s = FIRST_SIGHT_NS[Flavour.PX4] / 1e9 + VisionFeedback().land_after_s
+    (limit_us,) = [one.value for one in needed(Flavour.PX4, 255, {}) if "EKF2_NOAID_TOUT" in one.names]
+    assert landed_s < limit_us / 1e6 + 0.1, "it notices a tenth of a second later"

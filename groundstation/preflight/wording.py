@@ -15,6 +15,8 @@ SUBJECT = "pads"
 # From this size on a flight is not worth its risk (docs/explanation/preflight.md#checks-of-standing-drones).
 _MUST_SHARE, _MUST_M, _MUST_TURN, _MUST_TILT = 0.02, 0.08, math.radians(1.5), math.radians(1.2)
 _MUST_PLACED_M, _MUST_HEADING = 0.25, math.radians(10.0)
+# As near as this to 180 degrees a heading is that of a tag printed from AprilTag's images.
+_HALF_TURN = math.radians(20.0)
 _MOST_TOLD = 3
 _SURVEY = ", or survey it: groundstation calibrate extrinsics"
 _Told = tuple[bool, str, str]
@@ -123,6 +125,9 @@ def _heading(field: ResolvedField, e: Explanation) -> _Told:
         f"{who}'s marker is turned by {math.degrees(value):.0f} +- {math.degrees(std):.0f} deg from its pad's heading"
     )
     remedy = f"turn {who} on its pad; if it stands right, its marker is turned, and it would fly the wrong way"
+    april = (field.drones[who].marker.dictionary or "").startswith("DICT_APRILTAG")
+    if april and math.pi - abs(value) <= _HALF_TURN:
+        remedy += " (AprilTag's own images are turned by 180 deg: groundstation markers print)"
     return abs(value) >= _MUST_HEADING, text, remedy
 
 

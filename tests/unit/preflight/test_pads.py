@@ -91,6 +91,22 @@ def test_one_wrong_figure_is_named_with_size_and_remedy(
 
 
 @pytest.mark.parametrize(
+    ("dictionary", "turned_deg", "named"),
+    [("DICT_APRILTAG_36H11", 180.0, True), ("DICT_APRILTAG_36H11", 90.0, False), ("DICT_4X4_50", 180.0, False)],
+)
+def test_a_tag_printed_from_april_tags_images_is_named(
+    lab_field: ResolvedField, dictionary: str, turned_deg: float, named: bool
+) -> None:
+    """OpenCV's dictionaries have them turned by 180 degrees."""
+    marker = replace(lab_field.drones["drone_2"].marker, kind="aruco", dictionary=dictionary, id=7, size_mm=168.0)
+    tagged = replace(lab_field.drones["drone_2"], marker=marker)
+    site = replace(lab_field, drones=lab_field.drones | {"drone_2": tagged})
+    finding = only(site, Truth(moved={"drone_2": (0.0, 0.0, turned_deg)}))
+    assert "drone_2's marker is turned by" in finding.found
+    assert ("groundstation markers print" in finding.remedy) is named
+
+
+@pytest.mark.parametrize(
     ("truth", "what", "part", "value"),
     [
         (Truth(prints={"": 0.05}), "prints", "print", 0.05),

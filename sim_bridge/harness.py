@@ -23,7 +23,7 @@ from sim_bridge.launch_spec import LaunchSpec
 from sim_bridge.link_bursts import with_bursts
 from sim_bridge.mounting import generator_of_eye
 from sim_bridge.ranges import Radios
-from sim_bridge.real.followers import Followers
+from sim_bridge.real.followers import GOOD_NEWS, Followers
 from sim_bridge.stage import Stage
 from sim_bridge.tick_schedule import Clockwork
 from sim_bridge.wheel_odometry import WheelOdometry
@@ -212,7 +212,7 @@ class Harness:
 
     def _tell_lost(self) -> None:
         for entity, line in self._followers.news() if self._followers is not None else ():
-            severity = Severity.INFO if line == "is followed" else Severity.WARNING
+            severity = Severity.INFO if line in GOOD_NEWS else Severity.WARNING
             self._child.event(severity, line, "", entity)
 
     def _break_things(self) -> None:

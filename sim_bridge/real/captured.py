@@ -18,6 +18,8 @@ _Stamped = tuple[int, BodyPose]
 class CaptureFeed:
     """The pose of a body in the newest frame, extrapolated to now; refused frames do not count."""
 
+    caveat = ""
+
     def __init__(self, name: str, system: str, bus: Bus) -> None:
         self._name, self._system = name, system
         self._inbox = bus.subscribe([BODY_POSES])

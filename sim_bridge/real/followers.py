@@ -13,9 +13,16 @@ from sim_bridge.real.captured import CaptureFeed
 from sim_bridge.site import Site
 from sim_bridge.world.puppet import OutsidePose, Puppet
 
+_FOLLOWED, _EXACT = "is followed", "its pose is exact now"
+GOOD_NEWS = frozenset({_FOLLOWED, _EXACT})
+
 
 class PoseFeed(Protocol):
-    """A source of poses of one real body."""
+    """A source of poses of one real body. caveat: what is wrong with them, for the operator, or ""."""
+
+    @property
+    def caveat(self) -> str:
+        """Return what is wrong with its poses."""
 
     def latest(self, now_ns: int) -> OutsidePose | None:
         """Return the newest pose, None if nothing new arrived."""
@@ -26,6 +33,8 @@ class PoseFeed(Protocol):
 
 class EstimateFeed:
     """The tracker's estimate of one robot; emulated cameras cannot correct it, for they do not show the robot."""
+
+    caveat = ""  # the run says so at its start
 
     def __init__(self, name: str, bus: Bus) -> None:
         self._name = name
@@ -59,6 +68,7 @@ class Followers:
         self._puppets = puppets
         self._feeds: dict[str, PoseFeed] = {}
         self._said: dict[str, str | None] = dict.fromkeys(puppets)
+        self._warned: dict[str, str] = {}
         try:
             for name in puppets:
                 self._feeds[name] = _feed(name, real[name], site, bus)
@@ -74,14 +84,20 @@ class Followers:
                 self._puppets[name].follow(pose)
 
     def news(self) -> list[tuple[str, str]]:
-        """Return (name, line) for each body that got lost, or is known again, since the last call."""
+        """Return (name, line) for each body that got lost, is known again, or flies by doubtful poses, since the last.
+
+        A simulator may send its exact poses only some seconds after others: they are not missed until it flies.
+        """
         lines = []
         for name, puppet in self._puppets.items():
             why = puppet.nowhere
             if why != self._said[name]:
                 self._said[name] = why
-                line = f"{why}: emulated cameras neither show it nor send its pictures" if why else "is followed"
+                line = f"{why}: emulated cameras neither show it nor send its pictures" if why else _FOLLOWED
                 lines.append((name, line))
+            if puppet.airborne and (caveat := self._feeds[name].caveat) != self._warned.get(name, ""):
+                self._warned[name] = caveat
+                lines.append((name, caveat or _EXACT))
         return lines
 
     def close(self) -> None:

@@ -2,7 +2,8 @@
 
 SIM_STATE (ArduPilot, asked for) and HIL_STATE_QUATERNION (PX4's SIH) are exact; until one of them arrives,
 LOCAL_POSITION_NED with ATTITUDE counts, which any vehicle with a position sends, PX4's SIH even before it
-has been placed on its globe. The vehicle does not move when its source changes.
+has been placed on its globe. The vehicle does not move when its source changes. The latter are the autopilot's own
+estimate: cameras that see its body there confirm its errors, which `caveat` says.
 """
 
 import math
@@ -58,6 +59,11 @@ class AutopilotTruth:
             newest = self.take(data) or newest
             self._ask(source, now_ns)
         return None if newest is None else self._placement.pose(newest)
+
+    @property
+    def caveat(self) -> str:
+        """Return why the poses are not exact, or ""."""
+        return "" if self._exact else "its pose is its own estimate: cameras confirm its errors"
 
     def take(self, data: bytes) -> TrueState | None:
         """Return the newest true state in a datagram; other bytes and frames of other vehicles are counted."""

@@ -141,7 +141,7 @@ def test_a_puppet_follows_a_firmware_s_true_state_from_its_pad_on(
     assert harness.world.airborne == ("drone_1",)
     request = FrameDecoder().decode(next(split(teller.recv(512)))).message
     assert request is not None and request[:3] == (SYSTEM, 1, 511), "it asks for the true state"
-    assert [event for event in process.events if event[2] == "is followed"]
+    assert [text for _, _, text in process.events if "is followed" in text or "its pose" in text] == ["is followed"]
 
 
 def hil_state(north_m: float, up_m: float) -> HilStateQuaternion:
@@ -154,7 +154,7 @@ def hil_state(north_m: float, up_m: float) -> HilStateQuaternion:
 def test_a_vehicle_does_not_move_when_its_simulator_is_placed_on_its_globe(
     firmware: tuple[Harness, Process, socket.socket],
 ) -> None:
-    harness, _, teller = firmware
+    harness, process, teller = firmware
     mind = FrameEncoder(SYSTEM, 1)
     still = (0.0, 0.0, 0.0)
     teller.send(mind.encode(Attitude(1, *still, *still)))
@@ -163,9 +163,12 @@ def test_a_vehicle_does_not_move_when_its_simulator_is_placed_on_its_globe(
         turn(harness, 0.05)
     before = harness.world.states()[0][:3].copy()
     assert before == pytest.approx([1.0, 1.5, 1.06], abs=0.01)
+    told = (Severity.WARNING, "drone_1", "its pose is its own estimate: cameras confirm its errors")
+    assert process.events == [(Severity.INFO, "drone_1", "is followed"), told], "at its lift-off, once"
     teller.send(mind.encode(hil_state(5.0, 0.0)))
     turn(harness, 0.05)
     assert harness.world.states()[0][:3] == pytest.approx(before, abs=0.02)
+    assert process.events[-1] == (Severity.INFO, "drone_1", "its pose is exact now")
     teller.send(mind.encode(hil_state(6.0, 0.9)))
     turn(harness, 0.05)
     assert harness.world.states()[0][:3] == pytest.approx(np.add(before, (0.0, 1.0, 0.9)), abs=0.02)

@@ -2,13 +2,13 @@
 
 
 class FakeProcess:
-    """Records its calls; `texts` are those of its events."""
+    """Records its calls; `texts` are those of its events, `states` those that it was told, with their details."""
 
     def __init__(self, bus):
         self.name, self.bus, self.section = bus.source, bus, "{}"
         self.stop_requested, self.supervisor_alive, self.supervisor_fresh = False, True, True
         self.spoken_for_ns = 0
-        self.events = []
+        self.events, self.states = [], []
 
     @property
     def texts(self):
@@ -18,10 +18,10 @@ class FakeProcess:
         pass
 
     def ready(self, detail=""):
-        pass
+        self.states.append(f"READY {detail}")
 
     def degrade(self, detail):
-        pass
+        self.states.append(f"DEGRADED {detail}")
 
     def leave(self, number):
         self.left = number

@@ -86,6 +86,8 @@ def test_both_flavours_on_one_port_come_to_be_ready(hangar, port, kind):
         flying.turn(1.0)
         odometry, imu = flying.messages(ODOMETRY), flying.messages(IMU)
         assert {m.header.entity for m in odometry} == {"v21", "v22"}
+        at = f"udpin:127.0.0.1:{port}"
+        assert flying.process.states == [f"READY v21 at {at}; v22 at {at}"], "told once, though both are at each turn"
         assert len(odometry) > 60 and len(imu) > 30
         assert flying.fleet.link.rejected["unknown_system"] > 0
         assert [t for t in flying.process.texts if "system 23" in t] == [

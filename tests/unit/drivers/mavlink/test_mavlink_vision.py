@@ -3,9 +3,10 @@
 import pytest
 
 from drivers.mavlink.parameters import needed
-from drivers.mavlink.settings import VisionFeedback
+from drivers.mavlink.settings import MavlinkDriverSettings, VisionFeedback
 from drivers.mavlink.vision import FIRST_SIGHT_NS, VisionFeed
 from drivers.mavlink.wire.names import Flavour
+from drivers.watchdog_types import WatchdogLimits
 from groundstation.bus import clock
 from groundstation.bus.messages import EntityEstimate, Estimate, Header
 
@@ -157,3 +158,10 @@ def test_a_px4_that_nobody_finds_is_landed_before_it_lands_by_itself() -> None:
     landed_s = FIRST_SIGHT_NS[Flavour.PX4] / 1e9 + VisionFeedback().land_after_s
     (limit_us,) = [one.value for one in needed(Flavour.PX4, 255, {}) if "EKF2_NOAID_TOUT" in one.names]
     assert landed_s < limit_us / 1e6 + 0.1, "it notices a tenth of a second later"
+
+
+def test_the_table_of_failsafes_has_the_times_of_a_vehicle_that_flies_on_our_position() -> None:
+    row = {"name": "v", "system_id": 1, "flavour": "px4"}
+    settings = MavlinkDriverSettings.model_validate({"link": {"target": "udpout:127.0.0.1:14550"}, "vehicles": [row]})
+    flown, told = settings.authority(settings.vehicles[0]), WatchdogLimits()
+    assert (flown.lost_hover_s, flown.lost_land_s) == (told.lost_hover_s, told.lost_land_s) == (0.3, 0.7)

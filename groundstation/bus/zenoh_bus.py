@@ -36,8 +36,8 @@ _PRIORITY = {
     Quality.BULK: ("DATA_LOW", False),
 }
 # Batches that wait for a link before further ones are dropped; 2 by default, 16 at most. A replay needs
-# every message that the tracker got. Setpoints keep the short queue.
-_QUEUED_BATCHES = {"data_high": 16, "data": 16, "data_low": 16}
+# every message that the tracker got. A tick's setpoints are as many batches as drones fly, put back to back.
+_QUEUED_BATCHES = {"real_time": 16, "data_high": 16, "data": 16, "data_low": 16}
 
 
 AUTHORITY, CERTIFICATE, KEY = "authority.pem", ".pem", ".key"

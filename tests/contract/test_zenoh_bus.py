@@ -1,5 +1,8 @@
 """The star over real Zenoh on loopback: delivery, forwarding past a stalled reader, absent and taken endpoints."""
 
+import signal
+import subprocess
+import sys
 import time
 from collections import Counter
 from collections.abc import Iterator
@@ -24,6 +27,18 @@ def endpoint() -> Iterator[str]:
     router = zenoh_bus.open_router(address)
     yield address
     router.close()
+
+
+@pytest.fixture
+def router() -> Iterator[tuple[str, subprocess.Popen[str]]]:
+    """A router in a process of its own, which can be stopped, and before it its endpoint."""
+    address = free_endpoint()
+    code = "import sys; from groundstation.bus.zenoh_bus import open_router as o; r = o(sys.argv[1]); print(); input()"
+    command = [sys.executable, "-c", code, address]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None and process.stdout.readline()
+        yield address, process
+        process.kill()
 
 
 def send_until_heard(sender: zenoh_bus.ZenohBus, subscription: Subscription) -> int:
@@ -67,6 +82,32 @@ def test_all_of_a_burst_of_sensor_samples_arrives(endpoint: str) -> None:
             heard.wait(0.1)
             samples += [int(sample.payload) for sample in heard.drain_samples() if "/imu/" in sample.key]
         assert samples == list(range(count))
+
+
+def test_a_setpoint_for_each_drone_waits_for_a_router_that_stands_still(
+    router: tuple[str, subprocess.Popen[str]],
+) -> None:
+    """They are put back to back, each in a batch of its own (decision 0290)."""
+    address, process = router
+    drones = [f"drone_{number}" for number in range(1, 13)]
+    with (
+        closing(zenoh_bus.open_bus(address, "lab", "tracker")) as tracker,
+        closing(zenoh_bus.open_bus(address, "lab", "recorder")) as recorder,
+    ):
+        heard = recorder.subscribe([topics.EVENT, topics.SETPOINT])
+        assert send_until_heard(tracker, heard) >= 1
+        process.send_signal(signal.SIGSTOP)
+        for _ in range(300):  # fills the socket, so that batches wait
+            tracker.put(topics.IMAGE, "ceiling", bytes(60000), b"")
+        for drone in drones:
+            tracker.put(topics.SETPOINT, drone, bytes(300), b"")
+        process.send_signal(signal.SIGCONT)
+        arrived: set[str] = set()
+        deadline = time.monotonic() + 5
+        while len(arrived) < len(drones) and time.monotonic() < deadline:
+            heard.wait(0.1)
+            arrived |= {sample.key.split("/")[3] for sample in heard.drain_samples() if "/setpoint/" in sample.key}
+    assert arrived == set(drones)
 
 
 def test_a_reader_that_never_drains_stalls_nobody(endpoint: str) -> None:

@@ -65,7 +65,7 @@ class Header(msgspec.Struct, frozen=True, gc=False):
     source: str
     """The process that sends it."""
     seq: Whole
-    """Rises by one per key and sender."""
+    """Rises by one with each message of the sender about the entity, whatever its topic."""
 
 
 class Message(msgspec.Struct, frozen=True, kw_only=True):

@@ -31,8 +31,8 @@ _MAX_CHUNK_BYTES = 1 << 28
 _CHUNK = struct.Struct("<BQQQQII4sQ")
 _MARK, _MARK_AT = struct.pack("<I4s", 4, b"zstd"), struct.calcsize("<BQQQQI")
 _BLOCK_BYTES = 1 << 20
-# The errors that a parser raises for a damaged record body.
-UNREADABLE = (ValueError, EOFError, struct.error, zstandard.ZstdError, McapError)
+# The errors that a parser raises for a damaged record body; OverflowError: a length of more than 63 bits.
+UNREADABLE = (ValueError, EOFError, OverflowError, struct.error, zstandard.ZstdError, McapError)
 
 Channels = dict[int, Key | None]
 Wanted = Callable[[Topic], bool]
@@ -126,7 +126,7 @@ def chunk_data(body: bytes, damage: list[str]) -> bytes:
             raise ValueError(f"{chunk.uncompressed_size} bytes")
         data = chunk.data
         if chunk.compression == "zstd":
-            data = zstandard.decompress(chunk.data, max_output_size=chunk.uncompressed_size)
+            data = _decompressed(chunk)
         elif chunk.compression:
             raise ValueError(f"compression {chunk.compression}")
         if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
@@ -135,6 +135,13 @@ def chunk_data(body: bytes, damage: list[str]) -> bytes:
         damage.append(f"damaged chunk: {error}")
         return b""
     return bytes(data)
+
+
+def _decompressed(chunk: Chunk) -> bytes:
+    # A size in the frame's own head is reserved as it stands, whatever `max_output_size` says.
+    if zstandard.frame_content_size(chunk.data) > chunk.uncompressed_size:
+        raise ValueError("its frame is longer than the chunk")
+    return bytes(zstandard.decompress(chunk.data, max_output_size=chunk.uncompressed_size))
 
 
 def inner_records(data: bytes) -> Iterator[tuple[int, int, int]]:

@@ -13,11 +13,13 @@ import numpy as np
 import pytest
 
 from groundstation.bus import clock
+from groundstation.bus.jpeg import stated_size
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import Event, Severity
 from groundstation.bus.topics import EVENT, IMAGE, VIDEO
 from groundstation.recording import disk_space
 from groundstation.recording import rotating_file as series_module
+from groundstation.recording.blurring import blurred
 from groundstation.recording.mcap_file import McapFile
 from groundstation.recording.reader import open_recording, parts
 from groundstation.recording.writing import RunWriter
@@ -221,6 +223,15 @@ def test_pictures_are_recorded_as_far_as_the_field_allows(
         seen = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
         assert seen is not None and seen.shape == fine.shape
         assert _detail(seen) < 0.2 * _detail(fine)
+
+
+@pytest.mark.parametrize(("height", "width"), [(972, 1296), (243, 325)])
+def test_a_blurred_picture_keeps_its_size(height: int, width: int) -> None:
+    sharp = cv2.imencode(".jpg", np.zeros((height, width, 3), np.uint8))[1].tobytes()
+    turned = bytes.fromhex("ffe10022457869660000 49492a0008000000 0100 1201 0300 01000000 06000000 00000000")
+    for jpeg in (sharp, sharp[:2] + turned + sharp[2:]):  # EXIF: a phone held upright
+        soft = blurred(jpeg)
+        assert soft is not None and stated_size(soft) == (width, height)
 
 
 def test_a_huge_picture_is_left_out_and_recording_goes_on(

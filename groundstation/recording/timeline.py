@@ -5,6 +5,8 @@ from groundstation.time_units import NS_PER_S
 
 # A stamp farther from its arrival is a sender's defect: it must not stretch the time axis.
 _PLAUSIBLE_NS = 10 * NS_PER_S
+# A file's times have 64 bits without a sign, tables of them 63.
+_LATEST_NS = (1 << 63) - 1
 
 
 class Timeline:
@@ -27,14 +29,14 @@ class Timeline:
     def times(self, stamp_ns: int, clock: str, arrival_ns: int) -> tuple[int, int]:
         """Return (log time, publish time) in UNIX ns.
 
-        Publish time is the mapped stamp. Log time is the same, unless the stamp is implausible or its clock
-        unknown: then the time of arrival.
+        Publish time is the mapped stamp, as far as 63 bits hold it. Log time is the same, unless the stamp is
+        implausible or its clock unknown: then the time of arrival.
         """
         arrival = arrival_ns + self.unix_offset_ns
         offset = self._offsets.get(clock)
         if offset is None:
             return arrival, arrival
-        published = max(0, stamp_ns + offset + self.unix_offset_ns)
+        published = min(max(0, stamp_ns + offset + self.unix_offset_ns), _LATEST_NS)
         if abs(published - arrival) > _PLAUSIBLE_NS:
             return arrival, published
         return published, published

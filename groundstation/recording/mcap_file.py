@@ -17,11 +17,14 @@ _CHUNK_BYTES = 1 << 20
 
 
 class McapFile:
-    """Writes one file. Any method may raise OSError (disk full); the file is then to be abandoned."""
+    """Writes one new file. Any method may raise OSError (disk full); the file is then to be abandoned.
+
+    Raises FileExistsError where something is there already, and leaves that alone.
+    """
 
     def __init__(self, path: Path, preamble: Preamble) -> None:
         self.path = path
-        self._stream = path.open("wb")
+        self._stream = path.open("xb")
         # CRCs of the chunks let the reader tell a damaged chunk from a sound one.
         self._writer = Writer(
             self._stream, chunk_size=_CHUNK_BYTES, compression=CompressionType.ZSTD, index_types=IndexType.ALL

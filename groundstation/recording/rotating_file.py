@@ -134,13 +134,20 @@ class FileSeries:
         self._folder.mkdir(parents=True, exist_ok=True)  # a person may have removed it
         if not self._has_room():
             raise OSError(errno.ENOSPC, "no space left on the disk")
-        number = 1 + max((number for number, _ in numbered_parts(self._folder, self._stem)), default=0)
-        part = {"part": {"stem": self._stem, "number": str(number)}}
-        preamble = replace(self._preamble, metadata={**self._preamble.metadata, **part})
-        self._file = self._opener(part_path(self._folder, self._stem, number), preamble)
+        self._file = self._next_part()
         self._begun_ns = now_ns
         self._flush_ns = now_ns + FLUSH_PERIOD_NS
         return self._file
+
+    def _next_part(self) -> McapFile:
+        number = 1 + max((number for number, _ in numbered_parts(self._folder, self._stem)), default=0)
+        while True:
+            part = {"part": {"stem": self._stem, "number": str(number)}}
+            preamble = replace(self._preamble, metadata={**self._preamble.metadata, **part})
+            try:
+                return self._opener(part_path(self._folder, self._stem, number), preamble)
+            except FileExistsError:  # another recorder began it in this moment
+                number += 1
 
     def _open(self, now_ns: int) -> McapFile | None:
         if now_ns < self._retry_ns:

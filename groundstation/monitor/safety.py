@@ -8,6 +8,10 @@ from groundstation.bus.messages import AIRBORNE, FlightState
 from groundstation.monitor.alarms import Alarm
 from groundstation.monitor.batteries import battery_of
 from groundstation.monitor.state import MonitorState
+from groundstation.time_units import NS_PER_S
+
+# A drone joins the estimate within 0.3 s of its climb.
+_JOINS_NS = NS_PER_S
 
 
 class Level(StrEnum):
@@ -36,7 +40,23 @@ def safety_of(state: MonitorState, alarms: Sequence[Alarm]) -> Safety:
     up = [name for name, seen in state.vehicles.items() if seen.message.flight_state in AIRBORNE]
     if not up:
         return Safety(Level.SAFE, "No alarms. Nobody flies.")
+    if unplaced := [name for name in up if _is_unplaced(state, name)]:
+        return Safety(Level.WATCH, _unplaced_words(unplaced))
     return Safety(Level.SAFE, f"No alarms. All who fly are heard, nobody is lost{_lasting(state, up)}.")
+
+
+def _is_unplaced(state: MonitorState, name: str) -> bool:
+    """Return whether a flying drone's place is contradicted, or has not been estimated since its climb."""
+    entity = state.entity(name)
+    if entity is not None:
+        return entity.contradicted
+    stamp_ns = state.vehicles[name].stamp_ns
+    return stamp_ns - state.climbed_ns.get(name, stamp_ns) > _JOINS_NS
+
+
+def _unplaced_words(names: Sequence[str]) -> str:
+    who = " and ".join(names) if len(names) < 3 else f"{len(names)} drones"
+    return f"It is not known where {who} {'are' if len(names) > 1 else 'is'}."
 
 
 def _lasting(state: MonitorState, up: Sequence[str]) -> str:

@@ -62,13 +62,17 @@ class StampedMessage(Generic[T]):
 
 @dataclass(slots=True)
 class MonitorState:
-    """The newest message of each kind and entity; `hint` states the effect of Ctrl-C here."""
+    """The newest message of each kind and entity; `hint` states the effect of Ctrl-C here.
+
+    climbed_ns: stamp of the first status of each flying drone since its climb, or since one listens.
+    """
 
     cast: Cast = field(default_factory=Cast)
     hint: str = ""
     started_ns: int = 0
     vehicles: dict[str, StampedMessage[m.VehicleStatus]] = field(default_factory=dict)
     take_offs: dict[str, TakeOff | None] = field(default_factory=dict)
+    climbed_ns: dict[str, int] = field(default_factory=dict)
     cameras: dict[str, StampedMessage[m.CameraStatus]] = field(default_factory=dict)
     processes: dict[str, StampedMessage[m.ProcessStatus]] = field(default_factory=dict)
     sightings: dict[tuple[str, str], int] = field(default_factory=dict)
@@ -114,6 +118,7 @@ class MonitorState:
                 status = self._known(entity, message)
                 self.vehicles[entity] = StampedMessage(stamp_ns, status)
                 self.take_offs[entity] = take_off_of(self.take_offs.get(entity), stamp_ns, status)
+                self._note_climb(entity, stamp_ns, status)
             case m.CameraStatus():
                 self.cameras[entity] = StampedMessage(stamp_ns, message)
             case m.ProcessStatus():
@@ -139,6 +144,12 @@ class MonitorState:
                 self.answers.setdefault(message.command_id, {})[entity] = message
                 while len(self.answers) > _COMMANDS:
                     del self.answers[next(iter(self.answers))]
+
+    def _note_climb(self, name: str, stamp_ns: int, status: m.VehicleStatus) -> None:
+        if status.flight_state not in m.AIRBORNE or status.flight_state is m.FlightState.TAKING_OFF:
+            self.climbed_ns.pop(name, None)
+        else:
+            self.climbed_ns[name] = min(stamp_ns, self.climbed_ns.get(name, stamp_ns))
 
     def _known(self, name: str, said: m.VehicleStatus) -> m.VehicleStatus:
         before = self.vehicles.get(name)

@@ -1,6 +1,8 @@
 """A bus with the monitor's screen on it, and shorthands to publish as the other processes."""
 
 import io
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 from rich.console import Console
@@ -50,12 +52,19 @@ class World:
         )
 
     def estimate(
-        self, target_age_s: float = 0.1, age_s: float = 0.0, *searches: m.TargetSearch, drone_age_s: float = 0.2
+        self,
+        target_age_s: float = 0.1,
+        age_s: float = 0.0,
+        *searches: m.TargetSearch,
+        drone_age_s: float = 0.2,
+        drone_2: Mapping[str, Any] | None = MappingProxyType({}),
     ) -> None:
         wide = (0.04, 0.0, 0.0, 0.01)
         robot = tuple(0.01 if index % 5 == 0 else 0.0 for index in range(16))
+        second = ("drone_2", "robot", (-1.5, 0.5, 1.3, 0.0), robot, (0.0,) * 3, True, 0.2)
         entities = (
             m.EntityEstimate("drone_1", "robot", (1.25, -0.5, 1.3, 0.0), robot, (0.0,) * 3, True, drone_age_s),
+            *([] if drone_2 is None else [m.EntityEstimate(*second, **drone_2)]),
             m.EntityEstimate("turtlebot", "target", (0.75, 0.25), wide, (0.0, 0.0), True, target_age_s),
         )
         header = self.header("team", age_s)

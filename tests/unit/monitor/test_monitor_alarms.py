@@ -179,6 +179,21 @@ def test_a_drone_that_nobody_sees_is_lost_unless_its_landing_says_so(world: Worl
 
 
 @pytest.mark.parametrize(
+    ("unlocalised_s", "text"),
+    [(2.9, None), (9.0, "drone_2: not known where it is for 9 s"), (1e6, "drone_2: not known where it is")],
+)
+def test_a_drone_that_is_seen_elsewhere_or_by_unlocated_ones_is_an_alarm(
+    world: World, unlocalised_s: float, text: str | None
+) -> None:
+    world.vehicle("drone_2")
+    world.estimate(drone_2={"unlocalised_s": unlocalised_s, "contradicted": True})
+    assert _alarms(world) == ([text] if text else [])
+    assert not any("within 0 s" in alarm.advice for alarm in alarms_of(world.state, NOW))
+    world.vehicle("drone_2", "LANDED", flight_state=m.FlightState.LANDED)
+    assert _alarms(world) == []
+
+
+@pytest.mark.parametrize(
     ("mode", "text", "asks"),
     [
         ("SEARCH", "turtlebot is lost, most likely near (1.7, -0.9)", False),

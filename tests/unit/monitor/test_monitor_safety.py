@@ -46,6 +46,29 @@ def test_it_is_safe_while_nobody_flies(world: World) -> None:
     assert judged(world) == Safety(Level.SAFE, "No alarms. Nobody flies.")
 
 
+def test_it_is_not_safe_while_nobody_knows_where_a_flying_drone_is(world: World) -> None:
+    both(world, age_s=5.0)
+    judged(world)
+    both(world)
+    assert judged(world) == Safety(Level.WATCH, "It is not known where drone_1 and drone_2 are.")
+    world.estimate(drone_2=None)
+    assert judged(world) == Safety(Level.WATCH, "It is not known where drone_2 is.")
+    world.estimate(drone_2={"contradicted": True})
+    assert judged(world) == Safety(Level.WATCH, "It is not known where drone_2 is.")
+    world.vehicle("drone_2", "LANDED", flight_state=m.FlightState.LANDED)
+    assert judged(world).level is Level.SAFE
+
+
+def test_a_drone_that_climbs_or_just_has_need_not_be_estimated_yet(world: World) -> None:
+    world.estimate(drone_2=None)
+    both(world, age_s=5.0, flight_state=m.FlightState.TAKING_OFF)
+    judged(world)
+    both(world, age_s=0.9)
+    judged(world)
+    both(world)
+    assert judged(world).level is Level.SAFE
+
+
 def test_a_drone_never_heard_makes_the_safety_level_watch(world: World) -> None:
     world.vehicle("drone_1")
     assert judged(world) == Safety(Level.WATCH, "Not every drone has been heard yet.")

@@ -1,6 +1,6 @@
 """Forecasts of the same places when one camera or drone of the team fails."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from groundstation.field.resolved import ResolvedField
@@ -30,13 +30,9 @@ def failures(
     """Return the forecasts of some places under each single failure; told: called after each place."""
     found = []
     for what, left in teams_without_one(team):
-        if not left.robots:
-            gone = Spread(None, None, 1.0)
-            found.append(Failure(what, gone, (team.target,)))
-            continue
         forecaster = PlaceForecaster(field, left)
         seen = [_told(forecaster, place, told) for place in places]
-        found.append(Failure(what, spread_of(seen), _unlocalised(left, seen)))
+        found.append(Failure(what, spread_of(seen), _unlocalised(forecaster, seen)))
     return found
 
 
@@ -45,7 +41,17 @@ def _told(forecaster: PlaceForecaster, place: Place, told: Callable[[], None]) -
     return forecaster.at(place)
 
 
-def _unlocalised(team: Team, seen: Iterable[PlaceForecast]) -> tuple[str, ...]:
-    """Return the drones that fixed sensors locate, directly or through drones, at the stand of none of these places."""
-    placed = frozenset[str]().union(*(one.stand.placed for one in seen if one.stand is not None))
+def _unlocalised(forecaster: PlaceForecaster, seen: Sequence[PlaceForecast]) -> tuple[str, ...]:
+    """Return whom fixed sensors locate, directly or through drones, at the stand of none of these places.
+
+    Where the team has no stand, because it sees the target nowhere, drones count as located that fixed sensors could
+    see above one of these places.
+    """
+    team, stands = forecaster.team, [one.stand for one in seen if one.stand is not None]
+    placed = set[str]().union(*(stand.placed for stand in stands))
+    if not stands:
+        views, places = forecaster.search.views, [one.place for one in seen]
+        placed = {name for name in team.robots if any(views.is_placed_above(name, place) for place in places)}
+    if any(one.std_m is not None for one in seen):
+        placed.add(team.target)
     return tuple(name for name in (*team.robots, team.target) if name not in placed)

@@ -31,7 +31,7 @@ class PlaceForecast:
     """Forecast of a target at a place.
 
     std_m: of its place in the floor plan, root of the trace, in the filter; None if it is not seen, for the reason
-    in words. stand: the team's.
+    in words. stand: the team's; None if it has none, or no drone.
     """
 
     place: Place
@@ -119,10 +119,12 @@ class PlaceForecaster:
             return PlaceForecast(place, None, OBSTACLE)
         if not self.team.sensors.world:
             return PlaceForecast(place, None, "no fixed camera tells where drones are")
-        stand = self.search.at(place)
+        if not self.team.robots and not views.placed_by(views.ground(place), is_target=True):
+            return PlaceForecast(place, None, "no drone flies, and no fixed camera sees it")
+        stand = self.search.at(place) if self.team.robots else None
         if isinstance(stand, Obstruction):
             return PlaceForecast(place, None, _WORDS.get(stand) or self._unplaced(place))
-        belief = self._filter.belief(stand.poses, place, _SETTLED_S, _BEFORE)
+        belief = self._filter.belief({} if stand is None else stand.poses, place, _SETTLED_S, _BEFORE)
         if self.team.target not in belief.layout:
             return PlaceForecast(place, None, "the filter takes no sighting of it", stand)
         return PlaceForecast(place, math.sqrt(np.trace(belief.covariance_of(self.team.target)[:2, :2])), "", stand)

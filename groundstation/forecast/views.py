@@ -74,6 +74,14 @@ class Views:
             default=0.0,
         )
 
+    def is_placed_above(self, robot: str, place: Place) -> bool:
+        """Return whether a fixed camera sees a robot's marker at one of its heights above a place inside the fence."""
+        (x0, x1), (y0, y1) = self._team.planner.fence.x_m, self._team.planner.fence.y_m
+        return (x0 <= place[0] <= x1 and y0 <= place[1] <= y1) and any(
+            self.placed_by(self.marker(robot, np.array([*place, height, 0.0])), is_target=False)
+            for height in self._heights
+        )
+
     def marker(self, robot: str, pose: Array) -> Point:
         """Return the place of a robot's marker."""
         return float(pose[0]), float(pose[1]), float(pose[2]) + self._team.sensors.marker_height_m[robot]

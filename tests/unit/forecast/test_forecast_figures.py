@@ -15,6 +15,7 @@ from groundstation.forecast.flown_filter import FlownFilter
 from groundstation.forecast.observability import Observability, observe, topologies_of
 from groundstation.forecast.paths import spaced
 from groundstation.forecast.team import Team, team_of
+from groundstation.sensing.models import Rectangle
 from groundstation.sensing.topology import Topology
 
 MIDDLE = (0.0, 0.0)
@@ -102,6 +103,28 @@ def test_a_team_of_one_has_nothing_left_without_it(lab_field: ResolvedField, tea
     assert [what for what, _ in teams_without_one(single)] == ["ceiling", "drone_1's camera", "drone_1"]
     last = failures(lab_field, single, [MIDDLE])[-1]
     assert (last.without.blind, last.unlocalised) == (1.0, ("turtlebot",))
+
+
+def test_a_ceiling_camera_that_observes_targets_tracks_on_when_the_only_drone_fails(lab_field: ResolvedField) -> None:
+    cameras = {
+        name: msgspec.structs.replace(one, observes=("robots", "targets")) for name, one in lab_field.cameras.items()
+    }
+    field = msgspec.structs.replace(lab_field, cameras=cameras, drones={"drone_1": lab_field.drones["drone_1"]})
+    last = failures(field, team_of(field), [MIDDLE, (3.9, 2.9)])[-1]
+    assert (last.what, last.without.blind, last.unlocalised) == ("drone_1", 0.5, ())
+    assert last.without.median_m is not None and 0.0 < last.without.median_m < 0.1
+
+
+def test_drones_that_see_no_target_are_located_where_fixed_cameras_see_them(
+    lab_field: ResolvedField, team: Team
+) -> None:
+    blind = team.without_sensor("drone_2")
+    found = {one.what: one for one in failures(lab_field, blind, [MIDDLE])}
+    assert found["drone_1's camera"].unlocalised == ("turtlebot",)
+    assert found["ceiling"].unlocalised == ("drone_1", "drone_2", "turtlebot")
+    outside = replace(blind, planner=replace(blind.planner, fence=Rectangle((1.0, 2.0), (1.0, 2.0))))
+    (lost,) = (one for one in failures(lab_field, outside, [MIDDLE]) if one.what == "drone_1's camera")
+    assert lost.unlocalised == ("drone_1", "drone_2", "turtlebot")
 
 
 def test_batteries_last_as_their_kind_tells_down_to_where_they_land(lab_field: ResolvedField) -> None:

@@ -23,6 +23,7 @@ from groundstation.recording.run import RecordedRun
 from groundstation.recording.stretch import Stretch
 
 _FOR_EVER = 1 << 63
+_RECOVERED = "recovered"
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,19 +100,27 @@ def new_copy(path: Path, preamble: Preamble) -> Iterator[CopyWriter]:
 
 
 def recover(path: Path, target: Path) -> tuple[int, list[str]]:
-    """Write all sound messages of a file into a new one; returns their number and the damage.
+    """Write all sound messages of a file into a new one, with a note of the damage; returns their number and it.
 
     Raises RecordingError if the file is not ours, or not a single message is left.
     """
     opened, index = open_recording(path), FileIndex(path)
-    with new_copy(target, preamble_copy(opened, {})) as writer:
+    damage = [*opened.preamble_damage, *index.checked_damage()]
+    note = {_RECOVERED: {"damage": "; ".join([*damage_before(opened.metadata), *damage])}}
+    with new_copy(target, preamble_copy(opened, note)) as writer:
         for message in messages_of(index):
             writer.write(message)
         if not writer.written:
             raise RecordingError(
                 f"{path}: nothing can be recovered: {'; '.join(index.damage) or 'it holds no messages'}"
             )
-    return writer.written, [*opened.preamble_damage, *index.damage]
+    return writer.written, damage
+
+
+def damage_before(metadata: Mapping[str, Mapping[str, str]]) -> list[str]:
+    """Return in one text the damage of the file that a recording was recovered from; nothing for any other."""
+    noted = metadata.get(_RECOVERED, {}).get("damage")
+    return [noted] if noted else []
 
 
 def cut(run: RecordedRun, stem: str, from_ns: int, until_ns: int, target: Path) -> int:

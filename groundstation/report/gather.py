@@ -11,6 +11,7 @@ from groundstation.bus import messages as m
 from groundstation.bus import topics as t
 from groundstation.field.resolved import ResolvedField, field_from_json
 from groundstation.recording.chunks import among
+from groundstation.recording.copies import damage_before
 from groundstation.recording.file_topics import STATE
 from groundstation.recording.preamble import FIELD_NAME
 from groundstation.recording.reader import Recording, RecordingError, open_parts, parts
@@ -51,7 +52,8 @@ def gather(run_dir: Path) -> RunData:
         data.rerun = data.rerun or rerun_of(recording.metadata)
         data.stretch = data.stretch or stretch_of(recording.metadata)
         rows.take(recording)
-        data.damage.extend(f"{recording.path.name}: {damage}" for damage in recording.damage)
+        damage = [*(f"recovered, before: {text}" for text in damage_before(recording.metadata)), *recording.damage]
+        data.damage.extend(f"{recording.path.name}: {text}" for text in damage)
     rows.finish()
     return data
 

@@ -8,6 +8,7 @@ from groundstation.bus import codec, keys
 from groundstation.bus import messages as m
 from groundstation.bus.api import Sample
 from groundstation.bus.topics import ODOMETRY, PROCESS_STATUS, Topic
+from groundstation.recording.copies import recover
 from groundstation.recording.timeline import Timeline
 from groundstation.recording.writing import RunWriter
 from groundstation.report.gather import gather
@@ -62,3 +63,18 @@ def test_the_silence_of_a_vehicle_is_that_of_its_telemetry(tmp_path: Path) -> No
     writer.close()
     heard_s = gather(tmp_path).heard_s["drone_1"]
     assert heard_s.tolist() == [0.0, 1.0, 5.0, 6.0]
+
+
+def test_a_recovered_recording_keeps_the_damage_of_its_original(tmp_path: Path) -> None:
+    writer = _Writer(tmp_path)
+    for second in range(60):
+        writer.status(second, "tracker", "tracker")
+    writer.close()
+    original, copy, second_copy = tmp_path / "state.mcap", tmp_path / "copy", tmp_path / "second"
+    original.write_bytes(original.read_bytes()[:-2000])
+    for path, folder in ((original, copy), (copy / "state.mcap", second_copy)):
+        folder.mkdir()
+        recover(path, folder / "state.mcap")
+        (damage,) = gather(folder).damage
+        assert damage.startswith("state.mcap: recovered, before: cut off at byte "), damage
+        assert gather(folder).breaks_off

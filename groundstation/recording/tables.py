@@ -203,6 +203,10 @@ _ESTIMATE_COLUMNS = (
     column("converged", Cell.FLAG),
     column("age_s", Cell.REAL),
     column("epoch", Cell.WHOLE),
+    column("unlocalised_s", Cell.REAL),
+    column("contradicted", Cell.FLAG),
+    column("sighting_age_s", Cell.REAL),
+    column("sighting_std_m", Cell.REAL),
 )
 
 
@@ -214,6 +218,7 @@ def _estimate_rows(message: m.Estimate) -> list[Row]:
         mean = [*entity.mean[:4], *([None] * (4 - size))]
         velocity = [*entity.velocity_m_s[:3], *([None] * (3 - len(entity.velocity_m_s)))]
         upper = [entity.covariance[row * size + col] if row < size and col < size else None for row, col in _UPPER]
-        facts = [entity.converged, entity.age_s, message.epoch]
+        trust = [entity.unlocalised_s, entity.contradicted, *(entity.sighting or (None, None))]
+        facts = [entity.converged, entity.age_s, message.epoch, *trust]
         rows.append([entity.name, entity.kind, *mean, *velocity, *upper, *facts])
     return rows

@@ -55,6 +55,23 @@ def test_searches_of_an_estimate_have_a_table() -> None:
     assert (row["target"], row["place_x_m"], row["expected_s"]) == ("turtlebot", 1.0, None)
 
 
+def test_a_table_of_estimates_tells_how_far_they_can_be_trusted() -> None:
+    estimates, _ = tables_of(t.ESTIMATE)
+    place = ("turtlebot", "target", (1.0, 2.0), (0.01, 0.0, 0.0, 0.01), (0.0, 0.0), True, 0.1)
+    for sighting, cells in (((0.4, 0.02), (0.4, 0.02)), (None, (None, None))):
+        entity = m.EntityEstimate(*place, unlocalised_s=4.0, contradicted=True, sighting=sighting)
+        row = _row(estimates, m.Estimate(header=HEADER, entities=(entity,), epoch=1))
+        assert (row["unlocalised_s"], row["contradicted"]) == (4.0, True)
+        assert (row["sighting_age_s"], row["sighting_std_m"]) == cells
+
+
+def test_each_field_of_an_estimate_is_in_its_table() -> None:
+    columns = [one.name for one in tables_of(t.ESTIMATE)[0].columns]
+    beginnings = {"mean": "x_m", "velocity_m_s": "velocity"}
+    for name in get_type_hints(m.EntityEstimate):
+        assert any(column.startswith(beginnings.get(name, name)) for column in columns), name
+
+
 def test_columns_have_the_units_that_their_names_say() -> None:
     units = {one.name: one.unit for topic in (t.CAMERA_STATUS, t.VEHICLE_STATUS) for one in tables_of(topic)[0].columns}
     assert (units["edge_px"], units["clock_drift_ppm"], units["age_ms"], units["lands_in_s"]) == (

@@ -1,6 +1,7 @@
 """Gathers the files of a run into arrays, in one pass over the relevant topics."""
 
 import math
+from array import array
 from collections import defaultdict
 from pathlib import Path
 
@@ -72,8 +73,8 @@ class _Rows:
     def __init__(self, data: RunData) -> None:
         self._data = data
         self._truth: defaultdict[str, list[tuple[float, ...]]] = defaultdict(list)
-        self._estimates: defaultdict[str, list[tuple[float, m.EntityEstimate]]] = defaultdict(list)
-        self._certainties: defaultdict[str, list[tuple[float, ...]]] = defaultdict(list)
+        self._estimates: dict[str, _EstimateRows] = {}
+        self._certainties: defaultdict[str, array[float]] = defaultdict(lambda: array("d"))
         # By sender: the supervisor reports for a process that is absent, or never reports itself.
         self._processes: defaultdict[str, defaultdict[str, list[tuple[float, ...]]]]
         self._processes = defaultdict(lambda: defaultdict(list))
@@ -110,10 +111,11 @@ class _Rows:
             case m.Estimate():
                 searched = {search.target for search in message.searches}
                 for entity in message.entities:
-                    self._estimates[entity.name].append((time_s, entity))
+                    rows = self._estimates.setdefault(entity.name, _EstimateRows(entity.kind, len(entity.mean)))
+                    rows.append(time_s, entity)
                     doubted = entity.contradicted or entity.name in searched
                     known = (time_s, entity.age_s, entity.unlocalised_s, float(doubted))
-                    self._certainties[entity.name].append(known)
+                    self._certainties[entity.name].extend(known)
             case m.ProcessStatus():
                 counters = (message.pid, message.ticks, message.overruns, message.overflowed)
                 said = self._processes[message.header.entity][message.header.source]
@@ -150,10 +152,11 @@ class _Rows:
         if self._captured:
             system = data.resolved.motion_capture.get(data.resolved.truth["from"])
             data.truth = captured_tracks(self._captured, data.vehicles, system.rate_hz if system else 30.0)
-        for name, entries in self._estimates.items():
-            data.estimates[name] = _estimate_track(entries)
-        for name, rows in self._certainties.items():
-            table = np.array(sorted(rows))
+        for name, estimates in self._estimates.items():
+            data.estimates[name] = estimates.track()
+        for name, numbers in self._certainties.items():
+            table = np.array(numbers).reshape(-1, 4)
+            table = table[np.argsort(table[:, 0], kind="stable")]
             data.certainties[name] = CertaintyTrack(table[:, 0], table[:, 1], table[:, 2], table[:, 3] > 0.5)
         for name, said in self._processes.items():
             # Never both: the supervisor's status of an absent process (no pid, ticks or CPU) is no figure of it.
@@ -171,12 +174,22 @@ class _Rows:
             maps.sort(key=lambda item: item.time_s)
 
 
-def _estimate_track(entries: list[tuple[float, m.EntityEstimate]]) -> EstimateTrack:
-    size = len(entries[0][1].mean)
-    rows = sorted(
-        ((time_s, *entity.mean, *entity.covariance) for time_s, entity in entries if len(entity.mean) == size)
-    )
-    width = 1 + size + size * size
-    table = np.array([row for row in rows if len(row) == width]).reshape(-1, width)
-    covariance = table[:, 1 + size :].reshape(-1, size, size)
-    return EstimateTrack(entries[0][1].kind, table[:, 0], table[:, 1 : 1 + size], covariance)
+class _EstimateRows:
+    """The estimates of one entity as plain numbers: as messages an hour of three takes 0.7 GB more."""
+
+    def __init__(self, kind: str, size: int) -> None:
+        self._kind, self._size = kind, size
+        self._numbers = array("d")
+
+    def append(self, time_s: float, entity: m.EntityEstimate) -> None:
+        """Take an estimate, unless its mean or covariance has another size than the first one's."""
+        if len(entity.mean) == self._size and len(entity.covariance) == self._size**2:
+            self._numbers.extend((time_s, *entity.mean, *entity.covariance))
+
+    def track(self) -> EstimateTrack:
+        """Return the arrays, in order of time."""
+        size = self._size
+        table = np.array(self._numbers).reshape(-1, 1 + size + size**2)
+        table = table[np.argsort(table[:, 0], kind="stable")]
+        covariance = table[:, 1 + size :].reshape(-1, size, size)
+        return EstimateTrack(self._kind, table[:, 0], table[:, 1 : 1 + size], covariance)

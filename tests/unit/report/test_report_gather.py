@@ -1,5 +1,6 @@
 """From the files of a run to measurements of its processes and links."""
 
+import tracemalloc
 from pathlib import Path
 
 import pytest
@@ -7,7 +8,7 @@ import pytest
 from groundstation.bus import codec, keys
 from groundstation.bus import messages as m
 from groundstation.bus.api import Sample
-from groundstation.bus.topics import ODOMETRY, PROCESS_STATUS, Topic
+from groundstation.bus.topics import ESTIMATE, ODOMETRY, PROCESS_STATUS, Topic
 from groundstation.recording.copies import recover
 from groundstation.recording.timeline import Timeline
 from groundstation.recording.writing import RunWriter
@@ -78,3 +79,21 @@ def test_a_recovered_recording_keeps_the_damage_of_its_original(tmp_path: Path) 
         (damage,) = gather(folder).damage
         assert damage.startswith("state.mcap: recovered, before: cut off at byte "), damage
         assert gather(folder).breaks_off
+
+
+def test_an_estimate_is_kept_as_plain_numbers(tmp_path: Path) -> None:
+    """As a message it took 1.2 kB, and the report of an hour a gigabyte."""
+    writer, count = _Writer(tmp_path), 2000
+    for number in (*range(count - 1, 0, -1), 0):
+        header = m.Header(NS_PER_S + number * 20_000_000, "c", "team", "tracker", number)
+        figures = tuple(float(number + i) for i in range(16))
+        entity = m.EntityEstimate("drone_1", "robot", figures[:4], figures, (0.1, 0.2, 0.3), True, 0.1)
+        wrong = m.EntityEstimate("drone_1", "robot", figures[:2], figures[:4], (0.1, 0.2), True, 0.1)
+        writer.write(ESTIMATE, m.Estimate(header=header, entities=(entity, wrong), epoch=1))
+    writer.close()
+    tracemalloc.start()
+    track = gather(tmp_path).estimates["drone_1"]
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert track.mean[:, 0].tolist() == list(range(count)) and track.covariance[7].ravel().tolist() == [*range(7, 23)]
+    assert peak < 1700 * count, "with the buffers of one file, and both entities of each message"

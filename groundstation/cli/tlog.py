@@ -53,7 +53,8 @@ def write_tlogs(run: RecordedRun, folder: Path) -> dict[Path, Log]:
     """
     logs = _logs(run)
     if not any(log.frames for log in logs.values()):
-        raise RecordingError(f"{run.paths[0].parent}: no MAVLink frames are recorded there (recording.raw_datagrams)")
+        why = "it has no MAVLink vehicle, or recording.raw_datagrams is off"
+        raise RecordingError(f"{run.paths[0].parent}: no MAVLink frames are recorded there: {why}")
     targets = {folder / f"{entity}.tlog": log for entity, log in sorted(logs.items())}
     for path in targets:
         require_absent(path)

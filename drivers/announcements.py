@@ -81,7 +81,7 @@ class Announcements:
             told = f"{name}: {view.silence}" if heard else f"{name} does not answer at {address}"
             remedy = _UNSOUND if view.unsound else "" if heard else how_to_reach(address)
             self._event(Severity.ERROR, f"{told}; trying on", remedy)
-            self._start.degrade(name, told)
+            self._start.degrade(name, told, heard=mode is not DriverMode.CONNECTING)
 
     def _tell_start(self, now_ns: int, view: VehicleView, mode: DriverMode) -> None:
         """Report READY once the vehicle may take off, or at once if it flies and needs commands."""

@@ -85,8 +85,8 @@ class HostProcess(Protocol):
     def ready(self, detail: str = "") -> None:
         """Report that the start is finished."""
 
-    def degrade(self, detail: str) -> None:
-        """Report that something is missing."""
+    def degrade(self, detail: str, works: bool = True) -> None:
+        """Report that something is missing; works: False before the vehicle was heard, so that others go on for it."""
 
     def tick_status(self, ticks: int = 0, overruns: int = 0, overflowed: int = 0) -> None:
         """Publish the process status when due."""

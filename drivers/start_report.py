@@ -15,16 +15,19 @@ class StartReport:
     def __init__(self, child: HostProcess, names: Sequence[str]) -> None:
         self._child, self._names = child, tuple(names)
         self._of: dict[str, tuple[bool, str]] = {}
+        self._unheard: frozenset[str] = frozenset()
         self._told: tuple[bool, str] | None = None
 
     def ready(self, name: str, detail: str, flies: bool) -> None:
         """Note that a vehicle is ready."""
         self._of[name] = True, detail
+        self._unheard = self._unheard - {name}
         self._tell(flies)
 
-    def degrade(self, name: str, detail: str) -> None:
-        """Note what a vehicle lacks, until it is ready."""
+    def degrade(self, name: str, detail: str, heard: bool = True) -> None:
+        """Note what a vehicle lacks, until it is ready; heard: False if it has never answered this process."""
         self._of[name] = False, detail
+        self._unheard = self._unheard - {name} if heard else self._unheard | {name}
         self._tell(at_once=True)
 
     def _tell(self, at_once: bool) -> None:
@@ -37,4 +40,7 @@ class StartReport:
         if news == self._told:
             return
         self._told = news
-        (self._child.degrade if lacks else self._child.ready)(news[1])
+        if not lacks:
+            self._child.ready(news[1])
+        else:
+            self._child.degrade(news[1], works=not (unheard or self._unheard))

@@ -205,9 +205,12 @@ class Child:
         """Declare the start finished: from now on the hang limit counts."""
         self._announce(Lifecycle.READY, detail)
 
-    def degrade(self, detail: str) -> None:
-        """Declare that the process runs but lacks something; `ready` ends it."""
-        self._announce(Lifecycle.DEGRADED, detail)
+    def degrade(self, detail: str, works: bool = True) -> None:
+        """Declare that the process runs but lacks something; `ready` ends it.
+
+        works: False for a driver that has not heard its vehicle yet: whoever sends to it meanwhile goes on.
+        """
+        self._announce(Lifecycle.DEGRADED, detail, works)
 
     def tick_status(self, ticks: int = 0, overruns: int = 0, overflowed: int = 0) -> None:
         """Remember the loop's counters and publish the status once a second; call it each turn."""
@@ -253,15 +256,15 @@ class Child:
             event = Event(header=header, severity=severity, text=text, remedy=remedy, injected=injected)
             self.bus.publish(EVENT, event)
 
-    def _announce(self, state: Lifecycle, detail: str) -> None:
+    def _announce(self, state: Lifecycle, detail: str, works: bool = True) -> None:
         if (state, detail) == (self._state, self._detail):
             return
         if detail and detail != self._detail:
             _log.info("%s: %s", state, detail)
-        self._set_state(state, detail)
+        self._set_state(state, detail, works)
         self.publish_status()
 
-    def _set_state(self, state: Lifecycle, detail: str) -> None:
+    def _set_state(self, state: Lifecycle, detail: str, works: bool = True) -> None:
         self._state, self._detail = state, detail
         if self._block is not None:
-            self._block.set_state(self.spec.heartbeat_index, SlotState[state.name])
+            self._block.set_state(self.spec.heartbeat_index, SlotState[state.name], works)

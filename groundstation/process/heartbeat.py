@@ -74,13 +74,13 @@ class HeartbeatBlock:
         """Stamp a slot with the time now."""
         self._words[slot * _WORDS_PER_SLOT + _STAMP] = time.monotonic_ns()
 
-    def set_state(self, slot: int, state: SlotState) -> None:
-        """Record the lifecycle state of this process, with a beat."""
+    def set_state(self, slot: int, state: SlotState, works: bool = True) -> None:
+        """Record the lifecycle state of this process, with a beat; works: READY or DEGRADED, it has begun its work."""
         base = slot * _WORDS_PER_SLOT
         self._words[base + _PID] = os.getpid()
         self._words[base + _STAMP] = time.monotonic_ns()
         self._words[base + _STATE] = state
-        if state in (SlotState.READY, SlotState.DEGRADED):
+        if works and state in (SlotState.READY, SlotState.DEGRADED):
             self._words[base + _WORKED] = 1
 
     def end(self, slot: int) -> None:

@@ -20,7 +20,7 @@ class FakeProcess:
     def ready(self, detail=""):
         self.states.append(f"READY {detail}")
 
-    def degrade(self, detail):
+    def degrade(self, detail, works=True):
         self.states.append(f"DEGRADED {detail}")
 
     def leave(self, number):

@@ -49,7 +49,7 @@ class HostedProcess:
     def ready(self, detail: str = "") -> None:
         """Nobody waits."""
 
-    def degrade(self, detail: str) -> None:
+    def degrade(self, detail: str, works: bool = True) -> None:
         """Nobody waits."""
 
     def note_addresses(self, addresses: Sequence[tuple[str, int]]) -> None:

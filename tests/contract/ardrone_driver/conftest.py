@@ -52,7 +52,7 @@ class Process:
     def ready(self, detail: str = "") -> None:
         self.states.append(f"READY {detail}")
 
-    def degrade(self, detail: str) -> None:
+    def degrade(self, detail: str, works: bool = True) -> None:
         self.states.append(f"DEGRADED {detail}")
 
     def note_addresses(self, addresses: object) -> None:

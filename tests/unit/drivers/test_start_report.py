@@ -8,12 +8,14 @@ from drivers.start_report import StartReport
 class Process:
     def __init__(self) -> None:
         self.states: list[str] = []
+        self.works = False
 
     def ready(self, detail: str = "") -> None:
         self.states.append(f"READY {detail}")
 
-    def degrade(self, detail: str) -> None:
+    def degrade(self, detail: str, works: bool = True) -> None:
         self.states.append(f"DEGRADED {detail}")
+        self.works = works
 
 
 def report_of(*names: str) -> tuple[Process, StartReport]:
@@ -52,3 +54,14 @@ def test_a_single_vehicle_is_ready_or_not() -> None:
     start.degrade("a", "a does not answer")
     start.ready("a", "a at x", flies=False)
     assert process.states == ["DEGRADED a does not answer", "READY a at x"]
+
+
+def test_a_process_works_only_once_it_has_heard_all_its_vehicles() -> None:
+    """Whoever sends to a vehicle after its driver's death goes on until the new driver has heard it."""
+    process, start = report_of("a", "b")
+    start.degrade("a", "a does not answer", heard=False)
+    assert not process.works
+    start.degrade("b", "b: its battery is low")
+    assert not process.works
+    start.degrade("a", "a: its battery is low")
+    assert process.works

@@ -74,9 +74,9 @@ def test_names_are_whole_in_any_terminal(world: World, width: int) -> None:
 
 def test_columns_give_way_in_the_order_that_the_page_says(world: World) -> None:
     page = " ".join((DOCS / "tutorials" / "first-demo.md").read_text("utf-8").split())
-    listed = re.search(r"goes without ([^.]*?), in this order", page)
+    listed = re.search(r"drops columns: first ([^.]*)\.", page)
     assert listed is not None
-    order = re.split(r", | and ", listed[1])
+    order = re.split(r", then |, | and ", listed[1])
     world.vehicle("drone_1")
     seen = set()
     for width in range(160, 20, -2):

@@ -46,6 +46,8 @@ def test_a_successor_inherits_nothing_but_the_silence(block: HeartbeatBlock) -> 
     assert not block.has_worked(2) and not block.has_ended(2) and block.pid(2) == block.beat_ns(2) == 0
     block.set_state(2, SlotState.STARTING)
     assert not block.has_worked(2)
+    block.set_state(2, SlotState.DEGRADED, works=False)
+    assert not block.has_worked(2)
     block.set_state(2, SlotState.DEGRADED)
     block.end(2)
     block.set_silent_since(2, 5)

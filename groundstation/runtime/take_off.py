@@ -54,14 +54,15 @@ class TakeOff:
     def __init__(
         self, drones: tuple[str, ...], limits: TakeOffLimits, now_ns: int, flying: Collection[str] = ()
     ) -> None:
-        self._waiting = [name for name in drones if name not in flying]
+        each = dict.fromkeys(drones)  # a second entry would start a drone again that was stopped
+        self._waiting = [name for name in each if name not in flying]
         self._limits = limits
         self._step_ns = now_ns
         self._step = _Step.CONNECT
         self._ordered_ns = 0
         self._refusal = ""
         self._watch = LiftOffWatch()
-        self.up = [name for name in drones if name in flying]
+        self.up = [name for name in each if name in flying]
         self.left_out: dict[str, str] = {}
         self.mistake: Mistake | None = None
 

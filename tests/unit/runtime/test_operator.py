@@ -121,6 +121,19 @@ def test_a_stop_of_one_drone_leaves_the_others_to_go_on(scene: Scene) -> None:
     assert two.heard == [Verb.TAKEOFF, Verb.TRACK]
 
 
+def test_a_drone_that_was_named_twice_does_not_start_again_after_its_stop(scene: Scene) -> None:
+    one, two = scene.add("drone_1", seen=False), scene.add("drone_2")
+    scene.pass_(0.2)
+    scene.operator.take_off(scene.now_ns, ("drone_1", "drone_1", "drone_2"))
+    scene.pass_(0.3)
+    shell = MemoryBus(scene.exchange, "lab", "cli_1")
+    command = Command(header=shell.header("team"), id="x", verb=Verb.LAND, scope=("drone_1",), issuer="cli_1")
+    shell.publish(COMMAND, command)
+    scene.pass_(20.0)
+    assert one.heard == [Verb.TAKEOFF, Verb.LAND]
+    assert two.heard == [Verb.TAKEOFF, Verb.TRACK]
+
+
 def test_unheard_order_is_repeated_with_the_same_id(scene: Scene) -> None:
     scene.add("drone_1")
     scene.pass_(0.2)

@@ -22,7 +22,7 @@ from groundstation.runtime.before_take_off import BeforeTakeOff
 from groundstation.runtime.given_orders import GivenOrders
 from groundstation.runtime.lift_off import Mistake
 from groundstation.runtime.marker_height import FixedCamera
-from groundstation.runtime.requests import Requests, is_request
+from groundstation.runtime.requests import Requests, asks_for_start, named
 from groundstation.runtime.take_off import TakeOff, TakeOffCommand, TakeOffLimits
 from groundstation.runtime.team import TeamPhase, TeamStatus
 from groundstation.time_units import NS_PER_MS
@@ -136,8 +136,8 @@ class Operator:
         self.team.update(now_ns)
         if self._checks is not None:
             self._checks.update(now_ns)
-        # Requests come last: a stop that waits behind one in the queue takes precedence.
-        for message in sorted((received.message for received in self._inbox.drain()), key=is_request):
+        # Starts come last: a stop that waits behind one in the queue takes precedence.
+        for message in sorted((received.message for received in self._inbox.drain()), key=asks_for_start):
             match message:
                 case CommandAck() as ack:
                     self._hear_ack(ack, now_ns)
@@ -161,19 +161,17 @@ class Operator:
             self._hear_stop(command, now_ns)
 
     def _hear_stop(self, stop: Command, now_ns: int) -> None:
-        if not self._is_partial(stop):
+        names = named(stop)
+        if not names or set(names) >= set(self.team.members):
             self._end_starts(stop, now_ns)
             if self.phase is not TeamPhase.LANDING:
                 if self.phase is not TeamPhase.GROUND or not self.landed(now_ns):
                     self.phase = TeamPhase.HELD if stop.verb is Verb.HOLD else TeamPhase.LANDING
                 self._say(f"{stop.verb} by {stop.issuer}")
         elif self._sequence is not None:
-            for name in stop.scope:
+            for name in names:
                 self._sequence.drop(name, f"{stop.verb} by {stop.issuer}", now_ns)
-            self._say(f"{stop.verb} {', '.join(stop.scope)} by {stop.issuer}")
-
-    def _is_partial(self, command: Command) -> bool:
-        return bool(command.scope) and not set(command.scope) >= set(self.team.members)
+            self._say(f"{stop.verb} {', '.join(names)} by {stop.issuer}")
 
     # -- requests of other shells --------------------------------------------------------------------------------
 
@@ -181,17 +179,20 @@ class Operator:
         if self._requests.answer_again(request):
             return
         self._requests.answer(request, AckStage.RECEIVED)
-        names = tuple(name for name in request.scope if name != OPERATOR)
-        why = self._requests.refusal(now_ns, request)
-        if not why and self._sequence is not None:
-            why = f"{self._sequence.current} is taking off"
-        if not why and request.verb is Verb.TAKEOFF:
-            why = self._why_not(request, names, now_ns)
+        names = named(request)
+        why = self._requests.refusal(now_ns, request) or self._why_not(request, names, now_ns)
         self._requests.answer(request, AckStage.REFUSED if why else AckStage.ACCEPTED, why)
         if not why:
             self._obey(request, names, now_ns)
 
     def _why_not(self, request: Command, names: tuple[str, ...], now_ns: int) -> str:
+        """Return why a start is impossible now, or ""; a stop is always possible."""
+        if request.verb.stops:
+            return ""
+        if self._sequence is not None:
+            return f"{self._sequence.current} is taking off"
+        if request.verb is not Verb.TAKEOFF:
+            return ""
         why = self._forbids(now_ns, names, request.issuer if request.anyway else "")
         return f"{why}. Mend it, or insist: groundstation takeoff --anyway" if why else ""
 
@@ -203,6 +204,8 @@ class Operator:
             case Verb.TRACK:
                 self.track(now_ns, names, request)
             case verb:
+                if verb.stops and self._requests.hear_stop(now_ns, request):
+                    self._hear_stop(request, now_ns)
                 self._give(verb, names, now_ns, request)
 
     # -- take-off ------------------------------------------------------------------------------------------------

@@ -6,16 +6,21 @@ from typing import Any
 from groundstation.bus import clock
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import OPERATOR, AckStage, Command, CommandAck
-from groundstation.bus.stop_mark import StopMark
+from groundstation.bus.stop_mark import StopMark, why_too_old
 from groundstation.bus.topics import COMMAND_ACK
 from groundstation.time_units import NS_PER_S
 
 _REMEMBERED = 256
 
 
-def is_request(message: object) -> bool:
-    """Return whether this is a request to the operator; other commands are for the drivers."""
-    return isinstance(message, Command) and OPERATOR in message.scope
+def asks_for_start(message: object) -> bool:
+    """Return whether this is a request to the operator to start something."""
+    return isinstance(message, Command) and OPERATOR in message.scope and not message.verb.stops
+
+
+def named(command: Command) -> tuple[str, ...]:
+    """Return the drones that a command names, once each; none: all are meant."""
+    return tuple(name for name in dict.fromkeys(command.scope) if name != OPERATOR)
 
 
 def asked_ns(start: Command | None) -> int | None:
@@ -63,7 +68,7 @@ class Requests:
         _make_room(self._heard)
         self._heard[stop.id] = None
         mark = StopMark.of(stop, now_ns, clock.clock_id())
-        for name in stop.scope or self._drones:
+        for name in named(stop) or self._drones:
             if name not in self._stops or self._stops[name].given_ns < mark.given_ns:
                 self._stops[name] = mark
         return True
@@ -74,13 +79,15 @@ class Requests:
         A shell that misses an answer repeats its request for up to a minute. It must not undo a stop that came
         meanwhile.
         """
-        names = [name for name in request.scope if name != OPERATOR]
+        names = named(request)
         strangers = [name for name in names if name not in self._drones]
         if request.run != self._bus.run:
             return f"given for another run ({request.run})"
         if strangers:
             return f"there is no drone {', '.join(strangers)}"
-        if request.verb.stops or request.header.clock != clock.clock_id():
+        if request.verb.stops:
+            return why_too_old(request, now_ns, clock.clock_id())
+        if request.header.clock != clock.clock_id():
             return ""
         if 0 < request.expires_ns <= now_ns:
             return f"given {(now_ns - request.header.stamp_ns) / NS_PER_S:.0f} s ago"

@@ -80,7 +80,7 @@ def test_a_request_goes_to_the_drones_that_it_names_alone_and_is_answered(verb):
     assert desk.stages() == [(AckStage.EFFECTIVE, "")]
 
 
-@pytest.mark.parametrize(("verb", "phase"), [(Verb.RESUME, TeamPhase.TRACKING), (Verb.HOLD, TeamPhase.GROUND)])
+@pytest.mark.parametrize(("verb", "phase"), [(Verb.RESUME, TeamPhase.TRACKING), (Verb.HOLD, TeamPhase.HELD)])
 def test_only_what_moves_drones_again_is_tracking(verb, phase):
     desk = Desk(drone_1=UP)
     desk.ask(verb, OPERATOR, "drone_1")
@@ -193,6 +193,26 @@ def test_a_stop_that_waits_behind_a_start_ends_it_before_it_is_passed_on(start):
     desk.turn()
     assert desk.orders() == []
     assert desk.stages()[-1] == (AckStage.REFUSED, "HOLD by cli_1 came after it")
+
+
+@pytest.mark.parametrize("names", [(), ("drone_1",)], ids=["all", "one"])
+def test_a_stop_that_is_asked_of_the_operator_ends_the_take_off_and_every_earlier_start(names):
+    desk = Desk(drone_1=DOWN, drone_2=DOWN)
+    desk.ask(Verb.TAKEOFF, OPERATOR, "drone_1", identity="start")
+    late = desk.command(Verb.RESUME, OPERATOR, "drone_1", identity="late", age_s=-0.05)
+    desk.turn()
+    desk.ask(Verb.LAND, OPERATOR, *names, identity="stop")
+    desk.turn(1.0)
+    desk.send(late)
+    assert {(order.verb, order.scope) for order in desk.orders() if order.verb.stops} == {(Verb.LAND, names)}
+    assert desk.orders()[-1].verb is Verb.LAND, "nothing is started any more"
+    assert desk.stages()[-1] == (AckStage.REFUSED, "LAND by cli_1 came after it")
+
+
+def test_a_stop_that_lay_somewhere_for_too_long_is_not_passed_on():
+    desk = Desk(drone_1=UP)
+    desk.send(desk.command(Verb.LAND, OPERATOR, age_s=45))
+    assert desk.stages()[-1] == (AckStage.REFUSED, "given 45 s ago") and desk.orders() == []
 
 
 def test_drivers_are_told_when_a_start_was_asked_for():

@@ -1,6 +1,9 @@
 """How far one command has come at each drone: sent, received, accepted, effective, refused, or not confirmed."""
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
+
+from msgspec import structs
 
 from groundstation.bus.messages import AckStage, Command, CommandAck
 
@@ -52,6 +55,19 @@ class AwaitedAnswers:
             return False
         progress.stage, progress.reason = ack.stage, ack.reason
         return True
+
+    def leave_out(self, drones: Collection[str], why: str) -> tuple[str, ...]:
+        """Let the command go on without some drones, which count as having refused it; returns the others.
+
+        If there are no others, the command stays as it is: an empty scope would address all.
+        """
+        for name, progress in self.progress.items():
+            if name in drones and not progress.settled:
+                progress.stage, progress.reason = AckStage.REFUSED, why
+        others = tuple(name for name in self.command.scope or self.drones if name not in drones)
+        if others:
+            self.command = structs.replace(self.command, scope=others)
+        return others
 
     @property
     def unheard(self) -> tuple[str, ...]:

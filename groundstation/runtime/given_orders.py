@@ -1,6 +1,6 @@
 """The orders that an operator gave and that are still followed, until they are confirmed or given up."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 
 from groundstation.bus.api import Bus
@@ -74,13 +74,17 @@ class GivenOrders:
                 self._say(line)
         return bool(answered)
 
-    def end_starts(self, why: str) -> None:
-        """Follow starts no more, and refuse the requests behind them."""
-        starts = [order for order in self._orders if not order.book.command.verb.stops]
-        for order in starts:
+    def end_starts(self, why: str, drones: Collection[str] = ()) -> None:
+        """Repeat starts no more to stopped drones (none given: to any); refuse requests of which nothing is left.
+
+        A driver that was restarted has forgotten the stop, and would obey the repetition.
+        """
+        for order in [order for order in self._orders if not order.book.command.verb.stops]:
+            if drones and order.book.leave_out(drones, why):
+                continue
+            self._orders.remove(order)
             if order.request is not None:
                 self._requests.answer(order.request, AckStage.REFUSED, why)
-        self._orders = [order for order in self._orders if order not in starts]
 
     def follow(self, now_ns: int) -> None:
         """Repeat orders that were not answered; close those that are settled or timed out."""

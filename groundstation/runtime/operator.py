@@ -114,7 +114,7 @@ class Operator:
 
     def _end_starts(self, stop: Command, now_ns: int) -> None:
         """Cancel starts for a stop of the whole team, and answer the shells that requested them."""
-        why = StopMark.of(stop, now_ns, clock.clock_id()).words
+        why = _why_ended(stop, now_ns)
         if self._sequence_request is not None:
             self._requests.answer(self._sequence_request, AckStage.REFUSED, why)
         self._sequence, self._sequence_request = None, None
@@ -168,7 +168,9 @@ class Operator:
                 if self.phase is not TeamPhase.GROUND or not self.landed(now_ns):
                     self.phase = TeamPhase.HELD if stop.verb is Verb.HOLD else TeamPhase.LANDING
                 self._say(f"{stop.verb} by {stop.issuer}")
-        elif self._sequence is not None:
+            return
+        self._given.end_starts(_why_ended(stop, now_ns), names)
+        if self._sequence is not None:
             for name in names:
                 self._sequence.drop(name, f"{stop.verb} by {stop.issuer}", now_ns)
             self._say(f"{stop.verb} {', '.join(names)} by {stop.issuer}")
@@ -252,3 +254,7 @@ class Operator:
             self._requests.answer(request, AckStage.REFUSED if missing else AckStage.EFFECTIVE, missing)
         if self._then_track and sequence.up and sequence.mistake is None:
             self.track(now_ns, tuple(sequence.up))
+
+
+def _why_ended(stop: Command, now_ns: int) -> str:
+    return StopMark.of(stop, now_ns, clock.clock_id()).words

@@ -195,6 +195,26 @@ def test_a_stop_that_waits_behind_a_start_ends_it_before_it_is_passed_on(start):
     assert desk.stages()[-1] == (AckStage.REFUSED, "HOLD by cli_1 came after it")
 
 
+@pytest.mark.parametrize(("start", "goes_on"), [(Verb.TAKEOFF, []), (Verb.TRACK, [("drone_2",)])])
+def test_a_start_is_repeated_no_more_to_a_drone_that_was_stopped_alone(start, goes_on):
+    """Its driver may be restarted meanwhile, and has then forgotten the stop."""
+    desk = Desk(**dict.fromkeys(("drone_1", "drone_2"), DOWN if start is Verb.TAKEOFF else UP))
+    desk.ask(start, OPERATOR, *(("drone_1",) if start is Verb.TAKEOFF else ()), identity="start")
+    begun = desk.orders()
+    desk.send(desk.command(Verb.LAND, "drone_1", identity="stop"))
+    desk.turn(1.5)
+    repeated = desk.orders()[len(begun) :]
+    assert [order.scope for order in repeated] == goes_on
+    assert {order.id for order in repeated} <= {order.id for order in begun}
+    bus, _ = desk.drones["drone_2"]
+    for order in repeated:
+        ack = CommandAck(header=bus.header("drone_2"), command_id=order.id, verb=start, stage=AckStage.EFFECTIVE)
+        bus.publish(COMMAND_ACK, ack)
+    desk.turn()
+    stage, reason = desk.stages()[-1]
+    assert stage is AckStage.REFUSED and reason.startswith("drone_1: ") and "LAND by cli_1" in reason
+
+
 @pytest.mark.parametrize("names", [(), ("drone_1",)], ids=["all", "one"])
 def test_a_stop_that_is_asked_of_the_operator_ends_the_take_off_and_every_earlier_start(names):
     desk = Desk(drone_1=DOWN, drone_2=DOWN)

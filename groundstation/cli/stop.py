@@ -12,14 +12,15 @@ from typing import Any
 
 import click
 
+from groundstation.bus.api import Received
 from groundstation.bus.messages import OPERATOR, AckStage, CommandAck, Verb
 from groundstation.bus.roles import Role
-from groundstation.bus.topics import COMMAND, COMMAND_ACK
+from groundstation.bus.topics import COMMAND, COMMAND_ACK, LEASE
 from groundstation.bus.zenoh_bus import ZenohBus
 from groundstation.cli.exits import ExitCode, UnreachableError
 from groundstation.errors import GroundStationError, OperatorMistake
 from groundstation.runtime.acknowledgements import NOT_CONFIRMED, AwaitedAnswers
-from groundstation.runtime.asking import command_of, patience_s
+from groundstation.runtime.asking import by_clock_of, command_of, patience_s
 from groundstation.supervisor import runtime_file
 from groundstation.supervisor.joining import join
 from groundstation.supervisor.runtime_file import RuntimeRecord
@@ -101,12 +102,24 @@ def order(verb: Verb, drones: tuple[str, ...], run: str | None, as_json: bool, a
         return _without_router(verb, record, as_json, error)
     try:
         asked = (drones or record.drones) if verb.stops else (OPERATOR,)
-        book = AwaitedAnswers(command_of(bus, verb, drones, 1, anyway), asked)
+        command = command_of(bus, verb, drones, 1, anyway)
+        if record.host and not verb.stops:
+            command = by_clock_of(_lease(bus), command)
+        book = AwaitedAnswers(command, asked)
         say: Callable[[str], None] = (lambda _: None) if as_json else click.echo
         deliver(bus, book, patience_s(verb), say)
     finally:
         bus.close()
     return _report(book, as_json)
+
+
+def _lease(bus: ZenohBus) -> Received:
+    """Return the operator's next lease; raises UnreachableError if none comes."""
+    leases = bus.subscribe([LEASE], newest=True)
+    leases.wait(_CONNECT_S)
+    for received in leases.drain():
+        return received
+    raise UnreachableError("the ground station's router answers, but not its operator: look at its own terminal")
 
 
 def _report(book: AwaitedAnswers, as_json: bool) -> int:

@@ -1,6 +1,8 @@
 """Commands that a page or a shell gives to the team, and how long their answers may take."""
 
-from groundstation.bus.api import Bus
+from msgspec import structs
+
+from groundstation.bus.api import Bus, Received
 from groundstation.bus.messages import OPERATOR, Command, Verb
 from groundstation.time_units import NS_PER_S
 
@@ -37,3 +39,14 @@ def command_of(
         run=bus.run,
         anyway=anyway,
     )
+
+
+def by_clock_of(lease: Received, start: Command) -> Command:
+    """Return a start of this host, stamped on the clock of a lease that was received here from the run's host.
+
+    The stamp is early by the time that the lease was on its way, so no start passes for younger than it is.
+    """
+    shift_ns = lease.header.stamp_ns - lease.arrived_ns
+    stamp_ns = start.header.stamp_ns + shift_ns
+    header = structs.replace(start.header, stamp_ns=stamp_ns, clock=lease.header.clock)
+    return structs.replace(start, header=header, expires_ns=start.expires_ns + shift_ns)

@@ -24,13 +24,11 @@ def named(command: Command) -> tuple[str, ...]:
 
 
 def asked_ns(start: Command | None) -> int | None:
-    """Return when a start was requested [ns; our boot clock]; None for other commands, and for stamps of another clock.
+    """Return when a start was requested [ns; our boot clock]; None for other commands.
 
     Drivers need it to refuse a start that is older than a stop that they received.
     """
-    if start is None or start.verb.stops or start.header.clock != clock.clock_id():
-        return None
-    return start.header.stamp_ns
+    return None if start is None or start.verb.stops else start.header.stamp_ns
 
 
 class Requests:
@@ -77,7 +75,7 @@ class Requests:
         """Return why a request is refused, or "".
 
         A shell that misses an answer repeats its request for up to a minute. It must not undo a stop that came
-        meanwhile.
+        meanwhile, so a start whose time is unknown is refused (`asking.by_clock_of`).
         """
         names = named(request)
         strangers = [name for name in names if name not in self._drones]
@@ -88,7 +86,7 @@ class Requests:
         if request.verb.stops:
             return why_too_old(request, now_ns, clock.clock_id())
         if request.header.clock != clock.clock_id():
-            return ""
+            return "nobody knows here when it was given: install this version on the host that it was given on, too"
         if 0 < request.expires_ns <= now_ns:
             return f"given {(now_ns - request.header.stamp_ns) / NS_PER_S:.0f} s ago"
         return self.overtaken(request.header.stamp_ns, names)

@@ -7,15 +7,19 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec import structs
 
-from groundstation.bus.messages import AckStage, Command, CommandAck
-from groundstation.bus.topics import COMMAND, COMMAND_ACK
+from groundstation.bus.messages import AckStage, Command, CommandAck, Header, Lease, Verb
+from groundstation.bus.topics import COMMAND, COMMAND_ACK, LEASE
 from groundstation.bus.zenoh_bus import open_bus, open_router
+from groundstation.cli import stop
+from groundstation.cli.exits import UnreachableError
 from groundstation.supervisor import runtime_file
 from groundstation.supervisor.runtime_file import ProcessRecord, RuntimeRecord
 
@@ -133,6 +137,47 @@ def test_take_off_is_asked_of_the_operator_alone(team: FakeTeam) -> None:
     result = cli("takeoff", "--json")
     assert result.returncode == 0, result.stdout + result.stderr
     assert all(command.scope == ("operator",) for command in team.heard)
+
+
+def test_a_start_from_another_host_is_stamped_by_the_clock_of_the_run(
+    team: FakeTeam, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By its own clock nobody could tell whether a stop came after it."""
+    ahead_ns = 895 * 10**9
+    team.buses["operator"] = operator = open_bus(team.endpoint, "lab", "operator")
+    team.answers["operator"] = FULL
+    team.commands["operator"] = operator.subscribe([COMMAND])
+    (record,) = runtime_file.live_records()
+    monkeypatch.setattr(stop, "choose_run", lambda _run, stops: structs.replace(record, host="laptop"))
+    silent = threading.Event()
+
+    def renew() -> None:
+        while not silent.wait(0.1):
+            header = Header(time.monotonic_ns() + ahead_ns, "run", "team", "operator", 0)
+            operator.publish(LEASE, Lease(header=header, holder="operator", expires_ns=header.stamp_ns))
+
+    renewing = threading.Thread(target=renew)
+    renewing.start()
+    given_ns = time.monotonic_ns() + ahead_ns
+    try:
+        assert stop.order(Verb.RESUME, (), None, as_json=True) == 0
+    finally:
+        silent.set()
+        renewing.join()
+    start = team.heard[-1]
+    assert start.header.clock == "run" and start.expires_ns - start.header.stamp_ns == 5 * 10**9
+    assert given_ns - 10**8 < start.header.stamp_ns < time.monotonic_ns() + ahead_ns
+
+
+def test_a_start_from_another_host_is_not_sent_where_no_operator_is_heard(
+    team: FakeTeam, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (record,) = runtime_file.live_records()
+    monkeypatch.setattr(stop, "choose_run", lambda _run, stops: structs.replace(record, host="laptop"))
+    monkeypatch.setattr(stop, "_CONNECT_S", 0.5)
+    with pytest.raises(UnreachableError, match="not its operator"):
+        stop.order(Verb.TAKEOFF, (), None, as_json=True)
+    assert team.heard == []
 
 
 def test_nothing_runs(runtime: Path) -> None:

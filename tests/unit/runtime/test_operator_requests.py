@@ -1,12 +1,15 @@
 """Requests of other shells to the operator, and the recipients of the commands; each goes only to the named drones."""
 
+from dataclasses import replace
+
 import pytest
 from msgspec import structs
 
 from groundstation.bus import clock
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import OPERATOR, AckStage, Command, CommandAck, FlightState, VehicleStatus, Verb
-from groundstation.bus.topics import COMMAND, COMMAND_ACK, VEHICLE_STATUS
+from groundstation.bus.topics import COMMAND, COMMAND_ACK, LEASE, VEHICLE_STATUS
+from groundstation.runtime.asking import by_clock_of
 from groundstation.runtime.operator import Operator
 from groundstation.runtime.take_off import TakeOffLimits
 from groundstation.runtime.team import TeamPhase
@@ -233,6 +236,39 @@ def test_a_stop_that_lay_somewhere_for_too_long_is_not_passed_on():
     desk = Desk(drone_1=UP)
     desk.send(desk.command(Verb.LAND, OPERATOR, age_s=45))
     assert desk.stages()[-1] == (AckStage.REFUSED, "given 45 s ago") and desk.orders() == []
+
+
+def of_another_host(desk, start, identity):
+    """Return a start given now on a host whose clock is 895 s ahead, and the same by the clock of a lease it heard."""
+    ahead_ns = 895 * S
+    leases = desk.shell.subscribe([LEASE], newest=True)
+    desk.turn(0.5)
+    (lease,) = leases.drain()
+    here = desk.command(start, OPERATOR, identity=identity, lives_s=5)
+    header = structs.replace(here.header, stamp_ns=here.header.stamp_ns + ahead_ns, clock="another host's")
+    there = structs.replace(here, header=header, expires_ns=here.expires_ns + ahead_ns)
+    arrived_ns = lease.header.stamp_ns + ahead_ns + 20_000_000  # the lease was on its way for 20 ms
+    return there, by_clock_of(replace(lease, arrived_ns=arrived_ns), there)
+
+
+@pytest.mark.parametrize("late_s", [0.2, 3.0, 20.0])
+@pytest.mark.parametrize("start", [Verb.TAKEOFF, Verb.TRACK, Verb.RESUME])
+def test_a_start_of_another_host_undoes_no_later_stop_however_late_it_arrives(start, late_s):
+    desk = Desk(drone_1=DOWN if start is Verb.TAKEOFF else UP)
+    unknown, late = of_another_host(desk, start, "late")
+    assert (late.header.clock, late.expires_ns - late.header.stamp_ns) == (clock.clock_id(), 5 * S)
+    assert desk.now_ns - late.header.stamp_ns == 20_000_000, "never younger than it is"
+    desk.turn(0.1)
+    desk.send(desk.command(Verb.HOLD, identity="stop"))
+    desk.turn(late_s)
+    for given in (late, structs.replace(unknown, id="of an older version")):
+        desk.send(given)
+        stage, reason = desk.stages()[-1]
+        assert stage is AckStage.REFUSED and ("came after it" in reason or "given" in reason)
+    assert desk.orders() == []
+    _, anew = of_another_host(desk, start, "anew")
+    desk.send(anew)
+    assert desk.stages()[-1] == (AckStage.ACCEPTED, "") and desk.orders()[-1].verb is start
 
 
 def test_drivers_are_told_when_a_start_was_asked_for():

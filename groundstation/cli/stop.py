@@ -8,6 +8,7 @@ import os
 import signal
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import click
@@ -91,11 +92,24 @@ def signal_drivers(record: RuntimeRecord) -> list[str]:
 
 
 def order(verb: Verb, drones: tuple[str, ...], run: str | None, as_json: bool, anyway: bool = False) -> int:
-    """Carry out one verb; returns the exit code."""
+    """Carry out one verb; returns the exit code.
+
+    A stop goes to the drones that exist even if others are named as well; that is told, and never OK.
+    """
     record = choose_run(run, stops=verb.stops)
-    strangers = [name for name in drones if name not in record.drones]
+    known = tuple(name for name in drones if name in record.drones)
+    strangers = [name for name in drones if name not in known]
     if strangers:
-        raise OperatorMistake(f"there is no drone {', '.join(strangers)}, there are: {', '.join(record.drones)}")
+        mistake = f"there is no drone {', '.join(strangers)}, there are: {', '.join(record.drones)}"
+        if not (verb.stops and known):
+            raise OperatorMistake(mistake)
+        with suppress(OSError):  # the terminal is gone; the others are stopped all the same
+            click.echo(f"{mistake}; the others are ordered to {verb}", err=True)
+    code = _order(verb, known, record, as_json, anyway)
+    return ExitCode.FAULT if strangers else code
+
+
+def _order(verb: Verb, drones: tuple[str, ...], record: RuntimeRecord, as_json: bool, anyway: bool) -> int:
     try:
         bus = join(record, "cli", Role.CLI, timeout_s=_CONNECT_S)
     except GroundStationError as error:
@@ -170,7 +184,10 @@ def _verb(verb: Verb, text: str) -> click.Command:
         insist = click.option("--anyway", is_flag=True, help="Take off even if a check forbids it; this is recorded.")
         callback = insist(callback)
     example = f"\n\n\b\nExamples:\n  groundstation {name}\n  groundstation {name} drone_1 --json"
-    codes = "\n\nExit codes: 0 confirmed, 3 nothing is running, 4 not confirmed."
+    wrong, part = (
+        ("no name is a drone's", ", or one name is no drone's") if verb.stops else ("a name is no drone's", "")
+    )
+    codes = f"\n\nExit codes: 0 confirmed, 2 {wrong}, 3 nothing is running, 4 not confirmed{part}."
     return click.command(name=name, help=text + example + codes)(callback)
 
 

@@ -123,6 +123,21 @@ def test_named_drone_only(team: FakeTeam) -> None:
     assert result.returncode == 2 and "there is no drone drone_9" in result.stderr
 
 
+@pytest.mark.parametrize("verb", ["land", "hold", "cut-motors"])
+def test_a_mistyped_name_keeps_no_other_drone_from_stopping(team: FakeTeam, verb: str) -> None:
+    """In an emergency nobody types twice."""
+    result = cli(verb, "drone_9", "drone_2", "--json", *(["--yes"] if verb == "cut-motors" else []))
+    assert result.returncode == 4, "a drone that was meant flies on"
+    assert set(answers_of(result)) == {"drone_2"}
+    assert team.heard and all(command.scope == ("drone_2",) for command in team.heard)
+    assert "there is no drone drone_9, there are: drone_1, drone_2" in result.stderr
+
+
+def test_a_mistyped_name_starts_nobody(team: FakeTeam) -> None:
+    result = cli("takeoff", "drone_9", "drone_2")
+    assert result.returncode == 2 and "there is no drone drone_9" in result.stderr and not team.heard
+
+
 def test_cutting_the_motors_asks(team: FakeTeam) -> None:
     assert cli("cut-motors", given="n\n").returncode == 130
     assert team.heard == []

@@ -6,6 +6,8 @@ import threading
 import time
 
 _STDOUT = 1
+# Names of members and texts of devices may hold sequences that clear or forge a terminal's lines.
+_CONTROLS = dict.fromkeys({*range(0x20), *range(0x7F, 0xA0)} - {*b"\n\t"}, "\N{REPLACEMENT CHARACTER}")
 
 
 class Terminal:
@@ -20,12 +22,12 @@ class Terminal:
         self._thread.start()
 
     def say(self, text: str) -> None:
-        """Show a line; drops it if the terminal accepts none."""
+        """Show a line, without control characters but line ends; drops it if the terminal accepts none."""
         if self.muted:
             self._kept = [*self._kept[-200:], text]
             return
         try:
-            self._lines.put_nowait(text.encode(errors="replace") + b"\n")
+            self._lines.put_nowait(text.translate(_CONTROLS).encode(errors="replace") + b"\n")
         except queue.Full:
             return
 

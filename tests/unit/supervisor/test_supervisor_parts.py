@@ -146,6 +146,16 @@ def test_stopped_terminal_blocks_nobody() -> None:
     os.close(write)
 
 
+def test_a_line_moves_no_cursor_and_colours_nothing() -> None:
+    read, write = os.pipe()
+    terminal = Terminal(write)
+    terminal.say("LAND by \x1b[2Jcli\r\x9b1m\x07\x7f\nµ")
+    terminal.flush()
+    assert os.read(read, 100).decode() == "LAND by �[2Jcli��1m��\nµ\n"
+    os.close(read)
+    os.close(write)
+
+
 def test_muted_lines_come_later() -> None:
     read, write = os.pipe()
     terminal = Terminal(write)

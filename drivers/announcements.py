@@ -24,6 +24,7 @@ _INTRUSIONS = {
     "foreign_address": "datagrams from another address",
     "setpoint_other_source": "setpoints of another sender",
     "setpoint_epoch_leap": "setpoints of an epoch far ahead",
+    "overflow": "orders and leases unread, as too many came at once (a member of the run floods it)",
     "lease_held": "operator leases of another sender",
 }
 

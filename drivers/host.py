@@ -14,6 +14,7 @@ from drivers.start_report import StartReport
 from drivers.watchdog import Watchdog
 from drivers.watchdog_types import Ack, Action, DriverMode, Upstream, VehicleView, WatchdogDecision, WatchdogLimits
 from groundstation.bus import clock
+from groundstation.bus.api import Sample, decode_sample
 from groundstation.bus.messages import (
     AIRBORNE,
     OPERATOR,
@@ -26,6 +27,7 @@ from groundstation.bus.messages import (
     VelocitySetpoint,
 )
 from groundstation.bus.topics import COMMAND, COMMAND_ACK, ESTIMATE, LEASE, SETPOINT, VEHICLE_STATUS
+from groundstation.errors import MessageError
 from groundstation.process.priority import go_first
 from groundstation.time_units import NEVER_NS, NS_PER_MS, NS_PER_S
 
@@ -50,6 +52,7 @@ class VehicleHost:
         self._bus = child.bus
         self._setpoints = self._bus.subscribe([SETPOINT], entity=vehicle.name, newest=True)
         self._commands = self._bus.subscribe([COMMAND], capacity=256)
+        self._commands.admits = self._is_for_it  # many orders to others must not displace a LAND
         self._leases = self._bus.subscribe([LEASE], capacity=64)
         self._ignored: Counter[str] = Counter()
         self._next_status_ns = self._next_flush_ns = self._turned_ns = 0
@@ -69,6 +72,11 @@ class VehicleHost:
     def call_on_setpoints(self, wake: Callable[[], None]) -> None:
         """Have a function called, on the network's thread, whenever a setpoint arrives."""
         self._setpoints.on_arrival = wake
+
+    @property
+    def overflowed(self) -> int:
+        """Return how many orders and leases were dropped unread."""
+        return self._commands.overflowed + self._leases.overflowed
 
     def due_ns(self) -> int:
         """Return when a setpoint or command requires a turn; a flood of commands waits a little."""
@@ -177,11 +185,18 @@ class VehicleHost:
         total: Counter[str] = Counter()
         for name, subscription in (("setpoint", self._setpoints), ("command", self._commands), ("lease", self._leases)):
             total.update({f"{name}_{reason}": n for reason, n in subscription.refused.items()})
-        return total
+        return total + Counter(overflow=self.overflowed)
+
+    def _is_for_it(self, sample: Sample) -> bool:
+        """Return whether an order is addressed to this vehicle, or is malformed, which is counted later; any thread."""
+        try:
+            message = decode_sample(sample).message
+        except MessageError:
+            return True
+        scope = message.scope if isinstance(message, Command) else ()
+        return OPERATOR not in scope and (not scope or self.vehicle.name in scope)
 
     def _command(self, now_ns: int, command: Command) -> None:
-        if OPERATOR in command.scope or (command.scope and self.vehicle.name not in command.scope):
-            return
         self._refuse_strangers(now_ns, command)
         for ack in self.watchdog.accept_command(now_ns, command):
             self._answer(ack)
@@ -250,7 +265,7 @@ def run_hosts(
         for host in hosts:
             host.turn(now_ns)
         child.beat()
-        child.tick_status(tick, overruns)
+        child.tick_status(tick, overruns, sum(host.overflowed for host in hosts))
         if all(host.is_finished(now_ns) for host in hosts):
             break
         deadline_ns += period_ns

@@ -50,7 +50,8 @@ class Subscription:
     """A bounded queue between the network thread (which only enqueues) and the loop that drains it.
 
     With `newest=True` it keeps the newest sample per key instead. Overflows and refusals are counted. on_arrival:
-    called by the network thread after each sample; it must not block.
+    called by the network thread after each sample; it must not block. admits: judged by that thread before a sample is
+    enqueued, where samples for others must not displace any; it must not raise.
     """
 
     def __init__(self, capacity: int = 4096, newest: bool = False) -> None:
@@ -59,11 +60,14 @@ class Subscription:
         self._arrived = threading.Event()
         self._lock = threading.Lock()
         self.on_arrival: Callable[[], None] | None = None
+        self.admits: Callable[[Sample], bool] | None = None
         self.overflowed = 0
         self.refused: Counter[str] = Counter()
 
     def offer(self, sample: Sample) -> None:
         """Enqueue from any thread; drops and counts the oldest when full."""
+        if self.admits is not None and not self.admits(sample):
+            return
         with self._lock:
             if self._newest is not None:
                 self._newest[sample.key] = sample

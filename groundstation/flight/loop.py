@@ -93,6 +93,9 @@ class Flight:
     def _turn(self, operator: Operator) -> int:
         self._supervisor.step()
         now_ns = time.monotonic_ns()
+        for process in self._supervisor.processes:
+            if process.spec.role == "driver" and process.left_when_told():
+                operator.heed_signal(process.spec.name, now_ns)
         operator.step(now_ns)
         return now_ns
 

@@ -108,6 +108,26 @@ class Operator:
             self._requests.hear_stop(now_ns, stop)
             self._end_starts(stop, now_ns)
 
+    def heed_signal(self, driver: str, now_ns: int) -> None:
+        """Let no start go on after somebody signalled a driver to land and end, as shells do that reach no router.
+
+        What of such a stop concerns other drivers was lost, so it counts for the team; drones in the air fly on.
+        """
+        stop = Command(
+            header=self._bus.header(TEAM, now_ns),
+            id=f"signal-{driver}-{now_ns}",
+            verb=Verb.LAND,
+            scope=(),
+            issuer=f"a signal to {driver}",
+            run=self._bus.run,
+        )
+        self._requests.hear_stop(now_ns, stop)
+        self._end_starts(stop, now_ns)
+        if self.phase is TeamPhase.TAKING_OFF:
+            flew = self._phase_before in _IN_THE_AIR and not self.landed(now_ns)
+            self.phase = self._phase_before if flew else TeamPhase.LANDING
+        self._say(f"{driver}'s driver was told by a signal to land and end: no earlier order starts anything")
+
     def landed(self, now_ns: int) -> bool:
         """Return whether no drone is in the air, as far as the drones report."""
         return not self.team.airborne(now_ns)

@@ -36,6 +36,7 @@ class ManagedProcess:
         self.restart_due_ns: int | None = None
         self.kill_reason = ""
         self.detail = self.farewell = ""
+        self._left_when_told = False
         self._waited: tuple[int, int] | None = None
         self._failures = 0
 
@@ -123,8 +124,14 @@ class ManagedProcess:
         os.close(self.pidfd)
         self._handle, self.pidfd = None, -1
         self.silent_since_ns = self.judge_silence(0, 0, 0, gone=True)
+        self._left_when_told = self._block.has_ended(self.slot)
         self._block.clear(self.slot)
         return code
+
+    def left_when_told(self) -> bool:
+        """Return, once for each such end, whether it ended in order: during a run only a signal does that."""
+        told, self._left_when_told = self._left_when_told, False
+        return told
 
     def abandon(self) -> None:
         """Forget a process that even SIGKILL does not end; the kernel ends it when it can."""

@@ -16,6 +16,7 @@ from groundstation.flight.flight_plan import FlightPlan
 from groundstation.flight.loop import Flight
 from groundstation.flight.run_folder import make_run_dir
 from groundstation.runtime.take_off import TakeOffLimits
+from groundstation.supervisor.managed_process import ManagedProcess
 from groundstation.supervisor.start import Interrupted, Start
 from groundstation.supervisor.supervisor import Supervisor
 from groundstation.supervisor.terminal import Terminal
@@ -32,6 +33,7 @@ class Stage:
         self.interrupts = SimpleNamespace(stop_requested=not failure, hurry=False)
         self.failure, self._state, self._start = failure, state, start
         self.unwell: list[str] = []
+        self.processes: tuple[ManagedProcess, ...] = ()
         self.ends: list[m.Event] = []
 
     def start(self) -> None:

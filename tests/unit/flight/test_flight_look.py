@@ -62,6 +62,7 @@ class Broken:
         self.run = SimpleNamespace(drones=("drone_1",))
         self.interrupts = SimpleNamespace(stop_requested=False, hurry=False)
         self.failure, self.unwell, self._why = "", list[str](), failure
+        self.processes = ()
         self._turns = 0
 
     def step(self) -> None:

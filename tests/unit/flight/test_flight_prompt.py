@@ -43,7 +43,7 @@ class Waiting:
         self._orders = self._drone.subscribe([t.COMMAND])
         self.run = SimpleNamespace(drones=("drone_1",))
         self.interrupts = SimpleNamespace(stop_requested=False, hurry=False)
-        self.failure, self.unwell = "", list[str]()
+        self.failure, self.unwell, self.processes = "", list[str](), tuple[object, ...]()
         self.said: list[str] = []
         self.heard: list[m.Verb] = []
         self._pressed, self._typed = pressed, typed
@@ -112,6 +112,16 @@ def test_a_run_that_asks_nobody_does_not_take_off_after_a_stop(keyboard: Ends, s
     outcome = flown(waiting, asks=False)
     assert outcome.failure == f"nobody took off: {stop} by console came after it"
     assert m.Verb.TAKEOFF not in waiting.heard
+
+
+@pytest.mark.parametrize("role", ["driver", "camera"])
+def test_a_driver_that_somebody_signalled_counts_as_a_stop(keyboard: Ends, role: str) -> None:
+    waiting = Waiting(keyboard, m.Verb.HOLD, typed=b"")
+    ends = iter([False, True])
+    spec = SimpleNamespace(name="drone_1", role=role)
+    waiting.processes = (SimpleNamespace(spec=spec, left_when_told=lambda: next(ends, False)),)
+    flown(waiting, asks=True)
+    assert any("drone_1's driver was told by a signal to land" in line for line in waiting.said) is (role == "driver")
 
 
 @pytest.mark.parametrize("start", [m.Verb.TRACK, m.Verb.RESUME])

@@ -218,6 +218,27 @@ def test_a_start_is_repeated_no_more_to_a_drone_that_was_stopped_alone(start, go
     assert stage is AckStage.REFUSED and reason.startswith("drone_1: ") and "LAND by cli_1" in reason
 
 
+@pytest.mark.parametrize("flies", [False, True], ids=["all stand", "one flies"])
+def test_a_driver_that_somebody_signalled_ends_every_start_of_the_team(flies):
+    """`groundstation land` signals the drivers of its host if no router answers; those of other hosts it cannot."""
+    desk = Desk(drone_1=DOWN, drone_2=DOWN, drone_3=UP if flies else DOWN)
+    if flies:
+        desk.operator.track(desk.now_ns)
+        desk.confirm(*DONE)
+    late = desk.command(Verb.TRACK, OPERATOR, identity="late")
+    desk.ask(Verb.TAKEOFF, OPERATOR, "drone_1", "drone_2", identity="start")
+    begun = desk.orders()
+    desk.operator.heed_signal("drone_1", desk.now_ns)
+    assert desk.stages()[-1] == (AckStage.REFUSED, "LAND by a signal to drone_1 came after it")
+    assert desk.operator.phase is (TeamPhase.TRACKING if flies else TeamPhase.LANDING)
+    for _ in range(200):
+        desk.turn()
+    desk.send(late)
+    assert desk.orders() == begun and desk.stages()[-1][0] is AckStage.REFUSED
+    desk.ask(Verb.TAKEOFF, OPERATOR, "drone_1", identity="anew")
+    assert desk.stages()[-1] == (AckStage.ACCEPTED, "")
+
+
 @pytest.mark.parametrize("names", [(), ("drone_1",)], ids=["all", "one"])
 def test_a_stop_that_is_asked_of_the_operator_ends_the_take_off_and_every_earlier_start(names):
     desk = Desk(drone_1=DOWN, drone_2=DOWN)

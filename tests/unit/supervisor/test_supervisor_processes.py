@@ -41,6 +41,22 @@ def test_restarts_a_killed_process_with_a_new_epoch(make: Callable[..., Supervis
     assert "epoch 7\n" in log and "epoch 8\n" in log
 
 
+@pytest.mark.parametrize(("number", "told"), [(signal.SIGTERM, True), (signal.SIGKILL, False)])
+def test_a_driver_that_somebody_told_to_end_is_known_once_from_one_that_died(
+    make: Callable[..., Supervisor], number: int, told: bool
+) -> None:
+    supervisor = make(spec("drone_1", "obedient"))
+    start(supervisor)
+    driver = supervisor.processes[1]
+    pid = driver.pid
+    assert not driver.left_when_told()
+    os.kill(pid, number)
+    until(supervisor, lambda: not driver.running)
+    assert driver.left_when_told() is told and not driver.left_when_told()
+    until(supervisor, lambda: driver.is_up and driver.pid != pid)
+    assert not driver.left_when_told()
+
+
 def test_even_a_first_restart_waits_where_the_table_says_so(make: Callable[..., Supervisor]) -> None:
     supervisor = make(spec("relay", "obedient", restart_delay_s=0.5))
     start(supervisor)

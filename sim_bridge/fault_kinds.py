@@ -94,7 +94,7 @@ RULES: dict[FaultKind, KindRules] = {
     FaultKind.HEADING_DRIFTING: KindRules(Part.VEHICLE, (-90.0, 90.0), 1.0),
     FaultKind.HEADING_JUMPING: KindRules(Part.VEHICLE, (-180.0, 180.0), 30.0),
     FaultKind.BATTERY_STUCK: KindRules(Part.VEHICLE, (0.0, 1.0), 1.0),
-    FaultKind.UNIFORM_FLOOR: KindRules(Part.ABLE_VEHICLE),
+    FaultKind.UNIFORM_FLOOR: KindRules(Part.ABLE_VEHICLE, (0.0, 2.0), 0.0),
     FaultKind.OBSTACLE_BELOW: KindRules(Part.ABLE_VEHICLE, (0.0, 2.0), 0.4),
     FaultKind.WIND: KindRules(Part.VEHICLE, (0.0, 5.0), 1.0),
     FaultKind.IDS_SWAPPED: KindRules(Part.VEHICLE, other=True),
@@ -126,16 +126,17 @@ class Fault(Section):
     velocity_scaled, velocity_drifting, velocity_jumping: the reported horizontal velocity is value [m/s], value times
     the correct one, grows by value [m/s^2], is off by value [m/s]; heading_drifting, heading_jumping: the reported
     heading turns by value [deg/s], is off by value [deg]; battery_stuck: the reported charge is value;
-    uniform_floor: an AR.Drone's optical flow finds nothing, neither for its reports nor for its hover;
-    obstacle_below: something value high [m] stands under its ultrasound; wind: air pushes by value [m/s^2], and an
-    AR.Drone's reported tilt does not show how far it leans against it; ids_swapped: two vehicles have each other's
-    address or id, from the start; camera_bumped: a camera is turned by value [deg]; picture_frozen, picture_black: its
-    pictures come, and repeat the last one, are black; wrong_board: the entity carries the board of the other;
-    capture_silent, capture_frozen: a motion capture system sends nothing, repeats its last frame; body_jumped: all
-    systems have the entity's body value [m] aside; bodies_swapped: they name two bodies for each other; ranges_silent,
-    ranges_frozen: a ranging system sends nothing, repeats each drone's last round; ranges_long: those of a drone are
-    value [m] too long, as behind a wall; odometry_silent, odometry_frozen, odometry_scaled: a target's own odometry
-    ends, repeats its contents, reports value times the speed of its wheels."""
+    uniform_floor: an AR.Drone's optical flow finds nothing, neither for its reports nor for its hover, and its reported
+    velocity is 0 (value 0), noise about 0 (1), or the leaking integral of its tilts (2): what a real one reports is
+    unmeasured; obstacle_below: something value high [m] stands under its ultrasound; wind: air pushes by value [m/s^2],
+    and an AR.Drone's reported tilt does not show how far it leans against it; ids_swapped: two vehicles have each
+    other's address or id, from the start; camera_bumped: a camera is turned by value [deg]; picture_frozen,
+    picture_black: its pictures come, and repeat the last one, are black; wrong_board: the entity carries the board of
+    the other; capture_silent, capture_frozen: a motion capture system sends nothing, repeats its last frame;
+    body_jumped: all systems have the entity's body value [m] aside; bodies_swapped: they name two bodies for each
+    other; ranges_silent, ranges_frozen: a ranging system sends nothing, repeats each drone's last round; ranges_long:
+    those of a drone are value [m] too long, as behind a wall; odometry_silent, odometry_frozen, odometry_scaled: a
+    target's own odometry ends, repeats its contents, reports value times the speed of its wheels."""
     entity: str
     """The drone, camera (of a drone's camera: the drone), motion capture or ranging system; for boards and bodies a
     drone or target; for odometry a target that reports its own."""
@@ -144,9 +145,9 @@ class Fault(Section):
     end_s: Annotated[float, Field(ge=0)] | None = None
     """When it heals [s after the simulator is ready]; none: it does not."""
     value: Annotated[float, Field(ge=-1000, le=1000)] | None = None
-    """Size of the fault, as `kind` explains; none: 0.5 s, 0 m/s, 0.5 times, 0.1 m/s^2, 0.5 m/s, 1 deg/s, 30 deg, a
-    charge of 1, 0.4 m (body_jumped, ranges_long: 0.5 m), 1 m/s^2, 5 deg, each for the kind of that unit; battery_drop
-    needs a value."""
+    """Size of the fault, as `kind` explains; none (uniform_floor: 0): 0.5 s, 0 m/s, 0.5 times, 0.1 m/s^2, 0.5 m/s, 1
+    deg/s, 30 deg, a charge of 1, 0.4 m (body_jumped, ranges_long: 0.5 m), 1 m/s^2, 5 deg, each for the kind of that
+    unit; battery_drop needs a value."""
     direction_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
     """Direction of value: velocities counter-clockwise from forward, wind from world x; the axis that a camera turns
     about counter-clockwise from its image's right."""

@@ -1,10 +1,11 @@
-"""Wrong values at a device's edge: each kind is a pure function of the correct readings."""
+"""Wrong values at a device's edge: functions of the correct readings, pure but for the flow over a uniform floor."""
 
 import math
 from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 
+from sim_bridge.blind_flow import BlindFlow
 from sim_bridge.fault_kinds import Fault, FaultKind
 from sim_bridge.world.readings import Readings
 
@@ -43,11 +44,11 @@ CHANGES: dict[FaultKind, Change] = {
     FaultKind.HEADING_DRIFTING: lambda r, v, _, elapsed_s: _turned(r, v * elapsed_s),
     FaultKind.HEADING_JUMPING: lambda r, v, _, __: _turned(r, v),
     FaultKind.BATTERY_STUCK: lambda r, v, _, __: replace(r, battery=v),
-    FaultKind.UNIFORM_FLOOR: lambda r, _, __, ___: _with_velocity(r, 0.0, 0.0),
     FaultKind.OBSTACLE_BELOW: lambda r, v, _, __: _above(r, v),
 }
 _OF_TIME = frozenset({FaultKind.TELEMETRY_FROZEN, FaultKind.TELEMETRY_DELAYED})
-WRONG_VALUES = frozenset(CHANGES) | _OF_TIME
+_OF_FLOW = frozenset({FaultKind.UNIFORM_FLOOR})
+WRONG_VALUES = frozenset(CHANGES) | _OF_TIME | _OF_FLOW
 
 
 class WrongValues:
@@ -59,6 +60,7 @@ class WrongValues:
         self._longest_s = max(delays, default=0.0)
         self._past: deque[tuple[float, Readings]] = deque()
         self._frozen: Readings | None = None
+        self._flows = {fault: BlindFlow(fault) for fault in self._faults if fault.kind in _OF_FLOW}
 
     def __bool__(self) -> bool:
         return bool(self._faults)
@@ -68,7 +70,7 @@ class WrongValues:
         active = [fault for fault in self._faults if fault.covers(now_s)]
         reported = honest
         for fault in active:
-            if change := CHANGES.get(fault.kind):
+            if change := self._flows.get(fault) or CHANGES.get(fault.kind):
                 elapsed_s = now_s - fault.start_s
                 reported = change(reported, fault.amount, math.radians(fault.direction_deg), elapsed_s)
         return self._of_its_time(now_s, reported, active)

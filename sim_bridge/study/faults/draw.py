@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from sim_bridge.blind_flow import BlindReport
 from sim_bridge.fault_kinds import Fault, FaultKind
 from sim_bridge.scenario import Scenario
 from sim_bridge.study.faults.flight_order import WrongOrder
@@ -132,6 +133,8 @@ def _fault(field: dict[str, Any], rng: np.random.Generator, window_s: tuple[floa
     if kind is FaultKind.VELOCITY_STUCK and rng.random() < 0.5:
         value = 0.0  # reported by an AR.Drone that sees no floor
     start_s = float(rng.uniform(*window_s))
+    if kind is FaultKind.UNIFORM_FLOOR:  # a generator of its own: it changes no other draw
+        value = float(rng.spawn(1)[0].integers(len(BlindReport)))
     lasts_s = float(rng.uniform(1.0, 8.0)) if rng.random() < 0.25 and kind is not FaultKind.BATTERY_DROP else None
     return Fault(
         kind=kind,

@@ -76,7 +76,26 @@ def test_each_kind_changes_what_it_names_and_nothing_else(broken: Fault, changed
 
 def test_every_kind_that_reports_wrongly_is_tried_above() -> None:
     (mark,) = test_each_kind_changes_what_it_names_and_nothing_else.pytestmark
-    assert {case[0].kind for case in mark.args[1]} == set(CHANGES)
+    assert {case[0].kind for case in mark.args[1]} == set(CHANGES) | {FaultKind.UNIFORM_FLOOR}
+
+
+def test_over_a_uniform_floor_the_velocity_may_be_noise_about_zero() -> None:
+    wrong = WrongValues([fault("uniform_floor", value=1)])
+    told = [wrong.report(2.0 + 0.005 * n, HONEST).velocity for n in range(400)]
+    assert len(set(told)) == 400
+    for axis in range(2):
+        values = [velocity[axis] for velocity in told]
+        assert abs(sum(values) / 400) < 0.01
+        assert 0.01 < math.sqrt(sum(value**2 for value in values) / 400) < 0.05
+
+
+def test_over_a_uniform_floor_the_velocity_may_follow_the_tilts_alone() -> None:
+    wrong = WrongValues([fault("uniform_floor", value=2)])
+    told = [wrong.report(2.0 + 0.005 * n, replace(HONEST, roll=0.0, pitch=0.0)).vx for n in range(800)]
+    assert told[0] == pytest.approx(0.4, abs=0.05)
+    assert told[-1] == pytest.approx(0.4 * math.exp(-2.0), abs=0.05)
+    leaning = [wrong.report(6.0 + 0.005 * n, replace(HONEST, roll=0.0, pitch=0.05)).vx for n in range(200)]
+    assert leaning[-1] > told[-1] + 0.3
 
 
 def test_frozen_telemetry_repeats_all_it_said_last_clock_and_state_included() -> None:

@@ -52,6 +52,7 @@ def test_all_kinds_come_one_or_two_at_once_within_the_window_and_some_flights_ar
     assert all(11.0 <= fault.start_s <= 20.0 for faults in flights for fault in faults)
     of_ardrones = {f.entity for faults in flights for f in faults if f.kind is FaultKind.UNIFORM_FLOOR}
     assert of_ardrones == {"drone_1"}
+    assert {f.value for faults in flights for f in faults if f.kind is FaultKind.UNIFORM_FLOOR} == {0.0, 1.0, 2.0}
 
 
 def test_pads_are_apart() -> None:

@@ -1,6 +1,6 @@
-"""Detects a silent AR.Drone that drifts off though commanded to hold its place. Pure.
+"""Detects an AR.Drone, silent or doubted, that drifts off though commanded to hold its place. Pure.
 
-A silent drone does not report whether its optical flow sees the floor. Cameras show it: sound firmware brakes from full
+Such a drone does not report whether its optical flow sees the floor. Cameras show it: sound firmware brakes from full
 speed in a second.
 """
 
@@ -18,7 +18,8 @@ _ADRIFT_M_S = 0.12
 class AdriftWatch:
     """Detects when the driver must brake a drone that drifts.
 
-    It must from the detection on, as long as cameras see the drone while it is silent and must hold its place.
+    It must from the detection on, as long as cameras see the drone while it is silent or doubted and must hold its
+    place.
     """
 
     def __init__(self) -> None:
@@ -28,7 +29,8 @@ class AdriftWatch:
     def step(self, now_ns: int, holds: bool, silent: bool, seen_m_s: tuple[float, float] | None) -> bool:
         """Return whether it is adrift.
 
-        holds: its command is to hold its place; silent: it reports nothing new; seen_m_s: its velocity by cameras.
+        holds: its command is to hold its place; silent: it reports nothing new, or a doubted
+        velocity; seen_m_s: its velocity by cameras.
         """
         if not holds or not silent:
             self._since_ns, self.adrift = None, False

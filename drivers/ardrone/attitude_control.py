@@ -9,29 +9,29 @@ from typing import NamedTuple
 from drivers.ardrone.adrift import AdriftWatch
 from drivers.ardrone.blind_descent import BlindDescent
 from drivers.ardrone.settings import ArDroneLimits
+from drivers.ardrone.velocity_doubt import VelocityDoubt
 from drivers.ardrone.velocity_loop import HOVER, AttitudeRequest, VelocityLoop
 from drivers.watchdog_types import Action, WatchdogDecision
 from groundstation.bus.messages import Vector3
-from groundstation.time_units import NS_PER_MS, NS_PER_S
+from groundstation.time_units import NS_PER_S
 
 # A blind drone that falls silent or freezes is braked further by the loop's observer, until it would land for that.
 _BRAKED_ON_NS = 3 * NS_PER_S
-# A pause of this length makes the drone wait for RESUME.
-_DOUBTED_NS = 1_300 * NS_PER_MS
 
 
 class MotionReport(NamedTuple):
     """A drone's report of its motion.
 
     fresh: telemetry arrived a moment ago; told: fresh, with new contents; repeats: its velocity is no measurement;
-    blind: fresh, and its optical flow fails, though all its other reports are sound; flowless: blind, and it reports
-    that it stands still; velocity_m_s: true (scaled), FLU; force_m_s2: specific force forward and left, None if not
-    reported; height_m: above the floor, likewise.
+    able: fresh, it flies, and its reports besides the velocity are sound; blind: able, and its optical flow fails;
+    flowless: blind, and not because of a velocity stuck in motion; velocity_m_s: true (scaled), FLU; force_m_s2:
+    specific force forward and left, None if not reported; height_m: above the floor, likewise.
     """
 
     fresh: bool
     told: bool
     repeats: bool
+    able: bool
     blind: bool
     flowless: bool
     velocity_m_s: Vector3
@@ -49,11 +49,17 @@ class AttitudeControl:
         self.sinks = False
         self._turn_ns = 0
         self._blind_ns = -_BRAKED_ON_NS
-        self._doubted_ns = -_DOUBTED_NS
+        self._doubt = VelocityDoubt()
 
-    def is_doubted(self, now_ns: int) -> bool:
-        """Return whether the drone's velocity contradicted its command a moment ago."""
-        return now_ns - self._doubted_ns < _DOUBTED_NS
+    @property
+    def doubted(self) -> str:
+        """Return why the drone's velocity is doubted, or ""."""
+        return self._doubt.reason
+
+    @property
+    def blind(self) -> bool:
+        """Return whether commands or cameras have shown that the drone sees no floor."""
+        return self._doubt.blind
 
     def step(self, now_ns: int, decision: WatchdogDecision, report: MotionReport) -> AttitudeRequest:
         """Return the attitude for a decision."""
@@ -61,6 +67,7 @@ class AttitudeControl:
         self._turn_ns = now_ns
         if decision.action is Action.IDLE and report.fresh and report.force_m_s2 is not None:
             self._loop.stand(report.force_m_s2, dt_s)
+        report = self._judged(now_ns, dt_s, decision, report)
         self.sinks = self._descent.step(now_ns, decision.action is Action.LAND, report.flowless, report.height_m)
         unguided = self._is_unguided(now_ns, decision, report, dt_s)
         if unguided and (self.sinks or decision.action is Action.HOVER):
@@ -69,13 +76,23 @@ class AttitudeControl:
             return self._loop.brake(dt_s, force, decision.seen_m_s, climb_m_s)
         return self._guided(now_ns, decision, report, dt_s)
 
+    def _judged(self, now_ns: int, dt_s: float, decision: WatchdogDecision, report: MotionReport) -> MotionReport:
+        """Return the report with what commands and cameras have shown of the drone's optical flow."""
+        told, seen = report.velocity_m_s if report.told and not report.repeats else None, decision.seen_m_s
+        if self._doubt.step(now_ns, decision.action, told, seen) and seen is not None:
+            self._loop.hold((*seen, 0.0), dt_s)  # its own velocity gives no speed from which to brake it
+        if not (self._doubt.blind and report.able):
+            return report
+        return report._replace(blind=True, flowless=report.flowless or not report.repeats)
+
     def _is_unguided(self, now_ns: int, decision: WatchdogDecision, report: MotionReport, dt_s: float) -> bool:
         """Return whether the drone's own hover would not stop it: it is or was blind, or cameras see it drift."""
         if report.blind and report.told:
             self._blind_ns = now_ns
         was_blind = not report.told and now_ns - self._blind_ns <= _BRAKED_ON_NS
         known, seen = self._adrift.adrift, decision.seen_m_s
-        adrift = self._adrift.step(now_ns, decision.action is Action.HOVER, not report.told, seen)
+        silent = not report.told or bool(self._doubt.reason)
+        adrift = self._adrift.step(now_ns, decision.action is Action.HOVER, silent, seen)
         if adrift and not known and not was_blind and seen is not None:
             self._loop.hold((*seen, 0.0), dt_s)  # nothing else gives the speed from which to brake it
         return report.blind or was_blind or adrift
@@ -95,5 +112,5 @@ class AttitudeControl:
         asked = self._loop.step(wanted, decision.yaw_rate_rad_s, measured, dt_s, force, seen)
         if not self._loop.contradicted:
             return asked
-        self._doubted_ns = now_ns
+        self._doubt.contradict(report.velocity_m_s)
         return HOVER

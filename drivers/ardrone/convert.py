@@ -11,7 +11,7 @@ from typing import NamedTuple
 from drivers.ardrone.wire.errors import WireError
 from drivers.ardrone.wire.navdata import Navdata
 from drivers.ardrone.wire.options import ALTITUDE, DEMO, PHYS_MEASURES, TIME, Demo, PhysMeasures
-from drivers.ardrone.wire.state import ControlState, StateBit
+from drivers.ardrone.wire.state import FLYING_NO_VISION, ControlState, StateBit, join_control_state
 from drivers.plausibility.motion import MotionSample
 from groundstation.bus.messages import FlightState, Vector3
 from groundstation.geometry.angles import difference, wrap
@@ -32,6 +32,7 @@ _GROUND_GAP_S = 0.5
 _GAP_S = 5.0  # after a longer silence it may have a new battery
 # Module constants: looking up an enum member costs as much as reading an option.
 _FLY, _EMERGENCY, _TAKING_OFF = int(StateBit.FLY), int(StateBit.EMERGENCY), int(ControlState.TRANS_TAKEOFF)
+_BLINDLY = join_control_state(ControlState.FLYING, FLYING_NO_VISION)
 _PHASES: dict[int, FlightState] = {
     ControlState.TRANS_TAKEOFF: FlightState.TAKING_OFF,
     ControlState.TRANS_LANDING: FlightState.LANDING,
@@ -145,6 +146,14 @@ def flight_state_from_navdata(state: int, control_state: int | None) -> FlightSt
     if state & _FLY:
         return FlightState.FLYING if phase is None else _PHASES.get(phase, FlightState.FLYING)
     return FlightState.TAKING_OFF if phase == _TAKING_OFF else FlightState.LANDED
+
+
+def says_no_vision(control_state: int) -> bool:
+    """Return whether a drone that flies says that it sees nothing below.
+
+    WIRE: minor state 6 of FLYING (SDK control_states.h, docs/reference/ardrone.md 4.2); of HOVERING it means another.
+    """
+    return control_state == _BLINDLY
 
 
 class HeadingWatch:

@@ -12,6 +12,7 @@ from drivers.ardrone.attitude_control import AttitudeControl, MotionReport
 from drivers.ardrone.averages import MotionMean
 from drivers.ardrone.commands import orders_from_decision
 from drivers.ardrone.desired_config import ids_of, scale_from_settings, wishes
+from drivers.ardrone.flow_watch import FlowWatch
 from drivers.ardrone.identity import Model, model_from_navdata
 from drivers.ardrone.link import ArDroneLink, Arrival
 from drivers.ardrone.publisher import NavdataPublisher
@@ -20,6 +21,7 @@ from drivers.ardrone.rate_watch import RateWatch
 from drivers.ardrone.session import ArdroneSession, SessionPhase
 from drivers.ardrone.settings import ArDroneDriverSettings
 from drivers.ardrone.uplink_watch import UplinkWatch
+from drivers.ardrone.velocity_doubt import NO_FLOOR
 from drivers.ardrone.wire.errors import WireError
 from drivers.ardrone.wire.navdata import Navdata
 from drivers.ardrone.wire.options import DEMO, SPEED_REFERENCES
@@ -27,7 +29,7 @@ from drivers.ardrone.wire.state import StateBit, bit_names
 from drivers.base import HostProcess, LinkHealth, read_section
 from drivers.datagrams import DatagramLog
 from drivers.host import fly_one
-from drivers.plausibility.health import Health, Sensor
+from drivers.plausibility.health import Finding, Health, HealthReport, Sensor
 from drivers.plausibility.limits import PlausibilityLimits
 from drivers.plausibility.motion import MotionMonitor
 from drivers.watchdog_types import Action, VehicleView, WatchdogDecision
@@ -40,13 +42,14 @@ from groundstation.time_units import NS_PER_MS
 # WIRE: at least every 30 ms (guide), 20-25 ms (SDK); on a busy machine a turn comes late.
 RATE_HZ = 40.0
 _FRESH_NS = 300 * NS_PER_MS
-# Velocity reported by a drone that sees no floor: not its true one, so that its firmware's own braking fails as well.
+# A velocity that repeats below this is that of a drone that sees no floor: its firmware's own braking fails as well.
 _NO_FLOW_M_S = 0.02
 _RATE_PERIOD_NS = 200 * NS_PER_MS
 # A packet of which nothing is to be published waits unread for the next one, 5 ms later: two at once take two thirds of
 # the time, since most of it is spent on bringing the code back into the processor's caches.
 _AT_ONCE = 2
 _FAULTS = int(StateBit.MOTORS | StateBit.SOFTWARE_FAULT | StateBit.VBAT_LOW)
+_NO_VELOCITY = Finding(Sensor.VELOCITY, Health.BAD, NO_FLOOR)
 _NO_MOTION = "its navdata hold its state alone, no motion: it was restarted, or another program configures it"
 _NO_AR1_VIDEO = Notice(
     Severity.WARNING,
@@ -111,6 +114,7 @@ class ArDrone:
         self._next_rate_ns = 0
         self._scale = scale_from_settings(settings)
         self._motion, self._attitude = MotionMean(), AttitudeControl(settings.limits)
+        self._flow = FlowWatch()
         self._plausibility = MotionMonitor(LIMITS)
         self._video_refused = False
         self._refused: Counter[str] = Counter()
@@ -167,6 +171,12 @@ class ArDrone:
         sample = convert.sample_from_motion(now_ns, packet, motion)
         report = self._plausibility.update(sample, flight_state)
         self._motion.add(motion)
+        if flight_state in UP:
+            self._flow.update(now_ns, motion.velocity_m_s[:2], convert.says_no_vision(demo.control_state))
+        elif flight_state not in AIRBORNE:
+            self._flow.reset()
+        if self._flow.lost or self._attitude.blind:
+            report = HealthReport((_NO_VELOCITY, *report.findings))
         self._publisher.publish(now_ns, motion, report)
 
     # -- sender loop --------------------------------------------------------------------------------------------------
@@ -178,8 +188,7 @@ class ArDrone:
         mute = _NO_MOTION if not fresh and now_ns - heard.heard_ns < _FRESH_NS else ""
         configured = self._session.phase is SessionPhase.READY
         unsound = self._plausibility.report.reason(Health.BAD, LIMITS.essential)
-        if not unsound and self._attitude.is_doubted(now_ns):
-            unsound = "its velocity contradicts what was asked for"
+        unsound = unsound or (NO_FLOOR if self._flow.lost else self._attitude.doubted)
         not_ready = self._not_ready(heard)
         velocity = self._true(heard.velocity_m_s)
         return VehicleView(
@@ -240,26 +249,29 @@ class ArDrone:
     def _report(self, now_ns: int, heard: LatestNavdata) -> MotionReport:
         velocity, force = self._motion.drain()
         fresh = now_ns - heard.moved_ns <= _FRESH_NS
-        blind = fresh and self._is_blind()
+        repeats, lost = self._motion.repeats, self._flow.lost
+        able = fresh and self._is_able()
+        stands = math.hypot(*heard.velocity_m_s[:2]) < _NO_FLOW_M_S
         return MotionReport(
             fresh=fresh,
             told=fresh and not self._motion.frozen,
-            repeats=self._motion.repeats,
-            blind=blind,
-            flowless=blind and math.hypot(*heard.velocity_m_s[:2]) < _NO_FLOW_M_S,
+            repeats=repeats or self._flow.suspected,
+            able=able,
+            blind=able and (repeats or lost),
+            flowless=able and (stands if repeats else lost),
             velocity_m_s=self._true(velocity),
             force_m_s2=force,
             height_m=heard.height_m,
         )
 
-    def _is_blind(self) -> bool:
-        """Return whether the drone sees nothing of its motion; one that only wind pushes holds its place better itself.
+    def _is_able(self) -> bool:
+        """Return whether the driver could brake the drone; one that only wind pushes holds its place better itself.
 
-        True even before the velocity is BAD: the firmware's hover would end the loop, and with it the last correct
-        speed.
+        True even before a velocity that repeats is BAD: the firmware's hover would end the loop, and with it the last
+        correct speed.
         """
         others = self._plausibility.report.of(Sensor.TELEMETRY, Sensor.CLOCK, Sensor.ATTITUDE, Sensor.IMU)
-        return self._motion.repeats and others is not Health.BAD and self.telemetry.flight_state in UP
+        return others is not Health.BAD and self.telemetry.flight_state in UP
 
     def health(self, now_ns: int) -> LinkHealth:
         """Return rates, losses and refusals of the link."""

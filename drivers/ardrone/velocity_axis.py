@@ -89,6 +89,16 @@ class Axis:
         """Return whether the measured speed contradicts the one that the commands must have caused."""
         return self._unexplained_m > self._gains.doubt_m
 
+    @property
+    def expected_m_s(self) -> float:
+        """Return the speed that the commands should show in its reports by now."""
+        return self._expected_m_s
+
+    @property
+    def in_wind(self) -> bool:
+        """Return whether its accelerometers show a push that a wrong drag does not explain."""
+        return self._wind_m_s2 != 0.0
+
     def stand(self, force_m_s2: float, dt_s: float) -> None:
         """Learn from a standing drone: after the flat trim these are its accelerometer readings when level."""
         share = min(1.0, dt_s / self._gains.standing_s)

@@ -7,6 +7,7 @@ The drone takes tilt angles, not velocities: it accelerates by g tan(tilt) and i
 import math
 from dataclasses import dataclass
 
+from drivers.ardrone.flow_watch import NO_MOTION_M_S
 from drivers.ardrone.odometry_drift import DriftLimits, OdometryDrift
 from drivers.ardrone.settings import ArDroneLimits
 from drivers.ardrone.velocity_axis import Axis, Gains, clamp
@@ -16,6 +17,9 @@ from groundstation.geometry.stabilized_frame import STANDARD_GRAVITY_M_S2
 _LONGEST_STEP_S = 0.1
 # Time constant for following the speed of a drone that holds its place by itself: it covers noise, and its braking.
 _HELD_S = 0.15
+# A drone that reports to stand and does not lags behind its commands by more than this; integral of the excess at which
+# that counts, and how fast it shrinks.
+_STANDS_OFF_M_S, _STANDS_OFF_M, _FORGETS_M_S = 0.15, 0.05, 0.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,12 +56,13 @@ class VelocityLoop:
     @property
     def contradicted(self) -> bool:
         """Return whether the measured velocity contradicts the commanded one."""
-        return self._flying and any(axis.contradicted for axis in self._axes)
+        stands = self._stands_off_m > _STANDS_OFF_M
+        return self._flying and (stands or any(axis.contradicted for axis in self._axes))
 
     def reset(self) -> None:
         """Forget the motion, but not the learned figures of the vehicle; for times without this loop."""
         self._flying = False
-        self._still_s = 0.0
+        self._still_s = self._stands_off_m = 0.0
         self._held_m_s: tuple[float, float] | None = None
         for drift in self._drifts:
             drift.reset()
@@ -96,6 +101,7 @@ class VelocityLoop:
         if measured_m_s is not None:
             for drift, told, seen in zip(self._drifts, measured_m_s, seen_m_s or (None, None), strict=False):
                 drift.compare(told, seen, dt_s)
+            self._compare_standing(math.hypot(*measured_m_s[:2]), dt_s)
         turn_rad_s = clamp(yaw_rate_rad_s, self._limits.max_yaw_rate_rad_s)
         moving = max(abs(yaw_rate_rad_s), *(abs(v) for v in wanted_m_s)) > gains.still
         self._still_s = 0.0 if moving else self._still_s + dt_s
@@ -103,6 +109,14 @@ class VelocityLoop:
             self._flying = False
             return HOVER
         return self._request(wanted_m_s, turn_rad_s, measured_m_s, dt_s, force_m_s2)
+
+    def _compare_standing(self, told_m_s: float, dt_s: float) -> None:
+        """Compare a speed of nearly zero with the commands; in wind a drone may well stand."""
+        expected_m_s = math.hypot(*(axis.expected_m_s for axis in self._axes))
+        excess = -_FORGETS_M_S
+        if told_m_s < NO_MOTION_M_S and not any(axis.in_wind for axis in self._axes):
+            excess = max(excess, expected_m_s - told_m_s - _STANDS_OFF_M_S)
+        self._stands_off_m = max(0.0, self._stands_off_m + excess * dt_s)
 
     def brake(
         self,
@@ -118,6 +132,7 @@ class VelocityLoop:
         """
         dt_s = min(max(dt_s, 0.0), _LONGEST_STEP_S)
         if self.contradicted:
+            self._stands_off_m = 0.0
             for axis in self._axes:
                 axis.distrust()
         for axis in self._axes:

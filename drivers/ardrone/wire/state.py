@@ -61,6 +61,7 @@ class ControlState(IntEnum):
 # WIRE: some minor states (SDK control_states.h, docs/reference/ardrone.md 4.2).
 TAKE_OFF_AUTO = 1
 FLYING_COMBINED_YAW = 4
+FLYING_NO_VISION = 6
 HOVERING_LOST_COM = 8
 HOVERING_MAGNETO_CALIB = 12
 

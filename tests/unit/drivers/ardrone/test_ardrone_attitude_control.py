@@ -9,12 +9,12 @@ from drivers.watchdog_types import Action, DriverMode, WatchdogDecision
 
 TURN_NS = 25_000_000
 SOUND = MotionReport(
-    fresh=True, told=True, repeats=False, blind=False, flowless=False,
+    fresh=True, told=True, repeats=False, able=True, blind=False, flowless=False,
     velocity_m_s=(0.4, 0.0, 0.0), force_m_s2=(0.0, 0.0), height_m=1.2,
 )  # fmt: skip
 BLIND = SOUND._replace(repeats=True, blind=True)
 FLOWLESS = BLIND._replace(flowless=True, velocity_m_s=(0.0, 0.0, 0.0))
-SILENT = SOUND._replace(fresh=False, told=False)
+SILENT = SOUND._replace(fresh=False, told=False, able=False)
 
 
 def decision(action: Action, **more: object) -> WatchdogDecision:
@@ -65,8 +65,44 @@ def test_a_silent_one_that_cameras_see_drift_is_braked(turns) -> None:
     assert not asked.hover and asked.pitch_rad < 0.0
 
 
-def test_a_velocity_that_contradicts_what_was_asked_for_is_doubted_for_a_while(turns) -> None:
-    turns(Action.FLY, SOUND._replace(velocity_m_s=(-1.5, 0.0, 0.0)), 3.0, velocity_m_s=(0.4, 0.0, 0.0))
-    assert turns.control.is_doubted(turns.now_ns)
-    turns(Action.HOVER, SOUND, 1.5)
-    assert not turns.control.is_doubted(turns.now_ns)
+WRONG = SOUND._replace(velocity_m_s=(-1.5, 0.0, 0.0))
+STILL = SOUND._replace(velocity_m_s=(0.01, 0.02, 0.0))
+
+
+def test_a_velocity_that_contradicts_what_was_asked_for_is_doubted_until_it_lands(turns) -> None:
+    turns(Action.FLY, WRONG, 3.0, velocity_m_s=(0.4, 0.0, 0.0))
+    assert turns.control.doubted
+    assert turns(Action.HOVER, SOUND, 3.0).hover
+    assert turns.control.doubted
+    turns(Action.IDLE, SOUND)
+    assert not turns.control.doubted
+
+
+def test_it_is_believed_again_once_cameras_have_seen_the_drone_stand_as_it_reports(turns) -> None:
+    turns(Action.FLY, WRONG, 3.0, velocity_m_s=(0.4, 0.0, 0.0))
+    turns(Action.HOVER, STILL, 2.0, seen_m_s=(0.02, 0.0))
+    assert not turns.control.doubted
+
+
+def test_a_doubted_one_that_cameras_see_drift_is_braked(turns) -> None:
+    turns(Action.FLY, WRONG, 3.0, velocity_m_s=(0.4, 0.0, 0.0))
+    asked = turns(Action.HOVER, SOUND, 1.6, seen_m_s=(0.4, 0.0))
+    assert turns.control.doubted and not asked.hover and asked.pitch_rad < 0.0
+
+
+def test_one_that_reports_to_stand_though_sent_on_is_blind_and_braked_and_sinks(turns) -> None:
+    turns(Action.FLY, STILL, 1.5, velocity_m_s=(0.3, 0.0, 0.0))
+    assert turns.control.blind
+    assert not turns(Action.HOVER, STILL).hover
+    turns(Action.LAND, STILL)
+    assert turns.control.sinks
+
+
+def test_one_that_cameras_see_move_though_it_reports_to_stand_is_blind_and_braked(turns) -> None:
+    asked = turns(Action.HOVER, STILL, 2.0, seen_m_s=(0.3, 0.0))
+    assert turns.control.blind and not asked.hover and asked.pitch_rad < 0.0
+
+
+def test_one_whose_velocity_cameras_confirm_is_neither_doubted_nor_braked(turns) -> None:
+    assert turns(Action.HOVER, STILL, 5.0, seen_m_s=(0.08, 0.0)).hover
+    assert not turns.control.doubted

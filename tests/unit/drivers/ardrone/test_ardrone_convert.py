@@ -11,6 +11,7 @@ from drivers.ardrone.convert import (
     charge_from_demo,
     flight_state_from_navdata,
     motion_from_navdata,
+    says_no_vision,
 )
 from drivers.ardrone.desired_config import Scale
 from drivers.ardrone.velocity_loop import HOVER, AttitudeRequest
@@ -249,3 +250,11 @@ def test_waiting_says_nothing_about_flying():
 def test_a_charge_that_is_no_share_is_not_known(percent: int, charge: float | None) -> None:
     """Garbage counted as a full battery; a drone with unknown charge does not take off."""
     assert charge_from_demo(options.Demo(battery_percent=percent)) == charge
+
+
+@pytest.mark.parametrize(
+    ("phase", "minor", "blind"),
+    [(ControlState.FLYING, 6, True), (ControlState.FLYING, 4, False), (ControlState.HOVERING, 6, False)],
+)
+def test_only_a_flying_drone_says_that_it_has_no_vision(phase, minor, blind):
+    assert says_no_vision(join_control_state(phase, minor)) is blind

@@ -101,3 +101,16 @@ def test_in_flight_status_alone_is_no_telemetry_once_motion_was_reported(
     view = drone.view((1000 + 60 * 20) * NS_PER_MS)
     assert view.fresh is fresh
     assert ("no motion" in view.silence) is not fresh
+
+
+def flying(number: int, vx_mm_s: int, vy_mm_s: int) -> Arrival:
+    speeds = options.Demo(control_state=3 << 16, altitude_mm=900, vx_mm_s=vx_mm_s, vy_mm_s=vy_mm_s)
+    datagram = navdata.encode(Navdata(_HEALTHY | _FLY, number, 0, ((0, options.DEMO.encode(speeds, 148)),)))
+    return Arrival((1000 + 5 * number) * NS_PER_MS, datagram, _SOURCE)
+
+
+def test_a_velocity_that_drops_to_noise_about_zero_at_once_counts_as_a_lost_floor(drone: ArDrone) -> None:
+    read(drone, *(flying(number, 400 + number % 7, number % 5) for number in range(1, 51)))
+    assert not drone.view(1250 * NS_PER_MS).unsound
+    read(drone, *(flying(number, number % 7 - 3, number % 5 - 2) for number in range(51, 101)))
+    assert "does not see the floor" in drone.view(1500 * NS_PER_MS).unsound

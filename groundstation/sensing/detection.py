@@ -6,13 +6,11 @@ import numpy as np
 
 from groundstation.arrays import Matrix, Vector
 from groundstation.kernel import kernel
+from groundstation.sensing.models import STEEPEST_COS
 from groundstation.sensing.visibility import CameraRow
 
 FOUND_SHARE = 0.7
 """Share of pictures in which a full search finds a marker in view: blur, glare and drones in between cost some."""
-
-STEEPEST_COS = math.cos(math.radians(70.0))
-"""A flat marker is found up to this angle between its normal and the line of sight (docs/reference/vision.md 2)."""
 
 
 @kernel()

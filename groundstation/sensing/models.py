@@ -8,9 +8,13 @@ import numpy as np
 
 from groundstation.arrays import Array
 from groundstation.geometry.rotations import base_from_tilted_optical, rotation_z
+from groundstation.sensing.cross_section import shown_rectangle
 
 OPTICAL_FROM_WORLD_LOOKING_DOWN: Array = np.diag([1.0, -1.0, -1.0])
 OPTICAL_FROM_WORLD_LOOKING_DOWN.setflags(write=False)
+
+STEEPEST_COS = math.cos(math.radians(70.0))
+"""A flat marker is found up to this angle between its normal and the line of sight (docs/reference/vision.md 2)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,22 +192,21 @@ class SensorSuite:
         return eye.view.margin(eye.optical(mean, point)) >= 0
 
     def root_views(self, height_m: float) -> tuple[Rectangle, ...]:
-        """Return the rectangles in which downward world-fixed cameras reliably see a marker at this height.
+        """Return the rectangles in which world-fixed cameras reliably see a marker at this height, from above.
 
-        A tilt moves the whole rectangle; a turn about the vertical counts in quarters.
+        The whole of each rectangle is in view and within the camera's range, however the camera is tilted and turned.
         """
         found = []
         for camera in self.world.values():
-            right, _, axis = camera.optical_from_world.tolist()
-            x, y, z = camera.position_m
-            way = (z - height_m) / axis[2]
-            x, y = x - axis[0] * way, y - axis[1] * way
-            across = (z - height_m) * camera.view.half_width_tan
-            across -= camera.view.border_m * math.hypot(1.0, camera.view.half_width_tan)
-            along = (z - height_m) * camera.view.half_height_tan
-            along -= camera.view.border_m * math.hypot(1.0, camera.view.half_height_tan)
-            if abs(right[1]) > abs(right[0]):
-                across, along = along, across
-            if across > 0 and along > 0 and axis[2] < -0.99:
-                found.append(Rectangle((x - across, x + across), (y - along, y + along)))
+            (x, y, z), view = camera.position_m, camera.view
+            sides = shown_rectangle(
+                tuple(tuple(row) for row in camera.optical_from_world.tolist()),
+                (view.half_width_tan, view.half_height_tan),
+                view.border_m,
+                min(view.range_m, (z - height_m) / STEEPEST_COS),
+                z - height_m,
+            )
+            if sides is not None:
+                (west, east), (south, north) = sides
+                found.append(Rectangle((x + west, x + east), (y + south, y + north)))
         return tuple(found)

@@ -7,10 +7,7 @@ from typing import Annotated, NamedTuple
 from groundstation.arrays import Array, Matrix
 from groundstation.kernel import Record, Rows, kernel
 from groundstation.sensing.elementary import decay, log_of_sum
-from groundstation.sensing.models import OnboardCameraModel, Softness, WorldCameraModel
-
-STEEPEST_COS = math.cos(math.radians(70.0))
-"""A flat marker is found up to this angle between its normal and the line of sight (docs/reference/vision.md 2)."""
+from groundstation.sensing.models import STEEPEST_COS, OnboardCameraModel, Softness, WorldCameraModel
 
 SPREAD = math.pi / 8.0
 """Factor with which a Gaussian variance adds to the squared width of a logistic edge."""

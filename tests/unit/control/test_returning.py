@@ -14,9 +14,10 @@ from groundstation.control.parameters import control_from_field
 from groundstation.control.returning import is_lost, return_stand
 from groundstation.control.search_parameters import search_from_field
 from groundstation.control.setpoints import setpoints_from_plan
-from groundstation.control.view import VIEW_INSET_M, velocity_error_m_s, way_back_m
+from groundstation.control.view import VIEW_INSET_M, velocity_error_m_s, view_of, way_back_m
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, StateLayout
+from groundstation.geometry.rotations import world_from_downward_optical
 from groundstation.sensing.from_field import sensors_from_field
 from groundstation.sensing.models import Rectangle
 from groundstation.settings.load import load_field
@@ -83,6 +84,18 @@ def test_a_drone_far_out_flies_back_by_its_uncertainty_and_its_way() -> None:
     assert not is_lost("drone_1", belief(far, 0.1), CONTROL, SENSORS, unseen_s=4.0)
     assert is_lost("drone_1", belief(far, 0.1), CONTROL, SENSORS, unseen_s=10.0)
     assert not is_lost("drone_1", belief(near, 0.1), CONTROL, SENSORS, unseen_s=10.0)
+
+
+@pytest.mark.parametrize("rotation_deg", [(0, 8.5, 0), (25, 0, 0), (0, -30, 40)])
+def test_a_drone_flies_back_into_the_view_of_a_tilted_camera(rotation_deg: tuple[float, float, float]) -> None:
+    """From 8.1 degrees on it stayed where it was, and nothing said so."""
+    ceiling = SENSORS.world["ceiling"]
+    tilted = replace(ceiling, optical_from_world=world_from_downward_optical(rotation_deg).T)
+    sensors, far = replace(SENSORS, world={"ceiling": tilted}), np.array([3.4, -2.4, 1.6, 0.0])
+    assert is_lost("drone_1", belief(far, 0.1), CONTROL, sensors, unseen_s=10.0)
+    goal = return_stand(far, view_of(3.4, -2.4, "drone_1", CONTROL, sensors))
+    marker_m = CONTROL.search_height_m + sensors.marker_height_m["drone_1"]
+    assert sensors.world_in_view("ceiling", np.array([goal.x, goal.y, marker_m]))
 
 
 def test_an_odometry_that_is_known_to_be_wrong_leaves_less_time_out_of_sight() -> None:

@@ -16,6 +16,7 @@ from groundstation.control.search_parameters import SearchParameters
 from groundstation.control.stand import Stand
 from groundstation.estimation.room_map import RoomGrid
 from groundstation.sensing.footprint import HEADINGS, Footprint
+from groundstation.vectors import Interval
 
 _ANY_ORDER = 3  # with up to this many robots, any may choose first
 _STEP_RAD = math.tau / HEADINGS
@@ -50,17 +51,28 @@ class Lattice:
 
 
 def lattice_of(grid: RoomGrid, parameters: SearchParameters) -> Lattice:
-    """Return every other cell of a grid that lies well inside the fence."""
-    (x0, x1), (y0, y1), inset = parameters.fence_x_m, parameters.fence_y_m, parameters.fence_inset_m
-    cells = [
-        (row, column, x, y)
-        for row, y in enumerate(grid.ys.tolist())
-        for column, x in enumerate(grid.xs.tolist())
-        if row % 2 == column % 2 == 0 and x0 + inset <= x <= x1 - inset and y0 + inset <= y <= y1 - inset
-    ]
-    rows, columns, xs, ys = zip(*cells, strict=True) if cells else ((), (), (), ())
-    places = np.array([xs, ys], dtype=np.float64).T
-    return Lattice(np.array(rows, dtype=np.int64), np.array(columns, dtype=np.int64), places, grid.cell_m)
+    """Return every other cell of a grid that lies well inside the fence; a narrow fence has one row at least."""
+    inset_m = parameters.fence_inset_m
+    columns, xs = _along(grid.xs, parameters.fence_x_m, inset_m)
+    rows, ys = _along(grid.ys, parameters.fence_y_m, inset_m)
+    places = np.array([np.tile(xs, len(ys)), np.repeat(ys, len(xs))], dtype=np.float64).T
+    return Lattice(np.repeat(rows, len(xs)), np.tile(columns, len(ys)), places, grid.cell_m)
+
+
+def _along(centres: Array, fence_m: Interval, inset_m: float) -> tuple[IntVector, Array]:
+    """Return the numbers of the cells along one axis that have stands, and the stands' places [m].
+
+    Every other cell misses a narrow fence by chance, and the centre of a large cell may lie outside of one.
+    """
+    low, high = fence_m[0] + inset_m, fence_m[1] - inset_m
+    inside = np.flatnonzero((low <= centres) & (centres <= high))
+    chosen = inside[inside % 2 == 0]
+    if not len(chosen):
+        chosen = inside
+    if len(chosen):
+        return chosen, centres[chosen]
+    middle = 0.5 * (low + high)
+    return np.array([np.abs(centres - middle).argmin()], dtype=np.int64), np.array([middle])
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,8 +168,6 @@ def choose(
     sweeps so far, which are kept unless another is clearly better. No two stands are within the distance `apart_m`.
     With few robots the best choice of the first one is taken; if all are equal, the first in the order of `footprints`.
     """
-    if not len(lattice.places):
-        return NO_OUTLOOK
     searchers = {
         name: kind.searcher(footprint, lattice, poses[name], allowed_s[name], held.get(name), parameters)
         for name, footprint in footprints.items()

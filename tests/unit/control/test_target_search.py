@@ -181,6 +181,28 @@ def test_floor_hidden_by_an_obstacle_does_not_count_as_searched() -> None:
     assert maps[1].min() < 0.5  # before it
 
 
+@pytest.mark.parametrize(
+    ("room_m", "fence_x_m", "fence_y_m"),
+    [
+        ((200.0, 4.0), (-99.0, 99.0), (-0.8, 0.8)),
+        ((60.0, 40.0), (3.0, 4.5), (-5.0, 5.0)),
+        ((40.0, 30.0), (-19.0, -18.0), (-0.2, 0.3)),
+    ],
+)
+def test_a_narrow_fence_in_a_large_room_has_stands(
+    room_m: tuple[float, float], fence_x_m: tuple[float, float], fence_y_m: tuple[float, float]
+) -> None:
+    """Cells of 0.6 to 1 m: every other one missed the fence, and the team never searched."""
+    grid = RoomGrid.over(*room_m)
+    lattice = lattice_of(grid, replace(SEARCH, room_m=room_m, fence_x_m=fence_x_m, fence_y_m=fence_y_m))
+    assert len(lattice.places) and (lattice.places >= (fence_x_m[0], fence_y_m[0])).all()
+    assert (lattice.places <= (fence_x_m[1], fence_y_m[1])).all()
+    assert (lattice.nearest(lattice.places) == np.arange(len(lattice.places))).all()
+    rows, columns = lattice.cells(lattice.places)
+    assert (rows == lattice.rows).all() and (columns == lattice.columns).all()
+    assert (np.abs(np.array([grid.xs[columns], grid.ys[rows]]).T - lattice.places) <= 0.5 * grid.cell_m).all()
+
+
 def test_each_searches_on_its_own_side_whoever_is_nearer_to_the_middle() -> None:
     search, lattice = new_search(), lattice_of(RoomGrid.over(*SEARCH.room_m), SEARCH)
     chances = np.zeros(search.grid.shape)

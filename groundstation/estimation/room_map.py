@@ -26,6 +26,8 @@ HIDDEN_S = 2.0
 # For a target seen a moment ago, but not now where it is predicted: it is there nevertheless, near, anywhere.
 _THERE, _NEAR, _ANYWHERE = 0.6, 0.3, 0.1
 _NEAR_M = 1.2
+_OUTSIDE_M = 1.0  # rooms are measured roughly, and targets drive about their edge
+_NEAR_CELLS = 1.5  # least radius of a place, in cells: `lost_at` spreads it by half a cell
 _HINTED = 0.5
 _HIDDEN = 0.5  # share of a target where it was predicted that is hidden: somebody stands in the way
 # A passing person hides a target from cameras on two sides one after the other, rarely at once (docs/decisions/0274).
@@ -45,6 +47,12 @@ class RoomGrid:
         """Return the grid of a room, with larger cells where there would be too many."""
         cell_m = max(cell_m, math.sqrt(size_x_m * size_y_m / MOST_CELLS))
         return cls(cell_m, _centres(size_x_m, cell_m), _centres(size_y_m, cell_m))
+
+    def entered(self, x: float, y: float) -> tuple[float, float]:
+        """Return the point of the room that is closest to a place [m; world], or the place if it is far outside."""
+        half_m = 0.5 * self.cell_m
+        inside = _clipped(x, self.xs, half_m), _clipped(y, self.ys, half_m)
+        return inside if math.dist(inside, (x, y)) <= _OUTSIDE_M else (x, y)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -119,8 +127,14 @@ class RoomMap:
         return RoomMap(self.grid, stands / total, drives / total, goes_on / total, self.hidden / total, overlooked)
 
     def mass_near(self, mean: Sequence[float] | Array, covariance: Array, sigmas: float, least_m: float) -> float:
-        """Return the probability that the target is within some standard deviations of a place, or a least distance."""
-        dx, dy = self.grid.xs[None, :] - mean[0], self.grid.ys[:, None] - mean[1]
+        """Return the probability that the target is within some standard deviations of a place, or a least distance.
+
+        The least distance is never shorter than large cells need to hold what `lost_at` puts there. A place a little
+        outside the room counts as the nearest one in it; an estimate farther out is wrong, and nothing is near it.
+        """
+        x, y = self.grid.entered(float(mean[0]), float(mean[1]))
+        least_m = max(least_m, _NEAR_CELLS * self.grid.cell_m)
+        dx, dy = self.grid.xs[None, :] - x, self.grid.ys[:, None] - y
         square = _squared_distance(dx, dy, covariance)
         near = (square <= sigmas**2) | (dx * dx + dy * dy <= least_m**2)
         return float(self.chances[near].sum())
@@ -180,6 +194,10 @@ def _shared(grid: RoomGrid, elsewhere: Array, there: Array | float = 0.0, hidden
 def _centres(size_m: float, cell_m: float) -> Array:
     count = max(1, round(size_m / cell_m))
     return (np.arange(count, dtype=np.float64) - (count - 1) / 2) * cell_m
+
+
+def _clipped(value: float, centres: Array, half_m: float) -> float:
+    return min(max(value, float(centres[0]) - half_m), float(centres[-1]) + half_m)
 
 
 def _shifted(values: Array, axis: int, cells: int) -> Array:

@@ -122,6 +122,23 @@ def test_a_target_that_was_predicted_beyond_the_walls_is_looked_for_in_the_room(
     assert (row, column) == np.unravel_index(int(near), GRID.shape)
 
 
+@pytest.mark.parametrize("size_m", [(8.0, 6.0), (40.0, 25.0), (60.0, 40.0), (100.0, 60.0)])
+@pytest.mark.parametrize("at_once", [False, True])
+def test_a_place_holds_its_target_in_a_hall_of_large_cells_too(size_m: tuple[float, float], at_once: bool) -> None:
+    """Nobody has looked there yet: with cells of 1 m, half of the places were given up at once."""
+    grid = RoomGrid.over(*size_m)
+    for share in np.random.default_rng(2).uniform(-0.5, 0.5, (40, 2)):
+        place, covariance = share * size_m, 0.1**2 * np.eye(2)
+        assert lost_at(grid, place, covariance, at_once).mass_near(place, covariance, 2.0, 0.5) > 0.4
+
+
+@pytest.mark.parametrize(("x_m", "holds"), [(3.9, True), (4.3, True), (4.6, True), (4.9, True), (6.0, False)])
+def test_a_target_at_the_wall_may_be_estimated_a_little_beyond_it(x_m: float, holds: bool) -> None:
+    """One that is estimated far outside is not there."""
+    room = lost_at(GRID, (x_m, 1.0), 0.05**2 * np.eye(2))
+    assert (room.mass_near((x_m, 1.0), 0.05**2 * np.eye(2), 2.0, 0.5) > 0.5) is holds
+
+
 @pytest.mark.parametrize("speed_m_s", [0.0, 0.22, 0.45])
 def test_one_that_drives_on_as_it_did_is_not_given_up_by_time_alone(speed_m_s: float) -> None:
     room, cells = lost_at(GRID, (-1.0, 0.0), 0.01 * np.eye(2)), 0

@@ -42,7 +42,7 @@ class Excursions:
         """Return the latest time [s] to be at each place (n, 2) and be back in time; inf inside or without views."""
         p = self.parameters
         mean = belief.mean_of(name)
-        view = view_of(float(mean[0]), float(mean[1]), name, p, self.sensors)
+        view = view_of(float(mean[0]), float(mean[1]), name, p.return_height_m, self.sensors)
         if view is None:
             return np.full(len(places), math.inf)
         left_s = self.left_s(name, belief)

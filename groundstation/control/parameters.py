@@ -1,9 +1,10 @@
 """Parameters of setpoints and safety."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from groundstation.control.search_height import search_height_m
+from groundstation.control.search_height import return_height_m, search_height_m
 from groundstation.field.resolved import ResolvedField
 from groundstation.planning.parameters import MotionLimits, limits_from_field
 from groundstation.vectors import Interval
@@ -18,11 +19,12 @@ SEARCH_SPEED_M_S, SEARCH_YAW_RATE_RAD_S = 0.5, 0.8
 class ControlParameters:
     """Settings of the setpoints.
 
-    search_height_m: height while searching or returning; column_m: horizontal distance between two robots within which
-    neither changes height, and the least between two stands; return_std_m: a robot outside the world-fixed views with a
-    larger deviation flies back; so does one whose deviation would reach return_limit_m before it is back in view, or
-    that would then have been unseen for return_within_s (odometry may be worse than its stated error), each with
-    return_margin_s to turn round and be found; but none before return_soonest_s, a usual gap between sightings;
+    search_height_m: height while searching; return_below_m: greatest height while returning; column_m: horizontal
+    distance between two robots within which neither changes height, and the least between two stands; return_std_m: a
+    robot outside the world-fixed views with a larger deviation flies back; so does one whose deviation would reach
+    return_limit_m before it is back in view, or that would then have been unseen for return_within_s (odometry may be
+    worse than its stated error), each with return_margin_s to turn round and be found; but none before
+    return_soonest_s, a usual gap between sightings;
     return_drift_m_s: largest measured drift that is subtracted on the way back; drift_m_s: least rate at which a place
     becomes uncertain out of sight, starting from seen_std_m; sound_error_m_s: largest error of sound odometry;
     regain_after_s: when a target has been unseen for this long, the robots that track it turn to it and back off;
@@ -56,6 +58,12 @@ class ControlParameters:
     max_plan_age_s: float = 1.0
     fed: frozenset[str] = frozenset()
     untied_after_s: float = 0.4
+    return_below_m: float = math.inf
+
+    @property
+    def return_height_m(self) -> float:
+        """Return the height of ways back into view."""
+        return min(self.search_height_m, self.return_below_m)
 
     def limits_of(self, robot: str) -> MotionLimits:
         """Return a robot's motion limits."""
@@ -98,11 +106,12 @@ def search_speed_m_s(field: ResolvedField) -> float:
 
 def control_from_field(field: ResolvedField) -> ControlParameters:
     """Return the setpoints' settings of a resolved field."""
-    planner, safety, speed_m_s = field.planner, field.safety, search_speed_m_s(field)
+    planner, safety, speed_m_s, height_m = field.planner, field.safety, search_speed_m_s(field), search_height_m(field)
     return ControlParameters(
         return_speed_m_s=speed_m_s,
         search_speed_m_s=speed_m_s,
-        search_height_m=search_height_m(field),
+        search_height_m=height_m,
+        return_below_m=return_height_m(field, height_m),
         limits=limits_from_field(field),
         lost_after_s=field.estimator.lost_after_s,
         return_std_m=0.6 * safety.max_position_std_m,

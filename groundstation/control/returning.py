@@ -39,7 +39,7 @@ def is_lost(
     if any(sensors.world_in_view(camera, marker) for camera in sensors.world):
         # A robot estimated in view but unseen may be beside the view: towards the middle it is seen sooner.
         return unseen_s > parameters.return_soonest_s and left_s < parameters.return_margin_s
-    view = view_of(float(mean[0]), float(mean[1]), name, parameters, sensors)
+    view = view_of(float(mean[0]), float(mean[1]), name, parameters.return_height_m, sensors)
     if view is None or unseen_s <= parameters.return_soonest_s:
         return spread > parameters.return_std_m
     way_m = float(way_back_m(mean[:2], view))

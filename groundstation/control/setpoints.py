@@ -21,7 +21,7 @@ from groundstation.estimation.belief import JointBelief
 from groundstation.geometry.angles import difference
 from groundstation.geometry.stabilized_frame import stabilized_from_world, world_from_stabilized
 from groundstation.planning.planner import PlanResult
-from groundstation.sensing.models import Rectangle, SensorSuite
+from groundstation.sensing.models import SensorSuite
 
 _STAND_GAIN, _TURN_GAIN = 1.0, 1.5  # of the distance and the turn to a stand [1/s]
 
@@ -137,14 +137,15 @@ def _level_m(name: str, level_m: float, now: Moment) -> float:
     return min(level_m, float(now.belief.mean_of(name)[2]) - now.parameters.height_tolerance_m)
 
 
-def _search_level_m(name: str, now: Moment) -> float:
+def _search_level_m(name: str, phase: FlightMode, now: Moment) -> float:
     """Return the height at which a robot searches or returns.
 
     One that flies on our estimate climbs only where it is in a view at that height too, else it would leave its view.
     """
     x, y, z = (float(value) for value in now.belief.mean_of(name)[:3])
-    view = view_of(x, y, name, now.parameters, now.sensors) if name in now.parameters.fed else None
-    level_m, inside = now.parameters.search_height_m, view is None or view.nearest(x, y) == (x, y)
+    level_m = now.parameters.return_height_m if phase is FlightMode.RETURN else now.parameters.search_height_m
+    view = view_of(x, y, name, level_m, now.sensors) if name in now.parameters.fed else None
+    inside = view is None or view.nearest(x, y) == (x, y)
     return _level_m(name, level_m if inside else min(level_m, z), now)
 
 
@@ -171,7 +172,8 @@ def _stands(phases: Mapping[str, FlightMode], searching: Mapping[str, Stand], no
     robots = [name for name in now.robots if phases[name] in (FlightMode.RETURN, FlightMode.SEARCH)]
     means = {name: now.belief.mean_of(name) for name in robots}
     places = {name: (float(mean[0]), float(mean[1])) for name, mean in means.items()}
-    views = {name: view_of(*soon(name, now), name, now.parameters, now.sensors) for name in robots}
+    height_m = now.parameters.return_height_m
+    views = {name: view_of(*soon(name, now), name, height_m, now.sensors) for name in robots}
     able = steered(robots, now)
     held = {name: return_stand(means[name], None) for name in robots if name not in able}
     back = {
@@ -180,7 +182,7 @@ def _stands(phases: Mapping[str, FlightMode], searching: Mapping[str, Stand], no
         if phases[name] is FlightMode.RETURN
     }
     out = {
-        name: _risen_in_view(name, searching[name], views[name], now)
+        name: _risen_in_view(name, searching[name], now)
         for name in able
         if phases[name] is FlightMode.SEARCH and name in searching
     }
@@ -193,13 +195,17 @@ def _stands(phases: Mapping[str, FlightMode], searching: Mapping[str, Stand], no
     return apart(held | back | out | idle, places, within, now.parameters.column_m)
 
 
-def _risen_in_view(name: str, stand: Stand, view: Rectangle | None, now: Moment) -> Stand:
+def _risen_in_view(name: str, stand: Stand, now: Moment) -> Stand:
     """Return the place for a search of a robot that flies on our estimate: in its view, until it is as high as one.
 
     It climbs only there (`_search_level_m`), and from below it sees less than the search counts on.
     """
-    low = float(now.belief.mean_of(name)[2]) < now.parameters.search_height_m - now.parameters.height_tolerance_m
-    if name not in now.parameters.fed or view is None or not low:
+    height_m = now.parameters.search_height_m
+    low = float(now.belief.mean_of(name)[2]) < height_m - now.parameters.height_tolerance_m
+    if name not in now.parameters.fed or not low:
+        return stand
+    view = view_of(*soon(name, now), name, height_m, now.sensors)
+    if view is None:
         return stand
     x, y = view.nearest(stand.x, stand.y)
     return replace(stand, x=x, y=y)
@@ -228,7 +234,7 @@ def _towards(name: str, stand: Stand, phase: FlightMode, now: Moment) -> Setpoin
     limit = stand.turn_rad_s or parameters.search_yaw_rate_rad_s
     body = stabilized_from_world(velocity, float(mean[3]))
     rate = min(max(rate, -limit), limit)
-    ahead_m, level_m = math.dist((stand.x, stand.y), mean[:2]), _search_level_m(name, now)
+    ahead_m, level_m = math.dist((stand.x, stand.y), mean[:2]), _search_level_m(name, phase, now)
     kept, level_m = kept_in_sight(name, (float(body[0]), float(body[1])), level_m, ahead_m, now)
     return _with_height(name, kept, rate, level_m, phase, now)
 

@@ -1,4 +1,4 @@
-"""Views of world-fixed cameras at search height, and the uncertainty of a robot's place."""
+"""Views of world-fixed cameras, and the uncertainty of a robot's place."""
 
 import math
 from functools import cache
@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 
 from groundstation.arrays import Array
-from groundstation.control.parameters import ControlParameters, SafetyParameters
+from groundstation.control.parameters import SafetyParameters
 from groundstation.estimation.belief import JointBelief
 from groundstation.sensing.models import Rectangle, SensorSuite
 
@@ -16,9 +16,9 @@ _POINT_M = 1e-6  # a narrower view counts as a line
 _SEEN_S = 0.5  # longest time between two sightings of a robot in view
 
 
-def view_of(x: float, y: float, name: str, parameters: ControlParameters, sensors: SensorSuite) -> Rectangle | None:
-    """Return the world-fixed view at search height that is nearest to a point, a little inside; None without one."""
-    views = sensors.root_views(parameters.search_height_m + sensors.marker_height_m[name])
+def view_of(x: float, y: float, name: str, height_m: float, sensors: SensorSuite) -> Rectangle | None:
+    """Return a robot's world-fixed view at a height that is nearest to a point, a little inside; None without one."""
+    views = sensors.root_views(height_m + sensors.marker_height_m[name])
     inside = [view.shrunk(VIEW_INSET_M) for view in views]
     return min(inside, key=lambda view: math.dist((x, y), view.nearest(x, y)), default=None)
 

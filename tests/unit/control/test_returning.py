@@ -93,8 +93,8 @@ def test_a_drone_flies_back_into_the_view_of_a_tilted_camera(rotation_deg: tuple
     tilted = replace(ceiling, optical_from_world=world_from_downward_optical(rotation_deg).T)
     sensors, far = replace(SENSORS, world={"ceiling": tilted}), np.array([3.4, -2.4, 1.6, 0.0])
     assert is_lost("drone_1", belief(far, 0.1), CONTROL, sensors, unseen_s=10.0)
-    goal = return_stand(far, view_of(3.4, -2.4, "drone_1", CONTROL, sensors))
-    marker_m = CONTROL.search_height_m + sensors.marker_height_m["drone_1"]
+    goal = return_stand(far, view_of(3.4, -2.4, "drone_1", CONTROL.return_height_m, sensors))
+    marker_m = CONTROL.return_height_m + sensors.marker_height_m["drone_1"]
     assert sensors.world_in_view("ceiling", np.array([goal.x, goal.y, marker_m]))
 
 

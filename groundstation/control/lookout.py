@@ -27,6 +27,7 @@ from groundstation.time_units import NS_PER_S
 
 _OBEYS = "TRACK"  # a driver's mode in which setpoints move the drone
 _CALL_REMEDY = "check its marker and the light; drive it into the middle of the room; or land the team"
+_TOLD_SHARE = 0.01  # smaller parts of the floor that nobody can see are not told
 _ROBOT_REMEDY = "check its marker and that camera; land it if it strays"
 
 
@@ -136,7 +137,9 @@ class Lookout:
         """Return the state of each search, for display; none while no robot searches."""
         if not self._obeyed:
             return ()
-        return tuple(_message(name, self.targets[name], now_ns) for name in self.missing if self.targets[name].place)
+        never_shown = self._search.never_shown
+        states = {name: self.targets[name] for name in self.missing}
+        return tuple(_message(name, one, now_ns, never_shown) for name, one in states.items() if one.place)
 
     def maps(self) -> Mapping[str, RoomMap]:
         """Return the probability map of each target that is searched for."""
@@ -165,7 +168,8 @@ class Lookout:
                 continue
             self._told[name] = state.mode
             if state.mode is SearchMode.LOST:
-                text = f"{name} is not found: {state.excluded:.0%} of the room was searched"
+                floor = _floor(self._search.never_shown)
+                text = f"{name} is not found: {state.excluded:.0%} of {floor} was searched"
                 self._notices.append(Notice(Severity.ERROR, text, _CALL_REMEDY, name))
             elif state.mode is SearchMode.SEARCH:
                 place = self._search.likeliest(name)
@@ -175,14 +179,20 @@ class Lookout:
                 self._notices.append(Notice(Severity.INFO, f"{name} is found", "", name))
 
 
-def _message(name: str, state: SearchState, now_ns: int) -> TargetSearch:
+def _message(name: str, state: SearchState, now_ns: int, never_shown: float) -> TargetSearch:
     since_s = (now_ns - state.since_ns) / NS_PER_S
     x, y = state.place or (0.0, 0.0)
     how_long = "nobody can search now" if state.expected_s is None else f"about {state.expected_s:.0f} s more"
-    done = f"{state.excluded:.0%} of the room done"
+    done = f"{state.excluded:.0%} of {_floor(never_shown)} done"
     text = f"searched for {since_s:.0f} s, most likely near ({x:.1f}, {y:.1f}); {done}, {how_long}"
     if state.mode is SearchMode.LOST:
         text = f"not found in {since_s:.0f} s, {done}: {_CALL_REMEDY}"
     expected_s = None if state.expected_s is None else round(state.expected_s, 1)
     place = (round(x, 2), round(y, 2))
     return TargetSearch(name, str(state.mode), round(since_s, 1), place, round(state.excluded, 3), expected_s, text)
+
+
+def _floor(never_shown: float) -> str:
+    """Return the name of the floor that a search can show; never_shown: share of the rest."""
+    all_of_it = never_shown < _TOLD_SHARE
+    return "the room" if all_of_it else f"the {1.0 - never_shown:.0%} of the room that the team can see"

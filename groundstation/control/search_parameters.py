@@ -25,7 +25,7 @@ class SearchParameters:
     1/e; near_yaw_rate_rad_s: yaw rate while all targets searched for were tracked before; keep_gain: another stand must
     promise this much more; starts_ahead_m: how far before the team a target that was never seen is expected;
     target_speed_m_s, target_straight_s: of a target that drives about; lost_after_s, lost_excluded: length of a search,
-    and share of the room excluded by it, after which the operator is asked.
+    and share of the floor excluded by it, of that which it can show, after which the operator is asked.
     """
 
     room_m: tuple[float, float]

@@ -16,6 +16,7 @@ from groundstation.control.parameters import ControlParameters
 from groundstation.control.pursuit import choose_pursuit
 from groundstation.control.search_parameters import SearchParameters
 from groundstation.control.search_ranges import searching_cameras
+from groundstation.control.search_reach import showable
 from groundstation.control.stand import Stand
 from groundstation.control.sweeps import NO_OUTLOOK, Outlook, lattice_of
 from groundstation.estimation.belief import JointBelief
@@ -48,8 +49,9 @@ class SearchState:
     """The state of the search for one target.
 
     since_ns: since when the mode holds; place: its most likely place [m; world]; excluded: share of the floor where it
-    is not; expected_s: approximate time to find it; near: it was tracked when it got out of sight; predicted: to where
-    the map has followed its prediction [x, y in m] and that one's variance (mean of both axes) [m^2].
+    is not, of that which can be shown; expected_s: approximate time to find it; near: it was tracked when it got out of
+    sight; predicted: to where the map has followed its prediction [x, y in m] and that one's variance (mean of both
+    axes) [m^2].
     """
 
     mode: SearchMode
@@ -67,7 +69,7 @@ class Search:
     """Probability maps of unseen targets, updated by pictures without them, and the stands of the searching robots.
 
     Call `see` with sightings, `take` with searched pictures, `advance` with each belief; read `targets`, ask for
-    `stands`.
+    `stands`. `never_shown`: share of the floor that no robot may fly near enough to, and no fixed camera shows.
     """
 
     def __init__(
@@ -93,6 +95,11 @@ class Search:
         # What is in a box is never seen: looking there would be in vain, and never end.
         self._floor = outside_boxes(self._boxes, self.grid.xs, self.grid.ys, marker_m)
         self._lattice = lattice_of(self.grid, parameters)
+        fixed = [rows[0] for name, rows in self._cameras.items() if name in sensors.world]
+        self._shown = self._floor & showable(
+            self.grid, self._lattice, self._footprints, parameters, control, sensors, marker_m, fixed
+        )
+        self.never_shown = 1.0 - float(self._shown.sum()) / max(1, int(self._floor.sum()))
         self._pictures: list[SearchedPicture] = []
         self._history = BeliefHistory()
         self._moved_ns = 0
@@ -279,7 +286,7 @@ class Search:
         for name, state in self.targets.items():
             if state.room is None or state.mode is SearchMode.TRACK:
                 continue
-            excluded = state.room.excluded(self._floor)
+            excluded = state.room.excluded(self._shown)
             lasted_s = (now_ns - state.since_ns) / NS_PER_S
             lost = state.mode is SearchMode.LOST or (lasted_s > p.lost_after_s and excluded > p.lost_excluded)
             self.targets[name] = replace(

@@ -140,8 +140,11 @@ class RoomMap:
         return float(self.chances[near].sum())
 
     def excluded(self, floor: Cells) -> float:
-        """Return the share of some cells that was searched: the chance to have found a target that stands there."""
-        return 1.0 - float(np.mean(self.overlooked[floor]))
+        """Return the share of some cells that was searched: the chance to have found a target that stands there.
+
+        Of no cells all is searched.
+        """
+        return 1.0 - float(np.mean(self.overlooked[floor])) if floor.any() else 1.0
 
     def likeliest(self, floor: Cells) -> tuple[float, float]:
         """Return the centre of the likeliest of some cells for a target that nothing hides [m; world]."""

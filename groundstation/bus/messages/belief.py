@@ -45,7 +45,7 @@ class TargetSearch(msgspec.Struct, frozen=True):
     place_m: tuple[float, float]
     """Where the target most likely is [m; world]."""
     searched: float
-    """Share of the room that was searched."""
+    """Share of the room that was searched, of that which the team can see."""
     expected_s: float | None
     """Estimated remaining time [s]; none: no robot can search."""
     text: str

@@ -1,6 +1,8 @@
 """Operator notices about searches and missing robots."""
 
 import math
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -90,6 +92,15 @@ def test_a_loss_is_told_at_once_with_where_it_is_searched_and_so_is_its_end() ->
     assert [notice.text for notice in lookout.take_notices()] == ["turtlebot is found"]
     assert lookout.searches(round(2.9e9)) == ()
     assert lookout.maps() == {}
+
+
+def test_floor_that_nobody_can_see_is_told_and_not_counted() -> None:
+    search = replace(search_from_field(LAB), fence_x_m=(-1.0, 1.0), fence_y_m=(-0.8, 0.8))
+    lookout = Lookout(search, control_from_field(LAB), sensors_from_field(LAB), ("drone_1",), ("turtlebot",))
+    lookout.take(driver_in("TRACK"))
+    lookout.advance(belief(0.02), {"drone_1": 0.1, "turtlebot": 0.1}, {"drone_1": 0.1})
+    look_in_vain(lookout)
+    assert re.search(r"% of the \d+% of the room that the team can see done", lookout.searches(round(2.8e9))[0].text)
 
 
 def test_a_target_that_comes_into_view_again_is_said_to_be_seen() -> None:

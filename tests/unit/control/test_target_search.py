@@ -236,6 +236,25 @@ def test_a_room_with_a_box_is_searched_around_it_and_to_its_end() -> None:
     assert not (0.5 < found.place[0] < 3.5 and abs(found.place[1]) < 1.3)
 
 
+def test_floor_that_no_permitted_stand_shows_is_not_waited_for() -> None:
+    """Most of a room about a small fence, and of one too far from the fixed view, can never be searched."""
+    assert new_search().never_shown == 0.0
+    fenced = replace(SEARCH, fence_x_m=(-1.0, 1.0), fence_y_m=(-0.8, 0.8), lost_after_s=5.0)
+    search = fly((30.0, 0.0), 30.0, fenced)[2]
+    state = search.targets["turtlebot"]
+    assert state.mode is SearchMode.LOST
+    assert state.room is not None and state.room.excluded(np.ones(search.grid.shape, dtype=np.bool_)) < 0.7
+    assert search.never_shown > 0.3
+
+
+def test_a_room_far_larger_than_the_way_out_of_its_view_is_partly_never_shown() -> None:
+    hall = replace(SEARCH, room_m=(20.0, 12.0), fence_x_m=(-9.7, 9.7), fence_y_m=(-5.7, 5.7))
+    assert 0.4 < new_search(hall).never_shown < 0.7
+    assert new_search(hall, replace(SENSORS, world={})).never_shown == 0.0
+    only_fed = replace(CONTROL, fed=frozenset(NAMES))
+    assert new_search(hall, control=only_fed).never_shown > new_search(hall).never_shown
+
+
 def test_a_target_that_pictures_do_not_show_may_be_hidden_and_then_is_no_longer_where_it_was() -> None:
     search, poses = new_search(), {"drone_1": np.array([0.0, 0.0, 1.6, 0.0])}
     for tick in range(150):

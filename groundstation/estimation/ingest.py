@@ -67,7 +67,7 @@ class Intake:
         if isinstance(message, RelativeObservation):
             return self._observation(key, message, stamp_ns, now_ns)
         if isinstance(message, Odometry):
-            self.ranges.take_heading(message, stamp_ns)
+            self.ranges.take_heading(message, stamp_ns, self._screen.stands(message.header.entity))
             return self._filter.add_motion(message.header.entity, self._attitudes.motion(message, stamp_ns), now_ns)
         if isinstance(message, ImuSample):
             return self._attitudes.imu(message, stamp_ns, self._screen.stands(message.header.entity))

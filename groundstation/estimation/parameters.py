@@ -213,6 +213,8 @@ def _ranged(system: Ranging, drones: Mapping[str, FieldDrone]) -> dict[str, Rang
             math.radians(drone.pad_yaw_deg),
             math.radians(system.pad_heading_std_deg),
             math.radians(drone.odometry.yaw_rate_std_deg_s),
+            drone.pad_m,
+            system.pad_limit_m,
         )
         for name, drone in drones.items()
     }

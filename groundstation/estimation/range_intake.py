@@ -1,8 +1,9 @@
 """Feeds ranges to the filter, and lets a robot join at the place that one round of ranges gives.
 
-A single range places nothing, and ranges give no heading of a standing robot. The heading is that of the pad until a
-robot has flown, then its last estimate, each continued by the vehicle's own heading; after a reset of the latter it is
-unknown, and another sensor must see the robot first.
+A single range places nothing, and ranges give no heading of a standing robot. The heading is that of the pad from when
+a robot stood until it has flown, then its last estimate, each continued by the vehicle's own heading. It is unknown of
+a robot that was never reported to stand, and after a reset of the vehicle's own heading, unless that is just a jump on
+the ground or at lift-off: then another sensor must see the robot first, or ranges find it on its pad again.
 """
 
 import math
@@ -12,14 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.arrays import Array
-from groundstation.bus.messages import Odometry, RangeObservation, Verdict
+from groundstation.bus.messages import Odometry, RangeObservation, Vector3, Verdict
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.fixed_lag import FixedLagFilter
 from groundstation.estimation.measurement import SensorReading
 from groundstation.estimation.ranged_robot import RangedRobot
 from groundstation.field.room import ranging_link
 from groundstation.geometry.rotations import rotation_z
-from groundstation.time_units import NS_PER_S
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 # A fix farther from the belief than this many deviations of both, and this distance [m], contradicts it: the belief is
 # of now, the fix of slightly earlier.
@@ -27,11 +28,16 @@ _SIGMAS, _APART_M = 5.0, 0.2
 # A robot is placed with a larger variance than its fix, by this factor: the following ranges have the same biases,
 # which must not count twice.
 _LESS_SURE = 25.0
+# A robot on the ground does not turn unnoticed between two headings that are nearer than this: a jump is its compass.
+_NO_TURN_NS = 300 * NS_PER_MS
 
 
 @dataclass(slots=True)
 class _Heading:
-    """A vehicle's own heading; world heading minus own as last known (None: unknown), with variance and time."""
+    """A vehicle's own heading; world heading minus own as last known (None: unknown), with variance and time.
+
+    stands: whether it stood then; stood, flew: whether it ever did, `flew` since it was last put on its pad.
+    """
 
     own_rad: float = 0.0
     reset: int = 0
@@ -39,7 +45,16 @@ class _Heading:
     offset_rad: float | None = None
     variance: float = 0.0
     known_ns: int = 0
+    stands: bool = False
+    stood: bool = False
     flew: bool = False
+
+    def take(self, own_rad: float, reset: int, stamp_ns: int, aloft: bool) -> None:
+        """Take the vehicle's own heading, which may have jumped; aloft: the vehicle may have turned meanwhile."""
+        if reset != self.reset and self.offset_rad is not None:
+            jumped = not aloft and stamp_ns - self.stamp_ns <= _NO_TURN_NS
+            self.offset_rad = self.offset_rad + self.own_rad - own_rad if jumped else None
+        self.own_rad, self.reset, self.stamp_ns = own_rad, reset, stamp_ns
 
 
 class RangeIntake:
@@ -57,17 +72,16 @@ class RangeIntake:
         joined, self._joined = self._joined, []
         return joined
 
-    def take_heading(self, message: Odometry, stamp_ns: int) -> None:
-        """Take a vehicle's own heading."""
+    def take_heading(self, message: Odometry, stamp_ns: int, stands: bool) -> None:
+        """Take a vehicle's own heading; stands: whether it reports that it is on the ground."""
         name = message.header.entity
         heading, robot = self._headings.get(name), self._ranged.get(name)
         if heading is None or robot is None or stamp_ns < heading.stamp_ns:
             return
-        if message.reset != heading.reset:
-            heading.offset_rad = None
-        heading.own_rad, heading.reset, heading.stamp_ns = message.yaw_rad, message.reset, stamp_ns
-        heading.flew = heading.flew or self._filter.airborne(name)
-        if not heading.flew:
+        aloft = self._filter.airborne(name)
+        heading.take(message.yaw_rad, message.reset, stamp_ns, aloft)
+        heading.stands, heading.stood, heading.flew = stands, heading.stood or stands, heading.flew or aloft
+        if heading.stood and not heading.flew:
             heading.offset_rad = robot.pad_yaw_rad - message.yaw_rad
             heading.variance, heading.known_ns = robot.pad_yaw_std_rad**2, stamp_ns
 
@@ -95,7 +109,11 @@ class RangeIntake:
         known = name in belief.layout
         if known:
             self._remember(name, belief)
-        if point is None or not self._filter.airborne(name):
+        if not self._filter.airborne(name):
+            if point is not None:
+                self._stands_at(point, robot, self._headings[name])
+            return False
+        if point is None:
             return False
         if known and not self._insists(message, belief, robot, stamp_ns):
             return False
@@ -115,6 +133,12 @@ class RangeIntake:
         heading = self._headings[name]
         heading.offset_rad = float(belief.mean_of(name)[3]) - heading.own_rad
         heading.variance, heading.known_ns = float(belief.covariance_of(name)[3, 3]), belief.stamp_ns
+
+    def _stands_at(self, point: Vector3, robot: RangedRobot, heading: _Heading) -> None:
+        """Take the place of a robot on the ground: on its pad, an unknown heading is that of the pad again."""
+        place = np.array(point) - rotation_z(robot.pad_yaw_rad) @ np.array(robot.transponder_m)
+        if heading.stands and heading.offset_rad is None and math.dist(place[:2], robot.pad_m) < robot.pad_limit_m:
+            heading.flew = False
 
     def _insists(self, message: RangeObservation, belief: JointBelief, robot: RangedRobot, stamp_ns: int) -> bool:
         """Count successive rounds that put a robot elsewhere; True when they are enough and last long enough."""

@@ -7,6 +7,11 @@ import msgspec
 
 from groundstation.vectors import Interval, Vector2, Vector3
 
+# A person sets a drone on its cross to a centimetre; a drone farther off stands somewhere else [m].
+OFF_PAD_M = 0.25
+# A place by ranges also has the lasting part of their errors, times the dilution by the anchors' geometry.
+_DILUTED_SIGMAS = 4.0
+
 
 class Fence(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Box that drones must not leave [m; world]."""
@@ -128,6 +133,11 @@ class Ranging(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     def transponder(self, robot: str) -> Transponder:
         """Return the transponder of a robot; without an entry it has the robot's name and place."""
         return self.transponders.get(robot, Transponder())
+
+    @property
+    def pad_limit_m(self) -> float:
+        """Return the distance from its pad from which on a robot stands elsewhere [m]: lasting errors count."""
+        return OFF_PAD_M + _DILUTED_SIGMAS * self.bias_std_m
 
 
 def ranging_link(system: str, anchor: str, robot: str) -> str:

@@ -6,12 +6,10 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from groundstation.doctor.finding import Finding, Level
 from groundstation.field.drones import FieldDrone
 from groundstation.field.resolved import ResolvedField
+from groundstation.field.room import OFF_PAD_M
 from groundstation.preflight.stand import PadSighting
 
-# A person sets a drone on its cross to a centimetre; a drone farther off stands somewhere else.
-_ASIDE_M, _TURNED_RAD = 0.25, math.radians(25.0)
-# A place by ranges also has the lasting part of their errors, times the dilution by the anchors' geometry.
-_RANGED_SIGMAS = 4.0
+_TURNED_RAD = math.radians(25.0)
 
 _BODIES = "check that it streams rigid bodies, their names, up, position_m and yaw_deg in the field file"
 _RADIOS = "check that its gateway runs, the names of transponders and anchors, and that four anchors answer"
@@ -38,7 +36,7 @@ def captured_pad_findings(
 
 def _aside_limit_m(field: ResolvedField, system: str) -> float:
     ranging = field.ranging.get(system)
-    return _ASIDE_M if ranging is None else _ASIDE_M + _RANGED_SIGMAS * ranging.bias_std_m
+    return OFF_PAD_M if ranging is None else ranging.pad_limit_m
 
 
 def _judged(name: str, seen: PadSighting, drones: Mapping[str, FieldDrone], aside_limit_m: float) -> Finding:

@@ -28,13 +28,14 @@ PLACES = {
 }
 RADIO = (0.1, 0.0, 0.05)
 PAD_YAW, POSE = 0.8, (0.5, -0.4, 1.2)
+PAD = POSE[:2]
 
 
 class Desk:
     """An ingest with a filter of one drone among five anchors; the drone hovers at POSE and reports yaw 0.3."""
 
     def __init__(self) -> None:
-        robot = RangedRobot(RADIO, PAD_YAW, math.radians(10), math.radians(1))
+        robot = RangedRobot(RADIO, PAD_YAW, math.radians(10), math.radians(1), PAD, 0.45)
         entities: dict[str, MotionModel] = {"drone": OdometryRobot(), "other": OdometryRobot()}
         links = {ranging_link("uwb", name, "drone"): place for name, place in PLACES.items()}
         entities |= {link: Anchor(place) for link, place in links.items()}
@@ -87,6 +88,12 @@ class Desk:
         self.status(FlightState.FLYING)
         self.filter.advance(self.now)
 
+    def land(self) -> None:
+        self.status(FlightState.LANDED)
+        self.now += 20 * MS
+        self.odometry()
+        self.filter.advance(self.now)
+
 
 @pytest.fixture
 def desk() -> Desk:
@@ -134,6 +141,52 @@ def test_a_heading_that_jumped_in_the_air_is_unknown(desk: Desk) -> None:
     desk.filter.advance(desk.now)
     assert "drone" not in desk.filter.belief().layout
     assert {one.verdict for one in desk.filter.take_corrections()} == {Verdict.AMBIGUOUS}
+
+
+def test_the_pads_heading_is_not_that_of_a_robot_that_never_stood(desk: Desk) -> None:
+    """A tracker that starts in flight hears odometry before the first status."""
+    desk.odometry()
+    desk.status(FlightState.FLYING)
+    desk.filter.advance(desk.now)
+    desk.fly(3)
+    assert "drone" not in desk.filter.belief().layout
+    assert {one.verdict for one in desk.filter.take_corrections()} == {Verdict.AMBIGUOUS}
+
+
+def test_a_heading_that_jumps_at_the_next_take_off_is_the_same_as_before_the_jump(desk: Desk) -> None:
+    """AR.Drones fuse their magnetometer in at each lift-off."""
+    desk.take_off()
+    desk.fly(3)
+    desk.land()
+    desk.status(FlightState.TAKING_OFF)
+    desk.now += 20 * MS
+    desk.odometry(yaw=-2.0, reset=1)
+    desk.status(FlightState.FLYING)
+    desk.filter.advance(desk.now)
+    desk.take(desk.round())
+    desk.filter.advance(desk.now)
+    assert pose(desk)[3] == pytest.approx(PAD_YAW, abs=0.05)
+
+
+@pytest.mark.parametrize(("aside_m", "joins"), [(0.1, True), (0.8, False)])
+def test_with_a_new_battery_the_heading_is_the_pads_again_if_ranges_find_it_there(
+    desk: Desk, aside_m: float, joins: bool
+) -> None:
+    desk.take_off()
+    desk.fly(3)
+    desk.land()
+    desk.now += 60_000 * MS
+    desk.odometry(yaw=-2.0, reset=1)
+    desk.take(desk.round(at=(PAD[0] + aside_m, PAD[1], 0.0)))
+    desk.now += 20 * MS
+    desk.odometry(yaw=-2.0, reset=1)
+    desk.status(FlightState.FLYING)
+    desk.filter.advance(desk.now)
+    desk.take(desk.round())
+    desk.filter.advance(desk.now)
+    assert ("drone" in desk.filter.belief().layout) == joins
+    if joins:
+        assert pose(desk)[3] == pytest.approx(PAD_YAW, abs=0.01)
 
 
 def test_ranges_without_a_place_let_nobody_join(desk: Desk) -> None:

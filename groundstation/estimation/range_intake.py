@@ -28,6 +28,8 @@ _SIGMAS, _APART_M = 5.0, 0.2
 # A robot is placed with a larger variance than its fix, by this factor: the following ranges have the same biases,
 # which must not count twice.
 _LESS_SURE = 25.0
+# Contradictions farther apart than this are not in a row.
+_IN_A_ROW_NS = 5 * NS_PER_S
 # A robot on the ground does not turn unnoticed between two headings that are nearer than this: a jump is its compass.
 _NO_TURN_NS = 300 * NS_PER_MS
 
@@ -64,7 +66,7 @@ class RangeIntake:
         self._filter, self._robots = joint, robots
         ranged = {name: one for own in robots.values() for name, one in own.items()}
         self._ranged, self._headings = ranged, {name: _Heading() for name in ranged}
-        self._contradictions: dict[str, tuple[int, int]] = {}
+        self._contradictions: dict[str, tuple[int, int, int]] = {}
         self._joined: list[tuple[str, str, bool]] = []
 
     def take_joined(self) -> list[tuple[str, str, bool]]:
@@ -110,6 +112,7 @@ class RangeIntake:
         if known:
             self._remember(name, belief)
         if not self._filter.airborne(name):
+            self._contradictions.pop(name, None)
             if point is not None:
                 self._stands_at(point, robot, self._headings[name])
             return False
@@ -149,8 +152,10 @@ class RangeIntake:
         if math.dist(message.position_m or there, there) <= limit_m:
             self._contradictions.pop(name, None)
             return False
-        count, since_ns = self._contradictions.get(name, (0, stamp_ns))
-        self._contradictions[name] = count + 1, since_ns
+        count, since_ns, last_ns = self._contradictions.get(name, (0, stamp_ns, stamp_ns))
+        if stamp_ns - last_ns > _IN_A_ROW_NS:
+            count, since_ns = 0, stamp_ns
+        self._contradictions[name] = count + 1, since_ns, stamp_ns
         settings = self._filter.parameters
         lasted = stamp_ns - since_ns >= settings.divergence_s * NS_PER_S
         return lasted and count + 1 >= settings.divergence_count

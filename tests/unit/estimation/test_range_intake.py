@@ -207,6 +207,18 @@ def test_one_who_is_elsewhere_round_after_round_is_placed_anew(desk: Desk) -> No
     assert desk.intake.ranges.take_joined() == [("uwb", "drone", True)]
 
 
+def test_contradictions_long_ago_are_not_held_against_a_robot(desk: Desk) -> None:
+    desk.take_off()
+    desk.fly(10)
+    desk.intake.ranges.take_joined()
+    away = (POSE[0] - 1.5, POSE[1], POSE[2])
+    desk.fly(4, at=away)
+    desk.fly(60, fix=False)
+    desk.fly(1, at=away)
+    assert desk.intake.ranges.take_joined() == []
+    assert pose(desk)[0] > POSE[0] - 0.75
+
+
 @pytest.mark.parametrize(("age_ms", "verdict"), [(3000, Verdict.LATE), (-3000, Verdict.IMPLAUSIBLE)])
 def test_rounds_of_another_time_place_nobody(desk: Desk, age_ms: int, verdict: Verdict) -> None:
     desk.take_off()

@@ -14,13 +14,17 @@ from groundstation.bus.api import Bus
 from groundstation.bus.messages import ImuSample, Odometry, Vector3
 from groundstation.bus.topics import IMU, ODOMETRY
 from groundstation.geometry.angles import wrap
+from groundstation.time_units import NS_PER_S
 
 _GAP_S = 0.5
 _CLIMB_SHARE = 1.5
 
 
 class GyroHeading:
-    """Heading by integrated turn rates, from 0; `resets` rises where a gap makes the increment void."""
+    """Heading by integrated turn rates, from 0; `resets` rises where a gap makes the increment void.
+
+    It begins at the time of the first sample in seconds: another process, after a restart, has another 0.
+    """
 
     def __init__(self) -> None:
         self.yaw_rad = 0.0
@@ -31,7 +35,9 @@ class GyroHeading:
     def update(self, stamp_ns: int, attitude: BaseAttitude) -> None:
         """Take the turn rate of a sample."""
         rate = heading_rate_rad_s(attitude)
-        if self._stamp_ns is not None:
+        if self._stamp_ns is None:
+            self.resets = stamp_ns // NS_PER_S
+        else:
             elapsed_s = (stamp_ns - self._stamp_ns) * 1e-9
             if elapsed_s > _GAP_S:
                 self.resets += 1

@@ -50,3 +50,14 @@ def test_an_attitude_that_was_never_told_is_none() -> None:
     assert LatestTelemetry().attitude_at(MS) is None
     told = LatestTelemetry(attitude=BaseAttitude(0.1, 0.0, math.pi / 2, (0.0, 0.0, 0.0)), attitude_ns=5)
     assert told.attitude_at(10 * MS) == told.attitude
+
+
+def test_a_restarted_driver_does_not_begin_at_a_heading_that_its_predecessor_told() -> None:
+    first, second, turning = GyroHeading(), GyroHeading(), BaseAttitude(0.0, 0.0, 0.0, (0.0, 0.0, 0.5))
+    for begins_s, heading in ((0, first), (60, second)):
+        for step in range(50):
+            heading.update(begins_s * 1000 * MS + step * 20 * MS, turning)
+    before = first.resets
+    first.update(3000 * MS, turning)
+    assert first.resets == before + 1
+    assert second.resets not in (before, first.resets)

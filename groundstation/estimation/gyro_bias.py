@@ -23,6 +23,8 @@ _SIGHT_WANDER = math.radians(0.3)
 _SPAN_NS = 2 * NS_PER_S  # between two uses of the heading
 _LOST_S = 2.0  # a camera that has not shown the heading for longer is begun anew, or replaced by another one
 _GATE = 9.0  # a heading with a larger NIS is not used for the bias
+# A gyroscope that warms up leaves the gate. After so many blocks in a row beyond it, it is the bias that is wrong.
+_INSISTS = 3
 _HORIZON_S = 20.0  # the bias's effect on the heading is modelled as a random walk that is right after this time
 
 
@@ -34,6 +36,7 @@ class GyroBias:
         self._tilt, self._turn = BiasedAngle(_FIRST_RAD**2), BiasedAngle(0.0)
         self._block: list[Vector3] = []
         self._block_ns = 0
+        self._refused = 0  # blocks in a row
         self._heading: tuple[int, float, float, int] | None = None
         self._seen: tuple[str, int, float] | None = None
 
@@ -71,6 +74,7 @@ class GyroBias:
         self._block.append(rates_rad_s)
         if max(map(abs, rates_rad_s)) > _STILL_RAD_S:
             self._block.clear()
+            self._refused = 0
         elif stamp_ns - self._block_ns >= _BLOCK_NS:
             self._learn()
             self._block.clear()
@@ -78,6 +82,7 @@ class GyroBias:
     def leave_ground(self) -> None:
         """Discard the block begun on the ground: it may include the lift-off."""
         self._block.clear()
+        self._refused = 0
 
     def take_heading(self, stamp_ns: int, yaw_rad: float, own_yaw_rad: float, reset: int) -> None:
         """Take the vehicle's heading beside that by its gyroscopes; differences across a reset are void."""
@@ -102,7 +107,6 @@ class GyroBias:
             self._turn.begin(variance)
         elif camera == last and elapsed_s > 0.0:
             excess = difference(ahead, offset)
-            self._seen = camera, stamp_ns, offset
             if excess * excess <= _GATE * (self._turn.variance + variance):
                 angle, bias = self._turn.see_angle(variance)
                 self._seen = camera, stamp_ns, wrap(offset + angle * excess)
@@ -112,15 +116,21 @@ class GyroBias:
         n, (x, y, _) = len(self._block), self.rad_s
         means = [math.fsum(rates[i] for rates in self._block) / n for i in range(3)]
         scatter = math.fsum((rates[2] - means[2]) ** 2 for rates in self._block) / n
-        share = self._correct(means[2] - self.rad_s[2], _BLOCK_STD**2 + scatter / n)
+        share = self._correct(means[2] - self.rad_s[2], _BLOCK_STD**2 + scatter / n, self._refused + 1 >= _INSISTS)
+        self._refused = 0 if share > 0.0 else self._refused + 1
         if share > 0.0:
             self.rad_s = (x + share * (means[0] - x), y + share * (means[1] - y), self.rad_s[2])
             self._tilt.see_bias(_BLOCK_STD**2)
 
-    def _correct(self, excess: float, variance: float) -> float:
-        """Correct the third bias by a measured excess; returns the share that was taken, 0 beyond the gate."""
+    def _correct(self, excess: float, variance: float, insists: bool = False) -> float:
+        """Correct the third bias by a measured excess; returns the share that was taken, 0 beyond the gate.
+
+        insists: what was learnt of the bias is wrong if the excess lies beyond the gate, and begins anew with it.
+        """
         if excess * excess > _GATE * (self._turn.bias_variance + variance):
-            return 0.0
+            if not insists:
+                return 0.0
+            self._turn = BiasedAngle(self._turn.variance)
         angle, bias = self._turn.see_bias(variance)
         self.rad_s = (*self.rad_s[:2], self.rad_s[2] + bias * excess)
         if self._seen is not None:

@@ -196,6 +196,7 @@ def _capture(name: str, system: MotionCapture) -> MountedCamera:
     return MountedCamera(
         carrier=name,
         rotation=np.eye(3),
+        sees_all_round=True,
         observes_targets="targets" in system.observes,
         stamp_std_s=CAPTURE_STAMP_STD_S,
     )

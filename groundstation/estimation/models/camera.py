@@ -35,12 +35,13 @@ BY_YAW, BY_PITCH, BY_ROLL = 3, 4, 5  # columns of derivatives after those by x, 
 
 
 class CameraParameters(Record):
-    """carrier_from_camera [m], and the variances of its mounting [rad^2, m^2]."""
+    """carrier_from_camera [m], and the variances of its mounting [rad^2, m^2]; sees_all_round: 1 without a lens."""
 
     rotation: Annotated[Array, (3, 3)]
     translation: Annotated[Array, (3,)]
     attitude_variance: float
     position_variance: float
+    sees_all_round: int
 
 
 _own = own_parameters(CameraParameters)
@@ -124,7 +125,7 @@ def prepare_relative_pose(belief: Belief, sensor: SensorRow, event: EventRow, z:
 
     Return the number of rows that count, or minus OUT_OF_VIEW.
     """
-    if z[Z] <= 0.0:
+    if z[Z] <= 0.0 and _own(sensor).sees_all_round == 0:
         return -OUT_OF_VIEW
     rows = 4 if event.size > 3 and belief.entities[event.subject].at_yaw >= 0 else 3
     turn, shift = _own(sensor).attitude_variance, _own(sensor).position_variance
@@ -165,7 +166,7 @@ class MountedCamera(SensorDefaults):
 
     rotation (3, 3), translation (3): carrier_from_camera [m]. A mounting error is the same in every picture, so it
     enters R `repeats` times: it must not average out. stamp_std_s: of the exposure time about the calibrated delay; it
-    displaces sightings while observer or subject moves.
+    displaces sightings while observer or subject moves. sees_all_round: it has no lens, and nothing is behind it.
     """
 
     kernels: ClassVar[SensorKernels] = SensorKernels(measure_relative_pose, prepare_relative_pose, locate_relative_pose)
@@ -180,6 +181,7 @@ class MountedCamera(SensorDefaults):
     repeats: float = 10.0
     stamp_std_s: float = 0.0
     repeats_s: float = 0.0
+    sees_all_round: bool = False
 
     def own(self) -> CameraParameters:
         """Return the parameters that the kernels read."""
@@ -188,4 +190,5 @@ class MountedCamera(SensorDefaults):
             translation=self.translation,
             attitude_variance=self.repeats * self.attitude_std_rad**2,
             position_variance=self.repeats * self.position_std_m**2,
+            sees_all_round=int(self.sees_all_round),
         )

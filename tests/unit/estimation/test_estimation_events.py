@@ -1,15 +1,19 @@
 """The effect of one observation on the belief, by the compiled kernels alone."""
 
 import numpy as np
+import pytest
 
 from groundstation.estimation.event_log import observation_values, write_event
 from groundstation.estimation.measurement import Measurement
-from groundstation.estimation.models import FixedMount, ManoeuvringTarget, MountedCamera
+from groundstation.estimation.models import ConstantVelocityTarget, FixedMount, ManoeuvringTarget, MountedCamera
 from groundstation.estimation.models.protocol import MotionModel
 from groundstation.estimation.observe import observe
-from groundstation.estimation.parameters import WORLD_FROM_DOWN, EstimatorParameters
-from groundstation.estimation.records import ACCEPTED, EventRow, OutcomeRow
+from groundstation.estimation.parameters import WORLD_FROM_DOWN, EstimatorParameters, parameters_from_field
+from groundstation.estimation.records import ACCEPTED, OUT_OF_VIEW, EventRow, OutcomeRow
 from groundstation.estimation.tables import empty_state, tables_from_parameters
+from groundstation.settings.files import find_field
+from groundstation.settings.load import load_field
+from groundstation.settings.resolved import resolved_field
 
 
 def test_a_mode_whose_innovation_has_no_covariance_is_not_corrected_and_loses_its_probability() -> None:
@@ -33,3 +37,29 @@ def test_a_mode_whose_innovation_has_no_covariance_is_not_corrected_and_loses_it
     np.testing.assert_array_equal(state.means[1], means[1])
     np.testing.assert_array_equal(state.covariances[1], covariances[1])
     assert state.weights.tolist() == [1.0, 0.0]
+
+
+@pytest.mark.parametrize(("all_round", "verdict"), [(True, ACCEPTED), (False, OUT_OF_VIEW)])
+def test_only_a_camera_with_a_lens_has_something_behind_it(all_round: bool, verdict: int) -> None:
+    """A body of a motion capture system may lie below its origin, as a marker on the floor does by its noise."""
+    system = MountedCamera("mocap", np.eye(3), sees_all_round=all_round)
+    entities: dict[str, MotionModel] = {
+        "mocap": FixedMount((0.0, 0.0, 0.0), 0.001, 0.002),
+        "rover": ConstantVelocityTarget(marker_height_m=0.0),
+    }
+    tables = tables_from_parameters(EstimatorParameters(entities, {"mocap": system}))
+    state = empty_state(tables, [True, True])
+    state.memory["active"][0] = state.memory["admitted"][1] = 1
+    sight = Measurement(0, "mocap", "rover", (1.0, 0.5, -0.003), None, tuple(np.diag([1e-4] * 3).ravel().tolist()))
+    events, outcomes = EventRow.rows(1), OutcomeRow.rows(1)
+    values = observation_values(sight, 0.0, 0, observer=0, subject=1, sensor=0)
+    write_event(np.asarray(events).view(np.uint8).data, 0, values)
+    observe(state, tables, events[0], outcomes[0])
+    assert outcomes["verdict"][0] == verdict
+
+
+def test_a_motion_capture_system_has_no_lens() -> None:
+    field = resolved_field(load_field(find_field("mocap-lab")))
+    sensors = parameters_from_field(field).sensors
+    cameras = {name: one for name, one in sensors.items() if isinstance(one, MountedCamera)}
+    assert {name for name, one in cameras.items() if one.sees_all_round} == {*field.sensing_capture} != set()

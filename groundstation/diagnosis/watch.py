@@ -31,13 +31,19 @@ class FigureWatch:
     def take(self, verdict: Verdict, now_ns: int) -> list[Notice]:
         """Return the notices that follow from a verdict reached at this time."""
         named = {(key := _suspects(one)): self._suspected(key, one, now_ns) for one in verdict.causes}
-        refuted = [one for one in self._standing if all(verdict.leads.get(s, 0.0) < _REFUTED for s in one)]
         notices = [_accusation(figure, len(key)) for key, figure in named.items() if key not in self._standing]
-        for key in refuted:
-            text = f"{self._standing.pop(key).text}: no longer suspected"
-            notices.append(Notice(Severity.INFO, text, entity=key[0][0]))
-        if named:  # another suspect explains it now
-            self._standing = named
+        accused = {suspect for key in named for suspect in key}
+        # Others explain it now, unless this one was found beside one of them.
+        replaced = bool(named) and not named.keys() & self._standing.keys()
+        kept = dict[tuple[Suspect, ...], SuspectedFigure]()
+        for key, figure in self._standing.items():
+            if not accused.isdisjoint(key):
+                continue  # told again, alone or beside others that cannot be told apart
+            if replaced or all(verdict.leads.get(s, 0.0) < _REFUTED for s in key):
+                notices.append(Notice(Severity.INFO, f"{figure.text}: no longer suspected", entity=key[0][0]))
+            else:
+                kept[key] = figure
+        self._standing = named | kept
         return notices
 
     def _suspected(self, key: tuple[Suspect, ...], charges: tuple[Charge, ...], now_ns: int) -> SuspectedFigure:

@@ -44,6 +44,27 @@ def test_each_figure_keeps_its_own_name_while_its_size_changes(lab_field: Resolv
     assert before == ["drone_1 pan", "drone_1 focal"] and [figure.about for figure in watch.figures] == before[::-1]
 
 
+def test_a_suspicion_beside_one_that_is_told_again_stands_until_it_is_refuted(lab_field: ResolvedField) -> None:
+    watch, pan, lens = FigureWatch(lab_field), charge(PAN, 0.05), charge(LENS, 0.03)
+    assert len(watch.take(verdict((pan,), (lens,)), S)) == 2
+    assert watch.take(Verdict(((pan,),), {PAN: 9.0, LENS: 4.4}), 6 * S) == []
+    assert [figure.about for figure in watch.figures] == ["drone_1 pan", "drone_1 focal"]
+    assert watch.take(verdict((pan,), (lens,)), 11 * S) == [], "told already"
+    (refuted,) = watch.take(Verdict(((pan,),), {PAN: 9.0, LENS: 0.5}), 16 * S)
+    assert "focal length" in refuted.text and "no longer suspected" in refuted.text
+    assert [figure.about for figure in watch.figures] == ["drone_1 pan"]
+
+
+def test_a_suspicion_that_another_one_replaces_is_withdrawn(lab_field: ResolvedField) -> None:
+    """Both explain the same sightings, so that the lead of the former stays large."""
+    watch = FigureWatch(lab_field)
+    watch.take(verdict((charge(PAN, 0.05),)), S)
+    told, withdrawn = watch.take(Verdict(((charge(LENS, 0.03),),), {PAN: 7.0, LENS: 9.0}), 6 * S)
+    assert told.severity is Severity.WARNING and "focal length" in told.text
+    assert withdrawn.severity is Severity.INFO and "no longer suspected" in withdrawn.text
+    assert [figure.about for figure in watch.figures] == ["drone_1 focal"]
+
+
 def test_of_two_that_cannot_be_told_apart_the_likelier_comes_first(lab_field: ResolvedField) -> None:
     watch = FigureWatch(lab_field)
     (told,) = watch.take(verdict((charge(LENS, 0.03), charge(PAN, 0.05, 8.0))), S)

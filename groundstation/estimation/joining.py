@@ -11,7 +11,7 @@ import numpy as np
 
 from groundstation.arrays import IntVector, Matrix, Vector
 from groundstation.estimation.correction import surprise
-from groundstation.estimation.evidence import confront, least_nis, likeliest
+from groundstation.estimation.evidence import confront, least_nis, likeliest, set_noise
 from groundstation.estimation.filter_state import Hypothesis, State, Tables, belief_of
 from groundstation.estimation.linear import copy_matrix
 from groundstation.estimation.model_kernels import call_locate
@@ -111,6 +111,7 @@ def admit(state: State, tables: Tables, event: EventRow, rows: int, hypothesis: 
     )
     if not settle(trial, tables, event, hypothesis.z):
         return NOT_LOCATED
+    set_noise(hypothesis.innovations, hypothesis.R)  # without the timing noise that an earlier linearisation added
     confront(trial, tables, event, rows, hypothesis)
     mode = likeliest(state.weights, hypothesis.innovations)
     if mode < 0:

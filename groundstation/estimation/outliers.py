@@ -64,7 +64,7 @@ def fits_another(
             continue
         shared = rows if rows < 4 or entity.at_yaw >= 0 else 3
         event.subject = other
-        copy_matrix(hypothesis.innovations[0].R, work[0].R)
+        copy_matrix(hypothesis.R, work[0].R)
         linearise(belief, deferred, sensor, event, shared, hypothesis.z, work[0], HP)
         fits = 0.0 <= work[0].nis <= settings.wild_gates * settings.gates[shared]
         found = found or (fits and apart_m(sensor, work[0]) <= _SAME_M)

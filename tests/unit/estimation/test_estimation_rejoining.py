@@ -144,3 +144,21 @@ def test_years_of_rare_losses_are_never_held_against_anybody() -> None:
         place = 0.8 - place
         team.watch(11.0, a=(place, 0.0))
     assert len(team.given_up) == 5
+
+
+def test_the_uncertain_time_of_a_sighting_counts_once_where_a_robot_is_found_again() -> None:
+    """A camera without mounting errors sees a drone that passes at 1 m/s; stamps are right to 50 ms: 5 cm."""
+    entities: dict[str, MotionModel] = {"a": OdometryRobot(), "eye": FixedMount((0.0, 0.0, 4.2), 1e-5, 1e-5)}
+    camera = MountedCamera("eye", WORLD_FROM_DOWN, stamp_std_s=0.05)
+    joint, now = FixedLagFilter(EstimatorParameters(entities, {"eye": camera})), START
+    joint.set_airborne("a", True, now, now)
+    for tick in range(120):
+        now += 20 * MS
+        x = (now - START) / 1e9 + (4.0 if tick >= 60 else 0.0)
+        joint.add_motion("a", OdometrySample(now, (1.0, 0.0, 0.0), 0.0, FLIGHT_M), now)
+        if tick % 3 == 0:
+            joint.add_observation(Measurement(now, "eye", "a", (x, 0.0, 2.82), 0.0, COVARIANCE), "", now)
+        joint.advance(now)
+        if any(c.joined for c in joint.take_corrections()) and tick >= 60:
+            break
+    assert joint.belief().covariance_of("a")[0, 0] == pytest.approx(1e-4 + 0.05**2, rel=0.1)

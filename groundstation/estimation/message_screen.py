@@ -21,6 +21,7 @@ from groundstation.estimation.frozen_sensor import FreezeWatch, Novelty
 
 # No vehicle here moves this fast or far [m/s, m, rad]; a number that is merely finite can still overflow the filter.
 _ABSURD = 1e3
+_MOST_VARIANCE = 1e12  # a driver may call an entry unknown by a large one; squares of still larger ones overflow
 # Message identities kept per key to find duplicates: all that are not late yet, but no more than these.
 _REMEMBERED, _REMEMBERED_AT_MOST = 512, 8192
 # A working sensor does not repeat itself this often for this long [s].
@@ -95,8 +96,10 @@ class MessageScreen:
         if message.header.entity != message.observer:
             return Verdict.UNKNOWN_ENTITY
         fault = _fault_of(message)
-        if fault is None and message.alternative is not None:
-            fault = _fault_of(message.alternative)
+        other = message.alternative
+        if fault is None and other is not None:
+            lacks_heading = other.yaw_rad is None and message.yaw_rad is not None
+            fault = Verdict.SINGULAR if lacks_heading else _fault_of(other)
         if fault is not None:
             return fault
         if not _plausible(message.roll_rad, message.pitch_rad):
@@ -152,7 +155,7 @@ def _fault_of(pose: RelativeObservation | PoseHypothesis) -> Verdict | None:
     """Return why a measured pose cannot be used with any belief, or None."""
     if len(pose.position_m) != 3 or not _plausible(*pose.position_m, pose.yaw_rad or 0.0):
         return Verdict.IMPLAUSIBLE
-    if not (math.isfinite(sum(pose.covariance)) or all(map(math.isfinite, pose.covariance))):
+    if not math.isfinite(sum(pose.covariance)) or max(pose.covariance, default=0.0) > _MOST_VARIANCE:
         return Verdict.IMPLAUSIBLE
     rows = 3 if pose.yaw_rad is None else 4
     return None if _is_covariance(pose.covariance, rows) else Verdict.SINGULAR

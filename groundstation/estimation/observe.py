@@ -182,6 +182,7 @@ def change(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> No
             enter(belief, event.subject, prior)
     if kind == DISMISSED:
         memory.active = memory.refused.count = 0
+        memory.noted_error = memory.slow_vx = memory.slow_vy = 0.0
     elif enters:
         memory.active = 1
         memory.wild.count = memory.refused.count = memory.unconfirmed = 0

@@ -33,6 +33,7 @@ def hold_velocity(odometry: CondensedOdometry, memory: EntityMemory, hold_s: flo
         memory.slow_vy += share * (memory.held_vy - memory.slow_vy)
     elif memory.odometry_age_s > hold_s:
         memory.held_vx = memory.held_vy = memory.held_vz = memory.yaw_rate = 0.0
+        memory.slow_vx = memory.slow_vy = 0.0
 
 
 @kernel()

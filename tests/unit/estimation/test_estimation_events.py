@@ -3,13 +3,19 @@
 import numpy as np
 import pytest
 
-from groundstation.estimation.event_log import observation_values, write_event
+from groundstation.estimation.event_log import change_values, observation_values, write_event
 from groundstation.estimation.measurement import Measurement
-from groundstation.estimation.models import ConstantVelocityTarget, FixedMount, ManoeuvringTarget, MountedCamera
+from groundstation.estimation.models import (
+    ConstantVelocityTarget,
+    FixedMount,
+    ManoeuvringTarget,
+    MountedCamera,
+    OdometryRobot,
+)
 from groundstation.estimation.models.protocol import MotionModel
-from groundstation.estimation.observe import observe
+from groundstation.estimation.observe import change, observe
 from groundstation.estimation.parameters import WORLD_FROM_DOWN, EstimatorParameters, parameters_from_field
-from groundstation.estimation.records import ACCEPTED, OUT_OF_VIEW, EventRow, OutcomeRow
+from groundstation.estimation.records import ACCEPTED, DISMISSED, OUT_OF_VIEW, EventRow, OutcomeRow
 from groundstation.estimation.tables import empty_state, tables_from_parameters
 from groundstation.settings.files import find_field
 from groundstation.settings.load import load_field
@@ -63,3 +69,15 @@ def test_a_motion_capture_system_has_no_lens() -> None:
     sensors = parameters_from_field(field).sensors
     cameras = {name: one for name, one in sensors.items() if isinstance(one, MountedCamera)}
     assert {name for name, one in cameras.items() if one.sees_all_round} == {*field.sensing_capture} != set()
+
+
+def test_a_robot_that_lands_takes_no_velocity_errors_into_its_next_flight() -> None:
+    tables = tables_from_parameters(EstimatorParameters({"drone": OdometryRobot()}))
+    state, learnt = empty_state(tables, [True]), ("noted_error", "slow_vx", "slow_vy")
+    state.memory["active"] = 1
+    for name in learnt:
+        state.memory[name] = 0.7
+    events, outcomes = EventRow.rows(1), OutcomeRow.rows(1)
+    write_event(np.asarray(events).view(np.uint8).data, 0, change_values(DISMISSED, 0.0, 0, 0))
+    change(state, tables, events[0], outcomes[0])
+    assert [float(state.memory[name][0]) for name in ("active", *learnt)] == [0.0] * 4

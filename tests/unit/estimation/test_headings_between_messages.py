@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from groundstation.estimation.models.driven import take_heading
+from groundstation.estimation.models.driven import hold_velocity, take_heading
 from groundstation.estimation.records import CondensedOdometry, EntityMemory
 from groundstation.geometry.angles import wrap
 
@@ -77,3 +77,14 @@ def test_a_jump_that_nobody_counted_is_taken_once_and_not_continued() -> None:
     assert jumped == pytest.approx(RATE_RAD_S * STEP_S * 20 + 1.0)
     for _ in range(20):
         assert turner.step(None) == jumped
+
+
+def test_a_vehicle_that_fell_silent_has_no_smoothed_velocity() -> None:
+    memory, told, nothing = EntityMemory.rows(1), CondensedOdometry.rows(1), CondensedOdometry.rows(1)
+    told["sum_vx"], told["sum_vy"], told["velocity_count"] = 0.5, -0.2, 1.0
+    for _ in range(300):
+        hold_velocity(told[0], memory[0], 0.2, STEP_S)
+    assert memory["slow_vx"][0] == pytest.approx(0.5, rel=0.1)
+    for _ in range(25):
+        hold_velocity(nothing[0], memory[0], 0.2, STEP_S)
+    assert [float(memory[name][0]) for name in ("held_vx", "slow_vx", "slow_vy")] == [0.0, 0.0, 0.0]

@@ -11,7 +11,8 @@ SILENT_DENSITY = 0.09
 # So is its turn: 0.15 rad/s, likewise [rad^2/s]. It is ordered to hover, but may have been turning at its last message.
 SILENT_TURN_DENSITY = 0.0225
 _TURNS_ON_S = 0.1  # without a heading
-_FASTEST_TURN = 4.0  # of a vehicle [rad/s]; beyond, its heading jumped, which is not continued
+# No vehicle turns faster [rad/s]: beyond, its heading jumped. The time between two headings is this uncertain [s].
+_FASTEST_TURN, _APART_S = 4.0, 0.05
 _SILENT_S = 0.3  # after a longer pause between headings the vehicle was silent
 # Velocity is smoothed over this time for the estimates of its errors [s].
 SLOW_S = 1.0
@@ -40,9 +41,9 @@ def hold_velocity(odometry: CondensedOdometry, memory: EntityMemory, hold_s: flo
 def take_heading(odometry: CondensedOdometry, memory: EntityMemory, step: float) -> None:
     """Turn the vehicle's own heading into the yaw rate of this step, and hold roll and pitch.
 
-    Between two headings it turns on as before, and the next one corrects that. An increment across a reset is void: the
-    heading jumped, not the vehicle. Of an increment across a silence only the part after the last sighting of the
-    vehicle counts, which included the rest; the turn is assumed to be even.
+    Between two headings it turns on as before, and the next one corrects that. An increment across a reset, or one too
+    large for a turn, is void: the heading jumped, not the vehicle. Of an increment across a silence only the part after
+    the last sighting of the vehicle counts, which included the rest; the turn is assumed to be even.
     """
     memory.yaw_age_s += step
     if odometry.newest_at < 0.0:
@@ -52,10 +53,10 @@ def take_heading(odometry: CondensedOdometry, memory: EntityMemory, step: float)
     memory.yaw_rate = memory.turn_rate = 0.0
     if memory.has_yaw != 0 and memory.last_reset == odometry.newest_reset:
         increment = wrap(odometry.newest_yaw - memory.last_yaw)
-        memory.yaw_rate = (increment - memory.turned) / step
         if memory.yaw_age_s > _SILENT_S:
-            memory.yaw_rate *= min(1.0, memory.unseen_s / memory.yaw_age_s)
-        else:
+            memory.yaw_rate = (increment - memory.turned) / step * min(1.0, memory.unseen_s / memory.yaw_age_s)
+        elif abs(increment) <= _FASTEST_TURN * (memory.yaw_age_s + _APART_S):
+            memory.yaw_rate = (increment - memory.turned) / step
             mean_rate = increment / memory.yaw_age_s
             memory.turn_rate = mean_rate if abs(mean_rate) <= _FASTEST_TURN else 0.0
     memory.yaw_age_s = memory.turned = 0.0

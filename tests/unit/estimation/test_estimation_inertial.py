@@ -299,10 +299,10 @@ def test_a_turn_in_a_silence_counts_from_the_last_sighting_on(silent_s: float, u
     for _ in range(round(silent_s / step_s) - 1):
         take_heading(nothing[0], memory[0], step_s)
         assert memory["yaw_rate"][0] == 0.0
-    told["newest_yaw"], told["newest_at"], memory["unseen_s"] = 0.8, 1.0, unseen_s
+    told["newest_yaw"], told["newest_at"], memory["unseen_s"] = 0.2, 1.0, unseen_s
     take_heading(told[0], memory[0], step_s)
-    assert step_s * memory["yaw_rate"][0] == pytest.approx(share * 0.8, rel=0.02)
-    told["newest_yaw"] = 0.81
+    assert step_s * memory["yaw_rate"][0] == pytest.approx(share * 0.2, rel=0.02)
+    told["newest_yaw"] = 0.21
     take_heading(told[0], memory[0], step_s)
     assert step_s * memory["yaw_rate"][0] == pytest.approx(0.01)
 

@@ -69,14 +69,27 @@ def test_a_heading_that_jumped_is_no_turn() -> None:
     assert turner.step(None, reset=1) == before
 
 
-def test_a_jump_that_nobody_counted_is_taken_once_and_not_continued() -> None:
-    turner = Turner()
+def test_a_jump_that_nobody_counted_is_no_turn() -> None:
+    turner, jump_rad = Turner(), 1.0
     for k in range(20):
         turner.step(RATE_RAD_S * STEP_S * k if k % 2 == 0 else None)
-    jumped = turner.step(RATE_RAD_S * STEP_S * 20 + 1.0)
-    assert jumped == pytest.approx(RATE_RAD_S * STEP_S * 20 + 1.0)
+    before = turner.turned_rad
+    assert turner.step(RATE_RAD_S * STEP_S * 20 + jump_rad) == before
     for _ in range(20):
-        assert turner.step(None) == jumped
+        assert turner.step(None) == before
+    after = turner.step(RATE_RAD_S * STEP_S * 20 + jump_rad)
+    assert turner.step(RATE_RAD_S * STEP_S * 21 + jump_rad) == pytest.approx(after + RATE_RAD_S * STEP_S)
+
+
+def test_a_turn_faster_than_any_vehicles_is_taken_once_and_not_continued() -> None:
+    """Headings that are stamped unevenly show such rates."""
+    turner, step_rad = Turner(), 0.15
+    for k in range(20):
+        turner.step(RATE_RAD_S * STEP_S * k if k % 2 == 0 else None)
+    stepped = turner.step(RATE_RAD_S * STEP_S * 20 + step_rad)
+    assert stepped == pytest.approx(RATE_RAD_S * STEP_S * 20 + step_rad)
+    for _ in range(20):
+        assert turner.step(None) == stepped
 
 
 def test_a_vehicle_that_fell_silent_has_no_smoothed_velocity() -> None:

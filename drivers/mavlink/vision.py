@@ -25,7 +25,7 @@ _STANDING_VARIANCES = (0.05**2, 0.05**2, 0.02**2, math.radians(3.0) ** 2)
 # Without poses for longer than this an autopilot has drifted by its own velocity, and then refuses poses.
 _COASTED_NS = 400 * NS_PER_MS
 # After lift-off cameras need a while to find it. ArduPilot coasts for 8 s (docs/reference/mavlink.md 1.1), PX4 lands by
-# itself after 1 s (EKF2_NOAID_TOUT, docs/decisions/0298): our landing, 0.7 s after this time, has to come before that.
+# itself after 1 s (EKF2_NOAID_TOUT, docs/decisions/0296): our landing, 0.7 s after this time, has to come before that.
 FIRST_SIGHT_NS = {Flavour.PX4: 200 * NS_PER_MS, Flavour.ARDUPILOT: 4 * NS_PER_S}
 
 

@@ -18,7 +18,7 @@ Place = tuple[float, float]
 _HALF_VIEW = (640.0 / 1179.0, 360.0 / 1179.0)
 _WALL_M, _CEILING_M, _CAMERA_BELOW_CEILING_M = 0.3, 1.7, 0.3
 _LOWEST_CEILING_M = 3.0
-_PAD_GAP_M = 1.0
+_PAD_GAP_M, _PAD_TO_FENCE_M = 1.0, 0.3
 _TARGET_CODE = 5
 _LONGEST_SITE = 40
 _PLAIN = re.compile(r"[a-z0-9][\w.:/@?=&%+-]*[\w/]", re.ASCII)
@@ -98,12 +98,14 @@ def check_room(room: NewRoom) -> None:
 
 
 def pads(room: NewRoom, count: int) -> list[Place]:
-    """Return pads [m; world], one metre apart, in the ceiling camera's view; raises OperatorMistake."""
-    half = [length - RISEN_ROOM_M for length in room.half_view_m(RISEN_MARKER_M)]
+    """Return pads [m; world], one metre apart, in the ceiling camera's view and the fence; raises OperatorMistake."""
+    inside = (0.5 * side - _WALL_M - _PAD_TO_FENCE_M for side in room[:2])
+    half = [min(seen - RISEN_ROOM_M, most) for seen, most in zip(room.half_view_m(RISEN_MARKER_M), inside, strict=True)]
     columns, rows = (1 + int(2 * side / _PAD_GAP_M) for side in half)
     if count > columns * rows:
         raise OperatorMistake(
-            f"the ceiling camera sees room for {columns * rows} pads, not for {count}: use a wider lens"
+            f"there is room for {columns * rows} pads, not for {count}, inside the fence where the ceiling camera sees "
+            "them: use a wider lens or a larger room"
         )
     used = math.ceil(count / rows)
     column = [(index - (used - 1) / 2) * _PAD_GAP_M for index in range(used)]

@@ -44,6 +44,14 @@ def test_pads_are_a_metre_apart_in_the_cameras_view() -> None:
         pads(room, 40)
 
 
+def test_pads_of_a_small_high_room_lie_inside_its_fence() -> None:
+    """There the ceiling camera sees more than the floor."""
+    room = NewRoom(4, 4, 10, SOURCE)
+    assert all(max(abs(x), abs(y)) <= 1.4 for x, y in pads(room, 4))
+    with pytest.raises(OperatorMistake, match="room for 9 pads, not for 10, inside the fence"):
+        pads(room, 10)
+
+
 def test_a_low_room_is_refused_with_the_reason() -> None:
     with pytest.raises(OperatorMistake, match="too low"):
         check_room(NewRoom(8, 6, 2.4, SOURCE))

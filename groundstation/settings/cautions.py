@@ -28,6 +28,7 @@ _FENCE_MARGIN_M, _FENCE_LEAST_M, _WALL_M = 0.3, 1.0, 0.2
 _LEAST_STD_M = 0.1
 _ABOVE_OBSTACLE_M = 0.3
 _LEAST_TILT_DEG = 5.0
+_MOST_CORNER_SHARE = 0.7
 Caution = Callable[[Field], Iterator[Finding]]
 # Cosine of the angle between the optical axis and straight down beyond which a camera looks at walls.
 _AT_WALLS = math.cos(math.radians(75.0))
@@ -174,14 +175,34 @@ def _adapters(field: Field) -> Iterator[Finding]:
 
 def _lenses(field: Field) -> Iterator[Finding]:
     for name, camera in field.cameras.items():
-        if _folds(camera.calibration):
-            yield ("cameras", name, "calibration", "distortion"), _FOLDED
+        yield from ((("cameras", name, "calibration", "distortion"), text) for text in _odd(camera.calibration))
     for name, drone in field.drones.items():
-        if _folds(drone.camera.calibration):
-            yield ("drones", name, "camera", "calibration", "distortion"), _FOLDED
+        path: KeyPath = ("drones", name, "camera", "calibration", "distortion")
+        yield from ((path, text) for text in _odd(drone.camera.calibration))
 
 
-_FOLDED = "folds the picture before its corners: no lens does that; calibrate it again"
+def _odd(lens: CalibrationSettings) -> Iterator[str]:
+    if _folds(lens):
+        yield "folds the picture before its corners: no lens does that; calibrate it again"
+    elif (share := _corner_share(lens)) > _MOST_CORNER_SHARE:
+        yield f"moves the picture's corners by {share:.0%} of their distance from its middle: calibrate it again"
+
+
+def _corner_share(lens: CalibrationSettings) -> float:
+    """Return the greatest displacement of a corner by the distortion, relative to its distance from the axis."""
+    k1, k2, p1, p2, k3 = lens.distortion
+    half_x, half_y = lens.width_px / (2 * lens.fx_px), lens.height_px / (2 * lens.fy_px)
+    r2 = half_x**2 + half_y**2
+    radial = k1 * r2 + k2 * r2**2 + k3 * r2**3
+    return max(
+        math.hypot(
+            x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
+            y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
+        )
+        / math.sqrt(r2)
+        for x in (-half_x, half_x)
+        for y in (-half_y, half_y)
+    )
 
 
 def _folds(lens: CalibrationSettings) -> bool:

@@ -72,20 +72,28 @@ def test_a_foolish_setting_is_named_with_its_path(option: str, path: str, words:
     assert any(path in line and words in line for line in found), found
 
 
-def test_a_lens_that_folds_the_picture_is_named_where_it_is_written(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("distortion", "words"),
+    [
+        ("[0.2, -2.0, 0.0, 0.0, -3.0]", "folds the picture"),
+        ("[50.0, 0.0, 0.0, 0.0, 0.0]", "moves the picture's corners"),
+        ("[0.0, 0.0, 3.0, 0.0, 0.0]", "moves the picture's corners"),
+    ],
+)
+def test_a_lens_that_no_camera_has_is_named_where_it_is_written(tmp_path: Path, distortion: str, words: str) -> None:
     text = (LAB.parent / "cameras" / "ceiling.yaml").read_text()
     start = text.index("distortion:")
     end = text.index("\n", start)
     (tmp_path / "cameras").mkdir()
     for lens in (LAB.parent / "cameras").glob("*.yaml"):
         (tmp_path / "cameras" / lens.name).write_text(lens.read_text())
-    folded = text[:start] + "distortion: [0.2, -2.0, 0.0, 0.0, -3.0]" + text[end:]
+    folded = text[:start] + f"distortion: {distortion}" + text[end:]
     (tmp_path / "cameras" / "ceiling.yaml").write_text(folded)
     (tmp_path / "lab.yaml").write_text(LAB.read_text())
     (line,) = cautions_of(tmp_path / "lab.yaml")
     one = told(line, "WARNING")
     assert one.file.endswith("cameras/ceiling.yaml") and one.line == text[:start].count("\n") + 1
-    assert one.path == "distortion" and "folds the picture" in one.text
+    assert one.path == "distortion" and words in one.text
 
 
 def test_a_finding_is_taken_apart_for_programs() -> None:

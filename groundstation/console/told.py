@@ -47,6 +47,7 @@ def estimate(seen: StampedMessage[m.Estimate] | None) -> dict[str, Any] | None:
             "converged": entity.converged,
             # Never seen is infinite in the filter, which JSON cannot express.
             "age_s": round(min(entity.age_s, 1e6), 2),
+            "unplaced_s": round(min(entity.unlocalised_s, 1e6), 2),
         }
         for entity in seen.message.entities
     ]

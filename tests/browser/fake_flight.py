@@ -39,6 +39,7 @@ class FakeFlight(threading.Thread):
         self.lands_in_s: dict[str, float] = {}
         self.braked: set[str] = set()
         self.unseen_s: dict[str, float] = {}  # seconds since the target was last observed
+        self.unplaced_s: dict[str, float] = {}  # seconds for which what is seen has contradicted the estimate
         self.deaf: set[str] = set()
         self._sunk_m = dict.fromkeys(drones, 0.0)  # descent of each landing drone so far
         self.frozen = self.fenced = False
@@ -153,9 +154,10 @@ class FakeFlight(threading.Thread):
             cov = [0.0] * 16
             cov[0], cov[1], cov[4], cov[5], cov[10], cov[15] = a, b, b, c, 0.001, 0.002
             mean = (x + 0.04 * math.sin(3 * s), y + 0.04 * math.cos(2 * s), z, yaw)
-            entities.append(
-                m.EntityEstimate(name, "robot", mean, tuple(cov), (0.2, 0.1, 0.0), True, self.unseen_s.get(name, 0.05))
-            )
+            unseen_s, unplaced_s = self.unseen_s.get(name, 0.05), self.unplaced_s.get(name, 0.0)
+            known = {"unlocalised_s": unplaced_s, "contradicted": unplaced_s > 0.0}
+            speed = (0.2, 0.1, 0.0)
+            entities.append(m.EntityEstimate(name, "robot", mean, tuple(cov), speed, True, unseen_s, **known))
         x, y, vx, vy = self.target_at(s)
         place = (x + 0.06 * math.sin(1.3 * s), y + 0.05 * math.cos(1.1 * s))
         spread = (0.012 + 0.008 * math.sin(0.4 * s), 0.004, 0.004, 0.008)

@@ -236,3 +236,10 @@ def test_orders_passed_on_by_the_terminal_are_attributed_to_their_sender(stage: 
     page.wait(lambda s: any("passed on for you" in line for line in page.there("order").all_inner_texts()))
     order(stage.flight, m.Verb.TRACK, "operator")
     page.wait(lambda s: page.there("drone_1-duty").inner_text().startswith("Tracks turtlebot, ordered at the terminal"))
+
+
+def test_a_drone_whose_sightings_contradict_its_estimate_is_named(stage: Any) -> None:
+    stage.flight.unplaced_s["drone_2"] = 9.0
+    page = stage.open()
+    page.wait(lambda s: "It is not known yet where drone_2 is." in page.there("verdict").inner_text())
+    page.wait(lambda s: "drone_2: not known where it is for 9 s" in page.there("banners").inner_text())

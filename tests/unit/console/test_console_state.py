@@ -230,10 +230,13 @@ def test_a_viewer_gets_all_that_was_added_since_its_last_frame() -> None:
 
 def test_an_infinite_age_is_sent_as_a_large_number() -> None:
     state, board = ConsoleState(Cast("lab", {}, ("turtlebot",)), 0), Snapshot()
-    state.ingest([received(t.ESTIMATE, estimate(age_s=1e300))])
+    seen = estimate(age_s=1e300)
+    nowhere = tuple(msgspec.structs.replace(one, unlocalised_s=1e300) for one in seen.entities)
+    state.ingest([received(t.ESTIMATE, msgspec.structs.replace(seen, entities=nowhere))])
     board.begin()
     state.put(board, NS_PER_S)
-    assert json.loads(board.since(-1))["estimate"]["entities"][0]["age_s"] == 1e6
+    sent = json.loads(board.since(-1))["estimate"]["entities"][0]
+    assert (sent["age_s"], sent["unplaced_s"]) == (1e6, 1e6)
 
 
 def test_history_keeps_trails_and_samples_within_bounds() -> None:

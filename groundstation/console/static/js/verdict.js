@@ -47,8 +47,8 @@ function unseenFor(names) {
   return [seen.length && `${namedOrCounted(seen)}, not seen for ${least === most ? "" : `${least} to `}${most} s`, never.length && `${namedOrCounted(never)}, not seen yet`].filter(Boolean).join("; ");
 }
 
-// In pictures, and not localised.
-const isUnplaced = (name) => !entity(name) && unseenS(name) <= store.scene.lost_after_s;
+// In pictures, and not localised: never yet, or its pictures contradict its estimate for long.
+const isUnplaced = (name) => unseenS(name) <= store.scene.lost_after_s && (entity(name)?.unplaced_s ?? Infinity) > store.scene.lost_after_s;
 
 // The entities that cameras see, known without the tracker.
 function inPictures() {
@@ -58,7 +58,7 @@ function inPictures() {
 
 function lost() {
   if (trackerSilent()) return `No tracker tells if anyone is lost${inPictures()}.`;
-  const gone = sought().filter(isLost), unplaced = gone.filter(isUnplaced), unseen = gone.filter((name) => !isUnplaced(name));
+  const gone = sought().filter((name) => isLost(name) || isUnplaced(name)), unplaced = gone.filter(isUnplaced), unseen = gone.filter((name) => !isUnplaced(name));
   const yet = unplaced.length ? ` It is not known yet where ${joined(unplaced)} ${unplaced.length > 1 ? "are" : "is"}.` : "";
   return `${unseen.length ? `Lost: ${unseenFor(unseen)}` : `Nobody is lost${unseenYet()}`}.${yet}`;
 }

@@ -83,6 +83,13 @@ def place_camera(
             f"the corners fit no place of the camera ({placing.rms_px:.1f} px rms): is the calibration this camera's, "
             f"are the squares {square_mm:g} mm, do the markers lie flat?"
         )
+    if max(placing.offsets_m.values()) > _MISPLACED * mark_std_m:
+        offsets = misplaced | placing.offsets_m
+        each = ", ".join(f"{code} by {offset_m * 100:.1f} cm" for code, offset_m in sorted(offsets.items()))
+        raise DriverError(
+            f"the markers do not lie to each other as you said ({each}; {mark_std_m * 100:g} cm is their deviation), "
+            f"and they are too few to tell which is wrong: measure all places again; are the squares {square_mm:g} mm?"
+        )
     return Placing(placing.pose, placing.covariance, placing.rms_px, placing.offsets_m, misplaced)
 
 

@@ -178,6 +178,20 @@ def test_nothing_can_be_told_of_no_markers():
         place_camera([Mark(1, (0.0, 0.0, 0.0))], {}, LENS, 44.0, 0.005)
 
 
+@pytest.mark.parametrize(
+    ("codes", "scale", "square_mm", "moved"),
+    [((1, 2, 3, 4), 1.1, 44.0, 0.0), ((1, 2, 3, 4), 1.0, 40.0, 0.0), ((1, 2, 3), 1.0, 44.0, 0.2)],
+)
+def test_markers_that_contradict_each_other_place_nothing(codes, scale, square_mm, moved):
+    """A tape, or squares, 10 % off blame no single marker; of three, nobody knows which one is wrong."""
+    steady = {code: Steady(corners_of(code), 0.05, 20, moved=False) for code in codes}
+    places = {
+        code: (scale * PLACES[code][0] + (moved if code == 1 else 0.0), scale * PLACES[code][1]) for code in codes
+    }
+    with pytest.raises(DriverError, match="do not lie to each other as you said"):
+        place_camera([Mark(code, (*place, 0.0)) for code, place in places.items()], steady, LENS, square_mm, 0.005)
+
+
 def lab_with(tmp_path, cameras):
     """Return a copy of the shipped field with these cameras: name -> (source, pose, turn [deg])."""
     field = YAML(typ="safe").load((CONFIG / "lab.yaml").read_text())

@@ -239,7 +239,8 @@ def test_orders_passed_on_by_the_terminal_are_attributed_to_their_sender(stage: 
 
 
 def test_a_drone_whose_sightings_contradict_its_estimate_is_named(stage: Any) -> None:
-    stage.flight.unplaced_s["drone_2"] = 9.0
+    stage.flight.unplaced_s["drone_2"], stage.flight.battery["drone_2"] = 9.0, 0.9
     page = stage.open()
     page.wait(lambda s: "It is not known yet where drone_2 is." in page.there("verdict").inner_text())
     page.wait(lambda s: "drone_2: not known where it is for 9 s" in page.there("banners").inner_text())
+    assert "Nobody is lost" not in page.there("verdict").inner_text()

@@ -60,7 +60,8 @@ function lost() {
   if (trackerSilent()) return `No tracker tells if anyone is lost${inPictures()}.`;
   const gone = sought().filter((name) => isLost(name) || isUnplaced(name)), unplaced = gone.filter(isUnplaced), unseen = gone.filter((name) => !isUnplaced(name));
   const yet = unplaced.length ? ` It is not known yet where ${joined(unplaced)} ${unplaced.length > 1 ? "are" : "is"}.` : "";
-  return `${unseen.length ? `Lost: ${unseenFor(unseen)}` : `Nobody is lost${unseenYet()}`}.${yet}`;
+  const others = unseen.length ? `Lost: ${unseenFor(unseen)}.` : unplaced.length ? "" : `Nobody is lost${unseenYet()}.`;
+  return `${others}${yet}`.trim();
 }
 
 // The entities that would be lost next.

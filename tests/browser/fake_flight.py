@@ -155,9 +155,9 @@ class FakeFlight(threading.Thread):
             cov[0], cov[1], cov[4], cov[5], cov[10], cov[15] = a, b, b, c, 0.001, 0.002
             mean = (x + 0.04 * math.sin(3 * s), y + 0.04 * math.cos(2 * s), z, yaw)
             unseen_s, unplaced_s = self.unseen_s.get(name, 0.05), self.unplaced_s.get(name, 0.0)
-            known = {"unlocalised_s": unplaced_s, "contradicted": unplaced_s > 0.0}
-            speed = (0.2, 0.1, 0.0)
-            entities.append(m.EntityEstimate(name, "robot", mean, tuple(cov), speed, True, unseen_s, **known))
+            speed, wrong = (0.2, 0.1, 0.0), unplaced_s > 0.0
+            told = m.EntityEstimate(name, "robot", mean, tuple(cov), speed, True, unseen_s, unplaced_s, wrong)
+            entities.append(told)
         x, y, vx, vy = self.target_at(s)
         place = (x + 0.06 * math.sin(1.3 * s), y + 0.05 * math.cos(1.1 * s))
         spread = (0.012 + 0.008 * math.sin(0.4 * s), 0.004, 0.004, 0.008)

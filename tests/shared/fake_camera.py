@@ -65,7 +65,7 @@ class FakeChild:
     def ready(self, detail: str = "") -> None:
         self.states.append(("READY", detail))
 
-    def degrade(self, detail: str) -> None:
+    def degrade(self, detail: str, works: bool = True) -> None:
         self.states.append(("DEGRADED", detail))
 
     def event(self, severity: Any, text: str, remedy: str = "", entity: str | None = None) -> None:

@@ -5,6 +5,7 @@ import sys
 import time
 import types
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import pytest
 from dummy_table import spec, until
@@ -31,8 +32,8 @@ def drone() -> Iterator[socket.socket]:
 
 
 def datagrams(drone: socket.socket, transport: str = "") -> FailsafeDatagrams:
-    told = {"transport": transport} if transport else {}
-    return FailsafeDatagrams("127.0.0.1", drone.getsockname()[1], b"hover", b"land", land_after_s=3.0, **told)
+    usual = FailsafeDatagrams("127.0.0.1", drone.getsockname()[1], b"hover", b"land", land_after_s=3.0)
+    return replace(usual, transport=transport) if transport else usual
 
 
 def heard(drone: socket.socket) -> list[bytes]:

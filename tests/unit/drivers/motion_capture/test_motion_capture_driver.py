@@ -42,7 +42,7 @@ class FakeChild:
     def ready(self, detail: str = "") -> None:
         self.states.append("READY")
 
-    def degrade(self, detail: str) -> None:
+    def degrade(self, detail: str, works: bool = True) -> None:
         self.states.append("DEGRADED")
 
     def event(self, severity: str, text: str, remedy: str = "", entity: str | None = None) -> None:

@@ -46,7 +46,7 @@ class FakeChild:
     def ready(self, detail: str = "") -> None:
         self.told.append("READY")
 
-    def degrade(self, detail: str) -> None:
+    def degrade(self, detail: str, works: bool = True) -> None:
         self.told.append(f"DEGRADED {detail}")
 
     def event(self, severity: str, text: str, remedy: str = "", entity: str | None = None) -> None:

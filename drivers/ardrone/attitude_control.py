@@ -61,6 +61,10 @@ class AttitudeControl:
         """Return whether commands or cameras have shown that the drone sees no floor."""
         return self._doubt.blind
 
+    def trust(self) -> None:
+        """Trust the reported velocity again: the drone stands."""
+        self._doubt.reset()
+
     def step(self, now_ns: int, decision: WatchdogDecision, report: MotionReport) -> AttitudeRequest:
         """Return the attitude for a decision."""
         dt_s = (now_ns - self._turn_ns) * 1e-9

@@ -175,6 +175,7 @@ class ArDrone:
             self._flow.update(now_ns, motion.velocity_m_s[:2], convert.says_no_vision(demo.control_state))
         elif flight_state not in AIRBORNE:
             self._flow.reset()
+            self._attitude.trust()  # else its landing would not be believed either
         if self._flow.lost or self._attitude.blind:
             report = HealthReport((_NO_VELOCITY, *report.findings))
         self._publisher.publish(now_ns, motion, report)

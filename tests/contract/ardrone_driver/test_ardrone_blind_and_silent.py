@@ -3,7 +3,10 @@
 import time
 
 import pytest
+from scripted_drone import FLY
 
+from drivers.host import VehicleHost
+from drivers.watchdog_types import WatchdogLimits
 from groundstation.bus.messages import Verb
 
 HOLDS_ITSELF = "0,0,0,0,0"
@@ -32,3 +35,18 @@ def test_a_drone_that_saw_no_floor_before_falling_silent_is_braked(rig, monkeypa
     turn_for(rig, 0.8, settle=then == "frozen")
     assert rig.decision.action == "HOVER" and not rig.host.watchdog.vehicle.fresh
     assert (rig.fake.said("PCMD")[-1] != HOLDS_ITSELF) is braked
+
+
+def test_a_drone_that_was_shown_to_be_blind_is_believed_that_it_has_landed(new_rig):
+    """The doubt lasts until it stands: it must not hide that it does, or its motors would never be said to rest."""
+    rig = new_rig()
+    rig.host = VehicleHost(rig.process, rig.drone, WatchdogLimits(land_after_s=1.3))
+    rig.take_off()
+    rig.tracking = True
+    rig.order(Verb.TRACK)
+    rig.until(lambda: rig.decision.action == "FLY")
+    rig.drone._attitude._doubt.blind = True  # as cameras show it
+    rig.until(lambda: rig.decision.action == "LAND")
+    rig.until(lambda: not rig.fake.state & FLY)
+    rig.until(lambda: rig.host.watchdog.mode == "LANDED")
+    assert rig.drone._attitude.doubted == ""

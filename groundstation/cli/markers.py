@@ -10,7 +10,6 @@ from groundstation.printing import pdf, sheets
 from groundstation.recording.outputs import replaced_file
 
 _SQUARE_MM, _TAG_MM = 44.0, 168.0
-_SQUARES_MM, _TAGS_MM = (5.0, 200.0), (10.0, 1000.0)
 
 
 @click.group(epilog="Example: groundstation markers print --id 3 --size A4 -o marker.pdf")
@@ -84,7 +83,10 @@ def paper_size(text: str) -> tuple[float, float]:
 
 
 def _item(number: int, dictionary: str | None, size: float) -> sheets.Sheet:
-    least, most = _SQUARES_MM if dictionary is None else _TAGS_MM
+    from groundstation.settings.marker import TAGS_MM
+    from groundstation.settings.values import SQUARES_MM
+
+    least, most = SQUARES_MM if dictionary is None else TAGS_MM
     if not least <= size <= most:
         raise click.UsageError(f"a size of {size:g} mm: must be in {least:g}..{most:g}, as a field file permits")
     try:

@@ -94,6 +94,12 @@ class PlannerSettings(SettingsSection):
     separation_m: Annotated[float, Field(gt=0, le=10)] = 1.0
     """Horizontal distance [m] below which the cost drives drones apart; at least safety.min_separation_m."""
 
+    @property
+    def heights_m(self) -> tuple[float, float]:
+        """Return the lowest and the highest permitted height [m]."""
+        heights = [height for row in self.level_heights_m for height in row]
+        return min(heights), max(heights)
+
 
 class SafetySettings(SettingsSection):
     """Safety limits and communication time-outs."""

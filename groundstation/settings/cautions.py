@@ -24,7 +24,9 @@ from groundstation.settings.volumes import anchor_cautions, volume_cautions
 
 # The markers of drones that have taken off; half of a board.
 RISEN_MARKER_M, RISEN_ROOM_M = 1.0, 0.15
-_FENCE_MARGIN_M, _FENCE_LEAST_M, _WALL_M = 0.3, 1.0, 0.2
+PAD_TO_FENCE_M = 0.3
+"""Distance of a pad from the fence that a take-off needs."""
+_FENCE_LEAST_M, _WALL_M = 1.0, 0.2
 _LEAST_STD_M = 0.1
 _ABOVE_OBSTACLE_M = 0.3
 _LEAST_TILT_DEG = 5.0
@@ -90,10 +92,10 @@ def _carried_cameras(field: Field) -> Iterator[Finding]:
 
 def _walls(field: Field) -> Iterator[Finding]:
     """Yield sides of the fence nearer than an arm's length to a wall or, at the top, to a fixed camera."""
-    x, y, _ = field.room.size_m
     fence = field.room.fence
-    for axis, (low, high), half in (("x_m", fence.x_m, x / 2), ("y_m", fence.y_m, y / 2)):
-        if (gap := min(low + half, half - high)) < _WALL_M:
+    for axis in ("x_m", "y_m"):
+        (low, high), (least, most) = getattr(fence, axis), field.room.inside[axis]
+        if (gap := min(low - least, most - high)) < _WALL_M:
             yield (
                 ("room", "fence", axis),
                 f"comes within {max(0.0, gap):.2f} m of a wall: drones stop at it within 0.1 m",
@@ -111,13 +113,13 @@ def _fence(field: Field) -> Iterator[Finding]:
     for name, drone in field.drones.items():
         (x, y), xs, ys = drone.pad_m, fence.x_m, fence.y_m
         inside = (x - xs[0], xs[1] - x, y - ys[0], ys[1] - y)
-        if min(inside) < _FENCE_MARGIN_M:
+        if min(inside) < PAD_TO_FENCE_M:
             text = f"is {max(0.0, min(inside)):.2f} m from the fence: a take-off drifts farther than that"
             yield ("drones", name, "pad_m"), text
 
 
 def _obstacles(field: Field) -> Iterator[Finding]:
-    fence, lowest = field.room.fence, min(height for row in field.planner.level_heights_m for height in row)
+    fence, (lowest, _) = field.room.fence, field.planner.heights_m
     for name, one in field.room.obstacles.items():
         (x, y), (width, depth, height) = one.centre_m, one.size_m
         inside = (fence.x_m[0] - width / 2 < x < fence.x_m[1] + width / 2) and (
@@ -131,11 +133,8 @@ def _obstacles(field: Field) -> Iterator[Finding]:
 
 
 def _heights(field: Field) -> Iterator[Finding]:
-    lowest, range_m = (
-        min(height for row in field.planner.level_heights_m for height in row),
-        field.planner.planned_range_m,
-    )
-    over_m = lowest - max((one.marker.height_m for one in field.tracked.values()), default=0.0)
+    (lowest, _), range_m = field.planner.heights_m, field.planner.planned_range_m
+    over_m = lowest - field.highest_target_m
     if over_m >= range_m:
         text = f"keep the drones {over_m:.1f} m over the target, and planned_range_m is {range_m:g}: they never see it"
         yield ("planner", "level_heights_m"), text

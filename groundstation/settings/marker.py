@@ -11,7 +11,8 @@ from groundstation.geometry.tag import SquareTag, tag_fault
 from groundstation.settings.values import MarkerCode, SettingsSection, SquareSize
 
 TagId = Annotated[int, Field(ge=0)]
-TagSize = Annotated[float, Field(ge=10, le=1000)]
+TAGS_MM = (10.0, 1000.0)
+TagSize = Annotated[float, Field(ge=TAGS_MM[0], le=TAGS_MM[1])]
 
 
 class MarkerSettings(SettingsSection):

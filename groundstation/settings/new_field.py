@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from groundstation.errors import OperatorMistake
-from groundstation.settings.cautions import RISEN_MARKER_M, RISEN_ROOM_M
+from groundstation.settings.cautions import PAD_TO_FENCE_M, RISEN_MARKER_M, RISEN_ROOM_M
 from groundstation.settings.level_heights import FENCE_MARGIN_M, LEAST_BAND_M, OVER_TARGET_M
 from groundstation.vehicles import Offer, VehicleKind, all_kinds
 
@@ -18,7 +18,7 @@ Place = tuple[float, float]
 _HALF_VIEW = (640.0 / 1179.0, 360.0 / 1179.0)
 _WALL_M, _CEILING_M, _CAMERA_BELOW_CEILING_M = 0.3, 1.7, 0.3
 _LOWEST_CEILING_M = 3.0
-_PAD_GAP_M, _PAD_TO_FENCE_M = 1.0, 0.3
+_PAD_GAP_M = 1.0
 _TARGET_CODE = 5
 _LONGEST_SITE = 40
 _PLAIN = re.compile(r"[a-z0-9][\w.:/@?=&%+-]*[\w/]", re.ASCII)
@@ -99,7 +99,7 @@ def check_room(room: NewRoom) -> None:
 
 def pads(room: NewRoom, count: int) -> list[Place]:
     """Return pads [m; world], one metre apart, in the ceiling camera's view and the fence; raises OperatorMistake."""
-    inside = (0.5 * side - _WALL_M - _PAD_TO_FENCE_M for side in room[:2])
+    inside = (0.5 * side - _WALL_M - PAD_TO_FENCE_M for side in room[:2])
     half = [min(seen - RISEN_ROOM_M, most) for seen, most in zip(room.half_view_m(RISEN_MARKER_M), inside, strict=True)]
     columns, rows = (1 + int(2 * side / _PAD_GAP_M) for side in half)
     if count > columns * rows:

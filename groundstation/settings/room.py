@@ -57,6 +57,12 @@ class RoomSettings(SettingsSection):
     obstacles: dict[Name, ObstacleSettings] = Field(default_factory=dict)
     """What stands in the room and hides markers, by name. Plans look past it; drones do not fly round it."""
 
+    @property
+    def inside(self) -> dict[str, Interval]:
+        """Return the room's interval along each axis [m; world], by the name that fences and volumes give it."""
+        x, y, z = self.size_m
+        return {"x_m": (-x / 2, x / 2), "y_m": (-y / 2, y / 2), "z_m": (0.0, z)}
+
 
 Rotation = Annotated[tuple[Angle, Angle, Angle], of_length(3)]
 LensStd = Annotated[float, Field(ge=0)]

@@ -19,10 +19,8 @@ def findings_in_room(parts: Parts) -> Iterator[Finding]:
 def _fence_in_room(parts: Parts) -> Iterator[Finding]:
     if parts.room is None:
         return
-    size, fence = parts.room.size_m, parts.room.fence
-    walls = {"x_m": (-size[0] / 2, size[0] / 2), "y_m": (-size[1] / 2, size[1] / 2), "z_m": (0.0, size[2])}
-    for name, (low, high) in walls.items():
-        least, most = getattr(fence, name)
+    for name, (low, high) in parts.room.inside.items():
+        least, most = getattr(parts.room.fence, name)
         if least < low or most > high:
             yield ("room", "fence", name), f"must lie inside the room, {low:g} to {high:g} (got {least:g} to {most:g})"
 

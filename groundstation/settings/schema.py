@@ -74,9 +74,13 @@ class Field(SettingsSection):
         return self
 
     def _heights(self) -> LevelRows:
-        target_m = max((one.marker.height_m for one in self.tracked.values()), default=0.0)
         team = sum(drone.enabled for drone in self.drones.values())
-        return derived_heights(self.room.fence.z_m[1], target_m, self.planner.planned_range_m, team)
+        return derived_heights(self.room.fence.z_m[1], self.highest_target_m, self.planner.planned_range_m, team)
+
+    @property
+    def highest_target_m(self) -> float:
+        """Return the height of the highest target's marker [m]."""
+        return max((one.marker.height_m for one in self.tracked.values()), default=0.0)
 
     @property
     def volumes(self) -> dict[str, VolumeSettings]:

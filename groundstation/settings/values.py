@@ -61,7 +61,8 @@ OnVehicle = Annotated[tuple[_Offset, _Offset, _Offset], of_length(3)]  # a typin
 Interval = Annotated[Vector2, AfterValidator(_rising)]
 VideoDelay = Annotated[float, Field(ge=0, le=2000)]
 Readout = Annotated[float, Field(ge=0, le=100)]
-SquareSize = Annotated[float, Field(ge=5, le=200)]
+SQUARES_MM = (5.0, 200.0)
+SquareSize = Annotated[float, Field(ge=SQUARES_MM[0], le=SQUARES_MM[1])]
 MarkerCode = Annotated[int, Field(ge=0, le=15)]  # geometry.board.VALID_CODES
 # Only the driver gets the password, from the attribute: written, recorded and shown fields are dumps.
 Source = Annotated[str, read_by(parse_source), PlainSerializer(without_password)]

@@ -37,9 +37,7 @@ def anchor_cautions(field: Field) -> Iterator[Finding]:
 
 
 def _outside_room(field: Field, box: VolumeSettings) -> Iterator[tuple[str, str]]:
-    x, y, z = field.room.size_m
-    walls = {"x_m": (-x / 2, x / 2), "y_m": (-y / 2, y / 2), "z_m": (0.0, z)}
-    for axis, (low, high) in walls.items():
+    for axis, (low, high) in field.room.inside.items():
         least, most = getattr(box, axis)
         if least < low - _BEYOND_ROOM_M or most > high + _BEYOND_ROOM_M:
             yield (
@@ -50,9 +48,9 @@ def _outside_room(field: Field, box: VolumeSettings) -> Iterator[tuple[str, str]
 
 def _blind_heights(field: Field, boxes: dict[tuple[str, str], VolumeSettings]) -> Iterator[Finding]:
     """Yield a height at which no system sees the drones, where no camera does either."""
-    planned = [height for row in field.planner.level_heights_m for height in row]
+    lowest_m, highest_m = field.planner.heights_m
     path, box = next(iter(boxes.items()))
-    for height_m, what in ((STANDING_MARKER_M, "stand"), (min(planned), "fly"), (max(planned), "fly")):
+    for height_m, what in ((STANDING_MARKER_M, "stand"), (lowest_m, "fly"), (highest_m, "fly")):
         if not any(one.z_m[0] <= height_m <= one.z_m[1] for one in boxes.values()):
             low, high = box.z_m
             text = f"leaves out {height_m:g} m (got {low:g} to {high:g}), where drones {what}: nothing sees them there"

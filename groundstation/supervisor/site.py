@@ -147,7 +147,7 @@ def join(file: Path) -> Admission:
         admission = msgspec.json.decode(file.read_bytes(), type=Admission)
     except (OSError, msgspec.DecodeError) as error:
         raise OperatorMistake(f"{file} is no admission (groundstation site admit writes it): {error}") from error
-    if not _HOST.fullmatch(admission.host) or not re.fullmatch(r"[a-z][a-z0-9_]{0,47}", admission.site):
+    if not _HOST.fullmatch(admission.host) or not _SITE.fullmatch(admission.site):
         raise OperatorMistake(f"{file} is no admission: its site or host has a name that cannot be")
     place, name = folder("joined", admission.site), _member(admission.host).name
     shutil.rmtree(place, ignore_errors=True)

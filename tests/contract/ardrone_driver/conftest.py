@@ -159,6 +159,12 @@ class Rig:
         self.until(lambda: self.decision.mode == "HOVER")
         return self
 
+    def track(self) -> None:
+        """Let a drone that hovers fly by setpoints."""
+        self.tracking = True
+        self.order(Verb.TRACK)
+        self.until(lambda: self.decision.action == "FLY")
+
 
 @pytest.fixture
 def rig():

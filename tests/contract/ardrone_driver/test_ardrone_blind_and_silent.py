@@ -7,7 +7,6 @@ from scripted_drone import FLY
 
 from drivers.host import VehicleHost
 from drivers.watchdog_types import WatchdogLimits
-from groundstation.bus.messages import Verb
 
 HOLDS_ITSELF = "0,0,0,0,0"
 
@@ -23,9 +22,7 @@ def turn_for(rig, seconds, settle=True):
 @pytest.mark.parametrize(("lie", "braked"), [("stuck", True), ("", False)])
 def test_a_drone_that_saw_no_floor_before_falling_silent_is_braked(rig, monkeypatch, lie, then, braked):
     rig.take_off()
-    rig.tracking = True
-    rig.order(Verb.TRACK)
-    rig.until(lambda: rig.decision.action == "FLY")
+    rig.track()
     rig.fake.lie = lie
     turn_for(rig, 0.2)
     if then == "silent":
@@ -42,9 +39,7 @@ def test_a_drone_that_was_shown_to_be_blind_is_believed_that_it_has_landed(new_r
     rig = new_rig()
     rig.host = VehicleHost(rig.process, rig.drone, WatchdogLimits(land_after_s=1.3))
     rig.take_off()
-    rig.tracking = True
-    rig.order(Verb.TRACK)
-    rig.until(lambda: rig.decision.action == "FLY")
+    rig.track()
     rig.drone._attitude._doubt.blind = True  # as cameras show it
     rig.until(lambda: rig.decision.action == "LAND")
     rig.until(lambda: not rig.fake.state & FLY)

@@ -53,9 +53,7 @@ def test_numbers_rise_by_one_without_a_gap(rig):
 def test_take_off_track_land_over_the_wire(rig):
     rig.take_off()
     assert "290718208" in rig.fake.said("REF")
-    rig.tracking = True
-    rig.order(Verb.TRACK)
-    rig.until(lambda: rig.decision.action == "FLY")
+    rig.track()
     rig.fake.lines.clear()
     for _ in range(5):
         rig.turn()
@@ -170,9 +168,7 @@ def test_a_restarted_driver_lands_a_flying_drone_and_never_starts_a_standing_one
 
 def test_a_silent_drone_is_asked_again_and_nothing_moves_after_it_comes_back(rig):
     rig.take_off()
-    rig.tracking = True
-    rig.order(Verb.TRACK)
-    rig.until(lambda: rig.decision.action == "FLY")
+    rig.track()
     rig.speaking, requests = False, rig.fake.requests
     began = time.monotonic()
     while time.monotonic() - began < 1.6:
@@ -265,9 +261,7 @@ def test_values_that_cannot_be_true_stop_it_like_silence_and_the_operator_reads_
     rig = new_rig()
     rig.host = VehicleHost(rig.process, rig.drone, WatchdogLimits(land_after_s=1.3))
     rig.take_off()
-    rig.tracking = True
-    rig.order(Verb.TRACK)
-    rig.until(lambda: rig.decision.action == "FLY")
+    rig.track()
     rig.fake.lie = fault
     began = time.monotonic()
     rig.until(lambda: rig.decision.action == "HOVER")

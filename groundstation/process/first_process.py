@@ -40,6 +40,8 @@ def _until_alone(command_pid: int) -> int:
         if pid == command_pid:
             ended = os.waitstatus_to_exitcode(status)
             code = ended if ended >= 0 else 128 - ended
+            for number in _HANDED_ON:  # its pid may be another process's from now on
+                signal.signal(number, signal.SIG_IGN)
 
 
 if __name__ == "__main__":

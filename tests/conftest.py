@@ -1,6 +1,7 @@
 """Shared by all tests: coverage, the kernel cache of these sources, shipped settings, and recorded data."""
 
 import os
+import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NoReturn
@@ -19,6 +20,9 @@ from groundstation.field.resolved import ResolvedField
 from groundstation.process import child, numba_cache
 
 numba_cache.activate(numba_cache.EVERYTHING)
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    # A suite in the background inherits this, and would hand it on to the commands that its tests interrupt.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 ROOT = Path(__file__).parents[1]
 CONFIG = ROOT / "config"

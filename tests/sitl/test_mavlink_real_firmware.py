@@ -8,7 +8,7 @@ import socket
 import sys
 import threading
 import time
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -32,6 +32,9 @@ hangar, port = mavlink_hangar.hangar, mavlink_hangar.port
 
 SYSTEM = 5
 M_PER_DEGREE = 111_319.5
+# Custom modes: ours (OFFBOARD, GUIDED), and those in which a pilot holds it (AUTO.LOITER, LOITER).
+OURS = {Flavour.PX4: 6 << 16, Flavour.ARDUPILOT: 4}
+PILOTS = {"px4": (4, 3), "ardupilot": (5,)}
 
 
 class Truth(threading.Thread):
@@ -39,7 +42,7 @@ class Truth(threading.Thread):
 
     def __init__(self, port, ask):
         super().__init__(daemon=True)
-        self.place, self._origin, self._ask = None, None, ask
+        self.place, self._origin, self._ask, self._source = None, None, ask, None
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", port))
         self._socket.settimeout(0.2)
@@ -52,15 +55,19 @@ class Truth(threading.Thread):
         due = 0.0
         while not self.closing.is_set():
             with suppress(TimeoutError):
-                data, source = self._socket.recvfrom(2048)
+                data, self._source = self._socket.recvfrom(2048)
                 if self._ask and time.monotonic() > due:
                     due = time.monotonic() + 1.0
-                    command = (SYSTEM, 1, 511, 0, dialect.MAVLINK_MSG_ID_SIM_STATE, 20_000, 0, 0, 0, 0, 0)
-                    message = dialect.MAVLink_command_long_message(*command)
-                    self._socket.sendto(message.pack(self._mav), source)
+                    self.command(dialect.MAV_CMD_SET_MESSAGE_INTERVAL, dialect.MAVLINK_MSG_ID_SIM_STATE, 20_000)
                 for message in self._mav.parse_buffer(data) or []:
                     self._note(message)
         self._socket.close()
+
+    def command(self, number, *parameters):
+        """Send a command as another station would."""
+        filled = (*parameters, *[0] * (7 - len(parameters)))
+        message = dialect.MAVLink_command_long_message(SYSTEM, 1, number, 0, *filled)
+        self._socket.sendto(message.pack(self._mav), self._source)
 
     def _note(self, message):
         match message.get_type():
@@ -101,57 +108,110 @@ def set_up(flavour, port):
         link.close()
 
 
-def fly(port, kind, flavour, truth, patience_s):
-    """Take off, fly forward at 0.4 m/s for 6 s and land, on the true position; returns the distance flown [m]."""
-    pad, yaw = truth()
-    options = {"pad_m": pad[:2], "pad_yaw_rad": yaw}
-    pilot = Pilot(port, kind, lambda vehicle: truth(), {SYSTEM: flavour}, **options)
-    vehicle, watchdog, turns = pilot.fleet.vehicles[SYSTEM], pilot.hosts[0].watchdog, iter(range(10**9))
+class Flight:
+    """One vehicle under our driver, on its true position; `with` closes the driver. Takes off on entry."""
 
-    def until(condition, seconds, verb=None, mode=""):
+    def __init__(self, port, kind, flavour, truth, patience_s):
+        self.truth, (self.pad, yaw) = truth, truth()
+        options = {"pad_m": self.pad[:2], "pad_yaw_rad": yaw}
+        self.pilot = Pilot(port, kind, lambda vehicle: truth(), {SYSTEM: flavour}, **options)
+        self.vehicle, self.watchdog = self.pilot.fleet.vehicles[SYSTEM], self.pilot.hosts[0].watchdog
+        self._turns, self._patience_s = iter(range(10**9)), patience_s
+
+    def __enter__(self):
+        self.until(lambda: self.watchdog.mode == "LANDED" and not self.watchdog.vehicle.not_ready, self._patience_s)
+        self.until(lambda: self.watchdog.mode == "HOVER", 40, Verb.TAKEOFF, "LANDED")
+        self.until(lambda: self.height_m > 0.5, 15)
+        self.until(lambda: self.watchdog.mode == "TRACK", 5, Verb.TRACK, "HOVER")
+        return self
+
+    def __exit__(self, *_):
+        self.pilot.fleet.close()
+
+    @property
+    def height_m(self):
+        return self.truth()[0][2] - self.pad[2]
+
+    @property
+    def obeys(self):
+        """Whether it reports our mode and the driver steers it."""
+        return self.vehicle.telemetry.custom_mode == OURS[self.vehicle.flavour] and not self.vehicle.orders.yields
+
+    def until(self, condition, seconds, verb=None, mode=""):
         deadline, due = time.monotonic() + seconds, 0.0
         while not condition():
-            assert time.monotonic() < deadline, f"{watchdog.mode}: {watchdog.vehicle}; {pilot.process.texts[-8:]}"
+            state = f"{self.watchdog.mode}: {self.watchdog.vehicle}; {self.pilot.process.texts[-8:]}"
+            assert time.monotonic() < deadline, state
             if verb is not None and time.monotonic() > due:
                 due = time.monotonic() + 2.0
-                pilot.order(verb, mode)
-            pilot.turn(next(turns))
+                self.pilot.order(verb, mode)
+            self.pilot.turn(next(self._turns))
 
-    try:
-        until(lambda: watchdog.mode == "LANDED" and not watchdog.vehicle.not_ready, patience_s)
-        until(lambda: watchdog.mode == "HOVER", 40, Verb.TAKEOFF, "LANDED")
-        until(lambda: truth()[0][2] - pad[2] > 0.5, 15)
-        until(lambda: watchdog.mode == "TRACK", 5, Verb.TRACK, "HOVER")
-        begin, began = truth()[0], time.monotonic()
-        until(lambda: time.monotonic() - began > 6.0, 10)
+    def go_on(self, seconds):
+        end = time.monotonic() + seconds
+        self.until(lambda: time.monotonic() > end, seconds + 4.0)
+
+    def land(self):
+        self.until(lambda: self.watchdog.mode == "LANDED", 40, Verb.LAND, "TRACK")
+        assert not self.vehicle.telemetry.base_mode & 128 and self.height_m < 0.3
+
+
+def fly(port, kind, flavour, truth, patience_s):
+    """Take off, fly forward at 0.4 m/s for 6 s and land; returns the distance flown [m]."""
+    with Flight(port, kind, flavour, truth, patience_s) as flight:
+        begin = truth()[0]
+        flight.go_on(6.0)
         flown = math.dist(begin[:2], truth()[0][:2])
-        until(lambda: watchdog.mode == "LANDED", 40, Verb.LAND, "TRACK")
-        assert not vehicle.telemetry.base_mode & 128 and truth()[0][2] - pad[2] < 0.3
-    finally:
-        pilot.fleet.close()
+        flight.land()
     return flown
 
 
-@pytest.mark.firmware
-@pytest.mark.parametrize("kind", ["pymavlink", "mavsdk"])
-@pytest.mark.parametrize("flavour", ["ardupilot", "px4"])
-def test_real_firmware_is_set_up_and_flown(flavour, kind, tmp_path):
-    firmware = start(flavour, tmp_path)
-    truth = None
+@contextmanager
+def known(flavour, folder):
+    """Yield a binary set up for indoor flight, and its truth once it tells that."""
+    firmware, truth = start(flavour, folder), None
     try:
         set_up(flavour, firmware.port)
         firmware.restart()  # parameters take effect at the next start
         truth = Truth(firmware.truth_port, flavour == "ardupilot")
         deadline = time.monotonic() + 30
         while truth.place is None:
-            assert firmware.process.poll() is None, (tmp_path / "log2.txt").read_text(errors="replace")[-2000:]
+            assert firmware.process.poll() is None, (folder / "log2.txt").read_text(errors="replace")[-2000:]
             assert time.monotonic() < deadline, "the simulation does not tell where it is"
             time.sleep(0.1)
-        assert 1.2 < fly(firmware.port, kind, flavour, lambda: truth.place, patience_s=90) < 3.2
+        yield firmware, truth
     finally:
         if truth is not None:
             truth.closing.set()
         firmware.end()
+
+
+@pytest.mark.firmware
+@pytest.mark.parametrize("kind", ["pymavlink", "mavsdk"])
+@pytest.mark.parametrize("flavour", ["ardupilot", "px4"])
+def test_real_firmware_is_set_up_and_flown(flavour, kind, tmp_path):
+    with known(flavour, tmp_path) as (firmware, truth):
+        assert 1.2 < fly(firmware.port, kind, flavour, lambda: truth.place, patience_s=90) < 3.2
+
+
+@pytest.mark.firmware
+@pytest.mark.parametrize("flavour", ["ardupilot", "px4"])
+def test_real_firmware_that_a_pilot_stops_is_taken_back_by_resume(flavour, tmp_path):
+    """Four times, at four phases of its heartbeat."""
+    with (
+        known(flavour, tmp_path) as (firmware, truth),
+        Flight(firmware.port, "pymavlink", flavour, lambda: truth.place, patience_s=90) as flight,
+    ):
+        for stop in range(4):
+            flight.go_on(1.0 + 0.23 * stop)
+            truth.command(dialect.MAV_CMD_DO_SET_MODE, 1, *PILOTS[flavour])
+            flight.until(lambda: flight.vehicle.orders.yields, 5)
+            flight.go_on(0.5)
+            flight.pilot.order(Verb.RESUME, flight.watchdog.mode)
+            flight.until(lambda: flight.obeys, 4)
+            flight.go_on(3.0)
+            assert flight.obeys and flight.watchdog.mode == "TRACK" and flight.height_m > 0.5
+        flight.land()
 
 
 @pytest.mark.parametrize("flavour", ["ardupilot", "px4"])

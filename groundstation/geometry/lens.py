@@ -20,6 +20,8 @@ _NEWTON_STEPS = 12
 # The remaining error is of the order of the last step's square.
 _NEWTON_TOLERANCE = 1e-8
 _MAX_RADIUS = 4.0
+MOST_FOCAL_STD = 0.02
+"""Deviation of a focal length, as a share, beyond which a calibration is of no use: distances err by as much."""
 
 
 @dataclass(frozen=True, slots=True)

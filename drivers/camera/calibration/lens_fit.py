@@ -10,11 +10,12 @@ from drivers.camera.calibration.pattern import Pattern
 from drivers.camera.calibration.view_quality import KeptView
 from groundstation.arrays import Array
 from groundstation.errors import DriverError
-from groundstation.geometry.lens import CameraIntrinsics
+from groundstation.geometry.lens import MOST_FOCAL_STD, CameraIntrinsics
 
 LEAST_VIEWS = 6
 _ROUNDS = 4
 _OUTLIER_RATIO, _OUTLIER_PX = 2.5, 0.3
+_TINY = 1e-12
 _NAMES = ("fx_px", "fy_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3")
 
 
@@ -41,7 +42,8 @@ def fit_lens(
 ) -> LensFit:
     """Return the lens of pictures of (width, height).
 
-    keep_all: drop no view. Raises DriverError when the views are too few, or no lens fits them.
+    keep_all: drop no view. Raises DriverError when the views are too few, no lens fits them, or they hardly show its
+    focal length.
     """
     dropped: dict[str, float] = {}
     kept, all_views_px = list(views), 0.0
@@ -55,6 +57,9 @@ def fit_lens(
             break
         dropped |= {kept[index].name: float(errors[index]) for index in bad}
         kept = [view for index, view in enumerate(kept) if index not in bad]
+    uncertain = max(std[0] / matrix[0, 0], std[1] / matrix[1, 1])
+    if not uncertain <= MOST_FOCAL_STD:
+        raise DriverError(_too_frontal(uncertain))
     k1, k2, p1, p2, k3 = distortion.tolist()
     try:
         lens = CameraIntrinsics(
@@ -74,16 +79,49 @@ def _fitted(
     corners = [view.corners.astype(np.float32).reshape(-1, 1, 2) for view in views]
     flags = cv2.CALIB_FIX_ASPECT_RATIO if square_pixels else 0
     try:
-        rms, matrix, distortion, _, _, std, _, errors = cv2.calibrateCameraExtended(
+        rms, matrix, distortion, turns, shifts, _, _, errors = cv2.calibrateCameraExtended(
             objects, corners, size, np.eye(3), np.zeros(5), flags=flags
         )
-    except cv2.error:
+        lens = np.asarray(matrix, dtype=np.float64), np.asarray(distortion, dtype=np.float64).ravel()[:5]
+        poses = zip(np.asarray(turns, np.float64), np.asarray(shifts, np.float64), strict=True)
+        slopes = [_slopes(pattern.points, turn, shift, *lens) for turn, shift in poses]
+        squared_error = rms**2 * sum(len(view.corners) for view in views)
+        figures = _deviations(slopes, squared_error, square_pixels)
+    except (cv2.error, np.linalg.LinAlgError):
         raise DriverError("no lens comes of these views: show the board from more directions, tilted") from None
-    figures = np.asarray(std, dtype=np.float64).ravel()[: len(_NAMES)].copy()
-    if square_pixels:  # one focal length was fitted; its deviation is given for the other axis only
-        figures[0] = figures[1]
-    lens = np.asarray(matrix, dtype=np.float64), np.asarray(distortion, dtype=np.float64).ravel()[:5]
     return float(rms), *lens, figures, np.asarray(errors, dtype=np.float64).ravel()
+
+
+def _slopes(points: Array, turn: Array, shift: Array, matrix: Array, distortion: Array) -> Array:
+    """Return how a view's pixels change with the lens's nine figures (2n, 9), as far as no pose of the board does."""
+    by_all = np.asarray(cv2.projectPoints(points, turn, shift, matrix, distortion)[1], dtype=np.float64)
+    by_pose, by_lens = by_all[:, :6], by_all[:, 6 : 6 + len(_NAMES)]
+    basis = np.linalg.qr(by_pose / np.linalg.norm(by_pose, axis=0))[0]
+    return np.asarray(by_lens - basis @ (basis.T @ by_lens))
+
+
+def _deviations(slopes: list[Array], squared_error: float, square_pixels: bool) -> Array:
+    """Return one sigma (9) of the lens's figures; huge where the views do not show one.
+
+    OpenCV's own leave out the directions that the views show least: those of boards that are hardly tilted.
+    """
+    by_lens = np.concatenate(slopes)
+    if square_pixels:  # one focal length was fitted
+        by_lens = np.column_stack((by_lens[:, 0] + by_lens[:, 1], by_lens[:, 2:]))
+    variance = squared_error / (len(by_lens) - by_lens.shape[1] - 6 * len(slopes))
+    scale = np.maximum(np.linalg.norm(by_lens, axis=0), _TINY)
+    _, strengths, directions = np.linalg.svd(by_lens / scale, full_matrices=False)
+    spread = directions / np.maximum(strengths, _TINY)[:, None]
+    std = np.sqrt(variance * (spread**2).sum(axis=0)) / scale
+    return np.insert(std, 0, std[0]) if square_pixels else std
+
+
+def _too_frontal(uncertain: float) -> str:
+    known = f"by {uncertain:.0%}" if uncertain < 1.0 else "wholly"
+    return (
+        f"these views leave the focal length {known} uncertain (at most {MOST_FOCAL_STD:.0%}): "
+        "tilt the board by 20 to 40 degrees in several directions"
+    )
 
 
 def _outliers(errors: Array) -> list[int]:

@@ -15,9 +15,10 @@ from groundstation.geometry.rotations import world_from_downward_optical
 from groundstation.settings.document import KeyPath
 from groundstation.settings.files import is_there, unwritable
 from groundstation.settings.in_view import STANDING_MARKER_M, in_picture
+from groundstation.settings.lens_cautions import lens_cautions
 from groundstation.settings.marker_sizes import too_small
 from groundstation.settings.parts import Finding
-from groundstation.settings.room import CalibrationSettings, WorldCameraSettings
+from groundstation.settings.room import WorldCameraSettings
 from groundstation.settings.schema import Field
 from groundstation.settings.unlikely_figures import unlikely
 from groundstation.settings.volumes import anchor_cautions, volume_cautions
@@ -30,7 +31,6 @@ _FENCE_LEAST_M, _WALL_M = 1.0, 0.2
 _LEAST_STD_M = 0.1
 _ABOVE_OBSTACLE_M = 0.3
 _LEAST_TILT_DEG = 5.0
-_MOST_CORNER_SHARE = 0.7
 Caution = Callable[[Field], Iterator[Finding]]
 # Cosine of the angle between the optical axis and straight down beyond which a camera looks at walls.
 _AT_WALLS = math.cos(math.radians(75.0))
@@ -172,46 +172,6 @@ def _adapters(field: Field) -> Iterator[Finding]:
             yield path, text + "sudo sysctl -w net.ipv4.conf.all.rp_filter=2"
 
 
-def _lenses(field: Field) -> Iterator[Finding]:
-    for name, camera in field.cameras.items():
-        yield from ((("cameras", name, "calibration", "distortion"), text) for text in _odd(camera.calibration))
-    for name, drone in field.drones.items():
-        path: KeyPath = ("drones", name, "camera", "calibration", "distortion")
-        yield from ((path, text) for text in _odd(drone.camera.calibration))
-
-
-def _odd(lens: CalibrationSettings) -> Iterator[str]:
-    if _folds(lens):
-        yield "folds the picture before its corners: no lens does that; calibrate it again"
-    elif (share := _corner_share(lens)) > _MOST_CORNER_SHARE:
-        yield f"moves the picture's corners by {share:.0%} of their distance from its middle: calibrate it again"
-
-
-def _corner_share(lens: CalibrationSettings) -> float:
-    """Return the greatest displacement of a corner by the distortion, relative to its distance from the axis."""
-    k1, k2, p1, p2, k3 = lens.distortion
-    half_x, half_y = lens.width_px / (2 * lens.fx_px), lens.height_px / (2 * lens.fy_px)
-    r2 = half_x**2 + half_y**2
-    radial = k1 * r2 + k2 * r2**2 + k3 * r2**3
-    return max(
-        math.hypot(
-            x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
-            y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
-        )
-        / math.sqrt(r2)
-        for x in (-half_x, half_x)
-        for y in (-half_y, half_y)
-    )
-
-
-def _folds(lens: CalibrationSettings) -> bool:
-    """Return whether the distorted radius decreases anywhere up to nine tenths of the way to a corner."""
-    corner = math.hypot(lens.width_px / (2 * lens.fx_px), lens.height_px / (2 * lens.fy_px))
-    r2 = np.linspace(0.0, 0.9 * corner, 40) ** 2
-    k1, k2, _, _, k3 = lens.distortion
-    return bool(np.any(1.0 + 3.0 * k1 * r2 + 5.0 * k2 * r2**2 + 7.0 * k3 * r2**3 <= 0.0))
-
-
 def _places(field: Field) -> Iterator[Finding]:
     if field.recording.enabled and (why := unwritable(Path(field.recording.directory).absolute())):
         yield ("recording", "directory"), why
@@ -234,7 +194,7 @@ OF_A_FIELD: tuple[Caution, ...] = (
     _obstacles,
     _heights,
     _uncertainty,
-    _lenses,
+    lens_cautions,
     too_small,
     unlikely,
     volume_cautions,

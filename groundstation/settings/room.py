@@ -113,7 +113,8 @@ class CalibrationSettings(SettingsSection):
     distortion: tuple[float, float, float, float, float]
     """Distortion k1, k2, p1, p2, k3, as OpenCV's calibrateCamera orders them."""
     residual_px: Annotated[float, Field(gt=0, le=5)] = 0.2
-    """RMS residual [px] of the calibration; no corner is assumed to be more accurate."""
+    """RMS residual [px] of the calibration. calibrate check and calibrate extrinsics judge by it; flights do not take
+    it for noise, since errors of a lens do not average out."""
     date: datetime.date | None = None
     """Day of the measurement (YYYY-MM-DD)."""
     views: Annotated[int, Field(gt=0)] | None = None

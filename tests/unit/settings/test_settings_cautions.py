@@ -1,5 +1,6 @@
 """Legal but unwise settings give a caution with its place, and no refusal."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ from groundstation.settings.load import cautions_of, load_field
 from groundstation.settings.wording import told
 
 LAB = Path(__file__).parents[2] / "fixtures" / "field" / "lab.yaml"
+LENS = (LAB.parent / "cameras" / "ceiling.yaml").read_text()
 
 
 @pytest.mark.parametrize("name", ["lab", "mixed-team", "mocap-lab", "mocap-truth", "two-targets", "uwb-lab"])
@@ -72,6 +74,38 @@ def test_a_foolish_setting_is_named_with_its_path(option: str, path: str, words:
     assert any(path in line and words in line for line in found), found
 
 
+def cautions_with(folder: Path, ceiling: str) -> list[str]:
+    """Return the cautions about the lab with another calibration file of the ceiling camera."""
+    (folder / "cameras").mkdir()
+    for lens in (LAB.parent / "cameras").glob("*.yaml"):
+        (folder / "cameras" / lens.name).write_text(lens.read_text())
+    (folder / "cameras" / "ceiling.yaml").write_text(ceiling)
+    (folder / "lab.yaml").write_text(LAB.read_text())
+    return cautions_of(folder / "lab.yaml")
+
+
+def stds(fx_px: float) -> str:
+    others = ", ".join(f"{name}: 0.1" for name in ("fy_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3"))
+    return f"{LENS}std: {{fx_px: {fx_px}, {others}}}\n"
+
+
+@pytest.mark.parametrize(
+    ("ceiling", "words"),
+    [
+        (LENS.replace("residual_px: 0.2", "residual_px: 0.6"), "residual_px: says that the lens fits .* (got 0.6, "),
+        (stds(30.0), "std: leaves the focal length uncertain by 3%, .* tilted by 20 to 40 degrees"),
+    ],
+)
+def test_a_lens_that_its_own_calibration_calls_inexact_is_named(tmp_path: Path, ceiling: str, words: str) -> None:
+    (line,) = cautions_with(tmp_path, ceiling)
+    assert re.search(words.replace("(", r"\("), line), line
+
+
+@pytest.mark.parametrize("ceiling", [LENS.replace("residual_px: 0.2", "residual_px: 0.5"), stds(23.0)])
+def test_a_usual_lens_gives_no_caution(tmp_path: Path, ceiling: str) -> None:
+    assert cautions_with(tmp_path, ceiling) == []
+
+
 @pytest.mark.parametrize(
     ("distortion", "words"),
     [
@@ -81,18 +115,10 @@ def test_a_foolish_setting_is_named_with_its_path(option: str, path: str, words:
     ],
 )
 def test_a_lens_that_no_camera_has_is_named_where_it_is_written(tmp_path: Path, distortion: str, words: str) -> None:
-    text = (LAB.parent / "cameras" / "ceiling.yaml").read_text()
-    start = text.index("distortion:")
-    end = text.index("\n", start)
-    (tmp_path / "cameras").mkdir()
-    for lens in (LAB.parent / "cameras").glob("*.yaml"):
-        (tmp_path / "cameras" / lens.name).write_text(lens.read_text())
-    folded = text[:start] + f"distortion: {distortion}" + text[end:]
-    (tmp_path / "cameras" / "ceiling.yaml").write_text(folded)
-    (tmp_path / "lab.yaml").write_text(LAB.read_text())
-    (line,) = cautions_of(tmp_path / "lab.yaml")
+    folded = re.sub("distortion: .*", f"distortion: {distortion}", LENS)
+    (line,) = cautions_with(tmp_path, folded)
     one = told(line, "WARNING")
-    assert one.file.endswith("cameras/ceiling.yaml") and one.line == text[:start].count("\n") + 1
+    assert one.file.endswith("cameras/ceiling.yaml") and one.line == LENS[: LENS.index("distortion:")].count("\n") + 1
     assert one.path == "distortion" and words in one.text
 
 

@@ -1,38 +1,40 @@
 """Roll and pitch of vehicles in the recent past, to be read at a picture's exposure."""
 
-from collections import defaultdict, deque
+from bisect import bisect_left
+from collections import defaultdict
+from operator import itemgetter
 
 from groundstation.time_units import NS_PER_MS
 
-_MOST_SAMPLES = 64
 _FARTHEST_NS = 200 * NS_PER_MS
+# A stamp that is more ahead of now is wrong, and would keep all later samples out.
+_FUTURE_NS = 100 * NS_PER_MS
+_stamp_of = itemgetter(0)
 
 
 class AttitudeHistory:
-    """A short history per entity; pure values."""
+    """The samples of each entity over the last `span_ns`; pure values."""
 
-    def __init__(self) -> None:
-        self._samples: defaultdict[str, deque[tuple[int, float, float]]] = defaultdict(
-            lambda: deque(maxlen=_MOST_SAMPLES)
-        )
+    def __init__(self, span_ns: int) -> None:
+        self._span_ns = span_ns
+        self._samples: defaultdict[str, list[tuple[int, float, float]]] = defaultdict(list)
 
-    def add(self, entity: str, stamp_ns: int, roll_rad: float, pitch_rad: float) -> None:
-        """Remember a sample; one older than the newest is ignored."""
+    def add(self, entity: str, stamp_ns: int, roll_rad: float, pitch_rad: float, now_ns: int) -> None:
+        """Remember a sample; one older than the newest is ignored, and one from the future."""
         samples = self._samples[entity]
-        if not samples or stamp_ns > samples[-1][0]:
-            samples.append((stamp_ns, roll_rad, pitch_rad))
+        if stamp_ns > now_ns + _FUTURE_NS or (samples and stamp_ns <= samples[-1][0]):
+            return
+        samples.append((stamp_ns, roll_rad, pitch_rad))
+        if samples[0][0] < stamp_ns - self._span_ns:
+            del samples[0]
 
     def at(self, entity: str, stamp_ns: int) -> tuple[float, float] | None:
         """Return (roll, pitch) at a time, interpolated; None when no sample is within 0.2 s of it."""
         samples = self._samples.get(entity)
         if not samples:
             return None
-        before = after = samples[-1]
-        for sample in reversed(samples):
-            before = sample
-            if sample[0] <= stamp_ns:
-                break
-            after = sample
+        place = bisect_left(samples, stamp_ns, key=_stamp_of)
+        before, after = samples[max(0, place - 1)], samples[min(place, len(samples) - 1)]
         nearest = min((before, after), key=lambda sample: abs(sample[0] - stamp_ns))
         if abs(nearest[0] - stamp_ns) > _FARTHEST_NS:
             return None

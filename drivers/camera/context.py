@@ -13,10 +13,13 @@ from groundstation.bus.api import Bus
 from groundstation.bus.messages import Estimate, Odometry
 from groundstation.bus.topics import ESTIMATE, ODOMETRY
 from groundstation.geometry.rotations import rotation_from_euler
+from groundstation.time_units import NS_PER_S
 
 _LEVEL = (0.0, 0.0)
-# Samples that wait for a picture; an older one is no attitude at its exposure.
+# Samples that wait while a picture is searched.
 _WAITING = 64
+# A picture may be as much older than its usual delay [s].
+_LATE_S = 0.5
 # Below this measured height a vehicle may be standing.
 _ALOFT_M = 0.4
 
@@ -32,23 +35,24 @@ class Surroundings:
         self._targets = set(self._markers) - robots
         if not settings.mount.in_world:
             robots.add(settings.observer)
-        # Roll, pitch and height only; all samples since the last picture, for attitudes at its exposure.
+        # Roll, pitch and height only; all samples, for attitudes at exposures.
         self._odometry = [bus.subscribe([ODOMETRY], entity=name, capacity=_WAITING) for name in sorted(robots)]
         self._estimates = bus.subscribe([ESTIMATE], newest=True)
-        self._attitudes = AttitudeHistory()
+        self._attitudes = AttitudeHistory(round((settings.video_delay_ms / 1e3 + _LATE_S) * NS_PER_S))
         self._heights: dict[str, float] = {}
         self._foresight = Foresight(settings.mount, settings.observer, markers, settings.calibration.intrinsics())
 
     def read(self) -> None:
         """Take in messages; those with stamps of other clocks are ignored."""
+        now_ns = clock.now_ns()
         for subscription in (*self._odometry, self._estimates):
             for received in subscription.drain():
                 message = received.message
                 if message is None or message.header.clock != clock.clock_id():
                     continue
                 if isinstance(message, Odometry):
-                    entity = message.header.entity
-                    self._attitudes.add(entity, message.header.stamp_ns, message.roll_rad, message.pitch_rad)
+                    entity, tilt = message.header.entity, (message.roll_rad, message.pitch_rad)
+                    self._attitudes.add(entity, message.header.stamp_ns, *tilt, now_ns)
                     self._keep_height(entity, message.height_m)
                 elif isinstance(message, Estimate):
                     self._foresight.add(message)
@@ -81,14 +85,15 @@ class Surroundings:
     def drop_m(self, entity: str, exposure_ns: int) -> float | None:
         """Return how far a marker is below the camera by height sensors alone [m].
 
-        None if one of them gives no height.
+        None if one of them gives no height, or the observer's attitude is unknown.
         """
         marker, mount = self._markers[entity], self._settings.mount
         subject = 0.0 if entity in self._targets else self._heights.get(entity)
         own = 0.0 if mount.in_world else self._heights.get(self._settings.observer)
-        if subject is None or own is None:
+        tilt = self.attitude(exposure_ns)
+        if subject is None or own is None or tilt is None:
             return None
-        turn = rotation_from_euler(*(self.attitude(exposure_ns) or _LEVEL), 0.0)
+        turn = rotation_from_euler(*tilt, 0.0)
         return float(own + (turn @ mount.position_m)[2]) - subject - marker.position_m[2]
 
     def _keep_height(self, entity: str, height_m: float | None) -> None:

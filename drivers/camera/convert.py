@@ -1,11 +1,12 @@
 """Conversions: from mounting and attitudes to `Gravity`, and from a sighting to a `RelativeObservation`."""
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
-from drivers.camera.pose import RelativePose
+from drivers.camera.pose import LEVEL_STD_RAD, RelativePose
 from drivers.camera.settings import MountSettings
 from drivers.camera.sighting import Sighting
 from groundstation.arrays import Array
@@ -40,13 +41,22 @@ def stabilized_from_optical(mount: MountSettings, roll_rad: float, pitch_rad: fl
 
 
 def observation_from_sighting(
-    sighting: Sighting, header: Header, camera: str, observer_attitude: tuple[float, float], picture_ns: int = 0
+    sighting: Sighting,
+    header: Header,
+    camera: str,
+    mount: MountSettings,
+    attitude: tuple[float, float] | None,
+    picture_ns: int = 0,
 ) -> RelativeObservation:
     """Return the message for a sighting; header.entity is the observer, header.stamp_ns the exposure.
 
-    picture_ns: as in the message.
+    attitude: of the observer; None: unknown, so it is assumed to be level, with a wide deviation; picture_ns: as in the
+    message.
     """
     best, other = sighting.choice.best, sighting.choice.alternative
+    if attitude is None:
+        best, other = _assumed_level(best, mount), other and _assumed_level(other, mount)
+    roll_rad, pitch_rad = attitude or (0.0, 0.0)
     return RelativeObservation(
         header=header,
         observer=header.entity,
@@ -59,10 +69,20 @@ def observation_from_sighting(
         if other is None
         else PoseHypothesis(_vector(other), other.yaw_rad, tuple(other.covariance.ravel().tolist())),
         margin=sighting.margin,
-        roll_rad=observer_attitude[0],
-        pitch_rad=observer_attitude[1],
+        roll_rad=roll_rad,
+        pitch_rad=pitch_rad,
         picture_ns=picture_ns,
     )
+
+
+def _assumed_level(pose: RelativePose, mount: MountSettings) -> RelativePose:
+    """Return a pose whose observer was assumed to be level; of a level marker's heading that changes nothing."""
+    level = stabilized_from_optical(mount, 0.0, 0.0)
+    x, y, z = (level @ pose.position_m).tolist()
+    by_tilt = level.T @ np.array([[0.0, z], [-z, 0.0], [y, -x]])
+    covariance = pose.covariance.copy()
+    covariance[:3, :3] += LEVEL_STD_RAD**2 * (by_tilt @ by_tilt.T)
+    return replace(pose, covariance=covariance)
 
 
 def row_ns(corners: Array, height_px: int, readout_ms: float) -> int:

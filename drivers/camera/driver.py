@@ -29,7 +29,6 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 _log = logging.getLogger(__name__)
 # Most pictures come sooner, and then nothing else wakes it.
 _POLL_S = 0.08
-_LEVEL = (0.0, 0.0)
 # A picture that shows nothing new for so long is reported to hang [s].
 _HANGS_S = 3.0
 
@@ -147,7 +146,7 @@ class CameraDriver:
 
     def _observe(self, picture: NDArray[np.uint8], exposure_ns: int) -> None:
         settings, around = self._settings, self._surroundings
-        attitude = around.attitude(exposure_ns) or _LEVEL
+        attitude = around.attitude(exposure_ns)
         predictions = around.predictions(exposure_ns)
         sightings = self._pipeline.process(
             picture,
@@ -161,7 +160,9 @@ class CameraDriver:
         for sighting in sightings:
             later_ns = convert.row_ns(sighting.corners, self._intrinsics.height_px, settings.readout_ms)
             header = self._child.bus.header(settings.observer, exposure_ns + later_ns)
-            observation = convert.observation_from_sighting(sighting, header, settings.name, attitude, picture_ns)
+            observation = convert.observation_from_sighting(
+                sighting, header, settings.name, settings.mount, attitude, picture_ns
+            )
             self._child.bus.publish(OBSERVATION, observation)
             self._health.reported += 1
         if self._pipeline.searched and picture_ns == exposure_ns:  # old pictures do not show who is missing now

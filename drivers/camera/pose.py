@@ -10,9 +10,10 @@ from groundstation.arrays import Array
 from groundstation.geometry.angles import difference
 from groundstation.geometry.lens import CameraIntrinsics
 
-# By how much the measured roll and pitch of both vehicles may err together, and by how much assumed levelness may.
+LEVEL_STD_RAD = math.radians(8.0)
+"""By how much roll and pitch may err that are unknown and assumed to be level."""
+# By how much the measured roll and pitch of both vehicles may err together.
 _GRAVITY_STD_RAD = math.radians(3.0)
-_LEVEL_STD_RAD = math.radians(8.0)
 _REFINE = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 20, 1e-9)
 
 
@@ -130,7 +131,7 @@ def _cost(pose: PlanarPose, variance: float, gravity: Gravity) -> float:
     c, s = math.cos(yaw), math.sin(yaw)
     cosine = xz * (c * ahead - s * left) + yz * (s * ahead + c * left) + zz * up
     angle = math.acos(max(-1.0, min(1.0, cosine)))
-    std = _GRAVITY_STD_RAD if gravity.known else _LEVEL_STD_RAD
+    std = _GRAVITY_STD_RAD if gravity.known else LEVEL_STD_RAD
     return pose.squared_error / variance + (angle / std) ** 2
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from drivers.camera import convert
 from drivers.camera.detect import Window, window_around
+from drivers.camera.pose import LEVEL_STD_RAD
 from drivers.camera.settings import MarkerKind, MarkerSettings, MountSettings
 from groundstation.arrays import Array
 from groundstation.bus.messages import EntityEstimate, Estimate
@@ -18,13 +19,13 @@ from groundstation.time_units import NS_PER_MS
 
 Attitude = tuple[float, float]
 
-# Estimates come at 50 Hz; a picture is exposed up to 0.5 s before it is processed.
-_KEPT = 48
+# Estimates come at 50 Hz; a picture is exposed up to 2.5 s before it is processed.
+_KEPT = 128
 _FARTHEST_NS = 300 * NS_PER_MS
 # A target that no camera has seen for this long is sought by all; after the longer time the tracker decides that.
 _SOUGHT_AFTER_S, _SOUGHT_FOR_S = 0.5, 10.0
-# Errors of roll, pitch and mounting: of an observer that measures its attitude, of one assumed level, and of a mount.
-_ATTITUDE_STD_RAD, _LEVEL_STD_RAD, _MOUNT_STD_RAD = math.radians(2.0), math.radians(8.0), math.radians(0.5)
+# Errors of roll, pitch and mounting: of an observer that measures its attitude, and of a mount.
+_ATTITUDE_STD_RAD, _MOUNT_STD_RAD = math.radians(2.0), math.radians(0.5)
 _FLOOR_STD_M = 0.02
 _SIGMAS = 2.5
 _SLACK_PX = 4.0
@@ -146,7 +147,7 @@ class Foresight:
         covariance = np.array(carrier.covariance).reshape(4, 4)
         base = rotation_from_euler(*(attitude or (0.0, 0.0)), carrier.mean[3])
         centre = np.array(carrier.mean[:3]) + seconds * np.array(carrier.velocity_m_s)
-        tilt = _ATTITUDE_STD_RAD if attitude is not None else _LEVEL_STD_RAD
+        tilt = _ATTITUDE_STD_RAD if attitude is not None else LEVEL_STD_RAD
         return _Camera(Pose(base @ optical, centre + base @ position), covariance[:3, :3], tilt, covariance[3, 3])
 
 

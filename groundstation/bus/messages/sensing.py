@@ -76,9 +76,10 @@ class RelativeObservation(Message, frozen=True, kw_only=True):
     margin: float = 0.0
     """Identity margin of the detector; above 1 is sure."""
     roll_rad: float = 0.0
-    """Roll of the observer that the yaw was derived with [rad]; 0 for world-fixed cameras."""
+    """Roll of the observer that the yaw was derived with [rad]; 0 for world-fixed cameras, and, with a wide covariance,
+    where it is unknown."""
     pitch_rad: float = 0.0
-    """Pitch of the observer that the yaw was derived with [rad]; 0 for world-fixed cameras."""
+    """Pitch, likewise [rad]."""
     picture_ns: int = 0
     """Exposure of the picture [ns]; that of the first, if several in a row show nothing new; 0: unknown."""
 

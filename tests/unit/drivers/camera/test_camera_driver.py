@@ -66,17 +66,20 @@ def spend(rig, seconds):
         rig.camera.turn()
 
 
-def test_an_observation_carries_exposure_time_attitude_and_names(rig, jpeg):
-    now_ns = clock.now_ns()
-    attitude = Odometry(
-        header=rig.bus.header("drone_1", now_ns - 120_000_000),
+def odometry(rig, stamp_ns, roll_rad=0.1):
+    return Odometry(
+        header=rig.bus.header("drone_1", stamp_ns),
         velocity_m_s=(0.0, 0.0, 0.0),
         velocity_covariance=(0.0,) * 9,
         yaw_rad=0.3,
-        roll_rad=0.1,
+        roll_rad=roll_rad,
         pitch_rad=0.0,
     )
-    rig.bus.publish(ODOMETRY, attitude)
+
+
+def test_an_observation_carries_exposure_time_attitude_and_names(rig, jpeg):
+    now_ns = clock.now_ns()
+    rig.bus.publish(ODOMETRY, odometry(rig, now_ns - 120_000_000))
     rig.source.push(jpeg, now_ns)
     rig.camera.turn()
     heard = rig.heard.drain()
@@ -91,6 +94,36 @@ def test_an_observation_carries_exposure_time_attitude_and_names(rig, jpeg):
     (image,) = [r for r in heard if r.key.topic is IMAGE]
     assert (image.payload, image.header.entity, image.header.stamp_ns) == (jpeg, "drone_1_camera", now_ns - 120_000_000)
     assert rig.child.states[0][0] == "READY"
+
+
+def test_the_attitude_is_that_of_the_exposure_however_late_pictures_come(rig, jpeg):
+    now_ns = clock.now_ns()
+    camera = driver.CameraDriver(rig.child, settings(video_delay_ms=900), rig.source)
+    for k in range(120):
+        rig.bus.publish(ODOMETRY, odometry(rig, now_ns - (119 - k) * 10_000_000, 0.1 if k < 40 else 0.0))
+        camera._surroundings.read()
+    rig.source.push(jpeg, now_ns)
+    camera.turn()
+    (seen,) = [r.message for r in rig.heard.drain() if r.key.topic is OBSERVATION]
+    assert seen.roll_rad == pytest.approx(0.1)
+
+
+def test_an_unknown_attitude_is_level_with_a_wide_deviation(rig, jpeg):
+    """The place is off by 0.2 m where the drone leans by 6 degrees; its deviation must say so."""
+    now_ns = clock.now_ns()
+    rig.source.push(jpeg, now_ns)
+    rig.camera.turn()
+    rig.bus.publish(ODOMETRY, odometry(rig, now_ns))
+    rig.source.push(jpeg, now_ns + 100_000_000)
+    rig.camera.turn()
+    unknown, known = [r.message for r in rig.heard.drain() if r.key.topic is OBSERVATION]
+    assert (unknown.roll_rad, known.roll_rad) == (0.0, pytest.approx(0.1))
+    added = (np.array(unknown.covariance) - np.array(known.covariance)).reshape(4, 4)
+    line = np.array(known.position_m)
+    across = np.linalg.eigvalsh(added[:3, :3])
+    assert across[0] == pytest.approx(0.0, abs=1e-4)  # a tilt changes no distance
+    assert line @ added[:3, :3] @ line == pytest.approx(0.0, abs=1e-3)
+    assert math.sqrt(across[2]) == pytest.approx(math.radians(8.0) * np.linalg.norm(line), rel=0.05)
 
 
 @pytest.mark.parametrize(("told", "searches"), [(None, 4), (0.1, 4), (0.8, 15)])

@@ -6,14 +6,14 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.camera.markers import BarReading
 from drivers.camera.settings import MarkerSettings
 from drivers.camera.size_check import SizeCheck
 from groundstation.bus.messages import Severity
 from groundstation.bus.notice import Notice
 from groundstation.time_units import NS_PER_S
 
-_MIRRORED_MARGIN, _MIRRORED_TIMES = 2.0, 5
+_MIRRORED_TIMES = 5
+_FLIP = "switch off the camera's flip"
 # An unknown code is reported after this many readings over this time: now and then a code is misread.
 _FOREIGN_TIMES, _FOREIGN_NS, _MISREAD_NS = 4, 3 * NS_PER_S, 30 * NS_PER_S
 
@@ -23,6 +23,7 @@ class MarkerFaults:
 
     def __init__(self) -> None:
         self._sizes: defaultdict[str, SizeCheck] = defaultdict(SizeCheck)
+        self._identified: set[str] = set()
         self._mirrored: Counter[str] = Counter()
         self._foreign: dict[int, tuple[int, int]] = {}
         self._notices: list[Notice] = []
@@ -33,12 +34,23 @@ class MarkerFaults:
         notices, self._notices = self._notices, []
         return notices
 
-    def mirrored(self, marker: MarkerSettings, reading: BarReading) -> None:
-        """Take in that a bar reads on the wrong side of its board; several times, since clutter may look like one."""
-        self._mirrored[marker.entity] += reading.is_sure(_MIRRORED_MARGIN)
-        if self._mirrored[marker.entity] >= _MIRRORED_TIMES:
-            text = f"the {marker.label} of {marker.entity} is mirrored and cannot be used"
-            self._tell("mirrored", Notice(Severity.WARNING, text, "print it again, not mirrored", marker.entity))
+    def identified(self, entity: str) -> None:
+        """Take in that the marker of an entity reads as it should."""
+        self._identified.add(entity)
+
+    def mirrored(self, marker: MarkerSettings) -> None:
+        """Take in that a marker reads in a mirror; several times, since clutter may look like one."""
+        self._mirrored[marker.entity] += 1
+        wrong = sorted(entity for entity, times in self._mirrored.items() if times >= _MIRRORED_TIMES)
+        if marker.entity not in wrong:
+            return
+        if len(wrong) > 1 and not self._identified:
+            text = f"the picture is mirrored: it shows the markers of {' and '.join(wrong[:2])} the wrong way round"
+            self._tell("picture", Notice(Severity.WARNING, text, f"{_FLIP} (its mirror setting)"))
+            return
+        text = f"the {marker.label} of {marker.entity} is mirrored and cannot be used"
+        remedy = "print it again, not mirrored" + f", or {_FLIP}" * (not self._identified)
+        self._tell("mirrored", Notice(Severity.WARNING, text, remedy, marker.entity))
 
     def measured(
         self, marker: MarkerSettings, stamp_ns: int, relative_m: NDArray[np.float64], drop_m: float | None
@@ -68,7 +80,7 @@ class MarkerFaults:
         self._foreign[code] = (first_ns, times + 1)
         if times + 1 < _FOREIGN_TIMES or stamp_ns - first_ns < _FOREIGN_NS:
             return
-        unseen = [f"{marker.entity} ({marker.label})" for marker in expected if marker.entity not in self._sizes]
+        unseen = [f"{marker.entity} ({marker.label})" for marker in expected if marker.entity not in self._identified]
         whose = f"that of {' or '.join(unseen)}, not seen here so far" if unseen else "that of a vehicle or target"
         remedy = f"if it is {whose}, set its code in the field; else cover or remove it"
         text = f"marker {code} is in view, which the field gives to nobody"

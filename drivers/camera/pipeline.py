@@ -9,11 +9,12 @@ import numpy as np
 
 from drivers.camera import detect, markers, pose
 from drivers.camera.faults import MarkerFaults
+from drivers.camera.measuring import DropOf, GravityOf, Measuring, Scene
 from drivers.camera.prediction import Prediction, is_looked_for
 from drivers.camera.search import find_in, search
 from drivers.camera.settings import DetectorSettings, MarkerSettings
 from drivers.camera.sighting import Sighting
-from drivers.camera.tags import TagFinder
+from drivers.camera.tags import TAG_MARGIN, TagFinder
 from drivers.camera.tracks import Track
 from drivers.camera.whole_searches import SearchRates, WholeSearches
 from groundstation.arrays import Array, Image
@@ -21,11 +22,11 @@ from groundstation.bus.notice import Notice
 from groundstation.geometry.lens import CameraIntrinsics
 
 Followed = list[tuple[Track, detect.Find]]
-GravityOf = Callable[[str], pose.Gravity]
-DropOf = Callable[[str], float | None]
 
 # Corners beside a tracked board, including those of its bar, are no new board.
 _TAKEN_SQUARES = 2.2
+# A bar on the wrong side; clutter may look like one.
+_MIRRORED_MARGIN = 2.0
 _NOTHING_EXPECTED: Mapping[str, Prediction | None] = MappingProxyType({})
 
 
@@ -37,8 +38,8 @@ class Pipeline:
     """Finds, follows, identifies and measures the expected markers of one camera.
 
     `counts`: markers found, missed and refused since the start, by name; `searched`: whether the last picture was
-    wholly searched. cpu_s: returns the CPU time of this thread [s]; others: markers of the field that this camera does
-    not report.
+    wholly searched.
+    cpu_s: returns the CPU time of this thread [s]; others: markers of the field that this camera does not report.
     """
 
     def __init__(
@@ -54,10 +55,9 @@ class Pipeline:
         self._intrinsics = intrinsics
         self._settings = settings
         self._expected = {marker.code: marker for marker in expected if marker.code is not None}
-        self._known = {marker.code for marker in (*expected, *others)}
-        self._points = {marker.entity: marker.printed.corners() for marker in self._expected.values()}
+        self._known = {marker.code: marker.entity for marker in (*expected, *others) if marker.code is not None}
         self._markers = {marker.entity: marker for marker in expected}
-        self._tags = TagFinder(intrinsics, expected, settings)
+        self._tags = TagFinder(expected)
         self._searches = WholeSearches(SearchRates.of(settings, search_rate_hz), search_phase_s)
         self._cpu_s = cpu_s
         self._tracks: list[Track] = []
@@ -65,6 +65,7 @@ class Pipeline:
         self._blind: Counter[str] = Counter()
         self._faults = MarkerFaults()
         self.counts: Counter[str] = Counter()
+        self._measuring = Measuring(intrinsics, expected, settings, self._faults, self.counts)
 
     @property
     def tracked(self) -> tuple[str, ...]:
@@ -101,17 +102,22 @@ class Pipeline:
         begun_s = self._cpu_s()
         if searching:
             finds += self._search(picture, stamp_ns) if self._expected else []
-        sightings = self._tags.look(picture, stamp_ns, gravity_of, predictions, searching)
+        tags = self._tags.look(picture, stamp_ns, predictions, searching)
         if searching:
+            for marker in self._tags.mirrored(picture):
+                self._mirrored(marker)
             self._schedule_search(stamp_ns, predictions, self._cpu_s() - begun_s)
+        scene = Scene(stamp_ns, gravity_of, drop_of)
+        found = []
+        for marker, corners in tags:
+            self._faults.identified(marker.entity)
+            found.append(self._measuring.sighting(marker, corners, TAG_MARGIN, scene))
         for track, find in finds:
             rays = self._intrinsics.normalised_from_pixels(find.corners)
             self._identify(picture, track, find, rays, stamp_ns)
-            sighting = self._measure(track, rays, stamp_ns, gravity_of, drop_of)
-            if sighting is not None:
-                sightings.append(sighting)
+            found.append(self._measure(track, rays, scene))
         self._forget(stamp_ns, predictions)
-        return self._resolved(sightings, predictions)
+        return self._resolved([sighting for sighting in found if sighting is not None], predictions)
 
     def _entity_of(self, track: Track) -> str | None:
         marker = self._expected.get(track.code) if track.code is not None else None
@@ -223,39 +229,28 @@ class Pipeline:
         least = self._settings.identity_margin
         reading = markers.read_bar(picture, find, self._intrinsics, rays=rays)
         track.identify(reading, stamp_ns, least)
-        if track.code is not None and track.code not in self._known:
+        if track.code in self._known:
+            self._faults.identified(self._known[track.code])
+        elif track.code is not None:
             self._faults.foreign(track.code, stamp_ns, self._markers.values())
         if track.code is not None or (reading is not None and reading.is_sure(least)):
             return
         mirrored = markers.read_bar(picture, find, self._intrinsics, mirrored=True, rays=rays)
-        marker = self._expected.get(mirrored.code) if mirrored is not None and mirrored.is_sure(least) else None
-        if marker is not None and mirrored is not None:
-            self.counts["mirrored"] += 1
-            self._faults.mirrored(marker, mirrored)
+        marker = self._expected.get(mirrored.code) if mirrored is not None else None
+        if marker is not None and mirrored is not None and mirrored.is_sure(max(least, _MIRRORED_MARGIN)):
+            self._mirrored(marker)
 
-    def _measure(
-        self, track: Track, rays: Array, stamp_ns: int, gravity_of: GravityOf, drop_of: DropOf
-    ) -> Sighting | None:
+    def _mirrored(self, marker: MarkerSettings) -> None:
+        self.counts["mirrored"] += 1
+        self._faults.mirrored(marker)
+
+    def _measure(self, track: Track, rays: Array, scene: Scene) -> Sighting | None:
         """Return the sighting of an identified, expected board, unless its corners (and their rays) fit no pose."""
         expected = self._expected.get(track.code) if track.code is not None else None
         if expected is None:
             self.counts["unknown"] += 1
             return None
-        points, settings = self._points[expected.entity], self._settings
-        poses = pose.planar_poses(track.corners, points, self._intrinsics, rays)
-        if not poses:
-            self.counts["no_pose"] += 1
-            return None
-        gravity = gravity_of(expected.entity)
-        choice = pose.choose(
-            poses, points, self._intrinsics, gravity, settings.corner_floor_px, settings.ambiguity_cost
-        )
-        if choice.residual_px > settings.max_residual_px:
-            self.counts["residual"] += 1
-            return None
-        relative_m = gravity.stabilized_from_optical @ choice.best.position_m
-        self._faults.measured(expected, stamp_ns, relative_m, drop_of(expected.entity))
-        return Sighting(expected.entity, track.margin, choice, track.corners)
+        return self._measuring.sighting(expected, track.corners, track.margin, scene, rays)
 
     def _resolved(self, sightings: list[Sighting], predictions: Mapping[str, Prediction | None]) -> list[Sighting]:
         """Return one sighting per entity; a second board with the same code becomes an alternative.

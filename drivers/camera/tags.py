@@ -1,27 +1,24 @@
 """Square tags, the second kind of marker: looked for where they are expected, and seldom in whole pictures."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from drivers.camera import pose
 from drivers.camera.detect import Window, resized, window_around
 from drivers.camera.dictionaries import family_of
 from drivers.camera.prediction import Prediction
-from drivers.camera.settings import DetectorSettings, MarkerSettings, TagSettings
-from drivers.camera.sighting import Sighting
+from drivers.camera.settings import MarkerSettings, TagSettings
 from groundstation.arrays import Array, Image
-from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.time_units import NS_PER_MS
 
-GravityOf = Callable[[str], pose.Gravity]
-
+TAG_MARGIN = 2.0
+"""Margin of a tag's identity: it is read as a whole, with the parity of its dictionary, so no reading is half-sure."""
 _LIFETIME_NS = 450 * NS_PER_MS
 # A tag's side in a window: smaller ones are enlarged to this, because their bits need three pixels each.
 _WANTED_PX, _MOST_ENLARGEMENT = 48.0, 4.0
-# A tag is read as a whole, with the parity of its dictionary: no reading is half-sure.
-_MARGIN = 2.0
+# In each so many searches the picture is searched as in a mirror, too.
+_MIRROR_STRIDE = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,19 +42,18 @@ class _Seen:
 
 
 class TagFinder:
-    """Finds and measures the expected tags of one camera."""
+    """Finds the expected tags of one camera."""
 
-    def __init__(
-        self, intrinsics: CameraIntrinsics, markers: tuple[MarkerSettings, ...], settings: DetectorSettings
-    ) -> None:
-        self._intrinsics, self._settings = intrinsics, settings
+    def __init__(self, markers: tuple[MarkerSettings, ...]) -> None:
         self._markers = [(marker, marker.tag) for marker in markers if marker.tag is not None]
-        self._points = {marker.entity: marker.printed.corners() for marker, _ in self._markers}
         names = {tag.dictionary for _, tag in self._markers}
-        self._families = {name: family_of(name) for name in sorted(names)}
-        self._finders = {name: family.finder() for name, family in self._families.items()}
+        self._finders = {name: family_of(name).finder() for name in sorted(names)}
         # Each entity's places: a spare print of its tag has one too.
         self._seen: dict[str, list[_Seen]] = {}
+        # Tags of the last picture that was searched all over, by dictionary, and entities whose tags were ever read.
+        self._read: dict[str, list[tuple[int, Array]]] = {}
+        self._sound: set[str] = set()
+        self._in_vain = 0
 
     @property
     def tracked(self) -> tuple[str, ...]:
@@ -65,27 +61,42 @@ class TagFinder:
         return tuple(self._seen)
 
     def look(
-        self,
-        picture: Image,
-        stamp_ns: int,
-        gravity_of: GravityOf,
-        predictions: Mapping[str, Prediction | None],
-        everywhere: bool,
-    ) -> list[Sighting]:
-        """Return the sightings of tags: in their windows, and with `everywhere` in the whole picture.
+        self, picture: Image, stamp_ns: int, predictions: Mapping[str, Prediction | None], everywhere: bool
+    ) -> list[tuple[MarkerSettings, Array]]:
+        """Return the tags in a picture, with their corners (4, 2) [px]; several prints of one are all there.
 
-        Several prints with one identity give several sightings of their entity.
+        They are looked for in their windows, and with `everywhere` in the whole picture.
         """
         whole = self._everywhere(picture) if everywhere else {}
-        sightings, places = [], {}
+        places, finds = {}, []
         for marker, tag in self._markers:
             seen, known = self._seen.get(marker.entity, []), whole.get(marker.entity, [])
             found = self._found(picture, tag, seen, predictions.get(marker.entity), known)
             recent = [place for place in seen if stamp_ns - place.stamp_ns <= _LIFETIME_NS]
             places[marker.entity] = [_Seen(corners, stamp_ns) for corners in found] + _vacant(recent, found)
-            sightings += [self._measured(marker, corners, gravity_of) for corners in found]
+            finds += [(marker, corners) for corners in found]
         self._seen = {entity: those for entity, those in places.items() if those}
-        return [sighting for sighting in sightings if sighting is not None]
+        self._sound |= {marker.entity for marker, _ in finds}
+        return finds
+
+    def mirrored(self, picture: Image) -> list[MarkerSettings]:
+        """Return tags that a picture, just looked at everywhere, shows only in its mirror image.
+
+        Looked for now and then, and only those that were never seen as printed.
+        """
+        missing = [(marker, tag) for marker, tag in self._markers if marker.entity not in self._sound]
+        self._in_vain += bool(missing)
+        if not missing or self._in_vain % _MIRROR_STRIDE:
+            return []
+        turned, whole = np.ascontiguousarray(picture[:, ::-1]), _whole(picture)
+        found = []
+        for name in sorted({tag.dictionary for _, tag in missing}):
+            # What reads both ways is another tag whose mirror image happens to be a word too.
+            straight = [_mirrored(corners, picture) for _, corners in self._read[name]]
+            reads = self._detect(turned, name, whole, _WANTED_PX)
+            numbers = {number for number, corners in reads if not any(_is_same(corners, other) for other in straight)}
+            found += [marker for marker, tag in missing if tag.dictionary == name and tag.id in numbers]
+        return found
 
     def _found(
         self, picture: Image, tag: TagSettings, places: list[_Seen], prediction: Prediction | None, known: list[Array]
@@ -107,10 +118,9 @@ class TagFinder:
 
     def _everywhere(self, picture: Image) -> dict[str, list[Array]]:
         """Return the corners of all expected tags in the whole picture, by entity."""
-        window = Window(0, 0, picture.shape[1], picture.shape[0])
-        finds = {name: self._detect(picture, name, window, _WANTED_PX) for name in self._finders}
+        self._read = {name: self._detect(picture, name, _whole(picture), _WANTED_PX) for name in self._finders}
         return {
-            marker.entity: [corners for number, corners in finds[tag.dictionary] if number == tag.id]
+            marker.entity: [corners for number, corners in self._read[tag.dictionary] if number == tag.id]
             for marker, tag in self._markers
         }
 
@@ -125,19 +135,14 @@ class TagFinder:
             raise ValueError(f"tags {name}: {type(error).__name__}: {error}") from error
         return [(number, (four + 0.5) * ratio - 0.5 + place) for number, four in finds if four.shape == (4, 2)]
 
-    def _measured(self, marker: MarkerSettings, corners: Array, gravity_of: GravityOf) -> Sighting | None:
-        points = self._points[marker.entity]
-        poses = pose.planar_poses(corners, points, self._intrinsics)
-        if not poses:
-            return None
-        assert marker.tag is not None
-        floor_px = max(self._families[marker.tag.dictionary].corner_std_px, self._settings.corner_floor_px)
-        choice = pose.choose(
-            poses, points, self._intrinsics, gravity_of(marker.entity), floor_px, self._settings.ambiguity_cost
-        )
-        if choice.residual_px > self._settings.max_residual_px:
-            return None
-        return Sighting(marker.entity, _MARGIN, choice, corners)
+
+def _whole(picture: Image) -> Window:
+    return Window(0, 0, picture.shape[1], picture.shape[0])
+
+
+def _mirrored(corners: Array, picture: Image) -> Array:
+    """Return corners (4, 2) [px] in the mirror image of a picture."""
+    return np.column_stack((picture.shape[1] - 1.0 - corners[:, 0], corners[:, 1]))
 
 
 def _side_px(corners: Array) -> float:

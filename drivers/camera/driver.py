@@ -168,7 +168,13 @@ class CameraDriver:
         if self._pipeline.searched and picture_ns == exposure_ns:  # old pictures do not show who is missing now
             header = self._child.bus.header(settings.observer, exposure_ns)
             found = tuple(sighting.entity for sighting in sightings)
-            searched = SearchedPicture(header=header, observer=settings.observer, camera=settings.name, found=found)
+            searched = SearchedPicture(
+                header=header,
+                observer=settings.observer,
+                camera=settings.name,
+                found=found,
+                unmeasured=self._pipeline.unmeasured,
+            )
             self._child.bus.publish(SEARCHED_PICTURE, searched)
         for notice in self._pipeline.take_notices():
             self._child.event(notice.severity, f"camera {settings.name}: {notice.text}", notice.remedy, notice.entity)

@@ -38,7 +38,8 @@ class Pipeline:
     """Finds, follows, identifies and measures the expected markers of one camera.
 
     `counts`: markers found, missed and refused since the start, by name; `searched`: whether the last picture was
-    wholly searched.
+    wholly searched; `unmeasured`: the entities without a sighting that it may show all the same, because a find was
+    refused, was one of several, or cannot be read.
     cpu_s: returns the CPU time of this thread [s]; others: markers of the field that this camera does not report.
     """
 
@@ -62,6 +63,7 @@ class Pipeline:
         self._cpu_s = cpu_s
         self._tracks: list[Track] = []
         self.searched = False
+        self.unmeasured: tuple[str, ...] = ()
         self._blind: Counter[str] = Counter()
         self._faults = MarkerFaults()
         self.counts: Counter[str] = Counter()
@@ -108,6 +110,7 @@ class Pipeline:
                 self._mirrored(marker)
             self._schedule_search(stamp_ns, predictions, self._cpu_s() - begun_s)
         scene = Scene(stamp_ns, gravity_of, drop_of)
+        shown = {marker.entity for marker, _ in tags}
         found = []
         for marker, corners in tags:
             self._faults.identified(marker.entity)
@@ -115,9 +118,12 @@ class Pipeline:
         for track, find in finds:
             rays = self._intrinsics.normalised_from_pixels(find.corners)
             self._identify(picture, track, find, rays, stamp_ns)
+            shown |= self._may_be(track)
             found.append(self._measure(track, rays, scene))
         self._forget(stamp_ns, predictions)
-        return self._resolved([sighting for sighting in found if sighting is not None], predictions)
+        sightings = self._resolved([sighting for sighting in found if sighting is not None], predictions)
+        self.unmeasured = tuple(sorted(shown - {sighting.entity for sighting in sightings}))
+        return sightings
 
     def _entity_of(self, track: Track) -> str | None:
         marker = self._expected.get(track.code) if track.code is not None else None
@@ -243,6 +249,13 @@ class Pipeline:
     def _mirrored(self, marker: MarkerSettings) -> None:
         self.counts["mirrored"] += 1
         self._faults.mirrored(marker)
+
+    def _may_be(self, track: Track) -> set[str]:
+        """Return the entities whose board a track may be: an unread one may be that of each."""
+        entity = self._entity_of(track)
+        if entity is not None:
+            return {entity}
+        return {marker.entity for marker in self._expected.values()} if track.code is None else set()
 
     def _measure(self, track: Track, rays: Array, scene: Scene) -> Sighting | None:
         """Return the sighting of an identified, expected board, unless its corners (and their rays) fit no pose."""

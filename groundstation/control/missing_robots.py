@@ -64,7 +64,7 @@ class MissingRobots:
         if belief is None:
             return
         for name in unseen:
-            if name in picture.found or name not in belief.layout:
+            if picture.may_show(name) or name not in belief.layout:
                 continue
             marker = self._sensors.marker(name, belief.mean_of(name), is_robot=True)
             if self._is_hidden(name, marker, picture.observer, belief):

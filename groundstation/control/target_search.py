@@ -254,9 +254,10 @@ class Search:
         )
 
     def _look(self, picture: SearchedPicture, now_ns: int) -> None:
-        """Count a picture against all targets that it does not show."""
+        """Count a picture against all targets that it cannot show."""
         pose, slack_m = self._pose_at(picture.observer, picture.header.stamp_ns)
-        missing = [name for name, state in self.targets.items() if state.room is not None and name not in picture.found]
+        searched = (name for name, state in self.targets.items() if state.room is not None)
+        missing = [name for name in searched if not picture.may_show(name)]
         if pose is None or not missing:
             return
         for name in missing:

@@ -127,6 +127,12 @@ class SearchedPicture(Message, frozen=True, kw_only=True):
     """The camera."""
     found: tuple[str, ...] = ()
     """The robots and targets whose markers it shows."""
+    unmeasured: tuple[str, ...] = ()
+    """Those that it may show besides, without a sighting: of markers that cannot be read, are refused or repeat one."""
+
+    def may_show(self, name: str) -> bool:
+        """Return whether a robot or target may be in it: then it is no evidence that it is elsewhere."""
+        return name in self.found or name in self.unmeasured
 
 
 class BodyPose(msgspec.Struct, frozen=True):

@@ -56,13 +56,14 @@ def lookout_of_the_lab() -> Lookout:
     )
 
 
-def look_in_vain(lookout: Lookout) -> None:
-    """Take 2.8 s of pictures without the target, longer than an occlusion may last."""
+def look_in_vain(lookout: Lookout, unmeasured: tuple[str, ...] = ()) -> None:
+    """Take 2.8 s of pictures without the target, longer than an occlusion may last; unmeasured: whom they may show."""
     for tick in range(1, 140):
         now_s = 0.02 * (tick + 1)
         header = Header(round(now_s * 1e9), "c", "drone_1", "drone_1_camera", tick)
         if tick % 5 == 0:
-            lookout.take(SearchedPicture(header=header, observer="drone_1", camera="drone_1_camera"))
+            camera = "drone_1_camera"
+            lookout.take(SearchedPicture(header=header, observer="drone_1", camera=camera, unmeasured=unmeasured))
         lookout.advance(belief(now_s), {"drone_1": 0.1, "turtlebot": now_s}, {"drone_1": 0.1})
         lookout.stands(("drone_1",), lookout.missing, belief(now_s))
 
@@ -92,6 +93,20 @@ def test_a_loss_is_told_at_once_with_where_it_is_searched_and_so_is_its_end() ->
     assert [notice.text for notice in lookout.take_notices()] == ["turtlebot is found"]
     assert lookout.searches(round(2.9e9)) == ()
     assert lookout.maps() == {}
+
+
+def test_pictures_with_a_board_that_may_be_the_targets_are_no_evidence_that_it_is_elsewhere() -> None:
+    """The map was emptied just where the target stood, with glare on its bar or a spare print beside it."""
+    chances = []
+    for unmeasured in ((), ("turtlebot",)):
+        lookout = lookout_of_the_lab()
+        lookout.take(driver_in("TRACK"))
+        lookout.advance(belief(0.02), {"drone_1": 0.1, "turtlebot": 0.1}, {"drone_1": 0.1})
+        look_in_vain(lookout, unmeasured)
+        room = lookout.targets["turtlebot"].room
+        assert room is not None
+        chances.append(room.mass_near(np.array([1.0, 0.0]), 0.01 * np.eye(2), 2.0, 0.5))
+    assert chances[0] < 0.3 < 0.6 < chances[1]
 
 
 def test_floor_that_nobody_can_see_is_told_and_not_counted() -> None:

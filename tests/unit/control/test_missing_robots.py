@@ -37,6 +37,7 @@ def missed(
     obstacles: tuple[Box, ...] = (),
     observer: str = "ceiling",
     found: tuple[str, ...] = ("drone_2",),
+    unmeasured: tuple[str, ...] = (),
 ) -> tuple[list[str], MissingRobots]:
     """Return the missing robots after ten pictures without drone_1, or with the found ones."""
     said: list[str] = []
@@ -44,7 +45,8 @@ def missed(
     for tick in range(1, 11):
         stamp_ns = tick * 100_000_000
         header = Header(stamp_ns, "c", observer, observer, tick)
-        watch.take(SearchedPicture(header=header, observer=observer, camera=observer, found=found))
+        shown = {"found": found, "unmeasured": unmeasured}
+        watch.take(SearchedPicture(header=header, observer=observer, camera=observer, **shown))
         said += watch.advance(belief(first, second, stamp_ns, std_m), {"drone_1": age_s, "drone_2": 0.1})
     return said, watch
 
@@ -144,6 +146,10 @@ def test_pictures_weigh_by_the_chance_to_see_it_at_two_deviations_of_its_place(v
         watch.take(SearchedPicture(header=header, observer="ceiling", camera="ceiling", found=("drone_2",)))
         now = replace(belief(EDGE, THERE, stamp_ns), covariance=np.diag(variances * 2))
         assert watch.advance(now, {"drone_1": 2.0}) == (("drone_1",) if tick == needed else ())
+
+
+def test_one_that_may_be_the_unread_board_in_a_picture_is_not_missed() -> None:
+    assert missed(HERE, THERE, found=(), unmeasured=("drone_1",))[0] == []
 
 
 def test_one_who_does_not_fly_is_not_missed() -> None:

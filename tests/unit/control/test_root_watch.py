@@ -78,10 +78,9 @@ def test_a_late_sighting_is_as_old_as_its_picture_and_makes_nobody_older() -> No
     assert watch.age_s("drone_1") == pytest.approx(0.2)
 
 
-def picture(*found: str, observer: str = "ceiling") -> SearchedPicture:
-    return SearchedPicture(
-        header=Header(1, "c", observer, observer, 1), observer=observer, camera=observer, found=found
-    )
+def picture(*found: str, observer: str = "ceiling", unmeasured: tuple[str, ...] = ()) -> SearchedPicture:
+    header = Header(1, "c", observer, observer, 1)
+    return SearchedPicture(header=header, observer=observer, camera=observer, found=found, unmeasured=unmeasured)
 
 
 def frame(*bodies: str, refused: tuple[str, ...] = (), observer: str = "mocap") -> BodyPoses:
@@ -118,6 +117,10 @@ def test_roots_that_say_nothing_are_silent_after_a_while_and_are_told_of_once() 
 
 def test_one_that_finds_robots_in_a_picture_that_hangs_is_silent() -> None:
     assert len(silent_after(picture("drone_1"), 60)) == 1
+
+
+def test_a_camera_works_that_cannot_read_a_board() -> None:
+    assert silent_after(picture(unmeasured=("drone_1",)), 60) == []
 
 
 def hangs_after_s(root: str, others: tuple[str, ...] = (), also_new: bool = False) -> float | None:

@@ -8,10 +8,11 @@ from groundstation.doctor.finding import Finding, Level
 from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.lens import CameraIntrinsics, intrinsics_of
 from groundstation.preflight.stand import Pad, PadSighting, SurveyedCamera, marker_centres, stand_of
+from groundstation.preflight.wording import shown_by
 
 # A marker nearer to the edge of the picture may be cut off, or the camera hang a little differently [share].
 _EDGE = 0.1
-_REMEDY = "check that it is this camera's stream, and that nobody has turned it; groundstation camera view shows it"
+_REMEDY = "check that it is this camera's stream, and that nobody has turned it"
 
 
 def blind_cameras(
@@ -25,7 +26,8 @@ def blind_cameras(
         missed = sorted(drone for drone in seen if _well_in_view(camera, lens, stand.pads[drone]))
         if missed:
             found = f"sees none of the drones that stand in its view ({', '.join(missed)})"
-            yield Finding(Level.SHOULD, name, found, _REMEDY)
+            shown = shown_by(field.drones[drone].marker for drone in missed)
+            yield Finding(Level.SHOULD, name, found, f"{_REMEDY}; {shown}")
 
 
 def _well_in_view(camera: SurveyedCamera, lens: CameraIntrinsics, pad: Pad) -> bool:

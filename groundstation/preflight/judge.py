@@ -10,7 +10,7 @@ from groundstation.preflight.captured_pads import captured_pad_findings
 from groundstation.preflight.health import camera_findings, drone_findings
 from groundstation.preflight.stand import PadSighting, stand_of
 from groundstation.preflight.suspicions import opinion
-from groundstation.preflight.wording import SUBJECT, finding
+from groundstation.preflight.wording import SUBJECT, finding, shown_by
 
 _GRAVITY = {Level.MUST: 0, Level.SHOULD: 1, Level.OK: 2}
 
@@ -43,13 +43,15 @@ def pad_findings(
     known = [s for s in sightings if s.drone in field.drones and s.camera in field.cameras]
     seen = {s.drone for s in known}
     unseen = [name for name in field.drones if name not in seen and name not in flew]
-    remedy = "check light, lens and marker, and that it stands on its pad in view; groundstation camera view shows it"
+    remedy = "check light, lens and marker, and that it stands on its pad in view"
     if not known and not flew:
-        yield Finding(Level.MUST, SUBJECT, "no fixed camera sees any drone", remedy)
+        shown = shown_by(drone.marker for drone in field.drones.values())
+        yield Finding(Level.MUST, SUBJECT, "no fixed camera sees any drone", f"{remedy}; {shown}")
         return
     yield from blind_cameras(field, known, flew)
     for name in unseen:
-        yield Finding(Level.SHOULD, name, "no fixed camera sees its marker on the floor", remedy)
+        shown = shown_by([field.drones[name].marker])
+        yield Finding(Level.SHOULD, name, "no fixed camera sees its marker on the floor", f"{remedy}; {shown}")
     if known:
         yield finding(field, opinion(stand_of(field), known))
 

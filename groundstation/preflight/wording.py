@@ -1,12 +1,13 @@
 """An explanation in words: the error, its size and deviation, and the remedy. Pure."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 
 from groundstation.doctor.finding import Finding, Level
 from groundstation.field.resolved import ResolvedField
+from groundstation.field.targets import Marker
 from groundstation.geometry.rotations import euler_from_rotation, rotation_from_euler
 from groundstation.preflight.figure_words import calibrated_lens, fixed_camera, hangs, lens_is, marker_is, measured_by
 from groundstation.preflight.suspicions import Explanation, Opinion
@@ -38,6 +39,12 @@ def finding(field: ResolvedField, opinion: Opinion) -> Finding:
     survey = _SURVEY if any(remedy.endswith(_SURVEY) for _, _, remedy in told) else ""
     checks = "; or ".join(remedy.removesuffix(_SURVEY) for _, _, remedy in told) + survey
     return Finding(level, SUBJECT, f"{either}: these cannot be told apart here; the first is the likeliest", checks)
+
+
+def shown_by(markers: Iterable[Marker]) -> str:
+    """Return words for the command that shows these markers in a camera's pictures."""
+    dictionaries = sorted({marker.dictionary for marker in markers if marker.dictionary is not None})
+    return f"groundstation camera view{''.join(f' --dictionary {name}' for name in dictionaries)} shows it"
 
 
 def _unexplained(opinion: Opinion) -> Finding:

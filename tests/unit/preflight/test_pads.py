@@ -12,6 +12,7 @@ from msgspec.structs import replace
 
 from groundstation.doctor.finding import Finding, Level
 from groundstation.field.resolved import ResolvedField
+from groundstation.field.targets import DroneMarker
 from groundstation.geometry.rotations import euler_from_rotation, rotation_from_euler, rotation_z
 from groundstation.preflight.judge import open_musts, pad_findings
 from groundstation.preflight.stand import PadSighting, marker_centres, stand_of
@@ -170,6 +171,21 @@ def test_nobody_in_view_forbids_and_one_out_of_view_does_not(lab_field: Resolved
     unseen, well = pad_findings(lab_field, one)
     assert (unseen.subject, unseen.level, well.level) == ("drone_2", Level.SHOULD, Level.OK)
     assert list(pad_findings(lab_field, [], flew=("drone_1", "drone_2"))) == []
+
+
+def test_the_remedy_names_the_dictionary_of_a_tag(lab_field: ResolvedField) -> None:
+    tag = DroneMarker(kind="aruco", dictionary="DICT_4X4_50", id=7, size_mm=168.0)
+    drones = {**lab_field.drones, "drone_2": replace(lab_field.drones["drone_2"], marker=tag)}
+    tagged = replace(lab_field, drones=drones)
+    (blind,) = pad_findings(tagged, [])
+    assert blind.remedy.endswith("groundstation camera view --dictionary DICT_4X4_50 shows it")
+    unseen = {
+        finding.subject: finding.remedy
+        for name in lab_field.drones
+        for finding in pad_findings(tagged, [one for one in seen(lab_field, Truth(), 1) if one.drone == name])
+    }
+    assert unseen["drone_1"].endswith("groundstation camera view shows it")
+    assert unseen["drone_2"].endswith("groundstation camera view --dictionary DICT_4X4_50 shows it")
 
 
 def test_a_camera_that_sees_nobody_where_another_sees_drones_in_its_view_is_named(lab_field: ResolvedField) -> None:

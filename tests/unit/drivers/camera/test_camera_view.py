@@ -59,6 +59,39 @@ def test_without_a_calibration_nothing_is_said_of_distances(files, capsys):
     assert "marker 3 somewhere" in capsys.readouterr().out
 
 
+def tag_picture(number=7, side_px=72):
+    """Return a tag of 168 mm that faces the camera in the middle of the picture, 1.07 m away."""
+    dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36H11)
+    grey = np.full((HEIGHT, WIDTH), 200, np.uint8)
+    left, top = round((WIDTH - side_px) / 2), (HEIGHT - side_px) // 2
+    grey[top : top + side_px, left : left + side_px] = cv2.aruco.generateImageMarker(dictionary, number, side_px)
+    noise = np.random.default_rng(1).normal(0.0, 1.0, grey.shape)
+    return np.clip(cv2.GaussianBlur(grey, (0, 0), 0.6) + noise, 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        ((), "nothing found"),
+        (("--dictionary", "DICT_APRILTAG_36H11"), "tag DICT_APRILTAG_36H11 7 at 1.0"),
+        (("--dictionary", "DICT_APRILTAG_36H11", "--size-mm", "84"), "tag DICT_APRILTAG_36H11 7 at 0.5"),
+    ],
+)
+def test_tags_are_shown_by_their_dictionary(files, capsys, options, told):
+    for number in range(3):
+        cv2.imwrite(str(files / "in" / f"p{number}.png"), tag_picture())
+    lens = str(files / "lens.yaml")
+    assert run(["camera", "view", str(files / "in"), "--calibration", lens, "--frames", "1", *options]) == 0
+    assert told in capsys.readouterr().out
+
+
+def test_a_mirrored_picture_is_told(files, capsys):
+    for number in range(3):
+        cv2.imwrite(str(files / "in" / f"p{number}.png"), picture()[:, ::-1])
+    assert run(["camera", "view", str(files / "in"), "--frames", "1"]) == 0
+    assert "1 mirrored: the camera's flip, or the print?" in capsys.readouterr().out
+
+
 def test_bad_input_is_named(files, capsys):
     (files / "lens.yaml").write_text(json.dumps(CALIBRATION | {"width_px": 1280}))
     assert run(["camera", "view", str(files / "in"), "--calibration", str(files / "lens.yaml")]) == 2
@@ -69,6 +102,10 @@ def test_bad_input_is_named(files, capsys):
     (files / "taken").write_text("")
     assert run(["camera", "view", str(files / "in"), "-o", str(files / "taken" / "below")]) == 2
     assert "cannot be made" in capsys.readouterr().err
+    assert run(["camera", "view", str(files / "in"), "--dictionary", "DICT_APRILTAG_36H1"]) == 2
+    assert "did you mean DICT_APRILTAG_36H1" in capsys.readouterr().err
+    assert run(["camera", "view", str(files / "in"), "--size-mm", "100"]) == 2
+    assert "belongs to tags (--dictionary)" in capsys.readouterr().err
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = str(taken.getsockname()[1])
         assert run(["camera", "view", str(files / "in"), "--stream", "--port", port]) == 2

@@ -124,6 +124,10 @@ def _require_sound(gathering: "Gathering", named: set[int]) -> None:
     doubled = sorted(gathering.doubled & named)
     if doubled:
         raise OperatorMistake(f"two markers with code {doubled[0]} are in view: cover one of them")
+    mirrored = sorted(gathering.mirrored & named)
+    if mirrored and not gathering.steady():
+        which = f"marker{'s' * (len(mirrored) > 1)} {', '.join(map(str, mirrored))}"
+        raise OperatorMistake(f"{which} can be read in a mirror only: switch off the camera's flip, or print again")
     moved = [code for code, steady in gathering.steady().items() if steady.moved and code in named]
     if moved:
         raise OperatorMistake(f"marker {moved[0]} moved between the pictures: camera and markers must be still")

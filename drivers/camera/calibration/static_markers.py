@@ -13,18 +13,22 @@ from groundstation.geometry import board as marker
 from groundstation.geometry.lens import CameraIntrinsics
 
 _MOST_BOARDS = 16
-_SURE = 1.0
+_SURE, _SURE_MIRRORED = 1.0, 2.0
 # More than this between pictures, and the marker or the camera has moved [px].
 _STILL_PX = 1.5
 
 
 @dataclass(frozen=True, slots=True)
 class MarkerReading:
-    """A marker in one picture: its code (None: uncertain), margin of the reading, corners (12, 2) [px]."""
+    """A marker in one picture: its code (None: uncertain), margin of the reading, corners (12, 2) [px].
+
+    mirrored: the code of one that reads in a mirror.
+    """
 
     code: int | None
     margin: float
     corners: Array
+    mirrored: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,12 +48,17 @@ def markers_in(picture: Image, lens: CameraIntrinsics) -> list[MarkerReading]:
         reading = read_bar(picture, find, lens)
         sure = reading is not None and reading.is_sure(_SURE)
         code = reading.code if reading is not None and sure else None
-        seen.append(MarkerReading(code, reading.margin if reading is not None else 0.0, find.corners))
+        mirrored = read_bar(picture, find, lens, mirrored=True) if code is None else None
+        wrong = mirrored.code if mirrored is not None and mirrored.is_sure(_SURE_MIRRORED) else None
+        seen.append(MarkerReading(code, reading.margin if reading is not None else 0.0, find.corners, wrong))
     return seen
 
 
 class Gathering:
-    """Collects the markers of single pictures; `doubled`: codes that were seen twice in one picture."""
+    """Collects the markers of single pictures.
+
+    `doubled`: codes that were seen twice in one picture; `mirrored`: codes that read in a mirror.
+    """
 
     def __init__(self, lens: CameraIntrinsics) -> None:
         self._lens = lens
@@ -57,6 +66,7 @@ class Gathering:
         self.pictures = 0
         self.unread = 0
         self.doubled: set[int] = set()
+        self.mirrored: set[int] = set()
 
     def take(self, picture: Image) -> list[MarkerReading]:
         """Take a picture; return the markers in it."""
@@ -65,6 +75,7 @@ class Gathering:
         codes = [one.code for one in seen if one.code is not None]
         self.unread += len(seen) - len(codes)
         self.doubled |= {code for code in codes if codes.count(code) > 1}
+        self.mirrored |= {one.mirrored for one in seen if one.mirrored is not None}
         for one in seen:
             if one.code is not None:
                 self._corners[one.code].append(one.corners)

@@ -173,6 +173,13 @@ def test_a_layout_file_names_its_mistakes(tmp_path, measured):
     assert code == 2 and f"{layout}:4" in said and "position_m" in said
 
 
+def test_a_mirrored_picture_is_told_as_such(tmp_path, measured):
+    picture = drawn(CEILING, LENS, {code: (*PLACES[code], 0.0, HEADINGS[code]) for code in PLACES})
+    folder, calibration = files_for(tmp_path, LENS, picture[:, ::-1], 1)
+    code, _, said = measured(folder, "--calibration", calibration, *markers())
+    assert code == 2 and "markers 1, 2, 3, 4 can be read in a mirror only: switch off the camera's flip" in said
+
+
 def test_nothing_can_be_told_of_no_markers():
     with pytest.raises(DriverError, match="none of the markers 1"):
         place_camera([Mark(1, (0.0, 0.0, 0.0))], {}, LENS, 44.0, 0.005)

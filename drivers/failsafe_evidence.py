@@ -1,9 +1,10 @@
 """Evidence for the failsafe table: which conditions hold now, for how long, and why. Pure."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from drivers.failsafe_table import Condition, Failsafe, Latch, Reaction
+from drivers.failsafe_table import RESUME_NEEDED, Condition, Failsafe, Latch, Reaction
 from drivers.setpoints import SetpointGate
 from drivers.watchdog_types import DriverMode, Upstream, VehicleView, WatchdogLimits
 from groundstation.bus.messages import AIRBORNE, STANDING, UNHEARD, FlightState
@@ -17,13 +18,13 @@ _FIRST_S = 0.05
 # _FAULT_S it is reported however far off it is. Slow take-offs are usual, and only reported near the end.
 _LASTING_S, _NEAR_S, _FAULT_S = 0.3, 3.0, 3.0
 _USUAL = frozenset({Condition.TAKE_OFF_OVERDUE})
+_PAUSES = frozenset({Condition.TRACKER_PAUSED, Condition.SETPOINTS_PATCHY})
 
 
 class Situation(NamedTuple):
     """The watchdog's inputs at one moment; times in ns, gap_s: time for which the driver's own loop stood still.
 
-    clearing: a take-off is clearing an emergency, within its time. paused_ns: last setpoint before a pause that needs
-    RESUME, or None.
+    clearing: a take-off is clearing an emergency, within its time.
     """
 
     now_ns: int
@@ -34,7 +35,6 @@ class Situation(NamedTuple):
     gate: SetpointGate
     entered_ns: int = 0
     take_off_ended_ns: int = 0
-    paused_ns: int | None = None
     clearing: bool = False
     gap_s: float = 0.0
 
@@ -129,10 +129,13 @@ def timed(at: Situation) -> dict[Condition, float]:
     ):
         if lasted_s > 0.0:
             lasted[condition] = lasted_s
-    if at.paused_ns is not None:
-        # Setpoints that return after a pause do not stop the land timer: only an order does.
-        lasted[Condition.NOT_RESUMED] = at.since_s(at.paused_ns)
     return lasted
+
+
+def _why(condition: Condition, at: Situation) -> str:
+    if condition is Condition.LEFT_WAITING:
+        return at.reason.removesuffix(RESUME_NEEDED)
+    return at.vehicle.unlocated if condition is Condition.UNLOCATED else ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,6 +162,7 @@ class Evidence:
         self.charged_s: dict[Condition, float] = {}
         self._pardoned_s: dict[Condition, float] = {}
         self._last_ns: int | None = None
+        self._waits: dict[Condition, int] = {}
 
     def step(self, at: Situation, limits: WatchdogLimits) -> None:
         """Take the situation of one turn."""
@@ -173,9 +177,10 @@ class Evidence:
         for condition in self.holding:
             more_s = elapsed_s if condition in before else min(elapsed_s, _FIRST_S)
             self.charged_s[condition] = self.charged_s.get(condition, 0.0) + more_s
-        for condition, lasted_s in timed(at).items():
-            why = at.vehicle.unlocated if condition is Condition.UNLOCATED else ""
-            self.holding[condition], self.charged_s[condition] = why, lasted_s
+        # Conditions that end do not stop the timer of a wait for an order: only an order does.
+        waits = {condition: at.since_s(since_ns) for condition, since_ns in self._waits.items()}
+        for condition, lasted_s in (timed(at) | waits).items():
+            self.holding[condition], self.charged_s[condition] = _why(condition, at), lasted_s
         self._pardoned_s = {
             condition: min(pardoned_s, self.charged_s[condition])
             for condition, pardoned_s in self._pardoned_s.items()
@@ -192,6 +197,30 @@ class Evidence:
     def lasted_s(self, condition: Condition) -> float | None:
         """Return for how long a condition has lasted [s], or None if it does not hold."""
         return self.charged_s.get(condition, 0.0) if condition in self.holding else None
+
+    def enter(self, now_ns: int, row: Failsafe | None, gate: SetpointGate, limits: WatchdogLimits) -> None:
+        """Note the begin of a mode, and from when on it waits for RESUME if its row needs that; row: None for an order.
+
+        A pause of the tracker counts from its last setpoint.
+        """
+        self._waits = {}
+        if row is None or row.latch is not Latch.RESUME:
+            return
+        paused_s = self.lasted_s(Condition.TRACKER_PAUSED)
+        if paused_s is not None and paused_s >= limits.tracker_resume_within_s and gate.last_heard_ns is not None:
+            self._waits = {Condition.NOT_RESUMED: gate.last_heard_ns}
+        else:
+            self._waits = {Condition.NOT_RESUMED if row.condition in _PAUSES else Condition.LEFT_WAITING: now_ns}
+
+    @property
+    def waits(self) -> Collection[Condition]:
+        """Return the conditions that only an order ends."""
+        return self._waits.keys()
+
+    def suspends(self, mode: DriverMode) -> bool:
+        """Return whether a condition holds for which a vehicle in a mode has to hover."""
+        lasted = ((row, self.against_s(row)) for row in self._table if row.reaction is Reaction.HOVER)
+        return any(row.applies(mode, lasted_s) for row, lasted_s in lasted)
 
     def soonest(self, mode: DriverMode, reaction: Reaction) -> Outlook | None:
         """Return which row with a reaction acts first if nothing changes, and when; None: none is to be reported."""

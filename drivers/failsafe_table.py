@@ -50,6 +50,7 @@ class Condition(StrEnum):
     UNLOCATED = auto()
     TRACKER_PAUSED = auto()
     NOT_RESUMED = auto()
+    LEFT_WAITING = auto()
     NO_SETPOINT = auto()
     SETPOINTS_PATCHY = auto()
     UNCONVERGED = auto()
@@ -61,6 +62,8 @@ class Condition(StrEnum):
     SOMEBODY_NEAR = auto()
 
 
+# Ends the reason for a hover that only an order ends; the monitor and the page read it.
+RESUME_NEEDED = "; RESUME is needed"
 # Seconds by which a condition's duration decays for each second without it: failing one sixth of the time adds up.
 SLOWLY = 0.2
 EVENLY = 1.0
@@ -93,6 +96,7 @@ class Failsafe:
 
 # A vehicle's action without another command.
 _TRACK = frozenset({DriverMode.TRACK})
+_HOVER = frozenset({DriverMode.HOVER})
 _STANDS = frozenset({DriverMode.LANDED, DriverMode.CUT})
 _UNCONVERGED = "the tracker does not know well enough where it is"
 
@@ -139,6 +143,9 @@ def _landings(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
                  "safety.unseen_land_after_s"),
         Failsafe(Condition.NOT_RESUMED, land, "the tracker paused, and nobody ordered RESUME", limits.land_after_s,
                  patience),
+        # Nobody hovers for ever: an operator who did not notice leaves it to its battery.
+        Failsafe(Condition.LEFT_WAITING, land, "{why}, and nobody ordered RESUME", limits.unresumed_land_s,
+                 modes=_HOVER),
         Failsafe(Condition.UNCONVERGED, land, _UNCONVERGED, limits.unseen_land_after_s,
                  "safety.unseen_land_after_s", EVENLY, modes=FREE),
         Failsafe(Condition.NOT_SEEN, land, "not seen by any camera for too long", limits.unseen_land_after_s,

@@ -7,7 +7,7 @@ docs/explanation/authority.md#the-watchdog.
 
 from drivers.acknowledgements import AckBook
 from drivers.failsafe_evidence import Evidence, Outlook, Situation, observed
-from drivers.failsafe_table import Condition, Failsafe, Latch, Reaction, failsafes
+from drivers.failsafe_table import RESUME_NEEDED, Condition, Failsafe, Latch, Reaction, failsafes
 from drivers.lease import LeaseBook
 from drivers.setpoints import SetpointGate
 from drivers.watchdog_types import (
@@ -24,6 +24,7 @@ from drivers.watchdog_types import (
 from drivers.way_back import WayBack
 from groundstation.bus.messages import (
     AIRBORNE,
+    KEPT_IN_PLACE,
     STANDING,
     UNHEARD,
     UP,
@@ -39,7 +40,7 @@ from groundstation.time_units import NS_PER_S
 
 # LAND is sent for at least this long, even to a vehicle that reports standing: the report may be wrong.
 _TELLS_NS = NS_PER_S
-_PAUSES = frozenset({Condition.TRACKER_PAUSED, Condition.SETPOINTS_PATCHY})
+_ENTERED = {Reaction.CUT: DriverMode.CUT, Reaction.LAND: DriverMode.LANDING, Reaction.HOVER: DriverMode.HOVER}
 
 
 class Watchdog:
@@ -70,7 +71,6 @@ class Watchdog:
         self._brake_until_ns = 0
         self._land_until_ns = 0
         self._clearing = False
-        self._paused_ns: int | None = None
         self._way_back = WayBack()
         self._braked_by: Failsafe | None = None
 
@@ -178,15 +178,15 @@ class Watchdog:
         self.evidence.pardon()
         return self._enter(now_ns, DriverMode.TRACK, f"tracking for {command.issuer}")
 
-    def _enter(self, now_ns: int, mode: DriverMode, reason: str, brake: bool = False, failsafe: str = "") -> str:
+    def _enter(self, now_ns: int, mode: DriverMode, reason: str, row: Failsafe | None = None) -> str:
         if self.mode is DriverMode.TAKING_OFF:
             self._take_off_ended_ns = now_ns
         if mode is DriverMode.LANDING or (mode is DriverMode.LANDED and self.mode in FREE):
             self._land_until_ns = now_ns + _TELLS_NS
         self._entered_ns = now_ns
-        self.mode, self.reason, self.failsafe = mode, reason, failsafe
-        self._paused_ns = None
-        self._brake_until_ns = now_ns + self._brake_ns if brake else 0
+        self.mode, self.reason, self.failsafe = mode, reason, "" if row is None else row.condition
+        self.evidence.enter(now_ns, row, self.gate, self.limits)
+        self._brake_until_ns = now_ns + self._brake_ns if row is not None and row.brake else 0
         self._acks.enter(mode)
         return ""
 
@@ -199,11 +199,13 @@ class Watchdog:
 
     @property
     def explanation(self) -> str:
-        """Return why the vehicle acts as it does, in words; if it still obeys a command, why it will land."""
+        """Return why the vehicle acts as it does, in words; if it will land for another reason, that one."""
         if self._braked_by is not None:
             return f"hovers: {self._text_of(self._braked_by)}"
-        outlook = None if self.failsafe else self._landing
-        return self.reason if outlook is None else self._text_of(outlook.row)
+        outlook = self._landing
+        if outlook is None or outlook.row.condition in self.evidence.waits:
+            return self.reason
+        return self._text_of(outlook.row)
 
     @property
     def lands_in_s(self) -> float | None:
@@ -236,12 +238,10 @@ class Watchdog:
 
     def _asked_back(self, setpoint: VelocitySetpoint | None) -> Vector3 | None:
         """Return the velocity back to the place where it was commanded to hover; None if a failsafe might stop it."""
-        waits = self.mode in (DriverMode.HOVER, DriverMode.HOLD) and not self.failsafe
+        waits = self.mode in (DriverMode.HOVER, DriverMode.HOLD) and self.failsafe in KEPT_IN_PLACE
         if setpoint is None or not setpoint.holds or not waits or self.vehicle.flight_state not in UP:
             return None
-        lasted = ((row, self.evidence.against_s(row)) for row in self.table if row.reaction is Reaction.HOVER)
-        doubted = any(row.applies(DriverMode.TRACK, lasted_s) for row, lasted_s in lasted)
-        return None if doubted else setpoint.velocity_m_s
+        return None if self.evidence.suspends(DriverMode.TRACK) else setpoint.velocity_m_s
 
     def _situation(self, now_ns: int, gap_s: float = 0.0) -> Situation:
         return Situation(
@@ -253,7 +253,6 @@ class Watchdog:
             self.gate,
             self._entered_ns,
             self._take_off_ended_ns,
-            self._paused_ns,
             self._clears_in_time(now_ns),
             gap_s,
         )
@@ -290,17 +289,8 @@ class Watchdog:
         return row.text.format(why=self.evidence.holding.get(row.condition, ""))
 
     def _react(self, now_ns: int, row: Failsafe, reason: str) -> None:
-        if row.reaction is Reaction.CUT:
-            self._enter(now_ns, DriverMode.CUT, reason, failsafe=row.condition)
-        elif row.reaction is Reaction.LAND:
-            self._enter(now_ns, DriverMode.LANDING, reason, row.brake, row.condition)
-        else:
-            paused_s = self.evidence.lasted_s(Condition.TRACKER_PAUSED)
-            self._enter(now_ns, DriverMode.HOVER, f"{reason}; RESUME is needed", failsafe=row.condition)
-            if paused_s is not None and paused_s >= self.limits.tracker_resume_within_s:
-                self._paused_ns = self.gate.last_heard_ns
-            elif row.condition in _PAUSES:
-                self._paused_ns = now_ns
+        needed = RESUME_NEEDED if row.latch is Latch.RESUME else ""
+        self._enter(now_ns, _ENTERED[row.reaction], reason + needed, row)
 
     def _action(self, now_ns: int) -> Action:
         match self.mode:

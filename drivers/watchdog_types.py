@@ -51,10 +51,11 @@ class WatchdogLimits:
     """Times and limits of the watchdog [s].
 
     resume_within_s: silence of vehicle or supervisor longer than this needs a RESUME; tracker_resume_within_s: likewise
-    of the tracker, or of any part between it and here; gap_s: likewise a pause of our own loop; brake_s: hover before
-    landing when it is unknown what the vehicle was doing. tolerated_speed_m_s: actual speed that gusts and noise
-    explain while at most max_speed_m_s is commanded; beyond it for fast_brake_s the vehicle brakes, for fast_resume_s
-    it needs a RESUME, for fast_land_s it lands. stray_land_s: likewise while it strays from its commands: from 1 m/s it
+    of the tracker, or of any part between it and here; gap_s: likewise a pause of our own loop; unresumed_land_s: it
+    lands if no RESUME comes for so long (after a pause of the tracker: land_after_s). brake_s: hover before landing
+    when it is unknown what the vehicle was doing. tolerated_speed_m_s: actual speed that gusts and noise explain while
+    at most max_speed_m_s is commanded; beyond it for fast_brake_s the vehicle brakes, for fast_resume_s it needs a
+    RESUME, for fast_land_s it lands. stray_land_s: likewise while it strays from its commands: from 1 m/s it
     stands after 0.8 s with 2 m/s^2 and a lag of 0.3 s, doubled. blind_land_s: likewise while its sensors are wrong and
     no camera sees it. lost_hover_s, lost_land_s: without a position from the cameras, for vehicles that need one.
     crowded_land_s: likewise nearer to another than allowed, so that it has to make way: the limiter moves each of two
@@ -69,6 +70,7 @@ class WatchdogLimits:
     battery_hold_s: float = 3.0
     resume_within_s: float = 1.0
     tracker_resume_within_s: float = 0.5
+    unresumed_land_s: float = 30.0
     gap_s: float = 0.5
     brake_s: float = 1.0
     take_off_s: float = 10.0

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from groundstation.bus.messages import Vector3, VehicleStatus
+from groundstation.bus.messages import KEPT_IN_PLACE, Vector3, VehicleStatus
 from groundstation.control.output_limiter import Limited
 from groundstation.control.parameters import SafetyParameters
 from groundstation.control.setpoints import Setpoint
@@ -60,8 +60,8 @@ class _Stay:
 class Hovering:
     """Use: `take` every status; at each tick pass all setpoints through `held`, limit them `within`, then `sent`.
 
-    A robot that a failsafe stopped hovers by itself, and so does one of doubtful place. level: robots that hold their
-    height by our estimate, and of a way back obey the horizontal part only.
+    A robot that may stray, or waits after a pause of the tracker, hovers by itself, and so does one of doubtful place.
+    level: robots that hold their height by our estimate, and of a way back obey the horizontal part only.
     """
 
     def __init__(self, level: Collection[str] = ()) -> None:
@@ -71,7 +71,7 @@ class Hovering:
     def take(self, status: VehicleStatus, now_ns: int) -> None:
         """Take a driver's mode: an order to hover begins a stay, each further one a new one."""
         name, mode = status.header.entity, status.mode
-        if mode not in _HOVERS or status.failsafe:
+        if mode not in _HOVERS or status.failsafe not in KEPT_IN_PLACE:
             self._stays.pop(name, None)
         elif name not in self._stays or self._stays[name].mode != mode:
             self._stays[name] = _Stay(mode, now_ns)

@@ -19,6 +19,7 @@ from groundstation.bus.messages import (
 from groundstation.field.drones import camera_name
 from groundstation.monitor.batteries import Battery, Charge, battery_of
 from groundstation.monitor.endurance import flies
+from groundstation.monitor.failsafe_words import failsafe_words
 from groundstation.monitor.state import MonitorState
 
 VEHICLE_SILENT_S = 1.0
@@ -146,14 +147,8 @@ def _lands(status: VehicleStatus) -> bool:
 
 
 def _failsafe(name: str, status: VehicleStatus) -> Iterator[Alarm]:
-    """Yield alarms about a condition that keeps a drone from its plan, or will land it."""
-    if status.lands_in_s is not None:
-        advice = "Nothing to do: it lands by itself unless this ends. HOLD does not stop it."
-        why, soon_s = status.detail.removeprefix("hovers: ").removesuffix("; RESUME is needed"), status.lands_in_s
-        yield Alarm(f"{name} lands", f"{name} starts to land in {max(1, round(soon_s))} s: {why}", advice=advice)
-    elif status.braked:
-        advice = "Nothing to do: it follows its plan again when this ends."
-        yield Alarm(f"{name} braked", f"{name} {status.detail}", False, advice)
+    if words := failsafe_words(status):
+        yield Alarm(f"{name} {words.about}", f"{name} {words.text}", words.grave, words.advice)
 
 
 def _standing(state: MonitorState) -> Iterator[Alarm]:

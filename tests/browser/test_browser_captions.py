@@ -140,8 +140,11 @@ def test_a_start_says_who_goes_on_and_whether_it_can(stage: Any) -> None:
     stage.flight.detail["drone_2"] = "reported velocity stuck at 0.00 m/s; RESUME is needed"
     page.wait(lambda s: page.there("resume").inner_text() == "RESUME\ndrone_2 tracks again")
     stage.flight.lands_in_s["drone_2"] = 2.0
-    page.wait(lambda s: page.there("resume").inner_text() == "RESUME\ndrone_2 tracks, if able")
-    assert page.there("drone_2-duty").inner_text() == "Hovers, then lands: reported velocity stuck at 0.00 m/s."
+    duty = "Hovers, then lands: reported velocity stuck at 0.00 m/s"
+    page.wait(lambda s: page.there("drone_2-duty").inner_text() == f"{duty}. RESUME lets it go on.")
+    assert page.there("resume").inner_text() == "RESUME\ndrone_2 tracks again"
+    stage.flight.detail["drone_2"] = "reported velocity stuck at 0.00 m/s"
+    page.wait(lambda s: page.there("drone_2-duty").inner_text() == f"{duty}.")
     assert "RESUME" not in page.there("verdict").inner_text()
 
 

@@ -33,6 +33,7 @@ EVIDENCE: dict[Condition, str] = {
     Condition.UNLOCATED: "nothing sharp enough to feed to an autopilot that flies by our position (MAVLink)",
     Condition.TRACKER_PAUSED: "no setpoint of the authorised epoch",
     Condition.NOT_RESUMED: "a pause of the tracker, or patches, and no TRACK, RESUME or HOLD since",
+    Condition.LEFT_WAITING: "another row made it hover until TRACK or RESUME, and no TRACK, RESUME or HOLD since",
     Condition.NO_SETPOINT: "the newest setpoint has expired (`safety.setpoint_lifetime_ms`), or is another epoch's",
     Condition.SETPOINTS_PATCHY: "the newest setpoint is older than 0.15 s",
     Condition.UNCONVERGED: "setpoints that say so",

@@ -19,6 +19,7 @@ from groundstation.bus.messages.belief import (
 )
 from groundstation.bus.messages.flight import (
     AIRBORNE,
+    KEPT_IN_PLACE,
     OPERATOR,
     STANDING,
     STOP_LIVES_NS,
@@ -58,6 +59,7 @@ from groundstation.vectors import Quaternion, Vector3
 __all__ = [
     "AIRBORNE",
     "ALL_DOWN",
+    "KEPT_IN_PLACE",
     "STANDING",
     "UNHEARD",
     "UP",

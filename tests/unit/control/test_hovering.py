@@ -138,6 +138,13 @@ def test_a_further_order_holds_the_place_of_that_moment():
     assert math.dist(there, flight.place) < 0.01
 
 
+@pytest.mark.parametrize("failsafe", ["driver_stood", "telemetry_silent"])
+def test_a_drone_that_waits_for_resume_after_a_pause_is_held(failsafe):
+    flight = Flight(drift=(0.05, 0.0))
+    flight.hovering.take(status("HOVER", failsafe=failsafe), flight.now_ns)
+    assert any(sent.holds for sent in flight.run(10.0))
+
+
 @pytest.mark.parametrize("other", [status("TRACK"), status("LANDING"), status("HOVER", failsafe="strays")])
 def test_drones_in_tracking_landing_or_failsafe_are_not_held(other):
     flight = Flight()

@@ -94,7 +94,7 @@ function reasonOf(name, { mode, detail, lands_in_s, braked }) {
   if (standing([name]).length) return stands(name, detail);
   const [, doing, who] = detail.match(ORDERS) ?? [];
   if (who) return `${ORDERED[doing]} ${orderedBy(who, name, doing)}`;
-  if (lands_in_s !== null && !braked && mode in GOES_ON && detail) return `${GOES_ON[mode](name)}, then lands: ${detail.replace(NEEDED, "")}`;
+  if (lands_in_s !== null && !braked && mode in GOES_ON && detail) return `${GOES_ON[mode](name)}, then lands: ${detail.replace(NEEDED, ". RESUME lets it go on")}`;
   if (mode === "LANDING" && detail && !detail.startsWith("land")) return `lands: ${detail}`;
   return mode === "HOVER" && NEEDED.test(detail) ? `hovers: ${detail.replace(NEEDED, "")}. RESUME lets it go on` : detail;
 }

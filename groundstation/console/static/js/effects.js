@@ -124,8 +124,8 @@ export function isIdle(verb, names = droneNames()) {
   return moved.every((name) => modeNow(name) === left && !isUnheard(name));
 }
 
-// Whether a failsafe is about to land it: whether its fault is over, only its driver knows.
-const isBound = (name) => (store.s.vehicles[name].lands_in_s ?? null) !== null;
+// Whether a failsafe is about to land it, whatever is ordered: whether its fault is over, only its driver knows.
+const isBound = (name) => (store.s.vehicles[name].lands_in_s ?? null) !== null && !waits(store.s.vehicles[name].detail);
 // The drones that HOLD holds: it stops neither a landing nor an imminent failsafe landing.
 const holding = (names = droneNames()) => up(names).filter((name) => modeNow(name) !== "LANDING" && !isBound(name));
 

@@ -1,0 +1,33 @@
+"""Words for what failsafes do with a vehicle: what it does and why, and whether an operator must act. Pure."""
+
+from typing import NamedTuple
+
+from groundstation.bus.messages import VehicleStatus
+
+# As drivers end the reason for a hover that only an order ends.
+_NEEDED = "; RESUME is needed"
+_RESUME = "To do: press RESUME, or HOLD to keep it there"
+
+
+class FailsafeWords(NamedTuple):
+    """An alarm's words without its vehicle's name, which comes first; `grave` and `advice` as in an alarm."""
+
+    about: str
+    text: str
+    grave: bool
+    advice: str
+
+
+def failsafe_words(status: VehicleStatus) -> FailsafeWords | None:
+    """Return the words for a condition that keeps a drone from its plan, or will land it; None: there is none."""
+    why, lands_in_s = status.detail.removeprefix("hovers: ").removesuffix(_NEEDED), status.lands_in_s
+    soon = "" if lands_in_s is None else f"starts to land in {max(1, round(lands_in_s))} s"
+    if status.detail.endswith(_NEEDED):
+        text = f"{soon}: {why}" if soon else f"hovers: {why}"
+        return FailsafeWords("waits", text, True, f"{_RESUME}; otherwise it lands by itself.")
+    if soon:
+        advice = "Nothing to do: it lands by itself unless this ends. HOLD does not stop it."
+        return FailsafeWords("lands", f"{soon}: {why}", True, advice)
+    if status.braked:
+        return FailsafeWords("braked", status.detail, False, "Nothing to do: it follows its plan again when this ends.")
+    return None

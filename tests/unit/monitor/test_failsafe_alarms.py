@@ -1,0 +1,31 @@
+"""Alarms on what failsafes do with a drone: whether an order helps, and which."""
+
+import pytest
+from monitor_world import NOW, World
+
+from groundstation.monitor.alarms import alarms_of
+
+STOOD = "this driver stood still for 0.7 s; RESUME is needed"
+
+
+@pytest.mark.parametrize(
+    ("lands_in_s", "text"),
+    [
+        (None, "drone_1 hovers: this driver stood still for 0.7 s"),
+        (26.8, "drone_1 starts to land in 27 s: this driver stood still for 0.7 s"),
+    ],
+)
+def test_a_hover_that_only_an_order_ends_asks_for_one(world: World, lands_in_s: float | None, text: str) -> None:
+    world.vehicle("drone_1", "HOVER", failsafe="driver_stood", detail=STOOD, lands_in_s=lands_in_s)
+    world.text()
+    (alarm,) = alarms_of(world.state, NOW)
+    assert (alarm.about, alarm.text, alarm.asks, alarm.grave) == ("drone_1 waits", text, True, True)
+    assert alarm.advice == "To do: press RESUME, or HOLD to keep it there; otherwise it lands by itself."
+
+
+def test_a_landing_that_no_order_stops_asks_for_none(world: World) -> None:
+    why = "no telemetry from the vehicle"
+    world.vehicle("drone_1", "HOVER", failsafe="telemetry_silent", detail=why, lands_in_s=1.2)
+    world.text()
+    (alarm,) = alarms_of(world.state, NOW)
+    assert (alarm.text, alarm.asks) == (f"drone_1 starts to land in 1 s: {why}", False)

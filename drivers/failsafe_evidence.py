@@ -7,7 +7,7 @@ from typing import NamedTuple
 from drivers.failsafe_table import RESUME_NEEDED, Condition, Failsafe, Latch, Reaction
 from drivers.setpoints import SetpointGate
 from drivers.watchdog_types import DriverMode, Upstream, VehicleView, WatchdogLimits
-from groundstation.bus.messages import AIRBORNE, STANDING, UNHEARD, FlightState
+from groundstation.bus.messages import AIRBORNE, STANDING, UNHEARD, UP, FlightState
 from groundstation.time_units import NS_PER_S
 
 # An older setpoint is not part of a continuous stream.
@@ -89,6 +89,9 @@ def _observe_state(at: Situation, holding: dict[Condition, str]) -> None:
         holding[Condition.FLEW_AT_START] = ""
     if state in AIRBORNE and at.mode is DriverMode.LANDED:
         holding[Condition.UNORDERED_FLIGHT] = at.reason
+    # LANDING does not count: it is on its way down, and one that has fallen may say so for a while.
+    if state in UP | {FlightState.TAKING_OFF} and at.mode is DriverMode.CUT:
+        holding[Condition.CUT_IGNORED] = ""
 
 
 def _observe_setpoints(at: Situation, holding: dict[Condition, str]) -> None:
@@ -163,6 +166,7 @@ class Evidence:
         self._pardoned_s: dict[Condition, float] = {}
         self._last_ns: int | None = None
         self._waits: dict[Condition, int] = {}
+        self._mode: DriverMode | None = None
 
     def step(self, at: Situation, limits: WatchdogLimits) -> None:
         """Take the situation of one turn."""
@@ -198,19 +202,23 @@ class Evidence:
         """Return for how long a condition has lasted [s], or None if it does not hold."""
         return self.charged_s.get(condition, 0.0) if condition in self.holding else None
 
-    def enter(self, now_ns: int, row: Failsafe | None, gate: SetpointGate, limits: WatchdogLimits) -> None:
+    def enter(self, at: Situation, row: Failsafe | None, limits: WatchdogLimits) -> None:
         """Note the begin of a mode, and from when on it waits for RESUME if its row needs that; row: None for an order.
 
-        A pause of the tracker counts from its last setpoint.
+        A pause of the tracker counts from its last setpoint, and each new CUT has its own time.
         """
+        if at.mode is not self._mode:
+            self._mode = at.mode
+            self.charged_s.pop(Condition.CUT_IGNORED, None)
         self._waits = {}
         if row is None or row.latch is not Latch.RESUME:
             return
         paused_s = self.lasted_s(Condition.TRACKER_PAUSED)
-        if paused_s is not None and paused_s >= limits.tracker_resume_within_s and gate.last_heard_ns is not None:
-            self._waits = {Condition.NOT_RESUMED: gate.last_heard_ns}
+        heard_ns = at.gate.last_heard_ns
+        if paused_s is not None and paused_s >= limits.tracker_resume_within_s and heard_ns is not None:
+            self._waits = {Condition.NOT_RESUMED: heard_ns}
         else:
-            self._waits = {Condition.NOT_RESUMED if row.condition in _PAUSES else Condition.LEFT_WAITING: now_ns}
+            self._waits = {Condition.NOT_RESUMED if row.condition in _PAUSES else Condition.LEFT_WAITING: at.now_ns}
 
     @property
     def waits(self) -> Collection[Condition]:

@@ -33,6 +33,7 @@ class Condition(StrEnum):
     EMERGENCY = auto()
     FLEW_AT_START = auto()
     UNORDERED_FLIGHT = auto()
+    CUT_IGNORED = auto()
     LANDS_BY_ITSELF = auto()
     STOP_REQUESTED = auto()
     SUPERVISOR_DEAD = auto()
@@ -107,7 +108,7 @@ def failsafes(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
     return (*_ends(limits), *_landings(limits), *_suspensions(limits), *_brakes(limits), *_refusals())
 
 
-def _ends(_limits: WatchdogLimits) -> tuple[Failsafe, ...]:
+def _ends(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
     emergency = ALOFT | {DriverMode.LANDING}
     return (
         Failsafe(Condition.EMERGENCY, Reaction.CUT, "the vehicle reports an emergency", modes=emergency),
@@ -115,6 +116,9 @@ def _ends(_limits: WatchdogLimits) -> tuple[Failsafe, ...]:
                  modes=frozenset({DriverMode.CONNECTING})),
         Failsafe(Condition.UNORDERED_FLIGHT, Reaction.LAND, "airborne without a standing take-off order ({why})",
                  modes=frozenset({DriverMode.LANDED})),
+        # By then every kind of vehicle whose motors stopped has fallen, and says so.
+        Failsafe(Condition.CUT_IGNORED, Reaction.LAND, "it flies although its motors were cut", limits.cut_s,
+                 forgets=SLOWLY, modes=frozenset({DriverMode.CUT})),
         Failsafe(Condition.LANDS_BY_ITSELF, Reaction.LAND, "the vehicle lands by itself"),
     )  # fmt: skip
 

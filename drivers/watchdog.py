@@ -38,7 +38,8 @@ from groundstation.bus.messages import (
 )
 from groundstation.time_units import NS_PER_S
 
-# LAND is sent for at least this long, even to a vehicle that reports standing: the report may be wrong.
+# LAND is sent for at least this long, even to a vehicle that reports standing: the report may be wrong. So is CUT, even
+# if a LAND follows it at once.
 _TELLS_NS = NS_PER_S
 _ENTERED = {Reaction.CUT: DriverMode.CUT, Reaction.LAND: DriverMode.LANDING, Reaction.HOVER: DriverMode.HOVER}
 
@@ -117,12 +118,19 @@ class Watchdog:
                 return self._obey_track(now_ns, command)
 
     def _obey_land(self, now_ns: int, command: Command) -> str:
-        if self.mode in ALOFT or (self.mode is DriverMode.LANDING and self.failsafe):
+        uncut = self.mode is DriverMode.CUT
+        refusal = self._why_no_land_in_cut(now_ns) if uncut else ""
+        if refusal:
+            return refusal
+        if uncut or self.mode in ALOFT or (self.mode is DriverMode.LANDING and self.failsafe):
             return self._enter(now_ns, DriverMode.LANDING, f"landing for {command.issuer}")
-        if self.mode is DriverMode.CUT:
-            return "motors are cut"
         self._brake_until_ns, self._land_until_ns = 0, now_ns + _TELLS_NS
         return ""
+
+    def _why_no_land_in_cut(self, now_ns: int) -> str:
+        if not self.vehicle.fresh or self.vehicle.flight_state not in AIRBORNE:
+            return "motors are cut"
+        return "motors are being cut" if now_ns - self._entered_ns < _TELLS_NS else ""
 
     def _obey_hold(self, now_ns: int, command: Command) -> str:
         if self.mode is DriverMode.TAKING_OFF and self.vehicle.flight_state in STANDING:
@@ -185,7 +193,7 @@ class Watchdog:
             self._land_until_ns = now_ns + _TELLS_NS
         self._entered_ns = now_ns
         self.mode, self.reason, self.failsafe = mode, reason, "" if row is None else row.condition
-        self.evidence.enter(now_ns, row, self.gate, self.limits)
+        self.evidence.enter(self._situation(now_ns), row, self.limits)
         self._brake_until_ns = now_ns + self._brake_ns if row is not None and row.brake else 0
         self._acks.enter(mode)
         return ""

@@ -52,7 +52,8 @@ class WatchdogLimits:
 
     resume_within_s: silence of vehicle or supervisor longer than this needs a RESUME; tracker_resume_within_s: likewise
     of the tracker, or of any part between it and here; gap_s: likewise a pause of our own loop; unresumed_land_s: it
-    lands if no RESUME comes for so long (after a pause of the tracker: land_after_s). brake_s: hover before landing
+    lands if no RESUME comes for so long (after a pause of the tracker: land_after_s). cut_s: it may fly on after an
+    order to cut its motors. brake_s: hover before landing
     when it is unknown what the vehicle was doing. tolerated_speed_m_s: actual speed that gusts and noise explain while
     at most max_speed_m_s is commanded; beyond it for fast_brake_s the vehicle brakes, for fast_resume_s it needs a
     RESUME, for fast_land_s it lands. stray_land_s: likewise while it strays from its commands: from 1 m/s it
@@ -75,6 +76,7 @@ class WatchdogLimits:
     brake_s: float = 1.0
     take_off_s: float = 10.0
     clear_s: float = 2.0
+    cut_s: float = 2.0
     max_speed_m_s: float = 0.6
     fast_brake_s: float = 0.1
     fast_resume_s: float = 0.5

@@ -130,6 +130,7 @@ class Orders:
             case Action.CUT:
                 if armed:
                     self._ask(now_ns, "motor cut", MavCmd.COMPONENT_ARM_DISARM, 0.0, FORCE)
+                return self._stand(now_ns) if armed and guided else None
             case Action.IDLE:
                 if armed and landed == Landed.ON_GROUND:
                     self._ask(now_ns, "disarming", MavCmd.COMPONENT_ARM_DISARM, 0.0, 0.0)

@@ -131,9 +131,8 @@ class Ros2Vehicle:
             self._said_ns.clear()
             self._was_ordered |= self._asked is Action.TAKE_OFF
         match decision.action:
-            # If that order is a switch, a second one would undo it.
-            case Action.CUT if self._flight.airborne or Order.CUT not in self._said_ns:
-                self._order(now_ns, Order.CUT)
+            case Action.CUT:
+                self._cut(now_ns)
             case Action.LAND:
                 self._lands_until_ns = now_ns + _LASTS_NS
                 self._order(now_ns, Order.LAND)
@@ -151,6 +150,14 @@ class Ros2Vehicle:
 
     def _fly(self, now_ns: int, velocity: Vector3, turn_rad_s: float) -> None:
         self._note(now_ns, self._settings.ros2.velocity, self._link.fly(velocity, turn_rad_s))
+
+    def _cut(self, now_ns: int) -> None:
+        # If that order is a switch, a second one would undo it.
+        if self._flight.airborne or Order.CUT not in self._said_ns:
+            self._order(now_ns, Order.CUT)
+        # A node that has no such order must not fly on at its last velocity.
+        if self._flight.airborne or self._is_due(now_ns, None):
+            self._fly(now_ns, (0.0, 0.0, 0.0), 0.0)
 
     def _order(self, now_ns: int, order: Order) -> None:
         if self._is_due(now_ns, order):

@@ -154,6 +154,8 @@ class Tello(DatagramVehicle):
         match decision.action:
             case Action.CUT:
                 self._repeat(now_ns, text.EMERGENCY)
+                if flies:  # it must not fly on at its last velocity
+                    self._link.send(now_ns, text.rc(0, 0, 0, 0))
             case Action.LAND:  # whether it flies or not: its report may be wrong
                 self._repeat(now_ns, text.LAND)
             case Action.TAKE_OFF if not flies:

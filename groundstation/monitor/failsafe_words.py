@@ -6,7 +6,10 @@ from groundstation.bus.messages import VehicleStatus
 
 # As drivers end the reason for a hover that only an order ends.
 _NEEDED = "; RESUME is needed"
+_UNCUT = "cut_ignored"
 _RESUME = "To do: press RESUME, or HOLD to keep it there"
+
+_STAY_AWAY = "To do: stay away until it is down, it is told to land; CUT MOTORS tries to stop its motors again."
 
 
 class FailsafeWords(NamedTuple):
@@ -20,6 +23,8 @@ class FailsafeWords(NamedTuple):
 
 def failsafe_words(status: VehicleStatus) -> FailsafeWords | None:
     """Return the words for a condition that keeps a drone from its plan, or will land it; None: there is none."""
+    if status.failsafe == _UNCUT or (status.mode == "CUT" and status.lands_in_s is not None):
+        return FailsafeWords("uncut", "flies although its motors were cut", True, _STAY_AWAY)
     why, lands_in_s = status.detail.removeprefix("hovers: ").removesuffix(_NEEDED), status.lands_in_s
     soon = "" if lands_in_s is None else f"starts to land in {max(1, round(lands_in_s))} s"
     if status.detail.endswith(_NEEDED):

@@ -16,6 +16,7 @@ EVIDENCE: dict[Condition, str] = {
     Condition.EMERGENCY: "the vehicle says EMERGENCY, and no take-off is clearing one (2 s)",
     Condition.FLEW_AT_START: "the vehicle's first word is that it flies",
     Condition.UNORDERED_FLIGHT: "it says that it flies while it should stand",
+    Condition.CUT_IGNORED: "it says that it flies, though not that it lands, while it is told to cut its motors",
     Condition.LANDS_BY_ITSELF: "it says LANDING without a LAND",
     Condition.STOP_REQUESTED: "SIGTERM to the driver",
     Condition.SUPERVISOR_DEAD: "the supervisor's process is gone",

@@ -3,7 +3,9 @@
 import pytest
 from monitor_world import NOW, World
 
+from groundstation.bus.messages import FlightState
 from groundstation.monitor.alarms import alarms_of
+from groundstation.monitor.safety import Level, safety_of
 
 STOOD = "this driver stood still for 0.7 s; RESUME is needed"
 
@@ -29,3 +31,25 @@ def test_a_landing_that_no_order_stops_asks_for_none(world: World) -> None:
     world.text()
     (alarm,) = alarms_of(world.state, NOW)
     assert (alarm.text, alarm.asks) == (f"drone_1 starts to land in 1 s: {why}", False)
+
+
+@pytest.mark.parametrize(
+    ("mode", "failsafe", "detail", "lands_in_s"),
+    [
+        ("CUT", "", "it flies although its motors were cut", 1.2),
+        ("CUT", "emergency", "it flies although its motors were cut", 1.2),
+        ("LANDING", "cut_ignored", "it flies although its motors were cut", None),
+    ],
+)
+def test_one_that_flies_although_its_motors_were_cut_asks_to_stay_away(
+    world: World, mode: str, failsafe: str, detail: str, lands_in_s: float | None
+) -> None:
+    world.vehicle("drone_1", mode, failsafe=failsafe, detail=detail, lands_in_s=lands_in_s)
+    world.text()
+    alarms = alarms_of(world.state, NOW)
+    assert [alarm.text for alarm in alarms] == ["drone_1 flies although its motors were cut"]
+    assert alarms[0].grave and "stay away" in alarms[0].advice
+    assert safety_of(world.state, alarms).level is Level.ACT
+    world.vehicle("drone_1", "LANDED", flight_state=FlightState.LANDED)
+    world.text()
+    assert alarms_of(world.state, NOW) == []

@@ -181,6 +181,18 @@ def test_a_disarm_that_nobody_acknowledged_is_not_repeated_into_the_take_off_aft
         assert disarm not in asked(1.0 + 0.1 * tenth, DriverMode.TAKING_OFF, Action.TAKE_OFF)
 
 
+@pytest.mark.parametrize("flavour", [Flavour.PX4, Flavour.ARDUPILOT])
+def test_one_that_flies_although_its_motors_were_cut_does_not_fly_on_at_its_last_velocity(flavour):
+    climb = Climb(flavour, seen=True)
+    climb.rise_to(0.6)
+    fast = WatchdogDecision(DriverMode.TRACK, Action.FLY, (0.5, 0.0, 0.0), setpoint_ns=1, entered_ns=1)
+    where = (ARMED, guided_mode(flavour), Landed.IN_AIR, 0.8)
+    told = climb.orders.step(climb.now_ns + 10**8, fast, *where)
+    assert told is not None and told.vx == pytest.approx(0.5, abs=0.1)
+    told = climb.orders.step(climb.now_ns + 2 * 10**8, WatchdogDecision(DriverMode.CUT, Action.CUT), *where)
+    assert told is not None and told.vx == pytest.approx(0.0, abs=0.1)
+
+
 def test_a_change_of_mode_is_explained_by_what_was_said_before_it_and_by_nothing_later():
     orders = px4()
     decision = WatchdogDecision(DriverMode.HOVER, Action.HOVER)

@@ -29,8 +29,10 @@ class FakeLink:
     def __init__(self, address: str, section: Ros2Section, node: str, hear: object) -> None:
         self.refused: dict[str, str] = {}
         self.ordered: list[str] = []
+        self.flown: list[vehicle.Vector3] = []
 
     def fly(self, velocity: vehicle.Vector3, turn_rad_s: float) -> bytes:
+        self.flown.append(velocity)
         return b""
 
     def order(self, order: object) -> bytes:
@@ -144,3 +146,18 @@ def test_land_is_repeated_for_five_seconds_after_a_landing_seems_to_be_over(node
         at_s += [0.05 * (turn + 1)] * (len(link.ordered) - before)
     assert set(link.ordered) == {str(Order.LAND)}
     assert 4.4 < max(at_s) < 5.0 and len(at_s) == 10
+
+
+@pytest.mark.parametrize(("height_m", "least", "most"), [(0.8, 39, 40), (0.0, 2, 3)])
+def test_with_its_motors_cut_it_is_told_to_stand_still(node: Node, height_m: float, least: int, most: int) -> None:
+    """A node without such an order, or that refuses it, would fly on at its last velocity."""
+    link = node.driver._link
+    assert isinstance(link, FakeLink)
+    node.say(replace(STANDING, position=(0.0, 0.0, height_m)))
+    node.driver.apply(node.now_ns, WatchdogDecision(DriverMode.TRACK, Action.FLY, (0.5, 0.0, 0.0)))
+    link.flown.clear()
+    for _ in range(40):
+        node.now_ns += 50 * MS
+        node.driver.apply(node.now_ns, WatchdogDecision(DriverMode.CUT, Action.CUT))
+    assert set(link.flown) == {(0.0, 0.0, 0.0)} and least <= len(link.flown) <= most
+    assert str(Order.CUT) in link.ordered

@@ -166,6 +166,7 @@ def test_it_says_when_it_hovers(flight):
     assert flight.told(Action.FLY, state=still)[1] is FlightState.FLYING
     assert flight.told(Action.LAND, state=still) == (b"land", FlightState.LANDING)
     assert flight.told(Action.CUT, state=still)[0] == b"emergency"
+    assert flight.heard.recv(64) == b"rc 0 0 0 0", "one that does not obey must not fly on at its last velocity"
 
 
 def test_one_that_says_that_it_stands_is_told_to_land_all_the_same(flight):

@@ -216,11 +216,12 @@ def test_cut_beats_all_and_latches(new_bench):
     bench.step()
     bench.order(Verb.CUT_MOTORS, issuer="anyone", id="cut")
     assert bench.step().action is Action.CUT
-    for verb in (Verb.LAND, Verb.HOLD, Verb.TRACK, Verb.RESUME, Verb.TAKEOFF):
+    for verb in (Verb.HOLD, Verb.TRACK, Verb.RESUME, Verb.TAKEOFF):
         assert bench.order(verb).stage is AckStage.REFUSED
-    assert set(bench.run(3)) == {Action.CUT}
+    assert set(bench.run(1)) == {Action.CUT}
     bench.state = FlightState.EMERGENCY
     assert [ack.command_id for ack in bench.step().acks] == ["cut"]
+    assert bench.order(Verb.LAND).reason == "motors are cut"
     assert set(bench.run(3)) == {Action.CUT}
 
 

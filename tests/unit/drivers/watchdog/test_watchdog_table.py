@@ -200,7 +200,8 @@ def test_invariants_over_every_mode_and_input(mode):
             if verb is Verb.CUT_MOTORS:
                 assert accepted and decision.action is Action.CUT, case
             if mode is DriverMode.CUT and not (accepted and verb is Verb.TAKEOFF):
-                assert decision.action is Action.CUT, case
+                landed = accepted and verb is Verb.LAND and age == 4.0 and fresh and state in AIRBORNE
+                assert decision.action is (Action.LAND if landed else Action.CUT), case
             if decision.action is Action.CUT:
                 assert verb is Verb.CUT_MOTORS or mode is DriverMode.CUT or state is FlightState.EMERGENCY, case
             if mode is DriverMode.LANDING and decision.action is not Action.CUT:

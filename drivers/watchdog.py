@@ -133,7 +133,8 @@ class Watchdog:
         return "motors are being cut" if now_ns - self._entered_ns < _TELLS_NS else ""
 
     def _obey_hold(self, now_ns: int, command: Command) -> str:
-        if self.mode is DriverMode.TAKING_OFF and self.vehicle.flight_state in STANDING:
+        stands = self.vehicle.fresh and self.vehicle.flight_state in STANDING  # what it was before a silence says nothing
+        if self.mode is DriverMode.TAKING_OFF and stands:
             return self._enter(now_ns, DriverMode.LANDED, f"take-off cancelled by {command.issuer}")
         if self.mode in ALOFT:
             return self._enter(now_ns, DriverMode.HOLD, f"held by {command.issuer}")

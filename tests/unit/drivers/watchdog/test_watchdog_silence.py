@@ -214,6 +214,17 @@ def test_silent_telemetry_hovers_needs_resume_and_lands(new_bench):
     assert bench.run(3.2)[-1] is Action.LAND
 
 
+def test_hold_in_a_take_off_does_not_trust_what_was_heard_before_a_silence(new_bench):
+    bench = new_bench()
+    bench.order(Verb.TAKEOFF)
+    bench.step()
+    bench.fresh = False  # the take-off began, and nobody hears of it
+    bench.run(0.5)
+    assert bench.order(Verb.HOLD).stage is AckStage.ACCEPTED
+    assert bench.step().action is Action.HOVER
+    assert bench.run(3.0)[-1] is Action.LAND
+
+
 def test_a_driver_that_was_frozen_does_not_move_by_itself(new_bench):
     bench = new_bench().fly()
     assert bench.step(dt=700 * MS).action is Action.HOVER

@@ -1,6 +1,5 @@
 """Evidence for the failsafe table: which conditions hold now, for how long, and why. Pure."""
 
-from collections.abc import Collection
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -18,7 +17,7 @@ _FIRST_S = 0.05
 # _FAULT_S it is reported however far off it is. Slow take-offs are usual, and only reported near the end.
 _LASTING_S, _NEAR_S, _FAULT_S = 0.3, 3.0, 3.0
 _USUAL = frozenset({Condition.TAKE_OFF_OVERDUE})
-_PAUSES = frozenset({Condition.TRACKER_PAUSED, Condition.SETPOINTS_PATCHY})
+_PAUSES = frozenset({Condition.TRACKER_RESTARTED, Condition.TRACKER_PAUSED, Condition.SETPOINTS_PATCHY})
 
 
 class Situation(NamedTuple):
@@ -99,7 +98,7 @@ def _observe_setpoints(at: Situation, holding: dict[Condition, str]) -> None:
     if gate.last_heard_ns is not None and at.since_s(gate.last_heard_ns) > _STREAM_S:
         holding[Condition.SETPOINTS_PATCHY] = ""
     newest = gate.live(at.now_ns)
-    if newest is None or newest.epoch != gate.epoch:
+    if newest is None:
         holding[Condition.NO_SETPOINT] = ""
     elif not newest.converged:
         holding[Condition.UNCONVERGED] = ""
@@ -119,13 +118,15 @@ def timed(at: Situation) -> dict[Condition, float]:
     """Return the duration of a condition that has its own time of begin [s]."""
     if at.mode is DriverMode.TAKING_OFF:
         return {Condition.TAKE_OFF_OVERDUE: at.since_s(at.entered_ns)}
-    heard_ns = at.gate.last_heard_ns
-    if heard_ns is None:
+    heard_ns, any_heard_ns = at.gate.last_heard_ns, at.gate.any_heard_ns
+    if heard_ns is None or any_heard_ns is None:
         lasted = {Condition.UNSEEN: at.since_s(at.take_off_ended_ns)}
     else:
         # A TRACK command given while the tracker is silent is deliberate: the pause counts from that order.
         pause_s = at.since_s(max(heard_ns, at.entered_ns))
-        lasted = {Condition.TRACKER_SILENT: at.since_s(heard_ns), Condition.TRACKER_PAUSED: pause_s}
+        lasted = {Condition.TRACKER_SILENT: at.since_s(any_heard_ns), Condition.TRACKER_PAUSED: pause_s}
+        if at.gate.foreign and at.gate.live(at.now_ns) is not None:
+            lasted[Condition.TRACKER_RESTARTED] = at.since_s(heard_ns)
     for condition, lasted_s in (
         (Condition.NOT_SEEN, at.vehicle.unseen_s),
         (Condition.UNLOCATED, at.vehicle.lost_s),
@@ -205,7 +206,7 @@ class Evidence:
     def enter(self, at: Situation, row: Failsafe | None, limits: WatchdogLimits) -> None:
         """Note the begin of a mode, and from when on it waits for RESUME if its row needs that; row: None for an order.
 
-        A pause of the tracker counts from its last setpoint, and each new CUT has its own time.
+        A pause of the tracker counts from the last setpoint that was obeyed, and each new CUT has its own time.
         """
         if at.mode is not self._mode:
             self._mode = at.mode
@@ -213,17 +214,13 @@ class Evidence:
         self._waits = {}
         if row is None or row.latch is not Latch.RESUME:
             return
-        paused_s = self.lasted_s(Condition.TRACKER_PAUSED)
+        paused_s = self.lasted_s(Condition.TRACKER_PAUSED) or 0.0
         heard_ns = at.gate.last_heard_ns
-        if paused_s is not None and paused_s >= limits.tracker_resume_within_s and heard_ns is not None:
+        paused = row.condition in _PAUSES or paused_s >= limits.tracker_resume_within_s
+        if paused and heard_ns is not None:
             self._waits = {Condition.NOT_RESUMED: heard_ns}
         else:
-            self._waits = {Condition.NOT_RESUMED if row.condition in _PAUSES else Condition.LEFT_WAITING: at.now_ns}
-
-    @property
-    def waits(self) -> Collection[Condition]:
-        """Return the conditions that only an order ends."""
-        return self._waits.keys()
+            self._waits = {Condition.LEFT_WAITING: at.now_ns}
 
     def suspends(self, mode: DriverMode) -> bool:
         """Return whether a condition holds for which a vehicle in a mode has to hover."""

@@ -46,6 +46,7 @@ class Condition(StrEnum):
     BATTERY_UNKNOWN = auto()
     TAKE_OFF_OVERDUE = auto()
     TRACKER_SILENT = auto()
+    TRACKER_RESTARTED = auto()
     UNSEEN = auto()
     NOT_SEEN = auto()
     UNLOCATED = auto()
@@ -65,6 +66,8 @@ class Condition(StrEnum):
 
 # Ends the reason for a hover that only an order ends; the monitor and the page read it.
 RESUME_NEEDED = "; RESUME is needed"
+# Ends the text of a row that lands because that order does not come.
+UNRESUMED = ", and nobody ordered RESUME"
 # Seconds by which a condition's duration decays for each second without it: failing one sixth of the time adds up.
 SLOWLY = 0.2
 EVENLY = 1.0
@@ -145,10 +148,12 @@ def _landings(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
         Failsafe(Condition.TRACKER_SILENT, land, "the tracker sends it no velocity", limits.land_after_s, patience),
         Failsafe(Condition.UNSEEN, land, "the tracker sends it no velocity", limits.unseen_land_after_s,
                  "safety.unseen_land_after_s"),
-        Failsafe(Condition.NOT_RESUMED, land, "the tracker paused, and nobody ordered RESUME", limits.land_after_s,
-                 patience),
+        # On HOLD a restarted tracker is as good as any other: it moves nobody before RESUME.
+        Failsafe(Condition.TRACKER_RESTARTED, land, f"the tracker restarted{UNRESUMED}", limits.land_after_s, patience,
+                 modes=_HOVER | _TRACK),
+        Failsafe(Condition.NOT_RESUMED, land, f"the tracker paused{UNRESUMED}", limits.land_after_s, patience),
         # Nobody hovers for ever: an operator who did not notice leaves it to its battery.
-        Failsafe(Condition.LEFT_WAITING, land, "{why}, and nobody ordered RESUME", limits.unresumed_land_s,
+        Failsafe(Condition.LEFT_WAITING, land, f"{{why}}{UNRESUMED}", limits.unresumed_land_s,
                  modes=_HOVER),
         Failsafe(Condition.UNCONVERGED, land, _UNCONVERGED, limits.unseen_land_after_s,
                  "safety.unseen_land_after_s", EVENLY, modes=FREE),
@@ -169,6 +174,7 @@ def _suspensions(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
         (Condition.SUPERVISOR_SILENT, "the supervisor does not answer", limits.resume_within_s, SLOWLY),
         (Condition.TELEMETRY_SILENT, "{why}", limits.resume_within_s, SLOWLY),
         (Condition.STATE_UNKNOWN, "the vehicle does not say what it does", limits.hover_after_s, SLOWLY),
+        (Condition.TRACKER_RESTARTED, "the tracker restarted", 0.0, None),
         (Condition.TRACKER_PAUSED, "the tracker sends it no velocity", limits.tracker_resume_within_s, None),
         (Condition.SETPOINTS_PATCHY, "the tracker's velocities come in bits only", limits.resume_within_s, SLOWLY),
         (Condition.STRAYS, "it does not do what it is told: {why}", 0.0, None),

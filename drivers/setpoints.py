@@ -17,13 +17,14 @@ class SetpointGate:
     """Remembers the newest setpoint, and when the authorised epoch last sent. Only the first sender is accepted.
 
     max_lifetime_ns caps the lifetime that a setpoint claims. epoch: the authorised one (None: the first that comes is
-    authorised). last_heard_ns: receipt of the last live setpoint of that epoch.
+    authorised). last_heard_ns: receipt of the last live setpoint of that epoch; any_heard_ns: of any.
     """
 
     max_lifetime_ns: int
     clock: str
     epoch: int | None = None
     last_heard_ns: int | None = None
+    any_heard_ns: int | None = None
     newest: VelocitySetpoint | None = None
     expires_ns: int = 0
 
@@ -46,7 +47,7 @@ class SetpointGate:
         expires_ns = self._expiry(now_ns, setpoint)
         if expires_ns <= now_ns:
             return "expired"
-        self.newest, self.expires_ns = setpoint, expires_ns
+        self.newest, self.expires_ns, self.any_heard_ns = setpoint, expires_ns, now_ns
         if self.epoch is None:
             self.epoch = setpoint.epoch
         if self.epoch == setpoint.epoch:

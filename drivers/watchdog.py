@@ -7,7 +7,7 @@ docs/explanation/authority.md#the-watchdog.
 
 from drivers.acknowledgements import AckBook
 from drivers.failsafe_evidence import Evidence, Outlook, Situation, observed
-from drivers.failsafe_table import RESUME_NEEDED, Condition, Failsafe, Latch, Reaction, failsafes
+from drivers.failsafe_table import RESUME_NEEDED, UNRESUMED, Condition, Failsafe, Latch, Reaction, failsafes
 from drivers.lease import LeaseBook
 from drivers.setpoints import SetpointGate
 from drivers.watchdog_types import (
@@ -133,7 +133,7 @@ class Watchdog:
         return "motors are being cut" if now_ns - self._entered_ns < _TELLS_NS else ""
 
     def _obey_hold(self, now_ns: int, command: Command) -> str:
-        stands = self.vehicle.fresh and self.vehicle.flight_state in STANDING  # what it was before a silence says nothing
+        stands = self.vehicle.fresh and self.vehicle.flight_state in STANDING
         if self.mode is DriverMode.TAKING_OFF and stands:
             return self._enter(now_ns, DriverMode.LANDED, f"take-off cancelled by {command.issuer}")
         if self.mode in ALOFT:
@@ -211,10 +211,10 @@ class Watchdog:
         """Return why the vehicle acts as it does, in words; if it will land for another reason, that one."""
         if self._braked_by is not None:
             return f"hovers: {self._text_of(self._braked_by)}"
-        outlook = self._landing
-        if outlook is None or outlook.row.condition in self.evidence.waits:
+        if self._landing is None:
             return self.reason
-        return self._text_of(outlook.row)
+        text = self._text_of(self._landing.row)
+        return text.removesuffix(UNRESUMED) + RESUME_NEEDED if text.endswith(UNRESUMED) else text
 
     @property
     def lands_in_s(self) -> float | None:

@@ -89,7 +89,7 @@ class Operator:
         return "; ".join(f"{one.subject}: {one.found} -> {one.remedy}" for one in musts)
 
     def _begin(self, now_ns: int, drones: tuple[str, ...], then_track: bool) -> None:
-        self._sequence = TakeOff(drones or tuple(self.team.members), self._limits, now_ns, self.team.up)
+        self._sequence = TakeOff(drones or tuple(self.team.members), self._limits, now_ns, self.team.flying)
         self._then_track = then_track
         self.mistake = None
         self._phase_before, self.phase = self.phase, TeamPhase.TAKING_OFF
@@ -239,7 +239,7 @@ class Operator:
         if order is not None:
             self._order(order, now_ns)
         for name in sequence.up[up:]:
-            self._say(f"{name}: in the air, localised")
+            self._say(f"{name}: {'flies already' if name in sequence.flew else 'in the air, localised'}")
         if sequence.mistake is not None:
             self._say(f"TAKE-OFF STOPPED: {sequence.mistake}")
         for name, reason in list(sequence.left_out.items())[left_out:]:

@@ -47,8 +47,8 @@ class _Step(Enum):
 class TakeOff:
     """One take-off of the given drones, except those that fly already; finished when no drone is waiting.
 
-    up: drones that flew already or were seen in flight; left_out: the others, with reasons; mistake: the
-    likely mix-up that ended the sequence early.
+    up: drones that flew already (flew) or were seen in flight; left_out: the others, with reasons; mistake: the
+    likely mix-up that ended the sequence early. It lands none but those that it lifted.
     """
 
     def __init__(
@@ -62,7 +62,9 @@ class TakeOff:
         self._ordered_ns = 0
         self._refusal = ""
         self._watch = LiftOffWatch()
+        self._lifts = False
         self.up = [name for name in each if name in flying]
+        self.flew = set(self.up)
         self.left_out: dict[str, str] = {}
         self.mistake: Mistake | None = None
 
@@ -93,10 +95,15 @@ class TakeOff:
         if self.finished:
             return None
         member = team.members[self.current]
-        mistake = self._watch.step(now_ns, self.current, team.members)
+        if not self._lifts and member.flies:
+            # Who fell silent, or whose driver started anew, may turn out to be in the air: it is not this sequence's.
+            self.flew.add(self.current)
+            self._note_up(now_ns)
+            return None
+        mistake = self._watch.step(now_ns, self.current, team.members) if self._lifts else None
         if mistake is not None:
             return self._stop(mistake)
-        if member.up and self._step is not _Step.BE_SEEN:
+        if self._lifts and member.up and self._step is not _Step.BE_SEEN:
             self._go_to(_Step.BE_SEEN, now_ns)
         match self._step:
             case _Step.CONNECT:
@@ -109,7 +116,7 @@ class TakeOff:
 
     def _connect(self, now_ns: int, connected: bool, detail: str) -> TakeOffCommand | None:
         if connected and now_ns - self._ordered_ns >= self._limits.retry_s * NS_PER_S:
-            self._ordered_ns = now_ns
+            self._ordered_ns, self._lifts = now_ns, True
             order = TakeOffCommand(Verb.TAKEOFF, self.current)
             self._go_to(_Step.LIFT_OFF, now_ns, keep_time=bool(self._refusal))
             return order
@@ -120,7 +127,7 @@ class TakeOff:
     def _lift_off(self, now_ns: int, progress: Progress | None) -> TakeOffCommand | None:
         if progress is not None and progress.stage is AckStage.REFUSED:
             # Some reasons pass (no lease received yet, trim not done): ask again for a while.
-            self._refusal = f"refused: {progress.reason}"
+            self._refusal, self._lifts = f"refused: {progress.reason}", False
             self._go_to(_Step.CONNECT, now_ns, keep_time=True)
             return None
         if self._late(now_ns, self._limits.lift_off_s):
@@ -129,8 +136,7 @@ class TakeOff:
 
     def _be_seen(self, now_ns: int, member: Member) -> TakeOffCommand | None:
         if is_seen_in_flight(member, now_ns):
-            self.up.append(self._waiting.pop(0))
-            self._next(now_ns)
+            self._note_up(now_ns)
             self._ordered_ns = now_ns  # the next one's driver must first receive this one's place
         elif self._late(now_ns, self._limits.unseen_s):
             return self._leave_out(why_unseen(member, now_ns, self._limits.unseen_s), now_ns, land=True)
@@ -149,8 +155,12 @@ class TakeOff:
         self._next(now_ns)
         return TakeOffCommand(Verb.LAND, name, reason) if land else None
 
+    def _note_up(self, now_ns: int) -> None:
+        self.up.append(self._waiting.pop(0))
+        self._next(now_ns)
+
     def _next(self, now_ns: int) -> None:
-        self._refusal, self._ordered_ns = "", 0
+        self._refusal, self._ordered_ns, self._lifts = "", 0, False
         self._go_to(_Step.CONNECT, now_ns)
 
     def _go_to(self, step: _Step, now_ns: int, keep_time: bool = False) -> None:

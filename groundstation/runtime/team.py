@@ -15,6 +15,7 @@ from groundstation.bus.messages import (
     RelativeObservation,
     Vector3,
     VehicleStatus,
+    flies,
     known_state,
     stood_last,
 )
@@ -67,6 +68,12 @@ class Member:
     def up(self) -> bool:
         """Return whether it flies, its take-off finished."""
         return self.state in UP
+
+    @property
+    def flies(self) -> bool:
+        """Return whether it flies, or did when it was heard last, and does not land."""
+        lands = FlightState.LANDING in (self.state, self.mode)
+        return flies(self.state, self.mode) is True and not lands
 
     @property
     def on_ground(self) -> bool:
@@ -156,6 +163,11 @@ class TeamStatus:
     def up(self) -> tuple[str, ...]:
         """Return the drones that fly, their take-off finished."""
         return tuple(name for name, member in self.members.items() if member.up)
+
+    @property
+    def flying(self) -> tuple[str, ...]:
+        """Return the drones that a take-off leaves alone: they fly, or did when they were heard last."""
+        return tuple(name for name, member in self.members.items() if member.flies)
 
     def airborne(self, now_ns: int) -> tuple[str, ...]:
         """Return the drones not known to stand: a drone that connected once and then was lost counts as flying.

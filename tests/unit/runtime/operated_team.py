@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from groundstation.bus import clock
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import (
+    OPERATOR,
     AckStage,
     Command,
     CommandAck,
@@ -55,7 +56,7 @@ class Drone:
         for received in self.commands.drain():
             command = received.message
             assert isinstance(command, Command)
-            if not command.scope or self.name in command.scope:
+            if OPERATOR not in command.scope and (not command.scope or self.name in command.scope):
                 self.obey(command, now_ns)
         if self.change and now_ns >= self.change[0]:
             self.state = self.change[1]

@@ -4,12 +4,8 @@ import pytest
 from operated_team import Scene
 
 from groundstation.bus.memory_bus import MemoryBus
-from groundstation.bus.messages import (
-    Command,
-    FlightState,
-    Verb,
-)
-from groundstation.bus.topics import COMMAND
+from groundstation.bus.messages import OPERATOR, AckStage, Command, CommandAck, FlightState, Verb
+from groundstation.bus.topics import COMMAND, COMMAND_ACK
 from groundstation.runtime.team import TeamPhase
 
 
@@ -60,3 +56,54 @@ def test_a_later_take_off_of_all_excludes_drones_already_flying(scene: Scene) ->
     scene.pass_(14.0)
     assert flying.heard == [Verb.TAKEOFF, Verb.TRACK] and flying.state is FlightState.HOVERING
     assert late.heard == [Verb.TAKEOFF] and late.state is FlightState.HOVERING
+
+
+def ask(scene: Scene, verb: Verb, *names: str) -> list[tuple[AckStage, str]]:
+    """Ask the operator from another shell; returns the answers within half a second."""
+    other = MemoryBus(scene.exchange, "lab", "cli_1")
+    answers = other.subscribe([COMMAND_ACK], entity=OPERATOR)
+    scope = (OPERATOR, *names)
+    header = other.header("team", scene.now_ns + 1)
+    other.publish(COMMAND, Command(header=header, id=f"{verb}-{scene.now_ns}", verb=verb, scope=scope, issuer="cli_1"))
+    scene.pass_(0.5)
+    acks = [r.message for r in answers.drain() if isinstance(r.message, CommandAck)]
+    return [(ack.stage, ack.reason) for ack in acks]
+
+
+@pytest.mark.parametrize("names", [(), ("drone_1", "drone_2")], ids=["all", "by name"])
+def test_a_take_off_lands_no_drone_that_was_silent_when_it_began(scene: Scene, names: tuple[str, ...]) -> None:
+    tracking, late = scene.add("drone_1"), scene.add("drone_2")
+    scene.pass_(0.2)
+    scene.operator.take_off(scene.now_ns, ("drone_1",))
+    scene.pass_(4.0)
+    tracking.seen, tracking.mode = False, "TRACK"
+    scene.pass_(3.0)
+    tracking.state = FlightState.LOST  # a gap in its telemetry
+    scene.pass_(0.2)
+    ask(scene, Verb.TAKEOFF, *names)
+    tracking.state = FlightState.FLYING
+    scene.pass_(30.0)
+    assert tracking.heard == [Verb.TAKEOFF, Verb.TRACK], "others' cameras localise it"
+    assert late.heard == [Verb.TAKEOFF] and late.state is FlightState.HOVERING
+
+
+def test_a_drone_that_turns_out_to_fly_is_neither_awaited_nor_landed(scene: Scene) -> None:
+    one, two = scene.add("drone_1", seen=False), scene.add("drone_2")
+    one.state, one.mode = FlightState.UNKNOWN, "CONNECTING"
+    scene.pass_(0.2)
+    ask(scene, Verb.TAKEOFF)
+    one.state, one.mode = FlightState.FLYING, "TRACK"
+    scene.pass_(15.0)
+    assert one.heard == [] and "drone_1: flies already" in scene.said
+    assert two.heard == [Verb.TAKEOFF] and two.state is FlightState.HOVERING
+
+
+def test_a_drone_that_lands_is_not_counted_as_flying(scene: Scene) -> None:
+    one = scene.add("drone_1", refusal="already LANDING")
+    scene.add("drone_2").state = FlightState.HOVERING
+    one.state, one.mode = FlightState.LANDING, "LANDING"
+    scene.pass_(0.2)
+    ask(scene, Verb.TAKEOFF)
+    one.state, one.mode, one.refusal = FlightState.LANDED, "LANDED", ""
+    scene.pass_(4.0)
+    assert one.state is FlightState.HOVERING and Verb.LAND not in one.heard

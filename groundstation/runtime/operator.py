@@ -170,7 +170,11 @@ class Operator:
     def _hear_ack(self, ack: CommandAck, now_ns: int) -> None:
         starts = not ack.verb.stops and ack.verb is not Verb.TAKEOFF and ack.stage in _OBEYED
         if self._given.take(ack) and starts:
-            self.phase, self.tracking_since_ns = TeamPhase.TRACKING, self.tracking_since_ns or now_ns
+            self.tracking_since_ns = self.tracking_since_ns or now_ns
+            if self._sequence is None:
+                self.phase = TeamPhase.TRACKING
+            else:
+                self._phase_before = TeamPhase.TRACKING
 
     def _hear_command(self, command: Command, now_ns: int) -> None:
         if OPERATOR in command.scope:
@@ -211,12 +215,27 @@ class Operator:
         """Return why a start is impossible now, or ""; a stop is always possible."""
         if request.verb.stops:
             return ""
+        if request.verb is not Verb.TAKEOFF:
+            return self._why_not_on(names)
         if self._sequence is not None:
             return f"{self._sequence.current} is taking off"
-        if request.verb is not Verb.TAKEOFF:
-            return ""
         why = self._forbids(now_ns, names, request.issuer if request.anyway else "")
         return f"{why}. Mend it, or insist: groundstation takeoff --anyway" if why else ""
+
+    def _why_not_on(self, names: tuple[str, ...]) -> str:
+        """Return why drones may not track or go on, or "": a take-off concerns only those that wait in it."""
+        if self._sequence is None:
+            return ""
+        waiting = [name for name in names if name in self._sequence.waiting]
+        if waiting or not self._meant(names):
+            return f"{(waiting or [self._sequence.current])[0]} is taking off"
+        return ""
+
+    def _meant(self, names: tuple[str, ...]) -> tuple[str, ...]:
+        """Return whom TRACK or RESUME is for: without names during a take-off, those that do not wait in it."""
+        if names or self._sequence is None:
+            return names
+        return tuple(name for name in self.team.up if name not in self._sequence.waiting)
 
     def _obey(self, request: Command, names: tuple[str, ...], now_ns: int) -> None:
         match request.verb:
@@ -224,9 +243,11 @@ class Operator:
                 self._begin(now_ns, names, then_track=False)
                 self._sequence_request = request
             case Verb.TRACK:
-                self.track(now_ns, names, request)
+                self.track(now_ns, self._meant(names), request)
+            case Verb.RESUME:
+                self._give(Verb.RESUME, self._meant(names), now_ns, request)
             case verb:
-                if verb.stops and self._requests.hear_stop(now_ns, request):
+                if self._requests.hear_stop(now_ns, request):
                     self._hear_stop(request, now_ns)
                 self._give(verb, names, now_ns, request)
 

@@ -78,6 +78,11 @@ class TakeOff:
         """Return the drone whose turn it is, or ""."""
         return self._waiting[0] if self._waiting else ""
 
+    @property
+    def waiting(self) -> tuple[str, ...]:
+        """Return the drones that have yet to be seen in flight."""
+        return tuple(self._waiting)
+
     def drop(self, drone: str, reason: str, now_ns: int) -> None:
         """Leave out a drone that someone stopped; the others go on."""
         if drone in self._waiting:

@@ -107,3 +107,44 @@ def test_a_drone_that_lands_is_not_counted_as_flying(scene: Scene) -> None:
     one.state, one.mode, one.refusal = FlightState.LANDED, "LANDED", ""
     scene.pass_(4.0)
     assert one.state is FlightState.HOVERING and Verb.LAND not in one.heard
+
+
+@pytest.fixture(params=[TeamPhase.TRACKING, TeamPhase.HELD])
+def second_rises(scene: Scene, request: pytest.FixtureRequest) -> Scene:
+    """Return a team of which drone_1 tracks or holds and drone_2 takes off, and is not seen yet."""
+    scene.add("drone_1")
+    scene.pass_(0.2)
+    scene.operator.take_off(scene.now_ns, ("drone_1",))
+    scene.pass_(4.0)
+    if request.param is TeamPhase.HELD:
+        ask(scene, Verb.HOLD)
+    assert scene.operator.phase is request.param
+    scene.add("drone_2", seen=False)
+    scene.pass_(0.2)
+    assert ask(scene, Verb.TAKEOFF, "drone_2")[-1][0] is AckStage.ACCEPTED
+    scene.pass_(1.0)
+    assert scene.operator.phase is TeamPhase.TAKING_OFF
+    return scene
+
+
+@pytest.mark.parametrize("verb", [Verb.RESUME, Verb.TRACK])
+@pytest.mark.parametrize("names", [(), ("drone_1",)], ids=["all", "by name"])
+def test_who_flies_may_go_on_while_another_takes_off(second_rises: Scene, verb: Verb, names: tuple[str, ...]) -> None:
+    scene = second_rises
+    answers = ask(scene, verb, *names)
+    assert (AckStage.ACCEPTED, "") in answers
+    assert scene.drones["drone_1"].heard[-1] is verb
+    assert scene.drones["drone_2"].heard == [Verb.TAKEOFF], "its take-off is not over"
+    phases = [scene.operator.phase]
+    scene.drones["drone_2"].seen = True
+    scene.pass_(2.0)
+    assert [*phases, scene.operator.phase] == [TeamPhase.TAKING_OFF, TeamPhase.TRACKING]
+
+
+@pytest.mark.parametrize("verb", [Verb.RESUME, Verb.TRACK])
+def test_who_waits_in_a_take_off_may_not_go_on(second_rises: Scene, verb: Verb) -> None:
+    refused = (AckStage.REFUSED, "drone_2 is taking off")
+    for names in (("drone_2",), ("drone_1", "drone_2")):
+        assert ask(second_rises, verb, *names)[-1] == refused
+    assert ask(second_rises, Verb.TAKEOFF, "drone_1")[-1] == refused
+    assert second_rises.drones["drone_2"].heard == [Verb.TAKEOFF]

@@ -7,7 +7,8 @@ import { droneNames, store, trackerSilent } from "./store.js";
 // Why a start would be refused or do nothing now; "" if it would not. Stops are never withheld while a run goes on.
 export function refusalOf(verb, names = droneNames()) {
   const all = modes(names);
-  if (modes().includes("TAKING_OFF")) return "one rises";
+  const risen = up(names).some((name) => modeNow(name) !== "TAKING_OFF");
+  if (modes().includes("TAKING_OFF") && (verb === "TAKEOFF" || !risen)) return "one rises";
   if (verb === "TAKEOFF") return takeOffRefusal(names);
   if (!aloft()) return "nobody flies";
   if (trackerSilent()) return "no tracker";

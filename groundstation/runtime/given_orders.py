@@ -20,6 +20,7 @@ class _Order:
     """An order that is still being followed, and the request of another shell that it answers."""
 
     book: AwaitedAnswers
+    number: int
     given_ns: int
     repeated_ns: int
     request: Command | None = None
@@ -35,13 +36,13 @@ class GivenOrders:
         self._bus, self._requests, self._say = bus, requests, say
         self._orders: list[_Order] = []
         self._said: dict[str, str] = {}
-        self._count = 0
+        self._count = self._last_start = 0
 
     @property
     def lands_all(self) -> bool:
-        """Return whether a LAND for the whole team is being followed."""
-        given = (order.book.command for order in self._orders)
-        return any(command.verb is Verb.LAND and not command.scope for command in given)
+        """Return whether a LAND for the whole team is being followed that came after all that was started."""
+        latest = (order.book.command for order in self._orders if order.number > self._last_start)
+        return any(command.verb is Verb.LAND and not command.scope for command in latest)
 
     def give(
         self, verb: Verb, scope: tuple[str, ...], met: Iterable[str], now_ns: int, request: Command | None = None
@@ -58,8 +59,10 @@ class GivenOrders:
             expires_ns=0 if verb.stops else header.stamp_ns + START_LIVES_NS,
             run=self._bus.run,
         )
+        if not verb.stops:
+            self._last_start = self._count
         book = AwaitedAnswers(command, scope or tuple(met))
-        self._orders.append(_Order(book, now_ns, now_ns, request))
+        self._orders.append(_Order(book, self._count, now_ns, now_ns, request))
         self._bus.publish(COMMAND, command)
         return book
 

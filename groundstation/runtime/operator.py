@@ -102,31 +102,29 @@ class Operator:
         """Land all drones, and end everything else in progress."""
         # Not judged by the phase: another shell's LAND sets it as well, and may have been lost on its way to the
         # drones.
-        if not self._given.lands_all:
-            self.phase = TeamPhase.LANDING
-            stop = self._give(Verb.LAND, (), now_ns).command
-            self._requests.hear_stop(now_ns, stop)
-            self._end_starts(stop, now_ns)
+        self.phase = TeamPhase.LANDING
+        again = self._given.lands_all
+        stop = self._stop_of_all("land", OPERATOR, now_ns) if again else self._give(Verb.LAND, (), now_ns).command
+        self._requests.hear_stop(now_ns, stop)
+        self._end_starts(stop, now_ns)
 
     def heed_signal(self, driver: str, now_ns: int) -> None:
         """Let no start go on after somebody signalled a driver to land and end, as shells do that reach no router.
 
         What of such a stop concerns other drivers was lost, so it counts for the team; drones in the air fly on.
         """
-        stop = Command(
-            header=self._bus.header(TEAM, now_ns),
-            id=f"signal-{driver}-{now_ns}",
-            verb=Verb.LAND,
-            scope=(),
-            issuer=f"a signal to {driver}",
-            run=self._bus.run,
-        )
+        stop = self._stop_of_all(f"signal-{driver}", f"a signal to {driver}", now_ns)
         self._requests.hear_stop(now_ns, stop)
         self._end_starts(stop, now_ns)
         if self.phase is TeamPhase.TAKING_OFF:
             flew = self._phase_before in _IN_THE_AIR and not self.landed(now_ns)
             self.phase = self._phase_before if flew else TeamPhase.LANDING
         self._say(f"{driver}'s driver was told by a signal to land and end: no earlier order starts anything")
+
+    def _stop_of_all(self, what: str, issuer: str, now_ns: int) -> Command:
+        """Return a LAND that ends starts here; it is sent to nobody."""
+        header = self._bus.header(TEAM, now_ns)
+        return Command(header=header, id=f"{what}-{now_ns}", verb=Verb.LAND, scope=(), issuer=issuer, run=self._bus.run)
 
     def landed(self, now_ns: int) -> bool:
         """Return whether no drone is in the air, as far as the drones report."""

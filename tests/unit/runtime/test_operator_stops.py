@@ -156,3 +156,32 @@ def test_a_start_of_another_host_undoes_no_later_stop_however_late_it_arrives(st
     _, anew = of_another_host(desk, start, "anew")
     desk.send(anew)
     assert desk.stages()[-1] == (AckStage.ACCEPTED, "") and desk.orders()[-1].verb is start
+
+
+def test_ctrl_c_lands_again_whom_a_start_after_an_unanswered_landing_has_lifted():
+    desk = Desk(drone_1=UP, drone_2=UP)
+    desk.ask(Verb.LAND, OPERATOR, identity="stop")
+    desk.drones["drone_1"] = (desk.drones["drone_1"][0], DOWN)
+    desk.turn()
+    desk.ask(Verb.TAKEOFF, OPERATOR, "drone_1", identity="start")
+    assert desk.orders()[-1].verb is Verb.TAKEOFF
+    desk.operator.land(desk.now_ns)
+    assert desk.orders()[-1].verb is Verb.LAND and desk.orders()[-1].scope == ()
+    assert desk.operator.phase is TeamPhase.LANDING and desk.stages()[-1][0] is AckStage.REFUSED
+    begun = len(desk.orders())
+    desk.turn(2.0)
+    desk.turn(2.0)
+    assert {order.verb for order in desk.orders()[begun:]} == {Verb.LAND}
+
+
+def test_ctrl_c_after_an_unanswered_landing_ends_what_was_to_start_and_every_earlier_request():
+    desk = Desk(drone_1=UP, drone_2=UP)
+    desk.ask(Verb.LAND, OPERATOR, identity="stop")
+    desk.turn(1.0)
+    late = desk.command(Verb.TRACK, OPERATOR, identity="late")
+    desk.turn(1.0)
+    landings = {order.id for order in desk.orders()}
+    desk.operator.land(desk.now_ns)
+    desk.send(late)
+    assert desk.stages()[-1] == (AckStage.REFUSED, "LAND by operator came after it")
+    assert {order.id for order in desk.orders()} == landings, "a LAND that nothing followed is not given twice"

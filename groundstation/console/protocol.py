@@ -11,6 +11,8 @@ MAX_BYTES = 4096
 Name = Annotated[str, msgspec.Meta(max_length=48)]
 Names = Annotated[tuple[Name, ...], msgspec.Meta(max_length=64)]
 Metres = Annotated[float, msgspec.Meta(ge=-100, le=100)]
+PageTime = Annotated[float, msgspec.Meta(ge=0, le=1e13)]
+"""The page's own clock [ms], which the server only repeats."""
 
 
 class FromPage(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="type", tag=str.lower):
@@ -18,17 +20,22 @@ class FromPage(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_fiel
 
 
 class Hello(FromPage, frozen=True):
-    """First message: the token that the page was served with, and an id that survives a reconnection."""
+    """First message: the token that the page was served with, and an id that survives a reconnection.
+
+    sent_ms: when it was sent, as in all that the server answers with its own time.
+    """
 
     token: Annotated[str, msgspec.Meta(max_length=64)]
     client: Annotated[str, msgspec.Meta(min_length=4, max_length=40)]
+    sent_ms: PageTime | None = None
 
 
 class CommandRequest(FromPage, frozen=True, tag="order"):
     """A command to the drones named (none: all), given for the run that the page then showed.
 
-    at_ms: the server's time when it was given, as estimated by the page; age_ms: how long the page has kept it; ref:
-    the page's own id; anyway: of TAKEOFF, although the checks before it forbid it.
+    at_ms: the server's time when it was given, at the earliest; unsure_ms: by how much later that may have been, which
+    is what a round trip leaves open; age_ms: how long the page has kept it; ref: the page's own id; anyway: of TAKEOFF,
+    although the checks before it forbid it.
     """
 
     verb: Verb
@@ -38,6 +45,7 @@ class CommandRequest(FromPage, frozen=True, tag="order"):
     age_ms: Annotated[float, msgspec.Meta(ge=0)]
     ref: Annotated[str, msgspec.Meta(max_length=40)] = ""
     anyway: bool = False
+    unsure_ms: Annotated[float, msgspec.Meta(ge=0)] = 0.0
 
 
 class TakeOver(FromPage, frozen=True):
@@ -52,6 +60,7 @@ class FramesHandled(FromPage, frozen=True, tag="seen"):
     """Frames up to this number have been handled."""
 
     seq: int
+    sent_ms: PageTime | None = None
 
 
 class EndKept(FromPage, frozen=True, tag="kept"):

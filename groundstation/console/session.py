@@ -120,7 +120,8 @@ class Sessions:
     def handle(self, viewer: PageConnection, message: PageMessage) -> None:
         """Execute a page's request; one without the right to it is answered with the reason."""
         match message:
-            case FramesHandled(seq=seq):
+            case FramesHandled(seq=seq, sent_ms=sent_ms):
+                viewer.hear(sent_ms)
                 viewer.saw(seq)
             case EndKept():
                 viewer.keeps_end = True
@@ -173,7 +174,9 @@ class Sessions:
             self.operator_lock.arrived(viewer.client, viewer.name)
         else:
             self.refused["token"] += 1
-        viewer.say(encoded("welcome", name=viewer.name, client=viewer.client, trusted=viewer.trusted, role=viewer.role))
+        viewer.hear(hello.sent_ms)
+        rights = {"trusted": viewer.trusted, "role": viewer.role}
+        viewer.say(encoded("welcome", name=viewer.name, client=viewer.client, answer=viewer.take_answer(), **rights))
 
     def _has_token(self, hello: Hello) -> bool:
         return hmac.compare_digest(hello.token.encode(), self._token.encode())
@@ -190,8 +193,10 @@ class Sessions:
                 return
             self.operator_lock.take(viewer.client, viewer.name)
         now_ns = clock.now_ns()
-        # A page that slept may estimate the server's time wrongly, and cannot know how long an order waited here.
-        age_ms = max(order.age_ms, now_ns / NS_PER_MS - order.at_ms)
+        # A page cannot know how long an order was under way, or waited here. What it does not know of the server's time
+        # counts for a stop and against a start: a fresh stop must not be refused because news reach its page late.
+        at_ms = order.at_ms + (order.unsure_ms if order.verb.stops else 0.0)
+        age_ms = max(order.age_ms, now_ns / NS_PER_MS - at_ms)
         given = Given(viewer.name, age_ms, order.ref, order.anyway)
         problem = self.desk.give(order.verb, order.drones, given, now_ns)
         if problem:

@@ -5,8 +5,11 @@ import time
 from collections import deque
 from collections.abc import Awaitable, Callable
 
+import msgspec
+
 from groundstation.console.devices import DeviceRole
 from groundstation.console.snapshot import Snapshot
+from groundstation.time_units import NS_PER_MS
 
 # Number of unacknowledged frames on the way; the page answers each fourth. 12 frames are 0.6 s.
 WINDOW = 12
@@ -45,6 +48,7 @@ class PageConnection:
         self._pictures: dict[str, bytes] = {}
         self._wake = asyncio.Event()
         self._seq = self._seen = 0
+        self._answer: Answer | None = None
         self._turn = -1
         self._unseeded = True
         self._allowance, self._allowance_at = _BURST, time.monotonic()
@@ -75,6 +79,16 @@ class PageConnection:
         if camera in self.watched:
             self._pictures[camera] = frame
             self._wake.set()
+
+    def hear(self, sent_ms: float | None) -> None:
+        """Note when the page sent a message, to be answered with the time of its arrival."""
+        if sent_ms is not None:
+            self._answer = sent_ms, self._clock() / NS_PER_MS
+
+    def take_answer(self) -> "Answer | None":
+        """Return the page's time of its newest message and ours of its arrival [ms]; of each message once."""
+        answer, self._answer = self._answer, None
+        return answer
 
     def saw(self, seq: int) -> None:
         """Note that the page has handled frames up to this one."""
@@ -112,7 +126,7 @@ class PageConnection:
             sections = self._board.since(self._turn)
             self._turn = self._board.turn
             self._seq += 1
-            await self._send_text(delta(self._seq, self._clock(), sections))
+            await self._send_text(delta(self._seq, self._clock(), sections, self.take_answer()))
         if self._pictures:
             camera = next(iter(self._pictures))
             await self._send_bytes(self._pictures.pop(camera))
@@ -120,10 +134,12 @@ class PageConnection:
             self._wake.set()  # one at a time: on a link slower than the pictures, words and figures come in between
 
 
-def delta(seq: int, now_ns: int, sections: bytes) -> str:
+def delta(seq: int, now_ns: int, sections: bytes, answer: "Answer | None" = None) -> str:
     """Return a frame of the changed sections, with the server's time."""
-    return f'{{"type":"delta","seq":{seq},"now":{now_ns / 1e6:.3f},"s":{sections.decode()}}}'
+    told = f'"answer":{msgspec.json.encode(answer).decode()},' if answer else ""
+    return f'{{"type":"delta","seq":{seq},"now":{now_ns / NS_PER_MS:.3f},{told}"s":{sections.decode()}}}'
 
 
+Answer = tuple[float, float]
 SendText = Callable[[str], Awaitable[None]]
 SendBytes = Callable[[bytes], Awaitable[None]]

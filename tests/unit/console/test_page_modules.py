@@ -1,57 +1,11 @@
 """Page modules that need no browser, run by node: words in the bar, on buttons and in speech."""
 
-import json
-import shutil
-import subprocess
-from pathlib import Path
 from typing import Any
 
 import pytest
+from page_modules import LINK, needs_node
 
-_JS = Path(__file__).parents[3] / "groundstation" / "console" / "static" / "js"
-pytestmark = pytest.mark.skipif(shutil.which("node") is None, reason="node is not installed")
-
-# The part of a browser that these modules use.
-_BROWSER = """
-const spoken = [], played = [];
-const quiet = { getItem: () => null, setItem: () => {} };
-Object.assign(globalThis, {
-  window: globalThis, localStorage: quiet, sessionStorage: quiet,
-  document: { querySelector: () => ({ content: "" }), getElementById: () => ({ setAttribute() {} }) },
-  SpeechSynthesisUtterance: class { constructor(words) { this.words = words; } },
-  speechSynthesis: {
-    cancel: () => played.push("cut off"),
-    speak: ({ words }) => { spoken.push(words); played.push(words); },
-  },
-});
-globalThis.navigator ??= {};
-const beginning = performance.now();
-let passedMs = 0;
-performance.now = () => beginning + passedMs;
-const wait = (ms) => { passedMs += ms; };
-const { store } = await import("./store.js");
-store.scene = { drones: [{ name: "drone_1" }, { name: "drone_2" }], targets: [], lost_after_s: 3, unseen_land_s: 30 };
-Object.assign(store, { connected: true, receivedAt: Infinity });
-const heard = (charges) => Object.fromEntries(Object.entries(charges).map(([name, [battery, charge]]) =>
-  [name, { battery, charge, minutes: null, good_for: "", battery_min: 0.15 }]));
-"""
-
-
-@pytest.fixture
-def said(tmp_path: Path) -> Any:
-    """Return a function that runs a script with the page's modules, and returns its `result`."""
-    folder = tmp_path / "js"
-    shutil.copytree(_JS, folder)
-    (folder / "package.json").write_text('{"type": "module"}')
-
-    def run(script: str) -> Any:
-        ending = "console.log(JSON.stringify(result)); process.exit(0);"
-        (folder / "try.js").write_text(f"{_BROWSER}\n{script}\n{ending}")
-        ran = subprocess.run(["node", "try.js"], cwd=folder, capture_output=True, text=True, timeout=60)
-        assert ran.returncode == 0, ran.stderr
-        return json.loads(ran.stdout)
-
-    return run
+pytestmark = needs_node
 
 
 def test_the_worst_battery_is_told_though_another_drone_was_never_heard(said: Any) -> None:
@@ -189,37 +143,21 @@ def test_a_drone_with_cut_motors_takes_off_only_after_a_look_at_it(said: Any, fl
     assert said(script) == [one, *captions, "", "both rise, if able"]
 
 
-_LINK = """
-const sent = (kind) => sockets[0].sent.filter(({ type }) => type === kind), sockets = [];
-globalThis.location = { protocol: "http:", host: "127.0.0.1" };
-globalThis.Element = class {};
-globalThis.WebSocket = class {
-  static OPEN = 1;
-  readyState = 1;
-  sent = [];
-  constructor() { sockets.push(this); }
-  send(text) { this.sent.push(JSON.parse(text)); }
-};
-const { connect } = await import("./link.js");
-connect();
-const keydown = { preventDefault() {}, target: null };
-"""
-
-
 def test_each_seed_is_answered(said: Any) -> None:
-    script = f"""{_LINK}
-    const seed = (seq) => ({{ type: "seed", seq, now: 0, run: "", scene: store.scene, s: {{}},
-      history: {{ trails: {{}}, samples: [] }} }});
-    for (const seq of [1, 2, 3]) sockets[0].onmessage({{ data: JSON.stringify(seed(seq)) }});
+    script = f"""{LINK}
+    hear(seed(1));
+    hear(welcome());
+    for (const seq of [2, 3]) hear(seed(seq));
     const result = sent("seen").map(({{ seq }}) => seq);
     """
     assert said(script) == [1, 2, 3]
 
 
 def test_a_held_key_drives_a_target_by_the_clock_alone(said: Any) -> None:
-    script = f"""{_LINK}
+    script = f"""{LINK}
     const {{ startSteering }} = await import("./steer.js"), hears = {{}};
     store.scene.truth = true;
+    const keydown = {{ preventDefault() {{}}, target: null }};
     startSteering({{ addEventListener: (kind, heard) => {{ hears[kind] = heard; }} }}, {{}});
     for (let k = 0; k < 80; k++) hears.keydown({{ ...keydown, key: "ArrowUp", repeat: k > 0 }});
     const one = sent("drive").length;
@@ -236,10 +174,10 @@ def test_a_held_key_drives_a_target_by_the_clock_alone(said: Any) -> None:
 
 
 def test_a_held_key_steps_a_replay_twenty_times_a_second(said: Any) -> None:
-    script = f"""{_LINK}
+    script = f"""{LINK}
     const {{ playbackKey }} = await import("./playback.js");
     store.scene.replay = {{ start_ms: 0, end_ms: 60000, marks: [] }};
-    const ours = [];
+    const ours = [], keydown = {{ preventDefault() {{}}, target: null }};
     for (let k = 0; k < 81; k++) {{ ours.push(playbackKey({{ ...keydown, key: ".", repeat: k > 0 }})); wait(13); }}
     for (let k = 0; k < 5; k++) playbackKey({{ ...keydown, key: ",", repeat: false }});
     const result = [sent("step").filter(({{ ticks }}) => ticks > 0).length, sent("step").length, ours.every(Boolean),

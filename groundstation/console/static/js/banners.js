@@ -6,9 +6,9 @@ import { resultWords } from "./ending.js";
 import { modeNow, up } from "./glance.js";
 import { drawn } from "./map.js";
 import { withShortNames } from "./names.js";
-import { noteOwnAlarms, ownAlarms } from "./own_alarms.js";
+import { noteOwnAlarms, ownAlarms, slowWords } from "./own_alarms.js";
 import { momentWords } from "./playback.js";
-import { estimateAge, replaying, runOver, silentS, store, trackerSilent } from "./store.js";
+import { estimateAge, estimateOld, linkSlow, replaying, runOver, silentS, store, trackerSilent } from "./store.js";
 import { landingWords } from "./verdict.js";
 
 const SHOWN = 4, NOTICE_MS = 8000, LEVELS = { SAFE: "good", WATCH: "warn", ACT: "bad" };
@@ -29,7 +29,10 @@ export function addNotice({ text: words, grave }) {
 function banners(own) {
   const { ended } = store.s;
   const all = [...(ended ? [ending(ended)] : []), ...own.map((alarm) => ({ ...alarm, level: "grave", rank: "ACT" }))];
-  if (!runOver() && !own.some(({ shell }) => shell) && trackerSilent()) all.push(silentTracker());
+  if (!runOver() && !own.some(({ old }) => old)) {
+    if (trackerSilent()) all.push(silentTracker());
+    else if (linkSlow() && estimateOld()) all.push(slowLink());
+  }
   for (const { words, grave } of notices.filter(({ at }) => performance.now() - at < NOTICE_MS)) all.push({ kind: "notice", level: grave ? "grave" : "mild", title: words, rank: "notice" });
   const told = (store.s.alarms ?? []).filter(({ about }) => about !== "tracker silent" && !(trackerSilent() && MOOT.test(about))).map((alarm) => ({ kind: "alarm", level: alarm.grave ? "grave" : "mild",
     title: alarm.told === null ? alarm.text : `${alarm.text} (told at ${momentWords(alarm.told)})`, more: alarm.advice, subject: subjectOf(alarm), rank: alarm.asks ? "ACT" : "WATCH" }));
@@ -65,12 +68,14 @@ function silentTracker() {
     more: `Nothing to do: ${then}.` };
 }
 
+const slowLink = () => ({ kind: "slow", level: "grave", title: slowWords(), rank: "WATCH", more: "Nothing to do yet. Stops go out at once." });
+
 // As the console's process judges it, but for what only this page can know.
 function safetyWord(own) {
   const { ended, safety } = store.s;
   if (ended) return ended.severity === "INFO" ? "SAFE" : ended.down ? "WATCH" : "ACT";
   const level = own.length ? "ACT" : safety?.level ?? "WATCH";
-  return level === "SAFE" && trackerSilent() ? "WATCH" : level;
+  return level === "SAFE" && estimateOld() ? "WATCH" : level;
 }
 
 export function showBanners() {

@@ -2,7 +2,7 @@
 
 import { joined, seconds } from "./dom.js";
 import { isBlind, isDown, isLost, standing, unseenLeftS } from "./glance.js";
-import { ageS, droneNames, isSeen, NEVER_S, SEEN_S, seenBy, store, trackerSilent, unseenS } from "./store.js";
+import { droneNames, isSeen, NEVER_S, SEEN_S, seenBy, shownAgeS, store, trackerSilent, unseenS } from "./store.js";
 import { askedBy, ordered } from "./who.js";
 
 const FRESH_S = 1;
@@ -111,7 +111,7 @@ function stands(name, detail) {
 export function dutyOf(name, room) {
   const status = store.s.vehicles?.[name], plan = store.s.plan;
   if (!status) return "";
-  const planned = status.mode === "TRACK" && !status.braked && status.lands_in_s === null && status.flight !== "LOST" && plan && ageS(plan.at) < FRESH_S;
+  const planned = status.mode === "TRACK" && !status.braked && status.lands_in_s === null && status.flight !== "LOST" && plan && shownAgeS(plan.at) < FRESH_S;
   if (planned && trackerSilent()) return "Told to track; without the tracker it hovers, then lands.";
   return planned ? tracked(name, plan, room) : `${sentence(reasonOf(name, status))}${stray(name, status)}`;
 }

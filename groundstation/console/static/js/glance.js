@@ -1,7 +1,7 @@
 // The bar's summary of the whole team, from the newest messages.
 
 import { joined } from "./dom.js";
-import { ageS, droneNames, estimateAge, isTarget, entity, NEVER_S, runOver, store, trackerSilent, unseenS } from "./store.js";
+import { ageS, droneNames, estimateAge, isTarget, entity, NEVER_S, runOver, shownAgeS, shownEstimateAge, store, trackerSilent, unseenS } from "./store.js";
 
 const HEARD_S = 1; // as in groundstation/monitor/alarms.py
 const RECORDING_SILENT_S = 3;
@@ -52,7 +52,7 @@ export function landsIn(name) {
   return left === null ? "" : `${Math.max(1, Math.round(left))} s`;
 }
 
-export const isUnheard = (name) => Boolean(store.s.vehicles?.[name]) && ageS(store.s.vehicles[name].at) > HEARD_S;
+export const isUnheard = (name) => Boolean(store.s.vehicles?.[name]) && shownAgeS(store.s.vehicles[name].at) > HEARD_S;
 // Whether its motors were cut, by it or for it: it may lie on its side, and an order to take off may do no more than end
 // its emergency. Only an AR.Drone calls that an emergency.
 export const isDown = (name) => store.s.vehicles?.[name]?.flight === "EMERGENCY" || modeNow(name) === "CUT";
@@ -62,7 +62,7 @@ export const isBlind = (name) => Boolean(store.s.cameras?.[`${name}_camera`]?.da
 export const unseenLeftS = (name) => (unseenS(name) < NEVER_S ? Math.max(0, store.scene.unseen_land_s - unseenS(name)) : NaN);
 
 // Not seen for so long that it is searched for, or soon lands.
-export const isLost = (name) => (entity(name)?.age_s ?? Infinity) + estimateAge() > (store.scene?.lost_after_s ?? 3);
+export const isLost = (name) => (entity(name)?.age_s ?? Infinity) + shownEstimateAge() > (store.scene?.lost_after_s ?? 3);
 // Whether all targets are lost: where there is none, nobody searches.
 export const lostTarget = () => Boolean(store.scene?.targets.length) && store.scene.targets.every(({ name }) => isLost(name));
 // The drones in this mode now, among those with telemetry.
@@ -108,7 +108,7 @@ export function stageWord(name) {
 export const oldestS = () => runOver() ? NaN : Math.max(estimateAge(), ...droneNames().map((name) => ageS(store.s.vehicles?.[name]?.at)));
 
 // It ends with the run: then what counts is how long it had been silent.
-const recorderSilentS = (recorder) => (runOver() ? (store.s.ended.at - recorder.at) / 1000 : ageS(recorder.at));
+const recorderSilentS = (recorder) => (runOver() ? (store.s.ended.at - recorder.at) / 1000 : shownAgeS(recorder.at));
 
 export function recording() {
   const recorder = store.s.processes?.recorder;

@@ -1,17 +1,19 @@
 // The WebSocket: one seed, then what changed; comes back by itself, and asks for the token again when it does.
 
+import { asking, noteAnswer, roundTripMs, startClock } from "./server_clock.js";
 import { store, takeDelta, takeSeed } from "./store.js";
 
 const ACK_EVERY = 4, RETRY_MS = 300, RETRY_MAX_MS = 2000;
-// For how long nothing may come: from a new connection, and from one that has spoken, which it does twenty times a second.
-// The second leaves a stop that went into a dead connection time to be sent again while it is good.
+// For how long nothing may come: from a new connection, and from one that has spoken, which it does twenty times a second,
+// on a slow link in as many parts as the server sends unanswered. The second leaves a stop that went into a dead
+// connection time to be sent again while it is good.
 const NEW_MS = 5000, SPOKEN_MS = 2500, PATIENCE_MAX_MS = 20000, BEAT_MS = 250;
 const handlers = { seed: [], delta: [], notice: [], picture: [], state: [], welcome: [] };
 // greeted: this connection has had its seed and its welcome. role: what this device may do: watch, stop or command.
 export const me = { client: clientId(), name: "", trusted: false, greeted: false, role: "command" };
 
 let socket = null, token = document.querySelector("meta[name=token]").content, retryMs = RETRY_MS, watched = [];
-let newMs = NEW_MS, patienceMs = NEW_MS, quietMs = 0;
+let newMs = NEW_MS, patienceMs = NEW_MS, quietMs = 0, early = [];
 
 export const on = (kind, handler) => handlers[kind].push(handler);
 const tell = (kind, ...content) => handlers[kind].forEach((handler) => handler(...content));
@@ -40,15 +42,17 @@ export function watch(cameras) {
 
 export function connect() {
   socket = new WebSocket(`${location.protocol.replace("http", "ws")}//${location.host}/ws`);
-  [patienceMs, quietMs] = [newMs, 0];
+  [patienceMs, quietMs, early] = [newMs, 0, []];
+  startClock();
   socket.binaryType = "arraybuffer";
   socket.onopen = () => {
     retryMs = RETRY_MS;
-    send("hello", { token, client: me.client });
+    send("hello", { token, client: me.client, sent_ms: asking() });
     if (watched.length) watch(watched);
   };
   socket.onmessage = ({ data }) => {
-    [newMs, patienceMs, quietMs] = [NEW_MS, SPOKEN_MS, 0];
+    quietMs = 0;
+    if (me.greeted) [newMs, patienceMs] = [NEW_MS, SPOKEN_MS + roundTripMs()];
     return typeof data === "string" ? take(JSON.parse(data)) : takePicture(data);
   };
   socket.onclose = (event) => lost(event.reason);
@@ -64,9 +68,11 @@ function abandon() {
   const stalled = socket;
   stalled.onopen = stalled.onmessage = stalled.onclose = null; // a dead peer's answer to a close takes a minute
   stalled.close();
-  newMs = Math.min(PATIENCE_MAX_MS, 2 * newMs);
+  waitLonger();
   lost("Nothing came through it any more");
 }
+
+const waitLonger = () => { newMs = Math.min(PATIENCE_MAX_MS, 2 * newMs); };
 
 async function lost(reason = "") {
   socket = null;
@@ -82,26 +88,36 @@ async function reconnect() {
     // The process may be another one by now, with another token.
     const answer = await fetch("/token", { cache: "no-store", signal: AbortSignal.timeout(newMs) });
     if (answer.ok) token = await answer.text();
-  } catch { return lost(); }
+  } catch (error) {
+    if (error.name === "TimeoutError") waitLonger();
+    return lost();
+  }
   connect();
 }
 
+const answer = (seq) => send("seen", { seq, sent_ms: asking() });
+
 function take(message) {
+  // How old the first frames are is known once the server has answered.
+  if (!me.greeted && ["seed", "delta"].includes(message.type)) return early.push(message);
   switch (message.type) {
     case "seed":
       takeSeed(message);
-      send("seen", { seq: message.seq }); // a replay that jumps sends seeds only
+      answer(message.seq); // a replay that jumps sends seeds only
       store.connected = true;
       tell("seed"); tell("state");
       break;
     case "delta": {
       const sampled = takeDelta(message);
-      if (message.seq % ACK_EVERY === 0) send("seen", { seq: message.seq });
+      if (message.answer) noteAnswer(...message.answer);
+      if (message.seq % ACK_EVERY === 0) answer(message.seq);
       tell("delta", message.s, sampled);
       break;
     }
     case "welcome":
       Object.assign(me, { name: message.name, trusted: message.trusted, role: message.role, greeted: true });
+      if (message.answer) noteAnswer(...message.answer);
+      early.splice(0).forEach(take);
       tell("welcome"); tell("state");
       break;
     case "notice":

@@ -3,20 +3,27 @@
 import { seconds } from "./dom.js";
 import { STOPS } from "./effects.js";
 import { mayGive, ownOrders } from "./own_orders.js";
-import { ageS, consoleSilent, estimateAge, now, replaying, runOver, silentS, store } from "./store.js";
+import { ageS, consoleSilent, estimateAge, frameAgeS, linkSlow, now, replaying, runOver, silentS, slowForS, store } from "./store.js";
 
 const KEPT = 50; // this and the next as groundstation/console/alarm_log.py has them
 export const BREAK_MS = 2000;
 const UNHEARD_S = 0.8, FORGOTTEN_S = 30;
+// A slow link asks for an act when the newest frame is older than the first, and frames have been late for the second:
+// a page that stood still gets old ones for a moment.
+const SLOW_S = 2, SLOW_FOR_S = 1;
 const NOT_GIVEN = { unsent: "NOT SENT", dropped: "NOT SENT", refused: "REFUSED" };
 let episodes = [], keptFor = "";
 
-// [{kind, about, title, more, shell}]: about stays the same while figures change; shell: whether only a shell helps.
+export const slowWords = () => `SLOW LINK: what you see is ${seconds(frameAgeS())} old`;
+
+// [{kind, about, title, more, old, shell}]: about stays the same while figures change; old: whether all that the page shows
+// is; shell: whether only a shell helps.
 export function ownAlarms() {
   if (runOver()) return [];
   const alarms = [], age = estimateAge(), old = Number.isFinite(age) ? `What you see is ${seconds(age)} old.` : "";
-  if (!store.connected) alarms.push({ kind: "link", about: "link", title: "NO CONNECTION TO THE CONSOLE", more: [store.reason && `${store.reason}.`, old].filter(Boolean).join(" "), shell: true });
-  else if (consoleSilent()) alarms.push({ kind: "silent", about: "silent", title: `CONSOLE SILENT for ${seconds(silentS())}`, more: old, shell: true });
+  if (!store.connected) alarms.push({ kind: "link", about: "link", title: "NO CONNECTION TO THE CONSOLE", more: [store.reason && `${store.reason}.`, old].filter(Boolean).join(" "), old: true, shell: true });
+  else if (linkSlow() && frameAgeS() > SLOW_S && slowForS() > SLOW_FOR_S) alarms.push({ kind: "slow", about: "slow link", title: slowWords(), more: "To do: bring this device nearer, or watch on another. Stops go out at once.", old: true });
+  else if (consoleSilent()) alarms.push({ kind: "silent", about: "silent", title: `CONSOLE SILENT for ${seconds(silentS())}`, more: old, old: true, shell: true });
   const stop = store.connected ? unheardStop() : null;
   if (stop) alarms.push({ kind: "unheard", about: `unheard ${stop.id}`, title: stopWords(stop), more: "To do: press again. If a drone flies on: groundstation land in a shell, or its own remote control." });
   return alarms;

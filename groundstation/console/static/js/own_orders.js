@@ -3,7 +3,8 @@
 import { moment, pressedAgoMs, sinceMs } from "./clock.js";
 import { STOPS } from "./effects.js";
 import { me, on, send } from "./link.js";
-import { droneNames, now, replaying, runOver, serverNow, store } from "./store.js";
+import { earliestMs, latestMs } from "./server_clock.js";
+import { droneNames, now, replaying, runOver, store } from "./store.js";
 
 const KEPT_MS = 30000, STOP_LIVES_MS = 5000;
 export const OVER = "the run has ended: no order can be given any more";
@@ -42,8 +43,8 @@ function begin(order) {
 }
 
 function transmit({ verb, drones, run, anyway, ref, given }) {
-  const age_ms = sinceMs(given);
-  return me.greeted && send("order", { verb, drones, run, anyway, ref, age_ms, at_ms: serverNow() - age_ms });
+  const age_ms = sinceMs(given), at_ms = earliestMs() - age_ms;
+  return me.greeted && send("order", { verb, drones, run, anyway, ref, age_ms, at_ms, unsure_ms: latestMs() - earliestMs() });
 }
 
 // A stop that did not get out is good for the run that it was given for, and for so long only.

@@ -2,13 +2,13 @@
 
 import { byId, el, text } from "./dom.js";
 import { aloft } from "./glance.js";
-import { ageS, droneNames, replaying, runOver, store } from "./store.js";
+import { droneNames, replaying, runOver, shownAgeS, store } from "./store.js";
 
 const OLD_S = 10; // told again every 3 s
 const SHORT = 12; // letters of a name that has room on a button
 
 const findings = () => store.s.preflight?.findings ?? [];
-const isTold = () => !runOver() && !aloft() && (replaying() || ageS(store.s.preflight?.at) < OLD_S);
+const isTold = () => !runOver() && !aloft() && (replaying() || shownAgeS(store.s.preflight?.at) < OLD_S);
 const graded = (level) => findings().filter((one) => one.level === level);
 
 // The findings that forbid a take-off of these drones: those about other drones do not.

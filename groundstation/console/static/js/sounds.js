@@ -2,7 +2,7 @@
 
 import { byId } from "./dom.js";
 import { BREAK_MS, ownAlarms } from "./own_alarms.js";
-import { entity, estimateAge, NEVER_S, now, replaying, runOver, store, trackerSilent } from "./store.js";
+import { entity, NEVER_S, now, replaying, runOver, shownEstimateAge, store, trackerSilent } from "./store.js";
 
 const KEY = "skein-muted", NEW_MS = 3000, SAYING_MS = 3000;
 const STOPS = { HOLD: "hold", LAND: "landing", CUT_MOTORS: "motors cut" };
@@ -62,7 +62,7 @@ function targets() {
 function isGone(name) {
   const body = entity(name);
   if (!body || trackerSilent()) return before.lost.has(name);
-  return body.age_s < NEVER_S && body.age_s + estimateAge() > store.scene.lost_after_s;
+  return body.age_s < NEVER_S && body.age_s + shownEstimateAge() > store.scene.lost_after_s;
 }
 
 // Of each grave alarm that stands: what it is about and its words. Those of the page itself are among them.

@@ -2,14 +2,14 @@
 
 import { byId, el, seconds, text } from "./dom.js";
 import { drawn } from "./map.js";
-import { ageS, consoleSilent, estimateAge, replaying, runOver, store, trackerSilent } from "./store.js";
+import { ageS, consoleSilent, estimateAge, estimateOld, linkSlow, replaying, runOver, shownAgeS, store, trackerSilent } from "./store.js";
 
 const OLD_S = 1;
 let eventsShown = "";
 
 export function showTop() {
   const link = byId("link"), silent = consoleSilent(), age = estimateAge();
-  const [level, words] = store.s.ended ? ["calm", "run ended"] : !store.connected ? ["bad", "no connection"] : silent ? ["bad", "console silent"] : age === Infinity ? ["wait", "no estimate yet"] : trackerSilent() ? ["bad", "tracker silent"] : ["good", replaying() ? "as it was" : "live"];
+  const [level, words] = store.s.ended ? ["calm", "run ended"] : !store.connected ? ["bad", "no connection"] : silent ? ["bad", "console silent"] : age === Infinity ? ["wait", "no estimate yet"] : trackerSilent() ? ["bad", "tracker silent"] : linkSlow() && estimateOld() ? ["bad", "slow link"] : ["good", replaying() ? "as it was" : "live"];
   link.dataset.level = level;
   text(link, words);
   const latencies = [...drawn.latencies].sort((a, b) => a - b), middle = latencies[latencies.length >> 1];
@@ -44,13 +44,13 @@ export function showEvents() {
 
 export function showProcesses() {
   const processes = Object.entries(store.s.processes ?? {}).sort(([a], [b]) => a.localeCompare(b));
-  const total = processes.reduce((sum, [, status]) => sum + (ageS(status.at) < 3 ? status.cpu : 0), 0);
+  const total = processes.reduce((sum, [, status]) => sum + (shownAgeS(status.at) < 3 ? status.cpu : 0), 0);
   const host = byId("processes"), over = runOver();
-  const key = JSON.stringify([over, processes.map(([name, { cpu, state, late, at }]) => [name, cpu, state, late, ageS(at) > 3])]);
+  const key = JSON.stringify([over, processes.map(([name, { cpu, state, late, at }]) => [name, cpu, state, late, shownAgeS(at) > 3])]);
   if (host.dataset.key === key) return;
   host.dataset.key = key;
   host.replaceChildren(...processes.map(([name, status]) => {
-    const silent = ageS(status.at) > 3 && status.state !== "STOPPING";
+    const silent = shownAgeS(status.at) > 3 && status.state !== "STOPPING";
     const level = over ? "wait" : silent ? "bad" : status.state === "DEGRADED" ? "warn" : status.state === "READY" ? "good" : "wait";
     const late = status.late > 0.01 ? ` · ${(100 * status.late).toFixed(0)} % late` : "";
     return el("span", { class: "pill num", title: status.detail, data: { level } }, `${name} ${over ? "ended" : silent ? "silent" : `${(100 * status.cpu).toFixed(0)} %${late}`}`);

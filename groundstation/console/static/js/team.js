@@ -8,7 +8,7 @@ import { aloft, doing, isBlind, isDown, isLost, landsIn, modeOf, modeWord, named
 import { withShortNames } from "./names.js";
 import { give } from "./own_orders.js";
 import { colourOf, isAgain } from "./palette.js";
-import { ageS, entity, estimateAge, runOver, SEEN_S, seenBy, store, trackerSilent, unseenS } from "./store.js";
+import { ageS, entity, estimateAge, lagS, runOver, SEEN_S, seenBy, shownAgeS, store, trackerSilent, unseenS } from "./store.js";
 
 const STALE_S = 1;
 // In these modes a lost drone is shown as lost.
@@ -87,7 +87,7 @@ export function showTeam() {
 
 function showVehicle(name, { root, values, mode, detail }) {
   const status = store.s.vehicles?.[name], age = ageS(status?.at), stale = age > STALE_S || !store.connected;
-  const silent = status && age > STALE_S && store.connected && !runOver();
+  const silent = status && shownAgeS(status.at) > STALE_S && store.connected && !runOver();
   root.classList.toggle("stale", stale);
   const left = status && landsIn(name);
   const lost = status && STRAYS.has(status.mode) && !runOver() && !trackerSilent() && isLost(name);
@@ -175,7 +175,7 @@ function showBelief(name, { root, values, mode, detail, drone }) {
     text(detail, withShortNames((words || lost) && dark ? `Lost for ${seconds(age)}: nobody can look for it, the drones' pictures are dark.` : words ? `${Number.isFinite(age) ? "Lost" : "Not found yet"}: ${words}.` : beliefWords(name, body, age, lost)));
     root.classList.toggle("stale", estimateAge() > STALE_S || !store.connected);
   }
-  const [seen, level] = seenWords(name, body, age);
+  const [seen, level] = seenWords(name, body, age + lagS());
   text(values.seen, seen);
   values.seen.className = level;
   text(values.by, withShortNames(seenBy(name).join(", ") || "nobody"));

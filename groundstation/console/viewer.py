@@ -11,11 +11,43 @@ from groundstation.console.devices import DeviceRole
 from groundstation.console.snapshot import Snapshot
 from groundstation.time_units import NS_PER_MS
 
-# Number of unacknowledged frames on the way; the page answers each fourth. 12 frames are 0.6 s.
-WINDOW = 12
+# Number of unacknowledged frames on the way; the page answers each fourth, and each while it watches pictures. 12 are
+# 0.6 s. No more than a few may be before a picture, or behind it while one takes long: they would wait for it.
+WINDOW, _FEW = 12, 4
+# Number of unacknowledged pictures: one, and one more after each that was quickly acknowledged.
+_PICTURES_AT_ONCE, _QUICK_NS = 8, 200 * NS_PER_MS
 _URGENT = 64
 _RATE_PER_S = 60.0
 _BURST = 120.0
+
+
+class PicturesUnderWay:
+    """The pictures that a page has not acknowledged; it does so by a later frame."""
+
+    def __init__(self) -> None:
+        self._sent: deque[tuple[int, int]] = deque()  # number of the frame before each, time
+        self._at_once = 1
+
+    @property
+    def has_room(self) -> bool:
+        """Return whether another one may be sent."""
+        return len(self._sent) < self._at_once
+
+    @property
+    def window(self) -> int:
+        """Return how many frames may be under way."""
+        return _FEW if self._sent and self._at_once == 1 else WINDOW
+
+    def sent(self, after_seq: int, now_ns: int) -> None:
+        """Note that one was sent after a frame."""
+        self._sent.append((after_seq, now_ns))
+
+    def saw(self, seq: int, now_ns: int) -> None:
+        """Note that frames up to this one were handled."""
+        while self._sent and self._sent[0][0] < seq:
+            _, sent_ns = self._sent.popleft()
+            quick = now_ns - sent_ns < _QUICK_NS
+            self._at_once = min(_PICTURES_AT_ONCE, self._at_once + 1) if quick else 1
 
 
 class PageConnection:
@@ -46,6 +78,7 @@ class PageConnection:
         self._send_text, self._send_bytes = send_text, send_bytes
         self._urgent: deque[str] = deque()
         self._pictures: dict[str, bytes] = {}
+        self._under_way = PicturesUnderWay()
         self._wake = asyncio.Event()
         self._seq = self._seen = 0
         self._answer: Answer | None = None
@@ -93,6 +126,7 @@ class PageConnection:
     def saw(self, seq: int) -> None:
         """Note that the page has handled frames up to this one."""
         self._seen = max(self._seen, min(seq, self._seq))
+        self._under_way.saw(self._seen, time.monotonic_ns())
         self._wake.set()
 
     def may_speak(self) -> bool:
@@ -111,7 +145,7 @@ class PageConnection:
             self._wake.clear()
             while self._urgent:
                 await self._send_text(self._urgent.popleft())
-            if self._seq - self._seen < WINDOW:
+            if self._seq - self._seen < self._under_way.window:
                 await self._send_newest(seed)
             else:
                 self.skipped += 1
@@ -127,10 +161,10 @@ class PageConnection:
             self._turn = self._board.turn
             self._seq += 1
             await self._send_text(delta(self._seq, self._clock(), sections, self.take_answer()))
-        if self._pictures:
+        if self._pictures and self._under_way.has_room and self._seq - self._seen <= _FEW:
             camera = next(iter(self._pictures))
+            self._under_way.sent(self._seq, time.monotonic_ns())
             await self._send_bytes(self._pictures.pop(camera))
-        if self._pictures:
             self._wake.set()  # one at a time: on a link slower than the pictures, words and figures come in between
 
 

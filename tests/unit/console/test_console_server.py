@@ -18,8 +18,7 @@ from groundstation.console.access import refusal
 from groundstation.console.pages import load_pages
 from groundstation.console.run_end import read_end
 from groundstation.console.server import claim_port
-from groundstation.console.snapshot import Snapshot
-from groundstation.console.viewer import WINDOW, PageConnection
+from groundstation.console.viewer import WINDOW
 from groundstation.report import run_facts
 
 
@@ -202,73 +201,6 @@ def test_an_order_reaches_the_bus_with_the_token_only() -> None:
             assert received.message.verb is m.Verb.LAND
 
     run(test)
-
-
-def test_a_viewer_that_does_not_answer_gets_a_window_full_and_then_the_newest() -> None:
-    async def test() -> None:
-        board, sent = Snapshot(), []
-
-        async def keep(frame: str | bytes) -> None:
-            sent.append(frame)
-
-        board.begin()
-        viewer = PageConnection(1, board, keep, keep)
-        viewer.watched = frozenset({"ceiling"})
-        task = asyncio.create_task(viewer.run(lambda seq: json.dumps({"seq": seq})))
-        for value in range(40):
-            board.begin()
-            board.put("a", value)
-            viewer.notice()
-            viewer.show("ceiling", b"%d" % value)
-            await asyncio.sleep(0)
-            await asyncio.sleep(0)
-        texts = [json.loads(frame) for frame in sent if isinstance(frame, str)]
-        assert texts[-1]["seq"] == WINDOW
-        viewer.say("urgent")
-        await asyncio.sleep(0.01)
-        assert sent[-1:] == ["urgent"]  # answers are never held back
-        viewer.saw(WINDOW)
-        await asyncio.sleep(0.01)
-        newest = json.loads(next(frame for frame in reversed(sent) if isinstance(frame, str) and frame != "urgent"))
-        assert newest["s"] == {"a": 39} and sent[-1] == b"39"
-        assert viewer.skipped > 0
-        task.cancel()
-        await asyncio.gather(task, return_exceptions=True)
-
-    asyncio.run(test())
-
-
-def test_on_a_link_slower_than_the_pictures_figures_and_answers_still_arrive() -> None:
-    """New pictures come while one is sent: without a pause between them nothing else was sent any more."""
-
-    async def test() -> None:
-        board, texts = Snapshot(), []
-
-        async def keep(frame: str) -> None:
-            texts.append(frame)
-
-        async def send_slowly(frame: bytes) -> None:
-            await asyncio.sleep(0.01)
-            for camera in ("ceiling", "drone_1_camera"):
-                viewer.show(camera, frame)
-
-        board.begin()
-        viewer = PageConnection(1, board, keep, send_slowly)
-        viewer.watched = frozenset({"ceiling", "drone_1_camera"})
-        task = asyncio.create_task(viewer.run(lambda seq: json.dumps({"seq": seq})))
-        viewer.show("ceiling", b"picture")
-        for value in range(8):
-            board.begin()
-            board.put("a", value)
-            viewer.notice()
-            await asyncio.sleep(0.03)
-        viewer.say("urgent")
-        await asyncio.sleep(0.05)
-        task.cancel()
-        await asyncio.gather(task, return_exceptions=True)
-        assert "urgent" in texts and len(texts) >= 8
-
-    asyncio.run(test())
 
 
 def test_a_port_in_use_is_no_obstacle() -> None:

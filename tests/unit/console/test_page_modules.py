@@ -153,6 +153,19 @@ def test_each_seed_is_answered(said: Any) -> None:
     assert said(script) == [1, 2, 3]
 
 
+def test_each_frame_is_answered_while_pictures_are_watched_which_wait_for_it(said: Any) -> None:
+    script = f"""{LINK}
+    const {{ watch }} = await import("./link.js"), delta = (seq) => ({{ type: "delta", seq, now: 0, s: {{}} }});
+    hear(seed(1));
+    hear(welcome());
+    for (const seq of [2, 3, 4, 5]) hear(delta(seq));
+    watch(["ceiling"]);
+    for (const seq of [6, 7]) hear(delta(seq));
+    const result = sent("seen").map(({{ seq }}) => seq);
+    """
+    assert said(script) == [1, 4, 6, 7]
+
+
 def test_a_held_key_drives_a_target_by_the_clock_alone(said: Any) -> None:
     script = f"""{LINK}
     const {{ startSteering }} = await import("./steer.js"), hears = {{}};

@@ -110,7 +110,7 @@ function take(message) {
     case "delta": {
       const sampled = takeDelta(message);
       if (message.answer) noteAnswer(...message.answer);
-      if (message.seq % ACK_EVERY === 0) answer(message.seq);
+      if (watched.length || message.seq % ACK_EVERY === 0) answer(message.seq); // pictures wait for it
       tell("delta", message.s, sampled);
       break;
     }

@@ -18,7 +18,7 @@ from groundstation.bus.messages import (
 )
 from groundstation.field.drones import camera_name
 from groundstation.monitor.batteries import Battery, Charge, battery_of
-from groundstation.monitor.endurance import flies
+from groundstation.monitor.endurance import flies, may_fly
 from groundstation.monitor.failsafe_words import failsafe_words
 from groundstation.monitor.state import MonitorState
 
@@ -188,7 +188,9 @@ def _tracker(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
     age = state.estimate.age_s(now_ns)
     if age > ESTIMATE_SILENT_S:
         in_flight = _anybody_flies(state)
-        advice = "Nothing to do: drones hover, then land." if in_flight else "Nothing to do now: nobody flies."
+        may = any(may_fly(seen.message, state.take_offs.get(name)) for name, seen in state.vehicles.items())
+        nobody = "nobody is known to fly" if may else "nobody flies"
+        advice = "Nothing to do: drones hover, then land." if in_flight else f"Nothing to do now: {nobody}."
         yield Alarm("tracker silent", f"tracker: no estimate for {age:.1f} s", in_flight, advice)
 
 

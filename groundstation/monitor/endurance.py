@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass
 
-from groundstation.bus.messages import AIRBORNE, FlightState, VehicleStatus
+from groundstation.bus import messages as m
+from groundstation.bus.messages import AIRBORNE, UNHEARD, FlightState, VehicleStatus
 
 # Least charge spent, and least time, before the drain is used for a kind without a usual one.
 _LEAST_DRAIN, _LEAST_MIN = 0.02, 0.5
@@ -10,14 +11,15 @@ _LEAST_DRAIN, _LEAST_MIN = 0.02, 0.5
 # Until _LEAST_MIN the usual drain counts alone, from twice that on a flight counts in full.
 _USUAL_MIN = 1.0
 _NS_PER_MIN = 60e9
+_DOWN = frozenset({"LANDED", "CUT"})  # modes of drivers
 
 
 @dataclass(frozen=True, slots=True)
 class TakeOff:
-    """Time of a drone's first status in the air, and its battery level then."""
+    """Time of a drone's first status in the air, and its battery level then; None until it is known."""
 
     stamp_ns: int
-    battery: float
+    battery: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,19 +35,30 @@ class Endurance:
 
 
 def flies(status: VehicleStatus, take_off: TakeOff | None) -> bool:
-    """Return whether a vehicle is in the air, or was by its last status."""
-    return status.flight_state in AIRBORNE or (status.flight_state is FlightState.LOST and take_off is not None)
+    """Return whether a vehicle is in the air, or was by its last status; `take_off` counts where that does not say."""
+    by_status = m.flies(status.flight_state, status.mode)
+    if by_status is not None:
+        return by_status
+    rises, lost = status.flight_state is FlightState.TAKING_OFF, status.flight_state is FlightState.LOST
+    return rises or (lost and status.mode not in _DOWN and take_off is not None)
+
+
+def may_fly(status: VehicleStatus, take_off: TakeOff | None) -> bool:
+    """Return whether a vehicle flies, or may: it was not heard, and its driver does not have it down."""
+    return flies(status, take_off) or (status.flight_state in UNHEARD and status.mode not in _DOWN)
 
 
 def take_off_of(known: TakeOff | None, stamp_ns: int, status: VehicleStatus) -> TakeOff | None:
     """Return the take-off that this status belongs to: none on the floor; anew with a fuller battery or in the past."""
-    if status.flight_state is FlightState.LOST:
-        return known if known is not None and stamp_ns >= known.stamp_ns else None
-    if status.battery is None or status.flight_state not in AIRBORNE:
+    state, battery = status.flight_state, status.battery
+    if state is FlightState.LOST:
+        return known if known is not None and stamp_ns >= known.stamp_ns and status.mode not in _DOWN else None
+    if state not in AIRBORNE:
         return None
-    if known is None or stamp_ns < known.stamp_ns or status.battery > known.battery:
-        return TakeOff(stamp_ns, status.battery)
-    return known
+    if known is None or stamp_ns < known.stamp_ns:
+        return TakeOff(stamp_ns, battery)
+    fuller = battery is not None and (known.battery is None or battery > known.battery)
+    return TakeOff(stamp_ns, battery) if fuller else known
 
 
 def endurance(
@@ -57,7 +70,7 @@ def endurance(
     None if its kind states none.
     """
     left, minutes, spent = max(0.0, battery - limit), 0.0, 0.0
-    if take_off is not None:
+    if take_off is not None and take_off.battery is not None:
         minutes, spent = (stamp_ns - take_off.stamp_ns) / _NS_PER_MIN, take_off.battery - battery
     if flight_time_s is not None:
         usual, counts = _USUAL_MIN / (flight_time_s / 60.0), min(1.0, max(0.0, minutes / _LEAST_MIN - 1.0))

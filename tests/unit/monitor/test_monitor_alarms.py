@@ -86,7 +86,7 @@ def test_a_silent_driver_of_a_drone_that_stands_is_said_to_have_stood(world: Wor
     stood = found["drone_1: nothing heard for 600 s, it stood until then"]
     assert not stood.grave and "hover" not in stood.advice
     assert "it hovers, then lands" in found["drone_2: nothing heard for 600 s"].advice
-    assert "nobody flies" in found["tracker: no estimate for 0.5 s"].advice
+    assert found["tracker: no estimate for 0.5 s"].advice == "Nothing to do now: nobody is known to fly."
 
 
 @pytest.mark.parametrize("others", [m.FlightState.FLYING, m.FlightState.LANDED])

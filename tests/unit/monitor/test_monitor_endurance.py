@@ -5,14 +5,14 @@ from itertools import pairwise
 import pytest
 
 from groundstation.bus.messages import FlightState, Header, VehicleStatus
-from groundstation.monitor.endurance import Endurance, TakeOff, endurance, flies, take_off_of
+from groundstation.monitor.endurance import Endurance, TakeOff, endurance, flies, may_fly, take_off_of
 
 MIN = 60_000_000_000
 
 
-def status(battery: float | None, flight_state: FlightState = FlightState.FLYING) -> VehicleStatus:
+def status(battery: float | None, flight_state: FlightState = FlightState.FLYING, mode: str = "TRACK") -> VehicleStatus:
     header = Header(0, "here", "drone_1", "drone_1", 1)
-    return VehicleStatus(header=header, flight_state=flight_state, mode="TRACK", battery=battery)
+    return VehicleStatus(header=header, flight_state=flight_state, mode=mode, battery=battery)
 
 
 def test_a_drain_counts_for_as_much_as_has_been_flown() -> None:
@@ -67,13 +67,22 @@ def test_a_take_off_lasts_until_the_drone_stands() -> None:
     assert first == TakeOff(1 * MIN, 0.8)
     assert take_off_of(first, 2 * MIN, status(0.7)) == first
     assert take_off_of(first, 2 * MIN, status(0.7, FlightState.LANDED)) is None
-    assert take_off_of(first, 2 * MIN, status(None)) is None
+    unknown = take_off_of(first, 2 * MIN, status(None))
+    assert unknown == first, "an unknown charge is no landing"
+    begun = take_off_of(None, 1 * MIN, status(None))
+    assert begun == TakeOff(1 * MIN, None) and endurance(2 * MIN, 0.7, 0.15, begun, None) is None
+    assert take_off_of(begun, 2 * MIN, status(0.8)) == TakeOff(2 * MIN, 0.8)
 
 
 def test_a_drone_that_is_not_heard_for_a_moment_has_not_landed() -> None:
     first, lost = TakeOff(1 * MIN, 0.8), status(0.7, FlightState.LOST)
     assert take_off_of(first, 2 * MIN, lost) == first and flies(lost, first)
-    assert take_off_of(None, 2 * MIN, lost) is None and not flies(lost, None)
+    assert take_off_of(None, 2 * MIN, lost) is None and flies(lost, None), "its driver had it in the air"
+    restarted = status(0.7, FlightState.LOST, "CONNECTING")
+    assert flies(restarted, first) and not flies(restarted, None) and may_fly(restarted, None)
+    for mode in ("LANDED", "CUT"):
+        down = status(0.7, FlightState.LOST, mode)
+        assert take_off_of(first, 2 * MIN, down) is None and not flies(down, first) and not may_fly(down, first)
     assert take_off_of(first, 0, lost) is None
 
 

@@ -4,9 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from groundstation.bus.messages import AIRBORNE, FlightState
+from groundstation.bus.messages import AIRBORNE, FlightState, VehicleStatus
 from groundstation.monitor.alarms import Alarm
 from groundstation.monitor.batteries import battery_of
+from groundstation.monitor.endurance import flies, may_fly
 from groundstation.monitor.state import MonitorState
 from groundstation.time_units import NS_PER_S
 
@@ -37,12 +38,30 @@ def safety_of(state: MonitorState, alarms: Sequence[Alarm]) -> Safety:
         return Safety(Level.ACT if first.asks else Level.WATCH, f"{first.text}. {first.advice}".rstrip())
     if set(state.cast.drones) - set(state.vehicles):
         return Safety(Level.WATCH, "Not every drone has been heard yet.")
+    unsure = [name for name, seen in state.vehicles.items() if _is_unsure(seen.message)]
+    if unsure:
+        return Safety(Level.WATCH, _unsure_words(state, unsure))
     up = [name for name, seen in state.vehicles.items() if seen.message.flight_state in AIRBORNE]
     if not up:
         return Safety(Level.SAFE, "No alarms. Nobody flies.")
     if unplaced := [name for name in up if _is_unplaced(state, name)]:
         return Safety(Level.WATCH, _unplaced_words(unplaced))
     return Safety(Level.SAFE, f"No alarms. All who fly are heard, nobody is lost{_lasting(state, up)}.")
+
+
+def _is_unsure(status: VehicleStatus) -> bool:
+    """Return whether a vehicle may fly, and has not said so."""
+    return may_fly(status, None) and not flies(status, None)
+
+
+def _unsure_words(state: MonitorState, names: Sequence[str]) -> str:
+    unheard = any(state.vehicles[name].message.mode == "CONNECTING" for name in names)
+    heard = "Not every drone has been heard yet: it" if unheard else "It"
+    return f"{heard} is not known whether {_who(names)} {'fly' if len(names) > 1 else 'flies'}."
+
+
+def _who(names: Sequence[str]) -> str:
+    return " and ".join(names) if len(names) < 3 else f"{len(names)} drones"
 
 
 def _is_unplaced(state: MonitorState, name: str) -> bool:
@@ -55,8 +74,7 @@ def _is_unplaced(state: MonitorState, name: str) -> bool:
 
 
 def _unplaced_words(names: Sequence[str]) -> str:
-    who = " and ".join(names) if len(names) < 3 else f"{len(names)} drones"
-    return f"It is not known where {who} {'are' if len(names) > 1 else 'is'}."
+    return f"It is not known where {_who(names)} {'are' if len(names) > 1 else 'is'}."
 
 
 def _lasting(state: MonitorState, up: Sequence[str]) -> str:

@@ -115,6 +115,25 @@ def test_each_target_is_heard_to_be_lost_and_found(said: Any) -> None:
     assert said(script) == ["turtlebot lost", "cart lost", "turtlebot found", "target found"]
 
 
+def test_a_drone_that_is_not_heard_yet_is_not_said_to_stand(said: Any) -> None:
+    script = """
+    const { verdict } = await import("./verdict.js");
+    const { effectOf, effectOnOne, isIdle } = await import("./effects.js");
+    const is = (flight, mode) => ({ flight, mode, at: performance.now(), detail: "", battery: null, lands_in_s: null });
+    const words = (drones) => { store.s.vehicles = drones;
+      return [verdict().split(".")[0], effectOf("HOLD"), isIdle("LAND"), effectOnOne("LAND", "drone_1")]; };
+    const connecting = is("UNKNOWN", "CONNECTING"), stands = is("LANDED", "LANDED"), lost = is("LOST", "CONNECTING");
+    const result = [words({ drone_1: connecting, drone_2: connecting }), words({ drone_1: lost, drone_2: stands }),
+      words({ drone_1: is("LOST", "LANDED"), drone_2: stands })];
+    """
+    stops = ["if one flies", False, "if it flies"]
+    assert said(script) == [
+        ["It is not known whether drone_1 and drone_2 fly", *stops],
+        ["It is not known whether drone_1 flies", *stops],
+        ["Nobody flies", "nobody flies", True, "no use: stands"],
+    ]
+
+
 _TEAM = """
 const { effectOf, effectOnOne, mayFail, refusalOf, startEffect } = await import("./effects.js");
 const { dutyOf } = await import("./duty.js");

@@ -46,6 +46,26 @@ def test_it_is_safe_while_nobody_flies(world: World) -> None:
     assert judged(world) == Safety(Level.SAFE, "No alarms. Nobody flies.")
 
 
+UNKNOWN = m.FlightState.UNKNOWN
+
+
+@pytest.mark.parametrize(
+    ("modes", "words"),
+    [
+        (("CONNECTING",) * 2, "Not every drone has been heard yet: it is not known whether drone_1 and drone_2 fly."),
+        (("HOVER", "LANDED"), "It is not known whether drone_1 flies."),
+        (("CONNECTING", "TRACK"), "Not every drone has been heard yet: it is not known whether drone_1 flies."),
+    ],
+)
+def test_it_is_not_safe_while_nobody_knows_whether_a_drone_flies(
+    world: World, modes: tuple[str, str], words: str
+) -> None:
+    other = {"CONNECTING": UNKNOWN, "LANDED": m.FlightState.LANDED, "TRACK": m.FlightState.FLYING}[modes[1]]
+    world.vehicle("drone_1", modes[0], battery=None, flight_state=UNKNOWN)
+    world.vehicle("drone_2", modes[1], battery=0.8 if other is not UNKNOWN else None, flight_state=other)
+    assert judged(world) == Safety(Level.WATCH, words)
+
+
 def test_it_is_not_safe_while_nobody_knows_where_a_flying_drone_is(world: World) -> None:
     both(world, age_s=5.0)
     judged(world)
@@ -120,3 +140,24 @@ def test_a_drone_that_is_switched_off_after_its_landing_asks_for_nothing(world: 
         Level.WATCH,
         "drone_1: not heard any more, it stood until then. Nothing to do now: switch it on before it flies again.",
     )
+
+
+@pytest.mark.parametrize(
+    ("state", "mode", "advice"),
+    [
+        (m.FlightState.LOST, "HOVER", "Nothing to do: drones hover, then land."),
+        (m.FlightState.LOST, "TAKING_OFF", "Nothing to do now: nobody is known to fly."),
+        (m.FlightState.LOST, "LANDED", "Nothing to do now: nobody flies."),
+        (m.FlightState.LOST, "CUT", "Nothing to do now: nobody flies."),
+        (m.FlightState.LANDED, "LANDED", "Nothing to do now: nobody flies."),
+    ],
+)
+@pytest.mark.parametrize("battery", [0.8, None])
+def test_a_drone_that_was_lost_in_the_air_before_one_listened_flies(
+    world: World, state: m.FlightState, mode: str, advice: str, battery: float | None
+) -> None:
+    world.vehicle("drone_1", mode, battery=battery, flight_state=state)
+    world.estimate(age_s=0.5)
+    world.text()
+    (silent,) = (alarm for alarm in alarms_of(world.state, NOW) if alarm.about == "tracker silent")
+    assert silent.advice == advice

@@ -3,7 +3,7 @@
 import { showLog, showMore } from "./alarm_strip.js";
 import { byId, el, seconds, text } from "./dom.js";
 import { resultWords } from "./ending.js";
-import { modeNow, up } from "./glance.js";
+import { modeNow, unsure, up } from "./glance.js";
 import { drawn } from "./map.js";
 import { withShortNames } from "./names.js";
 import { noteOwnAlarms, ownAlarms, slowWords } from "./own_alarms.js";
@@ -63,7 +63,7 @@ function ending({ severity, text: words, down }) {
 }
 
 function silentTracker() {
-  const flying = up(), then = !flying.length ? "nobody flies" : flying.every((name) => modeNow(name) === "LANDING") ? "the drones land" : "the drones hover, then land by themselves. LAND ALL still works";
+  const flying = up(), then = !flying.length ? (unsure().length ? "nobody is known to fly" : "nobody flies") : flying.every((name) => modeNow(name) === "LANDING") ? "the drones land" : "the drones hover, then land by themselves. LAND ALL still works";
   return { kind: "tracker", level: "grave", title: `TRACKER SILENT for ${seconds(estimateAge())}${WIDE.matches ? ": the program that steers the drones sends nothing" : ""}`, rank: "WATCH",
     more: `Nothing to do: ${then}.` };
 }

@@ -1,6 +1,6 @@
 // The effect of a start or a stop now, or why a start has none: in the few words that a button has room for.
 
-import { aloft, isDown, isLost, isUnheard, lostTarget, modeNow, modeOf, modes, standing, up, waits } from "./glance.js";
+import { aloft, isDown, isLost, isUnheard, lostTarget, modeNow, modeOf, modes, standing, unsure, up, waits } from "./glance.js";
 import { wasForbidden } from "./preflight.js";
 import { droneNames, store, trackerSilent } from "./store.js";
 
@@ -71,7 +71,7 @@ export function startEffect(verb) {
 export function effectOf(verb) {
   const flying = up();
   if (!modes().length) return "";
-  if (!flying.length) return "nobody flies";
+  if (!flying.length) return unsure().length ? "if one flies" : "nobody flies";
   if (flying.some(isUnheard)) return unheard(verb, flying);
   if (verb === "CUT_MOTORS") return `press 1 s:\n${does(flying, "falls", "fall")}`;
   return verb === "LAND" ? landing(flying) : hover(flying);
@@ -89,6 +89,7 @@ function unheard(verb, flying) {
 // The effect that a stop of one drone would have now.
 export function effectOnOne(verb, name) {
   if (!modeNow(name)) return "";
+  if (unsure([name]).length) return "if it flies";
   if (!up([name]).length) return isDown(name) ? "no use: down" : "no use: stands";
   if (isUnheard(name)) return "if it hears";
   if (verb === "LAND") return isIdle(verb, [name]) ? "lands already" : "lands here";
@@ -120,7 +121,7 @@ function landing(flying) {
 
 // Whether a stop would change nothing now.
 export function isIdle(verb, names = droneNames()) {
-  if (!modes(names).length) return false;
+  if (!modes(names).length || unsure(names).length) return false;
   const left = { HOLD: "HOLD", LAND: "LANDING" }[verb], moved = verb === "HOLD" ? holding(names) : up(names);
   return moved.every((name) => modeNow(name) === left && !isUnheard(name));
 }

@@ -16,6 +16,8 @@ export const modes = (names = droneNames()) => names.map(modeNow).filter(Boolean
 // Of these drones those that fly.
 export const up = (names = droneNames()) => names.filter((name) => ALOFT.has(modeNow(name)));
 export const aloft = () => up().length;
+// Of these drones those of which nobody knows whether they fly, as groundstation/monitor/endurance.py has it.
+export const unsure = (names = droneNames()) => names.filter((name) => ["UNKNOWN", "LOST"].includes(store.s.vehicles?.[name]?.flight) && !["LANDED", "CUT"].includes(modeNow(name)) && !up([name]).length);
 // Of these drones those that stand, and might take off.
 export const standing = (names = droneNames()) => names.filter((name) => ["LANDED", "CUT"].includes(modeNow(name)));
 

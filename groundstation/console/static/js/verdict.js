@@ -2,7 +2,7 @@
 
 import { joined, seconds } from "./dom.js";
 import { howMany, ready, refusalOf, waiting } from "./effects.js";
-import { aloft, doing, isBlind, isLost, isUnheard, landsIn, lostTarget, modeNow, modes, NAMED, namedOrCounted, stage, standing, unseenLeftS, up } from "./glance.js";
+import { aloft, doing, isBlind, isLost, isUnheard, landsIn, lostTarget, modeNow, modes, NAMED, namedOrCounted, stage, standing, unseenLeftS, unsure, up } from "./glance.js";
 import { mustWords, openMusts } from "./preflight.js";
 import { droneNames, entity, NEVER_S, SEEN_S, seenBy, store, trackerSilent, unseenS } from "./store.js";
 
@@ -92,7 +92,8 @@ const next = () => (new Set(up().map(modeNow)).size === 1 ? NEXT[modeNow(up()[0]
 export function verdict() {
   if (!modes().length) return "No drone has been heard yet.";
   if (stage() === "over") return store.connected && !store.s.result ? "The run is over: it is being judged." : "The run is over.";
-  if (!aloft()) return `Nobody flies. ${takeOff()}`;
+  const doubt = unsure();
+  if (!aloft()) return `${doubt.length ? `It is not known whether ${namedOrCounted(doubt)} ${doubt.length > 1 ? "fly" : "flies"}` : "Nobody flies"}. ${takeOff()}`;
   return [deeds(), lost(), next() ?? start()].filter(Boolean).join(" ");
 }
 

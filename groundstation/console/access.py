@@ -137,11 +137,12 @@ class Gate:
         if scope["type"] not in ("http", "websocket"):
             return
         kind, reason = "other_site", refusal(scope, self._door.names)
+        # Before who is asked whether it is known: a device is invited anew to do more, or less.
+        if not reason and scope["type"] == "http" and (cookie := self._door.welcome(scope)):
+            await _answer(send, 303, [(b"location", b"/"), (b"set-cookie", cookie)], b"")
+            return
         role = None if reason else self._door.admits(scope)
         if not reason and role is None:
-            if scope["type"] == "http" and (cookie := self._door.welcome(scope)):
-                await _answer(send, 303, [(b"location", b"/"), (b"set-cookie", cookie)], b"")
-                return
             kind, reason = "other_user", self._door.reason
         if reason:
             self.refused[kind] += 1

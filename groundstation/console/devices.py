@@ -75,7 +75,10 @@ class Devices:
         return f"{self.url}?code={code}"
 
     def welcome(self, scope: Mapping[str, Any]) -> bytes:
-        """Return the cookie for a request with a fresh code, which is thereby used up; else b""."""
+        """Return the cookie for a request with a fresh code, which is thereby used up; else b"".
+
+        It replaces the rights that the device had.
+        """
         query = parse_qs(scope["query_string"].decode("latin-1"))
         path = self._folder / f"{_INVITED}{_digest(query.get('code', [''])[0])}"
         try:
@@ -89,13 +92,17 @@ class Devices:
             return b""
         token = secrets.token_urlsafe(24)
         write_private(self._folder / f"{_KNOWN}{_digest(token)}", role)
+        self._entry(scope).unlink(missing_ok=True)
         return f"{_COOKIE}={token}; Secure; HttpOnly; SameSite=Strict; Path=/".encode()
 
     def role_of(self, scope: Mapping[str, Any]) -> DeviceRole | None:
         """Return the role of the device that sent a request, None if unknown."""
         with suppress(OSError, ValueError):
-            return DeviceRole((self._folder / f"{_KNOWN}{_digest(cookie_of(scope, _COOKIE))}").read_text())
+            return DeviceRole(self._entry(scope).read_text())
         return None
+
+    def _entry(self, scope: Mapping[str, Any]) -> Path:
+        return self._folder / f"{_KNOWN}{_digest(cookie_of(scope, _COOKIE))}"
 
 
 def _digest(secret: str) -> str:

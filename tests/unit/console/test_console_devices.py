@@ -9,6 +9,7 @@ import stat
 import time
 from collections.abc import Awaitable, Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from console_site import Site, land, run, until
@@ -119,6 +120,25 @@ def test_a_device_may_what_its_role_says(tmp_path: Path, role: DeviceRole) -> No
     visited(tmp_path, visit)
 
 
+@pytest.mark.parametrize("role", [DeviceRole.COMMAND, DeviceRole.WATCH])
+def test_a_device_that_is_invited_anew_may_what_the_new_invitation_says(tmp_path: Path, role: DeviceRole) -> None:
+    async def visit(site: Site, devices: Devices, tablet: Tablet) -> None:
+        await tablet.enter(devices.invite(DeviceRole.STOP))
+        former, invitation = tablet.cookie, devices.invite(role)
+        assert await tablet.enter(invitation) == 303
+        async with tablet.page() as page:
+            await page.send(json.dumps({"type": "hello", "token": "guess", "client": "abcd"}))
+            async with asyncio.timeout(5):
+                while f'"role":"{role}"' not in str(await page.recv()):
+                    pass
+        assert await tablet.enter(invitation) == 200, "it is used up, and the device stays known"
+        assert tablet.cookie != former
+        tablet.cookie = former
+        assert (await tablet.get("/"))[0] == 403
+
+    visited(tmp_path, visit)
+
+
 def test_one_address_of_the_network_has_so_many_connections_at_most(tmp_path: Path) -> None:
     async def visit(site: Site, devices: Devices, tablet: Tablet) -> None:
         await tablet.enter(devices.invite(DeviceRole.WATCH))
@@ -166,6 +186,10 @@ def test_silent_strangers_are_shown_out_before_they_speak_tls(tmp_path: Path, mo
     visited(tmp_path, visit)
 
 
+def asked(query: bytes) -> dict[str, Any]:
+    return {"query_string": query, "headers": [], "server": (ADDRESS, 1)}
+
+
 def test_an_old_invitation_is_none_and_all_is_for_its_owner(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     devices = Devices(tmp_path / "devices")
     devices.open(ADDRESS, 1)
@@ -175,8 +199,8 @@ def test_an_old_invitation_is_none_and_all_is_for_its_owner(tmp_path: Path, monk
     assert stat.S_IMODE((tmp_path / "devices").stat().st_mode) == 0o700
     assert not any(code.removeprefix(b"code=") in path.read_bytes() + os.fsencode(path) for path in kept)
     monkeypatch.setattr("groundstation.console.devices.time.time", lambda: max(p.stat().st_mtime for p in kept) + 601)
-    assert devices.welcome({"query_string": code}) == b""
-    assert devices.welcome({"query_string": b"code=../../url"}) == devices.welcome({"query_string": b""}) == b""
+    assert devices.welcome(asked(code)) == b""
+    assert devices.welcome(asked(b"code=../../url")) == devices.welcome(asked(b"")) == b""
 
 
 @pytest.mark.parametrize(("later_s", "let_in"), [(500.0, True), (-500.0, True), (601.0, False), (-3600.0, False)])
@@ -188,4 +212,4 @@ def test_a_clock_that_was_set_keeps_no_invitation_alive(
     code = devices.invite(DeviceRole.COMMAND).partition("?")[2].encode()
     then_s = time.time()
     monkeypatch.setattr("groundstation.console.devices.time.time", lambda: then_s + later_s)
-    assert bool(devices.welcome({"query_string": code})) == let_in
+    assert bool(devices.welcome(asked(code))) == let_in

@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable, Mapping
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
-from groundstation.console.cookies import cookie_of
+from groundstation.console.cookies import cookie_of, port_of
 from groundstation.console.devices import DeviceRole, Devices
 from groundstation.process.ports import user_of
 from groundstation.report.page import inline
@@ -99,7 +99,7 @@ class Door:
 
     @staticmethod
     def _cookie_name(scope: Mapping[str, Any]) -> str:
-        return f"skein_{(scope.get('server') or ('', 0))[1]}"  # cookies of one host are seen on all of its ports
+        return f"skein_{port_of(scope)}"
 
 
 class DeviceDoor:

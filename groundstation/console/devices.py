@@ -18,12 +18,11 @@ from urllib.parse import parse_qs
 from cryptography import x509
 from cryptography.hazmat.primitives import hashes
 
-from groundstation.console.cookies import cookie_of
+from groundstation.console.cookies import cookie_of, port_of
 from groundstation.supervisor.authority import Authority, write_private
 
 _INVITATION_LIVES_S = 600.0
 _INVITED, _KNOWN, _URL = "invited-", "device-", "url"
-_COOKIE = "__Host-skein"
 
 
 class DeviceRole(StrEnum):
@@ -93,7 +92,7 @@ class Devices:
         token = secrets.token_urlsafe(24)
         write_private(self._folder / f"{_KNOWN}{_digest(token)}", role)
         self._entry(scope).unlink(missing_ok=True)
-        return f"{_COOKIE}={token}; Secure; HttpOnly; SameSite=Strict; Path=/".encode()
+        return f"{_cookie_name(scope)}={token}; Secure; HttpOnly; SameSite=Strict; Path=/".encode()
 
     def role_of(self, scope: Mapping[str, Any]) -> DeviceRole | None:
         """Return the role of the device that sent a request, None if unknown."""
@@ -102,7 +101,11 @@ class Devices:
         return None
 
     def _entry(self, scope: Mapping[str, Any]) -> Path:
-        return self._folder / f"{_KNOWN}{_digest(cookie_of(scope, _COOKIE))}"
+        return self._folder / f"{_KNOWN}{_digest(cookie_of(scope, _cookie_name(scope)))}"
+
+
+def _cookie_name(scope: Mapping[str, Any]) -> str:
+    return f"__Host-skein-{port_of(scope)}"
 
 
 def _digest(secret: str) -> str:

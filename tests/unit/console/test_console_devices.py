@@ -38,7 +38,7 @@ class Tablet:
         reader, writer = await asyncio.open_connection(ADDRESS, self._port, ssl=LAX)
         host = host or f"{ADDRESS}:{self._port}"
         cookie = f"Cookie: {self.cookie}\r\n" if self.cookie else ""
-        writer.write(f"GET {path} HTTP/1.1\r\nHost: {host}\r\n{cookie}Connection: close\r\n\r\n".encode())
+        writer.write(f"GET {path} HTTP/1.1\r\nHost: {host}\r\n{cookie}Connection: close\r\n\r\n".encode("latin-1"))
         head, _, body = (await asyncio.wait_for(reader.read(), 5)).partition(b"\r\n\r\n")
         writer.close()
         return int(head.split()[1]), head.decode(), body
@@ -135,6 +135,22 @@ def test_a_device_that_is_invited_anew_may_what_the_new_invitation_says(tmp_path
         assert tablet.cookie != former
         tablet.cookie = former
         assert (await tablet.get("/"))[0] == 403
+
+    visited(tmp_path, visit)
+
+
+@pytest.mark.parametrize("odd", ['theme={"a": 1, "b": [2]}', "na me=x", "flag", "=", 'quoted="a; b', "caf\xe9=\xe9"])
+def test_odd_cookies_of_other_programs_on_the_host_hide_no_device(tmp_path: Path, odd: str) -> None:
+    async def visit(site: Site, devices: Devices, tablet: Tablet) -> None:
+        await tablet.enter(devices.invite(DeviceRole.WATCH))
+        name, _, token = tablet.cookie.partition("=")
+        assert name == f"__Host-skein-{tablet._port}", "another console of the host has its own"
+        for cookie in (f"{odd}; {name}={token}", f"{name}={token}; {odd}"):
+            tablet.cookie = cookie
+            assert (await tablet.get("/"))[0] == 200
+        for cookie in (f"x{name}={token}", f"{name}x={token}", f"a={name}={token}", f"{name}="):
+            tablet.cookie = cookie
+            assert (await tablet.get("/"))[0] == 403
 
     visited(tmp_path, visit)
 

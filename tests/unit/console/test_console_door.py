@@ -61,7 +61,8 @@ def test_another_user_comes_in_with_the_code() -> None:
         status, head, _ = await site.request(f"/?code={code_of(site)}")
         assert status == 303 and "httponly; samesite=strict" in head
         cookie = f"skein_{site.port}={code_of(site)}"
-        assert (await site.request("/token", cookie=cookie))[0] == 200
+        for other in ("", 'theme={"a": 1}; '):
+            assert (await site.request("/token", cookie=f"{other}{cookie}"))[0] == 200
         async with site.connect(additional_headers={"Cookie": cookie}) as page:
             await page.recv()
 

@@ -1,5 +1,6 @@
 // The WebSocket: one seed, then what changed; comes back by itself, and asks for the token again when it does.
 
+import { guarded } from "./guard.js";
 import { asking, noteAnswer, roundTripMs, startClock } from "./server_clock.js";
 import { store, takeDelta, takeSeed } from "./store.js";
 
@@ -16,7 +17,7 @@ let socket = null, token = document.querySelector("meta[name=token]").content, r
 let newMs = NEW_MS, patienceMs = NEW_MS, quietMs = 0, early = [];
 
 export const on = (kind, handler) => handlers[kind].push(handler);
-const tell = (kind, ...content) => handlers[kind].forEach((handler) => handler(...content));
+const tell = (kind, ...content) => handlers[kind].forEach((handler, index) => guarded(index ? `${kind} ${index + 1}` : kind, () => handler(...content)));
 
 function clientId() {
   try {

@@ -7,6 +7,7 @@ import { buildCameras, pictures, showCameras, showDetections, startCameras } fro
 import { buildCharts, showSamples } from "./charts.js";
 import { byId, el, svg } from "./dom.js";
 import { keepEnd, showEnd } from "./ending.js";
+import { guarded } from "./guard.js";
 import { drawHeights } from "./heights.js";
 import { connect, me, on, send } from "./link.js";
 import { drawMap, drawn, layers } from "./map.js";
@@ -34,9 +35,9 @@ on("seed", () => {
   const { scene } = store, built = JSON.stringify(scene);
   // A replay that has jumped seeds the same scene again: what is in focus or being dragged must stay.
   if (built !== builtFor) build(scene);
-  else showSamples();
+  else guarded("charts", showSamples);
   builtFor = built;
-  keepEnd();
+  guarded("result", keepEnd);
   undrawnStamp = null;
   showAll();
   redraw();
@@ -53,26 +54,39 @@ function build(scene) {
   view.room = scene.room.size_m;
   if (view.fitted) view.fit();
   document.querySelector(".legend").open = (view.width - view.scale * view.room[0]) / 2 > 335;
-  buildLayers(); buildLegend(); buildTeam(); buildCameras(); buildCharts();
-  startPlayback();
+  const made = { layers: buildLayers, legend: buildLegend, "new cards": buildTeam, "new cameras": buildCameras, "new charts": buildCharts, "new playback": startPlayback };
+  for (const [part, make] of Object.entries(made)) guarded(part, make);
 }
 
 on("delta", (sections, sampled) => {
   if (sections.estimate) undrawnStamp = sections.estimate.at;
-  if (sections.orders || sections.session) { showOrders(); showControls(); }
-  if (sections.playback) showPlayback();
-  if (sections.result) keepEnd();
-  if (sections.detections) showDetections();
-  if (sampled) { showSamples(); showTimeline(); }
+  if (sections.orders || sections.session) show("orders", "buttons");
+  if (sections.playback) show("playback");
+  if (sections.result) guarded("result", keepEnd);
+  if (sections.detections) guarded("detections", showDetections);
+  if (sampled) { guarded("charts", showSamples); guarded("timeline", showTimeline); }
   redraw();
 });
 
-on("notice", (notice) => { addNotice(notice); showBanners(); });
-on("state", () => { showBanners(); showTop(); showControls(); redraw(); });
+on("notice", (notice) => { addNotice(notice); show("alarms"); });
+on("state", () => { show("alarms", "link", "buttons"); redraw(); });
 
-function showAll() {
-  showBar(); showBanners(); showTop(); showTeam(); showCameras(); showHealth(); showEvents(); showProcesses(); showPlan(); showSwitch(); showControls(); showOrders(); showPlayback(); showPreflight(); showEnd();
-  listen(); describe();
+// First what an operator must not miss, and acts with.
+const PARTS = {
+  alarms: alarm, buttons: showControls, orders: showOrders, sounds: listen, bar: showBar, link: showTop, cards: showTeam, checks: showPreflight, cameras: showCameras, topology: showPlan, "topology's changes": showSwitch,
+  estimator: showHealth, events: showEvents, processes: showProcesses, playback: showPlayback, end: showEnd, "words of the map": describe,
+};
+const show = (...parts) => parts.forEach((part) => guarded(part, PARTS[part]));
+const showAll = () => show(...Object.keys(PARTS));
+
+// The word as well must not be what it was.
+function alarm() {
+  try { showBanners(); } catch (error) {
+    Object.assign(byId("safety"), { textContent: "ACT" });
+    Object.assign(byId("safety-means"), { textContent: "this page fails:\nreload it" });
+    byId("safety-box").dataset.level = "bad";
+    throw error;
+  }
 }
 
 function describe() {
@@ -91,7 +105,7 @@ function redraw() {
 
 function draw() {
   asked = false; // first: what fails now does not stop what comes
-  drawMap(view, ghostPoint());
+  guarded("map", () => drawMap(view, ghostPoint()));
   if (undrawnStamp === null) return;
   drawn.latencies.push(now() - undrawnStamp);
   if (drawn.latencies.length > 200) drawn.latencies.shift();
@@ -104,7 +118,7 @@ function beat() {
   drawn.gapS = (at - lastBeat) / 1000;
   lastBeat = at;
   atOneTime(showAll);
-  drawHeights(byId("heights"), view.ratio ?? 1);
+  guarded("heights", () => drawHeights(byId("heights"), view.ratio ?? 1));
   redraw();
 }
 

@@ -1,10 +1,12 @@
 // Alarms that only a page can raise: that it hears nothing, or that a stop is not answered; and those of them that are over.
 
-import { seconds } from "./dom.js";
+import { joined, seconds } from "./dom.js";
 import { STOPS } from "./effects.js";
+import { failures } from "./guard.js";
 import { mayGive, ownOrders } from "./own_orders.js";
 import { ageS, consoleSilent, estimateAge, frameAgeS, linkSlow, now, replaying, runOver, silentS, slowForS, store } from "./store.js";
 
+const FEW = 3; // faults that are named
 const KEPT = 50; // this and the next as groundstation/console/alarm_log.py has them
 export const BREAK_MS = 2000;
 const UNHEARD_S = 0.8, FORGOTTEN_S = 30;
@@ -24,6 +26,8 @@ export function ownAlarms() {
   if (!store.connected) alarms.push({ kind: "link", about: "link", title: "NO CONNECTION TO THE CONSOLE", more: [store.reason && `${store.reason}.`, old].filter(Boolean).join(" "), old: true, shell: true });
   else if (linkSlow() && frameAgeS() > SLOW_S && slowForS() > SLOW_FOR_S) alarms.push({ kind: "slow", about: "slow link", title: slowWords(), more: "To do: bring this device nearer, or watch on another. Stops go out at once.", old: true });
   else if (consoleSilent()) alarms.push({ kind: "silent", about: "silent", title: `CONSOLE SILENT for ${seconds(silentS())}`, more: old, old: true, shell: true });
+  const faults = failures();
+  if (faults.length) alarms.push({ kind: "fault", about: "page fault", title: `PAGE FAULT: ${faults.length > FEW ? `${faults.length} parts` : joined(faults)} may show what was`, more: "To do: reload this page, or watch on another. Stops go out all the same." });
   const stop = store.connected ? unheardStop() : null;
   if (stop) alarms.push({ kind: "unheard", about: `unheard ${stop.id}`, title: stopWords(stop), more: "To do: press again. If a drone flies on: groundstation land in a shell, or its own remote control." });
   return alarms;

@@ -40,12 +40,15 @@ def power_saving(networks: Path = _NETWORKS, program: str = "iw") -> list[Findin
 
 
 def _adapter(name: str, program: str) -> Finding:
-    subject, remedy = f"Wi-Fi {name}", f"iw dev {name} set power_save off"
+    subject, remedy, unknown = f"Wi-Fi {name}", f"iw dev {name} set power_save off", "power saving is not known"
     if not shutil.which(program):
-        return Finding(Level.SHOULD, subject, "power saving is not known: iw is not installed", f"install iw; {remedy}")
+        return Finding(Level.SHOULD, subject, f"{unknown}: iw is not installed", f"install iw; {remedy}")
     try:
         answer = subprocess.run([program, "dev", name, "get", "power_save"], capture_output=True, text=True, timeout=5)
     except (OSError, subprocess.TimeoutExpired) as error:
-        return Finding(Level.SHOULD, subject, f"power saving is not known: {error}", remedy)
-    sleeps = "on" in answer.stdout.lower().split()
-    return judged(not sleeps, Level.SHOULD, subject, f"power saving {'on' if sleeps else 'off'}", remedy)
+        return Finding(Level.SHOULD, subject, f"{unknown}: {error}", remedy)
+    told = {"on", "off"} & set(answer.stdout.lower().split())
+    if answer.returncode or len(told) != 1:
+        words = (answer.stderr or answer.stdout).strip().partition("\n")[0] or f"iw ends with {answer.returncode}"
+        return Finding(Level.SHOULD, subject, f"{unknown}: {words}", remedy)
+    return judged(told == {"off"}, Level.SHOULD, subject, f"power saving {told.pop()}", remedy)

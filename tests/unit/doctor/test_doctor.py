@@ -67,14 +67,30 @@ def test_a_port_in_use_is_named() -> None:
     assert network.port(number, "console").level is Level.OK
 
 
-def test_each_adapter_that_sleeps_is_named(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("script", "level", "found"),
+    [
+        ("echo 'Power save: on'", Level.SHOULD, "power saving on"),
+        ("echo 'Power save: off'", Level.OK, "power saving off"),
+        (
+            "echo 'command failed: No such device (-19)' >&2; exit 237",
+            Level.SHOULD,
+            "not known: command failed: No such",
+        ),
+        ("echo 'Power save: off'; exit 1", Level.SHOULD, "not known"),
+        ("exit 0", Level.SHOULD, "not known: iw ends with 0"),
+        ("echo 'Usage: iw [options] command'", Level.SHOULD, "not known: Usage"),
+    ],
+)
+def test_each_adapter_that_sleeps_or_may_is_named(tmp_path: Path, script: str, level: Level, found: str) -> None:
     (tmp_path / "wlan7" / "wireless").mkdir(parents=True)
     (tmp_path / "eth0").mkdir()
     program = tmp_path / "iw"
-    program.write_text("#!/bin/sh\necho 'Power save: on'\n")
+    program.write_text(f"#!/bin/sh\n{script}\n")
     program.chmod(0o755)
     (asleep,) = network.power_saving(tmp_path, str(program))
-    assert asleep.level is Level.SHOULD and "iw dev wlan7 set power_save off" in asleep.remedy
+    assert asleep.level is level and found in asleep.found
+    assert asleep.remedy == ("" if level is Level.OK else "iw dev wlan7 set power_save off")
     (unknown,) = network.power_saving(tmp_path, str(tmp_path / "no-iw"))
     assert "not installed" in unknown.found
 

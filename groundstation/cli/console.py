@@ -1,5 +1,6 @@
 """`groundstation console`: the web page of a present run, from any terminal."""
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -7,6 +8,7 @@ import click
 
 from groundstation.cli.monitor import cast_of, choose
 from groundstation.errors import OperatorMistake
+from groundstation.process.standard_streams import with_sequences
 
 if TYPE_CHECKING:
     from groundstation.field.resolved import ResolvedField
@@ -70,7 +72,7 @@ def _invite(record: "RuntimeRecord", role: str) -> None:
     if not devices.url:
         raise OperatorMistake(f"the console of {record.name} is on loopback only: set console.listen in the field")
     address = devices.invite(DeviceRole(role))
-    click.echo(qr_text(address))
+    click.echo(qr_text(address), with_sequences(sys.stdout))
     click.echo(f"{address}\none device may {role}; the code works once, within 10 minutes")
     click.echo("the browser warns of a certificate that nobody signed; it is the right one if its SHA-256 is")
     click.echo(devices.fingerprint)

@@ -2,6 +2,7 @@
 
 import json
 import math
+import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,6 +11,7 @@ import click
 
 from groundstation.cli.terminal import progress, show
 from groundstation.errors import SettingsError
+from groundstation.process.standard_streams import with_sequences
 
 if TYPE_CHECKING:
     from groundstation.forecast.forecast import Forecast
@@ -125,7 +127,7 @@ def _tell(found: "Forecast") -> None:
     from groundstation.forecast.wording import sections_of
 
     for section in sections_of(found):
-        click.echo(click.style(section.title, bold=True))
+        click.echo(click.style(section.title, bold=True), with_sequences(sys.stdout))
         if section.rows:
             table = Table(
                 *map(escape, section.head), box=None, header_style="dim", pad_edge=False, padding=(0, 2, 0, 0)

@@ -5,6 +5,7 @@ from typing import Any
 
 import click
 
+from groundstation.appearance.plain_text import one_line
 from groundstation.cli.exits import ExitCode
 from groundstation.cli.numbers import FiniteRange
 from groundstation.errors import OperatorMistake
@@ -61,7 +62,7 @@ def probe(link: str, seconds: float, key_file: str, with_mavsdk: bool) -> int:
         if vehicle.video:
             click.echo(f"  video {vehicle.video}")
         for text in vehicle.texts:
-            click.echo(f"  says: {text}")
+            click.echo(f"  says: {one_line(text)}")
     for reason, count in sorted(opened.rejected.items()):
         click.echo(f"refused: {count} x {reason.replace('_', ' ')}")
     if not found:

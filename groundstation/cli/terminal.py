@@ -6,6 +6,9 @@ from typing import TYPE_CHECKING
 
 import click
 
+from groundstation.appearance.plain_text import plain
+from groundstation.process.standard_streams import with_sequences
+
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
@@ -13,11 +16,17 @@ _WHOLE = 10_000
 
 
 def show(picture: "RenderableType") -> None:
-    """Print a table or drawing of rich; in a pipe or a file nothing is shortened or wrapped."""
-    from rich.console import Console
+    """Print a table or drawing of rich, without control characters of texts in it.
 
-    terminal = Console()
-    (terminal if terminal.is_terminal else Console(width=_WHOLE)).print(picture)
+    In a pipe or a file nothing is shortened or wrapped.
+    """
+    from rich.console import Console
+    from rich.segment import Segment, Segments
+
+    terminal = Console(file=with_sequences(sys.stdout))
+    chosen = terminal if terminal.is_terminal else Console(width=_WHOLE)
+    drawn = (Segment(plain(part.text), part.style) for part in chosen.render(picture) if not part.control)
+    chosen.print(Segments(drawn), end="")
 
 
 def can_be_drawn_on() -> bool:
@@ -34,4 +43,4 @@ def progress(done: int, total: int) -> None:
 def write_over(text: str) -> None:
     """Overwrite the last line if standard error is a terminal; an empty text clears it."""
     if sys.stderr.isatty():
-        click.echo(f"\r\033[K{text}", err=True, nl=False)
+        click.echo(f"\r\033[K{text}", with_sequences(sys.stderr), nl=False)

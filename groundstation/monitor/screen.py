@@ -1,5 +1,6 @@
 """Draws the state on a terminal; without a terminal, prints a line now and then."""
 
+import sys
 from contextlib import ExitStack, suppress
 from types import TracebackType
 from typing import Self
@@ -7,6 +8,7 @@ from typing import Self
 from rich.console import Console
 from rich.live import Live
 
+from groundstation.appearance.plain_text import one_line
 from groundstation.appearance.topology import topology_words
 from groundstation.bus.api import Bus, Subscription
 from groundstation.bus.topics import (
@@ -26,6 +28,7 @@ from groundstation.bus.topics import (
 from groundstation.monitor.alarms import alarms_of
 from groundstation.monitor.state import Cast, MonitorState
 from groundstation.monitor.table import render
+from groundstation.process.standard_streams import with_sequences
 from groundstation.time_units import NEVER_NS, NS_PER_MS, NS_PER_S
 
 DRAW_PERIOD_NS = 250 * NS_PER_MS
@@ -37,7 +40,7 @@ class Screen:
 
     def __init__(self, bus: Bus, cast: Cast, now_ns: int, console: Console | None = None, hint: str = "") -> None:
         self.state = MonitorState(cast=cast, hint=hint, started_ns=now_ns)
-        self._console = console or Console()
+        self._console = console or Console(file=with_sequences(sys.stdout))
         self._newest = bus.subscribe(
             (ESTIMATE, PLAN, VEHICLE_STATUS, CAMERA_STATUS, PROCESS_STATUS, LEASE, SIM_STATUS, SUSPICION), newest=True
         )
@@ -91,4 +94,4 @@ def line(state: MonitorState, now_ns: int) -> str:
     plan = [f"topology {topology_words(state.plan.message.topology)}"] if state.plan else []
     alarms = [f"! {alarm.text}" for alarm in alarms_of(state, now_ns)]
     seconds = (now_ns - state.started_ns) / 1e9
-    return f"{seconds:5.0f} s  " + "; ".join([*vehicles, *plan, *alarms])
+    return f"{seconds:5.0f} s  " + one_line("; ".join([*vehicles, *plan, *alarms]))

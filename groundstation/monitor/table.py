@@ -8,6 +8,7 @@ from rich.table import Table
 from rich.text import Text
 
 from groundstation.appearance.cost import cost_text
+from groundstation.appearance.plain_text import one_line
 from groundstation.appearance.topology import topology_words
 from groundstation.bus.messages import OPERATOR, AckStage, EntityEstimate, Event, Lifecycle, Severity
 from groundstation.control.unseen_targets import TELL_AFTER_S, unseen_words
@@ -68,7 +69,12 @@ def render(state: MonitorState, now_ns: int) -> RenderableType:
     if state.cameras:
         parts.append(_cameras(state, now_ns))
     parts += [_processes(state, now_ns), Text(), *_events(state, now_ns)]
-    return Group(*parts)
+    return Group(*(_plain(part) if isinstance(part, Text) else part for part in parts))
+
+
+def _plain(text: Text) -> Text:
+    text.plain = one_line(text.plain)
+    return text
 
 
 def _title(state: MonitorState, now_ns: int) -> Text:
@@ -119,7 +125,7 @@ class _Entities:
                 min_width=max(map(len, _MODE_STYLES)) if title == _MODE else None,
             )
         for row in self._rows():
-            table.add_row(*(row[index] for index in kept))
+            table.add_row(*(_plain(row[index]) for index in kept))
         return table
 
     def _rows(self) -> Iterator[tuple[Text, ...]]:

@@ -4,6 +4,7 @@ from rich.console import Group, JustifyMethod, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from groundstation.appearance.plain_text import one_line
 from groundstation.appearance.topology import topology_words
 from groundstation.recording.part_names import shown
 from groundstation.report.compare import differences, labels
@@ -28,7 +29,7 @@ def summary(report: RunReport) -> RenderableType:
     parts += _happenings(report.findings.happenings)
     parts += [Text(f"  doubt: {doubt}", style="yellow") for doubt in report.findings.trust.doubts[:_DOUBTS_SHOWN]]
     for line in report.figures.loud_events[-5:]:
-        parts.append(Text(f"  {line}", style="yellow"))
+        parts.append(Text(f"  {one_line(line)}", style="yellow"))
     for line in report.damage[:3]:
         parts.append(Text(f"  recording: {line}", style="dim"))
     parts.append(Text(f"  {shown(report.run_dir)}: {HTML_NAME}, {JSON_NAME}, {PLOT_NAME}", style="dim"))
@@ -103,7 +104,8 @@ def _details(report: RunReport) -> Text:
 def _happenings(found: list[Happening]) -> list[RenderableType]:
     """Return the first faults and reactions, and the number of further ones."""
     lines: list[RenderableType] = [
-        Text(f"  {item.line}", style="red" if item.ended_flight else "yellow") for item in found[:_HAPPENINGS_SHOWN]
+        Text(f"  {one_line(item.line)}", style="red" if item.ended_flight else "yellow")
+        for item in found[:_HAPPENINGS_SHOWN]
     ]
     if len(found) > _HAPPENINGS_SHOWN:
         lines.append(Text(f"  {len(found) - _HAPPENINGS_SHOWN} more: {HTML_NAME}, Safety", style="dim"))

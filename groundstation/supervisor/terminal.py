@@ -5,9 +5,9 @@ import queue
 import threading
 import time
 
+from groundstation.appearance.plain_text import plain
+
 _STDOUT = 1
-# Names of members and texts of devices may hold sequences that clear or forge a terminal's lines.
-_CONTROLS = dict.fromkeys({*range(0x20), *range(0x7F, 0xA0)} - {*b"\n\t"}, "\N{REPLACEMENT CHARACTER}")
 
 
 class Terminal:
@@ -27,7 +27,7 @@ class Terminal:
             self._kept = [*self._kept[-200:], text]
             return
         try:
-            self._lines.put_nowait(text.translate(_CONTROLS).encode(errors="replace") + b"\n")
+            self._lines.put_nowait(plain(text).encode(errors="replace") + b"\n")
         except queue.Full:
             return
 

@@ -21,6 +21,19 @@ from groundstation.monitor.table import render
 DOCS = Path(__file__).parents[3] / "docs"
 
 
+def test_texts_of_devices_cannot_command_the_terminal(world: World) -> None:
+    forged = "\x1b[2J\x1b]0;owned\x07\nall is well\x9b1A"
+    world.say(t.EVENT, m.Event(header=world.header("drone_1"), severity=m.Severity.ERROR, text=forged, remedy=forged))
+    world.vehicle(f"drone_9{forged}", detail=forged, lands_in_s=6.0)
+    world.camera(f"ceiling{forged}", connected=False, detail=forged)
+    world.screen._console.width = 400
+    assert "owned" in world.text()
+    drawn = world.output.getvalue() + line(world.state, NOW)
+    assert "\ufffd[2J\ufffd]0;owned\ufffd\ufffdall is well\ufffd1A" in drawn
+    assert all(sign not in drawn for sign in ("\x1b[2J", "\x1b]0", "\x07", "\x9b"))
+    assert all(not row.strip().startswith("all is well") for row in drawn.splitlines())
+
+
 def test_an_empty_state_is_drawn(world: World) -> None:
     text = world.text()
     assert "no word yet" in text and "no plan yet" in text

@@ -8,7 +8,7 @@ from groundstation.time_units import NS_PER_S
 
 # A page that reconnects within this time is still the operator.
 _GRACE_NS = 15 * NS_PER_S
-# Prefix of another console's name: no page here has it.
+# Prefix of another console's name: no page here has it, whose id holds no such signs.
 _ELSEWHERE = "elsewhere: "
 
 

@@ -26,7 +26,7 @@ class Hello(FromPage, frozen=True):
     """
 
     token: Annotated[str, msgspec.Meta(max_length=64)]
-    client: Annotated[str, msgspec.Meta(min_length=4, max_length=40)]
+    client: Annotated[str, msgspec.Meta(min_length=4, max_length=40, pattern="^[A-Za-z0-9-]+$")]
     sent_ms: PageTime | None = None
 
 

@@ -99,10 +99,9 @@ class Sessions:
         return self.operator_lock.client == hello.client and self._has_token(hello)
 
     def summary(self, now_ns: int) -> dict[str, Any]:
-        """Return the viewers and the operator."""
+        """Return the viewers and the operator's name; its page's id is its right, which no other page may learn."""
         return {
-            "operator": self.operator_lock.client,
-            "operator_name": self.operator_lock.name,
+            "operator": self.operator_lock.name,
             "viewers": len(self.viewers),
             "lease": self.desk.lease_holder(now_ns),
         }
@@ -185,13 +184,8 @@ class Sessions:
         if order.run != self._run:
             self._refuse(viewer, "other_run", f"{order.verb} was given for another run and was dropped", order.ref)
             return
-        if not order.verb.stops:
-            if not self.operator_lock.may_start(viewer.client):
-                self._refuse(
-                    viewer, "not_operator", f"{self.operator_lock.name} is the operator: take over first", order.ref
-                )
-                return
-            self.operator_lock.take(viewer.client, viewer.name)
+        if not order.verb.stops and not self._operates(viewer, order.ref):
+            return
         now_ns = clock.now_ns()
         # A page cannot know how long an order was under way, or waited here. What it does not know of the server's time
         # counts for a stop and against a start: a fresh stop must not be refused because news reach its page late.
@@ -201,6 +195,14 @@ class Sessions:
         problem = self.desk.give(order.verb, order.drones, given, now_ns)
         if problem:
             self._refuse(viewer, "order", problem, order.ref)
+
+    def _operates(self, viewer: PageConnection, ref: str = "") -> bool:
+        """Make a viewer the operator unless another one is, which it is told; returns whether it is."""
+        if not self.operator_lock.may_start(viewer.client):
+            self._refuse(viewer, "not_operator", f"{self.operator_lock.name} is the operator: take over first", ref)
+            return False
+        self.operator_lock.take(viewer.client, viewer.name)
+        return True
 
     def _take_over(self, viewer: PageConnection) -> None:
         replaced = self.operator_lock.take(viewer.client, viewer.name)
@@ -220,6 +222,8 @@ class Sessions:
         name = message.target or self._targets[0]
         if name not in self._targets:
             self._refuse(viewer, "unknown_target", f"there is no target {name}")
+            return
+        if not self._operates(viewer):
             return
         header = self._bus.header(name)
         match message:

@@ -23,6 +23,7 @@ from groundstation.errors import MessageError
         ("[]", "malformed"),
         ('{"type":"order"}', "malformed"),
         ('{"type":"hello","token":"a","client":"abcd","more":1}', "malformed"),
+        ('{"type":"hello","token":"a","client":"elsewhere: console_2"}', "malformed"),
         ('{"type":"place","x_m":1e9,"y_m":0}', "malformed"),
         ('{"type":"drive","speed_m_s":NaN,"turn_rad_s":0}', "malformed"),
         (land().replace("LAND", "EXPLODE"), "malformed"),

@@ -259,7 +259,8 @@ def test_one_operator_at_a_time_and_anybody_may_stop() -> None:
     assert [command.verb for command in room.commands()] == [m.Verb.TRACK, m.Verb.LAND]
     assert "viewer 1 is the operator" in room.says(second) and '"ref":"mine"' in room.says(second)
     room.sessions.handle(second, TakeOver())
-    assert room.sessions.summary(room.now_ns)["operator"] == "client-2"
+    told = room.sessions.summary(room.now_ns)
+    assert told["operator"] == "viewer 2" and "client" not in f"{told}", "whoever knew that id would be the operator"
     assert "viewer 2 has taken over from viewer 1" in room.says(first)
     room.sessions.handle(second, Release())
     assert room.sessions.summary(room.now_ns)["operator"] == ""
@@ -286,6 +287,11 @@ def test_only_a_simulated_target_is_steered() -> None:
         room.sessions.handle(viewer, message)
     actions = [item.message.action for item in room.steering.drain()]  # type: ignore[union-attr]
     assert actions == ["drive", "place", "path"]
+    other = room.viewer(2)
+    for message in (Drive(0.3, -0.5), Place(1.0, -2.0), FollowPath()):
+        room.sessions.handle(other, message)
+    assert room.steering.drain() == [] and room.sessions.refused == {"not_operator": 3}, "the first who asked steers"
+    assert "viewer 1 is the operator: take over first" in room.says(other)
     several = Room(targets=("one", "other"))
     for steered in (Place(0.0, 0.0), Place(1.0, 1.0, target="other"), Place(1.0, 1.0, target="drone_1")):
         several.sessions.handle(several.viewer(1), steered)

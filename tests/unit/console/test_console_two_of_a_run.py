@@ -41,7 +41,7 @@ class Console:
 
     @property
     def operator(self) -> str:
-        return str(self.server.sessions.summary(clock.now_ns())["operator_name"])
+        return str(self.server.sessions.summary(clock.now_ns())["operator"])
 
     @property
     def told(self) -> str:

@@ -205,6 +205,19 @@ def test_a_held_key_drives_a_target_by_the_clock_alone(said: Any) -> None:
     assert (last["speed_m_s"], last["turn_rad_s"]) == (0, 0)
 
 
+def test_only_the_operators_page_steers(said: Any) -> None:
+    script = f"""{LINK}
+    const {{ maySteer }} = await import("./steer.js");
+    store.scene.truth = true;
+    hear(welcome({{ name: "viewer 7" }}));
+    const result = ["viewer 7", "", "viewer 8", "console_laptop_77"].map((operator) => {{
+      store.s.session = {{ operator }};
+      return maySteer();
+    }});
+    """
+    assert said(script) == [True, True, False, False]
+
+
 def test_a_held_key_steps_a_replay_twenty_times_a_second(said: Any) -> None:
     script = f"""{LINK}
     const {{ playbackKey }} = await import("./playback.js");

@@ -4,7 +4,7 @@ import { moment, sinceMs } from "./clock.js";
 import { byId, el, seconds, text } from "./dom.js";
 import { effectOf, effectOnOne, isIdle, mayFail, refusalOf, startEffect } from "./effects.js";
 import { me, send } from "./link.js";
-import { give, mayGive, OVER, ownOrders, roleText, startOwnOrders } from "./own_orders.js";
+import { give, mayGive, mayOperate, OVER, ownOrders, roleText, startOwnOrders } from "./own_orders.js";
 import { forbidden } from "./preflight.js";
 import { ageS, droneNames, replaying, runOver, store } from "./store.js";
 import { askedBy, giver } from "./who.js";
@@ -54,8 +54,8 @@ function holdToPress(button, fire) {
 
 export function showControls() {
   showStops();
-  const session = store.s.session ?? {}, replay = replaying(), mine = session.operator === me.client;
-  text(byId("operator"), replay ? "" : !me.trusted ? "looking only" : !mayGive("TAKEOFF") ? roleText() : `${!session.operator ? "anyone" : mine ? "you" : session.operator_name || "another page"} may start`);
+  const session = store.s.session ?? {}, replay = replaying(), mine = session.operator === me.name;
+  text(byId("operator"), replay ? "" : !me.trusted ? "looking only" : !mayGive("TAKEOFF") ? roleText() : `${!session.operator ? "anyone" : mine ? "you" : session.operator} may start`);
   byId("takeover").hidden = replay || !me.trusted || !mayGive("TAKEOFF") || !session.operator || mine;
   showStarts(barred(session));
 }
@@ -83,7 +83,7 @@ function barred(session) {
   if (!store.connected) return ["no connection", "no connection"];
   if (!me.trusted) return ["looking only", "this page may only look"];
   if (!mayGive("TAKEOFF")) return [`may ${me.role} only`, roleText()];
-  if (session.operator && session.operator !== me.client) return ["another page may", "another page is the operator: take over first"];
+  if (!mayOperate()) return ["another page may", "another page is the operator: take over first"];
   return session.lease ? null : ["station not in charge", "the ground station's main process may not give orders now"];
 }
 

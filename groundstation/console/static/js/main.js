@@ -20,7 +20,7 @@ import { showEvents, showHealth, showProcesses, showTop } from "./status.js";
 import { showPreflight } from "./preflight.js";
 import { playbackKey, showPlayback, startPlayback } from "./playback.js";
 import { listen, startSounds } from "./sounds.js";
-import { ghostPoint, startSteering } from "./steer.js";
+import { ghostPoint, maySteer, startSteering } from "./steer.js";
 import { atOneTime, entities, estimateAge, now, replaying, steerable, store, targetHeight } from "./store.js";
 import { buildTeam, paint, showTeam, startTeam } from "./team.js";
 import { View } from "./view.js";
@@ -170,7 +170,7 @@ addEventListener("keydown", (event) => {
   else if (key === "w") toggleWall();
   else if (key === "m") toggleSound();
   else if (key === "a") toggleLog();
-  else if (key === "p" && steerable()) for (const { name } of store.scene.targets) send("followpath", { target: name });
+  else if (key === "p" && maySteer()) for (const { name } of store.scene.targets) send("followpath", { target: name });
   else if (key === "?") toggleHelp();
   else if (key === "escape") byId("about").close();
 });

@@ -17,6 +17,8 @@ let own = [], count = 0, changed = () => {};
 
 // The server refuses the rest as well: a page of another make may ask for more.
 export const mayGive = (verb) => me.role === "command" || (me.role === "stop" && STOPS.has(verb));
+// Whether this page is the operator's, or nobody's is.
+export const mayOperate = () => [undefined, "", me.name].includes(store.s.session?.operator);
 export const roleText = () => `this device may ${me.role} only`;
 const inShell = (verb) => `groundstation ${verb.toLowerCase().replace("_", "-")} in a shell`;
 const put = (order, state, note = "") => Object.assign(order, { state, note, since: moment() });

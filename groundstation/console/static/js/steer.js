@@ -2,7 +2,8 @@
 // Keys drive the one that was dragged last, the first at the start.
 
 import { byId } from "./dom.js";
-import { me, send } from "./link.js";
+import { send } from "./link.js";
+import { mayGive, mayOperate } from "./own_orders.js";
 import { entity, steerable, store } from "./store.js";
 
 const SPEED_M_S = 0.4, TURN_RAD_S = 1.2, PERIOD_MS = 100, GRAB_PX = 24, PLACE_MS = 100;
@@ -11,6 +12,7 @@ const down = new Set(), pointers = new Map();
 let ghost = null, driving = 0, lastPlaced = 0, held = "";
 
 export const ghostPoint = () => ghost;
+export const maySteer = () => steerable() && mayGive("TAKEOFF") && mayOperate();
 
 function grabbed(view, x, y) {
   return store.scene.targets.find(({ name }) => {
@@ -25,7 +27,7 @@ export function startSteering(canvas, view) {
   canvas.addEventListener("pointerdown", (event) => {
     canvas.setPointerCapture(event.pointerId);
     pointers.set(event.pointerId, [event.offsetX, event.offsetY]);
-    const target = steerable() && me.role === "command" && pointers.size === 1 ? grabbed(view, event.offsetX, event.offsetY) : null;
+    const target = maySteer() && pointers.size === 1 ? grabbed(view, event.offsetX, event.offsetY) : null;
     if (target) [held, ghost] = [target.name, view.world(event.offsetX, event.offsetY)];
   });
   canvas.addEventListener("pointermove", (event) => move(event, view));
@@ -75,7 +77,7 @@ function place() {
 
 function key(event, view) {
   if (event.ctrlKey || event.altKey || event.metaKey) return;
-  if (event.key in KEYS && steerable() && me.role === "command") { event.preventDefault(); press(event.key); }
+  if (event.key in KEYS && maySteer()) { event.preventDefault(); press(event.key); }
   else if (event.key === "+" || event.key === "=") view.zoom(1.2);
   else if (event.key === "-") view.zoom(1 / 1.2);
   else if (event.key === "0") view.fit();
@@ -92,7 +94,7 @@ function press(name) {
 function drive() {
   clearInterval(driving);
   const [forward, left] = [...down].reduce(([a, b], name) => [a + KEYS[name][0], b + KEYS[name][1]], [0, 0]);
-  const order = () => send("drive", { speed_m_s: forward * SPEED_M_S, turn_rad_s: left * TURN_RAD_S, target: held });
+  const order = () => maySteer() && send("drive", { speed_m_s: forward * SPEED_M_S, turn_rad_s: left * TURN_RAD_S, target: held });
   order();
   if (down.size) driving = setInterval(order, PERIOD_MS);
 }

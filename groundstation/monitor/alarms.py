@@ -111,7 +111,7 @@ def _silent(name: str, age_s: float, status: VehicleStatus) -> Alarm:
     about, text = f"{name} silent", f"{name}: nothing heard for {age_s:.0f} s"
     if status.flight_state in STANDING:
         return Alarm(about, f"{text}, it stood until then", False, _SWITCHED_OFF)
-    return Alarm(about, text, advice="Nothing to do: it hovers, then lands. Stops are sent to it.")
+    return Alarm(about, text, advice=f"Nothing to do: {_left_alone(status)}. Stops are sent to it.")
 
 
 def _down(state: MonitorState, status: VehicleStatus) -> tuple[str, str] | None:
@@ -135,10 +135,13 @@ def _is_heard_in_vain(status: VehicleStatus) -> bool:
 
 
 def _not_believed(status: VehicleStatus) -> tuple[str, str]:
-    does = "it lands" if _lands(status) else "it hovers, then lands"
     told = status.mode == "LANDING" and status.detail and not status.detail.startswith("land")
     words = status.detail if told else "what it says is not believed"
-    return words, f"Nothing to do: {does}. Check its sensors then."
+    return words, f"Nothing to do: {_left_alone(status)}. Check its sensors then."
+
+
+def _left_alone(status: VehicleStatus) -> str:
+    return "it lands" if _lands(status) else "it hovers, then lands"
 
 
 def _lands(status: VehicleStatus) -> bool:

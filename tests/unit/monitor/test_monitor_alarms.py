@@ -89,6 +89,14 @@ def test_a_silent_driver_of_a_drone_that_stands_is_said_to_have_stood(world: Wor
     assert found["tracker: no estimate for 0.5 s"].advice == "Nothing to do now: nobody is known to fly."
 
 
+def test_a_drone_that_falls_silent_in_its_landing_lands(world: World) -> None:
+    for mode, state in (("LANDING", m.FlightState.FLYING), ("TRACK", m.FlightState.LANDING)):
+        world.vehicle("drone_1", mode, age_s=2.0, flight_state=state)
+        world.text()
+        (silent,) = alarms_of(world.state, NOW)
+        assert silent.advice == "Nothing to do: it lands. Stops are sent to it."
+
+
 @pytest.mark.parametrize("others", [m.FlightState.FLYING, m.FlightState.LANDED])
 def test_motors_that_were_cut_ask_to_stay_away_while_others_fly(world: World, others: m.FlightState) -> None:
     """A MAVLink vehicle whose motors were cut reports that it stands."""

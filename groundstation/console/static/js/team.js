@@ -4,7 +4,7 @@ import { batteryWords, lastsWords } from "./batteries.js";
 import { byId, el, seconds, svg, text } from "./dom.js";
 import { ellipse95 } from "./geometry.js";
 import { dutyOf } from "./duty.js";
-import { aloft, doing, isBlind, isDown, isLost, landsIn, modeOf, modeWord, namedOrCounted, up } from "./glance.js";
+import { aloft, doing, isBlind, isDown, isLost, landsIn, modeOf, modeWord, namedOrCounted, unsure, up } from "./glance.js";
 import { withShortNames } from "./names.js";
 import { give } from "./own_orders.js";
 import { colourOf, isAgain } from "./palette.js";
@@ -112,8 +112,9 @@ function levelOf(status) {
 
 // Of a vehicle that is not heard it is known what its driver does by itself.
 function unheardWords(name) {
-  if (!up([name]).length) return "It is not heard; it stood until then.";
-  return `It is not heard: it ${store.s.vehicles[name].mode === "LANDING" ? "was landing" : "hovers, then lands by itself"}. Stops are sent to it.`;
+  if (!up([name]).length && !unsure([name]).length) return "It is not heard; it stood until then.";
+  const { mode, flight } = store.s.vehicles[name];
+  return `It is not heard: it ${[mode, flight].includes("LANDING") ? "lands" : "hovers, then lands by itself"}. Stops are sent to it.`;
 }
 
 function showDuty(node, name, silent) {

@@ -111,7 +111,7 @@ class FakeFlight(threading.Thread):
         return here and subject not in self.unseen_s
 
     def flying(self) -> list[str]:
-        return [name for name in self.drones if self.modes[name] not in ("LANDED", "CUT")]
+        return [name for name in self.drones if self.modes[name] not in ("LANDED", "CUT", "CONNECTING")]
 
     # -- publishing ---
 

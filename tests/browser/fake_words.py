@@ -3,6 +3,7 @@
 from groundstation.bus import messages as m
 
 STATES = {
+    "CONNECTING": m.FlightState.UNKNOWN,
     "LANDED": m.FlightState.LANDED,
     "CUT": m.FlightState.LANDED,
     "LANDING": m.FlightState.LANDING,

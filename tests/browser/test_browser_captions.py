@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 from fake_flight import DRONES, TARGET, FakeFlight
+from layout import resize, whole
 from situations import SITUATIONS
 
 from groundstation.bus import messages as m
@@ -110,6 +111,31 @@ def test_silent_drones_are_described_alike_in_all_captions(stage: Any) -> None:
     for name in DRONES:
         assert page.there(f"{name}-duty").inner_text().startswith("It is not heard: it hovers, then lands by itself.")
         assert page.there(f"{name}-land").inner_text() == "Land\nif it hears"
+
+
+def test_a_drone_that_falls_silent_in_its_landing_lands_in_all_words(stage: Any) -> None:
+    SITUATIONS["all_land"](stage.flight)
+    page = stage.open()
+    page.wait(lambda s: page.there("drone_1-mode").inner_text() == "landing")
+    stage.flight.mute = {"drone_1"}
+    page.wait(lambda s: page.there("drone_1-duty").inner_text() == "It is not heard: it lands. Stops are sent to it.")
+    page.wait(lambda s: "Nothing to do: it lands. Stops are sent" in page.there("banners").text_content())
+
+
+def test_drones_that_were_never_heard_are_not_called_safe_on_the_ground(large_stage: Any) -> None:
+    flight = large_stage.flight
+    flight.modes, flight.battery = dict.fromkeys(flight.drones, "CONNECTING"), {}
+    page = large_stage.open()
+    page.wait(lambda s: page.there("safety").inner_text() == "WATCH")
+    said = "Not every drone has been heard yet: it is not known whether 8 drones fly."
+    page.wait(lambda s: page.there("banners").inner_text() == said)
+    assert page.there("verdict").inner_text().startswith("It is not known whether 8 drones fly. TAKE OFF")
+    assert page.there("hold").inner_text() == "HOLD\nif one flies" and page.there("team-mode").inner_text() == "UNKNOWN"
+    assert page.there("track").inner_text() == "TRACK\nnot now: not heard"
+    for size in ((1440, 900), (390, 844)):
+        resize(page, size)
+        assert whole(page) == [], size
+    page.shot("never_heard")
 
 
 def test_hold_tells_that_drones_land_without_the_tracker_also_while_one_is_not_heard(stage: Any) -> None:

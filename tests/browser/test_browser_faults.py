@@ -3,6 +3,7 @@
 from typing import Any
 
 import pytest
+from layout import resize, whole
 from situations import SITUATIONS
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
@@ -27,6 +28,9 @@ def test_a_part_that_fails_leaves_alarms_and_stops_as_they_are_and_is_an_alarm(s
     fault.wait_for(timeout=5000)
     assert fault.inner_text().startswith("PAGE FAULT: bar may show what was") and "reload" in fault.inner_text()
     assert page.there("safety").inner_text() == "ACT"
+    for size in ((390, 844), (1440, 900)):
+        resize(page, size)
+        assert whole(page) == [], size
     stage.flight.battery["drone_2"] = 0.18
     page.wait(lambda s: "battery 18%" in page.there("banners").text_content())
     page.wait(lambda s: page.there("drone_2-battery").inner_text() == "18 % low")

@@ -3,12 +3,12 @@
 from typing import Any
 
 import pytest
-from clipping import clipped, covered, overhanging
+from clipping import clipped, covered
 from fake_flight import DRONES, TARGET, FakeFlight
-from fonts import REMEMBER, small
+from fonts import REMEMBER
+from layout import resize, whole
 from on_demand import on_demand
 from places import boxes, moved
-from seen_page import Seen
 from situations import SITUATIONS
 
 from groundstation.bus.messages import RUN, Severity
@@ -17,11 +17,6 @@ pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 USUAL, FURTHER = ((1440, 900), (390, 844)), ((1024, 768), (2560, 1440))  # a desk's and a phone's; on demand
 SIZES = [*USUAL, *on_demand(FURTHER)]
-
-
-def resize(page: Seen, size: tuple[int, int]) -> None:
-    page.page.set_viewport_size({"width": size[0], "height": size[1]})
-    page.page.wait_for_timeout(300)  # until the page has chosen the texts that fit
 
 
 def ten_alarms(flight: FakeFlight) -> None:
@@ -59,14 +54,6 @@ def test_nothing_moves_while_alarms_and_orders_come(stage: Any, size: tuple[int,
     assert page.page.locator(".banner:visible").count() > 1
     assert moved(page, before) == {}
     page.shot(f"alarms_open_{size[0]}")
-
-
-def whole(page: Seen) -> list[str]:
-    """Return the faults of the page's layout: clipped, covered, too small, or wider than the window."""
-    wide = page.page.evaluate(
-        "() => document.documentElement.scrollWidth > innerWidth ? ['wider than the window'] : []"
-    )
-    return [*clipped(page.page), *overhanging(page.page), *covered(page.page), *small(page.page), *wide]
 
 
 @pytest.mark.parametrize("size", SIZES)

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from layout import resize, whole
 from seen_page import eventually
 from situations import SITUATIONS
 from stalling_pipe import StallingPipe
@@ -67,6 +68,10 @@ def test_a_link_that_delays_what_comes_is_named_and_passes_stops_on(
         "card-drone_1"
     ).get_attribute("class")
     page.shot("slow_link")
+    for size in ((1440, 900), (390, 844)):
+        resize(page, size)
+        assert whole(page) == [], size
+    page.shot("slow_link_phone")
     page.wait(lambda s: any(order["state"] == "confirmed" for order in s["orders"]))
     assert [command.verb for command in stage.flight.commands] == ["HOLD"]
     assert "too late" not in page.there("orders").inner_text()

@@ -10,7 +10,7 @@ export function refusalOf(verb, names = droneNames()) {
   const risen = up(names).some((name) => modeNow(name) !== "TAKING_OFF");
   if (modes().includes("TAKING_OFF") && (verb === "TAKEOFF" || !risen)) return "one rises";
   if (verb === "TAKEOFF") return takeOffRefusal(names);
-  if (!aloft()) return "nobody flies";
+  if (!aloft()) return unsure().length ? "not heard" : "nobody flies";
   if (trackerSilent()) return "no tracker";
   const resumes = waiting(names).length;
   if (verb === "RESUME") return resumes ? "" : "none on hold";

@@ -29,6 +29,7 @@ export function teamMode() {
   const soon = up().filter(landsIn), [first] = soon.map(landsIn).sort((a, b) => parseInt(a) - parseInt(b));
   if (soon.length && soon.length === aloft()) return [`LANDS IN ${first}`, "bad", some(soon)];
   const done = CAREFUL.filter(([mode]) => all.includes(mode));
+  if (!done.length && unsure().length) return ["UNKNOWN", "warn", some(unsure())];
   if (!done.length) return [all.length ? "ON GROUND" : "–", "calm"];
   const named = done.map(([mode]) => modeWord(mode)), level = levelOf(...done[0]);
   if (soon.length) return [named[0], level, `${some(soon)} ${soon.length > 1 ? "land" : "lands"} in ${first}`];

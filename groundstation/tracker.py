@@ -51,7 +51,7 @@ class Tracker:
         self.filter = FixedLagFilter(parameters.estimator)
         self.epoch = epoch
         self._clock = clock
-        self.holding = False
+        self.holding = frozenset[str]()
         self.current: PlanResult | None = None
         self.rejected: Counter[str] = Counter()
         self._intake = Intake(self.filter, parameters.estimator.sensors, clock)
@@ -138,8 +138,7 @@ class Tracker:
         self._notices += self._intake.reports.take_notices()
         self._heed_absence(now_ns)
         self._topology = self._topology_now()
-        if self.holding and self.airborne and all(self.converged(name) for name in self.airborne):
-            self.holding = False
+        self.holding &= {name for name in self.airborne if not self.converged(name)}
         self._watch_plan(now_ns)
         self._unlocalised_s = self._find_unlocalised()
         return self._belief
@@ -241,8 +240,8 @@ class Tracker:
     def setpoints(self, now_ns: int) -> dict[str, Limited]:
         """Return each airborne robot's setpoint, limited by the newest belief; robots of unknown place hover."""
         p, airborne = self.parameters, self.airborne
-        if self.holding or self._is_plan_stale(now_ns):
-            return {name: Limited(HOVER, ("hold" if self.holding else "stale plan",)) for name in airborne}
+        if self._is_plan_stale(now_ns):
+            return {name: Limited(HOVER, ("stale plan",)) for name in airborne}
         belief, lookout = self._belief.core(), self.lookout
         unseen_s = {name: self.filter.age_s(name) for name in belief.layout.robots}
         seen_s = [self.filter.age_s(name) for name in self._targets if name not in lookout.missing]
@@ -264,7 +263,7 @@ class Tracker:
             name: limit_setpoint(name, setpoint, belief, now_ns, safety, velocities, drifts)
             for name, setpoint in self._hovering.held(wanted, now_ns, belief, sure_s).items()
         }
-        limited = self._hovering.sent(limited, sure_s)
+        limited = self._hovering.sent(limited, sure_s) | {name: Limited(HOVER, ("hold",)) for name in self.holding}
         for name in drifts.keys() & limited.keys():
             is_obeyed = limited[name].holds or name not in lookout.unmoved
             velocity = np.array(limited[name].setpoint.velocity_m_s) if is_obeyed else np.zeros(3)
@@ -292,7 +291,7 @@ class Tracker:
     def _fault(self, text: str) -> None:
         """Drop the belief, hover, and begin a new epoch: drivers then move again only after an operator's RESUME."""
         self.filter.restart()
-        self.holding = True
+        self.holding = frozenset(self.airborne)
         self.current = None
         self.epoch += 1
         self._unlocalised_s = self._find_unlocalised()

@@ -75,7 +75,7 @@ class Announcer:
                 yaw_rate_rad_s=entry.setpoint.yaw_rate_rad_s,
                 lifetime_ms=self._lifetime_ms,
                 epoch=tracker.epoch,
-                converged=tracker.converged(name) and not tracker.holding,
+                converged=tracker.converged(name) and name not in tracker.holding,
                 holds=entry.holds,
             )
             self._bus.publish(SETPOINT, message)

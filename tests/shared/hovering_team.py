@@ -28,6 +28,7 @@ class Flight:
         self.places = {name: place.copy() for name, place in PLACES.items()}
         self.corrections: list[Any] = []
         self.notices: list[Any] = []
+        self.unseen = set[str]()  # drones outside of the ceiling camera's view
 
     def header(self, entity: str, age_ms: int = 0, clock: str = "here") -> Header:
         self.seq += 1
@@ -68,7 +69,7 @@ class Flight:
             self.now += 20 * MS
             for name in self.places:
                 assert self.ingest(self.odometry(name)) is None
-                if look:
+                if look and name not in self.unseen:
                     assert self.ingest(self.ceiling(name)) is None
                 if onboard:
                     assert self.ingest(self.onboard(name)) is None

@@ -77,4 +77,4 @@ class Plan(Message, frozen=True, kw_only=True):
     solver: SolverReport
     """What the optimiser did."""
     mode: str
-    """`multistart` or `paper`, or HOLD while the tracker's belief is broken."""
+    """`multistart` or `paper`, or HOLD while drones wait to be found after the tracker's belief broke."""

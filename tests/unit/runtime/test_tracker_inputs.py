@@ -224,6 +224,24 @@ def test_a_broken_covariance_means_hold_hover_and_a_new_epoch(tracking: Flight) 
     assert set(t.tracker.belief.layout.robots) == {"drone_1", "drone_2"}
 
 
+def test_after_a_broken_covariance_no_drone_waits_for_one_that_is_not_found(tracking: Flight) -> None:
+    t = tracking
+    t.unseen.add("drone_2")
+    t.tracker.filter._checkpoints.covariances[:] = np.nan
+    t.run(0.02, look=False, onboard=False)
+    assert t.tracker.holding == {"drone_1", "drone_2"}
+    t.run(0.5)
+    assert t.tracker.holding == {"drone_2"} and t.tracker.plan() is not None
+    limited = t.tracker.setpoints(t.now)
+    assert limited["drone_2"].limited_by == ("hold",) and limited["drone_1"].setpoint.phase is FlightMode.TRACK
+    t.fly("drone_2", state=FlightState.LANDED)
+    t.run(0.1)
+    assert not t.tracker.holding
+    t.fly("drone_2")
+    t.run(0.1)
+    assert not t.tracker.holding, "a new take-off has nothing to do with the fault"
+
+
 def test_plan_and_setpoints_follow_from_the_belief(tracking: Flight) -> None:
     plan = tracking.tracker.plan()
     assert plan is not None

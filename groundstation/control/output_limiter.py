@@ -14,6 +14,7 @@ from groundstation.arrays import Array
 from groundstation.control.half_spaces import project
 from groundstation.control.parameters import SafetyParameters
 from groundstation.control.setpoints import Setpoint
+from groundstation.control.view import is_placed
 from groundstation.estimation.belief import JointBelief
 from groundstation.geometry.stabilized_frame import stabilized_from_world, world_from_stabilized
 from groundstation.planning.parameters import MotionLimits
@@ -136,8 +137,7 @@ def _unfit(robot: str, setpoint: Setpoint, belief: JointBelief, now_ns: int, par
         return "not finite"
     if not -0.1 <= (now_ns - belief.stamp_ns) * 1e-9 <= parameters.max_belief_age_s:
         return "stale"
-    variances = _variances(robot, belief)
-    if not max(variances) <= parameters.max_position_std_m**2 or min(variances) < 0:
+    if not is_placed(belief, robot, parameters):
         return "uncertain"
     return "separation" if _coincides(robot, belief) else ""
 

@@ -6,7 +6,7 @@ from groundstation.arrays import Array
 from groundstation.control.excursion import time_left_s
 from groundstation.control.parameters import ControlParameters
 from groundstation.control.stand import Stand
-from groundstation.control.view import spread_m, view_of, way_back_m
+from groundstation.control.view import doubt_m, view_of, way_back_m
 from groundstation.estimation.belief import JointBelief
 from groundstation.sensing.models import Rectangle, SensorSuite
 
@@ -31,7 +31,7 @@ def is_lost(
     """
     if unseen_s > max(parameters.return_soonest_s, parameters.return_within_s):
         return True
-    mean, spread = belief.mean_of(name), spread_m(belief, name)
+    mean, spread = belief.mean_of(name), doubt_m(belief, name)
     if spread <= parameters.return_std_m and unseen_s <= parameters.return_soonest_s:
         return False
     left_s = time_left_s(spread, unseen_s, parameters, velocity_error_m_s)

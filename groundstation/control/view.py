@@ -8,6 +8,7 @@ import numpy as np
 from groundstation.arrays import Array
 from groundstation.control.parameters import SafetyParameters
 from groundstation.estimation.belief import JointBelief
+from groundstation.estimation.layout import EntityKind
 from groundstation.sensing.models import Rectangle, SensorSuite
 
 VIEW_INSET_M = 0.3
@@ -54,19 +55,30 @@ def _places_of_errors(labels: tuple[str, ...]) -> tuple[int, ...]:
     return tuple(labels.index(label) for label in _VELOCITY_ERRORS if label in labels)
 
 
+def doubt_m(belief: JointBelief, name: str) -> float:
+    """Return the standard deviation of a robot's position along its most uncertain axis, up and down included [m]."""
+    return max(spread_m(belief, name), math.sqrt(max(0.0, float(belief.covariance_of(name)[2, 2]))))
+
+
+def is_placed(belief: JointBelief, name: str, parameters: SafetyParameters) -> bool:
+    """Return whether a position is known well enough to fly on, that of a robot in height, too."""
+    axes = 3 if belief.layout.block(name).kind is EntityKind.ROBOT else 2
+    variances = belief.covariance_of(name).diagonal()[:axes].tolist()
+    return all(0.0 <= variance <= parameters.max_position_std_m**2 for variance in variances)
+
+
 def is_localised(belief: JointBelief, name: str, unseen_s: float, parameters: SafetyParameters) -> bool:
     """Return whether a robot is known well enough to fly on.
 
     The velocity of an unseen robot must be known as well: else its position is wrong sooner than its deviation shows.
     """
-    P = belief.covariance_of(name)
     lies = (
         known_velocity_error_m_s(belief, name) > parameters.max_known_velocity_error_m_s
         or velocity_error_m_s(belief, name) > parameters.max_velocity_error_m_s
     )
     if unseen_s > _SEEN_S and lies:
         return False
-    return bool(max(P[0, 0], P[1, 1]) <= parameters.max_position_std_m**2)
+    return is_placed(belief, name, parameters)
 
 
 class Localisation:

@@ -1,13 +1,18 @@
-"""Whether an entity is known well enough to fly on, queried many times of one belief."""
+"""Whether an entity is known well enough to fly on: by one rule for all, queried many times of one belief."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
+from groundstation.control.flight_mode import FlightMode
+from groundstation.control.output_limiter import limit_setpoint
 from groundstation.control.parameters import safety_from_field
+from groundstation.control.setpoints import Setpoint
 from groundstation.control.view import Localisation
 from groundstation.estimation.belief import JointBelief
-from groundstation.estimation.layout import ROBOT_CORE, EntityKind, StateLayout
+from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, StateLayout
 from groundstation.settings.load import load_field
 from groundstation.settings.resolved import resolved_field
 
@@ -30,3 +35,20 @@ def test_each_belief_and_each_time_out_of_sight_is_judged_for_itself() -> None:
         assert localisation.holds(false, "drone_1", 0.1)
         assert not localisation.holds(false, "drone_1", 2.0)
         assert localisation.holds(false, "drone_1", 0.1)
+
+
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize(("share", "known"), [(0.99, True), (1.01, False)])
+def test_whom_the_limiter_stops_for_its_place_is_not_localised(axis: int, share: float, known: bool) -> None:
+    """Else it would hover for ever, its height unknown: only a robot that is not localised lands or flies back."""
+    variances = np.full(len(LABELS), 0.05**2)
+    variances[axis] = (share * SAFETY.max_position_std_m) ** 2
+    at, fly = replace(belief(0.05), covariance=np.diag(variances)), Setpoint((0.1, 0.0, 0.0), 0.0, FlightMode.TRACK)
+    assert Localisation(SAFETY).holds(at, "drone_1", 0.0) == known
+    assert ("uncertain" in limit_setpoint("drone_1", fly, at, at.stamp_ns, SAFETY).limited_by) != known
+
+
+def test_the_speed_of_a_target_need_not_be_known() -> None:
+    layout = StateLayout().with_entity("turtlebot", EntityKind.TARGET, TARGET_CORE)
+    at = JointBelief(np.zeros(4), np.diag([0.01, 0.01, 4.0, 4.0]), layout, 1)
+    assert Localisation(SAFETY).holds(at, "turtlebot", 0.0)

@@ -48,6 +48,15 @@ def test_the_way_back_ends_where_it_enters_the_view() -> None:
     assert way_back_m(np.array(list(ways)), VIEW) == pytest.approx(list(ways.values()))
 
 
+def test_a_robot_flies_back_before_its_height_is_too_uncertain() -> None:
+    outside = np.array([3.0, 2.0, 1.3, 0.0])
+    for height_std_m, back in ((0.1, False), (1.1 * CONTROL.return_std_m, True)):
+        variances = np.full(8, 0.1**2)
+        variances[2] = height_std_m**2
+        at = replace(belief(outside), covariance=np.diag(variances))
+        assert is_lost("drone_1", at, CONTROL, SENSORS) == back
+
+
 def test_without_a_view_a_missed_robot_turns_where_it_is() -> None:
     """A circle about its own place, which moves with it, never closed: it flew across the room."""
     stand = return_stand(np.array([1.0, -0.5, 1.2, 0.3]), None, 12.0)

@@ -3,12 +3,14 @@
 import math
 from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from groundstation.bus.messages import EntityEstimate, Message, RelativeObservation, Severity, VehicleStatus, Verdict
 from groundstation.bus.notice import Notice
 from groundstation.control.drift import DriftWatch
+from groundstation.control.flight_mode import FlightMode
 from groundstation.control.hovering import Hovering
 from groundstation.control.joinings import Joinings
 from groundstation.control.lookout import Lookout
@@ -30,7 +32,11 @@ from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.stabilized_frame import world_from_stabilized
 from groundstation.planning.planner import Planner, PlanRequest, PlanResult
 from groundstation.sensing.topology import Topology
+from groundstation.time_units import NS_PER_S
 from groundstation.tracker_parameters import TrackerParameters, parameters_from_field
+
+# An alarm stands for 8 s after the event that raised it.
+_TOLD_AGAIN_NS = 5 * NS_PER_S
 
 
 def tracker_from_field(field: ResolvedField, clock: str, epoch: int) -> "Tracker":
@@ -60,7 +66,7 @@ class Tracker:
         self._localisation = Localisation(parameters.safety)
         self._hovering = Hovering(level=parameters.control.fed)
         self._topology = Topology(())
-        self._plan_stale = False
+        self._told_stale_ns: int | None = None
         self._drifts: defaultdict[str, DriftWatch] = defaultdict(DriftWatch)
         self._belief = self.filter.belief()
         self._unlocalised_s: Mapping[str, float] = {}
@@ -240,9 +246,10 @@ class Tracker:
     def setpoints(self, now_ns: int) -> dict[str, Limited]:
         """Return each airborne robot's setpoint, limited by the newest belief; robots of unknown place hover."""
         p, airborne = self.parameters, self.airborne
-        if self._is_plan_stale(now_ns):
-            return {name: Limited(HOVER, ("stale plan",)) for name in airborne}
-        belief, lookout = self._belief.core(), self.lookout
+        belief, lookout, plan = self._belief.core(), self.lookout, self.current
+        stale = self._is_plan_stale(now_ns)
+        if plan is not None and stale:
+            plan = plan.halted(belief)  # ways back and searches need none
         unseen_s = {name: self.filter.age_s(name) for name in belief.layout.robots}
         seen_s = [self.filter.age_s(name) for name in self._targets if name not in lookout.missing]
         sure = (n for n, age_s in self.unlocalised_s().items() if age_s == 0.0 and not self.filter.contradicted(n))
@@ -257,13 +264,16 @@ class Tracker:
             lambda robots, targets: lookout.stands(robots, targets, belief), lookout.velocity_errors_m_s, drifts,
             lookout.unsteered, {n: self._tied_age_s(n) for n in belief.layout.robots}, velocities,
             {n: self._roots.helped_age_s(n) for n in belief.layout.robots})  # fmt: skip
-        wanted = setpoints_from_plan(self.current, belief, airborne, p.control, p.sensors, sight)
+        wanted = setpoints_from_plan(plan, belief, airborne, p.control, p.sensors, sight)
         safety = self._hovering.within(p.safety)
         limited = {
             name: limit_setpoint(name, setpoint, belief, now_ns, safety, velocities, drifts)
             for name, setpoint in self._hovering.held(wanted, now_ns, belief, sure_s).items()
         }
         limited = self._hovering.sent(limited, sure_s) | {name: Limited(HOVER, ("hold",)) for name in self.holding}
+        for name, entry in limited.items() if stale else ():
+            if entry.setpoint.phase is FlightMode.TRACK:
+                limited[name] = replace(entry, limited_by=(*entry.limited_by, "stale plan"))
         for name in drifts.keys() & limited.keys():
             is_obeyed = limited[name].holds or name not in lookout.unmoved
             velocity = np.array(limited[name].setpoint.velocity_m_s) if is_obeyed else np.zeros(3)
@@ -276,11 +286,12 @@ class Tracker:
         return self.current is not None and now_ns - self.current.stamp_ns > limit_ns
 
     def _watch_plan(self, now_ns: int) -> None:
-        stale = self._is_plan_stale(now_ns)
-        if stale and not self._plan_stale:
-            text = f"no new plan for {self.parameters.control.max_plan_age_s:g} s: drones hover"
+        if not self._is_plan_stale(now_ns):
+            self._told_stale_ns = None
+        elif self._told_stale_ns is None or now_ns - self._told_stale_ns >= _TOLD_AGAIN_NS:
+            text = f"no new plan for {self.parameters.control.max_plan_age_s:g} s: drones that track hover"
             self._notices.append(Notice(Severity.ERROR, text, "they go on with the next plan; land them if none comes"))
-        self._plan_stale = stale
+            self._told_stale_ns = now_ns
 
     def _topology_now(self) -> Topology:
         flying = [name for name in self._belief.layout.robots if self.filter.airborne(name)]

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from inspect import signature
 from typing import Any, ClassVar
 
@@ -63,6 +63,12 @@ class PlanResult:
     def warm_start(self) -> dict[str, Array]:
         """Return the controls, each followed by the height (4 per robot), as the start of the next plan."""
         return {name: np.append(u, self.heights[name]) for name, u in self.controls.items()}
+
+    def halted(self, belief: JointBelief) -> "PlanResult":
+        """Return the plan that keeps each robot where the belief has it."""
+        names = [name for name in self.controls if name in belief.layout]
+        heights = {name: float(belief.mean_of(name)[2]) for name in names}
+        return replace(self, controls={name: np.zeros(HEIGHT) for name in names}, heights=heights)
 
 
 @dataclass(slots=True)

@@ -38,6 +38,7 @@ from groundstation.bus.topics import (
     VEHICLE_STATUS,
     Topic,
 )
+from groundstation.control.flight_mode import FlightMode
 from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.rotations import base_from_tilted_optical
 from groundstation.replay.difference import first_difference
@@ -66,6 +67,7 @@ class Lab:
         self.tape = self.listener.subscribe([ODOMETRY, OBSERVATION, VEHICLE_STATUS])
         self.tracking = Tracking(MemoryBus(exchange, "lab", "tracker"), TrackerSection(field, 2))
         self.now = clock.now_ns()
+        self.sees_target = True
         self.rng = np.random.default_rng(1)
 
     def send(self, topic: Topic, source: str, make: Any, age_ms: int = 0, entity: str = "") -> None:
@@ -80,6 +82,7 @@ class Lab:
             position = (x + noise[0], -y + noise[1], 4.12 - z + noise[2])
             if look:
                 self.send(OBSERVATION, "ceiling", lambda h, n=name, p=position: _sight(h, n, p), age_ms=120)
+            if look and self.sees_target:
                 base = TARGET - np.array([x + 0.09, y, z])
                 relative = tuple((base_from_tilted_optical(math.radians(45)).T @ base + noise).tolist())
                 self.send(OBSERVATION, name, lambda h, p=relative: _sight(h, "turtlebot", p), age_ms=150)
@@ -147,11 +150,32 @@ def test_drones_hover_once_the_planner_is_silent(lab: Lab) -> None:
     lab.run(60, pause_s=0.002)
     lab.tracking.close()  # like a planner that hangs: a submitted task never returns
     lab.messages()
-    lab.run(75)
+    lab.run(160)  # in the meantime the limiter forgets that these drones have not obeyed
     setpoints: list[VelocitySetpoint] = lab.messages()["setpoint"]
     assert any(any(m.velocity_m_s) for m in setpoints[:20]), "the last plan's controls are flown on at first"
     assert {m.velocity_m_s for m in setpoints[-20:]} == {(0.0, 0.0, 0.0)}
-    assert [n.text for n in lab.tracking.notices if "plan" in n.text] == ["no new plan for 1 s: drones hover"]
+    told = ["no new plan for 1 s: drones that track hover"]
+    assert [n.text for n in lab.tracking.notices if "plan" in n.text] == told
+    lab.run(250)
+    assert [n.text for n in lab.tracking.notices if "plan" in n.text] == 2 * told, "the alarm stands as long as this"
+
+
+def test_without_a_planner_drones_search_and_return_on(lab: Lab) -> None:
+    lab.run(60, pause_s=0.002)
+    lab.tracking.close()
+    lab.run(60)
+    lab.sees_target = False
+    lab.run(round(50 * (lab.tracking.tracker.parameters.control.lost_after_s + 1.0)))
+    lab.messages()
+    lab.run(10)
+    assert {m.velocity_m_s for m in lab.messages()["setpoint"]} != {(0.0, 0.0, 0.0)}, "the target is searched for"
+    tracker = lab.tracking.tracker
+    phases = {one.setpoint.phase for one in tracker.setpoints(lab.now).values()}
+    assert FlightMode.SEARCH in phases and FlightMode.TRACK not in phases
+    lab.run(round(50 * (tracker.parameters.control.return_within_s + 1.0)), look=False)
+    limited = tracker.setpoints(lab.now).values()
+    assert {one.setpoint.phase for one in limited} == {FlightMode.RETURN}
+    assert not any("stale plan" in one.limited_by for one in limited)
 
 
 def test_a_replayed_journal_says_the_same_to_the_bit(lab: Lab, lab_field: ResolvedField) -> None:

@@ -14,6 +14,7 @@ const LIMITS = {
   speed: "its speed limit",
   "yaw rate": "how fast it may turn",
   stale: "an old estimate",
+  "stale plan": "an old plan",
   uncertain: "an uncertain place",
   unknown: "an unknown place",
 };

@@ -62,7 +62,7 @@ class VehicleHost:
         self._seen, self._control_error = SeenVelocity(), ControlErrorMonitor()
         self._told: WatchdogDecision | None = None
         self._statuses = self._bus.subscribe([VEHICLE_STATUS], newest=True)
-        self._neighbours = Neighbours(vehicle.name, limits.pad_m, limits.min_separation_m)
+        self._neighbours = Neighbours(vehicle.name, limits.pad_m, limits.min_separation_m, limits.max_speed_m_s)
         self._localised_ns: int | None = None
 
     def call_on_commands(self, wake: Callable[[], None]) -> None:

@@ -18,6 +18,7 @@ from groundstation.control.moment import Sight
 from groundstation.control.output_limiter import Limited, limit_setpoint
 from groundstation.control.root_watch import RootWatch
 from groundstation.control.setpoints import HOVER, setpoints_from_plan
+from groundstation.control.shafts import Shafts
 from groundstation.control.view import Localisation
 from groundstation.errors import EstimatorFault
 from groundstation.estimation.belief import JointBelief
@@ -65,6 +66,7 @@ class Tracker:
         self._joinings = Joinings()
         self._localisation = Localisation(parameters.safety)
         self._hovering = Hovering(level=parameters.control.fed)
+        self._shafts = Shafts(parameters.estimator, parameters.safety)
         self._topology = Topology(())
         self._told_stale_ns: int | None = None
         self._drifts: defaultdict[str, DriftWatch] = defaultdict(DriftWatch)
@@ -110,9 +112,11 @@ class Tracker:
             self.lookout.take(message, message.header.clock == self._clock)
             if isinstance(message, VehicleStatus):
                 self._hovering.take(message, now_ns)
+                self._shafts.hear(message, now_ns)
         if verdict is Verdict.ACCEPTED:
             if not moved:
                 self._roots.take(message, now_ns)
+                self._shafts.see(message, now_ns)
             if isinstance(message, RelativeObservation) and message.header.clock == self._clock:
                 self.mounts.see(message)
                 self.lookout.see(message)
@@ -139,6 +143,7 @@ class Tracker:
         self._corrections += corrections
         self._notices += self._joinings.take(now_ns, corrections, self._intake.ranges.take_joined())
         velocities = {name: self.filter.velocity_of(name) for name in self._belief.layout.robots}
+        self._shafts.advance(self._belief, velocities)
         self._notices += self.mounts.advance(now_ns, velocities, corrections, self.airborne)
         self._notices += self._roots.advance(now_ns, corrections, flying=bool(self.airborne))
         self._notices += self._intake.reports.take_notices()
@@ -265,9 +270,9 @@ class Tracker:
             lookout.unsteered, {n: self._tied_age_s(n) for n in belief.layout.robots}, velocities,
             {n: self._roots.helped_age_s(n) for n in belief.layout.robots})  # fmt: skip
         wanted = setpoints_from_plan(plan, belief, airborne, p.control, p.sensors, sight)
-        safety = self._hovering.within(p.safety)
+        safety, shafts = self._hovering.within(p.safety), self._shafts.around(belief, airborne)
         limited = {
-            name: limit_setpoint(name, setpoint, belief, now_ns, safety, velocities, drifts)
+            name: limit_setpoint(name, setpoint, belief, now_ns, safety, velocities, drifts, shafts)
             for name, setpoint in self._hovering.held(wanted, now_ns, belief, sure_s).items()
         }
         limited = self._hovering.sent(limited, sure_s) | {name: Limited(HOVER, ("hold",)) for name in self.holding}

@@ -6,6 +6,7 @@ Why its half-spaces keep fence and separation for any wanted velocity: docs/expl
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from groundstation.arrays import Array
 from groundstation.control.half_spaces import project
 from groundstation.control.parameters import SafetyParameters
 from groundstation.control.setpoints import Setpoint
+from groundstation.control.shafts import Shaft
 from groundstation.control.view import is_placed
 from groundstation.estimation.belief import JointBelief
 from groundstation.geometry.stabilized_frame import stabilized_from_world, world_from_stabilized
@@ -22,6 +24,9 @@ from groundstation.vectors import Vector3, difference, dot
 
 # No two bodies are this near to each other: if their estimates are, the direction between them is unknown.
 _NO_SIDE_M = 0.1
+# A shorter way has no direction.
+_NOWHERE_M = 1e-6
+_NO_SHAFTS: Mapping[str, Shaft] = MappingProxyType({})
 # Number of sides of a polygon within the circle of the fastest horizontal velocities.
 _ROUND = np.array([(math.cos(a), math.sin(a), 0.0) for a in np.arange(16) * (2.0 * math.pi / 16)])
 # A velocity that was clipped to a limit, or asked for at it, may exceed it by this much.
@@ -59,13 +64,15 @@ def limit_setpoint(
     parameters: SafetyParameters,
     velocities: Mapping[str, Array] | None = None,
     drifts: Mapping[str, Array] | None = None,
+    shafts: Mapping[str, Shaft] = _NO_SHAFTS,
 ) -> Limited:
     """Return the part of a setpoint that is safe to send.
 
     velocities: measured ones [m/s; world], by robot, where known: braking starts later than without. drifts: motion
     beyond the commands [m/s; world], by robot: a robot in it is assumed to drift by up to `drift_m_s` more in any
-    direction, and may be moved away from a wall to counter the drift; None: nothing is added. Each of two robots may
-    use half of the closing speed between them, so that every robot is limited on its own.
+    direction, and may be moved away from a wall to counter the drift; None: nothing is added. shafts: of other robots;
+    they are kept out of at any height. Each of two robots may use half of the closing speed between them, so that every
+    robot is limited on its own.
     """
     reason = _unfit(robot, setpoint, belief, now_ns, parameters)
     if reason:
@@ -75,6 +82,7 @@ def limit_setpoint(
     velocity = world_from_stabilized(clipped, yaw)
     known = velocities or {}
     walls = _fence(robot, belief, parameters, known) + _others(robot, belief, parameters, known)
+    walls += _shafts(robot, belief, parameters, known, shafts)
     drift = None if drifts is None else drifts.get(robot)
     walls = walls if drift is None else [_held_off(wall, drift.tolist(), parameters) for wall in walls]
     if rate:
@@ -154,9 +162,14 @@ def _place(robot: str, belief: JointBelief) -> Vector3:
     return x, y, z
 
 
+def _covariance(robot: str, belief: JointBelief) -> Array:
+    """Return the covariance (3, 3) of a place [m^2]."""
+    return belief.covariance_of(robot)[:3, :3]
+
+
 def _variances(robot: str, belief: JointBelief) -> list[float]:
     """Return the variances of x, y and z [m^2]."""
-    variances: list[float] = belief.covariance_of(robot).diagonal()[:3].tolist()
+    variances: list[float] = _covariance(robot, belief).diagonal().tolist()
     return variances
 
 
@@ -223,11 +236,43 @@ def _others(
         covariance = _relative_covariance(robot, other, belief)
         apart = difference(_place(other, belief), place)
         for gap in (difference(there, rest), apart):
-            normal, distance = _towards(gap, apart)
-            keep = parameters.min_separation_m + parameters.margin_m
-            keep += parameters.sigmas * _spread(covariance, normal)
-            walls.append(_Wall("separation", normal, max(0.0, distance - keep) / (2.0 * max(time, other_time))))
+            walls.append(_apart(gap, apart, covariance, parameters, max(time, other_time)))
     return walls
+
+
+def _shafts(
+    robot: str,
+    belief: JointBelief,
+    parameters: SafetyParameters,
+    velocities: Mapping[str, Array],
+    shafts: Mapping[str, Shaft],
+) -> list[_Wall]:
+    """Return the two upright walls for each other robot's shaft."""
+    rest, time = _braking(robot, belief, parameters, velocities)
+    x, y, _ = _place(robot, belief)
+    walls = []
+    for other, shaft in shafts.items():
+        if other == robot:
+            continue
+        covariance = _covariance(robot, belief) + shaft.variance * np.eye(3)
+        rows: list[Vector3] = covariance.tolist()
+        apart = (shaft.x - x, shaft.y - y, 0.0)
+        # Right above it any direction leads out.
+        apart = apart if math.hypot(*apart) > _NOWHERE_M else (_NOWHERE_M, 0.0, 0.0)
+        for gap in ((shaft.x - rest[0], shaft.y - rest[1], 0.0), apart):
+            walls.append(_apart(gap, apart, rows, parameters, time, shaft.drifted_m))
+    return walls
+
+
+def _apart(
+    gap: Vector3, apart: Vector3, covariance: list[Vector3], parameters: SafetyParameters, time: float,
+    more_m: float = 0.0,
+) -> _Wall:  # fmt: skip
+    """Return the wall that keeps a robot away from another; more_m: to be added to the separation."""
+    normal, distance = _towards(gap, apart)
+    keep = parameters.min_separation_m + parameters.margin_m + more_m
+    keep += parameters.sigmas * _spread(covariance, normal)
+    return _Wall("separation", normal, max(0.0, distance - keep) / (2.0 * time))
 
 
 def _towards(gap: Vector3, apart: Vector3) -> tuple[Vector3, float]:
@@ -238,7 +283,7 @@ def _towards(gap: Vector3, apart: Vector3) -> tuple[Vector3, float]:
     and nothing is left of the distance.
     """
     distance = math.hypot(*gap)
-    if not (distance > 1e-6 and dot(gap, apart) > 0.0):
+    if not (distance > _NOWHERE_M and dot(gap, apart) > 0.0):
         gap, distance = apart, 0.0
     x, y, z = gap
     size = math.hypot(x, y, z)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from groundstation.control.search_height import return_height_m, search_height_m
 from groundstation.field.resolved import ResolvedField
 from groundstation.planning.parameters import MotionLimits, limits_from_field
-from groundstation.vectors import Interval
+from groundstation.vectors import Interval, Vector2
 from groundstation.vehicles import kind_named
 
 _USUAL_LIMITS = MotionLimits()
@@ -78,7 +78,8 @@ class SafetyParameters:
     kept from fence and other robots beyond `sigmas` standard deviations of the belief. drift_m_s: motion beyond the
     commands that may not have been noticed yet; most_drift_m_s: largest drift that is countered.
     max_known_velocity_error_m_s, max_velocity_error_m_s: largest mean and rms error of the odometry, by the belief,
-    with which a robot may fly unseen; robots that fly on our estimate are exempt.
+    with which a robot may fly unseen; robots that fly on our estimate are exempt. pads: where robots take off
+    [x, y; world].
     """
 
     fence: tuple[Interval, Interval, Interval]
@@ -93,6 +94,7 @@ class SafetyParameters:
     drift_m_s: float = 0.05
     most_drift_m_s: float = 0.2
     limits: Mapping[str, MotionLimits] = field(default_factory=dict)
+    pads: Mapping[str, Vector2] = field(default_factory=dict)
 
     def limits_of(self, robot: str) -> MotionLimits:
         """Return a robot's motion limits."""
@@ -131,4 +133,5 @@ def safety_from_field(field: ResolvedField) -> SafetyParameters:
         min_separation_m=safety.min_separation_m,
         max_position_std_m=safety.max_position_std_m,
         limits=limits_from_field(field),
+        pads={name: drone.pad_m for name, drone in field.drones.items()},
     )

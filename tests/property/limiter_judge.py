@@ -34,9 +34,10 @@ def limited(states: TeamStates) -> Told:
     wishes, rates = asked.tolist(), states.yaw_rates.tolist()
     for row in range(len(yaws)):
         at, velocities, drifts = states.belief(row), states.velocities_of(row), states.drifts_of(row)
+        shafts = states.shafts_of(row)
         for i, name in enumerate(states.names):
             wish = Setpoint(tuple(wishes[row][i]), rates[row][i], FlightMode.TRACK)
-            told = limit_setpoint(name, wish, at, 0, SAFETY, velocities, drifts).setpoint
+            told = limit_setpoint(name, wish, at, 0, SAFETY, velocities, drifts, shafts).setpoint
             answers[row, i] = *told.velocity_m_s, told.yaw_rate_rad_s
     return Told(_turned(answers[..., :3], yaws), answers[..., 3])
 

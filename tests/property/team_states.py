@@ -12,6 +12,7 @@ from scipy.sparse import block_diag
 
 from groundstation.arrays import Array, BoolArray
 from groundstation.control.parameters import SafetyParameters
+from groundstation.control.shafts import Shaft
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.layout import ROBOT_CORE, EntityKind, StateLayout
 from groundstation.planning.parameters import MotionLimits
@@ -40,7 +41,8 @@ class TeamStates:
     """States of n teams of r robots, and the wish of each robot.
 
     poses [n, r, 4], covariances [n, 4 r, 4 r]; reported velocities and known drifts [n, r, 3; m/s; world], NaN if
-    absent; wishes [n, r, 3; m/s; world], yaw_rates [n, r; rad/s].
+    absent; wishes [n, r, 3; m/s; world], yaw_rates [n, r; rad/s]. shafts [n, 4]: one of another robot in each, x, y,
+    variance and drift; NaN if there is none.
     """
 
     poses: Array
@@ -49,6 +51,7 @@ class TeamStates:
     drifts: Array
     wishes: Array
     yaw_rates: Array
+    shafts: Array
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -66,6 +69,9 @@ class TeamStates:
 
     def drifts_of(self, row: int) -> dict[str, Array]:
         return _known(self.names, self.drifts[row])
+
+    def shafts_of(self, row: int) -> dict[str, Shaft]:
+        return {} if math.isnan(self.shafts[row, 0]) else {"climbing": Shaft(*self.shafts[row].tolist())}
 
     def rest(self, robot: int) -> tuple[Array, Array]:
         """Return the points of rest [n, 3], and the times within which a barrier may be used up [n]."""
@@ -111,7 +117,16 @@ def random_states(rng: np.random.Generator, count: int, robots: int) -> TeamStat
         np.where(rng.random((count, robots, 1)) < _SAID, drifts, np.nan),
         _wishes(rng, places),
         np.where(rng.random((count, robots)) < 0.5, rng.normal(size=(count, robots)) * 0.8, 0.0),
+        _random_shafts(rng, places[:, 0]),
     )
+
+
+def _random_shafts(rng: np.random.Generator, places: Array) -> Array:
+    """Return shafts near places [n, 3]; NaN in half of the states."""
+    count = len(places)
+    near = places[:, :2] + _anywhere(rng, rng.uniform(0.1, 2.0, count))[:, :2]
+    more = rng.uniform(0.0, (0.1**2, 0.5), (count, 2))
+    return np.where(rng.random((count, 1)) < 0.5, np.concatenate((near, more), axis=1), np.nan)
 
 
 def _anywhere(rng: np.random.Generator, sizes: Array) -> Array:
@@ -136,7 +151,8 @@ def promised(states: TeamStates, robot: int, yaw_rates: Array) -> tuple[Array, A
     They leave room for the drift. They hold for the velocity as sent and as the vehicle carries it along in a turn:
     v + T yaw_rate (z x v).
     """
-    parts = [_fence(states, robot), *(_pair(states, robot, other) for other in states.others(robot))]
+    pairs = (_pair(states, robot, other) for other in states.others(robot))
+    parts = [_fence(states, robot), *pairs, _shaft(states, robot)]
     normals, barriers, times = (np.concatenate(part, axis=1) for part in zip(*parts, strict=True))
     known = np.maximum(np.einsum("nmi,ni->nm", normals, states.drifts[:, robot]), 0.0)
     room = np.minimum(SAFETY.drift_m_s + known, SAFETY.most_drift_m_s)
@@ -173,6 +189,25 @@ def _pair(states: TeamStates, robot: int, other: int) -> tuple[Array, Array, Arr
     times = 2.0 * np.maximum(time_s, its_time_s)
     distances[crossed, 0] = 0.0
     return normals, distances - kept, np.broadcast_to(times[:, None], distances.shape)
+
+
+def _shaft(states: TeamStates, robot: int) -> tuple[Array, Array, Array]:
+    """Return two upright rows, as those of a pair that only this robot can keep apart, at half the speed."""
+    rest, time_s = states.rest(robot)
+    there = np.column_stack((states.shafts[:, :2], np.zeros(len(rest))))
+    level = (1.0, 1.0, 0.0)
+    apart, gap = (there - states.poses[:, robot, :3]) * level, (there - rest) * level
+    crossed = np.einsum("ni,ni->n", gap, apart) <= 0.0
+    gaps = np.stack((np.where(crossed[:, None], apart, gap), apart), axis=1)
+    distances = np.linalg.norm(gaps, axis=2)
+    normals = gaps / distances[..., None]
+    own = states.covariances[:, 4 * robot : 4 * robot + 3, 4 * robot : 4 * robot + 3]
+    variances = np.einsum("nmi,nij,nmj->nm", normals, own, normals, optimize=True) + states.shafts[:, 2, None]
+    kept = SAFETY.min_separation_m + SAFETY.margin_m + SAFETY.sigmas * np.sqrt(variances) + states.shafts[:, 3, None]
+    distances[crossed, 0] = 0.0
+    absent = np.isnan(states.shafts[:, 0])
+    normals[absent], barriers = (1.0, 0.0, 0.0), np.where(absent[:, None], 1e6, distances - kept)
+    return normals, barriers, np.broadcast_to(2.0 * time_s[:, None], distances.shape)
 
 
 def anything_allowed(normals: Array, most: Array) -> BoolArray:

@@ -66,6 +66,15 @@ def flies(state: FlightState, mode: str) -> bool | None:
     return True if state in AIRBORNE - {FlightState.TAKING_OFF} else False if state in STANDING else None
 
 
+def climbs(state: FlightState, mode: str) -> bool:
+    """Return whether a vehicle may be leaving the ground, by state and mode of its VehicleStatus.
+
+    Also one told to take off that has not begun to, or was lost meanwhile.
+    """
+    told = mode == "TAKING_OFF" and flies(state, mode) is not True
+    return told or state is FlightState.TAKING_OFF
+
+
 class VehicleStatus(Message, frozen=True, kw_only=True):
     """Health of one vehicle and of the link to it (5 Hz)."""
 

@@ -12,18 +12,18 @@ S = 1_000_000_000
 ALOFT = (FlightState.FLYING, FlightState.HOVERING, FlightState.TAKING_OFF, FlightState.LANDING)
 
 
-def status(name, state):
-    return VehicleStatus(header=Header(0, "here", name, name, 0), flight_state=state, mode="TRACK")
+def status(name, state, mode="HOVER"):
+    return VehicleStatus(header=Header(0, "here", name, name, 0), flight_state=state, mode=mode)
 
 
-def believed(name, x_m, y_m=0.0, std_m=0.02, z_m=1.0, converged=True):
+def believed(name, x_m, y_m=0.0, std_m=0.02, z_m=1.0, converged=True, velocity_m_s=(0.0, 0.0, 0.0)):
     covariance = tuple(std_m**2 if row == column else 0.0 for row in range(4) for column in range(4))
-    return EntityEstimate(name, "robot", (x_m, y_m, z_m, 0.0), covariance, (0.0,) * 3, converged, 0.1)
+    return EntityEstimate(name, "robot", (x_m, y_m, z_m, 0.0), covariance, velocity_m_s, converged, 0.1)
 
 
-def watch(state=FlightState.FLYING, pad_m=(0.0, 0.0)):
-    neighbours = Neighbours("a", pad_m, 0.6)
-    neighbours.take(status("b", state))
+def watch(state=FlightState.FLYING, pad_m=(0.0, 0.0), mode="HOVER"):
+    neighbours = Neighbours("a", pad_m, 0.6, max_speed_m_s=0.4)
+    neighbours.take(status("b", state, mode))
     return neighbours
 
 
@@ -92,11 +92,31 @@ def test_the_separation_itself_is_far_enough():
     assert neighbours.obstacle(S) == ""
 
 
+@pytest.mark.parametrize("mode", ["HOVER", "HOLD", "LANDING", "CONNECTING"])
+@pytest.mark.parametrize(("towards_m_s", "least_m"), [(0.0, 0.6), (0.4, 0.8), (-0.4, 0.6)])
+def test_one_that_comes_towards_the_pad_needs_its_lag_to_stop(mode, towards_m_s, least_m):
+    neighbours = watch(mode=mode)
+    for x_m, held in ((least_m - 0.01, True), (least_m + 0.01, False)):
+        neighbours.see(S, [believed("b", x_m, std_m=0.0, velocity_m_s=(-towards_m_s, 0.3, 0.0))])
+        assert bool(neighbours.obstacle(S)) == held
+
+
+@pytest.mark.parametrize(("towards_m_s", "least_m"), [(0.0, 0.81), (0.4, 1.01)])
+def test_one_that_tracks_may_still_be_told_to_fly_there(towards_m_s, least_m):
+    neighbours = watch(mode="TRACK")
+    for x_m, held in ((least_m - 0.01, True), (least_m + 0.01, False)):
+        neighbours.see(S, [believed("b", x_m, std_m=0.0, velocity_m_s=(-towards_m_s, 0.0, 0.0))])
+        assert bool(neighbours.obstacle(S)) == held
+    neighbours.take(status("b", FlightState.FLYING, "HOLD"))
+    neighbours.see(S, [believed("b", 0.61, std_m=0.0)])
+    assert neighbours.obstacle(S) == ""
+
+
 def aloft(*entities):
     """Return the warnings of a and b about each other, with both in the air."""
     both = []
     for name in "ab":
-        neighbours = Neighbours(name, None, 0.6)
+        neighbours = Neighbours(name, None, 0.6, 0.6)
         for other in "ab":
             neighbours.take(status(other, FlightState.FLYING))
         neighbours.see(S, entities)

@@ -40,6 +40,7 @@ class FaultKind(StrEnum):
     CAPTURE_SILENT = "capture_silent"
     CAPTURE_FROZEN = "capture_frozen"
     BODY_JUMPED = "body_jumped"
+    BODY_TURNED = "body_turned"
     BODIES_SWAPPED = "bodies_swapped"
     RANGES_SILENT = "ranges_silent"
     RANGES_FROZEN = "ranges_frozen"
@@ -105,6 +106,7 @@ RULES: dict[FaultKind, KindRules] = {
     FaultKind.CAPTURE_SILENT: KindRules(Part.CAPTURE),
     FaultKind.CAPTURE_FROZEN: KindRules(Part.CAPTURE),
     FaultKind.BODY_JUMPED: KindRules(Part.BODY, (-5.0, 5.0), 0.5),
+    FaultKind.BODY_TURNED: KindRules(Part.BODY, (-180.0, 180.0), 180.0),
     FaultKind.BODIES_SWAPPED: KindRules(Part.BODY, other=True),
     FaultKind.RANGES_SILENT: KindRules(Part.RANGING),
     FaultKind.RANGES_FROZEN: KindRules(Part.RANGING),
@@ -133,8 +135,9 @@ class Fault(Section):
     other's address or id, from the start; camera_bumped: a camera is turned by value [deg]; picture_frozen,
     picture_black: its pictures come, and repeat the last one, are black; wrong_board: the entity carries the board of
     the other; capture_silent, capture_frozen: a motion capture system sends nothing, repeats its last frame;
-    body_jumped: all systems have the entity's body value [m] aside; bodies_swapped: they name two bodies for each
-    other; ranges_silent, ranges_frozen: a ranging system sends nothing, repeats each drone's last round; ranges_long:
+    body_jumped: all systems have the entity's body value [m] aside; body_turned: they have it turned by value [deg] in
+    its place, as one whose markers look the same from two sides; bodies_swapped: they name two bodies for each other;
+    ranges_silent, ranges_frozen: a ranging system sends nothing, repeats each drone's last round; ranges_long:
     those of a drone are value [m] too long, as behind a wall; odometry_silent, odometry_frozen, odometry_scaled: a
     target's own odometry ends, repeats its contents, reports value times the speed of its wheels."""
     entity: str
@@ -146,8 +149,8 @@ class Fault(Section):
     """When it heals [s after the simulator is ready]; none: it does not."""
     value: Annotated[float, Field(ge=-1000, le=1000)] | None = None
     """Size of the fault, as `kind` explains; none (uniform_floor: 0): 0.5 s, 0 m/s, 0.5 times, 0.1 m/s^2, 0.5 m/s, 1
-    deg/s, 30 deg, a charge of 1, 0.4 m (body_jumped, ranges_long: 0.5 m), 1 m/s^2, 5 deg, each for the kind of that
-    unit; battery_drop needs a value."""
+    deg/s, 30 deg, a charge of 1, 0.4 m (body_jumped, ranges_long: 0.5 m), 1 m/s^2, 5 deg (body_turned: 180), each for
+    the kind of that unit; battery_drop needs a value."""
     direction_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
     """Direction of value: velocities counter-clockwise from forward, wind from world x; the axis that a camera turns
     about counter-clockwise from its image's right."""

@@ -1,10 +1,14 @@
-"""Judges whether poses of a motion capture system can be true: finds frozen, jumped and exchanged bodies. Pure."""
+"""Judges whether poses of a motion capture system can be true: frozen, jumped, turned, exchanged bodies. Pure."""
 
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import combinations
 
+import numpy as np
+
+from drivers.motion_capture.convert import EntityPose
+from groundstation.arrays import Array
 from groundstation.time_units import NS_PER_S
 from groundstation.vectors import Vector3, difference
 
@@ -14,20 +18,25 @@ _FROZEN_S, _FROZEN_FRAMES = 0.2, 5
 _MARGIN_M = 0.05
 # Jumps that add up to less than this have led back to the start.
 _BACK_M = 0.15
+# No body turns faster, but for a drone that leans; nor does noise turn it. Turns that add up to less led back.
+_TURN_RAD_S, _LEAN_RAD, _BACK_RAD = 5.0, math.radians(30.0), math.radians(25.0)
 # A body out of sight for this long may be anywhere, and may have been renamed.
 _FORGOTTEN_S = 1.0
 
 
 @dataclass(slots=True)
 class _Track:
-    """One body: its last pose, since when it has repeated exactly, and the sum of its jumps [m]."""
+    """One body: its last pose, since when it has repeated exactly, and the sums of its jumps [m] and of its turns."""
 
     stamp_ns: int
     position: Vector3
+    rotation: Array
     since_ns: int
     repeats: int = 0
     offset: Vector3 = (0.0, 0.0, 0.0)
     jumped_m: float = 0.0
+    turn: Array = field(default_factory=lambda: np.eye(3))
+    turned_rad: float = 0.0
 
 
 @dataclass(slots=True)
@@ -38,9 +47,10 @@ class BodyWatch:
     _tracks: dict[str, _Track] = field(default_factory=dict)
     _exchanged: set[frozenset[str]] = field(default_factory=set)
 
-    def look(self, stamp_ns: int, positions: Mapping[str, Vector3]) -> dict[str, str]:
+    def look(self, stamp_ns: int, poses: Mapping[str, EntityPose]) -> dict[str, str]:
         """Take in the tracked bodies of a frame; return for each why it must not be used, or ""."""
         self._forget(stamp_ns)
+        positions = {name: pose.position for name, pose in poses.items()}
         before = {name: track.position for name, track in self._tracks.items()}
         reach_m = {name: self._reach_m(track, stamp_ns) for name, track in self._tracks.items()}
         jumped = {
@@ -48,12 +58,14 @@ class BodyWatch:
             for name, position in positions.items()
             if name in before and math.dist(before[name], position) > reach_m[name]
         }
+        turned = {name: turn for name, pose in poses.items() if (turn := self._turn(name, stamp_ns, pose)) is not None}
         for pair in list(_exchanges(jumped, before, positions, reach_m)):
             self._exchanged ^= {pair}
             for name in pair:
                 jumped.pop(name, None)
-        for name, position in positions.items():
-            self._follow(name, stamp_ns, position, jumped.get(name))
+                turned.pop(name, None)
+        for name, pose in poses.items():
+            self._follow(name, stamp_ns, pose, jumped.get(name), turned.get(name))
         return {name: self._fault(name, stamp_ns) for name in positions}
 
     def _forget(self, stamp_ns: int) -> None:
@@ -66,8 +78,18 @@ class BodyWatch:
         """Return how far a body may have moved since its last new pose [m]: it flies on while that is frozen."""
         return self.max_speed_m_s * max(0, stamp_ns - track.since_ns) / NS_PER_S + _MARGIN_M
 
-    def _follow(self, name: str, stamp_ns: int, position: Vector3, jump: Vector3 | None) -> None:
-        track = self._tracks.setdefault(name, _Track(stamp_ns, position, stamp_ns))
+    def _turn(self, name: str, stamp_ns: int, pose: EntityPose) -> Array | None:
+        """Return how a body turned in its own axes (3, 3) since its last pose, if it cannot have; else None."""
+        track = self._tracks.get(name)
+        if track is None:
+            return None
+        turn: Array = track.rotation.T @ pose.rotation
+        reach_rad = _TURN_RAD_S * max(0, stamp_ns - track.since_ns) / NS_PER_S + _LEAN_RAD
+        return turn if _angle_rad(turn) > reach_rad else None
+
+    def _follow(self, name: str, stamp_ns: int, pose: EntityPose, jump: Vector3 | None, turn: Array | None) -> None:
+        position = pose.position
+        track = self._tracks.setdefault(name, _Track(stamp_ns, position, pose.rotation, stamp_ns))
         if position == track.position:
             track.repeats += 1
         else:
@@ -76,7 +98,10 @@ class BodyWatch:
             x, y, z = track.offset
             track.offset = (x + jump[0], y + jump[1], z + jump[2])
             track.jumped_m = math.hypot(*track.offset)
-        track.stamp_ns, track.position = stamp_ns, position
+        if turn is not None:
+            track.turn = track.turn @ turn
+            track.turned_rad = _angle_rad(track.turn)
+        track.stamp_ns, track.position, track.rotation = stamp_ns, position, pose.rotation
 
     def _fault(self, name: str, stamp_ns: int) -> str:
         track = self._tracks[name]
@@ -86,7 +111,15 @@ class BodyWatch:
             if name in pair:
                 (other,) = pair - {name}
                 return f"its name was exchanged with that of {other} in flight"
-        return f"jumped by {track.jumped_m:.2f} m from one frame to the next" if track.jumped_m > _BACK_M else ""
+        if track.jumped_m > _BACK_M:
+            return f"jumped by {track.jumped_m:.2f} m from one frame to the next"
+        if track.turned_rad > _BACK_RAD:
+            return f"turned by {math.degrees(track.turned_rad):.0f} deg from one frame to the next"
+        return "lies upside down by its pose" if track.rotation[2, 2] < 0.0 else ""
+
+
+def _angle_rad(rotation: Array) -> float:
+    return math.acos(min(1.0, max(-1.0, 0.5 * (float(np.trace(rotation)) - 1.0))))
 
 
 def _exchanges(

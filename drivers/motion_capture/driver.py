@@ -15,7 +15,10 @@ from groundstation.bus.topics import BODY_POSES, OBSERVATION
 from groundstation.time_units import NS_PER_MS
 
 _POLL_S = 0.02
-_CHECK = "check the system's definition of its markers, what hides them, and its names of the bodies"
+_CHECK = (
+    "check the system's definition of its markers (each body must look different from each side), what hides them, and "
+    "its names of the bodies"
+)
 
 
 def run(child: HostProcess) -> int:
@@ -63,7 +66,7 @@ class MotionCaptureDriver:
         self._exposure_ns = exposure_ns
         self._health.used(exposure_ns)
         poses = self._entity_poses(frame)
-        faults = self._watch.look(exposure_ns, {name: pose.position for name, pose in poses.items()})
+        faults = self._watch.look(exposure_ns, poses)
         self._tell(faults)
         if self._grid.is_due(exposure_ns):
             self._publish(exposure_ns, poses, faults)

@@ -14,6 +14,8 @@ from groundstation.estimation.measurement import Correction, Measurement, Sensor
 FAR = "far beyond the gate"
 # Reason of a sighting that would have re-initialised a belief if the same observer had not just done so for others.
 HASTY = "far beyond the gate, but its observer lately had others given up"
+# Reason of a sighting that is used without its heading.
+TURNED = "its heading contradicts the vehicle's own: only its place counts"
 OTHER_POSE = "the other pose hypothesis is more likely"
 _VERDICTS = {
     r.ACCEPTED: (Verdict.ACCEPTED, ""),
@@ -27,6 +29,7 @@ _VERDICTS = {
     r.YAW_MISSING: (Verdict.AMBIGUOUS, "a robot joins only with a heading"),
     r.MISTAKEN: (Verdict.IMPLAUSIBLE, "far beyond the gate, but fits another entity: is its marker's id right?"),
     r.OBSERVER_HASTY: (Verdict.IMPLAUSIBLE, HASTY),
+    r.TURNED: (Verdict.INFLATED, TURNED),
     r.OBSERVER_DOUBTED: (Verdict.IMPLAUSIBLE, "far beyond the gate, as is its observer itself"),
     r.CONTRADICTED: (Verdict.IMPLAUSIBLE, "it would join, but contradicts where its observer is: once is not enough"),
     r.NOT_LOCATED: (Verdict.AMBIGUOUS, "this sensor alone cannot place its subject"),

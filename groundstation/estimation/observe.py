@@ -12,7 +12,7 @@ from groundstation.estimation.evidence import confront, least_nis, likeliest, se
 from groundstation.estimation.filter_state import Belief, Deferred, Hypothesis, State, Tables, belief_of, deferred_of
 from groundstation.estimation.joining import admit
 from groundstation.estimation.motion import clear, enter, join
-from groundstation.estimation.outliers import blame, doubt_velocity, forget_noted_error, note_given_up
+from groundstation.estimation.outliers import agree, blame, doubt_velocity, forget_noted_error, note_given_up
 from groundstation.estimation.records import (
     ACCEPTED,
     ADMITTED,
@@ -30,6 +30,8 @@ from groundstation.estimation.records import (
     POSE,
     SINGULAR,
     SUBJECT_GROUNDED,
+    TURNED,
+    YAW,
     YAW_MISSING,
     EventRow,
     Innovation,
@@ -74,6 +76,24 @@ def choose(
     return confront(state, tables, event, rows, other) > evidence
 
 
+@kernel()
+def confront_place(state: State, tables: Tables, event: EventRow, hypothesis: Hypothesis) -> float:
+    """Confront the belief with a sighting's place without its heading; returns its excess over the gate, at least 1."""
+    set_noise(hypothesis.innovations, hypothesis.R)
+    confront(state, tables, event, YAW, hypothesis)
+    excess: float = least_nis(hypothesis.innovations) / tables.settings.gates[YAW]
+    return max(excess, 1.0)
+
+
+@kernel(inlined=True)
+def correct_modes(state: State, tables: Tables, used: Hypothesis, excess: float) -> None:
+    """Correct all modes that can use the observation, with S raised by `excess`."""
+    for m in range(state.means.shape[0]):
+        if used.innovations[m].nis >= 0.0:
+            belief, deferred = belief_of(state, tables, m), deferred_of(state, m)
+            correct(belief, deferred, tables.headings, used.innovations[m], used.HP[m], excess)
+
+
 @kernel(inlined=True)
 def note_place(belief: Belief, deferred: Deferred, e: int) -> None:
     """Note the variance of a robot's or target's place right after an observation of it."""
@@ -95,8 +115,7 @@ def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> N
     used, other = Hypothesis(z[0], R[0], innovations[0], HP[0]), Hypothesis(z[1], R[1], innovations[1], HP[1])
     unused_s = event.at - state.used_at[event.sensor, event.subject]
     note_motion(first, event)
-    out.joined = out.alternative_chosen = 0
-    out.ahead_x = out.ahead_y = 0.0
+    out.joined, out.alternative_chosen, out.ahead_x, out.ahead_y = 0, 0, 0.0, 0.0
     rows = read(first, sensor, event, event.measured, unused_s, used.z, used.R)
     out.verdict = -rows if rows < 0 else refusal(first, event, rows)
     if out.verdict != PENDING:
@@ -117,14 +136,18 @@ def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> N
         if excess > settings.wild_gates:
             make_all(state)
             out.verdict = blame(first, deferred_of(state, 0), sensor, settings, event, rows, used)
-            if out.verdict != PENDING:
+            if out.verdict == TURNED:
+                rows, excess = YAW, confront_place(state, tables, event, used)
+                write_outcome(out, used.innovations[mode])
+            elif out.verdict != PENDING:
                 return
-            joins = True
-        elif excess == 1.0:
-            subject.wild.count = subject.refused.count = subject.unconfirmed = 0
-        elif first.entities[event.observer].kind == KIND_CAMERA:
+            joins = out.verdict == PENDING
+        if excess == 1.0:
+            agree(subject, event.at, rows)
+        elif not joins and first.entities[event.observer].kind == KIND_CAMERA:
             doubt_velocity(subject)
-    out.verdict = INFLATED if excess > 1.0 else ACCEPTED
+    if out.verdict != TURNED:
+        out.verdict = INFLATED if excess > 1.0 else ACCEPTED
     if joins:
         make_all(state)
         out.verdict = admit(state, tables, event, rows, used)
@@ -135,10 +158,7 @@ def observe(state: State, tables: Tables, event: EventRow, out: OutcomeRow) -> N
         if not fresh and confirmed and first.entities[event.subject].kind == KIND_ROBOT:
             note_given_up(state.memory[event.observer], event.subject, event.at)
         excess, out.joined = 1.0, 1
-    for m in range(modes):
-        if used.innovations[m].nis >= 0.0:
-            belief, deferred = belief_of(state, tables, m), deferred_of(state, m)
-            correct(belief, deferred, tables.headings, used.innovations[m], used.HP[m], excess)
+    correct_modes(state, tables, used, excess)
     if joins:
         make_all(state)  # a diffuse prior is too wide for deferred corrections beside it
     weigh(state.weights, used.innovations, rows, excess)

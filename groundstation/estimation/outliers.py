@@ -6,6 +6,7 @@ import numpy as np
 
 from groundstation.estimation.filter_state import Belief, Deferred, Hypothesis, Settings
 from groundstation.estimation.linear import copy_matrix
+from groundstation.estimation.models.driven import SILENT_S
 from groundstation.estimation.records import (
     IMPLAUSIBLE,
     KIND_ROBOT,
@@ -14,6 +15,9 @@ from groundstation.estimation.records import (
     OBSERVER_DOUBTED,
     OBSERVER_HASTY,
     PENDING,
+    POSE,
+    TURNED,
+    YAW,
     EntityMemory,
     EventRow,
     Innovation,
@@ -34,6 +38,12 @@ _IN_A_ROW_S = 5.0
 _BETWEEN_S, _AT_MOST, _FORGOTTEN_S = 3.0, 3.0, 10.0
 # A sighting counts for this time at most; while seen, a wrong velocity is forgotten with this time constant.
 _SEEN_S, _ERROR_FORGOTTEN_S = 0.2, 1.0
+# A vehicle's own heading is as good as a sighting's for this time after it was confirmed; a jump of it that the filter
+# took for a turn is smaller than this angle (0301).
+_CONFIRMED_S, _JUMP_RAD = 5.0, math.radians(40.0)
+# While the reported velocity seems wrong by more than this, the heading by which it is turned may be: if it is, then
+# that is what the way shows.
+_ASTRAY_M_S = 0.1
 _FIRST_DOUBT_M_S, _DOUBT_GROWS, _MOST_DOUBT_M_S = 0.2, 2.0, 1.0
 
 
@@ -70,6 +80,36 @@ def fits_another(
         found = found or (fits and apart_m(sensor, work[0]) <= _SAME_M)
     event.subject = subject
     return found
+
+
+@kernel()
+def agree(memory: EntityMemory, at: float, rows: int) -> None:
+    """Note a sighting within the gate: it ends all contradictions."""
+    memory.wild.count = memory.refused.count = memory.unconfirmed = 0
+    if rows == POSE:
+        memory.keeps_heading, memory.heading_at = 1, at
+
+
+@kernel()
+def is_turned(
+    belief: Belief, deferred: Deferred, sensor: SensorRow, settings: Settings, event: EventRow, rows: int,
+    hypothesis: Hypothesis,
+) -> bool:  # fmt: skip
+    """Return whether only a sighting's heading contradicts the belief, and the vehicle's own heading does not.
+
+    No vehicle turns so far without turning by its own heading, but a rigid body of motion capture does (0319).
+    """
+    memory = belief.memory[event.subject]
+    if rows != POSE or sensor.is_angle[YAW] == 0 or abs(hypothesis.innovations[0].y[YAW]) < _JUMP_RAD:
+        return False
+    if memory.keeps_heading == 0 or memory.yaw_age_s > SILENT_S or event.at - memory.heading_at > _CONFIRMED_S:
+        return False
+    if memory.noted_error > _ASTRAY_M_S:
+        return False
+    work, HP = np.empty(1, _INNOVATION), np.empty((4, belief.mean.shape[0]))
+    copy_matrix(hypothesis.R, work[0].R)
+    linearise(belief, deferred, sensor, event, YAW, hypothesis.z, work[0], HP)
+    return bool(0.0 <= work[0].nis <= settings.wild_gates * settings.gates[YAW])
 
 
 @kernel()
@@ -150,7 +190,8 @@ def blame(
 ) -> int:  # fmt: skip
     """Return why a wild observation is refused, or PENDING if the subject's belief must be given up for it.
 
-    belief: that of the first mode; hypothesis: its z and the first mode's noise count.
+    TURNED: it counts without its heading. belief: that of the first mode; hypothesis: its z and the first mode's noise
+    count.
     """
     if is_doubted(belief.memory[event.observer], settings, event.at):
         return OBSERVER_DOUBTED
@@ -158,6 +199,9 @@ def blame(
         return MISTAKEN
     subject, robot = belief.memory[event.subject], belief.entities[event.subject].kind == KIND_ROBOT
     confirmed = subject.unconfirmed == 0
+    if confirmed and is_turned(belief, deferred, sensor, settings, event, rows, hypothesis):
+        subject.heading_at = event.at
+        return TURNED
     if not has_diverged(subject, settings, event.at):
         return IMPLAUSIBLE
     if robot and confirmed and is_hasty(belief.memory[event.observer], event.subject, event.at):

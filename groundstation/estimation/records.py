@@ -33,6 +33,7 @@ EVENT_KINDS = 6
     range(9)
 )
 NOT_LOCATED, MISTAKEN, OBSERVER_DOUBTED, OBSERVER_UNCONFIRMED, CONTRADICTED, OBSERVER_HASTY = 9, 10, 11, 12, 13, 14
+TURNED = 15
 
 # Entries of a block that other entities' models may need; EntityRow has their indices.
 SHARED_LABELS = ("z", "yaw", "roll_error", "pitch_error", "yaw_offset", "range_bias", "range_scale", "bearing_bias")
@@ -110,7 +111,9 @@ class EntityMemory(Record):
     slow_v*: the smoothed velocity; commanded_*: the last command of a CommandedRobot; odometry_age_s: since the last
     velocity; attitude_std [rad], yaw_std [rad per root second]: errors as stated by the odometry (0: the model's own
     count); last_yaw, last_reset, has_yaw: the vehicle's own heading [rad; odom] at the step before, received yaw_age_s
-    ago; turn_rate [rad/s]: mean until then; turned [rad]: what it is taken to have turned since. velocity_x, _y, _z:
+    ago; turn_rate [rad/s]: mean until then; turned [rad]: what it is taken to have turned since; keeps_heading: 1 if it
+    has neither jumped nor paused since a sighting agreed with the belief's; heading_at: when one last did, or was used
+    without its heading. velocity_x, _y, _z:
     how they change [m/s; world], as last predicted; velocity_doubt [m/s]: deviation that a fixed camera's surprises add
     to the error of the reported velocity; noted_error [m/s]: by how much that error was recently seen to exceed that of
     a sound sensor; unseen_s: time predicted since the last sighting. wild: observations far beyond the
@@ -142,6 +145,8 @@ class EntityMemory(Record):
     yaw_age_s: float
     turn_rate: float
     turned: float
+    keeps_heading: int
+    heading_at: float
     velocity_x: float
     velocity_y: float
     velocity_z: float

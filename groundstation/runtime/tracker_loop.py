@@ -23,6 +23,7 @@ from groundstation.runtime.journal import FAULT, Adoption, entry_of
 from groundstation.runtime.latency_watch import PictureAge
 from groundstation.runtime.plan_worker import PlanWorker
 from groundstation.runtime.rejoin_watch import RejoinWatch
+from groundstation.runtime.turned_watch import TurnedWatch
 from groundstation.runtime.unseen_watch import UnseenWatch
 from groundstation.tracker import Tracker, tracker_from_field
 
@@ -104,7 +105,7 @@ class Tracking:
         self._bus = bus
         self._announcer = Announcer(bus, field.safety.setpoint_lifetime_ms)
         self._contradictions = ConsistencyWatch(self.tracker.parameters.estimator.entities)
-        self._rejoining = RejoinWatch(self.tracker.robots)
+        self._rejoining, self._turned = RejoinWatch(self.tracker.robots), TurnedWatch()
         self._picture_age = PictureAge(field, feed.clock)
         self._suspected = ""
         self._unseen = UnseenWatch(field.safety.unseen_land_after_s)
@@ -146,7 +147,7 @@ class Tracking:
         corrections = tracker.take_corrections()
         announcer.innovations(corrections, now_ns)
         self._contradictions.take(corrections, now_ns)
-        self.notices += self._rejoining.take(corrections, now_ns)
+        self.notices += self._rejoining.take(corrections, now_ns) + self._turned.take(corrections, now_ns)
         announcer.journal(entry_of(self._bus.header(TEAM, now_ns), self._tick, now_ns, ingested, adopted))
         if adopted is not None and adopted.stop_reason == FAULT:
             self.notices.append(Notice(Severity.ERROR, "planning failed", "the last plan stays in force for a while"))

@@ -84,6 +84,9 @@ class CapturedBodies:
         if jumped is not None:
             origin[0] += jumped.amount
         x, y, z = (self._turn @ origin - self._shift).tolist()
+        turned = standing(self._faults, FaultKind.BODY_TURNED, now_s, entity)
+        if turned is not None:
+            attitude[2] += math.radians(turned.amount)
         base_wxyz = quaternion_product(quaternion_from_euler(*attitude), self._body_wxyz[entity])
         qw, qx, qy, qz = quaternion_product(self._turn_wxyz, base_wxyz)
         box = self.system.volume_m

@@ -59,6 +59,18 @@ def test_nobody_flies_on_by_a_ceiling_picture_that_hangs() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("degrees", [180.0, 90.0])
+def test_nobody_flies_the_wrong_way_by_a_body_that_motion_capture_turns(degrees: float) -> None:
+    turned = fly(
+        "mocap-lab", Fault(kind=FaultKind.BODY_TURNED, entity="drone_1", start_s=16.0, value=degrees), seconds=14.0
+    )
+    assert turned["unsafe"] == {} and turned["modes"]["drone_1"] == "TRACK"
+    assert turned["speed_m_s"] < 0.6 and turned["separation_m"] > 0.9
+    assert not any("re-initialised" in line for line in turned["events"] if line.startswith("drone_1"))
+    assert any("mocap sees it turned" in line for line in turned["events"])
+
+
+@pytest.mark.slow
 def test_vehicles_of_all_kinds_are_flown_by_their_drivers() -> None:
     flown = fly("mixed-team", Fault(kind=FaultKind.NAVDATA_SILENT, entity="drone_2", start_s=15.0), seconds=5.0)
     assert flown["tracking_since_s"] is not None

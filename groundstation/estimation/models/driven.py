@@ -13,7 +13,7 @@ SILENT_TURN_DENSITY = 0.0225
 _TURNS_ON_S = 0.1  # without a heading
 # No vehicle turns faster [rad/s]: beyond, its heading jumped. The time between two headings is this uncertain [s].
 _FASTEST_TURN, _APART_S = 4.0, 0.05
-_SILENT_S = 0.3  # after a longer pause between headings the vehicle was silent
+SILENT_S = 0.3  # after a longer pause between headings the vehicle was silent
 # Velocity is smoothed over this time for the estimates of its errors [s].
 SLOW_S = 1.0
 
@@ -51,14 +51,20 @@ def take_heading(odometry: CondensedOdometry, memory: EntityMemory, step: float)
         memory.turned += memory.yaw_rate * step
         return
     memory.yaw_rate = memory.turn_rate = 0.0
-    if memory.has_yaw != 0 and memory.last_reset == odometry.newest_reset:
+    kept = memory.has_yaw != 0 and memory.last_reset == odometry.newest_reset
+    if kept:
         increment = wrap(odometry.newest_yaw - memory.last_yaw)
-        if memory.yaw_age_s > _SILENT_S:
+        if memory.yaw_age_s > SILENT_S:
+            kept = False
             memory.yaw_rate = (increment - memory.turned) / step * min(1.0, memory.unseen_s / memory.yaw_age_s)
         elif abs(increment) <= _FASTEST_TURN * (memory.yaw_age_s + _APART_S):
             memory.yaw_rate = (increment - memory.turned) / step
             mean_rate = increment / memory.yaw_age_s
             memory.turn_rate = mean_rate if abs(mean_rate) <= _FASTEST_TURN else 0.0
+        else:
+            kept = False
+    if not kept:
+        memory.keeps_heading = 0
     memory.yaw_age_s = memory.turned = 0.0
     memory.held_roll, memory.held_pitch = odometry.newest_roll, odometry.newest_pitch
     memory.attitude_std, memory.yaw_std = odometry.newest_attitude_std, odometry.newest_yaw_std

@@ -43,6 +43,9 @@ _FIGURES: dict[FaultKind, tuple[float, float] | None] = {
     FaultKind.PICTURE_BLACK: None,
 }
 KINDS = tuple(_FIGURES)
+# Flown where they are named: one more to draw from would change the faults of all seeds.
+_NAMED: dict[FaultKind, tuple[float, float]] = {FaultKind.BODY_TURNED: (-180.0, 180.0)}
+ALL_KINDS = (*KINDS, *_NAMED)
 _OF_CAMERAS = frozenset(
     {FaultKind.CAMERA_STALL, FaultKind.CAMERA_BUMPED, FaultKind.PICTURE_FROZEN, FaultKind.PICTURE_BLACK}
 )
@@ -128,7 +131,7 @@ def _faults(
 def _fault(field: dict[str, Any], rng: np.random.Generator, window_s: tuple[float, float], kind: FaultKind) -> Fault:
     drones = [n for n, d in field["drones"].items() if d["kind"] == "ardrone" or kind not in _OF_ARDRONES]
     entities = [*field["cameras"], *field["drones"]] if kind in _OF_CAMERAS else drones
-    figures = _FIGURES[kind]
+    figures = (_FIGURES | _NAMED)[kind]
     value = None if figures is None else float(rng.uniform(*figures))
     if kind is FaultKind.VELOCITY_STUCK and rng.random() < 0.5:
         value = 0.0  # reported by an AR.Drone that sees no floor

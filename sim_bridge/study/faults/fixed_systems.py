@@ -25,7 +25,7 @@ class FixedSystems:
         self._world = world
         self._reports = Exposures[OdometryEar](odometry_of(site, world, errors, seed))
         self._rounds = Exposures[RangingEye](ranging_of(site, errors, seed))
-        self._frames = Exposures[CaptureEye](captures_of(site, errors, seed))
+        self._frames = Exposures[CaptureEye](captures_of(site, errors, seed, scenario.faults))
 
     def due(self, now_ns: int, clock: str) -> Iterator[tuple[int, Topic, Message]]:
         """Yield the measurements of this tick: time of arrival [ns], topic and message."""

@@ -11,7 +11,11 @@ UP_AFTER_S: Mapping[str, float] = {"ardrone": 8.0, "mavlink": 14.0}
 WRONG_ORDER = 2
 """Exit code of a study that cannot be flown as ordered."""
 
-_BROKEN_HERE = frozenset({Part.VEHICLE, Part.ABLE_VEHICLE, Part.CAMERA}), frozenset({FaultKind.IDS_SWAPPED})
+_BROKEN_HERE = frozenset(
+    kind
+    for kind, rules in RULES.items()
+    if rules.part in (Part.VEHICLE, Part.ABLE_VEHICLE, Part.CAMERA) and kind is not FaultKind.IDS_SWAPPED
+) | {FaultKind.BODY_TURNED}
 _AT_THE_WIRE = "at the wire: groundstation sitl --scenario FILE"
 
 
@@ -31,8 +35,7 @@ def unbroken(faults: Iterable[Fault], entities: Iterable[str]) -> str:
 
     entities: names of the drones and cameras of the field.
     """
-    parts, others = _BROKEN_HERE
-    idle = [fault for fault in faults if RULES[fault.kind].part not in parts or fault.kind in others]
+    idle = [fault for fault in faults if fault.kind not in _BROKEN_HERE]
     if idle:
         named = ", ".join(f"{fault.kind} of {fault.entity}" for fault in idle)
         return f"{named}: nothing breaks so at message level; fly it {_AT_THE_WIRE}"

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from sim_bridge.fault_kinds import Fault, FaultKind
 from sim_bridge.site import SiteCapture
 from sim_bridge.study.capture_model import CaptureEye
 
@@ -15,6 +16,7 @@ class Room:
     """A sensor model's view of a world: one drone inside of the box, one outside, a target."""
 
     bodies = ("drone_1", "drone_2", "cart")
+    time_s = 5.0
 
     def states(self) -> np.ndarray:
         rows = np.zeros((3, 13))
@@ -57,3 +59,14 @@ def test_targets_are_reported_where_it_observes_them_and_axes_may_be_off() -> No
     assert np.allclose(straight[1].position_m, (0.0, 0.3, 0.4), atol=0.05)
     off = eye_of(layout, errors=True).look(ROOM, 10, "c")
     assert 0.01 < math.dist(off[0].position_m, straight[0].position_m) < 0.5
+
+
+def test_a_turned_body_has_another_heading_in_its_place_while_the_fault_lasts() -> None:
+    layout: Any = Layout(heading_std_deg=1e-3)
+    yaws = []
+    for start_s in (4.0, 6.0):
+        faults = [Fault(kind=FaultKind.BODY_TURNED, entity="drone_1", start_s=start_s, value=90.0)]
+        (seen,) = CaptureEye("mocap", layout, False, np.random.default_rng(1), faults).look(ROOM, 10, "c")
+        assert np.allclose(seen.position_m, (0.5, 0.0, 1.6), atol=1e-3) and seen.yaw_rad is not None
+        yaws.append(seen.yaw_rad)
+    assert np.allclose(yaws, (0.4 + math.pi / 2, 0.4), atol=1e-3)

@@ -142,6 +142,7 @@ def broken(kind: FaultKind, **more: object) -> tuple[Fault, ...]:
     ("rig", "who", "why"),
     [
         ((broken(FaultKind.BODY_JUMPED, value=0.4), ("drone_1", "drone_2")), {"drone_1"}, "jumped"),
+        ((broken(FaultKind.BODY_TURNED, value=90.0), ("drone_1", "drone_2")), {"drone_1"}, "turned"),
         ((broken(FaultKind.BODIES_SWAPPED, other="drone_2"), ("drone_1", "drone_2")), set(PLACES), "exchanged"),
         ((broken(FaultKind.CAPTURE_FROZEN, entity="mocap"), ("drone_1", "drone_2")), set(PLACES), "frozen"),
     ],

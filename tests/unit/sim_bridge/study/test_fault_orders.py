@@ -7,11 +7,19 @@ from typing import Any
 
 import pytest
 
+from sim_bridge.fault_kinds import FaultKind
 from sim_bridge.scenario import parse_scenario
 from sim_bridge.study.faults.command import fly
+from sim_bridge.study.faults.draw import draw
 from sim_bridge.study.faults.flight_order import WrongOrder, fly_seeds
 from sim_bridge.study.faults.hosted_kinds import WRONG_ORDER
 from sim_bridge.study.scenarios.flight import as_drawn
+
+FIELD: dict[str, Any] = {
+    "room": {"fence": {"x_m": (-3.7, 3.7), "y_m": (-2.7, 2.7), "z_m": (0.0, 2.8)}},
+    "cameras": {"ceiling": {}},
+    "drones": {"drone_1": {"kind": "ardrone"}, "px4_1": {"kind": "mavlink"}},
+}
 
 
 @pytest.mark.parametrize(
@@ -19,12 +27,14 @@ from sim_bridge.study.scenarios.flight import as_drawn
     [
         (["frozn"], "no kind of fault: frozn; there are navdata_silent,"),
         (["none", "wind"], "none flies healthy flights only: name it alone"),
+        (["body_turned"], "body_turned: the field has no motion capture"),
     ],
 )
 def test_kinds_that_mean_nothing_are_refused_in_one_line(
     kinds: list[str], said: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    order = {"field": {"drones": {}}, "sections": [], "scenario": {}, "seeds": [1], "seconds": 20.0, "kinds": kinds}
+    field = {"drones": {"a": {"kind": "ardrone"}}}
+    order = {"field": field, "sections": [], "scenario": {}, "seeds": [1], "seconds": 20.0, "kinds": kinds}
     monkeypatch.setattr(sys, "stdin", io.StringIO(json.dumps(order)))
     assert fly_seeds(fly) == WRONG_ORDER
     lines = capsys.readouterr().err.splitlines()
@@ -46,3 +56,12 @@ def test_a_fault_that_would_break_nothing_is_refused(broken: dict[str, Any], sai
     field = {"drones": {"a": {"kind": "ardrone"}}, "cameras": {"ceiling": {}}}
     with pytest.raises(WrongOrder, match=f"^{said}"):
         as_drawn(field, parse_scenario(json.dumps({"faults": [broken]})), 1)
+
+
+def test_a_turned_body_is_flown_where_it_is_named() -> None:
+    drawn = [
+        draw(FIELD, parse_scenario("{}"), s, (11.0, 20.0), (FaultKind.BODY_TURNED,)).scenario.faults for s in range(50)
+    ]
+    faults = [fault for faults in drawn for fault in faults]
+    assert {fault.entity for fault in faults} == {"drone_1", "px4_1"}
+    assert all(fault.value is not None and abs(fault.value) <= 180.0 for fault in faults)

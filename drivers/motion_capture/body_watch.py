@@ -72,7 +72,8 @@ class BodyWatch:
         gone = [n for n, track in self._tracks.items() if stamp_ns - track.stamp_ns > _FORGOTTEN_S * NS_PER_S]
         for name in gone:
             del self._tracks[name]
-        self._exchanged = {pair for pair in self._exchanged if not pair & set(gone)}
+        # While one of a pair is in sight under the other's name, the second has no name but the first's.
+        self._exchanged = {pair for pair in self._exchanged if pair & self._tracks.keys()}
 
     def _reach_m(self, track: _Track, stamp_ns: int) -> float:
         """Return how far a body may have moved since its last new pose [m]: it flies on while that is frozen."""

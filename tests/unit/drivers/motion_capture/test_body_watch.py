@@ -125,3 +125,21 @@ def test_a_body_upside_down_is_refused_from_its_first_frame_on() -> None:
     hall = Hall()
     hall.turned = (math.pi, 0.0, 0.0)
     assert all("upside down" in hall.look()["a"] for _ in range(20))
+
+
+def test_exchanged_names_stay_refused_while_one_of_the_two_is_out_of_sight() -> None:
+    hall = Hall()
+    hall.fly()
+
+    def exchanged() -> dict[str, tuple[float, float, float]]:
+        return {"a": hall.at("b"), "b": hall.at("a")}
+
+    hall.see(exchanged())
+    for _ in range(130):
+        hall.ticks += 1
+        told = hall.see({"b": exchanged()["b"]})
+    assert "exchanged with that of a" in told["b"]
+    assert all("exchanged" in why for why in hall.see(exchanged()).values())
+    hall.ticks += 130
+    hall.see({})
+    assert set(hall.look().values()) == {""}, "both were out of sight: the system may have named them anew"

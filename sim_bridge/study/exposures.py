@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 from typing import Generic, Protocol, TypeVar
 
-from sim_bridge.world.world import TICK_S
+# Share of a period by which an exposure may seem not yet due, because times are rounded.
+_ROUNDING = 1e-6
 
 
 class Exposing(Protocol):
@@ -16,18 +17,20 @@ Camera = TypeVar("Camera", bound=Exposing)
 
 
 class Exposures(Generic[Camera]):
-    """Exposure schedule of several cameras, with phases spread evenly."""
+    """Exposure schedule of several cameras, with phases spread evenly; each first exposes a period after its phase."""
 
     def __init__(self, cameras: Sequence[Camera]) -> None:
         self._phased = [
             (camera, camera.period_s, camera.period_s * index / len(cameras)) for index, camera in enumerate(cameras)
         ]
+        self._exposed = [0] * len(cameras)
 
     def due(self, now_s: float) -> list[Camera]:
         """Return the cameras that expose in the tick that ends now."""
-        before_s = now_s - TICK_S
-        return [
-            camera
-            for camera, period_s, phase_s in self._phased
-            if int((now_s - phase_s) / period_s) != int((before_s - phase_s) / period_s)
-        ]
+        found = []
+        for index, (camera, period_s, phase_s) in enumerate(self._phased):
+            number = int((now_s - phase_s) / period_s + _ROUNDING)
+            if number != self._exposed[index]:
+                self._exposed[index] = number
+                found.append(camera)
+        return found

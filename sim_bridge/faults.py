@@ -1,7 +1,7 @@
 """Begins and ends a scenario's faults in the world and on links."""
 
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Protocol, runtime_checkable
 
 from sim_bridge.fault_kinds import RULES, Fault, FaultKind, Part
@@ -19,8 +19,8 @@ class Emulator(Protocol):
 class Sufferer(Protocol):
     """A body or an emulator with faults that only its kind can have."""
 
-    def suffer(self, fault: Fault, begins: bool) -> None:
-        """Break, or heal; faults of other parts are ignored."""
+    def suffer(self, kind: FaultKind, lasting: Sequence[Fault]) -> None:
+        """Take all faults of a kind that last now, none: heal; kinds of other parts are ignored."""
 
 
 class FaultSchedule:
@@ -52,26 +52,28 @@ class FaultSchedule:
             lines += [(fault.entity, f"fault {described(fault)} lasts") for fault in self._standing]
         while self._edges and self._edges[0][0] <= now_s:
             _, begins, fault = self._edges.popleft()
-            self._switch(fault, begins)
             (self._standing.append if begins else self._standing.remove)(fault)
+            self._switch(fault, begins)
             lines.append((fault.entity, f"fault {described(fault)} {'begins' if begins else 'ends'}"))
         return lines
 
     def _switch(self, fault: Fault, begins: bool) -> None:
+        """Set what a fault breaks by all of its kind that last: the end of one heals none of the others."""
+        lasting = [one for one in self._standing if (one.kind, one.entity) == (fault.kind, fault.entity)]
         match fault.kind:
             case FaultKind.NAVDATA_SILENT:
-                self._emulators[fault.entity].silent = begins
+                self._emulators[fault.entity].silent = bool(lasting)
             case FaultKind.AT_DEAF:
-                self._emulators[fault.entity].deaf = begins
+                self._emulators[fault.entity].deaf = bool(lasting)
             case FaultKind.BATTERY_DROP if begins:
                 self._world.drones[fault.entity].battery = fault.amount
             case FaultKind.WIND:
-                self._world.blow(fault.entity, fault.amount if begins else 0.0, fault.direction_deg)
+                self._world.blow(fault.entity, [(one.amount, one.direction_deg) for one in lasting])
             case kind if RULES[kind].part is Part.ABLE_VEHICLE:
                 # If ids are swapped, body and emulator are of different vehicles: each takes the faults of its own.
                 for one in (self._emulators[fault.entity], self._world.drones[fault.entity]):
                     if isinstance(one, Sufferer):
-                        one.suffer(fault, begins)
+                        one.suffer(fault.kind, lasting)
 
 
 def described(fault: Fault) -> str:

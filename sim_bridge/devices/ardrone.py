@@ -2,6 +2,7 @@
 
 import selectors
 import socket
+from collections.abc import Sequence
 
 from groundstation.errors import GroundStationError
 from sim_bridge.devices.ardrone_control import FlightControl
@@ -65,10 +66,10 @@ class ArDroneEmulator:
             self.close()
             raise
 
-    def suffer(self, fault: Fault, begins: bool) -> None:
-        """Begin or end a fault of this device: something holds a propeller."""
-        if fault.kind is FaultKind.PROPELLER_BLOCKED:
-            self.control.blocked = begins
+    def suffer(self, kind: FaultKind, lasting: Sequence[Fault]) -> None:
+        """Take the faults of this device: something holds a propeller."""
+        if kind is FaultKind.PROPELLER_BLOCKED:
+            self.control.blocked = bool(lasting)
 
     @property
     def video_settings(self) -> VideoMode:

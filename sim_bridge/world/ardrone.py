@@ -1,6 +1,7 @@
 """One AR.Drone in the room: airframe, autopilot, battery, and the air that pushes it."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -72,12 +73,12 @@ class Quadrotor:
         share = min(1.0, self._most_air / strength) if strength > 0.0 else 1.0
         return self.wind[0] + share * x, self.wind[1] + share * y
 
-    def suffer(self, fault: Fault, begins: bool) -> None:
-        """Begin or end a fault of the sensors that look at the floor."""
-        if fault.kind is FaultKind.UNIFORM_FLOOR:
-            self.autopilot.blind = begins
-        elif fault.kind is FaultKind.OBSTACLE_BELOW:
-            self.autopilot.floor_m = fault.amount if begins else 0.0
+    def suffer(self, kind: FaultKind, lasting: Sequence[Fault]) -> None:
+        """Take the faults of the sensors that look at the floor; obstacles stand on each other."""
+        if kind is FaultKind.UNIFORM_FLOOR:
+            self.autopilot.blind = bool(lasting)
+        elif kind is FaultKind.OBSTACLE_BELOW:
+            self.autopilot.floor_m = sum(fault.amount for fault in lasting)
 
     def wake_on(self, other: Airframe) -> tuple[float, float, float] | None:
         """Return the acceleration of a body below by this drone's downwash, None out of its reach."""

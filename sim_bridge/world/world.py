@@ -163,11 +163,11 @@ class World:
             for name, target in self.targets.items():
                 target.parked = target.parked and self._together_s < self._depart_after_s[name]
 
-    def blow(self, name: str, push_m_s2: float, direction_deg: float) -> None:
-        """Push one drone by wind [m/s^2] towards a direction [deg; world], counter-clockwise from x."""
-        angle = math.radians(direction_deg)
-        wind = (push_m_s2 * math.cos(angle), push_m_s2 * math.sin(angle)) if push_m_s2 else (0.0, 0.0)
-        self.drones[name].wind = wind
+    def blow(self, name: str, winds: Iterable[tuple[float, float]]) -> None:
+        """Push one drone by winds: each [m/s^2] towards a direction [deg; world], counter-clockwise from x."""
+        towards = [(push, math.radians(direction_deg)) for push, direction_deg in winds]
+        x, y = (sum(push * turn(angle) for push, angle in towards) for turn in (math.cos, math.sin))
+        self.drones[name].wind = (x, y)
 
     def of(self, body: type[_Body]) -> dict[str, _Body]:
         """Return the drones whose body is of a class."""

@@ -1,5 +1,7 @@
 """An emulated AR.Drone on the network in memory: navdata and AT commands, no TCP."""
 
+from collections.abc import Sequence
+
 from sim_bridge.devices.ardrone import AT_PORT, DEMO_SUBSAMPLING, NAVDATA_PORT
 from sim_bridge.devices.ardrone_control import FlightControl
 from sim_bridge.devices.ardrone_edge import ArDroneEdge
@@ -43,10 +45,10 @@ class MemoryArDrone:
             udp.setblocking(False)
             udp.bind((address, port))
 
-    def suffer(self, fault: Fault, begins: bool) -> None:
-        """Begin or end a fault of this device: something holds a propeller."""
-        if fault.kind is FaultKind.PROPELLER_BLOCKED:
-            self.control.blocked = begins
+    def suffer(self, kind: FaultKind, lasting: Sequence[Fault]) -> None:
+        """Take the faults of this device: something holds a propeller."""
+        if kind is FaultKind.PROPELLER_BLOCKED:
+            self.control.blocked = bool(lasting)
 
     def receive(self) -> None:
         """Take the waiting datagrams of both ports."""

@@ -94,7 +94,7 @@ def read_order(path: Path) -> LaunchSpec:
     if strangers := sorted(set(envelope.captures) - {*site.motion_capture, *site.ranging, *heard}):
         raise SettingsError([f"{path}: captures: {name!r} is no system or odometry of the field" for name in strangers])
     if unfit := misfits(scenario, site, envelope.streams, envelope.real):
-        raise SettingsError([f"scenario: {'.'.join(map(str, one.path))}: {one.text}" for one in unfit])
+        raise SettingsError([str(one) for one in unfit])
     missing = sorted(set(site.drones) - set(envelope.addresses) - set(envelope.real))
     if missing:
         raise SettingsError([f"{path}: addresses: none for {', '.join(missing)}"])

@@ -16,6 +16,9 @@ class Misfit:
     path: tuple[str | int, ...]
     text: str
 
+    def __str__(self) -> str:
+        return f"scenario: {'.'.join(map(str, self.path))}: {self.text}"
+
 
 def misfits(scenario: Scenario, site: Site, cameras: Collection[str], real: Collection[str] = ()) -> list[Misfit]:
     """Return all misfits: entities that the field lacks or that are real; cameras: the emulated ones."""

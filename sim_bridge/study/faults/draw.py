@@ -14,9 +14,10 @@ from sim_bridge.target_paths import FigureEight
 from sim_bridge.world.noise import generator_of
 
 _HEALTHY_SHARE = 0.1
-# Pads lie where the ceiling camera of the shipped fields sees a drone at the height to which it takes off.
-_PADS_X_M, _PADS_Y_M = 1.4, 0.75
-_LEAST_PADS_M, _TARGET_M = 1.1, 0.6
+# Pads lie where the ceiling camera of the shipped fields sees a drone at the height to which it takes off, and far
+# enough inside the fence that a take-off does not leave it (as `groundstation check` advises).
+_PADS_M = (1.4, 0.75)
+_LEAST_PADS_M, _TARGET_M, _PAD_TO_FENCE_M = 1.1, 0.6, 0.3
 # Two pads may leave no room for a third: then all are drawn anew. If they fit, a seed's pads are those of old.
 _MISSES, _BEGINNINGS = 20_000, 60
 
@@ -78,59 +79,95 @@ def draw(
 
 
 def random_pads(field: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
-    """Return the drones of a field (plain values) on other pads, each heading for the middle."""
+    """Return the drones of a field (plain values) on other pads, each heading for the middle of the fence.
+
+    Raises WrongOrder if the fence is too small for so many.
+    """
+    (x, y), _ = _fenced(field)
     pads = _pads(field, rng)
     return {
-        name: {**drone, "pad_m": pads[i], "pad_yaw_deg": math.degrees(math.atan2(-pads[i][1], -pads[i][0]))}
+        name: {**drone, "pad_m": pads[i], "pad_yaw_deg": math.degrees(math.atan2(y - pads[i][1], x - pads[i][0]))}
         for i, (name, drone) in enumerate(field["drones"].items())
     }
 
 
+def _fenced(field: dict[str, Any]) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return the middle of the fence, and half of its length along world x and y [m]."""
+    sides = [field["room"]["fence"][axis] for axis in ("x_m", "y_m")]
+    (x, y), (half_x, half_y) = ([(high + sign * low) / 2 for low, high in sides] for sign in (1, -1))
+    return (x, y), (half_x, half_y)
+
+
 def _pads(field: dict[str, Any], rng: np.random.Generator) -> list[tuple[float, float]]:
-    """Return places in the ceiling camera's view, apart from each other and the target; WrongOrder for too many."""
+    """Return places about the middle of the fence, apart from each other and the target."""
+    middle, half_m = _fenced(field)
+    reach = tuple(min(most, half - _PAD_TO_FENCE_M) for most, half in zip(_PADS_M, half_m, strict=True))
     wanted = len(field["drones"])
-    for _ in range(_BEGINNINGS):
-        pads = _some_pads(wanted, rng)
+    for _ in range(_BEGINNINGS if min(reach) > 0.0 else 0):
+        pads = _some_pads(wanted, middle, (reach[0], reach[1]), rng)
         if len(pads) == wanted:
             return pads
-    raise WrongOrder(f"{wanted} drones: pads that are {_LEAST_PADS_M:g} m apart were not found for so many")
+    raise WrongOrder(
+        f"{wanted} drones: pads that are {_LEAST_PADS_M:g} m apart, {_TARGET_M:g} m from the middle of the fence and "
+        f"{_PAD_TO_FENCE_M:g} m inside it were not found for so many: fly fewer, or widen room.fence"
+    )
 
 
-def _some_pads(wanted: int, rng: np.random.Generator) -> list[tuple[float, float]]:
+def _some_pads(
+    wanted: int, middle: tuple[float, float], reach: tuple[float, float], rng: np.random.Generator
+) -> list[tuple[float, float]]:
     """Return `wanted` places, or fewer if there was no room for another one."""
+    (west, east), (south, north) = ((at - span, at + span) for at, span in zip(middle, reach, strict=True))
     pads: list[tuple[float, float]] = []
     missed = 0
     while len(pads) < wanted and missed < _MISSES:
-        place = (float(rng.uniform(-_PADS_X_M, _PADS_X_M)), float(rng.uniform(-_PADS_Y_M, _PADS_Y_M)))
-        fits = math.hypot(*place) >= _TARGET_M and all(math.dist(place, other) >= _LEAST_PADS_M for other in pads)
+        place = (float(rng.uniform(west, east)), float(rng.uniform(south, north)))
+        fits = math.dist(place, middle) >= _TARGET_M and all(math.dist(place, other) >= _LEAST_PADS_M for other in pads)
         missed = 0 if fits else missed + 1
         pads += [place] if fits else []
     return pads
 
 
 def random_eight(field: dict[str, Any], rng: np.random.Generator) -> FigureEight:
-    """Return a path within the fence of a field (plain values)."""
-    fence = field["room"]["fence"]
+    """Return a path about the middle of the fence of a field (plain values), within it."""
+    middle, (half_x, half_y) = _fenced(field)
+    longest, widest = 0.85 * half_x, 0.4 * half_y
     return FigureEight(
-        half_length_m=float(rng.uniform(1.0, 0.85 * fence["x_m"][1])),
-        half_width_m=float(rng.uniform(0.3, 0.4 * fence["y_m"][1])),
+        half_length_m=float(rng.uniform(min(1.0, longest), longest)),
+        half_width_m=float(rng.uniform(min(0.3, widest), widest)),
         speed_m_s=float(rng.uniform(0.15, 0.4)),
         start_phase=float(rng.choice((0.0, 0.5))),
+        centre_m=middle,
     )
 
 
 def _faults(
     field: dict[str, Any], rng: np.random.Generator, window_s: tuple[float, float], kinds: tuple[FaultKind, ...]
 ) -> tuple[Fault, ...]:
+    if kinds and not any(_entities(field, kind) for kind in kinds):
+        raise WrongOrder(f"{', '.join(kinds)}: nothing in this field can have such a fault: name other kinds")
     if rng.random() < _HEALTHY_SHARE or not kinds:
         return ()
     count = 1 if rng.random() < 0.5 else 2
-    return tuple(_fault(field, rng, window_s, kinds[int(rng.integers(len(kinds)))]) for _ in range(count))
+    return tuple(_fault(field, rng, window_s, _kind(field, rng, kinds)) for _ in range(count))
+
+
+def _kind(field: dict[str, Any], rng: np.random.Generator, kinds: tuple[FaultKind, ...]) -> FaultKind:
+    """Return a kind that something in the field can have; others are drawn again, so seeds keep their faults."""
+    while not _entities(field, kind := kinds[int(rng.integers(len(kinds)))]):
+        pass
+    return kind
+
+
+def _entities(field: dict[str, Any], kind: FaultKind) -> list[str]:
+    """Return the drones or cameras that can have a kind of fault."""
+    if kind in _OF_CAMERAS:
+        return [*field["cameras"], *field["drones"]]
+    return [n for n, d in field["drones"].items() if d["kind"] == "ardrone" or kind not in _OF_ARDRONES]
 
 
 def _fault(field: dict[str, Any], rng: np.random.Generator, window_s: tuple[float, float], kind: FaultKind) -> Fault:
-    drones = [n for n, d in field["drones"].items() if d["kind"] == "ardrone" or kind not in _OF_ARDRONES]
-    entities = [*field["cameras"], *field["drones"]] if kind in _OF_CAMERAS else drones
+    entities = _entities(field, kind)
     figures = (_FIGURES | _NAMED)[kind]
     value = None if figures is None else float(rng.uniform(*figures))
     if kind is FaultKind.VELOCITY_STUCK and rng.random() < 0.5:

@@ -30,15 +30,10 @@ def unhosted(drones: Mapping[str, Mapping[str, Any]]) -> str:
     )
 
 
-def unbroken(faults: Iterable[Fault], entities: Iterable[str]) -> str:
-    """Return a sentence naming faults that would have no effect here; "" if all have one.
-
-    entities: names of the drones and cameras of the field.
-    """
+def unbroken(faults: Iterable[Fault]) -> str:
+    """Return a sentence naming faults that would have no effect here; "" if all have one."""
     idle = [fault for fault in faults if fault.kind not in _BROKEN_HERE]
     if idle:
         named = ", ".join(f"{fault.kind} of {fault.entity}" for fault in idle)
         return f"{named}: nothing breaks so at message level; fly it {_AT_THE_WIRE}"
-    known = (*entities,)
-    strangers = [f"{fault.kind} of {fault.entity}" for fault in faults if fault.entity not in known]
-    return f"{', '.join(strangers)}: the field has {', '.join(known)}" if strangers else ""
+    return ""

@@ -6,6 +6,8 @@ from typing import Any
 from groundstation.bus.messages import Message
 from sim_bridge.link_bursts import with_bursts
 from sim_bridge.scenario import Scenario
+from sim_bridge.scenario_fit import misfits
+from sim_bridge.site import parse_site
 from sim_bridge.study.faults.draw import Drawn
 from sim_bridge.study.faults.flight import JUDGE_S, FaultFlight
 from sim_bridge.study.faults.flight_order import WrongOrder
@@ -21,10 +23,12 @@ _DOWN = ("LANDING", "LANDED")
 
 
 def as_drawn(field: dict[str, Any], scenario: Scenario, seed: int) -> Drawn:
-    """Return the flight of a seed; raises WrongOrder for faults that would have no effect here."""
-    drones = field["drones"]
-    if refusal := unbroken(scenario.faults, (*drones, *field["cameras"])):
+    """Return the flight of a seed; raises WrongOrder if the scenario does not fit, or has faults that break nothing."""
+    if refusal := unbroken(scenario.faults):
         raise WrongOrder(refusal)
+    drones, site = field["drones"], parse_site(field)
+    if unfit := misfits(scenario, site, (*site.cameras, *drones)):
+        raise WrongOrder("\n".join(map(str, unfit)))
     return Drawn(field, with_bursts(scenario, drones, drones, seed), seed)
 
 

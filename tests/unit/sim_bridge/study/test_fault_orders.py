@@ -5,8 +5,10 @@ import json
 import sys
 from typing import Any
 
+import msgspec
 import pytest
 
+from groundstation.field.resolved import ResolvedField
 from sim_bridge.fault_kinds import FaultKind
 from sim_bridge.scenario import parse_scenario
 from sim_bridge.study.faults.command import fly
@@ -49,11 +51,24 @@ def test_kinds_that_mean_nothing_are_refused_in_one_line(
             {"kind": "wrong_board", "entity": "a", "other": "b", "start_s": 5.0},
             "wrong_board of a: nothing breaks so at message level; fly it at the wire",
         ),
-        ({"kind": "wind", "entity": "drone_9", "start_s": 5.0}, "wind of drone_9: the field has a, ceiling"),
+        (
+            {"kind": "wind", "entity": "drone_9", "start_s": 5.0},
+            "scenario: faults.0.entity: 'drone_9' is none of drone_1, drone_2$",
+        ),
+        (
+            {"kind": "at_deaf", "entity": "ceiling", "start_s": 5.0},
+            "scenario: faults.0.entity: 'ceiling' is none of drone_1, drone_2$",
+        ),
+        (
+            {"kind": "camera_stall", "entity": "turtlebot", "start_s": 5.0},
+            "scenario: faults.0.entity: 'turtlebot' is none of ceiling, drone_1, drone_2$",
+        ),
     ],
 )
-def test_a_fault_that_would_break_nothing_is_refused(broken: dict[str, Any], said: str) -> None:
-    field = {"drones": {"a": {"kind": "ardrone"}}, "cameras": {"ceiling": {}}}
+def test_a_fault_that_would_break_nothing_is_refused(
+    lab_field: ResolvedField, broken: dict[str, Any], said: str
+) -> None:
+    field = msgspec.to_builtins(lab_field)
     with pytest.raises(WrongOrder, match=f"^{said}"):
         as_drawn(field, parse_scenario(json.dumps({"faults": [broken]})), 1)
 
@@ -65,3 +80,10 @@ def test_a_turned_body_is_flown_where_it_is_named() -> None:
     faults = [fault for faults in drawn for fault in faults]
     assert {fault.entity for fault in faults} == {"drone_1", "px4_1"}
     assert all(fault.value is not None and abs(fault.value) <= 180.0 for fault in faults)
+
+
+@pytest.mark.parametrize("broken", [("at_deaf", "drone_1"), ("uniform_floor", "drone_2"), ("picture_black", "drone_1")])
+def test_a_fault_that_breaks_something_is_flown(lab_field: ResolvedField, broken: tuple[str, str]) -> None:
+    fault = {"kind": broken[0], "entity": broken[1], "start_s": 5.0}
+    drawn = as_drawn(msgspec.to_builtins(lab_field), parse_scenario(json.dumps({"faults": [fault]})), 1)
+    assert [(one.kind, one.entity) for one in drawn.scenario.faults] == [broken]

@@ -35,7 +35,7 @@ _FIGURES: dict[FaultKind, tuple[float, float] | None] = {
     FaultKind.VELOCITY_JUMPING: (0.1, 1.0),
     FaultKind.HEADING_DRIFTING: (-5.0, 5.0),
     FaultKind.HEADING_JUMPING: (-90.0, 90.0),
-    FaultKind.BATTERY_STUCK: (0.2, 1.0),
+    FaultKind.BATTERY_STUCK: (0.0, 0.3),  # below and above the charge at which drones land
     FaultKind.UNIFORM_FLOOR: None,
     FaultKind.OBSTACLE_BELOW: (0.2, 0.8),
     FaultKind.WIND: (0.3, 1.75),

@@ -15,7 +15,7 @@ from groundstation.cli.lists import parts
     epilog="\b\nExamples:\n  groundstation experiment faults --flights 200\n"
     "  groundstation experiment faults --flights 1 --seed 4711 --json    (one flight again, with what was said)\n"
     "  groundstation experiment faults --flights 100 --kinds velocity_stuck,telemetry_frozen\n\n"
-    "Exit codes: 0 no unsafe end, 1 unsafe ends, 2 wrong settings."
+    "Exit codes: 0 all flew and none ended unsafe, 1 some did not fly or ended unsafe, 2 wrong settings."
 )
 @click.option(
     "--kinds",
@@ -30,10 +30,10 @@ def faults(
 ) -> int:
     """Fly random fields with one or two random faults, with the real drivers, watchdogs and tracker.
 
-    At message level: no processes, no pictures. Each seed is one flight, and always ends in the same way. Unsafe are: a
-    separation below 0.6 m; a drone outside the fence, 0.3 m/s above its speed limit, or in motion for more than a
-    second with a belief that is 0.5 m off; and, once a vehicle's telemetry is useless, no hover within 1 s or no rest
-    within 3.5 s.
+    At message level: no processes, no pictures. Each seed is one flight, and always ends in the same way. Unsafe are,
+    from the first lift-off on: a separation below 0.6 m; a drone outside the fence, 0.3 m/s above its speed limit, or
+    in motion for more than a second with a belief that is 0.5 m off; and, once a vehicle's telemetry is useless, no
+    hover within 1 s or no rest within 3.5 s.
     """
     from groundstation.experiments.faults import by_kind, ends_told, table, totals
     from groundstation.experiments.flight_batches import batches, flights_of
@@ -46,7 +46,7 @@ def faults(
     by_kinds = by_kind(found)
     document = {"experiment": "faults", **summary, "kinds": by_kinds, "flights_flown": found}
     publish(document, [*table(by_kinds), *ends_told(summary), *_spent(summary, out)], out, as_json)
-    return ExitCode.FAILED if summary["unsafe"] else ExitCode.OK
+    return ExitCode.FAILED if summary["unsafe"] or summary["not_flown"] else ExitCode.OK
 
 
 def _spent(summary: dict[str, Any], folder: Path) -> list[str]:

@@ -17,14 +17,15 @@ _WORST = (
 def by_kind(flights: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Return one row for each kind of fault, then one for flights with none; a flight with two faults counts in both.
 
-    flights: number flown; unsafe: number that ended so, alone: those with this fault only; worst figures; why:
-    how often each bound was broken first; seeds: of unsafe ends, those with this fault only first.
+    flights: number that lifted off, which are judged; not_flown: number whose team did not all take off, and so never
+    tracked; unsafe: number that ended so, alone: those with this fault only; worst figures; why: how often each bound
+    was broken first; seeds: of unsafe ends, those with this fault only first.
     """
     rows = []
     kinds = sorted({kind for flight in flights for kind in flight["kinds"]})
     for kind in (*kinds, HEALTHY):
         mine = [f for f in flights if (kind in f["kinds"] if kind != HEALTHY else not f["kinds"])]
-        flown = [f for f in mine if f["tracking_since_s"] is not None]
+        flown = [f for f in mine if "unsafe" in f]
         if not mine:
             continue
         unsafe = sorted((f for f in flown if f["unsafe"]), key=lambda f: (len(f["faults"]), f["seed"]))
@@ -36,11 +37,11 @@ def by_kind(flights: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
             {
                 "kind": kind,
                 "flights": len(flown),
-                "not_flown": len(mine) - len(flown),
+                "not_flown": sum(not _tracked(f) for f in mine),
                 "unsafe": len(unsafe),
                 "alone": sum(len(f["faults"]) == 1 for f in flown),
                 "unsafe_alone": sum(len(f["faults"]) == 1 for f in unsafe),
-                "stopped": sum(any(mode != "TRACK" for mode in f["modes"].values()) for f in flown),
+                "stopped": sum(any(mode != "TRACK" for mode in f["modes"].values()) for f in mine if _tracked(f)),
                 **{key: worst(flown, key, pick) for key, pick in _WORST},
                 "why": dict(sorted(why.items(), key=lambda item: -item[1])),
                 "seeds": [f["seed"] for f in unsafe],
@@ -51,7 +52,7 @@ def by_kind(flights: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 def totals(flights: Sequence[Mapping[str, Any]], timing: Sequence[Mapping[str, float]]) -> dict[str, Any]:
     """Return the figures of the whole campaign, and its time by parts (shares of the loop)."""
-    flown = [flight for flight in flights if flight["tracking_since_s"] is not None]
+    flown = [flight for flight in flights if "unsafe" in flight]
     parts = {name: sum(t.get(name, 0.0) for t in timing) for name in (timing[0] if timing else ()) if name != "cpu"}
     spent = sum(parts.values())
     cpu_s = sum(t["cpu"] for t in timing)
@@ -60,11 +61,18 @@ def totals(flights: Sequence[Mapping[str, Any]], timing: Sequence[Mapping[str, f
         "unsafe": sum(bool(flight["unsafe"]) for flight in flown),
         "unreached": [f["seed"] for f in flown if f["unsafe"] and set(f["unsafe"]) == set(f["unreached"])],
         "deaf": _deaf([spell for flight in flown for spell in flight["deaf"]]),
-        "not_flown": [flight["seed"] for flight in flights if flight["tracking_since_s"] is None],
-        "false_alarms": [f["seed"] for f in flown if not f["kinds"] and set(f["modes"].values()) != {"TRACK"}],
+        "not_flown": [flight["seed"] for flight in flights if not _tracked(flight)],
+        "false_alarms": [
+            f["seed"] for f in flights if _tracked(f) and not f["kinds"] and set(f["modes"].values()) != {"TRACK"}
+        ],
         "cpu_s_per_flight": round(cpu_s / max(1, len(timing)), 2),
         "time_shares": {name: round(value / spent, 2) for name, value in sorted(parts.items(), key=lambda i: -i[1])},
     }
+
+
+def _tracked(flight: Mapping[str, Any]) -> bool:
+    """Return whether a flight's team was told to track: once all of it had taken off."""
+    return flight["tracking_since_s"] is not None
 
 
 def _deaf(spells: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -80,7 +88,7 @@ def ends_told(summary: Mapping[str, Any]) -> list[str]:
     """Return the campaign's result as lines of text; summary: of `totals`."""
     lines = [
         f"{summary['unsafe']} of {summary['flights']} flights ended unsafe; healthy flights stopped: "
-        f"{summary['false_alarms'] or 'none'}; did not take off: {summary['not_flown'] or 'none'}"
+        f"{summary['false_alarms'] or 'none'}; did not all take off: {summary['not_flown'] or 'none'}"
     ]
     if unreached := summary["unreached"]:
         lines.append(

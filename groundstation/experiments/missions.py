@@ -12,13 +12,14 @@ _SHOWN_SEEDS = 8
 def rows_of(flights: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Return a row each for flights in which nothing is wrong, sightings state too little, or velocities are off.
 
-    flights: number flown; drones: sizes of their teams; violations: seeds that left the fence or came too close, with
-    the time [s]; landed_before: seeds in which a drone landed without the order; not_landed: seeds in which one still
-    flew at the end.
+    flights: number that tracked; not_flown: seeds whose team did not all take off; drones: sizes of the teams that
+    tracked; violations: seeds that left the fence or came too close, with the time [s]; landed_before: seeds in which a
+    drone landed without the order; not_landed: seeds in which one still flew at the end.
     """
     rows = []
     for share, drift_m_s in sorted({_wrong(flight) for flight in flights}, key=lambda wrong: (-wrong[0], wrong[1])):
         mine = [flight for flight in flights if _wrong(flight) == (share, drift_m_s)]
+        judged = [flight for flight in mine if "unsafe" in flight]
         flown = [flight for flight in mine if flight["flown"]]
         rows.append(
             {
@@ -27,8 +28,8 @@ def rows_of(flights: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
                 "drones": sorted({flight["drones"] for flight in flown}),
                 "flights": len(flown),
                 "not_flown": [flight["seed"] for flight in mine if not flight["flown"]],
-                **{key: worst(flown, key, pick) for key, pick in _WORST},
-                "violations": {flight["seed"]: broken for flight in flown if (broken := _broken(flight))},
+                **{key: worst(judged, key, pick) for key, pick in _WORST},
+                "violations": {flight["seed"]: broken for flight in judged if (broken := _broken(flight))},
                 "landed_before": [flight["seed"] for flight in flown if flight["landed_before"]],
                 "not_landed": [flight["seed"] for flight in flown if not flight["landed"]],
             }

@@ -44,6 +44,15 @@ def test_injected_faults_are_listed_among_the_events(silent: dict[str, Any]) -> 
     assert any(line.startswith("drone_1 LANDING: no telemetry") for line in silent["events"])
 
 
+def test_a_drone_is_judged_from_its_lift_off_though_the_team_never_tracks() -> None:
+    """The wind carries it out of the fence while the other one stands on its pad, silent."""
+    silent = Fault(kind=FaultKind.NAVDATA_SILENT, entity="drone_2", start_s=0.0)
+    gust = Fault(kind=FaultKind.WIND, entity="drone_1", start_s=8.0, value=5.0)
+    flown = fly("lab", silent, gust)
+    assert flown["tracking_since_s"] is None
+    assert set(flown["unsafe"]) & {"fence", "speed"}
+
+
 @pytest.mark.slow
 def test_a_seed_ends_the_same_again(silent: dict[str, Any]) -> None:
     again = fly("lab", Fault(kind=FaultKind.NAVDATA_SILENT, entity="drone_1", start_s=9.0))

@@ -1,7 +1,7 @@
 """One flight of the campaign: world, emulated vehicles, drivers, tracker; in one thread, by a manual clock."""
 
 import time
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -16,11 +16,8 @@ from groundstation.bus.keys import Key
 from groundstation.bus.messages import Estimate, Message
 from groundstation.bus.notice import Notice
 from groundstation.bus.topics import ESTIMATE, OBSERVATION, SEARCHED_PICTURE, Topic
-from groundstation.errors import EstimatorFault
 from groundstation.field.resolved import field_from_json
-from groundstation.planning.planner import Planner, PlanRequest
-from groundstation.runtime.inbox import TOPICS
-from groundstation.runtime.journal import Adoption
+from groundstation.planning.planner import Planner
 from groundstation.runtime.tracker_loop import TrackerFeed, TrackerSection, Tracking
 from groundstation.time_units import NS_PER_S
 from sim_bridge.fault_kinds import RULES, Fault, Part
@@ -38,6 +35,7 @@ from sim_bridge.study.faults.memory_network import MemoryNetwork
 from sim_bridge.study.faults.observed import ObservedValues
 from sim_bridge.study.faults.orders import TeamOrders
 from sim_bridge.study.faults.stand_ins import in_memory, manual_clock, read_all
+from sim_bridge.study.faults.tracker_feed import Arrivals, InlineWorker
 from sim_bridge.study.faults.vehicles import Drivers, Section, devices_of, on_pads
 from sim_bridge.study.faults.wrong_cameras import WrongEye
 from sim_bridge.study.wrong_figures import WrongFigures, misdated
@@ -51,59 +49,6 @@ JUDGE_S = _JUDGE_TICKS * TICK_NS / 1e9
 _ORDER_TICKS = 20
 # Deadline for the team to track: AR.Drones take 8 s, MAVLink vehicles longer.
 TRACKING_BY_S = 30.0
-
-
-class Arrivals:
-    """The tracker's inbox: the arrived messages that it uses."""
-
-    def __init__(self, bus: LocalBus, heeds: Callable[[Message], bool]) -> None:
-        self._heeds = heeds
-        self._subscription = bus.subscribe(TOPICS, capacity=8192)
-        self._keys: dict[Key, str] = {}
-        self.refused: Counter[str] = Counter()
-        self.overflowed = 0
-
-    def pop_ready(self) -> list[tuple[str, Message]]:
-        """Return (key, message) of all that have arrived, in order."""
-        keys = self._keys
-        ready = []
-        for received in self._subscription.drain():
-            if received.message is None or not self._heeds(received.message):
-                continue
-            if (key := keys.get(received.key)) is None:
-                key = keys[received.key] = str(received.key)
-            ready.append((key, received.message))
-        return ready
-
-
-class InlineWorker:
-    """Plans at once when a request is submitted; the plan is adopted a tick later."""
-
-    def __init__(self, planner: Planner) -> None:
-        self._planner = planner
-        self._done: Adoption | None = None
-
-    @property
-    def idle(self) -> bool:
-        """Return whether a request can be submitted."""
-        return self._done is None
-
-    def submit(self, tick: int, request: PlanRequest) -> None:
-        """Plan."""
-        try:
-            plan = request.put_to(self._planner, lambda: False)
-        except EstimatorFault:
-            self._done = Adoption(tick, None)
-            return
-        self._done = Adoption(tick, plan)
-
-    def poll(self) -> Adoption | None:
-        """Return and forget the finished plan."""
-        done, self._done = self._done, None
-        return done
-
-    def close(self) -> None:
-        """Nothing to stop."""
 
 
 class FaultFlight:
@@ -155,6 +100,7 @@ class FaultFlight:
         limits = {name: drone.limits.max_speed_m_s for name, drone in field.drones.items()}
         self.judge = Judge(drawn.field["room"]["fence"], limits, JUDGE_S, root=self._only_root())
         self.tracking_since_s: float | None = None
+        self._lifted_off = False
 
     def _bus(self, source: str) -> LocalBus:
         return LocalBus(self._exchange, self._field.site, source)
@@ -248,14 +194,16 @@ class FaultFlight:
         self.said.clear()
         if self.orders.tracking and self.tracking_since_s is None:
             self.tracking_since_s = now_s
-        if self.tracking_since_s is None:
+        self._lifted_off = self._lifted_off or bool(self.world.airborne)
+        if not self._lifted_off:
             return
         truth = dict(zip(self.world.bodies, self.world.states().copy(), strict=True))
         told = {name: decision.action is Action.FLY for name, decision in self.drivers.decisions.items()}
         believed = {name: self.believed(name) for name in self.world.drones}
         deaf = [name for name, device in self.devices.items() if device.deaf]
         self.judge.see(now_s, truth, told, believed, deaf)
-        self.watch()
+        if self.tracking_since_s is not None:
+            self.watch()
 
     def heeds(self, message: Message) -> bool:
         """Return whether the tracker takes a message; studies of other methods override it."""
@@ -297,8 +245,7 @@ class FaultFlight:
         observable = tuple(self._observable(fault) for fault in faults)
         modes = {name: str(host.watchdog.mode) for name, host in self.drivers.hosts.items()}
         reasons = {name: host.watchdog.reason for name, host in self.drivers.hosts.items()}
-        flown = self.tracking_since_s is not None
-        verdict = self.judge.verdict(faults, observable) if flown else {}
+        verdict = self.judge.verdict(faults, observable) if self._lifted_off else {}
         return {
             "seed": self._drawn.seed,
             "kinds": sorted(str(fault.kind) for fault in faults),

@@ -42,7 +42,7 @@ class _Flown:
 
 
 class Judge:
-    """Call `see` at an even rate while the team tracks; `verdict` returns the figures.
+    """Call `see` at an even rate from the first lift-off on; `verdict` returns the figures.
 
     root: the world-fixed camera, if there is only one: when its picture freezes, all drones must stop.
     """
@@ -139,12 +139,14 @@ class Judge:
 
     def _due(self, faults: Iterable[tuple[Fault, float | None]]) -> Iterable[tuple[_Flown, float]]:
         """Return the drones that had to stop and from when on [s], for faults that lasted that long."""
-        for fault, since_s in faults:
-            if since_s is None or (fault.end_s is not None and fault.end_s - since_s < REST_S):
+        for fault, shown_s in faults:
+            if shown_s is None:
                 continue
-            for name in self._stopped_by(fault):
-                if self._flown[name].times[-1] - since_s >= REST_S + _STAYS_S:
-                    yield self._flown[name], since_s
+            for flown in map(self._flown.__getitem__, self._stopped_by(fault)):
+                since_s = max(shown_s, flown.times[0])
+                lasts = fault.end_s is None or fault.end_s - since_s >= REST_S
+                if lasts and flown.times[-1] - since_s >= REST_S + _STAYS_S:
+                    yield flown, since_s
 
     def _stopped_by(self, fault: Fault) -> Iterable[str]:
         if fault.kind is FaultKind.PICTURE_FROZEN:

@@ -1,4 +1,4 @@
-"""One mission: take-off, tracking, and the order to land; judged by truth until all drones stand."""
+"""One mission: take-off, tracking, and the order to land; judged by truth from lift-off until all drones stand."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -30,11 +30,14 @@ class MissionFlight(FaultFlight):
             self._landing_since_s = self.world.time_s
             self._landed_before = [name for name, mode in self._modes().items() if mode in (_LANDS, _STANDS)]
             self.orders.land(self.now_ns, self.drivers.hosts)
-        stand = all(mode == _STANDS for mode in self._modes().values())
+        stand = not self.world.airborne and all(mode == _STANDS for mode in self._modes().values())
         return stand or self.world.time_s - self._landing_since_s >= _DOWN_BY_S
 
     def fly(self) -> dict[str, Any]:
-        """Fly to the end; landed_before: drones that landed without the order; landed: whether all stand at the end."""
+        """Fly to the end; landed_before: drones that landed without the order, as their drivers say.
+
+        landed: whether all stand at the end, by truth.
+        """
         report = self.run()
         judged = ("separation_m", "fence_m", "unsafe", "unlocalised_s")
         return {
@@ -45,7 +48,7 @@ class MissionFlight(FaultFlight):
             **{name: report[name] for name in judged if name in report},
             "landing_since_s": self._landing_since_s,
             "landed_before": self._landed_before,
-            "landed": all(mode == _STANDS for mode in self._modes().values()),
+            "landed": not self.world.airborne,
             "spent_s": report["spent_s"],
         }
 

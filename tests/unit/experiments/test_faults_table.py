@@ -1,6 +1,7 @@
 """The fault campaign's table, and the command that prints it."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -28,8 +29,9 @@ FLIGHTS = [
     flight(3, ["velocity_stuck"], {"hover": 11.0}, "LANDED", hover_s=2.5),
     flight(4, [], {}),
     flight(5, [], {}, "LANDED"),
-    flight(6, ["wind"], {}, tracking_since_s=None, separation_m=None),
+    {"seed": 6, "kinds": ["wind"], "faults": [{}], "tracking_since_s": None, "modes": {"a": "LANDED"}},
 ]
+HALF_FLOWN = flight(7, [], {"fence": 3.0}, "HOVER", tracking_since_s=None)
 
 
 def test_the_table_counts_by_kind_and_names_seeds() -> None:
@@ -41,6 +43,8 @@ def test_the_table_counts_by_kind_and_names_seeds() -> None:
     assert stuck["why"] == {"hover": 1, "speed": 1}
     assert (stuck["separation_m"], stuck["hover_s"]) == (0.4, 2.5)
     assert (wind["flights"], wind["not_flown"], wind["unsafe"], wind["unsafe_alone"]) == (2, 1, 1, 0)
+    (healthy,) = by_kind([HALF_FLOWN])
+    assert (healthy["flights"], healthy["not_flown"], healthy["unsafe"], healthy["stopped"]) == (1, 1, 1, 0)
     text = "\n".join(table(list(rows.values())))
     assert "velocity_stuck" in text and "hover 1, speed 1; 3 2" in text
 
@@ -51,6 +55,14 @@ def test_totals_name_false_alarms_and_where_time_goes() -> None:
     assert summary["false_alarms"] == [5]
     assert summary["time_shares"] == {"tracker": 0.75, "world": 0.25}
     assert summary["cpu_s_per_flight"] == 4.5
+
+
+def test_a_team_that_does_not_all_take_off_is_judged_and_is_no_false_alarm() -> None:
+    summary = totals([HALF_FLOWN], [])
+    assert (summary["flights"], summary["unsafe"], summary["not_flown"], summary["false_alarms"]) == (1, 1, [7], [])
+    assert ends_told(summary) == [
+        "1 of 1 flights ended unsafe; healthy flights stopped: none; did not all take off: [7]"
+    ]
 
 
 def test_unsafe_flights_that_nobody_could_stop_are_counted_and_named() -> None:
@@ -80,10 +92,17 @@ def test_batches_cover_all_seeds_once() -> None:
     assert len({batch.key for batch in found}) == 3
 
 
-def test_the_command_writes_all_flights_and_fails_for_unsafe_ends(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(("seed", "code"), [(1, ExitCode.OK), (3, ExitCode.FAILED), (6, ExitCode.FAILED)])
+def test_the_command_fails_for_an_unsafe_end_and_for_a_team_on_the_floor(
+    seed: int, code: ExitCode, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    told = []
+    monkeypatch.setattr("groundstation.experiments.flight_batches.fly", flown_from([]))
+    arguments = ["faults", "--flights", "1", "--seed", str(seed), "--scheduler", "none", "-o", str(tmp_path)]
+    assert experiment.main(arguments, standalone_mode=False) == code
+
+
+def flown_from(told: list[dict[str, Any]]) -> Callable[[FlightBatch], dict[str, Any]]:
+    """Return a function that gives the flights above in place of flying them, and keeps the orders in `told`."""
 
     def flown(batch: FlightBatch) -> dict[str, Any]:
         told.append(json.loads(batch.order))
@@ -91,7 +110,14 @@ def test_the_command_writes_all_flights_and_fails_for_unsafe_ends(
         timing = [{"tracker": 1.0, "cpu": 1.0} for _ in flights]
         return {"task": {}, "merits": {"flights": flights}, "timing": {"flights": timing}}
 
-    monkeypatch.setattr("groundstation.experiments.flight_batches.fly", flown)
+    return flown
+
+
+def test_the_command_writes_all_flights(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    told: list[dict[str, Any]] = []
+    monkeypatch.setattr("groundstation.experiments.flight_batches.fly", flown_from(told))
     monkeypatch.setattr("groundstation.experiments.runner._planar_run", lambda: pytest.fail("needs no kernels"))
     options = ["--scheduler", "none", "--kinds", "wind, velocity_stuck", "--set", "safety.min_separation_m=0.7"]
     arguments = ["faults", "--flights", "3", *options, "--output", str(tmp_path)]

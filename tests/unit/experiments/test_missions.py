@@ -4,12 +4,13 @@ from typing import Any
 
 from groundstation.experiments.missions import rows_of, table
 
+FIGURES = {"separation_m": 0.9, "fence_m": 0.0, "unlocalised_s": 0.0, "unsafe": {}}
+
 
 def flown(seed: int, share: float = 1.0, drift: float = 0.0, **figures: Any) -> dict[str, Any]:
-    whole = {"separation_m": 0.9, "fence_m": 0.0, "unlocalised_s": 0.0, "unsafe": {}}
     ends = {"landed_before": [], "landed": True}
     wrong = {"covariance_share": share, "drift_m_s": drift, "drones": 2}
-    return {"seed": seed, **wrong, "flown": True, **whole, **ends, **figures}
+    return {"seed": seed, **wrong, "flown": True, **FIGURES, **ends, **figures}
 
 
 def test_a_broken_bound_counts_and_another_fault_does_not() -> None:
@@ -27,9 +28,15 @@ def test_flights_that_state_too_little_have_a_row_of_their_own() -> None:
 
 
 def test_missions_not_flown_are_listed_without_figures() -> None:
-    (row,) = rows_of([flown(7) | {"flown": False}])
+    on_the_floor = {name: value for name, value in flown(7).items() if name not in FIGURES} | {"flown": False}
+    (row,) = rows_of([on_the_floor])
     assert (row["flights"], row["not_flown"], row["separation_m"]) == (0, [7], None)
     assert table([row])[1].split() == ["1.00", "0.00", "0", "0", "-", "-", "-", "0", "0", "7"]
+
+
+def test_a_violation_before_all_have_taken_off_counts() -> None:
+    (row,) = rows_of([flown(7, fence_m=0.2, unsafe={"fence": 4.0}) | {"flown": False}])
+    assert (row["flights"], row["not_flown"], row["violations"], row["fence_m"]) == (0, [7], {7: {"fence": 4.0}}, 0.2)
 
 
 def test_drifting_flights_have_a_row_of_their_own_and_rows_name_the_sizes_of_teams() -> None:

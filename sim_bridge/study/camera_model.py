@@ -129,6 +129,11 @@ class Eye:
         """Turn the camera away from its mounting, unknown to the ground station; 0: back to it."""
         self._rotation = self._mounted @ turned_about(angle_deg, axis_deg) if angle_deg else self._mounted
 
+    @property
+    def arrived(self) -> bool:
+        """Return whether the last picture reached its driver."""
+        return self._looked
+
     def look(self, world: World, stamp_ns: int, clock: str) -> list[RelativeObservation]:
         """Return the sightings of one exposure; stamps have the error of a delay of which only the mean is known."""
         self._looked = bool(self._rng.random() >= self._scenario.frame_loss)

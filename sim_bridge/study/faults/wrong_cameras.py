@@ -38,8 +38,10 @@ class WrongEye:
         if not self._shows:
             return []
         seen = self.eye.look(world, stamp_ns, clock)
+        if not self.eye.arrived:
+            return []
         if FaultKind.PICTURE_FROZEN not in kinds:
-            self._frozen = seen or self._frozen
+            self._frozen = seen
             return seen
         if self._frozen:
             self._repeats_s |= {fault: world.time_s for fault in active if fault not in self._repeats_s}

@@ -1,8 +1,6 @@
 """The fault campaign: random draws, judgement by truth, stand-ins for threads and sockets, and its table."""
 
 import math
-from itertools import pairwise
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -17,10 +15,7 @@ from sim_bridge.study.faults.draw import KINDS, draw
 from sim_bridge.study.faults.judge import Judge
 from sim_bridge.study.faults.local_bus import LocalBus, LocalExchange
 from sim_bridge.study.faults.memory_network import MemoryNetwork, NothingWaits
-from sim_bridge.study.faults.observed import ObservedValues
 from sim_bridge.study.faults.stand_ins import in_memory, manual_clock, read_all
-from sim_bridge.study.faults.wrong_cameras import WrongEye
-from sim_bridge.world.readings import Readings
 
 FENCE = {"x_m": (-3.7, 3.7), "y_m": (-2.7, 2.7), "z_m": (0.0, 2.8)}
 FIELD: dict[str, Any] = {
@@ -124,6 +119,13 @@ def test_after_useless_words_hover_and_rest_are_due(stops_s: float, rests_s: flo
     assert verdict["hover_s"] == pytest.approx(min(stops_s, 19.95) - 10.0, abs=0.11)
 
 
+def test_a_fault_before_the_first_sample_is_judged_from_there() -> None:
+    before = fault("telemetry_frozen", start_s=0.0)
+    verdict = judged(lambda t: row(0.0, 0.0), told=lambda t: False, faults=(before,))
+    assert (verdict["hover_s"], verdict["rest_s"], verdict["unsafe"]) == (0.0, 0.0, {})
+    assert judged(**flown(5.5, 7.0), faults=(before.model_copy(update={"end_s": 6.0}),))["unsafe"] == {}
+
+
 DEAF = fault("at_deaf", end_s=14.0)
 
 
@@ -174,21 +176,6 @@ def test_nobody_flies_on_where_the_picture_of_the_only_fixed_camera_freezes(root
 def test_nothing_is_due_after_a_fault_that_need_not_stop_or_healed_at_once() -> None:
     for harmless in (fault("camera_bumped", entity="ceiling"), fault("wind"), fault("velocity_stuck", end_s=11.0)):
         assert judged(**flown(99.0, 99.0), faults=(harmless,))["unsafe"] == {}
-
-
-# -- time at which a fault shows ------------------------------------------------------------------------------------
-
-
-def test_a_stuck_velocity_shows_once_the_drone_moves() -> None:
-    stuck, frozen = fault("velocity_stuck"), fault("telemetry_frozen", start_s=30.0)
-    values = ObservedValues((stuck, frozen))
-    for n in range(400):
-        t = n * PERIOD_S
-        honest = Readings(n, (0.3 if t > 12 else 0.0, 0.0, 0.0), 0, 0, 0, (0, 0, 0), (0, 0, 9.8), 1.0)
-        values.report(t, honest)
-    assert values.observable_s(stuck) == pytest.approx(12.05)
-    assert values.observable_s(frozen) == 30.0
-    assert ObservedValues((stuck,)).observable_s(stuck) is None
 
 
 # -- stand-ins ------------------------------------------------------------------------------------------------------
@@ -246,75 +233,3 @@ def test_the_local_bus_hands_messages_over_as_they_are() -> None:
     assert everything.waiting is False
     assert one.drain() == []
     assert [received.message for received in newest.drain()] == said[1:]
-
-
-class Eye:
-    """Gives one observation after the other."""
-
-    name, period_s = "a", 0.1
-
-    def __init__(self) -> None:
-        self.bumps: list[float] = []
-        self.n = 0
-
-    def bump(self, angle_deg: float, axis_deg: float) -> None:
-        self.bumps.append(angle_deg)
-
-    def look(self, world: Any, stamp_ns: int, clock: str) -> list[Any]:
-        from groundstation.bus.messages import Header, RelativeObservation
-
-        self.n += 1
-        header = Header(stamp_ns, clock, "a", "a_camera", self.n)
-        return [
-            RelativeObservation(
-                header=header, observer="a", subject="b", camera="a_camera", position_m=(float(self.n), 0.0, 1.0),
-                yaw_rad=0.0, covariance=(1.0, *(0.0,) * 4, 1.0, *(0.0,) * 4, 1.0, *(0.0,) * 4, 1.0), margin=2.0,
-                roll_rad=0.0, pitch_rad=0.0,
-            )
-        ]  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("kind", "seen"), [("picture_frozen", [1, 1, 1, 4]), ("picture_black", [1, 4]), ("camera_stall", [1, 4])]
-)
-def test_wrong_pictures_at_message_level(kind: str, seen: list[float]) -> None:
-    eye: Any = Eye()
-    camera = WrongEye(eye, [fault(kind, start_s=1.0, end_s=3.0)])
-    found = []
-    for t in (0.5, 1.0, 2.0, 3.0):
-        world: Any = SimpleNamespace(time_s=t, drones=())
-        eye.n = round(t)  # content of an honest picture
-        found += camera.look(world, int(t * 1e9), "c")
-    assert [one.position_m[0] for one in found] == seen
-    assert len({(one.header.stamp_ns, one.header.seq) for one in found}) == len(found)
-
-
-def test_a_vehicles_camera_that_hangs_trembles_until_its_driver_knows_it() -> None:
-    eye: Any = Eye()
-    camera, found = WrongEye(eye, [fault("picture_frozen", start_s=1.0)]), []
-    for k in range(40):
-        world: Any = SimpleNamespace(time_s=0.5 + 0.1 * k, drones={camera.name: None})
-        found += camera.look(world, int(k * 1e8), "c")
-    unknown, known = found[5:20], found[20:]
-    assert all(a.position_m != b.position_m for a, b in pairwise(unknown))
-    assert {one.picture_ns for one in unknown} == {0} and {one.picture_ns for one in known} == {400_000_000}
-
-
-def test_a_frozen_picture_shows_once_it_repeats_somebody() -> None:
-    frozen, black = fault("picture_frozen", start_s=1.0), fault("picture_black", start_s=1.0)
-    eye: Any = Eye()
-    camera = WrongEye(eye, [frozen])
-    assert camera.observable_s(frozen) is None
-    for t in (0.5, 1.5, 2.0):
-        world: Any = SimpleNamespace(time_s=t, drones=())
-        camera.look(world, 0, "c")
-    assert (camera.observable_s(frozen), camera.observable_s(black)) == (1.5, 1.0)
-
-
-def test_a_bumped_camera_stays_turned_until_it_is_put_back() -> None:
-    eye: Any = Eye()
-    camera = WrongEye(eye, [fault("camera_bumped", start_s=1.0, end_s=2.0, value=4.0)])
-    for t in (0.0, 1.0, 2.0):
-        world: Any = SimpleNamespace(time_s=t, drones=())
-        camera.look(world, 0, "c")
-    assert eye.bumps == [0.0, 4.0, 0.0]

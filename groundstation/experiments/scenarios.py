@@ -61,9 +61,10 @@ def paired(own: Iterable[Mapping[str, Any]], other: Iterable[Mapping[str, Any]])
 def against_best_fixed(flights: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Return the comparison of each other strategy with the best fixed topology of its scenario.
 
-    Best: least mean rmse over the seeds that found the target, chosen afterwards, which favours it. Entries: scenario,
-    strategy, best, share (mean rmse over that of the best, less 1, over the seeds of both), gap_m (mean difference and
-    half width of its 95 % interval; None with fewer than two seeds).
+    Best: it found the target in most seeds, then has the least mean rmse over those of all that did; chosen afterwards,
+    which favours it. Entries: scenario, strategy, best, seeds (number in which both found it), share (mean rmse over
+    that of the best, less 1, over these), gap_m (mean difference and half width of its 95 % interval; None with fewer
+    than two).
     """
     errors: dict[str, dict[str, dict[int, float]]] = {}
     for one in flights:
@@ -71,20 +72,33 @@ def against_best_fixed(flights: Iterable[Mapping[str, Any]]) -> list[dict[str, A
             errors.setdefault(one["scenario"], {}).setdefault(one["strategy"], {})[one["seed"]] = one["rmse_m"]
     entries: list[dict[str, Any]] = []
     for scenario, known in errors.items():
-        fixed = {name: float(np.mean(list(own.values()))) for name, own in known.items() if name in FIXED}
-        if not fixed:
+        if not (fixed := {name: own for name, own in known.items() if name in FIXED}):
             continue
-        best = min(fixed, key=lambda name: fixed[name])
+        best = _best(fixed)
         for strategy, own in known.items():
             shared = sorted(own.keys() & known[best].keys())
             if strategy in FIXED or not shared:
                 continue
             mean, other = (float(np.mean([rows[seed] for seed in shared])) for rows in (own, known[best]))
-            gap = paired(_as_flights(own), _as_flights(known[best]))
             entries.append(
-                {"scenario": scenario, "strategy": strategy, "best": best, "share": mean / other - 1.0, "gap_m": gap}
+                {
+                    "scenario": scenario,
+                    "strategy": strategy,
+                    "best": best,
+                    "seeds": len(shared),
+                    "share": mean / other - 1.0,
+                    "gap_m": paired(_as_flights(own), _as_flights(known[best])),
+                }
             )
     return entries
+
+
+def _best(errors: Mapping[str, Mapping[int, float]]) -> str:
+    """Return the best of some strategies by their rmse in the seeds that found the target."""
+    most = max(map(len, errors.values()))
+    leading = {name: own for name, own in errors.items() if len(own) == most}
+    shared = frozenset.intersection(*map(frozenset, leading.values()))
+    return min(leading, key=lambda name: float(np.mean([leading[name][seed] for seed in shared or leading[name]])))
 
 
 def _as_flights(errors: Mapping[int, float]) -> list[dict[str, float]]:
@@ -96,7 +110,9 @@ def comparison(entries: Iterable[Mapping[str, Any]]) -> list[str]:
     lines = []
     for one in entries:
         interval = "" if one["gap_m"] is None else " ({:+.3f} +- {:.3f} m)".format(*one["gap_m"])
-        lines.append(f"{one['scenario']} {one['strategy']}: {one['share']:+.0%} against {one['best']}{interval}")
+        seeds = f"{one['seeds']} seed{'s' * (one['seeds'] > 1)}"
+        against = f"{one['share']:+.0%} against {one['best']}{interval}"
+        lines.append(f"{one['scenario']} {one['strategy']}: {against} over {seeds}")
     return lines
 
 
@@ -106,6 +122,7 @@ def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
         "scenario",
         "strategy",
         "ok",
+        "never",
         "mean m",
         "median",
         "worst",
@@ -116,14 +133,15 @@ def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
         "viol",
         "switch",
     )
-    layout = "{:17s} {:13s} {:>6s} {:>7s} {:>7s} {:>7s} {:>7s} {:>7s} {:>7s} {:>4s} {:>4s} {:>6s}"
+    layout = "{:17s} {:13s} {:>6s} {:>5s} {:>7s} {:>7s} {:>7s} {:>7s} {:>7s} {:>7s} {:>4s} {:>4s} {:>6s}"
     lines = [layout.format(*head) + "  against the first [m]"]
     for row in rows:
-        errors = [f"{value:.3f}" for value in row["rmse_m"] or ()] or ["never", "-", "-"]
+        errors = [f"{value:.3f}" for value in row["rmse_m"] or ()] or ["-"] * 3
         seconds = ["-" if row[key] is None else f"{row[key]:.1f}" for key in ("lost_s", "longest_s", "found_s")]
         counts = [str(row[key]) for key in ("landings", "violations", "switches")]
         against = "" if row["against"] is None else "{:+.3f} +- {:.3f}".format(*row["against"])
         share = f"{row['as_expected']}/{row['flights']}"
-        cells = layout.format(row["scenario"], row["strategy"], share, *errors, *seconds, *counts)
+        never = str(row["never_found"])
+        cells = layout.format(row["scenario"], row["strategy"], share, never, *errors, *seconds, *counts)
         lines.append(f"{cells}  {against}".rstrip())
     return lines

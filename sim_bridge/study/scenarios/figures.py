@@ -29,9 +29,13 @@ class TrackingErrors:
             self.errors[name].append(off)
 
     def figures(self) -> dict[str, Any]:
-        """Return the figures of the worst target: time until it was found, then its errors [m] and losses [s]."""
+        """Return each figure of the target that has the worst: time until found, errors [m], losses [s].
+
+        None: a target was never found.
+        """
         found = [self._of(np.array(errors)) for errors in self.errors.values()]
-        return max(found, key=lambda one: (one["found_s"] is None, one["rmse_m"] or 0.0))
+        values = {key: [one[key] for one in found] for key in found[0]}
+        return {key: None if None in each else max(each) for key, each in values.items()}
 
     def _of(self, errors: Array) -> dict[str, Any]:
         found = tracking_figures(errors, self.period_s)

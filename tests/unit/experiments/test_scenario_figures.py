@@ -45,6 +45,19 @@ def test_a_target_that_was_never_found_has_no_error() -> None:
     assert errors_of(None, 2.0)["rmse_m"] is None
 
 
+def test_each_figure_is_that_of_the_target_for_which_it_is_worst() -> None:
+    errors = TrackingErrors(period_s=0.5)
+    for steady, lost in zip((0.2, 0.2, 0.2, 0.2), (0.0, 0.6, 0.0, 0.0), strict=True):
+        places = {"steady": np.array([steady, 0.0]), "lost": np.array([lost, 0.0])}
+        errors.take(dict.fromkeys(places, np.zeros(13)), places)
+    figures = errors.figures()
+    assert (figures["lost_s"], figures["longest_loss_s"], figures["worst_m"]) == (0.5, 0.5, 0.6)
+    apart = TrackingErrors(period_s=0.5)
+    for off in (0.2, 0.2, 0.2):
+        apart.take(dict.fromkeys("ab", np.zeros(13)), {"a": np.array([off, 0.0]), "b": None})
+    assert set(apart.figures().values()) == {None}, "one target was never found"
+
+
 def test_missed_criteria_are_named_with_their_limits() -> None:
     expected = ScenarioExpectation(rmse_m=0.05, lost_s=0.0, found_s=10.0)
     flown = {"found_s": None, "rmse_m": 0.1, "lost_s": 0.0, "landings": 1, "violations": ["fence 0.10 m"]}
@@ -83,18 +96,37 @@ def test_the_best_fixed_topology_is_compared_with_over_the_seeds_of_both() -> No
     assert comparison([ours])[0].startswith("walk ours: -17% against reversed (-0.005 +- ")
 
 
+def test_a_fixed_topology_that_hardly_ever_finds_the_target_is_not_the_best() -> None:
+    flown: dict[str, tuple[float | None, ...]] = {
+        "ours": (0.02, 0.03, 0.04), "string": (0.03, 0.04, 0.08), "reversed": (0.04, 0.05, 0.05),
+        "flat": (0.001, None, None),
+    }  # fmt: skip
+    flights = [flight(seed, rmse, name) for name, errors in flown.items() for seed, rmse in enumerate(errors)]
+    (ours,) = against_best_fixed(flights)
+    assert (ours["best"], ours["seeds"]) == ("reversed", 3)
+    assert comparison([ours])[0].endswith(" over 3 seeds")
+    never = [row["never_found"] for row in rows_of(flights)]
+    assert never == [0, 0, 0, 2] and [line.split()[3] for line in table(rows_of(flights))[1:]] == list("0002")
+
+
+def test_as_often_found_topologies_are_ranked_over_the_seeds_of_all() -> None:
+    flown = {"ours": (0.02, 0.03, 0.04), "string": (0.03, 0.04, None), "flat": (0.02, None, 0.9)}
+    flights = [flight(seed, rmse, name) for name, errors in flown.items() for seed, rmse in enumerate(errors)]
+    assert [one["best"] for one in against_best_fixed(flights)] == ["flat"]
+
+
 def test_without_a_fixed_topology_or_a_second_seed_there_is_less_to_say() -> None:
     assert against_best_fixed([flight(1, 0.02), flight(1, 0.03, "relay")]) == []
     (one,) = against_best_fixed([flight(1, 0.02), flight(1, 0.04, "flat")])
     assert (one["share"], one["gap_m"]) == (pytest.approx(-0.5), None)
-    assert comparison([one]) == ["walk ours: -50% against flat"]
+    assert comparison([one]) == ["walk ours: -50% against flat over 1 seed"]
 
 
 def test_a_scenario_that_never_found_its_target_has_a_row() -> None:
     lost = flight(1, None, missed=["found_s never > 25"], lost_s=None, longest_loss_s=None, found_s=None)
     (row,) = rows_of([lost])
     assert (row["never_found"], row["as_expected"]) == (1, 0)
-    assert "never" in table([row])[1]
+    assert table([row])[1].split()[2:5] == ["0/1", "1", "-"]
 
 
 def test_both_sides_know_the_same_strategies() -> None:

@@ -88,6 +88,21 @@ def _planar_run() -> Execute[Any]:
     return execute
 
 
+def _with_key(run: Execute[T], task: T) -> tuple[str, dict[str, Any]]:
+    """Return the key that a worker gives to a task, which tells its version of the program, and the row."""
+    return task.key, run(task)
+
+
+def _of_this_program(task: Keyed, key: str, row: dict[str, Any]) -> dict[str, Any]:
+    """Return a worker's row; raises SweepError if its key for the task is not the one of this program."""
+    if key != task.key:
+        raise SweepError(
+            f"a worker ran {task.key} as {key}: its program is another one than this, or has changed since the worker "
+            "began; install this one there, and start the workers again"
+        )
+    return row
+
+
 def dask_is_there() -> bool:
     """Return whether the optional extra `sweep` is installed."""
     return find_spec("distributed") is not None
@@ -122,11 +137,12 @@ def _on_cluster(
         except (OSError, TimeoutError, ValueError) as error:
             raise SweepError(f"no dask scheduler answers at {scheduler}: {error}") from error
         try:
-            futures = {client.submit(run, task, pure=False, retries=3): task for task in tasks}
+            futures = {client.submit(_with_key, run, task, pure=False, retries=3): task for task in tasks}
             for future in as_completed(list(futures)):
+                task = futures[future]
                 if future.status != "finished":
-                    raise SweepError(f"task {futures[future].key} failed: {future.exception()}")
-                yield futures[future], future.result()
+                    raise SweepError(f"task {task.key} failed: {future.exception()}")
+                yield task, _of_this_program(task, *future.result())
                 future.release()
         finally:
             client.close()

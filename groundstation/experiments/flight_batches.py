@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Iterable, Mapping
@@ -42,7 +43,7 @@ def batches(order: str, first_seed: int, flights: int, size: int = 20, study: st
 
 def fly(batch: FlightBatch) -> dict[str, Any]:
     """Fly a batch in a process of its own; raises CampaignError or OperatorMistake with its message."""
-    order = json.loads(batch.order) | {"seeds": list(batch.seeds)}
+    order = json.loads(batch.order) | {"seeds": list(batch.seeds), "parent": os.getpid()}
     command = [sys.executable, "-m", "sim_bridge.study", batch.study]
     result = subprocess.run(command, input=json.dumps(order), capture_output=True, text=True, check=False)
     if result.returncode == _WRONG_ORDER:

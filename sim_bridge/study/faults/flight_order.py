@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from groundstation.process import numba_cache
+from groundstation.process.parent import end_with
 from sim_bridge.scenario import Scenario, parse_scenario
 from sim_bridge.study.faults.hosted_kinds import WRONG_ORDER, unhosted
 
@@ -33,10 +34,16 @@ class FlightOrder:
 
 
 def fly_seeds(fly: Callable[[FlightOrder, int], dict[str, Any]]) -> int:
-    """Fly each seed of the order; return WRONG_ORDER if it cannot be flown here or `fly` refuses it."""
+    """Fly each seed of the order; return WRONG_ORDER if it cannot be flown here or `fly` refuses it.
+
+    If the order names its parent, this process ends with that one: nobody else would read the results.
+    """
     numba_cache.activate()
     try:
-        order = order_of(json.load(sys.stdin))
+        values = json.load(sys.stdin)
+        if parent_pid := values.pop("parent", None):
+            end_with(parent_pid)
+        order = order_of(values)
         for seed in order.seeds:
             print(json.dumps(fly(order, seed)), flush=True)
     except WrongOrder as refusal:

@@ -1,6 +1,7 @@
 """Heartbeat block, sleep and signals of a child."""
 
 import os
+import select
 import signal
 import subprocess
 import sys
@@ -192,3 +193,22 @@ def test_process_package_imports_nothing_heavy() -> None:
     )
     result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert result.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+def test_a_child_that_ends_with_its_parent_leaves_no_orphan(number: signal.Signals) -> None:
+    child = "import os, sys, time; from groundstation.process.parent import end_with; end_with(int(sys.argv[1]));"
+    child += "print(os.getpid(), flush=True); time.sleep(600)"
+    parent = f"import os, subprocess, sys; subprocess.run([sys.executable, '-c', {child!r}, str(os.getpid())])"
+    with subprocess.Popen([sys.executable, "-c", parent], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        watch = os.pidfd_open(int(process.stdout.readline()))
+        process.send_signal(number)
+        assert select.select([watch], [], [], 10.0)[0], "it outlived its parent"
+        os.close(watch)
+
+
+def test_a_child_whose_parent_has_ended_before_it_looked_ends_at_once() -> None:
+    script = "from groundstation.process.parent import end_with; end_with(1); print('lives')"
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert (ended.returncode, ended.stdout) == (-signal.SIGKILL, "")

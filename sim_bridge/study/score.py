@@ -104,13 +104,18 @@ class FlightScore:
             "robot_max_m": {k: round(math.sqrt(max(v)), 3) for k, v in self.squares.items() if k not in self.errors},
             "topology_seconds": {"flat": round(flat, 1), "string": round(string, 1)},
             "topology_switches": self.switches,
-            "longest_unseen_s": round(self.unseen_s, 1),
-            "min_separation_m": round(self.separation_m, 3),
+            "longest_unseen_s": _finite(self.unseen_s, 1),
+            "min_separation_m": _finite(self.separation_m, 3),
             "anees": {k: round(float(np.mean(v)), 3) for k, v in self.nees.items()},
             "diverged_s": {k: round(v, 1) for k, v in self.diverged_s.items()},
             "nis": {k: round(float(np.mean(v)), 3) for k, v in sorted(self.nis.items())},
             "verdicts": dict(sorted(self.verdicts.items())),
         }
+
+
+def _finite(value: float, digits: int) -> float | None:
+    """Return a rounded figure, None for one without bound, which JSON cannot hold: one drone, or one never seen."""
+    return round(value, digits) if math.isfinite(value) else None
 
 
 def _figures(errors: Array, period_s: float) -> dict[str, float]:

@@ -1,5 +1,8 @@
 """Scores of a flight at message level: mean and greatest position error of a robot."""
 
+import json
+import math
+
 import numpy as np
 import pytest
 
@@ -21,3 +24,6 @@ def test_the_greatest_error_is_that_of_each_robots_horizontal_position() -> None
     report = score.report()
     assert report["robot_max_m"] == {"a": pytest.approx(0.75)}
     assert report["target_max_m"] == pytest.approx(3.0)
+    assert report["min_separation_m"] is None, "one drone is apart from nobody"
+    score.take(belief, {"a": robot, "t": target}, ("t",), "a", {"a": math.inf})
+    assert '"longest_unseen_s": null' in json.dumps(score.report(), allow_nan=False)

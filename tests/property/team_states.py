@@ -122,11 +122,11 @@ def random_states(rng: np.random.Generator, count: int, robots: int) -> TeamStat
 
 
 def _random_shafts(rng: np.random.Generator, places: Array) -> Array:
-    """Return shafts near places [n, 3]; NaN in half of the states."""
+    """Return shafts near places [n, 3]; NaN in two of three states."""
     count = len(places)
     near = places[:, :2] + _anywhere(rng, rng.uniform(0.1, 2.0, count))[:, :2]
     more = rng.uniform(0.0, (0.1**2, 0.5), (count, 2))
-    return np.where(rng.random((count, 1)) < 0.5, np.concatenate((near, more), axis=1), np.nan)
+    return np.where(rng.random((count, 1)) < 1.0 / 3.0, np.concatenate((near, more), axis=1), np.nan)
 
 
 def _anywhere(rng: np.random.Generator, sizes: Array) -> Array:

@@ -101,6 +101,22 @@ def test_one_that_comes_towards_the_pad_needs_its_lag_to_stop(mode, towards_m_s,
         assert bool(neighbours.obstacle(S)) == held
 
 
+@pytest.mark.parametrize("bearing", [0.4, 2.0, 3.5, 5.0])
+def test_it_may_come_from_any_side(bearing):
+    neighbours, c, s = watch(pad_m=(2.0, 1.0)), math.cos(bearing), math.sin(bearing)
+    for distance_m, held in ((0.79, True), (0.81, False)):
+        velocity_m_s = (-0.4 * c - 0.2 * s, -0.4 * s + 0.2 * c, 0.3)
+        place = (2.0 + distance_m * c, 1.0 + distance_m * s)
+        neighbours.see(S, [believed("b", *place, std_m=0.0, velocity_m_s=velocity_m_s)])
+        assert bool(neighbours.obstacle(S)) == held
+
+
+def test_one_right_over_the_pad_is_too_near():
+    neighbours = watch()
+    neighbours.see(S, [believed("b", 0.0, velocity_m_s=(0.4, 0.0, 0.0))])
+    assert neighbours.obstacle(S)
+
+
 @pytest.mark.parametrize(("towards_m_s", "least_m"), [(0.0, 0.81), (0.4, 1.01)])
 def test_one_that_tracks_may_still_be_told_to_fly_there(towards_m_s, least_m):
     neighbours = watch(mode="TRACK")

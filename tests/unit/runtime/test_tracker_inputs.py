@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hovering_team import MS, PLACES, TARGET, Flight
 
+from groundstation import tracker
 from groundstation.bus.messages import (
     ClockOffset,
     FlightState,
@@ -17,6 +18,7 @@ from groundstation.bus.messages import (
     Verdict,
 )
 from groundstation.control.flight_mode import FlightMode
+from groundstation.control.setpoints import Setpoint
 from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.rotations import rotation_z
 
@@ -250,6 +252,22 @@ def test_plan_and_setpoints_follow_from_the_belief(tracking: Flight) -> None:
     assert {entry.setpoint.phase for entry in limited.values()} == {FlightMode.TRACK}
     for entry in limited.values():
         assert math.hypot(*entry.setpoint.velocity_m_s[:2]) <= 0.6 + 1e-9
+
+
+def test_a_drone_that_takes_off_is_kept_clear_of_although_it_is_not_in_the_belief(
+    flight: Flight, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    apart_m, speed_m_s = 1.05, 0.5
+    flight.places["drone_2"] = flight.places["drone_1"] - np.array([0.0, apart_m, 0.8])
+    flight.fly("drone_1")
+    flight.fly("drone_2", state=FlightState.TAKING_OFF)
+    flight.run(1.0)
+    assert flight.tracker.belief.layout.robots == ("drone_1",)
+    wish = Setpoint((0.0, -speed_m_s, 0.0), 0.0, FlightMode.TRACK)
+    monkeypatch.setattr(tracker, "setpoints_from_plan", lambda *_: {"drone_1": wish})
+    sent = flight.tracker.setpoints(flight.now)["drone_1"]
+    assert sent.limited_by == ("separation",)
+    assert abs(sent.setpoint.velocity_m_s[1]) <= (apart_m - 0.75) / 2.0
 
 
 def test_an_airborne_robot_nobody_has_seen_hovers(flight: Flight) -> None:

@@ -19,7 +19,7 @@ from drivers.ardrone.publisher import NavdataPublisher
 from drivers.ardrone.queries import TcpInquirer
 from drivers.ardrone.rate_watch import RateWatch
 from drivers.ardrone.session import ArdroneSession, SessionPhase
-from drivers.ardrone.settings import ArDroneDriverSettings
+from drivers.ardrone.settings import FASTEST_M_S, ArDroneDriverSettings
 from drivers.ardrone.uplink_watch import UplinkWatch
 from drivers.ardrone.velocity_doubt import NO_FLOOR
 from drivers.ardrone.wire.errors import WireError
@@ -59,7 +59,9 @@ _NO_AR1_VIDEO = Notice(
 # Firmware limits tilt to 30 degrees and flies 5 m/s at most. WIRE: the TIME option wraps after 2048 s.
 # 30 degrees are 6 m/s^2. Between two packets of a recorded flight its velocity changed by 0.024 m/s at most.
 # Our velocity loop is closed over the link: with a velocity older than this it oscillates.
-LIMITS = PlausibilityLimits(clock_wrap_s=2048.0, jump_m_s=0.2, acceleration_m_s2=6.0, clock_late_s=0.5)
+LIMITS = PlausibilityLimits(
+    speed_m_s=FASTEST_M_S, clock_wrap_s=2048.0, jump_m_s=0.2, acceleration_m_s2=6.0, clock_late_s=0.5
+)
 _log = logging.getLogger(__name__)
 
 
@@ -170,14 +172,15 @@ class ArDrone:
         )
         sample = convert.sample_from_motion(now_ns, packet, motion)
         report = self._plausibility.update(sample, flight_state)
-        self._motion.add(motion)
+        if not report.withheld:
+            self._motion.add(motion)
         if flight_state in UP:
             self._flow.update(now_ns, motion.velocity_m_s[:2], convert.says_no_vision(demo.control_state))
         elif flight_state not in AIRBORNE:
             self._flow.reset()
             self._attitude.trust()  # else its landing would not be believed either
         if self._flow.lost or self._attitude.blind:
-            report = HealthReport((_NO_VELOCITY, *report.findings))
+            report = HealthReport((_NO_VELOCITY, *report.findings), report.withheld)
         self._publisher.publish(now_ns, motion, report)
 
     # -- sender loop --------------------------------------------------------------------------------------------------

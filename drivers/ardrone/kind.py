@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from drivers.ardrone.settings import ArDroneDriverSettings, ArDroneLimits, FlightConfiguration, Video
+from drivers.ardrone.settings import FASTEST_M_S, ArDroneDriverSettings, ArDroneLimits, FlightConfiguration, Video
 from drivers.ardrone.wire import at
 from drivers.ardrone.wire.tags import OPTION_SIZES
 from drivers.vehicle_settings import Port, a_process_each, values_of, vehicle_limits
@@ -139,7 +139,7 @@ KIND = VehicleKind(
     name="ardrone",
     summary="Parrot AR.Drone 1.0 and 2.0",
     driver="drivers.ardrone.driver:run",
-    habits=ErrorHabits(0.4, 5.0, 0.7, 0.0, 0.2, reports_climb=False, tells_attitude=False),
+    habits=ErrorHabits(0.4, 5.0, 0.7, 0.0, 0.2, reports_climb=False, tells_attitude=False, fastest_m_s=FASTEST_M_S),
     processes=a_process_each(_settings),
     stop=_stop,
     sections={"video": ArDroneVideo, "ardrone": ArDroneOwn},

@@ -63,7 +63,7 @@ class NavdataPublisher:
         sound = motion.height_m is None or self.heights.accept(stamp_ns, motion.height_m)
         all_values = health.of(Sensor.TELEMETRY, Sensor.CLOCK)
         velocity = max(all_values, health.of(Sensor.VELOCITY))
-        if velocity < Health.BAD and self._odometry.is_due(stamp_ns):
+        if velocity < Health.BAD and not health.withheld and self._odometry.is_due(stamp_ns):
             covariance = self._covariances[velocity is Health.SUSPECT, sound]
             self._bus.publish(ODOMETRY, self._odometry_message(stamp_ns, motion, reset, sound, covariance))
         if max(all_values, health.of(Sensor.IMU)) is Health.BAD:

@@ -9,6 +9,9 @@ from drivers.vehicle_settings import DriverSection, Port, VehicleDriverSettings,
 
 VideoCodec = Literal["h264_360p", "h264_720p"]
 
+# Faster than any flight of this kind [m/s]: beyond it a reported velocity is no measurement.
+FASTEST_M_S = 5.0
+
 
 class ArDroneLimits(VehicleLimits):
     """Limits that no command exceeds; also written to the drone's configuration."""

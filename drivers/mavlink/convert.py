@@ -7,6 +7,7 @@ its local NED is the world turned by 180 degrees about x: north = world x, east 
 import math
 from dataclasses import dataclass
 
+from drivers.mavlink.settings import FASTEST_M_S
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.flight import OdometryMessage, SetPositionTargetLocalNed, VisionPositionEstimate
 from drivers.mavlink.wire.names import (
@@ -34,7 +35,7 @@ _MOST_M_S, _MOST_RAD_S, _MOST_M_S2, _MOST_M = 30.0, 60.0, 400.0, 10_000.0
 _STILL_M_S = 0.15
 _IN_EMERGENCY, _POWEROFF = 6, 7  # MAV_STATE; 8 is FLIGHT_TERMINATION
 # An estimator may be reset once, by the first position that it gets; time_boot_ms wraps after 49 days.
-LIMITS = PlausibilityLimits(speed_m_s=8.0, tilt_rad=math.radians(50.0), jump_m_s=0.6)
+LIMITS = PlausibilityLimits(speed_m_s=FASTEST_M_S, tilt_rad=math.radians(50.0), jump_m_s=0.6)
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +94,13 @@ def sample_from_local(
     """Return the input of a velocity's plausibility check, in the axes of the message, in which it may stand still."""
     tilt = (attitude.roll_rad, attitude.pitch_rad)
     return MotionSample(
-        stamp_ns, (message.vx, -message.vy), *tilt, inertial, message.time_boot_ms * 1_000_000, attitude.yaw_rad
+        stamp_ns,
+        (message.vx, -message.vy),
+        *tilt,
+        inertial,
+        message.time_boot_ms * 1_000_000,
+        attitude.yaw_rad,
+        -message.vz,
     )
 
 

@@ -6,7 +6,14 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from drivers.mavlink.settings import Forward, LinkSettings, MavlinkDriverSettings, VehicleSettings, VisionFeedback
+from drivers.mavlink.settings import (
+    FASTEST_M_S,
+    Forward,
+    LinkSettings,
+    MavlinkDriverSettings,
+    VehicleSettings,
+    VisionFeedback,
+)
 from drivers.vehicle_settings import Address, silence_limits, vehicle_limits
 from groundstation.adapters import with_zone
 from groundstation.errors import SettingsError
@@ -172,7 +179,16 @@ def _offer(flavour: str, title: str) -> Offer:
 # The error of a PX4's velocity changes by 0.09 m/s per axis in half a second, by 0.15 in one and by 0.19 in two
 # (docs/reference/mavlink.md 2.1).
 _HABITS = ErrorHabits(
-    5.0, 10.0, 2.0, 0.05, 0.0, reports_climb=True, tells_attitude=True, flies_on_estimate=True, velocity_walk=0.15
+    5.0,
+    10.0,
+    2.0,
+    0.05,
+    0.0,
+    reports_climb=True,
+    tells_attitude=True,
+    flies_on_estimate=True,
+    velocity_walk=0.15,
+    fastest_m_s=FASTEST_M_S,
 )
 # It flies on our estimate: it has no height of its own to report; its velocity follows our errors with its filter's
 # time constant.

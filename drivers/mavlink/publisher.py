@@ -70,7 +70,7 @@ class TelemetryPublisher:
     ) -> None:
         """Publish a velocity [base_stabilized] unless it is BAD."""
         believed = health.of(Sensor.TELEMETRY, Sensor.CLOCK, Sensor.VELOCITY)
-        if believed is Health.BAD:
+        if believed is Health.BAD or health.withheld:
             return
         std_m_s = max(self._velocity_std_m_s, self.stated.velocity_std_m_s(stamp_ns))
         if believed is Health.SUSPECT:

@@ -9,6 +9,8 @@ from pydantic_core import PydanticCustomError
 from drivers.vehicle_settings import DriverSection, Name, Positive, SilenceLimits, VehicleLimits, is_address
 from drivers.watchdog_types import WatchdogLimits
 
+# Faster than any flight of this kind [m/s]: beyond it a reported velocity is no measurement.
+FASTEST_M_S = 8.0
 _LIMITS = WatchdogLimits()
 
 

@@ -36,9 +36,13 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class HealthReport:
-    """Findings on all sensors that are not GOOD, the worst first."""
+    """Findings on all sensors that are not GOOD, the worst first.
+
+    withheld: the newest velocity is not to be used, whatever the health: it cannot be true, or nothing confirms it yet.
+    """
 
     findings: tuple[Finding, ...] = ()
+    withheld: bool = False
 
     def of(self, *sensors: Sensor) -> Health:
         """Return the worst health of some sensors."""

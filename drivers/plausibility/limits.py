@@ -13,7 +13,7 @@ class PlausibilityLimits:
     frozen_s: how long all values may repeat; stuck_s: how long one sensor may while others move; stuck_alone_s:
     likewise at any tilt; stuck_m_s: change of speed that the tilt must imply meanwhile. clock_stands_s,
     clock_suspect_s, clock_late_s: how long the vehicle's clock may stand, and how much older than the freshest its
-    values may be. speed_m_s, tilt_rad: beyond the vehicle's means, for beyond_s. jump_m_s, acceleration_m_s2 and
+    values may be. speed_m_s, tilt_rad: beyond the vehicle's means, BAD after beyond_s. jump_m_s, acceleration_m_s2 and
     jump_rad, turn_rad_s: the largest step between two values, at once and by time. jumps, jumps_within_s: number of
     such steps that is too many within a time. hold_s: how long a verdict outlives its evidence. clock_wrap_s: time at
     which the vehicle's clock starts over. stirs_on_floor: the noise of its inertial values shows while it stands.

@@ -25,8 +25,8 @@ _GAP_S = 0.3
 class MotionSample(NamedTuple):
     """Motion in one packet. stamp_ns: receipt; vehicle_ns: time on the vehicle's clock, None if it has none.
 
-    velocity_m_s: horizontal, as reported, in axes of the vehicle's choice; heading_rad: of the vehicle in these axes.
-    roll_rad, pitch_rad [FLU]; inertial: rates and specific forces, empty if not reported.
+    velocity_m_s: horizontal, as reported, in axes of the vehicle's choice; heading_rad: of the vehicle in these axes;
+    climb_m_s: 0 if none is used. roll_rad, pitch_rad [FLU]; inertial: rates and specific forces, empty if not reported.
     """
 
     stamp_ns: int
@@ -36,6 +36,12 @@ class MotionSample(NamedTuple):
     inertial: tuple[float, ...] = ()
     vehicle_ns: int | None = None
     heading_rad: float = 0.0
+    climb_m_s: float = 0.0
+
+    @property
+    def speed_m_s(self) -> float:
+        """Return the speed, climb included."""
+        return math.hypot(*self.velocity_m_s, self.climb_m_s)
 
     @property
     def lean_rad(self) -> tuple[float, float]:
@@ -64,6 +70,7 @@ class MotionMonitor:
         for watch in (self._contents, self._attitude, self._inertial, *self._velocity, self._clock):
             watch.reset()
         self._before: MotionSample | None = None
+        self._sound: MotionSample | None = None
         self._beyond_ns: dict[Sensor, int] = {}
         self._jumped_ns: dict[Sensor, deque[int]] = {}
         self._held: dict[Sensor, tuple[int, Finding]] = {}
@@ -80,13 +87,34 @@ class MotionMonitor:
         judged = self._judge_repeats(sample, state in UP)
         judged += self._judge_clock(sample)
         judged += self._judge_values(sample)
+        withheld = not self._is_sound(sample)
         self._before = sample
-        self.report = self._settle(sample.stamp_ns, judged)
+        self.report = self._settle(sample.stamp_ns, judged, withheld)
         return self.report
 
-    def _settle(self, now_ns: int, judged: list[_Judged]) -> HealthReport:
+    def _is_sound(self, sample: MotionSample) -> bool:
+        """Return whether a velocity is possible, and near the last one that was, or else near the one before it.
+
+        So the first value after a jump waits for the next one to confirm it.
+        """
+        limits, before, sound = self.limits, self._before, self._sound
+        if sample.speed_m_s > limits.speed_m_s:
+            return False
+        confirmed = before is not None and before.speed_m_s <= limits.speed_m_s and not self._jumps(before, sample)
+        if not confirmed and sound is not None and self._jumps(sound, sample):
+            return False
+        self._sound = sample
+        return True
+
+    def _jumps(self, before: MotionSample, after: MotionSample) -> bool:
+        """Return whether a velocity changes faster than the vehicle can change it; not after a pause."""
+        elapsed_s = (after.stamp_ns - before.stamp_ns) * 1e-9
+        step = math.dist(after.velocity_m_s, before.velocity_m_s)
+        return elapsed_s <= _GAP_S and step > self.limits.jump_m_s + self.limits.acceleration_m_s2 * elapsed_s
+
+    def _settle(self, now_ns: int, judged: list[_Judged], withheld: bool = False) -> HealthReport:
         """Hold each verdict for a while, the worse one first."""
-        if not judged and not self._held:
+        if not (judged or self._held or withheld):
             return ALL_GOOD
         hold_ns = round(self.limits.hold_s * 1e9)
         for sensor, health, reason in judged:
@@ -94,7 +122,8 @@ class MotionMonitor:
             if held is None or health >= held[1].health or now_ns - held[0] > hold_ns:
                 self._held[sensor] = (now_ns, Finding(sensor, health, reason))
         self._held = {sensor: held for sensor, held in self._held.items() if now_ns - held[0] <= hold_ns}
-        return HealthReport(tuple(sorted((one for _, one in self._held.values()), key=lambda one: -one.health)))
+        findings = sorted((one for _, one in self._held.values()), key=lambda one: -one.health)
+        return HealthReport(tuple(findings), withheld)
 
     def _judge_standing(self, sample: MotionSample) -> list[_Judged]:
         limits, stamp_ns, judged = self.limits, sample.stamp_ns, list[_Judged]()
@@ -155,7 +184,7 @@ class MotionMonitor:
 
     def _judge_values(self, sample: MotionSample) -> list[_Judged]:
         limits, before, judged = self.limits, self._before, list[_Judged]()
-        speed = math.hypot(*sample.velocity_m_s)
+        speed = sample.speed_m_s
         tilt = max(abs(sample.roll_rad), abs(sample.pitch_rad))
         if speed > limits.speed_m_s or tilt > limits.tilt_rad or self._beyond_ns:
             degrees = f"a tilt of {math.degrees(tilt):.0f} deg"
@@ -164,9 +193,9 @@ class MotionMonitor:
         elapsed_s = math.inf if before is None else (sample.stamp_ns - before.stamp_ns) * 1e-9
         if before is None or elapsed_s > _GAP_S:
             return judged
-        step = math.dist(sample.velocity_m_s, before.velocity_m_s)
         turned = max(abs(sample.roll_rad - before.roll_rad), abs(sample.pitch_rad - before.pitch_rad))
-        if step > limits.jump_m_s + limits.acceleration_m_s2 * elapsed_s:
+        if self._jumps(before, sample):
+            step = math.dist(sample.velocity_m_s, before.velocity_m_s)
             judged.append(self._jumped(Sensor.VELOCITY, sample, f"its velocity jumps by {step:.1f} m/s"))
         if turned > limits.jump_rad + limits.turn_rad_s * elapsed_s:
             judged.append(

@@ -6,7 +6,7 @@ from collections import Counter
 from drivers.base import HostProcess, LinkHealth, read_section
 from drivers.datagrams import DatagramLog
 from drivers.host import fly_one
-from drivers.plausibility.health import Health
+from drivers.plausibility.health import SUSPECT_VELOCITY_STD_M_S, Health, Sensor
 from drivers.plausibility.limits import PlausibilityLimits
 from drivers.plausibility.motion import MotionMonitor, MotionSample
 from drivers.rmw_zenoh.publisher_tie import PublisherTie
@@ -16,7 +16,7 @@ from drivers.ros2 import names
 from drivers.ros2.flight import FlightWatch, angles_of, fault_of_standing, levelled
 from drivers.ros2.link import Ros2Link
 from drivers.ros2.names import Order
-from drivers.ros2.settings import Ros2DriverSettings
+from drivers.ros2.settings import FASTEST_M_S, Ros2DriverSettings
 from drivers.watchdog_types import REFUSABLE, Action, VehicleView, WatchdogDecision
 from groundstation.bus import clock
 from groundstation.bus.api import Bus
@@ -34,7 +34,7 @@ _PAUSE_NS = {Order.TAKE_OFF: 2 * NS_PER_S, Order.LAND: NS_PER_S // 2, Order.CUT:
 # A take-off that is called off may still begin for this long after its order; a landing that seems to be over, go on.
 _LASTS_NS = 5 * NS_PER_S
 _ORDERS = {Action.TAKE_OFF: Order.TAKE_OFF, Action.LAND: Order.LAND, Action.CUT: Order.CUT}
-LIMITS = PlausibilityLimits(speed_m_s=8.0, tilt_rad=math.radians(50.0), jump_m_s=0.6)
+LIMITS = PlausibilityLimits(speed_m_s=FASTEST_M_S, tilt_rad=math.radians(50.0), jump_m_s=0.6)
 
 
 class Ros2Vehicle:
@@ -87,11 +87,13 @@ class Ros2Vehicle:
         self._heard_ns, self._velocity = now_ns, velocity
         self._flight.see(now_ns, height_m, velocity[2], self._asked)
         state = self._flight.state(self._asked, math.hypot(*velocity))
-        sample = MotionSample(now_ns, velocity[:2], roll, pitch, vehicle_ns=message.stamp_ns or None)
+        stamp_ns = message.stamp_ns or None
+        sample = MotionSample(now_ns, velocity[:2], roll, pitch, vehicle_ns=stamp_ns, climb_m_s=velocity[2])
         report = self._plausibility.update(sample, state)
-        if report.of(*LIMITS.essential) is Health.BAD:
+        if report.withheld or report.of(*LIMITS.essential) is Health.BAD:
             return
-        variance = self._settings.velocity_std_m_s**2
+        doubted = report.of(Sensor.TELEMETRY, Sensor.CLOCK, Sensor.VELOCITY) is Health.SUSPECT
+        variance = max(self._settings.velocity_std_m_s, SUSPECT_VELOCITY_STD_M_S if doubted else 0.0) ** 2
         odometry = Odometry(
             header=self._bus.header(self.name, now_ns),
             velocity_m_s=velocity,

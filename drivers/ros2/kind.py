@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from drivers.ros2.names import HOVER, LAND
-from drivers.ros2.settings import Ros2DriverSettings, Ros2Section
+from drivers.ros2.settings import FASTEST_M_S, Ros2DriverSettings, Ros2Section
 from drivers.vehicle_settings import a_process_each, values_of
 from groundstation.vehicles import ErrorHabits, Finding, Offer, StopDatagrams, VehicleKind, VehicleOrder
 
@@ -38,7 +38,7 @@ KIND = VehicleKind(
     name="ros2",
     summary="vehicles behind a ROS 2 node (Odometry in, Twist out)",
     driver="drivers.ros2.driver:run",
-    habits=ErrorHabits(0.5, 5.0, 0.7, 0.05, 0.0, reports_climb=True, tells_attitude=True),
+    habits=ErrorHabits(0.5, 5.0, 0.7, 0.05, 0.0, reports_climb=True, tells_attitude=True, fastest_m_s=FASTEST_M_S),
     processes=a_process_each(_settings),
     stop=_stop,
     sections={"ros2": Ros2Section},

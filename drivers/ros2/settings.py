@@ -10,6 +10,8 @@ from groundstation.vehicles import KindSection
 
 # The type hash of Humble, which has none.
 NO_HASH = "TypeHashNotSupported"
+# Faster than any flight of this kind [m/s]: beyond it a reported velocity is no measurement.
+FASTEST_M_S = 8.0
 
 TopicName = Annotated[str, Field(pattern=r"^/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*$")]
 

@@ -7,10 +7,10 @@ from drivers.base import HostProcess, LinkHealth, read_section
 from drivers.datagram_link import DatagramLink, DatagramVehicle
 from drivers.datagrams import DatagramLog
 from drivers.host import fly_one
-from drivers.plausibility.health import Health, Sensor
+from drivers.plausibility.health import SUSPECT_VELOCITY_STD_M_S, Health, Sensor
 from drivers.plausibility.limits import PlausibilityLimits
 from drivers.plausibility.motion import MotionMonitor, MotionSample
-from drivers.tello.settings import TelloDriverSettings
+from drivers.tello.settings import FASTEST_M_S, TelloDriverSettings
 from drivers.tello.wire import text
 from drivers.watchdog_types import REFUSABLE, Action, VehicleView, WatchdogDecision
 from groundstation.adapters import with_zone
@@ -37,7 +37,9 @@ _PAUSE_NS = {
     text.STREAM_ON: 3 * NS_PER_S,
 }
 # Whole numbers at 10 Hz: a single standing value means nothing; the accelerations of all three axes never stand.
-LIMITS = PlausibilityLimits(frozen_s=0.6, stuck_s=math.inf, stuck_alone_s=math.inf, jump_m_s=0.8, stirs_on_floor=False)
+LIMITS = PlausibilityLimits(
+    speed_m_s=FASTEST_M_S, frozen_s=0.6, stuck_s=math.inf, stuck_alone_s=math.inf, jump_m_s=0.8, stirs_on_floor=False
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,11 +108,14 @@ class Tello(DatagramVehicle):
 
     def _publish(self, now_ns: int, state: text.State, velocity: Vector3) -> None:
         roll, pitch, yaw = math.radians(state.roll), -math.radians(state.pitch), -math.radians(state.yaw)
-        sample = MotionSample(now_ns, velocity[:2], roll, pitch, state.acceleration)
+        sample = MotionSample(now_ns, velocity[:2], roll, pitch, state.acceleration, climb_m_s=velocity[2])
         report = self._plausibility.update(sample, self._flight_state(now_ns))
-        if report.of(Sensor.TELEMETRY, Sensor.VELOCITY) is Health.BAD:
+        believed = report.of(Sensor.TELEMETRY, Sensor.VELOCITY)
+        if report.withheld or believed is Health.BAD:
             return
         variance = self._settings.velocity_std_m_s**2 + _STEP_STD_M_S**2
+        if believed is Health.SUSPECT:
+            variance = max(variance, SUSPECT_VELOCITY_STD_M_S**2)
         message = Odometry(
             header=self._bus.header(self.name, now_ns),
             velocity_m_s=velocity,

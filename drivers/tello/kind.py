@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from drivers.tello.settings import TelloDriverSettings, TelloSection
+from drivers.tello.settings import FASTEST_M_S, TelloDriverSettings, TelloSection
 from drivers.tello.wire.text import COMMAND_PORT, LAND, VIDEO_PORT, rc
 from drivers.vehicle_settings import a_process_each, values_of
 from groundstation.vehicles import ErrorHabits, KindSection, StopDatagrams, VehicleKind, VehicleOrder
@@ -21,7 +21,9 @@ KIND = VehicleKind(
     summary="Ryze Tello and RoboMaster TT",
     driver="drivers.tello.driver:run",
     # Its velocity is the optical flow's, in steps of 0.1 m/s, its climb rate likewise.
-    habits=ErrorHabits(0.5, 5.0, 0.7, 0.05, 0.0, reports_climb=True, tells_attitude=True, tells_steps=True),
+    habits=ErrorHabits(
+        0.5, 5.0, 0.7, 0.05, 0.0, reports_climb=True, tells_attitude=True, tells_steps=True, fastest_m_s=FASTEST_M_S
+    ),
     processes=a_process_each(_settings),
     # Sticks in the middle never lift one that stands. The vehicle obeys every sender.
     stop=lambda orders: StopDatagrams(COMMAND_PORT, rc(0, 0, 0, 0), LAND),

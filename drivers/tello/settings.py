@@ -7,6 +7,9 @@ from pydantic import Field
 from drivers.vehicle_settings import Address, VehicleDriverSettings
 from groundstation.vehicles import KindSection
 
+# Faster than any flight of this kind [m/s]: beyond it a reported velocity is no measurement.
+FASTEST_M_S = 5.0
+
 
 class TelloSection(KindSection):
     """A Tello or RoboMaster TT in SDK mode."""

@@ -28,7 +28,7 @@ class Window:
 
     def __init__(self, field: ResolvedField, clock: str) -> None:
         self._clock = clock
-        self._screen = MessageScreen(parameters_from_field(field).tells_steps, _LASTS_NS)
+        self._screen = MessageScreen(parameters_from_field(field), _LASTS_NS)
         self._rows: deque[tuple[int, tuple[tuple[str, Message], ...]]] = deque()
         self._flying: dict[str, bool] = {}
         self._stood: set[str] = set()

@@ -48,7 +48,7 @@ class Intake:
         self._lag_ns = round(joint.parameters.max_lateness_s * 1e9)
         self._offsets: dict[str, int] = {}
         self._newest_status: dict[str, int] = {}
-        self._screen = MessageScreen(joint.parameters.tells_steps, self._lag_ns)
+        self._screen = MessageScreen(joint.parameters, self._lag_ns)
         self._attitudes = AttitudeIntake(joint.parameters.inertial)
         self.ranges = RangeIntake(joint, joint.parameters.ranging)
         self.reports = ReportIntake(joint, joint.parameters.reporting)

@@ -1,7 +1,6 @@
 """Checks messages before any computation: shapes and sizes, duplicates, frozen sensors."""
 
 import math
-from collections.abc import Container
 from operator import itemgetter
 
 from groundstation.bus.messages import (
@@ -18,6 +17,7 @@ from groundstation.bus.messages import (
 )
 from groundstation.estimation.fixed_lag import FUTURE_NS
 from groundstation.estimation.frozen_sensor import FreezeWatch, Novelty
+from groundstation.estimation.parameters import EstimatorParameters
 
 # No vehicle here moves this fast or far [m/s, m, rad]; a number that is merely finite can still overflow the filter.
 _ABSURD = 1e3
@@ -38,11 +38,12 @@ _STALE = {Novelty.NEW: None, Novelty.REPEATED: Verdict.DUPLICATE, Novelty.FROZEN
 class MessageScreen:
     """Judges messages one by one, each against earlier ones.
 
-    tells_steps: vehicles whose rounded values may repeat; lag_ns: older messages are too late.
+    parameters: which vehicles' rounded values may repeat, how fast each can be; lag_ns: older messages are too late.
     """
 
-    def __init__(self, tells_steps: Container[str], lag_ns: int) -> None:
-        self._tells_steps, self._lag_ns = tells_steps, lag_ns
+    def __init__(self, parameters: EstimatorParameters, lag_ns: int) -> None:
+        self._tells_steps, self._fastest_m_s = parameters.tells_steps, parameters.fastest_m_s
+        self._lag_ns = lag_ns
         self._seen: dict[str, dict[tuple[int, int], int]] = {}
         self._odometry_watch, self._sight_watch = FreezeWatch(*_FROZEN_ODOMETRY), FreezeWatch(*_FROZEN_SIGHT)
         self._standing: dict[str, tuple[int, bool]] = {}
@@ -84,10 +85,11 @@ class MessageScreen:
             return Verdict.IMPLAUSIBLE
         if not _plausible(message.attitude_std_rad, *message.velocity_covariance):
             return Verdict.IMPLAUSIBLE
-        if stamp_ns > now_ns + FUTURE_NS:
+        entity = message.header.entity
+        too_fast = math.hypot(*message.velocity_m_s) > self._fastest_m_s.get(entity, math.inf)
+        if too_fast or stamp_ns > now_ns + FUTURE_NS:
             return Verdict.IMPLAUSIBLE
         values = (message.velocity_m_s, *attitude, message.height_m)
-        entity = message.header.entity
         frozen = self._odometry_watch.is_frozen(entity, values, stamp_ns) and entity not in self._tells_steps
         # A vehicle that reports whole numbers repeats them while it stands.
         return Verdict.FROZEN if frozen and not self.stands(entity) else None

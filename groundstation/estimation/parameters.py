@@ -67,6 +67,7 @@ class EstimatorParameters:
     divergence_count of them in a row over at least divergence_s re-initialise the entity. inertial: robots whose
     attitude is taken from their IMU where they publish one (inertial.py), with their velocity scale. joins_early:
     robots that join as soon as they begin to take off. tells_steps: robots whose odometry may repeat itself in flight.
+    fastest_m_s: for robots, the reported speed beyond which it is no measurement.
     world_cameras: sensors mounted in the room that can be bumped. ranging: robots with a transponder, by system.
     reporting: targets whose own odometry is received.
     """
@@ -83,6 +84,7 @@ class EstimatorParameters:
     inertial: Mapping[str, float] = field(default_factory=dict)
     joins_early: frozenset[str] = frozenset()
     tells_steps: frozenset[str] = frozenset()
+    fastest_m_s: Mapping[str, float] = field(default_factory=dict)
     world_cameras: frozenset[str] = frozenset()
     ranging: Mapping[str, Mapping[str, RangedRobot]] = field(default_factory=dict)
     reporting: frozenset[str] = frozenset()
@@ -118,6 +120,7 @@ def parameters_from_field(resolved: ResolvedField) -> EstimatorParameters:
         },
         joins_early=frozenset(n for n, d in drones.items() if kind_named(d.kind).habits.flies_on_estimate),
         tells_steps=frozenset(n for n, d in drones.items() if kind_named(d.kind).habits.tells_steps),
+        fastest_m_s={n: kind_named(d.kind).habits.fastest_m_s for n, d in drones.items()},
         world_cameras=frozenset(resolved.cameras),
         ranging={name: _ranged(system, drones) for name, system in resolved.ranging.items()},
         reporting=reporting,

@@ -37,7 +37,8 @@ class ErrorHabits:
     tells_attitude: its own attitude is better than ours from its IMU. flies_on_estimate: it flies on our
     estimate, which the tracker must have before it lifts off. tells_steps: its velocities and angles come in steps
     so coarse that they repeat while it hovers; its driver must find frozen ones. velocity_walk: by how much the
-    error of its velocity changes while no camera sees it [m/s per root second].
+    error of its velocity changes while no camera sees it [m/s per root second]. fastest_m_s: faster reports are no
+    measurement, and not used.
     """
 
     velocity_s: float
@@ -50,6 +51,7 @@ class ErrorHabits:
     flies_on_estimate: bool = False
     tells_steps: bool = False
     velocity_walk: float = 0.0
+    fastest_m_s: float = math.inf
 
 
 @dataclass(frozen=True, slots=True)

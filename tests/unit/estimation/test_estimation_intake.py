@@ -40,7 +40,7 @@ class Desk:
             "ceiling": FixedMount((0.0, 0.0, 4.2), 0.003, 0.01),
         }
         camera = MountedCamera("ceiling", WORLD_FROM_DOWN, observes_targets=False)
-        self.filter = FixedLagFilter(EstimatorParameters(entities, {"ceiling": camera}))
+        self.filter = FixedLagFilter(EstimatorParameters(entities, {"ceiling": camera}, fastest_m_s={"drone": 5.0}))
         self.intake, self.seq = Intake(self.filter, {"ceiling": camera}, "here"), 0
 
     def header(self, entity: str, age_ns: int = 0, clock: str = "here") -> Header:
@@ -112,6 +112,7 @@ BAD_SIGHTS: list[tuple[dict[str, Any], Verdict]] = [
 BAD_ODOMETRY: list[tuple[dict[str, Any], Verdict]] = [
     ({"velocity_m_s": (0.0,)}, Verdict.IMPLAUSIBLE),
     ({"velocity_m_s": (1e308, 0.0, 0.0)}, Verdict.IMPLAUSIBLE),
+    ({"velocity_m_s": (3.0, -3.0, 3.0)}, Verdict.IMPLAUSIBLE),
     ({"yaw_rad": math.nan}, Verdict.IMPLAUSIBLE),
     ({"pitch_rad": math.nan}, Verdict.IMPLAUSIBLE),
     ({"height_m": -math.inf}, Verdict.IMPLAUSIBLE),

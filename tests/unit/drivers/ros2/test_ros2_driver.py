@@ -13,7 +13,7 @@ from drivers.ros2.settings import Ros2DriverSettings, Ros2Section
 from drivers.watchdog_types import Action, DriverMode, VehicleView, WatchdogDecision
 from groundstation.bus import clock
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
-from groundstation.bus.messages import FlightState
+from groundstation.bus.messages import FlightState, Odometry
 from groundstation.bus.topics import ODOMETRY
 
 MS = 1_000_000
@@ -161,3 +161,20 @@ def test_with_its_motors_cut_it_is_told_to_stand_still(node: Node, height_m: flo
         node.driver.apply(node.now_ns, WatchdogDecision(DriverMode.CUT, Action.CUT))
     assert set(link.flown) == {(0.0, 0.0, 0.0)} and least <= len(link.flown) <= most
     assert str(Order.CUT) in link.ordered
+
+
+def test_one_absurd_velocity_is_not_published_and_the_next_ones_are_uncertain(node: Node) -> None:
+    flying = replace(STANDING, position=(0.0, 0.0, 1.0))
+
+    def moves(number: int, forward: float = 0.0) -> vehicle.OdometryMessage:
+        swing = 0.01 * math.sin(number)
+        return replace(flying, quaternion=(swing, 0.0, 0.0, 1.0), velocity=(swing + forward, swing, 0.0))
+
+    for number in range(20):
+        node.say(moves(number))
+    node.heard.drain()
+    for number, forward in ((20, 99.0), (21, 0.0), (22, 0.0)):
+        node.say(moves(number, forward))
+    told = [one.message for one in node.heard.drain() if isinstance(one.message, Odometry)]
+    assert [one.velocity_m_s[0] < 1.0 for one in told] == [True, True]
+    assert all(one.velocity_covariance[0] == pytest.approx(0.25) for one in told)

@@ -14,7 +14,8 @@ from drivers.tello.settings import TelloDriverSettings
 from drivers.tello.wire.text import COMMAND_PORT, STATE_PORT, State, WireError, parse_state, rc
 from drivers.watchdog_types import Action, DriverMode, WatchdogDecision
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
-from groundstation.bus.messages import FlightState
+from groundstation.bus.messages import FlightState, Odometry
+from groundstation.bus.topics import ODOMETRY
 from groundstation.vehicles import kind_named
 from sim_bridge.conformance.subject import subject_of
 from sim_bridge.devices.tello import TelloBody, TelloEmulator
@@ -41,7 +42,9 @@ class Flight:
         self.heard = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.heard.bind((settings.address, COMMAND_PORT))
         self.heard.settimeout(1.0)
-        self.tello = Tello(settings, MemoryBus(MemoryExchange(), "lab", "tello"))
+        exchange = MemoryExchange()
+        self.tello = Tello(settings, MemoryBus(exchange, "lab", "tello"))
+        self.odometry = MemoryBus(exchange, "lab", "tracker").subscribe([ODOMETRY])
 
     def told(
         self, action: Action, velocity=(0.0, 0.0, 0.0), turn=0.0, state=STATE, back=None
@@ -68,6 +71,20 @@ def flight():
 def test_corrections_in_hover_are_commanded_as_velocities_in_flight(flight: Flight) -> None:
     flies, _ = flight.told(Action.FLY, (0.1, -0.15, 0.0))
     assert flight.told(Action.HOVER, back=(0.1, -0.15, 0.0))[0] == flies != flight.told(Action.HOVER)[0]
+
+
+def test_one_absurd_velocity_is_not_published_and_the_next_ones_are_uncertain(flight: Flight) -> None:
+    now_ns = time.monotonic_ns()
+    for number in range(30):
+        north = 990 if number == 20 else number % 3
+        state = dataclasses.replace(
+            STATE, velocity=(north, 0, 0), acceleration=(17.0, -4.0, -956.0 - number), time=number
+        )
+        flight.tello._hear_state(now_ns + number * 100_000_000, state_text(state))
+    told = [one.message for one in flight.odometry.drain() if isinstance(one.message, Odometry)]
+    assert len(told) == 29 and all(math.hypot(*one.velocity_m_s) < 1.0 for one in told)
+    stds = [math.sqrt(one.velocity_covariance[0]) for one in told]
+    assert max(stds[:20]) < 0.1 and stds[20:] == pytest.approx([0.5] * 9)
 
 
 class Rig:

@@ -11,6 +11,7 @@ Pose = tuple[Vector3, Quaternion]
 class CapturedFrame:
     """One frame: its arrival, the time from exposure to sending [ns], and the tracked bodies by name.
 
+    processing_ns: or by how much it came later than usual.
     poses: position [m; the system's axes], quaternion (x, y, z, w). untracked: known to the system, not seen.
     """
 

@@ -24,7 +24,7 @@ class Ros2Source:
         self.rejected: Counter[str] = Counter()
         endpoint = f"tcp/{address.host}:{address.port}"
         self.detail = f"no pose from the ROS 2 router {endpoint}"
-        self._waiting: deque[tuple[int, str, Pose]] = deque(maxlen=_WAITING)
+        self._waiting: deque[tuple[int, int, str, Pose]] = deque(maxlen=_WAITING)
         self._came, self._guard = threading.Event(), PoseGuard()
         self._session = RouterSession(endpoint, [ros2_pose.expression(address.domain, address.path)], self._hear)
 
@@ -35,11 +35,12 @@ class Ros2Source:
         time.sleep(_GATHER_S)
         self._came.clear()
         poses: dict[str, Pose] = {}
+        late_ns: dict[str, int] = {}
         arrival_ns = 0
         while self._waiting:
-            arrival_ns, name, pose = self._waiting.popleft()
-            poses[name] = pose
-        return [CapturedFrame(arrival_ns, 0, poses)] if poses else []
+            arrival_ns, late, name, pose = self._waiting.popleft()
+            poses[name], late_ns[name] = pose, late
+        return [CapturedFrame(arrival_ns, min(late_ns.values()), poses)] if poses else []
 
     def close(self) -> None:
         """Leave the router."""
@@ -53,10 +54,11 @@ class Ros2Source:
         except WireError as error:
             self.rejected[error.reason] += 1
             return
-        if refusal := self._guard.refusal(name, publisher, said.frame, said.stamp_ns, now_ns):
+        refusal, late_ns = self._guard.judge(name, publisher, said.frame, said.stamp_ns, now_ns)
+        if refusal:
             self.rejected[refusal] += 1
             self.detail = f"{refusal} of {name}"
             return
         self.detail = ""
-        self._waiting.append((now_ns, name, said.pose))
+        self._waiting.append((now_ns, late_ns, name, said.pose))
         self._came.set()

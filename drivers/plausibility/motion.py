@@ -18,6 +18,8 @@ from groundstation.bus.messages import AIRBORNE, UP, FlightState
 
 _Judged = tuple[Sensor, Health, str]
 _CLOCK_STANDS, _FROZEN = "its clock stands", "its telemetry is frozen: all values repeat"
+# Nothing is known of the quality of a vehicle's clock.
+_SLOWER = 0.005
 # After a pause a step between two values means nothing.
 _GAP_S = 0.3
 
@@ -61,7 +63,7 @@ class MotionMonitor:
         self.limits = limits
         self._contents, self._attitude, self._inertial = RepeatWatch(), RepeatWatch(), RepeatWatch()
         self._velocity = (StandstillWatch(), StandstillWatch())
-        self._clock, self.clock = ClockWatch(limits.clock_wrap_s), ClockDrift()
+        self._clock, self.clock = ClockWatch(limits.clock_wrap_s, _SLOWER), ClockDrift()
         self.reset()
 
     def reset(self) -> None:

@@ -80,7 +80,7 @@ class OdometryDriver:
         if self._refused:
             self.counts[self._refused] += 1
             return
-        stamp_ns = arrival_ns - round(self._settings.delay_ms * NS_PER_MS)
+        stamp_ns = arrival_ns - round(self._settings.delay_ms * NS_PER_MS + self._guard.late_s * NS_PER_S)
         self._health.came(arrival_ns)
         if stamp_ns - self._told_ns < _PERIOD_NS:
             return
@@ -93,9 +93,13 @@ class OdometryDriver:
 
 
 class OdometryGuard:
-    """Refuses messages of one topic that cannot be true now: of a second publisher, too fast, frozen, or late. Pure."""
+    """Refuses messages of one topic that cannot be true now: of a second publisher, too fast, frozen, or late. Pure.
+
+    late_s: by how much the last one that was judged came later than the freshest ones.
+    """
 
     def __init__(self, fastest_m_s: float) -> None:
+        self.late_s = 0.0
         self._fastest_m_s = fastest_m_s
         self._clock = ClockWatch()
         self._tie = PublisherTie()
@@ -111,10 +115,10 @@ class OdometryGuard:
         if math.hypot(*message.velocity[:2]) > self._fastest_m_s:
             return "too fast"
         # A stamp of 0 counts as none: some nodes leave it out.
-        stands_s, late_s = self._clock.update(arrival_ns, message.stamp_ns) if message.stamp_ns else (0.0, 0.0)
+        stands_s, self.late_s = self._clock.update(arrival_ns, message.stamp_ns) if message.stamp_ns else (0.0, 0.0)
         if stands_s > _STANDS_S or self._repeats(arrival_ns, message):
             return "hangs"
-        return "late" if late_s > _LATE_S else ""
+        return "late" if self.late_s > _LATE_S else ""
 
     def _repeats(self, arrival_ns: int, message: vehicle.OdometryMessage) -> bool:
         """Return whether a moving target's message has repeated exactly for too long."""

@@ -217,6 +217,8 @@ def test_late_or_impossibly_fast_odometry_is_refused() -> None:
     says = Says()
     assert {says.next() for _ in range(20)} == {""}
     assert says.next(age_ms=400) == "late" and says.next() == ""
+    assert says.next(age_ms=200) == "" and says.guard.late_s == pytest.approx(0.2, abs=1e-3)
+    assert {says.next(age_ms=2000) for _ in range(2000)} == {"late"} and says.next() == ""
     assert says.next(velocity=(1.2, 0.0, 0.0)) == "too fast"
 
 

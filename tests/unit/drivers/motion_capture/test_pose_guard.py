@@ -16,7 +16,8 @@ class Says:
     def next(self, publisher: bytes = b"a", frame: str = "world", age_ms: int = 5, stamp_ns: int | None = None) -> str:
         self.now_ns += 20 * MS
         told_ns = self.now_ns - 3600 * S - age_ms * MS if stamp_ns is None else stamp_ns
-        return self.guard.refusal("cf1", publisher, frame, told_ns, self.now_ns)
+        self.refusal, self.late_ns = self.guard.judge("cf1", publisher, frame, told_ns, self.now_ns)
+        return self.refusal
 
 
 @pytest.mark.parametrize("stamp_ns", [None, 0])
@@ -45,4 +46,27 @@ def test_poses_that_waited_somewhere_are_late() -> None:
 
 def test_bodies_have_publishers_of_their_own() -> None:
     guard = PoseGuard()
-    assert guard.refusal("cf1", b"a", "world", 0, S) == guard.refusal("cf2", b"b", "map", 0, S) == ""
+    assert guard.judge("cf1", b"a", "world", 0, S) == guard.judge("cf2", b"b", "map", 0, S) == ("", 0)
+
+
+def test_poses_that_are_late_for_good_stay_refused_also_after_a_silence() -> None:
+    says = Says()
+    assert {says.next() for _ in range(50)} == {""}
+    assert {says.next(age_ms=2000) for _ in range(3000)} == {"late"}
+    assert says.next() == ""
+    says.now_ns += 1200 * MS
+    assert {says.next(age_ms=1200) for _ in range(500)} == {"late"}
+
+
+def test_another_publisher_after_a_silence_has_a_clock_of_its_own() -> None:
+    says = Says()
+    assert {says.next() for _ in range(50)} == {""}
+    says.now_ns += 1200 * MS
+    assert {says.next(b"b", frame="map", age_ms=2000) for _ in range(50)} == {""}
+
+
+def test_a_pose_is_dated_by_how_late_it_came() -> None:
+    says = Says()
+    for age_ms, late_ms in ((5, 0), (5, 0), (105, 100), (205, 200), (5, 0)):
+        says.next(age_ms=age_ms)
+        assert says.late_ns / MS == pytest.approx(late_ms, abs=0.1)

@@ -1,0 +1,48 @@
+"""Poses of ROS 2 topics as frames: their dates."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from drivers.motion_capture import ros2_source
+from drivers.motion_capture.ros2_source import Ros2Source
+from drivers.motion_capture.settings import parse_source
+from drivers.motion_capture.wire.ros2_pose import encode_pose
+
+MS, S = 1_000_000, 1_000_000_000
+KEY = "0/mocap/{}/pose/geometry_msgs::msg::dds_::PoseStamped_/RIHS01_x"
+PLACE, TURN = (1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0)
+
+
+class Router:
+    """A source at a router that says what it is told to, at times of a manual clock."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now_ns = 1000 * S
+        monkeypatch.setattr(ros2_source, "RouterSession", lambda *_: SimpleNamespace(close=lambda: None))
+        monkeypatch.setattr("groundstation.bus.clock.now_ns", lambda: self.now_ns)
+        self.source = Ros2Source(parse_source("ros2://127.0.0.1/mocap"))
+
+    def say(self, body: str = "cf1", age_ms: int = 0, publisher: bytes = b"a") -> Any:
+        self.source._hear(KEY.format(body), encode_pose(self.now_ns - age_ms * MS, PLACE, TURN), publisher)
+
+    def frame(self) -> Any:
+        (frame,) = self.source.poll(0.0)
+        return frame
+
+
+@pytest.fixture
+def router(monkeypatch: pytest.MonkeyPatch) -> Router:
+    return Router(monkeypatch)
+
+
+def test_a_frame_that_came_late_is_dated_back_by_what_all_its_poses_are_late(router: Router) -> None:
+    for late_ms in (0, 0, 0, 150, 0):
+        router.now_ns += 20 * MS
+        router.say("cf1", late_ms)
+        router.say("cf2", late_ms + 3, b"b")
+        frame = router.frame()
+        assert frame.arrival_ns == router.now_ns and set(frame.poses) == {"cf1", "cf2"}
+        assert frame.processing_ns / MS == pytest.approx(late_ms, abs=0.1)
+    assert router.source.rejected == {}

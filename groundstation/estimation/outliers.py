@@ -97,7 +97,7 @@ def is_turned(
 ) -> bool:  # fmt: skip
     """Return whether only a sighting's heading contradicts the belief, and the vehicle's own heading does not.
 
-    No vehicle turns so far without turning by its own heading, but a rigid body of motion capture does (0319).
+    No vehicle turns so far without turning by its own heading, but a rigid body of motion capture does (0317).
     """
     memory = belief.memory[event.subject]
     if rows != POSE or sensor.is_angle[YAW] == 0 or abs(hypothesis.innovations[0].y[YAW]) < _JUMP_RAD:

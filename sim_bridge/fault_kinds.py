@@ -45,6 +45,7 @@ class FaultKind(StrEnum):
     RANGES_SILENT = "ranges_silent"
     RANGES_FROZEN = "ranges_frozen"
     RANGES_LONG = "ranges_long"
+    ANCHOR_FROZEN = "anchor_frozen"
     ODOMETRY_SILENT = "odometry_silent"
     ODOMETRY_FROZEN = "odometry_frozen"
     ODOMETRY_SCALED = "odometry_scaled"
@@ -111,6 +112,7 @@ RULES: dict[FaultKind, KindRules] = {
     FaultKind.RANGES_SILENT: KindRules(Part.RANGING),
     FaultKind.RANGES_FROZEN: KindRules(Part.RANGING),
     FaultKind.RANGES_LONG: KindRules(Part.TRANSPONDER, (-5.0, 5.0), 0.5),
+    FaultKind.ANCHOR_FROZEN: KindRules(Part.RANGING, other=True),
     FaultKind.ODOMETRY_SILENT: KindRules(Part.ODOMETRY),
     FaultKind.ODOMETRY_FROZEN: KindRules(Part.ODOMETRY),
     FaultKind.ODOMETRY_SCALED: KindRules(Part.ODOMETRY, (-5.0, 5.0), 0.5),
@@ -138,8 +140,9 @@ class Fault(Section):
     body_jumped: all systems have the entity's body value [m] aside; body_turned: they have it turned by value [deg] in
     its place, as one whose markers look the same from two sides; bodies_swapped: they name two bodies for each other;
     ranges_silent, ranges_frozen: a ranging system sends nothing, repeats each drone's last round; ranges_long:
-    those of a drone are value [m] too long, as behind a wall; odometry_silent, odometry_frozen, odometry_scaled: a
-    target's own odometry ends, repeats its contents, reports value times the speed of its wheels."""
+    those of a drone are value [m] too long, as behind a wall; anchor_frozen: an anchor of the system holds its last
+    range to each drone; odometry_silent, odometry_frozen, odometry_scaled: a target's own odometry ends, repeats its
+    contents, reports value times the speed of its wheels."""
     entity: str
     """The drone, camera (of a drone's camera: the drone), motion capture or ranging system; for boards and bodies a
     drone or target; for odometry a target that reports its own."""
@@ -155,7 +158,8 @@ class Fault(Section):
     """Direction of value: velocities counter-clockwise from forward, wind from world x; the axis that a camera turns
     about counter-clockwise from its image's right."""
     other: str | None = None
-    """ids_swapped, wrong_board, bodies_swapped: the other vehicle; the drone or target whose board or body it is."""
+    """ids_swapped, wrong_board, bodies_swapped: the other vehicle; the drone or target whose board or body it is;
+    anchor_frozen: the anchor."""
 
     @property
     def amount(self) -> float:

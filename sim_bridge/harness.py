@@ -143,7 +143,7 @@ class Harness:
         rng, errors = generator_of(order.seed, f"capture {name}"), order.scenario.cameras.mounting_errors
         if name in order.site.ranging:
             ranging, drones, faults = order.site.ranging[name], order.site.drones, order.scenario.faults
-            radios = Radios(ranging, errors, rng)
+            radios = Radios(ranging, errors, rng, [fault for fault in faults if fault.entity == name])
             gateway = RangeGateway(name, place, ranging, world.bodies, drones, world.states, radios, faults)
             self._stage.add(name, gateway, gateway.fileno())
             return

@@ -1,11 +1,13 @@
 """Simulates measured ranges: true distances with noise, lasting errors, reflections and silence."""
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
 from groundstation.arrays import Array
 from groundstation.geometry.rotations import rotation_from_euler
+from sim_bridge.fault_kinds import Fault, FaultKind
 from sim_bridge.site import SiteRanging, SiteTransponder
 from sim_bridge.world.noise import GaussMarkov, standard_normals
 
@@ -19,16 +21,20 @@ _DETOUR_LEAST_M, _DETOUR_M, _SILENT_SHARE = 0.2, 0.5, 0.03
 class Radios:
     """The radios of one system; `ranges_m` is one round with one robot.
 
-    errors: whether there are lasting errors; all else is noise of each round.
+    errors: whether there are lasting errors; all else is noise of each round. faults: those of this system.
     """
 
-    def __init__(self, system: SiteRanging, errors: bool, rng: np.random.Generator) -> None:
+    def __init__(
+        self, system: SiteRanging, errors: bool, rng: np.random.Generator, faults: Iterable[Fault] = ()
+    ) -> None:
         self._system, self._rng, self._errors = system, rng, errors
         std_m = _SHARE * system.bias_std_m
         self._own = {anchor: std_m * float(rng.standard_normal()) for anchor in system.anchors}
         self._pairs: dict[tuple[str, str], GaussMarkov] = {}
+        self._frozen = tuple(fault for fault in faults if fault.kind is FaultKind.ANCHOR_FROZEN)
+        self._last_m: dict[tuple[str, str], float] = {}
 
-    def ranges_m(self, robot: str, row: Array) -> dict[str, float]:
+    def ranges_m(self, robot: str, row: Array, now_s: float = 0.0) -> dict[str, float]:
         """Return the distance of a robot's transponder to each anchor that answers [m]; row: as `World.states`."""
         system, rng = self._system, self._rng
         own = system.transponders.get(robot, SiteTransponder())
@@ -42,6 +48,11 @@ class Radios:
             distance = math.dist(place.tolist(), at)
             if silent >= _SILENT_SHARE and distance <= system.reach_m:
                 told[anchor] = max(0.0, distance + off_m)
+        for fault in self._frozen:
+            held_m = self._last_m.get((robot, str(fault.other)))
+            if fault.covers(now_s) and fault.other in told and held_m is not None:
+                told[fault.other] = held_m
+        self._last_m |= {(robot, anchor): m for anchor, m in told.items()}
         return told
 
     def _lasting_m(self, anchor: str, robot: str) -> float:

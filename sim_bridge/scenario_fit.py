@@ -38,9 +38,12 @@ def _of_faults(scenario: Scenario, site: Site, cameras: Collection[str], real: C
     for number, fault in enumerate(scenario.faults):
         part = RULES[fault.kind].part
         names = _able(vehicles, fault.kind) if part is Part.ABLE_VEHICLE else known[part]
-        for key, name in (("entity", fault.entity), ("other", fault.other)):
-            if name and name not in names:
-                yield Misfit(("faults", number, key), f"{name!r} is none of {', '.join(names)}")
+        others = names
+        if fault.kind is FaultKind.ANCHOR_FROZEN and fault.entity in site.ranging:
+            others = list(site.ranging[fault.entity].anchors)
+        for key, name, possible in (("entity", fault.entity, names), ("other", fault.other, others)):
+            if name and name not in possible:
+                yield Misfit(("faults", number, key), f"{name!r} is none of {', '.join(possible)}")
         if _is_unlike(fault, site):
             text = f"{fault.entity} and {fault.other} are of different kinds"
             yield Misfit(("faults", number, "other"), text)

@@ -4,11 +4,12 @@ import math
 from collections import Counter
 
 from drivers.base import HostProcess, read_section
+from drivers.ranging.anchor_watch import AnchorWatch
 from drivers.ranging.gateway import Gateway
 from drivers.ranging.settings import RangingSection, parse_source
 from drivers.ranging.wire.ranges import Round
 from drivers.stream_health import StreamHealth, StreamNames
-from groundstation.bus.messages import RangeObservation
+from groundstation.bus.messages import RangeObservation, Severity
 from groundstation.bus.topics import RANGE
 from groundstation.geometry.multilateration import fix_from_ranges, likely_in
 from groundstation.time_units import NS_PER_MS
@@ -16,6 +17,7 @@ from groundstation.time_units import NS_PER_MS
 _POLL_S = 0.02
 # Noise of centimetres in several ranges does not repeat: a gateway that keeps sending its last round is stuck.
 _MOST_REPEATS = 3
+_RESTART = "restart that anchor, or the gateway; the other anchors' ranges count meanwhile"
 
 
 def run(child: HostProcess) -> int:
@@ -40,6 +42,7 @@ class RangingDriver:
         self._likely = likely_in(settings.volume_m)
         self._newest_ns: dict[str, int] = {}
         self._last: dict[str, tuple[dict[str, float], int]] = {}
+        self._anchors, self._held = AnchorWatch(), set[str]()
         remedy = f"check the gateway, whether its radios run, and its address {settings.source}"
         names = StreamNames("ranging", settings.name, "range", settings.source, remedy)
         self._health = StreamHealth(child, names, settings.start_within_s, settings.silent_after_s)
@@ -49,9 +52,22 @@ class RangingDriver:
         """Wait briefly for rounds, process them, and keep up heartbeat, status and the watch over silence."""
         for arrival_ns, told in self._gateway.poll(_POLL_S):
             self._handle(arrival_ns, told)
+        self._tell_held()
         stuck = sorted(robot for robot, (_, repeats) in self._last.items() if repeats > _MOST_REPEATS)
         why = f"the ranges of {', '.join(stuck)} repeat themselves: restart the gateway" if stuck else ""
-        self._health.end_turn(why, why, self.counts + self._gateway.rejected)
+        wrong = why or "".join(f"anchor {anchor} holds its last range; " for anchor in sorted(self._held)).strip("; ")
+        self._health.end_turn(why, wrong, self.counts + self._gateway.rejected)
+
+    def _tell_held(self) -> None:
+        """Report each anchor that holds its last range to a robot, once, and its return."""
+        name, held = self._settings.name, {anchor for anchors in self._anchors.stuck.values() for anchor in anchors}
+        for anchor in sorted(held - self._held):
+            robots = " and ".join(robot for robot, anchors in self._anchors.stuck.items() if anchor in anchors)
+            text = f"ranging {name}: anchor {anchor} holds its last range to {robots}, which is not used"
+            self._child.event(Severity.WARNING, text, _RESTART, name)
+        for anchor in sorted(self._held - held):
+            self._child.event(Severity.INFO, f"ranging {name}: anchor {anchor} measures again", entity=name)
+        self._held = held
 
     def _handle(self, arrival_ns: int, told: Round) -> None:
         robot = self._robots.get(told.transponder)
@@ -68,7 +84,8 @@ class RangingDriver:
             return
         self._newest_ns[robot] = stamp_ns
         self._health.used(stamp_ns)
-        ranges_m = self._known(told.m)
+        ranges_m = self._anchors.sound(robot, self._known(told.m))
+        self.counts["held"] += len(self._anchors.stuck[robot])
         if ranges_m:
             self._health.reported += 1
             self._child.bus.publish(RANGE, self._message(robot, ranges_m, stamp_ns))

@@ -20,8 +20,8 @@ from groundstation.cli.lists import parts
 @click.option(
     "--kinds",
     default="",
-    help="Only these kinds of faults, separated by commas (default: all that are drawn at random; body_turned is flown "
-    "only if named); none: healthy flights.",
+    help="Only these kinds of faults, separated by commas (default: all that are drawn at random; body_turned and "
+    "anchor_frozen are flown only if named); none: healthy flights.",
 )
 @flights_option(100)
 @flown_options("faults", seconds=20.0, least_s=12)

@@ -80,7 +80,7 @@ class RangeGateway:
         if drone in self._last_m and standing(self._faults, FaultKind.RANGES_FROZEN, now_s, self._name):
             return self._last_m[drone]
         row = self._states()[self._rows[drone]]
-        ranges_m = {} if np.isnan(row[0]) else self._radios.ranges_m(drone, row)
+        ranges_m = {} if np.isnan(row[0]) else self._radios.ranges_m(drone, row, now_s)
         detour = standing(self._faults, FaultKind.RANGES_LONG, now_s, drone)
         longer_m = detour.amount if detour else 0.0
         told = {anchor: round(m + longer_m, 3) for anchor, m in ranges_m.items() if m + longer_m > 0.0}

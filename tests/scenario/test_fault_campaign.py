@@ -80,6 +80,14 @@ def test_nobody_flies_the_wrong_way_by_a_body_that_motion_capture_turns(degrees:
 
 
 @pytest.mark.slow
+def test_an_anchor_that_holds_its_ranges_pulls_nobody_along() -> None:
+    held = Fault(kind=FaultKind.ANCHOR_FROZEN, entity="uwb", other="a1", start_s=16.0)
+    flown = fly("uwb-lab", held, seconds=20.0)
+    assert flown["unsafe"] == {} and flown["modes"] == {"drone_1": "TRACK", "drone_2": "TRACK"}
+    assert not any("contradicts" in line or "re-initialised by uwb" in line for line in flown["events"])
+
+
+@pytest.mark.slow
 def test_vehicles_of_all_kinds_are_flown_by_their_drivers() -> None:
     flown = fly("mixed-team", Fault(kind=FaultKind.NAVDATA_SILENT, entity="drone_2", start_s=15.0), seconds=5.0)
     assert flown["tracking_since_s"] is not None

@@ -45,7 +45,10 @@ _FIGURES: dict[FaultKind, tuple[float, float] | None] = {
 }
 KINDS = tuple(_FIGURES)
 # Flown where they are named: one more to draw from would change the faults of all seeds.
-_NAMED: dict[FaultKind, tuple[float, float]] = {FaultKind.BODY_TURNED: (-180.0, 180.0)}
+_NAMED: dict[FaultKind, tuple[float, float] | None] = {
+    FaultKind.BODY_TURNED: (-180.0, 180.0),
+    FaultKind.ANCHOR_FROZEN: None,
+}
 ALL_KINDS = (*KINDS, *_NAMED)
 _OF_CAMERAS = frozenset(
     {FaultKind.CAMERA_STALL, FaultKind.CAMERA_BUMPED, FaultKind.PICTURE_FROZEN, FaultKind.PICTURE_BLACK}
@@ -160,7 +163,9 @@ def _kind(field: dict[str, Any], rng: np.random.Generator, kinds: tuple[FaultKin
 
 
 def _entities(field: dict[str, Any], kind: FaultKind) -> list[str]:
-    """Return the drones or cameras that can have a kind of fault."""
+    """Return the drones, cameras or ranging systems that can have a kind of fault."""
+    if kind is FaultKind.ANCHOR_FROZEN:
+        return [*(field.get("ranging") or ())]
     if kind in _OF_CAMERAS:
         return [*field["cameras"], *field["drones"]]
     return [n for n, d in field["drones"].items() if d["kind"] == "ardrone" or kind not in _OF_ARDRONES]
@@ -176,11 +181,15 @@ def _fault(field: dict[str, Any], rng: np.random.Generator, window_s: tuple[floa
     if kind is FaultKind.UNIFORM_FLOOR:  # a generator of its own: it changes no other draw
         value = float(rng.spawn(1)[0].integers(len(BlindReport)))
     lasts_s = float(rng.uniform(1.0, 8.0)) if rng.random() < 0.25 and kind is not FaultKind.BATTERY_DROP else None
+    entity, anchors = entities[int(rng.integers(len(entities)))], list[str]()
+    if kind is FaultKind.ANCHOR_FROZEN:
+        anchors = [*field["ranging"][entity]["anchors"]]
     return Fault(
         kind=kind,
-        entity=entities[int(rng.integers(len(entities)))],
+        entity=entity,
         start_s=start_s,
         end_s=None if lasts_s is None else start_s + lasts_s,
         value=value,
         direction_deg=float(rng.uniform(-180.0, 180.0)),
+        other=anchors[int(rng.integers(len(anchors)))] if anchors else None,
     )

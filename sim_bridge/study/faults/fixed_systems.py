@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from drivers.ranging.anchor_watch import AnchorWatch
 from groundstation.bus.messages import Message
 from groundstation.bus.topics import OBSERVATION, RANGE, REPORTED_MOTION, Topic
 from groundstation.time_units import NS_PER_MS
@@ -21,11 +22,11 @@ class FixedSystems:
     """
 
     def __init__(self, site: Site, world: World, scenario: Scenario, seed: int) -> None:
-        errors = scenario.cameras.mounting_errors
+        errors, faults = scenario.cameras.mounting_errors, scenario.faults
         self._world = world
         self._reports = Exposures[OdometryEar](odometry_of(site, world, errors, seed))
-        self._rounds = Exposures[RangingEye](ranging_of(site, errors, seed))
-        self._frames = Exposures[CaptureEye](captures_of(site, errors, seed, scenario.faults))
+        self._rounds = Exposures[RangingEye](ranging_of(site, errors, seed, faults, lambda: AnchorWatch().sound))
+        self._frames = Exposures[CaptureEye](captures_of(site, errors, seed, faults))
 
     def due(self, now_ns: int, clock: str) -> Iterator[tuple[int, Topic, Message]]:
         """Yield the measurements of this tick: time of arrival [ns], topic and message."""

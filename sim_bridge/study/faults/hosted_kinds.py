@@ -15,7 +15,7 @@ _BROKEN_HERE = frozenset(
     kind
     for kind, rules in RULES.items()
     if rules.part in (Part.VEHICLE, Part.ABLE_VEHICLE, Part.CAMERA) and kind is not FaultKind.IDS_SWAPPED
-) | {FaultKind.BODY_TURNED}
+) | {FaultKind.BODY_TURNED, FaultKind.ANCHOR_FROZEN}
 _AT_THE_WIRE = "at the wire: groundstation sitl --scenario FILE"
 
 

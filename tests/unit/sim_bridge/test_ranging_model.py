@@ -7,7 +7,10 @@ import numpy as np
 import pytest
 
 from groundstation.geometry.rotations import rotation_from_euler
+from sim_bridge.fault_kinds import Fault, FaultKind
 from sim_bridge.ranges import Radios
+from sim_bridge.scenario import Scenario
+from sim_bridge.scenario_fit import misfits
 from sim_bridge.site import SiteRanging
 from sim_bridge.study.ranging_model import RangingEye
 
@@ -60,10 +63,32 @@ def test_reflections_are_too_long_and_as_often_as_told() -> None:
     assert 0.07 < len(far) / len(found) < 0.13 and far.min() > 0.19 and found.min() > -1e-6
 
 
+def test_a_frozen_anchor_holds_its_last_range_to_each_robot() -> None:
+    fault = Fault(kind=FaultKind.ANCHOR_FROZEN, entity="uwb", other="b", start_s=1.0, end_s=2.0)
+    radios = Radios(system(range_std_m=0.1), errors=False, rng=np.random.default_rng(1), faults=[fault])
+    told = {robot: [radios.ranges_m(robot, ROW, 0.1 * k) for k in range(30)] for robot in ("drone_1", "drone_2")}
+    held = {robot: {one["b"] for one in rounds[10:20] if "b" in one} for robot, rounds in told.items()}
+    assert all(len(values) == 1 for values in held.values()) and held["drone_1"] != held["drone_2"]
+    assert all(len({one["a"] for one in rounds if "a" in one}) > 20 for rounds in told.values())
+    assert all(len({one["b"] for one in rounds[20:] if "b" in one}) > 5 for rounds in told.values())
+
+
+@pytest.mark.parametrize(
+    ("entity", "other", "wrong"), [("uwb", "b", []), ("uwb", "z", ["'z' is none of a, b, c, d, e"]), ("x", "b", None)]
+)
+def test_a_frozen_anchor_is_one_of_its_system(entity: str, other: str, wrong: list[str] | None) -> None:
+    empty: dict[str, Any] = {"drones": {}, "tracked": {}, "bodies": (), "motion_capture": {}}
+    site: Any = type("Layout", (), {"ranging": {"uwb": system()}, **empty})
+    fault = Fault(kind=FaultKind.ANCHOR_FROZEN, entity=entity, other=other, start_s=1.0)
+    found = [one.text for one in misfits(Scenario(faults=(fault,)), site, ())]
+    assert found == wrong if wrong is not None else "'x' is none of uwb" in found
+
+
 class Room:
     """A sensor model's view of a world: two drones."""
 
     bodies = ("drone_1", "drone_2")
+    time_s = 5.0
 
     def states(self) -> np.ndarray:
         return np.array([ROW, ROW + 0.2])

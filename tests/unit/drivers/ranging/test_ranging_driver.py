@@ -93,8 +93,9 @@ def rig(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iter
     system = SiteRanging.model_validate(
         {"anchors": ANCHORS, "volume_m": WIDE, "transponders": carried, "range_std_m": 2e-3, "outlier_share": 0.0}
     )
-    drones, radios = ("drone_1", "drone_2"), Radios(system, errors=False, rng=np.random.default_rng(1))
-    gateway = RangeGateway("uwb", place, system, PLACES, drones, states, radios, getattr(request, "param", ()))
+    drones, faults = ("drone_1", "drone_2"), getattr(request, "param", ())
+    radios = Radios(system, errors=False, rng=np.random.default_rng(1), faults=faults)
+    gateway = RangeGateway("uwb", place, system, PLACES, drones, states, radios, faults)
     section = RangingSection.model_validate(
         {
             "name": "uwb",
@@ -138,7 +139,7 @@ def test_silence_is_told_with_its_remedy_and_so_is_its_end(rig: Rig) -> None:
     assert well[-1].connected and well[-1].detections > 0 and rig.child.told[-2] == "READY"
 
 
-def broken(kind: FaultKind, entity: str, **rest: float) -> Fault:
+def broken(kind: FaultKind, entity: str, **rest: Any) -> Fault:
     return Fault.model_validate({"kind": kind, "entity": entity, "start_s": 0.5, "end_s": 1.5, **rest})
 
 
@@ -155,6 +156,20 @@ def test_rounds_that_repeat_themselves_are_silence(rig: Rig) -> None:
     assert last.rejected["repeated"] > 5
     assert [one for one in rig.run(100) if isinstance(one, RangeObservation)]
     assert rig.child.told[-2] == "READY"
+
+
+@pytest.mark.parametrize("rig", [(broken(FaultKind.ANCHOR_FROZEN, "uwb", other="b", end_s=4.0),)], indirect=True)
+def test_an_anchor_that_holds_its_range_is_left_out_and_named(rig: Rig) -> None:
+    rig.driver.turn()
+    rig.run(100)
+    rig.run(400)
+    during = [one for one in rig.run(200) if isinstance(one, RangeObservation)]
+    assert during and all(set(one.ranges_m) <= {"a", "c", "d"} for one in during)
+    assert sum("anchor b holds its last range to drone_" in text for text in rig.child.told) == 1
+    rig.run(300)
+    after = [one for one in rig.run(100) if isinstance(one, RangeObservation)]
+    assert set().union(*(one.ranges_m for one in after)) == {"a", "b", "c", "d"}
+    assert any("anchor b measures again" in text for text in rig.child.told)
 
 
 @pytest.mark.parametrize("rig", [(broken(FaultKind.RANGES_LONG, "drone_1", value=0.4),)], indirect=True)

@@ -29,7 +29,7 @@ FIELD: dict[str, Any] = {
     [
         (["frozn"], "no kind of fault: frozn; there are navdata_silent,"),
         (["none", "wind"], "none flies healthy flights only: name it alone"),
-        (["body_turned"], "body_turned: the field has no motion capture"),
+        (["body_turned"], "body_turned: the field has no motion_capture"),
     ],
 )
 def test_kinds_that_mean_nothing_are_refused_in_one_line(
@@ -73,7 +73,11 @@ def test_a_fault_that_would_break_nothing_is_refused(
         as_drawn(field, parse_scenario(json.dumps({"faults": [broken]})), 1)
 
 
-def test_a_turned_body_is_flown_where_it_is_named() -> None:
+def test_faults_of_fixed_systems_are_flown_where_they_are_named() -> None:
+    ranged = FIELD | {"ranging": {"uwb": {"anchors": {"a1": (0, 0, 2), "a2": (1, 0, 2)}}}}
+    kinds = (FaultKind.ANCHOR_FROZEN,)
+    held = [f for s in range(50) for f in draw(ranged, parse_scenario("{}"), s, (11.0, 20.0), kinds).scenario.faults]
+    assert {(fault.entity, fault.other) for fault in held} == {("uwb", "a1"), ("uwb", "a2")}
     drawn = [
         draw(FIELD, parse_scenario("{}"), s, (11.0, 20.0), (FaultKind.BODY_TURNED,)).scenario.faults for s in range(50)
     ]

@@ -4,6 +4,7 @@ import asyncio
 import json
 import time
 from collections.abc import Awaitable, Callable
+from typing import Any
 
 import pytest
 from console_site import Site, land, run
@@ -70,7 +71,7 @@ class Link:
         self.board.begin()
         self.viewer = PageConnection(1, self.board, self._send, self._send, time.monotonic_ns)
         self.answers = True
-        self.frames: list[dict[str, object]] = []
+        self.frames: list[Any] = []
         self.ages_ms: list[float] = []
         self.pictures: list[bytes] = []
         self._rate, self._buffer, self._waiting = bytes_per_s, buffer, 0

@@ -4,6 +4,8 @@
 import { moment, sinceMs } from "./clock.js";
 
 const DRIFT = 5e-4, ASKED = 64;
+// The page's two clocks are read one after the other, and one of them in whole milliseconds.
+const SLACK_MS = 20;
 let frame = null, earliest = null, latest = null, asked = [], roundTrip = 0;
 
 const grown = ({ serverMs, at }, drift) => serverMs + sinceMs(at) * (1 + drift);
@@ -13,6 +15,8 @@ export const earliestMs = () => (earliest ? grown(earliest, -DRIFT) : performanc
 export const latestMs = () => (latest ? Math.max(grown(latest, DRIFT), earliestMs()) : earliestMs());
 // How long the newest answer took.
 export const roundTripMs = () => roundTrip;
+
+const contradict = () => Boolean(earliest && latest) && earliestMs() > grown(latest, DRIFT) + SLACK_MS;
 
 // For a new connection: the server may be another one.
 export function startClock() {
@@ -30,7 +34,7 @@ export function noteFrame(serverMs) {
   frame = { serverMs, at: moment() };
   if (!earliest || serverMs >= earliestMs()) earliest = frame;
   // One of the bounds is wrong: a clock was set, or stood still. The next answer shows which.
-  if (latest && earliestMs() > grown(latest, DRIFT)) latest = null;
+  if (contradict()) latest = null;
 }
 
 // The server had the page's message of the first time at the second, its own.
@@ -41,5 +45,5 @@ export function noteAnswer(sentMs, serverMs) {
   asked = asked.slice(index + 1);
   roundTrip = sinceMs(told.at);
   if (!latest || grown(told, 0) <= grown(latest, DRIFT)) latest = told;
-  if (earliest && earliestMs() > grown(latest, DRIFT)) earliest = frame;
+  if (contradict()) earliest = frame;
 }

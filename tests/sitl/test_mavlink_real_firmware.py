@@ -63,7 +63,7 @@ class Truth(threading.Thread):
                     self._note(message)
         self._socket.close()
 
-    def command(self, number, *parameters):
+    def command(self, number: int, *parameters: float) -> None:
         """Send a command as another station would."""
         filled = (*parameters, *[0] * (7 - len(parameters)))
         message = dialect.MAVLink_command_long_message(SYSTEM, 1, number, 0, *filled)

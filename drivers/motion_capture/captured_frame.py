@@ -1,7 +1,9 @@
 """One frame of a motion capture system, in the form common to all sources."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
+from drivers.motion_capture.wire.ros2_pose import Deviations
 from groundstation.vectors import Quaternion, Vector3
 
 Pose = tuple[Vector3, Quaternion]
@@ -13,9 +15,11 @@ class CapturedFrame:
 
     processing_ns: or by how much it came later than usual.
     poses: position [m; the system's axes], quaternion (x, y, z, w). untracked: known to the system, not seen.
+    deviations: as the system reports them, of x, y, z [m; likewise] and of the heading [rad], 0 where unknown.
     """
 
     arrival_ns: int
     processing_ns: int
     poses: dict[str, Pose]
     untracked: tuple[str, ...] = ()
+    deviations: Mapping[str, Deviations] = field(default_factory=dict)

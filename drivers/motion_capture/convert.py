@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from drivers.motion_capture.settings import BodySection, MotionCaptureSection
+from drivers.motion_capture.wire.ros2_pose import UNKNOWN, Deviations
 from groundstation.arrays import Array
 from groundstation.bus.messages import BodyPose, Header, RelativeObservation
 from groundstation.geometry.angles import quaternion_from_euler
@@ -18,11 +19,15 @@ _FARTHEST_M = 1e4
 
 @dataclass(frozen=True, slots=True)
 class EntityPose:
-    """An entity's pose: centre [m; world], world_from_base (3, 3), centre of its marker [m; world]."""
+    """An entity's pose: centre [m; world], world_from_base (3, 3), centre of its marker [m; world].
+
+    deviations: as the system reports them, in its axes.
+    """
 
     position: Vector3
     rotation: Array
     marker: Vector3
+    deviations: Deviations = UNKNOWN
 
 
 class Placement:
@@ -31,9 +36,11 @@ class Placement:
     def __init__(self, settings: MotionCaptureSection) -> None:
         self._rotation, self._translation = settings.world_from_system()
         self._upright = settings.upright()
-        self._name, self._covariance = settings.name, settings.covariance()
+        self._name, self._settings, self._covariance = settings.name, settings, settings.covariance()
 
-    def entity_pose(self, body: BodySection, position: Vector3, quaternion: Quaternion) -> EntityPose | None:
+    def entity_pose(
+        self, body: BodySection, position: Vector3, quaternion: Quaternion, deviations: Deviations = UNKNOWN
+    ) -> EntityPose | None:
         """Return the pose of the entity that carries a body; None if the numbers are no pose.
 
         position [m], quaternion (x, y, z, w): of the body, in the system's axes.
@@ -49,7 +56,7 @@ class Placement:
         origin = self._rotation @ np.array(position) + self._translation
         centre = origin - world_from_base @ np.array(body.position_m)
         marker = centre + world_from_base @ np.array(body.marker_m)
-        return EntityPose(_triple(centre), world_from_base, _triple(marker))
+        return EntityPose(_triple(centre), world_from_base, _triple(marker), deviations)
 
     def observation(self, entity: str, pose: EntityPose, header: Header) -> RelativeObservation:
         """Return the observation of an entity for the tracker."""
@@ -60,9 +67,20 @@ class Placement:
             camera=self._name,
             position_m=pose.marker,
             yaw_rad=euler_from_rotation(pose.rotation)[2],
-            covariance=self._covariance,
+            covariance=self._covariance_of(pose.deviations),
             margin=2.0,
         )
+
+    def _covariance_of(self, deviations: Deviations) -> tuple[float, ...]:
+        """Return the covariance (4, 4) of place [world] and heading: the configured one, or a larger reported one."""
+        least = (*[self._settings.position_std_m] * 3, math.radians(self._settings.heading_std_deg))
+        if all(told <= known for told, known in zip(deviations, least, strict=True)):
+            return self._covariance
+        *place, heading = (max(pair) ** 2 for pair in zip(deviations, least, strict=True))
+        covariance = np.zeros((4, 4))
+        turned = self._rotation @ np.diag(place) @ self._rotation.T
+        covariance[:3, :3], covariance[3, 3] = 0.5 * (turned + turned.T), heading
+        return tuple(covariance.ravel().tolist())
 
 
 def body_pose(entity: str, pose: EntityPose) -> BodyPose:

@@ -8,6 +8,7 @@ from drivers.motion_capture.captured_frame import CapturedFrame
 from drivers.motion_capture.convert import EntityPose, Placement, body_pose
 from drivers.motion_capture.settings import MotionCaptureSection, parse_source
 from drivers.motion_capture.sources import Source, open_source
+from drivers.motion_capture.wire.ros2_pose import UNKNOWN
 from drivers.stream_health import StreamHealth, StreamNames
 from drivers.thinning import Grid
 from groundstation.bus.messages import BodyPoses, Severity
@@ -78,7 +79,8 @@ class MotionCaptureDriver:
             body = self._bodies.get(name)
             if body is None:
                 continue
-            pose = self._placement.entity_pose(body, position, quaternion)
+            told = frame.deviations.get(name, UNKNOWN)
+            pose = self._placement.entity_pose(body, position, quaternion, told)
             if pose is None:
                 self.counts["no pose"] += 1
             else:

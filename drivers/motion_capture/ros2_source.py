@@ -4,10 +4,11 @@ import threading
 import time
 from collections import Counter, deque
 
-from drivers.motion_capture.captured_frame import CapturedFrame, Pose
+from drivers.motion_capture.captured_frame import CapturedFrame
 from drivers.motion_capture.pose_guard import PoseGuard
 from drivers.motion_capture.settings import SystemAddress
 from drivers.motion_capture.wire import ros2_pose
+from drivers.motion_capture.wire.ros2_pose import StampedPose
 from drivers.rmw_zenoh.session import RouterSession
 from drivers.rmw_zenoh.wire.cdr import WireError
 from groundstation.bus import clock
@@ -15,6 +16,8 @@ from groundstation.bus import clock
 # Bodies of one frame arrive one after the other; those within this time [s] are one frame.
 _GATHER_S = 0.003
 _WAITING = 256
+# A drone whose place is reported to this deviation cannot be flown by it.
+_UNCERTAIN_M = 0.5
 
 
 class Ros2Source:
@@ -24,7 +27,7 @@ class Ros2Source:
         self.rejected: Counter[str] = Counter()
         endpoint = f"tcp/{address.host}:{address.port}"
         self.detail = f"no pose from the ROS 2 router {endpoint}"
-        self._waiting: deque[tuple[int, int, str, Pose]] = deque(maxlen=_WAITING)
+        self._waiting: deque[tuple[int, int, str, StampedPose]] = deque(maxlen=_WAITING)
         self._came, self._guard = threading.Event(), PoseGuard()
         self._session = RouterSession(endpoint, [ros2_pose.expression(address.domain, address.path)], self._hear)
 
@@ -34,13 +37,17 @@ class Ros2Source:
             return []
         time.sleep(_GATHER_S)
         self._came.clear()
-        poses: dict[str, Pose] = {}
+        said: dict[str, StampedPose] = {}
         late_ns: dict[str, int] = {}
         arrival_ns = 0
         while self._waiting:
             arrival_ns, late, name, pose = self._waiting.popleft()
-            poses[name], late_ns[name] = pose, late
-        return [CapturedFrame(arrival_ns, min(late_ns.values()), poses)] if poses else []
+            said[name], late_ns[name] = pose, late
+        if not said:
+            return []
+        poses = {name: pose.pose for name, pose in said.items()}
+        deviations = {name: pose.deviations for name, pose in said.items()}
+        return [CapturedFrame(arrival_ns, min(late_ns.values()), poses, deviations=deviations)]
 
     def close(self) -> None:
         """Leave the router."""
@@ -55,10 +62,12 @@ class Ros2Source:
             self.rejected[error.reason] += 1
             return
         refusal, late_ns = self._guard.judge(name, publisher, said.frame, said.stamp_ns, now_ns)
+        if not refusal and max(said.deviations[:2]) > _UNCERTAIN_M:
+            refusal = "uncertain pose"
         if refusal:
             self.rejected[refusal] += 1
             self.detail = f"{refusal} of {name}"
             return
         self.detail = ""
-        self._waiting.append((now_ns, late_ns, name, said.pose))
+        self._waiting.append((now_ns, late_ns, name, said))
         self._came.set()

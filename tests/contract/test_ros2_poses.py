@@ -1,7 +1,9 @@
 """ROS 2 poses from a foreign encoder, through a ROS-like router, arrive as motion capture frames."""
 
+import math
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
 from typing import Any
 
 import pytest
@@ -14,7 +16,7 @@ from drivers.motion_capture.captured_frame import CapturedFrame
 from drivers.motion_capture.ros2_source import Ros2Source
 from drivers.motion_capture.settings import parse_source
 from drivers.motion_capture.sources import open_source
-from drivers.motion_capture.wire.ros2_pose import body_of, decode_pose, encode_pose
+from drivers.motion_capture.wire.ros2_pose import UNKNOWN, body_of, decode_pose, encode_pose
 from drivers.rmw_zenoh.wire import graph
 from drivers.rmw_zenoh.wire.cdr import WireError
 from groundstation.engineering_views.ros2.codec import Ros2Codec
@@ -23,8 +25,8 @@ PLACE, TURN = (1.0, -2.0, 1.5), (0.0, 0.0, 0.6, 0.8)
 KINDS = ("geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/PoseWithCovarianceStamped", "nav_msgs/msg/Odometry")
 
 
-def written(kind: str, frame: str) -> bytes:
-    """Return a pose as rosbags writes it."""
+def written(kind: str, frame: str, variances: Mapping[int, float] = MappingProxyType({})) -> bytes:
+    """Return a pose as rosbags writes it; variances: entries of its covariance, the others 0."""
     store: Any = Ros2Codec().store
     types = store.types
     header = types["std_msgs/msg/Header"](types["builtin_interfaces/msg/Time"](5, 6), frame)
@@ -33,7 +35,10 @@ def written(kind: str, frame: str) -> bytes:
     )
     import numpy as np
 
-    sure = types["geometry_msgs/msg/PoseWithCovariance"](pose, np.zeros(36))
+    covariance = np.zeros(36)
+    for at, value in variances.items():
+        covariance[at] = value
+    sure = types["geometry_msgs/msg/PoseWithCovariance"](pose, covariance)
     zero = types["geometry_msgs/msg/Vector3"](0.0, 0.0, 0.0)
     twist = types["geometry_msgs/msg/TwistWithCovariance"](types["geometry_msgs/msg/Twist"](zero, zero), np.zeros(36))
     values = {KINDS[0]: (pose,), KINDS[1]: (sure,), KINDS[2]: (frame + "x", sure, twist)}[kind]
@@ -49,10 +54,20 @@ def dds(kind: str) -> str:
 @pytest.mark.parametrize("frame", ["", "map", "world", "a_frame"])
 def test_a_pose_is_read_as_it_was_written(kind: str, frame: str) -> None:
     payload = written(kind, frame)
-    assert decode_pose(dds(kind), payload) == (5_000_000_006, frame, (PLACE, TURN))
+    assert decode_pose(dds(kind), payload) == (5_000_000_006, frame, (PLACE, TURN), UNKNOWN)
     for length in range(60):
         with pytest.raises(WireError, match="short"):
             decode_pose(dds(kind), payload[:length])
+
+
+@pytest.mark.parametrize("kind", KINDS[1:])
+def test_the_deviations_of_a_pose_are_those_of_its_covariance(kind: str) -> None:
+    def deviations(variances: dict[int, float]) -> tuple[float, ...]:
+        return decode_pose(dds(kind), written(kind, "map", variances)).deviations
+
+    assert deviations({0: 0.01, 7: 0.04, 14: 1e12, 21: 9.0, 35: 0.25}) == pytest.approx((0.1, 0.2, 1e3, 0.5))
+    assert deviations({0: -1.0, 7: 0.04}) == deviations({0: math.nan, 7: 0.04}) == UNKNOWN
+    assert deviations({0: 0.01, 7: math.nan, 35: 1e9}) == pytest.approx((0.1, 0.0, 0.0, math.pi))
 
 
 def test_a_pose_is_written_as_a_foreign_encoder_does() -> None:

@@ -46,6 +46,21 @@ def test_a_system_with_y_up_and_an_origin_of_its_own() -> None:
     assert told.position_m == pytest.approx((1.5, 2.0, 1.5)) and told.observer == "mocap"
 
 
+def test_the_larger_of_the_configured_and_the_reported_deviation_counts() -> None:
+    placement, body = Placement(section(yaw_deg=90.0, heading_std_deg=1.0)), BodySection(entity="drone_1", name="cf1")
+
+    def variances(*deviations: float) -> list[float]:
+        pose = placement.entity_pose(body, (1.0, 2.0, 1.0), NORTH, tuple(deviations))  # type: ignore[arg-type]
+        assert pose is not None
+        told = placement.observation("drone_1", pose, Header(1, "c", "mocap", "mocap", 1)).covariance
+        assert all(told[4 * i + j] == pytest.approx(told[4 * j + i], abs=1e-12) for i in range(4) for j in range(i))
+        return [told[5 * i] for i in range(4)]
+
+    usual = [0.002**2] * 3 + [math.radians(1.0) ** 2]
+    assert variances(0.0, 0.0, 0.0, 0.0) == variances(0.001, 0.0, 0.0, 1e-6) == pytest.approx(usual)
+    assert variances(0.3, 0.0, 0.1, 0.5) == pytest.approx([0.002**2, 0.09, 0.01, 0.25]), "its x is the world's y"
+
+
 @pytest.mark.parametrize("quaternion", [(0.0, 0.0, 0.0, 0.0), (math.nan, 0.0, 0.0, 1.0)])
 def test_numbers_that_are_no_rotation_give_no_pose(quaternion: tuple[float, float, float, float]) -> None:
     body = BodySection(entity="drone_1", name="cf1")

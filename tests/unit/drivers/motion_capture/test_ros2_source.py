@@ -1,4 +1,4 @@
-"""Poses of ROS 2 topics as frames: their dates."""
+"""Poses of ROS 2 topics as frames: their dates, and how certain they are."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -9,9 +9,10 @@ from drivers.motion_capture import ros2_source
 from drivers.motion_capture.ros2_source import Ros2Source
 from drivers.motion_capture.settings import parse_source
 from drivers.motion_capture.wire.ros2_pose import encode_pose
+from drivers.rmw_zenoh.wire.cdr import CdrWriter
 
 MS, S = 1_000_000, 1_000_000_000
-KEY = "0/mocap/{}/pose/geometry_msgs::msg::dds_::PoseStamped_/RIHS01_x"
+KEY = "0/mocap/{}/pose/geometry_msgs::msg::dds_::{}_/RIHS01_x"
 PLACE, TURN = (1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0)
 
 
@@ -25,7 +26,14 @@ class Router:
         self.source = Ros2Source(parse_source("ros2://127.0.0.1/mocap"))
 
     def say(self, body: str = "cf1", age_ms: int = 0, publisher: bytes = b"a") -> Any:
-        self.source._hear(KEY.format(body), encode_pose(self.now_ns - age_ms * MS, PLACE, TURN), publisher)
+        self.source._hear(
+            KEY.format(body, "PoseStamped"), encode_pose(self.now_ns - age_ms * MS, PLACE, TURN), publisher
+        )
+
+    def say_uncertainly(self, variance: float) -> None:
+        covariance = [variance if at % 7 == 0 else 0.0 for at in range(36)]
+        pose = CdrWriter().header(self.now_ns, "world").numbers("d", *PLACE, *TURN, *covariance)
+        self.source._hear(KEY.format("cf1", "PoseWithCovarianceStamped"), pose.payload, b"a")
 
     def frame(self) -> Any:
         (frame,) = self.source.poll(0.0)
@@ -46,3 +54,12 @@ def test_a_frame_that_came_late_is_dated_back_by_what_all_its_poses_are_late(rou
         assert frame.arrival_ns == router.now_ns and set(frame.poses) == {"cf1", "cf2"}
         assert frame.processing_ns / MS == pytest.approx(late_ms, abs=0.1)
     assert router.source.rejected == {}
+
+
+def test_an_uncertain_pose_says_so_and_a_useless_one_is_refused(router: Router) -> None:
+    router.say_uncertainly(0.04)
+    assert router.frame().deviations == {"cf1": pytest.approx((0.2, 0.2, 0.2, 0.2))}
+    router.now_ns += 20 * MS
+    router.say_uncertainly(1e6)
+    assert not router.source.poll(0.0) and router.source.rejected == {"uncertain pose": 1}
+    assert router.source.detail == "uncertain pose of cf1"

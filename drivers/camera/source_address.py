@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from urllib.parse import SplitResult, unquote, urlsplit
 
-from drivers.rmw_zenoh.address import ROUTER_PORT, domain_of
+from drivers.rmw_zenoh.address import ROUTER_PORT, domain_of, topic_of
 from groundstation import plug_ins
 from groundstation.adapters import split_zone, with_zone
 from groundstation.vehicles import VehicleKind, all_kinds
@@ -110,7 +110,7 @@ def _place(parts: SplitResult, usual_port: int) -> tuple[str, int, str]:
 
 
 def _topic(parts: SplitResult) -> str:
-    if not (topic := parts.path.strip("/")):
+    if not (topic := topic_of(parts.path)):
         raise ValueError("must name a topic, as in ros2://192.168.1.20/camera/image/compressed")
     return topic
 

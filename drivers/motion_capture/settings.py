@@ -9,7 +9,7 @@ from urllib.parse import urlsplit
 import numpy as np
 from pydantic import Field
 
-from drivers.rmw_zenoh.address import ROUTER_PORT, domain_of
+from drivers.rmw_zenoh.address import ROUTER_PORT, domain_of, topic_of
 from drivers.vehicle_settings import DriverSection, Name, NotNegative, Positive
 from groundstation import plug_ins
 from groundstation.arrays import Array
@@ -84,6 +84,7 @@ def parse_source(text: str) -> SystemAddress:
         raise ValueError(f"must name a host and nothing else, as in {scheme}://192.168.1.5")
     if protocol.paths:
         domain_of(parts.query)
+        path = topic_of(parts.path)
     return SystemAddress(scheme, parts.hostname, port or protocol.port, path, parts.query)
 
 

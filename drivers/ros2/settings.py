@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from drivers.rmw_zenoh.address import LAST_DOMAIN, ROUTER_PORT
+from drivers.rmw_zenoh.address import LAST_DOMAIN, NAME, ROUTER_PORT
 from drivers.vehicle_settings import VehicleDriverSettings
 from groundstation.vehicles import KindSection
 
@@ -13,7 +13,7 @@ NO_HASH = "TypeHashNotSupported"
 # Faster than any flight of this kind [m/s]: beyond it a reported velocity is no measurement.
 FASTEST_M_S = 8.0
 
-TopicName = Annotated[str, Field(pattern=r"^/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*$")]
+TopicName = Annotated[str, Field(pattern=f"^/?{NAME}$")]
 
 
 class Ros2Section(KindSection):
@@ -28,7 +28,7 @@ class Ros2Section(KindSection):
     """ROS_DOMAIN_ID of the node."""
     distro: Literal["humble", "jazzy", "lyrical"] = "jazzy"
     """Distribution of the node; those between have jazzy's keys."""
-    namespace: Annotated[str, Field(pattern=r"^([A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*)?$")] = ""
+    namespace: Annotated[str, Field(pattern=f"^({NAME})?$")] = ""
     """Namespace of the node's topics and services, such as drone_1; empty: none."""
     odometry: TopicName = "odom"
     """Topic of its nav_msgs/Odometry: velocity in the vehicle's own frame, attitude, height; at 10 Hz at least."""

@@ -6,7 +6,7 @@ from urllib.parse import urlsplit
 
 from pydantic import Field
 
-from drivers.rmw_zenoh.address import ROUTER_PORT, domain_of
+from drivers.rmw_zenoh.address import ROUTER_PORT, domain_of, topic_of
 from drivers.vehicle_settings import DriverSection, Name, NotNegative, Positive
 
 _SCHEME = "ros2"
@@ -30,8 +30,10 @@ def parse_source(text: str) -> OdometryAddress:
         host, port = parts.hostname or "", parts.port or ROUTER_PORT
     except ValueError:
         raise wrong from None
-    topic, more = parts.path.strip("/"), parts.fragment or parts.username is not None
-    if parts.scheme != _SCHEME or not host or not topic or more or any(character.isspace() for character in text):
+    more = parts.fragment or parts.username is not None
+    if parts.scheme != _SCHEME or not host or more or any(character.isspace() for character in text):
+        raise wrong
+    if not (topic := topic_of(parts.path)):
         raise wrong
     return OdometryAddress(host, port, topic, domain_of(parts.query))
 

@@ -2,19 +2,16 @@
 
 from groundstation.time_units import NS_PER_S
 
-# After this silence another publisher may take over: the node was restarted.
-_HEIR_NS = NS_PER_S
-
 
 class PublisherTie:
-    """Ties a topic to its first publisher, until that one is silent for a second."""
+    """Ties a topic to its first publisher, until that one is silent for heir_ns: its node was restarted."""
 
-    def __init__(self) -> None:
-        self._publisher, self._heard_ns = b"", 0
+    def __init__(self, heir_ns: int = NS_PER_S) -> None:
+        self._publisher, self._heard_ns, self._heir_ns = b"", 0, heir_ns
 
     def silent(self, now_ns: int) -> bool:
-        """Return whether the publisher has been silent for a second, or always."""
-        return not self._heard_ns or now_ns - self._heard_ns >= _HEIR_NS
+        """Return whether the publisher has been silent for so long, or always."""
+        return not self._heard_ns or now_ns - self._heard_ns >= self._heir_ns
 
     def is_second(self, publisher: bytes, now_ns: int) -> bool:
         """Return whether this is not the publisher that the topic is tied to."""

@@ -51,7 +51,8 @@ class Ros2Vehicle:
         self._said_ns: dict[Order | None, int] = {}
         self._lands_until_ns = 0
         self._heard_ns = self._charge_ns = 0
-        self._tie, self._charge, self._rate_hz = PublisherTie(), 0.0, 0.0
+        self._tie, self._battery_tie = PublisherTie(), PublisherTie(_CHARGE_NS)
+        self._charge, self._rate_hz = 0.0, 0.0
         self._refused, self._standing, self._height_m, self._was_ordered = "", "", 0.0, False
         self._velocity: Vector3 = (0.0, 0.0, 0.0)
         self._battery_type = names.battery_key(settings.ros2).rpartition("/")[0]
@@ -64,7 +65,7 @@ class Ros2Vehicle:
         self._log.received(now_ns, recorded(key, payload))
         try:
             if key.rpartition("/")[0] == self._battery_type:
-                self._charge, self._charge_ns = vehicle.decode_charge(payload), now_ns
+                self._take_charge(now_ns, payload, publisher)
             elif self._tie.is_second(publisher, now_ns):
                 self._rejected["second_publisher"] += 1
             else:
@@ -75,6 +76,13 @@ class Ros2Vehicle:
             self._rejected[error.reason.replace(" ", "_")] += 1
             if key.rpartition("/")[0] != self._battery_type:
                 self._refused = error.reason
+
+    def _take_charge(self, now_ns: int, payload: bytes, publisher: bytes) -> None:
+        if self._battery_tie.is_second(publisher, now_ns):
+            self._rejected["second_battery_publisher"] += 1
+            return
+        self._charge, self._charge_ns = vehicle.decode_charge(payload), now_ns
+        self._battery_tie.take(publisher, now_ns)
 
     def _take(self, now_ns: int, message: vehicle.OdometryMessage) -> None:
         roll, pitch, yaw = angles_of(message.quaternion)

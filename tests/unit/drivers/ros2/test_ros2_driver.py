@@ -178,3 +178,16 @@ def test_one_absurd_velocity_is_not_published_and_the_next_ones_are_uncertain(no
     told = [one.message for one in node.heard.drain() if isinstance(one.message, Odometry)]
     assert [one.velocity_m_s[0] < 1.0 for one in told] == [True, True]
     assert all(one.velocity_covariance[0] == pytest.approx(0.25) for one in told)
+
+
+def test_a_second_publisher_of_the_charge_is_counted_until_the_first_is_silent_for_long(node: Node) -> None:
+    def charge(told: float, publisher: bytes, seconds: int = 2) -> float | None:
+        node.now_ns += seconds * 1000 * MS
+        payload = vehicle.encode_battery(node.now_ns, told)
+        node.driver._hear("0/drone_1/battery/sensor_msgs::msg::dds_::BatteryState_/RIHS01_x", payload, publisher)
+        return node.driver.view(node.now_ns).battery
+
+    assert charge(0.8, b"the vehicle's own") == pytest.approx(0.8)
+    assert charge(1.0, b"that of another..") == charge(0.8, b"the vehicle's own") == pytest.approx(0.8)
+    assert node.rejected == {"second_battery_publisher": 1}
+    assert charge(0.5, b"that of another..", 31) == pytest.approx(0.5), "the node was restarted"

@@ -9,8 +9,8 @@ from contextlib import ExitStack, suppress
 from pkgutil import resolve_name
 from typing import Any, Protocol
 
+from drivers.host_lookup import HostLookup
 from drivers.motion_capture.captured_frame import CapturedFrame
-from drivers.motion_capture.host_lookup import HostLookup
 from drivers.motion_capture.settings import OURS, SystemAddress
 from drivers.motion_capture.wire import natnet
 from groundstation import plug_ins

@@ -56,7 +56,7 @@ class RangingDriver:
         stuck = sorted(robot for robot, (_, repeats) in self._last.items() if repeats > _MOST_REPEATS)
         why = f"the ranges of {', '.join(stuck)} repeat themselves: restart the gateway" if stuck else ""
         wrong = why or "".join(f"anchor {anchor} holds its last range; " for anchor in sorted(self._held)).strip("; ")
-        self._health.end_turn(why, wrong, self.counts + self._gateway.rejected)
+        self._health.end_turn(why or self._gateway.failed, wrong, self.counts + self._gateway.rejected)
 
     def _tell_held(self) -> None:
         """Report each anchor that holds its last range to a robot, once, and its return."""

@@ -50,7 +50,7 @@ def test_a_name_without_an_address_is_told_blocks_nothing_and_is_looked_up_again
             raise errors.pop()
         return [(0, 0, 0, "", ("127.0.0.1", 0)), (0, 0, 0, "", ("127.0.0.2", 0))]
 
-    monkeypatch.setattr("drivers.motion_capture.host_lookup.socket.getaddrinfo", looked_up)
+    monkeypatch.setattr("drivers.host_lookup.socket.getaddrinfo", looked_up)
     monkeypatch.setattr("drivers.motion_capture.sources._LOOK_UP_AGAIN_NS", 0)
     source = NatnetSource(parse_source("natnet://motive-pc"))
     began = time.monotonic()

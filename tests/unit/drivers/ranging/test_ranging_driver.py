@@ -2,6 +2,8 @@
 
 import math
 import socket
+import threading
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from types import SimpleNamespace
@@ -244,3 +246,46 @@ def test_a_wrong_address_is_refused_with_the_form(text: str) -> None:
     with pytest.raises(ValueError, match=r"as in ranges://192\.168\.1\.6:7417"):
         parse_source(text)
     assert parse_source("ranges://10.0.0.7") == ("10.0.0.7", 7417)
+
+
+def test_ranges_of_another_host_are_strangers_whatever_port_they_come_from() -> None:
+    told = encode(Round("0x1", {"a": 1.25}))
+    with (
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as own,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger,
+    ):
+        own.bind((HOST, 0))
+        own.settimeout(5.0)
+        stranger.bind(("127.0.0.9", own.getsockname()[1]))
+        gateway = Gateway("localhost", own.getsockname()[1])
+        asked = threading.Event()
+        poller = threading.Thread(target=lambda: [gateway.poll(0.05) for _ in iter(asked.is_set, True)])
+        poller.start()
+        _, client = own.recvfrom(64)
+        asked.set()
+        poller.join()
+        stranger.sendto(told, ("127.0.0.1", client[1]))
+        own.sendto(told, ("127.0.0.1", client[1]))
+        assert [one.m for _, one in gateway.poll(1.0) + gateway.poll(0.1)] == [{"a": 1.25}]
+        assert gateway.rejected == {"stranger": 1}
+        gateway.close()
+
+
+def test_a_name_that_is_looked_up_slowly_delays_nothing_and_is_told_if_it_is_none(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    released = threading.Event()
+
+    def looked_up(*_: object) -> list[Any]:
+        released.wait(10.0)
+        raise OSError(1, "Name or service not known")
+
+    monkeypatch.setattr("drivers.host_lookup.socket.getaddrinfo", looked_up)
+    gateway = Gateway("uwb-gateway", 7417)
+    began = time.monotonic()
+    assert gateway.poll(0.0) == [] and not gateway.failed and time.monotonic() - began < 1.0
+    released.set()
+    while not gateway.failed and time.monotonic() - began < 5.0:
+        time.sleep(0.01)
+    assert "no IPv4 address is known for the name uwb-gateway" in gateway.failed
+    gateway.close()

@@ -14,7 +14,6 @@ from sim_bridge.study.faults.hosted_kinds import UP_AFTER_S
 # Faults begin when the team has found the target, and early enough that their consequences are seen.
 _SETTLED_S, _LEFT_S = 3.0, 6.0
 _HEALTHY = "none"
-_SYSTEMS = {FaultKind.BODY_TURNED: "motion_capture", FaultKind.ANCHOR_FROZEN: "ranging"}
 
 
 def fly(order: FlightOrder, seed: int) -> dict[str, Any]:
@@ -25,9 +24,6 @@ def fly(order: FlightOrder, seed: int) -> dict[str, Any]:
     from sim_bridge.study.faults.flight import FaultFlight
 
     kinds = _kinds(order.own.get("kinds") or ())
-    for kind, key in _SYSTEMS.items():
-        if kind in kinds and not order.field.get(key):
-            raise WrongOrder(f"{kind}: the field has no {key}")
     up_s = max(UP_AFTER_S[drone["kind"]] for drone in order.field["drones"].values())
     window_s = (up_s + _SETTLED_S, up_s + order.seconds - _LEFT_S)
     flight = FaultFlight(draw(order.field, order.scenario, seed, window_s, kinds), order.sections, order.seconds)

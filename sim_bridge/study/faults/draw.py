@@ -165,7 +165,9 @@ def _kind(field: dict[str, Any], rng: np.random.Generator, kinds: tuple[FaultKin
 def _entities(field: dict[str, Any], kind: FaultKind) -> list[str]:
     """Return the drones, cameras or ranging systems that can have a kind of fault."""
     if kind is FaultKind.ANCHOR_FROZEN:
-        return [*(field.get("ranging") or ())]
+        return [*field.get("ranging", ())]
+    if kind is FaultKind.BODY_TURNED and not field.get("motion_capture"):
+        return []
     if kind in _OF_CAMERAS:
         return [*field["cameras"], *field["drones"]]
     return [n for n, d in field["drones"].items() if d["kind"] == "ardrone" or kind not in _OF_ARDRONES]

@@ -29,14 +29,12 @@ FIELD: dict[str, Any] = {
     [
         (["frozn"], "no kind of fault: frozn; there are navdata_silent,"),
         (["none", "wind"], "none flies healthy flights only: name it alone"),
-        (["body_turned"], "body_turned: the field has no motion_capture"),
     ],
 )
 def test_kinds_that_mean_nothing_are_refused_in_one_line(
     kinds: list[str], said: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    field = {"drones": {"a": {"kind": "ardrone"}}}
-    order = {"field": field, "sections": [], "scenario": {}, "seeds": [1], "seconds": 20.0, "kinds": kinds}
+    order = {"field": {"drones": {}}, "sections": [], "scenario": {}, "seeds": [1], "seconds": 20.0, "kinds": kinds}
     monkeypatch.setattr(sys, "stdin", io.StringIO(json.dumps(order)))
     assert fly_seeds(fly) == WRONG_ORDER
     lines = capsys.readouterr().err.splitlines()
@@ -73,17 +71,15 @@ def test_a_fault_that_would_break_nothing_is_refused(
         as_drawn(field, parse_scenario(json.dumps({"faults": [broken]})), 1)
 
 
-def test_faults_of_fixed_systems_are_flown_where_they_are_named() -> None:
-    ranged = FIELD | {"ranging": {"uwb": {"anchors": {"a1": (0, 0, 2), "a2": (1, 0, 2)}}}}
-    kinds = (FaultKind.ANCHOR_FROZEN,)
-    held = [f for s in range(50) for f in draw(ranged, parse_scenario("{}"), s, (11.0, 20.0), kinds).scenario.faults]
-    assert {(fault.entity, fault.other) for fault in held} == {("uwb", "a1"), ("uwb", "a2")}
-    drawn = [
-        draw(FIELD, parse_scenario("{}"), s, (11.0, 20.0), (FaultKind.BODY_TURNED,)).scenario.faults for s in range(50)
-    ]
-    faults = [fault for faults in drawn for fault in faults]
-    assert {fault.entity for fault in faults} == {"drone_1", "px4_1"}
-    assert all(fault.value is not None and abs(fault.value) <= 180.0 for fault in faults)
+@pytest.mark.parametrize("kind", [FaultKind.BODY_TURNED, FaultKind.ANCHOR_FROZEN])
+def test_faults_of_fixed_systems_are_flown_where_they_are_named_and_the_field_has_such(kind: FaultKind) -> None:
+    systems = {"motion_capture": {"mocap": {}}, "ranging": {"uwb": {"anchors": {"a1": (0, 0, 2), "a2": (1, 0, 2)}}}}
+    drawn = [draw(FIELD | systems, parse_scenario("{}"), s, (11.0, 20.0), (kind,)).scenario.faults for s in range(50)]
+    found = {(fault.entity, fault.other) for faults in drawn for fault in faults}
+    expected = {("drone_1", None), ("px4_1", None)}, {("uwb", "a1"), ("uwb", "a2")}
+    assert found == expected[kind is FaultKind.ANCHOR_FROZEN]
+    with pytest.raises(WrongOrder, match="nothing in this field can have such a fault"):
+        draw(FIELD, parse_scenario("{}"), 1, (11.0, 20.0), (kind,))
 
 
 @pytest.mark.parametrize("broken", [("at_deaf", "drone_1"), ("uniform_floor", "drone_2"), ("picture_black", "drone_1")])

@@ -42,7 +42,8 @@ class Truth(threading.Thread):
 
     def __init__(self, port, ask):
         super().__init__(daemon=True)
-        self.place, self._origin, self._ask, self._source = None, None, ask, None
+        self.place, self._origin, self._ask = None, None, ask
+        self._source: tuple[str, int] = ("127.0.0.1", 0)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", port))
         self._socket.settimeout(0.2)

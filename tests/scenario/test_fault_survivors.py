@@ -92,9 +92,9 @@ def order_of(changes: list[str], field_name: str = "lab") -> dict[str, Any]:
     return {"field": builtins, "sections": sections, "scenario": scenario, "seconds": SECONDS, "kinds": []}
 
 
-# Not mended: with cameras that expose at their rate, neither more often nor in pairs, one of these is seen too late. It
-# falls silent and loses its floor within 40 ms, and is at rest only when it has landed, after 4.6 s; the velocity of
-# the other drifts at the border of the ceiling's view, and its setpoints lead 0.5 m off its believed place for 1.6 s.
+# Not mended. One falls silent and loses its floor within 40 ms; it drifts at 0.08 to 0.14 m/s in the ceiling's view and
+# is at rest only when it has landed, after 4.6 s, as with 4 of 10 other seeds of noise. The velocity of the other
+# drifts at the border of that view, and its setpoints lead 0.5 m off its believed place for 1.6 s.
 UNSAFE = {
     "silent_a_moment_before_it_is_blind": (42024, {"rest"}, []),
     "drifting_in_the_corner_of_the_view": (7115, {"unlocalised"}, ["cameras.fps=15"]),

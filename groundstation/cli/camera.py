@@ -16,13 +16,14 @@ _PORT = 8770
 _TAG_MM = 168.0
 
 
-def _known(_context: click.Context, _parameter: click.Parameter, value: tuple[str, ...]) -> tuple[str, ...]:
+def _known(_context: click.Context, _parameter: click.Parameter, value: str) -> tuple[str, ...]:
     from groundstation.geometry.tag import tag_fault
 
-    for name in value:
+    names = tuple(dict.fromkeys(name for name in value.split(",") if name))
+    for name in names:
         if fault := tag_fault(name, 0):
             raise click.BadParameter(fault)
-    return tuple(dict.fromkeys(value))
+    return names
 
 
 @click.group(epilog="Example: groundstation camera view http://192.168.1.50:8080/video.mjpg --stream")
@@ -47,10 +48,10 @@ def camera() -> None:
 @click.option(
     "--dictionary",
     "dictionaries",
-    metavar="NAME",
-    multiple=True,
+    metavar="NAMES",
+    default="",
     callback=_known,
-    help="Find tags of this ArUco, AprilTag or plug-in's dictionary, too; repeatable.",
+    help="Find tags of these ArUco, AprilTag or plug-ins' dictionaries, too; NAME,NAME.",
 )
 @click.option("--size-mm", type=FiniteRange(10, 1000), help=f"Side of a tag's black square.  [default: {_TAG_MM:g}]")
 @click.option("-o", "--output", type=click.Path(path_type=Path, file_okay=False), help="Write annotated pictures here.")

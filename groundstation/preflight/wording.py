@@ -44,7 +44,7 @@ def finding(field: ResolvedField, opinion: Opinion) -> Finding:
 def shown_by(markers: Iterable[Marker]) -> str:
     """Return words for the command that shows these markers in a camera's pictures."""
     dictionaries = sorted({marker.dictionary for marker in markers if marker.dictionary is not None})
-    return f"groundstation camera view{''.join(f' --dictionary {name}' for name in dictionaries)} shows it"
+    return f"groundstation camera view{' --dictionary ' * bool(dictionaries)}{','.join(dictionaries)} shows it"
 
 
 def _unexplained(opinion: Opinion) -> Finding:

@@ -13,6 +13,7 @@ from groundstation.cli.verbs import RENAMED
 
 MEANINGS = {
     "--calibration": r"calibration",
+    "--dictionary": r"tags of th",
     "--duration": r"Seconds of tracking",
     "--field": r"field file",
     "--frames": r"pictures",

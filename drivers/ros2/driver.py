@@ -78,10 +78,11 @@ class Ros2Vehicle:
                 self._refused = error.reason
 
     def _take_charge(self, now_ns: int, payload: bytes, publisher: bytes) -> None:
+        charge = vehicle.decode_charge(payload)
         if self._battery_tie.is_second(publisher, now_ns):
             self._rejected["second_battery_publisher"] += 1
             return
-        self._charge, self._charge_ns = vehicle.decode_charge(payload), now_ns
+        self._charge, self._charge_ns = charge, now_ns
         self._battery_tie.take(publisher, now_ns)
 
     def _take(self, now_ns: int, message: vehicle.OdometryMessage) -> None:

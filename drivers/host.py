@@ -1,7 +1,6 @@
 """The part that all vehicle drivers share: orders in, acknowledgements and status out, and the sender loop."""
 
 import itertools
-import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 
@@ -11,6 +10,7 @@ from drivers.control_error import ControlErrorMonitor
 from drivers.neighbours import Neighbours
 from drivers.seen_velocity import SeenVelocity
 from drivers.start_report import StartReport
+from drivers.unlocalised_time import UnlocalisedTime
 from drivers.watchdog import Watchdog
 from drivers.watchdog_types import Ack, Action, DriverMode, Upstream, VehicleView, WatchdogDecision, WatchdogLimits
 from groundstation.bus import clock
@@ -63,7 +63,7 @@ class VehicleHost:
         self._told: WatchdogDecision | None = None
         self._statuses = self._bus.subscribe([VEHICLE_STATUS], newest=True)
         self._neighbours = Neighbours(vehicle.name, limits.pad_m, limits.min_separation_m, limits.max_speed_m_s)
-        self._localised_ns: int | None = None
+        self._unlocalised = UnlocalisedTime()
 
     def call_on_commands(self, wake: Callable[[], None]) -> None:
         """Have a function called, on the network's thread, whenever a command arrives."""
@@ -110,19 +110,16 @@ class VehicleHost:
             if isinstance(received.message, Estimate):
                 self._hear_estimate(now_ns, received.message)
         view = self._control_error.judge(now_ns, view, self._told, self._seen.velocity(now_ns))
-        if view.flight_state not in AIRBORNE:
-            self._localised_ns = None
-        unlocalised_s = 0.0 if self._localised_ns is None else (now_ns - self._localised_ns) / NS_PER_S
-        near, crowded = self._near(now_ns, view.flight_state in AIRBORNE)
-        return view._replace(unseen_s=unlocalised_s, near=near, crowded=crowded)
+        aloft = view.flight_state in AIRBORNE
+        near, crowded = self._near(now_ns, aloft)
+        return view._replace(unseen_s=self._unlocalised.of_flight(now_ns, aloft), near=near, crowded=crowded)
 
     def _hear_estimate(self, now_ns: int, estimate: Estimate) -> None:
         self._neighbours.see(now_ns, estimate.entities)
         for entity in estimate.entities:
             if entity.name == self.vehicle.name:
                 self._seen.take(now_ns, estimate.epoch, entity)
-                if math.isfinite(entity.unlocalised_s):
-                    self._localised_ns = now_ns - round(entity.unlocalised_s * NS_PER_S)
+                self._unlocalised.hear(now_ns, entity)
 
     def _near(self, now_ns: int, aloft: bool) -> tuple[str, str]:
         """Return the neighbour too near to this vehicle's pad, if it stands, and to it, if it flies; "" if none is."""

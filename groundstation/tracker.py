@@ -141,11 +141,12 @@ class Tracker:
         self._intake.reports.advance(now_ns, outcomes)
         corrections = [one for one in outcomes if not one.is_report]
         self._corrections += corrections
-        self._notices += self._joinings.take(now_ns, corrections, self._intake.ranges.take_joined())
+        ranged = self._intake.ranges.take_joined()
+        self._notices += self._joinings.take(now_ns, corrections, ranged)
         velocities = {name: self.filter.velocity_of(name) for name in self._belief.layout.robots}
         self._shafts.advance(self._belief, velocities)
         self._notices += self.mounts.advance(now_ns, velocities, corrections, self.airborne)
-        self._notices += self._roots.advance(now_ns, corrections, flying=bool(self.airborne))
+        self._notices += self._roots.advance(now_ns, corrections, ranged, flying=bool(self.airborne))
         self._notices += self._intake.reports.take_notices()
         self._heed_absence(now_ns)
         self._topology = self._topology_now()

@@ -76,14 +76,26 @@ class RootWatch:
             self._hanging.add(message.observer)
             self._silent = None
 
-    def advance(self, now_ns: int, corrections: Iterable[Correction], *, flying: bool) -> list[Notice]:
-        """Take what the filter used since the last call; returns the notices for the operator."""
+    def advance(
+        self,
+        now_ns: int,
+        corrections: Iterable[Correction],
+        ranged: Iterable[tuple[str, str, bool]] = (),
+        *,
+        flying: bool,
+    ) -> list[Notice]:
+        """Take what the filter used since the last call; returns the notices for the operator.
+
+        ranged: (observer, subject, whether again) of robots that one round of ranges placed: no correction tells it.
+        """
         self._now_ns = now_ns
         self._ages_s.clear()
         self._silent = None
         for one in corrections:
             if one.verdict in _USED and one.subject in self._carried:
                 self._tie(one, now_ns - round(one.latency_ms * NS_PER_MS))
+        for _, placed, _ in ranged:
+            self._rooted_ns.setdefault(placed, {})[placed] = now_ns
         told, self._told = self._told, self.is_silent and flying
         return [Notice(Severity.ERROR, _SILENCE, _REMEDY)] if self._told and not told else []
 

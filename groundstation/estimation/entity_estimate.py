@@ -1,11 +1,9 @@
 """The published estimate of one entity of the joint belief."""
 
-from groundstation.bus.messages import EntityEstimate
+from groundstation.bus.messages import NEVER_S, EntityEstimate
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.fixed_lag import FixedLagFilter
 from groundstation.estimation.layout import EntityKind
-
-_NEVER_S = 1e6  # stands for never: a message holds finite numbers
 
 
 def entity_estimate(
@@ -27,8 +25,8 @@ def entity_estimate(
         covariance=tuple(covariance[:size, :size].ravel().tolist()),
         velocity_m_s=velocity,
         converged=converged,
-        age_s=min(age_s, _NEVER_S),
-        unlocalised_s=min(unlocalised_s, _NEVER_S),
+        age_s=min(age_s, NEVER_S),
+        unlocalised_s=min(unlocalised_s, NEVER_S),
         contradicted=joint.contradicted(name),
         sighting=joint.sighting(name),
     )

@@ -7,6 +7,7 @@ from itertools import combinations
 
 from groundstation.bus.messages import (
     AIRBORNE,
+    NEVER_S,
     STANDING,
     EntityEstimate,
     FlightState,
@@ -29,7 +30,6 @@ CAMERA_SILENT_S = 2.0
 DARK = 0.08  # mean brightness, as a share of white
 WEAK_LINK, BAD_LINK = 0.6, 0.3
 _EVENT_SHOWN_S = 8.0
-_NEVER_S = 1e6  # stands for never in an estimate
 _SPEAKS_HZ = 5.0
 _TO_DO = "To do: "
 _BEFORE_FLIGHT = {
@@ -231,7 +231,7 @@ def _lost(state: MonitorState) -> Iterator[Alarm]:
             advice = _SEARCH
         elif seen and seen.message.flight_state in AIRBORNE and seen.message.lands_in_s is None:
             left_s = max(0.0, state.cast.unseen_land_s - unknown_s)
-            within = f" within {left_s:.0f} s" if unknown_s < _NEVER_S else ""
+            within = f" within {left_s:.0f} s" if unknown_s < NEVER_S else ""
             soon = f" by itself{within}, unless it is seen"
             advice = f"Nothing to do: it lands{'' if _lands(seen.message) else soon}."
         else:
@@ -244,7 +244,7 @@ def _lost_words(state: MonitorState, entity: EntityEstimate) -> str:
     """Return the words for an entity that is not seen, or that is seen and nevertheless not known to be there."""
     if entity.age_s > state.cast.lost_after_s:
         return f"{entity.name} is lost: not seen for {entity.age_s:.0f} s"
-    since = f" for {entity.unlocalised_s:.0f} s" if entity.unlocalised_s < _NEVER_S else ""
+    since = f" for {entity.unlocalised_s:.0f} s" if entity.unlocalised_s < NEVER_S else ""
     return f"{entity.name}: not known where it is{since}"
 
 

@@ -5,6 +5,7 @@ Frames and units follow the field names; covariances are row-major tuples of an 
 
 from groundstation.bus.messages.base import Header, Message
 from groundstation.bus.messages.belief import (
+    NEVER_S,
     Belief,
     EntityEstimate,
     Estimate,
@@ -61,6 +62,7 @@ __all__ = [
     "AIRBORNE",
     "ALL_DOWN",
     "KEPT_IN_PLACE",
+    "NEVER_S",
     "STANDING",
     "UNHEARD",
     "UP",

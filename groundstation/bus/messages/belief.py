@@ -6,6 +6,9 @@ import msgspec
 
 from groundstation.bus.messages.base import Message
 
+NEVER_S = 1e6
+"""Time that stands for "since ever": a message holds finite numbers."""
+
 
 class EntityEstimate(msgspec.Struct, frozen=True):
     """Mean and own covariance of one entity."""
@@ -23,7 +26,7 @@ class EntityEstimate(msgspec.Struct, frozen=True):
     converged: bool
     """Whether the estimate is good enough to fly on."""
     age_s: float
-    """Time since the last observation that corrected it [s]."""
+    """Time since the last observation that corrected it [s]; `NEVER_S`: there was none."""
     unlocalised_s: float = 0.0
     """For how long a flying robot may not have been where it is believed [s]; 0 while it is known."""
     contradicted: bool = False

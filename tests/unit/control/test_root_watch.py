@@ -55,6 +55,12 @@ def test_a_range_roots_a_robot_by_the_name_of_its_link() -> None:
     assert ages_s(watch) == [0.0, math.inf, math.inf]
 
 
+def test_a_round_of_ranges_that_places_a_robot_roots_it() -> None:
+    watch = RootWatch(["uwb"], CARRIED, ["uwb_a1_drone_1"])
+    watch.advance(TICK_NS, [], [("uwb", "drone_1", False)], flying=True)
+    assert ages_s(watch) == [0.0, math.inf, math.inf]
+
+
 def test_two_that_see_only_each_other_grow_older_together() -> None:
     watch = RootWatch(["ceiling"], CARRIED)
     watch.advance(TICK_NS, [used("ceiling", "drone_1")], flying=True)

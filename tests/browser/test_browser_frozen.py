@@ -15,7 +15,8 @@ from free_port import free_port
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
-FROZEN_S = 20.0
+# Longer than an unanswered stop is shown: it counts from when the page learnt what became of it.
+FROZEN_S = 35.0
 
 
 class DevTools:

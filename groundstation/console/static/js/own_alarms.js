@@ -1,5 +1,6 @@
 // Alarms that only a page can raise: that it hears nothing, or that a stop is not answered; and those of them that are over.
 
+import { sinceMs } from "./clock.js";
 import { joined, seconds } from "./dom.js";
 import { STOPS } from "./effects.js";
 import { failures } from "./guard.js";
@@ -42,9 +43,10 @@ function stops() {
 // The newest stop that somebody has not answered to whom no newer one was given.
 function unheardStop() {
   const renewed = new Set();
-  for (const { id, ref, verb, state, rows, given_ms } of stops()) {
-    const age = ageS(given_ms), silent = rows.filter(({ name, stage }) => !stage && !renewed.has(name)).map(({ name }) => name);
-    if (silent.length && age > UNHEARD_S && age < FORGOTTEN_S) return { id: ref || id, verb: verb.replace("_", " "), names: silent.join(", "), state };
+  for (const { id, ref, verb, state, rows, given_ms, since } of stops()) {
+    // What became of a page's own is known later than it was given, much later on a page that stood still.
+    const age = ageS(given_ms), known = since ? sinceMs(since) / 1000 : age, silent = rows.filter(({ name, stage }) => !stage && !renewed.has(name)).map(({ name }) => name);
+    if (silent.length && age > UNHEARD_S && known < FORGOTTEN_S) return { id: ref || id, verb: verb.replace("_", " "), names: silent.join(", "), state };
     rows.forEach(({ name }) => renewed.add(name));
   }
   return null;

@@ -54,6 +54,7 @@ write_over("[###]")
 def test_terminals_get_no_control_characters_of_others() -> None:
     operator, terminal = pty.openpty()
     environment = os.environ | {"TERM": "xterm-256color", "COLUMNS": "200", "PYTHONIOENCODING": "utf-8"}
+    environment.pop("NO_COLOR", None)
     subprocess.run([sys.executable, "-c", _SAID], stdout=terminal, stderr=terminal, env=environment, check=True)
     os.close(terminal)
     got = b""

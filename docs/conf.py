@@ -42,6 +42,13 @@ def _formula(as_block: bool) -> Callable[[HTML5Translator, nodes.Element], None]
     return visit
 
 
+def _leave_out_of_contents(app: Sphinx, _doctree: nodes.document) -> None:
+    # Every page shows the contents of the site: with the decisions in it, most of the build's time went there.
+    if app.env.docname.startswith("decisions/0"):
+        app.env.metadata[app.env.docname]["orphan"] = "listed by decisions/index"
+
+
 def setup(app: Sphinx) -> None:
-    """Register the renderer that `html_math_renderer` names."""
+    """Register the renderer that `html_math_renderer` names, and take decisions out of the contents."""
+    app.connect("doctree-read", _leave_out_of_contents)
     app.add_html_math_renderer("mathml", (_formula(as_block=False), None), (_formula(as_block=True), None))

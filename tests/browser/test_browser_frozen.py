@@ -78,7 +78,7 @@ def test_clicks_on_a_frozen_page_give_no_commands_after_it_resumes(watched: tupl
             for pid in stopped:
                 os.kill(pid, signal.SIGCONT)
     orders, banner = page.there("orders"), page.there("banner-unheard")
-    page.wait(lambda s: s["connected"] and orders.inner_text().count("came too late") == 2, within_s=5)
+    page.wait(lambda s: s["connected"] and orders.inner_text().count("came too late") == 2, within_s=10)
     page.wait(lambda s: "LAND REFUSED: not given to drone_2" in banner.inner_text(), within_s=5)
     page.shot("frozen_page_goes_on")
     assert stage.flight.commands == []

@@ -16,6 +16,7 @@ from groundstation.control.joinings import Joinings
 from groundstation.control.lookout import Lookout
 from groundstation.control.moment import Sight
 from groundstation.control.output_limiter import Limited, limit_setpoint
+from groundstation.control.plan_watch import PlanWatch
 from groundstation.control.root_watch import RootWatch
 from groundstation.control.setpoints import HOVER, setpoints_from_plan
 from groundstation.control.shafts import Shafts
@@ -33,11 +34,7 @@ from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.stabilized_frame import world_from_stabilized
 from groundstation.planning.planner import Planner, PlanRequest, PlanResult
 from groundstation.sensing.topology import Topology
-from groundstation.time_units import NS_PER_S
 from groundstation.tracker_parameters import TrackerParameters, parameters_from_field
-
-# An alarm stands for 8 s after the event that raised it.
-_TOLD_AGAIN_NS = 5 * NS_PER_S
 
 
 def tracker_from_field(field: ResolvedField, clock: str, epoch: int) -> "Tracker":
@@ -68,7 +65,7 @@ class Tracker:
         self._hovering = Hovering(level=parameters.control.fed)
         self._shafts = Shafts(parameters.estimator, parameters.safety)
         self._topology = Topology(())
-        self._told_stale_ns: int | None = None
+        self._plans = PlanWatch(parameters.control.max_plan_age_s)
         self._drifts: defaultdict[str, DriftWatch] = defaultdict(DriftWatch)
         self._belief = self.filter.belief()
         self._unlocalised_s: Mapping[str, float] = {}
@@ -151,7 +148,8 @@ class Tracker:
         self._heed_absence(now_ns)
         self._topology = self._topology_now()
         self.holding &= {name for name in self.airborne if not self.converged(name)}
-        self._watch_plan(now_ns)
+        planned_ns = None if self.current is None else self.current.stamp_ns
+        self._notices += self._plans.advance(now_ns, planned_ns, flying=bool(self.airborne))
         self._unlocalised_s = self._find_unlocalised()
         return self._belief
 
@@ -253,7 +251,7 @@ class Tracker:
         """Return each airborne robot's setpoint, limited by the newest belief; robots of unknown place hover."""
         p, airborne = self.parameters, self.airborne
         belief, lookout, plan = self._belief.core(), self.lookout, self.current
-        stale = self._is_plan_stale(now_ns)
+        stale = self._plans.is_stale(now_ns)
         if plan is not None and stale:
             plan = plan.halted(belief)  # ways back and searches need none
         unseen_s = {name: self.filter.age_s(name) for name in belief.layout.robots}
@@ -286,19 +284,6 @@ class Tracker:
             self._drifts[name].note_command(world_from_stabilized(velocity, float(belief.mean_of(name)[3])))
         return limited
 
-    def _is_plan_stale(self, now_ns: int) -> bool:
-        """Return whether the last plan is too old: its controls must no longer be flown."""
-        limit_ns = self.parameters.control.max_plan_age_s * 1e9
-        return self.current is not None and now_ns - self.current.stamp_ns > limit_ns
-
-    def _watch_plan(self, now_ns: int) -> None:
-        if not self._is_plan_stale(now_ns):
-            self._told_stale_ns = None
-        elif self._told_stale_ns is None or now_ns - self._told_stale_ns >= _TOLD_AGAIN_NS:
-            text = f"no new plan for {self.parameters.control.max_plan_age_s:g} s: drones that track hover"
-            self._notices.append(Notice(Severity.ERROR, text, "they go on with the next plan; land them if none comes"))
-            self._told_stale_ns = now_ns
-
     def _topology_now(self) -> Topology:
         flying = [name for name in self._belief.layout.robots if self.filter.airborne(name)]
         if not self._topology.levels:
@@ -309,7 +294,7 @@ class Tracker:
         """Drop the belief, hover, and begin a new epoch: drivers then move again only after an operator's RESUME."""
         self.filter.restart()
         self.holding = frozenset(self.airborne)
-        self.current = None
+        self.current, self._plans = None, PlanWatch(self.parameters.control.max_plan_age_s)
         self.epoch += 1
         self._unlocalised_s = self._find_unlocalised()
         remedy = "drones hover; RESUME once they are localised again, or land them"

@@ -44,7 +44,7 @@ class FakeFlight(threading.Thread):
         self._sunk_m = dict.fromkeys(drones, 0.0)  # descent of each landing drone so far
         self.frozen = self.fenced = False
         self.dark = False  # no camera has enough light
-        self.crashed: set[str] = set()  # drones whose own emergency stop has cut their motors
+        self.states: dict[str, m.FlightState] = {}  # those that do not follow from the mode
         self.mute: set[str] = set()  # drones without telemetry
         self.findings: tuple[m.PreflightFinding, ...] = ()  # findings of the pre-flight checks
         self.distance_m = 1.3  # distance of the drones from the target
@@ -238,9 +238,7 @@ class FakeFlight(threading.Thread):
             bus, mode = self.bus(name), self.modes[name]
             status = m.VehicleStatus(
                 header=bus.header(name),
-                flight_state=m.FlightState.EMERGENCY
-                if name in self.crashed
-                else STATES.get(mode, m.FlightState.FLYING),
+                flight_state=self.states.get(name, STATES.get(mode, m.FlightState.FLYING)),
                 mode=mode,
                 battery=self.battery.get(name),
                 link_quality=self.link.get(name, 0.93),

@@ -13,7 +13,7 @@ def all_is_well(flight: FakeFlight) -> None:
     flight.link, flight.rate_hz, flight.detail = {}, {}, {}
     flight.lands_in_s, flight.unseen_s = {}, {}
     flight.braked, flight.frozen = set(), False
-    flight.mute, flight.dark, flight.crashed = set(), False, set()
+    flight.mute, flight.dark, flight.states = set(), False, {}
 
 
 def one_lands_for_its_battery(flight: FakeFlight) -> None:

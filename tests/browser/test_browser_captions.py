@@ -177,7 +177,7 @@ def test_a_start_says_who_goes_on_and_whether_it_can(stage: Any) -> None:
 def test_a_crashed_drone_cannot_take_off_while_others_fly(stage: Any) -> None:
     SITUATIONS["all_is_well"](stage.flight)
     page = stage.open()
-    stage.flight.crashed, stage.flight.modes["drone_2"] = {"drone_2"}, "CUT"
+    stage.flight.states["drone_2"], stage.flight.modes["drone_2"] = m.FlightState.EMERGENCY, "CUT"
     stage.flight.detail["drone_2"] = "the vehicle reports an emergency"
     page.wait(lambda s: page.there("take-off").inner_text() == "TAKE OFF\ncheck drone_2")
     assert page.there("take-off").is_disabled() and page.there("drone_2-takeoff").is_disabled()
@@ -188,12 +188,22 @@ def test_a_crashed_drone_cannot_take_off_while_others_fly(stage: Any) -> None:
     stage.flight.detail["drone_2"] = "motors cut by operator"
     ordered = "Is on the floor, motors off: CUT MOTORS ordered at the terminal"
     page.wait(lambda s: page.there("drone_2-duty").inner_text().startswith(ordered))
-    stage.flight.crashed = set()  # a vehicle that does not count cut motors as an emergency
+    stage.flight.states.clear()  # a vehicle that does not count cut motors as an emergency
     page.wait(lambda s: s["sections"]["vehicles"]["drone_2"]["flight"] == "LANDED")
     assert page.there("take-off").inner_text() == "TAKE OFF\ncheck drone_2"
     assert page.there("hold").inner_text() == "HOLD\ndrone_1 hovers;\ndrone_2 is down"
     stage.flight.modes["drone_1"] = "LANDED"
     page.wait(lambda s: page.there("drone_2-takeoff").inner_text() == "Take off\nrises, if able")
+
+
+def test_a_drone_that_flies_on_after_its_motors_were_cut_is_not_called_down(stage: Any) -> None:
+    SITUATIONS["all_is_well"](stage.flight)
+    page = stage.open()
+    stage.flight.states["drone_2"], stage.flight.modes["drone_2"] = m.FlightState.FLYING, "CUT"
+    stage.flight.detail["drone_2"] = "motors cut by operator"
+    page.wait(lambda s: page.there("drone_2-duty").inner_text().startswith("Falls, or flies on: CUT MOTORS"))
+    assert page.there("drone_2-land").inner_text() == "Land\nlands here"
+    assert "is down" not in page.there("hold").inner_text()
 
 
 def test_minutes_are_of_who_flies_or_might(stage: Any) -> None:

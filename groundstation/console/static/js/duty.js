@@ -75,7 +75,7 @@ function unseen(name) {
 }
 
 const ORDERS = /^(landing|taking off|held|tracking|motors cut) (?:for|by) (.+)$/;
-const ORDERED = { landing: "lands:", "taking off": "takes off:", held: "hovers in place: HOLD", tracking: "tracks:" };
+const ORDERED = { landing: "lands:", "taking off": "takes off:", held: "hovers in place: HOLD", tracking: "tracks:", "motors cut": "falls, or flies on: CUT MOTORS" };
 
 const VERBS = { landing: ["LAND"], "taking off": ["TAKEOFF"], held: ["HOLD"], tracking: ["TRACK", "RESUME"], "motors cut": ["CUT_MOTORS"] };
 

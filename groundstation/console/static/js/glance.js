@@ -6,6 +6,7 @@ import { ageS, droneNames, estimateAge, isTarget, entity, NEVER_S, runOver, show
 const HEARD_S = 1; // as in groundstation/monitor/alarms.py
 const RECORDING_SILENT_S = 3;
 const ALOFT = new Set(["TAKING_OFF", "HOVER", "HOLD", "TRACK", "LANDING"]);
+const AIRBORNE = new Set(["TAKING_OFF", "FLYING", "HOVERING", "LANDING"]); // states of flight
 export const STAGES = ["pre-flight", "take-off", "form", "track", "land", "over"];
 
 const statuses = () => droneNames().map((name) => store.s.vehicles?.[name]).filter(Boolean);
@@ -13,13 +14,15 @@ const statuses = () => droneNames().map((name) => store.s.vehicles?.[name]).filt
 export const modeOf = (status) => (status?.braked ? "HOVER" : status?.mode);
 export const modeNow = (name) => store.s.vehicles?.[name]?.mode;
 export const modes = (names = droneNames()) => names.map(modeNow).filter(Boolean);
+// Whether its motors were cut, which its own state does not confirm: it falls, or has ignored that.
+const mayHaveIgnoredCut = (name) => modeNow(name) === "CUT" && AIRBORNE.has(store.s.vehicles[name].flight);
 // Of these drones those that fly.
-export const up = (names = droneNames()) => names.filter((name) => ALOFT.has(modeNow(name)));
+export const up = (names = droneNames()) => names.filter((name) => ALOFT.has(modeNow(name)) || mayHaveIgnoredCut(name));
 export const aloft = () => up().length;
 // Of these drones those of which nobody knows whether they fly, as groundstation/monitor/endurance.py has it.
 export const unsure = (names = droneNames()) => names.filter((name) => ["UNKNOWN", "LOST"].includes(store.s.vehicles?.[name]?.flight) && !["LANDED", "CUT"].includes(modeNow(name)) && !up([name]).length);
 // Of these drones those that stand, and might take off.
-export const standing = (names = droneNames()) => names.filter((name) => ["LANDED", "CUT"].includes(modeNow(name)));
+export const standing = (names = droneNames()) => names.filter((name) => ["LANDED", "CUT"].includes(modeNow(name)) && !mayHaveIgnoredCut(name));
 
 // Modes of the drones not on the ground, most careful first: [words, level, who does each if not all do the same].
 export function teamMode() {
@@ -58,7 +61,7 @@ export function landsIn(name) {
 export const isUnheard = (name) => Boolean(store.s.vehicles?.[name]) && shownAgeS(store.s.vehicles[name].at) > HEARD_S;
 // Whether its motors were cut, by it or for it: it may lie on its side, and an order to take off may do no more than end
 // its emergency. Only an AR.Drone calls that an emergency.
-export const isDown = (name) => store.s.vehicles?.[name]?.flight === "EMERGENCY" || modeNow(name) === "CUT";
+export const isDown = (name) => store.s.vehicles?.[name]?.flight === "EMERGENCY" || (modeNow(name) === "CUT" && !mayHaveIgnoredCut(name));
 // Whether its own camera has no light to see by.
 export const isBlind = (name) => Boolean(store.s.cameras?.[`${name}_camera`]?.dark);
 // In how many seconds one that stays lost lands at the latest; NaN for one that was never seen: only its driver knows.

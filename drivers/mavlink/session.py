@@ -53,8 +53,8 @@ def streams(flavour: Flavour, odometry_hz: float, imu_hz: float) -> dict[type[Me
         wanted[telemetry.EkfStatusReport] = 5.0
     else:
         # WIRE (docs/reference/mavlink.md 2): unrequested, PX4 sends 100 and 30 of these a second; of the latter only
-        # the covariances are of use. Its ESTIMATOR_STATUS comes unrequested.
-        wanted |= {telemetry.Attitude: _STOPPED, OdometryMessage: 5.0}
+        # the covariances are of use. Its ESTIMATOR_STATUS comes every second or two unless requested.
+        wanted |= {telemetry.Attitude: _STOPPED, OdometryMessage: 5.0, telemetry.EstimatorStatus: 5.0}
     return wanted
 
 

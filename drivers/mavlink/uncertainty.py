@@ -7,11 +7,12 @@ its filter refuses the fed positions (test ratios near 1), its velocity comes fr
 import math
 
 from drivers.mavlink.wire.flight import OdometryMessage
+from drivers.mavlink.wire.names import ESTIMATOR_LOCATED, EkfFlag
 from drivers.mavlink.wire.telemetry import EkfStatusReport, EstimatorStatus
 from groundstation.time_units import NS_PER_S
 
 # WIRE (ESTIMATOR_STATUS): below 0.5 under normal operation, above 1 a measurement is refused.
-_NORMAL_RATIO = 0.5
+_NORMAL_RATIO, _REFUSED_RATIO = 0.5, 1.0
 _REFUSED_STD_M_S = 0.5
 # WIRE (docs/reference/mavlink.md 2.1): 0.3 to 0.9 m/s after lift-off, at any covariances.
 _LIFT_OFF_STD_M_S = 0.5
@@ -44,13 +45,15 @@ class StatedUncertainty:
                 self._attitude = _std(pose[_ROLL_VARIANCE], pose[_PITCH_VARIANCE])
                 self._stated_ns = now_ns
             case EstimatorStatus():
-                self._doubt(now_ns, message.vel_ratio, message.pos_horiz_ratio)
+                aid = _REFUSED_RATIO if _is_blind(message) else math.nan
+                self._doubt(now_ns, message.vel_ratio, message.pos_horiz_ratio, aid)
             case EkfStatusReport():
                 self._doubt(now_ns, message.velocity_variance, message.pos_horiz_variance)
 
     def _doubt(self, now_ns: int, *ratios: float) -> None:
-        self._ratio = max((r for r in ratios if math.isfinite(r)), default=0.0)
-        self._ratio_ns = now_ns
+        # NaN: it compares nothing now, which does not refute what it found before.
+        if stated := [r for r in ratios if not math.isnan(r)]:
+            self._ratio, self._ratio_ns = max(stated), now_ns
 
     def leave_floor(self, now_ns: int) -> None:
         """Note that its motors turn before lift-off."""
@@ -74,6 +77,16 @@ class StatedUncertainty:
         """Return the deviation of roll and of pitch."""
         stated = self._attitude if now_ns - self._stated_ns <= _KEPT_NS else 0.0
         return min(_MOST_RAD, max(stated, _TILT_PER_VELOCITY * self._drift_m_s))
+
+
+def _is_blind(status: EstimatorStatus) -> bool:
+    """Return whether a PX4 disowns its velocity; without our positions its ratios are NaN, and its flags decide.
+
+    WIRE (docs/reference/mavlink.md 2.2): vel_ratio is NaN all the time where no velocity is fed.
+    """
+    if not status.flags & EkfFlag.VELOCITY_HORIZ:
+        return True
+    return math.isnan(status.pos_horiz_ratio) and not status.flags & ESTIMATOR_LOCATED
 
 
 def _std(*variances: float) -> float:

@@ -25,6 +25,8 @@ _NO_CELL = _UNKNOWN = 65535
 _VOLTS_EMPTY, _VOLTS_SPAN = 14.0, 2.8
 _POSITION_VARIANCE = 0.01  # as an autopilot states it [m^2]
 _SMALL_RATIO = 0.05
+# WIRE (PX4 1.16, source): its times without poses, and without one that it uses, until it navigates by its own inertia.
+_FED_S, _AIDED_S = 0.4, 1.0
 
 
 class Speaker:
@@ -194,9 +196,34 @@ class Speaker:
         return t.EkfStatusReport(self._solution, _SMALL_RATIO, ratio, ratio, 0.0, 0.0)
 
     def estimator_status(self) -> Message:
-        """Return the flags, test ratios and accuracies of its estimator (PX4), which is fed no velocities."""
+        """Return the flags, test ratios and accuracies of its estimator (PX4).
+
+        WIRE (docs/reference/mavlink.md 2.2): NaN is the ratio of what it is not fed.
+        """
         ratio, accuracy = self._honest.test_ratio, math.sqrt(_POSITION_VARIANCE)
-        return t.EstimatorStatus(self.boot_us, self._solution, 0.0, ratio, ratio, 0.0, 0.0, 0.0, accuracy, accuracy)
+        velocity = _SMALL_RATIO if self._firmware.global_position else math.nan
+        fed = ratio if self._is_fed else math.nan
+        flags = self._px4_solution
+        return t.EstimatorStatus(self.boot_us, flags, velocity, fed, ratio, 0.0, 0.0, 0.0, accuracy, accuracy)
+
+    @property
+    def _is_fed(self) -> bool:
+        return self._honest.has_position and self._honest.fed_s < _FED_S
+
+    @property
+    def _px4_solution(self) -> EkfFlag:
+        flags = EkfFlag.ATTITUDE | EkfFlag.VELOCITY_VERT | EkfFlag.POS_VERT_ABS
+        if not self._copter.airborne:
+            flags |= EkfFlag.CONST_POS_MODE  # it stands, with or without a position
+        inertial_s = max(self._honest.fed_s - _FED_S, self._honest.aided_s - _AIDED_S)
+        allowed_s = self._firmware.parameters["EKF2_NOAID_TOUT"] * 1e-6 - _AIDED_S
+        if self._honest.has_position and inertial_s < max(0.0, allowed_s):
+            flags |= EkfFlag.VELOCITY_HORIZ | EkfFlag.POS_HORIZ_REL
+            if self._firmware.origin is not None:
+                flags |= EkfFlag.POS_HORIZ_ABS
+        if self._is_fed:
+            flags |= EkfFlag.PRED_POS_HORIZ_REL
+        return flags | EkfFlag.PRED_POS_HORIZ_ABS if self._firmware.global_position else flags
 
     def home(self) -> Message | None:
         """Return its place of take-off, once it has an origin."""

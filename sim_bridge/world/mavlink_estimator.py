@@ -26,7 +26,8 @@ _GYRO_NOISE_RAD_S, _ACCELEROMETER_NOISE_M_S2 = 0.006, 0.08
 
 class InertialEstimate:
     """Readings after each `step`: position, velocity [fed frame], yaw, roll, pitch [rad; FLU], gyros and
-    accelerometers [base]. aided_s: since the last pose that was used; poses: number used; rejected: number not used;
+    accelerometers [base]. aided_s: since the last pose that was used; fed_s: since the last pose, used or not;
+    poses: number used; rejected: number not used;
     test_ratio: distance of the last pose from the estimate, as a share of the gate; beyond 1 it is refused.
     """
 
@@ -41,7 +42,7 @@ class InertialEstimate:
         self.yaw_rate = self.roll = self.pitch = 0.0
         self.gyros: Vector3 = (0.0, 0.0, 0.0)
         self.accelerometers: Vector3 = (0.0, 0.0, GRAVITY_M_S2)
-        self.aided_s = math.inf
+        self.aided_s = self.fed_s = math.inf
         self.poses = self.rejected = 0
         self.test_ratio = 0.0
         self._tick_s = tick_s
@@ -68,6 +69,7 @@ class InertialEstimate:
         dt, draw = self._tick_s, self._draw
         self._time_s += dt
         self.aided_s += dt
+        self.fed_s += dt
         share = 1.0 if motors_on else 0.05
         wx, wy, wz = body.body_rates()
         turn = share * _GYRO_NOISE_RAD_S
@@ -106,6 +108,7 @@ class InertialEstimate:
         jump = self._resets is not None and resets != self._resets
         first = self.poses == 0 or self.aided_s > 5.0
         self._resets = resets
+        self.fed_s = 0.0
         error = _sum(position, self.position, -1.0)
         turn = math.remainder(yaw - self.yaw, math.tau)
         self.test_ratio = 0.0 if jump or first else math.hypot(*error) / _GATE_M

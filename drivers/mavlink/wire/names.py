@@ -100,7 +100,7 @@ class SensorBits(IntFlag):
 
 
 class EkfFlag(IntFlag):
-    """ESTIMATOR_STATUS_FLAGS as ArduPilot reports them."""
+    """ESTIMATOR_STATUS_FLAGS."""
 
     ATTITUDE = 1
     VELOCITY_HORIZ = 2
@@ -111,6 +111,10 @@ class EkfFlag(IntFlag):
     CONST_POS_MODE = 128
     PRED_POS_HORIZ_REL = 256
     PRED_POS_HORIZ_ABS = 512
+
+
+# Either means a position; the second of them needs an origin as well.
+ESTIMATOR_LOCATED = EkfFlag.POS_HORIZ_REL | EkfFlag.POS_HORIZ_ABS
 
 
 class Px4Main(IntEnum):

@@ -14,7 +14,7 @@ def bench_of(hand):
 
 
 def test_test_ratios_are_those_of_its_own_estimate(bench_of, flavour):
-    """PX4 sends them unasked, once a second; ArduPilot on request."""
+    """PX4 sends them unasked, once a second; ArduPilot on request. NaN: PX4 is fed no positions, or no velocities."""
     bench = bench_of(flavour)
     px4 = flavour == "px4"
     if not px4:
@@ -28,10 +28,35 @@ def test_test_ratios_are_those_of_its_own_estimate(bench_of, flavour):
     assert len(ratios()) == pytest.approx(4, abs=1) and ratios()[-1] == pytest.approx(0.0, abs=0.02)
     bench.seen = False
     bench.run(1.0)
+    assert math.isnan(ratios()[-1]) == px4
     body = bench.copter.airframe
     assert not bench.copter.estimate.aid((body.x + 0.9, body.y, body.z), body.yaw, 0)
-    bench.run(1.0)
+    bench.run(0.2)
+    assert bench.command(512, 230.0 if px4 else 193.0) == 0
     assert ratios()[-1] == pytest.approx(1.5, abs=0.05)
+    assert not px4 or math.isnan([m for m in bench.heard if isinstance(m, t.EstimatorStatus)][-1].vel_ratio)
+
+
+@pytest.mark.parametrize(("patience_us", "valid_s"), [(900_000, 0.4), (5_000_000, 4.4)])
+def test_the_flags_of_a_px4_are_taken_back_after_the_last_position(bench_of, patience_us, valid_s):
+    bench = bench_of("px4")
+    bench.firmware.parameters.values["EKF2_NOAID_TOUT"] = patience_us
+
+    def flags():
+        assert bench.command(512, 230.0) == 0
+        return [m for m in bench.heard if isinstance(m, t.EstimatorStatus)][-1].flags
+
+    bench.seen = False
+    bench.run(1.0)
+    assert flags() == 0xA5
+    bench.seen = True
+    bench.run(1.0)
+    assert flags() == 0x1AF
+    bench.seen = False
+    bench.run(valid_s - 0.1)
+    assert flags() == (0x1AF if valid_s < 0.5 else 0x0AF)
+    bench.run(0.2)
+    assert flags() == 0xA5
 
 
 class Leaning:
@@ -56,3 +81,12 @@ def test_a_landing_without_cameras_goes_metres_astray_where_its_level_is_off_by_
     bench.run(10.0)
     assert body.on_ground
     assert 2.0 < math.hypot(body.x - x, body.y - y) < 6.0
+
+
+def test_a_px4_is_doubted_when_its_positions_end_and_not_before(rig_of):
+    rig = rig_of("px4").track_on().run(4.0)
+    stated = rig.vehicle._publisher.stated
+    assert stated.velocity_std_m_s(rig.hand.now) < 0.1
+    rig.tracking = False
+    rig.until(lambda: rig.copter.estimate.aided_s > 1.3)
+    assert not rig.body.on_ground and stated.velocity_std_m_s(rig.hand.now) == 0.5

@@ -10,7 +10,7 @@ from drivers.mavlink.vehicle import MavlinkVehicle
 from drivers.mavlink.wire.flight import CommandLong, OdometryMessage, SetPositionTargetLocalNed
 from drivers.mavlink.wire.names import CopterMode, Flavour, Px4Auto, Px4Main, px4_mode
 from drivers.mavlink.wire.service import ParamRequestRead, SetGpsGlobalOrigin, Timesync
-from drivers.mavlink.wire.telemetry import Attitude, GpsGlobalOrigin, Heartbeat, LocalPositionNed
+from drivers.mavlink.wire.telemetry import Attitude, EstimatorStatus, GpsGlobalOrigin, Heartbeat, LocalPositionNed
 from groundstation.bus.messages import Verb
 from groundstation.bus.topics import COMMAND_ACK, IMU, ODOMETRY, VEHICLE_STATUS
 
@@ -109,6 +109,7 @@ def test_px4_is_asked_to_stop_the_streams_that_nobody_uses(rig_of):
     assert Attitude not in rig.emulator.services.intervals
     assert rig.emulator.services.intervals[OdometryMessage] == 40  # 5 Hz, for its covariances
     assert rig.emulator.services.intervals[LocalPositionNed] == 4
+    assert rig.emulator.services.intervals[EstimatorStatus] == 40  # its doubts are 3 s old at most
 
 
 def test_setpoints_are_clamped(rig):

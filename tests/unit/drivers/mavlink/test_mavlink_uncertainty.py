@@ -6,9 +6,16 @@ import pytest
 
 from drivers.mavlink.uncertainty import StatedUncertainty
 from drivers.mavlink.wire.flight import OdometryMessage
+from drivers.mavlink.wire.names import EkfFlag
 from drivers.mavlink.wire.telemetry import EkfStatusReport, EstimatorStatus
 
 S = 1_000_000_000
+# WIRE (PX4 1.16): as standing on the floor with positions from outside, no origin set; and after they end.
+AIDED, UNAIDED = 0x1AF, 0xA5
+
+
+def estimator(velocity, position, flags=AIDED):
+    return EstimatorStatus(0, flags, velocity, position, 0, 0, 0, 0, 0, 0)
 
 
 def odometry(velocity, tilt):
@@ -43,9 +50,42 @@ def test_a_large_doubt_is_one_and_not_none():
 @pytest.mark.parametrize(("ratio", "std"), [(0.3, 0.0), (0.5, 0.0), (0.75, 0.25), (1.0, 0.5), (44.0, 0.5)])
 def test_a_filter_that_refuses_what_it_is_fed_is_doubted(ratio, std):
     px4, ardupilot = StatedUncertainty(), StatedUncertainty()
-    px4.take(S, EstimatorStatus(0, 0, 0.1, ratio, 0, 0, 0, 0, 0, 0))
+    px4.take(S, estimator(0.1, ratio))
     ardupilot.take(S, EkfStatusReport(0, 0.1, ratio, 0, 0, 0))
     assert px4.velocity_std_m_s(S) == ardupilot.velocity_std_m_s(S) == pytest.approx(std)
+
+
+@pytest.mark.parametrize("before", [0.1, 1.4])
+def test_a_px4_that_takes_no_more_positions_is_doubted(before):
+    """PX4 then sends NaN for its ratios, and takes back its flags for velocity and position."""
+    stated = StatedUncertainty()
+    stated.take(S, estimator(math.nan, before))
+    stated.take(2 * S, estimator(math.nan, math.nan, UNAIDED))
+    assert stated.velocity_std_m_s(2 * S) == 0.5
+    stated.take(3 * S, estimator(math.nan, 0.1))
+    assert stated.velocity_std_m_s(3 * S) == 0.0
+
+
+def test_a_position_that_is_neither_valid_nor_compared_is_doubted():
+    stated = StatedUncertainty()
+    stated.take(S, estimator(0.1, math.nan, UNAIDED | EkfFlag.VELOCITY_HORIZ))
+    assert stated.velocity_std_m_s(S) == 0.5
+
+
+@pytest.mark.parametrize("position", [0.1, math.nan])
+def test_a_px4_that_compares_no_velocity_is_not_doubted_for_that(position):
+    """vel_ratio is always NaN where no velocity is fed, and both are from 0.4 s after the last position on."""
+    stated = StatedUncertainty()
+    stated.take(S, estimator(math.nan, position))
+    assert stated.velocity_std_m_s(S) == 0.0
+
+
+def test_a_doubt_outlasts_a_message_without_ratios():
+    stated = StatedUncertainty()
+    stated.take(S, estimator(math.nan, 1.4))
+    stated.take(2 * S, estimator(math.nan, math.nan))
+    assert stated.velocity_std_m_s(4 * S) == 0.5
+    assert stated.velocity_std_m_s(5 * S) == 0.0
 
 
 def test_a_velocity_that_drifts_says_how_far_its_attitude_is_off():

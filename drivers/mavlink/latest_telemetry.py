@@ -20,7 +20,7 @@ class LatestTelemetry:
     """The last reports; times 0: never. moved_ns, attitude_ns: of the last velocity and attitude.
 
     asked_ns: of the last request for our time; disarmed_ns: since when heartbeats report again that its motors stand.
-    transmitter: it receives a pilot's transmitter.
+    transmitter: it receives a pilot's transmitter; ekf: flags of its estimator, None: never reported.
     """
 
     heard_ns: int = 0
@@ -35,7 +35,7 @@ class LatestTelemetry:
     landed_ns: int = 0
     healthy: int = 0
     transmitter: bool = False
-    ekf: int = 0
+    ekf: int | None = None
     batteries: Batteries = _NO_BATTERY
     attitude: BaseAttitude | None = None
     attitude_ns: int = 0

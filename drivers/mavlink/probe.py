@@ -7,10 +7,19 @@ from drivers.mavlink.identity import serial_number_of
 from drivers.mavlink.links.seam import MavlinkLink
 from drivers.mavlink.wire.flight import command_to
 from drivers.mavlink.wire.frames import id_of
-from drivers.mavlink.wire.names import ARMED, AUTOPILOT_COMPONENT, NO_AUTOPILOT, Flavour, MavCmd, mode_name
+from drivers.mavlink.wire.names import (
+    ARMED,
+    AUTOPILOT_COMPONENT,
+    ESTIMATOR_LOCATED,
+    NO_AUTOPILOT,
+    Flavour,
+    MavCmd,
+    mode_name,
+)
 from drivers.mavlink.wire.telemetry import (
     OUR_HEARTBEAT,
     AutopilotVersion,
+    EstimatorStatus,
     Heartbeat,
     LocalPositionNed,
     Statustext,
@@ -96,7 +105,10 @@ def _note(vehicle: Found, message: object) -> None:
             vehicle.battery = f"{message.battery_remaining} %"
         case VideoStreamInformation():
             vehicle.video = message.uri
-        case LocalPositionNed():
+        # WIRE (docs/reference/mavlink.md 2.2): a PX4 sends it without a position, too.
+        case LocalPositionNed() if vehicle.autopilot != Flavour.PX4:
             vehicle.located = True
+        case EstimatorStatus():
+            vehicle.located = bool(message.flags & ESTIMATOR_LOCATED)
         case Statustext() if message.text not in vehicle.texts:
             vehicle.texts.append(message.text)

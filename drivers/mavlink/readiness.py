@@ -5,7 +5,7 @@ from drivers.mavlink.requests import Requests
 from drivers.mavlink.session import MavlinkSession
 from drivers.mavlink.settling import Settling
 from drivers.mavlink.texts import Texts
-from drivers.mavlink.wire.names import EkfFlag, Flavour, SensorBits
+from drivers.mavlink.wire.names import ESTIMATOR_LOCATED, EkfFlag, Flavour, SensorBits
 from groundstation.time_units import NS_PER_S
 
 # ArduPilot repeats its reasons against arming every 30 s.
@@ -27,15 +27,21 @@ class Readiness:
             return detail
         if not known.tells_motion(now_ns):
             return "it has no position yet"
+        if not self._is_located(known.ekf):
+            return "its estimator has no position yet"
         if known.healthy & _FAULTS != _FAULTS:
             return "its gyros or accelerometers are not healthy"
         if self._flavour is Flavour.PX4:
             # WIRE (docs/reference/mavlink.md 2): without GPS PX4's PREARM_CHECK never becomes healthy, yet OFFBOARD
             # arming works.
             return "" if self._settling.is_over(now_ns, known.status) else "its own checks have not passed yet"
-        if not known.ekf & EkfFlag.POS_HORIZ_REL:
-            return "its estimator has no position yet"
         return "" if known.healthy & SensorBits.PREARM_CHECK else self._arming_reason(now_ns)
+
+    def _is_located(self, flags: int | None) -> bool:
+        if self._flavour is Flavour.ARDUPILOT:
+            return bool((flags or 0) & EkfFlag.POS_HORIZ_REL)
+        # WIRE (docs/reference/mavlink.md 2.2): PX4 sends LOCAL_POSITION_NED without a position, too.
+        return flags is None or bool(flags & ESTIMATOR_LOCATED)
 
     def _arming_reason(self, now_ns: int) -> str:
         said = self._said.reasons(now_ns - _COMPLAINTS_NS, "arm", now_ns)

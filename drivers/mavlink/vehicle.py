@@ -147,10 +147,10 @@ class MavlinkVehicle:
                 if news := known.batteries.news(message):
                     self._session.notes.append(news)
                 return replace(known, batteries=known.batteries.with_first(now_ns, message))
-            case telemetry.EkfStatusReport():
+            case telemetry.EkfStatusReport() | telemetry.EstimatorStatus():
                 self._publisher.stated.take(now_ns, message)
                 return replace(known, ekf=message.flags)
-            case telemetry.EstimatorStatus() | flight.OdometryMessage():
+            case flight.OdometryMessage():
                 self._publisher.stated.take(now_ns, message)
             case telemetry.Statustext():
                 self.texts.append((now_ns, message))

@@ -131,8 +131,8 @@ class Speaker:
         return t.ExtendedSysState(0, self._status[2])
 
     def local_position(self) -> Message | None:
-        """Return its estimated position, if it has one."""
-        if not self._honest.has_position:
+        """Return its estimated position; a PX4 tells one without having any (docs/reference/mavlink.md 2.2)."""
+        if not self._honest.has_position and self._firmware.flavour is Flavour.ARDUPILOT:
             return None
         (x, y, z), (vx, vy, vz) = self._estimate.position, self._estimate.velocity
         return t.LocalPositionNed(self.boot_ms, x, -y, -z, vx, -vy, -vz)

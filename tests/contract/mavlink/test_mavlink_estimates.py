@@ -6,6 +6,8 @@ import pytest
 from mavlink_bench import Bench
 
 from drivers.mavlink.wire import telemetry as t
+from drivers.mavlink.wire.names import Flavour
+from groundstation.bus.messages import Verb
 
 
 @pytest.fixture
@@ -90,3 +92,37 @@ def test_a_px4_is_doubted_when_its_positions_end_and_not_before(rig_of):
     rig.tracking = False
     rig.until(lambda: rig.copter.estimate.aided_s > 1.3)
     assert not rig.body.on_ground and stated.velocity_std_m_s(rig.hand.now) == 0.5
+
+
+def test_a_vehicle_whose_estimator_takes_no_positions_is_not_ready(rig_of, flavour):
+    """WIRE: PX4 sends LOCAL_POSITION_NED with or without a position; ArduPilot only with one."""
+    rig = rig_of(flavour)
+    feed = rig.emulator.services._vision
+    rig.emulator.services._vision = lambda message, now_ns: None
+    rig.run(10.0)
+    assert rig.vehicle.telemetry.tells_motion(rig.hand.now) == (flavour == "px4")
+    assert "no position yet" in rig.host.watchdog.vehicle.not_ready
+    rig.order(Verb.TAKEOFF)
+    rig.run(1.0)
+    assert not rig.emulator.firmware.armed and not [text for text in rig.texts if "enied" in text]
+    rig.emulator.services._vision = feed
+    rig.take_off()
+
+
+def test_a_px4_gets_time_to_settle_from_its_first_position_on(rig_of):
+    rig = rig_of("px4")
+    rig.emulator.speaker.builders[t.Heartbeat] = lambda: t.Heartbeat(2, Flavour.PX4, 1, rig.emulator.firmware.mode, 0)
+    feed = rig.emulator.services._vision
+    rig.emulator.services._vision = lambda message, now_ns: None
+    rig.run(10.0)
+    rig.emulator.services._vision = feed
+    rig.run(3.5)
+    assert rig.host.watchdog.vehicle.not_ready == "its own checks have not passed yet"
+    rig.run(2.0)
+    assert not rig.host.watchdog.vehicle.not_ready
+
+
+def test_a_px4_that_never_sends_its_estimators_status_is_ready_as_it_says_where_it_is(rig_of):
+    rig = rig_of("px4")
+    rig.emulator.speaker.builders[t.EstimatorStatus] = lambda: None
+    rig.connect()

@@ -18,6 +18,7 @@ from drivers.mavlink.wire.names import (
     Flavour,
     Landed,
     MavFrame,
+    MavState,
     land_mode,
 )
 from drivers.mavlink.wire.telemetry import AttitudeQuaternion, HighresImu, LocalPositionNed, RawImu
@@ -33,7 +34,6 @@ _RAD_S_FROM_MRAD_S = 0.001
 # Values beyond these are no measurement of an indoor vehicle.
 _MOST_M_S, _MOST_RAD_S, _MOST_M_S2, _MOST_M = 30.0, 60.0, 400.0, 10_000.0
 _STILL_M_S = 0.15
-_IN_EMERGENCY, _POWEROFF = 6, 7  # MAV_STATE; 8 is FLIGHT_TERMINATION
 # An estimator may be reset once, by the first position that it gets; time_boot_ms wraps after 49 days.
 LIMITS = PlausibilityLimits(speed_m_s=FASTEST_M_S, tilt_rad=math.radians(50.0), jump_m_s=0.6)
 
@@ -131,11 +131,11 @@ def flight_state_from(flavour: Flavour, base_mode: int, custom_mode: int, status
     """
     if not base_mode & ARMED:
         return FlightState.LANDED
-    if status >= _POWEROFF:
+    if status >= MavState.POWEROFF:
         return FlightState.EMERGENCY
     # WIRE (docs/reference/mavlink.md 5.2): a vehicle in an emergency lands by itself: its motors must not be cut for
     # that.
-    lands = custom_mode == land_mode(flavour) or status == _IN_EMERGENCY
+    lands = custom_mode == land_mode(flavour) or status == MavState.EMERGENCY
     if landed == Landed.LANDING or (landed == Landed.IN_AIR and lands):
         return FlightState.LANDING
     if landed == Landed.IN_AIR:

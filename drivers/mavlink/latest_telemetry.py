@@ -1,17 +1,21 @@
 """The newest telemetry of a MAVLink vehicle."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from drivers.mavlink.battery import Batteries
 from drivers.mavlink.convert import BaseAttitude
 from drivers.mavlink.turning import turned_on
-from drivers.mavlink.wire.names import ARMED, Landed
+from drivers.mavlink.wire.errors import WireError
+from drivers.mavlink.wire.names import ARMED, Landed, MavState
+from drivers.mavlink.wire.telemetry import Heartbeat
 from groundstation.bus.messages import Vector3
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 # Longer than a vehicle with stopped motors takes to be on the floor and to report it.
 _FALLS_NS = 5 * NS_PER_S
 FRESH_NS = 300 * NS_PER_MS
+# Shorter than the second between two heartbeats; one that came twice does not confirm itself.
+_CONFIRMS_NS = 300 * NS_PER_MS
 _NO_BATTERY = Batteries()
 
 
@@ -19,7 +23,8 @@ _NO_BATTERY = Batteries()
 class LatestTelemetry:
     """The last reports; times 0: never. moved_ns, attitude_ns: of the last velocity and attitude.
 
-    asked_ns: of the last request for our time; disarmed_ns: since when heartbeats report again that its motors stand.
+    asked_ns: of the last request for our time; disarmed_ns: since when heartbeats report again that its motors stand;
+    ends_ns: since when all of them report the end of its flight, 0 if they do not.
     transmitter: it receives a pilot's transmitter; ekf: flags of its estimator, None: never reported.
     """
 
@@ -31,6 +36,7 @@ class LatestTelemetry:
     disarmed_ns: int = 0
     custom_mode: int = 0
     status: int = 0
+    ends_ns: int = 0
     landed: int = 0
     landed_ns: int = 0
     healthy: int = 0
@@ -42,6 +48,23 @@ class LatestTelemetry:
     inertial: tuple[float, ...] = ()
     velocity_m_s: Vector3 = (0.0, 0.0, 0.0)
     position_m: Vector3 | None = None
+
+    def after_heartbeat(self, now_ns: int, beat: Heartbeat) -> "LatestTelemetry":
+        """Return it with a heartbeat taken; raises WireError for a state that does not exist.
+
+        With its motors running the end of its flight cuts them, so it counts from the second heartbeat in a row on.
+        """
+        status, armed = beat.system_status, bool(beat.base_mode & ARMED)
+        if status > MavState.FLIGHT_TERMINATION:
+            raise WireError("implausible", f"MAV_STATE {status}")
+        ends_ns = (self.ends_ns or now_ns) if status >= MavState.POWEROFF else 0
+        if ends_ns and armed and now_ns - ends_ns < _CONFIRMS_NS:
+            status = self.status
+        disarmed_ns = now_ns if self.base_mode & ARMED and not armed else self.disarmed_ns
+        return replace(
+            self, heartbeat_ns=now_ns, base_mode=beat.base_mode, custom_mode=beat.custom_mode, status=status,
+            ends_ns=ends_ns, disarmed_ns=disarmed_ns,
+        )  # fmt: skip
 
     def tells_motion(self, now_ns: int) -> bool:
         """Return whether its velocity is younger than 0.3 s."""

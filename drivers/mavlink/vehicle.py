@@ -102,10 +102,7 @@ class MavlinkVehicle:
             case telemetry.RawImu():
                 known = self._felt(now_ns, *convert.imu_from_raw(message), known)
             case telemetry.Heartbeat():
-                mode = (message.base_mode, message.custom_mode, message.system_status)
-                disarmed_ns = now_ns if known.base_mode & ARMED and not mode[0] & ARMED else known.disarmed_ns
-                known = replace(known, heartbeat_ns=now_ns, base_mode=mode[0], custom_mode=mode[1], status=mode[2])
-                known = replace(known, disarmed_ns=disarmed_ns)
+                known = known.after_heartbeat(now_ns, message)
                 if message.autopilot != self.flavour:
                     raise WireError(
                         "wrong_flavour", f"autopilot {message.autopilot}, the field says {self.flavour.name}"

@@ -67,6 +67,14 @@ class MavResult(IntEnum):
     IN_PROGRESS = 5
 
 
+class MavState(IntEnum):
+    """MAV_STATE: that of an emergency, the ends of a flight, of which the second is also the greatest."""
+
+    EMERGENCY = 6
+    POWEROFF = 7
+    FLIGHT_TERMINATION = 8
+
+
 class Landed(IntEnum):
     """MAV_LANDED_STATE."""
 

@@ -122,6 +122,41 @@ def test_a_px4_that_says_that_it_is_not_ready_is_given_four_seconds_from_its_fir
     ready.until(lambda: ready.mode == "TAKING_OFF", 0.2)
 
 
+def once(status):
+    """Change the state of one heartbeat."""
+    left = [status]
+
+    def change(frame):
+        if not isinstance(frame.message, Heartbeat) or not left:
+            return frame
+        return frame._replace(message=frame.message._replace(system_status=left.pop()))
+
+    return change
+
+
+@pytest.mark.parametrize("status", [7, 8, 9, 255])
+def test_one_heartbeat_with_a_wrong_state_cuts_no_motors(rig_of, status):
+    rig = rig_of("px4").track_on()
+    Liar(rig.link).change = once(status)
+    rig.run(2.5)
+    assert rig.mode == "TRACK" and rig.emulator.firmware.armed
+
+
+def test_a_px4_that_ends_its_flight_is_taken_at_its_word_within_two_seconds(rig_of):
+    rig = rig_of("px4").track_on()
+    Liar(rig.link).set(Heartbeat, system_status=8)
+    rig.until(lambda: rig.mode == "CUT", 2.1)
+
+
+def test_heartbeats_with_a_state_that_does_not_exist_are_silence(rig_of):
+    rig = rig_of("px4").track_on()
+    Liar(rig.link).set(Heartbeat, system_status=9)
+    rig.run(3.0)
+    assert rig.mode == "TRACK"
+    rig.until(lambda: rig.mode == "LANDING", 6.0)
+    assert rig.emulator.firmware.armed
+
+
 def test_a_battery_that_is_told_no_more_is_unknown_and_lands_it(rig_of):
     rig = rig_of("px4").track_on()
     Liar(rig.link).change = lambda frame: None if isinstance(frame.message, SysStatus | BatteryStatus) else frame

@@ -52,7 +52,7 @@ class Fleet:
         )
         self.vehicles = {v.system_id: MavlinkVehicle(settings, v, self.link, child.bus) for v in settings.vehicles}
         self._stations = OtherStations(
-            settings.link.system_id,
+            (settings.link.system_id, settings.link.component_id),
             {vehicle.system_id: vehicle.name for vehicle in settings.vehicles},
             [vehicle.system_id for vehicle in settings.vehicles if vehicle.forward],
         )

@@ -11,6 +11,7 @@ from drivers.mavlink.convert import LIMITS
 from drivers.mavlink.latest_telemetry import FRESH_NS, LatestTelemetry
 from drivers.mavlink.lift_off import credible
 from drivers.mavlink.links.seam import Heard, MavlinkLink
+from drivers.mavlink.other_stations import GivenOrders, is_answer_to
 from drivers.mavlink.publisher import TelemetryPublisher
 from drivers.mavlink.readiness import Readiness
 from drivers.mavlink.requests import Requests
@@ -56,8 +57,10 @@ class MavlinkVehicle:
         self._acks: deque[flight.CommandAckMessage] = deque(maxlen=64)
         self._values: deque[_Value] = deque(maxlen=256)
         rates = streams(self.flavour, vehicle.odometry_hz, vehicle.imu_hz)
-        self._ours, known, pinned = settings.link.system_id, dict(vehicle.parameters), vehicle.serial_number
-        self._session = MavlinkSession(self.system, self.flavour, rates, self._ours, settings.origin, known, pinned)
+        self._ours, known = (settings.link.system_id, settings.link.component_id), dict(vehicle.parameters)
+        ids, pinned = (self.system, self.flavour, rates, self._ours[0]), vehicle.serial_number
+        self._session = MavlinkSession(*ids, settings.origin, known, pinned)
+        self._given = GivenOrders(forwards=bool(vehicle.forward))
         pad, first_ns = (vehicle.pad_m, vehicle.pad_yaw_rad), FIRST_SIGHT_NS[self.flavour]
         self.vision = VisionFeed(vehicle.name, clock.clock_id(), settings.vision, *pad, first_ns)
         self.orders = Orders(vehicle, self.flavour, self._requests)
@@ -151,7 +154,7 @@ class MavlinkVehicle:
                 self._publisher.stated.take(now_ns, message)
             case telemetry.Statustext():
                 self.texts.append((now_ns, message))
-            case flight.CommandAckMessage() if message.target_system in (0, self._ours):  # not a second station's
+            case flight.CommandAckMessage() if is_answer_to(self._ours, message):
                 self._acks.append(message)
             case service.ParamValue() | telemetry.GpsGlobalOrigin() | telemetry.AutopilotVersion():
                 self._values.append(message)
@@ -241,11 +244,16 @@ class MavlinkVehicle:
         if setpoint is not None:
             messages.append(setpoint)
         for message in messages:
+            self._given.note(now_ns, message)
             self._link.send(self.system, message)
 
     def _take_answers(self, now_ns: int) -> None:
         while self._acks:
-            self._requests.answer(now_ns, self._acks.popleft())
+            ack = self._acks.popleft()
+            self._requests.answer(now_ns, ack)
+            if self._given.is_foreign(now_ns, ack.command):
+                text = f"it answers an order that is not ours, by our ids {self._ours}: another ground station has them"
+                self.orders.events.append((MavSeverity.WARNING, text))
         while self._values:
             value = self._values.popleft()
             try:

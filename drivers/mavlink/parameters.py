@@ -22,7 +22,8 @@ class Needed:
     """One parameter: the value that `setup` writes, its type on the wire, and its purpose.
 
     accepted: lowest and highest value that are acceptable too; others: acceptable single values; flown: a wider range
-    that permits a take-off, but is reported to the operator and changed by `setup`; aliases: names in other releases.
+    that permits a take-off, but is reported to the operator and changed by `setup`; aliases: names in other releases;
+    optional: a firmware without it flies.
     """
 
     name: str
@@ -33,6 +34,7 @@ class Needed:
     others: tuple[float, ...] = ()
     flown: tuple[float, float] | None = None
     aliases: tuple[str, ...] = ()
+    optional: bool = False
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -61,6 +63,13 @@ def _lies_in(span: tuple[float, float], value: float) -> bool:
     return span[0] - tolerance <= value <= span[1] + tolerance
 
 
+_CENTRE = "our positions are those of its centre"
+
+
+def _offsets(stem: str) -> tuple[Needed, ...]:
+    return tuple(Needed(f"{stem}_{axis}", 0, _CENTRE, REAL32, optional=True) for axis in "XYZ")
+
+
 _PX4 = (
     Needed("EKF2_GPS_CTRL", 0, "no GPS indoors"),
     Needed("EKF2_EV_CTRL", 11, "position, height and heading come from outside; velocity does not"),
@@ -68,6 +77,7 @@ _PX4 = (
     Needed("EKF2_RNG_CTRL", 0, "a distance sensor would replace our height as the reference"),
     Needed("EKF2_MAG_TYPE", 5, "no compass near steel"),
     Needed("EKF2_EV_DELAY", 0, "poses are sent as predicted to now", REAL32, accepted=(0, 50)),
+    *_offsets("EKF2_EV_POS"),
     Needed("EKF2_EVP_NOISE", 0.03, "lower bound of the error of our positions, 1 to 3 cm", REAL32, (0.01, 0.06)),
     Needed("EKF2_IMU_CTRL", 3, "it must not take its thrust for gravity while no position comes", others=(0, 1, 2)),
     Needed("EKF2_NOAID_TOUT", 900_000, "without our positions it lands level, not by its velocity", INT32, (5e5, 9e5)),
@@ -81,6 +91,9 @@ _PX4 = (
 )
 _ARDUPILOT = (
     Needed("VISO_TYPE", 1, "position from outside, by MAVLink"),
+    Needed("VISO_SCALE", 1, "it multiplies our positions", REAL32, optional=True),
+    Needed("VISO_DELAY_MS", 0, "poses are sent as predicted to now", accepted=(0, 50), optional=True),
+    *_offsets("VISO_POS"),
     Needed("GPS1_TYPE", 0, "no GPS indoors", aliases=("GPS_TYPE",)),
     Needed("EK3_SRC1_POSXY", 6, "position comes from outside"),
     Needed("EK3_SRC1_VELXY", 6, "as flown; no velocity is fed"),
@@ -96,6 +109,9 @@ _ARDUPILOT = (
     Needed("FS_GCS_TIMEOUT", 2.0, "time without our heartbeat before that", REAL32, (2.0, 3.0), flown=(2.0, 5.0)),
     Needed("LAND_SPEED", 70, "down in time where it lands without a position", INT32, (60, 100), flown=(30, 100)),
     Needed("FS_EKF_ACTION", 1, "position lost: land"),
+    Needed(
+        "FS_EKF_THRESH", 0.8, "with 0 it does not land then, with more than 1 late", REAL32, (0.6, 1), optional=True
+    ),
     Needed("FS_THR_ENABLE", 0, "a throttle failsafe of a transmitter that is off would forbid arming", others=(1, 3)),
 )
 

@@ -111,11 +111,11 @@ class MavlinkSession:
 
     @property
     def unchecked(self) -> list[str]:
-        """Return the parameters missing in a firmware of another version: nothing waits for those."""
+        """Return the missing parameters for which nothing waits: optional ones, and all of another version."""
         known = self._version is not None or self._version_tries >= _VERSION_TRIES
-        if not known or parameters.is_checked(self._flavour, self._version):
-            return []
-        return [name for name in self.unread if self._param_tries[name] >= _PARAM_TRIES]
+        another = known and not parameters.is_checked(self._flavour, self._version)
+        missing = [name for name in self.unread if self._param_tries[name] >= _PARAM_TRIES]
+        return [name for name in missing if another or self._by_name[name].optional]
 
     def detail(self, requests: Requests) -> str:
         """Return the pending step, or ""."""

@@ -59,7 +59,7 @@ class ParameterSetup:
         for wanted in self._needed:
             value = self._read(wanted)
             text = difference(wanted, {} if value is None else {wanted.name: value})
-            if text:
+            if text and not (value is None and wanted.optional):
                 yield ParameterDifference(wanted, value, text)
 
     def apply(self, wanted: Needed) -> bool:

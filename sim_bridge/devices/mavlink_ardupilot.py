@@ -140,7 +140,7 @@ class ArduCopter(AutopilotFirmware):
     def _watch_position(self, aided_s: float) -> None:
         if aided_s < _EKF_FAILSAFE_S:
             self._failed = self._aiding_stopped = False
-        elif not self._failed:
+        elif not self._failed and self.parameters["FS_EKF_THRESH"] > 0:
             self._failed = True
             self.say(2, "EKF variance")
             self.say(2, "EKF Failsafe: changed to LAND Mode")

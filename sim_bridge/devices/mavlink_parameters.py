@@ -24,6 +24,9 @@ _PX4_FACTORY: dict[str, float] = {
 }
 _PX4_REALS: dict[str, float] = {
     "EKF2_EV_DELAY": 0.0,
+    "EKF2_EV_POS_X": 0.0,
+    "EKF2_EV_POS_Y": 0.0,
+    "EKF2_EV_POS_Z": 0.0,
     "EKF2_EVP_NOISE": 0.1,
     "COM_OF_LOSS_T": 1.0,
     "COM_DL_LOSS_T": 10.0,
@@ -75,6 +78,10 @@ _COPTER_REALS: dict[str, float] = {
     "FS_GCS_TIMEOUT": 5.0,
     "FS_EKF_THRESH": 0.8,
     "PILOT_TKOFF_ALT": 0.0,
+    "VISO_POS_X": 0.0,
+    "VISO_POS_Y": 0.0,
+    "VISO_POS_Z": 0.0,
+    "VISO_SCALE": 1.0,
 }
 _COPTER_INDOOR: dict[str, float] = {
     "VISO_TYPE": 1,

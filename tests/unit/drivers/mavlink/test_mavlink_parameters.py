@@ -70,3 +70,27 @@ def test_a_value_may_do_for_a_take_off_that_setup_changes_all_the_same(value, di
     wanted = Needed("FS_GCS_TIMEOUT", 2, "time", accepted=(2, 3), flown=(2, 10))
     assert bool(difference(wanted, {"FS_GCS_TIMEOUT": value})) is differs
     assert bool(fault(wanted, {"FS_GCS_TIMEOUT": value})) is forbids
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "good"),
+    [
+        ("FS_EKF_THRESH", 0.0, False),
+        ("FS_EKF_THRESH", 0.6, True),
+        ("FS_EKF_THRESH", 0.8, True),
+        ("FS_EKF_THRESH", 1.2, False),
+        ("VISO_SCALE", 1.0, True),
+        ("VISO_SCALE", 1.1, False),
+        ("VISO_DELAY_MS", 10, True),
+        ("VISO_DELAY_MS", 100, False),
+        ("VISO_POS_X", 0.0, True),
+        ("VISO_POS_Y", -0.1, False),
+        ("VISO_POS_Z", 0.1, False),
+        ("EKF2_EV_POS_X", 0.1, False),
+        ("EKF2_EV_POS_Y", 0.0, True),
+        ("EKF2_EV_POS_Z", -0.1, False),
+    ],
+)
+def test_our_positions_are_used_as_they_are_and_their_loss_is_acted_upon(name, value, good):
+    flavour = Flavour.PX4 if name.startswith("EKF2") else Flavour.ARDUPILOT
+    assert (fault(of(name, flavour), {name: value}) == "") is good

@@ -53,6 +53,14 @@ def test_a_parameter_that_is_never_answered_is_named_with_the_firmware() -> None
     assert "does not know parameter GPS1_TYPE" in session.detail(Requests(1))
 
 
+def test_a_parameter_that_a_firmware_need_not_have_grounds_nobody() -> None:
+    session = read_all({"VISO_SCALE"}, 15.0)
+    session.hear_version(0x04060200)
+    session.hear_origin()
+    assert session.detail(Requests(1)) == ""
+    assert "not checked, because its firmware does not know them: VISO_SCALE" in session.notes
+
+
 def test_a_vehicle_with_another_serial_number_is_not_ready() -> None:
     session = MavlinkSession(1, Flavour.PX4, {}, 255, GlobalOrigin(), pinned="0a0B")
     requests = Requests(1)

@@ -5,7 +5,6 @@ import math
 import threading
 from collections import Counter
 from functools import partial
-from typing import NamedTuple
 
 from drivers.ardrone import convert
 from drivers.ardrone.attitude_control import AttitudeControl, MotionReport
@@ -14,13 +13,14 @@ from drivers.ardrone.commands import orders_from_decision
 from drivers.ardrone.desired_config import ids_of, scale_from_settings, wishes
 from drivers.ardrone.flow_watch import FlowWatch
 from drivers.ardrone.identity import Model, model_from_navdata
+from drivers.ardrone.latest import FRESH_NS, LatestNavdata
 from drivers.ardrone.link import ArDroneLink, Arrival
 from drivers.ardrone.publisher import NavdataPublisher
 from drivers.ardrone.queries import TcpInquirer
 from drivers.ardrone.rate_watch import RateWatch
 from drivers.ardrone.session import ArdroneSession, SessionPhase
 from drivers.ardrone.settings import FASTEST_M_S, ArDroneDriverSettings
-from drivers.ardrone.uplink_watch import UplinkWatch
+from drivers.ardrone.uplink_watch import ANOTHER, UplinkWatch
 from drivers.ardrone.velocity_doubt import NO_FLOOR
 from drivers.ardrone.wire.errors import WireError
 from drivers.ardrone.wire.navdata import Navdata
@@ -32,16 +32,15 @@ from drivers.host import fly_one
 from drivers.plausibility.health import Finding, Health, HealthReport, Sensor
 from drivers.plausibility.limits import PlausibilityLimits
 from drivers.plausibility.motion import MotionMonitor
-from drivers.watchdog_types import Action, VehicleView, WatchdogDecision
+from drivers.watchdog_types import Action, DriverMode, VehicleView, WatchdogDecision
 from groundstation.adapters import with_zone
 from groundstation.bus.api import Bus
-from groundstation.bus.messages import AIRBORNE, UP, FlightState, Severity, Vector3
+from groundstation.bus.messages import AIRBORNE, UP, Severity, Vector3
 from groundstation.bus.notice import Notice
 from groundstation.time_units import NS_PER_MS
 
 # WIRE: at least every 30 ms (guide), 20-25 ms (SDK); on a busy machine a turn comes late.
 RATE_HZ = 40.0
-_FRESH_NS = 300 * NS_PER_MS
 # A velocity that repeats below this is that of a drone that sees no floor: its firmware's own braking fails as well.
 _NO_FLOW_M_S = 0.02
 _RATE_PERIOD_NS = 200 * NS_PER_MS
@@ -63,35 +62,6 @@ LIMITS = PlausibilityLimits(
     speed_m_s=FASTEST_M_S, clock_wrap_s=2048.0, jump_m_s=0.2, acceleration_m_s2=6.0, clock_late_s=0.5
 )
 _log = logging.getLogger(__name__)
-
-
-class LatestNavdata(NamedTuple):
-    """The newest telemetry of the drone; heard_ns 0: never; moved_ns: when it last reported motion.
-
-    Velocity as reported; height_m: above the floor, if reported; packet: the last that reported motion.
-    """
-
-    heard_ns: int = 0
-    moved_ns: int = 0
-    state: int = 0
-    control_state: int | None = None
-    flight_state: FlightState = FlightState.UNKNOWN
-    battery: float | None = None
-    model: Model = Model.UNKNOWN
-    velocity_m_s: Vector3 = (0.0, 0.0, 0.0)
-    height_m: float | None = None
-    packet: Navdata | None = None
-
-    def is_fresh(self, now_ns: int) -> bool:
-        """Return whether it is newer than 0.3 s; in flight its motion counts, once that was reported."""
-        newest_ns = self.moved_ns if self.moved_ns and self.flight_state in AIRBORNE else self.heard_ns
-        return newest_ns > 0 and now_ns - newest_ns < _FRESH_NS
-
-    @property
-    def obeyed(self) -> int | None:
-        """Return the sequence number of the last PCMD that it reports as obeyed, if any."""
-        references = None if self.packet is None else self.packet.read(SPEED_REFERENCES)
-        return None if references is None else references.sequence
 
 
 class ArDrone:
@@ -168,8 +138,10 @@ class ArDrone:
             model=model_from_navdata(packet) if heard.model is Model.UNKNOWN else heard.model,
             velocity_m_s=motion.velocity_m_s,
             height_m=motion.height_m,
-            packet=packet,
         )
+        references = packet.read(SPEED_REFERENCES)
+        if references is not None:
+            self._uplink.hear(now_ns, references.sequence, self._link.sent)
         sample = convert.sample_from_motion(now_ns, packet, motion)
         report = self._plausibility.update(sample, flight_state)
         if not report.withheld:
@@ -189,7 +161,7 @@ class ArDrone:
         """Return the drone's last report."""
         heard = self.telemetry
         fresh = heard.is_fresh(now_ns)
-        mute = _NO_MOTION if not fresh and now_ns - heard.heard_ns < _FRESH_NS else ""
+        mute = _NO_MOTION if not fresh and now_ns - heard.heard_ns < FRESH_NS else ""
         configured = self._session.phase is SessionPhase.READY
         unsound = self._plausibility.report.reason(Health.BAD, LIMITS.essential)
         unsound = unsound or (NO_FLOOR if self._flow.lost else self._attitude.doubted)
@@ -204,6 +176,8 @@ class ArDrone:
         return velocity_m_s[0] * scale, velocity_m_s[1] * scale, velocity_m_s[2]
 
     def _not_ready(self, heard: LatestNavdata) -> str:
+        if self._uplink.foreign:
+            return ANOTHER
         if self._session.phase is not SessionPhase.READY:
             return self._session.detail
         pinned, serial = self._settings.serial_number, self._session.identity.serial
@@ -224,19 +198,23 @@ class ArDrone:
             action = Action.HOVER  # restarted since the order: if it flies it stays up, if it stands it stays there
         commands = orders_from_decision(action, attitude, heard.state, heard.flight_state, self._scale)
         commands += self._session.step(now_ns, heard.state, silence_ns, heard.model)
-        self._link.send(commands, restart=self._session.phase is SessionPhase.SEARCHING)
+        self._link.send(commands, self._insists(decision))
         self._watch_link(now_ns)
 
+    def _insists(self, decision: WatchdogDecision) -> bool:
+        """Return whether the drone must obey even if it has heard higher numbers, of ours or of another program."""
+        stops = decision.mode in (DriverMode.LANDING, DriverMode.CUT) or decision.action in (Action.LAND, Action.CUT)
+        return stops or not self._session.obeyed or self._uplink.cut or self._uplink.foreign
+
     def _watch_link(self, now_ns: int) -> None:
-        if self._session.phase is not SessionPhase.READY:
-            self._rate_watch.reset()
+        heard, phase, notices = self.telemetry, self._session.phase, []
+        if phase is SessionPhase.SEARCHING:
             self._uplink.reset()
-            return
-        heard, notices = self.telemetry, []
-        obeyed = heard.obeyed
-        if obeyed is not None and now_ns - heard.moved_ns < _FRESH_NS:
-            notices.append(self._uplink.step(now_ns, obeyed, heard.flight_state in UP))
-        if now_ns >= self._next_rate_ns:
+        elif now_ns - heard.moved_ns < FRESH_NS:
+            notices.append(self._uplink.step(now_ns, heard.flight_state in UP))
+        if phase is not SessionPhase.READY:
+            self._rate_watch.reset()
+        elif now_ns >= self._next_rate_ns:
             self._next_rate_ns = now_ns + _RATE_PERIOD_NS
             notices.append(self._rate_watch.step(now_ns, self._link.rates(now_ns)[0]))
         self._session.news.extend(notice for notice in notices if notice is not None)
@@ -252,7 +230,7 @@ class ArDrone:
 
     def _report(self, now_ns: int, heard: LatestNavdata) -> MotionReport:
         velocity, force = self._motion.drain()
-        fresh = now_ns - heard.moved_ns <= _FRESH_NS
+        fresh = now_ns - heard.moved_ns <= FRESH_NS
         repeats, lost = self._motion.repeats, self._flow.lost
         able = fresh and self._is_able()
         stands = math.hypot(*heard.velocity_m_s[:2]) < _NO_FLOW_M_S
@@ -282,7 +260,8 @@ class ArDrone:
         rate_hz, quality = self._link.rates(now_ns)
         heights = Counter({"height_jump": self._publisher.heights.refused})
         rejected = dict(self._link.rejected.copy() + self._refused + heights)
-        detail = "its commands do not arrive" if self._uplink.cut else self._session.detail
+        detail = ANOTHER if self._uplink.foreign else self._session.detail
+        detail = "its commands do not arrive" if self._uplink.cut else detail
         clock, firmware = self._plausibility.clock.figures, self._session.identity.firmware
         return LinkHealth(quality, rate_hz, rejected, detail, clock, firmware)
 

@@ -22,6 +22,7 @@ from groundstation.time_units import NS_PER_MS
 # After this silence a lower sequence number is a new session of the drone, before it a replay.
 _RESTART_NS = 300 * NS_PER_MS
 _POLL_S = 0.1
+_RESET = at.encode(at.comwdg(), 1)
 _log = logging.getLogger(__name__)
 
 
@@ -59,7 +60,8 @@ class Arrival(NamedTuple):
 class ArDroneLink:
     """Sockets on free ports, or those that the settings name, so that many drones fit on one host.
 
-    No received data raises; the constructor raises DriverError for an unavailable port or address.
+    sent: number of our last command. No received data raises; the constructor raises DriverError for an unavailable
+    port or address.
     """
 
     def __init__(self, settings: ArDroneDriverSettings, log: DatagramLog) -> None:
@@ -72,7 +74,7 @@ class ArDroneLink:
         except DriverError:
             self._navdata_socket.close()
             raise
-        self._sequence = 1
+        self.sent = 1
         self._filter = SequenceFilter()
         self.rejected: Counter[str] = Counter()
 
@@ -113,15 +115,15 @@ class ArDroneLink:
         """Request that the drone streams to our port."""
         self._send_to(self._navdata_socket, navdata.REQUEST, self._settings.navdata_port)
 
-    def send(self, commands: Sequence[AtCommand], restart: bool) -> None:
-        """Send commands in one datagram, with consecutive numbers, or from 1 on restart.
+    def send(self, commands: Sequence[AtCommand], insist: bool) -> None:
+        """Send commands in one datagram, numbered on from the last; insist: whatever numbers the drone has heard.
 
-        WIRE: number 1 is always accepted, so a drone gets number 1 until its first packet.
+        WIRE (docs/reference/ardrone.md 2.2): number 1 is always accepted, and any higher one after it. It goes to a
+        COMWDG in front of the others, whose numbers so rise on: by them the drone tells which of ours it obeyed, and a
+        late duplicate of an earlier datagram is refused.
         """
-        if restart:
-            self._sequence = 1
-        datagram = at.encode_datagram(commands, self._sequence)
-        self._sequence += len(commands)
+        datagram = at.encode_datagram(commands, self.sent + 1, _RESET if insist else b"")
+        self.sent += len(commands)
         self._send_to(self._at_socket, datagram, self._settings.at_port)
 
     def _send_to(self, channel: socket.socket, datagram: bytes, port: int) -> None:

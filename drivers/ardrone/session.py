@@ -78,7 +78,10 @@ class Inquirer(Protocol):
 
 
 class ArdroneSession:
-    """Brings one drone from silence to full navdata with our limits, and again when the drone forgets us."""
+    """Brings one drone from silence to full navdata with our limits, and again when the drone forgets us.
+
+    obeyed: whether it has acknowledged our last setting; before, it may ignore all our commands.
+    """
 
     def __init__(
         self,
@@ -104,6 +107,7 @@ class ArdroneSession:
         self._full_ns = 0
         self.identity = Identity()
         self.phase = SessionPhase.SEARCHING
+        self.obeyed = False
         self.news: deque[Notice] = deque(maxlen=32)
 
     @property
@@ -135,7 +139,7 @@ class ArdroneSession:
         state, silence_ns: the newest state word and its age; seen: the generation by navdata, if known.
         """
         if silence_ns > _DISCONNECTED_NS:
-            self.phase = SessionPhase.SEARCHING
+            self.phase, self.obeyed = SessionPhase.SEARCHING, False
             return []
         if self._must_begin(now_ns, state):
             self._begin(now_ns)
@@ -163,7 +167,7 @@ class ArdroneSession:
                 return forgotten
 
     def _begin(self, now_ns: int) -> None:
-        self.phase, self._problem = SessionPhase.CONFIGURING, ""
+        self.phase, self._problem, self.obeyed = SessionPhase.CONFIGURING, "", False
         self._began_ns = self._full_ns = now_ns
         self._round = 0
         self._trims_left = self._trims
@@ -187,6 +191,7 @@ class ArdroneSession:
         if self._cycle is _Cycle.CLEAR and not pending:
             self._enter(_Cycle.SET, now_ns)
         elif self._cycle is _Cycle.SET and (pending or late):
+            self.obeyed = not late
             if late:
                 self._doubtful.add(self._queue[0])
             self._enter(_Cycle.ACKNOWLEDGE, now_ns)
@@ -289,5 +294,5 @@ class ArdroneSession:
         if problem != self._told:
             remedy = "restart the drone, and see that no other program speaks to it"
             self.news.append(Notice(Severity.ERROR, f"not configured: {problem}", remedy))
-        self.phase, self._stage_ns = SessionPhase.FAILED, now_ns
+        self.phase, self._stage_ns, self.obeyed = SessionPhase.FAILED, now_ns, False
         self._problem = self._told = problem

@@ -207,9 +207,12 @@ def _encode_argument(argument: Argument) -> str:
     return f'"{argument}"'
 
 
-def encode_datagram(commands: Sequence[AtCommand], first_sequence: int) -> bytes:
-    """Return the commands with consecutive sequence numbers; raises WireError (too_long) above 1000 bytes."""
-    datagram = b"".join(encode(command, first_sequence + i) for i, command in enumerate(commands))
+def encode_datagram(commands: Sequence[AtCommand], first_sequence: int, before: bytes = b"") -> bytes:
+    """Return the commands with consecutive sequence numbers, behind encoded ones.
+
+    Raises WireError (too_long) above 1000 bytes.
+    """
+    datagram = before + b"".join(encode(command, first_sequence + i) for i, command in enumerate(commands))
     if len(datagram) > MAX_DATAGRAM:
         raise WireError("too_long", f"{len(datagram)} bytes")
     return datagram

@@ -80,7 +80,11 @@ class ScriptedTcp:
 
 
 class ScriptedDrone:
-    """Two sockets and a state: acknowledges CONFIG, takes off and lands at once, records every command line."""
+    """Two sockets and a state: acknowledges CONFIG, takes off and lands at once, records every command line.
+
+    Of all senders it obeys the number 1, and those above the last one that it obeyed. loses: how many datagrams it
+    loses next.
+    """
 
     def __init__(self) -> None:
         pid = os.getpid()
@@ -93,8 +97,10 @@ class ScriptedDrone:
         self.major = 2
         self.psi = self.force_mg = 0.0
         self.select = False
+        self.number = self.moved_by = self.loses = 0
         self.lie = ""  # frozen: every value repeats; stuck: the velocity does
         self.lines: list[tuple[str, int, str]] = []
+        self.heeded: list[tuple[str, str]] = []
         self.config: dict[str, str] = {}
         self.deaf_to: set[str] = set()
         self.tcp: ScriptedTcp | None = None
@@ -126,7 +132,8 @@ class ScriptedDrone:
             *(0, 0),
         )
         phys = struct.pack("<HHfH6fIII", 3, 46, 40.0, 0, self.force_mg, 0.0, -1000.0 - 2 * stir, 1.0, 2.0, 3.0, 0, 0, 0)
-        return checked(body + demo.ljust(148, b"\0") + phys)
+        references = struct.pack("<HH", 6, 88).ljust(84, b"\0") + struct.pack("<i", self.moved_by)
+        return checked(body + demo.ljust(148, b"\0") + phys + references)
 
     def turn(self) -> None:
         """Read all datagrams, and stream one packet."""
@@ -134,6 +141,9 @@ class ScriptedDrone:
             self.client, self.requests = source, self.requests + 1
         for datagram, _ in self._waiting(self.at):
             assert len(datagram) <= 1000 and datagram.endswith(b"\r")
+            if self.loses > 0:
+                self.loses -= 1
+                continue
             for line in datagram.decode("ascii").split("\r")[:-1]:
                 match = re.fullmatch(r"AT\*(\w+)=(\d+),?(.*)", line)
                 assert match, line
@@ -152,6 +162,12 @@ class ScriptedDrone:
 
     def obey(self, name: str, sequence: int, arguments: str) -> None:
         self.lines.append((name, sequence, arguments))
+        if sequence != 1 and sequence <= self.number:
+            return
+        self.number = sequence
+        self.heeded.append((name, arguments))
+        if name == "PCMD":
+            self.moved_by = sequence
         if name == "CONFIG" and not self.state & COMMAND_BIT:
             key, value = arguments.replace('"', "").split(",")
             if key not in self.deaf_to:

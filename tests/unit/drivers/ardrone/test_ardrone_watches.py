@@ -52,22 +52,43 @@ def test_a_scan_is_told_once_with_its_remedy_and_its_end():
     assert "back at 198 Hz" in second.text
 
 
-def told_by(watch, numbers, flies=True):
+def told_by(watch, numbers, flies=True, sent=1000):
     """Feed a number each 20 ms."""
-    return [watch.step(i * 20 * MS, number, flies) for i, number in enumerate(numbers)]
+    told = []
+    for i, number in enumerate(numbers):
+        watch.hear(i * 20 * MS, number, sent)
+        told.append(watch.step(i * 20 * MS, flies))
+    return [notice for notice in told if notice is not None]
 
 
 def test_a_cut_of_the_uplink_is_told_with_its_end():
-    notices = told_by(UplinkWatch(), [*range(1, 50), *[49] * 40, *range(90, 100)])
-    first, second = [notice for notice in notices if notice is not None]
+    first, second = told_by(UplinkWatch(), [*range(1, 50), *[49] * 40, *range(90, 100)])
     assert "obeyed no command for 0.5 s" in first.text and first.severity == "WARNING" and first.remedy
     assert "again after 0.8 s" in second.text
 
 
 def test_drones_that_stand_and_those_that_never_count_lose_no_commands():
-    assert not any(told_by(UplinkWatch(), [*range(1, 50), *[49] * 100], flies=False))
-    assert not any(told_by(UplinkWatch(), [0] * 200))
-    assert not any(told_by(UplinkWatch(), [*range(1, 50), *[49] * 20, *range(60, 90)]))
+    assert not told_by(UplinkWatch(), [*range(1, 50), *[49] * 100], flies=False)
+    assert not told_by(UplinkWatch(), [0] * 200)
+    assert not told_by(UplinkWatch(), [*range(1, 50), *[49] * 20, *range(60, 90)])
+
+
+def test_commands_of_another_program_are_none_of_ours():
+    watch = UplinkWatch()
+    first, second = told_by(watch, [*range(1, 50), *range(5000, 5100)])
+    assert "it obeys commands that are not ours" in first.text and first.remedy
+    assert "obeyed no command for 0.5 s" in second.text and watch.foreign and watch.cut
+
+
+def test_another_program_is_found_between_our_commands_and_told_when_it_is_gone():
+    watch, turns = UplinkWatch(), [n for i in range(1, 50) for n in (i, 5000 + i)]
+    first, second = told_by(watch, [*turns, *range(50, 400)])
+    assert "not ours" in first.text and "no other program" in second.text and not watch.foreign
+
+
+def test_numbers_from_before_us_and_those_of_a_firmware_that_counts_otherwise_are_nobodys():
+    assert not told_by(UplinkWatch(), [500_000] * 50 + [3, 4, 500_001, *range(5, 50)])
+    assert not told_by(UplinkWatch(), range(100_000, 100_400))
 
 
 def test_one_late_second_and_slow_streams_are_no_scan():

@@ -12,21 +12,29 @@ from drivers.ardrone.wire.at import AtCommand
 from drivers.ardrone.wire.state import StateBit
 from drivers.watchdog_types import Action
 from groundstation.bus.messages import FlightState
+from groundstation.time_units import NS_PER_MS
+
+# After 2 s without commands a drone hovers, half a second later it lands: a state as old as this may be over when the
+# next command arrives, and that must not lift the drone again.
+STALE_NS = 1500 * NS_PER_MS
+_STAYS_UP = (Action.FLY, Action.HOVER)
 
 
 def orders_from_decision(
-    action: Action, attitude: AttitudeRequest, state: int, flight_state: FlightState, scale: Scale
+    action: Action, attitude: AttitudeRequest, state: int, flight_state: FlightState, scale: Scale, stale: bool = False
 ) -> list[AtCommand]:
     """Return REF and PCMD for an action, and COMWDG if the drone missed our commands; no REF while waiting.
 
-    attitude: of a drone that flies a setpoint, or that must be braked to hover.
+    attitude: of a drone that flies a setpoint, or that must be braked to hover. stale: its state is older than
+    `STALE_NS`, so that it may have landed or been restarted; one that flies stays up by its last REF.
     """
-    steered = action in (Action.FLY, Action.HOVER)
+    steered = action in _STAYS_UP
     motion = motion_from_attitude(attitude, scale) if steered else at.ProgressiveMotion()
     orders = [at.pcmd(motion)]
-    if action is not Action.WAIT:
+    starts_nothing = action is Action.WAIT or (stale and action in (*_STAYS_UP, Action.TAKE_OFF))
+    if not starts_nothing:
         orders.insert(0, _reference(action, bool(state & StateBit.EMERGENCY), flight_state))
-    if action is Action.WAIT or state & StateBit.COM_WATCHDOG:
+    if starts_nothing or state & StateBit.COM_WATCHDOG:
         orders.insert(0, at.comwdg())
     return orders
 

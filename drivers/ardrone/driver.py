@@ -9,7 +9,7 @@ from functools import partial
 from drivers.ardrone import convert
 from drivers.ardrone.attitude_control import AttitudeControl, MotionReport
 from drivers.ardrone.averages import MotionMean
-from drivers.ardrone.commands import orders_from_decision
+from drivers.ardrone.commands import STALE_NS, orders_from_decision
 from drivers.ardrone.desired_config import ids_of, scale_from_settings, wishes
 from drivers.ardrone.flow_watch import FlowWatch
 from drivers.ardrone.identity import Model, model_from_navdata
@@ -122,10 +122,14 @@ class ArDrone:
 
     def _hear(self, now_ns: int, packet: Navdata) -> None:
         heard, demo = self.telemetry, packet.read(DEMO)
-        control_state = heard.control_state if demo is None else demo.control_state
+        # A restarted drone reports its state before its phase.
+        known = heard.control_state if now_ns - heard.heard_ns < STALE_NS else None
+        control_state = known if demo is None else demo.control_state
         flight_state = convert.flight_state_from_navdata(packet.state, control_state)
         if demo is None:
-            self.telemetry = heard._replace(heard_ns=now_ns, state=packet.state, flight_state=flight_state)
+            self.telemetry = heard._replace(
+                heard_ns=now_ns, state=packet.state, control_state=control_state, flight_state=flight_state
+            )
             return
         motion = convert.motion_from_demo(packet, demo)
         self.telemetry = LatestNavdata(
@@ -196,7 +200,8 @@ class ArDrone:
         action = Action.HOVER if self._attitude.sinks else decision.action
         if action is Action.TAKE_OFF and self._session.phase is not SessionPhase.READY:
             action = Action.HOVER  # restarted since the order: if it flies it stays up, if it stands it stays there
-        commands = orders_from_decision(action, attitude, heard.state, heard.flight_state, self._scale)
+        stale = silence_ns > STALE_NS
+        commands = orders_from_decision(action, attitude, heard.state, heard.flight_state, self._scale, stale)
         commands += self._session.step(now_ns, heard.state, silence_ns, heard.model)
         self._link.send(commands, self._insists(decision))
         self._watch_link(now_ns)

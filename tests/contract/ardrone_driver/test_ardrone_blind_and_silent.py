@@ -8,7 +8,7 @@ from scripted_drone import FLY
 from drivers.host import VehicleHost
 from drivers.watchdog_types import WatchdogLimits
 
-HOLDS_ITSELF = "0,0,0,0,0"
+HOLDS_ITSELF, START = "0,0,0,0,0", "290718208"
 
 
 def turn_for(rig, seconds, settle=True):
@@ -32,6 +32,24 @@ def test_a_drone_that_saw_no_floor_before_falling_silent_is_braked(rig, monkeypa
     turn_for(rig, 0.8, settle=then == "frozen")
     assert rig.decision.action == "HOVER" and not rig.host.watchdog.vehicle.fresh
     assert (rig.fake.said("PCMD")[-1] != HOLDS_ITSELF) is braked
+
+
+def test_a_drone_that_landed_while_nobody_heard_it_is_not_lifted_again(rig):
+    """Both directions are dead: it lands by itself, and a start bit is a level to it (docs/reference/ardrone.md 2.4)."""
+    rig.take_off()
+    rig.speaking = False
+    until = time.monotonic() + 2.6
+    while time.monotonic() < until:
+        rig.turn()
+        rig.fake._waiting(rig.fake.at)
+        time.sleep(0.02)
+    rig.fake.state, rig.fake.major = rig.fake.state & ~FLY, 2
+    assert rig.decision.action == "HOVER"
+    rig.fake.lines.clear()
+    rig.turn()
+    rig.speaking = True
+    rig.until(lambda: rig.decision.mode == "LANDED")
+    assert rig.fake.said("PCMD") and START not in rig.fake.said("REF")
 
 
 def test_a_drone_that_was_shown_to_be_blind_is_believed_that_it_has_landed(new_rig):

@@ -201,8 +201,8 @@ def test_forward_left_up_and_counter_clockwise_in_the_drones_signs():
     assert motion_from_attitude(HOVER, SCALE) == at.ProgressiveMotion()
 
 
-def orders(action, attitude=HOVER, state=0, flight_state=FlightState.HOVERING):
-    commands = orders_from_decision(action, attitude, state, flight_state, SCALE)
+def orders(action, attitude=HOVER, state=0, flight_state=FlightState.HOVERING, stale=False):
+    commands = orders_from_decision(action, attitude, state, flight_state, SCALE, stale)
     return {command.name: command.arguments for command in commands}
 
 
@@ -244,6 +244,14 @@ def test_waiting_says_nothing_about_flying():
     assert list(orders(Action.WAIT)) == ["COMWDG", "PCMD"]
     assert list(orders(Action.IDLE)) == ["REF", "PCMD"]
     assert list(orders(Action.IDLE, state=int(StateBit.COM_WATCHDOG))) == ["COMWDG", "REF", "PCMD"]
+
+
+@pytest.mark.parametrize("action", list(Action))
+def test_a_drone_that_was_not_heard_for_long_is_landed_or_cut_but_never_lifted(action):
+    sent = orders(action, state=FLY, stale=True)
+    assert ("REF" in sent) is (action in (Action.IDLE, Action.CLEAR, Action.LAND, Action.CUT))
+    assert sent.get("REF", (0,))[0] & 1 << 9 == 0
+    assert "REF" in sent or list(sent) == ["COMWDG", "PCMD"]
 
 
 @pytest.mark.parametrize(("percent", "charge"), [(0, 0.0), (73, 0.73), (100, 1.0), (101, None), (4_000_000_000, None)])

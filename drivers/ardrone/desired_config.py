@@ -60,6 +60,8 @@ def ids_of(name: str) -> Ids:
     return Ids(*(f"{zlib.crc32(text.encode()):08x}" for text in texts))
 
 
+# WIRE (docs/reference/ardrone.md 2.3): a drone that hears no command lands after so many seconds, at least 2.5.
+COM_WATCHDOG = Wish("general:com_watchdog", "2")
 # WIRE: full navdata; the bootstrap ends with this key, and it belongs to no set of ids.
 FULL_NAVDATA = Wish("general:navdata_demo", format_value(False))
 
@@ -75,6 +77,7 @@ def wishes(settings: ArDroneDriverSettings, identity: Identity, with_ids: bool) 
     names = ("custom:session_id", "custom:profile_id", "custom:application_id")
     return (
         *(Wish(name, value, required=False) for name, value in zip(names, ids, strict=True) if with_ids),
+        COM_WATCHDOG,
         Wish("control:outdoor", format_value(flight.outdoor)),
         Wish("control:flight_without_shell", format_value(flight.without_shell)),
         Wish("control:euler_angle_max", f"{scale.tilt_rad:.6g}"),

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 
 from drivers.ardrone.conversation import CONTROL_PORT, FTP_PORT, Conversation, NavdataStretch
 from drivers.ardrone.convert import charge_from_demo
-from drivers.ardrone.desired_config import FULL_NAVDATA
-from drivers.ardrone.dump import category
+from drivers.ardrone.desired_config import COM_WATCHDOG, FULL_NAVDATA
+from drivers.ardrone.dump import category, differences
 from drivers.ardrone.identity import Identity, Model, identity_from_dump, identity_from_version, model_from_navdata
 from drivers.ardrone.network_setup import UNPAIRED
 from drivers.ardrone.queries import TcpInquirer
@@ -116,6 +116,11 @@ def _hints(report: ProbeReport, values: dict[str, str]) -> list[str]:
         (any(s.link_quality is not None and s.link_quality < _LOSS for s in report.streams), "the radio loses packets"),
         (_is_slow(report), "navdata comes too slowly: does this computer scan for Wi-Fi networks?"),
         (report.rejected > 0, f"{report.rejected} packets were damaged"),
+        (
+            bool(differences([COM_WATCHDOG[:2]], values)),
+            f"without commands it flies on for {values.get(COM_WATCHDOG.key)} s before it lands; the driver sets"
+            f" {COM_WATCHDOG.key} to {COM_WATCHDOG.value}",
+        ),
         (
             values.get("network:wifi_mode") == "0",
             'it is an access point of its own: see "Put several AR.Drones on one network" in docs/how-to',

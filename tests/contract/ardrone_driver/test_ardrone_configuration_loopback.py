@@ -62,6 +62,15 @@ def test_another_drone_at_the_address_does_not_take_off(new_rig, pinned, flies):
     assert flies or "its serial number is PS721000AB2L01234, the field says PS721000AB2L09999" in acks[-1].reason
 
 
+@pytest.mark.parametrize(("stored", "phase"), [("60", "FAILED"), ("2", "READY"), (None, "READY")])
+def test_a_watchdog_that_the_drone_does_not_take_grounds_it_only_where_it_is_another(new_rig, stored, phase):
+    rig = new_rig("2.4.8")
+    rig.fake.deaf_to = {"general:com_watchdog"}
+    if stored is not None:
+        rig.fake.config["general:com_watchdog"] = stored
+    rig.until(lambda: rig.drone._session.phase == phase)
+
+
 def test_a_limit_that_is_not_stored_grounds_the_drone_and_says_why(new_rig):
     rig = new_rig("2.3.3")
     rig.fake.deaf_to = {"control:altitude_max"}

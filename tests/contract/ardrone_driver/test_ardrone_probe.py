@@ -18,7 +18,11 @@ def probe(*arguments):
 
 def test_a_standing_drone_tells_everything(drone_alone):
     drone = drone_alone("2.4.8")
-    drone.config = {"control:altitude_max": "3000", "control:euler_angle_max": "2.0943999e-01"}
+    drone.config = {
+        "control:altitude_max": "3000",
+        "control:euler_angle_max": "2.0943999e-01",
+        "general:com_watchdog": "60",
+    }
     result = probe(drone.address, "--json")
     assert result.return_value == 0, result.output
     facts = json.loads(result.output)
@@ -29,6 +33,7 @@ def test_a_standing_drone_tells_everything(drone_alone):
     assert facts["config"]["control:accs_gains"]["value"] == "{ 1.0000000e+00 0.0000000e+00 0.0000000e+00 }"
     assert facts["navdata"][-1]["rate_hz"] > 100 and facts["navdata"][-1]["link_quality"] == 1.0
     assert any("access point of its own" in hint for hint in facts["hints"])
+    assert any("flies on for 60 s before it lands" in hint for hint in facts["hints"])
     assert {name for name, _, _ in drone.lines} <= {"COMWDG", "CTRL", "CONFIG"}
     assert {key for key in drone.said("CONFIG") if "navdata_demo" not in key} == set()
     assert drone.config["general:navdata_demo"] == "FALSE"

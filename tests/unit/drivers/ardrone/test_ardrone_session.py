@@ -236,6 +236,7 @@ def test_configured_values_are_within_the_limits_of_the_drone():
     assert keys["control:control_vz_max"] == "200"
     assert keys["control:control_yaw"] == "0.7"
     assert (keys["control:altitude_max"], keys["pic:ultrasound_freq"]) == ("2500", "7")
+    assert keys["general:com_watchdog"] == "2", "without commands it lands soon"
     names = list(keys)
     assert names[:3] == ["custom:session_id", "custom:profile_id", "custom:application_id"]
     assert names.index("control:outdoor") < names.index("control:euler_angle_max")

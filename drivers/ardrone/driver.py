@@ -20,6 +20,7 @@ from drivers.ardrone.queries import TcpInquirer
 from drivers.ardrone.rate_watch import RateWatch
 from drivers.ardrone.session import ArdroneSession, SessionPhase
 from drivers.ardrone.settings import FASTEST_M_S, ArDroneDriverSettings
+from drivers.ardrone.stillness import Stillness
 from drivers.ardrone.uplink_watch import ANOTHER, UplinkWatch
 from drivers.ardrone.velocity_doubt import NO_FLOOR
 from drivers.ardrone.wire.errors import WireError
@@ -86,7 +87,7 @@ class ArDrone:
         self._next_rate_ns = 0
         self._scale = scale_from_settings(settings)
         self._motion, self._attitude = MotionMean(), AttitudeControl(settings.limits)
-        self._flow = FlowWatch()
+        self._flow, self._still = FlowWatch(), Stillness()
         self._plausibility = MotionMonitor(LIMITS)
         self._video_refused = False
         self._refused: Counter[str] = Counter()
@@ -146,6 +147,7 @@ class ArDrone:
         references = packet.read(SPEED_REFERENCES)
         if references is not None:
             self._uplink.hear(now_ns, references.sequence, self._link.sent)
+        self._still.update(now_ns, motion)
         sample = convert.sample_from_motion(now_ns, packet, motion)
         report = self._plausibility.update(sample, flight_state)
         if not report.withheld:
@@ -202,7 +204,7 @@ class ArDrone:
             action = Action.HOVER  # restarted since the order: if it flies it stays up, if it stands it stays there
         stale = silence_ns > STALE_NS
         commands = orders_from_decision(action, attitude, heard.state, heard.flight_state, self._scale, stale)
-        commands += self._session.step(now_ns, heard.state, silence_ns, heard.model)
+        commands += self._session.step(now_ns, heard.state, silence_ns, heard.model, self._still.stands)
         self._link.send(commands, self._insists(decision))
         self._watch_link(now_ns)
 

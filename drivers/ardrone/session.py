@@ -121,7 +121,7 @@ class ArdroneSession:
             case SessionPhase.VERIFYING:
                 return "reading the configuration back"
             case SessionPhase.TRIMMING:
-                return "trimming"
+                return "waits until it stands still and level"
             case _:
                 return self._problem
 
@@ -133,10 +133,13 @@ class ArdroneSession:
         self._next_request_ns = now_ns + _REQUEST_PERIOD_NS
         return True
 
-    def step(self, now_ns: int, state: int, silence_ns: int, seen: Model = Model.UNKNOWN) -> list[AtCommand]:
+    def step(
+        self, now_ns: int, state: int, silence_ns: int, seen: Model = Model.UNKNOWN, still: bool = True
+    ) -> list[AtCommand]:
         """Return the commands to add to the next datagram.
 
-        state, silence_ns: the newest state word and its age; seen: the generation by navdata, if known.
+        state, silence_ns: the newest state word and its age; seen: the generation by navdata, if known; still: whether
+        it stands still and level.
         """
         if silence_ns > _DISCONNECTED_NS:
             self.phase, self.obeyed = SessionPhase.SEARCHING, False
@@ -150,7 +153,7 @@ class ArdroneSession:
             return self._verify(now_ns, pending)
         if pending:
             return [at.ctrl(at.CTRL_ACK)]  # a late duplicate raised the bit
-        return self._trim(state) if self.phase is SessionPhase.TRIMMING else []
+        return self._trim(state, still) if self.phase is SessionPhase.TRIMMING else []
 
     def _must_begin(self, now_ns: int, state: int) -> bool:
         if not state & (StateBit.NAVDATA_BOOTSTRAP | StateBit.NAVDATA_DEMO):
@@ -251,8 +254,10 @@ class ArdroneSession:
         self._judge(now_ns, parse_dump(dump))
         return []
 
-    def _trim(self, state: int) -> list[AtCommand]:
+    def _trim(self, state: int, still: bool) -> list[AtCommand]:
         if self._trims_left and not state & StateBit.FLY:
+            if not still:
+                return []  # in somebody's hands its tilt would be taken for level
             self._trims_left -= 1  # several times, since datagrams get lost without acknowledgement
             return [at.ftrim()]
         self.phase = SessionPhase.READY

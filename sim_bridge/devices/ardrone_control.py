@@ -92,7 +92,7 @@ class FlightControl:
                 case "CTRL":
                     self._obey_ctrl(command.integer(0))
                 case "FTRIM" if self._drone.autopilot.phase is Phase.LANDED:
-                    self._onboard.trim()
+                    self._onboard.trim(self._drone.airframe.roll, self._drone.airframe.pitch)
                 case "CALIB" if self.firmware.generation == 2 and command.integer(0) == 0:
                     self._drone.autopilot.calibrate()
                 case "ANIM":

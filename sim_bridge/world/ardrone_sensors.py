@@ -87,9 +87,9 @@ class Onboard:
         self._wander = GaussMarkov(wander, scenario.yaw_wander_correlation_s, tick_s, draw)
         self._yaw_offset -= self._wander.value
 
-    def trim(self) -> None:
-        """Take the present attitude as level; the drone stands on the floor."""
-        self._level = (0.0, 0.0)
+    def trim(self, roll: float = 0.0, pitch: float = 0.0) -> None:
+        """Take the present attitude as level; roll, pitch: the true ones, which are wrong from now on [rad]."""
+        self._level = (-roll, -pitch)
 
     def step(
         self, drone: Senses, motors_on: bool, crosstalk: bool = False, air: tuple[float, float] = (0.0, 0.0)

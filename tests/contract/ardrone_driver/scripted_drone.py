@@ -96,6 +96,7 @@ class ScriptedDrone:
         self.state = BOOTSTRAP
         self.major = 2
         self.psi = self.force_mg = 0.0
+        self.theta = 1000.0
         self.select = False
         self.number = self.moved_by = self.loses = 0
         self.lie = ""  # frozen: every value repeats; stuck: the velocity does
@@ -117,7 +118,7 @@ class ScriptedDrone:
         if self.tcp is not None:
             self.tcp.close()
 
-    def packet(self, theta: float = 1000.0) -> bytes:
+    def packet(self) -> bytes:
         self.sequence += 1
         body = struct.pack("<IIII", 0x55667788, self.state, self.sequence, 0)
         if self.state & BOOTSTRAP:
@@ -128,7 +129,7 @@ class ScriptedDrone:
         altitude = 800 if self.state & FLY else 0
         demo = struct.pack(
             "<HHIIfffifffI",
-            *(0, 148, self.major << 16, 80, theta + 2 * stir, 500.0, self.psi, altitude, 300.0 + moved, 200.0 + moved),
+            *(0, 148, self.major << 16, 80, self.theta + 2 * stir, 500.0, self.psi, altitude, 300.0 + moved, 200.0 + moved),
             *(0, 0),
         )
         phys = struct.pack("<HHfH6fIII", 3, 46, 40.0, 0, self.force_mg, 0.0, -1000.0 - 2 * stir, 1.0, 2.0, 3.0, 0, 0, 0)

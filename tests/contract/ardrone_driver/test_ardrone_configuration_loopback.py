@@ -71,6 +71,19 @@ def test_a_watchdog_that_the_drone_does_not_take_grounds_it_only_where_it_is_ano
     rig.until(lambda: rig.drone._session.phase == phase)
 
 
+def test_a_drone_in_the_operators_hands_is_not_trimmed(rig):
+    rig.fake.theta = 12_000.0
+    rig.until(lambda: rig.drone._session.phase == "TRIMMING")
+    until = time.monotonic() + 1.3
+    while time.monotonic() < until:
+        rig.turn()
+    assert rig.fake.said("FTRIM") == []
+    assert rig.drone.view(time.monotonic_ns()).not_ready == "waits until it stands still and level"
+    rig.fake.theta = 1000.0
+    rig.connect()
+    assert rig.fake.said("FTRIM")
+
+
 def test_a_limit_that_is_not_stored_grounds_the_drone_and_says_why(new_rig):
     rig = new_rig("2.3.3")
     rig.fake.deaf_to = {"control:altitude_max"}

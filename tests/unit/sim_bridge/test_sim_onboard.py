@@ -6,8 +6,10 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
+from sim_bridge.devices.ardrone_control import FlightControl
 from sim_bridge.scenario import DroneScenario
 from sim_bridge.world.airframe import Airframe
+from sim_bridge.world.ardrone import Quadrotor
 from sim_bridge.world.ardrone_sensors import Onboard
 from sim_bridge.world.noise import DelayLine, GaussMarkov, generator_of, standard_normals
 
@@ -202,3 +204,13 @@ def gyros(onboard: Onboard, puppet: Puppet, seconds: float) -> list[tuple[float,
         onboard.step(puppet, motors_on=True)
         rows.append(onboard.gyros)
     return rows
+
+
+def test_a_flat_trim_takes_the_tilt_of_that_moment_for_level() -> None:
+    drone = Quadrotor((0.0, 0.0), 0.0, DroneScenario(), TICK_S, generator_of(1, "drone_1"))
+    onboard = Onboard(DroneScenario(attitude_noise_deg=0.0), TICK_S, drone.airframe, generator_of(1, "onboard"))
+    drone.airframe.roll, drone.airframe.pitch = 0.2, -0.1
+    FlightControl(drone, onboard).obey_datagram(b"AT*FTRIM=1\r", 0)
+    drone.airframe.roll = drone.airframe.pitch = 0.0
+    onboard.step(drone, motors_on=False)
+    assert (onboard.roll, onboard.pitch) == pytest.approx((-0.2, 0.1))

@@ -4,11 +4,13 @@ import math
 
 import pytest
 
+from drivers.ardrone.convert import NavdataMotion
 from drivers.ardrone.desired_config import Ids, Wish, ids_of, scale_from_settings, wishes
 from drivers.ardrone.identity import Identity, Model
 from drivers.ardrone.link import SequenceFilter
 from drivers.ardrone.session import ArdroneSession, SessionPhase
 from drivers.ardrone.settings import ArDroneDriverSettings, ArDroneLimits, FlightConfiguration, Video
+from drivers.ardrone.stillness import Stillness
 from drivers.ardrone.wire import at
 from drivers.ardrone.wire.state import StateBit
 
@@ -192,6 +194,35 @@ def test_flat_trim_is_never_sent_in_flight():
     assert drone.trims == 0
     for i in range(10):
         assert session.step((500 + i) * TICK, 0, 0) == [], "nor after it has landed: it was trimmed when it started"
+
+
+def test_flat_trim_waits_until_the_drone_stands_still_and_level():
+    drone = Drone()
+    session = session_for(drone)
+    run(session, drone, until=SessionPhase.TRIMMING)
+    for i in range(400, 500):
+        assert session.step(i * TICK, drone.state, 0, still=False) == []
+    assert session.phase is SessionPhase.TRIMMING and session.detail == "waits until it stands still and level"
+    sent = [command.name for i in range(500, 504) for command in session.step(i * TICK, drone.state, 0)]
+    assert sent == ["FTRIM"] * 3 and session.phase is SessionPhase.READY
+
+
+def motion(pitch_deg=0.0, rate_deg_s=0.1):
+    rates = (0.0, math.radians(rate_deg_s), 0.0)
+    return NavdataMotion((0.0, 0.0, 0.0), math.radians(0.5), math.radians(pitch_deg), 0.0, None, rates, None)
+
+
+def test_a_second_level_and_quiet_is_still_and_a_swinging_hand_never_is():
+    still, swung = Stillness(), Stillness()
+    for i in range(2000):
+        still.update(i * 5 * MS, motion(2.9))
+        phase = i * 0.005 * math.tau / 3
+        swung.update(i * 5 * MS, motion(25 * math.sin(phase), 25 * math.tau / 3 * math.cos(phase)))
+        assert still.stands is (i >= 200) and not swung.stands
+    still.update(2000 * 5 * MS, motion(2.9, rate_deg_s=20))
+    assert not still.stands
+    still.update(2400 * 5 * MS, motion(2.9))
+    assert not still.stands, "nor at once after it"
 
 
 @pytest.mark.parametrize("bit", [StateBit.NAVDATA_BOOTSTRAP, StateBit.NAVDATA_DEMO])

@@ -114,3 +114,21 @@ def test_a_velocity_that_drops_to_noise_about_zero_at_once_counts_as_a_lost_floo
     assert not drone.view(1250 * NS_PER_MS).unsound
     read(drone, *(flying(number, number % 7 - 3, number % 5 - 2) for number in range(51, 101)))
     assert "does not see the floor" in drone.view(1500 * NS_PER_MS).unsound
+
+
+def timed(number: int, at_s: float, clock_s: float, state: int) -> Arrival:
+    phase, stir = (3 if state & _FLY else 2) << 16, float(number % 7)
+    demo = options.Demo(phase, theta_mdeg=stir, phi_mdeg=stir, altitude_mm=900, vx_mm_s=stir, vy_mm_s=stir)
+    time = options.TIME.encode(options.Time.from_seconds(clock_s))
+    datagram = navdata.encode(Navdata(state, number, 0, ((0, options.DEMO.encode(demo, 148)), (1, time))))
+    return Arrival(round(at_s * 1e9), datagram, _SOURCE)
+
+
+@pytest.mark.parametrize(("pause_s", "clock_s"), [(900.0, 20.0), (2100.0, 1552.0)])
+def test_a_drone_that_was_restarted_in_a_pause_is_not_late(drone: ArDrone, pause_s: float, clock_s: float) -> None:
+    """Its clock wraps after 2048 s; neither a step back nor a round of it during the pause says anything."""
+    read(drone, *(timed(i, 10 + i * 0.005, 1500 + i * 0.005, _HEALTHY) for i in range(1, 200)))
+    for i in range(1, 400):
+        state = _HEALTHY | (_FLY if i > 100 else 0)
+        read(drone, timed(i, 11 + pause_s + i * 0.005, clock_s + i * 0.005, state), None)
+    assert drone.view(round((13 + pause_s) * 1e9)).unsound == ""

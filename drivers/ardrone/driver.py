@@ -82,7 +82,11 @@ class ArDrone:
         self._publisher = NavdataPublisher(settings, bus)
         inquirer = TcpInquirer(self.address, settings.ftp_port, settings.control_port)
         self._session = ArdroneSession(
-            partial(wishes, settings), ids_of(settings.name), inquirer, settings.flight.flat_trim
+            partial(wishes, settings),
+            ids_of(settings.name),
+            inquirer,
+            flat_trim=settings.flight.flat_trim,
+            serial_needed=bool(settings.serial_number),
         )
         self._rate_watch, self._uplink = RateWatch(), UplinkWatch()
         self._next_rate_ns = 0
@@ -191,7 +195,7 @@ class ArDrone:
             return self._session.detail
         pinned, serial = self._settings.serial_number, self._session.identity.serial
         if pinned and serial != pinned:
-            return f"it is another drone: its serial number is {serial or 'not known'}, the field says {pinned}"
+            return f"it is another drone: its serial number is {serial}, the field says {pinned}"
         faults = heard.state & _FAULTS
         return f"the drone reports {', '.join(bit_names(faults))}" if faults else ""
 

@@ -28,11 +28,17 @@ _STAGE_NS = NS_PER_S
 _DUMP_PERIOD_NS = 300 * NS_PER_MS
 # WIRE: a dump raises bit 6 as well. Its text may arrive before the packet with the bit.
 _SETTLE_NS = 300 * NS_PER_MS
-_ROUNDS = 3
+_ROUNDS = _ASKS = 3
 _RETRY_NS = 5 * NS_PER_S
 _FLAT_TRIMS = 3
 # A drone may for a while report the mode that it was commanded to leave.
 _FORGOTTEN_NS = NS_PER_S
+
+_NOT_READ = Notice(
+    Severity.WARNING,
+    "its settings were written, but not read back: its control port (TCP 5559) gives none",
+    "restart the drone if it does not keep to its limits, and look at the link",
+)
 
 
 class SessionPhase(StrEnum):
@@ -89,15 +95,16 @@ class ArdroneSession:
         ids: Ids,
         inquirer: Inquirer,
         flat_trim: bool = True,
+        serial_needed: bool = False,
     ) -> None:
         self._wishes_for = wishes_for
         self._ids = ids
         self._inquirer = inquirer
-        self._trims = _FLAT_TRIMS if flat_trim else 0
-        self._trims_left = 0
+        self._trims, self._trims_left = _FLAT_TRIMS if flat_trim else 0, 0
+        self._serial_needed = serial_needed
         self._next_request_ns = self._next_dump_ns = 0
         self._stage_ns = self._began_ns = 0
-        self._round = 0
+        self._round = self._asks = 0
         self._with_ids = False
         self._cycle = _Cycle.CLEAR
         self._queue: deque[Wish] = deque()
@@ -236,10 +243,14 @@ class ArdroneSession:
     def _read_back(self, now_ns: int) -> list[AtCommand]:
         self.phase = SessionPhase.VERIFYING
         self._round += 1
-        self._next_dump_ns = 0
-        self._inquirer.ask_dump()
-        self._stage_ns = now_ns
+        self._asks = 0
+        self._ask(now_ns)
         return []
+
+    def _ask(self, now_ns: int) -> None:
+        self._asks += 1
+        self._next_dump_ns, self._stage_ns = 0, now_ns
+        self._inquirer.ask_dump()
 
     def _verify(self, now_ns: int, pending: bool) -> list[AtCommand]:
         dump = self._inquirer.dump
@@ -249,9 +260,12 @@ class ArdroneSession:
             self._next_dump_ns, self._stage_ns = now_ns + _DUMP_PERIOD_NS, now_ns
             return [at.ctrl(at.CTRL_CONFIG_GET)]
         asked_ns = now_ns - self._stage_ns
-        if dump and (asked_ns < _SETTLE_NS or (pending and asked_ns < 2 * _STAGE_NS)):
+        if (dump and asked_ns < _SETTLE_NS) or (pending and asked_ns < 2 * _STAGE_NS):
             return [at.ctrl(at.CTRL_ACK)]
-        self._judge(now_ns, parse_dump(dump))
+        if dump or self._asks == _ASKS:
+            self._judge(now_ns, parse_dump(dump))
+        else:
+            self._ask(now_ns)
         return []
 
     def _trim(self, state: int, still: bool) -> list[AtCommand]:
@@ -285,8 +299,11 @@ class ArdroneSession:
         elif required:
             wish = required[0]
             self._fail(now_ns, f"{wish.key} is {wrong[wish]} on the drone, and {wish.value} was written")
+        elif self._serial_needed and not self.identity.serial:
+            self._fail(now_ns, "its serial number was not read")
         else:
             self.phase = SessionPhase.TRIMMING
+            self.news.extend(() if stored else (_NOT_READ,))
             self._confirm(now_ns, wrong)
 
     def _confirm(self, now_ns: int, wrong: dict[Wish, str]) -> None:

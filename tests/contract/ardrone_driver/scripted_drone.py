@@ -129,7 +129,18 @@ class ScriptedDrone:
         altitude = 800 if self.state & FLY else 0
         demo = struct.pack(
             "<HHIIfffifffI",
-            *(0, 148, self.major << 16, 80, self.theta + 2 * stir, 500.0, self.psi, altitude, 300.0 + moved, 200.0 + moved),
+            *(
+                0,
+                148,
+                self.major << 16,
+                80,
+                self.theta + 2 * stir,
+                500.0,
+                self.psi,
+                altitude,
+                300.0 + moved,
+                200.0 + moved,
+            ),
             *(0, 0),
         )
         phys = struct.pack("<HHfH6fIII", 3, 46, 40.0, 0, self.force_mg, 0.0, -1000.0 - 2 * stir, 1.0, 2.0, 3.0, 0, 0, 0)

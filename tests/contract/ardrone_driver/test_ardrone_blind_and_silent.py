@@ -35,7 +35,7 @@ def test_a_drone_that_saw_no_floor_before_falling_silent_is_braked(rig, monkeypa
 
 
 def test_a_drone_that_landed_while_nobody_heard_it_is_not_lifted_again(rig):
-    """Both directions are dead: it lands by itself, and a start bit is a level to it (docs/reference/ardrone.md 2.4)."""
+    """Both directions are dead, so it lands by itself; a start bit is a level to it (docs/reference/ardrone.md 2.4)."""
     rig.take_off()
     rig.speaking = False
     until = time.monotonic() + 2.6

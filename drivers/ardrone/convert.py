@@ -47,7 +47,8 @@ _PHASES: dict[int, FlightState] = {
 class NavdataMotion(NamedTuple):
     """The vehicle's motion by one packet, in our frames.
 
-    velocity_m_s [base_stabilized], as reported, without scale; rates and specific force [base], None in demo mode.
+    velocity_m_s [base_stabilized], as reported, without scale; rates and specific force [base], None in demo mode;
+    flies: by its state, also where it reports no height.
     """
 
     velocity_m_s: Vector3
@@ -57,6 +58,7 @@ class NavdataMotion(NamedTuple):
     height_m: float | None
     rates_rad_s: Vector3 | None
     specific_force_m_s2: Vector3 | None
+    flies: bool = False
 
 
 def motion_from_navdata(packet: Navdata) -> NavdataMotion | None:
@@ -86,6 +88,7 @@ def motion_from_demo(packet: Navdata, demo: Demo) -> NavdataMotion:
         height_m=_height(packet.state, demo),
         rates_rad_s=rates,
         specific_force_m_s2=force,
+        flies=bool(packet.state & _FLY),
     )
 
 
@@ -167,16 +170,16 @@ class HeadingWatch:
         self.resets = 0
         self._yaw_rad: float | None = None
         self._stamp_ns = 0
-        self._aloft = False
+        self._lifted = False
 
     def update(self, stamp_ns: int, motion: NavdataMotion) -> int:
         """Take the heading of a packet; returns the number of jumps so far."""
         elapsed_s = (stamp_ns - self._stamp_ns) * 1e-9
-        aloft = motion.height_m is not None
-        gap_s = _GAP_S if aloft else _GROUND_GAP_S
+        lifted = motion.height_m is not None or (self._lifted and motion.flies)  # a height may be missing in flight
+        gap_s = _GAP_S if lifted else _GROUND_GAP_S
         void = self._yaw_rad is not None and (elapsed_s > gap_s or self._has_jumped(elapsed_s, motion))
-        self.resets += void or (aloft and not self._aloft)
-        self._yaw_rad, self._stamp_ns, self._aloft = motion.yaw_rad, stamp_ns, aloft
+        self.resets += void or (lifted and not self._lifted)
+        self._yaw_rad, self._stamp_ns, self._lifted = motion.yaw_rad, stamp_ns, lifted
         return self.resets
 
     def _has_jumped(self, elapsed_s: float, motion: NavdataMotion) -> bool:

@@ -172,6 +172,12 @@ def test_lift_off_counts_by_itself():
     assert count_resets([turning(0, height=None), turning(0, height=None), turning(0), turning(0)]) == [0, 0, 1, 1]
 
 
+def test_a_height_that_is_missing_in_flight_is_no_new_lift_off():
+    flight = [turning(0, height=height)._replace(flies=True) for height in (None, 0.8, None, 0.8, None, None, 0.8)]
+    assert count_resets(flight) == [0, 1, 1, 1, 1, 1, 1]
+    assert count_resets([*flight, turning(0, height=None), *flight])[-1] == 2, "but the next flight is"
+
+
 def test_turning_and_wrapping_are_no_jumps():
     turn = [turning((179 + 0.3 * i + 180) % 360 - 180, 60) for i in range(50)]
     assert set(count_resets(turn)) == {1}

@@ -20,7 +20,7 @@ class Stillness:
 
     def update(self, now_ns: int, motion: NavdataMotion) -> None:
         """Take the motion in a packet."""
-        level = max(abs(motion.roll_rad), abs(motion.pitch_rad)) < _LEVEL_RAD
+        level = _is_level(motion)
         quiet = motion.rates_rad_s is None or max(map(abs, motion.rates_rad_s)) < _QUIET_RAD_S
         if not (level and quiet):
             self._since_ns = None
@@ -32,3 +32,11 @@ class Stillness:
     def stands(self) -> bool:
         """Return whether it does, by the packets until the last one."""
         return self._since_ns is not None and self._heard_ns - self._since_ns >= _STILL_NS
+
+
+def _is_level(motion: NavdataMotion) -> bool:
+    # By gravity as well: a trim at a slant made its attitude wrong, and only another trim mends that.
+    if max(abs(motion.roll_rad), abs(motion.pitch_rad)) < _LEVEL_RAD:
+        return True
+    force = motion.specific_force_m_s2
+    return force is not None and math.hypot(force[0], force[1]) < math.tan(_LEVEL_RAD) * force[2]

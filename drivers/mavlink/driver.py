@@ -8,6 +8,8 @@ from collections.abc import Sequence
 
 from drivers.base import HostProcess, read_section
 from drivers.host import VehicleHost, run_hosts
+from drivers.mavlink import line_load
+from drivers.mavlink.line_watch import LineWatch
 from drivers.mavlink.links.forwarding import with_riders
 from drivers.mavlink.links.opening import open_link
 from drivers.mavlink.links.seam import Heard, MavlinkLink
@@ -42,10 +44,14 @@ class Fleet:
         faults = frames.dialect_faults()
         if faults:
             raise DriverError(f"this pymavlink knows other messages than we do: {'; '.join(faults)}")
+        if fault := line_load.fault(settings):
+            raise DriverError(f"{settings.link.target} {fault}")
         self._child = child
         self._estimates = child.bus.subscribe([ESTIMATE], newest=True)
         self.vehicles: dict[int, MavlinkVehicle] = {}
         self._news: deque[tuple[str, str]] = deque(maxlen=16)
+        if caution := line_load.caution(settings):
+            self._tell(f"{settings.link.target} {caution}", "")
         shown = {vehicle.system_id: vehicle for vehicle in settings.vehicles}
         self.link: MavlinkLink = open_link(
             settings.link, self._sniff, lambda transport: with_riders(transport, shown, self._tell)
@@ -56,6 +62,7 @@ class Fleet:
             {vehicle.system_id: vehicle.name for vehicle in settings.vehicles},
             [vehicle.system_id for vehicle in settings.vehicles if vehicle.forward],
         )
+        self._line_watch = LineWatch() if settings.link.target.startswith("serial") else None
         self.strangers: Counter[int] = Counter()
         self._announced: dict[tuple[str, str], int] = {}
         self._closing = threading.Event()
@@ -101,6 +108,8 @@ class Fleet:
                     vehicle.see(now_ns, received.message)
         self._child.note_addresses(self.link.called_from)
         self._child.leave(self.link.newest_stamp)
+        if self._line_watch is not None:
+            self._news.extend(self._line_watch.news(now_ns, self.link.rejected))
         for news in (self._news, self._stations.news):
             while news:
                 self._child.event(Severity.WARNING, *news.popleft())

@@ -51,8 +51,9 @@ class Mavlink(KindSection):
     process. When the driver is dead, others speak to the vehicle from another port than the one it called."""
     local_address: Address = "0.0.0.0"
     """IPv4 address that the driver listens on, with listen."""
-    serial: Annotated[str, Field(pattern=r"^(/dev/[^:]+:\d+)?$")] = ""
-    """Serial radio DEVICE:BAUD instead of UDP, such as /dev/ttyUSB0:57600; empty: UDP."""
+    serial: Annotated[str, Field(pattern=r"^(/dev/[^:]+:\d{1,7})?$")] = ""
+    """Serial radio DEVICE:BAUD instead of UDP, such as /dev/ttyUSB0:921600; empty: UDP. `config check` compares BAUD
+    with what the vehicle needs."""
     key_file: str = ""
     """File with the signing key (32 bytes, or 64 hex digits), kept outside the field file; empty: frames are not
     signed."""
@@ -142,10 +143,12 @@ def _check(orders: Sequence[VehicleOrder]) -> Iterator[tuple[str, Finding]]:
     shared: dict[tuple[int, str], tuple[str, tuple[str, str, str]]] = {}
     for order in orders:
         name, mavlink = order.name, _own(order)
-        for key, text in _way(order.drone.address, mavlink):
-            yield name, (("mavlink", key), text)
+        wrong = list(_way(order.drone.address, mavlink))
+        yield from ((name, (("mavlink", key), text)) for key, text in wrong)
         if mavlink.serial and order.drone.interface:
             yield name, (("interface",), "has no meaning on a serial line")
+        if mavlink.serial and not wrong and (text := _of_line(order, "fault")):
+            yield name, (("mavlink", "serial"), text)
         if (other := systems.setdefault(mavlink.system_id, name)) != name:
             yield name, (("mavlink", "system_id"), f"system id {mavlink.system_id} is already that of {other}")
         how = (mavlink.link, mavlink.key_file, mavlink.local_address)
@@ -153,6 +156,20 @@ def _check(orders: Sequence[VehicleOrder]) -> Iterator[tuple[str, Finding]]:
         if mavlink.listen and shared.setdefault(port, (name, how))[1] != how:
             text = f"is shared with {shared[port][0]}, which is reached otherwise"
             yield name, (("mavlink", "port"), text)
+
+
+def _cautions(orders: Sequence[VehicleOrder]) -> Iterator[tuple[str, Finding]]:
+    for order in orders:
+        if _own(order).serial and (text := _of_line(order, "caution")):
+            yield order.name, (("mavlink", "serial"), text)
+
+
+def _of_line(order: VehicleOrder, judged: Literal["fault", "caution"]) -> str:
+    # Only here: pymavlink's dialect is slow to load.
+    from drivers.mavlink import line_load
+
+    settings = _settings([order])
+    return line_load.fault(settings) if judged == "fault" else line_load.caution(settings)
 
 
 def _way(address: str, mavlink: Mavlink) -> Iterator[tuple[str, str]]:
@@ -205,6 +222,7 @@ KIND = VehicleKind(
     has_interface=True,
     blink="drivers.mavlink.blink:blink",
     check=_check,
+    cautions=_cautions,
     moved=_moved,
     emulator="sim_bridge.devices.mavlink_emulation:EMULATION",
     scenario={"mavlink": "sim_bridge.mavlink_scenario:CopterScenario"},

@@ -32,7 +32,7 @@ def mavlink() -> None:
 @mavlink.command(
     epilog="\b\nExamples:\n  groundstation mavlink probe udpin:0.0.0.0:14550\n"
     "  groundstation mavlink probe udpout:192.168.1.12:14550 --seconds 5\n"
-    "  groundstation mavlink probe serial:/dev/ttyUSB0:57600\n\n"
+    "  groundstation mavlink probe serial:/dev/ttyUSB0:921600\n\n"
     "Exit codes: 0 somebody answered, 2 wrong usage, 4 nobody did."
 )
 @click.argument("link")

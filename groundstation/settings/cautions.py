@@ -15,6 +15,7 @@ from groundstation.geometry.rotations import world_from_downward_optical
 from groundstation.settings.document import KeyPath
 from groundstation.settings.files import is_there, unwritable
 from groundstation.settings.in_view import STANDING_MARKER_M, in_picture
+from groundstation.settings.kind_checks import cautions_of_kinds
 from groundstation.settings.lens_cautions import lens_cautions
 from groundstation.settings.marker_sizes import too_small
 from groundstation.settings.parts import Finding
@@ -185,6 +186,10 @@ def _places(field: Field) -> Iterator[Finding]:
             yield path, f"is not there on this machine (got {address.path})"
 
 
+def _kinds(field: Field) -> Iterator[Finding]:
+    yield from cautions_of_kinds(field.drones)
+
+
 OF_A_FIELD: tuple[Caution, ...] = (
     _views,
     _unseen_pads,
@@ -199,5 +204,6 @@ OF_A_FIELD: tuple[Caution, ...] = (
     unlikely,
     volume_cautions,
     anchor_cautions,
+    _kinds,
 )
 ALL: tuple[Caution, ...] = (*OF_A_FIELD, _addresses, _adapters, _places)  # of this computer as well

@@ -142,7 +142,8 @@ class VehicleKind:
     name: the word for `kind` in the field file. summary: a line for people. driver: "module:function" of the driver
     process. sections: keys of the field file that only this kind has; required: those that must be given.
     processes: vehicles that share a driver process, with its settings; stop: datagrams to vehicles of one dead process.
-    check: (drone, finding) for each fault between the sections of this kind. standing_m: height of the base above the
+    check: (drone, finding) for each fault between the sections of this kind; cautions: likewise for what is permitted
+    but unwise, of vehicles without faults. standing_m: height of the base above the
     floor before take-off, and its deviation; the default suits small vehicles. camera: scheme of the vehicle's own
     video, "" if it has none; camera_port: its usual port; reader: "module:attribute" of its
     source, called with address and interface like the sources of `drivers.camera`. has_serial_number: the
@@ -170,6 +171,7 @@ class VehicleKind:
     sections: Mapping[str, type[KindSection]] = field(default_factory=dict)
     required: frozenset[str] = frozenset()
     check: Callable[[Sequence[VehicleOrder]], Iterator[tuple[str, Finding]]] = _no_findings
+    cautions: Callable[[Sequence[VehicleOrder]], Iterator[tuple[str, Finding]]] = _no_findings
     standing_m: tuple[float, float] = (0.08, 0.04)
     camera: str = ""
     camera_port: int = 0

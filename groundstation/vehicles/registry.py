@@ -92,7 +92,7 @@ def _sound(name: str, kind: object, known: dict[str, VehicleKind]) -> VehicleKin
 def _require_parts(kind: VehicleKind) -> None:
     if not isinstance(kind.habits, ErrorHabits):
         raise TypeError(f"habits are a {type(kind.habits).__name__}, no ErrorHabits")
-    for part in ("processes", "stop", "check", "moved"):
+    for part in ("processes", "stop", "check", "cautions", "moved"):
         if not callable(getattr(kind, part)):
             raise TypeError(f"{part} is a {type(getattr(kind, part)).__name__}, no function")
     for part in ("driver", "emulator", "true_pose", "blink"):

@@ -10,7 +10,7 @@ from drivers.ardrone.wire import at, navdata, options, pave
 from drivers.ardrone.wire.navdata import Navdata
 from drivers.ardrone.wire.tags import OPTION_SIZES
 from drivers.mavlink.convert import attitude_from_quaternion, imu_from_highres, velocity_from_local
-from drivers.mavlink.links.serial import StreamCutter
+from drivers.mavlink.links.stream_cutter import StreamCutter
 from drivers.mavlink.wire import errors as mavlink_errors
 from drivers.mavlink.wire import flight, service, telemetry
 from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder, split

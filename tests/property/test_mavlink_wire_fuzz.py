@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import all as widest
 
-from drivers.mavlink.links.serial import StreamCutter
+from drivers.mavlink.links.stream_cutter import StreamCutter
 from drivers.mavlink.wire import flight
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder, split

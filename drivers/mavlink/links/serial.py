@@ -1,5 +1,6 @@
 """A serial radio or line: the same frames in a stream of bytes, with one or more vehicles at the other end."""
 
+import logging
 import os
 import select
 import threading
@@ -8,57 +9,45 @@ from contextlib import suppress
 
 from drivers.mavlink.links.frame_codec import FrameCodec
 from drivers.mavlink.links.seam import Heard, Sniffer, Transport, ignore_bytes
+from drivers.mavlink.links.stream_cutter import StreamCutter
 from drivers.mavlink.links.tty import open_raw
 from drivers.mavlink.other_stations import speaks_as_we
+from drivers.mavlink.send_queue import SendQueue, Waiting
 from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.wire.errors import WireError
-from drivers.mavlink.wire.frames import Message
-from drivers.mavlink.wire.signature import frame_size
+from drivers.mavlink.wire.frames import Message, split
 from drivers.mavlink.wire.verification import Signing
 from groundstation.adapters import Address
 from groundstation.bus import clock
 from groundstation.errors import DriverError
+from groundstation.time_units import NS_PER_S
 
 _POLL_S = 0.1
+# How soon a line is tried again that took a part of a frame, or nothing.
+_RETRY_S = 0.01
 _CHUNK = 4096
-
-
-class StreamCutter:
-    """Finds frames in a stream of bytes that may begin, end and break anywhere."""
-
-    def __init__(self) -> None:
-        self._buffer = bytearray()
-
-    def feed(self, data: bytes) -> list[bytes]:
-        """Return the frames that are complete by now; bytes that belong to none are skipped."""
-        buffer, frames = self._buffer, []
-        buffer += data
-        while len(buffer) >= 3:
-            try:
-                size = frame_size(buffer)
-            except WireError:
-                del buffer[0]
-                continue
-            if len(buffer) < size:
-                break
-            frames.append(bytes(buffer[:size]))
-            # A false start may hide a true frame: only a confirmed checksum lets a whole frame be skipped, by the
-            # caller's count of refusals; at most one frame is lost with it.
-            del buffer[:size]
-        return frames
+_BITS = 10  # of a byte on the line, with start and stop
+_log = logging.getLogger(__name__)
 
 
 class SerialLink(Transport):
-    """A terminal device, raw, 8N1; after a failure it is reopened, ten times a second."""
+    """A terminal device, raw, 8N1; after a failure it is reopened, ten times a second.
+
+    What the line has no time for waits (`SendQueue`), and a thread writes it when there is; frames leave as wholes.
+    """
 
     def __init__(self, settings: LinkSettings, signing: Signing | None = None, sniffer: Sniffer = ignore_bytes) -> None:
         _, device, baud = settings.target.split(":")
         self.rejected: Counter[str] = Counter()
         self._codec = FrameCodec(settings, signing)
-        self._cutter, self._lock, self._sniffer = StreamCutter(), threading.RLock(), sniffer
-        self._closed = False
+        self._cutter, self._sniffer = StreamCutter(), sniffer
         self._device, self._baud = device, int(baud)
         self._fd = open_raw(self._device, self._baud)
+        self._queue = SendQueue(self._baud / _BITS, self._note_dropped)
+        self._rest = b""  # of the frame that was begun
+        self._closed, self._line = False, threading.Condition()
+        self._writer = threading.Thread(target=self._write_waiting, name="mavlink line", daemon=True)
+        self._writer.start()
 
     @property
     def called_from(self) -> tuple[Address, ...]:
@@ -98,10 +87,11 @@ class SerialLink(Transport):
 
     def _open_anew(self) -> None:
         """Reopen the device: a radio that was replugged, or lost its supply, is a new device."""
-        with self._lock:
+        with self._line:
             if self._closed:
                 return
             self._release()
+            self._rest = b""
             with suppress(DriverError):
                 self._fd = open_raw(self._device, self._baud)
         self._cutter = StreamCutter()
@@ -112,22 +102,80 @@ class SerialLink(Transport):
         self._fd = -1
 
     def send(self, system: int, message: Message) -> None:
-        """Write one frame; a line that is too slow loses it."""
-        with self._lock:  # signed frames must leave in the order of their times
-            self.send_raw(system, self._codec.encode(message))
+        """Send a message as soon as the line has time for it."""
+        self._put(system, message)
 
     def send_raw(self, system: int, data: bytes) -> None:
-        """Write whole frames; a line that is too slow loses them."""
-        with self._lock:
-            try:
-                if os.write(self._fd, data) < len(data):
-                    self.rejected["send_cut"] += 1
-            except OSError:
-                self.rejected["send_failed"] += 1
-        self._sniffer(system, clock.now_ns(), data, False)
+        """Send whole frames as soon as the line has time for them."""
+        try:
+            self._put(system, *split(data, old=True))
+        except WireError as error:
+            self.rejected[error.reason] += 1
+
+    def _put(self, system: int, *contents: Message | bytes) -> None:
+        with self._line:
+            for content in contents:
+                self._queue.put(clock.now_ns(), system, content)
+            self._write_due()
+            self._line.notify()
+
+    def _write_waiting(self) -> None:
+        with self._line:
+            while not self._closed:
+                try:
+                    self._write_due()
+                except Exception:  # noqa: BLE001 - a landing may wait behind whatever failed: count, log, go on
+                    self.rejected["internal"] += 1
+                    _log.exception("a frame could not be sent")
+                self._line.wait(self._patience_s())
+
+    def _patience_s(self) -> float | None:
+        if self._rest:
+            return _RETRY_S
+        wait_ns = self._queue.wait_ns(clock.now_ns())
+        return None if wait_ns is None else max(_RETRY_S, wait_ns / NS_PER_S)
+
+    def _write_due(self) -> None:
+        """Write what the line has time for, the rest of a begun frame first: a cut frame would spoil the next too."""
+        while self._fd < 0 or select.select([], [self._fd], [], 0.0)[1]:
+            if not self._rest:
+                waiting = self._queue.take(clock.now_ns())
+                if waiting is None:
+                    return
+                self._rest = self._begin(waiting)
+            if not self._write_rest():
+                return
+
+    def _begin(self, waiting: Waiting) -> bytes:
+        """Return the bytes of a frame; encoded now, because signed ones must leave in the order of their times."""
+        now_ns, content = clock.now_ns(), waiting.content
+        try:
+            frame = content if isinstance(content, bytes) else self._codec.encode(content)
+        except WireError as error:
+            self.rejected[error.reason] += 1
+            return b""
+        self._queue.note_sent(now_ns, len(frame))
+        self._sniffer(waiting.system, now_ns, frame, False)
+        return frame
+
+    def _write_rest(self) -> bool:
+        """Write the rest of a frame, as far as the device takes it; return whether that was all of it."""
+        try:
+            self._rest = self._rest[os.write(self._fd, self._rest) :]
+        except BlockingIOError:
+            return False
+        except OSError:
+            self.rejected["send_failed"] += 1
+            self._rest = b""
+        return not self._rest
+
+    def _note_dropped(self) -> None:
+        self.rejected["send_dropped"] += 1
 
     def close(self) -> None:
-        """Close the device."""
-        with self._lock:
+        """End the writer and close the device."""
+        with self._line:
             self._closed = True
+            self._line.notify()
             self._release()
+        self._writer.join(timeout=1.0)

@@ -9,7 +9,7 @@ from groundstation.errors import DriverError
 def make_raw(fd: int, baud: int) -> None:
     """Set an open device to raw bytes, 8N1; raises DriverError, termios.error."""
     speed = getattr(termios, f"B{baud}", None)
-    if speed is None:
+    if speed is None or baud == 0:  # B0 would hang up
         raise DriverError("no such speed")
     if not os.isatty(fd):
         raise DriverError("it is no serial port")

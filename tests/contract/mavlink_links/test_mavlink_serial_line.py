@@ -1,17 +1,22 @@
-"""A serial line whose radio is unplugged, and one with two writing threads."""
+"""A serial line whose radio is unplugged, or that carries less than all."""
 
 import json
 import os
 import pty
+import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
 from drivers.mavlink.failsafe_transport import MavlinkFailsafe
 from drivers.mavlink.links.serial import SerialLink
+from drivers.mavlink.links.stream_cutter import StreamCutter
 from drivers.mavlink.settings import LinkSettings
+from drivers.mavlink.wire.flight import CommandLong, OdometryMessage, SetPositionTargetLocalNed, command_to
 from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder
+from drivers.mavlink.wire.names import MavCmd
 from drivers.mavlink.wire.telemetry import Heartbeat
 
 
@@ -82,3 +87,75 @@ def test_a_transport_finds_a_radio_that_is_plugged_in_again(tmp_path):
     assert os.read(plug.radio, 100) == b"land"
     transport.close()
     plug.pull_out()
+
+
+class SlowRadio(threading.Thread):
+    """The other end of a line, which reads 5750 bytes a second; `came`: (time, message)."""
+
+    def __init__(self, fd):
+        super().__init__(daemon=True)
+        self.came, self._fd, self._ends = [], fd, threading.Event()
+
+    def run(self):
+        cutter, decoder = StreamCutter(), FrameDecoder()
+        while not self._ends.wait(0.02):
+            with suppress(BlockingIOError):
+                for raw in cutter.feed(os.read(self._fd, 115)):
+                    self.came.append((time.monotonic(), decoder.decode(raw).message))
+
+    def stop(self):
+        self._ends.set()
+        self.join()
+
+    def times_of(self, kind):
+        return [at for at, message in self.came if isinstance(message, kind)]
+
+
+def test_a_landing_passes_a_saturated_line_at_once_and_no_frame_is_cut(tmp_path):
+    """Poses of a PX4 at 30 Hz and setpoints at 20 Hz need 8.7 kB/s; 57600 baud carry 5.76."""
+    plug = Plug(tmp_path / "ttyUSB0")
+    plug.put_in()
+    link, radio = SerialLink(LinkSettings(target=f"serial:{plug.place}:57600")), SlowRadio(plug.radio)
+    radio.start()
+    land, ordered = command_to(2, MavCmd.NAV_LAND), []
+    pose = OdometryMessage(1, 1, 12, 0.0, 0.0, 0.0, (1.0,) * 4, *(0.0,) * 6, (0.1,) * 21, (0.1,) * 21, 0, 2, 100)
+    for turn in range(400):
+        if turn % 3 == 0:
+            link.send(2, pose)
+        if turn % 5 == 0:
+            link.send(2, SetPositionTargetLocalNed(turn, 2, 1, 8, 0x5C7, *(0.0,) * 11))
+        if turn % 50 == 49:
+            ordered.append(time.monotonic())
+            link.send(2, land)
+        time.sleep(0.01)
+    time.sleep(0.3)
+    link.close()
+    radio.stop()
+    plug.pull_out()
+    landings = radio.times_of(CommandLong)
+    assert len(landings) == len(ordered) == 8
+    assert max(came - sent for came, sent in zip(landings, ordered, strict=True)) < 0.3
+    assert min(len(radio.times_of(kind)) for kind in (OdometryMessage, SetPositionTargetLocalNed)) > 40
+    assert link.rejected["send_dropped"] > 20 and set(link.rejected) == {"send_dropped"}
+
+
+def test_the_rest_of_a_cut_frame_goes_before_the_next(tmp_path):
+    """A device that is slower than its line takes a part of a frame only."""
+    plug = Plug(tmp_path / "ttyUSB0")
+    plug.put_in()
+    link, cutter, decoder, came = (
+        SerialLink(LinkSettings(target=f"serial:{plug.place}:4000000")),
+        StreamCutter(),
+        FrameDecoder(),
+        0,
+    )
+    for _ in range(2000):
+        link.send(2, command_to(2, MavCmd.NAV_LAND))
+    deadline = time.monotonic() + 0.8
+    while came < 2000 and time.monotonic() < deadline:
+        with suppress(BlockingIOError):
+            came += len([decoder.decode(raw) for raw in cutter.feed(os.read(plug.radio, 1000))])
+        time.sleep(0.001)
+    link.close()
+    plug.pull_out()
+    assert came == 2000 and not link.rejected

@@ -45,7 +45,7 @@ class DatagramCutter:
         if _begins_whole(joined) and not _begins_whole(data):
             del self._begun[source]
             return self._cut(joined, in_step=True)
-        if not _begins_whole(data) and _size_at(joined, 0) > len(joined):
+        if not _begins_whole(data) and size_at(joined, 0) > len(joined):
             del self._begun[source]
             return [], joined
         self._give_up(source)  # the datagram between the two was lost
@@ -55,7 +55,7 @@ class DatagramCutter:
         """Return the frames, and the bytes of one that has no end yet."""
         frames, begun, offset, false_starts = list[bytes](), len(data), 0, 0
         while offset < len(data):
-            size = _size_at(data, offset)
+            size = size_at(data, offset)
             raw = data[offset : offset + size]
             if in_step and size > len(raw):
                 return frames, raw
@@ -69,7 +69,7 @@ class DatagramCutter:
                 begun = min(begun, offset)
             if (false_starts := false_starts + 1) > _FALSE_STARTS:
                 return frames, b""
-            in_step, offset = False, _next_start(data, offset + 1)
+            in_step, offset = False, next_start(data, offset + 1)
         return frames, data[begun:]
 
     def _refuse(self, data: bytes, offset: int) -> None:
@@ -83,7 +83,7 @@ class DatagramCutter:
         self._reject("truncated", f"{len(begun)} bytes from {source[0]}:{source[1]}")
 
 
-def _size_at(data: bytes, offset: int) -> int:
+def size_at(data: bytes | bytearray, offset: int) -> int:
     """Return the length of the frame that begins at an offset; the longest possible if its header is cut; or 0."""
     try:
         return old_frame_size(data, offset) if data[offset] == MAGIC_1 else frame_size(data, offset)
@@ -92,10 +92,11 @@ def _size_at(data: bytes, offset: int) -> int:
 
 
 def _begins_whole(data: bytes) -> bool:
-    size = _size_at(data, 0) if data else 0
+    size = size_at(data, 0) if data else 0
     return 0 < size <= len(data) and is_whole(data[:size])
 
 
-def _next_start(data: bytes, offset: int) -> int:
+def next_start(data: bytes | bytearray, offset: int) -> int:
+    """Return where a byte that may begin a frame is next, the end if nowhere."""
     found = _START.search(data, offset)
     return found.start() if found else len(data)

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from drivers.mavlink.greeting import first_heartbeat
+from drivers.mavlink.identity import other_flavour
 from drivers.mavlink.links.seam import MavlinkLink
 from drivers.mavlink.parameters import Needed, difference, needed
 from drivers.mavlink.wire.errors import WireError
@@ -44,8 +45,8 @@ class ParameterSetup:
         heartbeat = first_heartbeat(self._link, self._system, _CONNECT_S)
         if heartbeat is None:
             raise DriverError(self._unanswered())
-        if heartbeat.autopilot != self._flavour:
-            raise DriverError(f"system {self._system} is autopilot {heartbeat.autopilot}, not {self._flavour.name}")
+        if foreign := other_flavour(heartbeat.autopilot, self._flavour):
+            raise DriverError(f"system {self._system}: {foreign}")
         if heartbeat.base_mode & ARMED:
             raise DriverError(f"system {self._system} is armed: parameters are not touched")
 

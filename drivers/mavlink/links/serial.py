@@ -16,7 +16,8 @@ from drivers.mavlink.send_queue import SendQueue, Waiting
 from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.frames import Message, split
-from drivers.mavlink.wire.verification import Signing
+from drivers.mavlink.wire.signature import MAGIC_1
+from drivers.mavlink.wire.verification import Signing, old_sender
 from groundstation.adapters import Address
 from groundstation.bus import clock
 from groundstation.errors import DriverError
@@ -40,7 +41,7 @@ class SerialLink(Transport):
         _, device, baud = settings.target.split(":")
         self.rejected: Counter[str] = Counter()
         self._codec = FrameCodec(settings, signing)
-        self._cutter, self._sniffer = StreamCutter(), sniffer
+        self._cutter, self._sniffer, self._signed = StreamCutter(), sniffer, signing is not None
         self._device, self._baud = device, int(baud)
         self._fd = open_raw(self._device, self._baud)
         self._queue = SendQueue(self._baud / _BITS, self._note_dropped)
@@ -75,6 +76,9 @@ class SerialLink(Transport):
             return []
         now_ns, heard = clock.now_ns(), list[tuple[Heard, bytes]]()
         for raw in self._cutter.feed(data):
+            if raw[0] == MAGIC_1:
+                self._hear_old(now_ns, raw)
+                continue
             try:
                 frame = self._codec.decode(raw)
             except WireError as error:
@@ -84,6 +88,12 @@ class SerialLink(Transport):
                 self._sniffer(frame.system, now_ns, raw, True)
                 heard.append((Heard(now_ns, frame), raw))
         return heard
+
+    def _hear_old(self, now_ns: int, raw: bytes) -> None:
+        """Count a frame of MAVLink 1, and record it unless the link is signed."""
+        self.rejected["mavlink_1"] += 1
+        if not self._signed:
+            self._sniffer(old_sender(raw), now_ns, raw, True)
 
     def _open_anew(self) -> None:
         """Reopen the device: a radio that was replugged, or lost its supply, is a new device."""

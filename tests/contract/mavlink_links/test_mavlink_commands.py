@@ -98,7 +98,9 @@ def test_setup_tells_and_sets_what_differs(hangar, flavour, drone, system):
 def test_setup_refuses_another_autopilot_and_an_armed_one(hangar):
     emulator, _, (address, port) = hangar.add("px4", 12)
     result = run("setup", "--check", FIELD, "drone_3", "--address", f"{address}:{port}")
-    assert isinstance(result.exception, DriverError) and "not ARDUPILOT" in str(result.exception)
+    assert isinstance(result.exception, DriverError) and "it is a PX4, the field says ardupilot" in str(
+        result.exception
+    )
     emulator, _, (address, port) = hangar.add("ardupilot", 12)
     emulator.firmware.armed = True
     result = run("setup", "--apply", FIELD, "drone_3", "--address", f"{address}:{port}")

@@ -1,6 +1,8 @@
 """The MAVLink driver on real sockets: a fleet on one port, strangers, duplicates, a vehicle that leaves."""
 
 import itertools
+import os
+import pty
 import socket
 import sys
 import threading
@@ -116,14 +118,36 @@ def test_another_ground_station_that_a_vehicle_passes_on_is_told_once(hangar, po
             flying.close()
 
 
-def test_wrong_flavour_is_refused(hangar, kind):
+def test_wrong_flavour_is_refused_and_named(hangar, kind):
     _, _, (address, port) = hangar.add("px4", 9)
     flying = Flying(f"udpout:{address}:{port}", {9: "ardupilot"}, kind)
     try:
         assert flying.turn(3.0, lambda: flying.fleet.vehicles[9].health(0).rejected.get("wrong_flavour", 0) > 0)
+        assert flying.turn(8.0, lambda: any("trying on" in text for text in flying.process.texts))
         assert flying.hosts[0].watchdog.mode == "CONNECTING"
+        why = "it is a PX4, the field says ardupilot: change mavlink.flavour"
+        assert f"v9: {why}; trying on" in flying.process.texts
+        assert any("heartbeats of another firmware than the field says" in text for text in flying.process.texts)
+        assert flying.messages(VEHICLE_STATUS)[-1].detail == why
     finally:
         flying.close()
+
+
+def test_a_vehicle_that_speaks_mavlink_1_only_is_told_once_it_does_not_answer():
+    radio, line = pty.openpty()
+    flying = Flying(f"serial:{os.ttyname(line)}:921600", {9: "px4"})
+    beat = FrameEncoder(9, 1).encode(Heartbeat(2, 12, 81, 0, 3), old=True)
+    try:
+        for _ in range(12):
+            os.write(radio, beat)
+            flying.turn(0.5)
+        (told,) = [text for text in flying.process.texts if "refused" in text]
+        assert told.endswith("frames of MAVLink 1 (set version 2 on the vehicle)")
+        assert flying.process.texts.index(told) > 0, "after the silence"
+    finally:
+        flying.close()
+        os.close(radio)
+        os.close(line)
 
 
 def test_a_vehicle_that_vanishes_is_lost_and_found_again(hangar, kind):

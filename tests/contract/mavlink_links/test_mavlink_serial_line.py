@@ -18,6 +18,7 @@ from drivers.mavlink.wire.flight import CommandLong, OdometryMessage, SetPositio
 from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder
 from drivers.mavlink.wire.names import MavCmd
 from drivers.mavlink.wire.telemetry import Heartbeat
+from drivers.mavlink.wire.verification import Signing
 
 
 def test_an_unplugged_radio_is_counted_and_not_asked_without_a_pause():
@@ -159,3 +160,17 @@ def test_the_rest_of_a_cut_frame_goes_before_the_next(tmp_path):
     link.close()
     plug.pull_out()
     assert came == 2000 and not link.rejected
+
+
+def test_a_vehicle_that_speaks_mavlink_1_is_counted_and_recorded(tmp_path):
+    plug, noted = Plug(tmp_path / "ttyUSB0"), []
+    plug.put_in()
+    settings = LinkSettings(target=f"serial:{plug.place}:57600")
+    beat = FrameEncoder(5, 1).encode(Heartbeat(2, 3, 1, 4, 3), old=True)
+    for signing, recorded in ((None, [(5, beat)]), (Signing(bytes(32), 0), [])):
+        link = SerialLink(settings, signing, lambda system, _, data, received: noted.append((system, data)))
+        os.write(plug.radio, beat)
+        assert link.receive() == [] and link.rejected == {"mavlink_1": 1} and noted == recorded
+        link.close()
+        noted.clear()
+    plug.pull_out()

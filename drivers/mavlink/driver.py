@@ -15,6 +15,7 @@ from drivers.mavlink.links.opening import open_link
 from drivers.mavlink.links.seam import Heard, MavlinkLink
 from drivers.mavlink.other_stations import OtherStations
 from drivers.mavlink.settings import MavlinkDriverSettings
+from drivers.mavlink.signing_key import read_key
 from drivers.mavlink.vehicle import MavlinkVehicle
 from drivers.mavlink.wire import frames
 from drivers.mavlink.wire.names import NO_AUTOPILOT, MavSeverity
@@ -53,8 +54,9 @@ class Fleet:
         if caution := line_load.caution(settings):
             self._tell(f"{settings.link.target} {caution}", "")
         shown = {vehicle.system_id: vehicle for vehicle in settings.vehicles}
+        key = read_key(settings.link.key_file) if settings.link.key_file else b""
         self.link: MavlinkLink = open_link(
-            settings.link, self._sniff, lambda transport: with_riders(transport, shown, self._tell)
+            settings.link, self._sniff, lambda transport: with_riders(transport, shown, self._tell, key)
         )
         self.vehicles = {v.system_id: MavlinkVehicle(settings, v, self.link, child.bus) for v in settings.vehicles}
         self._stations = OtherStations(

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 
 from drivers.mavlink.links.rider import Rider
 from drivers.mavlink.links.seam import Heard, Transport
-from drivers.mavlink.riding_along import Passage, may_pass, passage_of
+from drivers.mavlink.riding_along import Passage, may_pass, passage_of, words_of
 from drivers.mavlink.settings import VehicleSettings
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.flight import CommandAckMessage
@@ -23,16 +23,19 @@ _log = logging.getLogger(__name__)
 
 _TAKEN_BACK, _MAVLINK_2 = "RESUME or TRACK takes the drone back", "set it to MAVLink 2"
 _STOP_HERE = "order HOLD or LAND here"
+_KEY = "order HOLD or LAND here, and give that station the link's key"
 
 Tell = Callable[[str, str], None]
 
 
-def with_riders(transport: Transport, vehicles: Mapping[int, VehicleSettings], tell: Tell) -> Transport:
+def with_riders(
+    transport: Transport, vehicles: Mapping[int, VehicleSettings], tell: Tell, key: bytes = b""
+) -> Transport:
     """Return the link with its second ground stations (riders), unchanged if there are none.
 
-    tell: texts with remedies.
+    tell: texts with remedies. key: that of a signed link.
     """
-    riders = {system: Rider(vehicle) for system, vehicle in vehicles.items() if vehicle.forward}
+    riders = {system: Rider(vehicle, key) for system, vehicle in vehicles.items() if vehicle.forward}
     return ForwardedLink(transport, riders, tell) if riders else transport
 
 
@@ -164,16 +167,31 @@ class ForwardedLink(Transport):
         message = frame.message
         match passage_of(number_of(raw), message, rider.system, rider.flavour, rider.allowed):
             case Passage.STOP if message is not None:
+                if not self._is_signed(rider, raw, words_of(message, rider.flavour)):
+                    return
                 words = rider.stop(clock.now_ns(), message, raw)
                 self._pass_stop(rider)
                 self._tell_once(f"{rider.name}: a second ground station stops it ({words})", _TAKEN_BACK)
             case Passage.PASS if rider.allowance.take(clock.now_ns()):
+                rider.check_signature(raw)
                 self._transport.send_raw(rider.system, raw)
             case Passage.PASS:
                 self.rejected["rider_too_many"] += 1
             case Passage.REFUSE:
                 self.rejected["rider_refused"] += 1
                 rider.refuse(frame)
+
+    def _is_signed(self, rider: Rider, raw: bytes, words: str) -> bool:
+        """Return whether the vehicle takes a stop's signature; if not, it is reported as one that does not pass."""
+        try:
+            rider.check_signature(raw)
+        except WireError as error:
+            self._reject(rider, error)
+            why = "is not signed" if error.reason == "unsigned" else "is signed with another key"
+            text = f"{rider.name}: a second ground station's stop ({words}) {why} and does not pass"
+            self._tell_once(text, _KEY)
+            return False
+        return True
 
     def _tell_once(self, text: str, remedy: str) -> None:
         now_ns = clock.now_ns()

@@ -13,6 +13,7 @@ from drivers.mavlink.wire.flight import CommandAckMessage, CommandInt, CommandLo
 from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder, Message, ReceivedFrame
 from drivers.mavlink.wire.names import AUTOPILOT_COMPONENT, Flavour, MavResult
 from drivers.mavlink.wire.service import FileTransferProtocol
+from drivers.mavlink.wire.verification import check_signature
 from groundstation.time_units import NS_PER_S
 
 # Frames that pass in addition to stops: enough for a table of parameters in half a minute, too few to delay setpoints.
@@ -36,9 +37,12 @@ class _Allowance:
 
 
 class Rider:
-    """The way to and from the second ground station of one vehicle, on a port of its own."""
+    """The way to and from the second ground station of one vehicle, on a port of its own.
 
-    def __init__(self, vehicle: VehicleSettings) -> None:
+    key: that of a signed link, else empty: without it the vehicle would ignore what the station sends.
+    """
+
+    def __init__(self, vehicle: VehicleSettings, key: bytes = b"") -> None:
         _, host, port = vehicle.forward.split(":")
         self.name, self.system = vehicle.name, vehicle.system_id
         self.flavour = Flavour[vehicle.flavour.upper()]
@@ -46,6 +50,7 @@ class Rider:
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.setblocking(False)
         self.decoder, self.encoder = FrameDecoder(), FrameEncoder(vehicle.system_id, AUTOPILOT_COMPONENT)
+        self._key = key
         self.allowance, self.stops = _Allowance(), StopQueue()
         self._asked: dict[int, tuple[int, str]] = {}
 
@@ -64,6 +69,14 @@ class Rider:
             case _:
                 return
         self.show(self.encoder.encode(answer))
+
+    def check_signature(self, raw: bytes) -> None:
+        """Return if the vehicle takes the signature of a frame, or needs none; raises WireError (unsigned, signature).
+
+        The vehicle judges the time of signing, since it alone knows which senders it has heard.
+        """
+        if self._key:
+            check_signature(raw, self._key)
 
     def stop(self, now_ns: int, message: Message, raw: bytes) -> str:
         """Put a stop into the queue, and return it in words."""

@@ -61,7 +61,7 @@ class Verifier:
         if len(frame) < HEADER + CHECKSUM or frame_size(frame) != len(frame):
             raise WireError("size", f"{len(frame)} bytes")
         if self._key is not None:
-            _check_signature(frame, self._key)
+            check_signature(frame, self._key)
         _check_sum(frame)
         if self._key is not None:
             self._check_time(frame)
@@ -76,7 +76,8 @@ class Verifier:
         self.newest = max(self.newest, stamp)
 
 
-def _check_signature(frame: bytes, key: bytes) -> None:
+def check_signature(frame: bytes, key: bytes) -> None:
+    """Return if a whole frame is signed with a key, at whatever time; raises WireError (unsigned, signature)."""
     if not frame[2] & SIGNED:
         raise WireError("unsigned", f"from system {frame[5]}")
     if not hmac.compare_digest(digest(key, frame[:-6]), frame[-6:]):

@@ -1,18 +1,28 @@
 """A second ground station on a forwarded link sees the vehicle and may stop it, but cannot fly it or crowd us out."""
 
 import socket
+import sys
 import time
+from pathlib import Path
 
 import pytest
 
+from drivers.mavlink.driver import Fleet
 from drivers.mavlink.links.forwarding import with_riders
 from drivers.mavlink.links.opening import open_link
-from drivers.mavlink.settings import LinkSettings, VehicleSettings
+from drivers.mavlink.settings import LinkSettings, MavlinkDriverSettings, VehicleSettings
+from drivers.mavlink.signing_clock import SigningClock
 from drivers.mavlink.wire.flight import CommandAckMessage, CommandLong, SetPositionTargetLocalNed
 from drivers.mavlink.wire.frames import FrameDecoder, FrameEncoder, split
 from drivers.mavlink.wire.names import MavCmd, MavResult
 from drivers.mavlink.wire.service import FileTransferProtocol, ParamRequestList
 from drivers.mavlink.wire.telemetry import Heartbeat
+from drivers.mavlink.wire.verification import Signing
+from groundstation.bus import clock
+from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+
+sys.path.insert(0, str(Path(__file__).parents[1]))  # for the helper modules of that folder
+from mavlink_process import FakeProcess
 
 HEARTBEAT = Heartbeat(2, 12, 81, 0, 4)
 
@@ -20,7 +30,7 @@ HEARTBEAT = Heartbeat(2, 12, 81, 0, 4)
 class Ground:
     """A vehicle, our link to it, and a second ground station, all stepped by hand."""
 
-    def __init__(self, allows=()):
+    def __init__(self, allows=(), key=b""):
         self.vehicle = udp()
         self.station = udp()
         self.told: list[str] = []
@@ -31,7 +41,7 @@ class Ground:
         address, port = self.vehicle.getsockname()
         self.link = open_link(
             LinkSettings(target=f"udpout:{address}:{port}"),
-            shown=lambda transport: with_riders(transport, {11: ours}, lambda text, _: self.told.append(text)),
+            shown=lambda transport: with_riders(transport, {11: ours}, lambda text, _: self.told.append(text), key),
         )
         self.vehicle_says, self.station_says = FrameEncoder(11, 1), FrameEncoder(255, 190)
         self.link.send(11, HEARTBEAT)
@@ -224,3 +234,51 @@ def test_parameters_pass_where_the_field_allows_them_50_a_second_and_stops_beyon
     assert sum(isinstance(message, ParamRequestList) for message in came) >= 50
     eventually(lambda: ground.told)
     assert ground.link.rejected["rider_too_many"] >= 20
+
+
+KEY = bytes(range(32))
+
+
+def test_on_a_signed_link_only_a_signed_stop_passes_and_another_is_told_so(request):
+    ground = Ground(key=KEY)
+    request.addfinalizer(ground.close)
+    for _ in range(2):
+        ground.order(command(MavCmd.NAV_LAND))
+    eventually(lambda: ground.told)
+    ground.station_says = FrameEncoder(255, 190, Signing(bytes(32), 0))
+    ground.order(command(MavCmd.NAV_LAND), command(MavCmd.REQUEST_MESSAGE, 148.0))
+    eventually(lambda: ground.told[1:])
+    nothing_comes(ground.vehicle)
+    stop = "drone_2: a second ground station's stop (LAND)"
+    assert ground.told == [
+        f"{stop} is not signed and does not pass",
+        f"{stop} is signed with another key and does not pass",
+    ]
+    assert ground.link.rejected["rider_unsigned"] == ground.link.rejected["rider_signature"] == 2
+    ground.station_says = FrameEncoder(255, 190, Signing(KEY, 0))
+    ground.order(command(MavCmd.NAV_LAND))
+    assert message_of(ground.vehicle) == command(MavCmd.NAV_LAND)
+    assert eventually(lambda: ground.told[2:]) == ["drone_2: a second ground station stops it (LAND)"]
+
+
+def test_the_driver_judges_by_the_key_of_its_link(tmp_path, request):
+    (tmp_path / "key").write_bytes(KEY)
+    (tmp_path / "key").chmod(0o600)
+    vehicle, station = udp(), udp()
+    ours = {"name": "drone_2", "system_id": 11, "flavour": "ardupilot"}
+    link = {"target": "udpout:{}:{}".format(*vehicle.getsockname()), "key_file": str(tmp_path / "key")}
+    settings = MavlinkDriverSettings.model_validate(
+        {"link": link, "vehicles": [ours | {"forward": f"udp:127.0.0.1:{station.getsockname()[1]}"}]}
+    )
+    process = FakeProcess(MemoryBus(MemoryExchange(), "lab", "mavlink"))
+    fleet = Fleet(process, settings)
+    for end in (station.close, vehicle.close, fleet.close):
+        request.addfinalizer(end)
+    fleet.link.send(11, HEARTBEAT)
+    _, here = vehicle.recvfrom(2048)
+    vehicle.sendto(FrameEncoder(11, 1, Signing(KEY, SigningClock().stamp())).encode(HEARTBEAT), here)
+    _, rider = station.recvfrom(2048)
+    station.sendto(FrameEncoder(255, 190).encode(command(MavCmd.NAV_LAND)), rider)
+    assert eventually(lambda: fleet.turn(clock.now_ns()) or process.texts) == [
+        "drone_2: a second ground station's stop (LAND) is not signed and does not pass"
+    ]

@@ -150,6 +150,23 @@ def test_a_vehicle_that_speaks_mavlink_1_only_is_told_once_it_does_not_answer():
         os.close(line)
 
 
+def test_a_line_with_little_room_and_what_it_loses_are_told():
+    radio, line = pty.openpty()
+    flying = Flying(f"serial:{os.ttyname(line)}:115200", {9: "px4"})
+    try:
+        flying.fleet.turn(0)
+        assert len(flying.process.texts) == 1 and "115200 leaves little room: 9.0 kB/s" in flying.process.texts[0]
+        flying.fleet.link.rejected["send_dropped"] += 20
+        flying.fleet.turn(1)
+        assert flying.process.texts[1:] == [
+            "the serial line carries less than is sent: poses and setpoints are left out"
+        ]
+    finally:
+        flying.close()
+        os.close(radio)
+        os.close(line)
+
+
 def test_a_vehicle_that_vanishes_is_lost_and_found_again(hangar, kind):
     emulator, _, (address, port) = hangar.add("px4", 9)
     flying = Flying(f"udpout:{address}:{port}", {9: "px4"}, kind)

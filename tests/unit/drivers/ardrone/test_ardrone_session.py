@@ -39,7 +39,8 @@ class Tcp:
 
     def __init__(self, drone, version="2.3.3", control=True, broken=0):
         self.drone, self.answer, self.control, self.broken = drone, version, control, broken
-        self.version, self.listening, self._answer = None, False, b""
+        self.version, self.listening = None, False
+        self._answer: bytes | None = b""
 
     def ask_version(self):
         self.version = self.answer
@@ -222,7 +223,7 @@ def test_flat_trim_waits_until_the_drone_stands_still_and_level():
     run(session, drone, until=SessionPhase.TRIMMING)
     for i in range(400, 500):
         assert session.step(i * TICK, drone.state, 0, still=False) == []
-    assert session.phase is SessionPhase.TRIMMING and session.detail == "waits until it stands still and level"
+    assert session.phase == "TRIMMING" and session.detail == "waits until it stands still and level"
     sent = [command.name for i in range(500, 504) for command in session.step(i * TICK, drone.state, 0)]
     assert sent == ["FTRIM"] * 3 and session.phase is SessionPhase.READY
 

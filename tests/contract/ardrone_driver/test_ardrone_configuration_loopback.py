@@ -72,14 +72,14 @@ def test_a_watchdog_that_the_drone_does_not_take_grounds_it_only_where_it_is_ano
 
 
 def test_a_drone_in_the_operators_hands_is_not_trimmed(rig):
-    rig.fake.theta = 12_000.0
+    rig.fake.theta, rig.fake.force_mg = 12_000.0, 208.0
     rig.until(lambda: rig.drone._session.phase == "TRIMMING")
     until = time.monotonic() + 1.3
     while time.monotonic() < until:
         rig.turn()
     assert rig.fake.said("FTRIM") == []
     assert rig.drone.view(time.monotonic_ns()).not_ready == "waits until it stands still and level"
-    rig.fake.theta = 1000.0
+    rig.fake.theta, rig.fake.force_mg = 1000.0, 0.0
     rig.connect()
     assert rig.fake.said("FTRIM")
 

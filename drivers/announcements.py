@@ -18,7 +18,6 @@ _UNSOUND = "restart it; if it says this again, have that sensor repaired"
 # Refusals caused from outside of this run, in the operator's words.
 _INTRUSIONS = {
     "unsigned": "unsigned frames",
-    "mavlink_1": "frames of MAVLink 1 (set version 2 on the vehicle)",
     "wrong_flavour": "heartbeats of another firmware than the field says",
     "signature": "frames signed with another key",
     "duplicate_system": "frames with its number from a second address (another vehicle, or it was restarted there)",
@@ -29,8 +28,6 @@ _INTRUSIONS = {
     "overflow": "orders and leases unread, as too many came at once (a member of the run floods it)",
     "lease_held": "operator leases of another sender",
 }
-# A vehicle may speak MAVLink 1 until it is greeted: it matters if it then still does not answer.
-_WHILE_SILENT = frozenset({"mavlink_1"})
 
 
 class Announcements:
@@ -64,8 +61,7 @@ class Announcements:
 
     def tell_intrusions(self, now_ns: int, rejected: Mapping[str, int]) -> None:
         """Report refused messages from outside of the run; rejected: their numbers so far, by reason."""
-        told = {reason: n for reason, n in rejected.items() if self._silent or reason not in _WHILE_SILENT}
-        if refused := self._intrusions.news(now_ns, told):
+        if refused := self._intrusions.news(now_ns, rejected):
             self._event(Severity.WARNING, f"{self._vehicle.name} refused {refused}")
 
     def tell_silence(self, now_ns: int, view: VehicleView, mode: DriverMode) -> None:

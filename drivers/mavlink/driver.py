@@ -19,6 +19,7 @@ from drivers.mavlink.signing_key import read_key
 from drivers.mavlink.vehicle import MavlinkVehicle
 from drivers.mavlink.wire import frames
 from drivers.mavlink.wire.names import NO_AUTOPILOT, MavSeverity
+from drivers.mavlink.wire.signature import MAGIC_1
 from drivers.mavlink.wire.telemetry import Heartbeat
 from drivers.start_report import StartReport
 from groundstation.bus.messages import Estimate, Severity
@@ -74,6 +75,8 @@ class Fleet:
     def _sniff(self, system: int, stamp_ns: int, data: bytes, received: bool) -> None:
         vehicle = self.vehicles.get(system)
         if vehicle is not None:
+            if received and data[0] == MAGIC_1:
+                vehicle.misfit.take_old(stamp_ns)
             (vehicle.log.received if received else vehicle.log.sent)(stamp_ns, data)
 
     def _tell(self, text: str, remedy: str) -> None:

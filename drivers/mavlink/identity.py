@@ -2,7 +2,9 @@
 
 from drivers.mavlink.wire.names import Flavour
 from drivers.mavlink.wire.telemetry import AutopilotVersion
+from groundstation.time_units import NS_PER_S
 
+_HEARTBEAT_NS = 4 * NS_PER_S
 _WORDS = {Flavour.PX4: "a PX4", Flavour.ARDUPILOT: "an ArduPilot"}
 
 
@@ -24,3 +26,25 @@ def serial_number_of(version: AutopilotVersion) -> str:
     if any(version.uid2):
         return bytes(version.uid2).hex().upper()
     return f"{version.uid:016X}" if version.uid else ""
+
+
+class Misfit:
+    """Why the frames of a vehicle that does not count as heard are of no use, by its heartbeats of the last seconds."""
+
+    def __init__(self, flavour: Flavour) -> None:
+        self._flavour = flavour
+        self._told: tuple[int, str] | None = None
+
+    def take(self, now_ns: int, autopilot: int) -> str:
+        """Take a heartbeat; return that it is another kind than the field file says, with the remedy, or ""."""
+        self._told = now_ns, other_flavour(autopilot, self._flavour)
+        return self._told[1]
+
+    def take_old(self, now_ns: int) -> None:
+        """Take a frame of MAVLink 1, which some vehicles send until they are greeted, and routers among others."""
+        if self._told is None or self._told[1] or now_ns - self._told[0] > _HEARTBEAT_NS:
+            self._told = now_ns, "it speaks MAVLink 1 only: set version 2 on it"
+
+    def words(self, now_ns: int) -> str:
+        """Return the reason, "" if there is none."""
+        return self._told[1] if self._told is not None and now_ns - self._told[0] < _HEARTBEAT_NS else ""

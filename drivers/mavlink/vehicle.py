@@ -66,7 +66,7 @@ class MavlinkVehicle:
         self.orders = Orders(vehicle, self.flavour, self._requests)
         self._vision_period_ns = round(1e9 / settings.vision.rate_hz)
         self._next_vision_ns = 0
-        self._foreign = 0, ""  # the last heartbeat: when, and in words that it is another firmware's
+        self.misfit = identity.Misfit(self.flavour)
         self._traffic = Traffic()
         self._plausibility = MotionMonitor(LIMITS)
         self._refused: Counter[str] = Counter()
@@ -106,9 +106,8 @@ class MavlinkVehicle:
             case telemetry.RawImu():
                 known = self._felt(now_ns, *convert.imu_from_raw(message), known)
             case telemetry.Heartbeat():
-                self._foreign = now_ns, identity.other_flavour(message.autopilot, self.flavour)
-                if self._foreign[1]:
-                    raise WireError("wrong_flavour", self._foreign[1])
+                if words := self.misfit.take(now_ns, message.autopilot):
+                    raise WireError("wrong_flavour", words)
                 known = known.after_heartbeat(now_ns, message)
             case _:
                 known = self._take_rare(now_ns, message, known)
@@ -200,13 +199,9 @@ class MavlinkVehicle:
             unlocated=self.vision.missed, mute=mute,
         )  # fmt: skip
 
-    def _is_foreign(self, now_ns: int) -> str:
-        told_ns, words = self._foreign
-        return words if now_ns - told_ns < _HEARTBEAT_NS else ""
-
     def _mute(self, now_ns: int, known: LatestTelemetry) -> str:
-        if foreign := self._is_foreign(now_ns):
-            return foreign
+        if words := self.misfit.words(now_ns):
+            return words
         # WIRE (ArduCopter 4.6.2): without a position it ends its LOCAL_POSITION_NED, in flight as well.
         heard = now_ns - known.heard_ns < FRESH_NS and now_ns - known.heartbeat_ns < _HEARTBEAT_NS
         return "it tells no velocity, as its own estimator knows none" if heard and known.moved_ns else ""
@@ -306,7 +301,7 @@ class MavlinkVehicle:
         rate_hz, quality = self._traffic.rates(now_ns)
         lost_s, limit_s = self.vision.lost_s(now_ns), self._settings.vision.hover_after_s
         lost = f"no position {self.vision.missed} for {lost_s:.1f} s" if lost_s >= limit_s else ""
-        detail = self._is_foreign(now_ns) or lost or self.orders.yields or self._session.detail(self._requests)
+        detail = self.misfit.words(now_ns) or lost or self.orders.yields or self._session.detail(self._requests)
         rejected = dict(self._link.rejected.copy() + self._refused)
         clocks, firmware = self._plausibility.clock.figures, self._session.firmware
         return LinkHealth(quality, rate_hz, rejected, detail, clocks, firmware, self._asks_time(now_ns))

@@ -71,6 +71,7 @@ class Tracker:
         self._unlocalised_s: Mapping[str, float] = {}
         self._corrections: list[Correction] = []
         self._notices: list[Notice] = []
+        self._modes: Mapping[str, FlightMode] = {}
         self._robots = tuple(n for n, m in parameters.estimator.entities.items() if m.kind is EntityKind.ROBOT)
         self._targets = tuple(n for n, m in parameters.estimator.entities.items() if m.kind is EntityKind.TARGET)
         self.lookout = Lookout(parameters.search, parameters.control, parameters.sensors, self._robots, self._targets)
@@ -267,8 +268,9 @@ class Tracker:
             min(seen_s, default=None), unseen_s, lookout.missed_s, lookout.missing,
             lambda robots, targets: lookout.stands(robots, targets, belief), lookout.velocity_errors_m_s, drifts,
             lookout.unsteered, {n: self._tied_age_s(n) for n in belief.layout.robots}, velocities,
-            {n: self._roots.helped_age_s(n) for n in belief.layout.robots})  # fmt: skip
+            {n: self._roots.helped_age_s(n) for n in belief.layout.robots}, self._modes)  # fmt: skip
         wanted = setpoints_from_plan(plan, belief, airborne, p.control, p.sensors, sight)
+        self._modes = {name: one.phase for name, one in wanted.items()}
         safety, shafts = self._hovering.within(p.safety), self._shafts.around(belief, airborne)
         limited = {
             name: limit_setpoint(name, setpoint, belief, now_ns, safety, velocities, drifts, shafts)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from groundstation.arrays import Array
+from groundstation.control.flight_mode import FlightMode
 from groundstation.control.parameters import ControlParameters
 from groundstation.control.stand import Stand
 from groundstation.estimation.belief import JointBelief
@@ -31,7 +32,7 @@ class Sight:
     odometry; drifts_m_s: motion of each robot beyond its commands (3) [m/s; world]; unsteered: robots that follow no
     setpoints: they wait or land; untied_s: time since a sensor fixed in the room last located each robot, or another
     one saw it; velocities_m_s: of each robot (3) [m/s; world]; helped_s: time since others than the sensors fixed in
-    the room last located each robot.
+    the room last located each robot; before: modes of the robots in the last step.
     """
 
     target_age_s: float | None = None
@@ -45,6 +46,7 @@ class Sight:
     untied_s: Mapping[str, float] = field(default_factory=dict)
     velocities_m_s: Mapping[str, Array] = field(default_factory=dict)
     helped_s: Mapping[str, float] = field(default_factory=dict)
+    before: Mapping[str, FlightMode] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

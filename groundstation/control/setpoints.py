@@ -14,6 +14,7 @@ from groundstation.control.moment import STILL, Moment, Sight, is_untied, soon, 
 from groundstation.control.parameters import ControlParameters
 from groundstation.control.regaining import regaining, who_regains
 from groundstation.control.returning import is_lost, return_stand
+from groundstation.control.scouting import scout_of
 from groundstation.control.search_spacing import apart
 from groundstation.control.stand import Stand
 from groundstation.control.view import view_of
@@ -83,8 +84,9 @@ def _phases(plan: PlanResult | None, airborne: Collection[str], now: Moment) -> 
         )
         for name in airborne
     }
-    tracking = [name for name in steered(now.robots, now) if phases[name] is FlightMode.TRACK]
-    scout = _scout(tracking, now) if fresh and now.sight.missing else None
+    if plan is None or not fresh or not now.sight.missing:
+        return phases
+    scout = scout_of([name for name in now.robots if phases[name] is FlightMode.TRACK], plan.topology, now)
     return phases if scout is None else phases | {scout: FlightMode.SEARCH}
 
 
@@ -152,15 +154,6 @@ def _search_level_m(name: str, phase: FlightMode, now: Moment) -> float:
 def _is_lost(name: str, now: Moment) -> bool:
     unseen_s, error_m_s = now.sight.unseen_s.get(name, 0.0), now.sight.velocity_errors_m_s.get(name, 0.0)
     return name in now.sight.missed_s or is_lost(name, now.belief, now.parameters, now.sensors, unseen_s, error_m_s)
-
-
-def _scout(tracking: Sequence[str], now: Moment) -> str | None:
-    """Return the robot that can be spared for a search: the farthest from the tracked targets; None if it is alone."""
-    belief = now.belief
-    seen = [belief.mean_of(name)[:2] for name in belief.layout.targets if name not in now.sight.missing]
-    if len(tracking) < 2 or not seen:
-        return None
-    return max(tracking, key=lambda name: min(math.dist(belief.mean_of(name)[:2], place) for place in seen))
 
 
 def _stands(phases: Mapping[str, FlightMode], searching: Mapping[str, Stand], now: Moment) -> dict[str, Stand]:

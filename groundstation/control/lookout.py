@@ -166,6 +166,8 @@ class Lookout:
         for name, state in self.targets.items():
             if state.mode is self._told[name] or (state.mode is not SearchMode.TRACK and not self._obeyed):
                 continue
+            if state.mode is SearchMode.SEARCH and state.place is None:
+                continue  # not yet known whether a robot is free: the setpoints of this tick decide it
             self._told[name] = state.mode
             if state.mode is SearchMode.LOST:
                 floor = _floor(self._search.never_shown)
@@ -174,7 +176,10 @@ class Lookout:
             elif state.mode is SearchMode.SEARCH:
                 place = self._search.likeliest(name)
                 text = f"{name} is not where it was expected: the team searches around ({place[0]:.1f}, {place[1]:.1f})"
-                self._notices.append(Notice(Severity.WARNING, text, "", name))
+                remedy = ""
+                if state.expected_s is None:
+                    text, remedy = f"{name} is not where it was expected, and no drone is free to search", _CALL_REMEDY
+                self._notices.append(Notice(Severity.WARNING, text, remedy, name))
             else:
                 self._notices.append(Notice(Severity.INFO, f"{name} is found", "", name))
 
@@ -183,13 +188,15 @@ def _message(name: str, state: SearchState, now_ns: int, never_shown: float) -> 
     since_s = (now_ns - state.since_ns) / NS_PER_S
     x, y = state.place or (0.0, 0.0)
     how_long = "nobody can search now" if state.expected_s is None else f"about {state.expected_s:.0f} s more"
-    done = f"{state.excluded:.0%} of {_floor(never_shown)} done"
+    floor = _floor(never_shown)
+    done = f"{state.excluded:.0%} of {floor} done"
     text = f"searched for {since_s:.0f} s, most likely near ({x:.1f}, {y:.1f}); {done}, {how_long}"
     if state.mode is SearchMode.LOST:
         text = f"not found in {since_s:.0f} s, {done}: {_CALL_REMEDY}"
     expected_s = None if state.expected_s is None else round(state.expected_s, 1)
     place = (round(x, 2), round(y, 2))
-    return TargetSearch(name, str(state.mode), round(since_s, 1), place, round(state.excluded, 3), expected_s, text)
+    mode, searched = str(state.mode), round(state.excluded, 3)
+    return TargetSearch(name, mode, round(since_s, 1), place, searched, expected_s, text, floor)
 
 
 def _floor(never_shown: float) -> str:

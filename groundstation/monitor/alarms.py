@@ -252,10 +252,11 @@ def _searched(search: TargetSearch) -> Alarm:
     """Return the alarm for a target without a usable estimate, no longer or not yet."""
     about, (x, y) = f"{search.target} lost", search.place_m
     if search.mode == "LOST":
-        return Alarm(
-            about, f"{search.target} is not found: {search.searched:.0%} of the room was searched", False, _CALL
-        )
+        text = f"{search.target} is not found: {search.searched:.0%} of {search.floor} was searched"
+        return Alarm(about, text, False, _CALL)
     text = f"{search.target} is lost, most likely near ({x:.1f}, {y:.1f})"
+    if search.expected_s is None:
+        return Alarm(about, f"{text}; no drone is free to search", False, _CALL)
     return Alarm(about, text, False, _SEARCH)
 
 

@@ -48,11 +48,13 @@ class TargetSearch(msgspec.Struct, frozen=True):
     place_m: tuple[float, float]
     """Where the target most likely is [m; world]."""
     searched: float
-    """Share of the room that was searched, of that which the team can see."""
+    """Share of the room that was searched, of that which the team can see (`floor`)."""
     expected_s: float | None
     """Estimated remaining time [s]; none: no robot can search."""
     text: str
     """The same in words."""
+    floor: str = "the room"
+    """What `searched` is a share of, in words: the room, or the part of it that the team can see."""
 
 
 class SearchMap(Message, frozen=True, kw_only=True):

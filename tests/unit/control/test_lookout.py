@@ -56,8 +56,11 @@ def lookout_of_the_lab() -> Lookout:
     )
 
 
-def look_in_vain(lookout: Lookout, unmeasured: tuple[str, ...] = ()) -> None:
-    """Take 2.8 s of pictures without the target, longer than an occlusion may last; unmeasured: whom they may show."""
+def look_in_vain(lookout: Lookout, unmeasured: tuple[str, ...] = (), free: tuple[str, ...] = ("drone_1",)) -> None:
+    """Take 2.8 s of pictures without the target, longer than an occlusion may last.
+
+    unmeasured: whom they may show; free: robots that can search.
+    """
     for tick in range(1, 140):
         now_s = 0.02 * (tick + 1)
         header = Header(round(now_s * 1e9), "c", "drone_1", "drone_1_camera", tick)
@@ -65,7 +68,7 @@ def look_in_vain(lookout: Lookout, unmeasured: tuple[str, ...] = ()) -> None:
             camera = "drone_1_camera"
             lookout.take(SearchedPicture(header=header, observer="drone_1", camera=camera, unmeasured=unmeasured))
         lookout.advance(belief(now_s), {"drone_1": 0.1, "turtlebot": now_s}, {"drone_1": 0.1})
-        lookout.stands(("drone_1",), lookout.missing, belief(now_s))
+        lookout.stands(free, lookout.missing, belief(now_s))
 
 
 def test_a_loss_is_told_at_once_with_where_it_is_searched_and_so_is_its_end() -> None:
@@ -95,6 +98,18 @@ def test_a_loss_is_told_at_once_with_where_it_is_searched_and_so_is_its_end() ->
     assert lookout.maps() == {}
 
 
+def test_a_loss_that_no_robot_is_free_to_search_for_is_told_as_that() -> None:
+    lookout = lookout_of_the_lab()
+    lookout.take(driver_in("TRACK"))
+    lookout.advance(belief(0.02), {"drone_1": 0.1, "turtlebot": 0.1}, {"drone_1": 0.1})
+    lookout.take_notices()
+    look_in_vain(lookout, free=())
+    _, notice = lookout.take_notices()
+    assert notice.text == "turtlebot is not where it was expected, and no drone is free to search"
+    assert "check its marker" in notice.remedy
+    assert lookout.searches(round(2.8e9))[0].expected_s is None
+
+
 def test_pictures_with_a_board_that_may_be_the_targets_are_no_evidence_that_it_is_elsewhere() -> None:
     """The map was emptied just where the target stood, with glare on its bar or a spare print beside it."""
     chances = []
@@ -115,7 +130,9 @@ def test_floor_that_nobody_can_see_is_told_and_not_counted() -> None:
     lookout.take(driver_in("TRACK"))
     lookout.advance(belief(0.02), {"drone_1": 0.1, "turtlebot": 0.1}, {"drone_1": 0.1})
     look_in_vain(lookout)
-    assert re.search(r"% of the \d+% of the room that the team can see done", lookout.searches(round(2.8e9))[0].text)
+    (told,) = lookout.searches(round(2.8e9))
+    assert re.fullmatch(r"the \d\d% of the room that the team can see", told.floor)
+    assert f"% of {told.floor} done" in told.text
 
 
 def test_a_target_that_comes_into_view_again_is_said_to_be_seen() -> None:

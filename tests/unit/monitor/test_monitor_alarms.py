@@ -202,14 +202,18 @@ def test_a_drone_that_is_seen_elsewhere_or_by_unlocated_ones_is_an_alarm(
 
 
 @pytest.mark.parametrize(
-    ("mode", "text", "asks"),
+    ("mode", "expected_s", "text", "asks"),
     [
-        ("SEARCH", "turtlebot is lost, most likely near (1.7, -0.9)", False),
-        ("LOST", "turtlebot is not found: 96% of the room was searched", True),
+        ("SEARCH", 21.0, "turtlebot is lost, most likely near (1.7, -0.9)", False),
+        ("SEARCH", None, "turtlebot is lost, most likely near (1.7, -0.9); no drone is free to search", True),
+        ("LOST", 21.0, "turtlebot is not found: 96% of the 41% of the room that the team can see was searched", True),
     ],
 )
-def test_a_target_that_is_searched_for_is_one_alarm_of_its_own(world: World, mode: str, text: str, asks: bool) -> None:
-    search = m.TargetSearch("turtlebot", mode, 5.0, (1.7, -0.9), 0.96, 21.0, "in words")
+def test_a_target_that_is_searched_for_is_one_alarm_of_its_own(
+    world: World, mode: str, expected_s: float | None, text: str, asks: bool
+) -> None:
+    floor = "the 41% of the room that the team can see"
+    search = m.TargetSearch("turtlebot", mode, 5.0, (1.7, -0.9), 0.96, expected_s, "in words", floor)
     world.estimate(4.0, 0.0, search)
     world.text()
     (alarm,) = alarms_of(world.state, NOW)

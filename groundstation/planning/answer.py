@@ -1,0 +1,38 @@
+"""Judges what a planner returned, perhaps another package's, before anybody flies it. Pure."""
+
+import math
+from collections.abc import Collection
+from typing import Any
+
+import numpy as np
+
+from groundstation.bus.messages import Alternative, Edge, SolverReport
+from groundstation.planning.records import HEIGHT
+from groundstation.sensing.topology import Topology
+
+
+def check_answer(answer: Any, robots: Collection[str], stamp_ns: int) -> None:
+    """Raise ValueError if a `PlanResult` cannot be flown or published.
+
+    robots, stamp_ns: those of the request, and the time of its belief.
+    """
+    if not isinstance(answer.topology, Topology) or not answer.topology.robots.issuperset(answer.controls):
+        raise ValueError(f"a plan needs a Topology with all robots that it controls, not {answer.topology!r}")
+    if strangers := (answer.topology.robots | set(answer.controls) | set(answer.heights)).difference(robots):
+        raise ValueError(f"a plan was asked for {sorted(robots)}, not for {sorted(strangers)}")
+    if answer.stamp_ns != stamp_ns:
+        raise ValueError(f"a plan has the time of the belief, {stamp_ns} ns, not {answer.stamp_ns!r}")
+    for name, control in answer.controls.items():
+        values = np.asarray(control, dtype=np.float64)
+        if values.shape != (HEIGHT,) or not np.isfinite(values).all():
+            raise ValueError(f"a plan has {HEIGHT} finite controls for {name}, not {control!r}")
+        if name not in answer.heights:
+            raise ValueError(f"a plan has no height for {name}")
+    figures = {"cost": answer.cost, "uncertainty": answer.uncertainty, **answer.heights}
+    if wrong := {
+        name: one for name, one in figures.items() if not isinstance(one, int | float) or not math.isfinite(one)
+    }:
+        raise ValueError(f"a plan has finite figures, not {wrong}")
+    for kind, parts in ((Edge, answer.edges), (Alternative, answer.alternatives), (SolverReport, (answer.solver,))):
+        if not isinstance(parts, tuple) or not all(isinstance(part, kind) for part in parts):
+            raise ValueError(f"a plan has a tuple of {kind.__name__}, not {parts!r}")

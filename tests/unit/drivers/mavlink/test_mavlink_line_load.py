@@ -37,7 +37,7 @@ def test_a_line_that_carries_less_than_a_px4_is_sent_is_a_fault():
 
 @pytest.mark.parametrize(
     "flavour, baud, vision_hz, share",
-    [("px4", 115200, 30.0, "78 %"), ("px4", 57600, 15.0, "145 %"), ("ardupilot", 57600, 30.0, "112 %")],
+    [("px4", 115200, 30.0, "78 %"), ("px4", 57600, 15.0, "150 %"), ("ardupilot", 57600, 30.0, "112 %")],
 )
 def test_a_line_with_little_to_spare_is_a_caution(flavour, baud, vision_hz, share):
     fault, caution = judged(flavour, f"serial:/dev/ttyUSB0:{baud}", vision_hz)

@@ -41,6 +41,7 @@ _AFTER_LANDING = "Nothing to do now: check its power and cable once all have lan
 _DARK_ADVICE = "Nothing to do: who is not seen lands by itself, unless there is light again."
 _SWITCHED_OFF = "Nothing to do now: switch it on before it flies again."
 _SEARCH = "Nothing to do: the drones look for it."
+_WAITS = "Nothing to do now: drones look for it once they track."
 _RESTARTED = "Nothing to do: it is restarted if it hangs."
 _CALL = f"{_TO_DO}check its marker and the light; drive it into the middle of the room; or LAND ALL."
 _CUT = "CUT"
@@ -228,7 +229,7 @@ def _lost(state: MonitorState) -> Iterator[Alarm]:
             continue
         seen = state.vehicles.get(entity.name)
         if entity.name in state.cast.targets:
-            advice = _SEARCH
+            advice = _SEARCH if any(one.message.mode == "TRACK" for one in state.vehicles.values()) else _WAITS
         elif seen and seen.message.flight_state in AIRBORNE and seen.message.lands_in_s is None:
             left_s = max(0.0, state.cast.unseen_land_s - unknown_s)
             within = f" within {left_s:.0f} s" if unknown_s < NEVER_S else ""

@@ -53,3 +53,12 @@ def test_one_that_flies_although_its_motors_were_cut_asks_to_stay_away(
     world.vehicle("drone_1", "LANDED", flight_state=FlightState.LANDED)
     world.text()
     assert alarms_of(world.state, NOW) == []
+
+
+@pytest.mark.parametrize(("mode", "looks"), [("TRACK", True), ("HOLD", False), ("LANDING", False)])
+def test_nobody_is_said_to_look_for_a_target_while_no_drone_tracks(world: World, mode: str, looks: bool) -> None:
+    world.vehicle("drone_1", mode)
+    world.estimate(target_age_s=6.0)
+    world.text()
+    (alarm,) = (one for one in alarms_of(world.state, NOW) if one.about == "turtlebot lost")
+    assert (alarm.advice == "Nothing to do: the drones look for it.") == looks and not alarm.asks

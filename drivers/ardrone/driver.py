@@ -18,7 +18,7 @@ from drivers.ardrone.link import ArDroneLink, Arrival
 from drivers.ardrone.publisher import NavdataPublisher
 from drivers.ardrone.queries import TcpInquirer
 from drivers.ardrone.rate_watch import RateWatch
-from drivers.ardrone.session import ArdroneSession, SessionPhase
+from drivers.ardrone.session import DISCONNECTED_NS, ArdroneSession, SessionPhase
 from drivers.ardrone.settings import FASTEST_M_S, ArDroneDriverSettings
 from drivers.ardrone.stillness import Stillness
 from drivers.ardrone.uplink_watch import ANOTHER, UplinkWatch
@@ -38,13 +38,12 @@ from groundstation.adapters import with_zone
 from groundstation.bus.api import Bus
 from groundstation.bus.messages import AIRBORNE, UP, Severity, Vector3
 from groundstation.bus.notice import Notice
-from groundstation.time_units import NS_PER_MS, NS_PER_S
+from groundstation.time_units import NS_PER_MS
 
 # WIRE: at least every 30 ms (guide), 20-25 ms (SDK); on a busy machine a turn comes late.
 RATE_HZ = 40.0
 # A velocity that repeats below this is that of a drone that sees no floor: its firmware's own braking fails as well.
 _NO_FLOW_M_S = 0.02
-_PAUSE_NS = 2 * NS_PER_S
 _RATE_PERIOD_NS = 200 * NS_PER_MS
 # A packet of which nothing is to be published waits unread for the next one, 5 ms later: two at once take two thirds of
 # the time, since most of it is spent on bringing the code back into the processor's caches.
@@ -153,7 +152,7 @@ class ArDrone:
         if references is not None:
             self._uplink.hear(now_ns, references.sequence, self._link.sent)
         self._still.update(now_ns, motion)
-        if now_ns - heard.moved_ns > _PAUSE_NS and flight_state not in AIRBORNE:
+        if now_ns - heard.moved_ns > DISCONNECTED_NS and flight_state not in AIRBORNE:
             self._plausibility.reset()  # it may have been restarted: its clock would seem late by the pause
         sample = convert.sample_from_motion(now_ns, packet, motion)
         report = self._plausibility.update(sample, flight_state)

@@ -23,7 +23,7 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _REQUEST_PERIOD_NS = 100 * NS_PER_MS
 _REQUEST_AFTER_NS = NS_PER_S
-_DISCONNECTED_NS = 2 * NS_PER_S
+DISCONNECTED_NS = 2 * NS_PER_S
 _STAGE_NS = NS_PER_S
 _DUMP_PERIOD_NS = 300 * NS_PER_MS
 # WIRE: a dump raises bit 6 as well. Its text may arrive before the packet with the bit.
@@ -148,7 +148,7 @@ class ArdroneSession:
         state, silence_ns: the newest state word and its age; seen: the generation by navdata, if known; still: whether
         it stands still and level.
         """
-        if silence_ns > _DISCONNECTED_NS:
+        if silence_ns > DISCONNECTED_NS:
             self.phase, self.obeyed = SessionPhase.SEARCHING, False
             return []
         if self._must_begin(now_ns, state):

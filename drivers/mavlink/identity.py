@@ -1,10 +1,9 @@
 """Identifies a vehicle by its firmware, and by the number that its autopilot's maker gave it. Pure."""
 
+from drivers.mavlink.latest_telemetry import HEARTBEAT_NS
 from drivers.mavlink.wire.names import Flavour
 from drivers.mavlink.wire.telemetry import AutopilotVersion
-from groundstation.time_units import NS_PER_S
 
-_HEARTBEAT_NS = 4 * NS_PER_S
 _WORDS = {Flavour.PX4: "a PX4", Flavour.ARDUPILOT: "an ArduPilot"}
 
 
@@ -42,9 +41,9 @@ class Misfit:
 
     def take_old(self, now_ns: int) -> None:
         """Take a frame of MAVLink 1, which some vehicles send until they are greeted, and routers among others."""
-        if self._told is None or self._told[1] or now_ns - self._told[0] > _HEARTBEAT_NS:
+        if self._told is None or self._told[1] or now_ns - self._told[0] > HEARTBEAT_NS:
             self._told = now_ns, "it speaks MAVLink 1 only: set version 2 on it"
 
     def words(self, now_ns: int) -> str:
         """Return the reason, "" if there is none."""
-        return self._told[1] if self._told is not None and now_ns - self._told[0] < _HEARTBEAT_NS else ""
+        return self._told[1] if self._told is not None and now_ns - self._told[0] < HEARTBEAT_NS else ""

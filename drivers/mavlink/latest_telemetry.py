@@ -14,6 +14,8 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 # Longer than a vehicle with stopped motors takes to be on the floor and to report it.
 _FALLS_NS = 5 * NS_PER_S
 FRESH_NS = 300 * NS_PER_MS
+# Of one a second three may be lost.
+HEARTBEAT_NS = 4 * NS_PER_S
 # Shorter than the second between two heartbeats; one that came twice does not confirm itself.
 _CONFIRMS_NS = 300 * NS_PER_MS
 _NO_BATTERY = Batteries()

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from drivers.mavlink.links.tty import BITS_PER_BYTE
 from drivers.mavlink.session import streams
 from drivers.mavlink.settings import MavlinkDriverSettings, VehicleSettings
 from drivers.mavlink.wire.flight import OdometryMessage, SetPositionTargetLocalNed, VisionPositionEstimate
@@ -18,7 +19,6 @@ from drivers.mavlink.wire.telemetry import Heartbeat
 
 # Beyond this share requests, parameters and a radio that carries less than its line find too little room.
 WISE = 0.6
-_BITS = 10  # of a byte on the line, with start and stop
 _SLOWER = ", or a lower vision_hz"
 _HEARTBEAT_HZ, _TIMESYNC_HZ = 4.0, 10.0
 
@@ -48,7 +48,7 @@ def _told(what: str, settings: MavlinkDriverSettings, bytes_per_s: float, slower
 
 def _of_line(settings: MavlinkDriverSettings, bytes_per_s: float) -> float:
     way, _, baud = settings.link.target.split(":")
-    return bytes_per_s * _BITS / max(1, int(baud)) if way == "serial" else 0.0
+    return bytes_per_s * BITS_PER_BYTE / max(1, int(baud)) if way == "serial" else 0.0
 
 
 def _bytes_sent(settings: MavlinkDriverSettings) -> float:

@@ -8,7 +8,7 @@ from drivers.datagrams import DatagramLog
 from drivers.mavlink import convert, identity
 from drivers.mavlink.commands import Orders
 from drivers.mavlink.convert import LIMITS
-from drivers.mavlink.latest_telemetry import FRESH_NS, LatestTelemetry
+from drivers.mavlink.latest_telemetry import FRESH_NS, HEARTBEAT_NS, LatestTelemetry
 from drivers.mavlink.lift_off import credible
 from drivers.mavlink.links.seam import Heard, MavlinkLink
 from drivers.mavlink.other_stations import GivenOrders, is_answer_to
@@ -31,7 +31,6 @@ from groundstation.bus.api import Bus
 from groundstation.bus.messages import Estimate, FlightState, Vector3
 from groundstation.time_units import NEVER_NS, NS_PER_MS, NS_PER_S
 
-_HEARTBEAT_NS = 4 * NS_PER_S
 _ASKS_NS = 3 * NS_PER_S
 # A refusal is reported only after its STATUSTEXT: the COMMAND_ACK arrives first.
 _EXPLAIN_NS = 700 * NS_PER_MS
@@ -203,7 +202,7 @@ class MavlinkVehicle:
         if words := self.misfit.words(now_ns):
             return words
         # WIRE (ArduCopter 4.6.2): without a position it ends its LOCAL_POSITION_NED, in flight as well.
-        heard = now_ns - known.heard_ns < FRESH_NS and now_ns - known.heartbeat_ns < _HEARTBEAT_NS
+        heard = now_ns - known.heard_ns < FRESH_NS and now_ns - known.heartbeat_ns < HEARTBEAT_NS
         return "it tells no velocity, as its own estimator knows none" if heard and known.moved_ns else ""
 
     def _true_velocity(self, now_ns: int, known: LatestTelemetry) -> Vector3:
@@ -224,7 +223,7 @@ class MavlinkVehicle:
     def _is_heard(self, now_ns: int, known: LatestTelemetry) -> bool:
         # In the air, silence is judged by velocities; on the ground there may be none before the first pose.
         newest = known.heard_ns if self._landed(now_ns, known) == Landed.ON_GROUND else known.moved_ns
-        return known.heartbeat_ns > 0 and now_ns - newest < FRESH_NS and now_ns - known.heartbeat_ns < _HEARTBEAT_NS
+        return known.heartbeat_ns > 0 and now_ns - newest < FRESH_NS and now_ns - known.heartbeat_ns < HEARTBEAT_NS
 
     def apply(self, now_ns: int, decision: WatchdogDecision) -> None:
         """Send the vehicle its commands for the decision, poses for its estimator, and pending requests."""

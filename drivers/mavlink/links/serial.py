@@ -10,7 +10,7 @@ from contextlib import suppress
 from drivers.mavlink.links.frame_codec import FrameCodec
 from drivers.mavlink.links.seam import Heard, Sniffer, Transport, ignore_bytes
 from drivers.mavlink.links.stream_cutter import StreamCutter
-from drivers.mavlink.links.tty import open_raw
+from drivers.mavlink.links.tty import BITS_PER_BYTE, open_raw
 from drivers.mavlink.other_stations import speaks_as_we
 from drivers.mavlink.send_queue import SendQueue, Waiting
 from drivers.mavlink.settings import LinkSettings
@@ -27,7 +27,6 @@ _POLL_S = 0.1
 # How soon a line is tried again that took a part of a frame, or nothing.
 _RETRY_S = 0.01
 _CHUNK = 4096
-_BITS = 10  # of a byte on the line, with start and stop
 _log = logging.getLogger(__name__)
 
 
@@ -44,7 +43,7 @@ class SerialLink(Transport):
         self._cutter, self._sniffer, self._signed = StreamCutter(), sniffer, signing is not None
         self._device, self._baud = device, int(baud)
         self._fd = open_raw(self._device, self._baud)
-        self._queue = SendQueue(self._baud / _BITS, self._note_dropped)
+        self._queue = SendQueue(self._baud / BITS_PER_BYTE, self._note_dropped)
         self._rest = b""  # of the frame that was begun
         self._closed, self._line = False, threading.Condition()
         self._writer = threading.Thread(target=self._write_waiting, name="mavlink line", daemon=True)

@@ -5,6 +5,8 @@ import termios
 
 from groundstation.errors import DriverError
 
+BITS_PER_BYTE = 10  # on a line 8N1, with start and stop
+
 
 def make_raw(fd: int, baud: int) -> None:
     """Set an open device to raw bytes, 8N1; raises DriverError, termios.error."""

@@ -25,12 +25,16 @@ def scout_of(tracking: Sequence[str], topology: Topology, now: Moment) -> str | 
         return None
 
     def way_m(name: str) -> float:
-        bonus_m = _FARTHER_M if now.sight.before.get(name) is FlightMode.SEARCH else 0.0
+        bonus_m = _FARTHER_M if _searched(name, now) else 0.0
         return bonus_m + min(math.dist(belief.mean_of(name)[:2], target[:2]) for target in seen)
 
     nearest, levels = min(able, key=way_m), topology.level_by_robot()
     spared = [name for name in able if name != nearest and _can_be_spared(name, tracking, levels, seen, now)]
     return max(spared, key=way_m, default=None)
+
+
+def _searched(name: str, now: Moment) -> bool:
+    return now.sight.before.get(name) is FlightMode.SEARCH
 
 
 def _can_be_spared(
@@ -41,10 +45,7 @@ def _can_be_spared(
     To begin, those that a view locates must be in it; then a little outside is near enough, else one at the border of a
     view would call the scout back again and again.
     """
-    outside_m, place = (
-        _OUTSIDE_M if now.sight.before.get(name) is FlightMode.SEARCH else 0.0,
-        now.belief.mean_of(name)[:2],
-    )
+    outside_m, place = _OUTSIDE_M if _searched(name, now) else 0.0, now.belief.mean_of(name)[:2]
     others = [other for other in tracking if other != name]
     located = {other for other in others if _from_views_m(other, place, seen, now) <= outside_m}
     for other in sorted(others, key=lambda one: levels.get(one, 0)):

@@ -45,7 +45,8 @@ function unheardStop() {
   const renewed = new Set();
   for (const { id, ref, verb, state, rows, given_ms, since } of stops()) {
     // What became of a page's own is known later than it was given, much later on a page that stood still.
-    const age = ageS(given_ms), known = since ? sinceMs(since) / 1000 : age, silent = rows.filter(({ name, stage }) => !stage && !renewed.has(name)).map(({ name }) => name);
+    const age = ageS(given_ms), known = since ? sinceMs(since) / 1000 : age;
+    const silent = rows.filter(({ name, stage }) => !stage && !renewed.has(name)).map(({ name }) => name);
     if (silent.length && age > UNHEARD_S && known < FORGOTTEN_S) return { id: ref || id, verb: verb.replace("_", " "), names: silent.join(", "), state };
     rows.forEach(({ name }) => renewed.add(name));
   }

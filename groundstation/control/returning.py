@@ -10,6 +10,8 @@ from groundstation.control.view import doubt_m, view_of, way_back_m
 from groundstation.estimation.belief import JointBelief
 from groundstation.sensing.models import Rectangle, SensorSuite
 
+# A robot on its way back goes on until it has this much more time: the way and the time left shrink alike.
+_GOES_ON_S = 1.0
 _LOOK_M_S = 0.2  # speed along the spiral on which a robot looks for the view
 _LOOK_RAD_S = 0.7
 _FARTHEST_LOOK_M = 1.2
@@ -23,18 +25,19 @@ def is_lost(
     sensors: SensorSuite,
     unseen_s: float = 0.0,
     velocity_error_m_s: float = 0.0,
+    returns: bool = False,
 ) -> bool:
     """Return whether a robot must fly back now, else its place would soon be too uncertain for it to be found again.
 
     It depends on its uncertainty, the error of its odometry, and the length and time of the way back; without any
-    world-fixed view, on the uncertainty alone.
+    world-fixed view, on the uncertainty alone. returns: whether it was flying back already.
     """
     if unseen_s > max(parameters.return_soonest_s, parameters.return_within_s):
         return True
     mean, spread = belief.mean_of(name), doubt_m(belief, name)
     if spread <= parameters.return_std_m and unseen_s <= parameters.return_soonest_s:
         return False
-    left_s = time_left_s(spread, unseen_s, parameters, velocity_error_m_s)
+    left_s = time_left_s(spread, unseen_s, parameters, velocity_error_m_s) - (_GOES_ON_S if returns else 0.0)
     marker = sensors.marker(name, mean, is_robot=True)
     if any(sensors.world_in_view(camera, marker) for camera in sensors.world):
         # A robot estimated in view but unseen may be beside the view: towards the middle it is seen sooner.

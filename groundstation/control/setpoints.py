@@ -153,7 +153,10 @@ def _search_level_m(name: str, phase: FlightMode, now: Moment) -> float:
 
 def _is_lost(name: str, now: Moment) -> bool:
     unseen_s, error_m_s = now.sight.unseen_s.get(name, 0.0), now.sight.velocity_errors_m_s.get(name, 0.0)
-    return name in now.sight.missed_s or is_lost(name, now.belief, now.parameters, now.sensors, unseen_s, error_m_s)
+    returns = now.sight.before.get(name) is FlightMode.RETURN
+    return name in now.sight.missed_s or is_lost(
+        name, now.belief, now.parameters, now.sensors, unseen_s, error_m_s, returns
+    )
 
 
 def _stands(phases: Mapping[str, FlightMode], searching: Mapping[str, Stand], now: Moment) -> dict[str, Stand]:

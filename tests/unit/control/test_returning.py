@@ -95,6 +95,16 @@ def test_a_drone_far_out_flies_back_by_its_uncertainty_and_its_way() -> None:
     assert not is_lost("drone_1", belief(near, 0.1), CONTROL, SENSORS, unseen_s=10.0)
 
 
+def test_a_drone_on_its_way_back_is_not_turned_round_by_an_estimate_that_wavers() -> None:
+    """Its way and its time left shrink alike: at the border it returned and searched in turns."""
+    far, unseen = belief(np.array([3.4, 0.0, 1.6, 0.0]), 0.1), np.arange(4.0, 10.0, 0.01)
+    border_s = next(s for s in unseen if is_lost("drone_1", far, CONTROL, SENSORS, unseen_s=s))
+    for aside_m in (-0.1, 0.1):
+        wavered = belief(np.array([3.4 + aside_m, 0.0, 1.6, 0.0]), 0.1)
+        assert is_lost("drone_1", wavered, CONTROL, SENSORS, unseen_s=border_s, returns=True)
+    assert not is_lost("drone_1", far, CONTROL, SENSORS, unseen_s=border_s - 2.0, returns=True)
+
+
 @pytest.mark.parametrize("rotation_deg", [(0, 8.5, 0), (25, 0, 0), (0, -30, 40)])
 def test_a_drone_flies_back_into_the_view_of_a_tilted_camera(rotation_deg: tuple[float, float, float]) -> None:
     """From 8.1 degrees on it stayed where it was, and nothing said so."""

@@ -203,6 +203,7 @@ def test_a_drone_that_flies_on_after_its_motors_were_cut_is_not_called_down(stag
     stage.flight.detail["drone_2"] = "motors cut by operator"
     page.wait(lambda s: page.there("drone_2-duty").inner_text().startswith("Falls, or flies on: CUT MOTORS"))
     assert page.there("drone_2-land").inner_text() == "Land\nlands here"
+    assert page.there("drone_2-hold").inner_text() == "Hold\nlands anyway"
     assert "is down" not in page.there("hold").inner_text()
 
 

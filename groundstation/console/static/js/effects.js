@@ -128,7 +128,7 @@ export function isIdle(verb, names = droneNames()) {
 
 // Whether a failsafe is about to land it, whatever is ordered: whether its fault is over, only its driver knows.
 const isBound = (name) => (store.s.vehicles[name].lands_in_s ?? null) !== null && !waits(store.s.vehicles[name].detail);
-// The drones that HOLD holds: it stops neither a landing nor an imminent failsafe landing.
-const holding = (names = droneNames()) => up(names).filter((name) => modeNow(name) !== "LANDING" && !isBound(name));
+// The drones that HOLD holds: it stops neither a landing, an imminent failsafe landing nor that after ignored CUT MOTORS.
+const holding = (names = droneNames()) => up(names).filter((name) => !["LANDING", "CUT"].includes(modeNow(name)) && !isBound(name));
 
 export const STOPS = new Set(["HOLD", "LAND", "CUT_MOTORS"]);

@@ -211,7 +211,8 @@ def test_real_firmware_that_a_pilot_stops_is_taken_back_by_resume(flavour, tmp_p
             flight.pilot.order(Verb.RESUME, flight.watchdog.mode)
             flight.until(lambda: flight.obeys, 4)
             flight.go_on(3.0)
-            assert flight.obeys and flight.watchdog.mode == "TRACK" and flight.height_m > 0.5
+            assert flight.watchdog.mode == "TRACK", flight.watchdog.reason
+            assert flight.obeys and flight.height_m > 0.5
         flight.land()
 
 

@@ -32,9 +32,10 @@ hangar, port = mavlink_hangar.hangar, mavlink_hangar.port
 
 SYSTEM = 5
 M_PER_DEGREE = 111_319.5
-# Custom modes: ours (OFFBOARD, GUIDED), and those in which a pilot holds it (AUTO.LOITER, LOITER).
+# Custom modes: ours (OFFBOARD, GUIDED), and those in which a pilot stops it (AUTO.LOITER, BRAKE: in LOITER it would
+# sink to the floor, because ArduPilot's simulated transmitter has its throttle down).
 OURS = {Flavour.PX4: 6 << 16, Flavour.ARDUPILOT: 4}
-PILOTS = {"px4": (4, 3), "ardupilot": (5,)}
+PILOTS = {"px4": (4, 3), "ardupilot": (17,)}
 
 
 class Truth(threading.Thread):

@@ -61,9 +61,10 @@ class Node:
                     "scouting": {"multicast": {"enabled": False}}}  # fmt: skip
         self.session: Any = zenoh.open(zenoh.Config.from_json5(json.dumps(settings)))
 
-    def say(self, message: tuple[str, bytes]) -> None:
+    def say(self, message: tuple[str, bytes], publisher: bytes = b"the only one ...") -> None:
         kind, payload = message
-        self.session.put(graph.topic_key(DOMAIN, TOPIC, kind, CODEC.hash_of(kind)), payload)
+        key = graph.topic_key(DOMAIN, TOPIC, kind, CODEC.hash_of(kind))
+        self.session.put(key, payload, attachment=graph.attachment(1, 9, publisher))
 
 
 @pytest.fixture(scope="module")
@@ -132,6 +133,18 @@ def test_stamps_of_the_sender_free_arrivals_of_jitter(node: Node, source: FrameS
         assert packet.settled_ns == stamp_ns + round(usual_ns)
     stamped = taken(node, source, image("mono8", PIXELS[:, :, 0], 0))
     assert stamped.settled_ns == stamped.arrival_ns
+
+
+def test_pictures_of_a_second_camera_under_the_same_topic_are_refused(node: Node, source: FrameSource) -> None:
+    grey, other = image("mono8", PIXELS[:, :, 0]), image("mono8", PIXELS[:, :, 1])
+    before = colours(taken(node, source, grey))
+    node.say(other, b"another camera's")
+    until(lambda: source.rejected["second publisher"])
+    assert (colours(taken(node, source, grey)) == before).all()
+    time.sleep(1.1)  # the first has been silent: another one may be its restarted node
+    node.say(other, b"another camera's")
+    heir = source.take_newest(_PATIENCE_S)
+    assert heir is not None and (colours(heir) != before).any()
 
 
 @pytest.mark.parametrize(

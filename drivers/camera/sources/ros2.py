@@ -14,6 +14,7 @@ from drivers.camera.sources.frames import Matrix, Unit
 from drivers.camera.sources.jitter_filter import SenderClock
 from drivers.camera.sources.raw import Decoded
 from drivers.camera.sources.reader_thread import Drain, PictureDecoder
+from drivers.rmw_zenoh.publisher_tie import PublisherTie
 from drivers.rmw_zenoh.session import RouterSession
 from drivers.rmw_zenoh.wire import graph, pictures
 from drivers.rmw_zenoh.wire.cdr import WireError
@@ -27,7 +28,10 @@ _DDS = "::msg::dds_::"
 
 
 class Ros2Reader:
-    """Subscribes to one topic: sensor_msgs/CompressedImage (JPEG, PNG) or Image (mono8, rgb8, bgr8)."""
+    """Subscribes to one topic: sensor_msgs/CompressedImage (JPEG, PNG) or Image (mono8, rgb8, bgr8).
+
+    Pictures of a second publisher are refused: they may be another camera's.
+    """
 
     def __init__(self, host: str, port: int, topic: str, domain: int) -> None:
         self._endpoint, self._expression = f"tcp/{host}:{port}", graph.heard_key(domain, topic)
@@ -36,7 +40,8 @@ class Ros2Reader:
         self.decoder: PictureDecoder | None = None
         # Whether the last message was unreadable: the stream counts as open again only after a readable one.
         self._refused = False
-        self._waiting: deque[tuple[int, str, bytes]] = deque(maxlen=_WAITING)
+        self._tie, self._settled = PublisherTie(), SenderClock()
+        self._waiting: deque[tuple[int, bytes, str, bytes]] = deque(maxlen=_WAITING)
         self._came = threading.Event()
 
     def interrupt(self) -> None:
@@ -46,10 +51,10 @@ class Ros2Reader:
     def read(self, drain: Drain) -> None:
         """Hand over pictures until the drain closes."""
         self._waiting.clear()
+        self._settled = SenderClock()
         session = RouterSession(self._endpoint, [self._expression], self._hear)
         try:
             _await_router(session, drain)
-            settled = SenderClock()
             while not drain.closing:
                 if not self._refused:
                     drain.opened()
@@ -58,15 +63,24 @@ class Ros2Reader:
                 if not session.reaches_router:
                     raise DriverError("the ROS 2 Zenoh router is gone")
                 while self._waiting:
-                    drain.keep(self._units(*self._waiting.popleft(), settled))
+                    drain.keep(self._next_units(*self._waiting.popleft()))
         finally:
             session.close()
 
     def _hear(self, key: str, payload: bytes, publisher: bytes) -> None:
-        self._waiting.append((clock.now_ns(), key.split("/")[-2], payload))
+        self._waiting.append((clock.now_ns(), publisher, key.split("/")[-2], payload))
         self._came.set()
 
-    def _units(self, arrival_ns: int, dds_type: str, payload: bytes, settled: SenderClock) -> list[Unit]:
+    def _next_units(self, arrival_ns: int, publisher: bytes, dds_type: str, payload: bytes) -> list[Unit]:
+        """Return the picture of the topic's one publisher; raises as `_units`."""
+        if self._tie.is_second(publisher, arrival_ns):
+            self.rejected["second publisher"] += 1
+            return []
+        if self._tie.take(publisher, arrival_ns):
+            self._settled = SenderClock()
+        return self._units(arrival_ns, dds_type, payload)
+
+    def _units(self, arrival_ns: int, dds_type: str, payload: bytes) -> list[Unit]:
         """Return the picture of a message, or nothing for a damaged one.
 
         Raises DriverError for another type, format or encoding, naming it.
@@ -86,7 +100,7 @@ class Ros2Reader:
             return []
         self._refused = False
         self.decoder = None if picture is None else Decoded()
-        (settled_ns,) = settled.settle([stamp_ns], arrival_ns)
+        (settled_ns,) = self._settled.settle([stamp_ns], arrival_ns)
         return [Unit(data, arrival_ns, settled_ns, picture=picture)]
 
     def _compressed(self, message: pictures.CompressedPicture) -> tuple[int, bytes, Matrix | None]:

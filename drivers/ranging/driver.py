@@ -2,6 +2,7 @@
 
 import math
 from collections import Counter
+from collections.abc import Iterable
 
 from drivers.base import HostProcess, read_section
 from drivers.ranging.anchor_watch import AnchorWatch
@@ -17,6 +18,7 @@ from groundstation.time_units import NS_PER_MS
 _POLL_S = 0.02
 # Noise of centimetres in several ranges does not repeat: a gateway that keeps sending its last round is stuck.
 _MOST_REPEATS = 3
+_REMEDY = "restart the gateway"
 _RESTART = "restart that anchor, or the gateway; the other anchors' ranges count meanwhile"
 
 
@@ -42,7 +44,7 @@ class RangingDriver:
         self._likely = likely_in(settings.volume_m)
         self._newest_ns: dict[str, int] = {}
         self._last: dict[str, tuple[dict[str, float], int]] = {}
-        self._anchors, self._held = AnchorWatch(), set[str]()
+        self._anchors, self._held, self._stuck = AnchorWatch(), set[str](), set[str]()
         remedy = f"check the gateway, whether its radios run, and its address {settings.source}"
         names = StreamNames("ranging", settings.name, "range", settings.source, remedy)
         self._health = StreamHealth(child, names, settings.start_within_s, settings.silent_after_s)
@@ -50,11 +52,15 @@ class RangingDriver:
 
     def turn(self) -> None:
         """Wait briefly for rounds, process them, and keep up heartbeat, status and the watch over silence."""
-        for arrival_ns, told in self._gateway.poll(_POLL_S):
-            self._handle(arrival_ns, told)
+        rounds = list(self._gateway.poll(_POLL_S))
+        for number, (arrival_ns, told) in enumerate(rounds):
+            if _is_covered(told, (later for _, later in rounds[number + 1 :])):
+                self._health.skipped += 1  # came at once with a newer one, after a stall: nobody knows how old it is
+            else:
+                self._handle(arrival_ns, told)
         self._tell_held()
-        stuck = sorted(robot for robot, (_, repeats) in self._last.items() if repeats > _MOST_REPEATS)
-        why = f"the ranges of {', '.join(stuck)} repeat themselves: restart the gateway" if stuck else ""
+        self._tell_stuck({robot for robot, (_, repeats) in self._last.items() if repeats > _MOST_REPEATS})
+        why = f"the ranges of {', '.join(sorted(self._stuck))} repeat themselves: {_REMEDY}" if self._stuck else ""
         wrong = why or "".join(f"anchor {anchor} holds its last range; " for anchor in sorted(self._held)).strip("; ")
         self._health.end_turn(why or self._gateway.failed, wrong, self.counts + self._gateway.rejected)
 
@@ -68,6 +74,16 @@ class RangingDriver:
         for anchor in sorted(self._held - held):
             self._child.event(Severity.INFO, f"ranging {name}: anchor {anchor} measures again", entity=name)
         self._held = held
+
+    def _tell_stuck(self, stuck: set[str]) -> None:
+        """Report each robot whose rounds repeat themselves, once, and their return."""
+        name = self._settings.name
+        for robot in sorted(stuck - self._stuck):
+            text = f"ranging {name}: the ranges of {robot} repeat themselves and are not used"
+            self._child.event(Severity.WARNING, text, _REMEDY, name)
+        for robot in sorted(self._stuck - stuck):
+            self._child.event(Severity.INFO, f"ranging {name}: the ranges of {robot} change again", entity=name)
+        self._stuck = stuck
 
     def _handle(self, arrival_ns: int, told: Round) -> None:
         robot = self._robots.get(told.transponder)
@@ -119,3 +135,8 @@ class RangingDriver:
             position_m=None if fix is None else fix.position_m,
             covariance=(0.0,) * 9 if fix is None else tuple(fix.covariance.ravel().tolist()),
         )
+
+
+def _is_covered(told: Round, later: Iterable[Round]) -> bool:
+    """Return whether a later round of the same transponder tells as much."""
+    return any(other.transponder == told.transponder and told.m.keys() <= other.m.keys() for other in later)

@@ -157,7 +157,36 @@ def test_rounds_that_repeat_themselves_are_silence(rig: Rig) -> None:
     assert not last.connected and "the ranges of drone_1, drone_2 repeat themselves" in last.detail
     assert last.rejected["repeated"] > 5
     assert [one for one in rig.run(100) if isinstance(one, RangeObservation)]
-    assert rig.child.told[-2] == "READY"
+    assert rig.child.told[-4] == "READY", "then the ranges arrive, and those of two drones change again"
+
+
+def test_one_drones_rounds_that_repeat_themselves_are_told_once_and_so_is_their_end(rig: Rig) -> None:
+    """While another drone's ranges changed, the system counted as well, and only its detail said so."""
+    rig.driver.turn()
+    for number in range(12):
+        repeated = 1.0 if number < 8 else 1.0 + 0.01 * number
+        rig.driver._handle(10**12 + number * 100 * MS, Round("0x1", {"a": 1.0 + 0.01 * number}))
+        rig.driver._handle(10**12 + number * 100 * MS, Round("drone_2", {"a": repeated}))
+        rig.driver.turn()
+    told = [text for text in rig.child.told if "drone_2" in text]
+    assert told == [
+        "ranging uwb: the ranges of drone_2 repeat themselves and are not used; restart the gateway",
+        "ranging uwb: the ranges of drone_2 change again; ",
+    ]
+
+
+def test_of_rounds_that_come_at_once_after_a_stall_the_newest_is_used(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ten rounds of 0.9 s were all dated as new: 0.9 m apart, and 2 ms."""
+    rig.driver.turn()
+    rig.heard.drain()
+    burst = [(10**12 + number * MS, Round("0x1", {"a": 1.0 + 0.1 * number})) for number in range(10)]
+    parted = [(10**12 + MS, Round("drone_2", {"a": 2.0})), (10**12 + 2 * MS, Round("drone_2", {"b": 2.5}))]
+    monkeypatch.setattr(rig.driver._gateway, "poll", lambda _wait_s: iter(burst + parted))
+    rig.driver.turn()
+    told = [one.message for one in rig.heard.drain() if isinstance(one.message, RangeObservation)]
+    assert [dict(one.ranges_m) for one in told] == [{"a": 1.9}, {"a": 2.0}, {"b": 2.5}]
 
 
 @pytest.mark.parametrize("rig", [(broken(FaultKind.ANCHOR_FROZEN, "uwb", other="b", end_s=4.0),)], indirect=True)

@@ -86,8 +86,9 @@ def signal_drivers(record: RuntimeRecord) -> list[str]:
     told = []
     for process in record.processes:
         if process.role == "driver" and process.alive:
-            os.kill(process.pid, signal.SIGTERM)
-            told.append(process.name)
+            with suppress(ProcessLookupError):  # it has just ended
+                os.kill(process.pid, signal.SIGTERM)
+                told.append(process.name)
     return told
 
 

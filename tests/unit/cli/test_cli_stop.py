@@ -232,6 +232,21 @@ def test_silent_router_signals_the_drivers_and_no_stranger(runtime: Path) -> Non
         stranger.kill()
 
 
+def test_a_driver_that_has_just_ended_keeps_no_other_from_its_signal(monkeypatch: pytest.MonkeyPatch) -> None:
+    own = runtime_file.start_time(os.getpid()) or 0
+    drivers = tuple(ProcessRecord(name, "driver", os.getpid(), own) for name in ("drone_1", "drone_2"))
+    signalled: list[int] = []
+
+    def kill(pid: int, _number: int) -> None:
+        signalled.append(pid)
+        if len(signalled) == 1:
+            raise ProcessLookupError
+
+    monkeypatch.setattr("groundstation.cli.stop.os.kill", kill)
+    record = RuntimeRecord("lab", "", "", "", "", (), drivers[0], drivers)
+    assert stop.signal_drivers(record) == ["drone_2"] and len(signalled) == 2
+
+
 def test_stop_verbs_import_nothing_heavy() -> None:
     script = (
         "import sys, groundstation.cli.stop, groundstation.cli.main;"

@@ -8,6 +8,7 @@ import os
 import shlex
 import sys
 import time
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -32,12 +33,8 @@ def make_run_dir(parent: Path, field_name: str) -> Path:
     if (named := shown(path.absolute())) != str(path.absolute()):
         raise OperatorMistake(f"{named}: is no UTF-8 text: rename that folder, or fly from another one")
     try:
-        for number in range(2, 100):
-            if not path.exists():
-                break
-            path = parent / f"{stamp}-{field_name}-{number}"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.mkdir(mode=0o700)  # it holds pictures of people
+        parent.mkdir(parents=True, exist_ok=True)
+        path = _made(parent, path.name)
         probe = path / ".probe"
         probe.write_bytes(b"x" * 4096)
         probe.unlink()
@@ -49,6 +46,17 @@ def make_run_dir(parent: Path, field_name: str) -> Path:
         path.rmdir()
         raise GroundStationError(f"only {free / 1e6:.0f} MB are free for {parent}: make room before take-off")
     return path
+
+
+def _made(parent: Path, name: str) -> Path:
+    """Return a new folder of a name, or of that name with a number: other runs may begin in the same second."""
+    path, number = parent / name, 1
+    while True:
+        with suppress(FileExistsError):
+            path.mkdir(mode=0o700)  # it holds pictures of people
+            return path
+        number += 1
+        path = parent / f"{name}-{number}"
 
 
 def write_facts(run_dir: Path, facts: run_facts.RunFacts, *, asks: bool) -> None:

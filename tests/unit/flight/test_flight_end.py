@@ -2,6 +2,7 @@
 
 import stat
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -83,6 +84,12 @@ def test_a_run_says_how_it_ended(stage: dict[str, Any], severity: str, words: st
 def test_the_folder_of_a_run_is_its_owners(tmp_path: Path) -> None:
     folder = make_run_dir(tmp_path / "runs", "lab")
     assert stat.S_IMODE(folder.stat().st_mode) == 0o700
+
+
+def test_runs_that_begin_in_the_same_second_have_a_folder_each(tmp_path: Path) -> None:
+    with ThreadPoolExecutor(4) as pool:
+        folders = list(pool.map(lambda _: make_run_dir(tmp_path, "lab"), range(24)))
+    assert len(set(folders)) == 24
 
 
 def test_nobody_flies_from_a_place_that_no_recording_can_name(tmp_path: Path) -> None:

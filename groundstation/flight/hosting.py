@@ -114,11 +114,11 @@ class Hosting:
         try:
             why = self._why_over(supervisor, order.run)
             self._terminal.say(f"run {order.run}: {why}; drones of this host land")
-            return supervisor.interrupts.stop_requested
         finally:
             self._own = OwnState(order.run, Lifecycle.STOPPING)
             supervisor.close()
             self._leave()
+        return supervisor.interrupts.stop_requested  # even if it came while the drones landed
 
     def _why_over(self, supervisor: Supervisor, run: str) -> str:
         """Run the devices and return why they stopped; a failure ends only this run, and the next one is served."""

@@ -118,6 +118,21 @@ def test_a_run_that_is_gone_before_its_devices_start_ends_the_run_and_not_the_wa
     assert said[-1] == "run run-7: no router answers at tls/10.77.0.1:4717; drones of this host land"
 
 
+def test_a_stop_that_comes_while_the_drones_land_is_not_lost(
+    make: Callable[[str], tuple[hosting.Hosting, RunElsewhere]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It waited for the next run."""
+    served, _ = make(VERSION)
+    order, close = served.wait(), supervisor.Supervisor.close
+
+    def stopped_meanwhile(self: supervisor.Supervisor) -> None:
+        self.interrupts.stop_requested = True
+        close(self)
+
+    monkeypatch.setattr(supervisor.Supervisor, "close", stopped_meanwhile)
+    assert served.serve(order) is True
+
+
 def test_another_version_is_not_served_and_the_run_says_why(
     make: Callable[[str], tuple[hosting.Hosting, RunElsewhere]], monkeypatch: pytest.MonkeyPatch
 ) -> None:

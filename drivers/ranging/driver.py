@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Iterable
 
 from drivers.base import HostProcess, read_section
+from drivers.plausibility.clock_watch import ClockWatch
 from drivers.ranging.anchor_watch import AnchorWatch
 from drivers.ranging.gateway import Gateway
 from drivers.ranging.settings import RangingSection, parse_source
@@ -13,11 +14,13 @@ from drivers.stream_health import StreamHealth, StreamNames
 from groundstation.bus.messages import RangeObservation, Severity
 from groundstation.bus.topics import RANGE
 from groundstation.geometry.multilateration import fix_from_ranges, likely_in
-from groundstation.time_units import NS_PER_MS
+from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _POLL_S = 0.02
 # Noise of centimetres in several ranges does not repeat: a gateway that keeps sending its last round is stuck.
 _MOST_REPEATS = 3
+# As for poses of motion capture: a round this much later than the freshest ones has waited somewhere.
+_LATE_S = 0.3
 _REMEDY = "restart the gateway"
 _RESTART = "restart that anchor, or the gateway; the other anchors' ranges count meanwhile"
 
@@ -45,6 +48,7 @@ class RangingDriver:
         self._newest_ns: dict[str, int] = {}
         self._last: dict[str, tuple[dict[str, float], int]] = {}
         self._anchors, self._held, self._stuck = AnchorWatch(), set[str](), set[str]()
+        self._clock, self._late = ClockWatch(), False
         remedy = f"check the gateway, whether its radios run, and its address {settings.source}"
         names = StreamNames("ranging", settings.name, "range", settings.source, remedy)
         self._health = StreamHealth(child, names, settings.start_within_s, settings.silent_after_s)
@@ -52,17 +56,18 @@ class RangingDriver:
 
     def turn(self) -> None:
         """Wait briefly for rounds, process them, and keep up heartbeat, status and the watch over silence."""
-        rounds = list(self._gateway.poll(_POLL_S))
+        rounds = self._gateway.poll(_POLL_S)
         for number, (arrival_ns, told) in enumerate(rounds):
             if _is_covered(told, (later for _, later in rounds[number + 1 :])):
-                self._health.skipped += 1  # came at once with a newer one, after a stall: nobody knows how old it is
+                self._health.skipped += 1  # came at once with a newer one, after a stall
             else:
                 self._handle(arrival_ns, told)
         self._tell_held()
         self._tell_stuck({robot for robot, (_, repeats) in self._last.items() if repeats > _MOST_REPEATS})
         why = f"the ranges of {', '.join(sorted(self._stuck))} repeat themselves: {_REMEDY}" if self._stuck else ""
         wrong = why or "".join(f"anchor {anchor} holds its last range; " for anchor in sorted(self._held)).strip("; ")
-        self._health.end_turn(why or self._gateway.failed, wrong, self.counts + self._gateway.rejected)
+        late = "its last rounds came late" if self._late else ""
+        self._health.end_turn(why or late or self._gateway.failed, wrong, self.counts + self._gateway.rejected)
 
     def _tell_held(self) -> None:
         """Report each anchor that holds its last range to a robot, once, and its return."""
@@ -90,11 +95,16 @@ class RangingDriver:
         if robot is not None and self._repeats(robot, told.m):
             self.counts["repeated"] += 1
             return
+        late_s = self._late_s(arrival_ns, told)
+        self._late = late_s > _LATE_S
+        if self._late:
+            self.counts["late"] += 1
+            return
         self._health.came(arrival_ns)
         if robot is None:
             self.counts["unknown transponder"] += 1
             return
-        stamp_ns = arrival_ns - round((self._settings.delay_ms + told.age_ms) * NS_PER_MS)
+        stamp_ns = arrival_ns - round((self._settings.delay_ms + told.age_ms) * NS_PER_MS + late_s * NS_PER_S)
         if stamp_ns <= self._newest_ns.get(robot, 0):
             self._health.skipped += 1  # overtaken by a newer one on the way
             return
@@ -105,6 +115,12 @@ class RangingDriver:
         if ranges_m:
             self._health.reported += 1
             self._child.bus.publish(RANGE, self._message(robot, ranges_m, stamp_ns))
+
+    def _late_s(self, arrival_ns: int, told: Round) -> float:
+        """Return by how much a round came later than the freshest ones, 0 where the gateway tells no times."""
+        if told.sent_ms is None:
+            return 0.0
+        return self._clock.update(arrival_ns, round(told.sent_ms * NS_PER_MS))[1]
 
     def _repeats(self, robot: str, ranges_m: dict[str, float]) -> bool:
         """Return whether a robot's rounds have repeated too often."""
@@ -138,5 +154,5 @@ class RangingDriver:
 
 
 def _is_covered(told: Round, later: Iterable[Round]) -> bool:
-    """Return whether a later round of the same transponder tells as much."""
-    return any(other.transponder == told.transponder and told.m.keys() <= other.m.keys() for other in later)
+    """Return whether a later round of the same transponder has a newer range of any of the same anchors."""
+    return any(other.transponder == told.transponder and not told.m.keys().isdisjoint(other.m) for other in later)

@@ -5,11 +5,14 @@ WIRE (docs/reference/ranges.md 2): a client that asks is sent ranges as long as 
 
 from collections.abc import Callable, Iterable
 from contextlib import suppress
+from time import time_ns
 
+import msgspec
 import numpy as np
 
 from drivers.ranging.wire.ranges import LARGEST, Round, encode
 from groundstation.arrays import Array
+from groundstation.time_units import NS_PER_MS
 from sim_bridge.fault_kinds import Fault, FaultKind, standing
 from sim_bridge.listening import open_udp
 from sim_bridge.ranges import Radios
@@ -38,7 +41,7 @@ class RangeGateway:
         self._socket = open_udp(f"emulated {name}", *place)
         self._radios = radios
         self._heard: dict[Address, int] = {}
-        self._waiting: list[tuple[int, bytes]] = []
+        self._waiting: list[tuple[int, Round]] = []
         self._last_m: dict[str, dict[str, float]] = {}
         self._ticks = 0
         self._every = max(1, round(1.0 / (system.rate_hz * _TICK_S)))
@@ -66,10 +69,11 @@ class RangeGateway:
             due = (self._ticks + index * self._every // len(self._drones)) % self._every == 0
             if due and (told := self._round(drone, now_s)):
                 called = self._system.transponders.get(drone, SiteTransponder()).name or drone
-                self._waiting.append((self._ticks + late, encode(Round(called, told))))
+                self._waiting.append((self._ticks + late, Round(called, told)))
         self._heard = {one: heard for one, heard in self._heard.items() if self._ticks - heard < _FORGOTTEN_TICKS}
         while self._waiting and self._waiting[0][0] <= self._ticks:
-            _, datagram = self._waiting.pop(0)
+            _, waited = self._waiting.pop(0)
+            datagram = encode(msgspec.structs.replace(waited, sent_ms=time_ns() / NS_PER_MS))
             dumb = self.silent or standing(self._faults, FaultKind.RANGES_SILENT, now_s, self._name)
             for client in () if dumb else self._heard:
                 with suppress(OSError):

@@ -7,7 +7,7 @@ from drivers.ranging.wire.ranges import Round, encode
 from drivers.tello.wire.text import State
 from sim_bridge.devices.tello_text import state_text
 
-RANGES = encode(Round("tag_1", {"north": 3.25, "south": 4.5, "east": 0.75}, 4.0))
+RANGES = encode(Round("tag_1", {"north": 3.25, "south": 4.5, "east": 0.75}, 4.0, 1.5e6))
 TELLO = state_text(State(1, -2, 30, (1, 2, -3), 80, 75, 87, 12, (1.0, -2.0, -998.0)))
 
 _VERSIONS = ((3, 0), (4, 0), (4, 1))

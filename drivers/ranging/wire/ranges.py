@@ -4,7 +4,7 @@ import msgspec
 
 LARGEST = 1400
 _MOST_ANCHORS, _LONGEST_NAME = 64, 100
-_FARTHEST_M, _OLDEST_MS = 1000.0, 1000.0
+_FARTHEST_M, _OLDEST_MS, _LATEST_MS = 1000.0, 1000.0, 1e15
 
 # WIRE (docs/reference/ranges.md 2): a client sends this once a second.
 ASK = b'{"ranges": 1}'
@@ -18,12 +18,16 @@ class WireError(Exception):
         self.reason = reason
 
 
-class Round(msgspec.Struct, frozen=True):
-    """One transponder's distances [m] to the anchors that answered, measured `age_ms` before they were sent."""
+class Round(msgspec.Struct, frozen=True, omit_defaults=True):
+    """One transponder's distances [m] to the anchors that answered, measured `age_ms` before they were sent.
+
+    sent_ms: when that was, on the gateway's own clock.
+    """
 
     transponder: str
     m: dict[str, float]
     age_ms: float = 0.0
+    sent_ms: float | None = None
 
 
 _decoder = msgspec.json.Decoder(Round)
@@ -45,6 +49,7 @@ def decode(datagram: bytes) -> Round:
     names = (told.transponder, *told.m)
     if not told.m or len(told.m) > _MOST_ANCHORS or max(map(len, names)) > _LONGEST_NAME:
         raise WireError("damaged")
-    if not all(0.0 < distance <= _FARTHEST_M for distance in told.m.values()) or not 0.0 <= told.age_ms <= _OLDEST_MS:
+    times_told = 0.0 <= told.age_ms <= _OLDEST_MS and 0.0 <= (told.sent_ms or 0.0) <= _LATEST_MS
+    if not times_told or not all(0.0 < distance <= _FARTHEST_M for distance in told.m.values()):
         raise WireError("impossible")
     return told

@@ -4,117 +4,20 @@ import math
 import socket
 import threading
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from range_rig import ANCHORS, HOST, MS, PLACES, Rig
 
 from drivers.ranging import driver as process
-from drivers.ranging.driver import RangingDriver
 from drivers.ranging.gateway import Gateway
-from drivers.ranging.settings import RangingSection, parse_source
+from drivers.ranging.settings import parse_source
 from drivers.ranging.wire.ranges import Round, WireError, decode, encode
-from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import CameraStatus, RangeObservation
-from groundstation.bus.topics import CAMERA_STATUS, RANGE
 from groundstation.errors import SettingsError
-from sim_bridge.devices.range_gateway import RangeGateway
 from sim_bridge.fault_kinds import Fault, FaultKind
-from sim_bridge.ranges import Radios
-from sim_bridge.site import SiteRanging
-
-HOST, MS = "127.0.0.1", 1_000_000
-ANCHORS = {
-    "a": (-3.0, -3.0, 2.5),
-    "b": (3.0, -3.0, 2.5),
-    "c": (3.0, 3.0, 2.5),
-    "d": (-3.0, 3.0, 2.5),
-    "e": (0.0, 3.0, 0.2),
-}
-WIDE = {"x_m": (-3.0, 3.0), "y_m": (-3.0, 3.0), "z_m": (-0.1, 2.5)}
-PLACES = {"drone_1": (0.5, 0.2, 1.5), "cart": (0.0, 0.0, 0.0), "drone_2": (-0.9, 0.1, 1.4)}
-
-
-class FakeChild:
-    stop_requested, supervisor_alive, supervisor_fresh, spoken_for_ns = False, True, True, 0
-
-    def __init__(self, bus: MemoryBus, section: str) -> None:
-        self.bus, self.name, self.section = bus, "uwb", section
-        self.told: list[str] = []
-
-    def ready(self, detail: str = "") -> None:
-        self.told.append("READY")
-
-    def degrade(self, detail: str, works: bool = True) -> None:
-        self.told.append(f"DEGRADED {detail}")
-
-    def event(self, severity: str, text: str, remedy: str = "", entity: str | None = None) -> None:
-        self.told.append(f"{text}; {remedy}")
-
-    def beat(self) -> None: ...
-    def tick_status(self, ticks: int = 0, overruns: int = 0, overflowed: int = 0) -> None: ...
-
-
-@dataclass
-class Rig:
-    """Emulated gateway, driver, and a subscriber; `run` advances both, the gateway on a manual clock."""
-
-    gateway: RangeGateway
-    driver: RangingDriver
-    child: FakeChild
-    heard: Any
-    clock: SimpleNamespace
-
-    def run(self, ticks: int) -> list[Any]:
-        for tick in range(ticks):
-            self.clock.ns += 5 * MS
-            self.gateway.receive()
-            self.gateway.send()
-            if tick % 10 == 0:
-                self.driver.turn()
-        self.driver.turn()
-        return [one.message for one in self.heard.drain()]
-
-
-@pytest.fixture
-def rig(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[Rig]:
-    clock = SimpleNamespace(ns=10**12)
-    monkeypatch.setattr("groundstation.bus.clock.now_ns", lambda: clock.ns)
-    monkeypatch.setattr("drivers.ranging.driver._POLL_S", 0.001)
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind((HOST, 0))
-        place = (HOST, int(probe.getsockname()[1]))
-
-    def states() -> np.ndarray:
-        return np.array([[*at, 0, 0, 0, 0.0, 0.0, 0.3, 0, 0, 0, 0] for at in PLACES.values()])
-
-    carried = {"drone_1": {"name": "0x1", "position_m": (0.0, 0.0, 0.1)}}
-    system = SiteRanging.model_validate(
-        {"anchors": ANCHORS, "volume_m": WIDE, "transponders": carried, "range_std_m": 2e-3, "outlier_share": 0.0}
-    )
-    drones, faults = ("drone_1", "drone_2"), getattr(request, "param", ())
-    radios = Radios(system, errors=False, rng=np.random.default_rng(1), faults=faults)
-    gateway = RangeGateway("uwb", place, system, PLACES, drones, states, radios, faults)
-    section = RangingSection.model_validate(
-        {
-            "name": "uwb",
-            "source": f"ranges://{HOST}:{place[1]}",
-            "anchors": {name: at for name, at in ANCHORS.items() if name != "e"},
-            "transponders": ({"entity": "drone_1", "name": "0x1"}, {"entity": "drone_2", "name": "drone_2"}),
-            "volume_m": tuple(WIDE.values()),
-            "silent_after_s": 0.3,
-        }
-    )
-    exchange = MemoryExchange()
-    child: Any = FakeChild(MemoryBus(exchange, "lab", "uwb"), section.model_dump_json())
-    heard = MemoryBus(exchange, "lab", "test").subscribe([RANGE, CAMERA_STATUS])
-    client = Gateway(*parse_source(section.source))
-    yield Rig(gateway, RangingDriver(child, section, client), child, heard, clock)
-    client.close()
-    gateway.close()
 
 
 def test_rounds_come_with_their_place_and_the_time_they_were_measured_at(rig: Rig) -> None:
@@ -175,20 +78,6 @@ def test_one_drones_rounds_that_repeat_themselves_are_told_once_and_so_is_their_
     ]
 
 
-def test_of_rounds_that_come_at_once_after_a_stall_the_newest_is_used(
-    rig: Rig, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Ten rounds of 0.9 s were all dated as new: 0.9 m apart, and 2 ms."""
-    rig.driver.turn()
-    rig.heard.drain()
-    burst = [(10**12 + number * MS, Round("0x1", {"a": 1.0 + 0.1 * number})) for number in range(10)]
-    parted = [(10**12 + MS, Round("drone_2", {"a": 2.0})), (10**12 + 2 * MS, Round("drone_2", {"b": 2.5}))]
-    monkeypatch.setattr(rig.driver._gateway, "poll", lambda _wait_s: iter(burst + parted))
-    rig.driver.turn()
-    told = [one.message for one in rig.heard.drain() if isinstance(one.message, RangeObservation)]
-    assert [dict(one.ranges_m) for one in told] == [{"a": 1.9}, {"a": 2.0}, {"b": 2.5}]
-
-
 @pytest.mark.parametrize("rig", [(broken(FaultKind.ANCHOR_FROZEN, "uwb", other="b", end_s=4.0),)], indirect=True)
 def test_an_anchor_that_holds_its_range_is_left_out_and_named(rig: Rig) -> None:
     rig.driver.turn()
@@ -240,6 +129,9 @@ def test_strangers_and_what_nobody_carries_are_counted(rig: Rig) -> None:
         (b'{"transponder": "t", "m": {"a": -1}}', "impossible"),
         (b'{"transponder": "t", "m": {"a": 1e9}}', "impossible"),
         (b'{"transponder": "t", "m": {"a": 1}, "age_ms": 1e9}', "impossible"),
+        (b'{"transponder": "t", "m": {"a": 1}, "sent_ms": -1}', "impossible"),
+        (b'{"transponder": "t", "m": {"a": 1}, "sent_ms": 1e16}', "impossible"),
+        (b'{"transponder": "t", "m": {"a": 1}, "sent_ms": "1"}', "damaged"),
         (b'{"transponder": "t", "m": {"a": 1}}' + b" " * 1400, "too long"),
         (b'{"transponder": "' + b"t" * 200 + b'", "m": {"a": 1}}', "damaged"),
     ],
@@ -251,7 +143,7 @@ def test_invalid_ranging_rounds_are_refused_with_a_reason(datagram: bytes, reaso
 
 
 def test_a_round_survives_the_wire_and_unknown_keys_are_passed_over() -> None:
-    told = Round("0x1", {"a": 1.25, "b": 3.5}, 4.0)
+    told = Round("0x1", {"a": 1.25, "b": 3.5}, 4.0, 1.8e12)
     assert decode(encode(told)) == told
     assert decode(b'{"transponder": "0x1", "m": {"a": 1}, "quality": [1]}') == Round("0x1", {"a": 1.0})
 

@@ -11,7 +11,7 @@ from groundstation.bus.messages import Suspicion
 from groundstation.bus.notice import Notice
 from groundstation.bus.topics import SUSPICION
 from groundstation.diagnosis.judging import Judging
-from groundstation.diagnosis.suspects import verdict_on
+from groundstation.diagnosis.suspects import Verdict, verdict_on
 from groundstation.diagnosis.watch import FigureWatch
 from groundstation.diagnosis.window import TOPICS, Window
 from groundstation.field.resolved import ResolvedField
@@ -19,6 +19,8 @@ from groundstation.time_units import NS_PER_S
 
 _PAUSE_NS = 5 * NS_PER_S  # between the beginnings of two verdicts at least
 _PAUSES = 4  # times as long as the last verdict took
+# The tracker finds a bumped or frozen camera within this time; until then a verdict would blame a figure for it.
+_PROVES_NS = 2 * NS_PER_S
 _CAPACITY = 8192
 
 
@@ -31,7 +33,9 @@ class Diagnosis:
         self._queue = bus.subscribe(TOPICS, capacity=_CAPACITY)
         self._window, self._watch = Window(field, clock.clock_id()), FigureWatch(field)
         self._begun_ns: int | None = None
-        self._due_ns = 0
+        self._forgotten = 0  # when the last verdict was begun
+        self._reached: Verdict | None = None  # and not announced yet
+        self._due_ns = self._proven_ns = 0
         self._told_ns = 0
 
     @property
@@ -48,17 +52,21 @@ class Diagnosis:
             return
         if self._begun_ns is not None:
             took_ns = now_ns - self._begun_ns
-            self._due_ns, self._begun_ns = max(self._begun_ns + _PAUSE_NS, now_ns + _PAUSES * took_ns), None
-            self._tell(now_ns)
+            self._due_ns = max(self._begun_ns + _PAUSE_NS, now_ns + _PAUSES * took_ns)
+            self._proven_ns, self._begun_ns = self._begun_ns + _PROVES_NS, None
+            self._reached = self._judging.take()
+        if self._reached is not None and now_ns >= self._proven_ns:
+            self._tell(self._reached, now_ns)
+            self._reached = None
         if self._watch.figures and now_ns >= self._told_ns + _PAUSE_NS:
             self._publish(now_ns)  # for a console that was restarted since
         if now_ns >= self._due_ns and (flown := self._window.flown()) is not None:
-            self._begun_ns = now_ns
+            self._begun_ns, self._forgotten = now_ns, self._window.forgotten
             self._judging.begin(partial(verdict_on, flown, self._field))
 
-    def _tell(self, now_ns: int) -> None:
-        verdict = self._judging.take()
-        if verdict is not None:
+    def _tell(self, verdict: Verdict, now_ns: int) -> None:
+        """Announce a verdict, unless some of the sightings that it judged do not count any more."""
+        if self._forgotten == self._window.forgotten:
             self.notices += self._watch.take(verdict, now_ns)
             self._publish(now_ns)
 

@@ -43,6 +43,7 @@ class MountWatch:
         self._jumps, self._ties = SightJumps(mounts), TiedContradictions(mounts, robots)
         self._seen: dict[Pair, Vector] = {}
         self._moved: set[str] = set()
+        self._turned: dict[str, float] = {}
         self._recalled_ns: int | None = None
 
     @property
@@ -55,12 +56,21 @@ class MountWatch:
         """Return the cameras whose sightings are refused."""
         return frozenset(self._moved)
 
+    @property
+    def turned_ns(self) -> Mapping[str, int]:
+        """Return until when [ns] each camera that was bumped saw all in place; 0: that is not known.
+
+        Sightings of some of these are used: of those that hardly turned.
+        """
+        return {name: round(NS_PER_S * max(0.0, since_s)) for name, since_s in self._turned.items()}
+
     def recall(self, moved: Collection[str], now_ns: int) -> list[Notice]:
         """Distrust cameras that were found to have moved before this watch began, in the same flight; returns notices.
 
         They are trusted again if no robot flies within 5 s.
         """
         self._moved |= self._cameras & frozenset(moved)
+        self._turned |= dict.fromkeys(self._moved, 0.0)
         self._recalled_ns = now_ns
         what = "was bumped before the tracker was started anew; it is still not believed"
         return [Notice(Severity.ERROR, what + self._rest(), _REMEDY, name) for name in sorted(self._moved)]
@@ -90,11 +100,13 @@ class MountWatch:
             self._recalled_ns = None
         elif self._recalled_ns is None or now_ns - self._recalled_ns > _NOBODY_NS:
             self._moved.clear()
+            self._turned.clear()
         self._jumps.fly(now_s, velocities)
         self._ties.take(corrections, now_s)
         return [self._tell(turn) for turn in (*self._jumps.turns(), *self._ties.turns(now_s, self._seen))]
 
     def _tell(self, turn: CameraTurn) -> Notice:
+        self._turned.setdefault(turn.camera, turn.since_s)
         angle = f"{math.degrees(turn.angle_rad):.1f} +- {math.degrees(turn.std_rad):.1f} deg"
         what = f"was bumped: all that it sees is displaced at once by {turn.displaced_m:.2f} m, as if turned by {angle}"
         if turn.displaced_m < _HARMS_M:

@@ -118,7 +118,7 @@ class SightJumps:
             # line of sight.
             together = len(displaced) > 1 and min(one.size_m for one in displaced) > together_m
             if together or (len(displaced) == 1 and jump > alone_m):
-                return camera_turn(camera, displaced)
+                return camera_turn(camera, displaced, rows[_BEFORE - 1].at_s)
         return None
 
 

@@ -100,11 +100,12 @@ class TiedContradictions:
         if not off:
             return None
         since_s = min(far[robot].since_s for robot in off)
-        agrees = any(self._agreed((camera, robot)) >= since_s for robot in self._robots)
+        agreed_s = max(self._agreed((camera, robot)) for robot in self._robots)
         jumps = any(far[robot].is_jump(gap) for robot, gap in off.items())
-        if agrees or not (jumps or self._is_witnessed(off, now_s)):
+        if agreed_s >= since_s or not (jumps or self._is_witnessed(off, now_s)):
             return None
-        return camera_turn(camera, [Displacement(n, seen[camera, n] - gap, seen[camera, n]) for n, gap in off.items()])
+        displaced = [Displacement(n, seen[camera, n] - gap, seen[camera, n]) for n, gap in off.items()]
+        return camera_turn(camera, displaced, agreed_s)
 
     def _is_witnessed(self, off: Collection[str], now_s: float) -> bool:
         """Return whether two robots would have to be lost by the same amount."""

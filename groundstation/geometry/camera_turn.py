@@ -35,16 +35,20 @@ class Displacement:
 
 @dataclass(frozen=True, slots=True)
 class CameraTurn:
-    """The turn of a camera with its deviation [rad]; the largest displacement of a sighting by it [m]."""
+    """The turn of a camera with its deviation [rad]; the largest displacement of a sighting by it [m].
+
+    since_s: until then what it saw was in place.
+    """
 
     camera: str
     angle_rad: float
     std_rad: float
     displaced_m: float
+    since_s: float
 
 
-def camera_turn(camera: str, displaced: Sequence[Displacement]) -> CameraTurn | None:
-    """Return the rotation that explains all displacements of one camera, or None if none does."""
+def camera_turn(camera: str, displaced: Sequence[Displacement], since_s: float) -> CameraTurn | None:
+    """Return the rotation that explains all displacements of one camera since a time, or None if none does."""
     most_m = max(one.size_m for one in displaced)
     A = np.vstack([_cross(one.expected_m + one.seen_m) for one in displaced])
     b = np.concatenate([one.seen_m - one.expected_m for one in displaced])
@@ -56,7 +60,7 @@ def camera_turn(camera: str, displaced: Sequence[Displacement]) -> CameraTurn | 
     length = float(np.linalg.norm(gibbs))
     along = gibbs / max(length, 1e-9)
     std_rad = 2.0 * math.sqrt(float(along @ np.linalg.solve(information, along)))
-    return CameraTurn(camera, 2.0 * math.atan(length), std_rad, most_m)
+    return CameraTurn(camera, 2.0 * math.atan(length), std_rad, most_m, since_s)
 
 
 def _cross(p: Vector) -> Matrix:

@@ -11,6 +11,7 @@ from groundstation.bus.messages import (
     Estimate,
     Innovation,
     JournalEntry,
+    MovedCamera,
     Plan,
     SearchMap,
     SensorLateness,
@@ -41,8 +42,9 @@ class Announcer:
         self._bus.publish(ESTIMATE, message)
 
     def belief(self, tracker: Tracker, lateness: tuple[SensorLateness, ...], now_ns: int) -> None:
-        """Publish the joint belief, and how late each camera seems to be."""
+        """Publish the joint belief, how late each camera seems to be, and which were bumped."""
         belief = tracker.belief
+        moved = tuple(MovedCamera(name, since_ns) for name, since_ns in sorted(tracker.mounts.turned_ns.items()))
         upper = belief.covariance[np.triu_indices(belief.layout.dim)]
         message = Belief(
             header=self._bus.header(TEAM, now_ns),
@@ -50,6 +52,7 @@ class Announcer:
             covariance_upper=tuple(upper.tolist()),
             layout=belief.layout.labels,
             lateness=lateness,
+            moved=moved,
         )
         self._bus.publish(BELIEF, message)
 

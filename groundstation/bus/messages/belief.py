@@ -99,6 +99,15 @@ class SensorLateness(msgspec.Struct, frozen=True):
     """Standard deviation of the offset [ms]."""
 
 
+class MovedCamera(msgspec.Struct, frozen=True):
+    """A fixed camera that was bumped since the team took off."""
+
+    sensor: str
+    """The camera."""
+    since_ns: int
+    """Until then all that it saw was in place [ns], on the header's clock; 0: that is not known."""
+
+
 class Belief(Message, frozen=True, kw_only=True):
     """The joint belief over all robots and targets (at most 5 Hz)."""
 
@@ -110,6 +119,8 @@ class Belief(Message, frozen=True, kw_only=True):
     """What each entry of the mean is, such as `drone_1.x`."""
     lateness: tuple[SensorLateness, ...] = ()
     """Delay errors of the cameras whose delay the flight reveals."""
+    moved: tuple[MovedCamera, ...] = ()
+    """The cameras that were bumped, until all have landed."""
 
 
 class SuspectedFigure(msgspec.Struct, frozen=True):

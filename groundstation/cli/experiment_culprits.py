@@ -38,7 +38,7 @@ def culprits(
 
     In each row one thing is wrong: a delay, a camera's mounting, a marker's size, a lens, a pad, exchanged markers. The
     team stands on its pads for 4 s, is checked, and takes off whatever was found. The fault counts as named in time if
-    a finding forbids the take-off for it, or if it is the first suspicion within 20 s of the command to take off.
+    a finding forbids the take-off for it, or if it alone is suspected, within 20 s of the command to take off.
     """
     from groundstation.experiments.culprits import row_of, table, verdict_on
     from groundstation.experiments.flight_batches import flights_of

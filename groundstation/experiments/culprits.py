@@ -9,7 +9,8 @@ from groundstation.experiments.culprit_rows import WrongLab, size_told
 WITHIN_S = 20.0
 SIZE_SHARE = 0.25
 # Texts that accuse an entity; other warnings report consequences.
-_ACCUSES = ("explains best", "contradicts the belief", "its pictures seem", "was bumped")
+_FIGURE = "explains best"
+_ACCUSES = (_FIGURE, "contradicts the belief", "its pictures seem", "was bumped")
 _EXCUSED = "probably not its fault"
 _REFUTED = "no longer suspected"
 
@@ -28,14 +29,18 @@ def verdict_on(lab: WrongLab, flight: Mapping[str, Any]) -> dict[str, Any]:
     """Return the verdict on one flight.
 
     end: "refused" (rightly, before the take-off), "right" (reported in flight, in time), "late", "wrong" (another one
-    was accused first, or this one before it was wrong), "silent"; of a healthy lab "silent" or "false alarm".
-    size_error: relative error of the reported size; said: the first accusation.
+    was accused, or this one before it was wrong), "silent"; of a healthy lab "silent" or "false alarm".
+    size_error: relative error of the reported size; said: the first accusation, after the right one the first of
+    another.
     """
     said, on_pads = accusations(flight), flight["on_pads"]
     first = said[0] if said else None
     size = None if first is None else size_told(lab, first[1])
     refused = bool(on_pads) and on_pads[0][0] == "MUST"
-    end = _end(lab, first, size, refused)
+    end, other = _end(lab, first, size, refused), None
+    if end in ("right", "late"):
+        other = next((line for _, line in said if _names_another(lab, line, said[0][1])), None)
+        end = end if other is None else "wrong"
     return {
         "seed": flight["seed"],
         "end": end,
@@ -43,8 +48,15 @@ def verdict_on(lab: WrongLab, flight: Mapping[str, Any]) -> dict[str, Any]:
         "size_error": None if size is None or not lab.size or math.isnan(size) else abs(size / lab.size - 1.0),
         "refuted": any(_REFUTED in text for _, _, _, text, _ in flight["told"]),
         "rmse_m": flight.get("rmse_m"),
-        "said": "" if first is None else first[1],
+        "said": other or ("" if first is None else first[1]),
     }
+
+
+def _names_another(lab: WrongLab, line: str, right: str) -> bool:
+    """Return whether an accusation names another culprit, or another wrong figure of the same."""
+    if size_told(lab, line) is not None:
+        return False
+    return _FIGURE in line or line.split(": ")[0] != right.split(": ")[0]
 
 
 def _end(lab: WrongLab, first: tuple[float, str] | None, size: float | None, refused: bool) -> str:

@@ -56,11 +56,23 @@ def test_ends_of_a_wrong_lab() -> None:
     assert verdict_on(lab, flown(right))["size_error"] == pytest.approx(0.2)
     assert verdict_on(lab, flown(other, right))["end"] == "wrong"
     assert verdict_on(lab, flown((25.0, *right[1:])))["end"] == "late"
+    besides = verdict_on(lab, flown(right, other))
+    assert besides["end"] == "wrong" and besides["said"] == f"b: {other[2]}", "it need not be the first"
     begun = replace(lab, faults=({"start_s": STAND_S + 10.0},))
     assert verdict_on(begun, flown((25.0, *right[1:])))["end"] == "right"
     assert verdict_on(begun, flown((9.0, *right[1:])))["end"] == "wrong", "it was not wrong yet"
     assert verdict_on(lab, flown(other, on_pads=pads))["end"] == "refused"
     assert verdict_on(lab, flown())["end"] == "silent"
+
+
+def test_a_second_name_besides_a_bumped_camera_is_wrong() -> None:
+    lab = LABS["ceiling bumped"]
+    bumped = (19.0, "ceiling", "was bumped: all that it sees is displaced by 0.3 m, as if turned by 4.9 +- 0.9 deg")
+    same = (21.0, "ceiling", "what ceiling sees of a contradicts the belief for 3 s")
+    older = (24.0, "ceiling", "ceiling's pictures are 146 +- 13 ms older than configured" + EXPLAINS)
+    lens = (24.0, "b", "b's camera has a focal length 6.9 +- 0.9 % longer than calibrated" + EXPLAINS)
+    assert verdict_on(lab, flown(bumped, same))["end"] == "right"
+    assert [verdict_on(lab, flown(bumped, other))["end"] for other in (older, lens)] == ["wrong", "wrong"]
 
 
 def test_a_healthy_lab_must_be_silent() -> None:

@@ -18,19 +18,27 @@ _ELSEWHERE = "check who has its name in the system, where it stands, and the sys
 
 
 def captured_pad_findings(
-    field: ResolvedField, sightings: Sequence[PadSighting], flew: Collection[str] = ()
+    field: ResolvedField,
+    sightings: Sequence[PadSighting],
+    flew: Collection[str] = (),
+    aloft: Collection[str] = (),
 ) -> Iterator[Finding]:
-    """Yield findings of motion capture and ranges on drones on their pads: not followed, elsewhere, or well."""
+    """Yield findings of motion capture and ranges on standing drones: not followed, elsewhere, or well.
+
+    One that flew may stand anywhere.
+    """
     remedies = dict.fromkeys(field.sensing_capture, _BODIES) | dict.fromkeys(field.ranging, _RADIOS)
     for system, remedy in remedies.items():
         known = {s.drone: s for s in sightings if s.camera == system and s.drone in field.drones}
-        if not known and not flew:
+        if not known and not aloft:
             yield Finding(Level.MUST, system, "follows none of the drones", remedy)
             continue
         for name in field.drones:
-            if name in known:
+            if name in known and name in flew:
+                yield Finding(Level.OK, name, f"{system} follows it")
+            elif name in known:
                 yield _judged(name, known[name], field.drones, _aside_limit_m(field, system))
-            elif name not in flew:
+            elif name not in aloft:
                 yield Finding(Level.SHOULD, name, f"{system} does not follow it", _UNFOLLOWED)
 
 

@@ -22,38 +22,45 @@ def judge(
     sightings: Sequence[PadSighting],
     flew: Collection[str] = (),
     cautions: Sequence[Finding] = (),
+    aloft: Collection[str] = (),
 ) -> list[Finding]:
     """Return all findings, those that must be mended first.
 
-    flew: drones that have flown and may stand anywhere by now; cautions: warnings about the field file.
+    flew: drones that have flown and may stand anywhere by now, or be aloft still; cautions: warnings about the field
+    file.
     """
     sees = {camera: sorted({s.drone for s in sightings if s.camera == camera}) for camera in field.world_sensors}
     found = [*drone_findings(field, vehicles), *camera_findings(field, cameras, sees)]
-    found += [*pad_findings(field, sightings, flew), *cautions]
+    found += [*pad_findings(field, sightings, flew, aloft), *cautions]
     return sorted(found, key=lambda one: _GRAVITY[one.level])
 
 
 def pad_findings(
-    field: ResolvedField, sightings: Sequence[PadSighting], flew: Collection[str] = ()
+    field: ResolvedField,
+    sightings: Sequence[PadSighting],
+    flew: Collection[str] = (),
+    aloft: Collection[str] = (),
 ) -> Iterator[Finding]:
-    """Yield findings of fixed sensors on drones on their pads: unseen ones, and the errors of the others."""
-    yield from captured_pad_findings(field, sightings, flew)
+    """Yield findings of fixed sensors on standing drones: unseen ones, and the errors of those that never flew."""
+    yield from captured_pad_findings(field, sightings, flew, aloft)
     if not field.cameras:
         return
     known = [s for s in sightings if s.drone in field.drones and s.camera in field.cameras]
-    seen = {s.drone for s in known}
-    unseen = [name for name in field.drones if name not in seen and name not in flew]
-    remedy = "check light, lens and marker, and that it stands on its pad in view"
-    if not known and not flew:
+    seen, on_pads = {s.drone for s in known}, [s for s in known if s.drone not in flew]
+    remedy = "check light, lens and marker, and that it stands {} in view"
+    if not known and not aloft:
         shown = shown_by(drone.marker for drone in field.drones.values())
-        yield Finding(Level.MUST, SUBJECT, "no fixed camera sees any drone", f"{remedy}; {shown}")
+        where = remedy.format("anywhere" if set(field.drones) <= set(flew) else "on its pad")
+        yield Finding(Level.MUST, SUBJECT, "no fixed camera sees any drone", f"{where}; {shown}")
         return
     yield from blind_cameras(field, known, flew)
-    for name in unseen:
-        shown = shown_by([field.drones[name].marker])
-        yield Finding(Level.SHOULD, name, "no fixed camera sees its marker on the floor", f"{remedy}; {shown}")
-    if known:
-        yield finding(field, opinion(stand_of(field), known))
+    for name in field.drones:
+        if name not in seen and name not in aloft:
+            shown, where = shown_by([field.drones[name].marker]), "anywhere" if name in flew else "on its pad"
+            told = f"{remedy.format(where)}; {shown}"
+            yield Finding(Level.SHOULD, name, "no fixed camera sees its marker on the floor", told)
+    if on_pads:
+        yield finding(field, opinion(stand_of(field), on_pads))
 
 
 def open_musts(findings: Iterable[Finding], wanted: Collection[str], team: Collection[str]) -> list[Finding]:

@@ -36,7 +36,8 @@ class BeforeTakeOff:
     """Call `update` often; `findings` takes up to a tenth of a second with a team of eight.
 
     Once `publish` has sent the list, `update` sends it again every 3 s while nobody flies. A drone that has flown in
-    this run may stand anywhere, so it is no longer compared with its pad. cautions: warnings about the field file.
+    this run may stand anywhere: it must be seen, but is no longer compared with its pad. cautions: warnings about the
+    field file.
     """
 
     def __init__(self, bus: Bus, field: ResolvedField, cautions: Sequence[Finding] = ()) -> None:
@@ -45,6 +46,7 @@ class BeforeTakeOff:
         self._vehicles: dict[str, tuple[int, VehicleStatus]] = {}
         self._cameras: dict[str, tuple[int, CameraStatus]] = {}
         self._flew: set[str] = set()
+        self._aloft: set[str] = set()
         self._record = PadRecord(field.world_sensors)
         self._next_ns: int | None = None
 
@@ -52,24 +54,24 @@ class BeforeTakeOff:
         """Take the messages that have arrived."""
         for received in self._inbox.drain():
             match received.message:
-                case RelativeObservation() | RangeObservation() as sighting if sighting.subject not in self._flew:
+                case RelativeObservation() | RangeObservation() as sighting if sighting.subject not in self._aloft:
                     self._record.see(sighting, now_ns)
                 case CameraStatus() as status:
                     self._cameras[status.header.entity] = now_ns, status
                 case VehicleStatus() as status:
                     self._hear(status, now_ns)
-        if self._next_ns is not None and now_ns >= self._next_ns and not self._anybody_flies():
+        if self._next_ns is not None and now_ns >= self._next_ns and not self._aloft:
             self._tell(self.findings(now_ns), now_ns)
-
-    def _anybody_flies(self) -> bool:
-        return any(status.flight_state in AIRBORNE for _, status in self._vehicles.values())
 
     def _hear(self, status: VehicleStatus, now_ns: int) -> None:
         name = status.header.entity
         self._vehicles[name] = now_ns, status
         if status.flight_state in AIRBORNE:
             self._flew.add(name)
+            self._aloft.add(name)
             self._record.forget(name)
+        else:
+            self._aloft.discard(name)
 
     def complete(self, now_ns: int) -> bool:
         """Return whether every fixed sensor has reported and every drone that has not flown was seen often enough."""
@@ -81,7 +83,8 @@ class BeforeTakeOff:
     def findings(self, now_ns: int) -> list[Finding]:
         """Return all present findings, the grave first."""
         vehicles, cameras = _spoken(self._vehicles, now_ns), _spoken(self._cameras, now_ns)
-        return judge(self._field, vehicles, cameras, self._record.medians(now_ns), self._flew, self._cautions)
+        medians = self._record.medians(now_ns)
+        return judge(self._field, vehicles, cameras, medians, self._flew, self._cautions, self._aloft)
 
     def left_out(self, now_ns: int) -> tuple[str, ...]:
         """Return the drones that a take-off of all would leave on the ground now."""

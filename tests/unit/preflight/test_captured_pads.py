@@ -50,4 +50,13 @@ def test_nobody_followed_forbids_and_one_who_is_not_does_not(field: ResolvedFiel
     name, drone = next(iter(field.drones.items()))
     levels = {one.subject: one.level for one in pad_findings(field, [at(field, name, drone.pad_m)])}
     assert levels == {name: Level.OK} | {n: Level.SHOULD for n in field.drones if n != name}
-    assert list(pad_findings(field, [], flew=tuple(field.drones))) == []
+
+
+def test_drones_that_flew_need_only_be_followed(field: ResolvedField) -> None:
+    flew = tuple(field.drones)
+    (none,) = pad_findings(field, [], flew)
+    assert (none.subject, none.level) == ("mocap", Level.MUST)
+    assert list(pad_findings(field, [], flew, aloft=flew)) == []
+    elsewhere = [at(field, name, (-2.0, 2.0), 120.0) for name in flew[:1]]
+    levels = {one.subject: one.level for one in pad_findings(field, elsewhere, flew)}
+    assert levels == {flew[0]: Level.OK} | dict.fromkeys(flew[1:], Level.SHOULD)

@@ -170,7 +170,21 @@ def test_nobody_in_view_forbids_and_one_out_of_view_does_not(lab_field: Resolved
     one = [s for s in seen(lab_field, Truth(), 1) if s.drone == "drone_1"]
     unseen, well = pad_findings(lab_field, one)
     assert (unseen.subject, unseen.level, well.level) == ("drone_2", Level.SHOULD, Level.OK)
-    assert list(pad_findings(lab_field, [], flew=("drone_1", "drone_2"))) == []
+
+
+def test_drones_that_flew_need_only_be_seen_where_they_landed(lab_field: ResolvedField) -> None:
+    both, none = ("drone_1", "drone_2"), ()
+    landed = seen(lab_field, Truth(moved={"drone_1": (0.9, 0.0, 70.0), "drone_2": (0.0, 0.8, -90.0)}), 1)
+    assert list(pad_findings(lab_field, landed, flew=both)) == []
+    (blind,) = pad_findings(lab_field, [], flew=both)
+    assert blind.level is Level.MUST and "stands anywhere in view" in blind.remedy
+    assert list(pad_findings(lab_field, [], flew=both, aloft=both)) == []
+    for aloft in (("drone_1",), none):
+        unseen = list(pad_findings(lab_field, landed[:1], flew=both, aloft=aloft))
+        assert [(one.subject, one.level) for one in unseen] == [("drone_2", Level.SHOULD)]
+    assert [one.level for one in pad_findings(lab_field, landed[1:], flew=("drone_1",))] == [Level.SHOULD, Level.MUST]
+    (other,) = pad_findings(lab_field, [], flew=("drone_1",), aloft=("drone_1",))
+    assert (other.subject, other.level) == ("drone_2", Level.SHOULD)
 
 
 def test_the_remedy_names_the_dictionary_of_a_tag(lab_field: ResolvedField) -> None:

@@ -48,7 +48,7 @@ class Lab:
         self.checks = BeforeTakeOff(self.bus, field)
         drones = tuple(field.drones)
         self.operator = Operator(self.bus, drones, {}, TakeOffLimits(), self.said.append, self.checks)
-        self.states = dict.fromkeys(drones, FlightState.LANDED)
+        self.states, self.dark = dict.fromkeys(drones, FlightState.LANDED), False
 
     def turn(self, times: int = 12) -> None:
         for _ in range(times):
@@ -63,6 +63,8 @@ class Lab:
             header = self.devices.header(name)
             status = VehicleStatus(header=header, flight_state=state, mode="LANDED", battery=0.9, rate_hz=200.0)
             self.devices.publish(VEHICLE_STATUS, status)
+            if self.dark:
+                continue
             pad = stand.pads[name]
             centre = marker_centres([pad], np.zeros((1, 2)), np.zeros(1), np.zeros(1))[0] - camera.position_m
             x, y, z = (camera.rotation.T @ centre).tolist()
@@ -161,6 +163,24 @@ def test_drones_that_flew_in_this_run_may_stand_anywhere(lab_field: ResolvedFiel
     lab.states = dict.fromkeys(lab.states, FlightState.LANDED)
     lab.turn()
     assert lab.checks.forbids(lab.now_ns, ()) == []
+
+
+@pytest.mark.parametrize("flies_on", [False, True])
+def test_before_a_second_take_off_somebody_must_be_seen(lab_field: ResolvedField, flies_on: bool) -> None:
+    """A camera was turned away after the landing; while one still flies, that says nothing."""
+    lab = Lab(lab_field)
+    lab.turn()
+    lab.states = dict.fromkeys(lab.states, FlightState.HOVERING)
+    lab.turn()
+    assert lab.checks.forbids(lab.now_ns, ()) == [], "nobody stands"
+    lab.states = dict.fromkeys(lab.states, FlightState.LANDED)
+    if flies_on:
+        lab.states["drone_1"] = FlightState.HOVERING
+    lab.dark = True
+    lab.turn()
+    found = [one for one in lab.checks.findings(lab.now_ns) if one.level is not Level.OK]
+    assert [one.level for one in found] == [Level.SHOULD if flies_on else Level.MUST]
+    assert "no fixed camera sees" in found[0].found
 
 
 def test_a_look_tells_operator_and_bus_what_must_be_mended(lab_field: ResolvedField) -> None:

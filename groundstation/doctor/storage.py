@@ -15,16 +15,18 @@ _SPEED_SHOULD = 20e6
 _MEMORY_SHOULD = 4e9
 _FILES_SHOULD = 1024
 _BLOCK, _BLOCKS = 1 << 20, 16
+_REMEDY = "set recording.directory to a folder of yours"
 
 
 def room(folder: Path) -> Finding:
     """Return a finding on the free space of the recordings' folder, or of its nearest existing parent."""
+    taken = _present(folder)[0]
+    if not taken.is_dir():
+        return Finding(Level.MUST, "disk", f"{taken} is no folder: nothing can be recorded there", _REMEDY)
     try:
         free = free_bytes(_nearest(folder))
     except OSError as error:
-        return Finding(
-            Level.MUST, "disk", f"{folder}: {error.strerror}", "set recording.directory to a folder of yours"
-        )
+        return Finding(Level.MUST, "disk", f"{folder}: {error.strerror}", _REMEDY)
     level = Level.MUST if free < _FREE_MUST else Level.SHOULD
     found = f"{free / 1e9:.1f} GB free for {folder}"
     remedy = "make room, or set recording.directory: a flight writes about 3 GB an hour"
@@ -37,8 +39,7 @@ def speed(folder: Path) -> Finding:
     try:
         took_s = _write(path)
     except OSError as error:
-        remedy = "set recording.directory to a folder of yours"
-        return Finding(Level.MUST, "disk speed", f"cannot write to {path.parent}: {error.strerror}", remedy)
+        return Finding(Level.MUST, "disk speed", f"cannot write to {path.parent}: {error.strerror}", _REMEDY)
     rate = _BLOCK * _BLOCKS / max(took_s, 1e-6)
     found = f"{rate / 1e6:.0f} MB/s"
     return judged(
@@ -60,9 +61,14 @@ def _write(path: Path) -> float:
             path.unlink()
 
 
-def _nearest(folder: Path) -> Path:
+def _present(folder: Path) -> list[Path]:
+    """Return the folder and its parents, nearest first, without those that would have to be made."""
     folder = folder.absolute()
-    return next(place for place in (folder, *folder.parents) if place.is_dir())
+    return [place for place in (folder, *folder.parents) if os.path.lexists(place)]
+
+
+def _nearest(folder: Path) -> Path:
+    return next(place for place in _present(folder) if place.is_dir())
 
 
 def memory() -> Finding:

@@ -45,6 +45,15 @@ def test_a_full_disk_must_be_mended(monkeypatch: pytest.MonkeyPatch, tmp_path: P
         assert storage.room(tmp_path / "not" / "there").level is level
 
 
+def test_recordings_need_a_folder_not_a_file(tmp_path: Path) -> None:
+    file, dangling = tmp_path / "runs", tmp_path / "link"
+    file.write_text("")
+    dangling.symlink_to(tmp_path / "unplugged")
+    for place, named in ((file, file), (file / "of" / "lab", file), (dangling, dangling)):
+        finding = storage.room(place)
+        assert finding.level is Level.MUST and finding.found.startswith(f"{named} is no folder") and finding.remedy
+
+
 def test_the_probe_of_the_disk_leaves_nothing_behind(tmp_path: Path) -> None:
     assert "MB/s" in storage.speed(tmp_path / "runs").found
     assert list(tmp_path.iterdir()) == []

@@ -16,6 +16,7 @@ from groundstation.bus.topics import BODY_POSES, OBSERVATION
 from groundstation.time_units import NS_PER_MS
 
 _POLL_S = 0.02
+_NOBODY = ""  # the turn of frames without a body
 _CHECK = (
     "check the system's definition of its markers (each body must look different from each side), what hides them, and "
     "its names of the bodies"
@@ -44,7 +45,9 @@ class MotionCaptureDriver:
         self._bodies = {body.name: body for body in settings.bodies}
         self._watch = BodyWatch(settings.max_speed_m_s)
         self._faults: dict[str, str] = {}
-        self._exposure_ns, self._grid = 0, Grid(settings.rate_hz)
+        # Bodies that arrive one by one each have their own turn: the first of them must not take that of the others.
+        self._grids = {entity: Grid(settings.rate_hz) for entity in (_NOBODY, *(one.entity for one in settings.bodies))}
+        self._exposure_ns = 0
         remedy = f"check the system, whether it streams, and its address {settings.source}"
         names = StreamNames("motion capture", settings.name, "frame", settings.source, remedy)
         self._health = StreamHealth(child, names, settings.start_within_s, settings.silent_after_s)
@@ -69,8 +72,9 @@ class MotionCaptureDriver:
         poses = self._entity_poses(frame)
         faults = self._watch.look(exposure_ns, poses)
         self._tell(faults)
-        if self._grid.is_due(exposure_ns):
-            self._publish(exposure_ns, poses, faults)
+        due = {entity: pose for entity, pose in poses.items() if self._grids[entity].is_due(exposure_ns)}
+        if due or (not poses and self._grids[_NOBODY].is_due(exposure_ns)):
+            self._publish(exposure_ns, due, faults)
 
     def _entity_poses(self, frame: CapturedFrame) -> dict[str, EntityPose]:
         """Return the poses of our entities; invalid poses are counted and left out."""
@@ -95,7 +99,7 @@ class MotionCaptureDriver:
     def _publish(self, exposure_ns: int, poses: dict[str, EntityPose], faults: dict[str, str]) -> None:
         bus, name = self._child.bus, self._settings.name
         bodies = tuple(body_pose(entity, pose) for entity, pose in poses.items())
-        refused = {entity: why for entity, why in faults.items() if why}
+        refused = {entity: faults[entity] for entity in poses if faults[entity]}
         bus.publish(BODY_POSES, BodyPoses(header=bus.header(name, exposure_ns), bodies=bodies, refused=refused))
         for entity, pose in poses.items():
             if not self._in_volume(pose):

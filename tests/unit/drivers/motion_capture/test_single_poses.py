@@ -1,0 +1,91 @@
+"""The motion capture driver with bodies whose poses come one by one: each has its own turn and its own date."""
+
+from collections import Counter
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from drivers.motion_capture.captured_frame import CapturedFrame
+from drivers.motion_capture.driver import MotionCaptureDriver
+from drivers.motion_capture.settings import MotionCaptureSection
+from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
+from groundstation.bus.messages import BodyPoses, RelativeObservation
+from groundstation.bus.topics import BODY_POSES, CAMERA_STATUS, OBSERVATION
+
+MS = 1_000_000
+TURN = (0.0, 0.0, 0.0, 1.0)
+PLACES = {"drone_1": (0.5, 0.2, 1.5), "drone_2": (-0.9, 0.1, 1.4)}
+SECTION = MotionCaptureSection.model_validate(
+    {
+        "name": "mocap",
+        "source": "ros2://127.0.0.1/mocap",
+        "bodies": [{"entity": name, "name": name} for name in PLACES],
+        "observed": list(PLACES),
+        "volume_m": [(-3.0, 3.0)] * 3,
+        "delay_ms": 0.0,
+    }
+)
+
+
+class Hall:
+    """The driver, with a source of frames at times of a manual clock; bodies jitter by their count of poses."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now_ns, self.count = 1000 * 1000 * MS, 0
+        monkeypatch.setattr("groundstation.bus.clock.now_ns", lambda: self.now_ns)
+        exchange = MemoryExchange()
+        self.events: list[str] = []
+        nothing: Any = lambda *_, **__: None  # noqa: E731 - of its host the driver uses no more
+        child: Any = SimpleNamespace(
+            bus=MemoryBus(exchange, "lab", "mocap"), ready=nothing, degrade=nothing, beat=nothing, tick_status=nothing,
+            event=lambda _severity, text, *_, **__: self.events.append(text),
+        )  # fmt: skip
+        self._heard = MemoryBus(exchange, "lab", "test").subscribe([OBSERVATION, BODY_POSES, CAMERA_STATUS])
+        self._came: list[CapturedFrame] = []
+        source: Any = SimpleNamespace(poll=lambda _: self._taken(), rejected=Counter(), detail="")
+        self.driver = MotionCaptureDriver(child, SECTION, source)
+
+    def _taken(self) -> list[CapturedFrame]:
+        came, self._came = self._came, []
+        return came
+
+    def pose(self, name: str) -> Any:
+        self.count += 1
+        x, y, z = PLACES[name]
+        return (x + 1e-4 * (self.count % 7), y, z), TURN
+
+    def comes(self, *names: str, **more: Any) -> None:
+        """Let one frame with these bodies come now."""
+        self._came.append(CapturedFrame(self.now_ns, 0, {name: self.pose(name) for name in names}, **more))
+        self.driver.turn()
+
+    def heard(self, kind: type) -> list[Any]:
+        return [one.message for one in self._heard.drain() if isinstance(one.message, kind)]
+
+
+@pytest.fixture
+def hall(monkeypatch: pytest.MonkeyPatch) -> Hall:
+    return Hall(monkeypatch)
+
+
+@pytest.mark.parametrize(("rate_hz", "apart_ms"), [(30, 10), (60, 8), (120, 4), (15, 10), (100, 5)])
+def test_bodies_whose_poses_come_apart_are_all_observed(hall: Hall, rate_hz: int, apart_ms: int) -> None:
+    seconds, least = 10, min(30, rate_hz)
+    seen = dict.fromkeys(PLACES, 0)
+    for count in range(seconds * rate_hz):
+        hall.now_ns = 10**12 + round(count * 1e9 / rate_hz)
+        hall.comes("drone_1")
+        hall.now_ns += apart_ms * MS
+        hall.comes("drone_2")
+        for one in hall.heard(RelativeObservation):
+            seen[one.subject] += 1
+    assert all(0.9 * least <= number / seconds <= 1.1 * least for number in seen.values()), seen
+
+
+def test_bodies_of_one_frame_stay_together(hall: Hall) -> None:
+    for _ in range(200):
+        hall.now_ns += 10 * MS
+        hall.comes(*PLACES)
+    frames = hall.heard(BodyPoses)
+    assert 50 <= len(frames) <= 70 and all(len(one.bodies) == 2 for one in frames)

@@ -48,25 +48,25 @@ class BodyWatch:
     _exchanged: set[frozenset[str]] = field(default_factory=set)
 
     def look(self, stamp_ns: int, poses: Mapping[str, EntityPose]) -> dict[str, str]:
-        """Take in the tracked bodies of a frame; return for each why it must not be used, or ""."""
+        """Take in the bodies of a frame; return for each why it must not be used, or ""; stamp_ns: the frame's."""
         self._forget(stamp_ns)
         positions = {name: pose.position for name, pose in poses.items()}
         before = {name: track.position for name, track in self._tracks.items()}
-        reach_m = {name: self._reach_m(track, stamp_ns) for name, track in self._tracks.items()}
+        reach_m = {name: self._reach_m(self._tracks[name], poses[name].exposure_ns) for name in poses if name in before}
         jumped = {
             name: difference(position, before[name])
             for name, position in positions.items()
-            if name in before and math.dist(before[name], position) > reach_m[name]
+            if name in reach_m and math.dist(before[name], position) > reach_m[name]
         }
-        turned = {name: turn for name, pose in poses.items() if (turn := self._turn(name, stamp_ns, pose)) is not None}
+        turned = {name: turn for name, pose in poses.items() if (turn := self._turn(name, pose)) is not None}
         for pair in list(_exchanges(jumped, before, positions, reach_m)):
             self._exchanged ^= {pair}
             for name in pair:
                 jumped.pop(name, None)
                 turned.pop(name, None)
         for name, pose in poses.items():
-            self._follow(name, stamp_ns, pose, jumped.get(name), turned.get(name))
-        return {name: self._fault(name, stamp_ns) for name in positions}
+            self._follow(name, pose, jumped.get(name), turned.get(name))
+        return {name: self._fault(name) for name in positions}
 
     def _forget(self, stamp_ns: int) -> None:
         gone = [n for n, track in self._tracks.items() if stamp_ns - track.stamp_ns > _FORGOTTEN_S * NS_PER_S]
@@ -79,17 +79,17 @@ class BodyWatch:
         """Return how far a body may have moved since its last new pose [m]: it flies on while that is frozen."""
         return self.max_speed_m_s * max(0, stamp_ns - track.since_ns) / NS_PER_S + _MARGIN_M
 
-    def _turn(self, name: str, stamp_ns: int, pose: EntityPose) -> Array | None:
+    def _turn(self, name: str, pose: EntityPose) -> Array | None:
         """Return how a body turned in its own axes (3, 3) since its last pose, if it cannot have; else None."""
         track = self._tracks.get(name)
         if track is None:
             return None
         turn: Array = track.rotation.T @ pose.rotation
-        reach_rad = _TURN_RAD_S * max(0, stamp_ns - track.since_ns) / NS_PER_S + _LEAN_RAD
+        reach_rad = _TURN_RAD_S * max(0, pose.exposure_ns - track.since_ns) / NS_PER_S + _LEAN_RAD
         return turn if _angle_rad(turn) > reach_rad else None
 
-    def _follow(self, name: str, stamp_ns: int, pose: EntityPose, jump: Vector3 | None, turn: Array | None) -> None:
-        position = pose.position
+    def _follow(self, name: str, pose: EntityPose, jump: Vector3 | None, turn: Array | None) -> None:
+        stamp_ns, position = pose.exposure_ns, pose.position
         track = self._tracks.setdefault(name, _Track(stamp_ns, position, pose.rotation, stamp_ns))
         if position == track.position:
             track.repeats += 1
@@ -104,9 +104,9 @@ class BodyWatch:
             track.turned_rad = _angle_rad(track.turn)
         track.stamp_ns, track.position, track.rotation = stamp_ns, position, pose.rotation
 
-    def _fault(self, name: str, stamp_ns: int) -> str:
+    def _fault(self, name: str) -> str:
         track = self._tracks[name]
-        if track.repeats >= _FROZEN_FRAMES and stamp_ns - track.since_ns >= _FROZEN_S * NS_PER_S:
+        if track.repeats >= _FROZEN_FRAMES and track.stamp_ns - track.since_ns >= _FROZEN_S * NS_PER_S:
             return "its pose repeats to the last bit: the stream is frozen"
         for pair in self._exchanged:
             if name in pair:

@@ -13,7 +13,8 @@ Pose = tuple[Vector3, Quaternion]
 class CapturedFrame:
     """One frame: its arrival, the time from exposure to sending [ns], and the tracked bodies by name.
 
-    processing_ns: or by how much it came later than usual.
+    processing_ns: or by how much it came later than usual. behind_ns: by how much earlier a body was exposed than that
+    says, where bodies differ.
     poses: position [m; the system's axes], quaternion (x, y, z, w). untracked: known to the system, not seen.
     deviations: as the system reports them, of x, y, z [m; likewise] and of the heading [rad], 0 where unknown.
     """
@@ -23,3 +24,4 @@ class CapturedFrame:
     poses: dict[str, Pose]
     untracked: tuple[str, ...] = ()
     deviations: Mapping[str, Deviations] = field(default_factory=dict)
+    behind_ns: Mapping[str, int] = field(default_factory=dict)

@@ -21,13 +21,14 @@ _FARTHEST_M = 1e4
 class EntityPose:
     """An entity's pose: centre [m; world], world_from_base (3, 3), centre of its marker [m; world].
 
-    deviations: as the system reports them, in its axes.
+    deviations: as the system reports them, in its axes; exposure_ns: when it was there.
     """
 
     position: Vector3
     rotation: Array
     marker: Vector3
     deviations: Deviations = UNKNOWN
+    exposure_ns: int = 0
 
 
 class Placement:

@@ -1,6 +1,7 @@
 """The motion capture process: frames in; poses, observations and status out."""
 
 from collections import Counter
+from dataclasses import replace
 
 from drivers.base import HostProcess, read_section
 from drivers.motion_capture.body_watch import BodyWatch
@@ -47,7 +48,7 @@ class MotionCaptureDriver:
         self._faults: dict[str, str] = {}
         # Bodies that arrive one by one each have their own turn: the first of them must not take that of the others.
         self._grids = {entity: Grid(settings.rate_hz) for entity in (_NOBODY, *(one.entity for one in settings.bodies))}
-        self._exposure_ns = 0
+        self._exposures_ns = dict.fromkeys(self._grids, 0)
         remedy = f"check the system, whether it streams, and its address {settings.source}"
         names = StreamNames("motion capture", settings.name, "frame", settings.source, remedy)
         self._health = StreamHealth(child, names, settings.start_within_s, settings.silent_after_s)
@@ -64,20 +65,24 @@ class MotionCaptureDriver:
         self._health.came(frame.arrival_ns)
         delay_ns = round(self._settings.delay_ms * NS_PER_MS)
         exposure_ns = frame.arrival_ns - frame.processing_ns - delay_ns
-        if exposure_ns <= self._exposure_ns:
-            self._health.skipped += 1  # overtaken by a newer one on the way
-            return
-        self._exposure_ns = exposure_ns
-        self._health.used(exposure_ns)
-        poses = self._entity_poses(frame)
-        faults = self._watch.look(exposure_ns, poses)
+        came = self._entity_poses(frame, exposure_ns)
+        poses = {entity: pose for entity, pose in came.items() if pose.exposure_ns > self._exposures_ns[entity]}
+        if len(poses) < len(came):
+            self._health.skipped += 1  # overtaken by newer poses of the same body on the way
+            if not poses:
+                return
+        stamps_ns = {entity: pose.exposure_ns for entity, pose in poses.items()} or {_NOBODY: exposure_ns}
+        self._exposures_ns |= stamps_ns
+        newest_ns = max(stamps_ns.values())
+        self._health.used(newest_ns)
+        faults = self._watch.look(newest_ns, poses)
         self._tell(faults)
-        due = {entity: pose for entity, pose in poses.items() if self._grids[entity].is_due(exposure_ns)}
-        if due or (not poses and self._grids[_NOBODY].is_due(exposure_ns)):
-            self._publish(exposure_ns, due, faults)
+        due_ns = {entity: at_ns for entity, at_ns in stamps_ns.items() if self._grids[entity].is_due(at_ns)}
+        for at_ns in sorted(set(due_ns.values())):
+            self._publish(at_ns, {one: pose for one, pose in poses.items() if due_ns.get(one) == at_ns}, faults)
 
-    def _entity_poses(self, frame: CapturedFrame) -> dict[str, EntityPose]:
-        """Return the poses of our entities; invalid poses are counted and left out."""
+    def _entity_poses(self, frame: CapturedFrame, exposure_ns: int) -> dict[str, EntityPose]:
+        """Return the poses of our entities; invalid poses are counted and left out; exposure_ns: of the frame."""
         poses = {}
         for name, (position, quaternion) in frame.poses.items():
             body = self._bodies.get(name)
@@ -88,7 +93,7 @@ class MotionCaptureDriver:
             if pose is None:
                 self.counts["no pose"] += 1
             else:
-                poses[body.entity] = pose
+                poses[body.entity] = replace(pose, exposure_ns=exposure_ns - frame.behind_ns.get(name, 0))
         self.counts["untracked"] += sum(name in self._bodies for name in frame.untracked)
         return poses
 

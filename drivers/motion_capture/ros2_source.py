@@ -38,16 +38,17 @@ class Ros2Source:
         time.sleep(_GATHER_S)
         self._came.clear()
         said: dict[str, StampedPose] = {}
-        late_ns: dict[str, int] = {}
+        exposed_ns: dict[str, int] = {}
         arrival_ns = 0
         while self._waiting:
-            arrival_ns, late, name, pose = self._waiting.popleft()
-            said[name], late_ns[name] = pose, late
+            arrival_ns, late_ns, name, pose = self._waiting.popleft()
+            said[name], exposed_ns[name] = pose, arrival_ns - late_ns
         if not said:
             return []
         poses = {name: pose.pose for name, pose in said.items()}
         deviations = {name: pose.deviations for name, pose in said.items()}
-        return [CapturedFrame(arrival_ns, min(late_ns.values()), poses, deviations=deviations)]
+        behind_ns = {name: arrival_ns - at_ns for name, at_ns in exposed_ns.items()}
+        return [CapturedFrame(arrival_ns, 0, poses, deviations=deviations, behind_ns=behind_ns)]
 
     def close(self) -> None:
         """Leave the router."""

@@ -32,7 +32,8 @@ class Hall:
         yaw = self.ticks * 0.006 / 0.5
         lean = [math.radians(self.shake.gauss(0.0, 0.5)) for _ in range(3)]
         rotation = rotation_from_euler(lean[0], lean[1], yaw + lean[2])
-        return EntityPose(at, rotation @ rotation_from_euler(*self.turned) if name == "a" else rotation, at)
+        turned = rotation @ rotation_from_euler(*self.turned) if name == "a" else rotation
+        return EntityPose(at, turned, at, exposure_ns=self.ticks * STEP_NS)
 
     def look(self, **places: tuple[float, float, float]) -> dict[str, str]:
         self.ticks += 1

@@ -89,3 +89,33 @@ def test_bodies_of_one_frame_stay_together(hall: Hall) -> None:
         hall.comes(*PLACES)
     frames = hall.heard(BodyPoses)
     assert 50 <= len(frames) <= 70 and all(len(one.bodies) == 2 for one in frames)
+
+
+def test_a_body_that_comes_late_delays_and_discards_no_other(hall: Hall) -> None:
+    """Both are seen every 20 ms; poses of drone_2 come 50 ms late, between those of drone_1, as of late."""
+    used: dict[str, set[int]] = {name: set() for name in PLACES}
+    for _ in range(200):
+        hall.now_ns += 15 * MS
+        hall.comes("drone_1")
+        hall.now_ns += 5 * MS
+        hall.comes("drone_2", behind_ns={"drone_2": 50 * MS})
+        for one in hall.heard(RelativeObservation):
+            used[one.subject].add((hall.now_ns - one.header.stamp_ns) // MS)
+    assert used == {"drone_1": {5}, "drone_2": {50}} and hall.driver._health.skipped == 0
+
+
+def test_bodies_of_one_frame_have_dates_of_their_own(hall: Hall) -> None:
+    for _ in range(50):
+        hall.now_ns += 20 * MS
+        hall.comes(*PLACES, behind_ns={"drone_2": 250 * MS})
+    poses = hall.heard(BodyPoses)
+    ages = {(tuple(body.name for body in one.bodies), one.header.stamp_ns % (20 * MS) // MS) for one in poses}
+    assert ages == {(("drone_1",), 0), (("drone_2",), 10)} and not hall.events[1:]
+
+
+def test_a_pose_that_a_newer_one_of_its_body_overtook_is_skipped(hall: Hall) -> None:
+    hall.comes("drone_1")
+    hall.now_ns += 50 * MS
+    hall.comes("drone_1", "drone_2", behind_ns={"drone_1": 60 * MS})
+    assert [one.subject for one in hall.heard(RelativeObservation)] == ["drone_1", "drone_2"]
+    assert hall.driver._health.skipped == 1

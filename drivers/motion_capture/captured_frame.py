@@ -16,6 +16,7 @@ class CapturedFrame:
     processing_ns: or by how much it came later than usual. behind_ns: by how much earlier a body was exposed than that
     says, where bodies differ.
     poses: position [m; the system's axes], quaternion (x, y, z, w). untracked: known to the system, not seen.
+    whole: the system tracks no body that it lacks, which shows that the system works; else they may come separately.
     deviations: as the system reports them, of x, y, z [m; likewise] and of the heading [rad], 0 where unknown.
     """
 
@@ -25,3 +26,4 @@ class CapturedFrame:
     untracked: tuple[str, ...] = ()
     deviations: Mapping[str, Deviations] = field(default_factory=dict)
     behind_ns: Mapping[str, int] = field(default_factory=dict)
+    whole: bool = True

@@ -52,6 +52,7 @@ class MotionCaptureDriver:
         remedy = f"check the system, whether it streams, and its address {settings.source}"
         names = StreamNames("motion capture", settings.name, "frame", settings.source, remedy)
         self._health = StreamHealth(child, names, settings.start_within_s, settings.silent_after_s)
+        self._others = ""
         self.counts: Counter[str] = Counter()
 
     def turn(self) -> None:
@@ -59,13 +60,17 @@ class MotionCaptureDriver:
         for frame in self._source.poll(_POLL_S):
             self._handle(frame)
         wrong = "; ".join(f"{entity} {why}" for entity, why in self._faults.items() if why)
-        self._health.end_turn(self._source.detail, wrong, self.counts + self._source.rejected.copy())
+        self._health.end_turn(self._source.detail or self._others, wrong, self.counts + self._source.rejected.copy())
 
     def _handle(self, frame: CapturedFrame) -> None:
-        self._health.came(frame.arrival_ns)
         delay_ns = round(self._settings.delay_ms * NS_PER_MS)
         exposure_ns = frame.arrival_ns - frame.processing_ns - delay_ns
         came = self._entity_poses(frame, exposure_ns)
+        if not came and not frame.whole:
+            self._others = f"only other bodies come, such as {min(frame.poses)}" if frame.poses else ""
+            return
+        self._others = ""
+        self._health.came(frame.arrival_ns)
         poses = {entity: pose for entity, pose in came.items() if pose.exposure_ns > self._exposures_ns[entity]}
         if len(poses) < len(came):
             self._health.skipped += 1  # overtaken by newer poses of the same body on the way

@@ -48,7 +48,7 @@ class Ros2Source:
         poses = {name: pose.pose for name, pose in said.items()}
         deviations = {name: pose.deviations for name, pose in said.items()}
         behind_ns = {name: arrival_ns - at_ns for name, at_ns in exposed_ns.items()}
-        return [CapturedFrame(arrival_ns, 0, poses, deviations=deviations, behind_ns=behind_ns)]
+        return [CapturedFrame(arrival_ns, 0, poses, (), deviations, behind_ns, whole=False)]
 
     def close(self) -> None:
         """Leave the router."""

@@ -219,11 +219,15 @@ class LibrarySource:
 
     def _read_frames(self) -> None:
         system = self._library.connect(self._address.scheme, _place(self._address))
+        # Of VRPN the library returns by a timer what came, also without a server: nothing is no frame.
+        whole = self._address.scheme != "vrpn"
         while not self._closing.is_set():
             system.waitForNextFrame()
-            self._frames.append(_frame_of(system.rigidBodies))
-            self.detail = ""
-            self._came.set()
+            frame = _frame_of(system.rigidBodies, whole)
+            if frame.poses or whole:
+                self._frames.append(frame)
+                self.detail = ""
+                self._came.set()
 
 
 def _place(address: SystemAddress) -> dict[str, str]:
@@ -231,10 +235,10 @@ def _place(address: SystemAddress) -> dict[str, str]:
     return {"hostname": address.host} | port
 
 
-def _frame_of(bodies: Any) -> CapturedFrame:
+def _frame_of(bodies: Any, whole: bool) -> CapturedFrame:
     poses = {}
     for name, body in bodies.items():
         x, y, z = (float(value) for value in body.position)
         turn = body.rotation
         poses[str(name)] = ((x, y, z), (float(turn.x), float(turn.y), float(turn.z), float(turn.w)))
-    return CapturedFrame(clock.now_ns(), 0, poses)
+    return CapturedFrame(clock.now_ns(), 0, poses, whole=whole)

@@ -48,3 +48,11 @@ def test_qualisys_is_reached_at_the_port_of_its_address() -> None:
         source = open_source(parse_source(f"qualisys://127.0.0.1:{base}"))
         system.accept()[0].close()
         source.close()
+
+
+def test_vrpn_without_a_server_is_no_frame() -> None:
+    with closing(open_source(parse_source("vrpn://127.0.0.1"))) as source:
+        deadline_s = time.monotonic() + 1.0
+        while time.monotonic() < deadline_s:
+            assert source.poll(0.05) == []
+        assert source.detail == "no answer from 127.0.0.1"

@@ -52,7 +52,7 @@ class Hall:
 
     def pose(self, name: str) -> Any:
         self.count += 1
-        x, y, z = PLACES[name]
+        x, y, z = PLACES.get(name, (0.0, 0.0, 1.0))
         return (x + 1e-4 * (self.count % 7), y, z), TURN
 
     def comes(self, *names: str, **more: Any) -> None:
@@ -119,3 +119,23 @@ def test_a_pose_that_a_newer_one_of_its_body_overtook_is_skipped(hall: Hall) -> 
     hall.comes("drone_1", "drone_2", behind_ns={"drone_1": 60 * MS})
     assert [one.subject for one in hall.heard(RelativeObservation)] == ["drone_1", "drone_2"]
     assert hall.driver._health.skipped == 1
+
+
+def test_bodies_that_are_not_ours_do_not_make_a_dead_stream_look_alive(hall: Hall) -> None:
+    hall.comes(*PLACES, whole=False)
+    assert len(hall.heard(BodyPoses)) == 1
+    for _ in range(100):
+        hall.now_ns += 20 * MS
+        hall.comes("wand", whole=False)
+    assert not hall.heard(BodyPoses), "the watch over silence takes each for a sign of life"
+    assert hall.events[-1] == "motion capture mocap: no frame for 0.5 s (only other bodies come, such as wand)"
+    hall.comes("drone_1", whole=False)
+    assert len(hall.heard(BodyPoses)) == 1
+
+
+def test_a_system_that_says_that_it_tracks_nobody_works(hall: Hall) -> None:
+    for _ in range(100):
+        hall.now_ns += 20 * MS
+        hall.comes()
+    frames = hall.heard(BodyPoses)
+    assert 50 <= len(frames) <= 62 and not any(one.bodies for one in frames)

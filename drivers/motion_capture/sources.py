@@ -18,7 +18,10 @@ from groundstation.bus import clock
 from groundstation.errors import DriverError, SettingsError
 from groundstation.time_units import NS_PER_S
 
-_ASK_AGAIN_NS = _LOOK_UP_AGAIN_NS = NS_PER_S
+_SILENT_NS = _LOOK_UP_AGAIN_NS = NS_PER_S
+# Names are asked for while frames wait for them; anew in case that word of their change was lost.
+_ASK_AGAIN_NS, _CONFIRM_NS = NS_PER_S // 5, 3 * NS_PER_S
+_UNNAMED = "its bodies have no names yet"
 _AGAIN_S = 1.0
 _KEEP_ALIVE_NS = NS_PER_S
 _LARGEST = 65535
@@ -69,11 +72,12 @@ class NatnetSource:
         self._frames: socket.socket | None = None
         self._server: natnet.Server | None = None
         self._names: dict[int, str] = {}
-        self._asks = True  # names are missing, or may belong to other bodies by now
+        self._named = False  # else names are missing, or may belong to other bodies by now: no frame is used
+        self._lacks_name = False
         self._looked_up_ns = self._asked_ns = self._alive_ns = self._framed_ns = 0
 
     def poll(self, wait_s: float) -> list[CapturedFrame]:
-        """Return the arrived frames, the oldest first; requests missing descriptions once a second."""
+        """Return the arrived frames, the oldest first; requests what is missing."""
         now_ns = clock.now_ns()
         self._find_host(now_ns)
         if self._host.found:
@@ -99,14 +103,20 @@ class NatnetSource:
 
     def _ask(self, now_ns: int) -> None:
         # A restarted system has no clients: it streams only to those that request it.
-        asks = self._asks or now_ns - self._framed_ns >= _ASK_AGAIN_NS
-        if asks and now_ns - self._asked_ns >= _ASK_AGAIN_NS:
+        if self._is_silent(now_ns) or self._lacks_name:
+            again_ns = _SILENT_NS
+        else:
+            again_ns = _CONFIRM_NS if self._named else _ASK_AGAIN_NS
+        if now_ns - self._asked_ns >= again_ns:
             self._asked_ns = now_ns
             self._send(natnet.connect_request())
             self._send(natnet.encode(natnet.REQUEST_DESCRIPTIONS))
         if now_ns - self._alive_ns >= _KEEP_ALIVE_NS:
             self._alive_ns = now_ns
             self._send(natnet.encode(natnet.KEEP_ALIVE))
+
+    def _is_silent(self, now_ns: int) -> bool:
+        return now_ns - self._framed_ns >= _SILENT_NS
 
     def _send(self, datagram: bytes) -> None:
         with suppress(OSError):  # a network that is down now may be up later
@@ -138,7 +148,7 @@ class NatnetSource:
             self._greet(natnet.decode_server(payload))
         elif kind == natnet.DESCRIPTIONS and self._server is not None:
             self._names = natnet.decode_descriptions(payload, self._server.version)
-            self._asks = not self._names
+            self._named, self._lacks_name = bool(self._names), False
         elif kind == natnet.FRAME and self._server is not None:
             return self._captured(natnet.decode_frame(payload, self._server.version), self._server)
         return None
@@ -166,14 +176,21 @@ class NatnetSource:
             unless_joined.pop_all()
         return frames
 
-    def _captured(self, frame: natnet.Frame, server: natnet.Server) -> CapturedFrame:
-        self._framed_ns = clock.now_ns()
-        self._asks = self._asks or frame.changed or any(body.id not in self._names for body in frame.bodies)
+    def _captured(self, frame: natnet.Frame, server: natnet.Server) -> CapturedFrame | None:
+        now_ns = clock.now_ns()
+        if frame.changed or self._is_silent(now_ns):  # a system that was restarted may name its bodies differently
+            self._named = False
+        self._framed_ns = now_ns
+        if not self._named:
+            self.detail = _UNNAMED
+            return None
+        self.detail = ""
+        self._lacks_name = any(body.id not in self._names for body in frame.bodies)
         ticks = frame.sent - frame.exposed
         processing_ns = ticks * NS_PER_S // server.ticks_per_s if frame.exposed and server.ticks_per_s else 0
         named = {self._names.get(body.id, str(body.id)): body for body in frame.bodies}
         return CapturedFrame(
-            clock.now_ns(),
+            now_ns,
             max(0, processing_ns),
             {name: (body.position, body.rotation) for name, body in named.items() if body.tracked},
             tuple(name for name, body in named.items() if not body.tracked),

@@ -1,0 +1,116 @@
+"""The NatNet client with a system that is restarted or changed while it streams: names, and where frames are taken."""
+
+import socket
+from collections.abc import Iterator
+from contextlib import suppress
+
+import pytest
+
+from drivers.motion_capture.captured_frame import CapturedFrame
+from drivers.motion_capture.settings import parse_source
+from drivers.motion_capture.sources import NatnetSource
+from drivers.motion_capture.wire import natnet
+
+HOST, MS = "127.0.0.1", 1_000_000
+PLACES = {"cf1": (1.0, 0.0, 1.0), "cf2": (2.0, 0.0, 1.0)}
+TICKS_PER_S = 1000
+
+
+class Motive:
+    """A system at 100 Hz and its client, both on a manual clock. gone: it is switched off."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now_ns, self.ids, self.gone, self.number = 10**12, {"cf1": 1, "cf2": 2}, False, 0
+        monkeypatch.setattr("groundstation.bus.clock.now_ns", lambda: self.now_ns)
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.bind((HOST, 0))
+        self.socket.setblocking(False)
+        self.socket.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton(HOST))
+        self.server = natnet.Server("Motive", (4, 1), TICKS_PER_S, 1511, "")
+        self.client: tuple[str, int] | None = None
+        self.source = NatnetSource(parse_source(f"natnet://{HOST}:{self.socket.getsockname()[1]}"))
+
+    def answer(self) -> None:
+        with suppress(BlockingIOError):
+            while True:
+                datagram, sender = self.socket.recvfrom(2048)
+                kind, _ = natnet.message_of(datagram)
+                if self.gone:
+                    continue
+                if kind == natnet.CONNECT:
+                    self.client = sender
+                    self.socket.sendto(natnet.encode_server(self.server), sender)
+                elif kind == natnet.REQUEST_DESCRIPTIONS:
+                    names = {number: name for name, number in self.ids.items()}
+                    self.socket.sendto(natnet.encode_descriptions(names, self.server.version), sender)
+
+    def frame(self, changed: bool = False) -> bytes:
+        self.number += 1
+        bodies = tuple(
+            natnet.Body(self.ids[name], place, (0.0, 0.0, 0.0, 1.0))
+            for name, place in PLACES.items()
+            if name in self.ids
+        )
+        ticks = self.now_ns // MS
+        return natnet.encode_frame(
+            natnet.Frame(self.number, bodies, ticks - 5, ticks, changed=changed), self.server.version
+        )
+
+    def send(self, datagram: bytes) -> None:
+        to = (self.server.group, self.server.data_port) if self.server.group else self.client
+        if to is not None and not self.gone:
+            self.socket.sendto(datagram, to)
+
+    def run(self, frames: int, changed: bool = False) -> list[CapturedFrame]:
+        came = []
+        for _ in range(frames):
+            self.now_ns += 10 * MS
+            self.answer()
+            self.send(self.frame(changed))
+            came += self.source.poll(0.0)
+        return came
+
+
+@pytest.fixture
+def motive(monkeypatch: pytest.MonkeyPatch) -> Iterator[Motive]:
+    motive = Motive(monkeypatch)
+    motive.run(50)
+    yield motive
+    motive.source.close()
+    motive.socket.close()
+
+
+def wrong(frames: list[CapturedFrame]) -> int:
+    return sum({name: place for name, (place, _) in frame.poses.items()} != PLACES for frame in frames)
+
+
+@pytest.mark.parametrize("gone", [300, 340, 380])
+def test_no_frame_of_a_restarted_system_is_used_under_its_old_names(motive: Motive, gone: int) -> None:
+    assert len(motive.run(100)) >= 98
+    motive.gone = True
+    assert len(motive.run(gone)) <= 2
+    motive.gone, motive.ids = False, {"cf1": 2, "cf2": 1}
+    back = motive.run(100)
+    assert len(back) >= 75 and wrong(back) == 0 and motive.source.detail == ""
+
+
+def test_names_change_with_the_frame_that_says_so(motive: Motive) -> None:
+    assert len(motive.run(100)) >= 98
+    motive.ids = {"cf1": 2, "cf2": 1}
+    after = motive.run(1, changed=True) + motive.run(100)
+    assert len(after) >= 75 and wrong(after) == 0
+
+
+def test_names_whose_change_was_not_heard_are_right_after_a_few_seconds(motive: Motive) -> None:
+    motive.run(100)
+    motive.ids = {"cf1": 2, "cf2": 1}
+    motive.run(310)
+    after = motive.run(100)
+    assert len(after) >= 98 and wrong(after) == 0
+
+
+def test_a_system_that_names_no_body_is_told(motive: Motive) -> None:
+    motive.gone = True
+    motive.run(120)
+    motive.gone, motive.ids = False, {}
+    assert motive.run(100) == [] and motive.source.detail == "its bodies have no names yet"

@@ -6,7 +6,8 @@ from typing import NamedTuple
 from drivers.plausibility.clock_watch import ClockWatch
 from drivers.rmw_zenoh.publisher_tie import PublisherTie
 
-_LATE_S = 0.3
+# Later than the freshest ones by more than this, a pose is not used.
+LATE_S = 0.3
 
 
 class Judgement(NamedTuple):
@@ -47,4 +48,4 @@ class PoseGuard:
         if frame != topic.frame:
             return Judgement("another frame")
         late_s = topic.clock.update(arrival_ns, stamp_ns)[1] if stamp_ns else 0.0
-        return Judgement("late" if late_s > _LATE_S else "", round(late_s * 1e9))
+        return Judgement("late" if late_s > LATE_S else "", round(late_s * 1e9))

@@ -11,8 +11,10 @@ from typing import Any, Protocol
 
 from drivers.host_lookup import HostLookup
 from drivers.motion_capture.captured_frame import CapturedFrame
+from drivers.motion_capture.pose_guard import LATE_S
 from drivers.motion_capture.settings import OURS, SystemAddress
 from drivers.motion_capture.wire import natnet
+from drivers.plausibility.clock_watch import ClockWatch
 from groundstation import plug_ins
 from groundstation.bus import clock
 from groundstation.errors import DriverError, SettingsError
@@ -73,7 +75,7 @@ class NatnetSource:
         self._server: natnet.Server | None = None
         self._names: dict[int, str] = {}
         self._named = False  # else names are missing, or may belong to other bodies by now: no frame is used
-        self._lacks_name = False
+        self._lacks_name, self._clock = False, ClockWatch()
         self._looked_up_ns = self._asked_ns = self._alive_ns = self._framed_ns = 0
 
     def poll(self, wait_s: float) -> list[CapturedFrame]:
@@ -181,6 +183,11 @@ class NatnetSource:
         if frame.changed or self._is_silent(now_ns):  # a system that was restarted may name its bodies differently
             self._named = False
         self._framed_ns = now_ns
+        late_s = self._late_s(now_ns, frame, server)
+        if late_s > LATE_S:
+            self.rejected["late"] += 1
+            self.detail = f"its frames come {late_s:.1f} s late"
+            return None
         if not self._named:
             self.detail = _UNNAMED
             return None
@@ -191,10 +198,16 @@ class NatnetSource:
         named = {self._names.get(body.id, str(body.id)): body for body in frame.bodies}
         return CapturedFrame(
             now_ns,
-            max(0, processing_ns),
+            max(0, processing_ns) + round(late_s * NS_PER_S),
             {name: (body.position, body.rotation) for name, body in named.items() if body.tracked},
             tuple(name for name, body in named.items() if not body.tracked),
         )
+
+    def _late_s(self, now_ns: int, frame: natnet.Frame, server: natnet.Server) -> float:
+        """Return by how much later than the freshest frames one came, by the system's clock [s]."""
+        if not frame.sent or not server.ticks_per_s:
+            return 0.0
+        return self._clock.update(now_ns, frame.sent * NS_PER_S // server.ticks_per_s)[1]
 
 
 class LibrarySource:

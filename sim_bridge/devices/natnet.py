@@ -6,6 +6,8 @@ WIRE (docs/reference/natnet.md 2): a client that asked to connect is sent frames
 from contextlib import suppress
 
 from drivers.motion_capture.wire import natnet
+from groundstation.bus import clock
+from groundstation.time_units import NS_PER_S
 from sim_bridge.devices.captured_bodies import FRAME_TICKS, TICK_S, CapturedBodies
 from sim_bridge.listening import open_udp
 
@@ -80,7 +82,8 @@ class NatnetEmulator:
             self._socket.sendto(datagram, client)
 
     def _frame(self, now_s: float) -> natnet.Frame:
-        exposed = self._ticks * round(TICK_S * _TICKS_PER_S)
+        # Not the ticks of the simulation, which stand while its host has no time for it.
+        exposed = clock.now_ns() * _TICKS_PER_S // NS_PER_S
         sent = exposed + round(_PROCESSING_S * _TICKS_PER_S)
         bodies = [natnet.Body(self._ids[b.name], b.place, b.quaternion, b.inside) for b in self._seen.frame(now_s)]
         return natnet.Frame(self._frames, tuple(bodies), exposed, sent)

@@ -28,6 +28,7 @@ class Motive:
         self.socket.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton(HOST))
         self.server = natnet.Server("Motive", (4, 1), TICKS_PER_S, 1511, "")
         self.client: tuple[str, int] | None = None
+        self.started_ns = 0
         self.source = NatnetSource(parse_source(f"natnet://{HOST}:{self.socket.getsockname()[1]}"))
 
     def answer(self) -> None:
@@ -51,7 +52,7 @@ class Motive:
             for name, place in PLACES.items()
             if name in self.ids
         )
-        ticks = self.now_ns // MS
+        ticks = (self.now_ns - self.started_ns) // MS
         return natnet.encode_frame(
             natnet.Frame(self.number, bodies, ticks - 5, ticks, changed=changed), self.server.version
         )
@@ -114,3 +115,36 @@ def test_a_system_that_names_no_body_is_told(motive: Motive) -> None:
     motive.run(120)
     motive.gone, motive.ids = False, {}
     assert motive.run(100) == [] and motive.source.detail == "its bodies have no names yet"
+
+
+def exposed(frames: list[CapturedFrame]) -> list[int]:
+    return [frame.arrival_ns - frame.processing_ns for frame in frames]
+
+
+def test_frames_that_wait_on_their_way_are_dated_by_it_and_refused_where_they_waited_for_long(motive: Motive) -> None:
+    waiting, used = [motive.frame()], 0
+    for turn in range(150):
+        motive.now_ns += 10 * MS
+        motive.answer()
+        waiting.append(motive.frame())
+        if turn % 2 == 0:  # half of the frames get through: the queue grows to 0.75 s
+            true_ns = motive.now_ns - (len(waiting) - 1) * 10 * MS - 5 * MS
+            motive.send(waiting.pop(0))
+            for at_ns in exposed(motive.source.poll(0.0)):
+                used += 1
+                assert abs(at_ns - true_ns) < 11 * MS
+    assert 25 <= used <= 35 and motive.source.rejected["late"] >= 40 and "s late" in motive.source.detail
+
+
+def test_a_frame_that_newer_ones_overtook_is_dated_before_them(motive: Motive) -> None:
+    held = motive.frame()
+    newer = motive.run(4)
+    motive.send(held)
+    (older,) = motive.source.poll(0.0)
+    assert exposed([older])[0] < exposed(newer)[0]
+    assert max(exposed(motive.run(10))) > max(exposed(newer)), "the clock of the system is believed on"
+
+
+def test_the_clock_of_a_system_that_was_restarted_is_taken_anew(motive: Motive) -> None:
+    motive.started_ns = motive.now_ns - 10**9
+    assert len(motive.run(100)) >= 98 and not motive.source.rejected

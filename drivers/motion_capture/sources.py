@@ -91,8 +91,7 @@ class NatnetSource:
     def close(self) -> None:
         """Close the sockets."""
         self._requests.close()
-        if self._frames is not None:
-            self._frames.close()
+        self._leave()
 
     def _find_host(self, now_ns: int) -> None:
         # A silent system may have another address by now.
@@ -156,13 +155,22 @@ class NatnetSource:
         return None
 
     def _greet(self, server: natnet.Server) -> None:
-        self._server, self.detail = server, ""
+        before, self._server, self.detail = self._server, server, ""
+        moved = before is None or (before.group, before.data_port) != (server.group, server.data_port)
+        # A system that was restarted may send elsewhere; an adapter that was unplugged has left the group.
+        if moved or self._is_silent(clock.now_ns()):
+            self._leave()
         if server.group and self._frames is None:
             try:
                 self._frames = self._join(server.group, server.data_port)
             except OSError as error:  # a port taken by another program, or an invalid address: tried again
                 place = f"{server.group}:{server.data_port}"
                 self.detail = f"its frames cannot be taken at {place}: {error.strerror or error}"
+
+    def _leave(self) -> None:
+        if self._frames is not None:
+            self._frames.close()
+        self._frames = None
 
     def _join(self, group: str, port: int) -> socket.socket:
         with ExitStack() as unless_joined:

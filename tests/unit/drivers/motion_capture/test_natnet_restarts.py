@@ -3,15 +3,17 @@
 import socket
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import replace
 
 import pytest
+from free_port import free_port
 
 from drivers.motion_capture.captured_frame import CapturedFrame
 from drivers.motion_capture.settings import parse_source
 from drivers.motion_capture.sources import NatnetSource
 from drivers.motion_capture.wire import natnet
 
-HOST, MS = "127.0.0.1", 1_000_000
+HOST, GROUP, MS = "127.0.0.1", "239.255.42.99", 1_000_000
 PLACES = {"cf1": (1.0, 0.0, 1.0), "cf2": (2.0, 0.0, 1.0)}
 TICKS_PER_S = 1000
 
@@ -28,7 +30,7 @@ class Motive:
         self.socket.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton(HOST))
         self.server = natnet.Server("Motive", (4, 1), TICKS_PER_S, 1511, "")
         self.client: tuple[str, int] | None = None
-        self.started_ns = 0
+        self.started_ns, self.ports = 0, [free_port(HOST, kind=socket.SOCK_DGRAM) for _ in range(2)]
         self.source = NatnetSource(parse_source(f"natnet://{HOST}:{self.socket.getsockname()[1]}"))
 
     def answer(self) -> None:
@@ -148,3 +150,24 @@ def test_a_frame_that_newer_ones_overtook_is_dated_before_them(motive: Motive) -
 def test_the_clock_of_a_system_that_was_restarted_is_taken_anew(motive: Motive) -> None:
     motive.started_ns = motive.now_ns - 10**9
     assert len(motive.run(100)) >= 98 and not motive.source.rejected
+
+
+def test_frames_of_a_group_are_taken_where_the_restarted_system_sends_them(motive: Motive) -> None:
+    for place in ((GROUP, 0), (GROUP, 1), ("239.255.42.98", 1), ("", 1), (GROUP, 0)):
+        motive.gone = True
+        motive.run(150)
+        group, port = place
+        motive.gone, motive.server = False, replace(motive.server, group=group, data_port=motive.ports[port])
+        motive.run(150)
+        assert len(motive.run(50)) >= 48, place
+
+
+def test_a_group_that_the_host_has_left_is_joined_again(motive: Motive) -> None:
+    motive.server = replace(motive.server, group=GROUP, data_port=motive.ports[0])
+    motive.run(400)
+    frames = motive.source._frames
+    assert frames is not None and len(motive.run(50)) >= 48
+    membership = socket.inet_aton(GROUP) + socket.inet_aton(HOST)
+    frames.setsockopt(socket.IPPROTO_IP, socket.IP_DROP_MEMBERSHIP, membership)  # as the host does without the adapter
+    motive.run(250)
+    assert len(motive.run(50)) >= 48

@@ -1,7 +1,7 @@
 """Judges whether poses of a motion capture system can be true: frozen, jumped, turned, exchanged bodies. Pure."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass, field
 from itertools import combinations
 
@@ -46,6 +46,11 @@ class BodyWatch:
     max_speed_m_s: float
     _tracks: dict[str, _Track] = field(default_factory=dict)
     _exchanged: set[frozenset[str]] = field(default_factory=set)
+
+    @property
+    def names(self) -> Set[str]:
+        """Return the bodies on which its judgement still depends."""
+        return self._tracks.keys() | {name for pair in self._exchanged for name in pair}
 
     def look(self, stamp_ns: int, poses: Mapping[str, EntityPose]) -> dict[str, str]:
         """Take in the bodies of a frame; return for each why it must not be used, or ""; stamp_ns: the frame's."""

@@ -119,8 +119,11 @@ class MotionCaptureDriver:
                 self._health.reported += 1
 
     def _tell(self, faults: dict[str, str]) -> None:
-        """Report each body whose poses cannot be true, once, and its return."""
+        """Report each body whose poses cannot be true, once, and its return or that it is out of sight."""
         name = self._settings.name
+        for gone in sorted(self._faults.keys() - self._watch.names):
+            if self._faults.pop(gone):
+                self._child.event(Severity.INFO, f"{name}: {gone} is out of sight, and judged anew", entity=gone)
         for entity, why in faults.items():
             kind, before = why.partition(" ")[0], self._faults.get(entity, "").partition(" ")[0]
             if why and kind != before:

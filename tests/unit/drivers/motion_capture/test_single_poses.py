@@ -10,7 +10,7 @@ from drivers.motion_capture.captured_frame import CapturedFrame
 from drivers.motion_capture.driver import MotionCaptureDriver
 from drivers.motion_capture.settings import MotionCaptureSection
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
-from groundstation.bus.messages import BodyPoses, RelativeObservation
+from groundstation.bus.messages import BodyPoses, CameraStatus, RelativeObservation
 from groundstation.bus.topics import BODY_POSES, CAMERA_STATUS, OBSERVATION
 
 MS = 1_000_000
@@ -57,7 +57,10 @@ class Hall:
 
     def comes(self, *names: str, **more: Any) -> None:
         """Let one frame with these bodies come now."""
-        self._came.append(CapturedFrame(self.now_ns, 0, {name: self.pose(name) for name in names}, **more))
+        self.give({name: self.pose(name) for name in names}, **more)
+
+    def give(self, poses: dict[str, Any], **more: Any) -> None:
+        self._came.append(CapturedFrame(self.now_ns, 0, poses, **more))
         self.driver.turn()
 
     def heard(self, kind: type) -> list[Any]:
@@ -139,3 +142,27 @@ def test_a_system_that_says_that_it_tracks_nobody_works(hall: Hall) -> None:
         hall.comes()
     frames = hall.heard(BodyPoses)
     assert 50 <= len(frames) <= 62 and not any(one.bodies for one in frames)
+
+
+def test_a_fault_ends_when_its_body_was_out_of_sight(hall: Hall, monkeypatch: pytest.MonkeyPatch) -> None:
+    hall.comes(*PLACES)
+    monkeypatch.setitem(PLACES, "drone_1", (1.5, 0.2, 1.5))
+    hall.now_ns += 20 * MS
+    hall.comes(*PLACES)
+    assert hall.events[-1] == "mocap: drone_1 jumped by 1.00 m from one frame to the next"
+    for _ in range(80):
+        hall.now_ns += 20 * MS
+        hall.comes("drone_2")
+    assert hall.events[-1] == "mocap: drone_1 is out of sight, and judged anew"
+    assert hall.heard(CameraStatus)[-1].detail == ""
+    hall.comes("drone_1")
+    assert [one.subject for one in hall.heard(RelativeObservation)] == ["drone_1"] and len(hall.events) == 3
+
+
+def test_a_name_that_was_exchanged_stays_so_while_the_other_is_in_sight(hall: Hall) -> None:
+    hall.comes(*PLACES)
+    for count in range(80):
+        hall.now_ns += 20 * MS
+        poses = {name: hall.pose(other) for name, other in zip(PLACES, reversed(PLACES), strict=True)}
+        hall.give({name: pose for name, pose in poses.items() if count < 5 or name == "drone_2"})
+    assert len(hall.events) == 3 and "drone_1 its name was exchanged" in hall.heard(CameraStatus)[-1].detail

@@ -22,13 +22,15 @@ class PoseProtocol:
     """A protocol for poses: its usual port, its reader, and the parts that its address may have beside a host.
 
     reader: "module:class", made from a SystemAddress, a `drivers.motion_capture.sources.Source`; paths: a path and a
-    query; any_port: another port than the usual one.
+    query; any_port: another port than the usual one. answers_at: its TCP port, from that of the address on, at which it
+    is asked for a sign of life before the library connects: that waits for it, with the whole process, for ever.
     """
 
     port: int
     reader: str
     paths: bool = False
     any_port: bool = True
+    answers_at: int | None = None
 
 
 _NATNET = "natnet"
@@ -37,8 +39,8 @@ _SOURCES = "drivers.motion_capture.sources"
 OURS: Mapping[str, PoseProtocol] = {
     _NATNET: PoseProtocol(1510, f"{_SOURCES}:NatnetSource"),
     # The library takes another port for Qualisys only.
-    "vicon": PoseProtocol(801, f"{_SOURCES}:LibrarySource", any_port=False),
-    "qualisys": PoseProtocol(22222, f"{_SOURCES}:LibrarySource"),
+    "vicon": PoseProtocol(801, f"{_SOURCES}:LibrarySource", any_port=False, answers_at=0),
+    "qualisys": PoseProtocol(22222, f"{_SOURCES}:LibrarySource", answers_at=1),
     "vrpn": PoseProtocol(3883, f"{_SOURCES}:LibrarySource", any_port=False),
     "ros2": PoseProtocol(ROUTER_PORT, "drivers.motion_capture.ros2_source:Ros2Source", paths=True),
 }

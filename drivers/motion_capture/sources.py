@@ -25,6 +25,8 @@ _SILENT_NS = _LOOK_UP_AGAIN_NS = NS_PER_S
 _ASK_AGAIN_NS, _CONFIRM_NS = NS_PER_S // 5, 3 * NS_PER_S
 _UNNAMED = "its bodies have no names yet"
 _AGAIN_S = 1.0
+_ANSWERS_WITHIN_S = 2.0
+_LOST_NS = 5 * NS_PER_S
 _KEEP_ALIVE_NS = NS_PER_S
 _LARGEST = 65535
 _DATAGRAMS = 64
@@ -219,7 +221,11 @@ class NatnetSource:
 
 
 class LibrarySource:
-    """A system behind the library `motioncapture` (extra `mocap`), read in a thread: its calls block."""
+    """A system behind the library `motioncapture` (extra `mocap`), read in a thread: its calls block.
+
+    A call that waits for a lost Vicon or Qualisys system never ends: `poll` raises DriverError, so that a new process
+    connects anew.
+    """
 
     def __init__(self, address: SystemAddress) -> None:
         self.rejected: Counter[str] = Counter()
@@ -229,7 +235,9 @@ class LibrarySource:
         except ImportError:
             remedy = "install it: pip install 'skein-groundstation[mocap]'"
             raise SettingsError([f"{address.scheme}://: the library motioncapture is missing; {remedy}"]) from None
-        self._library, self._address = library, address
+        self._library, self._address, self._framed_ns = library, address, 0
+        # Of VRPN the library returns by a timer what came, also without a server: nothing is no frame.
+        self._whole = address.scheme != "vrpn"
         self._frames: deque[CapturedFrame] = deque(maxlen=_WAITING_FRAMES)
         self._came, self._closing = threading.Event(), threading.Event()
         threading.Thread(target=self._follow, name="motion capture", daemon=True).start()
@@ -241,6 +249,9 @@ class LibrarySource:
         frames = []
         while self._frames:
             frames.append(self._frames.popleft())
+        framed_ns = self._framed_ns
+        if self._whole and framed_ns and clock.now_ns() - framed_ns > _LOST_NS:
+            raise DriverError(f"no frame from {self._address.host} for {_LOST_NS / NS_PER_S:g} s: connecting anew")
         return frames
 
     def close(self) -> None:
@@ -249,20 +260,33 @@ class LibrarySource:
 
     def _follow(self) -> None:
         while not self._closing.is_set():
+            self._framed_ns = 0
             try:
-                self._read_frames()
+                if self._answers():
+                    self._read_frames()
             except Exception as error:  # noqa: BLE001 - what a foreign library raises is shown, and tried again
                 self.detail = f"{type(error).__name__}: {error}"
-                self._closing.wait(_AGAIN_S)
+            self._closing.wait(_AGAIN_S)
+
+    def _answers(self) -> bool:
+        offset = OURS[self._address.scheme].answers_at
+        if offset is None:
+            return True
+        place = (self._address.host, self._address.port + offset)
+        try:
+            socket.create_connection(place, _ANSWERS_WITHIN_S).close()
+        except OSError:
+            self.detail = f"no answer from {place[0]}:{place[1]}"
+            return False
+        return True
 
     def _read_frames(self) -> None:
         system = self._library.connect(self._address.scheme, _place(self._address))
-        # Of VRPN the library returns by a timer what came, also without a server: nothing is no frame.
-        whole = self._address.scheme != "vrpn"
         while not self._closing.is_set():
             system.waitForNextFrame()
-            frame = _frame_of(system.rigidBodies, whole)
-            if frame.poses or whole:
+            frame = _frame_of(system.rigidBodies, self._whole)
+            if frame.poses or self._whole:
+                self._framed_ns = frame.arrival_ns
                 self._frames.append(frame)
                 self.detail = ""
                 self._came.set()

@@ -233,6 +233,7 @@ def test_other_systems_come_through_the_library(monkeypatch) -> None:
     body = SimpleNamespace(position=np.array([1.0, 2.0, 3.0], dtype=np.float32), rotation=turn)
     calls, breaks = [], ["link lost"]
     monkeypatch.setattr("drivers.motion_capture.sources._AGAIN_S", 0.05)
+    monkeypatch.setattr("socket.create_connection", lambda *_: socket.socket())  # it answers
 
     class System:
         def __init__(self) -> None:

@@ -42,8 +42,9 @@ def forecast(
 ) -> None:  # fmt: skip
     """Predict how well the target will be known in a flight: over the floor, on its path, and when a device fails.
 
-    Figures are standard deviations of the target's position, by the filter that flies, with the drones where the
-    planner puts them for a target at each place. Errors of simulated flights were 0.7 to 0.8 of them.
+    Figures are standard deviations of the target's position, by the filter that flies, with the drones at the best
+    stand found for a target at each place: the planner's, or one from which it starts. Places whose stand the planner
+    would leave are counted. Errors of simulated flights were 0.7 to 0.8 of the figures.
     """
     from groundstation.cli.kernels import use_flying_kernels
     from groundstation.settings.files import find_field

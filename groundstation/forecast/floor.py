@@ -49,6 +49,11 @@ class Spread:
     blind: float
 
 
+def left_of(places: Iterable[PlaceForecast]) -> int:
+    """Return how many places are seen from stands only that the planner alone would leave."""
+    return sum(one.std_m is not None and one.stand is not None and one.stand.is_left for one in places)
+
+
 @dataclass(frozen=True, slots=True)
 class Region:
     """Connected places that are blind for one reason: bounds with their cells [m; world], share of the floor."""

@@ -36,7 +36,7 @@ def _place(one: PlaceForecast) -> dict[str, Any]:
     stand = None
     if one.stand is not None:
         poses = {name: [round(v, 3) for v in pose.tolist()] for name, pose in one.stand.poses.items()}
-        stand = {"topology": str(one.stand.topology), "poses": poses}
+        stand = {"topology": str(one.stand.topology), "poses": poses, "left_by_planner": one.stand.is_left}
     return {"place_m": list(one.place), "std_m": one.std_m, "reason": one.reason, "stand": stand}
 
 

@@ -28,7 +28,8 @@ class TeamStand:
     """The team's stand: poses (x, y, z, yaw) [m, rad; world], and its knowledge there.
 
     std_m: of the target's place in the floor plan, root of the trace; placed: those that fixed cameras see, directly or
-    through drones in their view.
+    through drones in their view; is_left: whether the planner alone would leave it for one where nobody places the
+    target, so that only flight's rule of staying within reach of a view (decision 0165) keeps the team there.
     """
 
     place: Place
@@ -36,6 +37,7 @@ class TeamStand:
     poses: Mapping[str, Array]
     std_m: float
     placed: frozenset[str]
+    is_left: bool = False
 
 
 class _Held(Planner):
@@ -67,8 +69,9 @@ class StandSearch:
         scene, topology = self._start(place, chain)
         stood = self._rested(place, scene, topology)
         planned = self._planned(place, scene, topology, Planner(self._parameters, self.team.sensors))
-        holding = [one for one in (planned, stood) if self.team.target in one.placed]
-        return min(holding, key=lambda one: one.std_m) if holding else Obstruction.NOBODY_PLACES
+        if self.team.target not in planned.placed:
+            return replace(stood, is_left=True) if self.team.target in stood.placed else Obstruction.NOBODY_PLACES
+        return min((one for one in (planned, stood) if self.team.target in one.placed), key=lambda one: one.std_m)
 
     def held(self, place: Place, topology: Topology) -> TeamStand:
         """Return the team's stand in a topology that may not change, whether or not it sees the target there.

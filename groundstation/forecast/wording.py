@@ -8,7 +8,7 @@ from itertools import groupby
 from groundstation.appearance.topology import topology_words
 from groundstation.forecast.endurance import Endurance
 from groundstation.forecast.failures import Failure
-from groundstation.forecast.floor import PlaceForecast, Spread, spread_of
+from groundstation.forecast.floor import PlaceForecast, Spread, left_of, spread_of
 from groundstation.forecast.forecast import Forecast
 from groundstation.forecast.observability import FLOWN_S, Direction, Observability
 
@@ -42,8 +42,21 @@ def _accuracy(forecast: Forecast) -> Section:
         rows.insert(0, ("along the path", *_cells(spread_of(forecast.path))))
     title = f"Where {forecast.team.target} will be known to, with the best stand of {_count(forecast.team.robots)}"
     others = ", ".join(forecast.team.others)
-    notes = (f"as if {others} were not there: --target forecasts others",) if others else ()
-    return Section(title, ("", "median", "worst", "not seen"), tuple(rows), notes)
+    notes = [f"as if {others} were not there: --target forecasts others"] if others else []
+    notes += [_left(where, places) for where, places in _places(forecast) if left_of(places)]
+    return Section(title, ("", "median", "worst", "not seen"), tuple(rows), tuple(notes))
+
+
+def _places(forecast: Forecast) -> tuple[tuple[str, Sequence[PlaceForecast]], ...]:
+    return ("on the path", forecast.path), ("on the floor", forecast.floor.places)
+
+
+def _left(where: str, places: Sequence[PlaceForecast]) -> str:
+    seen = sum(one.std_m is not None for one in places)
+    return (
+        f"{where}: at {left_of(places)} of the {seen} places that are seen the planner alone would leave the stand for "
+        "one that no fixed camera locates; the figure holds as far as flight keeps the drones within reach of a view"
+    )
 
 
 def _cells(spread: Spread) -> tuple[str, str, str]:

@@ -1,6 +1,7 @@
 """`groundstation forecast`: printed and written output, and operator mistakes."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from groundstation.cli import main as cli
 from groundstation.cli.exits import ExitCode
 from groundstation.forecast import forecast as parts
+from groundstation.forecast.stands import StandSearch
 
 
 @pytest.fixture(autouse=True)
@@ -44,6 +46,16 @@ def test_json_has_all_figures_and_pictures_are_drawn(tmp_path: Path, capsys: pyt
     assert found["observability"][0]["entries"]["ceiling.yaw"]["after"] > 0.0
     assert found["battery"] == {"drone_1": pytest.approx(612.0), "drone_2": pytest.approx(612.0)}
     assert picture.read_text(encoding="utf-8").count("<path") > 20
+
+
+def test_places_whose_stand_the_planner_would_leave_are_counted(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    planned = StandSearch._planned
+    monkeypatch.setattr(StandSearch, "_planned", lambda *given: replace(planned(*given), placed=frozenset()))
+    assert cli.run(["forecast", "lab", "--path", "0,0 3.9,2.9"]) == ExitCode.OK
+    told = " ".join(capsys.readouterr().out.split())
+    assert "on the path: at 2 of the 2 places that are seen the planner alone would leave the stand" in told
 
 
 def test_each_of_several_targets_is_forecast_by_itself(capsys: pytest.CaptureFixture[str]) -> None:

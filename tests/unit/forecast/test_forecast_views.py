@@ -8,7 +8,7 @@ import pytest
 
 from groundstation.field.resolved import ResolvedField
 from groundstation.field.room import RoomObstacle
-from groundstation.forecast.floor import OBSTACLE, PlaceForecaster
+from groundstation.forecast.floor import OBSTACLE, PlaceForecast, PlaceForecaster, left_of
 from groundstation.forecast.stands import StandSearch
 from groundstation.forecast.team import Team, team_of
 from groundstation.forecast.views import Link, Obstruction, Views
@@ -94,3 +94,17 @@ def test_the_planner_keeps_a_target_in_view_and_drones_apart_and_inside(team: Te
     poses = np.array(list(stand.poses.values()))
     assert np.hypot(*(poses[0, :2] - poses[1, :2])) > 0.4
     assert all(team.planner.fence.nearest(*pose[:2]) == tuple(pose[:2]) for pose in poses)
+
+
+def test_a_stand_that_the_planner_leaves_for_one_that_nobody_sees_counts_and_is_marked(
+    team: Team, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    place, planned = (2.0, 1.0), StandSearch._planned
+    search = StandSearch(team)
+    stand = search.at(place)
+    assert not isinstance(stand, Obstruction) and not stand.is_left
+    monkeypatch.setattr(StandSearch, "_planned", lambda *given: replace(planned(*given), placed=frozenset()))
+    left = search.at(place)
+    assert not isinstance(left, Obstruction) and left.is_left and team.target in left.placed
+    seen = PlaceForecast(place, left.std_m, "", left)
+    assert left_of([seen, replace(seen, stand=stand), replace(seen, std_m=None)]) == 1

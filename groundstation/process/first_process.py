@@ -19,6 +19,7 @@ _HANDED_ON = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 def main(command: list[str]) -> int:
     """Return the command's exit code (128 + its signal) once it and all that it left behind have ended."""
     ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)  # orphans come here, also where this is not process 1
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # where it is ignored the exit code is lost
     started = subprocess.Popen(command)
 
     def hand_on(number: int, _frame: object) -> None:

@@ -39,6 +39,8 @@ class Interrupts:
             signal.signal(number, self._on_signal)
         for number in _UNHEEDED:
             signal.signal(number, signal.SIG_IGN)
+        # Where our starter ignored it, the kernel would forget a child at its end, and with it the exit code.
+        signal.signal(signal.SIGCHLD, signal.SIG_DFL)
         signal.signal(signal.SIGTSTP, self._on_put_aside)
         signal.set_wakeup_fd(self._write, warn_on_full_buffer=False)
 

@@ -168,7 +168,10 @@ class ManagedProcess:
 
 def _has_ended(pid: int) -> bool:
     """Return whether a child of ours is a zombie, leaving it one so that its process group stays ours to signal."""
-    return os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
+    try:
+        return os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
+    except ChildProcessError:  # somebody else has waited for it: its exit code is lost, the run goes on
+        return True
 
 
 def exit_text(code: int, farewell: str = "") -> str:

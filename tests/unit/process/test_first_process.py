@@ -21,6 +21,12 @@ def test_what_a_killed_command_leaves_behind_goes_on_to_its_end(tmp_path: Path) 
     assert done.exists()
 
 
+def test_the_exit_code_counts_though_ends_of_children_are_ignored() -> None:
+    code = "import os, signal, sys; signal.signal(signal.SIGCHLD, signal.SIG_IGN); os.execv(sys.argv[1], sys.argv[1:])"
+    failing = [*FIRST, sys.executable, "-c", "raise SystemExit(7)"]
+    assert subprocess.run([sys.executable, "-c", code, *failing], timeout=20, check=False).returncode == 7
+
+
 def test_a_signal_reaches_the_command_whose_exit_code_counts() -> None:
     code = "import signal, sys, time; signal.signal(2, lambda *_: sys.exit(7)); print('up', flush=True); time.sleep(20)"
     with subprocess.Popen([*FIRST, sys.executable, "-c", code], stdout=subprocess.PIPE) as first:

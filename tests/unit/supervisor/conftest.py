@@ -27,7 +27,8 @@ def make(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[.
     runtime.mkdir()
     monkeypatch.setenv("PYTHONPATH", str(HERE))
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(runtime))
-    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    taken_over = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGCHLD)
+    handlers = {number: signal.getsignal(number) for number in taken_over}
     made: list[Supervisor] = []
     sink = os.open(tmp_path / "terminal", os.O_WRONLY | os.O_CREAT)
 

@@ -41,6 +41,29 @@ def test_restarts_a_killed_process_with_a_new_epoch(make: Callable[..., Supervis
     assert "epoch 7\n" in log and "epoch 8\n" in log
 
 
+def test_a_process_is_replaced_though_ends_of_children_are_ignored(make: Callable[..., Supervisor]) -> None:
+    """Ignoring SIGCHLD is inherited over exec, and then the kernel forgets each child at its end."""
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+    supervisor = make(spec("ceiling", "obedient"))
+    start(supervisor)
+    camera = supervisor.processes[1]
+    pid = camera.pid
+    os.kill(pid, signal.SIGKILL)
+    until(supervisor, lambda: camera.is_up and camera.pid != pid)
+    supervisor.stop()
+    assert not any(process.running for process in supervisor.processes)
+
+
+def test_a_process_whose_end_somebody_else_collected_is_replaced(make: Callable[..., Supervisor]) -> None:
+    supervisor = make(spec("ceiling", "obedient"))
+    start(supervisor)
+    camera = supervisor.processes[1]
+    pid = camera.pid
+    os.kill(pid, signal.SIGKILL)
+    os.waitpid(pid, 0)
+    until(supervisor, lambda: camera.is_up and camera.pid != pid)
+
+
 @pytest.mark.parametrize(("number", "told"), [(signal.SIGTERM, True), (signal.SIGKILL, False)])
 def test_a_driver_that_somebody_told_to_end_is_known_once_from_one_that_died(
     make: Callable[..., Supervisor], number: int, told: bool

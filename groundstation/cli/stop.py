@@ -36,12 +36,11 @@ def choose_run(name: str | None, stops: bool = False) -> RuntimeRecord:
 
     stops: without a name the run with real drones is meant, even if simulated ones run beside it.
     """
-    records = runtime_file.live_records() or _elsewhere()
-    if name is not None:
-        records = [record for record in records if name in (record.name, record.site, str(record.supervisor.pid))]
+    records = _found(name)
     if not records:
         which = f" called {name}" if name else ""
-        nobody = f"no ground station{which} is running (start one with: groundstation fly FIELD)"
+        searched = ", ".join(map(str, (runtime_file.folder(), *runtime_file.folders_beside())))
+        nobody = f"no ground station{which} is running (start one with: groundstation fly FIELD); searched: {searched}"
         raise UnreachableError("\n".join(_closed_doors()) or nobody)
     if len(records) > 1 and stops and name is None:
         # In an emergency nobody reads a list of runs.
@@ -50,6 +49,17 @@ def choose_run(name: str | None, stops: bool = False) -> RuntimeRecord:
         lines = "\n".join(f"  --run {r.name}  {r.field}, {', '.join(r.drones)}" for r in records)
         raise UnreachableError(f"several ground stations are running, choose one:\n{lines}")
     return records[0]
+
+
+def _found(name: str | None) -> list[RuntimeRecord]:
+    """Return the runs, or those of that name, from the nearest place that has any."""
+    for look in (runtime_file.live_records, runtime_file.records_beside, _elsewhere):
+        records = look()
+        if name is not None:
+            records = [record for record in records if name in (record.name, record.site, str(record.supervisor.pid))]
+        if records:
+            return records
+    return []
 
 
 def _elsewhere() -> list[RuntimeRecord]:

@@ -19,6 +19,8 @@ from groundstation.process.stat_file import stat_of
 
 # Not tempfile.gettempdir(): with another TMPDIR, or a full /tmp, another shell would look elsewhere than the run did.
 _SHARED = Path("/tmp")
+# A desktop's terminal, a cron job and `sudo -u` of one user have different $XDG_RUNTIME_DIR.
+_SESSIONS, _SERVICE = Path("/run/user"), Path("/run/skein")
 
 
 class ProcessRecord(msgspec.Struct, frozen=True):
@@ -93,16 +95,38 @@ def start_time(pid: int) -> int | None:
 def folder() -> Path:
     """Return the folder of runtime files, made if needed; raises GroundStationError if it is someone else's."""
     given = os.environ.get("XDG_RUNTIME_DIR", "")
-    path = Path(given) / "skein" if given and os.access(given, os.W_OK) else _SHARED / f"skein-{os.getuid()}"
+    path = Path(given) / "skein" if given and os.access(given, os.W_OK) else _shared()
     try:
         path.mkdir(mode=0o700, exist_ok=True)
-        status = path.lstat()
+        ours = _is_ours(path)
     except OSError as error:
         raise GroundStationError(f"cannot use {path} for the runtime file: {error.strerror}") from error
-    # /tmp is shared: a folder planted by another user could point our stop commands at processes of their own.
-    if not stat.S_ISDIR(status.st_mode) or status.st_uid != os.getuid():
+    if not ours:
         raise GroundStationError(f"{path} is not a folder of yours: remove it, or set XDG_RUNTIME_DIR")
     return path
+
+
+def _shared() -> Path:
+    return _SHARED / f"skein-{os.getuid()}"
+
+
+def _is_ours(path: Path) -> bool:
+    """Return whether nobody else can have put records there; raises OSError.
+
+    /tmp is shared: a folder planted by another user could point our stop commands at processes of their own.
+    """
+    status = path.lstat()
+    return stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid()
+
+
+def folders_beside() -> list[Path]:
+    """Return the other folders in which runs of this user record themselves, as far as there are any."""
+    found = []
+    for path in (_SESSIONS / str(os.getuid()) / "skein", _SERVICE / "skein", _shared()):
+        with suppress(OSError):
+            if path != folder() and _is_ours(path):
+                found.append(path)
+    return found
 
 
 def write(record: RuntimeRecord) -> Path:
@@ -120,8 +144,17 @@ def write(record: RuntimeRecord) -> Path:
 
 def live_records() -> list[RuntimeRecord]:
     """Return the runs that still have a process, and remove files of dead ones that can be read."""
+    return _live_records(folder())
+
+
+def records_beside() -> list[RuntimeRecord]:
+    """Return the runs of this user whose shells had another XDG_RUNTIME_DIR, as `live_records` does."""
+    return [record for place in folders_beside() for record in _live_records(place)]
+
+
+def _live_records(place: Path) -> list[RuntimeRecord]:
     records = []
-    for path in sorted(folder().glob("*.json")):
+    for path in sorted(place.glob("*.json")):
         try:
             content = path.read_bytes()
             record = msgspec.json.decode(content, type=RuntimeRecord)
@@ -134,7 +167,7 @@ def live_records() -> list[RuntimeRecord]:
         if record.alive:
             records.append(record)
         else:
-            remove(record)
+            _remove(record, place)
     return records
 
 
@@ -152,10 +185,19 @@ def identities_of(site: str, pid: int) -> Path:
 
 def remove(record: RuntimeRecord) -> None:
     """Remove a record, and the certificates and heartbeat block that a killed supervisor could not remove."""
-    with suppress(OSError, GroundStationError):  # the folder is gone, at a logout e.g.
-        (folder() / f"{record.name}.json").unlink(missing_ok=True)
+    try:
+        place = folder()
+    except GroundStationError:  # it is gone, at a logout e.g.
+        place = None
+    _remove(record, place)
+
+
+def _remove(record: RuntimeRecord, place: Path | None) -> None:
+    if place is not None:
+        with suppress(OSError):
+            (place / f"{record.name}.json").unlink(missing_ok=True)
         if record.identities:
-            shutil.rmtree(folder() / record.name, ignore_errors=True)
+            shutil.rmtree(place / record.name, ignore_errors=True)
     block = Path(record.heartbeat)
     if block.name.startswith("skein-"):
         with suppress(OSError):

@@ -29,7 +29,7 @@ from groundstation.bus.zenoh_bus import ZenohBus
 from groundstation.cli.exits import UnreachableError
 from groundstation.cli.stop import choose_run
 from groundstation.errors import GroundStationError, OperatorMistake
-from groundstation.supervisor import authority, site
+from groundstation.supervisor import authority, runtime_file, site
 from groundstation.supervisor.authority import make_identities
 from groundstation.supervisor.joining import join
 
@@ -47,6 +47,8 @@ HERE, ELSEWHERE = "127.0.0.1", "127.0.0.9"
 @pytest.fixture(autouse=True)
 def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    monkeypatch.setattr(runtime_file, "folders_beside", list)
     site.found("lab")
     return tmp_path
 

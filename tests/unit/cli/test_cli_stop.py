@@ -73,6 +73,15 @@ def runtime(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
+def alone(runtime: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """No run is seen but those of the test."""
+    for name in ("_SESSIONS", "_SERVICE", "_SHARED"):
+        monkeypatch.setattr(runtime_file, name, runtime)
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(runtime))
+    return runtime
+
+
+@pytest.fixture
 def team(runtime: Path) -> Iterator[FakeTeam]:
     made = FakeTeam({"drone_1": FULL, "drone_2": FULL})
     announce(made.endpoint)
@@ -195,9 +204,14 @@ def test_a_start_from_another_host_is_not_sent_where_no_operator_is_heard(
     assert team.heard == []
 
 
-def test_nothing_runs(runtime: Path) -> None:
-    result = cli("land")
-    assert result.returncode == 3 and "no ground station is running" in result.stderr
+def test_nothing_runs_and_the_folders_searched_are_named(alone: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (shared := alone / f"skein-{os.getuid()}").mkdir()
+    with pytest.raises(UnreachableError, match=f"no ground station is running .* {alone}/skein, {shared}$"):
+        stop.choose_run(None, stops=True)
+    monkeypatch.setenv("XDG_RUNTIME_DIR", "")
+    announce("tcp/127.0.0.1:9")
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(alone))
+    assert stop.choose_run(None, stops=True).site == "lab"
 
 
 def test_several_runs_must_be_told_apart(team: FakeTeam) -> None:

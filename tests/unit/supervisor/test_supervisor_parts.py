@@ -109,6 +109,44 @@ def test_shells_with_other_folders_for_temporary_files_find_the_same_run(
     assert found == {Path(f"/tmp/skein-{os.getuid()}")}
 
 
+def test_a_run_is_found_from_a_shell_with_another_runtime_folder(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """As from a desktop's terminal, a cron job, a session that is not a login, or beside the service."""
+    for name, place in (("_SESSIONS", "user"), ("_SERVICE", "service"), ("_SHARED", "tmp")):
+        (tmp_path / place).mkdir()
+        monkeypatch.setattr(runtime_file, name, tmp_path / place)
+    session = tmp_path / "user" / str(os.getuid())
+    session.mkdir()
+    one = record(os.getpid(), runtime_file.start_time(os.getpid()) or 0)
+    homes = (str(session), str(tmp_path / "service"), "")
+    for home in homes:
+        monkeypatch.setenv("XDG_RUNTIME_DIR", home)
+        assert runtime_file.live_records() == [] == runtime_file.records_beside()
+        runtime_file.write(one)
+        for other in {*homes, str(tmp_path)} - {home}:
+            monkeypatch.setenv("XDG_RUNTIME_DIR", other)
+            assert runtime_file.live_records() == []
+            assert runtime_file.records_beside() == [one]
+        monkeypatch.setenv("XDG_RUNTIME_DIR", home)
+        runtime_file.remove(one)
+
+
+def test_a_stale_record_of_another_folder_is_removed_there(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(runtime_file, "_SHARED", tmp_path)
+    monkeypatch.setenv("XDG_RUNTIME_DIR", "")
+    path = runtime_file.write(record(2**22 - 1, 1))
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    assert runtime_file.records_beside() == [] and not path.exists()
+
+
+def test_a_planted_folder_of_records_is_not_read(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(runtime_file, "_SHARED", tmp_path)
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    (tmp_path / f"skein-{os.getuid()}").symlink_to(runtime_file.folder().rename(tmp_path / "planted"))
+    assert runtime_file.folders_beside() == []
+
+
 def test_zombie_is_not_alive() -> None:
     with subprocess.Popen([sys.executable, "-c", ""]) as process:
         os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)

@@ -34,32 +34,35 @@ _CONNECT_S = 2.0
 def choose_run(name: str | None, stops: bool = False) -> RuntimeRecord:
     """Return the running ground station, or the named one of several; raises UnreachableError.
 
-    stops: without a name the run with real drones is meant, even if simulated ones run beside it.
+    stops: without a name the run with real drones is meant, even if simulated ones run nearer to this shell.
     """
-    records = _found(name)
+    records = _found(name, stops)
     if not records:
         which = f" called {name}" if name else ""
         searched = ", ".join(map(str, (runtime_file.folder(), *runtime_file.folders_beside())))
         nobody = f"no ground station{which} is running (start one with: groundstation fly FIELD); searched: {searched}"
         raise UnreachableError("\n".join(_closed_doors()) or nobody)
-    if len(records) > 1 and stops and name is None:
-        # In an emergency nobody reads a list of runs.
-        records = [record for record in records if not record.simulated] or records
     if len(records) > 1:
         lines = "\n".join(f"  --run {r.name}  {r.field}, {', '.join(r.drones)}" for r in records)
         raise UnreachableError(f"several ground stations are running, choose one:\n{lines}")
     return records[0]
 
 
-def _found(name: str | None) -> list[RuntimeRecord]:
-    """Return the runs, or those of that name, from the nearest place that has any."""
+def _found(name: str | None, stops: bool) -> list[RuntimeRecord]:
+    """Return the runs, or those of that name, from the nearest place that has any; for a stop any with real drones."""
+    simulated: list[RuntimeRecord] = []
     for look in (runtime_file.live_records, runtime_file.records_beside, _elsewhere):
         records = look()
         if name is not None:
             records = [record for record in records if name in (record.name, record.site, str(record.supervisor.pid))]
+        elif stops and (real := [record for record in records if not record.simulated]):
+            return real  # in an emergency nobody reads a list of runs
+        elif stops:
+            simulated = simulated or records
+            continue
         if records:
             return records
-    return []
+    return simulated
 
 
 def _elsewhere() -> list[RuntimeRecord]:

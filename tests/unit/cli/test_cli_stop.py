@@ -229,6 +229,41 @@ def test_a_stop_means_the_real_drones_whatever_is_rehearsed_beside_them(team: Fa
     assert cli("takeoff").returncode == 3, "a start is never guessed"
 
 
+@pytest.fixture
+def elsewhere(alone: Path, monkeypatch: pytest.MonkeyPatch) -> RuntimeRecord:
+    """A rehearsal on this host, and a run of a joined site, as another host finds it."""
+    simulator = ProcessRecord("sim_bridge", "sim_bridge", os.getpid(), runtime_file.start_time(os.getpid()) or 0)
+    announce("tcp/127.0.0.1:9", site="rehearsal", processes=(simulator,))
+    nobody = ProcessRecord("supervisor", "supervisor", 0, 0)
+    found = RuntimeRecord("arena", "", "tls/10.0.0.1:1", "r", "", ("drone_1",), nobody, (), host="laptop")
+    monkeypatch.setattr(stop, "_elsewhere", lambda: [found])
+    return found
+
+
+def test_a_rehearsal_here_hides_no_real_drones_on_another_host_from_a_stop(elsewhere: RuntimeRecord) -> None:
+    assert stop.choose_run(None, stops=True) == elsewhere
+    assert stop.choose_run(None).site == "rehearsal", "a start goes to the nearest"
+
+
+@pytest.mark.parametrize("stops", [True, False])
+def test_a_run_on_another_host_can_be_named_beside_one_here(elsewhere: RuntimeRecord, stops: bool) -> None:
+    assert stop.choose_run("arena", stops) == elsewhere
+    assert stop.choose_run("rehearsal", stops).site == "rehearsal"
+
+
+def test_a_rehearsal_is_stopped_where_nobody_else_flies(
+    elsewhere: RuntimeRecord, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stop, "_elsewhere", list)
+    assert stop.choose_run(None, stops=True).site == "rehearsal"
+
+
+def test_real_drones_here_are_stopped_without_a_search_elsewhere(alone: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    announce("tcp/127.0.0.1:9")
+    monkeypatch.setattr(stop, "_elsewhere", lambda: pytest.fail("a search takes seconds"))
+    assert stop.choose_run(None, stops=True).site == "lab"
+
+
 def test_silent_router_signals_the_drivers_and_no_stranger(runtime: Path) -> None:
     with subprocess.Popen(["sleep", "30"]) as driver, subprocess.Popen(["sleep", "30"]) as stranger:
         started = runtime_file.start_time(driver.pid) or 0

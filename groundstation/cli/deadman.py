@@ -18,13 +18,14 @@ import click
 
 from groundstation.bus.messages import CommandAck, Verb
 from groundstation.bus.roles import Role
-from groundstation.bus.topics import COMMAND_ACK
-from groundstation.cli.exits import ExitCode
+from groundstation.bus.topics import COMMAND_ACK, LEASE
+from groundstation.cli.exits import ExitCode, UnreachableError
 from groundstation.cli.stop import choose_run
 from groundstation.console.commands import CommandDesk, Given
 from groundstation.console.dead_man import DeadMan, Grip
 from groundstation.errors import GroundStationError, OperatorMistake
 from groundstation.supervisor.joining import join
+from groundstation.supervisor.runtime_file import RuntimeRecord
 from groundstation.time_units import NEVER_NS, NS_PER_MS, NS_PER_S
 
 if TYPE_CHECKING:
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 _ME = "deadman"
 _TURN_S = 0.02
 _FAREWELL_NS = 2 * NS_PER_S
+_LOST_NS = 10 * NS_PER_S  # longer than from letting go to LAND, which may still arrive
 _KEYBOARD_PATIENCE_NS = 900 * NS_PER_MS
 _GAMEPAD_PATIENCE_NS = NEVER_NS  # it reports its release
 # WIRE: linux/joystick.h js_event: time u32, value s16, type u8 (1 = button, 0x80 = initial state), number u8.
@@ -103,7 +105,7 @@ def deadman(name: str | None, gamepad: str | None) -> int:
     An unplugged gamepad or a closed terminal counts as letting go; Ctrl-C, Ctrl-Z and q hold and leave. It is no
     emergency stop.
     """
-    record = choose_run(name)
+    record = choose_run(name, stops=True)
     bus = join(record, "deadman", Role.CLI)
     grip = "any button (the second lands)" if gamepad else "the space bar"
     click.echo(f"{record.name}: hold {grip}. Let go: HOLD, 5 s later LAND. l: LAND now. q: HOLD and leave.")
@@ -111,10 +113,32 @@ def deadman(name: str | None, gamepad: str | None) -> int:
         with _opened(gamepad) as handle:
             patience_ns = _GAMEPAD_PATIENCE_NS if handle.gamepad else _KEYBOARD_PATIENCE_NS
             heed_signals(handle)
-            watch(bus, record.drones, handle, DeadMan(patience_ns), lambda: record.supervisor.alive)
+            watch(bus, record.drones, handle, DeadMan(patience_ns), sign_of_life(record, bus))
     finally:
         bus.close()
     return ExitCode.OK
+
+
+def sign_of_life(record: RuntimeRecord, bus: "Bus") -> Callable[[], bool]:
+    """Return how to ask whether a run goes on: by its supervisor, or on another host by the operator's leases.
+
+    The latter raises UnreachableError when the link may have broken: nobody may believe to hold the handle then.
+    """
+    if not record.host:
+        return lambda: record.supervisor.alive
+    leases, heard_ns = bus.subscribe([LEASE], newest=True), time.monotonic_ns()
+
+    def goes_on() -> bool:
+        nonlocal heard_ns
+        now_ns = time.monotonic_ns()
+        if any(leases.drain()):
+            heard_ns = now_ns
+        if now_ns - heard_ns > _LOST_NS:
+            text = f"{record.name}: nothing was heard of it for {_LOST_NS // NS_PER_S} s; it has ended, or the link has"
+            raise UnreachableError(text)
+        return True
+
+    return goes_on
 
 
 def heed_signals(handle: Handle) -> None:

@@ -16,12 +16,14 @@ import pytest
 
 from groundstation.bus import topics as t
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
-from groundstation.bus.messages import Command, Verb
+from groundstation.bus.messages import Command, Lease, Verb
 from groundstation.cli import deadman
-from groundstation.cli.deadman import Handle, heed_signals, watch
+from groundstation.cli.deadman import Handle, heed_signals, sign_of_life, watch
+from groundstation.cli.exits import UnreachableError
 from groundstation.console import dead_man
 from groundstation.console.dead_man import DeadMan, Grip
 from groundstation.errors import GroundStationError
+from groundstation.supervisor.runtime_file import ProcessRecord, RuntimeRecord
 from groundstation.time_units import NS_PER_S
 
 
@@ -107,6 +109,32 @@ def test_it_goes_out_to_everybody_and_is_repeated(pipe: tuple[int, int]) -> None
     sent = [received.message for received in commands.drain()]
     assert len(sent) >= 2
     assert all(isinstance(c, Command) and c.verb is Verb.HOLD and c.scope == () for c in sent)
+
+
+def test_on_another_host_it_lasts_as_long_as_the_operators_leases(
+    pipe: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """There the supervisor's process cannot be looked at."""
+    monkeypatch.setattr(deadman, "_LOST_NS", NS_PER_S // 2)
+    exchange = MemoryExchange()
+    bus, operator = MemoryBus(exchange, "lab", "deadman_laptop_1"), MemoryBus(exchange, "lab", "operator")
+    drone = MemoryBus(exchange, "lab", "drone_1")
+    commands = drone.subscribe([t.COMMAND])
+    record = RuntimeRecord("lab", "", "", "run-7", "", ("drone_1",), ProcessRecord("", "", 0, 0), (), host="laptop")
+    alive, began = sign_of_life(record, bus), time.monotonic()
+
+    def goes_on() -> bool:
+        if time.monotonic() - began < 1.0:
+            operator.publish(t.LEASE, Lease(header=operator.header("team"), holder="operator", expires_ns=1))
+        return alive()
+
+    man = DeadMan(NS_PER_S // 5)
+    man.press(time.monotonic_ns())
+    with pytest.raises(UnreachableError, match="lab: nothing was heard of it"):
+        watch(bus, record.drones, Handle(pipe[0], gamepad=False), man, goes_on)
+    assert 1.4 < time.monotonic() - began < 3.0
+    verbs = [one.message.verb for one in commands.drain() if isinstance(one.message, Command)]
+    assert verbs and set(verbs) == {Verb.HOLD}
 
 
 @pytest.mark.parametrize(

@@ -86,7 +86,7 @@ class Child:
         self._stop = StopSignal(self._parent)
         self._stop.install()
         if self.spec.heartbeat:
-            self._block = HeartbeatBlock.attach(self.spec.heartbeat)
+            self._block = self._attached_block()
             if self.spec.clock:
                 clock.follow(self.spec.clock, self._block.clock_offset_ns)
         self._set_state(Lifecycle.STARTING, "")
@@ -117,6 +117,14 @@ class Child:
                 clock.follow(self.spec.clock, lambda: last_ns)  # threads of a driver may still read the clock
             self._block.close()
             self._block = None
+
+    def _attached_block(self) -> HeartbeatBlock:
+        try:
+            return HeartbeatBlock.attach(self.spec.heartbeat)
+        except (OSError, ValueError) as error:  # without a file, or an empty one
+            why = error.strerror if isinstance(error, OSError) else error
+            text = f"cannot beat in {self.spec.heartbeat}: {why}; land, end the run and start it again"
+            raise GroundStationError(text) from error
 
     def _opened_bus(self) -> Bus:
         from groundstation.bus.zenoh_bus import open_bus, speak_on_one_thread

@@ -34,18 +34,25 @@ class SlotState(IntEnum):
 
 
 class HeartbeatBlock:
-    """All slots of one run. Writes are aligned 8-byte stores, so a reader never sees half a stamp."""
+    """All slots of one run. Writes are aligned 8-byte stores, so a reader never sees half a stamp.
+
+    descriptor: the file, for the creator's children; -1 where it was attached. Its name may vanish in a run: systemd
+    removes a user's files in /dev/shm at the last logout.
+    """
 
     def __init__(self, path: Path, slots: int, *, create: bool) -> None:
         self.path = path
         flags = os.O_RDWR | os.O_CLOEXEC | (os.O_CREAT | os.O_EXCL if create else 0)
-        descriptor = os.open(path, flags, 0o600)
+        self.descriptor = os.open(path, flags, 0o600)
         try:
             if create:
-                os.ftruncate(descriptor, slots * _WORDS_PER_SLOT * 8)
-            self._map = mmap.mmap(descriptor, 0)
-        finally:
-            os.close(descriptor)
+                os.ftruncate(self.descriptor, slots * _WORDS_PER_SLOT * 8)
+            self._map = mmap.mmap(self.descriptor, 0)
+        except BaseException:
+            self._close_descriptor()
+            raise
+        if not create:
+            self._close_descriptor()
         self._words = memoryview(self._map).cast("q")
 
     @classmethod
@@ -159,8 +166,19 @@ class HeartbeatBlock:
         """Unmap, and remove the file if nobody needs it any more; idempotent."""
         self._words.release()
         self._map.close()
+        self._close_descriptor()
         if remove:
             self.path.unlink(missing_ok=True)
+
+    def remove(self) -> None:
+        """Remove the file, which no further child gets; it stays mapped; idempotent."""
+        self._close_descriptor()
+        self.path.unlink(missing_ok=True)
+
+    def _close_descriptor(self) -> None:
+        if self.descriptor >= 0:
+            os.close(self.descriptor)
+            self.descriptor = -1
 
 
 def _is_live(path: Path) -> bool:

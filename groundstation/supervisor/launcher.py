@@ -21,9 +21,9 @@ _TAIL_LINES = 8
 
 
 class Launcher:
-    """Holds the run folder and the environment of children; log files stay open across restarts."""
+    """Holds the run folder and the environment of children; for restarts log files and heartbeat block stay open."""
 
-    def __init__(self, run: Run, heartbeat: str, identities: Path | None = None) -> None:
+    def __init__(self, run: Run, heartbeat: int, identities: Path | None = None) -> None:
         self._run = run
         self._run_dir = run.run_dir
         self._heartbeat = heartbeat
@@ -58,7 +58,7 @@ class Launcher:
                 role=spec.role,
                 endpoint=self._run.endpoint if spec.on_bus else "",
                 site=self._run.site,
-                heartbeat=self._heartbeat,
+                heartbeat=f"/proc/self/fd/{self._heartbeat}",
                 heartbeat_index=slot,
                 section=json.dumps(section),
                 parent_pid=os.getpid(),
@@ -96,7 +96,7 @@ class Launcher:
                 stdout=None if spec.on_terminal else log,
                 stderr=log,
                 start_new_session=True,
-                pass_fds=spec.keep_open,
+                pass_fds=(*spec.keep_open, self._heartbeat),
                 env=one_thread(),
             )
 

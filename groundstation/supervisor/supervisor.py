@@ -64,7 +64,7 @@ class Supervisor:
         self.interrupts = Interrupts()
         self._block = HeartbeatBlock.create(f"skein-{run.site}-{os.getpid()}", len(table) + 1)
         self._identities = runtime_file.identities_of(run.site, os.getpid()) if run.makes_identities else None
-        self._launcher = Launcher(run, str(self._block.path), self._identities)
+        self._launcher = Launcher(run, self._block.descriptor, self._identities)
         self.processes = [ManagedProcess(spec, slot_of(index), self._block) for index, spec in enumerate(table)]
         self._last_words = FailsafeSender()
         self.bus: ZenohBus | None = None
@@ -317,4 +317,4 @@ class Supervisor:
         if self._identities is not None:
             shutil.rmtree(self._identities, ignore_errors=True)
         self._launcher.close()
-        self._block.path.unlink(missing_ok=True)
+        self._block.remove()

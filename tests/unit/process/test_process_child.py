@@ -104,9 +104,17 @@ def test_a_child_takes_the_share_that_its_row_gives_it() -> None:
     assert int(nice) == (-2 if allowed == "True" else max(3, os.getpriority(os.PRIO_PROCESS, 0)))
 
 
-def test_attaching_to_a_block_that_is_gone_fails(tmp_path: Path) -> None:
+def test_a_child_whose_block_is_gone_says_so_with_the_remedy(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
         HeartbeatBlock.attach(str(tmp_path / "gone"))
+    script = (
+        "from groundstation.process.child import Child, ChildSpec;"
+        f"Child(ChildSpec('one', 'tracker', '', 'lab', {str(tmp_path / 'gone')!r}, 1)).__enter__()"
+    )
+    ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert ran.stderr.splitlines()[-1].endswith(
+        "/gone: No such file or directory; land, end the run and start it again"
+    )
 
 
 def test_death_of_the_parent_wakes_the_sleep_once() -> None:

@@ -54,6 +54,18 @@ def test_a_process_is_replaced_though_ends_of_children_are_ignored(make: Callabl
     assert not any(process.running for process in supervisor.processes)
 
 
+def test_a_process_is_replaced_though_the_heartbeat_file_was_removed(make: Callable[..., Supervisor]) -> None:
+    """systemd removes the files in /dev/shm of a user who logs out."""
+    supervisor = make(spec("tracker", "obedient"))
+    start(supervisor)
+    (record,) = runtime_file.live_records()
+    Path(record.heartbeat).unlink()
+    tracker = supervisor.processes[1]
+    pid = tracker.pid
+    os.kill(pid, signal.SIGKILL)
+    until(supervisor, lambda: tracker.is_up and tracker.pid != pid)
+
+
 def test_a_process_whose_end_somebody_else_collected_is_replaced(make: Callable[..., Supervisor]) -> None:
     supervisor = make(spec("ceiling", "obedient"))
     start(supervisor)

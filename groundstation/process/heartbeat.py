@@ -46,10 +46,13 @@ class HeartbeatBlock:
         self.descriptor = os.open(path, flags, 0o600)
         try:
             if create:
-                os.ftruncate(self.descriptor, slots * _WORDS_PER_SLOT * 8)
+                # Not ftruncate, which reserves nothing: where storage is full, the first beat would end by SIGBUS.
+                os.posix_fallocate(self.descriptor, 0, slots * _WORDS_PER_SLOT * 8)
             self._map = mmap.mmap(self.descriptor, 0)
         except BaseException:
             self._close_descriptor()
+            if create:
+                path.unlink(missing_ok=True)
             raise
         if not create:
             self._close_descriptor()
@@ -70,7 +73,8 @@ class HeartbeatBlock:
         except FileExistsError:
             raise GroundStationError(f"another run beats in {path}: end it") from None
         except OSError as error:
-            raise GroundStationError(f"cannot make the heartbeat block {path}: {error.strerror}; remove it") from error
+            text = f"cannot make the heartbeat block {path}: {error.strerror}; make room there, or remove it"
+            raise GroundStationError(text) from error
 
     @classmethod
     def attach(cls, path: str) -> "HeartbeatBlock":

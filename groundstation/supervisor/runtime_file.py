@@ -168,7 +168,17 @@ def _live_records(place: Path) -> list[RuntimeRecord]:
             records.append(record)
         else:
             _remove(record, place)
+    _remove_unrecorded_identities(place)
     return records
+
+
+def _remove_unrecorded_identities(place: Path) -> None:
+    """Remove the certificates of runs that died before they were recorded."""
+    for path in place.glob("*-*"):
+        pid = path.name.rpartition("-")[2]
+        unrecorded = pid.isdecimal() and path.is_dir() and not (place / f"{path.name}.json").exists()
+        if unrecorded and start_time(int(pid)) is None:
+            shutil.rmtree(path, ignore_errors=True)
 
 
 def _is_of_a_live_run(content: bytes) -> bool:

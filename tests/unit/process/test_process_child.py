@@ -1,5 +1,6 @@
 """Heartbeat block, sleep and signals of a child."""
 
+import errno
 import os
 import select
 import signal
@@ -67,6 +68,23 @@ def test_a_block_that_a_dead_run_left_is_replaced(block: HeartbeatBlock) -> None
     with pytest.raises(GroundStationError, match="another run beats in"):
         HeartbeatBlock.create(block.path.name, 2)
     made.close()
+
+
+def test_a_block_has_its_storage_before_anybody_beats(block: HeartbeatBlock) -> None:
+    """A beat into a hole of a full /dev/shm would end the process by SIGBUS."""
+    status = block.path.stat()
+    assert status.st_blocks * 512 >= status.st_size > 0
+
+
+def test_a_full_storage_is_reported_and_nothing_left_in_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def full(*_: int) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "posix_fallocate", full)
+    name = f"skein-test-{os.getpid()}-full"
+    with pytest.raises(GroundStationError, match=f"{name}: No space left on device; make room there, or remove it"):
+        HeartbeatBlock.create(name, 4)
+    assert not (Path("/dev/shm") / name).exists()
 
 
 def test_each_turn_beats_and_the_last_is_the_one_in_which_a_stop_came(block: HeartbeatBlock) -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from msgspec import structs
 
 from groundstation.errors import GroundStationError
 from groundstation.supervisor import runtime_file
@@ -145,6 +146,23 @@ def test_a_planted_folder_of_records_is_not_read(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     (tmp_path / f"skein-{os.getuid()}").symlink_to(runtime_file.folder().rename(tmp_path / "planted"))
     assert runtime_file.folders_beside() == []
+
+
+def test_keys_of_a_run_that_died_before_it_was_recorded_are_removed(runtime: Path) -> None:
+    own = f"lab-{os.getpid()}"  # about to be recorded
+    for name in ("lab-4194303", "hall_2-4194302", own, "lab", "lab-4194303-x"):
+        (runtime_file.folder() / name).mkdir()
+        (runtime_file.folder() / name / "drone_1.key").touch()
+    (runtime / "lab-4194301").touch()
+    assert runtime_file.live_records() == []
+    assert {path.name for path in runtime.iterdir()} == {own, "lab", "lab-4194303-x", "lab-4194301"}
+
+
+def test_keys_of_drivers_that_outlive_their_supervisor_stay(runtime: Path) -> None:
+    own = ProcessRecord("drone_1", "driver", os.getpid(), runtime_file.start_time(os.getpid()) or 0)
+    runtime_file.write(structs.replace(record(2**22 - 1, 1), processes=(own,)))
+    (runtime / f"lab-{2**22 - 1}").mkdir()
+    assert len(runtime_file.live_records()) == 1 and (runtime / f"lab-{2**22 - 1}").exists()
 
 
 def test_zombie_is_not_alive() -> None:

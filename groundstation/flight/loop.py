@@ -12,20 +12,21 @@ from groundstation.flight.looking import Looking
 from groundstation.process.sleep_watch import SleepWatch
 from groundstation.runtime.before_take_off import BeforeTakeOff
 from groundstation.runtime.operator import Operator
-from groundstation.runtime.team import TeamPhase
+from groundstation.runtime.team import TeamPhase, TeamStatus
 from groundstation.supervisor.start import Interrupted, Start
 from groundstation.supervisor.supervisor import Supervisor
 from groundstation.supervisor.terminal import Terminal
 from groundstation.time_units import NS_PER_S
 
 _FAILED_LANDING_S = 2.0
+_HEARD_NS = NS_PER_S // 2  # drivers report five times a second
 
 
 @dataclass(frozen=True, slots=True)
 class FlightOutcome:
     """The end of a flight. failure: why it could not continue, or ""; interrupted: by the operator.
 
-    landed: all reported it. forbidden: whether the take-off was forbidden, if that was asked.
+    landed: nobody reported to fly at the end. forbidden: whether the take-off was forbidden, if that was asked.
     """
 
     failure: str
@@ -66,7 +67,7 @@ class Flight:
         try:
             self._start.run()
         except Interrupted:
-            return FlightOutcome("", interrupted=True, landed=True)
+            return FlightOutcome("", interrupted=True, landed=self._stand())
         except GroundStationError as error:
             self._announce(Severity.ERROR, f"its start failed: {str(error).splitlines()[0]}")
             raise
@@ -75,10 +76,22 @@ class Flight:
         checks = None if plan.field is None else BeforeTakeOff(supervisor.bus, plan.field, plan.cautions)
         operator = Operator(supervisor.bus, supervisor.run.drones, plan.cameras, plan.limits, self._say, checks)
         if checks is not None and self._look(operator, checks):
-            return FlightOutcome("", supervisor.interrupts.stop_requested, landed=True, forbidden=self._forbidden)
+            landed = operator.landed(time.monotonic_ns())
+            return FlightOutcome("", supervisor.interrupts.stop_requested, landed, self._forbidden)
         failure = self._fly(operator)
         landed = self._land(operator)
         return FlightOutcome(failure, supervisor.interrupts.stop_requested, landed)
+
+    def _stand(self) -> bool:
+        """Return whether no drone reports within a moment that it flies; one found flying is landed by its driver."""
+        supervisor = self._supervisor
+        if supervisor.bus is None:
+            return True  # no driver was started
+        team, end_ns = TeamStatus(supervisor.bus, supervisor.run.drones, {}), time.monotonic_ns() + _HEARD_NS
+        while (now_ns := time.monotonic_ns()) < end_ns and not supervisor.interrupts.hurry:
+            supervisor.step()
+            team.update(now_ns)
+        return not team.airborne(now_ns)
 
     def _announce(self, severity: Severity, how: str) -> None:
         """Publish the end of the run, and its reason, while other processes still listen."""

@@ -72,6 +72,7 @@ LANDED, FLYING = m.FlightState.LANDED, m.FlightState.FLYING
         ({"state": FLYING}, "WARNING", "stopped by the operator; not every drone reported a landing"),
         ({"state": LANDED, "failure": "it died\nlog"}, "ERROR", "it died; all drones are on the ground"),
         ({"state": LANDED, "start": Interrupted("no")}, "INFO", "stopped by the operator; all drones are on the"),
+        ({"state": FLYING, "start": Interrupted("no")}, "WARNING", "stopped by the operator; not every drone reported"),
         ({"state": LANDED, "start": GroundStationError("no tracker\nlog")}, "ERROR", "its start failed: no tracker"),
     ],
 )

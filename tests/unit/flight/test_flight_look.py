@@ -55,7 +55,7 @@ class Silent(Unfinished):
 class Broken:
     """A run whose drone is ready on the ground, and that ends in the third turn of the checks."""
 
-    def __init__(self, failure: str) -> None:
+    def __init__(self, failure: str, state: m.FlightState = m.FlightState.LANDED) -> None:
         exchange = MemoryExchange()
         self.bus, self._drone = MemoryBus(exchange, "lab", "supervisor"), MemoryBus(exchange, "lab", "drone_1")
         self._orders = self._drone.subscribe([t.COMMAND])
@@ -63,11 +63,11 @@ class Broken:
         self.interrupts = SimpleNamespace(stop_requested=False, hurry=False)
         self.failure, self.unwell, self._why = "", list[str](), failure
         self.processes = ()
-        self._turns = 0
+        self._turns, self._state = 0, state
 
     def step(self) -> None:
         self._turns += 1
-        status = m.VehicleStatus(header=self._drone.header("drone_1"), flight_state=m.FlightState.LANDED, mode="LANDED")
+        status = m.VehicleStatus(header=self._drone.header("drone_1"), flight_state=self._state, mode="")
         self._drone.publish(t.VEHICLE_STATUS, status)
         if self._turns == 3:
             self.failure, self.interrupts.stop_requested = self._why, not self._why
@@ -127,3 +127,14 @@ def test_a_mere_look_by_which_nobody_would_take_off_is_not_well(
     flight = loop.Flight(cast(Supervisor, Broken("it took too long")), plan_of(lab_field, look_only=True), terminal)
     flight._start = cast(Start, SimpleNamespace(run=lambda: None, show_screen=lambda: None))
     assert flight.run().forbidden and said[-1].endswith("nothing must be mended; nobody would take off")
+
+
+def test_a_mere_look_at_a_flying_drone_does_not_call_it_landed(
+    lab_field: ResolvedField, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(loop, "BeforeTakeOff", Silent)
+    terminal = cast(Terminal, SimpleNamespace(say=lambda _: None, unmute=lambda: None))
+    run = Broken("it took too long", m.FlightState.FLYING)
+    flight = loop.Flight(cast(Supervisor, run), plan_of(lab_field, look_only=True), terminal)
+    flight._start = cast(Start, SimpleNamespace(run=lambda: None, show_screen=lambda: None))
+    assert flight.run().landed is False

@@ -77,7 +77,7 @@ class NatnetSource:
         self._server: natnet.Server | None = None
         self._names: dict[int, str] = {}
         self._named = False  # else names are missing, or may belong to other bodies by now: no frame is used
-        self._lacks_name, self._clock = False, ClockWatch()
+        self._lacks_name, self._changed, self._clock = False, False, ClockWatch()
         self._looked_up_ns = self._asked_ns = self._alive_ns = self._framed_ns = 0
 
     def poll(self, wait_s: float) -> list[CapturedFrame]:
@@ -190,9 +190,10 @@ class NatnetSource:
 
     def _captured(self, frame: natnet.Frame, server: natnet.Server) -> CapturedFrame | None:
         now_ns = clock.now_ns()
-        if frame.changed or self._is_silent(now_ns):  # a system that was restarted may name its bodies differently
+        # A restarted system may name its bodies differently; how long one keeps the mark of a change is unknown.
+        if (frame.changed and not self._changed) or self._is_silent(now_ns):
             self._named = False
-        self._framed_ns = now_ns
+        self._framed_ns, self._changed = now_ns, frame.changed
         late_s = self._late_s(now_ns, frame, server)
         if late_s > LATE_S:
             self.rejected["late"] += 1

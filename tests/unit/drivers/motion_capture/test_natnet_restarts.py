@@ -104,6 +104,11 @@ def test_names_change_with_the_frame_that_says_so(motive: Motive) -> None:
     assert len(after) >= 75 and wrong(after) == 0
 
 
+def test_a_mark_of_change_that_stays_set_ends_no_names_again(motive: Motive) -> None:
+    motive.run(100)
+    assert len(motive.run(100, changed=True)) >= 75
+
+
 def test_names_whose_change_was_not_heard_are_right_after_a_few_seconds(motive: Motive) -> None:
     motive.run(100)
     motive.ids = {"cf1": 2, "cf2": 1}

@@ -42,6 +42,8 @@ _WORTH_TELLING_M = 0.06
 # Mean squared deviation of a healthy simulated flight, whose sightings err independently; a larger one means that they
 # share a disturbance.
 _USUAL_MISFIT = 0.25
+# With all figures in doubt, no error of theirs leaves as much; noise of three times the stated size leaves 3.5.
+_UNEXPLAINED_MISFIT = 4.5
 _MOST = 3
 # Suspects with a smaller lead in the linear model are not tried by fits; of the others, this many for each cause.
 # Linearised with all figures in doubt, it preferred early pictures of all drones to late ones of the ceiling camera by
@@ -65,11 +67,13 @@ class Charge:
 class Verdict:
     """A verdict on a stretch of flight.
 
-    causes: for each thing that is wrong the charges that cannot be told apart, likeliest first; leads: of all suspects.
+    causes: for each thing that is wrong the charges that cannot be told apart, likeliest first; leads: of all suspects;
+    is_unexplained: the sightings disagree by more than wrong figures can explain, so that none is accused.
     """
 
     causes: tuple[tuple[Charge, ...], ...]
     leads: Mapping[Suspect, float]
+    is_unexplained: bool = False
 
 
 def verdict_on(flown: Flown, field: ResolvedField) -> Verdict | None:
@@ -79,6 +83,8 @@ def verdict_on(flown: Flown, field: ResolvedField) -> Verdict | None:
         batch = TeamBatch(record, field)
         wide = np.diag(batch.figures.wide**2)
         fit = batch.fit(wide)
+        if fit.misfit > _UNEXPLAINED_MISFIT:
+            return Verdict((), {}, is_unexplained=True)
         alike = max(1.0, fit.misfit / _USUAL_MISFIT)
         if alike > 1.0:
             fit = batch.fit(wide, alike)

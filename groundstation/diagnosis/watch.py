@@ -9,6 +9,12 @@ from groundstation.diagnosis.wording import remedies, sentence
 from groundstation.field.resolved import ResolvedField
 
 _REFUTED = math.log(3.0)
+# Stands for all that is no figure: streams or markers of others, clocks.
+_NO_FIGURE: tuple[Suspect, ...] = (("", "no figure"),)
+_UNEXPLAINED = "the team's sightings disagree, and no single wrong figure explains it"
+_UNEXPLAINED_REMEDY = (
+    "check that each video stream and each marker's id is that of its drone, and the clocks of the cameras' hosts"
+)
 
 
 class FigureWatch:
@@ -31,7 +37,9 @@ class FigureWatch:
     def take(self, verdict: Verdict, now_ns: int) -> list[Notice]:
         """Return the notices that follow from a verdict reached at this time."""
         named = {(key := _suspects(one)): self._suspected(key, one, now_ns) for one in verdict.causes}
-        notices = [_accusation(figure, len(key)) for key, figure in named.items() if key not in self._standing]
+        if verdict.is_unexplained:
+            named = {_NO_FIGURE: self._no_figure(now_ns)}
+        notices = [_accusation(figure, key) for key, figure in named.items() if key not in self._standing]
         accused = {suspect for key in named for suspect in key}
         # Others explain it now, unless this one was found beside one of them.
         replaced = bool(named) and not named.keys() & self._standing.keys()
@@ -40,7 +48,8 @@ class FigureWatch:
             if not accused.isdisjoint(key):
                 continue  # told again, alone or beside others that cannot be told apart
             if replaced or all(verdict.leads.get(s, 0.0) < _REFUTED for s in key):
-                notices.append(Notice(Severity.INFO, f"{figure.text}: no longer suspected", entity=key[0][0]))
+                over = "no longer so" if key == _NO_FIGURE else "no longer suspected"
+                notices.append(Notice(Severity.INFO, f"{figure.text}: {over}", entity=key[0][0]))
             else:
                 kept[key] = figure
         self._standing = named | kept
@@ -52,10 +61,17 @@ class FigureWatch:
         about = ", ".join(" ".join(suspect).strip() for suspect in key)
         return SuspectedFigure(who, text, remedy, known.told_ns if known else now_ns, about)
 
+    def _no_figure(self, now_ns: int) -> SuspectedFigure:
+        known = self._standing.get(_NO_FIGURE)
+        told_ns = known.told_ns if known else now_ns
+        return SuspectedFigure("", _UNEXPLAINED, _UNEXPLAINED_REMEDY, told_ns, _NO_FIGURE[0][1])
 
-def _accusation(figure: SuspectedFigure, charges: int) -> Notice:
+
+def _accusation(figure: SuspectedFigure, key: tuple[Suspect, ...]) -> Notice:
+    if key == _NO_FIGURE:
+        return Notice(Severity.WARNING, figure.text, figure.remedy)
     text = f"{figure.text}: that explains best why the team's sightings disagree"
-    if charges > 1:
+    if len(key) > 1:
         text += "; which of them it is cannot be told yet, the first is the most likely"
     return Notice(Severity.WARNING, text, figure.remedy, figure.entity)
 

@@ -10,7 +10,7 @@ WITHIN_S = 20.0
 SIZE_SHARE = 0.25
 # Texts that accuse an entity; other warnings report consequences.
 _FIGURE = "explains best"
-_ACCUSES = (_FIGURE, "contradicts the belief", "its pictures seem", "was bumped")
+_ACCUSES = (_FIGURE, "no single wrong figure", "contradicts the belief", "its pictures seem", "was bumped")
 _EXCUSED = "probably not its fault"
 _REFUTED = "no longer suspected"
 

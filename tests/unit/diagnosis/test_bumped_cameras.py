@@ -34,8 +34,9 @@ TURN = rotation_from_euler(math.radians(4.0), math.radians(3.0), math.radians(6.
 
 def bumped(message: Message) -> Message:
     """Return a message as it is after the ceiling camera was turned."""
-    seen = isinstance(message, RelativeObservation) and message.observer == "ceiling"
-    if not seen or message.header.stamp_ns < BUMPED_S * S:
+    if not isinstance(message, RelativeObservation) or message.observer != "ceiling":
+        return message
+    if message.header.stamp_ns < BUMPED_S * S:
         return message
     return msgspec.structs.replace(message, position_m=tuple((TURN @ np.array(message.position_m)).tolist()))
 

@@ -58,6 +58,14 @@ def test_a_wrong_figure_is_likeliest_with_its_size(
         assert charges[0].std < 0.25 * abs(size)
 
 
+def test_exchanged_drones_are_no_figure(lab_field: ResolvedField) -> None:
+    """A drone's marker was called 12 % smaller."""
+    other = dict(zip(lab_field.drones, reversed(lab_field.drones), strict=True))
+    exchanged = WrongFigures({}, exchanged=other)
+    verdict = verdict_on(Lab(lab_field, exchanged, seconds=16.0).flown(), lab_field)
+    assert verdict is not None and verdict.is_unexplained and verdict.causes == ()
+
+
 def test_two_causes_are_told_apart_and_what_is_too_small_is_not_told() -> None:
     H = np.diag([1e6, 1e6, 1e6])
     two = weighed(H, H @ np.array([0.05, 0.0, 0.06]), SURVEYED, suspicions())

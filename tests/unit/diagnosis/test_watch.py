@@ -36,6 +36,18 @@ def test_a_suspicion_is_told_once_and_stands_until_it_is_refuted(lab_field: Reso
     assert watch.cause == "" and watch.figures == ()
 
 
+def test_what_no_figure_explains_is_told_once_and_replaces_suspicions(lab_field: ResolvedField) -> None:
+    watch, unexplained = FigureWatch(lab_field), Verdict((), {}, is_unexplained=True)
+    watch.take(verdict((charge(PAN, math.radians(3.0)),)), S)
+    told, refuted = watch.take(unexplained, 6 * S)
+    assert told.severity is Severity.WARNING and "video stream" in told.remedy
+    assert told.text == "the team's sightings disagree, and no single wrong figure explains it" == watch.cause
+    assert refuted.text.startswith("drone_1's camera") and "no longer suspected" in refuted.text
+    assert watch.take(unexplained, 11 * S) == [] and watch.figures[0].told_ns == 6 * S
+    (over,) = watch.take(verdict(), 16 * S)
+    assert over.severity is Severity.INFO and over.text.endswith("no longer so") and watch.figures == ()
+
+
 def test_each_figure_keeps_its_own_name_while_its_size_changes(lab_field: ResolvedField) -> None:
     watch = FigureWatch(lab_field)
     watch.take(verdict((charge(PAN, 0.05),), (charge(LENS, 0.03),)), S)

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 _LEAST_STD_DEG, _LEAST_STD_M = 0.01, 0.001
 _ROLLED_DEG = 1.0
+# Errors of the prints worth a remark, and the deviation with which a layout must show them.
+_WORTH_SCALE, _SHOWN_SCALE = 0.01, 0.005
 
 
 @click.command(
@@ -146,10 +148,28 @@ def _remarks(gathering: "Gathering", named: set[int], layout: "FloorMarkers", pl
         for code, offset in placing.offsets_m.items()
         if offset > 3.0 * layout.position_std_m
     ]
+    remarks += _remarks_on_prints(layout.square_mm, placing)
     if gathering.unread:
         remarks.append(f"{gathering.unread} boards could not be read: are they near and sharp enough?")
     if len(seen & named) == 1:
         remarks.append("one marker alone: its heading and place are all that there is; two or more are much better")
+    return remarks
+
+
+def _remarks_on_prints(square_mm: float, placing: "Placing") -> list[str]:
+    remarks = []
+    if abs(placing.scale) > _WORTH_SCALE:
+        wrong = "small" if placing.scale < 0 else "large"
+        remarks.append(
+            f"the markers seem to be printed {abs(placing.scale) * 100:.1f} % too {wrong} "
+            f"(squares of {square_mm * (1.0 + placing.scale):.1f} mm, not {square_mm:g}), or their places are measured "
+            "wrongly: measure a print with a ruler, and give --square-mm; the deviations cover both until then"
+        )
+    if len(placing.offsets_m) > 1 and placing.layout_scale_std > _SHOWN_SCALE:
+        remarks.append(
+            "the markers lie too close together to show whether their prints have the right size, on which the "
+            "distance of the camera then depends: lay them further apart"
+        )
     return remarks
 
 

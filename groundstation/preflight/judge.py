@@ -7,6 +7,7 @@ from groundstation.doctor.finding import Finding, Level
 from groundstation.field.resolved import ResolvedField
 from groundstation.preflight.blind_cameras import blind_cameras
 from groundstation.preflight.captured_pads import captured_pad_findings
+from groundstation.preflight.expected import pads_in_view
 from groundstation.preflight.health import camera_findings, drone_findings
 from groundstation.preflight.stand import PadSighting, stand_of
 from groundstation.preflight.suspicions import opinion
@@ -41,24 +42,32 @@ def pad_findings(
     flew: Collection[str] = (),
     aloft: Collection[str] = (),
 ) -> Iterator[Finding]:
-    """Yield findings of fixed sensors on standing drones: unseen ones, and the errors of those that never flew."""
+    """Yield findings of fixed sensors on standing drones: unseen ones, and the errors of those that never flew.
+
+    A drone that a capture or ranging system follows needs no camera, but is missed where its pad lies in a view.
+    """
     yield from captured_pad_findings(field, sightings, flew, aloft)
     if not field.cameras:
         return
     known = [s for s in sightings if s.drone in field.drones and s.camera in field.cameras]
     seen, on_pads = {s.drone for s in known}, [s for s in known if s.drone not in flew]
+    followed = {s.drone for s in sightings if s.camera not in field.cameras} & field.drones.keys()
+    above = set(flew).union(*pads_in_view(field).values())
+    missed = [n for n in field.drones if n not in seen and n not in aloft and (n not in followed or n in above)]
     remedy = "check light, lens and marker, and that it stands {} in view"
     if not known and not aloft:
+        if not missed:
+            return
         shown = shown_by(drone.marker for drone in field.drones.values())
         where = remedy.format("anywhere" if set(field.drones) <= set(flew) else "on its pad")
-        yield Finding(Level.MUST, SUBJECT, "no fixed camera sees any drone", f"{where}; {shown}")
+        level = Level.SHOULD if followed else Level.MUST
+        yield Finding(level, SUBJECT, "no fixed camera sees any drone", f"{where}; {shown}")
         return
     yield from blind_cameras(field, known, flew)
-    for name in field.drones:
-        if name not in seen and name not in aloft:
-            shown, where = shown_by([field.drones[name].marker]), "anywhere" if name in flew else "on its pad"
-            told = f"{remedy.format(where)}; {shown}"
-            yield Finding(Level.SHOULD, name, "no fixed camera sees its marker on the floor", told)
+    for name in missed:
+        shown, where = shown_by([field.drones[name].marker]), "anywhere" if name in flew else "on its pad"
+        told = f"{remedy.format(where)}; {shown}"
+        yield Finding(Level.SHOULD, name, "no fixed camera sees its marker on the floor", told)
     if on_pads:
         yield finding(field, opinion(stand_of(field), on_pads))
 

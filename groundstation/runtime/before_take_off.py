@@ -18,6 +18,7 @@ from groundstation.bus.messages import (
 from groundstation.bus.topics import CAMERA_STATUS, EVENT, OBSERVATION, PREFLIGHT, RANGE, VEHICLE_STATUS
 from groundstation.doctor.finding import Finding, Level
 from groundstation.field.resolved import ResolvedField
+from groundstation.preflight.expected import all_shown
 from groundstation.preflight.health import left_out
 from groundstation.preflight.judge import judge, open_musts
 from groundstation.preflight.pad_record import PadRecord
@@ -74,11 +75,11 @@ class BeforeTakeOff:
             self._aloft.discard(name)
 
     def complete(self, now_ns: int) -> bool:
-        """Return whether every fixed sensor has reported and every drone that has not flown was seen often enough."""
+        """Return whether every fixed sensor has reported, and shown often enough what it should of standing drones."""
         if not set(self._field.world_sensors) <= self._cameras.keys():
             return False
-        seen = {sighting.drone for sighting in self._record.medians(now_ns)}
-        return set(self._field.drones) <= seen | self._flew
+        shown = {(sighting.camera, sighting.drone) for sighting in self._record.medians(now_ns)}
+        return all_shown(self._field, shown, self._flew)
 
     def findings(self, now_ns: int) -> list[Finding]:
         """Return all present findings, the grave first."""

@@ -9,6 +9,7 @@ import pytest
 from groundstation.doctor.finding import Level
 from groundstation.field.resolved import ResolvedField
 from groundstation.field.room import MotionCapture, Volume
+from groundstation.preflight.expected import all_shown
 from groundstation.preflight.judge import pad_findings
 from groundstation.preflight.stand import PadSighting
 
@@ -60,3 +61,41 @@ def test_drones_that_flew_need_only_be_followed(field: ResolvedField) -> None:
     elsewhere = [at(field, name, (-2.0, 2.0), 120.0) for name in flew[:1]]
     levels = {one.subject: one.level for one in pad_findings(field, elsewhere, flew)}
     assert levels == {flew[0]: Level.OK} | dict.fromkeys(flew[1:], Level.SHOULD)
+
+
+@pytest.fixture
+def both(field: ResolvedField, lab_field: ResolvedField) -> ResolvedField:
+    return msgspec.structs.replace(field, cameras=lab_field.cameras)
+
+
+@pytest.mark.parametrize("flew", [(), ("drone_1", "drone_2")])
+def test_a_camera_that_sees_nobody_forbids_nothing_where_a_system_follows_one(
+    both: ResolvedField, flew: tuple[str, ...]
+) -> None:
+    followed = [at(both, name, drone.pad_m) for name, drone in both.drones.items()]
+    levels = {one.subject: one.level for one in pad_findings(both, followed, flew)}
+    assert levels == dict.fromkeys(both.drones, Level.OK) | {"pads": Level.SHOULD}
+    assert {one.level for one in pad_findings(both, [], flew)} == {Level.MUST}
+
+
+def test_a_drone_that_a_system_follows_needs_no_camera_above_its_pad(both: ResolvedField) -> None:
+    aside = msgspec.structs.replace(both.cameras["ceiling"], position_m=(40.0, 0.0, 4.2))
+    elsewhere = msgspec.structs.replace(both, cameras={"ceiling": aside})
+    followed = [at(both, name, drone.pad_m) for name, drone in both.drones.items()]
+    assert {(one.subject, one.level) for one in pad_findings(elsewhere, followed)} == {
+        (name, Level.OK) for name in both.drones
+    }
+
+
+def test_sightings_are_awaited_of_each_sensor_that_should_have_them(both: ResolvedField) -> None:
+    first, second = both.drones
+    captured = {("mocap", first), ("mocap", second)}
+    assert not all_shown(both, captured, ()), "the camera is slower"
+    assert not all_shown(both, {*captured, ("ceiling", first)}, ())
+    assert not all_shown(both, {("ceiling", first), ("ceiling", second)}, ()), "the system is slower"
+    assert all_shown(both, {*captured, ("ceiling", first), ("ceiling", second)}, ())
+    assert all_shown(both, captured - {("mocap", second)} | {("ceiling", first)}, (second,))
+    ceiling = both.cameras["ceiling"]
+    two = msgspec.structs.replace(both, cameras={"ceiling": ceiling, "second": ceiling}, motion_capture={})
+    above = {("ceiling", first), ("ceiling", second)}
+    assert not all_shown(two, above, ()) and all_shown(two, {*above, ("second", first)}, ())

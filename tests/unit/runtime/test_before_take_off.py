@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -22,6 +23,7 @@ from groundstation.bus.messages import (
 from groundstation.bus.topics import CAMERA_STATUS, COMMAND, COMMAND_ACK, EVENT, OBSERVATION, PREFLIGHT, VEHICLE_STATUS
 from groundstation.doctor.finding import Finding, Level
 from groundstation.field.resolved import ResolvedField
+from groundstation.field.room import MotionCapture, Volume
 from groundstation.flight.flight_plan import plan_of
 from groundstation.flight.looking import Looking
 from groundstation.preflight.stand import marker_centres, stand_of
@@ -63,22 +65,15 @@ class Lab:
             header = self.devices.header(name)
             status = VehicleStatus(header=header, flight_state=state, mode="LANDED", battery=0.9, rate_hz=200.0)
             self.devices.publish(VEHICLE_STATUS, status)
+            pad = stand.pads[name]
+            for system in self.field.motion_capture:
+                self._see(system, name, (*pad.place_m, pad.height_m), pad.yaw_rad)
             if self.dark:
                 continue
-            pad = stand.pads[name]
             centre = marker_centres([pad], np.zeros((1, 2)), np.zeros(1), np.zeros(1))[0] - camera.position_m
             x, y, z = (camera.rotation.T @ centre).tolist()
-            observation = RelativeObservation(
-                header=self.devices.header("ceiling"),
-                observer="ceiling",
-                subject=name,
-                camera="ceiling",
-                position_m=(x, y, z + self.higher_m),
-                yaw_rad=pad.yaw_rad,
-                covariance=tuple(1e-4 if i % 5 == 0 else 0.0 for i in range(16)),
-            )
-            self.devices.publish(OBSERVATION, observation)
-        for name in self.field.calibrations:
+            self._see("ceiling", name, (x, y, z + self.higher_m), pad.yaw_rad)
+        for name in (*self.field.calibrations, *self.field.motion_capture):
             status_of = CameraStatus(
                 header=self.devices.header(name),
                 connected=True,
@@ -89,6 +84,18 @@ class Lab:
                 detections=99,
             )
             self.devices.publish(CAMERA_STATUS, status_of)
+
+    def _see(self, sensor: str, name: str, position_m: tuple[float, float, float], yaw_rad: float) -> None:
+        observation = RelativeObservation(
+            header=self.devices.header(sensor),
+            observer=sensor,
+            subject=name,
+            camera=sensor,
+            position_m=position_m,
+            yaw_rad=yaw_rad,
+            covariance=tuple(1e-4 if i % 5 == 0 else 0.0 for i in range(16)),
+        )
+        self.devices.publish(OBSERVATION, observation)
 
     def ask(self, *, anyway: bool = False, drones: tuple[str, ...] = ()) -> CommandAck:
         header = Header(self.now_ns, self.page.header("operator").clock, "operator", "console", 1)
@@ -181,6 +188,19 @@ def test_before_a_second_take_off_somebody_must_be_seen(lab_field: ResolvedField
     found = [one for one in lab.checks.findings(lab.now_ns) if one.level is not Level.OK]
     assert [one.level for one in found] == [Level.SHOULD if flies_on else Level.MUST]
     assert "no fixed camera sees" in found[0].found
+
+
+def test_a_look_waits_for_a_camera_that_is_slower_than_a_motion_capture(lab_field: ResolvedField) -> None:
+    box = Volume(x_m=(-3.0, 3.0), y_m=(-3.0, 3.0), z_m=(-3.0, 3.0))
+    capture = MotionCapture(source="natnet://10.0.0.2", volume_m=box)
+    lab = Lab(msgspec.structs.replace(lab_field, motion_capture={"mocap": capture}))
+    lab.dark = True
+    lab.turn(8)
+    assert not lab.checks.complete(lab.now_ns), "poses of all drones are there, pictures are not"
+    lab.dark = False
+    lab.turn()
+    assert lab.checks.complete(lab.now_ns)
+    assert all(one.level is Level.OK for one in lab.checks.findings(lab.now_ns))
 
 
 def test_a_look_tells_operator_and_bus_what_must_be_mended(lab_field: ResolvedField) -> None:

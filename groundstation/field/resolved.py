@@ -15,7 +15,7 @@ from groundstation.field.behaviour import (
 )
 from groundstation.field.drones import FieldDrone, camera_name, gathered
 from groundstation.field.room import LensCalibration, MotionCapture, Ranging, Room, Volume, WorldCamera, ranging_link
-from groundstation.field.targets import SingleTarget, Target, WeightedTarget
+from groundstation.field.targets import SingleTarget, Target, WeightedTarget, odometry_name
 
 
 class ResolvedField(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -42,6 +42,11 @@ class ResolvedField(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     def tracked(self) -> Mapping[str, Target]:
         """Return the targets by name, in the file's order."""
         return self.targets if self.target is None else {self.target.name: self.target}
+
+    @property
+    def reporting(self) -> tuple[str, ...]:
+        """Return the names on the bus of the drivers of targets' own odometry."""
+        return tuple(odometry_name(name) for name, target in self.tracked.items() if target.odometry is not None)
 
     @property
     def sensing_capture(self) -> Mapping[str, MotionCapture]:

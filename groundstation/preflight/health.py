@@ -87,7 +87,7 @@ def _battery(name: str, status: VehicleStatus, lands_at: float) -> Finding:
 def camera_findings(
     field: ResolvedField, statuses: Mapping[str, CameraStatus], sees: Mapping[str, Sequence[str]] = MappingProxyType({})
 ) -> Iterator[Finding]:
-    """Yield findings on each camera; statuses: by the camera's name on the bus.
+    """Yield findings on each camera, other sensor and target's odometry; statuses: by its name on the bus.
 
     sees: the entities whose markers it sees.
     """
@@ -96,15 +96,19 @@ def camera_findings(
     if len(dark) == len(fixed):
         remedy = "check power, source and network of at least one: without it nobody knows where the drones are"
         yield Finding(Level.MUST, "cameras", "no sensor fixed in the world sends anything", remedy)
-    for name in (*field.cameras, *field.motion_capture, *field.ranging, *map(camera_name, field.drones)):
+    pieces = dict.fromkeys((*field.cameras, *map(camera_name, field.drones)), "pictures")
+    pieces |= dict.fromkeys(field.motion_capture, "frames") | dict.fromkeys(field.ranging, "ranges")
+    pieces |= dict.fromkeys(field.reporting, "reports")
+    for name, what in pieces.items():
         status = statuses.get(name)
         if status is None or not status.connected:
             why = status.detail if status is not None and status.detail else "nothing arrives"
-            yield Finding(Level.SHOULD, name, why, "check its power, its source and its network")
+            alone = "; cameras track the target meanwhile" if name in field.reporting else ""
+            yield Finding(Level.SHOULD, name, why, f"check its power, its source and its network{alone}")
             continue
-        what = "frames" if name in field.motion_capture else "ranges" if name in field.ranging else "pictures"
         seen = f", sees {', '.join(sees[name])}" if sees.get(name) else ""
-        found = f"{status.fps:.0f} {what}/s, {status.age_ms:.0f} ms old, {status.detections} sightings{seen}"
+        used = "used" if name in field.reporting else "sightings"
+        found = f"{status.fps:.0f} {what}/s, {status.age_ms:.0f} ms old, {status.detections} {used}{seen}"
         good = status.fps >= _PICTURES_HZ and status.age_ms <= _PICTURES_OLD_MS
         remedy = "" if good else "fewer or smaller pictures, a better link, or a faster machine"
         yield Finding(Level.OK if good else Level.SHOULD, name, found, remedy)

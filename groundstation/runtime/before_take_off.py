@@ -75,8 +75,14 @@ class BeforeTakeOff:
             self._aloft.discard(name)
 
     def complete(self, now_ns: int) -> bool:
-        """Return whether every fixed sensor has reported, and shown often enough what it should of standing drones."""
+        """Return whether every sensor has reported, and fixed ones have shown often enough what they should.
+
+        A target's odometry is awaited until it flows or its driver says what it lacks.
+        """
         if not set(self._field.world_sensors) <= self._cameras.keys():
+            return False
+        told = {name for name, (_, status) in self._cameras.items() if status.connected or status.detail}
+        if not set(self._field.reporting) <= told:
             return False
         shown = {(sighting.camera, sighting.drone) for sighting in self._record.medians(now_ns)}
         return all_shown(self._field, shown, self._flew)

@@ -3,10 +3,12 @@
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from groundstation.bus.messages import CameraStatus, FlightState, Header, VehicleStatus
 from groundstation.doctor.finding import Finding, Level
 from groundstation.field.resolved import ResolvedField
+from groundstation.field.targets import TargetOdometry
 from groundstation.preflight.health import camera_findings, drone_findings
 
 
@@ -103,3 +105,31 @@ def test_a_standing_drone_that_is_not_ready_says_why_with_its_remedy(
     first, second, *_ = [one for one in drone_findings(lab_field, {"drone_1": status}) if one.subject == "drone_1"]
     assert (first.level, first.found) == (Level.SHOULD, found) and first.remedy.startswith(remedy)
     assert (second.level, second.found) == (Level.OK, "firmware PX4 1.15")
+
+
+def test_a_targets_odometry_is_a_finding_whether_it_flows_or_is_silent(lab_field: ResolvedField) -> None:
+    told = TargetOdometry(source="ros2://10.0.0.9/odom")
+    assert lab_field.target is not None
+    field = replace(lab_field, target=replace(lab_field.target, odometry=told))
+    (name,) = field.reporting
+    header = Header(0, "c", name, name, 1)
+    silent = CameraStatus(
+        header=header,
+        connected=False,
+        fps=0.0,
+        age_ms=9e3,
+        frames=0,
+        skipped=0,
+        detections=0,
+        detail="no report for 5 s",
+    )
+    flows = replace(silent, connected=True, fps=20.0, age_ms=31.0, detections=40, detail="")
+    lines = [
+        next(one for one in camera_findings(field, statuses) if one.subject == name)
+        for statuses in ({}, {name: silent}, {name: flows})
+    ]
+    assert [one.level for one in lines] == [Level.SHOULD, Level.SHOULD, Level.OK]
+    assert [one.found for one in lines] == [
+        "nothing arrives", "no report for 5 s", "20 reports/s, 31 ms old, 40 used"
+    ]  # fmt: skip
+    assert "cameras track the target meanwhile" in lines[0].remedy

@@ -24,6 +24,7 @@ from groundstation.bus.topics import CAMERA_STATUS, COMMAND, COMMAND_ACK, EVENT,
 from groundstation.doctor.finding import Finding, Level
 from groundstation.field.resolved import ResolvedField
 from groundstation.field.room import MotionCapture, Volume
+from groundstation.field.targets import TargetOdometry
 from groundstation.flight.flight_plan import plan_of
 from groundstation.flight.looking import Looking
 from groundstation.preflight.stand import marker_centres, stand_of
@@ -34,6 +35,12 @@ from groundstation.runtime.team import TeamPhase
 from groundstation.settings.load import load_field
 
 MS = 1_000_000
+
+
+def status_of(header: Header, *, connected: bool = True) -> CameraStatus:
+    return CameraStatus(
+        header=header, connected=connected, fps=15.0, age_ms=150.0, frames=99, skipped=0, detections=99
+    )  # fmt: skip
 
 
 class Lab:
@@ -74,16 +81,7 @@ class Lab:
             x, y, z = (camera.rotation.T @ centre).tolist()
             self._see("ceiling", name, (x, y, z + self.higher_m), pad.yaw_rad)
         for name in (*self.field.calibrations, *self.field.motion_capture):
-            status_of = CameraStatus(
-                header=self.devices.header(name),
-                connected=True,
-                fps=15.0,
-                age_ms=150.0,
-                frames=99,
-                skipped=0,
-                detections=99,
-            )
-            self.devices.publish(CAMERA_STATUS, status_of)
+            self.devices.publish(CAMERA_STATUS, status_of(self.devices.header(name)))
 
     def _see(self, sensor: str, name: str, position_m: tuple[float, float, float], yaw_rad: float) -> None:
         observation = RelativeObservation(
@@ -201,6 +199,19 @@ def test_a_look_waits_for_a_camera_that_is_slower_than_a_motion_capture(lab_fiel
     lab.turn()
     assert lab.checks.complete(lab.now_ns)
     assert all(one.level is Level.OK for one in lab.checks.findings(lab.now_ns))
+
+
+def test_a_look_waits_for_word_of_a_targets_odometry(lab_field: ResolvedField) -> None:
+    assert lab_field.target is not None
+    target = msgspec.structs.replace(lab_field.target, odometry=TargetOdometry(source="ros2://10.0.0.9/odom"))
+    lab = Lab(msgspec.structs.replace(lab_field, target=target))
+    (name,) = lab.field.reporting
+    for connected in (False, True):
+        lab.turn()
+        assert not lab.checks.complete(lab.now_ns)
+        lab.devices.publish(CAMERA_STATUS, status_of(lab.devices.header(name), connected=connected))
+    lab.turn(1)
+    assert lab.checks.complete(lab.now_ns)
 
 
 def test_a_look_tells_operator_and_bus_what_must_be_mended(lab_field: ResolvedField) -> None:

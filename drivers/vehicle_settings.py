@@ -2,11 +2,13 @@
 
 import ipaddress
 import math
+import re
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
-from pydantic_core import PydanticCustomError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from drivers.watchdog_types import WatchdogLimits
 from groundstation.field.behaviour import SafetyValues
@@ -32,6 +34,25 @@ def is_address(value: str) -> str:
 
 
 Address = Annotated[str, AfterValidator(is_address)]
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """Annotation of text of one pattern: the words say what it must be, and the JSON schema has the pattern."""
+
+    pattern: str
+    words: str
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_after_validator_function(self._checked, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        return {**handler(schema), "pattern": self.pattern}
+
+    def _checked(self, value: str) -> str:
+        if re.fullmatch(self.pattern, value) is None:
+            raise PydanticCustomError("shape", "{words}", {"words": self.words})
+        return value
 
 
 class DriverSection(BaseModel):

@@ -11,10 +11,11 @@ from drivers.mavlink.settings import (
     Forward,
     LinkSettings,
     MavlinkDriverSettings,
+    ParameterName,
     VehicleSettings,
     VisionFeedback,
 )
-from drivers.vehicle_settings import Address, silence_limits, vehicle_limits
+from drivers.vehicle_settings import Address, Shape, silence_limits, vehicle_limits
 from groundstation.adapters import with_zone
 from groundstation.errors import SettingsError
 from groundstation.vehicles import (
@@ -51,7 +52,7 @@ class Mavlink(KindSection):
     process. When the driver is dead, others speak to the vehicle from another port than the one it called."""
     local_address: Address = "0.0.0.0"
     """IPv4 address that the driver listens on, with listen."""
-    serial: Annotated[str, Field(pattern=r"^(/dev/[^:]+:\d{1,7})?$")] = ""
+    serial: Annotated[str, Shape(r"^(/dev/[^:]+:\d{1,7})?$", "must be DEVICE:BAUD, such as /dev/ttyUSB0:921600")] = ""
     """Serial radio DEVICE:BAUD instead of UDP, such as /dev/ttyUSB0:921600; empty: UDP. `config check` compares BAUD
     with what the vehicle needs."""
     key_file: str = ""
@@ -61,7 +62,7 @@ class Mavlink(KindSection):
     """Height [m] that a take-off climbs to."""
     vision_hz: Annotated[float, Field(ge=5, le=50)] = 30.0
     """Rate [Hz] at which the vehicle's position estimate is sent to its autopilot."""
-    parameters: dict[Annotated[str, Field(pattern=r"^[A-Z][A-Z0-9_]{0,15}$")], float] = Field(default={})
+    parameters: dict[ParameterName, float] = Field(default={})
     """Parameters of the autopilot that this drone needs otherwise than `groundstation mavlink setup` proposes, or
     besides, by name; the driver warns of the former."""
     forward: Forward = ""

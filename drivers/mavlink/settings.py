@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from drivers.vehicle_settings import DriverSection, Name, Positive, SilenceLimits, VehicleLimits, is_address
+from drivers.vehicle_settings import DriverSection, Name, Positive, Shape, SilenceLimits, VehicleLimits, is_address
 from drivers.watchdog_types import WatchdogLimits
 
 # Faster than any flight of this kind [m/s]: beyond it a reported velocity is no measurement.
@@ -23,7 +23,14 @@ def _is_reachable(forward: str) -> str:
     return forward
 
 
-Forward = Annotated[str, Field(pattern=r"^(udp:\d{1,3}(\.\d{1,3}){3}:\d{1,5})?$"), AfterValidator(_is_reachable)]
+_FORWARD = Shape(r"^(udp:\d{1,3}(\.\d{1,3}){3}:\d{1,5})?$", "must be udp:ADDRESS:PORT, such as udp:127.0.0.1:14550")
+_PARAMETER = Shape(r"^[A-Z][A-Z0-9_]{0,15}$", "must be a parameter's name (A-Z first, then A-Z, 0-9, _; 16 at most)")
+_TARGET = Shape(
+    r"^(udpout|udpin|serial):[^:]+:\d{1,7}$",
+    "must be like udpin:0.0.0.0:14550, udpout:ADDRESS:PORT, serial:DEVICE:BAUD",
+)
+ParameterName = Annotated[str, _PARAMETER]
+Forward = Annotated[str, _FORWARD, AfterValidator(_is_reachable)]
 """Where a second ground station listens, such as udp:127.0.0.1:14550; empty: nowhere."""
 
 
@@ -77,7 +84,7 @@ class LinkSettings(DriverSection):
     """
 
     kind: Literal["pymavlink", "mavsdk"] = "pymavlink"
-    target: Annotated[str, Field(pattern=r"^(udpout|udpin|serial):[^:]+:\d{1,7}$"), AfterValidator(_has_a_port)]
+    target: Annotated[str, _TARGET, AfterValidator(_has_a_port)]
     system_id: Annotated[int, Field(ge=1, le=255)] = 255
     component_id: Annotated[int, Field(ge=1, le=255)] = 190
     key_file: str = ""
@@ -108,7 +115,7 @@ class VehicleSettings(DriverSection):
     setpoint_hz: Annotated[float, Field(ge=5, le=50)] = 20.0
     velocity_std_m_s: Positive = 0.15
     attitude_std_rad: Positive = 0.0053
-    parameters: dict[Annotated[str, Field(pattern=r"^[A-Z][A-Z0-9_]{0,15}$")], float] = Field(default={})
+    parameters: dict[ParameterName, float] = Field(default={})
     forward: Forward = ""
     forward_allows: tuple[Literal["parameters", "missions"], ...] = ()
 

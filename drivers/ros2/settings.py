@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from drivers.rmw_zenoh.address import LAST_DOMAIN, NAME, ROUTER_PORT
-from drivers.vehicle_settings import VehicleDriverSettings
+from drivers.vehicle_settings import Shape, VehicleDriverSettings
 from groundstation.vehicles import KindSection
 
 # The type hash of Humble, which has none.
@@ -13,7 +13,8 @@ NO_HASH = "TypeHashNotSupported"
 # Faster than any flight of this kind [m/s]: beyond it a reported velocity is no measurement.
 FASTEST_M_S = 8.0
 
-TopicName = Annotated[str, Field(pattern=f"^/?{NAME}$")]
+_WORDS = "must be a name of ROS 2 such as drone_1/odom (parts of letters, digits and _, no digit first)"
+TopicName = Annotated[str, Shape(f"^/?{NAME}$", _WORDS)]
 
 
 class Ros2Section(KindSection):
@@ -28,7 +29,7 @@ class Ros2Section(KindSection):
     """ROS_DOMAIN_ID of the node."""
     distro: Literal["humble", "jazzy", "lyrical"] = "jazzy"
     """Distribution of the node; those between have jazzy's keys."""
-    namespace: Annotated[str, Field(pattern=f"^({NAME})?$")] = ""
+    namespace: Annotated[str, Shape(f"^({NAME})?$", f"{_WORDS}, without a leading slash")] = ""
     """Namespace of the node's topics and services, such as drone_1; empty: none."""
     odometry: TopicName = "odom"
     """Topic of its nav_msgs/Odometry: velocity in the vehicle's own frame, attitude, height; at 10 Hz at least."""

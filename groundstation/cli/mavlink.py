@@ -116,9 +116,8 @@ def _link_settings(target: str, key_file: str, kind: str) -> Any:
     try:
         return LinkSettings.model_validate({"kind": kind, "target": target, "key_file": key_file})
     except ValidationError as error:
-        like = "must be like udpin:0.0.0.0:14550, udpout:ADDRESS:PORT, serial:DEVICE:BAUD"
-        told = [like if one["type"] == "string_pattern_mismatch" else one["msg"] for one in error.errors()]
-        raise OperatorMistake(f"{target}: {'; '.join(text.removeprefix('Value error, ') for text in told)}") from None
+        told = [one["msg"].removeprefix("Value error, ") for one in error.errors()]
+        raise OperatorMistake(f"{target}: {'; '.join(told)}") from None
 
 
 def _vehicle(path: Path, name: str) -> tuple[Any, Any]:

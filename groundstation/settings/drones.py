@@ -7,6 +7,7 @@ from pydantic import AfterValidator, Field, create_model
 from pydantic_core import PydanticCustomError, PydanticKnownError
 
 from drivers.camera.source_address import behind_adapter, parse_source
+from drivers.vehicle_settings import Shape
 from groundstation.settings.marker import MarkerSettings
 from groundstation.settings.room import CalibrationSettings
 from groundstation.settings.values import (
@@ -23,6 +24,10 @@ from groundstation.vehicles import KindSection, all_kinds, kind_named, refused_k
 
 StdDeviation = Annotated[float, Field(gt=0, le=10)]
 Delay = Annotated[float, Field(ge=0, le=1000)]
+_ADAPTER = Shape(
+    r"^[A-Za-z0-9_.-]{0,15}$", "must be a network adapter such as wlan1 (letters, digits, _.-; 15 at most)"
+)
+_SERIAL_NUMBER = Shape(r"^[A-Za-z0-9-]{0,40}$", "must be a serial number (letters, digits and -; 40 at most)")
 
 
 class LimitSettings(SettingsSection):
@@ -143,14 +148,14 @@ class DroneOfAnyKind(SettingsSection):
     """false: the drone stays out of the run but keeps its entry in the file."""
     address: Address
     """IPv4 address of the vehicle; each its own, or behind an `interface` of its own."""
-    interface: Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]{0,15}$")] = ""
+    interface: Annotated[str, _ADAPTER] = ""
     """Network adapter of this computer that leads to the vehicle, such as wlan1; its video at the same address is
     taken from there too. For vehicles that all have the same address, each behind an adapter of its own. Empty: as this
     computer's routes say."""
     host: HostName = ""
     """Name of the host that the vehicle's driver and its camera's run on, as the site admitted it (`groundstation site
     admit`); there: `groundstation host`. Empty: the host of the run."""
-    serial_number: Annotated[str, Field(pattern=r"^[A-Za-z0-9-]{0,40}$")] = ""
+    serial_number: Annotated[str, _SERIAL_NUMBER] = ""
     """Serial number of the vehicle (of a MAVLink one: its uid2, else uid): another one at its address does not take
     off. groundstation ardrone probe and mavlink probe show it."""
     limits: LimitSettings = LimitSettings()

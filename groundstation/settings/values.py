@@ -8,7 +8,7 @@ from pydantic_core import PydanticCustomError
 
 from drivers.camera.source_address import parse_source
 from drivers.vehicle_settings import Address as Address
-from drivers.vehicle_settings import is_address
+from drivers.vehicle_settings import Shape, is_address
 from groundstation.errors import without_password
 
 NAME_PATTERN = r"^[a-z][a-z0-9_]{0,47}$"
@@ -52,8 +52,9 @@ def read_by(parse: Callable[[str], object]) -> AfterValidator:
     return AfterValidator(check)
 
 
-Name = Annotated[str, Field(pattern=NAME_PATTERN)]
-HostName = Annotated[str, Field(pattern=r"^([a-z][a-z0-9_]{0,15})?$")]
+_NAME_WORDS = "must be a name such as {} (a-z first, then a-z, 0-9, _)"
+Name = Annotated[str, Shape(NAME_PATTERN, _NAME_WORDS.format("drone_1"))]
+HostName = Annotated[str, Shape(r"^([a-z][a-z0-9_]{0,15})?$", f"{_NAME_WORDS.format('lab_2')} of 16 letters at most")]
 Vector2 = Annotated[tuple[float, float], of_length(2)]
 Vector3 = Annotated[tuple[float, float, float], of_length(3)]
 _Offset = Annotated[float, Field(ge=-2, le=2)]

@@ -26,7 +26,6 @@ _PLAIN = {
     "model_type": "must be a mapping",
     "model_attributes_type": "must be a mapping",
     "finite_number": "must be finite",
-    "string_pattern_mismatch": "must be a name such as drone_1 (a-z first, then a-z, 0-9, _)",
     "string_too_short": "must not be empty",
     "date_from_datetime_parsing": "must be a date such as 2026-11-20",
     "date_parsing": "must be a date such as 2026-11-20",
@@ -74,6 +73,8 @@ def text_of_error(error: Mapping[str, Any]) -> str:
         return f"must be {context['expected']} (got {got}){_close(str(error['input']), context['expected'])}"
     if kind in ("too_short", "too_long"):
         return f"must hold {_count(context)} (got {context['actual_length']})"
+    if kind == "string_pattern_mismatch":
+        return f"must match {context['pattern']} (got {got})"
     if kind in ("entries", "rows", "rising", "falling"):
         return str(error["msg"])
     return f"{_PLAIN.get(kind, error['msg'])} (got {got})"

@@ -119,21 +119,41 @@ def _ask_count(room: "NewRoom") -> int:
 
 
 def _ask_drones(room: "NewRoom") -> "list[NewDrone]":
+    count = _until_possible(lambda: _ask_count(room))
+    drones: list[NewDrone] = []
+    for _ in range(count):
+        drones.append(_until_possible(lambda: _ask_drone(room, drones)))
+    return drones
+
+
+def _ask_drone(room: "NewRoom", before: "list[NewDrone]") -> "NewDrone":
     from drivers.camera.source_address import parse_source
     from drivers.vehicle_settings import is_address
     from groundstation.settings.new_field import NewDrone, offers
 
-    count = _until_possible(lambda: _ask_count(room))
-    known = offers()
-    drones: list[NewDrone] = []
-    for number in range(1, 1 + count):
-        before = drones[-1].kind if drones else next(iter(known))
-        kind = click.prompt(f"Kind of drone_{number}", default=before, type=click.Choice(tuple(known)))
-        address = click.prompt("  its address", default=f"192.168.1.{10 + number}", value_proc=_checked(is_address))
-        own = known[kind][1].pictures.replace("{address}", address)
-        pictures = click.prompt("  pictures of its camera", default=own, value_proc=_checked(parse_source))
-        drones.append(NewDrone(kind, address, pictures))
-    return drones
+    known, number = offers(), 1 + len(before)
+    likely = before[-1].kind if before else next(iter(known))
+    kind = click.prompt(f"Kind of drone_{number}", default=likely, type=click.Choice(tuple(known)))
+    address = click.prompt("  its address", default=f"192.168.1.{10 + number}", value_proc=_checked(is_address))
+    own = known[kind][1].pictures.replace("{address}", address)
+    pictures = click.prompt("  pictures of its camera", default=own, value_proc=_checked(parse_source))
+    drone = NewDrone(kind, address, pictures)
+    _require_apart(room, [*before, drone])
+    return drone
+
+
+def _require_apart(room: "NewRoom", drones: "list[NewDrone]") -> None:
+    """Raise OperatorMistake for answers about the last drone that cannot be, such as the address of another one."""
+    from groundstation.settings.new_field import NewTarget, field_text
+    from groundstation.settings.wording import told
+
+    try:
+        _require_good(field_text("new", room, drones, NewTarget(board_m=0.0)), "new.yaml")
+    except SettingsError as error:
+        problems = [told(problem, "") for problem in error.problems]
+        own = f"drones.drone_{len(drones)}."
+        if texts := [problem.text for problem in problems if problem.path.startswith(own)]:
+            raise OperatorMistake("; ".join(texts)) from None
 
 
 def _ask_target(room: "NewRoom") -> "NewTarget":

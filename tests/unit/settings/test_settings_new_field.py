@@ -122,7 +122,19 @@ def test_an_answer_that_cannot_be_is_asked_again(tmp_path: Path) -> None:
     assert "must be an IPv4 address such as 192.168.1.11 (got 'drone.local')" in result.output
 
 
-def test_answers_that_contradict_each_other_are_not_written(tmp_path: Path) -> None:
+def test_a_drone_with_the_address_or_pictures_of_another_is_asked_for_again(tmp_path: Path) -> None:
+    one, same_pictures = ["px4", "192.168.1.11", ""], ["", "192.168.1.12", "http://192.168.1.11:8080/video.mjpg"]
+    answers = ["", "", "", "", "2", *one, *one, *same_pictures, "", "192.168.1.12", "", "", "", "y", ""]
+    result = CliRunner().invoke(new, [str(tmp_path / "hall")], input="\n".join(answers))
+    assert result.exit_code == 0, result.output
+    assert "\naddress 192.168.1.11 is already that of drone_1; behind an adapter each" in result.output
+    assert "\ncamera source http://192.168.1.11:8080/video.mjpg is already that of drone_1. Once" in result.output
+    field = load_field(tmp_path / "hall" / "hall.yaml")
+    assert [drone.address for drone in field.drones.values()] == ["192.168.1.11", "192.168.1.12"]
+
+
+def test_answers_that_contradict_each_other_are_not_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("groundstation.cli.new._require_apart", lambda room, drones: None)
     one = ["", "192.168.1.11", ""]
     result = CliRunner().invoke(
         new, [str(tmp_path / "hall")], input="\n".join(["", "", "", "", "2", *one, *one, "", "", "y", ""])

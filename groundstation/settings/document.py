@@ -91,14 +91,17 @@ def dotted(path: KeyPath) -> str:
     return text
 
 
-def read(path: Path, name: str = "") -> Node:
-    """Return a file's content; raises SettingsError naming file and line of every fault that makes it unreadable."""
+def read(path: Path, name: str = "", named_in: Path | None = None) -> Node:
+    """Return a file's content; raises SettingsError naming file and line of every fault that makes it unreadable.
+
+    named_in: the file that names this one, which is not meant.
+    """
     name = name or str(path)
     try:
         with open(path, "rb", opener=_without_waiting) as stream:
             content = stream.read(_MAX_BYTES + 1)  # a device (`/dev/zero`) has no end
     except FileNotFoundError:
-        raise SettingsError([f"{name}: no such file{_neighbours(path)}"]) from None
+        raise SettingsError([f"{name}: no such file{_neighbours(path, named_in)}"]) from None
     except OSError as error:
         raise SettingsError([f"{name}: cannot be read ({error.strerror})"]) from None
     if len(content) > _MAX_BYTES:
@@ -117,13 +120,16 @@ def _without_waiting(path: str, flags: int) -> int:
     return descriptor
 
 
-def _neighbours(path: Path) -> str:
+def _neighbours(path: Path, named_in: Path | None) -> str:
     from difflib import get_close_matches
 
     if not path.parent.is_dir():
         return ""
-    near = get_close_matches(path.name, [other.name for other in path.parent.glob("*.yaml")], 1, 0.5)
-    return f", did you mean {path.parent / near[0]}?" if near else ""
+    below = (folder / path.name for folder in sorted(path.parent.glob("*")))
+    same = next((str(place) for place in below if os.access(place, os.R_OK)), None)
+    others = {other.name: other for other in path.parent.glob("*.yaml") if other != named_in}
+    near = same or next((str(others[name]) for name in get_close_matches(path.name, others, 1, 0.5)), None)
+    return f", did you mean {near}?" if near else ""
 
 
 def without_end(text: str) -> str:

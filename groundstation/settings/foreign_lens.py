@@ -46,9 +46,9 @@ _KNOWN = (
 )
 
 
-def read_calibration(path: Path, name: str = "") -> Node:
+def read_calibration(path: Path, name: str = "", named_in: Path | None = None) -> Node:
     """Return the content of any program's calibration file with our keys; raises SettingsError as `read` does."""
-    return _ours(read(path, name))
+    return _ours(read(path, name, named_in))
 
 
 def _ours(tree: Node) -> Node:

@@ -123,7 +123,8 @@ class Calibrations:
         name = entry.value
         if name not in self._known:
             try:
-                self._known[name] = read_calibration(self._directory / name, str(Path(self._name).parent / name))
+                shown, named_in = str(Path(self._name).parent / name), self._directory / Path(self._name).name
+                self._known[name] = read_calibration(self._directory / name, shown, named_in)
             except SettingsError as error:
                 self._known[name] = None
                 self.problems += [problem(entry.origin, text) for text in error.problems]

@@ -215,6 +215,10 @@ def test_calibrations(lab: Path) -> None:
     assert broken("cameras/ceiling.yaml", "cameras/ceilng.yaml") == [
         "@ cameras.ceiling.calibration: cameras/ceilng.yaml: no such file, did you mean cameras/ceiling.yaml?"
     ]
+    assert broken("cameras/ceiling.yaml", "ceiling.yaml") == [
+        "@ cameras.ceiling.calibration: ceiling.yaml: no such file, did you mean cameras/ceiling.yaml?"
+    ]
+    assert broken("cameras/ceiling.yaml", "lap.yaml") == ["@ cameras.ceiling.calibration: lap.yaml: no such file"]
     (lab / "lab.yaml").write_text(GOOD, encoding="utf-8")
     lens = lab / "cameras" / "ardrone_front.yaml"
     text = lens.read_text(encoding="utf-8")

@@ -1,11 +1,14 @@
 """Finds figures that are permitted but unlikely: of another unit, or too small or large for a flight."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 from pydantic import BaseModel
 
+from drivers.motion_capture.settings import parse_source
 from groundstation.settings.document import KeyPath
+from groundstation.settings.motion_capture import MotionCaptureSettings
 from groundstation.settings.parts import Finding
 from groundstation.settings.schema import Field
 
@@ -47,6 +50,9 @@ _ESTIMATOR = {
 }
 _PLANNER = {"planned_range_m": Likely(0.3, 100.0, "plans would count on no sighting at all")}
 _LEAST_HORIZON_S = 0.3
+# Room for the rounding of a multiple of 45 degrees in radians, such as 1.57.
+_ROUNDED_RAD = 2e-3
+_NATNET_REQUESTS, _NATNET_FRAMES = 1510, 1511
 
 
 def unlikely(field: Field) -> Iterator[Finding]:
@@ -58,15 +64,39 @@ def unlikely(field: Field) -> Iterator[Finding]:
         yield from _outside((*path, "limits"), drone.limits, _LIMITS)
         yield from _outside((*path, "camera"), drone.camera, _CAMERA)
         yield from _outside((*path, "odometry"), drone.odometry, _ODOMETRY)
+        yield from _in_radians((*path, "pad_yaw_deg"), drone.pad_yaw_deg)
+    for name, target in field.tracked.items():
+        if target.odometry is not None:
+            owner: KeyPath = ("targets", name) if field.target is None else ("target",)
+            yield from _outside((*owner, "odometry"), target.odometry, _SYSTEM)
     for section, systems in (("motion_capture", field.motion_capture), ("ranging", field.ranging)):
         for name, system in systems.items():
             yield from _outside((section, name), system, _SYSTEM | (_RANGES if section == "ranging" else _CAPTURE))
+    for name, capture in field.motion_capture.items():
+        yield from _of_a_capture(("motion_capture", name), capture)
     yield from _outside(("estimator",), field.estimator, _ESTIMATOR)
     yield from _outside(("planner",), field.planner, _PLANNER)
     if (ahead_s := field.planner.horizon_steps * field.planner.step_s) < _LEAST_HORIZON_S:
         yield ("planner", "step_s"), f"lets plans look {ahead_s:g} s ahead: too short for any motion to pay"
     if field.recording.directory.startswith("~"):
         yield ("recording", "directory"), "is a folder of that very name: ~ is not your home in a field file"
+
+
+def _of_a_capture(path: KeyPath, system: MotionCaptureSettings) -> Iterator[Finding]:
+    yield from _in_radians((*path, "yaw_deg"), system.yaw_deg)
+    for name, body in system.bodies.items():
+        yield from _in_radians((*path, "bodies", name, "yaw_deg"), body.yaw_deg)
+    address = parse_source(system.source)
+    if address.scheme == "natnet" and address.port == _NATNET_FRAMES:
+        text = f"asks at port {_NATNET_FRAMES}, to which frames are sent: the system answers at {_NATNET_REQUESTS}"
+        yield (*path, "source"), text
+
+
+def _in_radians(path: KeyPath, value: float) -> Iterator[Finding]:
+    """Yield a heading that is a multiple of 45 degrees in radians."""
+    eighths = round(value / (math.pi / 4))
+    if 1 <= abs(eighths) <= 4 and abs(value - eighths * math.pi / 4) < _ROUNDED_RAD:
+        yield path, f"is unlikely (got {value:g}): {_RADIANS}"
 
 
 def _outside(path: KeyPath, section: BaseModel, figures: dict[str, Likely]) -> Iterator[Finding]:

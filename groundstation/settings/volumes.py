@@ -8,6 +8,7 @@ from groundstation.settings.in_view import STANDING_MARKER_M
 from groundstation.settings.motion_capture import VolumeSettings
 from groundstation.settings.parts import Finding
 from groundstation.settings.schema import Field
+from groundstation.settings.values import Vector3
 
 _BEYOND_ROOM_M = 1.0
 # Spread of anchors [m; root of the summed squares] along a direction below which ranges hardly tell places along it.
@@ -15,12 +16,14 @@ _LEAST_SPREAD_M = 0.6
 
 
 def volume_cautions(field: Field) -> Iterator[Finding]:
-    """Yield boxes larger than the room, and boxes that do not hold the heights at which the drones stand and fly."""
+    """Yield boxes and origins beyond the room, and boxes without the heights at which the drones stand and fly."""
     boxes = {("motion_capture", name): one for name, one in field.motion_capture.items()}
     seen = {path: one.volume_m for path, one in boxes.items() if path[1] != field.truth.get("from")}
     seen |= {("ranging", name): one.volume_m for name, one in field.ranging.items()}
     for path, box in seen.items():
         yield from (((*path, "volume_m", axis), text) for axis, text in _outside_room(field, box))
+    for path, system in boxes.items():
+        yield from (((*path, "position_m"), text) for text in _origin_outside(field, system.position_m))
     if seen and not field.cameras:
         yield from _blind_heights(field, seen)
 
@@ -40,10 +43,24 @@ def _outside_room(field: Field, box: VolumeSettings) -> Iterator[tuple[str, str]
     for axis, (low, high) in field.room.inside.items():
         least, most = getattr(box, axis)
         if least < low - _BEYOND_ROOM_M or most > high + _BEYOND_ROOM_M:
-            yield (
-                axis,
-                f"reaches beyond the room, {low:g} to {high:g} m (got {least:g} to {most:g}): is this in metres?",
-            )
+            meant = "z points up here, whatever the system's own axes do: exchange y_m and z_m"
+            remedy = meant if axis == "z_m" and _lies_on_its_side(field, box) else "is this in metres?"
+            yield axis, f"reaches beyond the room, {low:g} to {high:g} m (got {least:g} to {most:g}): {remedy}"
+
+
+def _lies_on_its_side(field: Field, box: VolumeSettings) -> bool:
+    """Return whether y and z would fit the room if they were exchanged: given along the axes of a system with y up."""
+    exchanged, inside = {"y_m": box.z_m, "z_m": box.y_m}, field.room.inside
+    return all(
+        inside[axis][0] - _BEYOND_ROOM_M <= least and most <= inside[axis][1] + _BEYOND_ROOM_M
+        for axis, (least, most) in exchanged.items()
+    )
+
+
+def _origin_outside(field: Field, origin_m: Vector3) -> Iterator[str]:
+    size_m = max(field.room.size_m)
+    if max(map(abs, origin_m)) > size_m:
+        yield f"is beyond the room (got {max(origin_m, key=abs):g}): is this in metres?"
 
 
 def _blind_heights(field: Field, boxes: dict[tuple[str, str], VolumeSettings]) -> Iterator[Finding]:

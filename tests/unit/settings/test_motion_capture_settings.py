@@ -14,6 +14,7 @@ from groundstation.flight.composition import process_table
 from groundstation.flight.flight_plan import plan_of
 from groundstation.sensing.from_field import sensors_from_field
 from groundstation.settings.cautions import cautions
+from groundstation.settings.document import dotted
 from groundstation.settings.load import load_field
 from groundstation.settings.motion_capture import MotionCaptureSettings
 from groundstation.settings.resolved import resolved_field
@@ -116,6 +117,29 @@ def test_pads_in_its_box_are_in_view() -> None:
     assert not list(cautions(load_field(ROOTED)))
     narrow = load_field(ROOTED, ("motion_capture.mocap.volume_m.x_m=[0.0, 3.5]",))
     assert ["in view of nothing fixed" in text for _, text in cautions(narrow)] == [True, True]
+
+
+@pytest.mark.parametrize(
+    ("options", "path", "words"),
+    [
+        (("position_m=[150,0,0]",), "position_m", "is beyond the room (got 150): is this in metres?"),
+        (("yaw_deg=1.5708",), "yaw_deg", "(got 1.5708): is this in radians"),
+        (("yaw_deg=-3.142",), "yaw_deg", "in radians"),
+        (("bodies={drone_1: {yaw_deg: 0.785}}",), "bodies.drone_1.yaw_deg", "in radians"),
+        (("source=natnet://10.0.0.2:1511",), "source", "asks at port 1511, to which frames are sent"),
+        (("volume_m.z_m=[-2600,2600]",), "volume_m.z_m", "is this in metres?"),
+        (("up=y", "volume_m.y_m=[-0.1,2.7]", "volume_m.z_m=[-2.6,2.6]"), "volume_m.z_m", "exchange y_m and z_m"),
+    ],
+)
+def test_a_foolish_setting_is_named_with_its_path(options: tuple[str, ...], path: str, words: str) -> None:
+    field = load_field(ROOTED, tuple(f"motion_capture.mocap.{option}" for option in options))
+    found = [(dotted(at), text) for at, text in cautions(field)]
+    assert [words in text for at, text in found if at == f"motion_capture.mocap.{path}"] == [True], found
+
+
+@pytest.mark.parametrize("option", ["yaw_deg=1.5", "yaw_deg=0", "source=natnet://10.0.0.2", "position_m=[-4,3,0]"])
+def test_likely_settings_give_no_caution(option: str) -> None:
+    assert not list(cautions(load_field(ROOTED, (f"motion_capture.mocap.{option}",))))
 
 
 def test_field_and_settings_have_the_same_defaults() -> None:

@@ -53,6 +53,12 @@ FOOLISH = [
     ("room.fence.z_m=[0,4.15]", "room.fence.z_m", "within 0.05 m of a fixed camera"),
     ("recording.directory=" + "x" * 300, "recording.directory", "File name too long"),
     ("drones.drone_1.odometry.yaw_rate_std_deg_s=0.0017", "drones.drone_1.odometry.yaw_rate_std_deg_s", "in radians"),
+    ("drones.drone_1.pad_yaw_deg=1.5708", "drones.drone_1.pad_yaw_deg", "(got 1.5708): is this in radians"),
+    (
+        "target.odometry={source: 'ros2://10.0.0.9/odom', delay_ms: 0.02}",
+        "target.odometry.delay_ms",
+        "(got 0.02): is this in seconds",
+    ),
     ("planner.step_s=2e-4", "planner.step_s", "0.002 s ahead"),
     ("cameras.ceiling.source=/dev/video97", "cameras.ceiling.source", "not there on this machine"),
 ]

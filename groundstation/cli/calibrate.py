@@ -11,7 +11,7 @@ from groundstation.cli.calibrate_team import team
 
 @click.group(
     epilog="\b\nExamples:\n"
-    "  groundstation calibrate camera http://192.168.1.50:8080/video.mjpg --board 9x6 --name ceiling\n"
+    "  groundstation calibrate camera http://192.168.1.50:8080/video.mjpg -o my_lab/cameras/ceiling.yaml --force\n"
     "  groundstation calibrate check lab.yaml\n\n"
     'The order of work for a new lab: "Calibrate lenses, mountings and delays" in docs/how-to.'
 )

@@ -27,9 +27,9 @@ _SHOWN_MISSING = 3
 
 @click.command(
     epilog="\b\nExamples:\n"
-    "  groundstation calibrate camera http://192.168.1.50:8080/video.mjpg --board 9x6 --name ceiling\n"
-    "  groundstation calibrate camera rtsp://192.168.1.60/front --board skein --square-mm 44 --name drone_1_front\n"
-    "  groundstation calibrate camera pictures/ --board 9x6 --judged\n\n"
+    "  groundstation calibrate camera http://192.168.1.50:8080/video.mjpg -o my_lab/cameras/ceiling.yaml --force\n"
+    "  groundstation calibrate camera rtsp://192.168.1.60/ --board skein --square-mm 44 -o my_lab/cameras/front.yaml\n"
+    "  groundstation calibrate camera pictures/ --board 9x6 -o my_lab/cameras/ceiling.yaml --judged\n\n"
     "Show the board in every part of the picture, near and far, tilted to all sides, and hold still for each view.\n\n"
     "Exit codes: 0 written, 2 wrong usage, 4 no pictures or no lens can be fitted."
 )

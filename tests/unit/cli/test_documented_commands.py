@@ -123,3 +123,10 @@ def test_links_of_a_document_lead_somewhere(path: Path) -> None:
     kept = [link for link in links if "://" not in link and "/generated/" not in link]
     lost = [link for link in kept if not (path.parent / link).exists()]
     assert not lost, lost
+
+
+def test_help_aims_no_calibration_at_the_shipped_lenses() -> None:
+    """In a checkout the default output is there already, and is that of the shipped fields."""
+    for path in ("calibrate", "calibrate camera"):
+        examples = [line for line in (VERBS[path].epilog or "").splitlines() if "calibrate camera" in line]
+        assert examples and all(" -o my_lab/cameras/" in line for line in examples), path

@@ -46,7 +46,7 @@ def _awaited(field: "Field") -> dict[str, tuple[str, int]]:
 
 
 def _examine(name: str) -> "list[Finding]":
-    from groundstation.doctor import network, processor, storage
+    from groundstation.doctor import load, network, processor, storage
     from groundstation.doctor.plug_ins import plug_in_findings
     from groundstation.settings.files import find_field
     from groundstation.settings.load import load_field
@@ -55,6 +55,7 @@ def _examine(name: str) -> "list[Finding]":
     folder = Path(field.recording.directory)
     found = [
         processor.cores(),
+        load.load(),
         processor.real_time_right(),
         processor.clock_source(),
         processor.governor(),

@@ -2,13 +2,15 @@
 
 import json
 import socket
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 
 from groundstation.cli.doctor import doctor
-from groundstation.doctor import network, processor, storage
+from groundstation.doctor import load, network, processor, storage
 from groundstation.doctor.finding import Level
 
 CONFIG = Path(__file__).parents[3] / "config"
@@ -18,6 +20,20 @@ def test_one_core_is_too_few_and_two_are_few(monkeypatch: pytest.MonkeyPatch) ->
     for count, level in ((1, Level.MUST), (2, Level.SHOULD), (8, Level.OK)):
         monkeypatch.setattr("os.sched_getaffinity", lambda _pid, n=count: set(range(n)))
         assert processor.cores().level is level
+
+
+def test_a_load_is_told_with_the_busiest_programs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("os.sched_getaffinity", lambda _pid: {0, 1})
+    with subprocess.Popen([sys.executable, "-c", "while True: pass"]) as busy:
+        try:
+            for mean, level in ((9.0, Level.SHOULD), (0.1, Level.OK)):
+                monkeypatch.setattr("os.getloadavg", lambda m=mean: (m, 0.0, 0.0))
+                finding = load.load()
+                assert finding.level is level and finding.found.startswith(f"{mean} on 2 cores; busiest now: ")
+        finally:
+            busy.kill()
+    monkeypatch.setattr(load, "_used_s", lambda: {1: 0.0})
+    assert load.load(lambda _s: None).found == "0.1 on 2 cores"
 
 
 def test_a_missing_right_is_named_with_its_remedy(monkeypatch: pytest.MonkeyPatch) -> None:

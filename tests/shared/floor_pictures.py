@@ -1,10 +1,14 @@
 """Markers on a floor: their corners, and pictures of them by a turned ceiling camera, as files."""
 
 import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 
+from groundstation.arrays import Array
 from groundstation.geometry.board import Checkerboard, raster
 from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
@@ -17,13 +21,15 @@ PLACES = {1: (0.9, 0.6), 2: (-0.8, 0.5), 3: (-0.7, -0.7), 4: (0.8, -0.6)}
 HEADINGS = {1: 0.3, 2: -1.2, 3: 2.0, 4: 0.0}
 
 
-def corners_of(code, camera=CEILING, lens=LENS, at=None):
+def corners_of(
+    code: int, camera: Pose = CEILING, lens: CameraIntrinsics = LENS, at: Sequence[float] | None = None
+) -> Array:
     x, y, z = (*(at or PLACES[code]), 0.0)[:3]
     points = Checkerboard(code, 44.0).corners() @ rotation_z(HEADINGS.get(code, 0.0)).T + (x, y, z)
     return lens.project(camera.inverse().apply(points))
 
 
-def drawn(camera, lens, marks):
+def drawn(camera: Pose, lens: CameraIntrinsics, marks: Mapping[int, tuple[float, float, float, float]]) -> Any:
     """Return a picture of markers {code: (x, y, z, yaw)} on grey ground."""
     picture = np.full((lens.height_px, lens.width_px), 120, np.uint8)
     for code, (x, y, z, yaw) in marks.items():
@@ -39,7 +45,7 @@ def drawn(camera, lens, marks):
     return cv2.GaussianBlur(picture, (0, 0), 0.6)
 
 
-def files_for(tmp_path, lens, picture, frames=3):
+def files_for(tmp_path: Path, lens: CameraIntrinsics, picture: Any, frames: int = 3) -> tuple[str, str]:
     (tmp_path / "in").mkdir()
     rng = np.random.default_rng(1)
     for number in range(frames):
@@ -52,5 +58,5 @@ def files_for(tmp_path, lens, picture, frames=3):
     return str(tmp_path / "in"), str(calibration)
 
 
-def markers(places=PLACES):
+def markers(places: Mapping[int, tuple[float, float]] = PLACES) -> list[str]:
     return [f"--marker={code}={x},{y}" for code, (x, y) in places.items()]

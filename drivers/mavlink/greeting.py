@@ -7,13 +7,21 @@ from drivers.mavlink.wire.names import AUTOPILOT_COMPONENT
 from drivers.mavlink.wire.telemetry import OUR_HEARTBEAT, Heartbeat
 
 
-def first_heartbeat(link: MavlinkLink, system: int, within_s: float) -> Heartbeat | None:
-    """Greet a vehicle until its autopilot answers; returns its heartbeat, or None."""
+def first_heartbeat(
+    link: MavlinkLink, system: int, within_s: float, others: set[int] | None = None
+) -> Heartbeat | None:
+    """Greet a vehicle until its autopilot answers; returns its heartbeat, or None.
+
+    others: gets the systems of other autopilots that are heard meanwhile.
+    """
     deadline = time.monotonic() + within_s
     while time.monotonic() < deadline:
         link.send(system, OUR_HEARTBEAT)
         for _, frame in link.receive():
-            from_it = frame.system == system and frame.component == AUTOPILOT_COMPONENT
-            if from_it and isinstance(frame.message, Heartbeat):
+            if frame.component != AUTOPILOT_COMPONENT or not isinstance(frame.message, Heartbeat):
+                continue
+            if frame.system == system:
                 return frame.message
+            if others is not None:
+                others.add(frame.system)
     return None

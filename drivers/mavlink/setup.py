@@ -42,15 +42,21 @@ class ParameterSetup:
 
     def connect(self) -> None:
         """Wait for the vehicle; raises DriverError if it does not answer, is another kind, or has its motors on."""
-        heartbeat = first_heartbeat(self._link, self._system, _CONNECT_S)
+        others: set[int] = set()
+        heartbeat = first_heartbeat(self._link, self._system, _CONNECT_S, others)
         if heartbeat is None:
-            raise DriverError(self._unanswered())
+            raise DriverError(self._unanswered(others))
         if foreign := other_flavour(heartbeat.autopilot, self._flavour):
             raise DriverError(f"system {self._system}: {foreign}")
         if heartbeat.base_mode & ARMED:
             raise DriverError(f"system {self._system} is armed: parameters are not touched")
 
-    def _unanswered(self) -> str:
+    def _unanswered(self, others: set[int]) -> str:
+        if others:
+            there = " and ".join(map(str, sorted(others)))
+            return (
+                f"system {self._system} does not answer, system {there} does: set mavlink.system_id in the field file"
+            )
         heard = ", ".join(f"{reason} {n}" for reason, n in self._link.rejected.items())
         refused = f" (refused: {heard})" if heard else ""
         return f"system {self._system} does not answer{refused}; `groundstation mavlink probe` tells who is on a link"

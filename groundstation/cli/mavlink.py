@@ -92,7 +92,7 @@ def setup(field: Path, drone: str, check: bool, address: str | None) -> int:
     if address is not None:
         link = _link_settings(f"udpout:{address}", link.key_file, link.kind)
     opened = open_link(link)
-    left = 0
+    left = changed = 0
     try:
         work = ParameterSetup(opened, vehicle.system_id, Flavour[vehicle.flavour.upper()], link.system_id,
                               vehicle.parameters)  # fmt: skip
@@ -100,11 +100,12 @@ def setup(field: Path, drone: str, check: bool, address: str | None) -> int:
         for found in work.differences():
             taken = not check and work.apply(found.wanted)
             left += not taken
+            changed += taken
             click.echo(found.text + ("" if check else ": set" if taken else ": NOT TAKEN"))
     finally:
         opened.close()
     if not left:
-        click.echo(f"{drone}: all parameters as needed" + ("" if check else "; restart it before the first flight"))
+        click.echo(f"{drone}: all parameters as needed" + ("; restart it before the first flight" if changed else ""))
     return ExitCode.FAILED if left else ExitCode.OK
 
 

@@ -197,7 +197,7 @@ defaults:                        # for every drone; its type and its own entry o
   limits: {max_speed_m_s: 0.6, max_climb_m_s: 0.4, max_yaw_rate_deg_s: 60, battery_min: 0.15}
   marker: {position_m: [0.0, 0.0, 0.08], square_mm: 44}
   camera:
-    calibration: cameras/ardrone_front.yaml
+    calibration: cameras/ardrone_front.yaml   # an AR.Drone's; measure yours: groundstation calibrate camera
     position_m: [0.09, 0.0, 0.0]
     tilt_down_deg: 45
     video_delay_ms: 120

@@ -92,7 +92,16 @@ def test_setup_tells_and_sets_what_differs(hangar, flavour, drone, system):
     result = run("setup", "--apply", FIELD, drone, *place)
     assert result.return_value == 0, result.output
     assert emulator.firmware.parameters.indoor
+    assert "as needed; restart it before the first flight" in result.output
     assert "all parameters as needed" in run("setup", "--check", FIELD, drone, *place).output
+    assert "restart" not in run("setup", "--apply", FIELD, drone, *place).output, "it changed nothing"
+
+
+def test_setup_names_the_system_that_answers_in_place_of_the_wanted_one(hangar):
+    _, _, (address, port) = hangar.add("px4", 1)
+    result = run("setup", "--check", FIELD, "drone_2", "--address", f"{address}:{port}")
+    assert isinstance(result.exception, DriverError)
+    assert "system 11 does not answer, system 1 does" in str(result.exception)
 
 
 def test_setup_refuses_another_autopilot_and_an_armed_one(hangar):

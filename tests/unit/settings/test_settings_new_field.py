@@ -25,6 +25,12 @@ def test_the_written_field_file_is_valid(tmp_path: Path, size: tuple[float, floa
     assert field.room.size_m == size and len(field.drones) == drones and field.site == "hall"
 
 
+def test_each_lens_is_said_to_be_one_to_measure() -> None:
+    text = field_text("lab", NewRoom(8, 6, 4.5, SOURCE), [NewDrone("px4", "192.168.1.11", SOURCE)], TURTLEBOT)
+    lenses = [line for line in text.splitlines() if "calibration:" in line]
+    assert len(lenses) == 2 and all("measure yours: groundstation calibrate camera" in line for line in lenses)
+
+
 def test_kinds_may_be_mixed(tmp_path: Path) -> None:
     team = ["", "", "", "px4", "", "", "ardupilot", "", ""]
     result = CliRunner().invoke(

@@ -39,7 +39,7 @@ def choose_run(name: str | None, stops: bool = False) -> RuntimeRecord:
     records = _found(name, stops)
     if not records:
         which = f" called {name}" if name else ""
-        searched = ", ".join(map(str, (runtime_file.folder(), *runtime_file.folders_beside())))
+        searched = ", ".join(map(str, (runtime_file.wanted_folder(), *runtime_file.folders_beside())))
         nobody = f"no ground station{which} is running (start one with: groundstation fly FIELD); searched: {searched}"
         raise UnreachableError("\n".join(_closed_doors()) or nobody)
     if len(records) > 1:

@@ -92,10 +92,15 @@ def start_time(pid: int) -> int | None:
     return None if fields is None or fields[0] in "ZX" else int(fields[19])
 
 
+def wanted_folder() -> Path:
+    """Return where this shell's runs have their files, if it can be used."""
+    given = os.environ.get("XDG_RUNTIME_DIR", "")
+    return Path(given) / "skein" if given and os.access(given, os.W_OK) else _shared()
+
+
 def folder() -> Path:
     """Return the folder of runtime files, made if needed; raises GroundStationError if it is someone else's."""
-    given = os.environ.get("XDG_RUNTIME_DIR", "")
-    path = Path(given) / "skein" if given and os.access(given, os.W_OK) else _shared()
+    path = wanted_folder()
     try:
         path.mkdir(mode=0o700, exist_ok=True)
         ours = _is_ours(path)
@@ -124,7 +129,7 @@ def folders_beside() -> list[Path]:
     found = []
     for path in (_SESSIONS / str(os.getuid()) / "skein", _SERVICE / "skein", _shared()):
         with suppress(OSError):
-            if path != folder() and _is_ours(path):
+            if path != wanted_folder() and _is_ours(path):
                 found.append(path)
     return found
 
@@ -144,7 +149,10 @@ def write(record: RuntimeRecord) -> Path:
 
 def live_records() -> list[RuntimeRecord]:
     """Return the runs that still have a process, and remove files of dead ones that can be read."""
-    return _live_records(folder())
+    with suppress(OSError):  # a folder that is missing, or another user's, must not keep a stop from other places
+        if _is_ours(wanted_folder()):
+            return _live_records(wanted_folder())
+    return []
 
 
 def records_beside() -> list[RuntimeRecord]:

@@ -214,6 +214,19 @@ def test_nothing_runs_and_the_folders_searched_are_named(alone: Path, monkeypatc
     assert stop.choose_run(None, stops=True).site == "lab"
 
 
+def test_a_folder_that_cannot_be_used_keeps_no_stop_from_the_others(
+    alone: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another user can plant one in /tmp."""
+    monkeypatch.setattr(runtime_file, "_SERVICE", alone / "service")
+    (alone / "service").mkdir()
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(alone / "service"))
+    announce("tcp/127.0.0.1:9")
+    monkeypatch.delenv("XDG_RUNTIME_DIR")
+    (alone / f"skein-{os.getuid()}").symlink_to(alone)
+    assert stop.choose_run(None, stops=True).site == "lab"
+
+
 def test_several_runs_must_be_told_apart(team: FakeTeam) -> None:
     announce(team.endpoint, site="hall")
     result = cli("land")

@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from groundstation.bus.messages import CommandAck, Verb
+from groundstation.bus.messages import RUN, CommandAck, Event, Lease, Verb
 from groundstation.bus.roles import Role
-from groundstation.bus.topics import COMMAND_ACK, LEASE
+from groundstation.bus.topics import COMMAND_ACK, EVENT, LEASE
 from groundstation.cli.exits import ExitCode, UnreachableError
 from groundstation.cli.stop import choose_run
 from groundstation.console.commands import CommandDesk, Given
@@ -126,17 +126,20 @@ def sign_of_life(record: RuntimeRecord, bus: "Bus") -> Callable[[], bool]:
     """
     if not record.host:
         return lambda: record.supervisor.alive
-    leases, heard_ns = bus.subscribe([LEASE], newest=True), time.monotonic_ns()
+    leases, events = bus.subscribe([LEASE], newest=True), bus.subscribe([EVENT], entity=RUN)
+    heard_ns = time.monotonic_ns()
 
     def goes_on() -> bool:
         nonlocal heard_ns
         now_ns = time.monotonic_ns()
-        if any(leases.drain()):
-            heard_ns = now_ns
+        said = [received.message for received in leases.drain()]
+        if any(isinstance(lease, Lease) and lease.run == record.run_dir for lease in said):
+            heard_ns = now_ns  # drivers obey no orders for another run, which may have begun meanwhile
         if now_ns - heard_ns > _LOST_NS:
             text = f"{record.name}: nothing was heard of it for {_LOST_NS // NS_PER_S} s; it has ended, or the link has"
             raise UnreachableError(text)
-        return True
+        told = [received.message for received in events.drain()]
+        return not any(isinstance(event, Event) and event.ends_run for event in told)
 
     return goes_on
 

@@ -16,7 +16,7 @@ import pytest
 
 from groundstation.bus import topics as t
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
-from groundstation.bus.messages import Command, Lease, Verb
+from groundstation.bus.messages import RUN, RUN_ENDED, Command, Event, Lease, Severity, Verb
 from groundstation.cli import deadman
 from groundstation.cli.deadman import Handle, heed_signals, sign_of_life, watch
 from groundstation.cli.exits import UnreachableError
@@ -124,8 +124,9 @@ def test_on_another_host_it_lasts_as_long_as_the_operators_leases(
     alive, began = sign_of_life(record, bus), time.monotonic()
 
     def goes_on() -> bool:
-        if time.monotonic() - began < 1.0:
-            operator.publish(t.LEASE, Lease(header=operator.header("team"), holder="operator", expires_ns=1))
+        header = operator.header("team")
+        of_run = "run-7" if time.monotonic() - began < 1.0 else "run-8"  # then another one
+        operator.publish(t.LEASE, Lease(header=header, holder="operator", expires_ns=1, run=of_run))
         return alive()
 
     man = DeadMan(NS_PER_S // 5)
@@ -135,6 +136,17 @@ def test_on_another_host_it_lasts_as_long_as_the_operators_leases(
     assert 1.4 < time.monotonic() - began < 3.0
     verbs = [one.message.verb for one in commands.drain() if isinstance(one.message, Command)]
     assert verbs and set(verbs) == {Verb.HOLD}
+
+
+def test_on_another_host_it_ends_with_the_run() -> None:
+    exchange = MemoryExchange()
+    bus, supervisor = MemoryBus(exchange, "lab", "deadman_1"), MemoryBus(exchange, "lab", "supervisor")
+    record = RuntimeRecord("lab", "", "", "run-7", "", ("drone_1",), ProcessRecord("", "", 0, 0), (), host="laptop")
+    alive = sign_of_life(record, bus)
+    assert alive()
+    end = Event(header=supervisor.header(RUN), severity=Severity.INFO, text=f"{RUN_ENDED}stopped by the operator")
+    supervisor.publish(t.EVENT, end)
+    assert not alive()
 
 
 @pytest.mark.parametrize(

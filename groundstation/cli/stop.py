@@ -34,7 +34,8 @@ _CONNECT_S = 2.0
 def choose_run(name: str | None, stops: bool = False) -> RuntimeRecord:
     """Return the running ground station, or the named one of several; raises UnreachableError.
 
-    stops: without a name the run with real drones is meant, even if simulated ones run nearer to this shell.
+    stops: without a name, or by that of a site, the run with real drones is meant, even if simulated ones run nearer to
+    this shell.
     """
     records = _found(name, stops)
     if not records:
@@ -55,13 +56,12 @@ def _found(name: str | None, stops: bool) -> list[RuntimeRecord]:
         records = look()
         if name is not None:
             records = [record for record in records if name in (record.name, record.site, str(record.supervisor.pid))]
-        elif stops and (real := [record for record in records if not record.simulated]):
+        real = [record for record in records if not record.simulated]
+        if stops and real:
             return real  # in an emergency nobody reads a list of runs
-        elif stops:
-            simulated = simulated or records
-            continue
-        if records:
+        if records and not (stops and all(name in (None, record.site) for record in records)):
             return records
+        simulated = simulated or records
     return simulated
 
 

@@ -214,16 +214,10 @@ def test_nothing_runs_and_the_folders_searched_are_named(alone: Path, monkeypatc
     assert stop.choose_run(None, stops=True).site == "lab"
 
 
-def test_a_folder_that_cannot_be_used_keeps_no_stop_from_the_others(
-    alone: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Another user can plant one in /tmp."""
-    monkeypatch.setattr(runtime_file, "_SERVICE", alone / "service")
-    (alone / "service").mkdir()
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(alone / "service"))
+def test_a_planted_folder_keeps_no_stop_from_the_others(alone: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     announce("tcp/127.0.0.1:9")
     monkeypatch.delenv("XDG_RUNTIME_DIR")
-    (alone / f"skein-{os.getuid()}").symlink_to(alone)
+    (alone / f"skein-{os.getuid()}").symlink_to(alone)  # by another user, in /tmp
     assert stop.choose_run(None, stops=True).site == "lab"
 
 
@@ -262,6 +256,12 @@ def test_a_rehearsal_here_hides_no_real_drones_on_another_host_from_a_stop(elsew
 def test_a_run_on_another_host_can_be_named_beside_one_here(elsewhere: RuntimeRecord, stops: bool) -> None:
     assert stop.choose_run("arena", stops) == elsewhere
     assert stop.choose_run("rehearsal", stops).site == "rehearsal"
+
+
+def test_the_site_of_a_rehearsal_names_the_real_run_of_that_site_to_a_stop(elsewhere: RuntimeRecord) -> None:
+    runtime_file.write(structs.replace(runtime_file.live_records()[0], site="arena"))
+    assert stop.choose_run("arena", stops=True) == elsewhere
+    assert not stop.choose_run("arena").host and not stop.choose_run(f"arena-{os.getpid()}", stops=True).host
 
 
 def test_a_rehearsal_is_stopped_where_nobody_else_flies(

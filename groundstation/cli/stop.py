@@ -23,7 +23,7 @@ from groundstation.errors import GroundStationError, OperatorMistake
 from groundstation.runtime.acknowledgements import NOT_CONFIRMED, AwaitedAnswers
 from groundstation.runtime.asking import by_clock_of, command_of, patience_s
 from groundstation.supervisor import runtime_file
-from groundstation.supervisor.joining import join
+from groundstation.supervisor.joining import admissions, join
 from groundstation.supervisor.runtime_file import RuntimeRecord
 
 # A router that died is back by then; drones hover without one. A living one may be busy, and a signal is the last
@@ -67,12 +67,16 @@ def _found(name: str | None, stops: bool) -> list[RuntimeRecord]:
 
 def _elsewhere() -> list[RuntimeRecord]:
     """Return the runs on other hosts whose sites this host has joined."""
+    if not admissions():  # then nobody waits for the libraries of certificates
+        return []
     from groundstation.supervisor import site
 
     return list(site.runs())
 
 
 def _closed_doors() -> list[str]:
+    if not admissions():
+        return []
     from groundstation.supervisor import site
 
     return list(site.closed_doors())

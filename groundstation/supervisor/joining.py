@@ -2,10 +2,21 @@
 
 import os
 from collections.abc import Mapping
+from pathlib import Path
 
 from groundstation.bus.roles import Role
 from groundstation.bus.zenoh_bus import ALL, ZenohBus, open_bus
 from groundstation.supervisor.runtime_file import RuntimeRecord
+
+
+def settings_folder() -> Path:
+    """Return where this user keeps sites and admissions."""
+    return Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config") / "skein"
+
+
+def admissions() -> list[Path]:
+    """Return the files of this host's admissions, one for each site that it has joined."""
+    return sorted((settings_folder() / "joined").glob("*/admission.json"))
 
 
 def join(

@@ -21,6 +21,7 @@ from groundstation.bus.topics import LEASE, VEHICLE_STATUS
 from groundstation.bus.zenoh_bus import AUTHORITY, CERTIFICATE, KEY, open_bus
 from groundstation.errors import GroundStationError, OperatorMistake
 from groundstation.supervisor.authority import Authority, key_pem, make_identities, write_private
+from groundstation.supervisor.joining import admissions, settings_folder
 from groundstation.supervisor.runtime_file import ProcessRecord, RuntimeRecord
 
 _HOSTS = "hosts.json"
@@ -42,8 +43,7 @@ class Admission(msgspec.Struct, frozen=True):
 
 def folder(kind: str, site: str) -> Path:
     """Return the folder for the files of a site; kind: "sites" or "joined"."""
-    base = os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config"
-    return Path(base) / "skein" / kind / site
+    return settings_folder() / kind / site
 
 
 def found(site: str) -> Path:
@@ -171,7 +171,7 @@ def membership(site: str | None) -> tuple[Admission, Identity]:
 
 def runs() -> Iterator[RuntimeRecord]:
     """Yield the runs on other hosts that this one may join now; each takes up to 3 s to find."""
-    for path in sorted(folder("joined", "").glob("*/admission.json")):
+    for path in admissions():
         admission = msgspec.json.decode(path.read_bytes(), type=Admission)
         record = _found(admission, str(path.parent))
         if record is not None:
@@ -180,7 +180,7 @@ def runs() -> Iterator[RuntimeRecord]:
 
 def closed_doors() -> Iterator[str]:
     """Yield why runs of the joined sites do not admit this host, with the remedy."""
-    for path in sorted(folder("joined", "").glob("*/admission.json")):
+    for path in admissions():
         admission = msgspec.json.decode(path.read_bytes(), type=Admission)
         if why := why_closed(admission.endpoint, Identity(str(path.parent), certificate_name(admission.host), "")):
             yield f"{admission.site} at {admission.endpoint}: {why}"

@@ -91,7 +91,8 @@ def sitl(field: str, **arguments: Any) -> int:
 @click.command(
     epilog="\b\nExamples:\n  groundstation fly lab.yaml\n  groundstation takeoff   (from another terminal)\n"
     "  groundstation land      (from another terminal)\n\n"
-    "Exit codes: 0 all landed, 1 a landing was not reported, 2 wrong settings, 4 a process failed."
+    "Exit codes: 0 all landed, 1 a landing was not reported, 2 wrong settings, 4 a process failed, "
+    "130 stopped before every drone was heard."
 )
 @click.argument("field")
 @_HEADLESS
@@ -238,7 +239,7 @@ def _exit_code(
     if plan.look_only:
         unsaid = ExitCode.INTERRUPTED if outcome.interrupted else ExitCode.OK
         return ExitCode.FAILED if outcome.forbidden else unsaid
-    if passed is not None and outcome.interrupted and plan.duration_s is not None:
+    if outcome.landed is None or (passed is not None and outcome.interrupted and plan.duration_s is not None):
         return ExitCode.INTERRUPTED
     if passed is None or judged_by_landing or plan.duration_s is None:
         passed = outcome.landed

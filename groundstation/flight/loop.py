@@ -19,6 +19,7 @@ from groundstation.supervisor.terminal import Terminal
 from groundstation.time_units import NS_PER_S
 
 _FAILED_LANDING_S = 2.0
+_LANDING = {True: ALL_DOWN, False: "not every drone reported a landing", None: "not every drone was heard"}
 _HEARD_NS = NS_PER_S // 2  # drivers report five times a second
 
 
@@ -26,12 +27,13 @@ _HEARD_NS = NS_PER_S // 2  # drivers report five times a second
 class FlightOutcome:
     """The end of a flight. failure: why it could not continue, or ""; interrupted: by the operator.
 
-    landed: nobody reported to fly at the end. forbidden: whether the take-off was forbidden, if that was asked.
+    landed: nobody reported to fly at the end; None: nor was every drone heard, in a run without an order to land.
+    forbidden: whether the take-off was forbidden, if that was asked.
     """
 
     failure: str
     interrupted: bool
-    landed: bool
+    landed: bool | None
     forbidden: bool = False
 
 
@@ -76,22 +78,22 @@ class Flight:
         checks = None if plan.field is None else BeforeTakeOff(supervisor.bus, plan.field, plan.cautions)
         operator = Operator(supervisor.bus, supervisor.run.drones, plan.cameras, plan.limits, self._say, checks)
         if checks is not None and self._look(operator, checks):
-            landed = operator.landed(time.monotonic_ns())
-            return FlightOutcome("", supervisor.interrupts.stop_requested, landed, self._forbidden)
+            standing = stand(operator.team, time.monotonic_ns())
+            return FlightOutcome("", supervisor.interrupts.stop_requested, standing, self._forbidden)
         failure = self._fly(operator)
         landed = self._land(operator)
         return FlightOutcome(failure, supervisor.interrupts.stop_requested, landed)
 
-    def _stand(self) -> bool:
-        """Return whether no drone reports within a moment that it flies; one found flying is landed by its driver."""
+    def _stand(self) -> bool | None:
+        """Return `stand` of what is heard within a moment; a drone that is found flying is landed by its driver."""
         supervisor = self._supervisor
         if supervisor.bus is None:
-            return True  # no driver was started
+            return None  # no driver was started
         team, end_ns = TeamStatus(supervisor.bus, supervisor.run.drones, {}), time.monotonic_ns() + _HEARD_NS
         while (now_ns := time.monotonic_ns()) < end_ns and not supervisor.interrupts.hurry:
             supervisor.step()
             team.update(now_ns)
-        return not team.airborne(now_ns)
+        return stand(team, now_ns)
 
     def _announce(self, severity: Severity, how: str) -> None:
         """Publish the end of the run, and its reason, while other processes still listen."""
@@ -244,12 +246,19 @@ class Flight:
         return not aloft
 
 
+def stand(team: TeamStatus, now_ns: int) -> bool | None:
+    """Return whether all drones report that they stand; None: some are not heard, and none is known to fly."""
+    if team.airborne(now_ns):
+        return False
+    return True if all(member.connected(now_ns) for member in team.members.values()) else None
+
+
 def end_of(outcome: FlightOutcome) -> tuple[Severity, str]:
     """Return severity and text of the end of a run."""
-    landing = ALL_DOWN if outcome.landed else "not every drone reported a landing"
+    landing = _LANDING[outcome.landed]
     if outcome.failure:
         return Severity.ERROR, f"{outcome.failure.splitlines()[0]}; {landing}"
-    severity = Severity.INFO if outcome.landed else Severity.WARNING
+    severity = Severity.WARNING if outcome.landed is False else Severity.INFO
     return severity, f"stopped by the operator; {landing}" if outcome.interrupted else landing
 
 

@@ -26,7 +26,7 @@ from groundstation.supervisor.terminal import Terminal
 class Stage:
     """A flight's view of a supervisor: one drone with telemetry, and a cause that stops the run."""
 
-    def __init__(self, state: m.FlightState, failure: str = "", start: Exception | None = None) -> None:
+    def __init__(self, state: m.FlightState | None, failure: str = "", start: Exception | None = None) -> None:
         exchange = MemoryExchange()
         self.bus, self._drone = MemoryBus(exchange, "lab", "supervisor"), MemoryBus(exchange, "lab", "drone_1")
         self.heard = self._drone.subscribe([t.EVENT])
@@ -42,9 +42,11 @@ class Stage:
             raise self._start
 
     def step(self) -> None:
+        time.sleep(0.01)
+        if self._state is None:  # its driver has not come so far
+            return
         status = m.VehicleStatus(header=self._drone.header("drone_1"), flight_state=self._state, mode="HOVER")
         self._drone.publish(t.VEHICLE_STATUS, status)
-        time.sleep(0.01)
 
     def end_run(self) -> None:
         self.ends = [r.message for r in self.heard.drain() if isinstance(r.message, m.Event)]
@@ -73,6 +75,7 @@ LANDED, FLYING = m.FlightState.LANDED, m.FlightState.FLYING
         ({"state": LANDED, "failure": "it died\nlog"}, "ERROR", "it died; all drones are on the ground"),
         ({"state": LANDED, "start": Interrupted("no")}, "INFO", "stopped by the operator; all drones are on the"),
         ({"state": FLYING, "start": Interrupted("no")}, "WARNING", "stopped by the operator; not every drone reported"),
+        ({"state": None, "start": Interrupted("no")}, "INFO", "stopped by the operator; not every drone was heard"),
         ({"state": LANDED, "start": GroundStationError("no tracker\nlog")}, "ERROR", "its start failed: no tracker"),
     ],
 )

@@ -118,6 +118,16 @@ def test_a_look_that_was_broken_off_does_not_say_that_all_is_well(
     assert _exit_code(outcome, plan_of(lab_field, look_only=True), None, judged_by_landing=False) is code
 
 
+@pytest.mark.parametrize(
+    ("landed", "code"), [(True, ExitCode.OK), (False, ExitCode.FAILED), (None, ExitCode.INTERRUPTED)]
+)
+def test_a_start_that_was_broken_off_says_no_more_of_landings_than_is_known(
+    landed: bool | None, code: ExitCode, lab_field: ResolvedField
+) -> None:
+    outcome = loop.FlightOutcome("", interrupted=True, landed=landed)
+    assert _exit_code(outcome, plan_of(lab_field, look_only=False), None, judged_by_landing=True) is code
+
+
 def test_a_mere_look_by_which_nobody_would_take_off_is_not_well(
     lab_field: ResolvedField, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -81,7 +81,7 @@ function safetyWord(own) {
 export function showBanners() {
   const own = ownAlarms(), all = banners(own), word = safetyWord(own);
   text(byId("safety"), word);
-  const over = store.s.ended && word === "SAFE" && "all are on\nthe ground", unheard = !store.s.safety && !store.s.ended && word === "WATCH" && "nothing is\nheard yet";
+  const over = store.s.ended?.down && word === "SAFE" && "all are on\nthe ground", unheard = !store.s.safety && !store.s.ended && word === "WATCH" && "nothing is\nheard yet";
   text(byId("safety-means"), over || unheard || (word === "WATCH" && !replaying() && !store.s.ended && store.scene && landingWords()) || MEANS[word]);
   byId("safety-box").dataset.level = LEVELS[word];
   document.body.dataset.safety = word;

@@ -6,7 +6,7 @@ filter, which predicts all sightings worse if one delay is wrong.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -16,7 +16,16 @@ from groundstation.bus.messages import Message, Odometry, RelativeObservation
 from groundstation.calibration.camera_delays import onboard_cameras
 from groundstation.calibration.flown import Flown
 from groundstation.calibration.sensor_delay import LEAST_SEEN, Delay
-from groundstation.calibration.time_offset import FAR_S, Part, across, briefly, interpolated, rate_hz, shift_between
+from groundstation.calibration.time_offset import (
+    FAR_S,
+    Change,
+    Part,
+    across,
+    briefly,
+    interpolated,
+    rate_hz,
+    shift_between,
+)
 from groundstation.estimation.models import OdometryRobot
 from groundstation.estimation.parameters import parameters_from_field
 from groundstation.field.drones import FieldDrone
@@ -28,6 +37,8 @@ M = TypeVar("M", bound=Message)
 
 # The delay of a height needs climbs of this much within the window, for this long.
 _CLIMB_M, _CLIMBING_S = 0.2, 10.0
+# Between two resets a heading drifts as a parabola, if it was seen for long enough.
+_DRIFTING = 2
 _TURN = "turn the drones to and fro in its sight, or let the target circle them"
 _DASH = "dash to and fro in sight of a fixed camera, or chase a target that keeps turning back; or fly four minutes"
 _CLIMB = "take off and land some five times in sight of a fixed camera, in one recording"
@@ -48,7 +59,10 @@ _UNSEEN = _Track(np.empty(0), np.empty((0, 3)), np.empty(0))
 
 @dataclass(frozen=True, slots=True)
 class _Own:
-    """A robot as it reported itself: times [s], velocities (n, 2) [base_stabilized], heading, roll, pitch, height."""
+    """A robot as it reported itself: times [s], velocities (n, 2) [base_stabilized], heading, roll, pitch, height.
+
+    resets: of the heading, counted.
+    """
 
     times: Array
     velocities: Array
@@ -56,6 +70,20 @@ class _Own:
     roll: Array
     pitch: Array
     height: Array
+    resets: Array
+
+    def block(self, begin: Array, end: Array) -> Array:
+        """Return the number of resets before each span, NaN where one is in it: under any delay that is searched."""
+        last = len(self.times) - 1
+        first = np.searchsorted(self.times, begin + FAR_S[0], side="right") - 1
+        second = np.searchsorted(self.times, end + FAR_S[1])
+        resets = self.resets[np.clip(first, 0, last)]
+        return np.where(resets == self.resets[np.clip(second, 0, last)], resets, np.nan)
+
+    def without_jumps(self, change: Change, times: Array) -> Change:
+        """Return the changes across which the heading has no reset."""
+        kept = np.isfinite(self.block(times[change.before], times[change.second]))
+        return replace(change, before=change.before[kept], first=change.first[kept], second=change.second[kept])
 
 
 def delays(flown: Flown, resolved: ResolvedField) -> list[Delay]:
@@ -95,10 +123,11 @@ def _own(flown: Flown, drone: str) -> _Own:
     for m in _messages(flown, Odometry):
         if m.header.entity == drone:
             height = np.nan if m.height_m is None else m.height_m
-            rows[m.header.stamp_ns] = (*m.velocity_m_s[:2], m.yaw_rad, m.roll_rad, m.pitch_rad, height)
-    table = np.array([(stamp, *row) for stamp, row in sorted(rows.items())], dtype=np.float64).reshape(-1, 7)
+            rows[m.header.stamp_ns] = (*m.velocity_m_s[:2], m.yaw_rad, m.roll_rad, m.pitch_rad, height, m.reset)
+    table = np.array([(stamp, *row) for stamp, row in sorted(rows.items())], dtype=np.float64).reshape(-1, 8)
     yaw = np.unwrap(table[:, 3])
-    return _Own(_seconds(flown, table[:, 0]), table[:, 1:3], yaw, table[:, 4], table[:, 5], table[:, 6])
+    roll, pitch, height, resets = table[:, 4:].T
+    return _Own(_seconds(flown, table[:, 0]), table[:, 1:3], yaw, roll, pitch, height, resets)
 
 
 def _messages(flown: Flown, kind: type[M]) -> list[M]:
@@ -116,7 +145,8 @@ def _fixed_camera(name: str, camera: WorldCamera, tracks: Mapping[str, _Track], 
         if len(track.times) > LEAST_SEEN and len(own[drone].times) > LEAST_SEEN:
             mine = own[drone]
             turned = interpolated(mine.times, mine.heading[:, None])
-            parts.append(Part(track.times, track.headings[:, None], turned, across(track.times)))
+            change = mine.without_jumps(across(track.times), track.times)
+            parts.append(Part(track.times, track.headings[:, None], turned, change))
     shift = shift_between(parts, scaled=False, within_s=FAR_S)
     if shift is None:
         return Delay(
@@ -139,7 +169,8 @@ def _odometry(drone: str, settings: FieldDrone, habits: OdometryRobot, track: _T
         return [Delay(f"{drone} {kind}", name, now, reason=reason, flight=flight) for kind, name, now, flight in told]
     body = _body_positions(track, own, settings.marker.position_m)
     lasting_s = habits.velocity_bias_correlation_s
-    velocity = shift_between([Part(track.times, body[:, :2], _path(track, own), briefly(track.times, lasting_s))], True)
+    brief = own.without_jumps(briefly(track.times, lasting_s), track.times)
+    velocity = shift_between([Part(track.times, body[:, :2], _path(track, own), brief)], True)
     known = np.isfinite(own.height)
     height = None
     in_a_second = across(track.times)
@@ -169,12 +200,19 @@ def _body_positions(track: _Track, own: _Own, marker_m: tuple[float, float, floa
 
 def _path(track: _Track, own: _Own) -> Callable[[Array, float], Array]:
     """Return (times, delay) -> positions, integrated from the reported velocities under this delay."""
-    at = np.interp(track.times, own.times, own.heading)
-    drift = np.polyfit(track.times, np.unwrap(track.headings - at), 2)
+    gaps = track.headings - np.interp(track.times, own.times, own.heading)
+    blocks, corrected = own.block(track.times, track.times), own.heading.copy()
+    for one in np.unique(own.resets):
+        seen, mine = blocks == one, own.resets == one
+        if seen.any():
+            times = track.times[seen]
+            degree = _DRIFTING if len(times) >= LEAST_SEEN else 0
+            drift = np.polynomial.Polynomial.fit(times, np.unwrap(gaps[seen]), degree)
+            corrected[mine] += drift(np.clip(own.times[mine], times[0], times[-1]))
 
     def path(times: Array, delay_s: float) -> Array:
         then = own.times - delay_s
-        heading = np.interp(then, own.times, own.heading) + np.polyval(drift, then)
+        heading = np.interp(then, own.times, corrected)
         c, s = np.cos(heading), np.sin(heading)
         vx, vy = own.velocities.T
         world = np.column_stack((c * vx - s * vy, s * vx + c * vy))

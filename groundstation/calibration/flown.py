@@ -10,12 +10,14 @@ from groundstation.bus.messages import Message, RelativeObservation
 class Flown:
     """The input messages of a tracker: (now [ns], messages with their keys) by tick, and the clock it read.
 
-    off_pads: drones that may have left their pads before the first tick: where they stand is not known.
+    off_pads: drones that may have left their pads before the first tick: where they stand is not known; doubts: what is
+    damaged or missing in the recording.
     """
 
     ticks: tuple[tuple[int, tuple[tuple[str, Message], ...]], ...]
     clock: str
     off_pads: frozenset[str] = frozenset()
+    doubts: tuple[str, ...] = ()
 
     @property
     def duration_s(self) -> float:

@@ -4,43 +4,81 @@ No planner, no truth: only the tracker's inputs, tick by tick.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import msgspec
 import numpy as np
 
-from groundstation.bus.messages import Message, RelativeObservation
+from groundstation.bus.messages import FlightState, JournalEntry, Message, RelativeObservation, VehicleStatus
 from groundstation.calibration.flown import Flown
 from groundstation.calibration.likeliest import Costs
 from groundstation.errors import OperatorMistake
 from groundstation.estimation.measurement import Correction
 from groundstation.field.resolved import ResolvedField
 from groundstation.replay.source import Source
-from groundstation.replay.tick_log import Tape
+from groundstation.replay.tick_log import Name, Tape
 from groundstation.time_units import NS_PER_S
 from groundstation.tracker import tracker_from_field
 
 # Corrections are weighted by a Student distribution with this many degrees of freedom: outliers must not decide.
 _FREEDOM = 8.0
 _SETTLING_NS = 3 * NS_PER_S
+_DOWN = frozenset({FlightState.LANDED, FlightState.UNKNOWN})
+_SHOWN = 5
+
+
+@dataclass(slots=True, eq=False)
+class _Life:
+    """A life of the tracker as far as it is recorded without gaps; missing: its inputs that are not recorded."""
+
+    first: JournalEntry
+    ticks: list[tuple[int, tuple[tuple[str, Message], ...]]] = field(default_factory=list)
+    missing: list[Name] = field(default_factory=list)
+
+    def statuses(self) -> Iterator[VehicleStatus]:
+        return (message for _, inputs in self.ticks for _, message in inputs if isinstance(message, VehicleStatus))
 
 
 def flown_of(source: Source) -> Flown:
     """Return the longest life of the tracker in a recording; raises OperatorMistake if it is empty."""
-    lives: list[list[tuple[int, tuple[tuple[str, Message], ...]]]] = []
-    clock = ""
-    for tick in Tape(source.state).ticks():
-        clock = tick.entry.header.clock
+    lives: list[_Life] = []
+    tape = Tape(source.state)
+    for tick in tape.ticks():
         if tick.first or not lives:
-            lives.append([])
-        lives[-1].append((tick.entry.now_ns, tuple(tick.inputs)))
-    longest = max(lives, key=len, default=[])
-    flown = Flown(tuple(longest), clock)
-    if not flown.cameras:
+            lives.append(_Life(tick.entry))
+        lives[-1].ticks.append((tick.entry.now_ns, tuple(tick.inputs)))
+        lives[-1].missing += tick.missing
+    longest = max(lives, key=lambda life: len(life.ticks), default=None)
+    flown = None if longest is None else Flown(tuple(longest.ticks), longest.first.header.clock)
+    if longest is None or flown is None or not flown.cameras:
         raise OperatorMistake(
             f"{source.name}: no journal, or no observation of any camera is in it: nothing to measure"
         )
-    return flown
+    doubts = (*_doubts(lives, longest), *source.damage, *tape.damage[:_SHOWN])
+    return replace(flown, off_pads=_off_pads(lives, longest), doubts=doubts)
+
+
+def _off_pads(lives: Sequence[_Life], used: _Life) -> frozenset[str]:
+    """Return the drones that may have flown before this life; all, where its begin is not recorded."""
+    if used.first.tick:
+        return frozenset(status.header.entity for status in used.statuses())
+    earlier = lives[: lives.index(used)]
+    return frozenset(s.header.entity for life in earlier for s in life.statuses() if s.flight_state not in _DOWN)
+
+
+def _doubts(lives: Sequence[_Life], used: _Life) -> Iterator[str]:
+    if len(lives) > 1:
+        part, ticks = lives.index(used) + 1, sum(len(life.ticks) for life in lives)
+        yield (
+            f"the tracker was restarted, or its journal has gaps: used is part {part} of {len(lives)}, "
+            f"{len(used.ticks)} of {ticks} ticks"
+        )
+    if used.first.tick:
+        yield f"the tracker's first {used.first.tick} ticks are not recorded: where the drones stood is not known"
+    if used.missing:
+        key, seq = used.missing[0]
+        yield f"{len(used.missing)} messages that the tracker took in are not recorded: {key} number {seq}"
 
 
 def costs(flown: Flown, resolved: ResolvedField, later_ms: Mapping[str, float]) -> Costs:

@@ -19,7 +19,7 @@ class RecordedFlight(NamedTuple):
 
 
 def recorded_flight(recording: tuple[Path, ...]) -> RecordedFlight:
-    """Return the flight of a recording; raises UsageError if it holds none that can be read."""
+    """Return the flight of a recording, and tell its damage; raises UsageError if it holds none that can be read."""
     from groundstation.cli.kernels import use_flying_kernels
     from groundstation.recording.reader import RecordingError
     from groundstation.replay.source import open_source
@@ -31,6 +31,9 @@ def recorded_flight(recording: tuple[Path, ...]) -> RecordedFlight:
         use_flying_kernels()
         from groundstation.calibration.recorded_likelihood import flown_of
 
-        return RecordedFlight(source.name, field, flown_of(source))
+        flown = flown_of(source)
     except RecordingError as error:
         raise click.UsageError(str(error)) from error
+    for doubt in flown.doubts:
+        click.echo(f"note: {doubt}", err=True)
+    return RecordedFlight(source.name, field, flown)

@@ -41,7 +41,7 @@ class HeartbeatBlock:
     """
 
     def __init__(self, path: Path, slots: int, *, create: bool) -> None:
-        self.path = path
+        self.path = Path(os.path.realpath(path))  # of an inherited descriptor its name, for the last who leaves
         flags = os.O_RDWR | os.O_CLOEXEC | (os.O_CREAT | os.O_EXCL if create else 0)
         self.descriptor = os.open(path, flags, 0o600)
         try:

@@ -12,9 +12,9 @@ from sim_bridge.conformance.subject import subject_of
 
 @pytest.mark.parametrize("wrong", ["udp:127.0.0.1:99999", "udp:127.0.0.1:0", "udp:300.1.1.1:14550", "tcp:127.0.0.1:1"])
 def test_invalid_forward_addresses_are_refused(wrong: str) -> None:
-    with pytest.raises(ValidationError, match=r"port|address|pattern"):
+    with pytest.raises(ValidationError, match=r"port|address|must be udp:ADDRESS:PORT"):
         Mavlink(flavour="px4", system_id=1, forward=wrong)
-    with pytest.raises(ValidationError, match=r"port|address|pattern"):
+    with pytest.raises(ValidationError, match=r"port|address|must be udp:ADDRESS:PORT"):
         VehicleSettings(name="v", system_id=1, flavour="px4", forward=wrong)
     assert Mavlink(flavour="px4", system_id=1, forward="udp:127.0.0.1:14550").forward
 

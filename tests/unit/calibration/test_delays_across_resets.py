@@ -15,7 +15,7 @@ from sim_bridge.study.wrong_figures import WrongFigures
 SENSORS = ("ceiling", "drone_1 velocity", "drone_2 velocity")
 
 
-class Jumping(Lab):
+class Jumping(Lab):  # type: ignore[misc]  # its module lies beside, where mypy does not look
     """The swinging lab, seen by its ceiling camera alone, 25 times a second; all headings jump at these times [s]."""
 
     jumps_s: tuple[float, ...] = ()

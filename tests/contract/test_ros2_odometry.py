@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from free_port import free_port
+from stream_child import StreamChild
 from zenoh_peer import opened
 
 pytest.importorskip("rosbags")
@@ -28,33 +29,13 @@ KIND, HOST, MS = "nav_msgs/msg/Odometry", "127.0.0.1", 1_000_000
 MOVING = vehicle.OdometryMessage(5_000_000_006, (1.0, 2.0, 0.0), (0.0, 0.0, 0.0, 1.0), (0.3, 0.0, 0.0), (0.0, 0.0, 0.5))
 
 
-class FakeChild:
-    stop_requested, supervisor_alive, supervisor_fresh, spoken_for_ns = False, True, True, 0
-    name, section = "cart_odometry", ""
-
-    def __init__(self, bus: MemoryBus) -> None:
-        self.bus, self.told = bus, list[str]()
-
-    def ready(self, detail: str = "") -> None:
-        self.told.append("READY")
-
-    def degrade(self, detail: str, works: bool = True) -> None:
-        self.told.append(f"DEGRADED {detail}")
-
-    def event(self, severity: str, text: str, remedy: str = "", entity: str | None = None) -> None:
-        self.told.append(f"{text}; {remedy}")
-
-    def beat(self) -> None: ...
-    def tick_status(self, ticks: int = 0, overruns: int = 0, overflowed: int = 0) -> None: ...
-
-
 class Rig:
     """The driver, a subscriber, and a way to run it until a condition holds."""
 
     def __init__(self, port: int) -> None:
         exchange = MemoryExchange()
         self.heard = MemoryBus(exchange, "lab", "ears").subscribe([REPORTED_MOTION, CAMERA_STATUS])
-        self.child = FakeChild(MemoryBus(exchange, "lab", "cart_odometry"))
+        self.child = StreamChild(MemoryBus(exchange, "lab", "cart_odometry"), "cart_odometry")
         source = f"ros2://{HOST}:{port}/cart/odom?domain=7"
         section = OdometrySection(
             name="cart_odometry",

@@ -7,6 +7,7 @@ import msgspec
 import numpy as np
 
 from groundstation.bus.messages import FlightState, Header, Message, Odometry, RelativeObservation, VehicleStatus
+from groundstation.bus.topics import OBSERVATION, ODOMETRY, VEHICLE_STATUS
 from groundstation.calibration.flown import Flown
 from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.rotations import (
@@ -20,6 +21,7 @@ from sim_bridge.study.wrong_figures import WrongFigures
 SECONDS, STAND_S, CLOCK = 12.0, 2.0, "c"
 NOISE = np.array([0.004, 0.004, 0.006, 0.01])
 STANDING_M = 0.1
+TOPIC_OF = {"status": VEHICLE_STATUS, "odometry": ODOMETRY, "observation": OBSERVATION}
 
 
 class Lab:

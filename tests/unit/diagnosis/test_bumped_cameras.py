@@ -5,7 +5,7 @@ import math
 import msgspec
 import numpy as np
 import pytest
-from swinging_lab import Lab
+from swinging_lab import TOPIC_OF, Lab
 
 from groundstation.bus import clock
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
@@ -18,7 +18,7 @@ from groundstation.bus.messages import (
     RelativeObservation,
     VehicleStatus,
 )
-from groundstation.bus.topics import BELIEF, OBSERVATION, ODOMETRY, VEHICLE_STATUS
+from groundstation.bus.topics import BELIEF
 from groundstation.diagnosis.judging import AtOnce
 from groundstation.diagnosis.loop import Diagnosis
 from groundstation.diagnosis.window import Window
@@ -26,7 +26,6 @@ from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.rotations import rotation_from_euler
 from sim_bridge.study.wrong_figures import WrongFigures
 
-TOPIC_OF = {"status": VEHICLE_STATUS, "odometry": ODOMETRY, "observation": OBSERVATION}
 S = 1_000_000_000
 BUMPED_S, FOUND_S = 108.0, 109.2
 TURN = rotation_from_euler(math.radians(4.0), math.radians(3.0), math.radians(6.0))

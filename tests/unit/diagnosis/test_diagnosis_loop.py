@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import msgspec
 import pytest
-from swinging_lab import Lab
+from swinging_lab import TOPIC_OF, Lab
 
 from groundstation.bus import clock
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
@@ -20,7 +20,7 @@ from groundstation.bus.messages import (
     Suspicion,
     VehicleStatus,
 )
-from groundstation.bus.topics import OBSERVATION, ODOMETRY, SUSPICION, VEHICLE_STATUS
+from groundstation.bus.topics import SUSPICION, VEHICLE_STATUS
 from groundstation.calibration.team_record import team_record
 from groundstation.diagnosis.judging import AtOnce, OnThread
 from groundstation.diagnosis.loop import Diagnosis
@@ -29,7 +29,6 @@ from groundstation.diagnosis.window import Window
 from groundstation.field.resolved import ResolvedField
 from sim_bridge.study.wrong_figures import WrongFigures
 
-TOPIC_OF = {"status": VEHICLE_STATUS, "odometry": ODOMETRY, "observation": OBSERVATION}
 S = 1_000_000_000
 
 

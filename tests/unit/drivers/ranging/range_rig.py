@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from stream_child import StreamChild
 
 from drivers.ranging.driver import RangingDriver
 from drivers.ranging.gateway import Gateway
@@ -32,33 +33,13 @@ WIDE = {"x_m": (-3.0, 3.0), "y_m": (-3.0, 3.0), "z_m": (-0.1, 2.5)}
 PLACES = {"drone_1": (0.5, 0.2, 1.5), "cart": (0.0, 0.0, 0.0), "drone_2": (-0.9, 0.1, 1.4)}
 
 
-class FakeChild:
-    stop_requested, supervisor_alive, supervisor_fresh, spoken_for_ns = False, True, True, 0
-
-    def __init__(self, bus: MemoryBus, section: str) -> None:
-        self.bus, self.name, self.section = bus, "uwb", section
-        self.told: list[str] = []
-
-    def ready(self, detail: str = "") -> None:
-        self.told.append("READY")
-
-    def degrade(self, detail: str, works: bool = True) -> None:
-        self.told.append(f"DEGRADED {detail}")
-
-    def event(self, severity: str, text: str, remedy: str = "", entity: str | None = None) -> None:
-        self.told.append(f"{text}; {remedy}")
-
-    def beat(self) -> None: ...
-    def tick_status(self, ticks: int = 0, overruns: int = 0, overflowed: int = 0) -> None: ...
-
-
 @dataclass
 class Rig:
     """Emulated gateway, driver, and a subscriber; `run` advances both, the gateway on a manual clock."""
 
     gateway: RangeGateway
     driver: RangingDriver
-    child: FakeChild
+    child: StreamChild
     heard: Any
     clock: SimpleNamespace
 
@@ -105,7 +86,7 @@ def opened(faults: Iterable[Fault], monkeypatch: pytest.MonkeyPatch) -> Iterator
         }
     )
     exchange = MemoryExchange()
-    child: Any = FakeChild(MemoryBus(exchange, "lab", "uwb"), section.model_dump_json())
+    child: Any = StreamChild(MemoryBus(exchange, "lab", "uwb"), "uwb", section.model_dump_json())
     heard = MemoryBus(exchange, "lab", "test").subscribe([RANGE, CAMERA_STATUS])
     client = Gateway(*parse_source(section.source))
     yield Rig(gateway, RangingDriver(child, section, client), child, heard, clock)

@@ -39,12 +39,12 @@ class Passage:
 
 def view_around(place: Array, views: Sequence[Rectangle]) -> Rectangle | None:
     """Return the view in which a place (2) [m] lies deepest, outside of all the nearest one; None without views."""
-    return max(views, key=lambda view: _depth_m(place, view), default=None)
+    return max(views, key=lambda view: view.depth_m(*place.tolist()), default=None)
 
 
 def is_inside(place: Array, views: Sequence[Rectangle]) -> bool:
     """Return whether a place (2) [m] lies in a view."""
-    return any(_depth_m(place, view) >= 0.0 for view in views)
+    return any(view.depth_m(*place.tolist()) >= 0.0 for view in views)
 
 
 def passage(place: Array, velocity: Array, views: Sequence[Rectangle]) -> Passage | None:
@@ -53,7 +53,7 @@ def passage(place: Array, velocity: Array, views: Sequence[Rectangle]) -> Passag
     If the way misses all other views, that along the larger component of the velocity counts, else the smaller one.
     """
     home = view_around(place, views)
-    if home is None or _depth_m(place, home) < 0.0:
+    if home is None or home.depth_m(*place.tolist()) < 0.0:
         return None
     others = [view for view in views if view is not home]
     ways = (velocity, *sorted(np.diag(velocity), key=np.linalg.norm, reverse=True))
@@ -67,8 +67,9 @@ def _passage(
 ) -> Passage | None:
     size = math.hypot(*velocity)
     way = velocity / size
-    _, leaves_m = _inside_m(place, way, home)
-    spans = (_inside_m(place, way, view) for view in others)
+    (x, y), (ahead, aside) = place.tolist(), way.tolist()
+    _, leaves_m = home.span((x, y), (ahead, aside))
+    spans = (view.span((x, y), (ahead, aside)) for view in others)
     reached = [first for first, last in spans if first <= last and last > leaves_m]
     return Passage(leaves_m, max(0.0, min(reached)), way, size / speed) if reached else None
 
@@ -117,20 +118,3 @@ def into(view: Rectangle, place: Array, velocity: Array, most: float) -> Array:
     straight = np.where(below, np.maximum(straight, velocity), np.minimum(straight, velocity))
     along = np.clip(np.clip(velocity, -_ASIDE_M_S, _ASIDE_M_S), low - place, high - place)
     return np.asarray(np.where(below | above, straight, along))
-
-
-def _depth_m(place: Array, view: Rectangle) -> float:
-    x, y = float(place[0]), float(place[1])
-    return min(x - view.x_m[0], view.x_m[1] - x, y - view.y_m[0], view.y_m[1] - y)
-
-
-def _inside_m(place: Array, way: Array, view: Rectangle) -> tuple[float, float]:
-    """Return where a line enters and leaves a view [m from its begin]; if it misses the view, the first is larger."""
-    first, last = -math.inf, math.inf
-    for at, along, (low, high) in zip(place.tolist(), way.tolist(), (view.x_m, view.y_m), strict=True):
-        if abs(along) < 1e-9:
-            first, last = (first, last) if low <= at <= high else (math.inf, -math.inf)
-            continue
-        ends = sorted(((low - at) / along, (high - at) / along))
-        first, last = max(first, ends[0]), min(last, ends[1])
-    return first, last

@@ -6,7 +6,10 @@ from dataclasses import dataclass, field
 
 from groundstation.control.search_height import return_height_m, search_height_m
 from groundstation.field.resolved import ResolvedField
+from groundstation.planning.detours import STRAIGHT, Detours, detours_from_field
 from groundstation.planning.parameters import MotionLimits, limits_from_field
+from groundstation.sensing.from_field import boxes_from_field
+from groundstation.sensing.models import Box
 from groundstation.vectors import Interval, Vector2
 from groundstation.vehicles import kind_named
 
@@ -30,7 +33,8 @@ class ControlParameters:
     regain_after_s: when a target has been unseen for this long, the robots that track it turn to it and back off;
     hint_std_m: no plan uses a target with a larger deviation; planned_s: how far plans reach; max_plan_age_s: controls
     of an older plan are no longer flown; fed: robots that fly on our estimate; untied_after_s: if no sensor locates
-    them for this long, they turn back; the next sighting takes 0.3 s at most, where there is one.
+    them for this long, they turn back; the next sighting takes 0.3 s at most, where there is one. detours: ways round
+    obstacles to stands.
     """
 
     search_height_m: float
@@ -59,6 +63,7 @@ class ControlParameters:
     fed: frozenset[str] = frozenset()
     untied_after_s: float = 0.4
     return_below_m: float = math.inf
+    detours: Detours = STRAIGHT
 
     @property
     def return_height_m(self) -> float:
@@ -79,7 +84,7 @@ class SafetyParameters:
     commands that may not have been noticed yet; most_drift_m_s: largest drift that is countered.
     max_known_velocity_error_m_s, max_velocity_error_m_s: largest mean and rms error of the odometry, by the belief,
     with which a robot may fly unseen; robots that fly on our estimate are exempt. pads: where robots take off
-    [x, y; world].
+    [x, y; world]. obstacles: what robots keep their centres obstacle_distance_m away from.
     """
 
     fence: tuple[Interval, Interval, Interval]
@@ -95,6 +100,8 @@ class SafetyParameters:
     most_drift_m_s: float = 0.2
     limits: Mapping[str, MotionLimits] = field(default_factory=dict)
     pads: Mapping[str, Vector2] = field(default_factory=dict)
+    obstacles: tuple[Box, ...] = ()
+    obstacle_distance_m: float = 0.3
 
     def limits_of(self, robot: str) -> MotionLimits:
         """Return a robot's motion limits."""
@@ -121,6 +128,7 @@ def control_from_field(field: ResolvedField) -> ControlParameters:
         return_within_s=0.5 * safety.unseen_land_at_last_s,
         planned_s=planner.horizon_steps * planner.step_s,
         max_plan_age_s=max(1.0, 3.0 / planner.rate_hz),
+        detours=detours_from_field(field),
         fed=frozenset(n for n, drone in field.drones.items() if kind_named(drone.kind).habits.flies_on_estimate),
     )
 
@@ -134,4 +142,6 @@ def safety_from_field(field: ResolvedField) -> SafetyParameters:
         max_position_std_m=safety.max_position_std_m,
         limits=limits_from_field(field),
         pads={name: drone.pad_m for name, drone in field.drones.items()},
+        obstacles=boxes_from_field(field),
+        obstacle_distance_m=safety.obstacle_distance_m,
     )

@@ -45,7 +45,8 @@ def is_lost(
     view = view_of(float(mean[0]), float(mean[1]), name, parameters.return_height_m, sensors)
     if view is None or unseen_s <= parameters.return_soonest_s:
         return spread > parameters.return_std_m
-    way_m = float(way_back_m(mean[:2], view))
+    x, y, z = (float(value) for value in mean[:3])
+    way_m = float(way_back_m(mean[:2], view)) + parameters.detours.extra_m((x, y), view.center, z)
     return left_s < way_m / parameters.return_speed_m_s + parameters.return_margin_s
 
 

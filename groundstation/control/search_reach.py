@@ -22,19 +22,20 @@ _IN_VIEW = 0.5 * FOUND_SHARE  # at the border of a view: beyond it markers are f
 def permitted(
     name: str, places: Array, parameters: SearchParameters, control: ControlParameters, sensors: SensorSuite
 ) -> BoolArray:
-    """Return to which places (n, 2) a robot may ever fly in a search: out of a fixed view, and back in time.
+    """Return to which places (n, 2) a robot may ever fly in a search: clear of obstacles, and back in view in time.
 
     It leaves the view known as well as a camera sees it. One that flies on our estimate does not leave it at all.
     """
     views = sensors.root_views(control.return_height_m + sensors.marker_height_m[name])
+    clear = control.detours.clear_of(places, control.search_height_m)
     if not views:
-        return np.ones(len(places), dtype=np.bool_)
+        return clear
     way_m = np.min([way_back_m(places, view.shrunk(VIEW_INSET_M)) for view in views], axis=0)
     if name in control.fed:
-        return np.asarray(way_m <= VIEW_INSET_M)
+        return np.asarray(clear & (way_m <= VIEW_INSET_M))
     left_s = time_left_s(control.seen_std_m, 0.0, control) - control.return_margin_s - parameters.look_s
     needed_s = way_m / parameters.speed_m_s + way_m / control.return_speed_m_s
-    return np.asarray((way_m == 0.0) | (needed_s <= left_s))
+    return np.asarray(clear & ((way_m == 0.0) | (needed_s <= left_s)))
 
 
 def shown_from(grid: RoomGrid, lattice: Lattice, free: BoolArray, footprint: Footprint) -> Cells:

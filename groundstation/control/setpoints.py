@@ -208,16 +208,18 @@ def _risen_in_view(name: str, stand: Stand, now: Moment) -> Stand:
 
 
 def _towards(name: str, stand: Stand, phase: FlightMode, now: Moment) -> Setpoint:
-    """Return a setpoint that flies to a stand and turns to its heading, keeping off other robots.
+    """Return a setpoint that flies to a stand and turns to its heading, past obstacles and keeping off other robots.
 
     From a returning robot's velocity its drift is subtracted, up to the largest credible one.
     """
     mean, parameters = now.belief.mean_of(name), now.parameters
     drift_m_s = now.sight.drifts_m_s.get(name, STILL) if phase is FlightMode.RETURN else STILL
-    velocity = _STAND_GAIN * np.array([stand.x - mean[0], stand.y - mean[1], 0.0])
-    speed = float(np.linalg.norm(velocity))
+    x, y, z = (float(value) for value in mean[:3])
+    way = parameters.detours.way((x, y), (stand.x, stand.y), z)
     most = parameters.return_speed_m_s if phase is FlightMode.RETURN else parameters.search_speed_m_s
-    velocity *= min(1.0, most / max(speed, 1e-9))
+    velocity = _STAND_GAIN * np.array([way.next_m[0] - x, way.next_m[1] - y, 0.0])
+    speed = max(float(np.linalg.norm(velocity)), 1e-9)
+    velocity *= min(1.0 if way.is_straight else way.length_m / speed, most / speed)
     size = float(np.hypot(*drift_m_s[:2]))
     velocity[:2] -= drift_m_s[:2] * min(1.0, parameters.return_drift_m_s / max(size, 1e-9))
     for other in now.robots:
@@ -230,7 +232,7 @@ def _towards(name: str, stand: Stand, phase: FlightMode, now: Moment) -> Setpoin
     limit = stand.turn_rad_s or parameters.search_yaw_rate_rad_s
     body = stabilized_from_world(velocity, float(mean[3]))
     rate = min(max(rate, -limit), limit)
-    ahead_m, level_m = math.dist((stand.x, stand.y), mean[:2]), _search_level_m(name, phase, now)
+    ahead_m, level_m = way.length_m, _search_level_m(name, phase, now)
     kept, level_m = kept_in_sight(name, (float(body[0]), float(body[1])), level_m, ahead_m, now)
     return _with_height(name, kept, rate, level_m, phase, now)
 

@@ -95,6 +95,7 @@ class Search:
         # What is in a box is never seen: looking there would be in vain, and never end.
         self._floor = outside_boxes(self._boxes, self.grid.xs, self.grid.ys, marker_m)
         self._lattice = lattice_of(self.grid, parameters)
+        self._clear = control.detours.clear_of(self._lattice.places, control.search_height_m)
         fixed = [rows[0] for name, rows in self._cameras.items() if name in sensors.world]
         self._shown = self._floor & showable(
             self.grid, self._lattice, self._footprints, parameters, control, sensors, marker_m, fixed
@@ -173,7 +174,10 @@ class Search:
         poses = {name: belief.mean_of(name)[:4] for name in robots}
         order = robots_in_order(robots, chances, poses, self.grid)
         footprints = {name: self._footprints[name] for name in order}
-        allowed_s = {name: self._excursions.allowed_s(name, belief, self._lattice.places) for name in robots}
+        allowed_s = {
+            name: np.where(self._clear, self._excursions.allowed_s(name, belief, self._lattice.places), -1.0)
+            for name in robots
+        }
         held, parameters = self._outlook.sweeps, self.parameters
         choose = choose_stands
         if all(self.targets[name].near for name in targets):

@@ -1,4 +1,4 @@
-"""The half-spaces of velocities that keep a robot in the fence and away from others. Pure.
+"""The half-spaces of velocities that keep a robot in the fence, and away from obstacles and others. Pure.
 
 Why they do: docs/explanation/safety.md#why-it-holds.
 """
@@ -13,11 +13,14 @@ from groundstation.arrays import Array
 from groundstation.control.parameters import SafetyParameters
 from groundstation.control.shafts import Shaft
 from groundstation.estimation.belief import JointBelief
+from groundstation.sensing.models import Box
 from groundstation.vectors import Vector3, difference, dot
 
 # A shorter way has no direction.
 _NOWHERE_M = 1e-6
 _AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+# Directions into a box through each of its faces.
+_INWARDS = ((1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0))
 
 
 class Wall(NamedTuple):
@@ -35,8 +38,9 @@ def walls_around(
     velocities: Mapping[str, Array],
     shafts: Mapping[str, Shaft],
 ) -> list[Wall]:
-    """Return the walls of a robot's fence, of each other robot in the belief, and of each shaft."""
-    walls = _fence(robot, belief, parameters, velocities) + _others(robot, belief, parameters, velocities)
+    """Return the walls of a robot's fence, of each obstacle, of each other robot in the belief, and of each shaft."""
+    walls = _fence(robot, belief, parameters, velocities) + _obstacles(robot, belief, parameters, velocities)
+    walls += _others(robot, belief, parameters, velocities)
     return walls + _shafts(robot, belief, parameters, velocities, shafts)
 
 
@@ -102,6 +106,32 @@ def _fence(
         walls.append(Wall("fence", normal, max(0.0, high - keep - at) / time))
         walls.append(Wall("fence", (-normal[0], -normal[1], -normal[2]), max(0.0, at - low - keep) / time))
     return walls
+
+
+def _obstacles(
+    robot: str, belief: JointBelief, parameters: SafetyParameters, velocities: Mapping[str, Array]
+) -> list[Wall]:
+    """Return a wall for each obstacle: the side, or the top, of which the robot's point of rest is farthest outside."""
+    if not parameters.obstacles:
+        return []
+    rest, time = _braking(robot, belief, parameters, velocities)
+    place, (x, y, z) = place_of(robot, belief), (math.sqrt(variance) for variance in _variances(robot, belief))
+    keep = parameters.obstacle_distance_m + parameters.margin_m
+    keeps = [keep + parameters.sigmas * std for std in (x, x, y, y, z)]
+    walls = []
+    for box in parameters.obstacles:
+        gaps = [gap - keep for gap, keep in zip(_gaps(box, rest), keeps, strict=True)]
+        beside = [side for side, gap in enumerate(_gaps(box, place)) if gap > 0.0] or range(len(gaps))
+        side = max(beside, key=gaps.__getitem__)
+        walls.append(Wall("obstacle", _INWARDS[side], max(0.0, gaps[side]) / time))
+    return walls
+
+
+def _gaps(box: Box, place: Vector3) -> tuple[float, float, float, float, float]:
+    """Return how far a place is outside of each face of a box, in the order of _INWARDS [m; negative: behind it]."""
+    (x, y), (length, width, height) = box.centre_m, box.size_m
+    across, along = place[0] - x, place[1] - y
+    return -across - length / 2, across - length / 2, -along - width / 2, along - width / 2, place[2] - height
 
 
 def _others(

@@ -44,6 +44,11 @@ class SafetyValues(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     max_position_std_m: float = 0.6
 
     @property
+    def obstacle_distance_m(self) -> float:
+        """Return the least distance of a drone's centre from obstacles [m]: the separation is that of two bodies."""
+        return 0.5 * self.min_separation_m
+
+    @property
     def unseen_land_at_last_s(self) -> float:
         """Return the time unseen after which a drone lands even if its place is well known [s]."""
         return 3.0 * self.unseen_land_after_s

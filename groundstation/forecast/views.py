@@ -185,7 +185,9 @@ class Views:
         ]
         if not inside:
             return Obstruction.OUT_OF_FENCE
-        free = [pose for pose in inside if not self.in_box((float(pose[0]), float(pose[1])), float(pose[2]))]
+        free = np.array(inside)
+        for box in self._team.sensors.obstacles:
+            free = free[box.distances_m(free[:, :3]) >= self._team.planner.obstacle_m]
         seeing = [(sure, pose) for pose in free if (sure := self.sees(robot, pose, point)) > 0.0]
         return seeing or Obstruction.HIDDEN
 

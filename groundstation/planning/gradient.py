@@ -125,6 +125,7 @@ def go_back(problem: CostProblem, tape: Tape, gradient: Vector) -> None:
             W[r, r] += 2.0 * discount * options.robot_weight
             for axis in range(2):
                 state[r, axis] += discount * tape.penalties[i, r, axis]
+            state[r, HEIGHT] += discount * tape.penalties[i, r, 2]
         between(tape.covariances[i], W, M, product)
         undo_weights(M, problem, tape, i, state, yaws, work)
         undo_move(state, tape.motion[i], options.step_s, gradient)

@@ -10,6 +10,9 @@ from groundstation.field.resolved import ResolvedField
 from groundstation.field.targets import Target, WeightedTarget
 from groundstation.sensing.models import Rectangle
 
+SOFT_WALL_M = 0.3
+"""Width of what plans avoid, before the distance that a robot must keep."""
+
 NO_FENCE = Rectangle((-math.inf, math.inf), (-math.inf, math.inf))
 
 
@@ -54,10 +57,10 @@ class PlannerParameters:
     level_heights_m: row n-1 holds the heights, top first, from which the search for a topology of n levels begins;
     topologies with more levels are not considered, and heights are chosen between the lowest and the highest of all.
     hysteresis: relative gain required of a new topology; within min_dwell_s of the last switch it is urgent_gain.
-    fence: drones' box in the floor plan, kept fence_margin_m away from (softly). evaluation_budget and tolerance: of
-    one solve. Of the starts of all topologies, at most `starts` of each, the `solves` cheapest get first_look
-    evaluations, and the `finals` best of those go on to the end. target_weights: relative weights of targets'
-    uncertainties in the cost, 1 by default.
+    fence: drones' box in the floor plan, kept fence_margin_m away from (softly), as obstacles are by obstacle_m.
+    evaluation_budget and tolerance: of one solve. Of the starts of all topologies, at most `starts` of each, the
+    `solves` cheapest get first_look evaluations, and the `finals` best of those go on to the end. target_weights:
+    relative weights of targets' uncertainties in the cost, 1 by default.
     """
 
     level_heights_m: tuple[tuple[float, ...], ...]
@@ -69,7 +72,8 @@ class PlannerParameters:
     urgent_gain: float = 0.5
     separation_m: float = 1.0
     fence: Rectangle = NO_FENCE
-    fence_margin_m: float = 0.3
+    fence_margin_m: float = SOFT_WALL_M
+    obstacle_m: float = 0.3 + SOFT_WALL_M
     limits: Mapping[str, MotionLimits] = field(default_factory=dict)
     noise: ProcessNoise = ProcessNoise()
     weights: Weights = Weights()
@@ -122,6 +126,7 @@ def parameters_from_field(field: ResolvedField) -> PlannerParameters:
         hysteresis=planner.hysteresis,
         separation_m=planner.separation_m,
         fence=Rectangle(fence.x_m, fence.y_m),
+        obstacle_m=field.safety.obstacle_distance_m + SOFT_WALL_M,
         limits=limits_from_field(field),
         noise=_noise(field),
         target_weights={name: _weight(target) for name, target in field.tracked.items()},

@@ -123,6 +123,7 @@ class ProblemBuilder:
             p.noise.robot_position, p.noise.robot_yaw, p.noise.target_acceleration,
             p.weights.repulsion, p.separation_m, p.weights.fence,
             np.array([[p.fence.x_m[0] + low, p.fence.x_m[1] + high], [p.fence.y_m[0] + low, p.fence.y_m[1] + high]]),
+            p.obstacle_m,
             p.weights.effort, p.weights.robots, max(1.0, sensors.sightings_per_s * p.step_s), self.height_m,
         )  # fmt: skip
         self._of: PlanningScene | None = None

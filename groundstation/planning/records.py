@@ -39,8 +39,8 @@ class CostOptions(NamedTuple):
     """Settings of the cost that all topologies share.
 
     Noise densities: robot_position [m^2/s], robot_yaw [rad^2/s], target_acceleration [m^2/s^3]. The fence is where the
-    soft wall begins [m; world]. readings: sightings per step of a marker in view. height_m: origin of the heights among
-    the controls.
+    soft wall begins [m; world]; obstacle_m: how far from an obstacle its soft wall begins, with the fence's weight.
+    readings: sightings per step of a marker in view. height_m: origin of the heights among the controls.
     """
 
     steps: int
@@ -53,6 +53,7 @@ class CostOptions(NamedTuple):
     separation_m: float
     fence_weight: float
     fence: Matrix  # (2, 2): low and high of x, then of y
+    obstacle_m: float
     effort_weight: float
     robot_weight: float
     readings: float
@@ -64,7 +65,7 @@ class CostProblem(NamedTuple):
 
     scale (4 n): bounds of the controls, for the effort; poses (n, 4): x, y, z, yaw; targets (k, 4): x, y, vx, vy;
     climbs (n): climb limit of each [m/s]; prior (d, d), per axis; yaw_variances (n) [rad^2]; markers (n + k): heights
-    above the robot's centre or the floor [m]; target_weights (k), in state order; boxes: obstacles that hide markers.
+    above the robot's centre or the floor [m]; target_weights (k), in state order; boxes: obstacles, which hide markers.
     """
 
     scale: Vector
@@ -112,7 +113,7 @@ class Tape(NamedTuple):
     path (h + 1, n, 6): x, y, yaw, its cosine and sine, z; motion (h, n, 4): displacement, direction, and the derivative
     of z by the commanded height; sightings (h m): by step, then edge; informations (h, d, d) before and covariances (h,
     d, d) after each correction, padded to whole vectors; yaws_before, yaws_after (h, n): variances; penalties (h, n,
-    3): their derivatives by x, y.
+    3): their derivatives by x, y, z.
     """
 
     path: MatrixStack

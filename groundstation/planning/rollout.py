@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from groundstation.arrays import Matrix, Vector
-from groundstation.kernel import kernel
+from groundstation.kernel import Rows, kernel
 from groundstation.planning.covariance import invert, predict, room_for
 from groundstation.planning.dense import padded
 from groundstation.planning.records import (
@@ -27,6 +27,7 @@ from groundstation.planning.records import (
     Z,
 )
 from groundstation.planning.sightings import look_around, views_of
+from groundstation.sensing.occlusion import BoxRow
 
 _EDGE_TAPE = EdgeTape.dtype
 
@@ -71,8 +72,27 @@ def climb(u: Vector, problem: CostProblem, i: int, after: Matrix, motion: Matrix
 
 
 @kernel()
-def penalty(path: Matrix, options: CostOptions, gradient: Matrix) -> float:
-    """Return repulsion between robots and soft fence at one step; adds d/d(x, y) to gradient (n, 3)."""
+def soft_box(box: BoxRow, place: Vector, options: CostOptions, gradient: Vector) -> float:
+    """Return the penalty of a place too near to a box, by the way out; adds d/d(x, y, z)."""
+    x, y, z = place[X] - box.middle[0], place[Y] - box.middle[1], place[Z] - box.middle[2]
+    out_x, out_y, out_z = abs(x) - box.half[0], abs(y) - box.half[1], z - box.half[2]
+    depth = options.obstacle_m - max(out_x, max(out_y, out_z))
+    if depth <= 0.0:
+        return 0.0
+    weight: float = options.fence_weight
+    slope = -2.0 * weight * depth
+    if out_z >= max(out_x, out_y):
+        gradient[2] += slope
+    elif out_x >= out_y:
+        gradient[0] += slope if x > 0.0 else -slope
+    else:
+        gradient[1] += slope if y > 0.0 else -slope
+    return float(weight * depth * depth)
+
+
+@kernel()
+def penalty(path: Matrix, boxes: Rows[BoxRow], options: CostOptions, gradient: Matrix) -> float:
+    """Return repulsion between robots, soft fence and soft boxes at one step; adds d/d(x, y, z) to gradient (n, 3)."""
     n, cost = path.shape[0], 0.0
     weight, reach, wall = options.repulsion_weight, options.separation_m, options.fence_weight
     for a in range(n):
@@ -94,6 +114,8 @@ def penalty(path: Matrix, options: CostOptions, gradient: Matrix) -> float:
             if out > 0.0:
                 cost += wall * out * out
                 gradient[a, axis] += 2.0 * wall * (high if high > low else -low)
+        for k in range(boxes.shape[0]):
+            cost += soft_box(boxes[k], path[a], options, gradient[a])
     return cost
 
 
@@ -176,5 +198,5 @@ def roll_out(u: Vector, problem: CostProblem, tape: Tape) -> tuple[float, float]
         for r in range(n):
             extra += 2.0 * discount * options.robot_weight * P[r, r]
         penalties[i, :, :] = 0.0
-        extra += discount * penalty(path[i + 1], options, penalties[i])
+        extra += discount * penalty(path[i + 1], problem.boxes, options, penalties[i])
     return uncertainty, extra

@@ -7,6 +7,7 @@ import numpy as np
 
 from groundstation.arrays import Array
 from groundstation.geometry.angles import difference
+from groundstation.planning.detours import Detours
 from groundstation.planning.parameters import PlannerParameters
 from groundstation.planning.problem import PlanningScene
 from groundstation.planning.records import HEIGHT, ROBOT_CONTROLS
@@ -36,6 +37,7 @@ class Starts:
         self._scale: list[float] = scale.tolist()
         self._poses: list[list[float]] = scene.poses.tolist()
         self._views: dict[float, list[Rectangle]] = {}
+        self._detours = Detours(sensors.obstacles, parameters.obstacle_m, parameters.fence)
 
     def of(self, topology: Topology, known: Array | None, moved: Collection[str]) -> list[Array]:
         """Return starts of a topology: the known optimum of another one, which differs by the robots `moved`.
@@ -98,10 +100,14 @@ class Starts:
         return self._views[above_m]
 
     def _steer(self, x: Array, i: int, goal: Point) -> None:
-        """Write the controls that bring a robot to (x, y, yaw) within the horizon, or as near as possible."""
-        px, py, yaw = goal
+        """Write the controls that bring a robot to (x, y, yaw) within the horizon, or as near as possible.
+
+        Past an obstacle it goes to the first corner of its way.
+        """
+        *end, yaw = goal
         at = ROBOT_CONTROLS * i
-        (x_m, y_m, _, yaw_rad), horizon_s = self._poses[i], self._parameters.horizon_s
+        (x_m, y_m, z_m, yaw_rad), horizon_s = self._poses[i], self._parameters.horizon_s
+        px, py = self._detours.way((x_m, y_m), (end[0], end[1]), z_m).next_m
         forward, left, turn = self._scale[at : at + HEIGHT]
         rate = max(-1.0, min(1.0, difference(yaw, yaw_rad) / horizon_s / turn))
         middle = yaw_rad + 0.5 * rate * turn * horizon_s

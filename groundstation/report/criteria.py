@@ -26,7 +26,7 @@ MAX_STARVED_S = 1.0
 _MOST_WAITED = 0.2
 # Processes beside a flight, at low priority.
 _IN_NO_HURRY = frozenset({"diagnosis", "recorder", "console"})
-_SAFE = frozenset({"max_fence_violation_m", "min_separation_m", "landed", "cuts_in_flight"})
+_SAFE = frozenset({"max_fence_violation_m", "min_obstacle_m", "min_separation_m", "landed", "cuts_in_flight"})
 MAX_AIRBORNE_S = 40.0
 # Drones take off one by one. An emulated AR.Drone takes 5.2 s until it is seen in flight, on a full machine 7 s.
 AIRBORNE_S_PER_DRONE = 10.0
@@ -114,9 +114,11 @@ def _of_the_targets(figures: RunFigures, field: ResolvedField, expected: Expecta
 
 
 def _of_safety(figures: RunFigures, field: ResolvedField, *, tracked: bool) -> Iterator[Criterion]:
-    """Judge what was measured of fence, separation and landing; tracked: a truth of the targets asks for all three."""
+    """Judge what was measured of fence, obstacles, separation and landing; tracked: the targets have a truth."""
     if tracked or figures.max_fence_violation_m is not None:
         yield _below("max_fence_violation_m", figures.max_fence_violation_m, 0.0)
+    if figures.min_obstacle_m is not None:
+        yield _above("min_obstacle_m", figures.min_obstacle_m, field.safety.obstacle_distance_m)
     if (tracked and len(field.drones) > 1) or figures.min_separation_m is not None:
         yield _above("min_separation_m", figures.min_separation_m, field.safety.min_separation_m)
     judged = min(figures.drones_judged.values(), default=1.0)

@@ -42,6 +42,7 @@ class RunFigures(msgspec.Struct, frozen=True, kw_only=True):
     robots: dict[str, Accuracy]
     max_fence_violation_m: float | None
     min_separation_m: float | None
+    min_obstacle_m: float | None = None
     drones_judged: dict[str, float] = {}
     landed: bool | None
     failsafe_landings: list[str] = []
@@ -96,6 +97,7 @@ def figures_of(data: RunData) -> RunFigures:
         robots=robots,
         max_fence_violation_m=safety.max_fence_violation_m(data),
         min_separation_m=safety.min_separation_m(data),
+        min_obstacle_m=safety.min_obstacle_m(data),
         drones_judged=safety.judged_shares(data),
         landed=safety.landed(data),
         failsafe_landings=[item.line for item in landings(happenings(data))],

@@ -9,6 +9,7 @@ from groundstation.field.room import Fence
 from groundstation.report.accuracy import time_grid
 from groundstation.report.aloft import aloft_at
 from groundstation.report.tracks import RunData, TruthTrack
+from groundstation.sensing.from_field import boxes_from_field
 
 # Contact with the floor lets a body sink by fractions of this; it is no breach of a fence.
 _TOUCH_M = 1e-3
@@ -30,6 +31,14 @@ def max_fence_violation_m(data: RunData) -> float | None:
     """Return the worst of all drones, or None without truth."""
     tracks = [data.truth[name] for name in data.drones if name in data.truth]
     return max((fence_violation_m(track, data.resolved.room.fence) for track in tracks), default=None)
+
+
+def min_obstacle_m(data: RunData) -> float | None:
+    """Return the smallest distance of a flying drone's centre from an obstacle; None without either, or truth."""
+    tracks = [data.truth[name] for name in data.drones if name in data.truth]
+    flown = np.concatenate([np.empty((0, 3)), *(track.position_m[~track.on_ground] for track in tracks)])
+    boxes = boxes_from_field(data.resolved)
+    return min((float(box.distances_m(flown).min()) for box in boxes), default=None) if len(flown) else None
 
 
 def min_separation_m(data: RunData) -> float | None:

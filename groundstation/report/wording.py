@@ -15,6 +15,7 @@ _TITLES = {
     "target_unseen_s": ("target unseen, by the estimates", "s"),
     "drone_uncertain_s": ("longest time with a drone's place unknown", "s"),
     "max_fence_violation_m": ("beyond the fence", "m"),
+    "min_obstacle_m": ("least distance from an obstacle", "m"),
     "min_separation_m": ("least separation", "m"),
     "drones_judged": ("share of a drone's flight with a truth", ""),
     "landed": ("everybody landed", ""),

@@ -56,8 +56,13 @@ def sensors_from_field(field: ResolvedField) -> SensorSuite:
         | {name: _ranged(system) for name, system in field.ranging.items()},
         onboard={name: _onboard(drone, max(*carried, *tracked), reach) for name, drone in drones.items()},
         marker_height_m=heights | {name: target.marker.height_m for name, target in targets.items()},
-        obstacles=tuple(Box(one.centre_m, one.size_m) for one in field.room.obstacles.values()),
+        obstacles=boxes_from_field(field),
     )
+
+
+def boxes_from_field(field: ResolvedField) -> tuple[Box, ...]:
+    """Return the obstacles of a resolved field."""
+    return tuple(Box(one.centre_m, one.size_m) for one in field.room.obstacles.values())
 
 
 def square_m(marker: Marker) -> float:

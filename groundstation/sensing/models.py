@@ -134,6 +134,26 @@ class Rectangle:
         dx, dy = min(by_m, (x1 - x0) / 2), min(by_m, (y1 - y0) / 2)
         return Rectangle((x0 + dx, x1 - dx), (y0 + dy, y1 - dy))
 
+    def grown(self, by_m: float) -> "Rectangle":
+        """Return the rectangle with each side moved outwards."""
+        (x0, x1), (y0, y1) = self.x_m, self.y_m
+        return Rectangle((x0 - by_m, x1 + by_m), (y0 - by_m, y1 + by_m))
+
+    def depth_m(self, x: float, y: float) -> float:
+        """Return how far inside its nearest side a point lies [m; negative: outside of the farthest one]."""
+        return min(x - self.x_m[0], self.x_m[1] - x, y - self.y_m[0], self.y_m[1] - y)
+
+    def span(self, place: tuple[float, float], way: tuple[float, float]) -> tuple[float, float]:
+        """Return where a line along a unit vector enters and leaves it [m from place]; missed: the first is larger."""
+        first, last = -math.inf, math.inf
+        for at, along, (low, high) in zip(place, way, (self.x_m, self.y_m), strict=True):
+            if abs(along) < 1e-9:
+                first, last = (first, last) if low <= at <= high else (math.inf, -math.inf)
+                continue
+            ends = sorted(((low - at) / along, (high - at) / along))
+            first, last = max(first, ends[0]), min(last, ends[1])
+        return first, last
+
     def nearest(self, x: float, y: float) -> tuple[float, float]:
         """Return the point of the rectangle that is closest to a point."""
         return min(max(x, self.x_m[0]), self.x_m[1]), min(max(y, self.y_m[0]), self.y_m[1])
@@ -150,6 +170,17 @@ class Box:
     def middle_m(self) -> tuple[float, float, float]:
         """Return its middle."""
         return (*self.centre_m, self.size_m[2] / 2.0)
+
+    @property
+    def outline(self) -> Rectangle:
+        """Return what it covers of the floor plan."""
+        (x, y), (length, width, _) = self.centre_m, self.size_m
+        return Rectangle((x - length / 2, x + length / 2), (y - width / 2, y + width / 2))
+
+    def distances_m(self, places: Array) -> Array:
+        """Return how far places (n, 3) [m; world] are from it (n) [m]; 0 inside."""
+        outside = np.abs(places - self.middle_m) - 0.5 * np.array(self.size_m)
+        return np.asarray(np.linalg.norm(np.maximum(outside, 0.0), axis=1))
 
 
 SIGHTINGS_PER_S = 12.0

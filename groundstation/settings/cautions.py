@@ -28,9 +28,9 @@ from groundstation.settings.volumes import anchor_cautions, volume_cautions
 RISEN_MARKER_M, RISEN_ROOM_M = 1.0, 0.15
 PAD_TO_FENCE_M = 0.3
 """Distance of a pad from the fence that a take-off needs."""
+_PAD_TO_OBSTACLE_M = 0.6
 _FENCE_LEAST_M, _WALL_M = 1.0, 0.2
 _LEAST_STD_M = 0.1
-_ABOVE_OBSTACLE_M = 0.3
 _LEAST_TILT_DEG = 5.0
 Caution = Callable[[Field], Iterator[Finding]]
 # Cosine of the angle between the optical axis and straight down beyond which a camera looks at walls.
@@ -120,17 +120,16 @@ def _fence(field: Field) -> Iterator[Finding]:
 
 
 def _obstacles(field: Field) -> Iterator[Finding]:
-    fence, (lowest, _) = field.room.fence, field.planner.heights_m
-    for name, one in field.room.obstacles.items():
-        (x, y), (width, depth, height) = one.centre_m, one.size_m
-        inside = (fence.x_m[0] - width / 2 < x < fence.x_m[1] + width / 2) and (
-            fence.y_m[0] - depth / 2 < y < fence.y_m[1] + depth / 2
-        )
-        if inside and height > lowest - _ABOVE_OBSTACLE_M:
-            text = (
-                f"is {height:g} m high, and drones fly at {lowest:g} m and do not go round it: keep it out of the fence"
-            )
-            yield ("room", "obstacles", name), text
+    for name, drone in field.drones.items():
+        for obstacle, one in field.room.obstacles.items():
+            (x, y), (width, depth, _) = one.centre_m, one.size_m
+            beside = abs(drone.pad_m[0] - x) - width / 2, abs(drone.pad_m[1] - y) - depth / 2
+            apart = math.hypot(*(max(0.0, gap) for gap in beside))
+            if 0.0 < apart < _PAD_TO_OBSTACLE_M:
+                text = (
+                    f"is {apart:.2f} m from room.obstacles.{obstacle}: in flight drones keep {_PAD_TO_OBSTACLE_M:g} m"
+                )
+                yield ("drones", name, "pad_m"), text
 
 
 def _heights(field: Field) -> Iterator[Finding]:

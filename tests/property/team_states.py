@@ -16,8 +16,10 @@ from groundstation.control.shafts import Shaft
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.layout import ROBOT_CORE, EntityKind, StateLayout
 from groundstation.planning.parameters import MotionLimits
+from groundstation.sensing.models import Box
 
-SAFETY = SafetyParameters(fence=((-3.7, 3.7), (-2.7, 2.7), (0.0, 2.8)))
+PILLAR, TABLE = Box((2.4, -1.5), (0.6, 0.5, 2.8)), Box((-2.4, 1.6), (1.6, 1.0, 0.75))
+SAFETY = SafetyParameters(fence=((-3.7, 3.7), (-2.7, 2.7), (0.0, 2.8)), obstacles=(PILLAR, TABLE))
 LIMITS = MotionLimits()
 _FENCE = np.array(SAFETY.fence)
 _SAID = 0.85  # share of robots with a reported velocity, and of those with a known drift
@@ -152,7 +154,8 @@ def promised(states: TeamStates, robot: int, yaw_rates: Array) -> tuple[Array, A
     v + T yaw_rate (z x v).
     """
     pairs = (_pair(states, robot, other) for other in states.others(robot))
-    parts = [_fence(states, robot), *pairs, _shaft(states, robot)]
+    boxes = (_obstacle(states, robot, box) for box in SAFETY.obstacles)
+    parts = [_fence(states, robot), *boxes, *pairs, _shaft(states, robot)]
     normals, barriers, times = (np.concatenate(part, axis=1) for part in zip(*parts, strict=True))
     known = np.maximum(np.einsum("nmi,ni->nm", normals, states.drifts[:, robot]), 0.0)
     room = np.minimum(SAFETY.drift_m_s + known, SAFETY.most_drift_m_s)
@@ -169,6 +172,19 @@ def _fence(states: TeamStates, robot: int) -> tuple[Array, Array, Array]:
     barriers = np.concatenate((_FENCE[:, 1] - kept - rest, rest - _FENCE[:, 0] - kept), axis=1)
     normals = np.broadcast_to(np.concatenate((np.eye(3), -np.eye(3))), (len(rest), 6, 3))
     return normals, barriers, np.broadcast_to(time_s[:, None], barriers.shape)
+
+
+def _obstacle(states: TeamStates, robot: int, box: Box) -> tuple[Array, Array, Array]:
+    """Return one row: of the faces that the robot is beside, that of which its point of rest is farthest outside."""
+    rest, time_s = states.rest(robot)
+    half, middle = np.array(box.size_m) / 2.0, np.array(box.middle_m)
+    outwards = np.array([(-1, 0, 0), (1, 0, 0), (0, -1, 0), (0, 1, 0), (0, 0, 1)], dtype=float)
+    kept = SAFETY.min_separation_m / 2.0 + SAFETY.margin_m + SAFETY.sigmas * np.sqrt(states.variances(robot))
+    beside = (states.poses[:, robot, :3] - middle) @ outwards.T - np.abs(outwards) @ half > 0.0
+    barriers = (rest - middle) @ outwards.T - np.abs(outwards) @ half - kept @ np.abs(outwards).T
+    beside[~beside.any(axis=1)] = True
+    side = np.where(beside, barriers, -np.inf).argmax(axis=1)
+    return -outwards[side][:, None], barriers[np.arange(len(side)), side][:, None], time_s[:, None]
 
 
 def _pair(states: TeamStates, robot: int, other: int) -> tuple[Array, Array, Array]:

@@ -56,7 +56,7 @@ def _verdict(run: SitlRun, tap: WireTap, fault: Fault, tracking_s: float, begun_
     """Judge from TRACK on. The belief is not on the wire: here no drone counts as unlocalised."""
     field = resolved_field(load_field(find_field("lab")))
     limits = {name: drone.limits.max_speed_m_s for name, drone in field.drones.items()}
-    judge = Judge(msgspec.to_builtins(field.room.fence), limits, _PERIOD_S, root="ceiling")
+    judge = Judge(msgspec.to_builtins(field.room), limits, _PERIOD_S, root="ceiling")
     tracks = {name: run.truth(name) for name in limits}
     tells = {name: tap.heard[run.address(name)] for name in limits}
     observable_s = None

@@ -98,7 +98,7 @@ class FaultFlight:
         self._systems = FixedSystems(self.site, world, scenario, seed)
         self._schedule = FaultSchedule(scenario.faults, self.world, self.devices)
         limits = {name: drone.limits.max_speed_m_s for name, drone in field.drones.items()}
-        self.judge = Judge(drawn.field["room"]["fence"], limits, JUDGE_S, root=self._only_root())
+        self.judge = Judge(drawn.field["room"], limits, JUDGE_S, root=self._only_root())
         self.tracking_since_s: float | None = None
         self._lifted_off = False
 

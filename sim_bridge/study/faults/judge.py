@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from groundstation.arrays import Array
+from groundstation.sensing.models import Box
 from sim_bridge.fault_kinds import Fault, FaultKind
 from sim_bridge.study.faults.deafness import DeafSpells
 
-SEPARATION_M = 0.6
+SEPARATION_M, OBSTACLE_M = 0.6, 0.3
 HOVER_S, REST_S = 1.0, 3.5
 REST_M_S = 0.1
 FASTER_M_S = 0.3  # above the drone's limit: a gust, or a correction, may add this
@@ -48,13 +49,16 @@ class Judge:
     """
 
     def __init__(
-        self, fence: Mapping[str, Any], limits_m_s: Mapping[str, float], period_s: float, root: str | None = None
+        self, room: Mapping[str, Any], limits_m_s: Mapping[str, float], period_s: float, root: str | None = None
     ) -> None:
+        fence = room["fence"]
         self._fence = np.array([fence["x_m"], fence["y_m"], fence["z_m"]])
+        self._boxes = [Box(one["centre_m"], one["size_m"]) for one in room.get("obstacles", {}).values()]
         self._limits, self._period_s, self._root = limits_m_s, period_s, root
         self._flown = {name: _Flown() for name in limits_m_s}
         self._lost_s = dict.fromkeys(limits_m_s, 0.0)
         self.separation_m, self.fence_m, self.speed_m_s, self.lost_s = math.inf, 0.0, 0.0, 0.0
+        self.obstacle_m = math.inf
         self.first: dict[str, float] = {}
         self._deafness = DeafSpells()
         # Bounds that were first broken by drones that received no command.
@@ -89,6 +93,8 @@ class Judge:
     def _see_one(self, now_s: float, name: str, row: Array, told: bool, believed: Array | None) -> None:
         outside = np.maximum(self._fence[:, 0] - row[:3], row[:3] - self._fence[:, 1])
         self._worst(now_s, "fence", float(outside.max()), by=(name,))
+        for box in self._boxes:
+            self._worst(now_s, "obstacle", float(box.distances_m(row[None, :3])[0]), by=(name,))
         self._worst(now_s, "speed", math.hypot(row[3], row[4]), self._limits[name] + FASTER_M_S, by=(name,))
         off_m = math.inf if believed is None else float(np.hypot(*(believed - row[:2])))
         self._lost_s[name] = self._lost_s[name] + self._period_s if told and off_m > LOST_M else 0.0
@@ -100,6 +106,8 @@ class Judge:
                 self.separation_m, bad = min(self.separation_m, figure), figure < SEPARATION_M
             case "fence":
                 self.fence_m, bad = max(self.fence_m, figure), figure > 0.0
+            case "obstacle":
+                self.obstacle_m, bad = min(self.obstacle_m, figure), figure < OBSTACLE_M
             case "speed":
                 self.speed_m_s, bad = max(self.speed_m_s, figure), figure > limit
             case _:
@@ -125,6 +133,7 @@ class Judge:
         return {
             "separation_m": round(self.separation_m, 3) if math.isfinite(self.separation_m) else None,
             "fence_m": round(max(0.0, self.fence_m), 3),
+            "obstacle_m": round(self.obstacle_m, 3) if self._boxes else None,
             "speed_m_s": round(self.speed_m_s, 3),
             "unlocalised_s": round(self.lost_s, 2),
             "hover_s": round(hover, 2),

@@ -12,6 +12,7 @@ from sim_bridge.study.faults.draw import Drawn
 from sim_bridge.study.faults.flight import JUDGE_S, FaultFlight
 from sim_bridge.study.faults.flight_order import WrongOrder
 from sim_bridge.study.faults.hosted_kinds import unbroken
+from sim_bridge.study.faults.judge import OBSTACLE_M
 from sim_bridge.study.faults.vehicles import Section
 from sim_bridge.study.scenarios.figures import SEPARATION_M, TrackingErrors, shortfalls
 from sim_bridge.study.scenarios.first_program import along_an_edge
@@ -68,6 +69,7 @@ class ScenarioFlight(FaultFlight):
         """Return the flight's figures."""
         judge = self.judge
         violations = [f"fence {judge.fence_m:.2f} m"] * (judge.fence_m > 0.0)
+        violations += [f"obstacle {judge.obstacle_m:.2f} m"] * (judge.obstacle_m < OBSTACLE_M)
         violations += [f"separation {judge.separation_m:.2f} m"] * (judge.separation_m < SEPARATION_M)
         modes = [str(host.watchdog.mode) for host in self.drivers.hosts.values()]
         figures = {

@@ -13,6 +13,7 @@ from groundstation.planning.bound import lower_bound
 from groundstation.planning.gradient import evaluate
 from groundstation.planning.local_search import search_state, solve
 from groundstation.planning.records import CostOptions, CostProblem, EdgeRow
+from groundstation.planning.rollout import soft_box
 from groundstation.sensing.models import Box, Frustum, OnboardCameraModel, Softness, WorldCameraModel
 from groundstation.sensing.occlusion import BoxRow, box_rows
 from groundstation.sensing.visibility import available, camera_rows, limits_of
@@ -21,7 +22,7 @@ CEILING = WorldCameraModel((0.0, 0.0, 4.2), Frustum.of_picture(1280, 720, 1179, 
 ONBOARD = OnboardCameraModel((0.09, 0.0, 0.02), Frustum.of_picture(640, 360, 460, 460, 1.9), pan_left_rad=0.1)
 CAMERAS = camera_rows([CEILING, ONBOARD], Softness())
 FENCE, STEPS, HEIGHT_M = np.array([[-0.8, 0.9], [-0.6, 0.7]]), 8, 1.5
-OPTIONS = CostOptions(STEPS, 0.3, 0.9, 2e-3, 3e-4, 0.05, 0.1, 1.0, 1.0, FENCE, 1e-3, 0.5, 3.6, HEIGHT_M)
+OPTIONS = CostOptions(STEPS, 0.3, 0.9, 2e-3, 3e-4, 0.05, 0.1, 1.0, 1.0, FENCE, 0.6, 1e-3, 0.5, 3.6, HEIGHT_M)
 WEIGHTS = np.array([1.0, 2.5])  # of two targets
 BOXES = box_rows([Box((0.2, 0.1), (0.3, 0.4, 1.1)), Box((-0.4, -0.3), (0.2, 0.2, 1.6))])
 
@@ -194,6 +195,18 @@ def test_obstacles_increase_the_cost_and_never_reduce_it() -> None:
         assert one.value(np.zeros(8)) >= free * (1.0 - 1e-12)
         hidden += one.value(np.zeros(8)) > 1.01 * free
     assert hidden > 2
+
+
+def test_a_place_too_near_to_an_obstacle_costs_the_square_of_the_way_out() -> None:
+    """Beyond the least distance nothing; over a low box the way out is up."""
+    gradient, options = np.zeros(3), OPTIONS
+    for place, slope in (((0.85, 0.1, 1.0), (-0.2, 0.0, 0.0)), ((0.2, 0.9, 1.0), (0.0, 0.0, 0.0)),
+                         ((0.2, 0.1, 1.6), (0.0, 0.0, -0.2)), ((0.2, -0.6, 1.0), (0.0, 0.2, 0.0))):  # fmt: skip
+        at = np.array([place[0], place[1], 0.0, 1.0, 0.0, place[2]])
+        gradient[:] = 0.0
+        depth = 0.5 * max(map(abs, slope))
+        assert soft_box(BOXES[0], at, options, gradient) == pytest.approx(depth**2, abs=1e-12)
+        assert gradient == pytest.approx(slope)
 
 
 def search(one: Case, start: Array, budget: int, tolerance: float) -> tuple[Array, float, int]:

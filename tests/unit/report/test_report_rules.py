@@ -10,7 +10,7 @@ import pytest
 
 from groundstation.bus import messages as m
 from groundstation.field.drones import FieldDrone, OnboardCamera
-from groundstation.field.room import Fence, LensCalibration
+from groundstation.field.room import Fence, LensCalibration, RoomObstacle
 from groundstation.field.targets import DroneMarker, Target, TargetMarker
 from groundstation.geometry.ellipse import semi_axes_95
 from groundstation.report import load, topology_use
@@ -20,7 +20,7 @@ from groundstation.report.interval import tracking_interval, tracking_spans
 from groundstation.report.judge import judge
 from groundstation.report.metrics import figures_of
 from groundstation.report.run_facts import RunFacts
-from groundstation.report.safety import all_airborne_s, fence_violation_m
+from groundstation.report.safety import all_airborne_s, fence_violation_m, min_obstacle_m
 from groundstation.report.tracks import UNKNOWN_FIELD, EstimateTrack, ProcessTrack, RunData, TimedMessage, TruthTrack
 
 LENS = LensCalibration(
@@ -229,6 +229,15 @@ def test_a_starved_simulated_run_that_fails_says_nothing_and_one_that_passes_cou
     assert invalidity(figures, [missed, unsafe]) == ""  # must not happen on any computer
     assert invalidity(msgspec.structs.replace(figures, starved_s=1.0), [missed]) == ""
     assert invalidity(msgspec.structs.replace(figures, sim_overrun_percent=None), [missed]) == ""
+
+
+def test_the_distance_from_obstacles_is_that_of_flying_drones() -> None:
+    data, box = _data(truth={"a": _truth([True, False])}), RoomObstacle(centre_m=(3.0, 0.0), size_m=(1.0, 1.0, 2.0))
+    room = msgspec.structs.replace(data.resolved.room, obstacles={"box": box})
+    boxed = replace(data, resolved=msgspec.structs.replace(data.resolved, room=room))
+    assert min_obstacle_m(boxed) == pytest.approx(2.5)
+    assert min_obstacle_m(replace(boxed, truth={"a": _truth([True, True])})) is None
+    assert min_obstacle_m(data) is None
 
 
 def test_the_fence_binds_flying_drones_only() -> None:

@@ -26,7 +26,11 @@ FOOLISH = [
     ("drones.drone_1.camera.tilt_down_deg=-45", "drones.drone_1.camera.tilt_down_deg", "seen from above only"),
     ("room.fence.x_m=[-0.95,3.7]", "drones.drone_1.pad_m", "0.05 m from the fence"),
     ("room.fence.x_m=[-1.6,-0.7]", "room.fence.x_m", "leaves 0.90 m"),
-    ("room.obstacles={pillar: {centre_m: [2, 1], size_m: [1, 1, 2]}}", "room.obstacles.pillar", "do not go round it"),
+    (
+        "room.obstacles={pillar: {centre_m: [-1.75, 0.5], size_m: [1, 1, 2]}}",
+        "drones.drone_1.pad_m",
+        "is 0.35 m from room",
+    ),
     ("safety.max_position_std_m=0.01", "safety.max_position_std_m", "would hover all the time"),
     ("drones.drone_1.address=192.168.1.255", "drones.drone_1.address", "not the address of a single vehicle"),
     ("drones.drone_1.address=224.0.0.1", "drones.drone_1.address", "not the address of a single vehicle"),
@@ -64,8 +68,8 @@ FOOLISH = [
 ]
 
 
-@pytest.mark.parametrize(("centre", "height"), [("[2, 1]", 0.8), ("[3.85, 0]", 2.0)])
-def test_obstacles_below_or_beyond_the_drones_give_no_caution(centre: str, height: float) -> None:
+@pytest.mark.parametrize(("centre", "height"), [("[2, 1]", 0.8), ("[3.85, 0]", 2.0), ("[2, 1]", 2.0)])
+def test_obstacles_away_from_the_pads_give_no_caution(centre: str, height: float) -> None:
     option = f"room.obstacles={{table: {{centre_m: {centre}, size_m: [0.2, 1, {height}]}}}}"
     assert cautions_of(LAB, [option]) == cautions_of(LAB)
 

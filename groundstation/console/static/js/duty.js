@@ -11,6 +11,7 @@ const RELIED_ON = 100;
 const LIMITS = {
   fence: "the fence",
   separation: "a drone nearby",
+  obstacle: "an obstacle",
   speed: "its speed limit",
   "yaw rate": "how fast it may turn",
   stale: "an old estimate",

@@ -18,6 +18,7 @@ from sim_bridge.study.faults.memory_network import MemoryNetwork, NothingWaits
 from sim_bridge.study.faults.stand_ins import in_memory, manual_clock, read_all
 
 FENCE = {"x_m": (-3.7, 3.7), "y_m": (-2.7, 2.7), "z_m": (0.0, 2.8)}
+PILLAR = {"centre_m": (-2.0, 1.5), "size_m": (0.4, 0.4, 2.0)}
 FIELD: dict[str, Any] = {
     "room": {"fence": FENCE},
     "cameras": {"ceiling": {}},
@@ -71,7 +72,7 @@ def judged(
     deaf: Any = lambda t: (),
 ) -> dict[str, Any]:
     """Return the verdict on 15 s in which drone a flies rows(t) and drone b stands still 3 m away."""
-    judge = Judge(FENCE, {"a": 0.6, "b": 0.6}, PERIOD_S, root)
+    judge = Judge({"fence": FENCE, "obstacles": {"pillar": PILLAR}}, {"a": 0.6, "b": 0.6}, PERIOD_S, root)
     for n in range(300):
         t = 5.0 + n * PERIOD_S
         truth = {"a": rows(t), "b": row(0.0, -2.0)}
@@ -86,6 +87,8 @@ def judged(
         (lambda t: row(0.0, 0.0), {}),
         (lambda t: row(0.0, -1.5), {"separation": 5.0}),
         (lambda t: row(3.8 if t > 9.99 else 3.0, 0.0), {"fence": 10.0}),
+        (lambda t: row(-2.0, 1.05 if t > 9.99 else 0.9), {"obstacle": 10.0}),
+        (lambda t: row(-2.0, 1.5, ground=True), {}),
         (lambda t: row(0.0, 0.0, vx=0.95), {"speed": 5.0}),
         (lambda t: row(0.0, 0.0, vx=0.85), {}),
         (lambda t: row(0.0, -1.5, ground=True), {}),

@@ -107,6 +107,8 @@ def _observe_setpoints(at: Situation, holding: dict[Condition, str]) -> None:
 def _observe_motion(vehicle: VehicleView, limits: WatchdogLimits, holding: dict[Condition, str]) -> None:
     if vehicle.stray:
         holding[Condition.STRAYS] = vehicle.stray
+    if vehicle.on_floor:
+        holding[Condition.ON_FLOOR] = ""
     if vehicle.crowded:
         holding[Condition.CROWDED] = vehicle.crowded
     if vehicle.speed_m_s > limits.tolerated_speed_m_s:

@@ -59,6 +59,7 @@ class Condition(StrEnum):
     STRAYS = auto()
     TOO_FAST = auto()
     CROWDED = auto()
+    ON_FLOOR = auto()
     DRIVER_STOOD = auto()
     NOT_READY = auto()
     SOMEBODY_NEAR = auto()
@@ -164,6 +165,8 @@ def _landings(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
         Failsafe(Condition.TOO_FAST, land, "{why}", limits.fast_land_s, "", SLOWLY, modes=FREE),
         # Hovering and tracking drones are moved apart: this is for when that fails.
         Failsafe(Condition.CROWDED, land, "{why}", limits.crowded_land_s, "", SLOWLY, modes=FREE),
+        # A pilot has landed it, or it was pressed down: its controllers wind up until it notices its landing.
+        Failsafe(Condition.ON_FLOOR, land, "it has come down to the floor", limits.floor_land_s, modes=FREE),
     )  # fmt: skip
 
 

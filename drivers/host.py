@@ -10,6 +10,7 @@ from drivers.control_error import ControlErrorMonitor
 from drivers.neighbours import Neighbours
 from drivers.seen_velocity import SeenVelocity
 from drivers.start_report import StartReport
+from drivers.touch_down import TouchDown
 from drivers.unlocalised_time import UnlocalisedTime
 from drivers.watchdog import Watchdog
 from drivers.watchdog_types import Ack, Action, DriverMode, Upstream, VehicleView, WatchdogDecision, WatchdogLimits
@@ -63,7 +64,7 @@ class VehicleHost:
         self._told: WatchdogDecision | None = None
         self._statuses = self._bus.subscribe([VEHICLE_STATUS], newest=True)
         self._neighbours = Neighbours(vehicle.name, limits.pad_m, limits.min_separation_m, limits.max_speed_m_s)
-        self._unlocalised = UnlocalisedTime()
+        self._unlocalised, self._touch_down = UnlocalisedTime(), TouchDown()
 
     def call_on_commands(self, wake: Callable[[], None]) -> None:
         """Have a function called, on the network's thread, whenever a command arrives."""
@@ -112,7 +113,9 @@ class VehicleHost:
         view = self._control_error.judge(now_ns, view, self._told, self._seen.velocity(now_ns))
         aloft = view.flight_state in AIRBORNE
         near, crowded = self._near(now_ns, aloft)
-        return view._replace(unseen_s=self._unlocalised.of_flight(now_ns, aloft), near=near, crowded=crowded)
+        unseen_s, touches = self._unlocalised.of_flight(now_ns, aloft), self._touch_down.of_flight(aloft)
+        view = view._replace(touches_down=touches, on_floor=self._touch_down.low)
+        return view._replace(unseen_s=unseen_s, near=near, crowded=crowded)
 
     def _hear_estimate(self, now_ns: int, estimate: Estimate) -> None:
         self._neighbours.see(now_ns, estimate.entities)
@@ -120,6 +123,7 @@ class VehicleHost:
             if entity.name == self.vehicle.name:
                 self._seen.take(now_ns, estimate.epoch, entity)
                 self._unlocalised.hear(now_ns, entity)
+                self._touch_down.hear(entity)
 
     def _near(self, now_ns: int, aloft: bool) -> tuple[str, str]:
         """Return the neighbour too near to this vehicle's pad, if it stands, and to it, if it flies; "" if none is."""

@@ -170,11 +170,9 @@ class Watchdog:
     def _obey_track(self, now_ns: int, command: Command) -> str:
         if self.mode not in FREE:
             return f"the vehicle is {self.mode}"
-        silent = self._refusal(now_ns, Condition.TELEMETRY_SILENT)
-        if silent:
-            return silent
-        if self.vehicle.flight_state in STANDING | UNHEARD | {FlightState.LANDING}:
-            return f"the vehicle says {self.vehicle.flight_state}"
+        ended = self._refusal(now_ns, Condition.TELEMETRY_SILENT) or self.vehicle.flight_ends
+        if ended:
+            return ended
         above = (Condition.STOP_REQUESTED, Condition.SUPERVISOR_DEAD, Condition.SUPERVISOR_SILENT)
         refusal = self._refusal(now_ns, *above)
         if refusal:

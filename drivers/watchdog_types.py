@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import NamedTuple
 
-from groundstation.bus.messages import AckStage, FlightState, Vector3, Verb
+from groundstation.bus.messages import STANDING, UNHEARD, AckStage, FlightState, Vector3, Verb
 from groundstation.field.behaviour import SafetyValues
 
 _SAFETY = SafetyValues()
@@ -60,8 +60,8 @@ class WatchdogLimits:
     stands after 0.8 s with 2 m/s^2 and a lag of 0.3 s, doubled. blind_land_s: likewise while its sensors are wrong and
     no camera sees it. lost_hover_s, lost_land_s: without a position from the cameras, for vehicles that need one.
     crowded_land_s: likewise nearer to another than allowed, so that it has to make way: the limiter moves each of two
-    by 0.1 m in that time. pad_m: where it takes off [x, y; world], if known; min_separation_m: least distance of all
-    airborne vehicles from there, and from it in flight.
+    by 0.1 m in that time. floor_land_s: likewise on the floor. pad_m: where it takes off [x, y; world], if known;
+    min_separation_m: least distance of all airborne vehicles from there, and from it in flight.
     """
 
     hover_after_s: float = _SAFETY.setpoint_lifetime_ms / 1000
@@ -86,6 +86,7 @@ class WatchdogLimits:
     lost_hover_s: float = 0.3
     lost_land_s: float = 0.7
     crowded_land_s: float = 2.0
+    floor_land_s: float = 0.3
     pad_m: tuple[float, float] | None = None
     min_separation_m: float = 0.6
 
@@ -106,7 +107,8 @@ class VehicleView(NamedTuple):
     or ""; crowded: why it makes way for another that is too near in flight, or "". lost_s: how long it has
     lacked a position that it needs; unlocated: whose, and since when, in words. clears: whether a separate order ends
     its emergency without starting motors.
-    mute: the report that it lacks although telemetry arrives, or "".
+    mute: the report that it lacks although telemetry arrives, or "". touches_down, on_floor: by its estimate it comes
+    down to the floor, and is there.
     """
 
     flight_state: FlightState = FlightState.UNKNOWN
@@ -126,6 +128,8 @@ class VehicleView(NamedTuple):
     unlocated: str = "from the cameras"
     clears: bool = False
     mute: str = ""
+    touches_down: bool = False
+    on_floor: bool = False
 
     @property
     def plausible(self) -> "VehicleView":
@@ -138,6 +142,13 @@ class VehicleView(NamedTuple):
         if self.unsound:
             return f"its sensors cannot be believed: {self.unsound}"
         return self.mute or "no telemetry from the vehicle"
+
+    @property
+    def flight_ends(self) -> str:
+        """Return why its flight is over, or is not to be interrupted any more in ending, or ""."""
+        if self.flight_state in STANDING | UNHEARD | {FlightState.LANDING}:
+            return f"the vehicle says {self.flight_state}"
+        return "it is touching down: let it land, then take off again" if self.touches_down else ""
 
 
 class Upstream(NamedTuple):

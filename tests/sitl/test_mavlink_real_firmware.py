@@ -36,6 +36,7 @@ M_PER_DEGREE = 111_319.5
 # sink to the floor, because ArduPilot's simulated transmitter has its throttle down).
 OURS = {Flavour.PX4: 6 << 16, Flavour.ARDUPILOT: 4}
 PILOTS = {"px4": (4, 3), "ardupilot": (17,)}
+LOITER = 5
 
 
 class Truth(threading.Thread):
@@ -215,6 +216,23 @@ def test_real_firmware_that_a_pilot_stops_is_taken_back_by_resume(flavour, tmp_p
             assert flight.watchdog.mode == "TRACK", flight.watchdog.reason
             assert flight.obeys and flight.height_m > 0.5
         flight.land()
+
+
+@pytest.mark.firmware
+@pytest.mark.parametrize("height_m", [0.85, 0.03])
+def test_real_copter_that_comes_down_is_let_down(height_m, tmp_path):
+    """In LOITER it sinks to the floor; RESUME is too late to catch it, and made it shoot off at 3.6 m/s from there."""
+    with (
+        known("ardupilot", tmp_path) as (firmware, truth),
+        Flight(firmware.port, "pymavlink", "ardupilot", lambda: truth.place, patience_s=90) as flight,
+    ):
+        flight.go_on(2.0)
+        truth.command(dialect.MAV_CMD_DO_SET_MODE, 1, LOITER)
+        flight.until(lambda: flight.height_m < height_m, 6)
+        place = truth.place[0]
+        flight.pilot.order(Verb.RESUME, "TRACK")
+        flight.until(lambda: flight.watchdog.mode == "LANDED", 15)
+        assert math.dist(place[:2], truth.place[0][:2]) < 0.3
 
 
 @pytest.mark.parametrize("flavour", ["ardupilot", "px4"])

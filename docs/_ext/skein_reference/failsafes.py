@@ -44,6 +44,8 @@ EVIDENCE: dict[Condition, str] = {
     Condition.CROWDED: "the estimates of it and of another that flies and does not land are nearer to each other than "
     "the separation, by more than two standard deviations, and it is the lower one; of two as high as each other "
     "(0.2 m) the later one by name",
+    Condition.ON_FLOOR: "since its take-off it was higher, and now its estimated height, known to 0.2 m within two "
+    "standard deviations, is 0.1 m or less",
     Condition.DRIVER_STOOD: "more than 0.5 s between two turns of the driver",
     Condition.NOT_READY: "the driver's own reason",
     Condition.SOMEBODY_NEAR: "a vehicle in the air whose estimate, less two standard deviations, is nearer to the pad "

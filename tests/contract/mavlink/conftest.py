@@ -132,6 +132,7 @@ class Rig:
         self.estimates = self.process.bus.subscribe([ESTIMATE])
         self.tracking = True  # the tracker lives
         self.sees = True  # cameras see the vehicle
+        self.lingers = False  # the tracker has it on the floor, too
         self.driving = True  # the driver lives
         self.wanted = ((0.0, 0.0, 0.0), 0.0)
         self.offset_m = (0.0, 0.0, 0.0)
@@ -176,7 +177,7 @@ class Rig:
         if not self.tracking:
             return
         b, sd = self.body, self.noise_m
-        aloft = not b.on_ground
+        aloft = not b.on_ground or self.lingers
         entities: tuple[EntityEstimate, ...] = ()
         if aloft:
             x, y, z = (

@@ -24,7 +24,7 @@ class Bench:
         self.battery = 0.9
         self.not_ready = self.unsound = self.stray = ""
         self.speed = self.unseen_s = self.lost_s = 0.0
-        self.unseen = self.lost = False
+        self.unseen = self.lost = self.touches_down = self.on_floor = False
         self.seen = True
         self.near, self.crowded, self.clears = "", "", clears
         self.holds = False
@@ -55,6 +55,7 @@ class Bench:
     def view(self):
         view = VehicleView(self.state, self.fresh, self.battery, self.not_ready, unsound=self.unsound)
         seen = view._replace(unseen_s=self.unseen_s, lost_s=self.lost_s, near=self.near, crowded=self.crowded)
+        seen = seen._replace(touches_down=self.touches_down, on_floor=self.on_floor)
         return seen._replace(speed_m_s=self.speed, seen=self.seen, stray=self.stray, clears=self.clears).plausible
 
     def see(self):

@@ -44,7 +44,7 @@ def bare_scene(site: str, drones: tuple[str, ...], truth: bool) -> Json:
     return {
         "site": site,
         "truth": truth,
-        "room": {"size_m": [8.0, 6.0, 4.5], "fence": None},
+        "room": {"size_m": [8.0, 6.0, 4.5], "fence": None, "obstacles": {}},
         "drones": [{"name": name} for name in drones],
         "cameras": [],
         "volumes": [],

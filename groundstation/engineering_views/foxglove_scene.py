@@ -14,6 +14,7 @@ from groundstation.bus import messages as m
 from groundstation.engineering_views.scene import (
     FENCE,
     LINK_COLOUR,
+    OBSTACLE_COLOUR,
     VOLUME_COLOUR,
     Body,
     SearchCell,
@@ -42,8 +43,9 @@ class FoxgloveScene:
     def __init__(self, field: ResolvedField | None, mark: str = "") -> None:
         self._scene = ViewScene(field)
         self._mark = [_text(mark, self._scene.top_m, _MARK_M, rgb(NEUTRAL_COLOUR.dark))] if mark else []
-        volumes = [_box(sides, VOLUME_COLOUR) for sides in self._scene.volumes.values()]
-        self._static = [*_static(field), *(line for box in volumes for line in box)]
+        boxes = [_box(sides, VOLUME_COLOUR) for sides in self._scene.volumes.values()]
+        boxes += [_box(sides, OBSTACLE_COLOUR) for sides in self._scene.obstacles.values()]
+        self._static = [*_static(field), *(line for box in boxes for line in box)]
         self._links: list[SensingLink] = []
         self._arrows: dict[str, tuple[Array, Array]] = {}
         self._searched: dict[str, list[SearchCell]] = {}

@@ -16,7 +16,15 @@ from groundstation.appearance.cost import COST_UNIT, cost_cm2
 from groundstation.appearance.topology import topology_words
 from groundstation.bus import messages as m
 from groundstation.bus.topics import Topic
-from groundstation.engineering_views.scene import FENCE, LINK_COLOUR, VOLUME_COLOUR, Body, Sides, ViewScene
+from groundstation.engineering_views.scene import (
+    FENCE,
+    LINK_COLOUR,
+    OBSTACLE_COLOUR,
+    VOLUME_COLOUR,
+    Body,
+    Sides,
+    ViewScene,
+)
 from groundstation.field.resolved import ResolvedField
 from groundstation.field.room import Room
 from groundstation.geometry.angles import quaternion_from_euler
@@ -98,6 +106,8 @@ class RerunScene:
         self._log_room(field.room)
         for name, sides in self._scene.volumes.items():
             self._log_box(f"world/{name}", sides, VOLUME_COLOUR, name)
+        for name, sides in self._scene.obstacles.items():
+            self._log_box(f"world/obstacles/{name}", sides, OBSTACLE_COLOUR, name)
         for camera in self._scene.cameras:
             self._log_camera(camera, field)
 

@@ -13,6 +13,7 @@ from groundstation.field.resolved import ResolvedField
 from groundstation.geometry.ellipse import semi_axes_95
 from groundstation.recording.derived import camera_frames
 from groundstation.recording.viewers import Transform
+from groundstation.sensing.from_field import boxes_from_field
 
 Sides = tuple[tuple[float, float], tuple[float, float], tuple[float, float]]
 
@@ -21,6 +22,7 @@ _CIRCLE = np.linspace(0.0, 2.0 * math.pi, _RING_POINTS + 1)
 _COS, _SIN = np.cos(_CIRCLE), np.sin(_CIRCLE)
 LINK_COLOUR: Rgb = (130, 130, 130)
 VOLUME_COLOUR: Rgb = (140, 150, 110)
+OBSTACLE_COLOUR: Rgb = (150, 120, 90)
 FENCE: Rgb = rgb(FENCE_COLOUR.dark)
 _LIKELY_AT_ALL = 0.03
 _USUAL_HEIGHT_M = 4.0
@@ -91,6 +93,7 @@ class ViewScene:
         self._target_heights_m = {name: target.marker.height_m for name, target in targets.items()}
         self._colours = colours_of(field.drones, targets) if field else {}
         self.volumes: dict[str, Sides] = _volumes(field) if field else {}
+        self.obstacles: dict[str, Sides] = _obstacles(field) if field else {}
         self._places = {one.child: one.position_m for one in self.cameras if one.parent == "world"}
         self._places |= {name: (sum(x) / 2, sum(y) / 2, z[1]) for name, (x, y, z) in self.volumes.items()}
         self.bodies: dict[str, Body] = {}
@@ -147,6 +150,11 @@ class ViewScene:
         c, s = math.cos(body.yaw_rad), math.sin(body.yaw_rad)
         vector = np.array([c * forward - s * left, s * forward + c * left, up])
         return np.array(body.position_m), ARROW_S * vector
+
+
+def _obstacles(field: ResolvedField) -> dict[str, Sides]:
+    boxes = zip(field.room.obstacles, boxes_from_field(field), strict=True)
+    return {name: (box.outline.x_m, box.outline.y_m, (0.0, box.size_m[2])) for name, box in boxes}
 
 
 def _volumes(field: ResolvedField) -> dict[str, Sides]:

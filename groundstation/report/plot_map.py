@@ -1,4 +1,4 @@
-"""The room from above, to scale: fence, the ceiling camera's view, truth, estimates with 95 % ellipses."""
+"""The room from above, to scale: fence, obstacles, the ceiling camera's view, truth, estimates with 95 % ellipses."""
 
 import math
 
@@ -14,6 +14,7 @@ from groundstation.report.accuracy import STALE_S
 from groundstation.report.interval import tracking_interval
 from groundstation.report.plot_style import INK, MUTED, color_of
 from groundstation.report.tracks import EstimateTrack, RunData
+from groundstation.sensing.from_field import boxes_from_field
 
 _ELLIPSES = 16
 _CAMERA = "#6b8e23"
@@ -45,6 +46,9 @@ def _draw_room(axes: Axes, data: RunData) -> None:
             (x_low, y_low), x_high - x_low, y_high - y_low, fill=False, ec=FENCE_COLOUR.light, lw=1.0, ls="--"
         )
         axes.add_patch(fence)
+    for obstacle in boxes_from_field(data.resolved):
+        (x_low, x_high), (y_low, y_high) = obstacle.outline.x_m, obstacle.outline.y_m
+        axes.add_patch(Rectangle((x_low, y_low), x_high - x_low, y_high - y_low, fc=MUTED, lw=0, zorder=1))
     for camera in data.resolved.cameras.values():
         for index, height in enumerate(data.heights_m):
             half_x, half_y = _footprint_half_m(camera, height)
@@ -106,6 +110,7 @@ def _legend(data: RunData) -> list[Line2D | Patch]:
     entities: list[Line2D | Patch] = [
         Line2D([], [], color=color_of(name, data).light, lw=2.4, label=name) for name in (*data.drones, *data.tracked)
     ]
+    obstacles = [Patch(fc=MUTED, lw=0, label="obstacle")] if data.resolved.room.obstacles else []
     return [
         *entities,
         Line2D([], [], color=MUTED, lw=1.8, label="truth"),
@@ -114,6 +119,7 @@ def _legend(data: RunData) -> list[Line2D | Patch]:
         Line2D([], [], color=MUTED, marker="o", mfc="white", lw=0, label="start of tracking"),
         Line2D([], [], color=MUTED, marker="s", lw=0, label="end"),
         Line2D([], [], color=FENCE_COLOUR.light, lw=1.0, ls="--", label="fence"),
+        *obstacles,
         Patch(fc="#eef2e4", ec=_CAMERA, ls=":", lw=0.7, label=_world_view(data)),
     ]
 

@@ -10,6 +10,7 @@ from groundstation.bus import messages as m
 from groundstation.bus.api import Sample
 from groundstation.bus.topics import ESTIMATE, SEARCH_MAP, Topic
 from groundstation.engineering_views.scene import ViewScene
+from groundstation.field.room import RoomObstacle
 from groundstation.recording.copies import messages_of
 from groundstation.recording.run import open_run
 from groundstation.recording.timeline import Timeline
@@ -46,6 +47,17 @@ def test_foxglove_draws_the_volume_beside_room_and_fence() -> None:
     bare = msgspec.structs.replace(FIELD, motion_capture={})
     whole, fewer = (FoxgloveScene(one)._static for one in (FIELD, bare))  # content of every update
     assert len(whole) == len(fewer) + 6  # two rings and four edges
+
+
+def test_obstacles_are_drawn_as_boxes() -> None:
+    pytest.importorskip("foxglove")
+    from groundstation.engineering_views.foxglove_scene import FoxgloveScene
+
+    table = RoomObstacle(centre_m=(1.0, -0.5), size_m=(0.6, 0.4, 0.75))
+    cluttered = msgspec.structs.replace(FIELD, room=msgspec.structs.replace(FIELD.room, obstacles={"table": table}))
+    assert ViewScene(cluttered).obstacles == {"table": ((0.7, 1.3), (-0.7, -0.3), (0.0, 0.75))}
+    whole, fewer = (FoxgloveScene(one)._static for one in (cluttered, FIELD))
+    assert len(whole) == len(fewer) + 6
 
 
 def search_map() -> m.SearchMap:

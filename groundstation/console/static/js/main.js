@@ -139,6 +139,7 @@ function buildLegend() {
     ["target's prediction", svg("path", { d: "M2 7 H28", stroke: colourOf(store.scene.targets[0]?.name), "stroke-width": 2, "stroke-dasharray": "2 4" })],
     ["fence", svg("path", { d: "M2 7 H28", stroke: fenceColour(), "stroke-width": 2, "stroke-dasharray": "7 4" })],
   ];
+  if (Object.keys(store.scene.room.obstacles).length) rows.push(["obstacle", svg("rect", { x: 8, y: 2, width: 14, height: 10, fill: c.axis })]);
   if (store.scene.truth) rows.push(["truth (simulation)", svg("path", { d: "M10 2 L20 12 M20 2 L10 12", stroke: c.truth, "stroke-width": 2 })]);
   byId("legend").replaceChildren(...rows.map(([words, ...shapes]) => el("li", {}, svg("svg", { viewBox: "0 0 30 14" }, ...shapes), words)));
 }

@@ -1,4 +1,4 @@
-// The parts of the map that do not move: floor, grid, fence, pads.
+// The parts of the map that do not move: floor, grid, obstacles, fence, pads.
 
 import { fenceColour, ink } from "./palette.js";
 import { label, path } from "./canvas.js";
@@ -18,6 +18,7 @@ export function drawRoom(g, view) {
   g.strokeStyle = colours.axis;
   g.lineWidth = 1.5;
   g.strokeRect(left, top, w * view.scale, h * view.scale);
+  drawObstacles(g, view, colours);
   drawTicks(g, view, w, h, colours);
   drawFence(g, view);
   drawPads(g, view, colours);
@@ -28,6 +29,14 @@ function drawTicks(g, view, w, h, colours) {
   for (let y = Math.ceil(-h / 2); y <= h / 2; y++) { const [px, py] = view.point(-w / 2, y); label(g, `${y}`, px - 8, py + 4, colours.dim, 14, 400, "right"); }
   const [px, py] = view.point(w / 2, -h / 2);
   label(g, "x, y [m]", px, py + 30, colours.dim, 14, 400, "right");
+}
+
+function drawObstacles(g, view, colours) {
+  g.fillStyle = colours.axis;
+  for (const { centre_m: [x, y], size_m: [length, width] } of Object.values(store.scene.room.obstacles)) {
+    const [left, top] = view.point(x - length / 2, y + width / 2);
+    g.fillRect(left, top, length * view.scale, width * view.scale);
+  }
 }
 
 function drawFence(g, view) {

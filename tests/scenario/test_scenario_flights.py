@@ -25,8 +25,8 @@ from sim_bridge.study.faults.vehicles import Section
 from sim_bridge.study.scenarios.flight import ScenarioFlight, as_drawn
 
 pytestmark = [pytest.mark.slow, pytest.mark.study]
-# A search of the whole room, a carried target, a sharp turn.
-TELLING = ("corner", "kidnap-2m", "sharp-turns-0.7")
+# A search of the whole room, a carried target, a pillar in the way, a sharp turn.
+TELLING = ("corner", "kidnap-2m", "pillar", "sharp-turns-0.7")
 
 
 def order(name: str, *options: str) -> tuple[Drawn, list[Section]]:

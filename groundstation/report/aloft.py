@@ -8,6 +8,9 @@ from groundstation.arrays import Array, BoolArray
 from groundstation.bus.messages import AIRBORNE, STANDING, UNHEARD, FlightState, VehicleStatus
 from groundstation.report.tracks import RunData, TimedMessage
 
+Said = tuple[Array, BoolArray]
+"""Times in order (n) [s], and what held from each on (n)."""
+
 
 def aloft_at(
     statuses: Iterable[TimedMessage[VehicleStatus]], time_s: Array, states: Collection[FlightState] = AIRBORNE
@@ -16,12 +19,34 @@ def aloft_at(
 
     time_s: [s since the first message]; states: those in the air.
     """
+    return held_at(_said(statuses, states), time_s)
+
+
+def held_at(said: Said, time_s: Array) -> BoolArray:
+    """Return for each time whether something held by what was said last (m): False before."""
+    said_s, held = said
+    found: BoolArray = np.append(False, held)[np.searchsorted(said_s, time_s, side="right")]
+    return found
+
+
+def flights_of(data: RunData, name: str) -> Said:
+    """Return when a drone left the floor and was on it again [s], and whether it flew from then on.
+
+    By a simulator's truth, which also knows of a drone that is not heard; else by its own reports.
+    """
+    truth = data.truth.get(name)
+    if truth is not None and truth.is_simulated:
+        said_s, flies = truth.time_s, ~truth.on_ground
+    else:
+        said_s, flies = _said(data.vehicles.get(name, ()), AIRBORNE)
+    changes = np.flatnonzero(np.diff(flies, prepend=False))
+    return said_s[changes], flies[changes]
+
+
+def _said(statuses: Iterable[TimedMessage[VehicleStatus]], states: Collection[FlightState]) -> Said:
     told = [(item.time_s, item.message.flight_state) for item in statuses]
     said = sorted((at_s, state in states) for at_s, state in told if state not in UNHEARD)
-    times = np.array([at_s for at_s, _ in said])
-    aloft = np.array([False, *(flies for _, flies in said)])
-    found: BoolArray = aloft[np.searchsorted(times, time_s, side="right")]
-    return found
+    return np.array([at_s for at_s, _ in said]), np.array([flies for _, flies in said], dtype=bool)
 
 
 def anybody_flew(data: RunData) -> bool:

@@ -1,4 +1,4 @@
-"""The parts of a run that count: from TRACK to the commands that end each flight of the team, else in the air."""
+"""The parts of a run that count: from TRACK until the team was ordered down or is on the floor, else in the air."""
 
 from collections.abc import Sequence
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from groundstation.arrays import Array, BoolArray
 from groundstation.bus.messages import AckStage, Verb
-from groundstation.report.aloft import in_the_air
+from groundstation.report.aloft import Said, flights_of, held_at, in_the_air
 from groundstation.report.tracks import RunData
 
 _STARTED = (AckStage.ACCEPTED, AckStage.EFFECTIVE)
@@ -22,8 +22,8 @@ Span = tuple[float, float]
 def tracking_spans(data: RunData) -> tuple[Span, ...]:
     """Return (start, end) [s] of each flight; none when no drone ever accepted TRACK.
 
-    A flight ends once LAND or CUT_MOTORS was ordered to all of the team, at once or one by one, else with the last
-    message.
+    A flight ends once each drone of the team was ordered LAND or CUT_MOTORS or is on the floor, however it got there;
+    else with the last message.
     """
     spans = list[Span]()
     for start in sorted(_accepted(data)):
@@ -90,15 +90,21 @@ def _accepted(data: RunData) -> list[float]:
 
 
 def _end(data: RunData, start: float) -> float:
-    team, down = set(data.drones), set[str]()
-    for command in data.commands:
-        verb, scope = command.message.verb, set(command.message.scope or team)
-        if command.time_s < start:
-            continue
-        if verb in _STARTS:
-            down -= scope
-        elif verb in _ENDS:
-            down |= scope
-            if down >= team:
-                return command.time_s
-    return max(start, data.end_s)
+    """Return the end of a flight [s]; where no drone is known to have flown since its start, only orders end it."""
+    team = data.drones or tuple(data.vehicles) or ("",)  # without a field; nor any drone: an order to all counts
+    flights = [flights_of(data, name) for name in team]
+    orders = [_orders_down(data, name, team, start) for name in team]
+    times = np.unique(np.concatenate([[start], *(said_s for said_s, _ in (*flights, *orders))]))
+    times = times[times >= start]
+    aloft = np.array([held_at(said, times) for said in flights])
+    ordered = np.array([held_at(said, times) for said in orders])
+    flew = np.logical_or.accumulate(aloft.any(axis=0))
+    down = ordered.all(axis=0) | (flew & (ordered | ~aloft).all(axis=0))
+    return float(times[int(np.argmax(down))]) if down.any() else max(start, data.end_s)
+
+
+def _orders_down(data: RunData, name: str, team: tuple[str, ...], start: float) -> Said:
+    """Return when a drone was ordered down or up, from the start of a flight on [s], and whether down."""
+    orders = [item for item in data.commands if item.time_s >= start and name in (item.message.scope or team)]
+    said = sorted((one.time_s, one.message.verb in _ENDS) for one in orders if one.message.verb in (*_ENDS, *_STARTS))
+    return np.array([at_s for at_s, _ in said]), np.array([down for _, down in said], dtype=bool)

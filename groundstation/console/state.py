@@ -5,6 +5,8 @@ from dataclasses import asdict
 from types import MappingProxyType
 from typing import Any, TypeVar
 
+import msgspec
+
 from groundstation.bus import messages as m
 from groundstation.bus.api import Received
 from groundstation.console import told
@@ -19,6 +21,7 @@ from groundstation.monitor.batteries import battery_of
 from groundstation.monitor.endurance import flies
 from groundstation.monitor.safety import safety_of
 from groundstation.monitor.state import Cast, MonitorState, StampedMessage
+from groundstation.monitor.whereabouts import is_anywhere
 from groundstation.sensing.switches import Switch, switch_between
 
 _EVENTS = 40
@@ -77,6 +80,10 @@ class ConsoleState:
             return
         truth = {name: seen.message for name, seen in self.truth.items()}
         estimate, plan = _current(self.monitor.estimate, now_ns), _current(self.monitor.plan, now_ns)
+        if estimate is not None:
+            room_m = self.monitor.cast.room_m
+            placed = tuple(entity for entity in estimate.entities if not is_anywhere(entity, room_m))
+            estimate = msgspec.structs.replace(estimate, entities=placed)
         nis = self.health.nis() if estimate is not None and self.history.sample_due(now_ns) else None
         self.history.step(now_ns, estimate, plan, nis, truth)
 
@@ -86,7 +93,7 @@ class ConsoleState:
 
     def put(self, board: Snapshot, now_ns: int) -> None:
         """Put the changed values on the board."""
-        board.put("estimate", told.estimate(self.monitor.estimate))
+        board.put("estimate", told.estimate(self.monitor.estimate, self.monitor.cast.room_m))
         board.put("setpoints", {name: told.setpoint(seen) for name, seen in self.setpoints.items()})
         if self.truth:
             board.put("truth", {name: told.truth(seen) for name, seen in self.truth.items()})

@@ -10,6 +10,7 @@ from groundstation.bus import messages as m
 from groundstation.monitor.alarms import DARK, Alarm
 from groundstation.monitor.batteries import Battery
 from groundstation.monitor.state import StampedMessage
+from groundstation.monitor.whereabouts import is_anywhere
 from groundstation.sensing.switches import Switch
 
 _ALTERNATIVES = 8
@@ -32,8 +33,11 @@ def rounded(values: Iterable[float], digits: int = 4) -> list[float]:
     return [round(value, digits) for value in values]
 
 
-def estimate(seen: StampedMessage[m.Estimate] | None) -> dict[str, Any] | None:
-    """The estimates of all entities; None before the first estimate."""
+def estimate(seen: StampedMessage[m.Estimate] | None, room_m: tuple[float, float]) -> dict[str, Any] | None:
+    """The estimates of all entities; None before the first estimate.
+
+    anywhere: it has no place to show in a room of that length and width [m].
+    """
     if seen is None:
         return None
     entities = [
@@ -45,6 +49,7 @@ def estimate(seen: StampedMessage[m.Estimate] | None) -> dict[str, Any] | None:
             "cov": rounded((entity.covariance[0], entity.covariance[1], entity.covariance[len(entity.mean) + 1]), 7),
             "velocity": rounded(entity.velocity_m_s, 3),
             "converged": entity.converged,
+            "anywhere": is_anywhere(entity, room_m),
             # Never seen is infinite in the filter, which JSON cannot express.
             "age_s": round(min(entity.age_s, 1e6), 2),
             "unplaced_s": round(min(entity.unlocalised_s, 1e6), 2),

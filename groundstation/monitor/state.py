@@ -1,5 +1,6 @@
 """The state that an observer of the bus keeps: the newest message of each kind, and its time."""
 
+import math
 from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -24,7 +25,7 @@ class Cast:
 
     flight_times_s: usual flight time of a drone with a full battery, where its kind states one. lost_after_s: time
     unseen after which a robot or target is lost. unseen_land_s: time unseen after which a robot lands at the latest.
-    min_separation_m: the least distance of flying drones.
+    min_separation_m: the least distance of flying drones. room_m: length and width of the room.
     """
 
     site: str = ""
@@ -35,6 +36,7 @@ class Cast:
     lost_after_s: float = 3.0
     unseen_land_s: float = 30.0
     min_separation_m: float = 0.6
+    room_m: tuple[float, float] = (math.inf, math.inf)
 
 
 def cast_from_field(resolved: ResolvedField) -> Cast:
@@ -44,8 +46,8 @@ def cast_from_field(resolved: ResolvedField) -> Cast:
     flight_times_s = {name: time_s for name, time_s in usual.items() if time_s is not None}
     lost_after_s = resolved.estimator.lost_after_s
     targets, cameras, safety = tuple(resolved.tracked), tuple(resolved.cameras), resolved.safety
-    limits = safety.unseen_land_at_last_s, safety.min_separation_m
-    return Cast(resolved.site, drones, targets, cameras, flight_times_s, lost_after_s, *limits)
+    limits, room_m = (safety.unseen_land_at_last_s, safety.min_separation_m), resolved.room.size_m[:2]
+    return Cast(resolved.site, drones, targets, cameras, flight_times_s, lost_after_s, *limits, room_m)
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,12 +10,12 @@ from rich.text import Text
 from groundstation.appearance.cost import cost_text
 from groundstation.appearance.plain_text import one_line
 from groundstation.appearance.topology import topology_words
-from groundstation.bus.messages import OPERATOR, AckStage, EntityEstimate, Event, Lifecycle, Severity
+from groundstation.bus.messages import OPERATOR, AckStage, Event, Lifecycle, Severity
 from groundstation.control.unseen_targets import TELL_AFTER_S, unseen_words
-from groundstation.geometry.ellipse import semi_axes_95
 from groundstation.monitor.alarms import alarms_of
 from groundstation.monitor.batteries import Charge, battery_of
 from groundstation.monitor.state import MonitorState, StampedMessage
+from groundstation.monitor.whereabouts import ellipse_m, is_anywhere
 
 _SEEN_S = 0.6
 _EVENTS = 6
@@ -150,7 +150,7 @@ def _unseen(state: MonitorState, now_ns: int) -> Iterator[Text]:
     searched = {search.target for search in state.estimate.message.searches} if state.estimate else set()
     for name in state.cast.targets:
         target = state.entity(name)
-        if target is None or state.estimate is None or name in searched:
+        if target is None or state.estimate is None or name in searched or is_anywhere(target, state.cast.room_m):
             continue
         age_s = target.age_s + state.estimate.age_s(now_ns)
         if TELL_AFTER_S < age_s <= state.cast.lost_after_s:
@@ -184,20 +184,17 @@ def _belief(state: MonitorState, name: str, now_ns: int) -> tuple[Text, Text, Te
     if entity is None or state.estimate is None:
         return Text(), Text("unknown", style="dim"), Text(), sight
     age = entity.age_s + state.estimate.age_s(now_ns)
+    seen_ago = Text(f"{age:.1f} s", style="red" if age > 3 else "yellow" if age > 1 else "")
+    if is_anywhere(entity, state.cast.room_m):
+        return seen_ago, Text("unknown", style="dim"), Text(), sight
     position = " ".join(f"{value:6.2f}" for value in entity.mean[: 3 if entity.kind == "robot" else 2])
     style = "" if entity.converged else "yellow"
     return (
-        Text(f"{age:.1f} s", style="red" if age > 3 else "yellow" if age > 1 else ""),
+        seen_ago,
         Text(position, style=style),
-        Text(_ellipse(entity), style=style),
+        Text("{:.2f} x {:.2f}".format(*ellipse_m(entity)), style=style),
         sight,
     )
-
-
-def _ellipse(entity: EntityEstimate) -> str:
-    size = len(entity.mean)
-    major, minor, _ = semi_axes_95(entity.covariance[0], entity.covariance[1], entity.covariance[size + 1])
-    return f"{major:.2f} x {minor:.2f}"
 
 
 def _seen_by(state: MonitorState, name: str, now_ns: int) -> Text:

@@ -262,3 +262,14 @@ def test_no_seconds_are_stated_for_a_drone_that_nobody_has_ever_seen(said: Any, 
     assert (never, card) == ("unseen: one\nlands unless seen", "Hovers. Not seen yet: lands by itself, unless seen.")
     assert "Lost: drone_1, not seen yet." in line
     assert both == "unseen: both\nland unless seen"
+
+
+def test_a_target_that_may_be_anywhere_is_unseen_but_has_no_place_on_the_map(said: Any) -> None:
+    script = """
+    const { entities, entity, placed, unseenS } = await import("./store.js");
+    const target = { name: "turtlebot", kind: "target", mean: [12.8, -11.5], age_s: 65, anywhere: true };
+    store.s.estimate = { at: performance.now(), entities: [target, { name: "drone_1", mean: [0, 0, 1], age_s: 0 }] };
+    const result = [entities().map(({ name }) => name), placed("turtlebot") ?? null, entity("turtlebot").name];
+    result.push(Math.round(unseenS("turtlebot")));
+    """
+    assert said(script) == [["drone_1"], None, "turtlebot", 65]

@@ -17,8 +17,9 @@ from groundstation.monitor.table import render
 S = 1_000_000_000
 NOW = 100 * S
 CAST = Cast(
-    "lab", {"drone_1": 0.15, "drone_2": 0.15}, ("turtlebot",), ("ceiling",), {"drone_1": 720.0, "drone_2": 720.0}
-)
+    "lab", {"drone_1": 0.15, "drone_2": 0.15}, ("turtlebot",), ("ceiling",), {"drone_1": 720.0, "drone_2": 720.0},
+    room_m=(8.0, 6.0),
+)  # fmt: skip
 
 
 class World:

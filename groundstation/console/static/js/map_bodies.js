@@ -7,7 +7,7 @@ import { seconds } from "./dom.js";
 import { isDown, isLost } from "./glance.js";
 import { NAME, around, keepClear, note } from "./labels.js";
 import { withShortNames } from "./names.js";
-import { ageS, entities, entity, estimateAge, isTarget, store } from "./store.js";
+import { ageS, entities, entity, estimateAge, isTarget, placed, store } from "./store.js";
 
 const ARROW_S = 1.5, OLD_S = 2;
 // Entities not seen for long are greyed even while the tracker publishes.
@@ -32,10 +32,7 @@ export function drawTrails(g, view) {
 }
 
 function drawPrediction(g, view) {
-  for (const { name } of store.scene.targets) {
-    const target = entity(name);
-    if (target) drawPredictionOf(g, view, target);
-  }
+  for (const body of entities()) if (isTarget(body.name)) drawPredictionOf(g, view, body);
 }
 
 function drawPredictionOf(g, view, target) {
@@ -172,7 +169,7 @@ export function drawTruth(g, view) {
     g.moveTo(x - r, y + r); g.lineTo(x + r, y - r);
     g.moveTo(x, y); g.lineTo(...view.point(position[0] + 0.32 * Math.cos(yaw), position[1] + 0.32 * Math.sin(yaw)));
     g.stroke();
-    if (!entity(name) && !(store.s.standing ?? []).some((one) => one.name === name)) note(g, NAME, name, withShortNames(`${name} (true place)`), around(x, y, 10, 14), ink().truth, 14, 500);
+    if (!placed(name) && !(store.s.standing ?? []).some((one) => one.name === name)) note(g, NAME, name, withShortNames(`${name} (true place)`), around(x, y, 10, 14), ink().truth, 14, 500);
   }
 }
 

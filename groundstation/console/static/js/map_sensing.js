@@ -4,7 +4,7 @@ import { bodyToWorld, footprint, thickness } from "./geometry.js";
 import { colourOf, ink } from "./palette.js";
 import { drawArrow, path } from "./canvas.js";
 import { FIGURE, SENSOR, around, keepClear, note } from "./labels.js";
-import { ageS, droneNames, entities, entity, isSeen, store, targetHeight } from "./store.js";
+import { ageS, droneNames, entities, entity, isSeen, placed, store, targetHeight } from "./store.js";
 
 const FIGURE_PX = 75;
 export const DRAWN_S = 2; // a plan that is older is not drawn
@@ -68,7 +68,7 @@ function worldSensors() {
 }
 
 function place(name) {
-  const body = entity(name);
+  const body = placed(name);
   if (body) return body.mean;
   return worldSensors().find((sensor) => sensor.name === name)?.position_m;
 }

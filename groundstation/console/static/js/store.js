@@ -75,8 +75,11 @@ export function takeDelta(delta) {
   return Boolean(delta.s.samples);
 }
 
-export const entities = () => store.s.estimate?.entities ?? [];
-export const entity = (name) => entities().find((candidate) => candidate.name === name);
+const estimated = () => store.s.estimate?.entities ?? [];
+export const entity = (name) => estimated().find((candidate) => candidate.name === name);
+// All but targets that may be anywhere: those have no place to show.
+export const entities = () => estimated().filter(({ anywhere }) => !anywhere);
+export const placed = (name) => entities().find((candidate) => candidate.name === name);
 export const estimateAge = () => ageS(store.s.estimate?.at);
 export const shownEstimateAge = () => shownAgeS(store.s.estimate?.at);
 const TRACKER_S = 0.5, CONSOLE_S = 0.8;

@@ -150,7 +150,7 @@ function beliefWords(name, body, age, lost) {
   if (!body) return "";
   const trackers = doing("TRACK"), they = (one, many) => `${namedOrCounted(trackers)} ${trackers.length > 1 ? many : one} it.`;
   if (lost) return `Lost: nobody has seen it for ${seconds(age)}. ${trackers.length ? they("looks for", "look for") : ""}`.trim();
-  if (age > SEEN_S) return `Not seen for ${seconds(age)}: it may be hidden near (${body.mean.slice(0, 2).map((value) => value.toFixed(1)).join(", ")}).`;
+  if (age > SEEN_S) return `Not seen for ${seconds(age)}: ${body.anywhere ? "its place is unknown" : `it may be hidden near (${body.mean.slice(0, 2).map((value) => value.toFixed(1)).join(", ")})`}.`;
   return trackers.length ? `Seen: ${they("tracks", "track")}` : aloft() ? "Seen; nobody follows it now." : "Seen.";
 }
 
@@ -180,7 +180,7 @@ function showBelief(name, { root, values, mode, detail, drone }) {
   text(values.seen, seen);
   values.seen.className = level;
   text(values.by, withShortNames(seenBy(name).join(", ") || "nobody"));
-  if (!body) { for (const field of ["position", "ellipse", "speed"]) text(values[field], "unknown"); return; }
+  if (!body || body.anywhere) { for (const field of ["position", "ellipse", "speed"]) text(values[field], "unknown"); return; }
   const { major, minor } = ellipse95(body.cov);
   text(values.position, body.mean.slice(0, drone ? 3 : 2).map((value) => value.toFixed(2)).join("  "));
   text(values.ellipse, `${major.toFixed(2)} × ${minor.toFixed(2)}${body.converged ? "" : ", too unsure to fly by"}`);

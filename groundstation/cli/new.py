@@ -95,13 +95,21 @@ def _ask_room() -> "NewRoom":
 
     length = click.prompt("Length of the room [m]", default=8.0, type=FiniteRange(3, 60))
     width = click.prompt("Width [m]", default=6.0, type=FiniteRange(3, length))
-    height = click.prompt("Height [m]", default=4.5, type=FiniteRange(3, 20))
+    height = _until_possible(_ask_height)
     pictures = "http://192.168.1.50:8080/video.mjpg"
     source = click.prompt("Pictures of the ceiling camera", default=pictures, value_proc=_checked(parse_source))
     room = NewRoom(length, width, height, source)
     check_room(room)
     _draw(room, 0)
     return room
+
+
+def _ask_height() -> float:
+    from groundstation.settings.new_field import check_height
+
+    height: float = click.prompt("Height [m]", default=4.5, type=FiniteRange(0))
+    check_height(height)
+    return height
 
 
 def _draw(room: "NewRoom", drones: int) -> None:

@@ -17,7 +17,10 @@ Place = tuple[float, float]
 # Lens of config/cameras/ceiling.yaml: half a picture over its focal length.
 _HALF_VIEW = (640.0 / 1179.0, 360.0 / 1179.0)
 _WALL_M, _CEILING_M, _CAMERA_BELOW_CEILING_M = 0.3, 1.7, 0.3
-_LOWEST_CEILING_M = 3.0
+# Under a low ceiling the fence comes nearer to the camera: below this, drones could not fly over a board of 0.4 m.
+_LOWEST_FENCE_TOP_M = 1.3
+_LOWEST_CEILING_M, _HIGHEST_CEILING_M = 2.4, 20.0
+_BY_HAND = "groundstation config init writes a field file to edit"
 _PAD_GAP_M = 1.0
 _TARGET_CODE = 5
 _LONGEST_SITE = 40
@@ -58,7 +61,7 @@ class NewRoom(NamedTuple):
     @property
     def fence_top_m(self) -> float:
         """Height of the fence's top [m]."""
-        return round(self.height_m - _CEILING_M, 2)
+        return max(_LOWEST_FENCE_TOP_M, round(self.height_m - _CEILING_M, 2))
 
     def half_view_m(self, height_m: float) -> Place:
         """Return half the length and width of the ceiling camera's view at a height [m]."""
@@ -87,14 +90,21 @@ def check_room(room: NewRoom) -> None:
     """Raise OperatorMistake for a room in which no team can fly."""
     if not all(map(math.isfinite, room[:3])):
         raise OperatorMistake("a room's length, width and height must be numbers")
-    if room.height_m < _LOWEST_CEILING_M:
-        raise OperatorMistake(f"a room {room.height_m:g} m high is too low: two drones need {_LOWEST_CEILING_M:g} m")
+    check_height(room.height_m)
     if min(room.length_m, room.width_m) < 3.0:
         raise OperatorMistake(f"a room of {room.length_m:g} x {room.width_m:g} m is too small: 3 x 3 m at least")
-    if max(room.length_m, room.width_m, 3 * room.height_m) > 60.0:
+    if max(room.length_m, room.width_m) > 60.0:
+        raise OperatorMistake(f"a room of {room.length_m:g} x {room.width_m:g} m is too large: 60 x 60 m at most")
+
+
+def check_height(height_m: float) -> None:
+    """Raise OperatorMistake for a ceiling under which, or a height from which, no ceiling camera serves."""
+    if not height_m >= _LOWEST_CEILING_M:
         raise OperatorMistake(
-            f"a room of {room.length_m:g} x {room.width_m:g} x {room.height_m:g} m is too large: 60 x 60 x 20 m at most"
+            f"a room {height_m:g} m high is too low: {_LOWEST_CEILING_M:g} m at least (for a lower one, {_BY_HAND})"
         )
+    if height_m > _HIGHEST_CEILING_M:
+        raise OperatorMistake(f"a room {height_m:g} m high is too high: {_HIGHEST_CEILING_M:g} m at most")
 
 
 def pads(room: NewRoom, count: int) -> list[Place]:
@@ -102,10 +112,10 @@ def pads(room: NewRoom, count: int) -> list[Place]:
     inside = (0.5 * side - _WALL_M - PAD_TO_FENCE_M for side in room[:2])
     half = [min(seen - RISEN_ROOM_M, most) for seen, most in zip(room.half_view_m(RISEN_MARKER_M), inside, strict=True)]
     columns, rows = (1 + int(2 * side / _PAD_GAP_M) for side in half)
-    if count > columns * rows:
+    if count > (most := columns * rows):
         raise OperatorMistake(
-            f"there is room for {columns * rows} pads, not for {count}, inside the fence where the ceiling camera sees "
-            "them: use a wider lens or a larger room"
+            f"there is room for {most} pad{'s' * (most > 1)}, not for {count}, inside the fence where the ceiling "
+            f"camera sees them: take {most} drone{'s' * (most > 1)} (for a wider lens or more cameras, {_BY_HAND})"
         )
     used = math.ceil(count / rows)
     column = [(index - (used - 1) / 2) * _PAD_GAP_M for index in range(used)]

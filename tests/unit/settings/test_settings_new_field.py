@@ -7,7 +7,7 @@ from click.testing import CliRunner
 
 from groundstation.cli.new import new
 from groundstation.errors import OperatorMistake, SettingsError
-from groundstation.settings.load import load_field
+from groundstation.settings.load import cautions_of, load_field
 from groundstation.settings.new_field import BASES, NewDrone, NewRoom, NewTarget, check_room, field_text, pads
 from groundstation.settings.room_text import room_text
 
@@ -60,9 +60,30 @@ def test_pads_of_a_small_high_room_lie_inside_its_fence() -> None:
 
 def test_a_low_room_is_refused_with_the_reason() -> None:
     with pytest.raises(OperatorMistake, match="too low"):
-        check_room(NewRoom(8, 6, 2.4, SOURCE))
+        check_room(NewRoom(8, 6, 2.3, SOURCE))
     with pytest.raises(OperatorMistake, match="too low"):
-        field_text("lab", NewRoom(8, 6, 2.4, SOURCE), [ARDRONE], TURTLEBOT)
+        field_text("lab", NewRoom(8, 6, 2.3, SOURCE), [ARDRONE], TURTLEBOT)
+
+
+@pytest.mark.parametrize(("height_m", "drones"), [(2.4, 1), (2.5, 2), (2.8, 2), (3.0, 2), (3.2, 2)])
+def test_the_field_of_an_ordinary_room_has_no_warnings_of_its_own(tmp_path: Path, height_m: float, drones: int) -> None:
+    answers = "\n".join(["7", "5", str(height_m), "", str(drones), *(["", "", ""] * drones), "", "", "y", ""])
+    result = CliRunner().invoke(new, [str(tmp_path / "home")], input=answers)
+    assert result.exit_code == 0, result.output
+    file = tmp_path / "home" / "home.yaml"
+    assert cautions_of(file) == []
+    assert load_field(file).room.fence.z_m[1] == max(1.3, round(height_m - 1.7, 2))
+
+
+def test_a_ceiling_out_of_bounds_is_asked_again_with_the_bound_and_another_way(tmp_path: Path) -> None:
+    answers = ["7", "5", "2", "21", "2.5", "", "3", "2", *["", "", ""] * 2, "", "", "y", ""]
+    result = CliRunner().invoke(new, [str(tmp_path / "home")], input="\n".join(answers))
+    assert result.exit_code == 0, result.output
+    by_hand = "groundstation config init writes a field file to edit). Once more:"
+    assert f"a room 2 m high is too low: 2.4 m at least (for a lower one, {by_hand}" in result.output
+    assert "a room 21 m high is too high: 20 m at most. Once more:" in result.output
+    assert "there is room for 2 pads, not for 3, inside the fence where the ceiling camera sees them" in result.output
+    assert f"take 2 drones (for a wider lens or more cameras, {by_hand}" in result.output
 
 
 def test_the_drawing_shows_each_pad_within_the_view() -> None:

@@ -4,13 +4,23 @@ import json
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import AfterValidator, Field, TypeAdapter, ValidationError
+from pydantic_core import PydanticCustomError
 
 from groundstation.errors import SettingsError
 from groundstation.settings.document import read
-from groundstation.settings.room import Angle
+from groundstation.settings.room import LONGEST_M, Angle
 from groundstation.settings.values import MarkerCode, SettingsSection, SquareSize, Vector3
-from groundstation.settings.wording import ordered, problem_of_error
+from groundstation.settings.wording import ordered, problem_of_error, text_of_error
+
+_FARTHEST_M = LONGEST_M / 2
+
+
+def _in_a_room(place: tuple[float, float, float]) -> tuple[float, float, float]:
+    if max(map(abs, place)) > _FARTHEST_M:
+        text = "must lie within {farthest} m of the origin: places are in metres"
+        raise PydanticCustomError("in_a_room", text, {"farthest": f"{_FARTHEST_M:g}"})
+    return place
 
 
 class FloorMarker(SettingsSection):
@@ -18,7 +28,7 @@ class FloorMarker(SettingsSection):
 
     code: MarkerCode
     """Number of the marker."""
-    position_m: Vector3
+    position_m: Annotated[Vector3, AfterValidator(_in_a_room)]
     """Centre of the marker [m; world]."""
     yaw_deg: Angle | None = None
     """Direction of its bar [deg; world], counter-clockwise; none: unknown."""
@@ -58,7 +68,8 @@ def floor_marker_of(text: str) -> FloorMarker:
         position = (numbers[0], numbers[1], numbers[2] if len(numbers) > 2 else 0.0)
         return FloorMarker(code=int(code), position_m=position, yaw_deg=numbers[3] if len(numbers) > 3 else None)
     except ValidationError as error:
-        faults = "; ".join(f"{fault['loc'][0]}: {fault['msg']}" for fault in error.errors())
+        found = error.errors(include_url=False)
+        faults = "; ".join(f"{fault['loc'][0]}: {text_of_error(fault)}" for fault in found)
         raise SettingsError([f"--marker {text}: {faults}"]) from None
     except ValueError:
         raise SettingsError([f"--marker {text}: must look like 3=0.5,1.0 or 3=0.5,1.0,0,90"]) from None

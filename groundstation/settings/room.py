@@ -19,7 +19,9 @@ from groundstation.settings.values import (
     of_length,
 )
 
-Length = Annotated[float, Field(gt=0, le=100)]
+LONGEST_M = 100.0
+"""Longest side of a room."""
+Length = Annotated[float, Field(gt=0, le=LONGEST_M)]
 Angle = Annotated[float, Field(ge=-180, le=180)]
 
 

@@ -28,12 +28,16 @@ def _fence_in_room(parts: Parts) -> Iterator[Finding]:
 def _obstacles(parts: Parts) -> Iterator[Finding]:
     if parts.room is None:
         return
-    size = parts.room.size_m
     for name, one in parts.room.obstacles.items():
         path = ("room", "obstacles", name)
-        (x, y), half = one.centre_m, (one.size_m[0] / 2, one.size_m[1] / 2)
-        if abs(x) + half[0] > size[0] / 2 or abs(y) + half[1] > size[1] / 2 or one.size_m[2] > size[2]:
-            yield path, "must stand inside the room"
+        (x, y), half, height = one.centre_m, (one.size_m[0] / 2, one.size_m[1] / 2), one.size_m[2]
+        for axis, least, most in (("x", x - half[0], x + half[0]), ("y", y - half[1], y + half[1])):
+            low, high = parts.room.inside[f"{axis}_m"]
+            if least < low or most > high:
+                span = f"{axis} {low:g} to {high:g} (got {least:g} to {most:g})"
+                yield path, f"must stand inside the room, {span}"
+        if height > (ceiling := parts.room.size_m[2]):
+            yield path, f"must be no higher than the room, {ceiling:g} m (got {height:g})"
         for drone, own in parts.flying.items():
             if abs(own.pad_m[0] - x) < half[0] and abs(own.pad_m[1] - y) < half[1]:
                 yield ("drones", drone, "pad_m"), f"lies in room.obstacles.{name}"
@@ -42,14 +46,15 @@ def _obstacles(parts: Parts) -> Iterator[Finding]:
 def _cameras_above_fence(parts: Parts) -> Iterator[Finding]:
     if parts.room is None:
         return
-    size, top = parts.room.size_m, parts.room.fence.z_m[1]
+    inside, top = parts.room.inside, parts.room.fence.z_m[1]
     for name, camera in parts.cameras.items():
-        x, y, z = camera.position_m
-        path = ("cameras", name, "position_m")
-        if abs(x) > size[0] / 2 or abs(y) > size[1] / 2 or z > size[2]:
-            yield path, "must lie inside the room"
-        elif z <= top:
-            yield path, f"must hang above the fence: height > {top:g} (got {z:g})"
+        path, height = ("cameras", name, "position_m"), camera.position_m[2]
+        for axis, at in zip("xyz", camera.position_m, strict=True):
+            low, high = inside[f"{axis}_m"]
+            if at > high or (at < low and axis != "z"):
+                yield path, f"must lie inside the room, {axis} {low:g} to {high:g} (got {at:g})"
+        if height <= top:
+            yield path, f"must hang above the fence: height > {top:g} (got {height:g})"
 
 
 def _pads(parts: Parts) -> Iterator[Finding]:

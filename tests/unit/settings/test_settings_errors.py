@@ -62,8 +62,9 @@ def test_one_mistake_gives_one_line(old: str, new: str, expected: str) -> None:
 @pytest.mark.parametrize(
     ("box", "words"),
     [
-        ("{centre_m: [3.8, 0], size_m: [1, 1, 1]}", "room.obstacles.box: must stand inside the room"),
-        ("{centre_m: [0, 0], size_m: [1, 1, 5]}", "room.obstacles.box: must stand inside the room"),
+        ("{centre_m: [3.8, 0], size_m: [1, 1, 1]}", "box: must stand inside the room, x -4 to 4 (got 3.3 to 4.3)"),
+        ("{centre_m: [0, -3], size_m: [1, 1, 1]}", "box: must stand inside the room, y -3 to 3 (got -3.5 to -2.5)"),
+        ("{centre_m: [0, 0], size_m: [1, 1, 5]}", "room.obstacles.box: must be no higher than the room, 4.5 m (got 5)"),
         ("{centre_m: [-0.9, 0.45], size_m: [0.6, 0.6, 1]}", "drones.drone_1.pad_m: lies in room.obstacles.box"),
         ("{centre_m: [0, 0], size_m: [1, 0, 1]}", "room.obstacles.box.size_m[1]: must be > 0 (got 0)"),
     ],
@@ -242,10 +243,8 @@ OPTIONS = [
     ("drones.x.pad_m=[0, 0]", "there is no drones.x, there are drone_1, drone_2"),
     ("site.name=a", "site is a single value, nothing lies below it"),
     ("room.fence.x_m.0=-9", "room.fence.x_m: must lie inside the room, -4 to 4 (got -9 to 3.7)"),
-    (
-        "drones.drone_1.camera.position_m=[30, 0, 0]",
-        "drones.drone_1.camera.position_m[0]: must be <= 2 (got 30)",
-    ),
+    ("drones.drone_1.camera.position_m=[30, 0, 0]", "drones.drone_1.camera.position_m[0]: must be <= 2 (got 30)"),
+    ("cameras.ceiling.position_m=[0, 5, 4]", "cameras.ceiling.position_m: must lie inside the room, y -3 to 3 (got 5)"),
     ("room.fence.x_m.2=-9", "room.fence.x_m is a list of 2, '2' is not in it"),
     ("planner", "must look like path.to.key=value"),
     ("=3", "must look like path.to.key=value"),

@@ -108,7 +108,10 @@ def test_insufficient_floor_markers_are_refused_with_a_reason(tmp_path, measured
     code, _, said = measured(folder, "--calibration", calibration, "--marker=9=0,0")
     assert code == 4 and "none of the markers 9 was seen" in said
     code, _, said = measured(folder, "--calibration", calibration, "--marker=16=0,0", "--marker=2=x")
-    assert code == 2 and "--marker 16=0,0" in said
+    assert code == 2 and "--marker 16=0,0: code: must be <= 15 (got 16)" in said
+    code, _, said = measured(folder, "--calibration", calibration, "--marker=8=100,100")
+    far = "position_m: must lie within 50 m of the origin: places are in metres (got [100.0, 100.0, 0.0])"
+    assert code == 2 and f"--marker 8=100,100: {far}" in said
     code, _, said = measured(folder, "--calibration", calibration)
     assert code == 2 and "--markers FILE" in said
     other_lens(tmp_path, width_px=640)

@@ -14,7 +14,7 @@ from typing import Any
 import click
 
 from groundstation.bus.api import Received
-from groundstation.bus.messages import OPERATOR, AckStage, CommandAck, Verb
+from groundstation.bus.messages import OPERATOR, CommandAck, Verb
 from groundstation.bus.roles import Role
 from groundstation.bus.topics import COMMAND, COMMAND_ACK, LEASE
 from groundstation.bus.zenoh_bus import ZenohBus
@@ -164,7 +164,7 @@ def _report(book: AwaitedAnswers, as_json: bool) -> int:
         click.echo(json.dumps(document))
     elif not book.confirmed:
         for name, progress in book.progress.items():
-            if progress.stage is not AckStage.EFFECTIVE:
+            if not progress.settled:  # a refusal was told when it came
                 click.echo(f"{name:<12} {progress.text(final=True)}")
     return ExitCode.OK if book.confirmed else ExitCode.FAULT
 

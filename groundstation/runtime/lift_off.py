@@ -52,7 +52,7 @@ def why_unseen(member: Member, now_ns: int, for_s: float) -> str:
     """Return why a flying drone was not seen in flight for a time [s]."""
     rise_m, reported_m = member.rise_m(now_ns), member.reported_m(now_ns)
     if rise_m is None:
-        return f"not seen by any fixed camera for {for_s:g} s"
+        return f"it flies, but no fixed camera has seen it for {for_s:g} s"
     reports = "flies" if reported_m is None else f"reports {reported_m:.1f} m"
     return f"it {reports}, but its marker rose by {rise_m:.1f} m"
 

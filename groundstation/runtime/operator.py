@@ -272,7 +272,7 @@ class Operator:
             self._take_off_book = book
 
     def _report_left_out(self, name: str, reason: str, mistake: Mistake | None) -> None:
-        text, remedy = f"{name} does not fly: {reason}", "see its log"
+        text, remedy = f"{name} is left out of the take-off: {reason}", "see its log"
         if mistake is not None and reason == mistake.text:
             text, remedy = f"take-off stopped: {reason}", mistake.remedy
         else:

@@ -144,7 +144,8 @@ class TakeOff:
             self._note_up(now_ns)
             self._ordered_ns = now_ns  # the next one's driver must first receive this one's place
         elif self._late(now_ns, self._limits.unseen_s):
-            return self._leave_out(why_unseen(member, now_ns, self._limits.unseen_s), now_ns, land=True)
+            why = why_unseen(member, now_ns, self._limits.unseen_s)
+            return self._leave_out(f"{why}: it lands again", now_ns, land=True)
         return None
 
     def _stop(self, mistake: Mistake) -> TakeOffCommand:

@@ -123,6 +123,7 @@ def test_refused_and_silent_drones_are_not_confirmed(team: FakeTeam) -> None:
     assert document["drones"]["drone_1"] == {"stage": "REFUSED", "reason": "on the ground"}
     assert document["drones"]["drone_2"]["stage"] == "NOT CONFIRMED"
     assert len({command.id for command in team.heard}) == 1 and len(team.heard) > 3, "repeated under the same id"
+    assert cli("hold").stdout.count("refused: on the ground") == 1
 
 
 def test_named_drone_only(team: FakeTeam) -> None:

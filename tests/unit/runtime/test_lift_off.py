@@ -51,7 +51,7 @@ def test_seen_in_flight_is_the_own_marker_risen_to_where_the_drone_says_that_it_
 
 
 def test_a_drone_that_was_not_seen_is_left_out_for_what_was_seen() -> None:
-    assert why_unseen(member(UP, 0.8, None), NOW, 10) == "not seen by any fixed camera for 10 s"
+    assert why_unseen(member(UP, 0.8, None), NOW, 10) == "it flies, but no fixed camera has seen it for 10 s"
     assert why_unseen(member(UP, 2.0, 0.8), NOW, 10) == "it reports 2.0 m, but its marker rose by 0.8 m"
     assert why_unseen(member(UP, None, 0.1), NOW, 10) == "it flies, but its marker rose by 0.1 m"
 

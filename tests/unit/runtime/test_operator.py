@@ -86,6 +86,7 @@ def test_unseen_drone_lands(scene: Scene) -> None:
     scene.pass_(16.0)
     assert one.heard == [Verb.TAKEOFF, Verb.LAND] and one.state is FlightState.LANDED
     assert two.heard == [Verb.TAKEOFF, Verb.TRACK]
+    assert "drone_1: left out, it flies, but no fixed camera has seen it for 10 s: it lands again" in scene.said
 
 
 def test_refusal_is_retried_then_reported_with_its_reason(scene: Scene) -> None:

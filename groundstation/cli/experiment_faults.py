@@ -31,9 +31,9 @@ def faults(
     """Fly random fields with one or two random faults, with the real drivers, watchdogs and tracker.
 
     At message level: no processes, no pictures. Each seed is one flight, and always ends in the same way. Unsafe are,
-    from the first lift-off on: a separation below 0.6 m; a drone outside the fence, 0.3 m/s above its speed limit, or
-    in motion for more than a second with a belief that is 0.5 m off; and, once a vehicle's telemetry is useless, no
-    hover within 1 s or no rest within 3.5 s.
+    from the first lift-off on: a separation below 0.6 m; a drone outside the fence, within 0.3 m of an obstacle of the
+    field, 0.3 m/s above its speed limit, or in motion for more than a second with a belief that is 0.5 m off; and, once
+    a vehicle's telemetry is useless, no hover within 1 s or no rest within 3.5 s.
     """
     from groundstation.experiments.faults import by_kind, ends_told, table, totals
     from groundstation.experiments.flight_batches import batches, flights_of

@@ -40,7 +40,7 @@ def missions(flights: int, seed: int, scheduler: str, workers: int, out: Path, a
     Rooms of 6 to 12 m by 5 to 8 m; two or more of the field's drones; targets stand, or drive on one of the scenarios'
     paths at 0.15 to 0.6 m/s. Of three flights, in one nothing is wrong but the scenario's errors; in one sightings
     state too small a covariance; in one drones drift and do not report it. By ground truth, from lift-off to the
-    floor, the drones must stay within the fence and 0.6 m apart.
+    floor, the drones must stay within the fence, 0.6 m apart, and 0.3 m from the pillar that half of the rooms have.
     """
     from groundstation.experiments.flight_batches import batches, flights_of
     from groundstation.experiments.missions import rows_of, table

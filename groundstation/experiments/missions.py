@@ -5,7 +5,8 @@ from typing import Any
 
 from groundstation.experiments.summary import worst
 
-_WORST = (("separation_m", min), ("fence_m", max), ("unlocalised_s", max))
+_WORST = (("separation_m", min), ("fence_m", max), ("obstacle_m", min), ("unlocalised_s", max))
+_BOUNDS = ("fence", "obstacle", "separation")
 _SHOWN_SEEDS = 8
 
 
@@ -13,7 +14,8 @@ def rows_of(flights: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Return a row each for flights in which nothing is wrong, sightings state too little, or velocities are off.
 
     flights: number that tracked; not_flown: seeds whose team did not all take off; drones: sizes of the teams that
-    tracked; violations: seeds that left the fence or came too close, with the time [s]; landed_before: seeds in which a
+    tracked; violations: seeds that left the fence, or came too near to each other or an obstacle, with the time
+    [s]; landed_before: seeds in which a
     drone landed without the order; not_landed: seeds in which one still flew at the end.
     """
     rows = []
@@ -42,13 +44,13 @@ def _wrong(flight: Mapping[str, Any]) -> tuple[float, float]:
 
 
 def _broken(flight: Mapping[str, Any]) -> dict[str, float]:
-    return {what: at_s for what, at_s in flight["unsafe"].items() if what in ("fence", "separation")}
+    return {what: at_s for what, at_s in flight["unsafe"].items() if what in _BOUNDS}
 
 
 def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return the rows as lines of text."""
-    columns = "{:>10s} {:>9s} {:>7s} {:>10s} {:>6s} {:>8s} {:>7s} {:>6s} {:>8s}  {}"
-    heads = ("flights", "violations", "sep m", "fence m", "lost s", "landed", "airborne", "seeds")
+    columns = "{:>10s} {:>9s} {:>7s} {:>10s} {:>6s} {:>8s} {:>6s} {:>7s} {:>6s} {:>8s}  {}"
+    heads = ("flights", "violations", "sep m", "fence m", "box m", "lost s", "landed", "airborne", "seeds")
     lines = [columns.format("covariance", "drift m/s", *heads)]
     for row in rows:
         figures = ["-" if row[key] is None else f"{row[key]:.2f}" for key, _ in _WORST]

@@ -17,6 +17,7 @@ _HEALTHY_SHARE = 0.1
 # Pads lie where the ceiling camera of the shipped fields sees a drone at the height to which it takes off, and far
 # enough inside the fence that a take-off does not leave it (as `groundstation check` advises).
 _PADS_M = (1.4, 0.75)
+PAD_TO_OBSTACLE_M = 0.6
 _LEAST_PADS_M, _TARGET_M, _PAD_TO_FENCE_M = 1.1, 0.6, 0.3
 # Two pads may leave no room for a third: then all are drawn anew. If they fit, a seed's pads are those of old.
 _MISSES, _BEGINNINGS = 20_000, 60
@@ -107,17 +108,30 @@ def _pads(field: dict[str, Any], rng: np.random.Generator) -> list[tuple[float, 
     reach = tuple(min(most, half - _PAD_TO_FENCE_M) for most, half in zip(_PADS_M, half_m, strict=True))
     wanted = len(field["drones"])
     for _ in range(_BEGINNINGS if min(reach) > 0.0 else 0):
-        pads = _some_pads(wanted, middle, (reach[0], reach[1]), rng)
+        pads = _some_pads(wanted, middle, (reach[0], reach[1]), list(field["room"].get("obstacles", {}).values()), rng)
         if len(pads) == wanted:
             return pads
     raise WrongOrder(
-        f"{wanted} drones: pads that are {_LEAST_PADS_M:g} m apart, {_TARGET_M:g} m from the middle of the fence and "
-        f"{_PAD_TO_FENCE_M:g} m inside it were not found for so many: fly fewer, or widen room.fence"
+        f"{wanted} drones: pads that are {_LEAST_PADS_M:g} m apart, {_TARGET_M:g} m from the middle of the fence, "
+        f"{PAD_TO_OBSTACLE_M:g} m from room.obstacles and {_PAD_TO_FENCE_M:g} m inside the fence were not found for so "
+        "many: fly fewer, or widen room.fence"
     )
 
 
+def apart_m(obstacle: dict[str, Any], place: tuple[float, float]) -> float:
+    """Return the distance of a place from an obstacle of a field (plain values) [m]."""
+    gaps = (
+        abs(at - c) - size / 2 for at, c, size in zip(place, obstacle["centre_m"], obstacle["size_m"], strict=False)
+    )
+    return math.hypot(*(max(0.0, gap) for gap in gaps))
+
+
 def _some_pads(
-    wanted: int, middle: tuple[float, float], reach: tuple[float, float], rng: np.random.Generator
+    wanted: int,
+    middle: tuple[float, float],
+    reach: tuple[float, float],
+    obstacles: list[dict[str, Any]],
+    rng: np.random.Generator,
 ) -> list[tuple[float, float]]:
     """Return `wanted` places, or fewer if there was no room for another one."""
     (west, east), (south, north) = ((at - span, at + span) for at, span in zip(middle, reach, strict=True))
@@ -126,6 +140,7 @@ def _some_pads(
     while len(pads) < wanted and missed < _MISSES:
         place = (float(rng.uniform(west, east)), float(rng.uniform(south, north)))
         fits = math.dist(place, middle) >= _TARGET_M and all(math.dist(place, other) >= _LEAST_PADS_M for other in pads)
+        fits = fits and all(apart_m(one, place) >= PAD_TO_OBSTACLE_M for one in obstacles)
         missed = 0 if fits else missed + 1
         pads += [place] if fits else []
     return pads

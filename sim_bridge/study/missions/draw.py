@@ -6,7 +6,7 @@ import numpy as np
 
 from sim_bridge.fault_kinds import Fault, FaultKind
 from sim_bridge.scenario import Scenario
-from sim_bridge.study.faults.draw import Drawn, random_eight, random_pads
+from sim_bridge.study.faults.draw import PAD_TO_OBSTACLE_M, Drawn, apart_m, random_eight, random_pads
 from sim_bridge.target_paths import AlongWalls, Anywhere, Path, RandomWalk, Sprint, Waypoints
 from sim_bridge.world.noise import generator_of
 
@@ -16,6 +16,7 @@ _FENCE_INSET_M, _TARGET_INSET_M = 0.3, 0.6
 _SPEED_M_S = (0.15, 0.6)
 _POINTS = 5
 _LEAST_TEAM = 2
+_PILLAR_M, _PILLARED, _TRIES = (0.2, 0.8), 0.5, 100
 
 
 def draw_mission(field: dict[str, Any], base: Scenario, seed: int, drift_m_s: float = 0.0) -> Drawn:
@@ -26,6 +27,7 @@ def draw_mission(field: dict[str, Any], base: Scenario, seed: int, drift_m_s: fl
     rng = generator_of(seed, "mission")
     sized = {**field, "room": _room(field["room"], rng)}
     told = {**sized, "drones": random_pads(sized, rng)}
+    told["room"] = {**told["room"], "obstacles": _pillar(told, seed)}
     path = _path(told, rng)
     waits = {"departs_after_team_s": None} if isinstance(path, AlongWalls | Anywhere) else {}
     target = base.target.model_copy(update={"path": path, **waits})
@@ -56,6 +58,22 @@ def _room(room: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
     x_m, y_m = length_m / 2 - _FENCE_INSET_M, width_m / 2 - _FENCE_INSET_M
     fence = {**room["fence"], "x_m": (-x_m, x_m), "y_m": (-y_m, y_m)}
     return {**room, "size_m": (length_m, width_m, room["size_m"][2]), "fence": fence, "obstacles": {}}
+
+
+def _pillar(field: dict[str, Any], seed: int) -> dict[str, Any]:
+    """Return a pillar inside the fence, away from the pads, in every other flight.
+
+    As high as the room: low boxes are flown over, and who lands on one would sink through it, as nothing stops bodies.
+    """
+    rng = generator_of(seed, "pillar")
+    (x0, x1), (y0, y1) = field["room"]["fence"]["x_m"], field["room"]["fence"]["y_m"]
+    side_m = (float(rng.uniform(*_PILLAR_M)), float(rng.uniform(*_PILLAR_M)))
+    box: dict[str, Any] = {"size_m": (*side_m, field["room"]["size_m"][2])}
+    for _ in range(_TRIES if rng.random() < _PILLARED else 0):
+        box["centre_m"] = float(rng.uniform(x0, x1)), float(rng.uniform(y0, y1))
+        if all(apart_m(box, drone["pad_m"]) >= PAD_TO_OBSTACLE_M for drone in field["drones"].values()):
+            return {"pillar": box}
+    return {}
 
 
 def _path(field: dict[str, Any], rng: np.random.Generator) -> Path:

@@ -39,7 +39,7 @@ class MissionFlight(FaultFlight):
         landed: whether all stand at the end, by truth.
         """
         report = self.run()
-        judged = ("separation_m", "fence_m", "unsafe", "unlocalised_s")
+        judged = ("separation_m", "fence_m", "obstacle_m", "unsafe", "unlocalised_s")
         return {
             "seed": report["seed"],
             "path": self.scenario.target.path.shape,

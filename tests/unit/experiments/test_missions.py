@@ -4,7 +4,7 @@ from typing import Any
 
 from groundstation.experiments.missions import rows_of, table
 
-FIGURES = {"separation_m": 0.9, "fence_m": 0.0, "unlocalised_s": 0.0, "unsafe": {}}
+FIGURES: dict[str, Any] = {"separation_m": 0.9, "fence_m": 0.0, "obstacle_m": None, "unlocalised_s": 0.0, "unsafe": {}}
 
 
 def flown(seed: int, share: float = 1.0, drift: float = 0.0, **figures: Any) -> dict[str, Any]:
@@ -20,18 +20,23 @@ def test_a_broken_bound_counts_and_another_fault_does_not() -> None:
     assert (row["separation_m"], row["unlocalised_s"]) == (0.5, 1.4)
 
 
+def test_who_comes_near_to_a_pillar_breaks_a_bound() -> None:
+    (row,) = rows_of([flown(1, obstacle_m=0.5), flown(2, obstacle_m=0.2, unsafe={"obstacle": 20.0}), flown(3)])
+    assert (row["obstacle_m"], row["violations"]) == (0.2, {2: {"obstacle": 20.0}})
+
+
 def test_flights_that_state_too_little_have_a_row_of_their_own() -> None:
     whole, less = rows_of([flown(1), flown(3, 0.25, fence_m=0.1, unsafe={"fence": 31.0}, landed=False)])
     assert whole["violations"] == {} and whole["not_landed"] == []
     assert less["violations"] == {3: {"fence": 31.0}} and less["not_landed"] == [3]
-    assert table([whole, less])[2].split() == ["0.25", "0.00", "1", "1", "0.90", "0.10", "0.00", "0", "1", "3"]
+    assert table([whole, less])[2].split() == ["0.25", "0.00", "1", "1", "0.90", "0.10", "-", "0.00", "0", "1", "3"]
 
 
 def test_missions_not_flown_are_listed_without_figures() -> None:
     on_the_floor = {name: value for name, value in flown(7).items() if name not in FIGURES} | {"flown": False}
     (row,) = rows_of([on_the_floor])
     assert (row["flights"], row["not_flown"], row["separation_m"]) == (0, [7], None)
-    assert table([row])[1].split() == ["1.00", "0.00", "0", "0", "-", "-", "-", "0", "0", "7"]
+    assert table([row])[1].split() == ["1.00", "0.00", "0", "0", "-", "-", "-", "-", "0", "0", "7"]
 
 
 def test_a_violation_before_all_have_taken_off_counts() -> None:

@@ -13,6 +13,7 @@ from groundstation.settings.sections import CAMERA, driver_sections
 from sim_bridge.fault_kinds import FaultKind
 from sim_bridge.scenario import Scenario
 from sim_bridge.site import parse_site
+from sim_bridge.study.faults.draw import apart_m
 from sim_bridge.study.faults.vehicles import of_team
 from sim_bridge.study.missions.draw import draw_mission
 from sim_bridge.world.world import World
@@ -53,16 +54,22 @@ def test_teams_of_two_to_all_drones_fly_with_their_drivers_alone() -> None:
 
 def test_rooms_hold_their_fence_pads_and_target(lab_field: ResolvedField) -> None:
     field = msgspec.to_builtins(lab_field)
-    lengths, shapes = [], set()
+    lengths, shapes, pillars = [], set(), 0
     for seed in SEEDS:
         drawn = draw_mission(field, Scenario(), seed)
         room = field_from_json(msgspec.json.encode(drawn.field)).room
         half = (room.size_m[0] / 2, room.size_m[1] / 2)
         assert (room.fence.x_m[1], room.fence.y_m[1]) == pytest.approx((half[0] - 0.3, half[1] - 0.3))
+        for pillar in room.obstacles.values():
+            pillars += 1
+            pads = [drone["pad_m"] for drone in drawn.field["drones"].values()]
+            assert min(apart_m(msgspec.to_builtins(pillar), pad) for pad in pads) >= 0.6
+            assert room.fence.x_m[0] <= pillar.centre_m[0] <= room.fence.x_m[1]
         world = World(parse_site(drawn.field), drawn.scenario, seed)
         for state in world.states():
             assert abs(state[0]) < half[0] and abs(state[1]) < half[1]
         lengths.append(room.size_m[0])
         shapes.add(drawn.scenario.target.path.shape)
+    assert 0.3 < pillars / len(SEEDS) < 0.7
     assert min(lengths) < 7.0 and max(lengths) > 11.0
     assert shapes == {"figure_eight", "random_walk", "sprint", "along_walls", "anywhere", "waypoints"}

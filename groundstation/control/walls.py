@@ -115,14 +115,14 @@ def _obstacles(
     if not parameters.obstacles:
         return []
     rest, time = _braking(robot, belief, parameters, velocities)
-    place, (x, y, z) = place_of(robot, belief), (math.sqrt(variance) for variance in _variances(robot, belief))
-    keep = parameters.obstacle_distance_m + parameters.margin_m
-    keeps = [keep + parameters.sigmas * std for std in (x, x, y, y, z)]
+    place, keep = place_of(robot, belief), parameters.obstacle_distance_m + parameters.margin_m
+    x, y, z = (keep + parameters.sigmas * math.sqrt(variance) for variance in _variances(robot, belief))
     walls = []
     for box in parameters.obstacles:
-        gaps = [gap - keep for gap, keep in zip(_gaps(box, rest), keeps, strict=True)]
-        beside = [side for side, gap in enumerate(_gaps(box, place)) if gap > 0.0] or range(len(gaps))
-        side = max(beside, key=gaps.__getitem__)
+        gaps = [gap - kept for gap, kept in zip(_gaps(box, rest), (x, x, y, y, z), strict=True)]
+        # Beyond a thin box a point of rest shows no way through it.
+        outside = [side for side, gap in enumerate(_gaps(box, place)) if gap > 0.0]
+        side = max(outside or range(len(gaps)), key=gaps.__getitem__)
         walls.append(Wall("obstacle", _INWARDS[side], max(0.0, gaps[side]) / time))
     return walls
 

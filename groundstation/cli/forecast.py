@@ -44,11 +44,12 @@ def forecast(
 
     Figures are standard deviations of the target's position, by the filter that flies, with the drones at the best
     stand found for a target at each place: the planner's, or one from which it starts. Places whose stand the planner
-    would leave are counted. Errors of simulated flights were 0.7 to 0.8 of the figures.
+    would leave are counted. Errors of simulated flights were 0.7 to 0.8 of the figures. The warnings of `config check`
+    come first.
     """
     from groundstation.cli.kernels import use_flying_kernels
     from groundstation.settings.files import find_field
-    from groundstation.settings.load import load_field
+    from groundstation.settings.load import cautions_of, load_field
     from groundstation.settings.resolved import resolved_field
 
     if drawn and scenario:
@@ -59,6 +60,9 @@ def forecast(
     settings = load_field(path, options)
     target = _target(settings, target)
     paths = _paths(settings, path, target, drawn, scenario)
+    warnings = cautions_of(path, options)
+    if not as_json:
+        _warn(warnings)
     use_flying_kernels()
     from groundstation.forecast.forecast import forecast as forecast_of
 
@@ -68,13 +72,13 @@ def forecast(
     if as_json:
         from groundstation.forecast.plain import plain
 
-        click.echo(json.dumps(plain(found)))
+        click.echo(json.dumps({"warnings": warnings, **plain(found)}))
     else:
         _tell(found)
     if spent_s > _LONG_S:
         click.echo(f"this took {spent_s:.0f} s of computing: large teams and many cameras take long", err=True)
     if output is not None:
-        _write(found, settings, paths, output)
+        _write(found, warnings, settings, paths, output)
 
 
 def _target(settings: "Field", named: str | None) -> str:
@@ -121,6 +125,13 @@ def _places(text: str) -> list[tuple[float, float]]:
     return places
 
 
+def _warn(warnings: list[str]) -> None:
+    for line in warnings:
+        click.echo(click.wrap_text(f"WARNING: {line}", _WIDTH, subsequent_indent="  "))
+    if warnings:
+        click.echo()
+
+
 def _tell(found: "Forecast") -> None:
     from rich.markup import escape
     from rich.table import Table
@@ -141,7 +152,7 @@ def _tell(found: "Forecast") -> None:
         click.echo()
 
 
-def _write(found: "Forecast", settings: "Field", paths: "Paths", output: Path) -> None:
+def _write(found: "Forecast", warnings: list[str], settings: "Field", paths: "Paths", output: Path) -> None:
     from groundstation.recording.outputs import replaced_file
     from groundstation.settings.drawing import Shade, draw, svg_of
 
@@ -152,7 +163,7 @@ def _write(found: "Forecast", settings: "Field", paths: "Paths", output: Path) -
         from groundstation.forecast.wording import sections_of
 
         title = f"Forecast of {settings.site}"
-        text = page(title, sections_of(found), svg_of(settings, paths, shade))
+        text = page(title, warnings, sections_of(found), svg_of(settings, paths, shade))
         with replaced_file(output) as partial:
             partial.write_text(text, encoding="utf-8")
     else:

@@ -8,14 +8,17 @@ from statistics import median
 import numpy as np
 
 from groundstation.arrays import Array
+from groundstation.estimation.motion import DIFFUSE_M2
 from groundstation.field.resolved import ResolvedField
 from groundstation.forecast.flown_filter import FlownFilter
 from groundstation.forecast.stands import StandSearch, TeamStand
 from groundstation.forecast.team import Place, Team
 from groundstation.forecast.views import Obstruction
 
-_SETTLED_S = 1.5  # time until the filter's covariance, begun near its final value, is constant
-_BEFORE = (0.05**2, 0.05**2, 0.04**2, 0.05**2)  # initial variances of x, y, z, yaw
+_SETTLED_S = 1.5  # time until the covariance of places seen by cameras is constant
+# Initial variances of x, y, z, yaw: heights and headings are near their final values, places unknown, since a direction
+# that no sensor tells would keep what it began with.
+_BEFORE = (DIFFUSE_M2, DIFFUSE_M2, 0.04**2, 0.05**2)
 OBSTACLE = "an obstacle stands there"
 
 _WORDS = {

@@ -11,11 +11,12 @@ _STYLE = (
 )
 
 
-def page(title: str, sections: Iterable[Section], svg: str) -> str:
-    """Return the page of some sections, the map after the first."""
+def page(title: str, warnings: Iterable[str], sections: Iterable[Section], svg: str) -> str:
+    """Return the page of warnings about the field and of some sections, the map after the first."""
     first, *rest = [_section(one) for one in sections]
     drawn = svg[svg.index("<svg") :]
-    body = "\n".join([f"<h1>{escape(title)}</h1>", first, drawn, *rest])
+    warned = (f"<p><strong>WARNING: {escape(line)}</strong></p>" for line in warnings)
+    body = "\n".join([f"<h1>{escape(title)}</h1>", *warned, first, drawn, *rest])
     head = f'<meta charset="utf-8"><title>{escape(title)}</title><style>{_STYLE}</style>'
     return f'<!doctype html>\n<html lang="en"><head>{head}</head><body>\n{body}\n</body></html>\n'
 

@@ -1,8 +1,10 @@
 """The team of a forecast: its drones and cameras, also without those that fail."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 from groundstation.field.resolved import ResolvedField
+from groundstation.forecast.ranged_places import RangedPlaces
 from groundstation.planning.parameters import PlannerParameters, parameters_from_field
 from groundstation.sensing.from_field import sensors_from_field
 from groundstation.sensing.models import SensorSuite
@@ -12,13 +14,17 @@ Place = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Team:
-    """Drones with their cameras, and the target that all track; others: the field's other targets."""
+    """Drones with their cameras, and the target that all track.
+
+    others: the field's other targets; ranging: the places that each ranging system tells, by its name.
+    """
 
     robots: tuple[str, ...]
     target: str
     others: tuple[str, ...]
     sensors: SensorSuite
     planner: PlannerParameters
+    ranging: Mapping[str, RangedPlaces] = field(default_factory=dict)
 
     def without_sensor(self, name: str) -> "Team":
         """Return the team when one camera, of a drone or fixed in the room, shows nothing."""
@@ -32,8 +38,10 @@ class Team:
         return replace(left, robots=tuple(one for one in self.robots if one != name))
 
 
-def team_of(field: ResolvedField, target: str = "") -> Team:
+def team_of(resolved: ResolvedField, target: str = "") -> Team:
     """Return the whole team of a field, with one of its targets ("": the first)."""
-    target = target or next(iter(field.tracked))
-    others = tuple(name for name in field.tracked if name != target)
-    return Team(tuple(field.drones), target, others, sensors_from_field(field), parameters_from_field(field))
+    target = target or next(iter(resolved.tracked))
+    others = tuple(name for name in resolved.tracked if name != target)
+    ranging = {name: RangedPlaces(system) for name, system in resolved.ranging.items()}
+    sensors, planner = sensors_from_field(resolved), parameters_from_field(resolved)
+    return Team(tuple(resolved.drones), target, others, sensors, planner, ranging)

@@ -67,12 +67,16 @@ class Views:
         return share * free if free >= 0.5 else 0.0
 
     def placed_by(self, point: Point, is_target: bool) -> float:
-        """Return the probability that a fixed camera, the best one, shows a marker at a point."""
+        """Return the probability that a fixed sensor, the best one, locates a marker at a point."""
         world = self._team.sensors.world
         return max(
-            (self.sees(name, _NOWHERE, point) for name, one in world.items() if one.observes_targets or not is_target),
+            (self._places(name, point) for name, one in world.items() if one.observes_targets or not is_target),
             default=0.0,
         )
+
+    def _places(self, sensor: str, point: Point) -> float:
+        seen, ranges = self.sees(sensor, _NOWHERE, point), self._team.ranging.get(sensor)
+        return seen if seen <= 0.0 or ranges is None or ranges.tells(point) else 0.0
 
     def is_placed_above(self, robot: str, place: Place) -> bool:
         """Return whether a fixed camera sees a robot's marker at one of its heights above a place inside the fence."""
@@ -139,7 +143,9 @@ class Views:
         model = self._team.sensors.world[camera]
         if math.dist(model.position_m, point) > model.view.range_m:
             return "beyond the range of"
-        return "hidden from" if self._team.sensors.world_in_view(camera, np.array(point)) else "out of the view of"
+        if not self._team.sensors.world_in_view(camera, np.array(point)):
+            return "out of the view of"
+        return "not told in x and y by the ranges of" if camera in self._team.ranging else "hidden from"
 
     def _chain(self, point: Point, robots: Sequence[str], links: int) -> Chain | Obstruction:
         worst, stands = Obstruction.NO_CAMERA, []

@@ -58,6 +58,20 @@ def test_places_whose_stand_the_planner_would_leave_are_counted(
     assert "on the path: at 2 of the 2 places that are seen the planner alone would leave the stand" in told
 
 
+def test_warnings_about_the_field_come_first(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    plane = "ranging.uwb.anchors={a: [-3, -2, 2], b: [3, -2, 2], c: [3, 2, 2], d: [-3, 2, 2]}"
+    page, words = tmp_path / "forecast.html", "lie nearly in one plane"
+    assert cli.run(["forecast", "uwb-lab", "--set", plane, "-o", str(page)]) == ExitCode.OK
+    text = capsys.readouterr().out
+    assert text.startswith("WARNING: ") and words in " ".join(text.split())
+    assert max(len(line.rstrip()) for line in text.splitlines()) <= 80
+    written = page.read_text(encoding="utf-8")
+    assert written.index("WARNING: ") < written.index("<h2>") and words in written
+    assert cli.run(["forecast", "uwb-lab", "--set", plane, "--json"]) == ExitCode.OK
+    (warning,) = json.loads(capsys.readouterr().out)["warnings"]
+    assert words in warning
+
+
 def test_each_of_several_targets_is_forecast_by_itself(capsys: pytest.CaptureFixture[str]) -> None:
     order = ["forecast", "two-targets", "--scenario", "parting-targets"]
     assert cli.run(order) == ExitCode.OK

@@ -10,7 +10,7 @@ from groundstation.settings.host_checks import findings_of_hosts
 from groundstation.settings.kind_checks import findings_of_kinds
 from groundstation.settings.name_checks import findings_of_names
 from groundstation.settings.parts import Finding, Parts
-from groundstation.settings.ranging_checks import findings_of_ranging
+from groundstation.settings.ranging_checks import findings_of_lines, findings_of_ranging
 from groundstation.settings.room import CalibrationSettings
 from groundstation.settings.room_checks import findings_in_room
 from groundstation.vehicles import kind_named
@@ -41,6 +41,11 @@ def _root(parts: Parts) -> Iterator[Finding]:
 
 def _ranged(parts: Parts) -> Iterator[Finding]:
     yield from findings_of_ranging(parts.ranging, parts.drones, parts.flying, parts.room)
+    observed = {name: one.observes for name, one in parts.cameras.items()}
+    observed |= {name: one.observes for name, one in parts.motion_capture.items() if name != parts.truth}
+    faulty = parts.given - {*parts.ranging, *parts.cameras, *parts.motion_capture}
+    if not faulty and not any("robots" in seen for seen in observed.values()):
+        yield from findings_of_lines(parts.ranging)
 
 
 def _kinds(parts: Parts) -> Iterator[Finding]:

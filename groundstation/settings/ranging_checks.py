@@ -4,11 +4,30 @@ import math
 from collections.abc import Container, Iterable, Iterator, Mapping
 from itertools import combinations
 
+import numpy as np
+
+from groundstation.arrays import Array
 from groundstation.settings.document import KeyPath
 from groundstation.settings.ranging import RangingSettings
 from groundstation.settings.room import RoomSettings
 
 _APART_M = 0.1
+# Spread of anchors [m; root of the summed squares] along a direction below which ranges hardly tell places along it.
+_LEAST_SPREAD_M = 0.6
+
+
+def untold_directions(system: RangingSettings) -> Array:
+    """Return the directions (n, 3) across the line or plane in which the anchors nearly lie; none otherwise."""
+    places = np.array([*system.anchors.values()])
+    _, spread_m, directions = np.linalg.svd(places - places.mean(axis=0))
+    return directions[spread_m < _LEAST_SPREAD_M]
+
+
+def findings_of_lines(systems: Mapping[str, RangingSettings]) -> Iterator[tuple[KeyPath, str]]:
+    """Return the systems if the anchors of each lie in a line, and nothing else fixed locates drones."""
+    if all(len(untold_directions(one)) > 1 for one in systems.values()):
+        text = "lie nearly in one line: ranges tell a circle around it, no place, and nothing else fixed locates drones"
+        yield from ((("ranging", name, "anchors"), text) for name in systems)
 
 
 def findings_of_ranging(

@@ -1,4 +1,4 @@
-"""Warnings about the boxes in which motion capture and ranging systems see drones, and about anchors in one plane."""
+"""Warnings about boxes in which motion capture and ranging systems see drones, and anchors in one line or plane."""
 
 from collections.abc import Iterator
 
@@ -7,12 +7,11 @@ import numpy as np
 from groundstation.settings.in_view import STANDING_MARKER_M
 from groundstation.settings.motion_capture import VolumeSettings
 from groundstation.settings.parts import Finding
+from groundstation.settings.ranging_checks import untold_directions
 from groundstation.settings.schema import Field
 from groundstation.settings.values import Vector3
 
 _BEYOND_ROOM_M = 1.0
-# Spread of anchors [m; root of the summed squares] along a direction below which ranges hardly tell places along it.
-_LEAST_SPREAD_M = 0.6
 
 
 def volume_cautions(field: Field) -> Iterator[Finding]:
@@ -29,12 +28,13 @@ def volume_cautions(field: Field) -> Iterator[Finding]:
 
 
 def anchor_cautions(field: Field) -> Iterator[Finding]:
-    """Yield systems whose anchors lie in one plane, or nearly so: places across it are hardly told, or mirrored."""
+    """Yield systems whose anchors lie in one line or plane, or nearly so, and what their ranges do not tell."""
     for name, system in field.ranging.items():
-        places = np.array([*system.anchors.values()])
-        _, spread_m, directions = np.linalg.svd(places - places.mean(axis=0))
-        if spread_m[-1] < _LEAST_SPREAD_M:
-            axis = "xyz"[int(np.argmax(np.abs(directions[-1])))]
+        across = untold_directions(system)
+        if len(across) > 1:
+            yield ("ranging", name, "anchors"), "lie nearly in one line: ranges tell a circle around it, and no place"
+        elif len(across):
+            axis = "xyz"[int(np.argmax(np.abs(across[0])))]
             text = f"lie nearly in one plane: places across it (mostly along {axis}) are hardly told, or mirrored"
             yield ("ranging", name, "anchors"), text
 

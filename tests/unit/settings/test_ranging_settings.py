@@ -18,6 +18,7 @@ from groundstation.sensing.from_field import sensors_from_field
 from groundstation.settings.cautions import cautions
 from groundstation.settings.load import load_field
 from groundstation.settings.ranging import RangingSettings
+from groundstation.settings.ranging_checks import findings_of_lines
 from groundstation.settings.resolved import resolved_field, summary_of
 from groundstation.settings.sections import driver_sections, rerouted
 
@@ -33,6 +34,10 @@ FIELD = Path(__file__).parents[3] / "config" / "uwb-lab.yaml"
         (
             "ranging.uwb.anchors={a: [-3, -2, 2], b: [-3, -2, 2.05], c: [3, 2, 0.5], d: [-3, 2, 3]}",
             "ranging.uwb.anchors.b: is where a is",
+        ),
+        (
+            "ranging.uwb.anchors={a: [-3, 0, 2.6], b: [-1, 0.1, 2.6], c: [1, 0, 2.5], d: [3, 0, 2.6]}",
+            "ranging.uwb.anchors: lie nearly in one line: ranges tell a circle around it, no place, and nothing else",
         ),
         ("ranging.uwb.transponders.ghost={}", "ghost is no drone of the field"),
         ("ranging.uwb.transponders={drone_1: {name: a}, drone_2: {name: a}}", "the transponder's name a is already"),
@@ -62,6 +67,34 @@ def test_a_wrong_system_is_refused_with_its_place(option: str, told: str) -> Non
 def test_anchors_and_boxes_that_fly_badly_are_warned_of(option: str, place: str, words: str) -> None:
     found = [(".".join(map(str, path)), text) for path, text in cautions(load_field(FIELD, (option,)))]
     assert [path for path, _ in found] == [f"ranging.uwb.{place}"] and words in found[0][1]
+
+
+LINE = "ranging.uwb.anchors={a: [-3, 0, 2.6], b: [-1, 0, 2.6], c: [1, 0, 2.6], d: [3, 0, 2.6]}"
+CEILING = (
+    "{source: 'http://192.168.1.50:8080/', calibration: cameras/ceiling.yaml, position_m: [0, 0, 4.2], "
+    "looking: down, video_delay_ms: 120, observes: [%s]}"
+)
+
+
+@pytest.mark.parametrize(("observes", "flies"), [("robots", True), ("targets", False)])
+def test_anchors_in_one_line_fly_only_beside_another_sensor_that_locates_drones(observes: str, flies: bool) -> None:
+    options = (LINE, f"cameras.ceiling={CEILING % observes}")
+    if flies:
+        found = [text for path, text in cautions(load_field(FIELD, options)) if path == ("ranging", "uwb", "anchors")]
+        assert found == ["lie nearly in one line: ranges tell a circle around it, and no place"]
+    else:
+        with pytest.raises(SettingsError, match="nothing else fixed locates drones"):
+            load_field(FIELD, options)
+
+
+def test_a_second_system_may_tell_what_anchors_in_one_line_do_not() -> None:
+    beside = (LINE, f"cameras.ceiling={CEILING % 'robots'}")
+    whole, line = load_field(FIELD).ranging["uwb"], load_field(FIELD, beside).ranging["uwb"]
+    assert list(findings_of_lines({"uwb": line, "radio": whole})) == []
+    assert [path for path, _ in findings_of_lines({"uwb": line, "radio": line})] == [
+        ("ranging", "uwb", "anchors"),
+        ("ranging", "radio", "anchors"),
+    ]
 
 
 def test_a_transponder_of_a_drone_that_does_not_fly_is_free_for_another() -> None:

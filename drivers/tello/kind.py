@@ -1,11 +1,13 @@
 """Tellos as a kind of vehicle."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 from drivers.tello.settings import FASTEST_M_S, TelloDriverSettings, TelloSection
 from drivers.tello.wire.text import COMMAND_PORT, LAND, VIDEO_PORT, rc
 from drivers.vehicle_settings import a_process_each, values_of
-from groundstation.vehicles import ErrorHabits, KindSection, StopDatagrams, VehicleKind, VehicleOrder
+from groundstation.vehicles import ErrorHabits, Finding, KindSection, StopDatagrams, VehicleKind, VehicleOrder
+
+_WIDTH_PX, _HEIGHT_PX = 960, 720  # WIRE (docs/reference/tello.md 4)
 
 
 def _settings(order: VehicleOrder) -> TelloDriverSettings:
@@ -14,6 +16,23 @@ def _settings(order: VehicleOrder) -> TelloDriverSettings:
 
 def _moved(local_address: str, sections: Mapping[str, KindSection]) -> dict[str, dict[str, object]]:
     return {"tello": {"local_address": local_address}}
+
+
+def _check(orders: Sequence[VehicleOrder]) -> Iterator[tuple[str, Finding]]:
+    """Yield a finding where a drone's own video has another size than its calibration, or is never asked for."""
+    for order in orders:
+        camera = order.drone.camera
+        if not camera.source.startswith("tello://"):
+            continue
+        found = camera.calibration.width_px, camera.calibration.height_px
+        if found != (_WIDTH_PX, _HEIGHT_PX):
+            text = f"must be for {_WIDTH_PX} x {_HEIGHT_PX} pixels, as a Tello sends them (got {found[0]} x {found[1]})"
+            yield order.name, (("camera", "calibration"), text)
+        if not order.section("tello", TelloSection()).video:
+            yield (
+                order.name,
+                (("tello", "video"), f"must be true for camera.source {camera.source}: else no picture comes"),
+            )
 
 
 KIND = VehicleKind(
@@ -34,6 +53,7 @@ KIND = VehicleKind(
     reader="drivers.tello.video:TelloReader",
     has_interface=True,
     moved=_moved,
+    check=_check,
     emulator="sim_bridge.devices.tello:EMULATION",
     flight_time_s=13 * 60.0,
     example={"tello": {}},

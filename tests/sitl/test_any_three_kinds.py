@@ -22,7 +22,8 @@ def field_of(folder: Path, team: tuple[str, ...]) -> Path:
     """Write mixed-team.yaml with another team."""
     shutil.copytree(CONFIG / "cameras", folder / "cameras")
     field = YAML(typ="safe").load(CONFIG / "mixed-team.yaml")
-    field["types"] |= {"tello": {"kind": "tello", "tello": {}}, "ros2": {"kind": "ros2", "ros2": {}}}
+    lens = {"calibration": "cameras/tello_front.yaml"}
+    field["types"] |= {"tello": {"kind": "tello", "tello": {}, "camera": lens}, "ros2": {"kind": "ros2", "ros2": {}}}
     for (drone, values), kind in zip(field["drones"].items(), team, strict=True):
         values["type"] = kind
         pictures = f"http://192.168.1.6{drone[-1]}:8080/video.mjpg"

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from drivers.tello.settings import FASTEST_M_S, TelloDriverSettings, TelloSection
 from drivers.tello.wire.text import COMMAND_PORT, LAND, VIDEO_PORT, rc
 from drivers.vehicle_settings import a_process_each, values_of
-from groundstation.vehicles import ErrorHabits, Finding, KindSection, StopDatagrams, VehicleKind, VehicleOrder
+from groundstation.vehicles import ErrorHabits, Finding, KindSection, Offer, StopDatagrams, VehicleKind, VehicleOrder
 
 _WIDTH_PX, _HEIGHT_PX = 960, 720  # WIRE (docs/reference/tello.md 4)
 
@@ -35,6 +35,14 @@ def _check(orders: Sequence[VehicleOrder]) -> Iterator[tuple[str, Finding]]:
             )
 
 
+_OFFER = """\
+    tello: {}
+    camera:
+      calibration: cameras/tello_front.yaml   # a Tello's, 960 x 720; measure yours: groundstation calibrate camera
+      position_m: [0.04, 0.0, 0.0]
+      tilt_down_deg: 45          # as you mount it: as sold, it looks ahead, where markers are not seen from above
+"""
+
 KIND = VehicleKind(
     name="tello",
     summary="Ryze Tello and RoboMaster TT",
@@ -57,4 +65,5 @@ KIND = VehicleKind(
     emulator="sim_bridge.devices.tello:EMULATION",
     flight_time_s=13 * 60.0,
     example={"tello": {}},
+    offers={"tello": Offer("Tello", _OFFER, pictures="tello://{address}", address="192.168.10.1")},
 )

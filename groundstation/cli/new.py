@@ -142,8 +142,10 @@ def _ask_drone(room: "NewRoom", before: "list[NewDrone]") -> "NewDrone":
     known, number = offers(), 1 + len(before)
     likely = before[-1].kind if before else next(iter(known))
     kind = click.prompt(f"Kind of drone_{number}", default=likely, type=click.Choice(tuple(known)))
-    address = click.prompt("  its address", default=f"192.168.1.{10 + number}", value_proc=_checked(is_address))
-    own = known[kind][1].pictures.replace("{address}", address)
+    offer = known[kind][1]
+    usual = f"192.168.1.{10 + number}" if offer.address in {"", *(one.address for one in before)} else offer.address
+    address = click.prompt("  its address", default=usual, value_proc=_checked(is_address))
+    own = offer.pictures.replace("{address}", address)
     pictures = click.prompt("  pictures of its camera", default=own, value_proc=_checked(parse_source))
     drone = NewDrone(kind, address, pictures)
     _require_apart(room, [*before, drone])

@@ -106,13 +106,15 @@ class Offer:
     """Text of `groundstation new` for a type of this kind and for each drone of it, beside the keys of all drones.
 
     title: its name for people, "" if its word is one. of_type, of_drone: YAML, indented by four; pictures: the
-    address of its camera's. {address} is the drone's own, {id} a number that no other drone has.
+    address of its camera's. {address} is the drone's own, {id} a number that no other drone has. address: that of a
+    new vehicle of the type, if it is an access point and a team has one of them.
     """
 
     title: str = ""
     of_type: str = ""
     of_drone: str = ""
     pictures: str = "http://{address}:8080/video.mjpg"
+    address: str = ""
 
 
 @dataclass(frozen=True, slots=True)

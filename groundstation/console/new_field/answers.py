@@ -38,8 +38,11 @@ class Reply(msgspec.Struct):
 
 
 def offers_script() -> bytes:
-    """Return the script that tells the page the types of drones: titles and addresses of pictures, by name."""
-    shown = {name: {"title": one.title or name, "pictures": one.pictures} for name, (_, one) in offers().items()}
+    """Return the script that tells the page the types of drones: titles, addresses and those of pictures, by name."""
+    shown = {
+        name: {"title": one.title or name, "pictures": one.pictures, "address": one.address}
+        for name, (_, one) in offers().items()
+    }
     return b"export const OFFERS = " + msgspec.json.encode(shown) + b";\n"
 
 

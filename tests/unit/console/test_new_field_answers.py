@@ -32,8 +32,9 @@ def test_answers_are_drawn_and_nothing_is_written(tmp_path: Path) -> None:
 
 def test_the_page_offers_every_kind_there_is() -> None:
     told = json.loads(offers_script().decode().partition("=")[2].rstrip().rstrip(";"))
-    assert told["px4"] == {"title": "PX4", "pictures": "http://{address}:8080/video.mjpg"}
-    assert told["ardrone"]["pictures"] == "ardrone://{address}" and told["tello"]["title"] == "tello"
+    assert told["px4"] == {"title": "PX4", "pictures": "http://{address}:8080/video.mjpg", "address": ""}
+    assert told["ardrone"]["pictures"] == "ardrone://{address}"
+    assert told["tello"] == {"title": "Tello", "pictures": "tello://{address}", "address": "192.168.10.1"}
 
 
 def test_the_button_writes_a_good_field_once(tmp_path: Path) -> None:

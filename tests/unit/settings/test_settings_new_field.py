@@ -40,6 +40,19 @@ def test_kinds_may_be_mixed(tmp_path: Path) -> None:
     assert [drone.kind for drone in load_field(tmp_path / "hall" / "hall.yaml").drones.values()][1:] == ["mavlink"] * 2
 
 
+def test_a_tello_is_met_at_its_access_point_and_shows_its_own_video(tmp_path: Path) -> None:
+    answers = ["", "", "", "", "2", "tello", "", "", "", "", "", "", "", "y", ""]
+    result = CliRunner().invoke(new, [str(tmp_path / "hall")], input="\n".join(answers))
+    assert result.exit_code == 0, result.output
+    path = tmp_path / "hall" / "hall.yaml"
+    first, second = load_field(path).drones.values()
+    assert (first.kind, first.address, first.camera.source) == ("tello", "192.168.10.1", "tello://192.168.10.1")
+    assert (second.address, second.camera.source) == ("192.168.1.12", "tello://192.168.1.12")
+    lens = first.camera.calibration
+    assert (lens.width_px, lens.height_px) == (960, 720)
+    assert [line for line in cautions_of(path) if "camera" in line] == []
+
+
 def test_pads_are_a_metre_apart_in_the_cameras_view() -> None:
     room = NewRoom(8, 6, 4.5, SOURCE)
     places = pads(room, 4)

@@ -30,18 +30,21 @@ function select() {
   return made;
 }
 
-// Its pictures come from the place that its kind suggests, until somebody writes another.
-function suggest(kind, address, pictures) {
+// Its address and pictures are those that its kind suggests, until somebody writes others.
+function suggest(kind, address, pictures, usual) {
+  const own = OFFERS[kind.value].address;
+  const taken = [...list.querySelectorAll("input")].some((other) => other !== address && other.value === own);
+  if (!address.dataset.own) address.value = own && !taken ? own : usual;
   if (pictures.dataset.own) return;
   pictures.value = OFFERS[kind.value].pictures.replace("{address}", address.value);
 }
 
 function drone(index) {
   const item = document.createElement("li");
-  const [kind, address, pictures] = [select(), input(`192.168.1.${11 + index}`), input("")];
-  for (const each of [kind, address]) each.addEventListener("input", () => suggest(kind, address, pictures));
-  pictures.addEventListener("input", () => { pictures.dataset.own = "1"; });
-  suggest(kind, address, pictures);
+  const [kind, address, pictures, usual] = [select(), input(""), input(""), `192.168.1.${11 + index}`];
+  for (const each of [address, pictures]) each.addEventListener("input", () => { each.dataset.own = "1"; });
+  for (const each of [kind, address]) each.addEventListener("input", () => suggest(kind, address, pictures, usual));
+  suggest(kind, address, pictures, usual);
   item.append(labelled(`drone_${index + 1}`, kind), labelled("Its address", address), labelled("Its pictures", pictures));
   return item;
 }

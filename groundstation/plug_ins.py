@@ -4,23 +4,37 @@ Groups: `skein.vehicles` (kinds of vehicles), `skein.cameras` (schemes of camera
 `skein.world_sensors` (schemes of motion capture sources), `skein.markers` (dictionaries of square tags).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache
-from importlib import metadata
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from groundstation.errors import SettingsError
 
+if TYPE_CHECKING:
+    from importlib import metadata
+
 VEHICLES, CAMERAS, PLANNERS = "skein.vehicles", "skein.cameras", "skein.planners"
 WORLD_SENSORS, MARKERS = "skein.world_sensors", "skein.markers"
+
+
+def _as_it_is() -> None:
+    """Prepare nothing."""
+
+
+before_planners: Callable[[], None] = _as_it_is
+"""Called before a planner is imported; a program sets it. Most planners import kernels, and numba reads only at its own
+import where compiled ones are kept: without that each command would compile them anew, for a minute."""
 
 
 class PlugInError(ValueError):
     """A plug-in that is not installed, or that cannot be loaded; the text names it, its package and the reason."""
 
 
-def entries(group: str) -> Iterator[tuple[str, str, metadata.EntryPoint]]:
+def entries(group: str) -> "Iterator[tuple[str, str, metadata.EntryPoint]]":
     """Yield name, "package (module:attribute)" and entry point of each plug-in of a group, by name."""
+    # Imported here only: commands that stop drones must not wait for it.
+    from importlib import metadata
+
     for entry in sorted(metadata.entry_points(group=group), key=lambda entry: entry.name):
         package = entry.dist.name if entry.dist is not None else "?"
         yield entry.name, f"{package} ({entry.value})", entry
@@ -89,6 +103,8 @@ def _loaded(group: str, name: str) -> tuple[str, Any]:
         raise PlugInError(f"{name} cannot be used: {several[name]} have the same name: uninstall all but one")
     for found, source, entry in entries(group):
         if found == name:
+            if group == PLANNERS:
+                before_planners()
             try:
                 if not callable(make := entry.load()):
                     raise TypeError(f"is of type {type(make).__name__}, nothing that can be called")

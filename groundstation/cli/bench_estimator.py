@@ -36,6 +36,7 @@ def estimator(robots: str, rounds: int, flight_ms: int, field_name: str, seed: i
     required figure is missed, or if the filters do not agree.
     """
     sizes = numbers(robots, "--robots", 2, 40)
+    use_all_kernels()  # before the field is read, whose planner may import kernels
     from groundstation.settings.files import find_field
     from groundstation.settings.load import load_field
     from groundstation.settings.resolved import resolved_field
@@ -43,7 +44,6 @@ def estimator(robots: str, rounds: int, flight_ms: int, field_name: str, seed: i
     resolved = resolved_field(load_field(find_field(field_name), ()))
     if not resolved.drones or not resolved.cameras:
         raise click.UsageError(f"--field: {field_name} has no drone or no camera to copy")
-    use_all_kernels()
     from groundstation.bench.estimator import SAME_BELIEF, run_bench
 
     result = run_bench(sizes, resolved, rounds, flight_ms, seed, write_over)

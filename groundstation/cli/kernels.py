@@ -19,6 +19,12 @@ def use_flying_kernels() -> None:
     compile_kernels(cache)
 
 
+def use_kernels_of_plug_in() -> None:
+    """Use the cache of the kernels that fly for a plug-in that imports some of them; missing ones compile then."""
+    if not numba_cache.activate().exists():
+        click.echo(_TOLD, err=True)
+
+
 def use_all_kernels() -> None:
     """Use the cache for kernels of experiments and benches too, which compile at import."""
     cache = numba_cache.activate(numba_cache.EVERYTHING)

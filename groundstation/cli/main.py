@@ -9,6 +9,7 @@ from pkgutil import resolve_name
 
 import click
 
+from groundstation import plug_ins
 from groundstation.cli.exits import ExitCode, exit_code_of
 from groundstation.cli.verbs import RENAMED, VERBS, CommandRow, all_verbs, meant, of_kinds
 from groundstation.errors import GroundStationError, SettingsError
@@ -114,8 +115,16 @@ def check_installation() -> None:
         raise GroundStationError(f"the packages come from different places ({found}): install again")
 
 
+def _before_planners() -> None:
+    # Imported here only: commands that stop drones must not wait for it.
+    from groundstation.cli.kernels import use_kernels_of_plug_in
+
+    use_kernels_of_plug_in()
+
+
 def run(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code; errors go to stderr, with a traceback only for bugs."""
+    plug_ins.before_planners = _before_planners
     try:
         check_installation()
         result = groundstation.main(

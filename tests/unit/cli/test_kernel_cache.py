@@ -1,5 +1,6 @@
 """Commands that compile kernels set the cache folder before numba is imported, which reads it only then."""
 
+import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -7,6 +8,7 @@ from pathlib import Path
 
 import click
 import pytest
+from installation import install
 
 from groundstation.cli import kernels
 from groundstation.cli.lists import choices, numbers
@@ -15,6 +17,7 @@ from groundstation.errors import GroundStationError
 from groundstation.process import numba_cache
 from groundstation.runtime import compile_kernels
 
+ROOT = Path(__file__).parents[3]
 _SCRIPT = """
 import sys
 from groundstation.process import numba_cache
@@ -33,6 +36,21 @@ run(sys.argv[1:])
 def test_the_place_of_compiled_kernels_is_set_before_numba_is_there(command: str) -> None:
     script = [sys.executable, "-c", _SCRIPT, "experiment", command]
     assert subprocess.run(script, capture_output=True, text=True, check=True).stdout.split() == ["False"]
+
+
+def test_a_planner_of_another_package_finds_compiled_kernels(tmp_path: Path) -> None:
+    """Every command that reads a field with such a planner compiled for 70 s."""
+    (tmp_path / "lab_planner.py").write_text(
+        "import sys\nfrom numba import config\n\n\n"
+        "class Calm:\n    def __init__(self, *made_from): ...\n    def plan(self, *asked): ...\n\n\n"
+        "print(f'kept in {config.CACHE_DIR}', file=sys.stderr)\n"
+    )
+    install(tmp_path, "lab-planner", "[skein.planners]\ncalm = lab_planner:Calm\n")
+    chosen = os.environ | {"PYTHONPATH": f"{tmp_path}:{ROOT}", "XDG_CACHE_HOME": str(tmp_path)}
+    del chosen["NUMBA_CACHE_DIR"]
+    command = [sys.executable, "-m", "groundstation", "config", "check", "lab", "--set", "planner.plug_in=calm"]
+    told = subprocess.run(command, capture_output=True, text=True, check=True, env=chosen, cwd=tmp_path).stderr
+    assert f"kept in {tmp_path}/skein/numba-{numba_cache.sources_hash()}\n" in told
 
 
 @pytest.mark.parametrize("use", [kernels.use_flying_kernels, kernels.use_all_kernels])

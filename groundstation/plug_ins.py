@@ -6,6 +6,7 @@ Groups: `skein.vehicles` (kinds of vehicles), `skein.cameras` (schemes of camera
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
+from inspect import getattr_static, signature
 from typing import TYPE_CHECKING, Any
 
 from groundstation.errors import SettingsError
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
 
 VEHICLES, CAMERAS, PLANNERS = "skein.vehicles", "skein.cameras", "skein.planners"
 WORLD_SENSORS, MARKERS = "skein.world_sensors", "skein.markers"
+_PLANNED_FROM = ("belief", "current", "warm_start", "should_stop", "max_evaluations")
 
 
 def _as_it_is() -> None:
@@ -75,6 +77,8 @@ def made(group: str, name: str, uses: Sequence[str], *arguments: object) -> Any:
         one = make(*arguments)
         if missing := [each for each in uses if not hasattr(one, each)]:
             raise TypeError(f"{type(one).__name__} without {', '.join(missing)}")
+        if group == PLANNERS:
+            _require_plan(one, type(one).__name__)
     except (Exception, SystemExit) as error:
         raise PlugInError(f"{name} cannot be used: {source}: {reason(error)}") from error
     return one
@@ -106,10 +110,50 @@ def _loaded(group: str, name: str) -> tuple[str, Any]:
             if group == PLANNERS:
                 before_planners()
             try:
-                if not callable(make := entry.load()):
-                    raise TypeError(f"is of type {type(make).__name__}, nothing that can be called")
+                make = entry.load()
+                _require_callable(make, "")
+                if group == PLANNERS:
+                    _require_planner(make)
                 return source, make
             except (Exception, SystemExit) as error:  # a plug-in that exits at import must not end this program
                 raise PlugInError(f"{name} cannot be used: {source}: {reason(error)}") from error
     known = ", ".join(names(group)) or "none is installed"
     raise PlugInError(f"{name} is not known; known in {group}: {known}")
+
+
+def _require_callable(one: object, what: str) -> None:
+    if not callable(one):
+        raise TypeError(f"{what}is of type {type(one).__name__}, nothing that can be called")
+
+
+def _require_planner(make: Any) -> None:
+    """Raise TypeError for what cannot be made or asked as `groundstation.planning.planner.Planner` is.
+
+    Of a function only the planner that it makes shows how that is asked.
+    """
+    name = getattr(make, "__name__", type(make).__name__)
+    _require_arguments(make, f"{name} is made", ("parameters", "sensors"))
+    if isinstance(make, type):
+        _require_plan(make, name)
+
+
+def _require_plan(planner: Any, name: str) -> None:
+    """Raise TypeError for a planner, or its class, whose `plan` is missing or takes other arguments."""
+    if not hasattr(planner, "plan"):
+        raise TypeError(f"{name} without plan")
+    _require_callable(planner.plan, f"{name}.plan ")
+    bound = not isinstance(planner, type) or isinstance(getattr_static(planner, "plan"), staticmethod | classmethod)
+    held = ("held",) if getattr(planner, "takes_held", False) else ()
+    _require_arguments(planner.plan, f"{name}.plan is called", (*(() if bound else ("self",)), *_PLANNED_FROM), held)
+
+
+def _require_arguments(called: Any, what: str, positional: Sequence[str], keywords: Sequence[str] = ()) -> None:
+    try:
+        known = signature(called)
+    except (TypeError, ValueError):  # of another language: only a call would show it
+        return
+    try:
+        known.bind(*positional, **dict.fromkeys(keywords))
+    except TypeError as error:
+        told = ", ".join((*(one for one in positional if one != "self"), *(f"{one}=..." for one in keywords)))
+        raise TypeError(f"{what} with ({told}): {error}") from None

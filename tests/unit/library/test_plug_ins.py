@@ -2,6 +2,7 @@
 
 import re
 import sys
+from inspect import signature
 from unittest.mock import Mock
 
 import numpy as np
@@ -18,6 +19,7 @@ from groundstation.doctor.plug_ins import plug_in_findings
 from groundstation.errors import DriverError, SettingsError
 from groundstation.geometry.tag import tag_fault
 from groundstation.library import Topology, belief_of, field_named, plan_step, planner_of
+from groundstation.planning.planner import Planner
 from groundstation.runtime.tracker_loop import TrackerFeed, TrackerSection, Tracking
 
 CODE = '''
@@ -58,14 +60,50 @@ class Sulking:
     def __init__(self, *made_from):
         raise RuntimeError("no licence")
 
+    def plan(self, *asked):
+        pass
+
 
 class Stumbling(Static):
     def read(self, drain):
         raise ValueError("no picture of mine")
 
 
+class Fixed(Idle):
+    plan = 3
+
+
+class Alone:
+    def __init__(self):
+        pass
+
+    def plan(self, belief, current, warm_start, should_stop, max_evaluations=None):
+        pass
+
+
+class Short(Idle):
+    def plan(self, belief):
+        pass
+
+
+class Holding(Alone, Idle):
+    takes_held = True
+    __init__ = Idle.__init__
+
+
+def hired(parameters, sensors):
+    return Short()
+
+
 FIGURE = 3
 '''
+UNFIT = {
+    "idle": "Idle without plan",
+    "fixed": "Fixed.plan is of type int, nothing that can be called",
+    "alone": r"Alone is made with \(parameters, sensors\): too many positional arguments",
+    "short": r"Short.plan is called with \(belief, current, .*\): too many positional arguments",
+    "holding": r"Holding.plan is called with \(belief, .*, held=...\): got an unexpected keyword argument 'held'",
+}
 FAULTS = """
 idle = lab_plug_ins:Idle
 sulking = lab_plug_ins:Sulking
@@ -75,6 +113,11 @@ ending = lab_ending:Nobody
 ENTRIES = (
     """[skein.planners]
 calm = lab_plug_ins:Calm
+fixed = lab_plug_ins:Fixed
+alone = lab_plug_ins:Alone
+short = lab_plug_ins:Short
+holding = lab_plug_ins:Holding
+hired = lab_plug_ins:hired
 broken = no_such_module:Planner
 """
     + FAULTS
@@ -130,6 +173,24 @@ def test_a_planner_that_is_not_installed_is_refused_at_its_line():
 def test_a_planner_that_cannot_be_loaded_is_refused_by_the_check_of_the_field(name):
     with pytest.raises(SettingsError, match=rf"planner.plug_in: {name} cannot be used: lab-plug-ins"):
         field_named("lab", [f"planner.plug_in={name}"])
+
+
+@pytest.mark.parametrize("name", UNFIT)
+def test_a_planner_that_cannot_plan_is_refused_by_the_check_of_the_field(name):
+    with pytest.raises(SettingsError, match=rf"planner.plug_in: {name} cannot be used: lab-plug-ins .*{UNFIT[name]}"):
+        field_named("lab", [f"planner.plug_in={name}"])
+
+
+def test_a_planner_that_a_function_makes_is_judged_once_it_is_made():
+    assert field_named("lab", ["planner.plug_in=hired"]).planner.plug_in == "hired"
+    with pytest.raises(SettingsError, match=r"hired cannot be used: .*Short.plan is called with"):
+        plug_ins.planner("hired", None, None)
+
+
+def test_planners_of_other_packages_are_asked_as_ours_is():
+    ours = list(signature(Planner.plan).parameters)
+    assert ours == ["self", *plug_ins._PLANNED_FROM, "held"]
+    assert list(signature(Planner).parameters)[:2] == ["parameters", "sensors"]
 
 
 def test_a_planner_that_cannot_be_loaded_is_named():

@@ -11,6 +11,7 @@ import numpy as np
 
 from groundstation import plug_ins
 from groundstation.bus.messages import EntityEstimate, Estimate, Header, Message, Odometry, VehicleStatus
+from groundstation.errors import SettingsError
 from groundstation.field.resolved import ResolvedField
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 from groundstation.tracker import Tracker, tracker_from_field
@@ -74,7 +75,7 @@ class FlownLink(Protocol):
 
 
 class Study:
-    """A run in progress; `run` flies it to its end and returns the figures.
+    """A run in progress; `run` flies it to its end and returns the figures; raises SettingsError for a failing plug-in.
 
     mode: that of all drivers; in HOVER and HOLD drones are only kept at their places. real: drones whose bodies are
     moved from outside (`world.puppets`); `attach` gives each a driver. wrong: wrong figures of the field; None: only
@@ -95,9 +96,10 @@ class Study:
         self.world = World(self.site, scenario, options.seed, real, real)
         self.tracker: Tracker = tracker_from_field(field, CLOCK, epoch=1)
         self._estimates: tuple[EntityEstimate, ...] = ()  # of the tracker's last tick
-        if field.planner.plug_in:
+        self._plug_in = field.planner.plug_in
+        if self._plug_in:
             parameters = self.tracker.parameters
-            self.tracker.planner = plug_ins.planner(field.planner.plug_in, parameters.planner, parameters.sensors)
+            self.tracker.planner = plug_ins.planner(self._plug_in, parameters.planner, parameters.sensors)
         self.score = FlightScore(_SCORE_TICKS * TICK_NS / 1e9, field.estimator.gate_probability)
         self.spent_s: defaultdict[str, float] = defaultdict(float)
         self._rng = generator_of(options.seed, "study")
@@ -243,7 +245,7 @@ class Study:
             return
         mark = time.perf_counter()
         if obeys and self.world.ticks % self._plan_every == 0:
-            tracker.plan()
+            self._plan()
         self.spent_s["planner"] += time.perf_counter() - mark
         mark = time.perf_counter()
         for name, limited in tracker.setpoints(now_ns).items():
@@ -253,6 +255,14 @@ class Study:
             pilot = self._links.get(name) or self._pilots[name]
             pilot.obey(setpoint.velocity_m_s, setpoint.yaw_rate_rad_s, self.world.time_s)
         self.spent_s["setpoints"] += time.perf_counter() - mark
+
+    def _plan(self) -> None:
+        try:
+            self.tracker.plan()
+        except Exception as error:
+            if not self._plug_in:
+                raise
+            raise SettingsError([f"planner.plug_in {self._plug_in}: {plug_ins.reason(error)}"]) from error
 
     def _judge(self) -> None:
         states = self.world.states().copy()

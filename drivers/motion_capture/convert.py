@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from numbers import Real
 
 import numpy as np
 
@@ -46,8 +47,10 @@ class Placement:
 
         position [m], quaternion (x, y, z, w): of the body, in the system's axes.
         """
+        if len(position) != 3 or len(quaternion) != 4 or not all(map(_is_finite, (*position, *quaternion))):
+            return None
         length = math.sqrt(sum(value * value for value in quaternion))
-        if not 0.5 < length < 2.0 or not all(abs(value) < _FARTHEST_M for value in position):  # nan compares false
+        if not 0.5 < length < 2.0 or not all(abs(value) < _FARTHEST_M for value in position):
             return None
         system_from_body = _rotation_of(quaternion, length)
         # WIRE (docs/reference/natnet.md 5): a body's axes are the system's at the moment of its definition, so the
@@ -87,6 +90,14 @@ class Placement:
 def body_pose(entity: str, pose: EntityPose) -> BodyPose:
     """Return an entity's pose as a message."""
     return BodyPose(entity, pose.position, _quaternion_of(pose.rotation))
+
+
+def _is_finite(value: object) -> bool:
+    """Return whether something, which may be of another package, is a finite number."""
+    try:
+        return isinstance(value, Real) and math.isfinite(value)
+    except OverflowError:  # an integer beyond all floats
+        return False
 
 
 def _triple(vector: Array) -> Vector3:

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 
 from drivers.host_lookup import HostLookup
 from drivers.motion_capture.captured_frame import CapturedFrame
+from drivers.motion_capture.plug_in_source import PlugInSource
 from drivers.motion_capture.pose_guard import LATE_S
 from drivers.motion_capture.settings import OURS, SystemAddress
 from drivers.motion_capture.wire import natnet
@@ -58,10 +59,10 @@ def open_source(address: SystemAddress) -> Source:
         ours: Source = resolve_name(OURS[address.scheme].reader)(address)
         return ours
     try:
-        source: Source = plug_ins.made(plug_ins.WORLD_SENSORS, address.scheme, _USED, address)
+        source = plug_ins.made(plug_ins.WORLD_SENSORS, address.scheme, _USED, address)
     except plug_ins.PlugInError as error:
         raise DriverError(f"motion capture source {address.scheme}://: {error}") from None
-    return source
+    return PlugInSource(address.scheme, source)
 
 
 class NatnetSource:

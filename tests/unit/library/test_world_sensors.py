@@ -5,12 +5,14 @@ import re
 import socket
 import sys
 from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import pytest
+from free_port import free_port
 
 from drivers.motion_capture.settings import OURS, parse_source
-from drivers.motion_capture.sources import open_source
+from drivers.motion_capture.sources import Source, open_source
 from groundstation.errors import DriverError, SettingsError
 from groundstation.settings.load import load_field
 from groundstation.settings.sections import driver_sections
@@ -37,18 +39,42 @@ def _installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None
         sys.modules.pop(name, None)
 
 
+@contextmanager
+def open_page() -> Iterator[tuple[Source, tuple[str, int]]]:
+    """Yield the page's source with the place at which it listens."""
+    place = ("127.0.0.1", free_port("127.0.0.1", kind=socket.SOCK_DGRAM))
+    source = open_source(parse_source(f"anchors://{place[0]}:{place[1]}"))
+    with closing(source):
+        yield source, place
+
+
 def test_poses_of_the_page_are_read() -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
-        sender.bind(("127.0.0.1", 0))
-        port = sender.getsockname()[1] % 20000 + 30000
-        source = open_source(parse_source(f"anchors://127.0.0.1:{port}"))
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender, open_page() as (source, place):
         assert source.detail and source.poll(0.0) == []
         for told in (b"{", b'{"cf1": [1]}', json.dumps({"cf1": [1.0, 2.0, 0.5, *NORTH]}).encode()):
-            sender.sendto(told, ("127.0.0.1", port))
+            sender.sendto(told, place)
         frames = [frame for _ in range(3) for frame in source.poll(1.0)]
-        source.close()
     assert [frame.poses for frame in frames] == [{"cf1": ((1.0, 2.0, 0.5), (0.0, 0.0, 0.0, 1.0))}]
     assert source.rejected == {"damaged": 2} and not source.detail
+
+
+@pytest.mark.parametrize(
+    "told",
+    [b'{"b":[null,0,1,0,0,0,1]}', b'{"b":"abcdefg"}', b'{"b":[%s,0,1,0,0,0,1]}' % (b"9" * 401), b"[" * 60000, b"[]"],
+)
+def test_no_datagram_ends_the_reading(told: bytes) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender, open_page() as (source, place):
+        sender.sendto(told, place)
+        sender.sendto(json.dumps({"cf1": [1.0, 2.0, 0.5, *NORTH]}).encode(), place)
+        assert source.poll(1.0) == [] and source.rejected == {"damaged": 1}
+        assert len(source.poll(1.0)) == 1
+
+
+def test_strangers_are_not_believed() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger, open_page() as (source, place):
+        stranger.bind(("127.0.0.2", 0))
+        stranger.sendto(json.dumps({"cf1": [1.0, 2.0, 0.5, *NORTH]}).encode(), place)
+        assert source.poll(1.0) == [] and source.rejected == {"stranger": 1}
 
 
 def test_a_field_may_be_rooted_in_it_and_its_driver_is_handed_its_address() -> None:

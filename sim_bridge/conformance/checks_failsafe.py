@@ -114,7 +114,7 @@ def old_sequence_moves_nothing(case: Case) -> None:
 def other_source_moves_nothing(case: Case) -> None:
     """Setpoints from any sender but the tracker move nothing, and are counted."""
     still(case, "other source")
-    counted = case.record.heard(VEHICLE_STATUS, "epoch far ahead")[-1].message.rejected
+    counted = case.record.last(VEHICLE_STATUS, "epoch far ahead").rejected
     assert counted.get("setpoint_other_source"), f"refused: {counted}"
 
 
@@ -221,7 +221,7 @@ def unheard_vehicle_lands(case: Case) -> None:
 @check("unheard")
 def heard_again_it_is_known(case: Case) -> None:
     """When its telemetry returns its state is known again: LANDED."""
-    said = case.record.heard(VEHICLE_STATUS, "heard again")[-1].message.flight_state
+    said = case.record.last(VEHICLE_STATUS, "heard again").flight_state
     assert said == "LANDED", f"it is called {said}"
 
 
@@ -278,4 +278,5 @@ def impossible_velocity_is_not_flown_by(case: Case) -> None:
 def operator_is_told_why(case: Case) -> None:
     """An event gives the operator the reason for the landing."""
     texts = [one.message.text for one in case.record.heard(EVENT, "jumping")]
-    assert any(_REASONED.search(text) for text in texts), f"events: {texts}"
+    told = "; ".join(texts) or f"none{case.record.burden}"
+    assert any(_REASONED.search(text) for text in texts), f"no event has a reason; events: {told}"

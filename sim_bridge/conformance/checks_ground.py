@@ -47,7 +47,7 @@ def status_comes_at_4_hz(case: Case) -> None:
 @check("stand")
 def status_tells_the_charge(case: Case) -> None:
     """The charge is reported as a share, within 3 % of the true one."""
-    told = case.record.heard(VEHICLE_STATUS, "standing")[-1].message.battery
+    told = case.record.last(VEHICLE_STATUS, "standing").battery
     true = case.record.motion("standing")[-1].battery
     assert told is not None and abs(told - true) < 0.03, f"told {told}, true {true:.2f}"
 
@@ -55,7 +55,7 @@ def status_tells_the_charge(case: Case) -> None:
 @check("stand")
 def status_tells_the_rate(case: Case) -> None:
     """The reported rate of telemetry is finite and above 1 Hz."""
-    told = case.record.heard(VEHICLE_STATUS, "standing")[-1].message.rate_hz
+    told = case.record.last(VEHICLE_STATUS, "standing").rate_hz
     assert math.isfinite(told) and told > 1.0, f"{told:.1f} Hz told"
 
 
@@ -174,7 +174,8 @@ def damaged_datagrams_lift_nothing(case: Case) -> None:
 @check("damaged")
 def damaged_datagrams_leave_no_trace(case: Case) -> None:
     """After the damage it flies and lands as before."""
-    assert case.record.stages("take off after the damage", COMMAND_ACK)[-1] == AckStage.EFFECTIVE, case.record.failure
+    stages = case.record.stages("take off after the damage", COMMAND_ACK)
+    assert stages and stages[-1] == AckStage.EFFECTIVE, f"{' '.join(stages) or 'no answer'} {case.record.failure}"
     case.record.span("landing after the damage")
     assert math.isfinite(case.record.facts["landing after the damage"]), case.record.failure
 

@@ -269,6 +269,8 @@ def _fly_into(bench: Bench, mark: str) -> None:
     bench.up.wanted = ((LIMITS.max_speed_m_s / 2, 0.0, 0.0), 0.0)
     while bench.room.world.time_s < FAULT_S:
         time.sleep(0.005)
+    if bench.now.on_ground:
+        raise FlightFailed(f"it landed before its reports became wrong; {bench.last_words()}")
     with bench.mark(mark):
         bench.await_landing(f"landing {mark}", 12.0)
     bench.driver.send(signal.SIGTERM)

@@ -1,5 +1,6 @@
 """Flights of the kit: their type, their list, and how one is flown."""
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -57,6 +58,9 @@ def fly(script: Script, subject: Subject, damaged: int) -> Record:
                 script.run(bench)
             except FlightFailed as error:
                 record.failure = str(error)
+        record.load = os.getloadavg()[0] / len(os.sched_getaffinity(0))
+        if record.failure:
+            record.failure += record.burden
         if record.stood_ms <= _STOOD_MS:
             return record
     record.failure = f"this machine stood still for {record.stood_ms:.0f} ms in each of {_TRIES} flights: not judged"

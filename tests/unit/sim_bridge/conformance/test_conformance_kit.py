@@ -265,3 +265,20 @@ def test_no_check_passes_where_the_driver_said_nothing():
     marks = ("standing", "still", "turn", "up", "down", "hover", "landed", "jumping", "silent vehicle")
     record.marks |= dict.fromkeys(marks, (at_ns, at_ns + 4 * S))
     assert {name: verdict(record, name).end for name in told} == dict.fromkeys(told, "failed")
+
+
+@pytest.mark.parametrize(("load", "said"), [(0.4, "the computer was not too busy"), (2.5, "the computer was too busy")])
+def test_a_span_without_data_is_told_as_such(load, said):
+    """Python's errors were the result: max() of an empty sequence."""
+    record = flown()
+    record.load, record.marks["jumping"] = load, (0, 1)
+    record.marks |= {"heard again": (0, 1), "held": (0, 1)}
+    speed, told, known, held = (
+        verdict(record, name).why
+        for name in ("impossible_velocity_is_not_flown_by", "operator_is_told_why", "heard_again_it_is_known",
+                     "hold_goes_before_setpoints")
+    )  # fmt: skip
+    assert speed == f"nothing was recorded of: jumping ({said}: load {load} per core" + speed.partition("per core")[2]
+    assert told.startswith(f"no event has a reason; events: none ({said}")
+    assert known.startswith(f"no vehicle_status was received in: heard again ({said}")
+    assert held.startswith(f"nothing was recorded of: held ({said}")

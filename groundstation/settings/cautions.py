@@ -126,9 +126,8 @@ def _obstacles(field: Field) -> Iterator[Finding]:
             beside = abs(drone.pad_m[0] - x) - width / 2, abs(drone.pad_m[1] - y) - depth / 2
             apart = math.hypot(*(max(0.0, gap) for gap in beside))
             if 0.0 < apart < _PAD_TO_OBSTACLE_M:
-                text = (
-                    f"is {apart:.2f} m from room.obstacles.{obstacle}: in flight drones keep {_PAD_TO_OBSTACLE_M:g} m"
-                )
+                near = f"is {apart:.2f} m from room.obstacles.{obstacle}"
+                text = f"{near}: take-offs and landings drift, keep it {_PAD_TO_OBSTACLE_M:g} m away"
                 yield ("drones", name, "pad_m"), text
 
 

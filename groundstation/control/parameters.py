@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 from groundstation.control.search_height import return_height_m, search_height_m
 from groundstation.field.resolved import ResolvedField
-from groundstation.planning.detours import STRAIGHT, Detours, detours_from_field
-from groundstation.planning.parameters import MotionLimits, limits_from_field
+from groundstation.planning.detours import STRAIGHT, Detours
+from groundstation.planning.parameters import MotionLimits, limits_from_field, parameters_from_field
 from groundstation.sensing.from_field import boxes_from_field
 from groundstation.sensing.models import Box
 from groundstation.vectors import Interval, Vector2
@@ -128,7 +128,7 @@ def control_from_field(field: ResolvedField) -> ControlParameters:
         return_within_s=0.5 * safety.unseen_land_at_last_s,
         planned_s=planner.horizon_steps * planner.step_s,
         max_plan_age_s=max(1.0, 3.0 / planner.rate_hz),
-        detours=detours_from_field(field),
+        detours=_detours(field),
         fed=frozenset(n for n, drone in field.drones.items() if kind_named(drone.kind).habits.flies_on_estimate),
     )
 
@@ -145,3 +145,10 @@ def safety_from_field(field: ResolvedField) -> SafetyParameters:
         obstacles=boxes_from_field(field),
         obstacle_distance_m=safety.obstacle_distance_m,
     )
+
+
+def _detours(field: ResolvedField) -> Detours:
+    """Return ways that are as far from obstacles as plans are, and where the output limiter lets robots fly."""
+    safety, planner = safety_from_field(field), parameters_from_field(field)
+    least_m = safety.obstacle_distance_m + safety.margin_m
+    return Detours(safety.obstacles, planner.obstacle_m, planner.fence, least_m, safety.margin_m, safety.sigmas)

@@ -46,7 +46,7 @@ def is_lost(
     if view is None or unseen_s <= parameters.return_soonest_s:
         return spread > parameters.return_std_m
     x, y, z = (float(value) for value in mean[:3])
-    way_m = float(way_back_m(mean[:2], view)) + parameters.detours.extra_m((x, y), view.center, z)
+    way_m = float(way_back_m(mean[:2], view)) + parameters.detours.extra_m((x, y), view.center, z, spread)
     return left_s < way_m / parameters.return_speed_m_s + parameters.return_margin_s
 
 

@@ -1,5 +1,6 @@
 """The part of the floor that a search can show at all: from stands that robots may fly to, and by fixed cameras."""
 
+import math
 from collections.abc import Iterable, Mapping
 
 import numpy as np
@@ -27,15 +28,29 @@ def permitted(
     It leaves the view known as well as a camera sees it. One that flies on our estimate does not leave it at all.
     """
     views = sensors.root_views(control.return_height_m + sensors.marker_height_m[name])
-    clear = control.detours.clear_of(places, control.search_height_m)
+    extra_m = extra_ways_m(name, places, control, sensors)
     if not views:
-        return clear
-    way_m = np.min([way_back_m(places, view.shrunk(VIEW_INSET_M)) for view in views], axis=0)
+        return np.isfinite(extra_m)
+    way_m = np.min([way_back_m(places, view.shrunk(VIEW_INSET_M)) for view in views], axis=0) + extra_m
     if name in control.fed:
-        return np.asarray(clear & (way_m <= VIEW_INSET_M))
+        return np.asarray(way_m <= VIEW_INSET_M)
     left_s = time_left_s(control.seen_std_m, 0.0, control) - control.return_margin_s - parameters.look_s
     needed_s = way_m / parameters.speed_m_s + way_m / control.return_speed_m_s
-    return np.asarray(clear & ((way_m == 0.0) | (needed_s <= left_s)))
+    return np.asarray((way_m == 0.0) | (needed_s <= left_s))
+
+
+def extra_ways_m(name: str, places: Array, control: ControlParameters, sensors: SensorSuite) -> Array:
+    """Return how much longer a robot's ways back from stands (n, 2) are past obstacles [m].
+
+    Infinite for those that are too near to one, or from which no way is known.
+    """
+    detours, height_m = control.detours, control.return_height_m
+    extra_m = np.where(detours.clear_of(places, control.search_height_m), 0.0, np.inf)
+    views = sensors.root_views(height_m + sensors.marker_height_m[name])
+    for stand, (x, y) in enumerate(places.tolist() if detours.obstacles and views else ()):
+        goal = min((view.nearest(x, y) for view in views), key=lambda goal: math.dist(goal, (x, y)))
+        extra_m[stand] += detours.extra_m((x, y), goal, height_m)
+    return extra_m
 
 
 def shown_from(grid: RoomGrid, lattice: Lattice, free: BoolArray, footprint: Footprint) -> Cells:

@@ -17,7 +17,7 @@ from groundstation.control.returning import is_lost, return_stand
 from groundstation.control.scouting import scout_of
 from groundstation.control.search_spacing import apart
 from groundstation.control.stand import Stand
-from groundstation.control.view import view_of
+from groundstation.control.view import spread_m, view_of
 from groundstation.estimation.belief import JointBelief
 from groundstation.geometry.angles import difference
 from groundstation.geometry.stabilized_frame import stabilized_from_world, world_from_stabilized
@@ -215,7 +215,7 @@ def _towards(name: str, stand: Stand, phase: FlightMode, now: Moment) -> Setpoin
     mean, parameters = now.belief.mean_of(name), now.parameters
     drift_m_s = now.sight.drifts_m_s.get(name, STILL) if phase is FlightMode.RETURN else STILL
     x, y, z = (float(value) for value in mean[:3])
-    way = parameters.detours.way((x, y), (stand.x, stand.y), z)
+    way = parameters.detours.way((x, y), (stand.x, stand.y), z, spread_m(now.belief, name))
     most = parameters.return_speed_m_s if phase is FlightMode.RETURN else parameters.search_speed_m_s
     velocity = _STAND_GAIN * np.array([way.next_m[0] - x, way.next_m[1] - y, 0.0])
     speed = max(float(np.linalg.norm(velocity)), 1e-9)

@@ -16,7 +16,7 @@ from groundstation.control.parameters import ControlParameters
 from groundstation.control.pursuit import choose_pursuit
 from groundstation.control.search_parameters import SearchParameters
 from groundstation.control.search_ranges import searching_cameras
-from groundstation.control.search_reach import showable
+from groundstation.control.search_reach import extra_ways_m, showable
 from groundstation.control.stand import Stand
 from groundstation.control.sweeps import NO_OUTLOOK, Outlook, lattice_of
 from groundstation.estimation.belief import JointBelief
@@ -95,7 +95,10 @@ class Search:
         # What is in a box is never seen: looking there would be in vain, and never end.
         self._floor = outside_boxes(self._boxes, self.grid.xs, self.grid.ys, marker_m)
         self._lattice = lattice_of(self.grid, parameters)
-        self._clear = control.detours.clear_of(self._lattice.places, control.search_height_m)
+        there_and_back_s_m = 1.0 / parameters.speed_m_s + 1.0 / control.return_speed_m_s
+        self._extra_s = {
+            name: there_and_back_s_m * extra_ways_m(name, self._lattice.places, control, sensors) for name in onboard
+        }
         fixed = [rows[0] for name, rows in self._cameras.items() if name in sensors.world]
         self._shown = self._floor & showable(
             self.grid, self._lattice, self._footprints, parameters, control, sensors, marker_m, fixed
@@ -174,15 +177,17 @@ class Search:
         poses = {name: belief.mean_of(name)[:4] for name in robots}
         order = robots_in_order(robots, chances, poses, self.grid)
         footprints = {name: self._footprints[name] for name in order}
-        allowed_s = {
-            name: np.where(self._clear, self._excursions.allowed_s(name, belief, self._lattice.places), -1.0)
-            for name in robots
-        }
+        allowed_s = {name: self._allowed_s(name, belief) for name in robots}
         held, parameters = self._outlook.sweeps, self.parameters
         choose = choose_stands
         if all(self.targets[name].near for name in targets):
             choose, parameters = choose_pursuit, replace(parameters, yaw_rate_rad_s=parameters.near_yaw_rate_rad_s)
         return choose(chances, self._lattice, footprints, poses, allowed_s, held, parameters)
+
+    def _allowed_s(self, name: str, belief: JointBelief) -> Array:
+        """Return the latest time [s] to be at each stand; negative: never."""
+        allowed_s, extra_s = self._excursions.allowed_s(name, belief, self._lattice.places), self._extra_s[name]
+        return np.asarray(np.subtract(allowed_s, extra_s, out=np.full(len(extra_s), -1.0), where=np.isfinite(extra_s)))
 
     def _begun(self, name: str, state: SearchState, belief: JointBelief, age_s: float) -> SearchState:
         p, now_ns = self.parameters, belief.stamp_ns

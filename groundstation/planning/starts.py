@@ -38,6 +38,7 @@ class Starts:
         self._poses: list[list[float]] = scene.poses.tolist()
         self._views: dict[float, list[Rectangle]] = {}
         self._detours = Detours(sensors.obstacles, parameters.obstacle_m, parameters.fence)
+        self._stds_m: list[float] = np.sqrt(np.maximum(scene.prior.diagonal(), 0.0)).tolist()
 
     def of(self, topology: Topology, known: Array | None, moved: Collection[str]) -> list[Array]:
         """Return starts of a topology: the known optimum of another one, which differs by the robots `moved`.
@@ -107,7 +108,7 @@ class Starts:
         *end, yaw = goal
         at = ROBOT_CONTROLS * i
         (x_m, y_m, z_m, yaw_rad), horizon_s = self._poses[i], self._parameters.horizon_s
-        px, py = self._detours.way((x_m, y_m), (end[0], end[1]), z_m).next_m
+        px, py = self._detours.way((x_m, y_m), (end[0], end[1]), z_m, self._stds_m[i]).next_m
         forward, left, turn = self._scale[at : at + HEIGHT]
         rate = max(-1.0, min(1.0, difference(yaw, yaw_rad) / horizon_s / turn))
         middle = yaw_rad + 0.5 * rate * turn * horizon_s

@@ -57,7 +57,7 @@ class RoomSettings(SettingsSection):
     fence: FenceSettings
     """Box inside the room that drones are not allowed to leave."""
     obstacles: dict[Name, ObstacleSettings] = Field(default_factory=dict)
-    """What stands in the room and hides markers, by name. Plans look past it; drones do not fly round it."""
+    """What stands in the room and hides markers, by name. Plans look past it; drones fly round or over it."""
 
     @property
     def inside(self) -> dict[str, Interval]:

@@ -18,7 +18,7 @@ from groundstation.estimation.layout import ROBOT_CORE, EntityKind, StateLayout
 from groundstation.planning.parameters import MotionLimits
 from groundstation.sensing.models import Box
 
-PILLAR, TABLE = Box((2.4, -1.5), (0.6, 0.5, 2.8)), Box((-2.4, 1.6), (1.6, 1.0, 0.75))
+PILLAR, TABLE = Box((2.4, -1.5), (0.4, 0.3, 2.8)), Box((-2.4, 1.6), (0.8, 0.6, 0.75))
 SAFETY = SafetyParameters(fence=((-3.7, 3.7), (-2.7, 2.7), (0.0, 2.8)), obstacles=(PILLAR, TABLE))
 LIMITS = MotionLimits()
 _FENCE = np.array(SAFETY.fence)
@@ -108,6 +108,10 @@ def random_states(rng: np.random.Generator, count: int, robots: int) -> TeamStat
     for i in range(1, robots):
         near = places[:, i - 1] + _anywhere(rng, rng.uniform(0.1, 1.6, count))
         places[:, i] = np.where(rng.random((count, 1)) < 0.5, near, rng.uniform(_FENCE[:, 0], _FENCE[:, 1], (count, 3)))
+    # Few are in an obstacle: there all sides squeeze.
+    within = np.min([box.distances_m(places.reshape(-1, 3)) for box in SAFETY.obstacles], axis=0) < 0.3
+    elsewhere = rng.uniform(_FENCE[:, 0], _FENCE[:, 1], (count, robots, 3))
+    places = np.where(within.reshape(count, robots, 1), elsewhere, places)
     dim = 4 * robots
     factor = rng.normal(size=(count, dim, dim)) * rng.choice((0.003, 0.03, 0.1), (count, 1, 1))
     drifts = _anywhere(rng, rng.uniform(0.0, SAFETY.most_drift_m_s, (count, robots)))

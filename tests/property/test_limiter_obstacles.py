@@ -79,7 +79,7 @@ def test_a_way_past_an_obstacle_is_free() -> None:
 
 def test_a_robot_before_an_obstacle_slides_along_it() -> None:
     x, y = PILLAR.centre_m
-    place = np.array([x - 0.3 - BODY_M - SAFETY.margin_m - 2.0 * STD_M, y, 1.4])
+    place = np.array([x - 0.5 * PILLAR.size_m[0] - BODY_M - SAFETY.margin_m - 2.0 * STD_M, y, 1.4])
     found = told(place, np.array([0.4, 0.3, 0.0]), np.zeros(3))
     assert found.limited_by == ("obstacle",)
     assert found.setpoint.velocity_m_s == pytest.approx((0.0, 0.3, 0.0), abs=1e-6)
@@ -102,14 +102,14 @@ def test_over_a_table_no_robot_sinks_to_it() -> None:
 
 def test_a_robot_that_stands_too_near_may_leave_but_not_come_nearer() -> None:
     x, y = PILLAR.centre_m
-    place = np.array([x - 0.3 - 0.2, y, 1.4])
+    place = np.array([x - 0.5 * PILLAR.size_m[0] - 0.2, y, 1.4])
     assert told(place, np.array([-0.3, 0.0, 0.0]), np.zeros(3)).setpoint.velocity_m_s[0] == pytest.approx(-0.3)
     assert told(place, np.array([0.3, 0.0, 0.2]), np.zeros(3)).setpoint.velocity_m_s == pytest.approx((0.0, 0.0, 0.2))
 
 
 def test_a_drift_towards_an_obstacle_is_countered() -> None:
     x, y = PILLAR.centre_m
-    place = np.array([x, y + 0.25 + BODY_M + SAFETY.margin_m + 2.0 * STD_M, 1.4])
+    place = np.array([x, y + 0.5 * PILLAR.size_m[1] + BODY_M + SAFETY.margin_m + 2.0 * STD_M, 1.4])
     found = told(place, np.zeros(3), np.zeros(3), np.array([0.0, -0.1, 0.0]))
     assert found.setpoint.velocity_m_s == pytest.approx((0.0, 0.15, 0.0))
     assert math.isclose(PILLAR.distances_m(place[None])[0], BODY_M + SAFETY.margin_m + 2.0 * STD_M)

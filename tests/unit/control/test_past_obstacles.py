@@ -73,7 +73,8 @@ def test_a_longer_way_back_begins_sooner() -> None:
     assert sum(behind) > sum(free)
 
 
-def test_a_stand_in_an_obstacle_is_flown_to_straight_and_the_limiter_stops() -> None:
-    inside = told(CONTROL, BEFORE, Stand(1.5, 0.1, 0.0))
-    assert inside.velocity_m_s[:2] == pytest.approx(told(FREE, BEFORE, Stand(1.5, 0.1, 0.0)).velocity_m_s[:2])
+def test_a_stand_in_an_obstacle_is_approached_as_far_as_allowed() -> None:
+    near = CONTROL.detours.way(BEFORE[:2], (0.95, 0.0), BEFORE[2], 0.03).next_m
+    assert near == pytest.approx((0.65, 0.0))
+    assert told(CONTROL, (*near, 1.4, 0.0), Stand(0.95, 0.0, 0.0)).velocity_m_s[:2] == pytest.approx((0.0, 0.0))
     assert replace(CONTROL, detours=FREE.detours) == FREE

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from itertools import count
 
 import numpy as np
-from team_states import LIMITS, SAFETY, TeamStates, anything_allowed, promised, random_states
+from team_states import CLUTTERED, LIMITS, SAFETY, TeamStates, anything_allowed, promised, random_states
 
 from groundstation.arrays import Array, BoolArray, IntArray
 from groundstation.control.flight_mode import FlightMode
@@ -37,7 +37,7 @@ def limited(states: TeamStates) -> Told:
         shafts = states.shafts_of(row)
         for i, name in enumerate(states.names):
             wish = Setpoint(tuple(wishes[row][i]), rates[row][i], FlightMode.TRACK)
-            told = limit_setpoint(name, wish, at, 0, SAFETY, velocities, drifts, shafts).setpoint
+            told = limit_setpoint(name, wish, at, 0, states.safety, velocities, drifts, shafts).setpoint
             answers[row, i] = *told.velocity_m_s, told.yaw_rate_rad_s
     return Told(_turned(answers[..., :3], yaws), answers[..., 3])
 
@@ -121,8 +121,12 @@ def judged(states: int, seed: int) -> Counter[str]:
 
 
 def judged_batch(seed: int, number: int, teams: int) -> Counter[str]:
-    """Draw and judge the states of one batch, teams of two and of three in turn; its number reproduces it."""
-    drawn = random_states(np.random.default_rng((seed, number)), teams, 2 + number % 2)
+    """Draw and judge the states of one batch; its number reproduces it.
+
+    Teams of two and of three in turn, and every third pair of batches in a room with obstacles.
+    """
+    safety = CLUTTERED if number % 6 < 2 else SAFETY
+    drawn = random_states(np.random.default_rng((seed, number)), teams, 2 + number % 2, safety)
     told, ends = limited(drawn), Counter[str]()
     for robot in range(len(drawn.names)):
         try:

@@ -4,7 +4,7 @@ Many states at a time, as arrays: drawing and judging one takes a tenth of the l
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import linprog
@@ -19,7 +19,8 @@ from groundstation.planning.parameters import MotionLimits
 from groundstation.sensing.models import Box
 
 PILLAR, TABLE = Box((2.4, -1.5), (0.4, 0.3, 2.8)), Box((-2.4, 1.6), (0.8, 0.6, 0.75))
-SAFETY = SafetyParameters(fence=((-3.7, 3.7), (-2.7, 2.7), (0.0, 2.8)), obstacles=(PILLAR, TABLE))
+SAFETY = SafetyParameters(fence=((-3.7, 3.7), (-2.7, 2.7), (0.0, 2.8)))
+CLUTTERED = replace(SAFETY, obstacles=(PILLAR, TABLE))
 LIMITS = MotionLimits()
 _FENCE = np.array(SAFETY.fence)
 _SAID = 0.85  # share of robots with a reported velocity, and of those with a known drift
@@ -44,7 +45,7 @@ class TeamStates:
 
     poses [n, r, 4], covariances [n, 4 r, 4 r]; reported velocities and known drifts [n, r, 3; m/s; world], NaN if
     absent; wishes [n, r, 3; m/s; world], yaw_rates [n, r; rad/s]. shafts [n, 4]: one of another robot in each, x, y,
-    variance and drift; NaN if there is none.
+    variance and drift; NaN if there is none. safety: the limiter's settings, with the obstacles of the room.
     """
 
     poses: Array
@@ -54,6 +55,7 @@ class TeamStates:
     wishes: Array
     yaw_rates: Array
     shafts: Array
+    safety: SafetyParameters = SAFETY
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -98,7 +100,7 @@ def _known(names: tuple[str, ...], values: Array) -> dict[str, Array]:
     return {name: value for name, value in zip(names, values, strict=True) if not math.isnan(value[0])}
 
 
-def random_states(rng: np.random.Generator, count: int, robots: int) -> TeamStates:
+def random_states(rng: np.random.Generator, count: int, robots: int, safety: SafetyParameters = SAFETY) -> TeamStates:
     """Return states of teams: every second robot near another, some outside the fence or without reported velocity.
 
     Half of the wishes lead to another robot, half of them include a turn.
@@ -108,10 +110,6 @@ def random_states(rng: np.random.Generator, count: int, robots: int) -> TeamStat
     for i in range(1, robots):
         near = places[:, i - 1] + _anywhere(rng, rng.uniform(0.1, 1.6, count))
         places[:, i] = np.where(rng.random((count, 1)) < 0.5, near, rng.uniform(_FENCE[:, 0], _FENCE[:, 1], (count, 3)))
-    # Few are in an obstacle: there all sides squeeze.
-    within = np.min([box.distances_m(places.reshape(-1, 3)) for box in SAFETY.obstacles], axis=0) < 0.3
-    elsewhere = rng.uniform(_FENCE[:, 0], _FENCE[:, 1], (count, robots, 3))
-    places = np.where(within.reshape(count, robots, 1), elsewhere, places)
     dim = 4 * robots
     factor = rng.normal(size=(count, dim, dim)) * rng.choice((0.003, 0.03, 0.1), (count, 1, 1))
     drifts = _anywhere(rng, rng.uniform(0.0, SAFETY.most_drift_m_s, (count, robots)))
@@ -124,6 +122,7 @@ def random_states(rng: np.random.Generator, count: int, robots: int) -> TeamStat
         _wishes(rng, places),
         np.where(rng.random((count, robots)) < 0.5, rng.normal(size=(count, robots)) * 0.8, 0.0),
         _random_shafts(rng, places[:, 0]),
+        safety,
     )
 
 
@@ -158,7 +157,7 @@ def promised(states: TeamStates, robot: int, yaw_rates: Array) -> tuple[Array, A
     v + T yaw_rate (z x v).
     """
     pairs = (_pair(states, robot, other) for other in states.others(robot))
-    boxes = (_obstacle(states, robot, box) for box in SAFETY.obstacles)
+    boxes = (_obstacle(states, robot, box) for box in states.safety.obstacles)
     parts = [_fence(states, robot), *boxes, *pairs, _shaft(states, robot)]
     normals, barriers, times = (np.concatenate(part, axis=1) for part in zip(*parts, strict=True))
     known = np.maximum(np.einsum("nmi,ni->nm", normals, states.drifts[:, robot]), 0.0)

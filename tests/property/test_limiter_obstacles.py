@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from team_states import PILLAR, SAFETY, TABLE
+from team_states import CLUTTERED, PILLAR, TABLE
 
 from groundstation.arrays import Array
 from groundstation.control.drift import DriftWatch
@@ -27,7 +27,7 @@ def told(place: Array, wish: Array, velocity: Array, drift: Array | None = None,
     x, y, z = wish.tolist()
     drifts = None if drift is None else {"a": drift}
     setpoint = Setpoint((x, y, z), 0.0, FlightMode.TRACK)
-    return limit_setpoint("a", setpoint, at, now_ns, SAFETY, {"a": velocity}, drifts)
+    return limit_setpoint("a", setpoint, at, now_ns, CLUTTERED, {"a": velocity}, drifts)
 
 
 def flown(begin: tuple[float, float, float], wishes: Array, drift: Array, lag_s: float) -> Array:
@@ -36,7 +36,7 @@ def flown(begin: tuple[float, float, float], wishes: Array, drift: Array, lag_s:
     places = []
     for step in range(20 * len(wishes)):
         now_ns = 1 + round(step * dt * 1e9)
-        known = watch.see(now_ns, place + SAFETY.reaction_s * velocity)
+        known = watch.see(now_ns, place + CLUTTERED.reaction_s * velocity)
         asked = np.array(told(place, wishes[step // 20], velocity, known, now_ns).setpoint.velocity_m_s)
         watch.note_command(asked)
         velocity = velocity + dt / lag_s * (asked - velocity)
@@ -66,7 +66,7 @@ def test_no_wish_and_no_unreported_drift_brings_a_robot_to_an_obstacle(box: Box,
     drift *= min(1.0, 0.05 / float(np.linalg.norm(drift)))
     places = flown(begin, wishes, drift, data.draw(st.floats(0.2, 0.5)))
     assert box.distances_m(places).min() >= BODY_M
-    for axis, (low, high) in enumerate(SAFETY.fence):
+    for axis, (low, high) in enumerate(CLUTTERED.fence):
         assert low <= places[:, axis].min() and places[:, axis].max() <= high
 
 
@@ -79,7 +79,7 @@ def test_a_way_past_an_obstacle_is_free() -> None:
 
 def test_a_robot_before_an_obstacle_slides_along_it() -> None:
     x, y = PILLAR.centre_m
-    place = np.array([x - 0.5 * PILLAR.size_m[0] - BODY_M - SAFETY.margin_m - 2.0 * STD_M, y, 1.4])
+    place = np.array([x - 0.5 * PILLAR.size_m[0] - BODY_M - CLUTTERED.margin_m - 2.0 * STD_M, y, 1.4])
     found = told(place, np.array([0.4, 0.3, 0.0]), np.zeros(3))
     assert found.limited_by == ("obstacle",)
     assert found.setpoint.velocity_m_s == pytest.approx((0.0, 0.3, 0.0), abs=1e-6)
@@ -97,7 +97,7 @@ def test_a_high_robot_flies_over_a_table_and_a_low_one_does_not(height_m: float,
 def test_over_a_table_no_robot_sinks_to_it() -> None:
     (x, y), (*_, height) = TABLE.centre_m, TABLE.size_m
     places = flown((x, y, 1.6), np.tile((0.0, 0.0, -0.4), (8, 1)), np.zeros(3), 0.3)
-    assert height + BODY_M + SAFETY.margin_m <= places[:, 2].min() <= height + 0.58
+    assert height + BODY_M + CLUTTERED.margin_m <= places[:, 2].min() <= height + 0.58
 
 
 def test_a_robot_that_stands_too_near_may_leave_but_not_come_nearer() -> None:
@@ -109,7 +109,7 @@ def test_a_robot_that_stands_too_near_may_leave_but_not_come_nearer() -> None:
 
 def test_a_drift_towards_an_obstacle_is_countered() -> None:
     x, y = PILLAR.centre_m
-    place = np.array([x, y + 0.5 * PILLAR.size_m[1] + BODY_M + SAFETY.margin_m + 2.0 * STD_M, 1.4])
+    place = np.array([x, y + 0.5 * PILLAR.size_m[1] + BODY_M + CLUTTERED.margin_m + 2.0 * STD_M, 1.4])
     found = told(place, np.zeros(3), np.zeros(3), np.array([0.0, -0.1, 0.0]))
     assert found.setpoint.velocity_m_s == pytest.approx((0.0, 0.15, 0.0))
-    assert math.isclose(PILLAR.distances_m(place[None])[0], BODY_M + SAFETY.margin_m + 2.0 * STD_M)
+    assert math.isclose(PILLAR.distances_m(place[None])[0], BODY_M + CLUTTERED.margin_m + 2.0 * STD_M)

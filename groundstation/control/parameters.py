@@ -150,5 +150,4 @@ def safety_from_field(field: ResolvedField) -> SafetyParameters:
 def _detours(field: ResolvedField) -> Detours:
     """Return ways that are as far from obstacles as plans are, and where the output limiter lets robots fly."""
     safety, planner = safety_from_field(field), parameters_from_field(field)
-    least_m = safety.obstacle_distance_m + safety.margin_m
-    return Detours(safety.obstacles, planner.obstacle_m, planner.fence, least_m, safety.margin_m, safety.sigmas)
+    return Detours(safety.obstacles, planner.obstacle_m, planner.fence, safety.margin_m, safety.sigmas)

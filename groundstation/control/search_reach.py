@@ -21,14 +21,19 @@ _IN_VIEW = 0.5 * FOUND_SHARE  # at the border of a view: beyond it markers are f
 
 
 def permitted(
-    name: str, places: Array, parameters: SearchParameters, control: ControlParameters, sensors: SensorSuite
+    name: str,
+    places: Array,
+    extra_m: Array,
+    parameters: SearchParameters,
+    control: ControlParameters,
+    sensors: SensorSuite,
 ) -> BoolArray:
     """Return to which places (n, 2) a robot may ever fly in a search: clear of obstacles, and back in view in time.
 
     It leaves the view known as well as a camera sees it. One that flies on our estimate does not leave it at all.
+    extra_m: by `extra_ways_m`.
     """
     views = sensors.root_views(control.return_height_m + sensors.marker_height_m[name])
-    extra_m = extra_ways_m(name, places, control, sensors)
     if not views:
         return np.isfinite(extra_m)
     way_m = np.min([way_back_m(places, view.shrunk(VIEW_INSET_M)) for view in views], axis=0) + extra_m
@@ -77,15 +82,15 @@ def showable(
     grid: RoomGrid,
     lattice: Lattice,
     footprints: Mapping[str, Footprint],
-    parameters: SearchParameters,
-    control: ControlParameters,
-    sensors: SensorSuite,
+    free: Mapping[str, BoolArray],
     marker_m: float,
     cameras: Iterable[CameraRow],
 ) -> Cells:
-    """Return the cells that the team's search can show; cameras: the fixed ones that observe targets."""
+    """Return the cells that the team's search can show.
+
+    free: the stands permitted to each robot; cameras: the fixed ones that observe targets.
+    """
     shown = shown_by_fixed(grid, cameras, marker_m)
     for name, footprint in footprints.items():
-        free = permitted(name, lattice.places, parameters, control, sensors)
-        shown |= shown_from(grid, lattice, free, footprint)
+        shown |= shown_from(grid, lattice, free[name], footprint)
     return shown

@@ -16,7 +16,7 @@ from groundstation.control.parameters import ControlParameters
 from groundstation.control.pursuit import choose_pursuit
 from groundstation.control.search_parameters import SearchParameters
 from groundstation.control.search_ranges import searching_cameras
-from groundstation.control.search_reach import extra_ways_m, showable
+from groundstation.control.search_reach import extra_ways_m, permitted, showable
 from groundstation.control.stand import Stand
 from groundstation.control.sweeps import NO_OUTLOOK, Outlook, lattice_of
 from groundstation.estimation.belief import JointBelief
@@ -95,14 +95,12 @@ class Search:
         # What is in a box is never seen: looking there would be in vain, and never end.
         self._floor = outside_boxes(self._boxes, self.grid.xs, self.grid.ys, marker_m)
         self._lattice = lattice_of(self.grid, parameters)
-        there_and_back_s_m = 1.0 / parameters.speed_m_s + 1.0 / control.return_speed_m_s
-        self._extra_s = {
-            name: there_and_back_s_m * extra_ways_m(name, self._lattice.places, control, sensors) for name in onboard
-        }
+        places, there_and_back_s_m = self._lattice.places, 1.0 / parameters.speed_m_s + 1.0 / control.return_speed_m_s
+        extra_m = {name: extra_ways_m(name, places, control, sensors) for name in self._footprints}
+        self._extra_s = {name: there_and_back_s_m * way_m for name, way_m in extra_m.items()}
+        free = {name: permitted(name, places, way_m, parameters, control, sensors) for name, way_m in extra_m.items()}
         fixed = [rows[0] for name, rows in self._cameras.items() if name in sensors.world]
-        self._shown = self._floor & showable(
-            self.grid, self._lattice, self._footprints, parameters, control, sensors, marker_m, fixed
-        )
+        self._shown = self._floor & showable(self.grid, self._lattice, self._footprints, free, marker_m, fixed)
         self.never_shown = 1.0 - float(self._shown.sum()) / max(1, int(self._floor.sum()))
         self._pictures: list[SearchedPicture] = []
         self._history = BeliefHistory()

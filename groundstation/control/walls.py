@@ -39,9 +39,10 @@ def walls_around(
     shafts: Mapping[str, Shaft],
 ) -> list[Wall]:
     """Return the walls of a robot's fence, of each obstacle, of each other robot in the belief, and of each shaft."""
-    walls = _fence(robot, belief, parameters, velocities) + _obstacles(robot, belief, parameters, velocities)
-    walls += _others(robot, belief, parameters, velocities)
-    return walls + _shafts(robot, belief, parameters, velocities, shafts)
+    rest, time = _braking(robot, belief, parameters, velocities)
+    walls = _fence(robot, belief, parameters, rest, time) + _obstacles(robot, belief, parameters, rest, time)
+    walls += _others(robot, belief, parameters, velocities, rest, time)
+    return walls + _shafts(robot, belief, parameters, shafts, rest, time)
 
 
 def held_off(wall: Wall, drift: Vector3, parameters: SafetyParameters) -> Wall:
@@ -96,10 +97,7 @@ def _braking(
     return (x + reaction_s * vx, y + reaction_s * vy, z + reaction_s * vz), 2.0 * reaction_s
 
 
-def _fence(
-    robot: str, belief: JointBelief, parameters: SafetyParameters, velocities: Mapping[str, Array]
-) -> list[Wall]:
-    rest, time = _braking(robot, belief, parameters, velocities)
+def _fence(robot: str, belief: JointBelief, parameters: SafetyParameters, rest: Vector3, time: float) -> list[Wall]:
     walls = []
     for (low, high), normal, at, variance in zip(parameters.fence, _AXES, rest, _variances(robot, belief), strict=True):
         keep = parameters.margin_m + parameters.sigmas * math.sqrt(variance)
@@ -108,13 +106,10 @@ def _fence(
     return walls
 
 
-def _obstacles(
-    robot: str, belief: JointBelief, parameters: SafetyParameters, velocities: Mapping[str, Array]
-) -> list[Wall]:
+def _obstacles(robot: str, belief: JointBelief, parameters: SafetyParameters, rest: Vector3, time: float) -> list[Wall]:
     """Return a wall for each obstacle: the side, or the top, of which the robot's point of rest is farthest outside."""
     if not parameters.obstacles:
         return []
-    rest, time = _braking(robot, belief, parameters, velocities)
     place, keep = place_of(robot, belief), parameters.obstacle_distance_m + parameters.margin_m
     x, y, z = (keep + parameters.sigmas * math.sqrt(variance) for variance in _variances(robot, belief))
     walls = []
@@ -135,13 +130,13 @@ def _gaps(box: Box, place: Vector3) -> tuple[float, float, float, float, float]:
 
 
 def _others(
-    robot: str, belief: JointBelief, parameters: SafetyParameters, velocities: Mapping[str, Array]
-) -> list[Wall]:
+    robot: str, belief: JointBelief, parameters: SafetyParameters, velocities: Mapping[str, Array], rest: Vector3,
+    time: float,
+) -> list[Wall]:  # fmt: skip
     """Return two walls for each other robot: one at its point of rest, one at its place now.
 
     Half of the closing speed is this robot's share.
     """
-    rest, time = _braking(robot, belief, parameters, velocities)
     place = place_of(robot, belief)
     walls = []
     for other in belief.layout.robots:
@@ -156,14 +151,10 @@ def _others(
 
 
 def _shafts(
-    robot: str,
-    belief: JointBelief,
-    parameters: SafetyParameters,
-    velocities: Mapping[str, Array],
-    shafts: Mapping[str, Shaft],
-) -> list[Wall]:
+    robot: str, belief: JointBelief, parameters: SafetyParameters, shafts: Mapping[str, Shaft], rest: Vector3,
+    time: float,
+) -> list[Wall]:  # fmt: skip
     """Return the two upright walls for each other robot's shaft."""
-    rest, time = _braking(robot, belief, parameters, velocities)
     x, y, _ = place_of(robot, belief)
     walls = []
     for other, shaft in shafts.items():

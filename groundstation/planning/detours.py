@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse.csgraph import floyd_warshall
 
 from groundstation.arrays import Array, BoolArray, IntMatrix
-from groundstation.planning.parameters import NO_FENCE
+from groundstation.planning.parameters import NO_FENCE, SOFT_WALL_M
 from groundstation.sensing.models import Box, Rectangle
 from groundstation.vectors import Vector2
 
@@ -46,16 +46,20 @@ class Way:
 class Detours:
     """Ways round obstacles.
 
-    keep_m: distance of a robot's centre from them [m]; least_m, fence_m: distances from obstacles and from the fence
-    that the output limiter enforces, with `sigmas` standard deviations on top.
+    keep_m: distance of a robot's centre from them in plans [m]; margin_m, sigmas: the output limiter's, beyond the
+    fence and the distance without plans' soft wall, in metres and standard deviations.
     """
 
     obstacles: tuple[Box, ...] = ()
     keep_m: float = 0.6
     fence: Rectangle = NO_FENCE
-    least_m: float = 0.45
-    fence_m: float = 0.15
+    margin_m: float = 0.15
     sigmas: float = 2.0
+
+    @property
+    def least_m(self) -> float:
+        """Return the distance that the output limiter enforces for a place without doubt [m]."""
+        return self.keep_m - SOFT_WALL_M + self.margin_m
 
     def way(self, place: Vector2, goal: Vector2, height_m: float, std_m: float = 0.0) -> Way:
         """Return the shortest way at a height; straight ahead where none is known.
@@ -67,7 +71,7 @@ class Detours:
         if self.obstacles:
             doubt_m = _STEP_M * math.ceil(self.sigmas * std_m / _STEP_M)
             wide_m = max(self.keep_m, self.least_m + _BESIDE_M + doubt_m)
-            fence = self.fence.shrunk(self.fence_m + doubt_m + _NARROWLY_M)
+            fence = self.fence.shrunk(self.margin_m + doubt_m + _NARROWLY_M)
             wide = _way(place, goal, self._outlines(height_m, wide_m), wide_m, _BESIDE_M, fence)
             if wide is not None and wide.is_straight:
                 return wide

@@ -96,6 +96,6 @@ def test_random_rooms_are_crossed(seed: int) -> None:
     assume(min(clear) > 0.5 + 2.0 * std_m)
     begin, goal = (tuple(at) for at in places.tolist())
     # In passages with less room the drift may stop it.
-    assume(Detours(boxes, fence=FENCE, least_m=0.55, fence_m=0.25).way(begin, goal, HEIGHT_M, std_m).is_known)
+    assume(Detours(boxes, fence=FENCE, margin_m=0.25).way(begin, goal, HEIGHT_M, std_m).is_known)
     end, least_m = flown(boxes, begin, goal, std_m, (float(drift[0]), float(drift[1])))
     assert math.dist(end, goal) < 0.45 and least_m > 0.3

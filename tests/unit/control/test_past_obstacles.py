@@ -13,7 +13,7 @@ from groundstation.control.moment import Sight
 from groundstation.control.parameters import ControlParameters, control_from_field, safety_from_field
 from groundstation.control.returning import is_lost
 from groundstation.control.search_parameters import search_from_field
-from groundstation.control.search_reach import permitted
+from groundstation.control.search_reach import extra_ways_m, permitted
 from groundstation.control.setpoints import Setpoint, setpoints_from_plan
 from groundstation.control.stand import Stand
 from groundstation.estimation.belief import JointBelief
@@ -60,8 +60,9 @@ def test_a_searching_robot_flies_round_a_pillar_at_full_speed() -> None:
 def test_no_robot_searches_from_a_place_too_near_to_an_obstacle() -> None:
     places = np.array([[1.5, 0.0], [0.9, 0.0], [0.5, 0.0], [1.5, 0.9]])
     search = search_from_field(LAB)
-    assert permitted("drone_1", places, search, CONTROL, SENSORS).tolist() == [False, False, True, True]
-    assert permitted("drone_1", places, search, FREE, SENSORS).all()
+    past, free = (extra_ways_m("drone_1", places, control, SENSORS) for control in (CONTROL, FREE))
+    assert permitted("drone_1", places, past, search, CONTROL, SENSORS).tolist() == [False, False, True, True]
+    assert permitted("drone_1", places, free, search, FREE, SENSORS).all()
 
 
 def test_a_longer_way_back_begins_sooner() -> None:

@@ -22,6 +22,7 @@ from sim_bridge.own_video import OwnVideo
 from sim_bridge.render.spec import (
     BoardSpec,
     BodyShape,
+    BoxSpec,
     FloorKind,
     Mount,
     Outage,
@@ -32,6 +33,7 @@ from sim_bridge.render.spec import (
 from sim_bridge.scenario import Scenario
 from sim_bridge.site import Site
 from sim_bridge.world.emulation import video_of
+from sim_bridge.world.obstacles import all_obstacles, box_names
 
 Stream = tuple[str, int]
 _START_LIMIT_S = 45.0
@@ -50,6 +52,8 @@ def render_specs(
 
     unseen: bodies that no camera shows.
     """
+    about = all_obstacles(scenario.obstacles, site.room.obstacles.values())
+    boxes = tuple(BoxSpec(name, one.size_m) for name, one in zip(box_names(len(about)), about, strict=True))
     body_at, errors = exchanged(scenario.faults), scenario.cameras.mounting_errors
     optics = {name: _optics(site, body_at.get(name, name), errors, seed) for name in streams}
     return [
@@ -59,7 +63,7 @@ def render_specs(
             intrinsics=optics[name][1],
             boards=tuple(board for board in _boards(site) if board.body not in unseen),
             truth_name=truth_name,
-            bodies=site.bodies,
+            bodies=(*site.bodies, *(box.body for box in boxes)),
             address=address,
             port=port,
             own=_own_video(site, name, scenario),
@@ -67,6 +71,7 @@ def render_specs(
             seed=seed,
             room_size_m=site.room.size_m,
             parent_pid=os.getpid(),
+            boxes=boxes,
         )
         for name, (address, port) in streams.items()
     ]

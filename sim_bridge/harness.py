@@ -64,8 +64,6 @@ class Harness:
             self._child.starting(f"{len(order.streams)} cameras")
             specs = render_specs(order.site, order.scenario, order.streams, name, order.seed, order.unseen)
             self._stage.open_cameras(specs, lambda: self._child.stop_requested)
-            if self.world.obstacles:
-                self._child.event(Severity.WARNING, "rendered pictures do not show obstacles")
 
     def run(self) -> None:
         """Run until told to stop; after the supervisor's end, until every drone has landed (20 s at most)."""

@@ -7,6 +7,7 @@ from sim_bridge.cameras import Cameras
 from sim_bridge.render.spec import RenderSpec
 from sim_bridge.truth import TruthBoard, remove_stale_boards
 from sim_bridge.world.emulation import Emulator, video_settings_of
+from sim_bridge.world.obstacles import box_names
 from sim_bridge.world.world import World
 
 
@@ -28,9 +29,9 @@ class Stage:
         self._readers[descriptor] = emulator.receive
 
     def share_truth(self, name: str) -> None:
-        """Let render processes read the states of all bodies under that name."""
+        """Let render processes read the states of all bodies and obstacles under that name."""
         remove_stale_boards()
-        self._board = TruthBoard.create(name, self.world.bodies)
+        self._board = TruthBoard.create(name, (*self.world.bodies, *box_names(len(self.world.obstacles))))
 
     def open_cameras(self, specs: Iterable[RenderSpec], should_stop: Callable[[], bool]) -> None:
         """Start the render processes; returns when every stream is served. Raises GroundStationError."""
@@ -45,7 +46,8 @@ class Stage:
         for emulator in self.emulators.values():
             emulator.send()
         if self._board is not None:
-            self._board.write(stamp_ns, self.world.rows())
+            boxes = (box.row() for box in self.world.obstacles)
+            self._board.write(stamp_ns, (*self.world.rows(), *boxes))
 
     def tell_cameras(self) -> None:
         """Pass the drones' video configurations to the render processes."""

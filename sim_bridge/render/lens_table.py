@@ -11,9 +11,9 @@ from groundstation.geometry.lens import CameraIntrinsics
 Float32 = NDArray[np.float32]
 
 PAD = 2
-_COARSE = 8
+COARSE = 8
 # Pixels that no ray of the lens model reaches look far sideways, off every texture.
-_NOWHERE = 1e3
+NOWHERE = 1e3
 
 
 class LensTable:
@@ -25,8 +25,8 @@ class LensTable:
         rows = np.arange(-PAD, self.height + PAD, dtype=np.float64)
         self._x, self._y = _rays(intrinsics, columns, rows)
         # Placed so that enlarging by 8 puts the samples exactly onto pixels; one extra sample on each side.
-        coarse_columns = (np.arange(-1, -(-self.width // _COARSE) + 1) + 0.5) * _COARSE - 0.5
-        coarse_rows = (np.arange(-1, -(-self.height // _COARSE) + 1) + 0.5) * _COARSE - 0.5
+        coarse_columns = (np.arange(-1, -(-self.width // COARSE) + 1) + 0.5) * COARSE - 0.5
+        coarse_rows = (np.arange(-1, -(-self.height // COARSE) + 1) + 0.5) * COARSE - 0.5
         self.coarse_x, self.coarse_y = _rays(intrinsics, coarse_columns, coarse_rows)
         # How far down the picture each coarse row is, 0 at the first row and 1 at the last (n, 1).
         self.coarse_share = (coarse_rows / (self.height - 1)).astype(np.float32)[:, None]
@@ -39,13 +39,13 @@ class LensTable:
     def enlarge(self, coarse: Float32) -> Float32:
         """Return a quantity sampled at the coarse rays for every pixel, by linear interpolation."""
         rows, columns = coarse.shape
-        full = cv2.resize(coarse, (columns * _COARSE, rows * _COARSE), interpolation=cv2.INTER_LINEAR)
-        return np.asarray(full[_COARSE : _COARSE + self.height, _COARSE : _COARSE + self.width], dtype=np.float32)
+        full = cv2.resize(coarse, (columns * COARSE, rows * COARSE), interpolation=cv2.INTER_LINEAR)
+        return np.asarray(full[COARSE : COARSE + self.height, COARSE : COARSE + self.width], dtype=np.float32)
 
 
 def _rays(
     intrinsics: CameraIntrinsics, columns: NDArray[np.floating[Any]], rows: NDArray[np.floating[Any]]
 ) -> tuple[Float32, ...]:
     grid = np.stack(np.meshgrid(columns, rows), axis=-1)
-    normalised = np.nan_to_num(intrinsics.normalised_from_pixels(grid), nan=_NOWHERE).astype(np.float32)
+    normalised = np.nan_to_num(intrinsics.normalised_from_pixels(grid), nan=NOWHERE).astype(np.float32)
     return np.ascontiguousarray(normalised[..., 0]), np.ascontiguousarray(normalised[..., 1])

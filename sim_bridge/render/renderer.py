@@ -1,14 +1,16 @@
-"""One camera's picture: floor, bodies and boards from far to near, defocus, smear, sensor noise."""
+"""One camera's picture: floor, boxes, bodies and boards from far to near, defocus, smear, sensor noise."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from groundstation.arrays import Image
+from groundstation.arrays import Array, Image
 from groundstation.geometry.pose import Pose
 from sim_bridge.render.board_painter import BoardPainter, Flaws, smear_kernel
+from sim_bridge.render.box_painter import BoxPainter, Cover
 from sim_bridge.render.card import card_of
 from sim_bridge.render.floor import Floor, texture
 from sim_bridge.render.lens_table import LensTable
@@ -29,6 +31,8 @@ class Renderer:
         # The carpet is the room's: every camera of one run sees the same floor.
         self._floor = Floor(texture(spec.scenario.floor, room, spec.seed), room, table)
         self._painters = {board: BoardPainter(card_of(board), intrinsics, table) for board in spec.boards}
+        focal_px = min(intrinsics.fx_px, intrinsics.fy_px)
+        self._boxes = {box: BoxPainter(box.size_m, focal_px, spec.scenario.blur_px, table) for box in spec.boxes}
         self._sensor = ImageSensor(intrinsics.width_px, intrinsics.height_px, spec.scenario, self._random)
         fixed = not spec.mount.body
         self._background = self._blurred(self._floor.draw(spec.mount.parent_from_optical)) if fixed else None
@@ -42,11 +46,30 @@ class Renderer:
         """Return the picture (h, w) of the true states (n, 13) of the spec's bodies."""
         scene = compose_scene(self._spec, states)
         picture = self._draw_floor(scene)
+        covers = self._draw_boxes(picture, scene, states)
         for sight in scene.sights:
+            place = scene.world_from_optical.apply(sight.optical_from_marker.translation)
+            hiding = [cover for cover, hides in covers if hides(place)]
+            before = picture.copy() if hiding else picture
             draw_body(picture, sight.board.shape, sight.optical_from_base, self._spec.intrinsics)
             painter = self._painters[sight.board]
             painter.draw(picture, sight.optical_from_marker, self._flaws(sight), self._random, sight.rolling)
+            for cover in hiding:
+                cover.keep(picture, before)
         return self._sensor.expose(picture, self._random)
+
+    def _draw_boxes(
+        self, picture: Image, scene: CameraScene, states: NDArray[np.float64]
+    ) -> list[tuple[Cover, Callable[[Array], bool]]]:
+        """Draw the boxes over the floor, farthest first; returns what each covers, and which points it may hide."""
+        camera = scene.world_from_optical
+        drawn: list[tuple[Cover, Callable[[Array], bool]]] = []
+        places = [(states[self._spec.bodies.index(box.body)][:3], painter) for box, painter in self._boxes.items()]
+        for place, painter in sorted(places, key=lambda one: -float(np.linalg.norm(one[0] - camera.translation))):
+            if (cover := painter.cover(place, camera)) is not None:
+                cover.over(picture)
+                drawn.append((cover, partial(painter.may_hide, place_m=place, world_from_optical=camera)))
+        return drawn
 
     def _draw_floor(self, scene: CameraScene) -> Image:
         if self._background is not None:

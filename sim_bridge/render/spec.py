@@ -43,6 +43,14 @@ class BoardSpec:
     tag: SquareTag | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class BoxSpec:
+    """An upright box that hides what is behind it: its row among the bodies, and its size along x, y, z [m]."""
+
+    body: str
+    size_m: tuple[float, float, float]
+
+
 class FloorKind(StrEnum):
     """Kind of floor; `TILES` is itself a checkerboard and hard for detectors."""
 
@@ -119,3 +127,4 @@ class RenderSpec:
     room_size_m: tuple[float, float, float] = (8.0, 6.0, 4.5)
     parent_pid: int = 0
     own: OwnVideo | None = None
+    boxes: tuple[BoxSpec, ...] = ()

@@ -10,6 +10,7 @@ from sim_bridge.scenario import TargetScenario
 from sim_bridge.site import SimulatedObstacle
 from sim_bridge.surroundings import Obstacle
 from sim_bridge.target_paths import Standstill
+from sim_bridge.truth import WIDTH
 from sim_bridge.world.noise import generator_of
 from sim_bridge.world.places import Footprint, settled
 from sim_bridge.world.unicycle import BASES, Unicycle
@@ -39,6 +40,10 @@ class Box:
         """Move on by one tick."""
         self.body.step()
 
+    def row(self) -> tuple[float, ...]:
+        """Return its row of the truth board: its foot, never turned."""
+        return (self.body.x, self.body.y, *(0.0,) * (WIDTH - 2))
+
     def hides(self, eye: Array, point: Array) -> bool:
         """Return whether it lies between two points [world]."""
         width, depth, height = self.size_m
@@ -60,6 +65,11 @@ def all_obstacles(scenario: Iterable[Obstacle], room: Iterable[SimulatedObstacle
     """Return the obstacles of a scenario, then those of the field's room."""
     standing = (Obstacle(size_m=one.size_m, path=Standstill(position_m=one.centre_m)) for one in room)
     return (*scenario, *standing)
+
+
+def box_names(count: int) -> tuple[str, ...]:
+    """Return the names of the rows of boxes on the truth board."""
+    return tuple(f"obstacle {index}" for index in range(count))
 
 
 def boxes_of(

@@ -49,10 +49,17 @@ def fly(batch: FlightBatch) -> dict[str, Any]:
     if result.returncode == _WRONG_ORDER:
         raise OperatorMistake(result.stderr.strip())
     if result.returncode != 0:
-        raise CampaignError(result.stderr.strip()[-2000:])
+        raise CampaignError(_end(result.stderr))
     flights = [json.loads(line) for line in result.stdout.splitlines()]
+    if [flight["seed"] for flight in flights] != list(batch.seeds):
+        lost = f"{len(flights)} of {len(batch.seeds)} flights were reported"
+        raise CampaignError(f"{batch.study}: {lost}; a plug-in may have ended the process: {_end(result.stderr)}")
     timing = [flight.pop("spent_s") for flight in flights]
     return {"task": {"batch": batch.key}, "merits": {"flights": flights}, "timing": {"flights": timing}}
+
+
+def _end(text: str) -> str:
+    return text.strip()[-2000:] or "nothing was said"
 
 
 def flights_of(rows: Iterable[Mapping[str, Any]]) -> tuple[list[dict[str, Any]], list[dict[str, float]]]:

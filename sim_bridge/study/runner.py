@@ -259,7 +259,7 @@ class Study:
     def _plan(self) -> None:
         try:
             self.tracker.plan()
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             if not self._plug_in:
                 raise
             raise SettingsError([f"planner.plug_in {self._plug_in}: {plug_ins.reason(error)}"]) from error

@@ -3,9 +3,11 @@
 import json
 import sys
 from collections.abc import Callable, Mapping
+from contextlib import redirect_stdout
 from dataclasses import dataclass
 from typing import Any
 
+from groundstation.errors import SettingsError
 from groundstation.process import numba_cache
 from groundstation.process.parent import end_with
 from sim_bridge.scenario import Scenario, parse_scenario
@@ -34,19 +36,22 @@ class FlightOrder:
 
 
 def fly_seeds(fly: Callable[[FlightOrder, int], dict[str, Any]]) -> int:
-    """Fly each seed of the order; return WRONG_ORDER if it cannot be flown here or `fly` refuses it.
+    """Fly each seed of the order; return WRONG_ORDER if it cannot be flown here, or `fly` or a plug-in refuses it.
 
-    If the order names its parent, this process ends with that one: nobody else would read the results.
+    Standard output is for the results alone: what a plug-in prints goes to standard error. If the order names its
+    parent, this process ends with that one: nobody else would read the results.
     """
     numba_cache.activate()
+    results = sys.stdout
     try:
         values = json.load(sys.stdin)
         if parent_pid := values.pop("parent", None):
             end_with(parent_pid)
         order = order_of(values)
-        for seed in order.seeds:
-            print(json.dumps(fly(order, seed)), flush=True)
-    except WrongOrder as refusal:
+        with redirect_stdout(sys.stderr):
+            for seed in order.seeds:
+                print(json.dumps(fly(order, seed)), file=results, flush=True)
+    except (WrongOrder, SettingsError) as refusal:
         print(refusal, file=sys.stderr)
         return WRONG_ORDER
     return 0

@@ -1,6 +1,7 @@
 """The fault campaign's table, and the command that prints it."""
 
 import json
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from groundstation.cli.exits import ExitCode
 from groundstation.cli.experiment import experiment
 from groundstation.errors import OperatorMistake
 from groundstation.experiments.faults import HEALTHY, by_kind, ends_told, table, totals
-from groundstation.experiments.flight_batches import FlightBatch, batches, fly
+from groundstation.experiments.flight_batches import CampaignError, FlightBatch, batches, fly
 
 
 def flight(seed: int, kinds: list[str], unsafe: dict[str, float], mode: str = "TRACK", **more: Any) -> dict[str, Any]:
@@ -158,6 +159,17 @@ def test_another_program_flies_anew(monkeypatch: pytest.MonkeyPatch) -> None:
     key = batch.key
     monkeypatch.setattr("groundstation.experiments.flight_batches.program_digest", lambda: "of another program")
     assert batch.key != key
+
+
+@pytest.mark.parametrize("out", ["", '{"seed": 1, "spent_s": {}}\n'])
+def test_a_batch_whose_process_ends_early_without_an_error_is_refused(
+    out: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ended = subprocess.CompletedProcess((), 0, out, "last words")
+    monkeypatch.setattr("groundstation.experiments.flight_batches.subprocess.run", lambda *_, **__: ended)
+    (batch,) = batches("{}", 1, 2)
+    with pytest.raises(CampaignError, match=rf"{out.count('seed')} of 2 flights .* last words"):
+        fly(batch)
 
 
 def test_an_unknown_kind_is_the_operators_mistake() -> None:

@@ -8,6 +8,7 @@ from typing import Any
 import msgspec
 import pytest
 
+from groundstation.errors import SettingsError
 from groundstation.field.resolved import ResolvedField
 from sim_bridge.fault_kinds import FaultKind
 from sim_bridge.scenario import parse_scenario
@@ -39,6 +40,23 @@ def test_kinds_that_mean_nothing_are_refused_in_one_line(
     assert fly_seeds(fly) == WRONG_ORDER
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 1 and lines[0].startswith(said)
+
+
+def test_words_of_a_plug_in_are_no_results_and_its_failure_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fly(_: Any, seed: int) -> dict[str, Any]:
+        print("a planner says", seed)
+        if seed == 2:
+            raise SettingsError(["planner.plug_in clumsy: ZeroDivisionError: division by zero"])
+        return {"seed": seed}
+
+    order = {"field": {"drones": {}}, "sections": [], "scenario": {}, "seeds": [1, 2], "seconds": 20.0}
+    monkeypatch.setattr(sys, "stdin", io.StringIO(json.dumps(order)))
+    assert fly_seeds(fly) == WRONG_ORDER
+    out, err = capsys.readouterr()
+    assert out == '{"seed": 1}\n'
+    assert err.splitlines()[-1] == "planner.plug_in clumsy: ZeroDivisionError: division by zero"
 
 
 @pytest.mark.parametrize(

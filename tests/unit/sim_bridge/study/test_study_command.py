@@ -52,10 +52,14 @@ def test_a_start_on_a_path_without_phases_is_refused(tmp_path, monkeypatch, caps
     assert "--start-phase: the target's path is none" in capsys.readouterr().err
 
 
+PLANNERS = "".join(f"{name} = lab_planner:{name.title()}\n" for name in ("clumsy", "leaving", "sulking"))
+
+
 @pytest.mark.parametrize(
     ("name", "said"),
     [
         ("clumsy", "planner.plug_in clumsy: ZeroDivisionError: division by zero\n"),
+        ("leaving", "planner.plug_in leaving: SystemExit: bye\n"),
         ("sulking", "planner.plug_in: sulking cannot be used: lab-planner (lab_planner:Sulking): ValueError: no\n"),
     ],
 )
@@ -64,9 +68,10 @@ def test_a_planner_of_another_package_that_fails_is_named(
 ):
     (tmp_path / "lab_planner.py").write_text(
         "class Clumsy:\n    def __init__(self, *made_from): ...\n    def plan(self, *asked): return 1 / 0\n"
+        "class Leaving(Clumsy):\n    def plan(self, *asked): raise SystemExit('bye')\n"
         "class Sulking(Clumsy):\n    def __init__(self, *made_from): raise ValueError('no')\n"
     )
-    install(tmp_path, "lab-planner", "[skein.planners]\nclumsy = lab_planner:Clumsy\nsulking = lab_planner:Sulking\n")
+    install(tmp_path, "lab-planner", f"[skein.planners]\n{PLANNERS}")
     monkeypatch.syspath_prepend(tmp_path)
     field = msgspec.structs.replace(lab_field, planner=msgspec.structs.replace(lab_field.planner, plug_in=name))
     monkeypatch.setattr("sim_bridge.study.__main__.resolved_field", lambda *_: field)

@@ -75,7 +75,7 @@ class Door:
     def admits(self, scope: Mapping[str, Any]) -> DeviceRole | None:
         """Return full rights for a request from our own user, or with the code; None for others."""
         shown = cookie_of(scope, self._cookie_name(scope)).encode()
-        known = self._is_own(scope) or hmac.compare_digest(shown, self._code.encode())
+        known = self._user(scope) in (os.getuid(), 0) or hmac.compare_digest(shown, self._code.encode())
         return DeviceRole.COMMAND if known else None
 
     def welcome(self, scope: Mapping[str, Any]) -> bytes:
@@ -91,11 +91,15 @@ class Door:
         place = f" It is in {self._file}." if self._file else ""
         return f"another user of this machine runs this console; ask for its code and open /?code=CODE.{place}"
 
-    def _is_own(self, scope: Mapping[str, Any]) -> bool:
+    def is_other_user(self, scope: Mapping[str, Any]) -> bool:
+        """Return whether a request is known to be another user's: its sender has not closed it meanwhile."""
+        return self._user(scope) not in (None, os.getuid(), 0)
+
+    def _user(self, scope: Mapping[str, Any]) -> int | None:
         client, server = scope.get("client"), scope.get("server")
         if client is None or server is None:
-            return False
-        return user_of((client[0], client[1]), (server[0], server[1])) in (os.getuid(), 0)
+            return None
+        return user_of((client[0], client[1]), (server[0], server[1]))
 
     @staticmethod
     def _cookie_name(scope: Mapping[str, Any]) -> str:
@@ -116,6 +120,10 @@ class DeviceDoor:
         """Return the cookie for a request with a valid code, else b""."""
         return self._devices.welcome(scope)
 
+    def is_other_user(self, scope: Mapping[str, Any]) -> bool:
+        """Return True: a device is none of ours before it is admitted."""
+        return True
+
     @property
     def reason(self) -> str:
         """Return the message for a refused device."""
@@ -125,7 +133,8 @@ class DeviceDoor:
 class Gate:
     """ASGI middleware that answers 403 to requests that are not permitted.
 
-    refused: counts of "other_site" (`refusal` has a reason) and "other_user" (the door does not admit them).
+    refused: counts of "other_site" (`refusal` has a reason), "other_user" (the door does not admit them) and "left"
+    (nor those, whose senders had left).
     """
 
     def __init__(self, app: Asgi, door: Door | DeviceDoor) -> None:
@@ -143,7 +152,7 @@ class Gate:
             return
         role = None if reason else self._door.admits(scope)
         if not reason and role is None:
-            kind, reason = "other_user", self._door.reason
+            kind, reason = "other_user" if self._door.is_other_user(scope) else "left", self._door.reason
         if reason:
             self.refused[kind] += 1
             await _answer_403(scope, receive, send, reason)

@@ -55,6 +55,22 @@ def test_another_user_gets_no_page_no_token_and_no_connection() -> None:
     run(test)
 
 
+@pytest.mark.parametrize(("sender", "told"), [(STRANGER, "other_user"), (None, "left")])
+def test_who_has_left_is_refused_and_not_called_another_user(
+    sender: int | None, told: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(access, "user_of", lambda _client, _server: sender)
+
+    async def test(site: Site) -> None:
+        assert (await site.request("/"))[0] == 403
+        refused = site.server.refused
+        assert {kind: refused.get(kind, 0) for kind in ("other_user", "left")} == {"other_user": 0, "left": 0} | {
+            told: 1
+        }
+
+    run(test)
+
+
 @pytest.mark.usefixtures("stranger")
 def test_another_user_comes_in_with_the_code() -> None:
     async def test(site: Site) -> None:

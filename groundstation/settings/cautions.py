@@ -175,9 +175,13 @@ def _places(field: Field) -> Iterator[Finding]:
     if field.recording.enabled and (why := unwritable(Path(field.recording.directory).absolute())):
         yield ("recording", "directory"), why
     sources: list[tuple[KeyPath, str]] = [
-        (("cameras", name, "source"), camera.source) for name, camera in field.cameras.items()
+        (("cameras", name, "source"), camera.source) for name, camera in field.cameras.items() if not camera.host
     ]
-    sources += [(("drones", name, "camera", "source"), drone.camera.source) for name, drone in field.drones.items()]
+    sources += [
+        (("drones", name, "camera", "source"), drone.camera.source)
+        for name, drone in field.drones.items()
+        if not drone.host
+    ]
     for path, source in sources:
         address = parse_source(source)
         if address.kind in (SourceKind.DEVICE, SourceKind.FILE) and not is_there(Path(address.path)):

@@ -68,6 +68,11 @@ FOOLISH = [
 ]
 
 
+def test_devices_of_another_host_are_not_looked_for_here() -> None:
+    device = ("bus.listen=192.168.1.5", "cameras.ceiling.source=/dev/video97", "cameras.ceiling.host=lab_pc_2")
+    assert [line for line in cautions_of(LAB, device) if "not there" in line] == []
+
+
 @pytest.mark.parametrize(("centre", "height"), [("[2, 1]", 0.8), ("[3.85, 0]", 2.0), ("[2, 1]", 2.0)])
 def test_obstacles_away_from_the_pads_give_no_caution(centre: str, height: float) -> None:
     option = f"room.obstacles={{table: {{centre_m: {centre}, size_m: [0.2, 1, {height}]}}}}"

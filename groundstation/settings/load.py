@@ -138,6 +138,8 @@ def _sound_parts(plain: dict[str, Any], faults: Collection[KeyPath]) -> Parts:
         ranging=named("ranging"),
         truth=_text(plain.get("truth"), "from"),
         given=frozenset(name for section in FIXED for name in _keys(plain.get(section))),
+        bodies=frozenset(name for section in ("drones", "targets") for name in _keys(plain.get(section)))
+        | {_text(plain.get("target"), "name") or ""},
         drones=named("drones"),
         targets=named("targets"),
         **{name: sound(Field.model_fields[name].annotation, name) for name in single},

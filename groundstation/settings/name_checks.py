@@ -82,10 +82,11 @@ def _placed(source: str, host: str) -> str:
 
 
 def _captured(parts: Parts) -> Iterator[Finding]:
-    known = {*parts.drones, *(name for name, _ in parts.tracked.values())}
     for name, system in parts.motion_capture.items():
         bodies: KeyPath = ("motion_capture", name, "bodies")
-        yield from (((*bodies, n), f"{n} is no drone or target of the field") for n in sorted({*system.bodies} - known))
+        yield from (
+            ((*bodies, n), f"{n} is no drone or target of the field") for n in sorted({*system.bodies} - parts.bodies)
+        )
         as_they_are = {*parts.flying, *(target for target, _ in parts.tracked.values())} - system.bodies.keys()
         called: list[tuple[KeyPath, object, str]] = [(bodies, n, n) for n in sorted(as_they_are)]
         called += [((*bodies, n), body.name or n, n) for n, body in system.bodies.items()]

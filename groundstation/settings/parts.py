@@ -18,7 +18,8 @@ Finding = tuple[KeyPath, str]
 class Parts:
     """The sections without errors of their own; a check is left out if one that it needs is missing.
 
-    truth: the sensor that judges; given: the names of all sensors fixed in the world, faulty entries included.
+    truth: the sensor that judges; given, bodies: the names of all sensors fixed in the world, and of all drones and
+    targets, faulty entries included.
     """
 
     room: RoomSettings | None = None
@@ -27,6 +28,7 @@ class Parts:
     ranging: dict[str, RangingSettings] = field(default_factory=dict)
     truth: str | None = None
     given: frozenset[str] = frozenset()
+    bodies: frozenset[str] = frozenset()
     drones: dict[str, Drone] = field(default_factory=dict)
     target: TargetSettings | None = None
     targets: dict[str, OneOfTargets] = field(default_factory=dict)

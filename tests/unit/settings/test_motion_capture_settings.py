@@ -50,6 +50,14 @@ def test_a_wrong_system_is_refused_with_its_place(options: tuple[str, ...], told
     assert told in str(refused.value)
 
 
+@pytest.mark.parametrize("fault", ["drones.drone_1.address=nowhere", "target.marker=none"])
+def test_a_body_of_a_faulty_entry_is_no_second_mistake(fault: str) -> None:
+    bodies = "motion_capture.mocap.bodies={drone_1: {}, turtlebot: {}}"
+    with pytest.raises(SettingsError) as refused:
+        load_field(ROOTED, (fault, bodies))
+    assert len(refused.value.problems) == 1
+
+
 def test_a_body_of_a_drone_that_does_not_fly_is_free_for_another() -> None:
     assert load_field(
         ROOTED, ("drones.drone_2.enabled=false", "motion_capture.mocap.bodies={drone_1: {name: drone_2}}")

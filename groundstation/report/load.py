@@ -11,8 +11,9 @@ from groundstation.report.tracks import ProcessTrack, RunData
 
 TRACKER = "tracker"
 _PID, _TICKS, _OVERRUNS, _OVERFLOWED = range(4)
-# Alone on a computer of two cores, nobody waits for a core for more than a tenth of a second; other programs use 0.1.
-_WAITED, _OTHERS_CPU = 0.3, 0.5
+# Share of a second waited, and cores that others used. Alone on a computer of two cores, nobody waits for more than a
+# tenth of a second; other programs use 0.1. Whoever hardly ran at all was kept from it by less than half a core.
+_STARVED = ((0.3, 0.5), (0.9, 0.3))
 
 
 def cpu_cores(data: RunData) -> dict[str, float]:
@@ -84,7 +85,8 @@ def starved_s(data: RunData, start_s: float, end_s: float) -> float:
         status = np.searchsorted(track.time_s, seconds)  # each covers the time before it; behind the last: nothing
         waited = np.fmax(waited, np.append(track.waited, 0.0)[status])
         others = np.fmax(others, np.append(track.others_cpu, 0.0)[status])
-    return float(np.count_nonzero((waited >= _WAITED) & (others >= _OTHERS_CPU)))
+    starved = [(waited >= share) & (others >= cores) for share, cores in _STARVED]
+    return float(np.count_nonzero(np.any(starved, axis=0)))
 
 
 def waited(data: RunData, start_s: float, end_s: float) -> dict[str, float]:

@@ -10,7 +10,7 @@ from groundstation.bus.messages import Severity, Verdict
 from groundstation.estimation.tracking_errors import TrackingFigures, tracking_figures
 from groundstation.report import load, safety, topology_use
 from groundstation.report.accuracy import RATE_HZ, Accuracy, accuracy, errors_at, time_grid
-from groundstation.report.aloft import aloft_at, anybody_flew
+from groundstation.report.aloft import aloft_at, anybody_flew, in_the_air
 from groundstation.report.certainty import drone_uncertain_s, target_unseen_s
 from groundstation.report.happenings import cuts_in_flight, happenings, landings
 from groundstation.report.interval import recorded_share, tracking_spans, whole
@@ -113,7 +113,7 @@ def figures_of(data: RunData) -> RunFigures:
         mean_cpu_cores=sum(cores.values()) if cores else None,
         cpu_cores=cores,
         sim_overrun_percent=load.sim_overrun_percent(data),
-        starved_s=load.starved_s(data, *(interval or (0.0, data.end_s))),
+        starved_s=load.starved_s(data, *(in_the_air(data) or (0.0, data.end_s))),
         waited=load.waited(data, *(interval or (0.0, data.end_s))),
         command_to_airborne_s=_command_to_airborne_s(data),
         verdicts=dict(Counter(str(item.message.verdict) for item in data.innovations)),

@@ -53,13 +53,16 @@ def team(recording: tuple[Path, ...], field: Path | None, output: Path | None, a
 
     One least-squares fit over all sightings, odometry and inertial readings. The same recording gives the same figures.
     """
+    from groundstation.cli.flown_field import differing
     from groundstation.cli.recorded_flight import recorded_flight
     from groundstation.settings.load import load_field
     from groundstation.settings.resolved import resolved_field
 
-    if field is not None:
-        load_field(field)  # a field that cannot be read is reported before a minute of computing
+    # A field that cannot be read is reported before a minute of computing.
+    told = None if field is None else load_field(field)
     name, flown_with, flown = recorded_flight(recording)
+    if told is not None and (note := differing(str(field), told, flown_with)):
+        click.echo(f"note: errors are told against the field that was flown; {note}", err=True)
     from groundstation.calibration.team import calibrate_team
 
     found = calibrate_team(flown, resolved_field(flown_with))

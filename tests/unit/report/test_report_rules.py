@@ -205,7 +205,10 @@ def _load(waited: float, others_cpu: float) -> RunData:
     return _data(processes={"camera": camera, "supervisor": supervisor})
 
 
-@pytest.mark.parametrize(("waited", "others_cpu", "starved_s"), [(0.6, 1.2, 2.0), (0.6, 0.1, 0.0), (0.05, 1.2, 0.0), (0.95, 0.4, 2.0), (0.6, 0.4, 0.0)])
+@pytest.mark.parametrize(
+    ("waited", "others_cpu", "starved_s"),
+    [(0.6, 1.2, 2.0), (0.6, 0.1, 0.0), (0.05, 1.2, 0.0), (0.95, 0.4, 2.0), (0.6, 0.4, 0.0)],
+)
 def test_a_run_is_starved_while_it_waits_for_cores_that_others_use(
     waited: float, others_cpu: float, starved_s: float
 ) -> None:

@@ -169,10 +169,11 @@ def draw(field: str, options: tuple[str, ...], scenario: str | None, output: Pat
 @click.argument("directory", type=click.Path(path_type=Path, file_okay=False))
 @click.option(
     "--like",
-    type=click.Choice(["lab", "mixed-team"]),
+    type=click.Choice(["lab", "mixed-team", "mocap-lab", "mocap-truth", "two-targets", "uwb-lab"]),
     default="lab",
     show_default=True,
-    help="lab: two AR.Drones, one ceiling camera; mixed-team: AR.Drone, PX4 and ArduPilot vehicle, two cameras.",
+    help="lab: two AR.Drones, one ceiling camera; mixed-team: AR.Drone, PX4 and ArduPilot vehicle, two cameras; "
+    "mocap-lab, mocap-truth: motion capture as the sensor, or as the judge; two-targets; uwb-lab: ranging.",
 )
 def init(directory: Path, like: str) -> None:
     """Write a commented field file to start from, its calibrations and the shipped scenarios into DIRECTORY."""

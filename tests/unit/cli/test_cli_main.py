@@ -17,6 +17,7 @@ from groundstation.cli import main as cli
 from groundstation.cli.exits import ExitCode, UnreachableError, exit_code_of
 from groundstation.cli.verbs import VERBS, CommandRow, all_verbs
 from groundstation.errors import DriverError, GroundStationError, SettingsError
+from groundstation.settings.files import SHIPPED
 
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "field"
 
@@ -247,6 +248,12 @@ def test_config_show(capsys: pytest.CaptureFixture[str]) -> None:
 def test_config_schema(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.run(["config", "schema"]) == 0
     assert json.loads(capsys.readouterr().out)["title"] == "Field file"
+
+
+@pytest.mark.parametrize("like", sorted(path.stem for path in SHIPPED.glob("*.yaml")))
+def test_every_shipped_field_can_be_begun_with(like: str, tmp_path: Path) -> None:
+    assert cli.run(["config", "init", str(tmp_path), "--like", like]) == 0
+    assert cli.run(["config", "check", str(tmp_path / f"{like}.yaml")]) == 0
 
 
 def test_config_init_starts_a_field_and_overwrites_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

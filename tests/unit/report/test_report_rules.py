@@ -42,6 +42,7 @@ DRONE = FieldDrone(
 )
 TARGET = Target(marker=TargetMarker(code=5))
 HEADER = m.Header(0, "here", "team", "tester", 0)
+STARVED = [(0.6, 1.2, 2.0), (0.6, 0.1, 0.0), (0.05, 1.2, 0.0), (0.95, 0.4, 2.0), (0.6, 0.4, 0.0)]
 
 
 def _data(**content: object) -> RunData:
@@ -205,13 +206,8 @@ def _load(waited: float, others_cpu: float) -> RunData:
     return _data(processes={"camera": camera, "supervisor": supervisor})
 
 
-@pytest.mark.parametrize(
-    ("waited", "others_cpu", "starved_s"),
-    [(0.6, 1.2, 2.0), (0.6, 0.1, 0.0), (0.05, 1.2, 0.0), (0.95, 0.4, 2.0), (0.6, 0.4, 0.0)],
-)
-def test_a_run_is_starved_while_it_waits_for_cores_that_others_use(
-    waited: float, others_cpu: float, starved_s: float
-) -> None:
+@pytest.mark.parametrize(("waited", "others_cpu", "starved_s"), STARVED)
+def test_a_run_that_waits_for_cores_of_others_starves(waited: float, others_cpu: float, starved_s: float) -> None:
     assert load.starved_s(_load(waited, others_cpu), 5.0, 30.0) == starved_s
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from drivers.base import HostProcess, read_section
 from drivers.camera import convert
+from drivers.camera.clear_pictures import ClearPictures
 from drivers.camera.context import Surroundings
 from drivers.camera.picture_quality import quality_of
 from drivers.camera.pipeline import Pipeline
@@ -71,6 +72,7 @@ class CameraDriver:
         self._newest: Image | None = None
         self._unchanged, self._steady = UnchangedPictures(), SteadyMarkers(self._intrinsics.fx_px)
         self._hangs_s = 0.0
+        self._clear = ClearPictures(stands=settings.mount.in_world)
         self._images = Grid(settings.image_fps)
         address = without_password(settings.source)
         remedy = f"check the camera and its address {address}"
@@ -166,18 +168,22 @@ class CameraDriver:
             self._child.bus.publish(OBSERVATION, observation)
             self._health.reported += 1
         if self._pipeline.searched and picture_ns == exposure_ns:  # old pictures do not show who is missing now
-            header = self._child.bus.header(settings.observer, exposure_ns)
-            found = tuple(sighting.entity for sighting in sightings)
-            searched = SearchedPicture(
-                header=header,
-                observer=settings.observer,
-                camera=settings.name,
-                found=found,
-                unmeasured=self._pipeline.unmeasured,
-            )
-            self._child.bus.publish(SEARCHED_PICTURE, searched)
+            self._tell_searched(picture, exposure_ns, tuple(sighting.entity for sighting in sightings))
         for notice in self._pipeline.take_notices():
             self._child.event(notice.severity, f"camera {settings.name}: {notice.text}", notice.remedy, notice.entity)
+
+    def _tell_searched(self, picture: Image, exposure_ns: int, found: tuple[str, ...]) -> None:
+        """Publish that a picture was searched, unless it could not show anybody."""
+        unmeasured = self._pipeline.unmeasured
+        if not self._clear.is_clear(picture, shows_marker=bool(found or unmeasured)):
+            self._pipeline.counts["unclear"] += 1
+            return
+        observer = self._settings.observer
+        header = self._child.bus.header(observer, exposure_ns)
+        searched = SearchedPicture(
+            header=header, observer=observer, camera=self._settings.name, found=found, unmeasured=unmeasured
+        )
+        self._child.bus.publish(SEARCHED_PICTURE, searched)
 
     def _publish_image(self, packet: Packet, exposure_ns: int) -> None:
         """Pass a JPEG on, at most `image_fps` times a second: as received, or encoded from the decoded picture."""

@@ -58,6 +58,11 @@ class Renderer:
                 cover.keep(picture, before)
         return self._sensor.expose(picture, self._random)
 
+    def black(self) -> Image:
+        """Return the picture (h, w) of a covered lens: the sensor's noise alone."""
+        intrinsics = self._spec.intrinsics
+        return self._sensor.expose(np.zeros((intrinsics.height_px, intrinsics.width_px), np.uint8), self._random)
+
     def _draw_boxes(
         self, picture: Image, scene: CameraScene, states: NDArray[np.float64]
     ) -> list[tuple[Cover, Callable[[Array], bool]]]:

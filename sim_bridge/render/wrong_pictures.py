@@ -3,8 +3,6 @@
 from collections.abc import Iterable
 from dataclasses import replace
 
-import numpy as np
-
 from groundstation.arrays import Array, Image
 from groundstation.geometry.pose import Pose
 from sim_bridge.fault_kinds import Fault, FaultKind
@@ -37,7 +35,7 @@ class WrongPictures:
     """Draws the pictures of one camera under its faults. Everything is prepared at the start."""
 
     def __init__(self, spec: RenderSpec) -> None:
-        self._spec, self._faults = spec, spec.scenario.faults
+        self._faults = spec.scenario.faults
         ends = {end for fault in self._faults for end in (fault.start_s, fault.end_s) if end is not None}
         scenes = {self._scene(at_s) for at_s in (0.0, *ends)}
         self._renderers = {scene: Renderer(spec_under(spec, scene)) for scene in scenes}
@@ -49,8 +47,9 @@ class WrongPictures:
     def render(self, states: Array, now_s: float) -> Image:
         """Return the picture (h, w) of the true states at a time since the first true state [s]."""
         kinds = {fault.kind for fault in self._faults if fault.covers(now_s)}
+        renderer = self._renderers[self._scene(now_s)]
         if FaultKind.PICTURE_BLACK in kinds:
-            return np.zeros((self._spec.intrinsics.height_px, self._spec.intrinsics.width_px), dtype=np.uint8)
+            return renderer.black()
         if FaultKind.PICTURE_FROZEN not in kinds or self._last is None:
-            self._last = self._renderers[self._scene(now_s)].render(states)
+            self._last = renderer.render(states)
         return self._last

@@ -119,7 +119,7 @@ class ReportedMotion(Message, frozen=True, kw_only=True):
 
 
 class SearchedPicture(Message, frozen=True, kw_only=True):
-    """A picture that was searched all over for markers, even if it shows none; stamped with the exposure."""
+    """A picture that could show markers and was searched all over, even if it has none; stamped with the exposure."""
 
     observer: str
     """A drone, or the name of a world-fixed camera."""

@@ -131,13 +131,13 @@ def test_a_driver_that_hears_of_a_target_that_nobody_sees_searches_often(rig, to
     """Every second picture; without that information twice a second, for there is nothing in view."""
     start_ns = clock.now_ns()
     for k in range(30):
-        grey = encoded(np.full((360, 640), 100 + k, np.uint8))
+        floor = encoded(np.tile(np.linspace(60 + k, 160 + k, 640), (360, 1)).astype(np.uint8))
         came_ns = start_ns + k * 66_666_667
         if told is not None:
             bot = EntityEstimate("bot", "target", (-3.0, 0.0), (0.01, 0.0, 0.0, 0.01), (0.0, 0.0), True, told)
             header = rig.bus.header("team", came_ns - 120_000_000)
             rig.bus.publish(ESTIMATE, Estimate(header=header, entities=(bot,), epoch=1))
-        rig.source.push(grey, came_ns)
+        rig.source.push(floor, came_ns)
         rig.camera.turn()
     assert sum(r.key.topic is SEARCHED_PICTURE for r in rig.heard.drain()) == pytest.approx(searches, abs=1)
 

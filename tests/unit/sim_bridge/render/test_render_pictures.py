@@ -169,6 +169,13 @@ def test_a_frozen_picture_repeats_and_a_black_one_shows_nothing():
     assert black.render(STATES[0], 3.0).max() == 0 and black.render(STATES[0], 5.0).max() > 0
 
 
+def test_a_black_picture_has_the_noise_of_its_sensor():
+    spec = make_spec(scenario=PictureQuality(pixel_noise=2.0, faults=(broken("picture_black"),)))
+    camera = WrongPictures(spec)
+    one, other = (camera.render(STATES[0], t) for t in (2.5, 3.0))
+    assert (one != other).any() and 5 < one.max() < 20 and one.mean() < 2.0
+
+
 def test_in_a_bumped_camera_everything_moves():
     camera = pictures(broken("camera_bumped", value=3.0))
     honest, bumped = (camera.render(STATES[0], t) for t in (1.0, 3.0))

@@ -26,6 +26,9 @@ class Eye:
         self.bumps: list[float] = []
         self.n = 0
 
+    def searched(self, *_picture: Any) -> Any:
+        return "searched"
+
     def bump(self, angle_deg: float, axis_deg: float) -> None:
         self.bumps.append(angle_deg)
 
@@ -56,6 +59,15 @@ def test_wrong_pictures_at_message_level(kind: str, seen: list[float]) -> None:
         found += camera.look(world, int(t * 1e9), "c")
     assert [one.position_m[0] for one in found] == seen
     assert len({(one.header.stamp_ns, one.header.seq) for one in found}) == len(found)
+
+
+def test_a_black_picture_does_not_count_as_searched() -> None:
+    camera = WrongEye(eye := Eye(), [fault("picture_black", start_s=1.0)])  # type: ignore[arg-type]
+    told = []
+    for t in (0.5, 1.5):
+        world: Any = SimpleNamespace(time_s=t, drones=())
+        told.append(camera.searched(camera.look(world, 0, "c"), 0, "c"))
+    assert told == [eye.searched(), None]
 
 
 def test_a_vehicles_camera_that_hangs_trembles_until_its_driver_knows_it() -> None:

@@ -200,7 +200,7 @@ class CameraDriver:
                 self._child.bus.publish_bytes(VIDEO, header, unit.data)
 
     def _first_shown_ns(self, picture: Image, exposure_ns: int, sightings: list[Sighting]) -> int:
-        """Return the exposure of a picture, or of the first that showed the same [ns]."""
+        """Return the exposure of a picture, or of the last one that showed anything new [ns]."""
         corners = {sighting.entity: sighting.corners for sighting in sightings}
         first_ns = min(
             self._unchanged.since_ns(picture, exposure_ns),

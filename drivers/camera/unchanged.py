@@ -1,6 +1,7 @@
 """Recognises pictures that show nothing new although something moves: a camera or a stream that hangs. Pure."""
 
 import math
+from collections import deque
 from collections.abc import Mapping
 
 import numpy as np
@@ -10,6 +11,7 @@ from groundstation.time_units import NS_PER_MS
 
 # Of these rows alone, pictures are compared first: noise tells those of a working camera apart.
 _EVERY_ROW = 32
+_REMEMBERED = 8
 # Codecs make a marker's centre tremble by less; a flying vehicle never keeps one so steady while it tilts.
 _STEADY_PX = 0.6
 # In 88 recorded flights markers stood so steady in a living picture for 0.3 s at most; meanwhile the vehicle's tilt
@@ -18,21 +20,22 @@ _LASTING_NS, _TURNED_PX = 800 * NS_PER_MS, 4.0
 
 
 class UnchangedPictures:
-    """Recognises pictures that equal their predecessor in every pixel; a working camera's never do."""
+    """Recognises pictures that equal one of the last eight different ones in every pixel; a working camera's never do.
+
+    A stream that hangs may repeat several in turn.
+    """
 
     def __init__(self) -> None:
-        self._picture: Image | None = None
-        self._since_ns = 0
+        self._shown: deque[tuple[bytes, Image]] = deque(maxlen=_REMEMBERED)
+        self._newest_ns = 0
 
     def since_ns(self, picture: Image, exposure_ns: int) -> int:
-        """Return the exposure of the first of the equal pictures in a row that end with this one [ns]."""
-        if self._picture is None or not _are_equal(self._picture, picture):
-            self._picture, self._since_ns = picture, exposure_ns
-        return self._since_ns
-
-
-def _are_equal(one: Image, other: Image) -> bool:
-    return np.array_equal(one[::_EVERY_ROW], other[::_EVERY_ROW]) and np.array_equal(one, other)
+        """Return the exposure of the newest picture that was none of those before it: this one, if it is new [ns]."""
+        some = picture[::_EVERY_ROW].tobytes()
+        if not any(rows == some and np.array_equal(shown, picture) for rows, shown in self._shown):
+            self._shown.append((some, picture))
+            self._newest_ns = exposure_ns
+        return self._newest_ns
 
 
 class SteadyMarkers:

@@ -81,7 +81,7 @@ class RelativeObservation(Message, frozen=True, kw_only=True):
     pitch_rad: float = 0.0
     """Pitch, likewise [rad]."""
     picture_ns: int = 0
-    """Exposure of the picture [ns]; that of the first, if several in a row show nothing new; 0: unknown."""
+    """Exposure of the picture [ns]; that of the last new one, if this one shows nothing new; 0: unknown."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -12,11 +12,30 @@ FOCAL_PX = 560.0
 BOARD = np.array([[300.0, 200.0], [320.0, 200.0], [320.0, 214.0], [300.0, 214.0]])
 
 
-def test_equal_pictures_in_a_row_are_as_old_as_the_first():
-    grey, other = np.zeros((4, 6), np.uint8), np.ones((4, 6), np.uint8)
+def ages_of(shown):
     pictures = UnchangedPictures()
-    shown = [grey, grey.copy(), grey.copy(), other, grey]
-    assert [pictures.since_ns(picture, at) for at, picture in enumerate(shown)] == [0, 0, 0, 3, 4]
+    levels = [np.full((40, 6), level, np.uint8) for level in shown]
+    return [at - pictures.since_ns(picture, at) for at, picture in enumerate(levels)]
+
+
+def test_equal_pictures_in_a_row_are_as_old_as_the_first():
+    assert ages_of([7, 7, 7, 1, 2]) == [0, 1, 2, 0, 0]
+
+
+@pytest.mark.parametrize("length", [2, 4, 8])
+def test_pictures_that_are_repeated_in_turn_are_as_old_as_the_last_new_one(length):
+    assert ages_of([k % length for k in range(40)]) == [0] * length + [*range(1, 41 - length)]
+
+
+def test_a_new_picture_ends_a_repetition():
+    assert ages_of([1, 2, 1, 2, *range(10, 20), 1]) == [0, 0, 1, 2] + [0] * 11
+
+
+def test_pictures_that_differ_in_one_pixel_are_different():
+    grey, other = np.zeros((40, 6), np.uint8), np.zeros((40, 6), np.uint8)
+    other[5, 3] = 1
+    pictures = UnchangedPictures()
+    assert [pictures.since_ns(picture, at) for at, picture in enumerate((grey, other, other))] == [0, 1, 1]
 
 
 def fly(shift_px, swing_deg, seconds=3.0, aloft=True):

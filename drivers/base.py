@@ -100,6 +100,9 @@ class HostProcess(Protocol):
     def note_addresses(self, addresses: Sequence[tuple[str, int]]) -> None:
         """Record the last addresses of vehicles that call us, for the process that commands them after this one."""
 
+    def finish(self) -> None:
+        """Record that no vehicle of this process needs anybody; without it others land them after its end."""
+
     def leave(self, number: int) -> None:
         """Record a number (0 to 2^62) for the process that commands the vehicles after this one."""
 

@@ -274,6 +274,7 @@ def run_hosts(
             overruns += 1
             deadline_ns = clock.now_ns()
         sleep_serving(child, hosts, deadline_ns)
+    child.finish()
     for host in hosts:
         host.publish_status(clock.now_ns())
     return 0

@@ -98,8 +98,6 @@ class Child:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if error is None and self._block is not None:
-            self._block.end(self.spec.heartbeat_index)
         known = error is None or isinstance(error, GroundStationError)
         self._set_state(
             Lifecycle.STOPPING, str(error or "") if known else without_passwords(f"{type(error).__name__}: {error}")
@@ -194,6 +192,11 @@ class Child:
         if self._block is not None and tuple(addresses) != self._addresses:
             self._addresses = tuple(addresses)
             self._block.set_addresses(self.spec.heartbeat_index, self._addresses)
+
+    def finish(self) -> None:
+        """Record that no vehicle of this driver needs anybody; whoever ends without it is spoken for as if it died."""
+        if self._block is not None:
+            self._block.end(self.spec.heartbeat_index)
 
     def leave(self, number: int) -> None:
         """Record a number (0 to 2^62) for the process that is started in place of this one."""

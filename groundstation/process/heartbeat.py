@@ -95,7 +95,7 @@ class HeartbeatBlock:
             self._words[base + _WORKED] = 1
 
     def end(self, slot: int) -> None:
-        """Record that the work of this process is done: its vehicle stands, or its telemetry ended."""
+        """Record that the work of this driver is done: its vehicles stand, or have been silent for too long."""
         self._words[slot * _WORDS_PER_SLOT + _ENDED] = 1
 
     def set_silent_since(self, slot: int, since_ns: int) -> None:

@@ -128,6 +128,11 @@ class ManagedProcess:
         self._block.clear(self.slot)
         return code
 
+    def end_text(self, code: int) -> str:
+        """Return how it ended, in words, after `reap`."""
+        unasked = code == 0 and self.spec.failsafe_datagrams is not None and not self._left_when_told
+        return self.kill_reason or ("ended without an order to" if unasked else exit_text(code, self.farewell))
+
     def left_when_told(self) -> bool:
         """Return, once for each such end, whether it ended in order: during a run only a signal does that."""
         told, self._left_when_told = self._left_when_told, False

@@ -23,7 +23,7 @@ from groundstation.supervisor.events import ProcessEvents
 from groundstation.supervisor.failsafe_sender import FailsafeSender, unreachable
 from groundstation.supervisor.interrupts import Interrupts
 from groundstation.supervisor.launcher import Launcher
-from groundstation.supervisor.managed_process import ManagedProcess, exit_text
+from groundstation.supervisor.managed_process import ManagedProcess
 from groundstation.supervisor.process_spec import ProcessSpec, Restart, StopOrder, slot_of
 from groundstation.supervisor.run import SOURCE, Run
 from groundstation.supervisor.run_entry import RunEntry
@@ -248,7 +248,7 @@ class Supervisor:
     def _ended(self, process: ManagedProcess, code: int, now_ns: int) -> None:
         if self._stopping:
             return
-        why = process.kill_reason or exit_text(code, process.farewell)
+        why = process.end_text(code)
         self._speak_for(process, why, now_ns)
         never_up = not process.ready_ns and process.life == 1
         if process.spec.restart is Restart.ENDS_RUN or (never_up and process.spec.required):

@@ -93,6 +93,7 @@ class Bench:
         """Wait for the driver's end and note its exit code; None if it does not end in time."""
         ended = self.wait(lambda: not self.driver.alive, limit_s, must=False)
         self.record.exits.append(self.driver.exit_code if ended else None)
+        self.record.facts["finished"] = float(self._block.has_ended(_SLOT))
 
     @contextmanager
     def failsafe(self) -> Iterator[Callable[[str], None]]:

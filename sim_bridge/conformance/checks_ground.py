@@ -141,6 +141,13 @@ def stop_on_the_ground_ends_the_driver(case: Case) -> None:
 
 
 @check("stand")
+def end_on_the_ground_is_told(case: Case) -> None:
+    """The driver ends through `drivers.host`, which calls `child.finish`: else others land its vehicle after it."""
+    case.record.span("low battery")
+    assert case.record.facts["finished"], "it ended without child.finish(), as if its vehicle still flew"
+
+
+@check("stand")
 def refusals_are_events(case: Case) -> None:
     """Refusals are reported to the operator as events."""
     texts = [one.message.text for one in case.record.heard(EVENT)]

@@ -23,6 +23,9 @@ class FakeProcess:
     def degrade(self, detail, works=True):
         self.states.append(f"DEGRADED {detail}")
 
+    def finish(self):
+        pass
+
     def leave(self, number):
         self.left = number
 

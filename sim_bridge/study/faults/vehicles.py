@@ -55,6 +55,9 @@ class HostedProcess:
     def note_addresses(self, addresses: Sequence[tuple[str, int]]) -> None:
         """Keep no addresses: no process dies here."""
 
+    def finish(self) -> None:
+        """Nobody waits."""
+
     def leave(self, number: int) -> None:
         """Leave nothing: no process dies here."""
 

@@ -43,7 +43,7 @@ class Process:
         self.spoken_for_ns = 0
         self.events: list[tuple[Severity, str, str]] = []
         self.states: list[str] = []
-        self.beats = 0
+        self.beats, self.finished = 0, False
         self.on_sleep = lambda: None
 
     def beat(self) -> None:
@@ -57,6 +57,9 @@ class Process:
 
     def note_addresses(self, addresses: object) -> None:
         pass
+
+    def finish(self) -> None:
+        self.finished = True
 
     def leave(self, number: int) -> None:
         pass

@@ -216,7 +216,7 @@ def test_stopping_lands_first_and_then_ends(rig):
     rig.process.on_sleep = turn
     rig.process.stop_requested = True
     assert run_hosts(rig.process, [rig.host], rate_hz=100) == 0
-    assert not rig.fake.state & FLY
+    assert rig.process.finished and not rig.fake.state & FLY
     assert rig.messages(VEHICLE_STATUS)[-1].mode == "LANDED"
 
 

@@ -98,16 +98,19 @@ def test_each_turn_beats_and_the_last_is_the_one_in_which_a_stop_came(block: Hea
     assert beats[2] - beats[1] >= 4 * MS
 
 
-@pytest.mark.parametrize(("error", "ended"), [(None, True), (RuntimeError, False)])
-def test_only_an_ordinary_end_is_recorded_as_one(
-    block: HeartbeatBlock, error: type[Exception] | None, ended: bool
+@pytest.mark.parametrize("error", [None, RuntimeError])
+@pytest.mark.parametrize("finished", [True, False])
+def test_only_a_driver_that_says_so_has_finished_its_work(
+    block: HeartbeatBlock, error: type[Exception] | None, finished: bool
 ) -> None:
     spec = ChildSpec("one", "driver", "", "lab", str(block.path), 1)
     with suppress(RuntimeError), Child(spec) as child:
         child.ready()
+        if finished:
+            child.finish()
         if error:
             raise error
-    assert block.has_ended(1) is ended and block.state(1) is SlotState.STOPPING
+    assert block.has_ended(1) is finished and block.state(1) is SlotState.STOPPING
 
 
 def test_a_child_takes_the_share_that_its_row_gives_it() -> None:

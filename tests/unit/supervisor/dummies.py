@@ -25,6 +25,15 @@ def obedient(child):
         turn(child)
     if not child.supervisor_alive:
         print("orphan leaves", flush=True)
+    child.finish()
+    return 0
+
+
+def returns_when_told(child):
+    """Leave a stopped or orphaned run without a word on its drone."""
+    child.ready()
+    while not child.stop_requested and child.supervisor_alive:
+        turn(child)
     return 0
 
 
@@ -59,10 +68,19 @@ def flying(child):
         child.beat()
         drone.sendto(b"fly", ("127.0.0.1", json.loads(child.section)["port"]))
         child.sleep_until(time.monotonic_ns() + 33_000_000)
+    child.finish()
+    return 0
+
+
+def gives_up(child):
+    """Return from a flight without an exception, as for a lost connection."""
+    child.ready()
+    time.sleep(0.3)
     return 0
 
 
 def ends_its_work(child):
     child.ready()
     turn(child)
+    child.finish()
     return 0

@@ -10,7 +10,7 @@ import sys
 import textwrap
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import replace
 from itertools import pairwise, product
 from pathlib import Path
@@ -95,6 +95,10 @@ def start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[
     for number, handler in handlers.items():
         signal.signal(number, handler)
     os.close(sink)
+
+
+def said_on(tmp_path: Path) -> str:
+    return (tmp_path / "terminal").read_text()
 
 
 SCRIPT = """
@@ -225,6 +229,41 @@ def test_lands_a_drone_whose_driver_is_killed_during_the_stop(
     said = [data for _, data in drone.listen(0.1)]
     assert said[0] == b"hover" and said[-1] == b"land"
     assert not any(process.running for process in supervisor.processes)
+
+
+def test_a_drone_whose_driver_returns_in_flight_is_stopped_and_landed(
+    start: Callable[..., Supervisor], drone: FakeDrone, tmp_path: Path
+) -> None:
+    supervisor = start(table(drone, "gives_up", restart_delay_s=60.0))
+    driver = supervisor.processes[1]
+    until(supervisor, lambda: driver.restart_due_ns is not None)
+    assert not driver.left_when_told(), "nobody told it"
+    supervisor.step()
+    assert {data for _, data in drone.listen(0.1)} == {b"hover"}
+    assert "drone_1: ended without an order to: the supervisor tells its drone to hover" in said_on(tmp_path)
+    supervisor.stop()
+    said = [data for _, data in drone.listen(0.1)]
+    assert said.index(b"land") and set(said[said.index(b"land") :]) == {b"land"}
+
+
+def test_a_drone_whose_driver_returns_during_the_stop_is_landed(
+    start: Callable[..., Supervisor], drone: FakeDrone
+) -> None:
+    supervisor = start(table(drone, "returns_when_told"))
+    supervisor.stop()
+    said = [data for _, data in drone.listen(0.1)]
+    assert said[0] == b"hover" and said[-1] == b"land"
+
+
+def test_a_drone_whose_driver_returns_without_a_supervisor_is_landed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, drone: FakeDrone
+) -> None:
+    monkeypatch.setenv("PYTHONPATH", f"{HERE}:{os.environ.get('PYTHONPATH', '')}")
+    with closing(SupervisedRun(tmp_path / "run", table(drone, "returns_when_told"))) as run:
+        run.process.kill()
+        run.until_gone("drone_1")
+        said = [data for _, data in drone.listen(LAND_AFTER_S + 0.5)]
+        assert said[0] == b"hover" and said[-1] == b"land"
 
 
 def test_a_driver_that_cannot_be_killed_is_left_behind(

@@ -131,6 +131,12 @@ def test_a_vehicle_that_rises_from_the_ground_fails():
     assert verdict(record, "hover_datagram_lifts_nothing").end == "failed"
 
 
+@pytest.mark.parametrize(("finished", "end"), [(1.0, "passed"), (0.0, "failed")])
+def test_a_driver_that_ends_without_a_word_fails(finished, end):
+    record = Record(marks={"low battery": (S, 2 * S)}, exits=[0], facts={"finished": finished})
+    assert verdict(record, "end_on_the_ground_is_told").end == end
+
+
 def test_a_driver_that_is_silent_for_long_fails():
     record = Record(marks={"damaged": (S, 5 * S)})
     for at_ns in (2 * S, 4 * S):

@@ -68,10 +68,12 @@ def _check(name: str, options: tuple[str, ...], scenario: str | None) -> list[st
 
     path = find_field(name)
     problems: list[str] = []
+    cautions: list[str] = []
     warnings: list[str] = []
     field = None
     try:
         field = load_field(path, options)
+        cautions = cautions_of(path, options)
         team = f"{len(field.drones)} drone(s), {len(field.cameras)} fixed camera(s), {_targets(tuple(field.tracked))}"
     except SettingsError as error:
         problems += error.problems
@@ -86,7 +88,7 @@ def _check(name: str, options: tuple[str, ...], scenario: str | None) -> list[st
     if problems:
         raise SettingsError(problems)
     click.echo(f"{path}: good ({team})", err=True)
-    return cautions_of(path, options) + warnings
+    return cautions + warnings
 
 
 @config.command(

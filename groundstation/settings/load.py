@@ -15,6 +15,7 @@ from groundstation.settings.drones import Drone
 from groundstation.settings.levels import FIXED, NAMED, Calibrations, Levels, with_options
 from groundstation.settings.parts import Parts
 from groundstation.settings.schema import SCHEMA_VERSION, Field
+from groundstation.settings.sections import faults_of_kinds
 from groundstation.settings.wording import ordered, problem, problem_of_error
 
 
@@ -46,11 +47,16 @@ def field_of_tree(tree: Node, options: Sequence[str], path: Path) -> Field:
 
 
 def cautions_of(path: Path | str, options: Sequence[str] = ()) -> list[str]:
-    """Return the warnings about a field file without mistakes, a line each; raises SettingsError as above."""
+    """Return the warnings about a field file without mistakes, a line each.
+
+    Raises SettingsError as above, and for a kind of vehicle that could not be flown or stopped.
+    """
     path = Path(path)
     field = load_field(path, options)
     tree, _ = _with_options(read(path), options)
     origins = Levels(tree, Calibrations(path.parent, str(path))).tree
+    if faults := [problem(origins.origin_of(at), text) for at, text in faults_of_kinds(field)]:
+        raise SettingsError(ordered(faults))
     return ordered([problem(origins.origin_of(at), text) for at, text in cautions(field)])
 
 

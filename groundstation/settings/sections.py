@@ -1,7 +1,7 @@
 """Makes each process's section from the field: its own part, as JSON, and nothing else."""
 
 import json
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -11,6 +11,7 @@ from drivers.camera.settings import SEARCH_RATE_HZ
 from drivers.camera.source_address import parse_source
 from drivers.motion_capture.settings import emulated_source
 from drivers.ranging.settings import emulated_source as emulated_gateway
+from groundstation.errors import SettingsError
 from groundstation.field.drones import camera_name
 from groundstation.field.targets import odometry_name
 from groundstation.settings.camera_sections import onboard_camera, world_camera
@@ -18,10 +19,12 @@ from groundstation.settings.capture_sections import capture_section
 from groundstation.settings.drones import Drone
 from groundstation.settings.motion_capture import MotionCaptureSettings
 from groundstation.settings.odometry_sections import odometry_section, with_emulated_odometry
+from groundstation.settings.parts import Finding
 from groundstation.settings.ranging_sections import ranging_section
 from groundstation.settings.resolved import resolved_field
 from groundstation.settings.schema import Field
 from groundstation.vehicles import VehicleOrder, kind_named
+from groundstation.vehicles.answers import processes_of, stop_of
 from groundstation.vehicles.registry import ask
 
 # Kinds of driver processes other than kinds of vehicles.
@@ -173,12 +176,28 @@ def vehicle_order(field: Field, name: str) -> VehicleOrder:
     )
 
 
-def _vehicles(field: Field) -> list[DriverSection]:
+def faults_of_kinds(field: Field) -> Iterator[Finding]:
+    """Yield why a kind cannot make its driver processes, or their stop datagrams, at one of its vehicles."""
+    for (kind, _), group in _teams(field).items():
+        orders = {order.name: order for order in group}
+        try:
+            for process in processes_of(kind_named(kind), group):
+                stop_of(kind_named(kind), [orders[name] for name in process.vehicles])
+        except SettingsError as error:
+            yield from ((("drones", group[0].name, "kind"), one.removeprefix("kind: ")) for one in error.problems)
+
+
+def _teams(field: Field) -> dict[tuple[str, str], list[VehicleOrder]]:
+    """Return the orders of all vehicles by kind and host."""
     orders: dict[tuple[str, str], list[VehicleOrder]] = {}
     for name, drone in field.drones.items():
         orders.setdefault((drone.kind, drone.host), []).append(vehicle_order(field, name))
+    return orders
+
+
+def _vehicles(field: Field) -> list[DriverSection]:
     return [
         DriverSection(process.vehicles[0], kind, process.vehicles[0], process.section, process.vehicles, host)
-        for (kind, host), group in orders.items()
-        for process in ask(kind_named(kind), "processes", group)
+        for (kind, host), group in _teams(field).items()
+        for process in processes_of(kind_named(kind), group)
     ]

@@ -13,6 +13,7 @@ from pkgutil import resolve_name
 from msgspec.structs import replace as change
 
 from groundstation.vehicles import KindSection, VehicleOrder
+from groundstation.vehicles.answers import MOST_BYTES, stop_of
 from sim_bridge.conformance.check import Case, NotApplicable, check
 from sim_bridge.conformance.subject import LIMITS, NAME, PAD_M, TOP_M
 from sim_bridge.world.emulation import emulation_of
@@ -20,7 +21,6 @@ from sim_bridge.world.noise import generator_of
 from sim_bridge.world.world import TICK_S, World
 
 _HEAVY = ("numba", "cv2", "av", "scipy", "zenoh", "matplotlib", "numpy")
-_UDP_BYTES = 1472
 _SAME: Mapping[str, float] = {}
 
 
@@ -165,11 +165,10 @@ def interface_reaches_driver_and_guardian(case: Case) -> None:
 
 @check()
 def stop_datagrams_fit(case: Case) -> None:
-    """Hover and land are different datagrams for a real port, each small enough for one packet."""
-    stop = case.subject.kind.stop([case.subject.order()])
-    assert 0 < stop.port < 65536, f"port {stop.port}"
-    assert stop.hover and stop.land and stop.hover != stop.land, "hover and land must be different, and not empty"
-    assert max(len(stop.hover), len(stop.land)) <= _UDP_BYTES, "longer than a packet"
+    """Hover and land are different bytes for a real port, each small enough for one packet."""
+    stop = stop_of(case.subject.kind, [case.subject.order()])
+    assert stop.hover != stop.land, "hover and land must be different"
+    assert max(len(stop.hover), len(stop.land)) <= MOST_BYTES, "longer than a packet"
 
 
 @check()

@@ -25,6 +25,8 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 _STATUS_PERIOD_NS = NS_PER_S
 _SUPERVISOR_STALE_NS = 300 * NS_PER_MS
+ENDS_BY = f"{__name__}: ends by "
+"""What precedes the reason of a child's end in its log."""
 _log = logging.getLogger(__name__)
 
 

@@ -11,13 +11,13 @@ from typing import BinaryIO
 
 from groundstation.bus.roles import Identity
 from groundstation.errors import GroundStationError
-from groundstation.process.child import ChildSpec
+from groundstation.process.child import ENDS_BY, ChildSpec
 from groundstation.process.one_thread import one_thread
 from groundstation.supervisor.interrupts import put_aside_by_nobody
 from groundstation.supervisor.process_spec import ProcessSpec
 from groundstation.supervisor.run import Run
 
-_TAIL_LINES = 8
+_TAIL_LINES, _TAIL_BYTES = 8, 65536
 
 
 class Launcher:
@@ -29,6 +29,7 @@ class Launcher:
         self._heartbeat = heartbeat
         self._identities = identities
         self._logs: dict[str, BinaryIO] = {}
+        self._begins: dict[str, int] = {}
 
     def log_path(self, name: str) -> Path:
         """Return where a process's standard error goes."""
@@ -89,6 +90,7 @@ class Launcher:
 
     def _popen(self, spec: ProcessSpec, command: list[str], stdin: int) -> subprocess.Popen[bytes]:
         log = self._logs[spec.name]
+        self._begins[spec.name] = os.fstat(log.fileno()).st_size
         with put_aside_by_nobody():
             return subprocess.Popen(
                 command,
@@ -104,6 +106,14 @@ class Launcher:
         """Return the last lines of a process's log, for an error message."""
         with suppress(OSError):
             return "\n".join(self.log_path(name).read_text(errors="replace").splitlines()[-_TAIL_LINES:])
+        return ""
+
+    def last_words(self, name: str) -> str:
+        """Return the reason of a process's end by the log of its last life, "" for none."""
+        with suppress(OSError), self.log_path(name).open("rb") as log:
+            log.seek(max(self._begins.get(name, 0), log.seek(0, os.SEEK_END) - _TAIL_BYTES))
+            lines = log.read().decode(errors="replace").splitlines()
+            return next((line.partition(ENDS_BY)[2] for line in reversed(lines) if ENDS_BY in line), "")
         return ""
 
     def close(self) -> None:

@@ -3,6 +3,7 @@
 import os
 import signal
 import subprocess
+from collections.abc import Callable
 from contextlib import suppress
 
 from groundstation.bus.messages import Lifecycle, ProcessStatus
@@ -128,10 +129,11 @@ class ManagedProcess:
         self._block.clear(self.slot)
         return code
 
-    def end_text(self, code: int) -> str:
-        """Return how it ended, in words, after `reap`."""
-        unasked = code == 0 and self.spec.failsafe_datagrams is not None and not self._left_when_told
-        return self.kill_reason or ("ended without an order to" if unasked else exit_text(code, self.farewell))
+    def end_text(self, code: int, logged: Callable[[str], str]) -> str:
+        """Return how it ended, in words, after `reap`; logged: the reason in its log, if its last status is late."""
+        if code == 0 and self.spec.failsafe_datagrams is not None and not self._left_when_told:
+            return "ended without an order to"
+        return self.kill_reason or exit_text(code, self.farewell or (logged(self.spec.name) if code > 0 else ""))
 
     def left_when_told(self) -> bool:
         """Return, once for each such end, whether it ended in order: during a run only a signal does that."""

@@ -248,7 +248,7 @@ class Supervisor:
     def _ended(self, process: ManagedProcess, code: int, now_ns: int) -> None:
         if self._stopping:
             return
-        why = process.end_text(code)
+        why = process.end_text(code, self._launcher.last_words)
         self._speak_for(process, why, now_ns)
         never_up = not process.ready_ns and process.life == 1
         if process.spec.restart is Restart.ENDS_RUN or (never_up and process.spec.required):

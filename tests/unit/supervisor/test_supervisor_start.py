@@ -95,6 +95,18 @@ def test_optional_process_is_retried_with_back_off_and_does_not_hold_the_start(
     assert "ceiling: ended with code 1: RuntimeError: no luck; restarting" in told
 
 
+def test_the_reason_of_an_end_is_told_though_no_status_came(
+    make: Callable[..., Supervisor], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("groundstation.supervisor.start._OPTIONAL_GRACE_S", 0.3)
+    supervisor = make(spec("ceiling", "crashing", required=False, on_bus=False))
+    start(supervisor)
+    camera = supervisor.processes[1]
+    until(supervisor, lambda: camera.life == 3)
+    told = (tmp_path / "terminal").read_text()
+    assert told.count("ceiling: ended with code 1: RuntimeError: no luck; restarting") == 2
+
+
 @pytest.mark.parametrize(("awaited", "up"), [(True, True), (False, False)])
 def test_a_slow_process_delays_the_start_only_if_awaited(
     make: Callable[..., Supervisor], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, awaited: bool, up: bool

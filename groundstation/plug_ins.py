@@ -4,7 +4,9 @@ Groups: `skein.vehicles` (kinds of vehicles), `skein.cameras` (schemes of camera
 `skein.world_sensors` (schemes of motion capture sources), `skein.markers` (dictionaries of square tags).
 """
 
+import re
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from functools import cache
 from inspect import getattr_static, signature
 from typing import TYPE_CHECKING, Any
@@ -34,10 +36,7 @@ class PlugInError(ValueError):
 
 def entries(group: str) -> "Iterator[tuple[str, str, metadata.EntryPoint]]":
     """Yield name, "package (module:attribute)" and entry point of each plug-in of a group, by name."""
-    # Imported here only: commands that stop drones must not wait for it.
-    from importlib import metadata
-
-    for entry in sorted(metadata.entry_points(group=group), key=lambda entry: entry.name):
+    for entry in sorted(_installed(group)[0], key=lambda entry: entry.name):
         package = entry.dist.name if entry.dist is not None else "?"
         yield entry.name, f"{package} ({entry.value})", entry
 
@@ -45,6 +44,32 @@ def entries(group: str) -> "Iterator[tuple[str, str, metadata.EntryPoint]]":
 def names(group: str) -> tuple[str, ...]:
     """Return the names of the installed plug-ins of a group; none is loaded."""
     return tuple(dict.fromkeys(name for name, _, _ in entries(group)))
+
+
+def damage() -> str:
+    """Return, after "; ", which packages' plug-ins cannot even be listed; "" if there are none."""
+    packages = ", ".join(_installed(VEHICLES)[1])
+    return f"; {packages}: entry_points.txt is damaged: mend or uninstall that package" if packages else ""
+
+
+def _installed(group: str) -> "tuple[Sequence[metadata.EntryPoint], list[str]]":
+    """Return the entry points of a group, and the packages whose list of all their own cannot be read."""
+    # Imported here only: commands that stop drones must not wait for it.
+    from importlib import metadata
+
+    with suppress(Exception):  # one damaged list, of any package and in any group, makes it fail
+        return metadata.entry_points(group=group), []
+    found = list[metadata.EntryPoint]()
+    first = dict[str, metadata.Distribution]()  # of each name on the path; only that one is ever imported
+    for package in metadata.distributions():
+        first.setdefault(re.sub("[-_.]+", "-", package.name or "?").lower(), package)
+    damaged = list[str]()
+    for name, package in first.items():
+        try:
+            found += package.entry_points.select(group=group)
+        except Exception:  # noqa: BLE001 - whatever is wrong with it, the others go on
+            damaged.append(name)
+    return found, damaged
 
 
 def planner(name: str, parameters: object, sensors: object) -> Any:
@@ -118,7 +143,7 @@ def _loaded(group: str, name: str) -> tuple[str, Any]:
             except (Exception, SystemExit) as error:  # a plug-in that exits at import must not end this program
                 raise PlugInError(f"{name} cannot be used: {source}: {reason(error)}") from error
     known = ", ".join(names(group)) or "none is installed"
-    raise PlugInError(f"{name} is not known; known in {group}: {known}")
+    raise PlugInError(f"{name} is not known; known in {group}: {known}{damage()}")
 
 
 def _require_callable(one: object, what: str) -> None:

@@ -83,6 +83,7 @@ def _unknown() -> ValueError:
     return ValueError(
         f"must be an address such as http://192.168.1.50:8080/video.mjpg, {own}"
         "rtsp://192.168.1.60/stream, ros2://192.168.1.20/camera/image/compressed, /dev/video0 or /a/video.mp4"
+        f"{plug_ins.damage()}"
     )
 
 

@@ -95,7 +95,7 @@ def _unknown(others: Sequence[str]) -> ValueError:
     return ValueError(
         "must be an address such as natnet://192.168.1.5 (OptiTrack), vicon://, qualisys:// or vrpn://192.168.1.5, "
         "or ros2://192.168.1.5/vrpn_mocap?domain=0 for topics /vrpn_mocap/<body>/pose behind a ROS 2 Zenoh router"
-        f"{installed}"
+        f"{installed}{plug_ins.damage()}"
     )
 
 

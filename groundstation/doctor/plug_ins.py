@@ -11,7 +11,10 @@ def plug_in_findings() -> list[Finding]:
     """Return a finding for each plug-in; each is loaded, but not instantiated."""
     refused = refused_kinds()
     found = [_finding(plug_ins.VEHICLES, name, refused.get(name, "")) for name in plug_ins.names(plug_ins.VEHICLES)]
-    return found + [_finding(group, name, _why_not(group, name)) for group in _GROUPS for name in plug_ins.names(group)]
+    found += [_finding(group, name, _why_not(group, name)) for group in _GROUPS for name in plug_ins.names(group)]
+    if damage := plug_ins.damage():
+        found.append(Finding(Level.SHOULD, "plug-ins", damage.removeprefix("; "), "its plug-ins cannot be found"))
+    return found
 
 
 def _why_not(group: str, name: str) -> str:

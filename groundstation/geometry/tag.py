@@ -111,7 +111,8 @@ def tag_fault(dictionary: str, number: int) -> str:
             return f"dictionary {error}"
     else:
         known = (*sorted(DICTIONARIES), *installed)
-        return f"dictionary must be one of {', '.join(known)}{_meant(dictionary, known)} (got {dictionary})"
+        others = f"{_meant(dictionary, known)} (got {dictionary}){plug_ins.damage()}"
+        return f"dictionary must be one of {', '.join(known)}{others}"
     return "" if 0 <= number < count else f"id must be in 0..{count - 1} of {dictionary} (got {number})"
 
 

@@ -50,8 +50,8 @@ LevelHeights = Annotated[
 def _known_planner(name: str) -> str:
     known = plug_ins.names(plug_ins.PLANNERS)
     if name and name not in known:
-        told = {"known": ", ".join(known) or "none is installed"}
-        raise PydanticCustomError("planner", "must be an installed planner: {known}", told)
+        told = {"known": ", ".join(known) or "none is installed", "damage": plug_ins.damage()}
+        raise PydanticCustomError("planner", "must be an installed planner: {known}{damage}", told)
     if name:
         try:
             plug_ins.load(plug_ins.PLANNERS, name)

@@ -8,6 +8,7 @@ from pydantic_core import PydanticCustomError, PydanticKnownError
 
 from drivers.camera.source_address import behind_adapter, parse_source
 from drivers.vehicle_settings import Shape
+from groundstation import plug_ins
 from groundstation.settings.marker import MarkerSettings
 from groundstation.settings.room import CalibrationSettings
 from groundstation.settings.values import (
@@ -133,6 +134,8 @@ def _is_kind(name: str) -> str:
     if name in refused_kinds() and name not in all_kinds():
         raise PydanticCustomError("kind", "cannot be used: {why}", {"why": refused_kinds()[name]})
     if f"'{name}'" not in known:
+        if why := plug_ins.damage():
+            raise PydanticCustomError("kind", "is not known (got {name}){why}", {"name": name, "why": why})
         raise PydanticKnownError("literal_error", {"expected": " or ".join((", ".join(known[:-1]), known[-1]))})
     return name
 

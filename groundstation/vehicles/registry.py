@@ -20,7 +20,7 @@ def kind_named(name: str) -> VehicleKind:
         return kinds[name]
     if name in refused:
         raise SettingsError([f"kind: {name} cannot be used: {refused[name]}"])
-    raise SettingsError([f"kind: {name} is not known; known: {', '.join(kinds)}"])
+    raise SettingsError([f"kind: {name} is not known; known: {', '.join(kinds)}{plug_ins.damage()}"])
 
 
 def all_kinds() -> dict[str, VehicleKind]:
@@ -55,7 +55,7 @@ def ask(kind: VehicleKind, part: str, *arguments: object) -> Any:
         return list(answer) if isinstance(answer, Iterator) else answer
     except SettingsError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise SettingsError([f"kind: {kind.name}: {part} fails: {plug_ins.reason(error)}"]) from error
 
 

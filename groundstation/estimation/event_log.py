@@ -80,7 +80,7 @@ class EventLog:
         verdict_code, size, nis, ahead_x, ahead_y, *values, alternative_chosen, joined = _OUTCOME.unpack_from(
             self._outcome_bytes, row * _OUTCOME.size
         )
-        verdict, reason = _VERDICTS[verdict_code]
+        verdict, reason = _VERDICTS.get(verdict_code) or _unknown(verdict_code)
         if joined:
             reason = "joined" if size == 0 else "re-initialised: the belief contradicted several observations in a row"
         elif alternative_chosen:
@@ -107,6 +107,11 @@ class EventLog:
         self.events, self.outcomes = events, outcomes
         self._free.extend(range(size, 2 * size))
         self._look()
+
+
+def _unknown(code: int) -> tuple[Verdict, str]:
+    # A plug-in's sensor model may return any number: it costs its own readings, not the tracker.
+    return Verdict.IMPLAUSIBLE, f"refused by its sensor model, whose prepare returned {-code}: no verdict"
 
 
 def write_event(rows: memoryview, row: int, values: Sequence[float]) -> None:

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from groundstation.estimation.event_log import change_values, observation_values, write_event
+from groundstation.bus.messages import Verdict
+from groundstation.estimation.event_log import EventLog, change_values, observation_values, write_event
 from groundstation.estimation.measurement import Measurement
 from groundstation.estimation.models import (
     ConstantVelocityTarget,
@@ -81,3 +82,13 @@ def test_a_robot_that_lands_takes_no_velocity_errors_into_its_next_flight() -> N
     write_event(np.asarray(events).view(np.uint8).data, 0, change_values(DISMISSED, 0.0, 0, 0))
     change(state, tables, events[0], outcomes[0])
     assert [float(state.memory[name][0]) for name in ("active", *learnt)] == [0.0] * 4
+
+
+@pytest.mark.parametrize("returned", [-77, -(2**62)])
+def test_a_verdict_that_only_its_sensor_model_knows_refuses_the_reading(returned: int) -> None:
+    log = EventLog()
+    row = log.add(0, "", change_values(DISMISSED, 0.0, 0, 1))
+    log.outcomes["verdict"][row] = -returned
+    correction = log.correction(row, "drone_1", "anchor", 3.0)
+    assert correction.verdict is Verdict.IMPLAUSIBLE
+    assert correction.reason == f"refused by its sensor model, whose prepare returned {returned}: no verdict"

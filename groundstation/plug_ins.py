@@ -72,6 +72,12 @@ def _installed(group: str) -> "tuple[Sequence[metadata.EntryPoint], list[str]]":
     return found, damaged
 
 
+def title(group: str, name: str) -> str:
+    """Return "name (package)" of a plug-in for the operator; the name alone if it is not installed."""
+    found = next((source.split(" (")[0] for known, source, _ in entries(group) if known == name), "")
+    return f"{name} ({found})" if found else name
+
+
 def planner(name: str, parameters: object, sensors: object) -> Any:
     """Return a plug-in's replacement for `groundstation.planning.planner.Planner`; raises SettingsError naming it.
 

@@ -1,6 +1,5 @@
 """Re-runs today's tracker in the flight loop from a journal: same inputs and ticks, plans adopted at the same ticks."""
 
-import logging
 from collections import Counter
 from collections.abc import Iterable
 
@@ -8,14 +7,12 @@ from groundstation.bus.api import Subscription
 from groundstation.bus.messages import Header, JournalEntry, Message
 from groundstation.bus.sender import Sender
 from groundstation.bus.topics import Topic
-from groundstation.errors import EstimatorFault
 from groundstation.field.resolved import ResolvedField
 from groundstation.planning.planner import Planner, PlanRequest
 from groundstation.replay.tick_log import Tick
 from groundstation.runtime.journal import STOPPED, Adoption
+from groundstation.runtime.planner_watch import FailureLog
 from groundstation.runtime.tracker_loop import TrackerFeed, TrackerSection, Tracking
-
-_log = logging.getLogger(__name__)
 
 Words = list[tuple[Topic, Message]]
 
@@ -77,6 +74,7 @@ class JournalWorker:
 
     def __init__(self, planner: Planner) -> None:
         self._planner = planner
+        self._failures = FailureLog()
         self._pending: tuple[int, PlanRequest] | None = None
         self.entry: JournalEntry | None = None
 
@@ -98,11 +96,9 @@ class JournalWorker:
         budget = entry.evaluations if entry.stop_reason == STOPPED else None
         try:
             plan = request.put_to(self._planner, lambda: False, budget)
-        except EstimatorFault:
-            return Adoption(tick, None)
-        except Exception:  # noqa: BLE001 - as in flight (PlanWorker): a fault survived in flight can be replayed
-            _log.exception("planning crashed")
-            return Adoption(tick, None)
+        # As in flight (PlanWorker): a fault survived in flight can be replayed.
+        except (Exception, SystemExit) as error:  # noqa: BLE001
+            return Adoption(tick, None, self._failures.take(error))
         return Adoption(tick, plan)
 
     def close(self) -> None:

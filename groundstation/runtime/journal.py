@@ -11,10 +11,11 @@ STOPPED = "stopped"
 
 @dataclass(frozen=True, slots=True)
 class Adoption:
-    """A finished plan with the tick on whose snapshot it was made; `plan` is None if planning failed."""
+    """A finished plan with the tick on whose snapshot it was made; `plan` is None if planning failed, by `failure`."""
 
     tick: int
     plan: PlanResult | None
+    failure: str = ""
 
     @property
     def evaluations(self) -> int:

@@ -1,6 +1,5 @@
 """Planning on a thread of its own, on belief snapshots, so that no tick waits for it."""
 
-import logging
 import threading
 import time
 from collections.abc import Callable
@@ -8,13 +7,11 @@ from dataclasses import replace
 
 import msgspec
 
-from groundstation.errors import EstimatorFault
 from groundstation.planning.planner import Planner, PlanRequest
 from groundstation.planning.time_budget import TimeBudget
 from groundstation.process.priority import Rank, go_first
 from groundstation.runtime.journal import Adoption
-
-_log = logging.getLogger(__name__)
+from groundstation.runtime.planner_watch import FailureLog
 
 
 class PlanWorker:
@@ -27,6 +24,7 @@ class PlanWorker:
         self._planner = planner
         self._budget_s = budget_s
         self._clock = clock
+        self._failures = FailureLog()
         self._wake = threading.Condition()
         self._request: tuple[int, PlanRequest] | None = None
         self._done: Adoption | None = None
@@ -78,11 +76,7 @@ class PlanWorker:
         budget = TimeBudget(self._budget_s, self._clock)
         try:
             plan = request.put_to(self._planner, budget.must_stop)
-        except EstimatorFault as fault:
-            _log.error("planning failed: %s", fault)
-            return Adoption(tick, None)
-        except Exception:  # noqa: BLE001 - the thread's outermost loop: the last plan stays, drones are not left alone
-            _log.exception("planning crashed")
-            return Adoption(tick, None)
+        except BaseException as error:  # noqa: BLE001 - the thread's outermost loop: a planner that exits ends it silently
+            return Adoption(tick, None, self._failures.take(error))
         report = msgspec.structs.replace(plan.solver, seconds=self._clock() - began)
         return Adoption(tick, replace(plan, solver=report))

@@ -19,9 +19,10 @@ from groundstation.runtime.announcer import Announcer
 from groundstation.runtime.asking import TEAM
 from groundstation.runtime.consistency_watch import ConsistencyWatch
 from groundstation.runtime.inbox import Inbox
-from groundstation.runtime.journal import FAULT, Adoption, entry_of
+from groundstation.runtime.journal import Adoption, entry_of
 from groundstation.runtime.latency_watch import PictureAge
 from groundstation.runtime.plan_worker import PlanWorker
+from groundstation.runtime.planner_watch import PlannerWatch
 from groundstation.runtime.rejoin_watch import RejoinWatch
 from groundstation.runtime.turned_watch import TurnedWatch
 from groundstation.runtime.unseen_watch import UnseenWatch
@@ -108,6 +109,7 @@ class Tracking:
         self._rejoining, self._turned = RejoinWatch(self.tracker.robots), TurnedWatch()
         self._picture_age = PictureAge(field, feed.clock)
         self._suspected = ""
+        self._planner = PlannerWatch(field.planner.plug_in, self.tracker.parameters.control.max_plan_age_s)
         self._unseen = UnseenWatch(field.safety.unseen_land_after_s)
         self._plan_every = max(1, round(self.rate_hz / plan_hz))
         self._belief_every = max(1, round(self.rate_hz / _BELIEF_HZ))
@@ -149,8 +151,7 @@ class Tracking:
         self._contradictions.take(corrections, now_ns)
         self.notices += self._rejoining.take(corrections, now_ns) + self._turned.take(corrections, now_ns)
         announcer.journal(entry_of(self._bus.header(TEAM, now_ns), self._tick, now_ns, ingested, adopted))
-        if adopted is not None and adopted.stop_reason == FAULT:
-            self.notices.append(Notice(Severity.ERROR, "planning failed", "the last plan stays in force for a while"))
+        self.notices += self._planner.take(now_ns, adopted, idle=self._worker.idle)
         self._watch(now_ns)
         self._tick += 1
 

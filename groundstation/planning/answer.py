@@ -4,11 +4,14 @@ import math
 from collections.abc import Collection
 from typing import Any
 
+import msgspec
 import numpy as np
 
-from groundstation.bus.messages import Alternative, Edge, SolverReport
+from groundstation.bus.messages import Alternative, Edge, Header, Plan, SolverReport
 from groundstation.planning.records import HEIGHT
 from groundstation.sensing.topology import Topology
+
+_sent, _received = msgspec.json.Encoder(), msgspec.json.Decoder(Plan)
 
 
 def check_answer(answer: Any, robots: Collection[str], stamp_ns: int) -> None:
@@ -36,3 +39,24 @@ def check_answer(answer: Any, robots: Collection[str], stamp_ns: int) -> None:
     for kind, parts in ((Edge, answer.edges), (Alternative, answer.alternatives), (SolverReport, (answer.solver,))):
         if not isinstance(parts, tuple) or not all(isinstance(part, kind) for part in parts):
             raise ValueError(f"a plan has a tuple of {kind.__name__}, not {parts!r}")
+
+
+def check_message(answer: Any) -> None:
+    """Raise ValueError if the message of a `PlanResult` could not be sent, or would be refused by those who get it.
+
+    Types of Python are checked nowhere else: a number of numpy ends the process that sends it.
+    """
+    try:
+        message = Plan(
+            header=Header(answer.stamp_ns, "", "", "", 0),
+            topology=str(answer.topology),
+            cost=answer.cost,
+            controls=(),
+            edges=answer.edges,
+            alternatives=answer.alternatives,
+            solver=answer.solver,
+            mode=answer.mode,
+        )
+        _received.decode(_sent.encode(message))
+    except (TypeError, ValueError, msgspec.MsgspecError) as error:
+        raise ValueError(f"a plan cannot be published: {error}") from error

@@ -1,13 +1,15 @@
 """Answers of planners of other packages: one that cannot be flown ends neither the tracker nor planning."""
 
+import math
 import time
 from dataclasses import replace
 from typing import Any, cast
 
+import msgspec
 import numpy as np
 import pytest
 
-from groundstation.bus.messages import SolverReport
+from groundstation.bus.messages import Alternative, Edge, SolverReport
 from groundstation.library import belief_of
 from groundstation.planning.planner import Planner, PlanRequest, PlanResult
 from groundstation.runtime.plan_worker import PlanWorker
@@ -20,6 +22,12 @@ RIGHT = PlanResult(
     FLAT, 0.1, 0.1, {"drone_1": np.zeros(3)}, {"drone_1": 1.6}, (), (), SolverReport("complete", 1, 0.0, 1, 1), "mine",
     BELIEF.stamp_ns,
 )  # fmt: skip
+
+
+def report(**figures: Any) -> SolverReport:
+    return msgspec.structs.replace(RIGHT.solver, **figures)
+
+
 WRONG = {
     "nothing": None,
     "no height": replace(RIGHT, heights={}),
@@ -34,6 +42,18 @@ WRONG = {
     "cost without a value": replace(RIGHT, cost=np.nan),
     "report of another kind": replace(RIGHT, solver=cast(SolverReport, "complete")),
     "edges as a list": replace(RIGHT, edges=cast(Any, [])),
+    "evaluations of numpy": replace(RIGHT, solver=report(evaluations=np.int64(3))),
+    "evaluations as text": replace(RIGHT, solver=report(evaluations="3")),
+    "gap without a value": replace(RIGHT, solver=report(gap=math.nan)),
+    "edge of numpy": replace(RIGHT, edges=(Edge("drone_1", "turtlebot", cast(Any, np.float32(1.0))),)),
+    "edge without a value": replace(RIGHT, edges=(Edge("drone_1", "turtlebot", math.nan),)),
+    "alternative of numpy": replace(RIGHT, alternatives=(Alternative("drone_1", cast(Any, np.float32(1.0))),)),
+    "cost of numpy": replace(RIGHT, cost=np.float64(0.1)),
+    "cost beyond 64 bits": replace(RIGHT, cost=10**30),
+    "cost that is a truth value": replace(RIGHT, cost=True),
+    "mode as a number": replace(RIGHT, mode=cast(Any, 7)),
+    "time of numpy": replace(RIGHT, stamp_ns=cast(Any, np.int64(BELIEF.stamp_ns))),
+    "time with a fraction": replace(RIGHT, stamp_ns=cast(Any, float(BELIEF.stamp_ns))),
 }
 
 

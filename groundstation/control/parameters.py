@@ -127,7 +127,7 @@ def control_from_field(field: ResolvedField) -> ControlParameters:
         return_limit_m=0.8 * safety.max_position_std_m,
         return_within_s=0.5 * safety.unseen_land_at_last_s,
         planned_s=planner.horizon_steps * planner.step_s,
-        max_plan_age_s=max(1.0, 3.0 / planner.rate_hz),
+        max_plan_age_s=planner.max_plan_age_s,
         detours=_detours(field),
         fed=frozenset(n for n, drone in field.drones.items() if kind_named(drone.kind).habits.flies_on_estimate),
     )

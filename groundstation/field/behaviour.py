@@ -33,6 +33,11 @@ class PlannerValues(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     planned_range_m: float = 1.9
     separation_m: float = 1.0
 
+    @property
+    def max_plan_age_s(self) -> float:
+        """Return for how long the controls of a plan are flown [s]."""
+        return max(1.0, 3.0 / self.rate_hz)
+
 
 class SafetyValues(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Safety limits and communication time-outs."""

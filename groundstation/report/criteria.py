@@ -18,6 +18,7 @@ MAX_DRONE_UNCERTAIN_S = 2.0
 MAX_CPU_CORES = 1.6
 CPU_CORES_PER_DRONE = 0.8
 MAX_PLANNER_P99_MS = 50.0
+MAX_UNPLANNED_S = 2.0
 MAX_MISSED_PERCENT = 1.0
 MIN_RATE_SHARE = 0.98
 MAX_SIM_OVERRUN_PERCENT = 1.0
@@ -67,6 +68,8 @@ def criteria_of(figures: RunFigures, field: ResolvedField, facts: RunFacts) -> l
         _under("tracker_missed_percent", figures.tracker_missed_percent, MAX_MISSED_PERCENT),
         _above("tracker_rate_hz", figures.tracker_rate_hz, MIN_RATE_SHARE * field.estimator.rate_hz),
     ]
+    if figures.unplanned_s is not None:
+        criteria.append(_below("unplanned_s", figures.unplanned_s, MAX_UNPLANNED_S))
     simulated = figures.sim_overrun_percent is not None
     tracked = simulated or figures.target is not None
     by_estimates = () if simulated else _by_the_estimates(figures)

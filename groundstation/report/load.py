@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.arrays import Array
+from groundstation.report.accuracy import RATE_HZ, STALE_S
 from groundstation.report.interval import Span, flight_spans, within
 from groundstation.report.tracks import ProcessTrack, RunData
 
@@ -107,6 +108,27 @@ def planner_ms(data: RunData) -> tuple[float, float] | None:
     seconds = np.array([plan.message.solver.seconds for plan in data.plans])[flown]
     median, high = np.percentile(seconds, [50, 99])
     return float(median * 1000), float(high * 1000)
+
+
+def unplanned_s(data: RunData, time_s: Array) -> float | None:
+    """Return for how long every plan was too old to be flown while the tracker lived, at 10 Hz [s].
+
+    None where it told nothing of anybody. Without a tracker drones hover as well, and that is reported otherwise.
+    """
+    lives = np.zeros(len(time_s), dtype=bool)
+    for track in data.certainties.values():
+        lives |= _age_s(track.time_s, time_s) <= STALE_S
+    if not lives.any():
+        return None
+    old = _age_s(np.array([plan.time_s for plan in data.plans]), time_s) > data.resolved.planner.max_plan_age_s
+    return float(np.count_nonzero(lives & old) / RATE_HZ)
+
+
+def _age_s(told_s: Array, time_s: Array) -> Array:
+    """Return for each time that since the newest of what was told (m) [s]; infinite before the first."""
+    index = np.searchsorted(told_s, time_s, side="right")
+    age_s: Array = time_s - np.concatenate(([-np.inf], told_s))[index]
+    return age_s
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,7 +24,8 @@ class RunFigures(msgspec.Struct, frozen=True, kw_only=True):
     each target from when it was found, None if it never was. target_unseen_s, drone_uncertain_s: by the estimates.
     flew: whether any drone did. recorded_share: of the flights, without holes. drones_judged: share of each drone's
     flights for which motion capture knows its place. failsafe_landings: which drones a failsafe landed or cut, when and
-    why; cuts_in_flight: which fell because somebody ordered it. truth: the reference of the errors, a motion capture
+    why; cuts_in_flight: which fell because somebody ordered it. unplanned_s: for how long all plans were too old to be
+    flown. truth: the reference of the errors, a motion capture
     system of the field or the simulator, "" for nothing. starved_s: how long other programs of the computer kept
     processes of the run from it; waited: the share of the time for which each waited for a core.
     """
@@ -49,6 +50,7 @@ class RunFigures(msgspec.Struct, frozen=True, kw_only=True):
     cuts_in_flight: list[str] = []
     topology_seconds: dict[str, float]
     topology_switches: int
+    unplanned_s: float | None = None
     planner_p50_ms: float | None
     planner_p99_ms: float | None
     tracker_ticks: int
@@ -104,6 +106,7 @@ def figures_of(data: RunData) -> RunFigures:
         cuts_in_flight=[item.line for item in cuts_in_flight(data)],
         topology_seconds=topology_use.topology_seconds(data, start, end),
         topology_switches=topology_use.switches(data, start, end),
+        unplanned_s=load.unplanned_s(data, grid),
         planner_p50_ms=planner[0] if planner else None,
         planner_p99_ms=planner[1] if planner else None,
         tracker_ticks=ticks,

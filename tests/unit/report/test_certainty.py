@@ -50,6 +50,23 @@ def flight(lab_field: ResolvedField) -> RunData:
     )
 
 
+@pytest.mark.parametrize(("gap_s", "unplanned_s"), [(0.0, 0.0), (2.5, 1.5), (6.0, 5.0)])
+def test_time_without_a_plan_is_judged(flight: RunData, gap_s: float, unplanned_s: float) -> None:
+    plans = [at_s for at_s in np.arange(4.0, 26.0, 0.1) if not 10.0 < at_s < 10.0 + gap_s]
+    header = m.Header(0, "here", "team", "tracker", 0)
+    plan = m.Plan(header=header, topology="a", cost=0.1, controls=(), edges=(), alternatives=(), mode="multistart",
+                  solver=m.SolverReport("complete", 1, 0.01, 1, 1))  # fmt: skip
+    flown = replace(flight, plans=[TimedMessage(float(at_s), plan) for at_s in plans])
+
+    def judged(data: RunData) -> list[tuple[object, bool]]:
+        found = criteria_of(figures_of(data), data.resolved, data.facts)
+        return [(one.value, one.ok) for one in found if one.name == "unplanned_s"]
+
+    assert judged(flown) == [(pytest.approx(unplanned_s, abs=0.11), unplanned_s <= 2.0)]
+    dead = {name: until(known(), 10.0) for name in flight.certainties}
+    assert judged(replace(flown, certainties=dead)) == [(0.0, True)], "a dead tracker is no fault of the planner"
+
+
 def values(data: RunData) -> dict[str, tuple[object, bool]]:
     found = criteria_of(figures_of(data), data.resolved, data.facts)
     names = ("target_unseen_s", "drone_uncertain_s")

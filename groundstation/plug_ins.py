@@ -72,10 +72,12 @@ def _installed(group: str) -> "tuple[Sequence[metadata.EntryPoint], list[str]]":
     return found, damaged
 
 
-def title(group: str, name: str) -> str:
-    """Return "name (package)" of a plug-in for the operator; the name alone if it is not installed."""
-    found = next((source.split(" (")[0] for known, source, _ in entries(group) if known == name), "")
-    return f"{name} ({found})" if found else name
+def planner_title(name: str) -> str:
+    """Return "planner name (package)" for the operator, without a package if none brings it; "" for our own planner."""
+    if not name:
+        return ""
+    found = next((source.split(" (")[0] for known, source, _ in entries(PLANNERS) if known == name), "")
+    return f"planner {name} ({found})" if found else f"planner {name}"
 
 
 def planner(name: str, parameters: object, sensors: object) -> Any:

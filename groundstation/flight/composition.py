@@ -19,6 +19,7 @@ from groundstation.errors import OperatorMistake
 from groundstation.field.targets import odometry_name
 from groundstation.flight.failsafe_datagrams import failsafe_datagrams
 from groundstation.flight.real_parts import ALL_EMULATED, RealParts
+from groundstation.plug_ins import planner_title
 from groundstation.process.ports import port_of
 from groundstation.runtime.liaison import VERSION, LiaisonSection
 from groundstation.runtime.router import RouterSection
@@ -114,7 +115,7 @@ def process_table(
     table = [rows.ROUTER]
     if simulation is not None:
         table.append(_sim_bridge(field, simulation))
-    table.append(replace(rows.TRACKER, section=core))
+    table.append(replace(rows.TRACKER, section=core, guest=planner_title(field.planner.plug_in)))
     if field.cameras:  # only where a fixed camera sees the team can sightings contradict the field
         table.append(replace(rows.DIAGNOSIS, section=core))
     if field.recording.enabled:

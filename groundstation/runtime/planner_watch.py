@@ -46,7 +46,7 @@ class PlannerWatch:
     def __init__(self, plug_in: str, max_plan_age_s: float) -> None:
         self._flown_s = max_plan_age_s
         self._answers_within_ns = int(2.0 * max_plan_age_s * NS_PER_S)
-        self._name = f"planner {plug_ins.title(plug_ins.PLANNERS, plug_in)}" if plug_in else "the planner"
+        self._name = plug_ins.planner_title(plug_in) or "the planner"
         self._told_ns: dict[str, int] = {}
         self._asked_ns: int | None = None
 

@@ -60,7 +60,8 @@ class ProcessSpec:
     waits for it, if only for a moment. on_terminal: it writes to the operator's terminal. entities: the vehicles or
     camera of a device. kernels: it uses compiled kernels, which are made before anything starts. nice: its share of the
     processor (docs/decisions/0137). shows_end: it stays until the run is judged (docs/decisions/0152). at_most_hz: by
-    key, how many samples a second are enough for it (docs/decisions/0169).
+    key, how many samples a second are enough for it (docs/decisions/0169). guest: another package's code that runs in
+    it, and may keep it from its heartbeat.
     """
 
     name: str
@@ -86,7 +87,13 @@ class ProcessSpec:
     kernels: bool = False
     nice: int = 0
     shows_end: bool = False
+    guest: str = ""
     at_most_hz: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def suspect(self) -> str:
+        """Return the words that name its guest after the report of a hang, "" without one."""
+        return f"; {self.guest} runs in it" if self.guest else ""
 
     @property
     def is_router(self) -> bool:

@@ -224,7 +224,7 @@ class Supervisor:
         if late and starved and process.spec.failsafe_datagrams is None and heard_s < _STARVED_FOR * late_s:
             self._tell_starved(process, now_ns)
         else:
-            self._kill(process, f"hung: no heartbeat for {heard_s:.2f} s", late)
+            self._kill(process, f"hung: no heartbeat for {heard_s:.2f} s{process.spec.suspect}", late)
 
     def _tell_starved(self, process: ManagedProcess, now_ns: int) -> None:
         if now_ns >= self._tell_starved_ns:

@@ -3,6 +3,7 @@
 import re
 import sys
 from inspect import signature
+from pathlib import Path
 from unittest.mock import Mock
 
 import numpy as np
@@ -17,10 +18,14 @@ from groundstation import plug_ins
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.doctor.plug_ins import plug_in_findings
 from groundstation.errors import DriverError, SettingsError
+from groundstation.flight.composition import process_table
 from groundstation.geometry.tag import tag_fault
 from groundstation.library import Topology, belief_of, field_named, plan_step, planner_of
 from groundstation.planning.planner import Planner
 from groundstation.runtime.tracker_loop import TrackerFeed, TrackerSection, Tracking
+from groundstation.settings.load import load_field
+
+FIXTURE = Path(__file__).parents[2] / "fixtures" / "field" / "lab.yaml"
 
 CODE = '''
 from collections import Counter
@@ -162,6 +167,13 @@ def test_a_planner_of_another_package_plans():
     tracking = Tracking(MemoryBus(MemoryExchange(), "lab", "tracker"), TrackerSection(field, epoch=1), feed)
     worker_of.assert_called_once_with(tracking.tracker.planner)
     assert type(tracking.tracker.planner).__name__ == "Calm"
+
+
+@pytest.mark.parametrize(("options", "guest"), [(["planner.plug_in=calm"], "planner calm (lab-plug-ins)"), ([], "")])
+def test_the_supervisor_knows_the_planner_that_may_hang_the_tracker(tmp_path, options, guest):
+    field = load_field(FIXTURE, options)
+    table = process_table(field, "tcp/127.0.0.1:1", tmp_path, simulation=None, monitor=False)
+    assert [row.guest for row in table if row.name == "tracker"] == [guest]
 
 
 def test_a_planner_that_is_not_installed_is_refused_at_its_line():

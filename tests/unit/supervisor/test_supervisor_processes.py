@@ -146,6 +146,18 @@ def test_a_process_waiting_for_a_core_is_not_restarted_as_hanging(
     until(supervisor, lambda: camera.pid != pid and camera.is_up)  # but with a time limit
 
 
+def test_the_plug_in_of_a_hanging_process_is_named(
+    make: Callable[..., Supervisor], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    supervisor = make(spec("tracker", "obedient", hang_limit_s=0.5, guest="planner calm (my-lab)"))
+    start(supervisor)
+    tracker, heard = supervisor.processes[1], []
+    monkeypatch.setattr(supervisor.events, "event", lambda *words: heard.append(words[2]))
+    os.kill(tracker.pid, signal.SIGSTOP)  # as a call that holds the interpreter
+    until(supervisor, lambda: any("restarting" in text for text in heard))
+    assert any("hung: no heartbeat for" in text and "planner calm (my-lab) runs in it" in text for text in heard), heard
+
+
 def test_a_freeze_of_the_supervisor_itself_is_nobodys_fault(make: Callable[..., Supervisor]) -> None:
     supervisor = make(spec("drone_1", "obedient", silence_limit_s=0.4, hang_limit_s=0.8))
     start(supervisor)

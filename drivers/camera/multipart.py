@@ -8,10 +8,13 @@ import re
 
 from drivers.camera.http_answer import HEAD_END, boundary_from_body, may_begin_with_boundary
 from groundstation.bus.jpeg import has_ended
+from groundstation.time_units import NS_PER_S
 
 MAX_FRAME_BYTES = 8 << 20
 _MAX_HEAD_BYTES = 4096
 _LENGTH = re.compile(rb"^content-length:[ \t]*(\d{1,9})[ \t]*$", re.IGNORECASE | re.MULTILINE)
+# WIRE: seconds of the camera's clock, as MJPG-streamer and the ESP32's examples send them.
+_STAMP = re.compile(rb"^x-timestamp:[ \t]*(\d{1,10})(?:\.(\d{1,9}))?[ \t]*$", re.IGNORECASE | re.MULTILINE)
 _JPEG_START, _JPEG_END = b"\xff\xd8", b"\xff\xd9"
 
 
@@ -19,7 +22,7 @@ class MultipartParser:
     """Takes the bytes of a body as they come; returns the complete JPEG frames in them.
 
     boundary: the announced one; a body that begins with another has that. `rejected` counts parts that are no JPEG, too
-    long, or cut short.
+    long, or cut short; `stamps_ns`: the sender's times of the frames returned last, None where it sent none.
     """
 
     def __init__(self, boundary: bytes) -> None:
@@ -27,11 +30,14 @@ class MultipartParser:
         self._begun = False
         self._buffer = bytearray()
         self._needed = 0
+        self._stamp_ns: int | None = None
         self.rejected = 0
+        self.stamps_ns: list[int | None] = []
 
     def feed(self, data: bytes) -> list[bytes]:
         """Take in bytes; return the frames that are now complete, oldest first."""
         self._buffer += data
+        self.stamps_ns = []
         if not self._begun and not self._begin():
             return []
         frames: list[bytes] = []
@@ -69,7 +75,9 @@ class MultipartParser:
         return self._take_body(head_start, head, frames)
 
     def _take_body(self, head_start: int, head: re.Match[bytes], frames: list[bytes]) -> bool:
-        length = _LENGTH.search(bytes(self._buffer[head_start : head.start()]).replace(b"\r\n", b"\n"))
+        lines = bytes(self._buffer[head_start : head.start()]).replace(b"\r\n", b"\n")
+        self._stamp_ns = _stamp_ns(lines)
+        length = _LENGTH.search(lines)
         body = head.end()
         if length is None:
             end = self._buffer.find(self._mark, body)
@@ -97,6 +105,7 @@ class MultipartParser:
         body = body.lstrip(b"\r\n")  # if the length does not count them, only the picture's end mark is missing
         if body.startswith(_JPEG_START):
             frames.append(body)
+            self.stamps_ns.append(self._stamp_ns)
             del self._buffer[:end]
         else:
             self._reject(end)
@@ -105,3 +114,8 @@ class MultipartParser:
         self.rejected += 1
         self._needed = 0
         del self._buffer[:upto]
+
+
+def _stamp_ns(lines: bytes) -> int | None:
+    stamp = _STAMP.search(lines)
+    return None if stamp is None else int(stamp[1]) * NS_PER_S + int((stamp[2] or b"0").ljust(9, b"0"))

@@ -38,11 +38,12 @@ def encoder():
 class Camera:
     """Serves one client at a time with 25 pictures a second of rising brightness.
 
-    most: pictures, then none; with_sound: goes on with sound alone.
+    most: pictures, then none; with_sound: goes on with sound alone; stored: so many pictures at once at first.
     """
 
-    def __init__(self, in_band, most=1 << 20, with_sound=False):
-        self.in_band, self.most, self.with_sound = in_band, most, with_sound
+    def __init__(self, in_band, most=1 << 20, with_sound=False, stored=0):
+        self.in_band, self.most, self.with_sound, self.stored = in_band, most, with_sound, stored
+        self.exposed_s = {}
         self.clients = 0
         self.codec, self.number = encoder(), 0
         self.sets = [u for u in units_of(self.picture()) if u[0] & 0x1F in (7, 8)]
@@ -99,13 +100,16 @@ class Camera:
 
     def stream(self, connection):
         sequence = sounds = 0
-        while not self.closing.wait(0.04):
+        began_s, first = time.monotonic(), self.number
+        while not self.closing.wait(0.04 * (self.number - first >= self.stored)):
             if self.with_sound:
                 rtp = struct.pack(">BBHII", 0x80, 0, sounds & 0xFFFF, sounds * 320, 2) + b"\xff" * 320
                 connection.sendall(b"$\x02" + struct.pack(">H", len(rtp)) + rtp)
                 sounds += 1
             if self.number > self.most:
                 continue
+            level = 40 + self.number % 160
+            self.exposed_s[level] = min(time.monotonic(), began_s + 0.04 * (self.number - first - self.stored))
             parts = [u for u in units_of(self.picture()) if self.in_band or u[0] & 0x1F not in (7, 8)]
             for index, part in enumerate(parts):
                 last = 0x80 if index == len(parts) - 1 else 0
@@ -165,6 +169,15 @@ def test_it_is_read_soon_after_it_is_opened():
     with watching(most=30) as (camera, source):  # a key picture is the 20th
         taken(source, 1)
         assert camera.clients == 1
+
+
+def test_pictures_that_the_camera_had_stored_are_decoded_but_not_shown():
+    """A second of them at once, and each was dated by its arrival."""
+    with watching(stored=25) as (camera, source):
+        packets = taken(source, 5)
+        late_s = [packet.settled_ns / 1e9 - camera.exposed_s[round(packet.picture.grey().mean())] for packet in packets]
+        assert max(late_s) < 0.15
+        assert source.rejected["held_back"] > 2
 
 
 def test_it_comes_back_when_the_camera_hangs_up():

@@ -116,12 +116,14 @@ def _units(packet: "av.Packet[Any]", prepared: Callable[[bytes, bool], bytes], s
     if packet.size == 0:
         return []
     arrival_ns = clock.now_ns()
-    settled_ns = arrival_ns
+    settled_ns, held_back = arrival_ns, False
     # With B-frames, times of display (pts) go back and forth: the filter needs those in the order of sending (dts).
     if packet.dts is not None and packet.time_base is not None:
         (settled_ns,) = settled.settle([round(packet.dts * packet.time_base * NS_PER_S)], arrival_ns)
+        held_back = settled.opening
     data = prepared(bytes(packet), packet.is_keyframe)
-    return [Unit(data, arrival_ns, settled_ns, starts=packet.is_keyframe, follows=not packet.is_corrupt)]
+    follows = not packet.is_corrupt
+    return [Unit(data, arrival_ns, settled_ns, packet.is_keyframe, follows, held_back=held_back)]
 
 
 def rtsp(url: str, name: str) -> ContainerReader:

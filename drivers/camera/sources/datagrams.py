@@ -8,6 +8,7 @@ from collections import Counter
 from drivers.camera.sources.cut_pictures import Assembly
 from drivers.camera.sources.frames import Unit
 from drivers.camera.sources.h264 import H264Decoder
+from drivers.camera.sources.held_back import Cadence
 from drivers.camera.sources.reader_thread import Drain, PictureDecoder
 from groundstation.adapters import bind_to_adapter
 from groundstation.bus import clock
@@ -42,6 +43,7 @@ class DatagramReader:
         with own as udp:
             drain.opened()
             assembly, heard_s = Assembly(self._whole_bytes), time.monotonic()
+            cadence = Cadence()
             while not drain.closing:
                 try:
                     done = assembly.feed(udp.recv(_LARGEST))
@@ -50,7 +52,12 @@ class DatagramReader:
                     continue
                 heard_s = time.monotonic()
                 now_ns = clock.now_ns()
-                drain.keep([Unit(unit.data, now_ns, now_ns, unit.starts) for unit in done])
+                drain.keep(
+                    [
+                        Unit(unit.data, now_ns, now_ns, unit.starts, held_back=cadence.holds_back(now_ns))
+                        for unit in done
+                    ]
+                )
                 self.rejected["bytes"] += assembly.skipped
                 assembly.skipped = 0
 

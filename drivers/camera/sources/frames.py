@@ -48,7 +48,7 @@ class Unit:
 
     settled_ns: arrival with the link's usual delay, if the stream carries times of its own; else the arrival. starts: a
     decoder can begin here; follows: nothing is missing since its predecessor; picture: if the reader has already
-    decoded it.
+    decoded it; held_back: it may be old, of an unknown time, and is decoded for the pictures after it only.
     """
 
     data: bytes
@@ -57,6 +57,7 @@ class Unit:
     starts: bool = True
     follows: bool = True
     picture: Picture | None = None
+    held_back: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,6 +26,10 @@ _AT_ONCE = 0.25
 # Offsets that wander by more between the halves of the window, and by more than jitter explains, do not rest.
 _REST_NS = 8 * NS_PER_MS
 _FEWEST_OF_HALF = 6
+# Stamps that anybody may have written are believed while half of the offsets lie within this.
+_STEADY_NS = 50 * NS_PER_MS
+# A stream may begin with what its sender has stored, faster than by its stamps; for how long it can be recognised.
+_STORED, _OPENING_NS = 0.5, 3 * NS_PER_S
 # By so much earlier than usual frames come by jitter. After a jump of the stamps alone so many running prove that the
 # sender's clock was put forward; links change by as much for seconds at a time, but their stamps do not jump.
 _AHEAD_NS, _AHEAD_FRAMES = 30 * NS_PER_MS, 3
@@ -35,7 +39,10 @@ _GAPS = 31
 
 
 class SenderClock:
-    """Learns the usual delay of one stream."""
+    """Learns the usual delay of one stream.
+
+    `opening`: all frames so far may have been stored by the sender, and their times are unknown.
+    """
 
     def __init__(self) -> None:
         self._offsets: deque[int] = deque(maxlen=_FRAMES)
@@ -43,6 +50,17 @@ class SenderClock:
         self._ahead = _Ahead()
         self._last_sent_ns: int | None = None
         self._last_arrival_ns = 0
+        self._first_arrival_ns: int | None = None
+        self.opening = True
+
+    @property
+    def proven(self) -> bool:
+        """Return whether the stamps have risen as time does for a while."""
+        offsets = list(self._offsets)
+        if len(offsets) < 2 * _FEWEST_OF_HALF or not _rests(offsets):
+            return False
+        lower, _, upper = quantiles(offsets)
+        return upper - lower <= _STEADY_NS
 
     def settle(self, sent_ns: Sequence[int], arrival_ns: int) -> list[int]:
         """Return when frames that arrived together would have arrived with the usual delay, by their sender's stamps.
@@ -52,6 +70,7 @@ class SenderClock:
         """
         newest = sent_ns[-1]
         offset = arrival_ns - newest
+        self._open(newest, arrival_ns)
         if self._last_sent_ns is not None and self._offsets:
             apart_ns = newest - self._last_sent_ns, arrival_ns - self._last_arrival_ns
             self._ahead.take(self._usual_ns - offset, *apart_ns, len(sent_ns))
@@ -66,6 +85,17 @@ class SenderClock:
             return [arrival_ns] * len(sent_ns)
         usual_ns = offset if self._ahead.suspected else self._usual_ns
         return [sent + usual_ns for sent in sent_ns]
+
+    def _open(self, newest: int, arrival_ns: int) -> None:
+        """Drop the offsets of frames that the sender had stored when the stream began."""
+        if not self.opening:
+            return
+        if self._first_arrival_ns is None or self._last_sent_ns is None:
+            self._first_arrival_ns = arrival_ns
+        else:
+            stored = arrival_ns - self._last_arrival_ns < _STORED * (newest - self._last_sent_ns)
+            self.opening = stored and arrival_ns - self._first_arrival_ns < _OPENING_NS
+            self._offsets.clear()
 
     def _forget(self, newest: int, arrival_ns: int) -> None:
         """Drop the offsets that the newest frame disproves."""

@@ -3,6 +3,7 @@
 import socket
 from base64 import b64encode
 from collections import Counter
+from collections.abc import Sequence
 from secrets import token_hex
 
 from drivers.camera.digest import Challenge, authorization, challenge_of
@@ -16,13 +17,18 @@ from drivers.camera.http_answer import (
 )
 from drivers.camera.multipart import MultipartParser
 from drivers.camera.sources.frames import Unit
+from drivers.camera.sources.held_back import Cadence
+from drivers.camera.sources.jitter_filter import SenderClock
 from drivers.camera.sources.reader_thread import Drain, PictureDecoder
 from drivers.camera.sources.tcp import Line
 from groundstation.bus import clock
 from groundstation.errors import DriverError
+from groundstation.time_units import NS_PER_MS
 
 _READ_BYTES = 1 << 16
 _MAX_HEAD_BYTES = 8192
+# A stamp that has a picture wait by so much explains why it came out of turn.
+_WAITED_NS = 50 * NS_PER_MS
 
 
 class MjpegReader:
@@ -61,11 +67,12 @@ class MjpegReader:
             _require_success(head)
             body = _Body(connection, ChunkedBody() if is_chunked(head) else None, rest)
             parser = MultipartParser(body.boundary(boundary_from_head(head)))
-            data = body.begun
+            dates, data = _Dates(), body.begun
             drain.opened()
             while not drain.closing:
                 arrival_ns = clock.now_ns()
-                drain.keep([Unit(jpeg, arrival_ns, arrival_ns) for jpeg in parser.feed(data)])
+                jpegs = parser.feed(data)
+                drain.keep(dates.units(jpegs, parser.stamps_ns, arrival_ns))
                 self.rejected["multipart"] += parser.rejected
                 parser.rejected = 0
                 data = body.read()
@@ -82,6 +89,26 @@ class MjpegReader:
         if secret:
             request += f"Authorization: {secret}\r\n"
         return f"{request}\r\n".encode("ascii", "replace")
+
+
+class _Dates:
+    """Dates the pictures of one connection: by the sender's stamps once they prove true, else by their arrival."""
+
+    def __init__(self) -> None:
+        self._clock, self._cadence = SenderClock(), Cadence()
+
+    def units(self, jpegs: Sequence[bytes], stamps_ns: Sequence[int | None], arrival_ns: int) -> list[Unit]:
+        """Return pictures that arrived together, oldest first."""
+        when_ns = [arrival_ns] * len(jpegs)
+        sent_ns = [stamp for stamp in stamps_ns if stamp is not None]
+        if jpegs and len(sent_ns) == len(jpegs):
+            settled_ns = self._clock.settle(sent_ns, arrival_ns)
+            when_ns = settled_ns if self._clock.proven else when_ns
+        return [self._unit(jpeg, arrival_ns, when) for jpeg, when in zip(jpegs, when_ns, strict=True)]
+
+    def _unit(self, jpeg: bytes, arrival_ns: int, when_ns: int) -> Unit:
+        may_be_old = self._cadence.holds_back(arrival_ns)
+        return Unit(jpeg, arrival_ns, when_ns, held_back=may_be_old and arrival_ns - when_ns < _WAITED_NS)
 
 
 class _Body:

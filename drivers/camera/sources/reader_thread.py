@@ -98,7 +98,13 @@ class Drain:
             return
         with self._condition:
             self._received += len(units)
+            held_back = sum(unit.held_back for unit in units)
+            if held_back:
+                self.rejected["held_back"] += held_back
             if not self._is_video:
+                units = [unit for unit in units if not unit.held_back]
+                if not units:
+                    return
                 self._units.clear()
             self._units.extend(units)
             self._condition.notify()
@@ -126,6 +132,8 @@ class Drain:
         if found is None:
             return None
         unit, picture = found
+        if unit.held_back:
+            return None
         return Packet(b"", unit.arrival_ns, unit.settled_ns, number, picture)
 
     def take_video(self) -> list[Unit]:

@@ -93,6 +93,30 @@ def send(udp: socket.socket, unit: bytes) -> None:
         udp.sendto(datagram, ("127.0.0.70", VIDEO_PORT))
 
 
+def test_pictures_that_the_link_held_back_are_not_shown(units: list[bytes]) -> None:
+    """After 0.5 s without any, those of that time come at once."""
+    with closing(open_source("tello://127.0.0.73")) as source, ExitStack() as stack:
+        udp = stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
+        udp.bind(("127.0.0.73", 0))
+        while not source.connected:
+            send(udp, units[0])
+            time.sleep(0.05)
+        for _ in range(12):
+            send(udp, units[0])
+            time.sleep(0.05)
+        source.take_newest(0.2)
+        time.sleep(0.5)
+        for _ in range(10):
+            send(udp, units[0])
+            assert source.take_newest(0.004) is None
+        seen = 0
+        for _ in range(5):
+            time.sleep(0.05)
+            send(udp, units[0])
+            seen += source.take_newest(0.2) is not None
+        assert seen >= 3 and 7 <= source.rejected["held_back"] <= 11
+
+
 def test_two_vehicles_that_send_to_one_port_are_kept_apart(units: list[bytes]) -> None:
     pictures = (units[0], GreyStream(SIZE, 15.0, 2e6).encode(picture(180), want_idr=True)[0])
     addresses = ("127.0.0.71", "127.0.0.72")

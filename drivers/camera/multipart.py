@@ -1,7 +1,8 @@
 """Extracts JPEG frames from a multipart/x-mixed-replace byte stream; pure, bounded, never trusting the sender.
 
 WIRE: RFC 2046 section 5.1 as IP cameras implement it: boundaries with and without leading dashes, parts with and
-without Content-Length, lines that end in LF alone, any number of blank lines between parts and before pictures.
+without Content-Length or with a wrong one, lines that end in LF alone, any number of blank lines between parts and
+before pictures.
 """
 
 import re
@@ -12,6 +13,9 @@ from groundstation.time_units import NS_PER_S
 
 MAX_FRAME_BYTES = 8 << 20
 _MAX_HEAD_BYTES = 4096
+_MAX_BLANK_BYTES = 256
+# A part that is not whole yet is searched for a boundary at this size, and whenever it has doubled.
+_FIRST_LOOK_BYTES = 1 << 14
 _LENGTH = re.compile(rb"^content-length:[ \t]*(\d{1,9})[ \t]*$", re.IGNORECASE | re.MULTILINE)
 # WIRE: seconds of the camera's clock, as MJPG-streamer and the ESP32's examples send them.
 _STAMP = re.compile(rb"^x-timestamp:[ \t]*(\d{1,10})(?:\.(\d{1,9}))?[ \t]*$", re.IGNORECASE | re.MULTILINE)
@@ -31,6 +35,9 @@ class MultipartParser:
         self._buffer = bytearray()
         self._needed = 0
         self._stamp_ns: int | None = None
+        # Whether a length was wrong; whether pictures end without a JPEG's end mark although their length is right.
+        self._doubted = self._bare = False
+        self._end_within = re.compile(re.escape(_JPEG_END) + rb"[\r\n]*" + re.escape(self._mark))
         self.rejected = 0
         self.stamps_ns: list[int | None] = []
 
@@ -54,6 +61,7 @@ class MultipartParser:
             return False
         found = boundary_from_body(begun)
         self._mark = b"--" + found if found else self._mark
+        self._end_within = re.compile(re.escape(_JPEG_END) + rb"[\r\n]*" + re.escape(self._mark))
         self._begun = True
         return True
 
@@ -77,22 +85,36 @@ class MultipartParser:
     def _take_body(self, head_start: int, head: re.Match[bytes], frames: list[bytes]) -> bool:
         lines = bytes(self._buffer[head_start : head.start()]).replace(b"\r\n", b"\n")
         self._stamp_ns = _stamp_ns(lines)
-        length = _LENGTH.search(lines)
-        body = head.end()
-        if length is None:
-            end = self._buffer.find(self._mark, body)
-            if end < 0:
-                self._take_ended(body, frames)
-                return False
-            self._emit(bytes(self._buffer[body:end]).rstrip(b"\r\n-"), end, frames)
-            return True
-        end = body + int(length[1])
-        if end - body > MAX_FRAME_BYTES:
-            self._reject(head_start)
-            return True
-        if len(self._buffer) < end:
-            self._needed = end
+        length, body = _LENGTH.search(lines), head.end()
+        if length is not None and (taken := self._take_sized(body, body + int(length[1]), frames)) is not None:
+            return taken
+        end = self._buffer.find(self._mark, body)
+        if end < 0:
+            self._take_ended(body, frames)
             return False
+        self._emit(bytes(self._buffer[body:end]).rstrip(b"\r\n-"), end, frames)
+        return True
+
+    def _take_sized(self, body: int, end: int, frames: list[bytes]) -> bool | None:
+        """Take a part by its stated length; None if that is wrong, or that of another part was."""
+        has_come = len(self._buffer) >= end
+        if has_come and (self._bare or _ends_as_jpeg(self._buffer[body:end])):
+            self._emit(bytes(self._buffer[body:end]), end, frames)
+            return True
+        if self._doubted or end - body > MAX_FRAME_BYTES:
+            self._doubted = True
+            return None
+        if not has_come:
+            self._doubted = self._end_within.search(self._buffer, body) is not None
+            self._needed = 0 if self._doubted else min(end, max(2 * len(self._buffer), _FIRST_LOOK_BYTES))
+            return None if self._doubted else False
+        behind = bytes(self._buffer[end : end + _MAX_BLANK_BYTES]).lstrip(b"\r\n")
+        if len(behind) < len(self._mark) and self._mark.startswith(behind):
+            return False
+        if not behind.startswith(self._mark):
+            self._doubted = True
+            return None
+        self._bare = self._buffer.startswith(_JPEG_START, body)
         self._emit(bytes(self._buffer[body:end]), end, frames)
         return True
 
@@ -102,7 +124,7 @@ class MultipartParser:
             self._emit(data.rstrip(b"\r\n"), len(self._buffer), frames)
 
     def _emit(self, body: bytes, end: int, frames: list[bytes]) -> None:
-        body = body.lstrip(b"\r\n")  # if the length does not count them, only the picture's end mark is missing
+        body = body.lstrip(b"\r\n")
         if body.startswith(_JPEG_START):
             frames.append(body)
             self.stamps_ns.append(self._stamp_ns)
@@ -114,6 +136,10 @@ class MultipartParser:
         self.rejected += 1
         self._needed = 0
         del self._buffer[:upto]
+
+
+def _ends_as_jpeg(body: bytearray) -> bool:
+    return body.rstrip(b"\r\n").endswith(_JPEG_END)
 
 
 def _stamp_ns(lines: bytes) -> int | None:

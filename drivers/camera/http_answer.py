@@ -13,6 +13,7 @@ _CHUNKED = re.compile(rb"^transfer-encoding:[^\r\n]*\bchunked\b", re.IGNORECASE 
 _BOUNDARY = re.compile(rb"multipart/[a-z-]+[^\r\n]*boundary=\"?([^\r\n\";]+)", re.IGNORECASE)
 # A line of dashes counts only before a part's head: anything may begin so.
 _FIRST_LINES = re.compile(rb"[\r\n]*--([ -~]{1,70})\r?\n[A-Za-z-]+:")
+_LOCATION = re.compile(rb"^location:[ \t]*([!-~]{1,200})", re.IGNORECASE | re.MULTILINE)
 _SIZE = re.compile(rb"[ \t]*([0-9a-fA-F]{1,8})[ \t]*(;.*)?")
 _MAX_LINE_BYTES = 256
 
@@ -21,6 +22,12 @@ def split_answer(data: bytes) -> tuple[bytes, bytes] | None:
     """Return the head and the bytes behind it, or None while the head has not ended."""
     end = HEAD_END.search(data)
     return None if end is None else (data[: end.start()], data[end.end() :])
+
+
+def location_of(head: bytes) -> str:
+    """Return the address to which an answer refers, or ""."""
+    match = _LOCATION.search(head)
+    return match[1].decode("ascii") if match else ""
 
 
 def is_chunked(head: bytes) -> bool:

@@ -12,6 +12,7 @@ from drivers.camera.http_answer import (
     boundary_from_body,
     boundary_from_head,
     is_chunked,
+    location_of,
     may_begin_with_boundary,
     split_answer,
 )
@@ -158,4 +159,6 @@ def _status(head: bytes) -> list[bytes]:
 def _require_success(head: bytes) -> None:
     status = _status(head)
     if len(status) < 2 or not status[0].startswith(b"HTTP/") or status[1] != b"200":
-        raise DriverError(f"the camera answered {b' '.join(status[:3]).decode('ascii', 'replace')!r}")
+        answer = f"the camera answered {b' '.join(status[:3]).decode('ascii', 'replace')!r}"
+        moved_to = location_of(head) if status[1:2] and status[1].startswith(b"3") else ""
+        raise DriverError(f"{answer}: give {moved_to} as its address" if moved_to else answer)

@@ -149,6 +149,8 @@ def _serve_once(answer):
     [
         (b"HTTP/1.0 404 Not Found\r\n\r\n", "404"),
         (b"HTTP/1.0 200 OK\r\nContent-Type: text/html\r\n\r\n<html>", "no multipart"),
+        (b"HTTP/1.1 302 Found\r\nLocation: http://127.0.0.1:81/stream\r\n\r\n", "give http://127.0.0.1:81/stream as"),
+        (b"HTTP/1.1 302 Found\r\n\r\n", "'HTTP/1.1 302 Found'"),
         (b"SSH-2.0-OpenSSH\r\n\r\n", "answered"),
         (b"", "no HTTP answer"),
         (b"HTTP/1.0 200 OK\r\nX: " + b"y" * 20000, "no HTTP answer"),

@@ -18,6 +18,7 @@ from drivers.camera.sighting import Sighting
 from drivers.camera.sources.frames import GREY_AS_EXPOSED, FrameSource, Packet, Unit
 from drivers.camera.sources.opening import open_source
 from drivers.camera.unchanged import SteadyMarkers, UnchangedPictures
+from drivers.camera.why_silent import why_silent
 from drivers.stream_health import StreamHealth, StreamNames
 from drivers.thinning import Grid
 from groundstation.arrays import Image
@@ -80,6 +81,7 @@ class CameraDriver:
         names = StreamNames("camera", settings.name, "picture", address, remedy, size)
         self._health = StreamHealth(child, names, settings.start_within_s, settings.stall_after_s)
         self.counts: Counter[str] = Counter()
+        self._refused_then: Counter[str] = Counter()
 
     def tell_counts(self) -> None:
         """Log the counts of all pictures and boards."""
@@ -94,8 +96,9 @@ class CameraDriver:
         if packet is not None:
             self._handle(packet)
         self._health.skipped = self._skipped
-        why = "connected, but nothing comes" if self._source.connected else self._source.detail
-        self._health.end_turn(why, self._hanging(), self.counts + self._source.rejected.copy(), self._quality)
+        refused = self.counts + self._source.rejected.copy()
+        why = why_silent(refused - self._refused_then) if self._source.connected else self._source.detail
+        self._health.end_turn(why, self._hanging(), refused, self._quality)
 
     @property
     def _skipped(self) -> int:
@@ -107,6 +110,7 @@ class CameraDriver:
         if picture is None:
             return
         self._health.flows(packet.arrival_ns)
+        self._refused_then = self.counts + self._source.rejected.copy()
         self._health.used(exposure_ns)
         self._newest = picture
         self._publish_image(packet, exposure_ns)

@@ -1,5 +1,6 @@
 """Pictures of any source, one after the other, for tools that process them at once."""
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -10,6 +11,7 @@ from drivers.camera.source_address import SourceKind, parse_source
 from drivers.camera.sources.files import FileReader
 from drivers.camera.sources.frames import GREY_AS_EXPOSED, FrameSource, Packet
 from drivers.camera.sources.opening import open_source
+from drivers.camera.why_silent import why_silent
 from groundstation.arrays import Image
 from groundstation.bus import clock
 from groundstation.errors import DriverError, without_password
@@ -70,20 +72,21 @@ def _stored(path: str) -> Iterator[SourcePicture]:
 
 def _live(source: FrameSource, name: str, patience_s: float) -> Iterator[SourcePicture]:
     began_ns = last_ns = clock.now_ns()
-    broken = 0
+    broken, refused_then = 0, source.rejected.copy()
     while True:
         packet = source.take_newest(_POLL_S)
         grey = _grey(packet) if packet is not None else None
         now_ns = clock.now_ns()
         if packet is not None and grey is not None:
-            last_ns, broken = now_ns, 0
+            last_ns, broken, refused_then = now_ns, 0, source.rejected.copy()
             age_ms = (now_ns - packet.arrival_ns) / NS_PER_MS
             yield SourcePicture(f"{packet.number:05d}", grey, (packet.arrival_ns - began_ns) / NS_PER_S, age_ms)
             last_ns = clock.now_ns()
             continue
         broken += packet is not None
         if (now_ns - last_ns) / NS_PER_S > patience_s:
-            why = f"{broken} came that cannot be decoded" if broken else source.detail or "connected, but nothing comes"
+            refused = source.rejected.copy() - refused_then + Counter(jpeg=broken)
+            why = why_silent(refused) if refused or source.connected else source.detail
             raise DriverError(f"{name}: no picture for {patience_s:g} s ({why})")
 
 

@@ -1,12 +1,18 @@
 """Checks of a camera stream before its pictures: silence, refusals, sizes in the header."""
 
+from collections import Counter
+
 import cv2
 import numpy as np
 import pytest
+from fake_camera import FakeChild, FakeSource, settings
 
+from drivers.camera import driver
 from drivers.camera.source_address import SourceAddress, SourceKind, parse_source
 from drivers.stream_watch import StreamState, StreamWatch
+from groundstation.bus import clock
 from groundstation.bus.jpeg import whole_size
+from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 
 
 def test_stream_watch():
@@ -71,3 +77,38 @@ def test_any_bytes_have_a_size_or_none():
 )
 def test_sources_are_taken_apart(text, address):
     assert parse_source(text) == address
+
+
+@pytest.mark.parametrize(
+    ("refused", "why"),
+    [
+        ({}, "connected, but nothing comes"),
+        ({"bytes": 900, "second publisher": 5}, "connected, but nothing comes"),
+        ({"multipart": 20, "unreadable": 7}, "27 came that cannot be decoded"),
+        ({"after_lost_picture": 1, "before_key_picture": 24, "h264": 2}, "25 came, but no key picture"),
+        ({"held_back": 9}, "9 came that the link had held back"),
+    ],
+)
+def test_a_camera_whose_pictures_are_refused_is_not_said_to_send_none(refused, why):
+    """It was: "connected, but nothing comes"."""
+    child, source = FakeChild(MemoryBus(MemoryExchange(), "lab", "drone_1_camera")), FakeSource()
+    source.rejected = Counter(jpeg=4, bytes=1)
+    jpeg = cv2.imencode(".jpg", np.zeros((360, 640), np.uint8))[1].tobytes()
+    camera = driver.CameraDriver(child, settings(), source)
+    source.push(jpeg)
+    camera.turn()
+    source.rejected += Counter(refused)
+    end_ns = clock.now_ns() + 100_000_000
+    while clock.now_ns() < end_ns:
+        camera.turn()
+    assert child.states[-1][0] == "DEGRADED" and f"0.05 s ({why}" in child.states[-1][1]
+
+
+def test_damaged_pictures_are_counted_as_such():
+    child, source = FakeChild(MemoryBus(MemoryExchange(), "lab", "drone_1_camera")), FakeSource()
+    camera = driver.CameraDriver(child, settings(), source)
+    end_ns = clock.now_ns() + 100_000_000
+    while clock.now_ns() < end_ns:
+        source.push(b"\xff\xd8 torn")
+        camera.turn()
+    assert "came that cannot be decoded" in child.states[-1][1]

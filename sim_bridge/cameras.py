@@ -16,7 +16,7 @@ from groundstation.geometry.pose import Pose
 from groundstation.geometry.tag import SquareTag
 from groundstation.process.priority import take_share
 from groundstation.vehicles import kind_named
-from sim_bridge.fault_kinds import FaultKind, exchanged
+from sim_bridge.fault_kinds import Fault, FaultKind, exchanged
 from sim_bridge.mounting import generator_of_eye, mounted, on_drone, true_lens
 from sim_bridge.own_video import OwnVideo
 from sim_bridge.render.spec import (
@@ -38,6 +38,8 @@ from sim_bridge.world.obstacles import all_obstacles, box_names
 Stream = tuple[str, int]
 _START_LIMIT_S = 45.0
 _STOP_LIMIT_S = 1.5
+# The readers' patience.
+_HUNG_UP_AFTER_S = 2.0
 
 
 def render_specs(
@@ -118,11 +120,10 @@ def _board(
 
 
 def _camera_scenario(scenario: Scenario, name: str) -> PictureQuality:
-    kinds = {FaultKind.CAMERA_CUT: OutageKind.CUT, FaultKind.CAMERA_STALL: OutageKind.STALL}
     outages = tuple(
-        Outage(kinds[fault.kind], fault.start_s, fault.end_s)
+        Outage(kind, fault.start_s, fault.end_s)
         for fault in scenario.faults
-        if fault.kind in kinds and fault.entity == name
+        if fault.entity == name and (kind := _outage_kind(fault)) is not None
     )
     own = (FaultKind.CAMERA_BUMPED, FaultKind.PICTURE_FROZEN, FaultKind.PICTURE_BLACK)
     faults = tuple(
@@ -132,6 +133,18 @@ def _camera_scenario(scenario: Scenario, name: str) -> PictureQuality:
     )
     figures = scenario.cameras.model_dump(exclude={"floor", "mounting_errors"})
     return PictureQuality(**figures, floor=FloorKind(scenario.cameras.floor), outages=outages, faults=faults)
+
+
+def _outage_kind(fault: Fault) -> OutageKind | None:
+    """Return how a fault breaks a stream, if it does."""
+    match fault.kind:
+        case FaultKind.CAMERA_CUT:
+            return OutageKind.CUT
+        case FaultKind.CAMERA_HELD_BACK if fault.end_s is not None and fault.end_s - fault.start_s < _HUNG_UP_AFTER_S:
+            return OutageKind.HELD_BACK
+        case FaultKind.CAMERA_STALL | FaultKind.CAMERA_HELD_BACK:
+            return OutageKind.STALL
+    return None
 
 
 def _render(spec: RenderSpec, modes: Connection | None, tally: MutableSequence[int]) -> None:

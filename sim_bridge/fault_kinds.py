@@ -18,6 +18,7 @@ class FaultKind(StrEnum):
     AT_DEAF = "at_deaf"
     CAMERA_CUT = "camera_cut"
     CAMERA_STALL = "camera_stall"
+    CAMERA_HELD_BACK = "camera_held_back"
     BATTERY_DROP = "battery_drop"
     PROPELLER_BLOCKED = "propeller_blocked"
     TELEMETRY_FROZEN = "telemetry_frozen"
@@ -85,6 +86,7 @@ RULES: dict[FaultKind, KindRules] = {
     FaultKind.AT_DEAF: KindRules(Part.VEHICLE),
     FaultKind.CAMERA_CUT: KindRules(Part.CAMERA),
     FaultKind.CAMERA_STALL: KindRules(Part.CAMERA),
+    FaultKind.CAMERA_HELD_BACK: KindRules(Part.CAMERA),
     FaultKind.BATTERY_DROP: KindRules(Part.VEHICLE, (0.0, 1.0)),
     FaultKind.PROPELLER_BLOCKED: KindRules(Part.ABLE_VEHICLE),
     FaultKind.TELEMETRY_FROZEN: KindRules(Part.VEHICLE),
@@ -124,7 +126,8 @@ class Fault(Section):
 
     kind: FaultKind
     """navdata_silent: a vehicle sends nothing; at_deaf: it receives nothing; camera_cut: a camera's connection is
-    closed and refused; camera_stall: it stays open, without pictures; battery_drop: the charge falls to value;
+    closed and refused; camera_stall: it stays open, without pictures; camera_held_back: they come together at the end,
+    if that is within 2 s: later the driver has hung up, as in a camera_stall; battery_drop: the charge falls to value;
     propeller_blocked: an AR.Drone's cut-out stops its motors, an emergency until it is free; telemetry_frozen: a
     vehicle's telemetry repeats its contents; telemetry_delayed: it is value old [s]; velocity_stuck,
     velocity_scaled, velocity_drifting, velocity_jumping: the reported horizontal velocity is value [m/s], value times

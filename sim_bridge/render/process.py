@@ -65,21 +65,30 @@ class FrameDelay:
         self._random = np.random.default_rng([spec.seed, 7, *spec.camera.encode()])
         self._last_ns = 0
 
-    def release_ns(self, exposure_ns: int) -> int | None:
-        """Return when a frame arrives, or None when it is lost."""
+    def release_ns(self, exposure_ns: int, held_until_ns: int = 0) -> int | None:
+        """Return when a frame arrives that the link holds back until a time, or None when it is lost."""
         lost = self._random.random() < self._scenario.frame_loss
         jitter_ms = self._random.uniform(-1.0, 1.0) * self._scenario.video_jitter_ms
         if lost and not self._repeats:
             return None
         delay_ms = max(0.0, self._scenario.video_delay_ms + jitter_ms) + lost * _REPEATED_AFTER_MS
-        self._last_ns = max(self._last_ns, exposure_ns + round(delay_ms * NS_PER_MS))
+        self._last_ns = max(self._last_ns, exposure_ns + round(delay_ms * NS_PER_MS), held_until_ns)
         return self._last_ns
 
 
 def active_outage(outages: tuple[Outage, ...], seconds: float) -> OutageKind | None:
-    """Return the stream's failure at a time since the first true state, if any; a cut goes before a stall."""
-    kinds = [o.kind for o in outages if o.start_s <= seconds and (o.end_s is None or seconds < o.end_s)]
-    return min(kinds, default=None)
+    """Return the stream's failure at a time since the first true state, if any; a cut goes first, a stall last."""
+    return min((one.kind for one in _active(outages, seconds)), default=None)
+
+
+def held_until_s(outages: tuple[Outage, ...], seconds: float) -> float:
+    """Return until when what is sent at a time is held back [s since the first true state]; 0: it is not."""
+    ends = (one.end_s for one in _active(outages, seconds) if one.kind is OutageKind.HELD_BACK)
+    return max((end for end in ends if end is not None), default=0.0)
+
+
+def _active(outages: tuple[Outage, ...], seconds: float) -> list[Outage]:
+    return [one for one in outages if one.start_s <= seconds and (one.end_s is None or seconds < one.end_s)]
 
 
 class _Exposures:
@@ -118,10 +127,17 @@ class _Exposures:
         self._first_ns = self._first_ns or exposure_ns
         self._last_ns = exposure_ns
         now_s = (exposure_ns - self._first_ns) / NS_PER_S
-        outage = active_outage(self._spec.scenario.outages, now_s)
+        outages = self._spec.scenario.outages
+        outage = active_outage(outages, now_s)
         self._output.set_accepting(outage is not OutageKind.CUT)
-        release_ns = self._link.release_ns(exposure_ns)
-        if release_ns is None or outage is not None or not self._output.clients or self._is_nowhere(states):
+        held_until_ns = self._first_ns + round(held_until_s(outages, now_s) * NS_PER_S)
+        release_ns = self._link.release_ns(exposure_ns, held_until_ns)
+        if (
+            release_ns is None
+            or outage in (OutageKind.CUT, OutageKind.STALL)
+            or not self._output.clients
+            or self._is_nowhere(states)
+        ):
             return
         self._output.show(states, exposure_ns, release_ns, now_s)
         self._tally[1] += time.monotonic_ns() > release_ns

@@ -61,9 +61,11 @@ class FloorKind(StrEnum):
 
 
 class OutageKind(StrEnum):
-    """How a stream fails: `STALL` keeps the connection but sends nothing, `CUT` closes it and refuses new ones."""
+    """How a stream fails: `STALL` keeps the connection but sends nothing, `HELD_BACK` sends it all at the end, `CUT`
+    closes the connection and refuses new ones."""
 
     STALL = "stall"
+    HELD_BACK = "held_back"
     CUT = "cut"
 
 

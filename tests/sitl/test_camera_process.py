@@ -109,6 +109,14 @@ def test_a_stalled_stream_stays_connected():
         assert source.connected
 
 
+def test_pictures_that_a_link_holds_back_are_sent_and_withheld():
+    outages = (Outage(OutageKind.HELD_BACK, 4.0, 5.0),)
+    with rendering(outages=outages, fps=15.0) as (truth, source, _):
+        write_until(truth, lambda: source.rejected["held_back"] >= 6)
+        source.take_newest(0.0)
+        write_until(truth, lambda: source.take_newest(0.0) is not None)
+
+
 _PARENT = """
 import multiprocessing, sys, time
 sys.path[:0] = {path!r}

@@ -10,8 +10,10 @@ from sim_bridge.fault_kinds import Fault, FaultKind
 from sim_bridge.study.camera_model import Eye
 from sim_bridge.world.world import World
 
-# A black picture shows nobody, and its driver does not count it as searched.
-_NOTHING = frozenset({FaultKind.CAMERA_CUT, FaultKind.CAMERA_STALL, FaultKind.PICTURE_BLACK})
+# A black picture shows nobody, and its driver does not count it as searched; it withholds what was held back.
+_NOTHING = frozenset(
+    {FaultKind.CAMERA_CUT, FaultKind.CAMERA_STALL, FaultKind.CAMERA_HELD_BACK, FaultKind.PICTURE_BLACK}
+)
 # A vehicle's own video is compressed, so that no two pictures of a hanging camera are equal; at the wire its driver
 # knows it by markers that stand while it tilts, after some 0.8 s.
 _KNOWN_S = 1.5

@@ -200,7 +200,7 @@ def test_scenarios_are_judged_by_the_simulator_and_worded_here(tmp_path: Path) -
     path = tmp_path / "s.yaml"
     path.write_text(WRONG_SCENARIO.lstrip(), encoding="utf-8")
     kinds = [f"'{kind}'" for kind in FaultKind][:-1]
-    assert len(kinds) == 34
+    assert len(kinds) == 35
     with pytest.raises(SettingsError) as caught:
         load_scenario(path, ["cameras.blur_px=20", "seed"])
     assert [problem.removeprefix(f"{path}") for problem in caught.value.problems] == [

@@ -16,7 +16,7 @@ from sim_bridge.fault_kinds import Fault, FaultKind
 from sim_bridge.faults import FaultSchedule
 from sim_bridge.harness import Harness
 from sim_bridge.launch_spec import read_order
-from sim_bridge.render.spec import BodyShape, OutageKind
+from sim_bridge.render.spec import BodyShape
 from sim_bridge.scenario import Scenario
 from sim_bridge.tick_schedule import LATE_NS, Clockwork
 from sim_bridge.world.ardrone import Quadrotor
@@ -119,10 +119,10 @@ def test_a_missing_file_is_named(tmp_path: Path) -> None:
 
 
 def test_render_specs_follow_field_and_scenario(tmp_path: Path) -> None:
-    content = order()
+    content, broken = order(), (("camera_stall", 4), ("camera_held_back", 4), ("camera_held_back", 5))
     content["scenario"] = {
         "cameras": {"frame_loss": 0.1},
-        "faults": [{"kind": "camera_stall", "entity": "ceiling", "start_s": 3, "end_s": 4}],
+        "faults": [{"kind": kind, "entity": "ceiling", "start_s": 3, "end_s": end_s} for kind, end_s in broken],
     }
     read = read_order(write(tmp_path, content))
     ceiling, onboard = render_specs(read.site, read.scenario, read.streams, "board", read.seed)
@@ -130,7 +130,7 @@ def test_render_specs_follow_field_and_scenario(tmp_path: Path) -> None:
     assert ceiling.mount.body == ""
     point = ceiling.mount.parent_from_optical.apply(np.array([1.0, 2.0, 4.2]))
     np.testing.assert_allclose(point, [1.5, -2.0, 0.0], atol=1e-12)
-    assert [outage.kind for outage in ceiling.scenario.outages] == [OutageKind.STALL]
+    assert [outage.kind.value for outage in ceiling.scenario.outages] == ["stall", "held_back", "stall"]
     assert ceiling.scenario.frame_loss == 0.1
     assert onboard.mount.body == "drone_1"
     assert onboard.scenario.outages == ()

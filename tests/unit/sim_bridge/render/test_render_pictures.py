@@ -14,7 +14,7 @@ from groundstation.geometry.lens import CameraIntrinsics
 from groundstation.geometry.pose import Pose
 from groundstation.geometry.rotations import base_from_tilted_optical
 from sim_bridge.fault_kinds import Fault, FaultKind
-from sim_bridge.render.process import FrameDelay, active_outage
+from sim_bridge.render.process import FrameDelay, active_outage, held_until_s
 from sim_bridge.render.renderer import Renderer
 from sim_bridge.render.scene import compose_scene
 from sim_bridge.render.spec import BoardSpec, BodyShape, Mount, Outage, OutageKind, PictureQuality, RenderSpec
@@ -148,6 +148,17 @@ def test_outages():
     assert active_outage(outages, 2.5) is OutageKind.STALL
     assert active_outage(outages, 3.5) is OutageKind.CUT
     assert active_outage(outages, 1e6) is OutageKind.CUT
+
+
+def test_pictures_that_are_held_back_come_together_at_the_end_in_their_order():
+    outages = (Outage(OutageKind.HELD_BACK, 2.0, 3.0),)
+    sure = replace(CLEAN, video_delay_ms=100.0, video_jitter_ms=0.0, frame_loss=0.0)
+    link = FrameDelay(make_spec("drone_1", sure))
+    releases = []
+    for exposed in (1.9, 2.1, 2.6, 2.95, 3.1):
+        held_until_ns = round(1e9 * held_until_s(outages, exposed))
+        releases.append(link.release_ns(round(exposed * 1e9), held_until_ns))
+    assert releases == [pytest.approx(when * 1e9, abs=1e3) for when in (2.0, 3.0, 3.0, 3.05, 3.2)]
 
 
 def broken(kind, **more):

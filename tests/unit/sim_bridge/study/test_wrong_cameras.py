@@ -47,7 +47,11 @@ class Eye:
 
 
 @pytest.mark.parametrize(
-    ("kind", "seen"), [("picture_frozen", [1, 1, 1, 4]), ("picture_black", [1, 4]), ("camera_stall", [1, 4])]
+    ("kind", "seen"),
+    [
+        ("picture_frozen", [1, 1, 1, 4]),
+        *((kind, [1, 4]) for kind in ("picture_black", "camera_stall", "camera_held_back")),
+    ],
 )
 def test_wrong_pictures_at_message_level(kind: str, seen: list[float]) -> None:
     eye: Any = Eye()

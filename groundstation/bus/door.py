@@ -1,10 +1,11 @@
-"""Finds why a guarded router refuses this member, by a TLS handshake of our own.
+"""Finds why a guarded router refuses this member, or that nobody answers, by a TLS handshake of our own.
 
 Zenoh reports every failure alike: it cannot open a session.
 """
 
 import socket
 import ssl
+from contextlib import suppress
 from pathlib import Path
 
 from groundstation.bus.roles import Identity
@@ -15,20 +16,25 @@ _PATIENCE_S = 1.0
 _OUT_OF_DATE, _ELSEWHERE = (9, 10), (62, 64)
 
 
-def why_closed(endpoint: str, identity: Identity) -> str:
+def why_closed(endpoint: str, identity: Identity, silent: str = "", admitted: str = "") -> str:
     """Return why the router at an endpoint and this member do not trust each other, with the remedy.
 
-    "": nobody is there, or the member is admitted.
+    "": nobody listens there. silent: returned if nothing there answers, so that nobody knows; admitted: if it is let
+    in.
     """
     host, _, port = endpoint.rpartition("/")[2].rpartition(":")
     try:
         context = _context(identity)
+    except OSError as error:  # which those of TLS are, too
+        why = getattr(error, "reason", "") or error.strerror
+        return f"the certificate of this host cannot be used ({why}): admit and join this host anew"
+    try:
         with socket.create_connection((host, int(port)), _PATIENCE_S) as raw:
-            return _knock(context, raw, host)
-    except ssl.SSLError as error:
-        return f"the certificate of this host cannot be used ({error.reason}): admit and join this host anew"
-    except OSError:
+            return _knock(context, raw, host) or admitted
+    except ConnectionRefusedError:
         return ""
+    except OSError:
+        return silent
 
 
 def _context(identity: Identity) -> ssl.SSLContext:
@@ -40,8 +46,10 @@ def _context(identity: Identity) -> ssl.SSLContext:
 
 def _knock(context: ssl.SSLContext, raw: socket.socket, host: str) -> str:
     try:
-        with context.wrap_socket(raw, server_hostname=host) as guarded:
-            guarded.recv(1)  # in TLS 1.3 a refusal follows the handshake; an admitted member gets nothing yet
+        guarded = context.wrap_socket(raw, server_hostname=host)
+        # In TLS 1.3 a refusal follows the handshake; an admitted member gets nothing yet.
+        with guarded, suppress(TimeoutError):
+            guarded.recv(1)
     except ssl.SSLCertVerificationError as error:
         return _mistrust(error, host)
     except ssl.SSLError as error:

@@ -42,7 +42,7 @@ def choose_run(name: str | None, stops: bool = False) -> RuntimeRecord:
         which = f" called {name}" if name else ""
         searched = ", ".join(map(str, (runtime_file.wanted_folder(), *runtime_file.folders_beside())))
         nobody = f"no ground station{which} is running (start one with: groundstation fly FIELD); searched: {searched}"
-        raise UnreachableError("\n".join(_closed_doors()) or nobody)
+        raise UnreachableError("\n".join(_why_not_found()) or nobody)
     if len(records) > 1:
         lines = "\n".join(f"  --run {r.name}  {r.field}, {', '.join(r.drones)}" for r in records)
         raise UnreachableError(f"several ground stations are running, choose one:\n{lines}")
@@ -74,12 +74,13 @@ def _elsewhere() -> list[RuntimeRecord]:
     return list(site.runs())
 
 
-def _closed_doors() -> list[str]:
+def _why_not_found() -> list[str]:
+    """Return what keeps this host from runs that may be flying on others."""
     if not admissions():
         return []
     from groundstation.supervisor import site
 
-    return list(site.closed_doors())
+    return list(site.why_not_found())
 
 
 def deliver(bus: ZenohBus, book: AwaitedAnswers, patience_s: float, on_news: Callable[[str], None]) -> None:
@@ -124,6 +125,9 @@ def order(verb: Verb, drones: tuple[str, ...], run: str | None, as_json: bool, a
         with suppress(OSError):  # the terminal is gone; the others are stopped all the same
             click.echo(f"{mistake}; the others are ordered to {verb}", err=True)
     code = _order(verb, known, record, as_json, anyway)
+    if verb.stops and record.simulated and run != record.name:  # real ones were looked for
+        with suppress(OSError):
+            click.echo("".join(f"{why}\n" for why in _why_not_found()), err=True, nl=False)
     return ExitCode.FAULT if strangers else code
 
 
@@ -205,7 +209,7 @@ def _verb(verb: Verb, text: str) -> click.Command:
     wrong, part = (
         ("no name is a drone's", ", or one name is no drone's") if verb.stops else ("a name is no drone's", "")
     )
-    codes = f"\n\nExit codes: 0 confirmed, 2 {wrong}, 3 nothing is running, 4 not confirmed{part}."
+    codes = f"\n\nExit codes: 0 confirmed, 2 {wrong}, 3 no run was reached, 4 not confirmed{part}."
     return click.command(name=name, help=text + example + codes)(callback)
 
 

@@ -27,6 +27,8 @@ from groundstation.supervisor.runtime_file import ProcessRecord, RuntimeRecord
 _HOSTS = "hosts.json"
 _SITE = re.compile(r"[a-z][a-z0-9_]{0,47}")
 _HOST = re.compile(r"[a-z][a-z0-9_]{0,15}")
+_SILENT = "no answer, and a run there may be flying: stop it there, or mend the link"
+_NO_OPERATOR = "a run there may be flying, but its operator is not heard: stop it there"
 _CONNECT_S, _LEASE_S, _STATUS_S = 1.0, 1.5, 0.5
 
 
@@ -178,12 +180,13 @@ def runs() -> Iterator[RuntimeRecord]:
             yield record
 
 
-def closed_doors() -> Iterator[str]:
-    """Yield why runs of the joined sites do not admit this host, with the remedy."""
+def why_not_found() -> Iterator[str]:
+    """Yield what keeps this host from runs that may be flying at the joined sites, where `runs` found none."""
     for path in admissions():
         admission = msgspec.json.decode(path.read_bytes(), type=Admission)
-        if why := why_closed(admission.endpoint, Identity(str(path.parent), certificate_name(admission.host), "")):
-            yield f"{admission.site} at {admission.endpoint}: {why}"
+        identity = Identity(str(path.parent), certificate_name(admission.host), "")
+        if why := why_closed(admission.endpoint, identity, _SILENT, _NO_OPERATOR):
+            yield f"{admission.site} at {admission.endpoint.rpartition('/')[2]}: {why}"
 
 
 def _found(admission: Admission, place: str) -> RuntimeRecord | None:

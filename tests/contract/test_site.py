@@ -1,6 +1,8 @@
 """A site over real TLS: admitted hosts give commands in its runs, others cannot, and none has further rights."""
 
+import os
 import shutil
+import socket
 import stat
 import threading
 import time
@@ -26,12 +28,14 @@ from groundstation.bus.messages import (
 )
 from groundstation.bus.roles import Identity, Member, Role
 from groundstation.bus.zenoh_bus import ZenohBus
+from groundstation.cli import stop
 from groundstation.cli.exits import UnreachableError
 from groundstation.cli.stop import choose_run
 from groundstation.errors import GroundStationError, OperatorMistake
 from groundstation.supervisor import authority, runtime_file, site
 from groundstation.supervisor.authority import make_identities
 from groundstation.supervisor.joining import join
+from groundstation.supervisor.runtime_file import ProcessRecord, RuntimeRecord
 
 MEMBERS = (
     Member("supervisor", Role.SUPERVISOR, ("supervisor",)),
@@ -74,7 +78,7 @@ class Run:
         self.operator, self.driver = (self._join(folder, here, member.name) for member in MEMBERS)
         self.commands = self.driver.subscribe([topics.COMMAND])
         self.setpoints = self.driver.subscribe([topics.SETPOINT])
-        self._over = threading.Event()
+        self._over, self.still = threading.Event(), threading.Event()
         self._speaking = threading.Thread(target=self._speak)
         self._speaking.start()
 
@@ -83,6 +87,8 @@ class Run:
 
     def _speak(self) -> None:
         while not self._over.wait(0.05):
+            if self.still.is_set():
+                continue
             lease = Lease(header=self.operator.header("team"), holder="operator", expires_ns=10**18, run="run-7")
             self.operator.publish(topics.LEASE, lease)
             header = self.driver.header("drone_1")
@@ -190,7 +196,43 @@ def identity_of(host: str) -> Identity:
 def test_admitted_hosts_and_absent_routers_give_no_reason_of_refusal(home: Path, run: Run, port: int) -> None:
     assert why_closed(run.elsewhere, identity_of("laptop")) == ""
     assert why_closed(f"tls/{ELSEWHERE}:1", identity_of("laptop")) == ""
-    assert list(site.closed_doors()) == []
+    assert why_closed(run.elsewhere, identity_of("laptop"), "silent", "let in") == "let in"
+    assert why_closed(f"tls/{ELSEWHERE}:1", identity_of("laptop"), "silent", "let in") == ""
+
+
+def test_a_run_whose_link_is_down_is_never_said_not_to_exist(home: Path) -> None:
+    with socket.create_server((ELSEWHERE, 0)) as mute:  # it takes connections, and says nothing, as a link that is cut
+        port = mute.getsockname()[1]
+        admit(home, "laptop", port)
+        assert why_closed(f"tls/{ELSEWHERE}:{port}", identity_of("laptop")) == ""
+        lost = f"^lab at {ELSEWHERE}:{port}: no answer, and a run there may be flying: stop it there, or mend the link$"
+        with pytest.raises(UnreachableError, match=lost):
+            choose_run(None, stops=True)
+    with pytest.raises(UnreachableError, match=r"^no ground station is running"):
+        choose_run(None, stops=True)
+
+
+def test_a_stop_that_met_only_a_rehearsal_says_whom_it_did_not_reach(
+    home: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    simulator = ProcessRecord("sim_bridge", "sim_bridge", os.getpid(), runtime_file.start_time(os.getpid()) or 0)
+    runtime_file.write(RuntimeRecord("demo", "", "tcp/127.0.0.1:9", "r", "", ("drone_1",), simulator, (simulator,)))
+    monkeypatch.setattr(stop, "_order", lambda *_: 0)
+    with socket.create_server((ELSEWHERE, 0)) as mute:
+        admit(home, "laptop", mute.getsockname()[1])
+        assert stop.order(Verb.LAND, (), None, as_json=True) == 0
+        assert "lab at" in capfd.readouterr().err
+        for verb, run in ((Verb.LAND, f"demo-{os.getpid()}"), (Verb.TAKEOFF, None)):
+            assert stop.order(verb, (), run, as_json=True) == 0
+            assert capfd.readouterr().err == "", "who names a run, or starts one, means that one"
+
+
+def test_a_run_whose_operator_is_not_heard_is_named(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(site, "_LEASE_S", 0.0)
+    monkeypatch.setattr(site, "_STATUS_S", 0.0)
+    run.still.set()
+    with pytest.raises(UnreachableError, match="may be flying, but its operator is not heard"):
+        choose_run(None, stops=True)
 
 
 def test_a_run_of_an_authority_made_anew_is_named_with_the_remedy(home: Path, port: int) -> None:
@@ -200,8 +242,8 @@ def test_a_run_of_an_authority_made_anew_is_named_with_the_remedy(home: Path, po
     run = Run(home / "keys", port)
     try:
         assert "admit and join this host again" in why_closed(run.elsewhere, identity_of("laptop"))
-        assert [reason.split(": ")[0] for reason in site.closed_doors()] == [f"lab at {run.elsewhere}"]
-        with pytest.raises(UnreachableError, match=r"^lab at tls/.*its authority was made anew"):
+        assert [reason.split(": ")[0] for reason in site.why_not_found()] == [f"lab at {run.elsewhere[4:]}"]
+        with pytest.raises(UnreachableError, match=r"^lab at 127.*its authority was made anew"):
             choose_run(None)
         # Conversely, a host that trusts any router is not admitted either.
         shutil.copy(home / "keys" / "authority.pem", site.folder("joined", "lab") / "authority.pem")

@@ -85,8 +85,17 @@ def with_zone(address: str, interface: str) -> str:
 
 
 def how_to_reach(address: str) -> str:
-    """Return a remedy for a vehicle that does not answer, given its address with or without an adapter."""
-    host, interface = split_zone(address)
+    """Return a remedy for a vehicle that does not answer.
+
+    address: with or without an adapter, or the target of a link: udpout:ADDRESS:PORT, udpin: likewise, which the
+    vehicle calls, or serial:DEVICE:BAUD.
+    """
+    way, place, number = address.split(":") if address.count(":") == 2 else ("", address, "")
+    if way == "udpin":
+        return f"check that it is switched on and calls port {number} of this computer, in its network"
+    if way == "serial":
+        return f"check that it is switched on, and the radios at both ends: this one at {place}, {number} baud"
+    host, interface = split_zone(place)
     ping = f"ping -I {interface} {host}" if interface else f"ping {host}"
     return f"check that it is switched on and that this computer is in its network: {ping}"
 

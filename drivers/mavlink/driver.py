@@ -101,6 +101,8 @@ class Fleet:
         elif isinstance(heard.frame.message, Heartbeat) and heard.frame.message.autopilot != NO_AUTOPILOT:
             self.strangers[heard.frame.system] += 1
             self.link.rejected["unknown_system"] += 1
+            for vehicle in self.vehicles.values():
+                vehicle.misfit.take_stranger(heard.stamp_ns, heard.frame.system)
             if self.strangers[heard.frame.system] == 1:
                 text = f"system {heard.frame.system} answers, which is not in the field file"
                 self._news.append((text, "see system_id in the field file"))

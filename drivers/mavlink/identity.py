@@ -13,7 +13,7 @@ def other_flavour(autopilot: int, flavour: Flavour) -> str:
         return ""
     words = {kind.value: text for kind, text in _WORDS.items()}
     found = words.get(autopilot, f"neither a PX4 nor an ArduPilot (autopilot {autopilot})")
-    remedy = ": change mavlink.flavour" if autopilot in words else ""
+    remedy = ": set mavlink.flavour" if autopilot in words else ""
     return f"it is {found}, the field says {flavour.name.lower()}{remedy}"
 
 
@@ -30,13 +30,15 @@ def serial_number_of(version: AutopilotVersion) -> str:
 class Misfit:
     """Why the frames of a vehicle that does not count as heard are of no use, by its heartbeats of the last seconds."""
 
-    def __init__(self, flavour: Flavour) -> None:
-        self._flavour = flavour
+    def __init__(self, flavour: Flavour, system: int) -> None:
+        self._flavour, self._system = flavour, system
         self._told: tuple[int, str] | None = None
+        self._stranger: tuple[int, int] | None = None
+        self._heard = False
 
     def take(self, now_ns: int, autopilot: int) -> str:
         """Take a heartbeat; return that it is another kind than the field file says, with the remedy, or ""."""
-        self._told = now_ns, other_flavour(autopilot, self._flavour)
+        self._told, self._heard = (now_ns, other_flavour(autopilot, self._flavour)), True
         return self._told[1]
 
     def take_old(self, now_ns: int) -> None:
@@ -44,6 +46,15 @@ class Misfit:
         if self._told is None or self._told[1] or now_ns - self._told[0] > HEARTBEAT_NS:
             self._told = now_ns, "it speaks MAVLink 1 only: set version 2 on it"
 
+    def take_stranger(self, now_ns: int, system: int) -> None:
+        """Take a heartbeat of an autopilot of this link whose system id the field file does not have."""
+        if not self._heard:  # one that was heard has the id of the field
+            self._stranger = now_ns, system
+
     def words(self, now_ns: int) -> str:
         """Return the reason, "" if there is none."""
-        return self._told[1] if self._told is not None and now_ns - self._told[0] < HEARTBEAT_NS else ""
+        if self._told is not None and now_ns - self._told[0] < HEARTBEAT_NS:
+            return self._told[1]
+        if self._stranger is None or self._heard or now_ns - self._stranger[0] >= HEARTBEAT_NS:
+            return ""
+        return f"system {self._stranger[1]} answers here, the field says {self._system}: set mavlink.system_id"

@@ -65,7 +65,7 @@ class MavlinkVehicle:
         self.orders = Orders(vehicle, self.flavour, self._requests)
         self._vision_period_ns = round(1e9 / settings.vision.rate_hz)
         self._next_vision_ns = 0
-        self.misfit = identity.Misfit(self.flavour)
+        self.misfit = identity.Misfit(self.flavour, self.system)
         self._traffic = Traffic()
         self._plausibility = MotionMonitor(LIMITS)
         self._refused: Counter[str] = Counter()

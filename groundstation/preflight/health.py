@@ -9,8 +9,8 @@ from groundstation.field.drones import camera_name
 from groundstation.field.resolved import ResolvedField
 from groundstation.monitor.alarms import DARK
 
-# Drivers append to a fault the command that mends it.
-_COMMAND = ": groundstation "
+# Drivers append to a fault the command, or the setting, that mends it.
+_COMMAND, _SETTING = ": groundstation ", ": set "
 _BATTERY_MARGIN, _BATTERY_SHOULD = 0.05, 0.4
 _TELEMETRY_HZ, _LINK_SHARE = 5.0, 0.9
 _PICTURES_HZ, _PICTURES_OLD_MS = 5.0, 700.0
@@ -27,7 +27,9 @@ def drone_findings(field: ResolvedField, statuses: Mapping[str, VehicleStatus]) 
         status = statuses.get(name)
         if status is None or status.flight_state in UNHEARD:
             why = status.detail if status is not None and status.detail else "nothing is heard of it"
-            yield Finding(Level.SHOULD, name, why, f"check its power, its network and {drone.address}")
+            found, _, setting = why.partition(_SETTING)
+            remedy = f"set {setting}" if setting else f"check its power, its network and {drone.address}"
+            yield Finding(Level.SHOULD, name, found, remedy)
             continue
         if status.flight_state is FlightState.EMERGENCY:
             yield Finding(Level.SHOULD, name, "its motors are cut off", "set it upright and start it again")

@@ -125,9 +125,21 @@ def test_wrong_flavour_is_refused_and_named(hangar, kind):
         assert flying.turn(3.0, lambda: flying.fleet.vehicles[9].health(0).rejected.get("wrong_flavour", 0) > 0)
         assert flying.turn(8.0, lambda: any("trying on" in text for text in flying.process.texts))
         assert flying.hosts[0].watchdog.mode == "CONNECTING"
-        why = "it is a PX4, the field says ardupilot: change mavlink.flavour"
+        why = "it is a PX4, the field says ardupilot: set mavlink.flavour"
         assert f"v9: {why}; trying on" in flying.process.texts
         assert any("heartbeats of another firmware than the field says" in text for text in flying.process.texts)
+        assert flying.messages(VEHICLE_STATUS)[-1].detail == why
+    finally:
+        flying.close()
+
+
+def test_a_vehicle_with_another_number_than_the_fields_is_named(hangar, kind):
+    _, _, (address, port) = hangar.add("px4", 1)
+    flying = Flying(f"udpout:{address}:{port}", {9: "px4"}, kind)
+    why = "system 1 answers here, the field says 9: set mavlink.system_id"
+    try:
+        assert flying.turn(8.0, lambda: any("trying on" in text for text in flying.process.texts))
+        assert f"v9: {why}; trying on" in flying.process.texts
         assert flying.messages(VEHICLE_STATUS)[-1].detail == why
     finally:
         flying.close()

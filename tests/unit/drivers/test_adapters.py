@@ -22,7 +22,15 @@ from drivers.mavlink.links.udp import UdpLink
 from drivers.mavlink.settings import LinkSettings
 from drivers.tello.driver import Tello
 from drivers.tello.settings import TelloDriverSettings
-from groundstation.adapters import bind_to_adapter, connected, drops_strangers, send_to_all, split_zone, with_zone
+from groundstation.adapters import (
+    bind_to_adapter,
+    connected,
+    drops_strangers,
+    how_to_reach,
+    send_to_all,
+    split_zone,
+    with_zone,
+)
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.errors import DriverError
 from groundstation.supervisor.failsafe_sender import FailsafeSender
@@ -145,6 +153,20 @@ def test_strict_filters_of_the_kernel_are_known(tmp_path: Path, everywhere: str,
         (tmp_path / name / "rp_filter").write_text(f"{value}\n")
     assert drops_strangers("wlan1", tmp_path) is drops
     assert not drops_strangers("wlan2", tmp_path) or everywhere == "1"
+
+
+@pytest.mark.parametrize(
+    ("address", "words"),
+    [
+        ("10.0.0.11", "this computer is in its network: ping 10.0.0.11"),
+        ("udpout:10.0.0.11:14550", "this computer is in its network: ping 10.0.0.11"),
+        ("udpout:10.0.0.11%wlan1:14550", "this computer is in its network: ping -I wlan1 10.0.0.11"),
+        ("udpin:0.0.0.0:14550", "calls port 14550 of this computer"),
+        ("serial:/dev/ttyUSB0:921600", "this one at /dev/ttyUSB0, 921600 baud"),
+    ],
+)
+def test_the_remedy_for_a_silent_vehicle_can_be_carried_out(address: str, words: str) -> None:
+    assert words in how_to_reach(address)
 
 
 def test_one_address_that_fails_does_not_silence_those_after_it() -> None:

@@ -52,6 +52,25 @@ def findings_of(field: ResolvedField, rate_hz: float, **told: Any) -> list[Findi
     return list(drone_findings(field, {"drone_1": status}))
 
 
+@pytest.mark.parametrize(
+    ("detail", "found", "remedy"),
+    [
+        ("system 1 answers here, the field says 11: set mavlink.system_id",
+         "system 1 answers here, the field says 11", "set mavlink.system_id"),
+        ("waiting for its heartbeat", "waiting for its heartbeat", "check its power, its network and 192.168.1.11"),
+    ],
+)  # fmt: skip
+def test_who_answers_wrongly_is_sent_to_the_setting_and_not_to_the_power(
+    lab_field: ResolvedField, detail: str, found: str, remedy: str
+) -> None:
+    status = VehicleStatus(
+        header=Header(0, "here", "drone_1", "drone_1", 1), flight_state=FlightState.UNKNOWN, mode="CONNECTING",
+        detail=detail,
+    )  # fmt: skip
+    one = next(iter(drone_findings(lab_field, {"drone_1": status})))
+    assert (one.found, one.remedy) == (found, remedy)
+
+
 def clock_findings(field: ResolvedField, drift_ppm: float | None, late_ms: float | None) -> list[Finding]:
     found = findings_of(field, 200.0, clock_drift_ppm=drift_ppm, telemetry_late_ms=late_ms)
     return [one for one in found if one.subject == "drone_1" and "battery" not in one.found]

@@ -63,13 +63,14 @@ class MavlinkSession:
 
     problems: parameters that forbid a take-off. detail: the awaited step, or "". notes: for the operator; drained by
     the driver. overrides: parameters set by the field file. pinned: the serial number of the only vehicle that may take
-    off, "" for any.
+    off, "" for any. called: whether we call it at its address, rather than it us.
     """
 
     def __init__(
         self, system: int, flavour: Flavour, rates: dict[type[Message], float], our_system: int, origin: GlobalOrigin,
-        overrides: Mapping[str, float] | None = None, pinned: str = "",
+        overrides: Mapping[str, float] | None = None, pinned: str = "", called: bool = False,
     ) -> None:  # fmt: skip
+        self._advice = "; if it calls this computer, it needs mavlink.listen: true" if called else ""
         self._pinned, self._serial_number = pinned.upper(), ""
         self._system, self._flavour, self._rates, self._origin = system, flavour, rates, origin
         self._needed = parameters.needed(flavour, our_system, overrides)
@@ -120,7 +121,7 @@ class MavlinkSession:
     def detail(self, requests: Requests) -> str:
         """Return the pending step, or ""."""
         if not self._connected:
-            return "waiting for its heartbeat"
+            return f"waiting for its heartbeat{self._advice}"
         if self._pinned and self._serial_number != self._pinned:
             number = self._serial_number or "not known"
             return f"it is another vehicle: its serial number is {number}, the field says {self._pinned}"
@@ -210,7 +211,7 @@ class MavlinkSession:
         if silence_ns > _DISCONNECTED_NS:
             self.start_over(requests)
             return messages
-        self._connected = True
+        self._connected, self._advice = True, ""
         kind = next((one for one in self._rates if self._key(one) not in requests.accepted), None)
         if (kind := kind or self._ended(now_ns)) is not None:
             # WIRE (SET_MESSAGE_INTERVAL): microseconds; -1 stops the stream.

@@ -4,10 +4,11 @@ import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from drivers.mavlink.greeting import first_heartbeat
+from drivers.mavlink.greeting import calls_us, first_heartbeat
 from drivers.mavlink.identity import other_flavour
 from drivers.mavlink.links.seam import MavlinkLink
 from drivers.mavlink.parameters import Needed, difference, needed
+from drivers.mavlink.settings import LinkSettings
 from drivers.mavlink.wire.errors import WireError
 from drivers.mavlink.wire.names import ARMED, AUTOPILOT_COMPONENT, Flavour
 from drivers.mavlink.wire.parameters import carried_from_value, value_from_carried
@@ -29,13 +30,13 @@ class ParameterDifference:
 
 
 class ParameterSetup:
-    """The parameters of one vehicle on an open link without another reader."""
+    """The parameters of one vehicle on an open link without another reader; settings: those of the link, if known."""
 
     def __init__(
         self, link: MavlinkLink, system: int, flavour: Flavour, our_system: int,
-        overrides: Mapping[str, float] | None = None,
+        overrides: Mapping[str, float] | None = None, settings: LinkSettings | None = None,
     ) -> None:  # fmt: skip
-        self._link, self._system, self._flavour = link, system, flavour
+        self._link, self._system, self._flavour, self._settings = link, system, flavour, settings
         self._needed = needed(flavour, our_system, overrides)
         # From its answer: the name, and the encoding.
         self._answers: dict[str, ParamValue] = {}
@@ -57,9 +58,18 @@ class ParameterSetup:
             return (
                 f"system {self._system} does not answer, system {there} does: set mavlink.system_id in the field file"
             )
+        if self._settings is not None and calls_us(self._settings, self._system):
+            return (
+                f"system {self._system} does not answer at {self._settings.target}, but calls this computer: "
+                "set mavlink.listen to true in the field file"
+            )
         heard = ", ".join(f"{reason} {n}" for reason, n in self._link.rejected.items())
         refused = f" (refused: {heard})" if heard else ""
-        return f"system {self._system} does not answer{refused}; `groundstation mavlink probe` tells who is on a link"
+        link = f" {self._settings.target}" if self._settings is not None else ""
+        return (
+            f"system {self._system} does not answer{refused}; `groundstation mavlink probe{link}` tells who is on "
+            "that link, and one that is heard at udpin:0.0.0.0:14550 only needs mavlink.listen: true"
+        )
 
     def differences(self) -> Iterator[ParameterDifference]:
         """Yield the differences from the needed values."""

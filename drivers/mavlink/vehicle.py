@@ -58,7 +58,7 @@ class MavlinkVehicle:
         rates = streams(self.flavour, vehicle.odometry_hz, vehicle.imu_hz)
         self._ours, known = (settings.link.system_id, settings.link.component_id), dict(vehicle.parameters)
         ids, pinned = (self.system, self.flavour, rates, self._ours[0]), vehicle.serial_number
-        self._session = MavlinkSession(*ids, settings.origin, known, pinned)
+        self._session = MavlinkSession(*ids, settings.origin, known, pinned, self.address.startswith("udpout"))
         self._given = GivenOrders(forwards=bool(vehicle.forward))
         pad, first_ns = (vehicle.pad_m, vehicle.pad_yaw_rad), FIRST_SIGHT_NS[self.flavour]
         self.vision = VisionFeed(vehicle.name, clock.clock_id(), settings.vision, *pad, first_ns)

@@ -95,7 +95,7 @@ def setup(field: Path, drone: str, check: bool, address: str | None) -> int:
     left = changed = 0
     try:
         work = ParameterSetup(opened, vehicle.system_id, Flavour[vehicle.flavour.upper()], link.system_id,
-                              vehicle.parameters)  # fmt: skip
+                              vehicle.parameters, link)  # fmt: skip
         work.connect()
         for found in work.differences():
             taken = not check and work.apply(found.wanted)

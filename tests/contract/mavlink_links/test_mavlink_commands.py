@@ -104,6 +104,18 @@ def test_setup_names_the_system_that_answers_in_place_of_the_wanted_one(hangar):
     assert "system 11 does not answer, system 1 does" in str(result.exception)
 
 
+def test_setup_tells_that_a_vehicle_calls_this_computer(hangar, port):
+    hangar.add("px4", 11, calls=("127.0.0.1", port))
+    result = run("setup", "--check", FIELD, "drone_2", "--address", f"127.0.0.1:{port}")
+    why = f"system 11 does not answer at udpout:127.0.0.1:{port}, but calls this computer: set mavlink.listen to true"
+    assert isinstance(result.exception, DriverError) and why in str(result.exception)
+
+
+def test_setup_tells_how_to_look_for_a_vehicle_that_is_nowhere(port):
+    error = str(run("setup", "--check", FIELD, "drone_2", "--address", f"127.0.0.1:{port}").exception)
+    assert f"`groundstation mavlink probe udpout:127.0.0.1:{port}`" in error and "mavlink.listen: true" in error
+
+
 def test_setup_refuses_another_autopilot_and_an_armed_one(hangar):
     emulator, _, (address, port) = hangar.add("px4", 12)
     result = run("setup", "--check", FIELD, "drone_3", "--address", f"{address}:{port}")

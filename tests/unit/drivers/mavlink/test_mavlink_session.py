@@ -39,6 +39,16 @@ def test_eight_heartbeats_go_out_in_the_time_after_which_an_ardupilot_lands_with
     assert lands_s == 2.0 and sent.count(OUR_HEARTBEAT) == 8
 
 
+def test_a_vehicle_that_was_never_heard_may_be_one_that_calls() -> None:
+    session, requests = MavlinkSession(1, Flavour.PX4, {}, 255, GlobalOrigin(), called=True), Requests(1)
+    assert session.detail(requests) == (
+        "waiting for its heartbeat; if it calls this computer, it needs mavlink.listen: true"
+    )
+    session.step(10_000 * MS, 0, requests)
+    session.start_over(requests)
+    assert session.detail(requests) == "waiting for its heartbeat", "it was reached"
+
+
 def test_unknown_parameters_do_not_hide_the_others() -> None:
     first = [n.name for n in needed(Flavour.ARDUPILOT, 255)][:5]
     assert read_all(set(first), 15.0).unread == first

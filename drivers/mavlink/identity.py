@@ -3,6 +3,7 @@
 from drivers.mavlink.latest_telemetry import HEARTBEAT_NS
 from drivers.mavlink.wire.names import Flavour
 from drivers.mavlink.wire.telemetry import AutopilotVersion
+from groundstation.time_units import NEVER_NS
 
 _WORDS = {Flavour.PX4: "a PX4", Flavour.ARDUPILOT: "an ArduPilot"}
 
@@ -25,6 +26,21 @@ def serial_number_of(version: AutopilotVersion) -> str:
     if any(version.uid2):
         return bytes(version.uid2).hex().upper()
     return f"{version.uid:016X}" if version.uid else ""
+
+
+class Namesakes:
+    """Whether other senders use a vehicle's system id now: nobody knows which of them would obey."""
+
+    def __init__(self, system: int) -> None:
+        self._system, self._count, self._counted_ns = system, 0, -NEVER_NS
+
+    def words(self, now_ns: int, doubled: int) -> str:
+        """Return the fault with its remedy, or ""; doubled: frames with the id from a second address so far."""
+        if doubled > self._count:
+            self._count, self._counted_ns = doubled, now_ns
+        if now_ns - self._counted_ns >= HEARTBEAT_NS:
+            return ""
+        return f"a second address sends with its system id {self._system}: set an id of its own on each vehicle"
 
 
 class Misfit:

@@ -65,7 +65,7 @@ class MavlinkVehicle:
         self.orders = Orders(vehicle, self.flavour, self._requests)
         self._vision_period_ns = round(1e9 / settings.vision.rate_hz)
         self._next_vision_ns = 0
-        self.misfit = identity.Misfit(self.flavour, self.system)
+        self.misfit, self._namesakes = identity.Misfit(self.flavour, self.system), identity.Namesakes(self.system)
         self._traffic = Traffic()
         self._plausibility = MotionMonitor(LIMITS)
         self._refused: Counter[str] = Counter()
@@ -190,7 +190,8 @@ class MavlinkVehicle:
         elif state is FlightState.LANDED and self.orders.starting:
             state = FlightState.TAKING_OFF if known.base_mode & ARMED else FlightState.LANDED
         velocity = self._true_velocity(now_ns, known) if self.orders.are_heeded(now_ns, known.custom_mode) else None
-        not_ready = self._readiness.why_not(now_ns, known)
+        doubled = self._namesakes.words(now_ns, self._link.rejected.doubled(self.system))
+        not_ready = doubled or self._readiness.why_not(now_ns, known)
         battery = known.batteries.charge(now_ns)
         lost_s, mute = self.vision.lost_s(now_ns), "" if fresh else self._mute(now_ns, known)
         return VehicleView(
@@ -296,12 +297,12 @@ class MavlinkVehicle:
         return [convert.vision_from_pose(pose, attitude, self.vision.resets)]
 
     def health(self, now_ns: int) -> LinkHealth:
-        """Return rates, losses and refusals; refusals are of the whole link."""
+        """Return rates, losses and refusals; of the whole link, but for frames of others."""
         rate_hz, quality = self._traffic.rates(now_ns)
         lost_s, limit_s = self.vision.lost_s(now_ns), self._settings.vision.hover_after_s
         lost = f"no position {self.vision.missed} for {lost_s:.1f} s" if lost_s >= limit_s else ""
         detail = self.misfit.words(now_ns) or lost or self.orders.yields or self._session.detail(self._requests)
-        rejected = dict(self._link.rejected.copy() + self._refused)
+        rejected = dict(self._link.rejected.seen_by(self.system) + self._refused)
         clocks, firmware = self._plausibility.clock.figures, self._session.firmware
         return LinkHealth(quality, rate_hz, rejected, detail, clocks, firmware, self._asks_time(now_ns))
 

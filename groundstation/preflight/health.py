@@ -10,7 +10,7 @@ from groundstation.field.resolved import ResolvedField
 from groundstation.monitor.alarms import DARK
 
 # Drivers append to a fault the command, or the setting, that mends it.
-_COMMAND, _SETTING = ": groundstation ", ": set "
+_REMEDIES = (": groundstation ", ": set ")
 _BATTERY_MARGIN, _BATTERY_SHOULD = 0.05, 0.4
 _TELEMETRY_HZ, _LINK_SHARE = 5.0, 0.9
 _PICTURES_HZ, _PICTURES_OLD_MS = 5.0, 700.0
@@ -27,9 +27,8 @@ def drone_findings(field: ResolvedField, statuses: Mapping[str, VehicleStatus]) 
         status = statuses.get(name)
         if status is None or status.flight_state in UNHEARD:
             why = status.detail if status is not None and status.detail else "nothing is heard of it"
-            found, _, setting = why.partition(_SETTING)
-            remedy = f"set {setting}" if setting else f"check its power, its network and {drone.address}"
-            yield Finding(Level.SHOULD, name, found, remedy)
+            found, remedy = _remedied(why)
+            yield Finding(Level.SHOULD, name, found, remedy or f"check its power, its network and {drone.address}")
             continue
         if status.flight_state is FlightState.EMERGENCY:
             yield Finding(Level.SHOULD, name, "its motors are cut off", "set it upright and start it again")
@@ -49,11 +48,20 @@ def left_out(field: ResolvedField, statuses: Mapping[str, VehicleStatus]) -> tup
     return tuple(n for n, told in known.items() if told is None or told.flight_state in UNHEARD or told.not_ready)
 
 
+def _remedied(told: str) -> tuple[str, str]:
+    """Return a fault and what mends it, "" if its driver names nothing."""
+    for begins in _REMEDIES:
+        found, _, rest = told.partition(begins)
+        if rest:
+            return found, f"{begins[2:]}{rest}"
+    return told, ""
+
+
 def _readiness(name: str, status: VehicleStatus) -> Iterator[Finding]:
     """Yield why a drone would refuse to take off, which leaves out only that drone; and its firmware."""
     if status.not_ready:
-        found, _, command = status.not_ready.partition(_COMMAND)
-        remedy = f"groundstation {command}" if command else "do what it asks for; until then it does not take off"
+        found, remedy = _remedied(status.not_ready)
+        remedy = remedy or "do what it asks for; until then it does not take off"
         yield Finding(Level.SHOULD, name, f"it refuses to take off: {found}", remedy)
     if status.firmware:
         yield Finding(Level.OK, name, f"firmware {status.firmware}")

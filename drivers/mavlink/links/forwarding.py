@@ -3,9 +3,9 @@
 import logging
 import select
 import threading
-from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 
+from drivers.mavlink.links.refusals import LinkRefusals
 from drivers.mavlink.links.rider import Rider
 from drivers.mavlink.links.seam import Heard, Transport
 from drivers.mavlink.riding_along import Passage, may_pass, passage_of, words_of
@@ -55,12 +55,12 @@ class ForwardedLink(Transport):
         self._listener.start()
 
     @property
-    def rejected(self) -> Counter[str]:
+    def rejected(self) -> LinkRefusals:
         """Return the transport's counts together with ours."""
         return self._transport.rejected
 
     @rejected.setter
-    def rejected(self, counts: Counter[str]) -> None:
+    def rejected(self, counts: LinkRefusals) -> None:
         self._transport.rejected = counts
 
     @property

@@ -15,7 +15,7 @@ import math
 import queue
 import threading
 import time
-from collections import Counter, deque
+from collections import deque
 from typing import Any
 
 from mavsdk import Configuration, ConnectionResult, Mavsdk
@@ -146,7 +146,7 @@ class MavsdkLink:
     """One port, a thread that passes its datagrams to the library, and the vehicles behind it."""
 
     def __init__(self, settings: LinkSettings, transport: Transport) -> None:
-        self.rejected: Counter[str] = transport.rejected
+        self.rejected = transport.rejected
         self._settings, self._transport = settings, transport
         self._heard: queue.Queue[Heard] = queue.Queue(_WAITING)
         self._systems: dict[int, _System] = {}

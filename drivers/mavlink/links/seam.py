@@ -1,9 +1,9 @@
 """The interface between the driver and a link: the driver sends and receives messages, the link carries them."""
 
-from collections import Counter
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
+from drivers.mavlink.links.refusals import LinkRefusals
 from drivers.mavlink.wire.frames import Message, ReceivedFrame
 from groundstation.adapters import Address
 
@@ -20,7 +20,7 @@ class Heard(NamedTuple):
 class MavlinkLink(Protocol):
     """One port with any number of vehicles behind it. Nothing that arrives raises; refusals are counted by reason."""
 
-    rejected: Counter[str]
+    rejected: LinkRefusals
 
     @property
     def called_from(self) -> tuple[Address, ...]:

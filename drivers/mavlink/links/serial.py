@@ -4,10 +4,10 @@ import logging
 import os
 import select
 import threading
-from collections import Counter
 from contextlib import suppress
 
 from drivers.mavlink.links.frame_codec import FrameCodec
+from drivers.mavlink.links.refusals import LinkRefusals
 from drivers.mavlink.links.seam import Heard, Sniffer, Transport, ignore_bytes
 from drivers.mavlink.links.stream_cutter import StreamCutter
 from drivers.mavlink.links.tty import BITS_PER_BYTE, open_raw
@@ -38,7 +38,7 @@ class SerialLink(Transport):
 
     def __init__(self, settings: LinkSettings, signing: Signing | None = None, sniffer: Sniffer = ignore_bytes) -> None:
         _, device, baud = settings.target.split(":")
-        self.rejected: Counter[str] = Counter()
+        self.rejected = LinkRefusals()
         self._codec = FrameCodec(settings, signing)
         self._cutter, self._sniffer, self._signed = StreamCutter(), sniffer, signing is not None
         self._device, self._baud = device, int(baud)

@@ -4,12 +4,12 @@ import logging
 import socket
 import threading
 import zlib
-from collections import Counter
 from contextlib import suppress
 
 from drivers import vehicle_socket
 from drivers.mavlink.links.datagram_cutter import DatagramCutter
 from drivers.mavlink.links.frame_codec import FrameCodec
+from drivers.mavlink.links.refusals import DUPLICATE, LinkRefusals
 from drivers.mavlink.links.seam import Heard, Sniffer, Transport, ignore_bytes
 from drivers.mavlink.other_stations import speaks_as_we
 from drivers.mavlink.settings import LinkSettings
@@ -50,7 +50,7 @@ class UdpLink(Transport):
     def __init__(self, settings: LinkSettings, signing: Signing | None = None, sniffer: Sniffer = ignore_bytes) -> None:
         way, place, port = settings.target.split(":")
         address, interface = split_zone(place)
-        self.rejected: Counter[str] = Counter()
+        self.rejected = LinkRefusals()
         self._peer = (address, int(port)) if way == "udpout" else None
         self._addresses: dict[int, tuple[tuple[str, int], int]] = {}
         self._codec, self._lock = FrameCodec(settings, signing), threading.Lock()
@@ -152,7 +152,8 @@ class UdpLink(Transport):
                 return False
             return True
         if known is not None and known[0] != source and now_ns - known[1] < _ADDRESS_HELD_NS:
-            self._reject("duplicate_system", f"system {system} at {source[0]}:{source[1]} and {known[0]}")
+            self.rejected.note(DUPLICATE, system)
+            _log.debug("system %d at %s:%d and %s", system, *source, known[0])
             return False
         self._addresses[system] = (source, now_ns)
         return True

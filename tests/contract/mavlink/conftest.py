@@ -6,13 +6,14 @@ Bytes go through both codecs; 20 s of flight take about a second.
 import itertools
 import math
 import sys
-from collections import Counter, deque
+from collections import deque
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from drivers.host import VehicleHost
+from drivers.mavlink.links.refusals import LinkRefusals
 from drivers.mavlink.links.seam import Heard
 from drivers.mavlink.settings import MavlinkDriverSettings
 from drivers.mavlink.vehicle import MavlinkVehicle
@@ -69,7 +70,7 @@ class DirectLink:
     called_from, newest_stamp = (), 0
 
     def __init__(self, emulator, system=255):
-        self.rejected = Counter[str]()
+        self.rejected = LinkRefusals()
         self.emulator = emulator
         self.encoder, self.decoder = FrameEncoder(system, 190), FrameDecoder()
         self.sent = []

@@ -145,6 +145,24 @@ def test_a_vehicle_with_another_number_than_the_fields_is_named(hangar, kind):
         flying.close()
 
 
+def test_two_senders_of_one_number_ground_that_vehicle_and_no_other(hangar, port):
+    place = ("127.0.0.1", port)
+    flying = Flying(f"udpin:127.0.0.1:{port}", {21: "px4", 22: "px4"})
+    for system in (21, 22):
+        hangar.add("px4", system, calls=place)
+    second, fault = hangar.add("px4", 21, calls=place)[0], "a second address sends with its system id 21"
+    reasons = lambda: [host.watchdog.vehicle.not_ready.split(":")[0] for host in flying.hosts]  # noqa: E731
+    try:
+        assert flying.turn(12.0, lambda: reasons() == [fault, ""]), reasons()
+        told = lambda: [text for text in flying.process.texts if "from a second address" in text]  # noqa: E731
+        flying.turn(1.0)
+        assert len(told()) == 1 and told()[0].startswith("v21 refused ")
+        second.silent = True  # it is switched off
+        assert flying.turn(8.0, lambda: reasons() == ["", ""]), reasons()
+    finally:
+        flying.close()
+
+
 def test_a_vehicle_that_speaks_mavlink_1_only_is_told_once_it_does_not_answer():
     radio, line = pty.openpty()
     flying = Flying(f"serial:{os.ttyname(line)}:921600", {9: "px4"})

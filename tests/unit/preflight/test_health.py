@@ -71,6 +71,13 @@ def test_who_answers_wrongly_is_sent_to_the_setting_and_not_to_the_power(
     assert (one.found, one.remedy) == (found, remedy)
 
 
+def test_two_senders_of_one_number_are_told_with_the_remedy(lab_field: ResolvedField) -> None:
+    told = "a second address sends with its system id 11: set an id of its own on each vehicle"
+    (one,) = (one for one in findings_of(lab_field, 50.0, not_ready=told) if "system id" in one.found)
+    assert one.found == "it refuses to take off: a second address sends with its system id 11"
+    assert one.remedy == "set an id of its own on each vehicle"
+
+
 def clock_findings(field: ResolvedField, drift_ppm: float | None, late_ms: float | None) -> list[Finding]:
     found = findings_of(field, 200.0, clock_drift_ppm=drift_ppm, telemetry_late_ms=late_ms)
     return [one for one in found if one.subject == "drone_1" and "battery" not in one.found]

@@ -1,10 +1,10 @@
 """A vehicle without motion telemetry holds the place where a picture showed it, in flight only."""
 
-from collections import Counter
 from typing import ClassVar, cast
 
 import pytest
 
+from drivers.mavlink.links.refusals import LinkRefusals
 from drivers.mavlink.links.seam import MavlinkLink
 from drivers.mavlink.settings import MavlinkDriverSettings
 from drivers.mavlink.vehicle import MavlinkVehicle
@@ -20,7 +20,7 @@ PLACE, YAW = (1.2, -0.5, 0.8), 0.3
 class _Silent:
     """A link without telemetry."""
 
-    rejected: ClassVar[Counter[str]] = Counter()
+    rejected: ClassVar[LinkRefusals] = LinkRefusals()
 
 
 @pytest.fixture

@@ -116,8 +116,7 @@ class Hosting:
             self._terminal.say(f"run {order.run}: {why}; drones of this host land")
         finally:
             self._own = OwnState(order.run, Lifecycle.STOPPING)
-            supervisor.close()
-            self._leave()
+            self._end(supervisor)
         return supervisor.interrupts.stop_requested  # even if it came while the drones landed
 
     def _why_over(self, supervisor: Supervisor, run: str) -> str:
@@ -168,14 +167,18 @@ class Hosting:
             if link.silent_s(clock.own_ns()) > _LOST_S:
                 return f"nothing was heard of it for {_LOST_S:.0f} s"
 
-    def _leave(self) -> None:
-        """Report that no process of the run is left on this host."""
-        self._own = OwnState()
-        for _ in range(_FAREWELLS):
-            self._link.turn(clock.own_ns(), self._own)
-            time.sleep(_TURN_S)
-        if self._bus is not None:
-            self._bus.close()
+    def _end(self, supervisor: Supervisor) -> None:
+        """End all processes of the run, and report that none is left on this host."""
+        try:
+            supervisor.stop()
+            self._own = OwnState()
+            for _ in range(_FAREWELLS):  # before the supervisor leaves the bus, which may last longer than a silence
+                self._link.turn(clock.own_ns(), self._own)
+                time.sleep(_TURN_S)
+        finally:
+            supervisor.close()
+            if self._bus is not None:
+                self._bus.close()
 
 
 def _refusal(order: HostOrder) -> str:

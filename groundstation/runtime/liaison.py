@@ -26,6 +26,8 @@ VERSION = version("skein-groundstation")
 _TURN_NS = 50 * NS_PER_MS
 _ORDER_PERIOD_NS = NS_PER_S
 _SILENT_NS = 500 * NS_PER_MS
+# Of a host that has said that it ends its processes, which keeps a small computer busy.
+_ENDING_SILENT_NS = 3 * NS_PER_S
 # As long as drivers may take to land and end, including the guardian that waits for them.
 _LINGER_NS = 25 * NS_PER_S
 # A host whose devices are still starting is waited for; a host that nobody has started is not.
@@ -94,7 +96,8 @@ class Liaison:
 
     def silent(self, now_ns: int) -> bool:
         """Return whether the host has been silent for a while."""
-        return now_ns - self._heard_ns > _SILENT_NS
+        ending = self._newest is not None and self._newest.state is Lifecycle.STOPPING
+        return now_ns - self._heard_ns > (_ENDING_SILENT_NS if ending else _SILENT_NS)
 
     def state(self, now_ns: int) -> tuple[Lifecycle, str]:
         """Return the lifecycle state of the host's devices, and a description."""

@@ -133,6 +133,23 @@ def test_a_stop_that_comes_while_the_drones_land_is_not_lost(
     assert served.serve(order) is True
 
 
+def test_a_host_says_farewell_before_it_leaves_the_bus(
+    make: Callable[[str], tuple[hosting.Hosting, RunElsewhere]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Leaving took longer than a silence, and the run reported that the link was down."""
+    served, run = make(VERSION)
+    order, close, missed = served.wait(), supervisor.Supervisor.close, list[bool]()
+
+    def close_late(self: supervisor.Supervisor) -> None:
+        time.sleep(0.6)
+        missed.append(run.liaison.serving)
+        close(self)
+
+    monkeypatch.setattr(supervisor.Supervisor, "close", close_late)
+    served.serve(order)
+    assert missed == [False]
+
+
 def test_another_version_is_not_served_and_the_run_says_why(
     make: Callable[[str], tuple[hosting.Hosting, RunElsewhere]], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -67,6 +67,14 @@ def test_silence_of_either_end_is_noticed_by_the_other(both: Both) -> None:
     assert both.liaison.state(both.now_ns) == (Lifecycle.DEGRADED, f"{HOST} is silent")
 
 
+def test_a_host_that_said_that_it_ends_is_not_missed_at_once(both: Both) -> None:
+    both.turn(OwnState("run-7", Lifecycle.STOPPING), turns=5)
+    both.turn(None, turns=58)
+    assert not both.liaison.silent(both.now_ns), "2.9 s"
+    both.turn(None, turns=4)
+    assert both.liaison.silent(both.now_ns) and both.liaison.serving, "nobody knows whether its drones have landed"
+
+
 def test_a_frozen_supervisor_is_silent_and_a_dead_one_ends_the_run(both: Both) -> None:
     both.turn(SERVES, turns=3)
     both.turn(SERVES, Supervision.SILENT, turns=2)

@@ -46,7 +46,6 @@ class ConsoleState:
         self.setpoints: dict[str, StampedMessage[m.VelocitySetpoint]] = {}
         self.truth: dict[str, StampedMessage[m.TruthState]] = {}
         self.search_maps: dict[str, m.SearchMap] = {}
-        self.preflight: StampedMessage[m.Preflight] | None = None
         self._airborne_since_ns: int | None = None
         self._flown = False
 
@@ -60,8 +59,6 @@ class ConsoleState:
                     self.truth[item.header.entity] = StampedMessage(item.header.stamp_ns, truth)
                 case m.SearchMap() as search_map:
                     self.search_maps[item.header.entity] = search_map
-                case m.Preflight() as preflight:
-                    self.preflight = StampedMessage(item.header.stamp_ns, preflight)
                 case m.Innovation() as innovation:
                     self.health.take(innovation)
                 case m.RelativeObservation() as sighting:
@@ -160,10 +157,8 @@ class ConsoleState:
         board.put("search_maps", self._search_maps())
         board.put("past_alarms", self.alarm_log.as_json())
         board.put("health", self.health.summary())
-        if self.preflight is not None:
-            board.put(
-                "preflight", {"at": told.milliseconds(self.preflight), "findings": self.preflight.message.findings}
-            )
+        if (checks := self.monitor.preflight) is not None:
+            board.put("preflight", {"at": told.milliseconds(checks), "findings": checks.message.findings})
 
 
 def _current(seen: StampedMessage[_T] | None, now_ns: int) -> _T | None:

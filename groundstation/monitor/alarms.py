@@ -19,6 +19,7 @@ from groundstation.bus.messages import (
 )
 from groundstation.field.drones import camera_name
 from groundstation.monitor.batteries import Battery, Charge, battery_of
+from groundstation.monitor.before_flight import forbidding
 from groundstation.monitor.endurance import flies, may_fly
 from groundstation.monitor.failsafe_words import failsafe_words
 from groundstation.monitor.state import MonitorState
@@ -303,10 +304,10 @@ def _processes(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
 
 
 def _events(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
-    for seen in state.events:
-        if seen.message.severity is Severity.ERROR and seen.age_s(now_ns) < _EVENT_SHOWN_S:
-            advice = f"{_TO_DO}{seen.message.remedy}" if seen.message.remedy else ""
-            yield Alarm(seen.message.sentence, seen.message.sentence, advice=advice)
+    young = [seen.message for seen in state.events if seen.age_s(now_ns) < _EVENT_SHOWN_S]
+    told = [(one.sentence, one.remedy) for one in young if one.severity is Severity.ERROR]
+    for sentence, remedy in (*told, *forbidding(state, now_ns)):
+        yield Alarm(sentence, sentence, advice=f"{_TO_DO}{remedy}" if remedy else "")
 
 
 def _suspected(state: MonitorState) -> Iterator[Alarm]:

@@ -20,6 +20,7 @@ from groundstation.bus.topics import (
     LEASE,
     OBSERVATION,
     PLAN,
+    PREFLIGHT,
     PROCESS_STATUS,
     SIM_STATUS,
     SUSPICION,
@@ -42,7 +43,8 @@ class Screen:
         self.state = MonitorState(cast=cast, hint=hint, started_ns=now_ns)
         self._console = console or Console(file=with_sequences(sys.stdout))
         self._newest = bus.subscribe(
-            (ESTIMATE, PLAN, VEHICLE_STATUS, CAMERA_STATUS, PROCESS_STATUS, LEASE, SIM_STATUS, SUSPICION), newest=True
+            (ESTIMATE, PLAN, VEHICLE_STATUS, CAMERA_STATUS, PROCESS_STATUS, LEASE, SIM_STATUS, SUSPICION, PREFLIGHT),
+            newest=True,
         )
         # Of these every message counts, not only the newest of a key.
         self._each: Subscription = bus.subscribe((EVENT, COMMAND, COMMAND_ACK, OBSERVATION), capacity=1024)

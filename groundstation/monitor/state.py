@@ -66,7 +66,8 @@ class StampedMessage(Generic[T]):
 class MonitorState:
     """The newest message of each kind and entity; `hint` states the effect of Ctrl-C here.
 
-    climbed_ns: stamp of the first status of each flying drone since its climb, or since one listens.
+    climbed_ns: stamp of the first status of each flying drone since its climb, or since one listens. flown: whether one
+    has flown since then.
     """
 
     cast: Cast = field(default_factory=Cast)
@@ -82,6 +83,8 @@ class MonitorState:
     estimate: StampedMessage[m.Estimate] | None = None
     plan: StampedMessage[m.Plan] | None = None
     suspicion: m.Suspicion | None = None
+    preflight: StampedMessage[m.Preflight] | None = None
+    flown: bool = False
     lease: StampedMessage[m.Lease] | None = None
     sim: StampedMessage[m.SimStatus] | None = None
     command: StampedMessage[m.Command] | None = None
@@ -135,6 +138,8 @@ class MonitorState:
                 self.plan = StampedMessage(stamp_ns, message)
             case m.Suspicion():
                 self.suspicion = message
+            case m.Preflight():
+                self.preflight = StampedMessage(stamp_ns, message)
             case m.Lease():
                 self.lease = StampedMessage(stamp_ns, message)
             case m.SimStatus():
@@ -148,6 +153,7 @@ class MonitorState:
                     del self.answers[next(iter(self.answers))]
 
     def _note_climb(self, name: str, stamp_ns: int, status: m.VehicleStatus) -> None:
+        self.flown |= status.flight_state in m.AIRBORNE
         if status.flight_state not in m.AIRBORNE or status.flight_state is m.FlightState.TAKING_OFF:
             self.climbed_ns.pop(name, None)
         else:

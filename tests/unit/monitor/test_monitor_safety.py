@@ -4,8 +4,10 @@ from dataclasses import replace
 
 import pytest
 from monitor_world import CAST, NOW, World
+from msgspec.structs import replace as replaced
 
 from groundstation.bus import messages as m
+from groundstation.bus import topics as t
 from groundstation.monitor.alarms import alarms_of
 from groundstation.monitor.safety import Level, Safety, safety_of
 
@@ -26,6 +28,32 @@ def test_it_is_safe_while_nothing_is_wrong_and_the_reason_says_how_long(world: W
     world.estimate()
     reason = "No alarms. All who fly are heard, nobody is lost; the first must land for its battery in ~6 min."
     assert judged(world) == Safety(Level.SAFE, reason)
+
+
+def checks(world: World, *findings: m.PreflightFinding, age_s: float = 0.0) -> None:
+    world.say(t.PREFLIGHT, m.Preflight(header=world.header("team", age_s), findings=findings))
+
+
+def test_it_asks_for_an_act_as_long_as_a_check_forbids_the_first_take_off(world: World) -> None:
+    lost = m.PreflightFinding("MUST", "cameras", "no sensor fixed in the world sends anything", "check their power")
+    text = "team: before take-off: cameras: no sensor fixed in the world sends anything"
+    told = m.Event(header=world.header("team", 9.0), severity=m.Severity.ERROR, text=text, remedy=lost.remedy)
+    world.say(t.EVENT, told)
+    both(world, "LANDED", flight_state=m.FlightState.LANDED)
+    checks(world, lost, m.PreflightFinding("SHOULD", "drone_1", "battery 30%", "charge it"))
+    assert judged(world) == Safety(Level.ACT, f"{text}. To do: check their power")
+    world.say(t.EVENT, replaced(told, header=world.header("team", 1.0)))
+    world.text()
+    assert [one.text for one in alarms_of(world.state, NOW)] == [text], "its event is the same alarm"
+    world.state.events.clear()
+    checks(world, lost, age_s=11.0)
+    assert judged(world).level is Level.SAFE, "nobody knows whether an old list holds"
+    checks(world, lost)
+    both(world)
+    world.estimate()
+    assert judged(world).level is Level.SAFE
+    both(world, "LANDED", flight_state=m.FlightState.LANDED)
+    assert judged(world).level is Level.SAFE, "after a flight the card of the checks says it"
 
 
 def test_landing_drones_are_ignored_in_the_battery_forecast(world: World) -> None:

@@ -16,8 +16,9 @@ from groundstation.control.missing_robots import MissingRobots
 from groundstation.control.odometry_errors import OdometryErrors
 from groundstation.control.parameters import ControlParameters
 from groundstation.control.search_parameters import SearchParameters
+from groundstation.control.search_state import SearchMode, SearchState
 from groundstation.control.stand import Stand
-from groundstation.control.target_search import Search, SearchMode, SearchState
+from groundstation.control.target_search import Search
 from groundstation.control.unseen_targets import UnseenTargets
 from groundstation.control.view import spread_m
 from groundstation.estimation.belief import JointBelief

@@ -2,8 +2,7 @@
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
-from enum import StrEnum
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -17,6 +16,7 @@ from groundstation.control.pursuit import choose_pursuit
 from groundstation.control.search_parameters import SearchParameters
 from groundstation.control.search_ranges import searching_cameras
 from groundstation.control.search_reach import extra_ways_m, permitted, showable
+from groundstation.control.search_state import SearchMode, SearchState
 from groundstation.control.stand import Stand
 from groundstation.control.sweeps import NO_OUTLOOK, Outlook, lattice_of
 from groundstation.estimation.belief import JointBelief
@@ -34,35 +34,6 @@ _SLOW_SEARCH_S = 999.0
 _AT_ONCE_NS = 100 * NS_PER_MS  # largest difference of two last sightings that count as simultaneous
 _TWO_SIDES_COS = math.cos(math.radians(30.0))
 _TIPPED_M = 0.08  # error of a picture at the distance of a target, by the error of the robot's tilt
-
-
-class SearchMode(StrEnum):
-    """State of the search for one target."""
-
-    TRACK = "TRACK"  # it is seen, or was a moment ago
-    SEARCH = "SEARCH"  # the team searches for it
-    LOST = "LOST"  # the team has searched nearly everywhere: the operator is asked
-
-
-@dataclass(frozen=True, slots=True)
-class SearchState:
-    """The state of the search for one target.
-
-    since_ns: since when the mode holds; place: its most likely place [m; world]; excluded: share of the floor where it
-    is not, of that which can be shown; expected_s: approximate time to find it; near: it was tracked when it got out of
-    sight; predicted: to where the map has followed its prediction [x, y in m] and that one's variance (mean of both
-    axes) [m^2].
-    """
-
-    mode: SearchMode
-    since_ns: int
-    room: RoomMap | None = None
-    place: tuple[float, float] | None = None
-    excluded: float = 0.0
-    expected_s: float | None = None
-    given_up: bool = False
-    near: bool = False
-    predicted: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 class Search:

@@ -19,7 +19,7 @@ from groundstation.bus.messages import (
 from groundstation.control.lookout import Lookout
 from groundstation.control.parameters import control_from_field
 from groundstation.control.search_parameters import search_from_field
-from groundstation.control.target_search import SearchMode
+from groundstation.control.search_state import SearchMode
 from groundstation.estimation.belief import JointBelief
 from groundstation.estimation.layout import ROBOT_CORE, TARGET_CORE, EntityKind, StateLayout
 from groundstation.sensing.from_field import sensors_from_field

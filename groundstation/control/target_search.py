@@ -29,7 +29,7 @@ from groundstation.sensing.occlusion import box_rows, outside_boxes, sight_map
 from groundstation.sensing.visibility import camera_rows
 from groundstation.time_units import NS_PER_MS, NS_PER_S
 
-_STEP_NS = 100 * NS_PER_MS  # of the maps' motion
+_STEP_NS, _MOST_STEPS = 100 * NS_PER_MS, 20  # of the maps' motion, and how many at once after a pause
 _SLOW_SEARCH_S = 999.0
 _AT_ONCE_NS = 100 * NS_PER_MS  # largest difference of two last sightings that count as simultaneous
 _TWO_SIDES_COS = math.cos(math.radians(30.0))
@@ -204,17 +204,20 @@ class Search:
         return unknown_place(self.grid, places)
 
     def _move(self, belief: JointBelief) -> None:
-        """Let the targets of the maps drive on, in steps."""
-        if belief.stamp_ns - self._moved_ns < _STEP_NS:
+        """Let the targets of the maps drive on, in whole steps; what is left of the time counts with the next."""
+        self._moved_ns = self._moved_ns or belief.stamp_ns
+        due, rest_ns = divmod(belief.stamp_ns - self._moved_ns, _STEP_NS)
+        if due < 1:
             return
-        self._moved_ns = belief.stamp_ns
+        self._moved_ns = belief.stamp_ns - rest_ns
         p = self.parameters
         variance = p.target_speed_m_s**2 * p.target_straight_s * _STEP_NS / NS_PER_S
         for name in self.targets:
             state = self._predicted(name, belief)
-            if state.room is not None:
-                state = replace(state, room=state.room.moved(variance).uncovered(_STEP_NS / NS_PER_S))
-            self.targets[name] = state
+            room = state.room
+            for _ in range(min(due, _MOST_STEPS)):
+                room = room and room.moved(variance).uncovered(_STEP_NS / NS_PER_S)
+            self.targets[name] = replace(state, room=room)
 
     def _predicted(self, name: str, belief: JointBelief) -> SearchState:
         """Return the state whose map has followed the prediction of its target, by whole cells."""

@@ -1,0 +1,44 @@
+"""What counts in a search: pictures of cameras at known places, once; robots that see and obey; real time."""
+
+import math
+
+import numpy as np
+import pytest
+from searching_team import CONTROL, belief, new_search
+
+from groundstation.control.target_search import Search
+from groundstation.estimation.room_map import HIDDEN_S
+
+POSES = {
+    "drone_1": np.array([-0.5, 0.5, CONTROL.search_height_m, 0.0]),
+    "drone_2": np.array([-0.5, -0.5, CONTROL.search_height_m, 0.0]),
+}
+TARGET = (0.3, 0.1)
+
+
+def hidden_in(search: Search) -> float:
+    room = search.targets["turtlebot"].room
+    assert room is not None
+    return float(room.hidden.sum())
+
+
+@pytest.mark.parametrize("tick_s", [0.02, 0.023, 0.06, 0.099, 0.1, 0.14, 1.7])
+def test_maps_move_on_as_fast_as_time_passes_however_beliefs_come(tick_s: float) -> None:
+    """Each step waited for the first belief after 100 ms and counted 100 ms: a tenth was lost."""
+    search = new_search()
+    hidden = []
+    for tick in range(1, round(6.0 / tick_s)):
+        now_s = 40.0 + tick_s * tick
+        search.advance(belief(POSES, now_s, TARGET), {"turtlebot": 1.0})
+        hidden.append((now_s, hidden_in(search)))
+    (begun_s, first), (end_s, last) = hidden[0], hidden[-1]
+    assert HIDDEN_S * math.log(first / last) == pytest.approx(end_s - begun_s, abs=0.101)
+
+
+def test_a_pause_of_the_tracker_lets_maps_move_no_further_than_two_seconds() -> None:
+    search = new_search()
+    search.advance(belief(POSES, 40.0, TARGET), {"turtlebot": 1.0})
+    first = hidden_in(search)
+    search.advance(belief(POSES, 100.0, TARGET), {"turtlebot": 1.0})
+    last = hidden_in(search)
+    assert HIDDEN_S * math.log(first / last) == pytest.approx(2.0, abs=0.01)

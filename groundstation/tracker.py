@@ -107,7 +107,7 @@ class Tracker:
         refused = moved and isinstance(message, RelativeObservation)
         verdict = Verdict.IMPLAUSIBLE if refused else self._intake.take(key, message, now_ns)
         if not moved and verdict is not Verdict.IMPLAUSIBLE:
-            self.lookout.take(message, message.header.clock == self._clock)
+            self.lookout.take(message, verdict is Verdict.ACCEPTED and message.header.clock == self._clock)
             if isinstance(message, VehicleStatus):
                 self._hovering.take(message, now_ns)
                 self._shafts.hear(message, now_ns)

@@ -89,13 +89,13 @@ class Lookout:
         """Return the expected rms error of each robot's odometry [m/s]."""
         return self._excursions.velocity_errors_m_s
 
-    def take(self, message: Message, in_our_time: bool = True) -> None:
-        """Take a driver's mode, or a fully searched picture; a picture stamped by another clock does not count."""
+    def take(self, message: Message, counts: bool = True) -> None:
+        """Take a driver's mode, or a searched picture; one refused, or stamped by another clock, does not count."""
         match message:
             case VehicleStatus():
                 self._modes[message.header.entity] = message.mode
                 (self._braked.add if message.braked else self._braked.discard)(message.header.entity)
-            case SearchedPicture() if in_our_time:
+            case SearchedPicture() if counts:
                 self._search.take(message)
                 self._robots.take(message)
 

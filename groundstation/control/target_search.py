@@ -20,7 +20,7 @@ from groundstation.control.search_state import SearchMode, SearchState
 from groundstation.control.stand import Stand
 from groundstation.control.sweeps import NO_OUTLOOK, Outlook, lattice_of
 from groundstation.estimation.belief import JointBelief
-from groundstation.estimation.belief_history import BeliefHistory
+from groundstation.estimation.belief_history import KEPT_NS, BeliefHistory
 from groundstation.estimation.room_map import RoomGrid, RoomMap, lost_at, unknown_place
 from groundstation.sensing.detection import detection_map
 from groundstation.sensing.footprint import footprint_of
@@ -123,7 +123,8 @@ class Search:
         self._move(belief)
         pictures, self._pictures = self._pictures, []
         for picture in pictures:
-            self._look(picture, now_ns)
+            if picture.header.stamp_ns > now_ns - KEPT_NS:
+                self._look(picture)
         return tuple(dropped)
 
     def stands(self, robots: Sequence[str], targets: Collection[str], belief: JointBelief) -> Mapping[str, Stand]:
@@ -234,11 +235,13 @@ class Search:
             state, room=state.room.predicted(rows, columns, max(0.0, variance - before)), predicted=predicted
         )
 
-    def _look(self, picture: SearchedPicture, now_ns: int) -> None:
-        """Count a picture against all targets that it cannot show."""
-        pose, slack_m = self._pose_at(picture.observer, picture.header.stamp_ns)
+    def _look(self, picture: SearchedPicture) -> None:
+        """Count a picture against all targets that it cannot show, and that were not seen since."""
+        stamp_ns = picture.header.stamp_ns
+        pose, slack_m = self._pose_at(picture.observer, stamp_ns)
         searched = (name for name, state in self.targets.items() if state.room is not None)
-        missing = [name for name in searched if not picture.may_show(name)]
+        unseen = (name for name in searched if stamp_ns > max(self._shown_ns[name].values(), default=-1))
+        missing = [name for name in unseen if not picture.may_show(name)]
         if pose is None or not missing:
             return
         for name in missing:

@@ -5,7 +5,8 @@ from collections import deque
 from groundstation.estimation.belief import JointBelief
 from groundstation.time_units import NS_PER_S
 
-_KEPT_NS = NS_PER_S  # the largest age of a picture, at any rate of beliefs
+KEPT_NS = NS_PER_S
+"""The largest age of a picture, at any rate of beliefs."""
 
 
 class BeliefHistory:
@@ -17,7 +18,7 @@ class BeliefHistory:
     def append(self, belief: JointBelief) -> None:
         """Add the newest belief."""
         self._beliefs.append(belief)
-        while belief.stamp_ns - self._beliefs[0].stamp_ns >= _KEPT_NS:
+        while belief.stamp_ns - self._beliefs[0].stamp_ns >= KEPT_NS:
             self._beliefs.popleft()
 
     def at(self, stamp_ns: int) -> JointBelief | None:

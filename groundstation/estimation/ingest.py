@@ -17,6 +17,7 @@ from groundstation.bus.messages import (
     flies,
 )
 from groundstation.estimation.attitude_intake import AttitudeIntake
+from groundstation.estimation.belief_history import KEPT_NS
 from groundstation.estimation.fixed_lag import FUTURE_NS, FixedLagFilter
 from groundstation.estimation.measurement import Measurement
 from groundstation.estimation.message_screen import MessageScreen
@@ -57,7 +58,7 @@ class Intake:
     def take(self, key: str, message: Message, now_ns: int) -> Verdict:
         """Take one message that came under a key; return ACCEPTED, or why not. Other kinds of messages are ignored."""
         if not isinstance(message, _HEARD):
-            return self._other(message, now_ns)
+            return self._other(key, message, now_ns)
         stamp_ns = self._local_stamp(message)
         if stamp_ns is None:
             return Verdict.UNSYNCED
@@ -77,15 +78,23 @@ class Intake:
             return self.reports.take(key, message, stamp_ns, now_ns)
         return self._status(message, stamp_ns, now_ns)
 
-    def _other(self, message: Message, now_ns: int) -> Verdict:
+    def _other(self, key: str, message: Message, now_ns: int) -> Verdict:
         """Take a message without information on places."""
         if isinstance(message, ClockOffset) and message.header.clock == self._clock:
             self._offsets[message.of] = message.offset_ns
         if isinstance(message, SearchedPicture):
             stamp_ns = self._local_stamp(message)
-            if stamp_ns is not None and stamp_ns > now_ns + FUTURE_NS:
-                return Verdict.IMPLAUSIBLE
+            if stamp_ns is not None:
+                return self._searched(key, message, stamp_ns, now_ns)
         return Verdict.ACCEPTED
+
+    def _searched(self, key: str, message: SearchedPicture, stamp_ns: int, now_ns: int) -> Verdict:
+        """Take a searched picture: each one is evidence once, and only with the belief of its time."""
+        if stamp_ns > now_ns + FUTURE_NS:
+            return Verdict.IMPLAUSIBLE
+        if stamp_ns <= now_ns - max(KEPT_NS, self._lag_ns):
+            return Verdict.LATE
+        return self._screen.refusal(key, message, stamp_ns, now_ns) or Verdict.ACCEPTED
 
     def _status(self, message: VehicleStatus, stamp_ns: int, now_ns: int) -> Verdict:
         entity, airborne = message.header.entity, flies(message.flight_state, message.mode)

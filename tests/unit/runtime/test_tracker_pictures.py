@@ -25,6 +25,42 @@ def test_a_picture_from_the_future_keeps_nobody_from_searching(tracking: Flight)
     assert tracking.tracker.lookout.missing == ("turtlebot",)
 
 
+def searched(flight: Flight, observer: str, age_ms: int, *found: str, clock: str = "here") -> SearchedPicture:
+    header = flight.header(observer, age_ms, clock)
+    return SearchedPicture(header=header, observer=observer, camera=f"{observer}_camera", found=found)
+
+
+def overlooked(flight: Flight) -> float:
+    """Return the chance that all pictures would have missed the target, where that is least."""
+    flight.run(0.02, onboard=False)
+    room = flight.tracker.lookout.targets["turtlebot"].room
+    assert room is not None
+    return float(room.overlooked.min())
+
+
+def test_a_searched_picture_counts_once_and_not_when_it_is_old(tracking: Flight) -> None:
+    """Ten copies of one picture made it nearly certain that the target is not there."""
+    tracking.run(1.5, onboard=False)
+    picture = searched(tracking, "drone_1", 40)
+    assert tracking.ingest(picture) is None
+    once = overlooked(tracking)
+    assert 0.1 < once < 0.5
+    assert {tracking.ingest(picture) for _ in range(10)} == {Verdict.DUPLICATE}
+    assert tracking.ingest(searched(tracking, "drone_1", 1000)) is Verdict.LATE
+    assert overlooked(tracking) == once
+    assert tracking.tracker.rejected == {"SearchedPicture DUPLICATE": 10, "SearchedPicture LATE": 1}
+    assert tracking.ingest(searched(tracking, "drone_1", 990)) is None
+
+
+def test_copies_of_one_picture_raise_no_doubt_about_a_drone(tracking: Flight) -> None:
+    tracking.run(0.8, look=False)
+    picture = searched(tracking, "ceiling", 40)
+    for _ in range(6):
+        tracking.ingest(picture)
+    tracking.run(0.02, look=False)
+    assert tracking.tracker.lookout.missed_s == {}
+
+
 def test_observations_belong_to_their_drone_whatever_camera_they_name(tracking: Flight) -> None:
     tracking.corrections.clear()
     for _ in range(10):

@@ -214,7 +214,8 @@ class Tracker:
         """Use pictures that do not show entities: an entity missing at its estimated place leaves the belief."""
         ages_s = {name: self.filter.age_s(name) for name in (*self.airborne, *self._targets)}
         rooted_s = {name: self._rooted_age_s(name) for name in self.airborne}
-        gone = self.lookout.advance(self._belief, ages_s, rooted_s)
+        unlocalised = [name for name, unknown_s in self._unlocalised_s.items() if unknown_s > 0.0]
+        gone = self.lookout.advance(self._belief, ages_s, rooted_s, unlocalised)
         self._notices += self.lookout.take_notices()
         for name in gone:
             for present in (False, True):

@@ -104,19 +104,25 @@ class Lookout:
         self._search.see(sighting)
 
     def advance(
-        self, belief: JointBelief, ages_s: Mapping[str, float], rooted_s: Mapping[str, float]
+        self,
+        belief: JointBelief,
+        ages_s: Mapping[str, float],
+        rooted_s: Mapping[str, float],
+        unlocalised: Collection[str] = (),
     ) -> tuple[str, ...]:
         """Count all pictures; returns the targets whose estimates no longer hold.
 
         ages_s: time since each airborne robot and each target was last seen; rooted_s: time since a sensor fixed in the
-        room last located each airborne robot, directly or through others. Infinite: not in the belief.
+        room last located each airborne robot, directly or through others. Infinite: not in the belief. unlocalised:
+        robots that may be elsewhere than estimated.
         """
         self._excursions.unseen_s = {name: age_s for name, age_s in ages_s.items() if name in self._names}
         self._excursions.velocity_errors_m_s = self._errors.advance(belief)
         for name in self._robots.advance(belief, rooted_s):
             text = "is not seen where it is believed, in a fixed camera's view: it turns and looks for the view"
             self._notices.append(Notice(Severity.WARNING, text, _ROBOT_REMEDY, name))
-        gone = self._search.advance(belief, {name: age_s for name, age_s in ages_s.items() if name in self.targets})
+        target_ages_s = {name: age_s for name, age_s in ages_s.items() if name in self.targets}
+        gone = self._search.advance(belief, target_ages_s, {*unlocalised, *self.missed_s})
         self._tell()
         self._notices += self._unseen.advance(belief, self._unseen_s(belief.stamp_ns, ages_s))
         return gone

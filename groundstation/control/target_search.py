@@ -106,10 +106,16 @@ class Search:
         stamp_ns = max(self._shown_ns[name].values(), default=None)
         return math.inf if stamp_ns is None else (now_ns - stamp_ns) / NS_PER_S
 
-    def advance(self, belief: JointBelief, ages_s: Mapping[str, float]) -> tuple[str, ...]:
+    def advance(
+        self,
+        belief: JointBelief,
+        ages_s: Mapping[str, float],
+        misplaced: Collection[str] = (),
+    ) -> tuple[str, ...]:
         """Update the maps to a belief's time; returns the targets whose estimates no longer hold.
 
-        ages_s: time since each target was last seen (infinite: not in the belief).
+        ages_s: time since each target was last seen (infinite: not in the belief); misplaced: robots that may be
+        elsewhere than estimated, so that nobody knows what their pictures show.
         """
         self._history.append(belief)
         now_ns = belief.stamp_ns
@@ -123,7 +129,7 @@ class Search:
         self._move(belief)
         pictures, self._pictures = self._pictures, []
         for picture in pictures:
-            if picture.header.stamp_ns > now_ns - KEPT_NS:
+            if picture.observer not in misplaced and picture.header.stamp_ns > now_ns - KEPT_NS:
                 self._look(picture)
         return tuple(dropped)
 

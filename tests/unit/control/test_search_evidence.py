@@ -55,6 +55,15 @@ def test_a_picture_does_not_count_against_a_target_that_was_seen_since(seen_s: f
     assert (overlooked(search) < 0.9) is counts
 
 
+def test_pictures_of_a_drone_that_may_be_elsewhere_do_not_count() -> None:
+    for misplaced, counts in (((), True), (("drone_1",), False), (("drone_2",), True)):
+        search = new_search()
+        search.advance(belief(POSES, 1.0), {"turtlebot": math.inf}, misplaced)
+        search.take(picture("drone_1", 1.0))
+        search.advance(belief(POSES, 1.02), {"turtlebot": math.inf}, misplaced)
+        assert (overlooked(search) < 0.9) is counts
+
+
 @pytest.mark.parametrize("tick_s", [0.02, 0.023, 0.06, 0.099, 0.1, 0.14, 1.7])
 def test_maps_move_on_as_fast_as_time_passes_however_beliefs_come(tick_s: float) -> None:
     """Each step waited for the first belief after 100 ms and counted 100 ms: a tenth was lost."""

@@ -61,6 +61,19 @@ def test_copies_of_one_picture_raise_no_doubt_about_a_drone(tracking: Flight) ->
     assert tracking.tracker.lookout.missed_s == {}
 
 
+def test_pictures_of_a_drone_that_is_not_where_it_is_believed_do_not_count(tracking: Flight) -> None:
+    tracking.unseen = {"drone_1"}
+    for _ in range(30):
+        tracking.run(0.1, onboard=False)
+        tracking.ingest(searched(tracking, "ceiling", 40, "drone_2"))
+    assert set(tracking.tracker.lookout.missed_s) == {"drone_1"}
+    before = overlooked(tracking)
+    tracking.ingest(searched(tracking, "drone_1", 40))
+    assert overlooked(tracking) == before
+    tracking.ingest(searched(tracking, "drone_2", 40))
+    assert overlooked(tracking) < 0.7 * before
+
+
 def test_observations_belong_to_their_drone_whatever_camera_they_name(tracking: Flight) -> None:
     tracking.corrections.clear()
     for _ in range(10):

@@ -107,7 +107,7 @@ class Tracker:
         refused = moved and isinstance(message, RelativeObservation)
         verdict = Verdict.IMPLAUSIBLE if refused else self._intake.take(key, message, now_ns)
         if not moved and verdict is not Verdict.IMPLAUSIBLE:
-            self.lookout.take(message, verdict is Verdict.ACCEPTED and message.header.clock == self._clock)
+            self.lookout.take(message, verdict is Verdict.ACCEPTED, message.header.clock == self._clock)
             if isinstance(message, VehicleStatus):
                 self._hovering.take(message, now_ns)
                 self._shafts.hear(message, now_ns)
@@ -269,7 +269,7 @@ class Tracker:
             min(seen_s, default=None), unseen_s, lookout.missed_s, lookout.missing,
             lambda robots, targets: lookout.stands(robots, targets, belief), lookout.velocity_errors_m_s, drifts,
             lookout.unsteered, {n: self._tied_age_s(n) for n in belief.layout.robots}, velocities,
-            {n: self._roots.helped_age_s(n) for n in belief.layout.robots}, self._modes)  # fmt: skip
+            {n: self._roots.helped_age_s(n) for n in belief.layout.robots}, self._modes, lookout.blind)  # fmt: skip
         wanted = setpoints_from_plan(plan, belief, airborne, p.control, p.sensors, sight)
         self._modes = {name: one.phase for name, one in wanted.items()}
         safety, shafts = self._hovering.within(p.safety), self._shafts.around(belief, airborne)

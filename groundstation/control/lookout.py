@@ -85,16 +85,28 @@ class Lookout:
         return frozenset(self.unsteered if len(self.unsteered) < len(self._names) else ())
 
     @property
+    def blind(self) -> frozenset[str]:
+        """Return the robots that cannot search, because their pictures stay away."""
+        return frozenset(self._search.blind)
+
+    @property
     def velocity_errors_m_s(self) -> Mapping[str, float]:
         """Return the expected rms error of each robot's odometry [m/s]."""
         return self._excursions.velocity_errors_m_s
 
-    def take(self, message: Message, counts: bool = True) -> None:
-        """Take a driver's mode, or a searched picture; one refused, or stamped by another clock, does not count."""
+    def take(self, message: Message, counts: bool = True, in_our_time: bool = True) -> None:
+        """Take a driver's mode, a sighting as a sign of life, or a fully searched picture.
+
+        counts: it was not refused; one stamped by another clock shows only that its camera works.
+        """
         match message:
             case VehicleStatus():
                 self._modes[message.header.entity] = message.mode
                 (self._braked.add if message.braked else self._braked.discard)(message.header.entity)
+            case RelativeObservation() if counts:
+                self._search.hear(message.observer)
+            case SearchedPicture() if counts and not in_our_time:
+                self._search.hear(message.observer)
             case SearchedPicture() if counts:
                 self._search.take(message)
                 self._robots.take(message)
@@ -122,7 +134,7 @@ class Lookout:
             text = "is not seen where it is believed, in a fixed camera's view: it turns and looks for the view"
             self._notices.append(Notice(Severity.WARNING, text, _ROBOT_REMEDY, name))
         target_ages_s = {name: age_s for name, age_s in ages_s.items() if name in self.targets}
-        gone = self._search.advance(belief, target_ages_s, {*unlocalised, *self.missed_s})
+        gone = self._search.advance(belief, target_ages_s, {*unlocalised, *self.missed_s}, self.unsteered)
         self._tell()
         self._notices += self._unseen.advance(belief, self._unseen_s(belief.stamp_ns, ages_s))
         return gone

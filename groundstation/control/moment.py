@@ -32,7 +32,7 @@ class Sight:
     odometry; drifts_m_s: motion of each robot beyond its commands (3) [m/s; world]; unsteered: robots that follow no
     setpoints: they wait or land; untied_s: time since a sensor fixed in the room last located each robot, or another
     one saw it; velocities_m_s: of each robot (3) [m/s; world]; helped_s: time since others than the sensors fixed in
-    the room last located each robot; before: modes of the robots in the last step.
+    the room last located each robot; before: modes of the robots in the last step; blind: robots that cannot search.
     """
 
     target_age_s: float | None = None
@@ -47,6 +47,7 @@ class Sight:
     velocities_m_s: Mapping[str, Array] = field(default_factory=dict)
     helped_s: Mapping[str, float] = field(default_factory=dict)
     before: Mapping[str, FlightMode] = field(default_factory=dict)
+    blind: Collection[str] = ()
 
 
 @dataclass(frozen=True, slots=True)

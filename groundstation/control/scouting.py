@@ -29,7 +29,8 @@ def scout_of(tracking: Sequence[str], topology: Topology, now: Moment) -> str | 
         return bonus_m + min(math.dist(belief.mean_of(name)[:2], target[:2]) for target in seen)
 
     nearest, levels = min(able, key=way_m), topology.level_by_robot()
-    spared = [name for name in able if name != nearest and _can_be_spared(name, tracking, levels, seen, now)]
+    sees = [name for name in able if name != nearest and name not in now.sight.blind]
+    spared = [name for name in sees if _can_be_spared(name, tracking, levels, seen, now)]
     return max(spared, key=way_m, default=None)
 
 

@@ -1,7 +1,7 @@
 """The part of the floor that a search can show at all: from stands that robots may fly to, and by fixed cameras."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -75,22 +75,4 @@ def shown_by_fixed(grid: RoomGrid, cameras: Iterable[CameraRow], marker_m: float
     shown = np.zeros(grid.shape, dtype=np.bool_)
     for camera in cameras:
         shown |= detection_map(camera, np.zeros(4), 0.0, grid.xs, grid.ys, marker_m) >= _IN_VIEW
-    return shown
-
-
-def showable(
-    grid: RoomGrid,
-    lattice: Lattice,
-    footprints: Mapping[str, Footprint],
-    free: Mapping[str, BoolArray],
-    marker_m: float,
-    cameras: Iterable[CameraRow],
-) -> Cells:
-    """Return the cells that the team's search can show.
-
-    free: the stands permitted to each robot; cameras: the fixed ones that observe targets.
-    """
-    shown = shown_by_fixed(grid, cameras, marker_m)
-    for name, footprint in footprints.items():
-        shown |= shown_from(grid, lattice, free[name], footprint)
     return shown

@@ -15,8 +15,9 @@ from groundstation.control.parameters import ControlParameters
 from groundstation.control.pursuit import choose_pursuit
 from groundstation.control.search_parameters import SearchParameters
 from groundstation.control.search_ranges import searching_cameras
-from groundstation.control.search_reach import extra_ways_m, permitted, showable
+from groundstation.control.search_reach import extra_ways_m, permitted, shown_by_fixed, shown_from
 from groundstation.control.search_state import SearchMode, SearchState
+from groundstation.control.search_team import SearchTeam
 from groundstation.control.stand import Stand
 from groundstation.control.sweeps import NO_OUTLOOK, Outlook, lattice_of
 from groundstation.estimation.belief import JointBelief
@@ -40,7 +41,7 @@ class Search:
     """Probability maps of unseen targets, updated by pictures without them, and the stands of the searching robots.
 
     Call `see` with sightings, `take` with searched pictures, `advance` with each belief; read `targets`, ask for
-    `stands`. `never_shown`: share of the floor that no robot may fly near enough to, and no fixed camera shows.
+    `stands`.
     """
 
     def __init__(
@@ -71,8 +72,12 @@ class Search:
         self._extra_s = {name: there_and_back_s_m * way_m for name, way_m in extra_m.items()}
         free = {name: permitted(name, places, way_m, parameters, control, sensors) for name, way_m in extra_m.items()}
         fixed = [rows[0] for name, rows in self._cameras.items() if name in sensors.world]
-        self._shown = self._floor & showable(self.grid, self._lattice, self._footprints, free, marker_m, fixed)
-        self.never_shown = 1.0 - float(self._shown.sum()) / max(1, int(self._floor.sum()))
+        self._team = SearchTeam(
+            self._floor,
+            shown_by_fixed(self.grid, fixed, marker_m),
+            {name: shown_from(self.grid, self._lattice, free[name], one) for name, one in self._footprints.items()},
+        )
+        self._heard = set[str]()
         self._pictures: list[SearchedPicture] = []
         self._history = BeliefHistory()
         self._moved_ns = 0
@@ -80,8 +85,23 @@ class Search:
         self._outlook = NO_OUTLOOK
         self._planned: tuple[int, tuple[str, ...], tuple[str, ...]] = (0, (), ())
 
+    @property
+    def never_shown(self) -> float:
+        """Return the share of the floor that no robot may fly near enough to, and no fixed camera shows."""
+        return 1.0 - float(self._team.shown.sum()) / max(1, int(self._floor.sum()))
+
+    @property
+    def blind(self) -> Collection[str]:
+        """Return the robots that cannot search, because their pictures stay away."""
+        return self._team.blind
+
+    def hear(self, observer: str) -> None:
+        """Take a sign of life of a camera."""
+        self._heard.add(observer)
+
     def take(self, picture: SearchedPicture) -> None:
         """Take a picture that was searched; it counts with the next `advance`."""
+        self.hear(picture.observer)
         if picture.observer in self._cameras:
             self._pictures.append(picture)
 
@@ -111,11 +131,12 @@ class Search:
         belief: JointBelief,
         ages_s: Mapping[str, float],
         misplaced: Collection[str] = (),
+        unsteered: Collection[str] = (),
     ) -> tuple[str, ...]:
         """Update the maps to a belief's time; returns the targets whose estimates no longer hold.
 
         ages_s: time since each target was last seen (infinite: not in the belief); misplaced: robots that may be
-        elsewhere than estimated, so that nobody knows what their pictures show.
+        elsewhere than estimated, so that nobody knows what their pictures show; unsteered: those that do not obey.
         """
         self._history.append(belief)
         now_ns = belief.stamp_ns
@@ -131,12 +152,14 @@ class Search:
         for picture in pictures:
             if picture.observer not in misplaced and picture.header.stamp_ns > now_ns - KEPT_NS:
                 self._look(picture)
+        self._team.advance(belief, self._heard.difference(misplaced), unsteered)
+        self._heard.clear()
         return tuple(dropped)
 
     def stands(self, robots: Sequence[str], targets: Collection[str], belief: JointBelief) -> Mapping[str, Stand]:
         """Return the robots' stands for the search, none within `column_m` of another; some robots may have none."""
         wanted = tuple(name for name in sorted(targets) if name in self.targets and self.targets[name].room is not None)
-        able = tuple(name for name in robots if name in self._footprints)
+        able = tuple(name for name in robots if name in self._footprints and name not in self.blind)
         planned_ns, of_robots, of_targets = self._planned
         recent = belief.stamp_ns - planned_ns < self.parameters.plan_period_s * NS_PER_S
         if not (recent and (able, wanted) == (of_robots, of_targets)):
@@ -277,7 +300,7 @@ class Search:
         for name, state in self.targets.items():
             if state.room is None or state.mode is SearchMode.TRACK:
                 continue
-            excluded = state.room.excluded(self._shown)
+            excluded = state.room.excluded(self._team.shown)
             lasted_s = (now_ns - state.since_ns) / NS_PER_S
             lost = state.mode is SearchMode.LOST or (lasted_s > p.lost_after_s and excluded > p.lost_excluded)
             self.targets[name] = replace(

@@ -117,3 +117,9 @@ def test_the_tracker_remembers_who_searched(monkeypatch: pytest.MonkeyPatch) -> 
     for now_ns in (10**9, 10**9 + 20_000_000):
         tracker.setpoints(now_ns)
     assert [dict(sight.before) for sight in sights] == [{}, {"drone_1": FlightMode.SEARCH}]
+
+
+def test_a_robot_whose_pictures_stay_away_is_not_spared_to_search() -> None:
+    now = moment([(0.2, 0.5), (-0.6, -0.5), (-0.4, 0.6)])
+    assert scout("a,b,c", now) == "b"
+    assert scout("a,b,c", replace(now, sight=replace(now.sight, blind={"b"}))) == "c"

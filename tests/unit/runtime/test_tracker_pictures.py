@@ -4,8 +4,9 @@ import math
 
 import pytest
 from hovering_team import TARGET, Flight
+from msgspec import structs
 
-from groundstation.bus.messages import SearchedPicture, Verdict
+from groundstation.bus.messages import ClockOffset, SearchedPicture, Verdict
 from groundstation.field.resolved import ResolvedField
 
 
@@ -72,6 +73,26 @@ def test_pictures_of_a_drone_that_is_not_where_it_is_believed_do_not_count(track
     assert overlooked(tracking) == before
     tracking.ingest(searched(tracking, "drone_2", 40))
     assert overlooked(tracking) < 0.7 * before
+
+
+@pytest.mark.parametrize("sign", ["none", "pictures of another clock", "sightings"])
+def test_a_drone_searches_whose_camera_shows_that_it_works(tracking: Flight, sign: str) -> None:
+    """A picture of another host's clock fills no map, but the sightings of that camera count."""
+    offset = ClockOffset(header=tracking.header("run"), of="there", offset_ns=0)
+    assert tracking.ingest(offset) is None
+    for tick in range(40):
+        tracking.run(0.1, onboard=False)
+        tracking.ingest(searched(tracking, "drone_2", 40))
+        if sign == "sightings":
+            seen = structs.replace(tracking.onboard("drone_1"), subject="drone_2") if tick % 10 == 0 else None
+            if seen is not None:
+                tracking.ingest(seen)
+        elif sign != "none":
+            tracking.ingest(searched(tracking, "drone_1", 40, clock="there"))
+        tracking.tracker.setpoints(tracking.now)
+    belief = tracking.tracker.belief
+    stands = tracking.tracker.lookout.stands(("drone_1", "drone_2"), ("turtlebot",), belief)
+    assert set(stands) == ({"drone_2"} if sign == "none" else {"drone_1", "drone_2"})
 
 
 def test_observations_belong_to_their_drone_whatever_camera_they_name(tracking: Flight) -> None:

@@ -40,7 +40,8 @@ class Namesakes:
             self._count, self._counted_ns = doubled, now_ns
         if now_ns - self._counted_ns >= HEARTBEAT_NS:
             return ""
-        return f"a second address sends with its system id {self._system}: set an id of its own on each vehicle"
+        fault = f"a second address sends with its system id {self._system}"
+        return f"{fault}: set an id of its own on each vehicle, or close one of the ways by which this one sends"
 
 
 class Misfit:

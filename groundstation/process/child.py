@@ -72,6 +72,7 @@ class Child:
         self.name = spec.name
         self.section = spec.section
         self._block: HeartbeatBlock | None = None
+        self._finished = False
         self._state = Lifecycle.STARTING
         self._detail = ""
         self._counters = (0, 0, 0)
@@ -100,6 +101,8 @@ class Child:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        if error is None and self._finished and self._block is not None:
+            self._block.end(self.spec.heartbeat_index)  # not before: one that hangs while it closes its links is killed
         known = error is None or isinstance(error, GroundStationError)
         self._set_state(
             Lifecycle.STOPPING, str(error or "") if known else without_passwords(f"{type(error).__name__}: {error}")
@@ -197,8 +200,7 @@ class Child:
 
     def finish(self) -> None:
         """Record that no vehicle of this driver needs anybody; whoever ends without it is spoken for as if it died."""
-        if self._block is not None:
-            self._block.end(self.spec.heartbeat_index)
+        self._finished = True
 
     def leave(self, number: int) -> None:
         """Record a number (0 to 2^62) for the process that is started in place of this one."""

@@ -96,8 +96,10 @@ class JournalWorker:
         budget = entry.evaluations if entry.stop_reason == STOPPED else None
         try:
             plan = request.put_to(self._planner, lambda: False, budget)
+        except KeyboardInterrupt:  # whoever re-runs it stops
+            raise
         # As in flight (PlanWorker): a fault survived in flight can be replayed.
-        except (Exception, SystemExit) as error:  # noqa: BLE001
+        except BaseException as error:  # noqa: BLE001
             return Adoption(tick, None, self._failures.take(error))
         return Adoption(tick, plan)
 

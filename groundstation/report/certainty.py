@@ -58,15 +58,15 @@ def _longest_s(track: CertaintyTrack | None, time_s: Array, flying: BoolArray) -
     if not flying.any():
         return None
     if track is None:
-        return _run_s(flying)
+        return longest_s(flying)
     newest, fresh = _latest(track, time_s)
     unlocalised_s = track.unlocalised_s[newest][fresh & flying]
-    doubted_s = _run_s(flying & (~fresh | track.doubted[newest]))
+    doubted_s = longest_s(flying & (~fresh | track.doubted[newest]))
     # Since its last sighting, which may be before the time that counts.
     return max(doubted_s, min(float(unlocalised_s.max(initial=0.0)), float(np.count_nonzero(flying) / RATE_HZ)))
 
 
-def _run_s(held: BoolArray) -> float:
+def longest_s(held: BoolArray) -> float:
     """Return the longest time for which something held without a break [s]."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], held, [False]))))
     return float((edges[1::2] - edges[::2]).max(initial=0) / RATE_HZ)

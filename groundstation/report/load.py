@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.arrays import Array
-from groundstation.report.accuracy import RATE_HZ, STALE_S
+from groundstation.report.accuracy import STALE_S
+from groundstation.report.certainty import longest_s
 from groundstation.report.interval import Span, flight_spans, within
 from groundstation.report.tracks import ProcessTrack, RunData
 
@@ -111,7 +112,7 @@ def planner_ms(data: RunData) -> tuple[float, float] | None:
 
 
 def unplanned_s(data: RunData, time_s: Array) -> float | None:
-    """Return for how long every plan was too old to be flown while the tracker lived, at 10 Hz [s].
+    """Return for how long at most every plan was too old to be flown while the tracker lived, at 10 Hz [s].
 
     None where it told nothing of anybody. Without a tracker drones hover as well, and that is reported otherwise.
     """
@@ -121,7 +122,7 @@ def unplanned_s(data: RunData, time_s: Array) -> float | None:
     if not lives.any():
         return None
     old = _age_s(np.array([plan.time_s for plan in data.plans]), time_s) > data.resolved.planner.max_plan_age_s
-    return float(np.count_nonzero(lives & old) / RATE_HZ)
+    return longest_s(lives & old)
 
 
 def _age_s(told_s: Array, time_s: Array) -> Array:

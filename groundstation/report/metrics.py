@@ -24,10 +24,10 @@ class RunFigures(msgspec.Struct, frozen=True, kw_only=True):
     each target from when it was found, None if it never was. target_unseen_s, drone_uncertain_s: by the estimates.
     flew: whether any drone did. recorded_share: of the flights, without holes. drones_judged: share of each drone's
     flights for which motion capture knows its place. failsafe_landings: which drones a failsafe landed or cut, when and
-    why; cuts_in_flight: which fell because somebody ordered it. unplanned_s: for how long all plans were too old to be
-    flown. truth: the reference of the errors, a motion capture
-    system of the field or the simulator, "" for nothing. starved_s: how long other programs of the computer kept
-    processes of the run from it; waited: the share of the time for which each waited for a core.
+    why; cuts_in_flight: which fell because somebody ordered it. unplanned_s: for how long at most all plans were too
+    old to be flown. truth: the reference of the errors, a motion capture system of the field or the simulator, "" for
+    nothing. starved_s: how long other programs of the computer kept processes of the run from it; waited: the share of
+    the time for which each waited for a core.
     """
 
     flew: bool = True

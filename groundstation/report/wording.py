@@ -25,7 +25,7 @@ _TITLES = {
     "command_to_airborne_s": ("from the command to the air", "s"),
     "failsafe_landings": ("flights ended by a failsafe", ""),
     "planner_p50_ms": ("planning step, median", "ms"),
-    "unplanned_s": ("time without a plan, while tracking", "s"),
+    "unplanned_s": ("longest time without a plan, while tracking", "s"),
     "planner_p99_ms": ("planning step, 99th percentile", "ms"),
     "tracker_missed_percent": ("tracker's deadlines missed", "%"),
     "tracker_rate_hz": ("tracker's rate", "Hz"),

@@ -12,7 +12,7 @@ from groundstation.time_units import NS_PER_MS, NS_PER_S
 
 # The cadence is the median of the means of so many intervals: bursts of two or three do not move it.
 _INTERVALS, _FEWEST, _SPAN = 31, 8, 6
-# A gap is later than jitter, than one picture that is missing, and than nine of ten intervals of an uneven stream.
+# A gap is later than jitter, than one picture that is missing, and than all intervals but one of an uneven stream.
 _LATE_NS, _MISSING, _UNEVEN = 100 * NS_PER_MS, 1.2, 1.5
 # Within this part of the cadence after the one before, a picture had waited; so many in a row later: none waits.
 _SOON, _STEADY = 0.7, 2
@@ -22,16 +22,22 @@ _MADE_UP = 0.5
 _SLOWED = 1.5
 # The connection ends after 2 s of silence.
 _MOST_BEHIND_NS = 2 * NS_PER_S
-_LONGEST_NS = 5 * NS_PER_S
+# A link that carries twice what the camera sends has caught up as long after a gap as that lasted. Whatever comes later
+# is the stream's own way, and is learnt, as are gaps that follow each other within a few pictures.
+_CATCHES_UP_NS = NS_PER_S // 2
 
 
 class Cadence:
-    """Learns how often the pictures of one connection come, and withholds none for more than 5 s on end."""
+    """Learns how often the pictures of one connection come, and withholds those that may be old.
+
+    None longer than half a second more than the gap before them lasted.
+    """
 
     def __init__(self) -> None:
         self._intervals: deque[int] = deque(maxlen=_INTERVALS)
         self._last_ns: int | None = None
         self._gap: _Gap | None = None
+        self._since_gap = _FEWEST
 
     def holds_back(self, arrival_ns: int) -> bool:
         """Take in a picture's arrival; return whether the picture may be old."""
@@ -45,34 +51,39 @@ class Cadence:
         usual_ns = self._usual_ns()
         is_long = apart_ns > self._longest_ns(usual_ns)
         if self._gap is None:
+            self._since_gap += 1
             if not is_long:
                 self._intervals.append(apart_ns)
                 return False
             self._gap = _Gap(last_ns, apart_ns)
-        old = self._gap.holds_back(arrival_ns, apart_ns, usual_ns, is_long)
-        self._intervals.extend(self._gap.learnt_ns())
-        if old and arrival_ns - self._gap.since_ns > _LONGEST_NS:
-            self._intervals.clear()
-            self._gap, old = None, False
-        elif self._gap.over:
-            self._gap = None
-        return old
+        gap = self._gap
+        old = gap.holds_back(arrival_ns, apart_ns, usual_ns, is_long)
+        self._intervals.extend(gap.learnt_ns())
+        too_long = old and arrival_ns > gap.until_ns
+        if too_long or (gap.over and self._since_gap < _FEWEST):
+            self._intervals.extend(gap.seen_ns)
+        if too_long or gap.over:
+            self._gap, self._since_gap = None, 0
+        return old and not too_long
 
     def _usual_ns(self) -> float:
         known = list(self._intervals)
         return median(sum(known[at : at + _SPAN]) for at in range(len(known) - _SPAN + 1)) / _SPAN
 
     def _longest_ns(self, usual_ns: float) -> float:
-        uneven_ns = sorted(self._intervals)[-1 - len(self._intervals) // 10]
+        uneven_ns = sorted(self._intervals)[-1 - len(self._intervals) // 16]
         return max(usual_ns + max(_LATE_NS, _MISSING * usual_ns), _UNEVEN * uneven_ns)
 
 
 class _Gap:
-    """A gap and the pictures after it; since_ns: the arrival before it. `over`: nothing is held back any more."""
+    """A gap and the pictures after it; since_ns: the arrival before it.
+
+    `over`: nothing is held back any more; `until_ns`: nor after this time; `seen_ns`: all intervals, the gap's too.
+    """
 
     def __init__(self, since_ns: int, apart_ns: int) -> None:
-        self.since_ns = since_ns
-        self.over = False
+        self.since_ns, self.until_ns = since_ns, since_ns + 2 * apart_ns + _CATCHES_UP_NS
+        self.over, self.seen_ns = False, list[int]()
         self._first_ns = apart_ns
         self._learnt_ns: list[int] = []
         self._behind_ns = 0.0
@@ -80,6 +91,7 @@ class _Gap:
 
     def holds_back(self, arrival_ns: int, apart_ns: int, usual_ns: float, is_long: bool) -> bool:
         """Take in a picture; is_long: it came after a gap itself. Return whether it may be old."""
+        self.seen_ns.append(apart_ns)
         before_ns, self._before_ns = self._before_ns, apart_ns if is_long else 0
         self._pictures += 1
         self._behind_ns = min(self._behind_ns + apart_ns - usual_ns, _MOST_BEHIND_NS)

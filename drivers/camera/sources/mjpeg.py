@@ -24,12 +24,9 @@ from drivers.camera.sources.reader_thread import Drain, PictureDecoder
 from drivers.camera.sources.tcp import Line
 from groundstation.bus import clock
 from groundstation.errors import DriverError
-from groundstation.time_units import NS_PER_MS
 
 _READ_BYTES = 1 << 16
 _MAX_HEAD_BYTES = 8192
-# A stamp that has a picture wait by so much explains why it came out of turn.
-_WAITED_NS = 50 * NS_PER_MS
 
 
 class MjpegReader:
@@ -105,11 +102,10 @@ class _Dates:
         if jpegs and len(sent_ns) == len(jpegs):
             settled_ns = self._clock.settle(sent_ns, arrival_ns)
             when_ns = settled_ns if self._clock.proven else when_ns
-        return [self._unit(jpeg, arrival_ns, when) for jpeg, when in zip(jpegs, when_ns, strict=True)]
-
-    def _unit(self, jpeg: bytes, arrival_ns: int, when_ns: int) -> Unit:
-        may_be_old = self._cadence.holds_back(arrival_ns)
-        return Unit(jpeg, arrival_ns, when_ns, held_back=may_be_old and arrival_ns - when_ns < _WAITED_NS)
+        # Both learn from every picture; one whose stamp is known to be right is dated, however late it comes.
+        held_back = [self._cadence.holds_back(arrival_ns) and not self._clock.proven for _ in jpegs]
+        pictures = zip(jpegs, when_ns, held_back, strict=True)
+        return [Unit(jpeg, arrival_ns, when, held_back=old) for jpeg, when, old in pictures]
 
 
 class _Body:

@@ -115,3 +115,14 @@ def test_light_that_fails_ends_the_reports_before_boards_are_lost() -> None:
     finds = [bool(search(shown(board, light, BLACK), [])) for light in lights]
     assert counts == sorted(counts, reverse=True) and finds == sorted(finds, reverse=True)
     assert abs(sum(counts) - sum(finds)) <= 1, list(zip(lights, counts, finds, strict=True))
+
+
+def test_one_picture_of_great_contrast_does_not_make_a_plain_floor_unclear() -> None:
+    """A strip of sun, or a hull near the lens: ten times the contrast of the floor without it."""
+    plain, judge = shown(view(FloorKind.CONCRETE), 0.6, GREY), ClearPictures(stands=True)
+    board = shown(view(FloorKind.CONCRETE, marked=True), 0.6, GREY)
+    sunny = board.copy()
+    sunny[:, :80], sunny[:, -80:] = 255, 0
+    for _ in range(5):
+        assert judge.is_clear(board, True) and judge.is_clear(plain, False)
+    assert judge.is_clear(sunny, True) and judge.is_clear(plain, False)

@@ -1,6 +1,7 @@
 """Pictures that a stalled link delivers late, by their arrivals alone: cameras of several rates, and uneven ones."""
 
 import itertools
+import math
 from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
@@ -112,4 +113,27 @@ def test_no_pattern_of_arrivals_withholds_pictures_for_ever() -> None:
         pattern = random.choice([0.0, 0.005, 0.03, 0.07, 0.3, 0.6, 1.5], random.integers(1, 8))
         times = np.cumsum(np.concatenate([np.full(20, random.choice([0.03, 0.07, 0.2])), np.resize(pattern, 400)]))
         when = [0.0, *(arrival for arrival, _ in shown((at, at) for at in times)), float(times[-1])]
-        assert max(after - before for before, after in itertools.pairwise(when)) < 5.0 + 2.0
+        assert max(after - before for before, after in itertools.pairwise(when)) < 2 * 1.5 + 0.5 + 1.5
+
+
+@pytest.mark.parametrize("smooth_s", [0.0, 10.0])
+@pytest.mark.parametrize(("fps", "bunch_s"), [(30, 0.2), (30, 0.3), (15, 0.25), (15, 0.4)])
+@pytest.mark.parametrize("missing", [0.0, 0.05])
+def test_pictures_that_begin_to_come_in_bunches_are_soon_shown(
+    fps: int, bunch_s: float, missing: float, smooth_s: float
+) -> None:
+    random = np.random.default_rng(2)
+    exposed = [at for at in every(1 / fps, smooth_s + 30.0) if random.random() >= missing]
+    ways = [at if at < smooth_s else (math.floor(at / bunch_s) + 1) * bunch_s for at in exposed]
+    pictures = [(at, way + random.uniform(0.0, 0.004)) for at, way in zip(exposed, ways, strict=True)]
+    found = [when for when, _ in shown(sorted(pictures, key=lambda one: one[1]))]
+    apart = [(after - before, before) for before, after in itertools.pairwise(found)]
+    assert max(apart)[0] < 3 * bunch_s + 0.5
+    assert max(gap for gap, begin in apart if begin > smooth_s + 5.0) < 1.2 * bunch_s
+
+
+@pytest.mark.parametrize(("slow", "fast", "pause_s"), [(10, 15, 1.8), (15, 30, 1.0), (7, 30, 0.5)])
+def test_a_camera_that_is_faster_after_a_pause_is_soon_shown(slow: int, fast: int, pause_s: float) -> None:
+    exposed = [*every(1 / slow, 20.0), *(20.0 + pause_s + at for at in every(1 / fast, 20.0))]
+    found = [when for when, _ in shown(arrivals(exposed))]
+    assert max(after - before for before, after in itertools.pairwise(found)) < 2 * pause_s + 0.8

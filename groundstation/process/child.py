@@ -101,7 +101,7 @@ class Child:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if error is None and self._finished and self._block is not None:
+        if self._finished and self._block is not None:
             self._block.end(self.spec.heartbeat_index)  # not before: one that hangs while it closes its links is killed
         known = error is None or isinstance(error, GroundStationError)
         self._set_state(

@@ -1,8 +1,11 @@
 """Pictures from the disk: video files and folders, and their errors."""
 
+import itertools
 import os
 import time
 from contextlib import contextmanager
+from functools import partial
+from types import SimpleNamespace
 
 import av
 import cv2
@@ -14,6 +17,7 @@ from drivers.camera.sources.container import device
 from drivers.camera.sources.frames import Packet
 from drivers.camera.sources.opening import open_source
 from drivers.camera.sources.reader_thread import Drain
+from groundstation.time_units import NS_PER_S
 
 
 @contextmanager
@@ -107,8 +111,10 @@ def test_an_absent_device_is_named():
 
 
 @pytest.mark.parametrize("pixel_format", ["yuyv422", "yuv420p", "gray", "bgr24"])
-def test_raw_pictures_of_a_device_are_read(tmp_path, pixel_format):
-    """A file stands in for a camera of this machine: its pictures arrive uncompressed, in the same way."""
+def test_raw_pictures_of_a_device_are_read(tmp_path, pixel_format, monkeypatch):
+    """A file stands in for a camera of this machine: its pictures arrive uncompressed, in the same way and as fast."""
+    arrivals = SimpleNamespace(now_ns=partial(next, itertools.count(NS_PER_S, NS_PER_S // 30)))
+    monkeypatch.setattr("drivers.camera.sources.container.clock", arrivals)
     path = write_video(tmp_path / "raw.nut", "rawvideo", count=3, pixel_format=pixel_format)
     reader = device(str(path), None)
     reader._form, reader._choices = None, ({},)

@@ -97,15 +97,14 @@ class _Dates:
 
     def units(self, jpegs: Sequence[bytes], stamps_ns: Sequence[int | None], arrival_ns: int) -> list[Unit]:
         """Return pictures that arrived together, oldest first."""
-        when_ns = [arrival_ns] * len(jpegs)
+        # The cadence learns from every picture, also while stamps prove true: they may end.
+        old = [self._cadence.holds_back(arrival_ns) for _ in jpegs]
         sent_ns = [stamp for stamp in stamps_ns if stamp is not None]
         if jpegs and len(sent_ns) == len(jpegs):
             settled_ns = self._clock.settle(sent_ns, arrival_ns)
-            when_ns = settled_ns if self._clock.proven else when_ns
-        # Both learn from every picture; one whose stamp is known to be right is dated, however late it comes.
-        held_back = [self._cadence.holds_back(arrival_ns) and not self._clock.proven for _ in jpegs]
-        pictures = zip(jpegs, when_ns, held_back, strict=True)
-        return [Unit(jpeg, arrival_ns, when, held_back=old) for jpeg, when, old in pictures]
+            if self._clock.proven:  # then a picture is dated, however late it comes
+                return [Unit(jpeg, arrival_ns, when_ns) for jpeg, when_ns in zip(jpegs, settled_ns, strict=True)]
+        return [Unit(jpeg, arrival_ns, arrival_ns, held_back=one) for jpeg, one in zip(jpegs, old, strict=True)]
 
 
 class _Body:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 import pytest
 
+from drivers.camera.sources import mjpeg
 from drivers.camera.sources.held_back import Cadence
 from groundstation.time_units import NS_PER_S
 
@@ -137,3 +138,23 @@ def test_a_camera_that_is_faster_after_a_pause_is_soon_shown(slow: int, fast: in
     exposed = [*every(1 / slow, 20.0), *(20.0 + pause_s + at for at in every(1 / fast, 20.0))]
     found = [when for when, _ in shown(arrivals(exposed))]
     assert max(after - before for before, after in itertools.pairwise(found)) < 2 * pause_s + 0.8
+
+
+@pytest.mark.parametrize("end", ["missing", "frozen"])
+def test_stamps_that_end_or_stand_still_leave_the_judgement_to_the_cadence(end: str) -> None:
+    """Before a stall their pictures are dated by stamps that had proven true; after it, by nothing."""
+    dates, delay_ns, period_ns = mjpeg._Dates(), 100_000_000, NS_PER_S // 15
+    stall_ns = 45 * period_ns
+    held_back = []
+    for number in range(70):
+        taken_ns = NS_PER_S + number * period_ns
+        held = 40 <= number < 45
+        arrival_ns = NS_PER_S + (stall_ns if held else number * period_ns) + delay_ns + (number - 40) * held * 5_000_000
+        stamp_ns = taken_ns if number < 35 else None if end == "missing" else NS_PER_S + 34 * period_ns
+        (unit,) = dates.units([b"jpeg"], [stamp_ns], arrival_ns)
+        if 20 <= number < 35:
+            assert unit.settled_ns == pytest.approx(taken_ns + delay_ns, abs=1_000_000) and not unit.held_back
+        elif number >= 36:
+            assert unit.settled_ns == unit.arrival_ns
+        held_back += [number] * unit.held_back
+    assert held_back and set(held_back) <= {40, 41, 42, 43, 44}

@@ -1,5 +1,6 @@
 """Shared by all tests: coverage, the kernel cache of these sources, shipped settings, and recorded data."""
 
+import gc
 import os
 import signal
 from collections.abc import Callable, Iterator
@@ -24,6 +25,9 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # A suite in the background inherits this, and would hand it on to the commands that its tests interrupt.
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
+# Nothing that is imported and collected becomes garbage: a tenth of the time of collecting, without this.
+gc.disable()
+
 ROOT = Path(__file__).parents[1]
 CONFIG = ROOT / "config"
 BESIDE_FLIGHTS = {
@@ -41,6 +45,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         for folder in set(item.path.relative_to(ROOT).parts) & set(BESIDE_FLIGHTS):
             if item.get_closest_marker("slow"):
                 item.add_marker(BESIDE_FLIGHTS[folder])
+
+
+def pytest_collection_finish() -> None:
+    """Leave all modules and tests out of the later collections of garbage."""
+    gc.freeze()
+    gc.enable()
 
 
 def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:

@@ -17,10 +17,10 @@ class AckBook:
         """Return the earlier answer to this command."""
         return self._answers.get(command.id)
 
-    def answer(self, command: Command, refusal: str) -> Ack:
-        """Note the answer to a command, and wait for an accepted one to become effective."""
+    def answer(self, command: Command, refusal: str, final: bool = False) -> Ack:
+        """Note the answer to a command, and wait for an accepted one to become effective; final: see `CommandAck`."""
         stage = AckStage.REFUSED if refusal else AckStage.ACCEPTED
-        answer = Ack(command.id, command.verb, stage, refusal)
+        answer = Ack(command.id, command.verb, stage, refusal, final)
         if len(self._answers) >= _REMEMBERED_COMMANDS:
             self._answers.pop(next(iter(self._answers)))
         self._answers[command.id] = answer

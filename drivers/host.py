@@ -212,7 +212,12 @@ class VehicleHost:
     def _answer(self, ack: Ack) -> None:
         header = self._bus.header(self.vehicle.name)
         message = CommandAck(
-            header=header, command_id=ack.command_id, verb=ack.verb, stage=ack.stage, reason=ack.reason
+            header=header,
+            command_id=ack.command_id,
+            verb=ack.verb,
+            stage=ack.stage,
+            reason=ack.reason,
+            final=ack.final,
         )
         self._bus.publish(COMMAND_ACK, message)
 

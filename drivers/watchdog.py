@@ -41,6 +41,7 @@ from groundstation.time_units import NS_PER_S
 # LAND is sent for at least this long, even to a vehicle that reports standing: the report may be wrong. So is CUT, even
 # if a LAND follows it at once.
 _TELLS_NS = NS_PER_S
+_CLEARED = "it was in an emergency: this order ends that and starts nothing; order TAKEOFF again"
 _ENTERED = {Reaction.CUT: DriverMode.CUT, Reaction.LAND: DriverMode.LANDING, Reaction.HOVER: DriverMode.HOVER}
 
 
@@ -98,7 +99,8 @@ class Watchdog:
         refusal = self.lease.refusal(now_ns, command)
         if command.verb.stops and not refusal:
             self.lease.hear_stop(now_ns, command)
-        return received, self._acks.answer(command, refusal or self._obey(now_ns, command))
+        refusal = refusal or self._obey(now_ns, command)
+        return received, self._acks.answer(command, refusal, final=refusal == _CLEARED)
 
     def has_answered(self, command: Command) -> bool:
         """Return whether this is the repetition of a command that was obeyed or refused before."""
@@ -156,7 +158,7 @@ class Watchdog:
     def _clear(self, now_ns: int, command: Command) -> str:
         self._enter(now_ns, DriverMode.LANDED, f"emergency cleared for {command.issuer}")
         self._clearing = True
-        return "it was in an emergency: this order ends that and starts nothing; order TAKEOFF again"
+        return _CLEARED
 
     def _refusal(self, now_ns: int, *conditions: Condition) -> str:
         """Return why the table refuses a start now, or ""; conditions: those to check, if not all."""

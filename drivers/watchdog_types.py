@@ -167,6 +167,7 @@ class Ack:
     verb: Verb
     stage: AckStage
     reason: str = ""
+    final: bool = False
 
 
 class WatchdogDecision(NamedTuple):

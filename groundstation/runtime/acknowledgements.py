@@ -13,10 +13,11 @@ NOT_CONFIRMED = "NOT CONFIRMED"
 
 @dataclass(slots=True)
 class Progress:
-    """One drone's answers to one command; `stage` is the furthest, None before the first."""
+    """One drone's answers to one command; `stage` is the furthest, None before the first; final: see `CommandAck`."""
 
     stage: AckStage | None = None
     reason: str = ""
+    final: bool = False
 
     @property
     def settled(self) -> bool:
@@ -53,7 +54,7 @@ class AwaitedAnswers:
         known = -1 if progress.stage is None else _ORDER.index(progress.stage)
         if ack.stage is not AckStage.REFUSED and _ORDER.index(ack.stage) <= known:
             return False
-        progress.stage, progress.reason = ack.stage, ack.reason
+        progress.stage, progress.reason, progress.final = ack.stage, ack.reason, ack.final
         return True
 
     def leave_out(self, drones: Collection[str], why: str) -> tuple[str, ...]:

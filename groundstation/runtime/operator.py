@@ -262,7 +262,7 @@ class Operator:
         if sequence.mistake is not None:
             self._say(f"TAKE-OFF STOPPED: {sequence.mistake}")
         for name, reason in list(sequence.left_out.items())[left_out:]:
-            self._report_left_out(name, reason, sequence.mistake)
+            self._report_left_out(name, reason, sequence)
         if sequence.finished:
             self._finish(sequence, now_ns)
 
@@ -271,8 +271,9 @@ class Operator:
         if order.verb is Verb.TAKEOFF:
             self._take_off_book = book
 
-    def _report_left_out(self, name: str, reason: str, mistake: Mistake | None) -> None:
-        text, remedy = f"{name} is left out of the take-off: {reason}", "see its log"
+    def _report_left_out(self, name: str, reason: str, sequence: TakeOff) -> None:
+        text, mistake = f"{name} is left out of the take-off: {reason}", sequence.mistake
+        remedy = "order TAKEOFF again once it stands upright" if name in sequence.awaits else "see its log"
         if mistake is not None and reason == mistake.text:
             text, remedy = f"take-off stopped: {reason}", mistake.remedy
         else:

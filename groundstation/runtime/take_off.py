@@ -47,8 +47,9 @@ class _Step(Enum):
 class TakeOff:
     """One take-off of the given drones, except those that fly already; finished when no drone is waiting.
 
-    up: drones that flew already (flew) or were seen in flight; left_out: the others, with reasons; mistake: the
-    likely mix-up that ended the sequence early. It lands none but those that it lifted.
+    up: drones that flew already (flew) or were seen in flight; left_out: the others, with reasons; awaits: those of
+    them that only a person may start now; mistake: the likely mix-up that ended the sequence early. It lands none but
+    those that it lifted.
     """
 
     def __init__(
@@ -66,6 +67,7 @@ class TakeOff:
         self.up = [name for name in each if name in flying]
         self.flew = set(self.up)
         self.left_out: dict[str, str] = {}
+        self.awaits: set[str] = set()
         self.mistake: Mistake | None = None
 
     @property
@@ -131,6 +133,9 @@ class TakeOff:
 
     def _lift_off(self, now_ns: int, progress: Progress | None) -> TakeOffCommand | None:
         if progress is not None and progress.stage is AckStage.REFUSED:
+            if progress.final:
+                self.awaits.add(self.current)
+                return self._leave_out(f"refused: {progress.reason}", now_ns)
             # Some reasons pass (no lease received yet, trim not done): ask again for a while.
             self._refusal, self._lifts = f"refused: {progress.reason}", False
             self._go_to(_Step.CONNECT, now_ns, keep_time=True)

@@ -202,6 +202,8 @@ class CommandAck(Message, frozen=True, kw_only=True):
     """How far it has come."""
     reason: str = ""
     """Why it was refused."""
+    final: bool = False
+    """Refused, and only a person may give the same order anew: it did something, and would start motors next time."""
 
 
 class Lease(Message, frozen=True, kw_only=True):

@@ -105,8 +105,10 @@ def test_cut_presses_the_button_until_the_drone_reports_the_emergency(rig):
     assert rig.fake.state & EMERGENCY, "pressing again would have cleared it"
     assert rig.fake.said("REF")[-1] == "290717696"
     assert rig.decision.mode == "CUT"
+    rig.messages(COMMAND_ACK)
     rig.order(Verb.TAKEOFF)
     rig.until(lambda: not rig.fake.state & EMERGENCY)
+    assert [ack.final for ack in rig.messages(COMMAND_ACK)] == [False, True], "no sequence may order it again"
     for _ in range(10):
         rig.turn()
     assert rig.decision.mode == "LANDED" and not rig.fake.state & FLY, "clearing starts nothing"

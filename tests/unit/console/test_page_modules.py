@@ -273,3 +273,25 @@ def test_a_target_that_may_be_anywhere_is_unseen_but_has_no_place_on_the_map(sai
     result.push(Math.round(unseenS("turtlebot")));
     """
     assert said(script) == [["drone_1"], None, "turtlebot", 65]
+
+
+def test_a_double_click_starts_once_and_stops_twice(said: Any) -> None:
+    """After an emergency the first TAKEOFF only ends that, and the second starts motors."""
+    script = f"""{LINK}
+    const {{ give }} = await import("./own_orders.js");
+    sockets[0].onopen();
+    hear(welcome());
+    hear(seed(1));
+    for (const verb of ["TAKEOFF", "LAND"]) for (const ms of [24, 900, 100]) {{ give(verb, []); wait(ms); }}
+    give("TAKEOFF", ["drone_1"]);
+    give("TAKEOFF", ["drone_2"]);
+    wait(1000);
+    give("TAKEOFF", ["drone_2"]);
+    const result = sent("order").map(({{ verb, drones }}) => [verb, ...drones].join(" "));
+    """
+    assert said(script) == [
+        "TAKEOFF",
+        *["LAND"] * 3,
+        "TAKEOFF drone_1",
+        *["TAKEOFF drone_2"] * 2,
+    ]

@@ -23,11 +23,12 @@ from groundstation.runtime.take_off import TakeOffLimits
 MS = 1_000_000
 LIMITS = TakeOffLimits(connect_s=5, lift_off_s=15, unseen_s=10)
 CEILING_M, MARKER_M, FLIGHT_M = 4.2, 0.1, 0.8
+CLEARED = "it was in an emergency"
 CAMERAS = {"ceiling": FixedCamera(CEILING_M, (0.0, 0.0, -1.0))}
 
 
 class Drone:
-    """A driver with its drone: takes off in half a second, answers every command.
+    """A driver with its drone: takes off in half a second, answers every command; as an AR.Drone in an emergency.
 
     marker: name of the marker on the drone; reports: whether it measures its height.
     """
@@ -75,6 +76,10 @@ class Drone:
             return
         self.heard.append(command.verb)
         self.answer(command, AckStage.RECEIVED)
+        if self.state is FlightState.EMERGENCY and command.verb is Verb.TAKEOFF:
+            self.state = FlightState.LANDED
+            self.answer(command, AckStage.REFUSED, CLEARED, final=True)
+            return
         if self.refusal and command.verb is Verb.TAKEOFF:
             self.answer(command, AckStage.REFUSED, self.refusal)
             return
@@ -82,13 +87,15 @@ class Drone:
         after = {Verb.TAKEOFF: FlightState.HOVERING, Verb.LAND: FlightState.LANDED}.get(command.verb, self.state)
         self.change = (now_ns + 500 * MS, after, command)
 
-    def answer(self, command: Command, stage: AckStage, reason: str = "") -> None:
+    def answer(self, command: Command, stage: AckStage, reason: str = "", final: bool = False) -> None:
         self.last[command.id] = stage
         if stage is self.lost:
             self.lost = None
             return
         header = self.bus.header(self.name)
-        ack = CommandAck(header=header, command_id=command.id, verb=command.verb, stage=stage, reason=reason)
+        ack = CommandAck(
+            header=header, command_id=command.id, verb=command.verb, stage=stage, reason=reason, final=final
+        )
         self.bus.publish(COMMAND_ACK, ack)
 
     def measure(self, height_m: float | None) -> None:

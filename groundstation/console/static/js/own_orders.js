@@ -6,14 +6,14 @@ import { me, on, send } from "./link.js";
 import { earliestMs, latestMs } from "./server_clock.js";
 import { droneNames, now, replaying, runOver, store } from "./store.js";
 
-const KEPT_MS = 30000, STOP_LIVES_MS = 5000;
+const KEPT_MS = 30000, STOP_LIVES_MS = 5000, SAME_PRESS_MS = 1000;
 export const OVER = "the run has ended: no order can be given any more";
 // What becomes of a stop that waits for the connection when it has waited for too long. A doubtful one was handed to a
 // connection that broke: it may have been heard.
 const AFTER_WAITING = { unsent: "dropped", doubtful: "lost" };
 // No other load of a page names an order so: a duplicated tab has the same client, and a reload counts from 1 again.
 const load = [...crypto.getRandomValues(new Uint8Array(6))].map((byte) => byte.toString(16).padStart(2, "0")).join("");
-let own = [], count = 0, changed = () => {};
+let own = [], count = 0, started = null, changed = () => {};
 
 // The server refuses the rest as well: a page of another make may ask for more.
 export const mayGive = (verb) => me.role === "command" || (me.role === "stop" && STOPS.has(verb));
@@ -29,12 +29,17 @@ const meanwhile = (verb) => `if the connection is back within ${STOP_LIVES_MS / 
 // the checks before a take-off.
 export function give(verb, drones = [], run = store.run, anyway = false) {
   if (replaying()) return; // the server would refuse it as well
-  const agoMs = pressedAgoMs();
-  const order = { ref: `${load}-${++count}`, verb, drones, run, anyway, given: moment(agoMs), given_ms: now() - agoMs };
+  const agoMs = pressedAgoMs(), given = moment(agoMs);
+  if (isSamePress(verb, drones, given)) return;
+  const order = { ref: `${load}-${++count}`, verb, drones, run, anyway, given, given_ms: now() - agoMs };
   own.push(order);
   begin(order);
+  if (order.state === "sent" && !STOPS.has(verb)) started = order;
   changed();
 }
+
+// The second click of a double click: a start given twice may do more than one, as after an emergency.
+const isSamePress = (verb, drones, given) => started?.verb === verb && `${started.drones}` === `${drones}` && sinceMs(started.given) - sinceMs(given) < SAME_PRESS_MS;
 
 function begin(order) {
   if (!mayGive(order.verb)) return put(order, "refused", roleText());

@@ -241,7 +241,7 @@ def test_a_new_take_off_clears_an_emergency(new_bench):
 def test_clearing_and_starting_are_two_orders_where_the_vehicle_can_tell_them_apart(new_bench):
     bench = new_bench(state=FlightState.EMERGENCY, clears=True)
     first = bench.order(Verb.TAKEOFF)
-    assert first.stage is AckStage.REFUSED and "order TAKEOFF again" in first.reason
+    assert first.stage is AckStage.REFUSED and first.final and "order TAKEOFF again" in first.reason
     assert bench.step().action is Action.CLEAR
     bench.state = FlightState.LANDED
     assert set(bench.run(3)) == {Action.IDLE}, "nothing starts by itself"

@@ -11,7 +11,7 @@ import time
 import tty
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import click
@@ -37,9 +37,9 @@ _FAREWELL_NS = 2 * NS_PER_S
 _LOST_NS = 10 * NS_PER_S  # longer than from letting go to LAND, which may still arrive
 _KEYBOARD_PATIENCE_NS = 900 * NS_PER_MS
 _GAMEPAD_PATIENCE_NS = NEVER_NS  # it reports its release
-# WIRE: linux/joystick.h js_event: time u32, value s16, type u8 (1 = button, 0x80 = initial state), number u8.
+# WIRE: linux/joystick.h js_event: time u32, value s16, type u8 (1 = button, 0x80 = present state), number u8.
 _EVENT = struct.Struct("<IhBB")
-_BUTTON = 1
+_BUTTON, _PRESENT = 0x01, 0x80
 _LAND_BUTTON = 1
 
 
@@ -47,13 +47,14 @@ _LAND_BUTTON = 1
 class Handle:
     """Source of the grip: a terminal (any repeating space) or a gamepad (any button but the second).
 
-    gone: it can no longer be held, the drones land; left: its user leaves, the drones hold.
+    pressed: those buttons; gone: it can no longer be held, the drones land; left: its user leaves, the drones hold.
     """
 
     descriptor: int
     gamepad: bool
     gone: bool = False
     left: bool = False
+    pressed: set[int] = field(default_factory=set)
 
     def feel(self, man: DeadMan, now_ns: int) -> tuple[Verb | None, bool]:
         """Read the input; return the stop that it asks for, and whether no further one will follow."""
@@ -84,13 +85,19 @@ class Handle:
     def _buttons(self, man: DeadMan, data: bytes, now_ns: int) -> tuple[Verb | None, bool]:
         asked: Verb | None = None
         for _, value, kind, number in _EVENT.iter_unpack(data[: len(data) // _EVENT.size * _EVENT.size]):
-            if kind != _BUTTON:
+            # The present state is told when the device is opened, where a button that is down was not pressed for us,
+            # and instead of events that were lost because more than 64 waited: a release or LAND may be among them.
+            told = bool(kind & _PRESENT)
+            if kind & ~_PRESENT != _BUTTON:
                 continue
-            if number == _LAND_BUTTON and value:
-                return man.land(), False
-            if value:
+            if number == _LAND_BUTTON:
+                if value and (not told or man.grip is not Grip.DISARMED):
+                    return man.land(), False
+            elif value and not told:
+                self.pressed.add(number)
                 man.press(now_ns)
-            elif number != _LAND_BUTTON:
+            elif not value and (not told or number in self.pressed):
+                self.pressed.discard(number)
                 asked = man.release(now_ns) or asked
         return asked, False
 

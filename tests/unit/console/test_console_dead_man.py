@@ -87,7 +87,8 @@ def test_gamepad(pipe: tuple[int, int]) -> None:
         os.write(pipe[1], b"".join(events))
         return handle.feel(man, 5)[0], man.grip
 
-    assert feel(button(5, 1, kind=0x81), button(0, 300, kind=2)) == (None, Grip.DISARMED)
+    state_at_first = [button(5, 1, kind=0x81), button(1, 1, kind=0x81), button(0, 0, kind=0x81)]
+    assert feel(*state_at_first, button(0, 300, kind=2)) == (None, Grip.DISARMED)
     assert feel(button(5, 1)) == (None, Grip.HELD)
     assert feel(button(5, 0))[0] is Verb.HOLD
     assert feel(button(5, 1), button(1, 1))[0] is Verb.LAND
@@ -95,6 +96,25 @@ def test_gamepad(pipe: tuple[int, int]) -> None:
     os.close(pipe[1])  # pulled out
     assert [handle.feel(man, 6) for _ in range(3)] == [(None, False), (Verb.HOLD, False), (None, False)]
     assert man.step(6 * NS_PER_S) is Verb.LAND and handle.feel(man, 6 * NS_PER_S) == (None, True)
+
+
+@pytest.mark.parametrize(
+    ("state", "verb", "grip"),
+    [
+        ({5: 1, 0: 0}, None, Grip.HELD),
+        ({5: 0, 0: 1}, Verb.HOLD, Grip.LOOSE),
+        ({5: 1, 1: 1}, Verb.LAND, Grip.LANDED),
+    ],
+)
+def test_a_release_among_lost_events_shows_in_the_state_told_instead(
+    pipe: tuple[int, int], state: dict[int, int], verb: Verb | None, grip: Grip
+) -> None:
+    """Linux drops all events of a joystick when more than 64 wait."""
+    man, handle = DeadMan(1 << 62), Handle(pipe[0], gamepad=True)
+    os.write(pipe[1], button(5, 1))
+    handle.feel(man, 5)
+    os.write(pipe[1], b"".join(button(*one, kind=0x81) for one in state.items()) + button(0, 9, kind=0x82))
+    assert (handle.feel(man, 6)[0], man.grip) == (verb, grip)
 
 
 def test_it_goes_out_to_everybody_and_is_repeated(pipe: tuple[int, int]) -> None:

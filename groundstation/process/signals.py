@@ -3,6 +3,7 @@
 import os
 import select
 import signal
+import time
 from contextlib import suppress
 
 from groundstation.bus import clock
@@ -44,12 +45,14 @@ class StopSignal:
         watched = [self._read]
         if self._parent.descriptor >= 0 and not self._parent_reported:
             watched.append(self._parent.descriptor)
+        # The bus clock may be corrected meanwhile, by as much as another host slept: this host's own measures the wait.
+        own_ns = time.monotonic_ns() + deadline_ns - clock.now_ns()
         # select, unlike poll, takes less than a millisecond: one wait and one wake-up for each sleep.
         while True:
-            left_ns = 0 if self._nudged else max(0, deadline_ns - clock.now_ns())
+            left_ns = 0 if self._nudged else max(0, own_ns - time.monotonic_ns())
             if self._woken(select.select(watched, (), (), left_ns / 1e9)[0]):
                 return False
-            if self._nudged or clock.now_ns() >= deadline_ns:
+            if self._nudged or time.monotonic_ns() >= own_ns:
                 self._nudged = False
                 return True
 

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from groundstation.bus import clock
 from groundstation.errors import GroundStationError
 from groundstation.process.child import Child, ChildSpec
 from groundstation.process.heartbeat import SUPERVISOR_SLOT, HeartbeatBlock, SlotState
@@ -170,6 +171,20 @@ def test_a_call_from_another_thread_ends_one_sleep() -> None:
     assert time.process_time() - spent < 0.1, "the call is over: it sleeps and does not spin"
     stop.close()
     parent.close()
+
+
+def test_a_sleep_ends_in_time_where_the_clock_of_the_run_is_put_back() -> None:
+    """A driver's loop stood still for as long as the run's host had slept."""
+    parent, began_ns = ParentWatch(), time.monotonic_ns()
+    stop = StopSignal(parent)
+    clock.follow("run", lambda: 5000 * MS if time.monotonic_ns() < began_ns + 100 * MS else 2000 * MS)
+    try:
+        assert stop.sleep_until(clock.now_ns() + 200 * MS) is True
+        assert 200 * MS <= time.monotonic_ns() - began_ns < 2000 * MS
+    finally:
+        clock.follow_none()
+        stop.close()
+        parent.close()
 
 
 def test_stranger_as_parent_counts_as_dead() -> None:

@@ -115,7 +115,8 @@ class Hosting:
             why = self._why_over(supervisor, order.run)
             self._terminal.say(f"run {order.run}: {why}; drones of this host land")
         finally:
-            self._own = OwnState(order.run, Lifecycle.STOPPING)
+            detail = f"{admission.host} lands its drones: {link.stood}" if link.stood else ""
+            self._own = OwnState(order.run, Lifecycle.STOPPING, detail)
             self._end(supervisor)
         return supervisor.interrupts.stop_requested  # even if it came while the drones landed
 
@@ -162,6 +163,8 @@ class Hosting:
                 return "stopped here"
             if link.ends:
                 return "it ends"
+            if link.stood:
+                return link.stood
             if link.order is not None and link.order.run != run:
                 return "another one has begun"
             if link.silent_s(clock.own_ns()) > _LOST_S:

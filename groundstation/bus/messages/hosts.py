@@ -64,4 +64,4 @@ class ClockOffset(Message, frozen=True, kw_only=True):
     offset_ns: int
     """To be added to its stamps to read them on `header.clock` [ns]."""
     error_ns: int = 0
-    """Largest possible error of the offset [ns]: half of the quickest round trip."""
+    """Largest possible error of the offset [ns], if no clock has just begun to run off by more than 500 ppm."""

@@ -118,6 +118,27 @@ def test_a_run_that_is_gone_before_its_devices_start_ends_the_run_and_not_the_wa
     assert said[-1] == "run run-7: no router answers at tls/10.77.0.1:4717; drones of this host land"
 
 
+def test_after_the_runs_host_slept_the_drones_of_this_host_land_and_the_run_is_told_why(
+    make: Callable[[str], tuple[hosting.Hosting, RunElsewhere]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    served, run = make(VERSION)
+    stop = supervisor.Supervisor.stop
+
+    def land(self: supervisor.Supervisor) -> None:
+        for _ in range(10):
+            self.step(0.01)
+        stop(self)
+
+    monkeypatch.setattr(supervisor.Supervisor, "stop", land)
+    order, stood = served.wait(), "the clock of the run's host stood still for 3.0 s: it slept or was paused"
+    served._link.stood = stood
+    said: list[str] = []
+    monkeypatch.setattr(served._terminal, "say", said.append)
+    assert served.serve(order) is False
+    assert said[-1] == f"run run-7: {stood}; drones of this host land"
+    assert f"pc_2 lands its drones: {stood}" in run.details
+
+
 def test_a_stop_that_comes_while_the_drones_land_is_not_lost(
     make: Callable[[str], tuple[hosting.Hosting, RunElsewhere]], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,13 +1,24 @@
 """The liaison and the other host's link, without a network: commands, answers, silence, and clock offset."""
 
 import time
+from itertools import pairwise
 
 import pytest
 
 from groundstation.bus import clock
 from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
-from groundstation.bus.messages import ClockOffset, Header, HostAnswer, HostReport, Lifecycle, Supervision
-from groundstation.bus.topics import CLOCK, HOST_ANSWER, HOST_ORDER, HOST_REPORT
+from groundstation.bus.messages import (
+    ClockOffset,
+    FlightState,
+    Header,
+    HostAnswer,
+    HostReport,
+    Lifecycle,
+    Supervision,
+    VehicleStatus,
+)
+from groundstation.bus.topics import CLOCK, HOST_ANSWER, HOST_ORDER, HOST_REPORT, VEHICLE_STATUS
+from groundstation.process.clock_offset import OffsetFilter
 from groundstation.runtime.liaison import Liaison, LiaisonSection
 from groundstation.supervisor.host_link import HostLink, OwnState
 
@@ -91,15 +102,71 @@ def answer(both: Both, name: str, ahead_ns: int) -> HostAnswer:
     return HostAnswer(header=header, supervision=Supervision.WATCHES, instance=both.link.instance, **stamps)
 
 
+def hear(both: Both, ahead_ns: int, own: OwnState = SERVES, turns: int = 1, name: str = "one") -> list[int]:
+    """Let the run's host, whose clock is ahead, answer for some turns; return the offset in use after each of them."""
+    used_ns = []
+    for _ in range(turns):
+        both.bus.publish(HOST_ANSWER, answer(both, name, ahead_ns))
+        both.turn(own, None)
+        used_ns.append(both.link.offset_ns)
+    return used_ns
+
+
 def test_the_offset_of_the_clocks_is_measured_and_published_and_begins_anew_with_another_clock(both: Both) -> None:
     for ahead_ns, name in ((895 * S, "one"), (-20 * S, "another")):
-        for _ in range(12):
-            both.bus.publish(HOST_ANSWER, answer(both, name, ahead_ns))
-            both.turn(SERVES, None)
+        hear(both, ahead_ns, OwnState(), 12, name)
+        hear(both, ahead_ns, SERVES, 1, name)
         assert both.link.run_clock == name and both.link.synchronised
         assert both.link.offset_ns == pytest.approx(ahead_ns, abs=11 * MS)
         told = both.offsets.drain()[-1].message
         assert isinstance(told, ClockOffset) and told.of == clock.own_id() and told.offset_ns == both.link.offset_ns
+
+
+def test_the_clock_that_devices_read_is_not_put_back_after_the_runs_host_slept(both: Both) -> None:
+    """Their loops stood still for as long as it had slept, and what had expired lived again."""
+    hear(both, 895 * S, OwnState(), 40)
+    before_ns = hear(both, 895 * S, turns=40)[-1]
+    after_ns = hear(both, 892 * S, turns=40)
+    assert both.link.stood == "the clock of the run's host stood still for 3.0 s: it slept or was paused"
+    assert min(after_ns) == before_ns
+    told = both.offsets.drain()[-1].message
+    assert isinstance(told, ClockOffset) and told.error_ns > 3 * S
+    assert hear(both, 892 * S, OwnState())[-1] == pytest.approx(892 * S, abs=11 * MS), "nobody reads it any more"
+
+
+def test_the_clock_that_devices_read_is_put_forward_after_this_host_slept_and_they_end_all_the_same(both: Both) -> None:
+    hear(both, 895 * S, OwnState(), 40)
+    hear(both, 895 * S, turns=2)
+    assert hear(both, 900 * S, turns=5)[-1] == pytest.approx(900 * S, abs=11 * MS)
+    assert both.link.stood == "the clock of this host stood still for 5.0 s: it slept or was paused"
+
+
+def test_after_a_brief_pause_of_the_runs_host_the_clock_runs_at_half_speed_until_it_is_right(both: Both) -> None:
+    hear(both, 895 * S, OwnState(), 40)
+    before_ns = hear(both, 895 * S, turns=2)[-1]
+    used_ns = hear(both, 895 * S - 150 * MS, turns=12)
+    steps_ns = [before - after for before, after in pairwise([before_ns, *used_ns])]
+    assert max(steps_ns) == 25 * MS, "of a turn's 50 ms"
+    assert used_ns[-1] == pytest.approx(895 * S - 150 * MS, abs=21 * MS) and not both.link.stood
+
+
+@pytest.mark.parametrize(("state", "slowly"), [(FlightState.LANDED, False), (FlightState.HOVERING, True)])
+def test_small_corrections_are_slow_only_while_somebody_flies(both: Both, state: FlightState, slowly: bool) -> None:
+    driver = MemoryBus(both.bus._exchange, "lab", "drone_1")
+    hear(both, 895 * S, OwnState(), 40)
+    before_ns = hear(both, 895 * S)[-1]
+    driver.publish(VEHICLE_STATUS, VehicleStatus(header=driver.header("drone_1"), flight_state=state, mode="HOVER"))
+    both.link._offsets = OffsetFilter()
+    moved_ns = hear(both, 895 * S + 15 * MS, turns=20)[-1] - before_ns
+    assert moved_ns == pytest.approx(MS if slowly else 15 * MS, rel=0.1), "in a second"
+
+
+def test_a_restarted_host_of_the_run_is_not_heard_before_the_devices_of_the_former_run_have_ended(both: Both) -> None:
+    hear(both, 895 * S, OwnState(), 12)
+    before_ns = hear(both, 895 * S)[-1]
+    assert set(hear(both, 20 * S, turns=20, name="another")) == {before_ns} and not both.link.watches(both.now_ns)
+    hear(both, 20 * S, OwnState(), 12, "another")
+    assert both.link.run_clock == "another" and both.link.watches(both.now_ns)
 
 
 def test_a_report_of_another_name_is_not_heard(both: Both) -> None:

@@ -109,8 +109,8 @@ def deadman(name: str | None, gamepad: str | None) -> int:
     """Dead man's handle: while it is held, the drones fly on. Let go, and they hold (space bar: after 0.9 s); 5 s later
     they land.
 
-    An unplugged gamepad or a closed terminal counts as letting go; Ctrl-C, Ctrl-Z and q hold and leave. It is no
-    emergency stop.
+    An unplugged gamepad or a closed terminal counts as letting go; Ctrl-C, Ctrl-Z and q hold and leave. If the run ends
+    while it is held, the exit code is 3. It is no emergency stop.
     """
     record = choose_run(name, stops=True)
     bus = join(record, "deadman", Role.CLI)
@@ -120,9 +120,15 @@ def deadman(name: str | None, gamepad: str | None) -> int:
         with _opened(gamepad) as handle:
             patience_ns = _GAMEPAD_PATIENCE_NS if handle.gamepad else _KEYBOARD_PATIENCE_NS
             heed_signals(handle)
-            watch(bus, record.drones, handle, DeadMan(patience_ns), sign_of_life(record, bus))
+            man = DeadMan(patience_ns)
+            left = watch(bus, record.drones, handle, man, sign_of_life(record, bus))
     finally:
         bus.close()
+    if not left:
+        ended = f"{record.name}: the run has ended: this handle stops nothing"
+        if man.grip is Grip.HELD:
+            raise UnreachableError(ended)
+        _show(f"{ended}\n")
     return ExitCode.OK
 
 
@@ -170,15 +176,19 @@ def heed_signals(handle: Handle) -> None:
     signal.signal(signal.SIGTTOU, signal.SIG_IGN)  # in the background its output would stop it
 
 
-def watch(bus: "Bus", drones: tuple[str, ...], handle: Handle, man: DeadMan, go_on: Callable[[], bool]) -> None:
-    """Obey the handle until the user leaves and the last order is settled, or until `go_on` returns False."""
+def watch(bus: "Bus", drones: tuple[str, ...], handle: Handle, man: DeadMan, go_on: Callable[[], bool]) -> bool:
+    """Obey the handle until the user leaves and the last order is settled, or until `go_on` returns False.
+
+    Returns whether the user left.
+    """
     desk, answers = CommandDesk(bus, drones), bus.subscribe([COMMAND_ACK])
-    shown, left_ns = "", 0
+    shown, left_ns, left = "", 0, False
     while go_on():
         now_ns = time.monotonic_ns()
         if left_ns:
             time.sleep(_TURN_S)
-            if now_ns - left_ns > _FAREWELL_NS or _settled(desk):
+            left = now_ns - left_ns > _FAREWELL_NS or _settled(desk)
+            if left:
                 break
         else:
             asked, leaves = handle.feel(man, now_ns)
@@ -195,6 +205,7 @@ def watch(bus: "Bus", drones: tuple[str, ...], handle: Handle, man: DeadMan, go_
             shown = line
             _show(f"\r{line:<78}")
     _show("\n")
+    return left
 
 
 def _show(text: str) -> None:

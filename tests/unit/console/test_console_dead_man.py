@@ -19,7 +19,7 @@ from groundstation.bus.memory_bus import MemoryBus, MemoryExchange
 from groundstation.bus.messages import RUN, RUN_ENDED, Command, Event, Lease, Severity, Verb
 from groundstation.cli import deadman
 from groundstation.cli.deadman import Handle, heed_signals, sign_of_life, watch
-from groundstation.cli.exits import UnreachableError
+from groundstation.cli.exits import ExitCode, UnreachableError
 from groundstation.console import dead_man
 from groundstation.console.dead_man import DeadMan, Grip
 from groundstation.errors import GroundStationError
@@ -167,6 +167,26 @@ def test_on_another_host_it_ends_with_the_run() -> None:
     end = Event(header=supervisor.header(RUN), severity=Severity.INFO, text=f"{RUN_ENDED}stopped by the operator")
     supervisor.publish(t.EVENT, end)
     assert not alive()
+
+
+@pytest.mark.parametrize(("keys", "held"), [(b" ", True), (b"x", False), (b" l", False)])
+def test_a_run_that_ends_is_told_and_is_an_error_while_it_is_held(
+    pipe: tuple[int, int], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], keys: bytes, held: bool
+) -> None:
+    record = RuntimeRecord("lab", "", "", "run-7", "", ("drone_1",), ProcessRecord("", "", 0, 0), ())
+    turns = iter([True, True, True, False])
+    monkeypatch.setattr(deadman, "choose_run", lambda *_, **__: record)
+    monkeypatch.setattr(deadman, "join", lambda *_: MemoryBus(MemoryExchange(), "lab", "deadman_1"))
+    monkeypatch.setattr(deadman, "sign_of_life", lambda *_: lambda: next(turns))
+    monkeypatch.setattr(deadman, "_opened", lambda _: contextlib.nullcontext(Handle(pipe[0], gamepad=False)))
+    monkeypatch.setattr(deadman, "heed_signals", lambda _: None)
+    os.write(pipe[1], keys)
+    if held:
+        with pytest.raises(UnreachableError, match="the run has ended: this handle stops nothing"):
+            deadman.deadman.main([], standalone_mode=False)
+    else:
+        assert deadman.deadman.main([], standalone_mode=False) == ExitCode.OK
+        assert capsys.readouterr().out.endswith("the run has ended: this handle stops nothing\n")
 
 
 @pytest.mark.parametrize(

@@ -239,7 +239,8 @@ def _exit_code(
     if plan.look_only:
         unsaid = ExitCode.INTERRUPTED if outcome.interrupted else ExitCode.OK
         return ExitCode.FAILED if outcome.forbidden else unsaid
-    if outcome.landed is None or (passed is not None and outcome.interrupted and plan.duration_s is not None):
+    judged_early = passed is not None and plan.duration_s is not None
+    if outcome.interrupted and (outcome.landed is None or judged_early):
         return ExitCode.INTERRUPTED
     if passed is None or judged_by_landing or plan.duration_s is None:
         passed = outcome.landed

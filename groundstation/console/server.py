@@ -11,7 +11,7 @@ import msgspec
 
 from groundstation.bus import clock
 from groundstation.bus.api import Bus, Received
-from groundstation.bus.messages import ALL_DOWN, Command, CommandAck, Event, Lease, RelativeObservation
+from groundstation.bus.messages import ALL_DOWN, SOME_UNHEARD, Command, CommandAck, Event, Lease, RelativeObservation
 from groundstation.bus.topics import (
     CAMERA_STATUS,
     COMMAND,
@@ -267,7 +267,8 @@ class ConsoleServer:
         if self._end is not None:
             words, at_ms = self._end.text, self._end.header.stamp_ns / 1e6
             ended = {"text": words, "severity": self._end.severity, "at": at_ms, "closed": self.closed}
-            self.board.put("ended", ended | {"down": words.endswith(ALL_DOWN)})
+            down = None if words.endswith(SOME_UNHEARD) else words.endswith(ALL_DOWN)
+            self.board.put("ended", ended | {"down": down})
         if self._result is not None:
             self.board.put("result", self._result.section())
         if self._player is not None:

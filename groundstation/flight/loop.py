@@ -3,7 +3,7 @@
 import time
 from dataclasses import dataclass
 
-from groundstation.bus.messages import ALL_DOWN, RUN, RUN_ENDED, Event, Severity
+from groundstation.bus.messages import ALL_DOWN, RUN, RUN_ENDED, SOME_UNHEARD, Event, FlightState, Severity
 from groundstation.bus.topics import EVENT
 from groundstation.errors import GroundStationError
 from groundstation.flight.flight_plan import FlightPlan
@@ -19,7 +19,7 @@ from groundstation.supervisor.terminal import Terminal
 from groundstation.time_units import NS_PER_S
 
 _FAILED_LANDING_S = 2.0
-_LANDING = {True: ALL_DOWN, False: "not every drone reported a landing", None: "not every drone was heard"}
+_LANDING = {True: ALL_DOWN, False: "not every drone reported a landing", None: SOME_UNHEARD}
 _HEARD_NS = NS_PER_S // 2  # drivers report five times a second
 
 
@@ -27,7 +27,7 @@ _HEARD_NS = NS_PER_S // 2  # drivers report five times a second
 class FlightOutcome:
     """The end of a flight. failure: why it could not continue, or ""; interrupted: by the operator.
 
-    landed: nobody reported to fly at the end; None: nor was every drone heard, in a run without an order to land.
+    landed: nobody reported to fly at the end; None: nor was every drone heard.
     forbidden: whether the take-off was forbidden, if that was asked.
     """
 
@@ -225,8 +225,8 @@ class Flight:
 
     # -- land ----------------------------------------------------------------------------------------------------
 
-    def _land(self, operator: Operator) -> bool:
-        """Land all drones and wait; returns whether all reported that they have landed."""
+    def _land(self, operator: Operator) -> bool | None:
+        """Land all drones and wait; returns whether all reported that they have landed, as `stand` does."""
         supervisor = self._supervisor
         now_ns = time.monotonic_ns()
         if not operator.landed(now_ns):
@@ -239,18 +239,22 @@ class Flight:
         while now_ns < deadline_ns and not supervisor.interrupts.hurry:
             now_ns = self._turn(operator)
             if operator.landed(now_ns):
-                self._say("all drones have landed")
-                return True
+                standing = stand(operator.team, now_ns)
+                self._say("all drones have landed" if standing else f"nobody is known to fly; {SOME_UNHEARD}")
+                return standing
         aloft = ", ".join(operator.team.airborne(now_ns))
         self._say(f"stopping, though {aloft or 'nobody'} did not report a landing")
-        return not aloft
+        return stand(operator.team, now_ns)
 
 
 def stand(team: TeamStatus, now_ns: int) -> bool | None:
-    """Return whether all drones report that they stand; None: some are not heard, and none is known to fly."""
+    """Return whether all drones report that they stand; None: some were not heard, and none is known to fly.
+
+    One that was switched off after it stood counts as standing.
+    """
     if team.airborne(now_ns):
         return False
-    return True if all(member.connected(now_ns) for member in team.members.values()) else None
+    return None if any(member.state is FlightState.UNKNOWN for member in team.members.values()) else True
 
 
 def end_of(outcome: FlightOutcome) -> tuple[Severity, str]:
@@ -258,7 +262,7 @@ def end_of(outcome: FlightOutcome) -> tuple[Severity, str]:
     landing = _LANDING[outcome.landed]
     if outcome.failure:
         return Severity.ERROR, f"{outcome.failure.splitlines()[0]}; {landing}"
-    severity = Severity.WARNING if outcome.landed is False else Severity.INFO
+    severity = Severity.INFO if outcome.landed else Severity.WARNING
     return severity, f"stopped by the operator; {landing}" if outcome.interrupted else landing
 
 

@@ -85,6 +85,16 @@ def test_an_end_without_a_landing_is_grave(stage: Any) -> None:
     page.shot("run_ended_without_landing")
 
 
+def test_an_end_that_does_not_know_whether_all_are_down_is_not_called_safe(stage: Any) -> None:
+    page: Seen = stage.open()
+    stage.flight.event(Severity.WARNING, "run ended: stopped by the operator; not every drone was heard", RUN)
+    strip = page.there("banner-ended")
+    strip.wait_for(timeout=20_000)
+    assert page.there("safety").inner_text() == "WATCH"
+    assert "groundstation land" in strip.inner_text() and "mild" in strip.get_attribute("class")
+    assert all(stop.is_enabled() for stop in stops(page))
+
+
 def test_a_fault_that_ends_the_run_asks_for_nothing_once_all_have_landed(stage: Any) -> None:
     page = ended_page(stage, Severity.ERROR, "tracker died; all drones are on the ground")
     strip = page.there("banner-ended")

@@ -43,7 +43,16 @@ from groundstation.bus.messages.flight import (
 from groundstation.bus.messages.hosts import ClockOffset, HostAnswer, HostOrder, HostReport, Supervision
 from groundstation.bus.messages.plan import Alternative, Control, Edge, Plan, SolverReport
 from groundstation.bus.messages.preflight import Preflight, PreflightFinding
-from groundstation.bus.messages.process import ALL_DOWN, RUN, RUN_ENDED, Event, Lifecycle, ProcessStatus, Severity
+from groundstation.bus.messages.process import (
+    ALL_DOWN,
+    RUN,
+    RUN_ENDED,
+    SOME_UNHEARD,
+    Event,
+    Lifecycle,
+    ProcessStatus,
+    Severity,
+)
 from groundstation.bus.messages.sensing import (
     BodyPose,
     BodyPoses,
@@ -69,6 +78,7 @@ __all__ = [
     "UP",
     "RUN",
     "RUN_ENDED",
+    "SOME_UNHEARD",
     "OPERATOR",
     "STOP_LIVES_NS",
     "AckStage",

@@ -7,8 +7,9 @@ from groundstation.bus.messages.base import Message
 # The entity of events about a run as a whole. The text of one begins so: the run has ended, and how.
 RUN = "run"
 RUN_ENDED = "run ended: "
-# The last words of such an event, where it is so.
+# The last words of such an event, where it is so; where neither is, a drone may fly.
 ALL_DOWN = "all drones are on the ground"
+SOME_UNHEARD = "not every drone was heard"
 
 
 class Severity(StrEnum):

@@ -26,13 +26,15 @@ from groundstation.supervisor.terminal import Terminal
 class Stage:
     """A flight's view of a supervisor: one drone with telemetry, and a cause that stops the run."""
 
-    def __init__(self, state: m.FlightState | None, failure: str = "", start: Exception | None = None) -> None:
+    def __init__(
+        self, state: m.FlightState | None, failure: str = "", start: Exception | None = None, mode: str = "HOVER"
+    ) -> None:
         exchange = MemoryExchange()
         self.bus, self._drone = MemoryBus(exchange, "lab", "supervisor"), MemoryBus(exchange, "lab", "drone_1")
         self.heard = self._drone.subscribe([t.EVENT])
         self.run = SimpleNamespace(drones=("drone_1",))
         self.interrupts = SimpleNamespace(stop_requested=not failure, hurry=False)
-        self.failure, self._state, self._start = failure, state, start
+        self.failure, self._state, self._start, self._mode = failure, state, start, mode
         self.unwell: list[str] = []
         self.processes: tuple[ManagedProcess, ...] = ()
         self.ends: list[m.Event] = []
@@ -45,7 +47,7 @@ class Stage:
         time.sleep(0.01)
         if self._state is None:  # its driver has not come so far
             return
-        status = m.VehicleStatus(header=self._drone.header("drone_1"), flight_state=self._state, mode="HOVER")
+        status = m.VehicleStatus(header=self._drone.header("drone_1"), flight_state=self._state, mode=self._mode)
         self._drone.publish(t.VEHICLE_STATUS, status)
 
     def end_run(self) -> None:
@@ -64,7 +66,7 @@ class Stage:
         return end
 
 
-LANDED, FLYING = m.FlightState.LANDED, m.FlightState.FLYING
+LANDED, FLYING, UNKNOWN, LOST = (m.FlightState(name) for name in ("LANDED", "FLYING", "UNKNOWN", "LOST"))
 
 
 @pytest.mark.parametrize(
@@ -75,7 +77,11 @@ LANDED, FLYING = m.FlightState.LANDED, m.FlightState.FLYING
         ({"state": LANDED, "failure": "it died\nlog"}, "ERROR", "it died; all drones are on the ground"),
         ({"state": LANDED, "start": Interrupted("no")}, "INFO", "stopped by the operator; all drones are on the"),
         ({"state": FLYING, "start": Interrupted("no")}, "WARNING", "stopped by the operator; not every drone reported"),
-        ({"state": None, "start": Interrupted("no")}, "INFO", "stopped by the operator; not every drone was heard"),
+        ({"state": None, "start": Interrupted("no")}, "WARNING", "stopped by the operator; not every drone was heard"),
+        ({"state": None}, "WARNING", "stopped by the operator; not every drone was heard"),
+        ({"state": UNKNOWN}, "WARNING", "stopped by the operator; not every drone was heard"),
+        ({"state": LOST, "mode": "LANDED"}, "INFO", "stopped by the operator; all drones are on the ground"),
+        ({"state": LOST, "mode": "HOVER"}, "WARNING", "stopped by the operator; not every drone reported a landing"),
         ({"state": LANDED, "start": GroundStationError("no tracker\nlog")}, "ERROR", "its start failed: no tracker"),
     ],
 )

@@ -119,12 +119,18 @@ def test_a_look_that_was_broken_off_does_not_say_that_all_is_well(
 
 
 @pytest.mark.parametrize(
-    ("landed", "code"), [(True, ExitCode.OK), (False, ExitCode.FAILED), (None, ExitCode.INTERRUPTED)]
+    ("landed", "interrupted", "code"),
+    [
+        (True, True, ExitCode.OK),
+        (False, True, ExitCode.FAILED),
+        (None, True, ExitCode.INTERRUPTED),
+        (None, False, ExitCode.FAILED),
+    ],
 )
-def test_a_start_that_was_broken_off_says_no_more_of_landings_than_is_known(
-    landed: bool | None, code: ExitCode, lab_field: ResolvedField
+def test_the_exit_code_says_no_more_of_landings_than_is_known(
+    landed: bool | None, interrupted: bool, code: ExitCode, lab_field: ResolvedField
 ) -> None:
-    outcome = loop.FlightOutcome("", interrupted=True, landed=landed)
+    outcome = loop.FlightOutcome("", interrupted, landed=landed)
     assert _exit_code(outcome, plan_of(lab_field, look_only=False), None, judged_by_landing=True) is code
 
 

@@ -56,10 +56,12 @@ function together(alarms) {
   return all;
 }
 
-// down: whether all drones are on the ground, whatever ended the run.
-function ending({ severity, text: words, down }) {
-  const calm = severity === "INFO", title = [words[0].toUpperCase() + words.slice(1), resultWords()].filter(Boolean).join(". ");
-  return { kind: "ended", level: calm ? "calm" : "grave", title, more: runOver() ? "This run takes no more orders: the stop buttons are off." : "", shell: !down, rank: calm ? undefined : down ? "WATCH" : "ACT" };
+// down: whether all drones are on the ground, whatever ended the run; null: not known, and nobody is known to fly.
+const endWord = ({ severity, down }) => (down ? (severity === "INFO" ? "SAFE" : "WATCH") : down === null && severity !== "ERROR" ? "WATCH" : "ACT");
+
+function ending(ended) {
+  const { text: words, down } = ended, word = endWord(ended), calm = word === "SAFE", title = [words[0].toUpperCase() + words.slice(1), resultWords()].filter(Boolean).join(". ");
+  return { kind: "ended", level: calm ? "calm" : "grave", title, more: runOver() ? "This run takes no more orders: the stop buttons are off." : "", shell: !down, rank: calm ? undefined : word };
 }
 
 function silentTracker() {
@@ -73,7 +75,7 @@ const slowLink = () => ({ kind: "slow", level: "grave", title: slowWords(), rank
 // As the console's process judges it, but for what only this page can know.
 function safetyWord(own) {
   const { ended, safety } = store.s;
-  if (ended) return ended.severity === "INFO" ? "SAFE" : ended.down ? "WATCH" : "ACT";
+  if (ended) return endWord(ended);
   const level = own.length ? "ACT" : safety?.level ?? "WATCH";
   return level === "SAFE" && estimateOld() ? "WATCH" : level;
 }

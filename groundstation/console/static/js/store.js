@@ -22,7 +22,7 @@ function noteClock(serverMs) {
 
 export const replaying = () => Boolean(store.scene?.replay);
 // Announced by the run itself; while drones may still be in the air, buttons stay for as long as somebody can obey them.
-export const runOver = () => Boolean(store.s.ended) && (store.s.ended.severity === "INFO" || store.s.ended.closed || !store.connected);
+export const runOver = () => Boolean(store.s.ended) && ((store.s.ended.severity === "INFO" && store.s.ended.down) || store.s.ended.closed || !store.connected);
 export const steerable = () => Boolean(store.scene?.truth) && !replaying();
 // A drone may be called as something that every object has, "constructor" say: a table by names holds these names only.
 function onlyNames(table) {

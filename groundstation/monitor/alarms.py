@@ -15,6 +15,7 @@ from groundstation.bus.messages import (
     Severity,
     TargetSearch,
     VehicleStatus,
+    climbs,
     stood_last,
 )
 from groundstation.field.drones import camera_name
@@ -111,7 +112,7 @@ def _vehicles(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
 
 def _silent(name: str, age_s: float, status: VehicleStatus) -> Alarm:
     about, text = f"{name} silent", f"{name}: nothing heard for {age_s:.0f} s"
-    if status.flight_state in STANDING:
+    if status.flight_state in STANDING and not climbs(status.flight_state, status.mode):
         return Alarm(about, f"{text}, it stood until then", False, _SWITCHED_OFF)
     return Alarm(about, text, advice=f"Nothing to do: {_left_alone(status)}. Stops are sent to it.")
 

@@ -44,8 +44,9 @@ def flies(status: VehicleStatus, take_off: TakeOff | None) -> bool:
 
 
 def may_fly(status: VehicleStatus, take_off: TakeOff | None) -> bool:
-    """Return whether a vehicle flies, or may: it was not heard, and its driver does not have it down."""
-    return flies(status, take_off) or (status.flight_state in UNHEARD and status.mode not in _DOWN)
+    """Return whether a vehicle flies, or may: ordered up, or not heard while its driver does not have it down."""
+    unheard = status.flight_state in UNHEARD and status.mode not in _DOWN
+    return flies(status, take_off) or m.climbs(status.flight_state, status.mode) or unheard
 
 
 def take_off_of(known: TakeOff | None, stamp_ns: int, status: VehicleStatus) -> TakeOff | None:

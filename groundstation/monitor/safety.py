@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from groundstation.bus.messages import AIRBORNE, FlightState, VehicleStatus
+from groundstation.bus.messages import AIRBORNE, UNHEARD, FlightState, VehicleStatus, climbs
 from groundstation.monitor.alarms import Alarm
 from groundstation.monitor.batteries import battery_of
 from groundstation.monitor.endurance import flies, may_fly
@@ -41,7 +41,7 @@ def safety_of(state: MonitorState, alarms: Sequence[Alarm]) -> Safety:
     unsure = [name for name, seen in state.vehicles.items() if _is_unsure(seen.message)]
     if unsure:
         return Safety(Level.WATCH, _unsure_words(state, unsure))
-    up = [name for name, seen in state.vehicles.items() if seen.message.flight_state in AIRBORNE]
+    up = [name for name, seen in state.vehicles.items() if _is_up(seen.message)]
     if not up:
         return Safety(Level.SAFE, "No alarms. Nobody flies.")
     if unplaced := [name for name in up if _is_unplaced(state, name)]:
@@ -49,9 +49,14 @@ def safety_of(state: MonitorState, alarms: Sequence[Alarm]) -> Safety:
     return Safety(Level.SAFE, f"No alarms. All who fly are heard, nobody is lost{_lasting(state, up)}.")
 
 
+def _is_up(status: VehicleStatus) -> bool:
+    """Return whether a vehicle flies, or was ordered to, which it may do before it says so."""
+    return status.flight_state in AIRBORNE or climbs(status.flight_state, status.mode)
+
+
 def _is_unsure(status: VehicleStatus) -> bool:
-    """Return whether a vehicle may fly, and has not said so."""
-    return may_fly(status, None) and not flies(status, None)
+    """Return whether a vehicle that is not heard may fly."""
+    return status.flight_state in UNHEARD and may_fly(status, None) and not flies(status, None)
 
 
 def _unsure_words(state: MonitorState, names: Sequence[str]) -> str:

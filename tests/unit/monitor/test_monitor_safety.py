@@ -69,6 +69,20 @@ def test_how_long_batteries_last_is_left_out_where_it_is_not_known(world: World)
     assert judged(world).reason == "No alarms. All who fly are heard, nobody is lost."
 
 
+def test_nobody_is_said_to_stand_who_was_ordered_up(world: World) -> None:
+    ordered = {"mode": "TAKING_OFF", "flight_state": m.FlightState.LANDED}
+    world.vehicle("drone_1", "LANDED", flight_state=m.FlightState.LANDED)
+    world.vehicle("drone_2", **ordered)
+    assert judged(world).reason.startswith("No alarms. All who fly are heard, nobody is lost")
+    world.vehicle("drone_2", age_s=3.0, **ordered)
+    left = "Nothing to do: it hovers, then lands. Stops are sent to it."
+    assert judged(world) == Safety(Level.WATCH, f"drone_2: nothing heard for 3 s. {left}")
+    world.estimate(age_s=0.5)
+    world.text()
+    (silent,) = (alarm for alarm in alarms_of(world.state, NOW) if alarm.about == "tracker silent")
+    assert silent.advice == "Nothing to do now: nobody is known to fly."
+
+
 def test_it_is_safe_while_nobody_flies(world: World) -> None:
     both(world, "LANDED", flight_state=m.FlightState.LANDED)
     assert judged(world) == Safety(Level.SAFE, "No alarms. Nobody flies.")

@@ -11,13 +11,14 @@ from groundstation.errors import OperatorMistake
 from groundstation.process.standard_streams import with_sequences
 
 if TYPE_CHECKING:
+    from groundstation.console.devices import Devices
     from groundstation.field.resolved import ResolvedField
     from groundstation.supervisor.runtime_file import RuntimeRecord
 
 
 @click.command(
     epilog="\b\nExamples:\n  groundstation console\n  groundstation console --port 9000 --run lab-4711\n"
-    "  groundstation console --invite stop"
+    "  groundstation console --invite stop\n  groundstation console --uninvite"
 )
 @click.option("--run", "name", metavar="NAME", help="The run to show, if there are several.")
 @click.option(
@@ -27,11 +28,17 @@ if TYPE_CHECKING:
     help="Let one tablet or phone in as watch, stop or command, by a code that works once; needs console.listen in the "
     "field.",
 )
+@click.option(
+    "--uninvite",
+    is_flag=True,
+    help="Withdraw the rights of all tablets and phones, after one was lost: their open pages end.",
+)
 @click.option("--port", type=click.IntRange(1024, 65535), help="Port to serve on (default: the field's console.port).")
-def console(name: str | None, invite: str | None, port: int | None) -> None:
+def console(name: str | None, invite: str | None, uninvite: bool, port: int | None) -> None:
     """Serve the operator's page for a running ground station, on loopback. Leaving it stops nothing.
 
-    With --invite: print an address (also as a QR code) at which one device may open the run's own page.
+    With --invite: print an address (also as a QR code) at which one device may open the run's own page. With --uninvite
+    all devices must be invited anew.
     """
     import asyncio
 
@@ -44,8 +51,12 @@ def console(name: str | None, invite: str | None, port: int | None) -> None:
     from groundstation.supervisor.joining import join
 
     record = choose(name)
+    if uninvite:
+        _uninvite(record)
     if invite is not None:
-        return _invite(record, invite)
+        _invite(record, invite)
+    if uninvite or invite is not None:
+        return
     cast, field = cast_of(record), _field_of(record)
     truth = record.has_truth
     scene = scene_from_field(field, truth) if field else bare_scene(record.site, record.drones, truth)
@@ -63,14 +74,26 @@ def console(name: str | None, invite: str | None, port: int | None) -> None:
         bus.close()
 
 
-def _invite(record: "RuntimeRecord", role: str) -> None:
-    from groundstation.console.devices import DeviceRole, Devices
-    from groundstation.console.qr import qr_text
+def _devices_of(record: "RuntimeRecord") -> "Devices":
+    from groundstation.console.devices import Devices
     from groundstation.console.section import devices_of
 
     devices = Devices(devices_of(record.identities))
     if not devices.url:
         raise OperatorMistake(f"the console of {record.name} is on loopback only: set console.listen in the field")
+    return devices
+
+
+def _uninvite(record: "RuntimeRecord") -> None:
+    count = _devices_of(record).uninvite()
+    click.echo(f"withdrawn: {count} (devices and open invitations); invite those that shall stay anew")
+
+
+def _invite(record: "RuntimeRecord", role: str) -> None:
+    from groundstation.console.devices import DeviceRole
+    from groundstation.console.qr import qr_text
+
+    devices = _devices_of(record)
     address = devices.invite(DeviceRole(role))
     click.echo(qr_text(address), with_sequences(sys.stdout))
     click.echo(f"{address}\none device may {role}; the code works once, within 10 minutes")

@@ -14,7 +14,7 @@ from groundstation.report.page import inline
 
 _LOOPBACK_NAMES = frozenset({"127.0.0.1", "localhost", "::1"})
 _SAFE_METHODS = frozenset({"GET", "HEAD"})
-ROLE = "skein.role"
+ROLE, KEEPS_ROLE = "skein.role", "skein.keeps_role"
 # Pages keep the report of their run, and show it under the policy of the console.
 _SCRIPTS = f"'self' {inline.source_of(inline.script())}"
 _STYLES = f"'self' {inline.source_of(inline.style())}"
@@ -85,6 +85,10 @@ class Door:
             return b""
         return f"{self._cookie_name(scope)}={self._code}; HttpOnly; SameSite=Strict; Path=/".encode()
 
+    def keeps_role(self, scope: Mapping[str, Any]) -> bool:
+        """Return True: users of this machine are admitted for as long as they stay."""
+        return True
+
     @property
     def reason(self) -> str:
         """Return the message for a refused user."""
@@ -123,6 +127,10 @@ class DeviceDoor:
     def is_other_user(self, scope: Mapping[str, Any]) -> bool:
         """Return True: a device is none of ours before it is admitted."""
         return True
+
+    def keeps_role(self, scope: Mapping[str, Any]) -> bool:
+        """Return whether a device has the role still with which it was admitted."""
+        return self._devices.knows(scope)
 
     @property
     def reason(self) -> str:
@@ -164,7 +172,8 @@ class Gate:
                 message["headers"] = [*message["headers"], *security_headers(host)]
             await send(message)
 
-        await self._app(scope | {ROLE: role}, receive, send_with_headers)
+        rights = {ROLE: role, KEEPS_ROLE: lambda: self._door.keeps_role(scope)}
+        await self._app(scope | rights, receive, send_with_headers)
 
 
 async def _answer_403(scope: Any, receive: Any, send: Any, reason: str) -> None:

@@ -12,7 +12,7 @@ from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from groundstation.console.access import ROLE, DeviceDoor, Door, Gate
+from groundstation.console.access import KEEPS_ROLE, ROLE, DeviceDoor, Door, Gate
 from groundstation.console.pages import StaticFile
 from groundstation.console.protocol import Hello, decode
 from groundstation.console.session import Sessions
@@ -114,6 +114,9 @@ class ConsoleApp:
                 text = await socket.receive_text()
             except KeyError:
                 return self._bad("binary")  # pages send no binary messages
+            # Soon noticed on any page: one that says nothing gets a few more frames and no others.
+            if not socket.scope[KEEPS_ROLE]():
+                return self._bad("uninvited")
             if not viewer.may_speak():
                 return self._bad("too_fast")
             try:

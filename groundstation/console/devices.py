@@ -100,6 +100,20 @@ class Devices:
             return DeviceRole(self._entry(scope).read_text())
         return None
 
+    def knows(self, scope: Mapping[str, Any]) -> bool:
+        """Return whether a device that was let in has its rights still, neither invited anew nor uninvited since.
+
+        A folder that went with a dead supervisor withdraws nothing: stops of a console that lives on are wanted then.
+        """
+        return self._entry(scope).exists() or not self._folder.exists()
+
+    def uninvite(self) -> int:
+        """Withdraw the rights of all devices, and all invitations; returns how many there were."""
+        entries = [path for kind in (_INVITED, _KNOWN) for path in self._folder.glob(f"{kind}*")]
+        for path in entries:
+            path.unlink(missing_ok=True)
+        return len(entries)
+
     def _entry(self, scope: Mapping[str, Any]) -> Path:
         return self._folder / f"{_KNOWN}{_digest(cookie_of(scope, _cookie_name(scope)))}"
 

@@ -169,8 +169,10 @@ class Sessions:
     def _greet(self, viewer: PageConnection, hello: Hello) -> None:
         viewer.client = hello.client
         viewer.trusted = self._has_token(hello)
-        if viewer.trusted:
+        if viewer.trusted and viewer.role is DeviceRole.COMMAND:
             self.operator_lock.arrived(viewer.client, viewer.name)
+        elif viewer.trusted:
+            self.operator_lock.release(viewer.client)  # it was invited anew, to do less
         else:
             self.refused["token"] += 1
         viewer.hear(hello.sent_ms)

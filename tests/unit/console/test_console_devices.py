@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import json
 import os
+import shutil
 import ssl
 import stat
 import time
@@ -13,7 +14,7 @@ from typing import Any
 
 import pytest
 from console_site import Site, land, run, until
-from websockets.asyncio.client import connect
+from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import InvalidStatus
 from websockets.typing import Origin
 
@@ -137,6 +138,59 @@ def test_a_device_that_is_invited_anew_may_what_the_new_invitation_says(tmp_path
         assert (await tablet.get("/"))[0] == 403
 
     visited(tmp_path, visit)
+
+
+async def greeted(page: ClientConnection, token: str) -> None:
+    await page.send(json.dumps({"type": "hello", "token": token, "client": "abcd"}))
+    async with asyncio.timeout(5):
+        while '"welcome"' not in str(await page.recv()):
+            pass
+
+
+@pytest.mark.parametrize("anew", [True, False])
+def test_a_page_that_is_open_loses_its_rights_with_its_device(tmp_path: Path, anew: bool) -> None:
+    async def visit(site: Site, devices: Devices, tablet: Tablet) -> None:
+        await tablet.enter(devices.invite(DeviceRole.COMMAND))
+        token, lock = (await tablet.get("/token"))[2].decode(), site.server.sessions.operator_lock
+        async with tablet.page() as page:
+            await greeted(page, token)
+            await page.send('{"type":"takeover"}')
+            await until(lambda: lock.client == "abcd")
+            if anew:
+                await tablet.enter(devices.invite(DeviceRole.WATCH))
+            else:
+                assert devices.uninvite() == 1
+            await page.send(land())
+            assert await site.closed(page) == (1008, "message refused: uninvited")
+        assert site.commands.drain() == []
+        if not anew:
+            assert (await tablet.get("/"))[0] == 403
+            return
+        async with tablet.page() as page:
+            await greeted(page, token)
+            assert lock.client == "", "another page need not take over from one that may only watch"
+
+    visited(tmp_path, visit)
+
+
+def test_no_page_loses_its_stop_with_the_folder_of_a_dead_supervisor(tmp_path: Path) -> None:
+    async def visit(site: Site, devices: Devices, tablet: Tablet) -> None:
+        await tablet.enter(devices.invite(DeviceRole.STOP))
+        async with tablet.page() as page:
+            await greeted(page, (await tablet.get("/token"))[2].decode())
+            shutil.rmtree(tmp_path / "devices")
+            await page.send(land())
+            assert {received.message.verb for received in await until(site.commands.drain)} == {m.Verb.LAND}
+
+    visited(tmp_path, visit)
+
+
+def test_an_invitation_that_was_withdrawn_lets_nobody_in(tmp_path: Path) -> None:
+    devices = Devices(tmp_path / "devices")
+    devices.open(ADDRESS, 1)
+    code = devices.invite(DeviceRole.COMMAND).partition("?")[2].encode()
+    assert devices.uninvite() == 1 and devices.uninvite() == 0
+    assert devices.welcome(asked(code)) == b"" and devices.url
 
 
 @pytest.mark.parametrize("odd", ['theme={"a": 1, "b": [2]}', "na me=x", "flag", "=", 'quoted="a; b', "caf\xe9=\xe9"])

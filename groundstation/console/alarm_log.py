@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from groundstation.monitor.alarms import Alarm
+from groundstation.monitor.alarm import Alarm
 from groundstation.time_units import NS_PER_S
 
 _KEPT = 50

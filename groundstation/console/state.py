@@ -20,7 +20,7 @@ from groundstation.monitor.alarms import alarms_of
 from groundstation.monitor.batteries import battery_of
 from groundstation.monitor.endurance import flies
 from groundstation.monitor.safety import safety_of
-from groundstation.monitor.state import Cast, MonitorState, StampedMessage
+from groundstation.monitor.state import Cast, MonitorState, StampedMessage, heard_ns
 from groundstation.monitor.whereabouts import is_anywhere
 from groundstation.sensing.switches import Switch, switch_between
 
@@ -54,9 +54,9 @@ class ConsoleState:
         for item in received:
             match item.message:
                 case m.VelocitySetpoint() as setpoint:
-                    self.setpoints[item.header.entity] = StampedMessage(item.header.stamp_ns, setpoint)
+                    self.setpoints[item.header.entity] = StampedMessage(heard_ns(item), setpoint)
                 case m.TruthState() as truth:
-                    self.truth[item.header.entity] = StampedMessage(item.header.stamp_ns, truth)
+                    self.truth[item.header.entity] = StampedMessage(heard_ns(item), truth)
                 case m.SearchMap() as search_map:
                     self.search_maps[item.header.entity] = search_map
                 case m.Innovation() as innovation:
@@ -66,7 +66,7 @@ class ConsoleState:
                     self.monitor.ingest((item,))
                 case m.Plan() as plan:
                     before = self.monitor.plan.message if self.monitor.plan else plan
-                    self.switch = switch_between(before, plan, item.header.stamp_ns / 1e9) or self.switch
+                    self.switch = switch_between(before, plan, heard_ns(item) / 1e9) or self.switch
                     self.monitor.ingest((item,))
                 case _:
                     self.monitor.ingest((item,))

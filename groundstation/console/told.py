@@ -7,7 +7,8 @@ from typing import Any
 from groundstation.appearance.cost import cost_cm2, cost_text
 from groundstation.appearance.topology import topology_words
 from groundstation.bus import messages as m
-from groundstation.monitor.alarms import DARK, Alarm
+from groundstation.monitor.alarm import Alarm
+from groundstation.monitor.alarms import DARK
 from groundstation.monitor.batteries import Battery
 from groundstation.monitor.state import StampedMessage
 from groundstation.monitor.whereabouts import is_anywhere

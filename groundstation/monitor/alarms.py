@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import combinations
 
 from groundstation.bus.messages import (
@@ -19,6 +18,7 @@ from groundstation.bus.messages import (
     stood_last,
 )
 from groundstation.field.drones import camera_name
+from groundstation.monitor.alarm import TO_DO, Alarm
 from groundstation.monitor.batteries import Battery, Charge, battery_of
 from groundstation.monitor.before_flight import forbidding
 from groundstation.monitor.endurance import flies, may_fly
@@ -33,7 +33,6 @@ DARK = 0.08  # mean brightness, as a share of white
 WEAK_LINK, BAD_LINK = 0.6, 0.3
 _EVENT_SHOWN_S = 8.0
 _SPEAKS_HZ = 5.0
-_TO_DO = "To do: "
 _BEFORE_FLIGHT = {
     Charge.LOW: "charge it before it flies again",
     Charge.EMPTY: "charge it before it flies again",
@@ -44,37 +43,15 @@ _DARK_ADVICE = "Nothing to do: who is not seen lands by itself, unless there is 
 _SWITCHED_OFF = "Nothing to do now: switch it on before it flies again."
 _SEARCH = "Nothing to do: the drones look for it."
 _WAITS = "Nothing to do now: drones look for it once they track."
+_DATED = "Nothing to do now: they count from their arrival. Check the clock of its host once all have landed."
 _RESTARTED = "Nothing to do: it is restarted if it hangs."
-_CALL = f"{_TO_DO}check its marker and the light; drive it into the middle of the room; or LAND ALL."
+_CALL = f"{TO_DO}check its marker and the light; drive it into the middle of the room; or LAND ALL."
 _CUT = "CUT"
-_STAY_AWAY = f"{_TO_DO}stay away until all have landed (LAND ALL); then set it upright on its pad."
+_STAY_AWAY = f"{TO_DO}stay away until all have landed (LAND ALL); then set it upright on its pad."
 _DOWN = {
     FlightState.EMERGENCY: ("EMERGENCY, its motors are off", _STAY_AWAY),
-    FlightState.LOST: ("its driver no longer hears it", f"{_TO_DO}check its battery and its link."),
+    FlightState.LOST: ("its driver no longer hears it", f"{TO_DO}check its battery and its link."),
 }
-
-
-@dataclass(frozen=True, slots=True)
-class Alarm:
-    """An alarm line; `grave` ones are red, the others yellow.
-
-    about: identifies the alarm while figures in its text change.
-
-    advice: first whether an operator must do something now, then what happens next.
-
-    told_ns: time when it was first raised, for an alarm that stands from then on.
-    """
-
-    about: str
-    text: str
-    grave: bool = True
-    advice: str = ""
-    told_ns: int | None = None
-
-    @property
-    def asks(self) -> bool:
-        """Return whether an operator must do something now."""
-        return self.advice.startswith(_TO_DO)
 
 
 def alarms_of(state: MonitorState, now_ns: int) -> list[Alarm]:
@@ -176,7 +153,7 @@ def _battery(name: str, status: VehicleStatus, battery: Battery) -> Iterator[Ala
     if _lands(status) or (below and status.lands_in_s is not None):
         yield Alarm(about, f"{held}, it lands", False, "Nothing to do.")
     elif battery.charge is Charge.EMPTY:
-        advice = f"{_TO_DO}press Land on its card now; {lands}, wherever it is."
+        advice = f"{TO_DO}press Land on its card now; {lands}, wherever it is."
         yield Alarm(about, f"{held}{battery.good_for}", below, advice)
     else:
         yield Alarm(about, f"{held}{battery.good_for}", False, f"Nothing to do yet: {lands}.")
@@ -184,7 +161,7 @@ def _battery(name: str, status: VehicleStatus, battery: Battery) -> Iterator[Ala
 
 def _link(name: str, share: float | None) -> Iterator[Alarm]:
     if share is not None and share < WEAK_LINK:
-        advice = f"{_TO_DO}press Land on its card, or move what shields its radio. Without a link it lands by itself."
+        advice = f"{TO_DO}press Land on its card, or move what shields its radio. Without a link it lands by itself."
         yield Alarm(f"{name} link", f"{name}: weak link, {share:.0%} arrives", share < BAD_LINK, advice)
 
 
@@ -302,13 +279,17 @@ def _processes(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
                 False,
                 "Nothing to do now.",
             )
+    for name, ahead in state.ahead.items():
+        if ahead.age_s(now_ns) < _EVENT_SHOWN_S:
+            text = f"process {name}: dates its messages {ahead.message:.0f} s ahead"
+            yield Alarm(f"process {name} ahead", text, False, _DATED)
 
 
 def _events(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
     young = [seen.message for seen in state.events if seen.age_s(now_ns) < _EVENT_SHOWN_S]
     told = [(one.sentence, one.remedy) for one in young if one.severity is Severity.ERROR]
     for sentence, remedy in (*told, *forbidding(state, now_ns)):
-        yield Alarm(sentence, sentence, advice=f"{_TO_DO}{remedy}" if remedy else "")
+        yield Alarm(sentence, sentence, advice=f"{TO_DO}{remedy}" if remedy else "")
 
 
 def _suspected(state: MonitorState) -> Iterator[Alarm]:

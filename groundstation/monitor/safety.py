@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from groundstation.bus.messages import AIRBORNE, UNHEARD, FlightState, VehicleStatus, climbs
-from groundstation.monitor.alarms import Alarm
+from groundstation.monitor.alarm import Alarm
 from groundstation.monitor.batteries import battery_of
 from groundstation.monitor.endurance import flies, may_fly
 from groundstation.monitor.state import MonitorState

@@ -12,10 +12,12 @@ from groundstation.bus import messages as m
 from groundstation.bus.api import Received
 from groundstation.field.resolved import ResolvedField
 from groundstation.monitor.endurance import TakeOff, take_off_of
+from groundstation.time_units import NS_PER_S
 from groundstation.vehicles import kind_named
 
 _EVENTS = 50
 _COMMANDS = 8
+_AHEAD_NS = NS_PER_S
 T = TypeVar("T")
 
 
@@ -50,9 +52,17 @@ def cast_from_field(resolved: ResolvedField) -> Cast:
     return Cast(resolved.site, drones, targets, cameras, flight_times_s, lost_after_s, *limits, room_m)
 
 
+def heard_ns(item: Received) -> int:
+    """Return the time from which a message counts: that of its stamp, or of its arrival if the stamp lies ahead.
+
+    Else one from a clock that is ahead would look new for as long as that, however silent its sender is.
+    """
+    return min(item.header.stamp_ns, item.arrived_ns or item.header.stamp_ns)
+
+
 @dataclass(frozen=True, slots=True)
 class StampedMessage(Generic[T]):
-    """A message and its stamp on this host's boot clock [ns]."""
+    """A message and the time from which it counts, on this host's boot clock [ns]."""
 
     stamp_ns: int
     message: T
@@ -67,7 +77,7 @@ class MonitorState:
     """The newest message of each kind and entity; `hint` states the effect of Ctrl-C here.
 
     climbed_ns: stamp of the first status of each flying drone since its climb, or since one listens. flown: whether one
-    has flown since then.
+    has flown since then. ahead: senders whose stamps lie ahead [s], with the newest arrival of such a message.
     """
 
     cast: Cast = field(default_factory=Cast)
@@ -80,6 +90,7 @@ class MonitorState:
     processes: dict[str, StampedMessage[m.ProcessStatus]] = field(default_factory=dict)
     sightings: dict[tuple[str, str], int] = field(default_factory=dict)
     events: deque[StampedMessage[m.Event]] = field(default_factory=lambda: deque(maxlen=_EVENTS))
+    ahead: dict[str, StampedMessage[float]] = field(default_factory=dict)
     estimate: StampedMessage[m.Estimate] | None = None
     plan: StampedMessage[m.Plan] | None = None
     suspicion: m.Suspicion | None = None
@@ -94,7 +105,10 @@ class MonitorState:
         """Remember messages; unknown types are ignored."""
         for item in received:
             if item.message is not None:
-                self._take(item.header.entity, item.header.stamp_ns, item.message)
+                if item.header.stamp_ns - (at_ns := heard_ns(item)) > _AHEAD_NS:
+                    ahead_s = (item.header.stamp_ns - at_ns) / NS_PER_S
+                    self.ahead[item.header.source] = StampedMessage(at_ns, ahead_s)
+                self._take(item.header.entity, at_ns, item.message)
 
     def entity(self, name: str) -> m.EntityEstimate | None:
         """Return the estimate of an entity, or None."""

@@ -1,7 +1,7 @@
 """The log of past alarms: start and end; a flickering alarm, or one whose figures change, is one entry."""
 
 from groundstation.console.alarm_log import AlarmLog
-from groundstation.monitor.alarms import Alarm
+from groundstation.monitor.alarm import Alarm
 
 S = 1_000_000_000
 

@@ -64,20 +64,6 @@ def test_the_map_of_a_search_is_shown_as_long_as_it_lasts() -> None:
     assert shown == [{}, {"turtlebot": {"first": [-0.2, 0.0], "cell": 0.2, "columns": 3, "chances": [0, 255, 9]}}, {}]
 
 
-def test_the_time_in_the_air_goes_on_while_a_drone_is_not_heard() -> None:
-    state, board = ConsoleState(Cast(), 0), Snapshot()
-    flying, lost, landed = m.FlightState.FLYING, m.FlightState.LOST, m.FlightState.LANDED
-    shown, down = [], {0: "LANDED", 4: "LANDED", 5: "LANDED"}
-    for turn, flight in enumerate((lost, flying, lost, flying, landed, lost, lost)):
-        head = header("drone_1", (turn + 1) * NS_PER_S)
-        status = m.VehicleStatus(header=head, flight_state=flight, mode=down.get(turn, "TRACK"), battery=0.5)
-        state.ingest([received(t.VEHICLE_STATUS, status)])
-        board.begin()
-        state.put_often(board, NS_PER_S)
-        shown.append(json.loads(board.since(-1))["flight"]["airborne_since_ms"])
-    assert shown == [None, 2000.0, 2000.0, 2000.0, None, None, 7000.0]
-
-
 def test_a_board_tells_what_changed_since() -> None:
     board = Snapshot()
     board.begin()

@@ -3,13 +3,16 @@
 from dataclasses import replace
 
 import pytest
-from monitor_world import CAST, NOW, World
+from monitor_world import CAST, NOW, S, World
 from msgspec.structs import replace as replaced
 
 from groundstation.bus import messages as m
 from groundstation.bus import topics as t
+from groundstation.bus.api import Received
+from groundstation.bus.keys import Key
 from groundstation.monitor.alarms import alarms_of
 from groundstation.monitor.safety import Level, Safety, safety_of
+from groundstation.monitor.state import Cast, MonitorState
 
 
 def judged(world: World) -> Safety:
@@ -203,3 +206,19 @@ def test_a_drone_that_was_lost_in_the_air_before_one_listened_flies(
     world.text()
     (silent,) = (alarm for alarm in alarms_of(world.state, NOW) if alarm.about == "tracker silent")
     assert silent.advice == advice
+
+
+def test_stamps_that_lie_ahead_hide_no_silence() -> None:
+    state, ahead_ns = MonitorState(Cast("lab", {"drone_1": 0.15})), NOW + 3600 * S
+    head = m.Header(ahead_ns, "here", "drone_1", "drone_1", 1)
+    status = m.VehicleStatus(header=head, flight_state=m.FlightState.FLYING, mode="TRACK", battery=0.8, rate_hz=200.0)
+    estimate = m.Estimate(header=replaced(head, entity="team", source="tracker"), entities=(), epoch=1)
+    for topic, said in ((t.VEHICLE_STATUS, status), (t.ESTIMATE, estimate)):
+        key = Key("lab", said.header.entity, topic, said.header.source)
+        state.ingest([Received(key, said.header, said, b"", arrived_ns=NOW)])
+    about = [(one.about, one.text) for one in alarms_of(state, NOW)]
+    text = "process {0}: dates its messages 3600 s ahead"
+    assert about == [(f"process {one} ahead", text.format(one)) for one in ("drone_1", "tracker")]
+    assert safety_of(state, alarms_of(state, NOW)).level is Level.WATCH
+    later = [one.about for one in alarms_of(state, NOW + 100 * S)]
+    assert later == ["drone_1 silent", "tracker silent"], "of clocks of the silent nothing is known"

@@ -84,6 +84,20 @@ def test_muted_only_stops_are_heard_and_felt(stage: Any) -> None:
     becomes(page, "landing", 880, [400])
 
 
+def test_a_hidden_page_whose_timers_stand_still_sounds_its_alarms(stage: Any) -> None:
+    SITUATIONS["all_is_well"](stage.flight)
+    hidden = """
+      Object.defineProperty(document, "hidden", {value: true});
+      const every = window.setInterval;
+      window.setInterval = (act, ms) => every(act, Math.max(ms, 60000));  // as Chromium does after five minutes
+    """
+    page = stage.open(script=STUBS + hidden)
+    stage.flight.battery["drone_2"] = 0.28
+    page.wait(lambda s: "battery drone_2 low" in heard(page)["spoken"])
+    stage.console.kill()
+    page.wait(lambda s: "NO CONNECTION TO THE CONSOLE" in heard(page)["spoken"])
+
+
 def test_before_the_first_touch_it_only_speaks(stage: Any) -> None:
     SITUATIONS["all_is_well"](stage.flight)
     # The test's own access to the page counts as a touch, so the answer is given in the browser's place.

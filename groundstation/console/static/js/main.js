@@ -65,11 +65,17 @@ on("delta", (sections, sampled) => {
   if (sections.result) guarded("result", keepEnd);
   if (sections.detections) guarded("detections", showDetections);
   if (sampled) { guarded("charts", showSamples); guarded("timeline", showTimeline); }
+  soundIfHidden();
   redraw();
 });
 
+// Timers of a page that has been hidden for long run once a minute; what it is sent comes at once.
+function soundIfHidden() {
+  if (document.hidden) show("sounds");
+}
+
 on("notice", (notice) => { addNotice(notice); show("alarms"); });
-on("state", () => { show("alarms", "link", "buttons"); redraw(); });
+on("state", () => { show("alarms", "link", "buttons"); soundIfHidden(); redraw(); });
 
 // First what an operator must not miss, and acts with.
 const PARTS = {
@@ -112,7 +118,7 @@ function draw() {
   undrawnStamp = null;
 }
 
-// By a timer, so that alarms sound in a page that is hidden.
+// By a timer: ages grow while nothing comes, and a page that is hidden gets no picture of the screen to draw.
 function beat() {
   const at = performance.now();
   drawn.gapS = (at - lastBeat) / 1000;

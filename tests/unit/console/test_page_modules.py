@@ -94,6 +94,28 @@ def test_alarms_of_the_page_itself_are_heard(said: Any) -> None:
     assert said(script) == [silence, "NO CONNECTION TO THE CONSOLE", order, "the run broke off: drone_1 may fly"]
 
 
+def test_a_stop_that_is_refused_is_an_alarm_unless_the_drone_does_more(said: Any) -> None:
+    script = """
+    const { ownAlarms } = await import("./own_alarms.js");
+    const title = (verb, modes, reason, id = "a") => {
+      const rows = Object.keys(modes).map((name) => ({ name, stage: "REFUSED", reason }));
+      store.s.vehicles = Object.fromEntries(Object.entries(modes).map(([name, mode]) => [name, { mode }]));
+      store.s.orders = [{ id, verb, given_ms: performance.now() - 1000, state: "refused", rows }];
+      return ownAlarms().map(({ title }) => title);
+    };
+    const old = (verb, ...modes) => title(verb, { drone_1: modes[0], drone_2: modes[1] }, "given 41 s ago", verb);
+    const result = [old("HOLD", "TRACK", "TRACK"), old("LAND", "TRACK", "LANDING"), old("CUT_MOTORS", "CUT", "LANDING"),
+      title("HOLD", { drone_1: "LANDING" }, "LANDING goes before HOLD"), title("LAND", { drone_1: "CUT" }, "motors are cut"),
+      title("HOLD", { drone_1: "TAKING_OFF" }, "LANDING goes before HOLD")];
+    """
+    assert said(script) == [
+        ["HOLD REFUSED by drone_1, drone_2: given 41 s ago"],
+        ["LAND REFUSED by drone_1: given 41 s ago"],
+        ["CUT MOTORS REFUSED by drone_2: given 41 s ago"],
+        *([], [], []),
+    ]
+
+
 def test_each_target_is_heard_to_be_lost_and_found(said: Any) -> None:
     script = f"""{_ALARMS}
     const unseen = (ages) => {{

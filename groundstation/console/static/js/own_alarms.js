@@ -14,7 +14,10 @@ const UNHEARD_S = 0.8, FORGOTTEN_S = 30;
 // A slow link asks for an act when the newest frame is older than the first, and frames have been late for the second:
 // a page that stood still gets old ones for a moment.
 const SLOW_S = 2, SLOW_FOR_S = 1;
+// Modes in which a drone that refuses a stop does what was asked, or more.
+const DOES_MORE = { HOLD: ["HOLD", "LANDING", "LANDED", "CUT"], LAND: ["LANDING", "LANDED", "CUT"], CUT_MOTORS: ["LANDED", "CUT"] };
 const NOT_GIVEN = { unsent: "NOT SENT", dropped: "NOT SENT", refused: "REFUSED" };
+const done = new Set(); // refusals by drones that did more when they refused; they may have gone up again
 let episodes = [], keptFor = "";
 
 export const slowWords = () => `SLOW LINK: what you see is ${seconds(frameAgeS())} old`;
@@ -29,7 +32,7 @@ export function ownAlarms() {
   else if (consoleSilent()) alarms.push({ kind: "silent", about: "silent", title: `CONSOLE SILENT for ${seconds(silentS())}`, more: old, old: true, shell: true });
   const faults = failures();
   if (faults.length) alarms.push({ kind: "fault", about: "page fault", title: `PAGE FAULT: ${faults.length > FEW ? `${faults.length} parts` : joined(faults)} may show what was`, more: "To do: reload this page, or watch on another. Stops go out all the same." });
-  const stop = store.connected ? unheardStop() : null;
+  const stop = store.connected ? failedStop() : null;
   if (stop) alarms.push({ kind: "unheard", about: `unheard ${stop.id}`, title: stopWords(stop), more: "To do: press again. If a drone flies on: groundstation land in a shell, or its own remote control." });
   return alarms;
 }
@@ -40,22 +43,32 @@ function stops() {
   return [...own, ...(store.s.orders ?? [])].filter(({ verb }) => STOPS.has(verb)).sort((a, b) => b.given_ms - a.given_ms);
 }
 
-// The newest stop that somebody has not answered to whom no newer one was given.
-function unheardStop() {
+// The newest stop that somebody has not answered, or refused and flies on, to whom no newer one was given.
+function failedStop() {
   const renewed = new Set();
   for (const { id, ref, verb, state, rows, given_ms, since } of stops()) {
     // What became of a page's own is known later than it was given, much later on a page that stood still.
     const age = ageS(given_ms), known = since ? sinceMs(since) / 1000 : age;
-    const silent = rows.filter(({ name, stage }) => !stage && !renewed.has(name)).map(({ name }) => name);
-    if (silent.length && age > UNHEARD_S && known < FORGOTTEN_S) return { id: ref || id, verb: verb.replace("_", " "), names: silent.join(", "), state };
+    const open = rows.filter(({ name }) => !renewed.has(name)), silent = open.filter(({ stage }) => !stage), refused = open.filter((row) => isRefused(id, verb, row));
+    if (silent.length + refused.length && age > UNHEARD_S && known < FORGOTTEN_S) return { id: ref || id, verb: verb.replace("_", " "), silent, refused, state };
     rows.forEach(({ name }) => renewed.add(name));
   }
   return null;
 }
 
-function stopWords({ verb, names, state }) {
-  const fault = NOT_GIVEN[state];
-  return fault ? `${verb} ${fault}: not given to ${names}` : `${verb} NOT CONFIRMED: no answer from ${names}`;
+function isRefused(id, verb, { name, stage }) {
+  const key = `${id} ${name}`;
+  if (stage === "REFUSED" && DOES_MORE[verb].includes(store.s.vehicles?.[name]?.mode)) done.add(key);
+  return stage === "REFUSED" && !done.has(key);
+}
+
+const namesOf = (rows) => rows.map(({ name }) => name).join(", ");
+
+function stopWords({ verb, silent, refused, state }) {
+  const fault = NOT_GIVEN[state], words = [];
+  if (silent.length) words.push(fault ? `${verb} ${fault}: not given to ${namesOf(silent)}` : `${verb} NOT CONFIRMED: no answer from ${namesOf(silent)}`);
+  if (refused.length) words.push(`${verb} REFUSED by ${namesOf(refused)}: ${refused[0].reason}`);
+  return words.join("; ");
 }
 
 const storeKey = () => `skein-own-alarms ${store.run}`;

@@ -18,7 +18,7 @@ from groundstation.console.standing import StandingDrones
 from groundstation.field.room import WorldCamera
 from groundstation.monitor.alarms import alarms_of
 from groundstation.monitor.batteries import battery_of
-from groundstation.monitor.endurance import flies
+from groundstation.monitor.endurance import flies, may_fly
 from groundstation.monitor.safety import safety_of
 from groundstation.monitor.state import Cast, MonitorState, StampedMessage, heard_ns
 from groundstation.monitor.whereabouts import is_anywhere
@@ -47,6 +47,8 @@ class ConsoleState:
         self.truth: dict[str, StampedMessage[m.TruthState]] = {}
         self.search_maps: dict[str, m.SearchMap] = {}
         self._airborne_since_ns: int | None = None
+        self._stood: set[str] = set()
+        self._or_longer = False
         self._flown = False
 
     def ingest(self, received: Iterable[Received]) -> None:
@@ -121,13 +123,21 @@ class ConsoleState:
         board.put("safety", asdict(safety_of(known, alarms)))
 
     def _flight(self) -> dict[str, Any]:
-        """Return since when a drone is in the air, and whether any ever was."""
+        """Return since when a drone is in the air, whether longer for all that is known, and whether any ever was."""
         seen, take_offs = self.monitor.vehicles.items(), self.monitor.take_offs
-        airborne = [status.stamp_ns for name, status in seen if flies(status.message, take_offs.get(name))]
+        airborne = {name: status.stamp_ns for name, status in seen if flies(status.message, take_offs.get(name))}
         self._flown |= bool(airborne)
-        self._airborne_since_ns = (self._airborne_since_ns or min(airborne)) if airborne else None
+        self._airborne_since_ns = (self._airborne_since_ns or min(airborne.values())) if airborne else None
+        self._stood |= {name for name, status in seen if not may_fly(status.message, take_offs.get(name))}
+        # Whose take-off this console was not there to see, was up before.
+        unseen = not airborne.keys() <= self._stood
+        self._or_longer = bool(airborne) and (self._or_longer or unseen)
         since_ns = self._airborne_since_ns
-        return {"airborne_since_ms": None if since_ns is None else since_ns / 1e6, "flown": self._flown}
+        return {
+            "airborne_since_ms": None if since_ns is None else since_ns / 1e6,
+            "or_longer": self._or_longer,
+            "flown": self._flown,
+        }
 
     def _standing(self, now_ns: int) -> list[dict[str, Any]]:
         estimate = self.monitor.estimate.message.entities if self.monitor.estimate else ()

@@ -43,6 +43,18 @@ def test_what_is_dated_ahead_counts_from_its_arrival() -> None:
     assert said["vehicles"]["drone_1"]["at"] == said["setpoints"]["drone_1"]["at"] == said["estimate"]["at"] == 1000.0
 
 
+def test_a_console_that_saw_no_take_off_knows_a_least_time_in_the_air() -> None:
+    state, told = ConsoleState(Cast(), 0), []
+    flying, landed = m.FlightState.FLYING, m.FlightState.LANDED
+    flights = [("drone_1", flying), ("drone_2", landed), ("drone_2", flying), ("drone_1", landed)]
+    flights += [("drone_2", landed), ("drone_1", flying)]
+    for name, flight in flights:
+        status = m.VehicleStatus(header=header(name, NS_PER_S), flight_state=flight, mode="TRACK", battery=0.5)
+        state.ingest([received(t.VEHICLE_STATUS, status)])
+        told.append(shown(state)["flight"]["or_longer"])
+    assert told == [True, True, True, True, False, False]
+
+
 def test_the_time_in_the_air_goes_on_while_a_drone_is_not_heard() -> None:
     state, board = ConsoleState(Cast(), 0), Snapshot()
     flying, lost, landed = m.FlightState.FLYING, m.FlightState.LOST, m.FlightState.LANDED

@@ -105,7 +105,8 @@ def test_a_stop_that_is_refused_is_an_alarm_unless_the_drone_does_more(said: Any
     };
     const old = (verb, ...modes) => title(verb, { drone_1: modes[0], drone_2: modes[1] }, "given 41 s ago", verb);
     const result = [old("HOLD", "TRACK", "TRACK"), old("LAND", "TRACK", "LANDING"), old("CUT_MOTORS", "CUT", "LANDING"),
-      title("HOLD", { drone_1: "LANDING" }, "LANDING goes before HOLD"), title("LAND", { drone_1: "CUT" }, "motors are cut"),
+      title("HOLD", { drone_1: "LANDING" }, "LANDING goes before HOLD"),
+      title("LAND", { drone_1: "CUT" }, "motors are cut"),
       title("HOLD", { drone_1: "TAKING_OFF" }, "LANDING goes before HOLD")];
     """
     assert said(script) == [

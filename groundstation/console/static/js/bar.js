@@ -20,8 +20,8 @@ export function showBar() {
   const [mode, level, who] = teamMode();
   show("team-mode", mode, level);
   text(byId("team-who"), withShortNames(who || "team"));
-  const since = store.s.flight?.airborne_since_ms, airborne = since ? ageS(since) : null;
-  show("air-time", airborne === null || replaying() ? "–" : `${Math.floor(airborne / 60)}:${String(Math.floor(airborne % 60)).padStart(2, "0")}`);
+  const { airborne_since_ms: since, or_longer: longer } = store.s.flight ?? {}, airborne = since ? ageS(since) : null;
+  show("air-time", airborne === null || replaying() ? "–" : `${longer ? "≥ " : ""}${Math.floor(airborne / 60)}:${String(Math.floor(airborne % 60)).padStart(2, "0")}`);
   const battery = worstBattery();
   show("worst-battery", battery ? withShortNames(`${battery.words} ${battery.name}`) : "–", battery?.level);
   text(byId("battery-lasts"), battery?.title ?? "worst battery");

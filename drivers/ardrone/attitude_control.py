@@ -83,7 +83,8 @@ class AttitudeControl:
     def _judged(self, now_ns: int, dt_s: float, decision: WatchdogDecision, report: MotionReport) -> MotionReport:
         """Return the report with what commands and cameras have shown of the drone's optical flow."""
         told, seen = report.velocity_m_s if report.told and not report.repeats else None, decision.seen_m_s
-        if self._doubt.step(now_ns, decision.action, told, seen) and seen is not None:
+        commanded_m_s = self._loop.commanded_m_s
+        if self._doubt.step(now_ns, decision.action, told, seen, commanded_m_s) and seen is not None:
             self._loop.hold((*seen, 0.0), dt_s)  # its own velocity gives no speed from which to brake it
         if not (self._doubt.blind and report.able):
             return report
@@ -111,7 +112,7 @@ class AttitudeControl:
             self._loop.reset()
             return HOVER
         wanted = decision.velocity_m_s if back is None else back
-        measured = None if report.repeats else report.velocity_m_s
+        measured = None if report.repeats or report.blind else report.velocity_m_s
         force, seen = report.force_m_s2, decision.seen_m_s
         asked = self._loop.step(wanted, decision.yaw_rate_rad_s, measured, dt_s, force, seen)
         if not self._loop.contradicted:

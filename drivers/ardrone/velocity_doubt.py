@@ -20,6 +20,8 @@ CONTRADICTS = "its velocity contradicts what was asked for"
 _SEEN_NS = 800 * NS_PER_MS
 # In 32 healthy emulated flights no drone that reported to stand was seen faster than that by more.
 _SEEN_M_S = 0.12
+# Its commands say so too: a picture that jumps explains only the one, and a wrong drag only the other.
+_COMMANDED_M_S, _BOTH_NS = 0.1, 400 * NS_PER_MS
 # Sound firmware brakes within a second, and the seen speed is 0.3 s old: by the end of these and `_SEEN_NS` the drone
 # stands. Three deviations of that speed are 0.12 m/s, and a slightly misleading floor accounts for 0.1 m/s more.
 _BRAKES_WITHIN_NS = 500 * NS_PER_MS
@@ -55,11 +57,18 @@ class VelocityDoubt:
         self._contradicts = True
         self.blind = self.blind or math.hypot(*told_m_s[:2]) < NO_MOTION_M_S
 
-    def step(self, now_ns: int, action: Action, told_m_s: Vector3 | None, seen_m_s: tuple[float, float] | None) -> bool:
+    def step(
+        self,
+        now_ns: int,
+        action: Action,
+        told_m_s: Vector3 | None,
+        seen_m_s: tuple[float, float] | None,
+        commanded_m_s: float = 0.0,
+    ) -> bool:
         """Take one turn; return whether cameras have just shown that the drone sees no floor.
 
         told_m_s: its velocity, None if it reports nothing new; seen_m_s: likewise by cameras, forward and left, None
-        if they do not see it.
+        if they do not see it; commanded_m_s: the speed that its commands should show by now, 0 if unknown.
         """
         if action in _STANDS:
             self.reset()
@@ -79,7 +88,9 @@ class VelocityDoubt:
         stood = speed < _CONFIRMED_M_S and apart < _CONFIRMED_M_S
         if self._lasting(now_ns, "stood", stood) >= _CONFIRMED_NS:
             self._contradicts = False
-        shown = self._lasting(now_ns, "moves", moves) >= _SEEN_NS or self._lasting(now_ns, "drifts", drifts) >= _SEEN_NS
+        both = moves and commanded_m_s > claimed + _COMMANDED_M_S
+        lasting = (("moves", moves, _SEEN_NS), ("drifts", drifts, _SEEN_NS), ("both", both, _BOTH_NS))
+        shown = any(self._lasting(now_ns, what, holds) >= enough_ns for what, holds, enough_ns in lasting)
         fresh, self.blind = shown and not self.blind, self.blind or shown
         return fresh
 

@@ -59,6 +59,13 @@ class VelocityLoop:
         stands = self._stands_off_m > _STANDS_OFF_M
         return self._flying and (stands or any(axis.contradicted for axis in self._axes))
 
+    @property
+    def commanded_m_s(self) -> float:
+        """Return the speed that the commands should show in its reports by now; 0 in wind, where it may well stand."""
+        if not self._flying or any(axis.in_wind for axis in self._axes):
+            return 0.0
+        return math.hypot(*(axis.expected_m_s for axis in self._axes))
+
     def reset(self) -> None:
         """Forget the motion, but not the learned figures of the vehicle; for times without this loop."""
         self._flying = False
@@ -111,11 +118,10 @@ class VelocityLoop:
         return self._request(wanted_m_s, turn_rad_s, measured_m_s, dt_s, force_m_s2)
 
     def _compare_standing(self, told_m_s: float, dt_s: float) -> None:
-        """Compare a speed of nearly zero with the commands; in wind a drone may well stand."""
-        expected_m_s = math.hypot(*(axis.expected_m_s for axis in self._axes))
+        """Compare a speed of nearly zero with the commands."""
         excess = -_FORGETS_M_S
-        if told_m_s < NO_MOTION_M_S and not any(axis.in_wind for axis in self._axes):
-            excess = max(excess, expected_m_s - told_m_s - _STANDS_OFF_M_S)
+        if told_m_s < NO_MOTION_M_S:
+            excess = max(excess, self.commanded_m_s - told_m_s - _STANDS_OFF_M_S)
         self._stands_off_m = max(0.0, self._stands_off_m + excess * dt_s)
 
     def brake(

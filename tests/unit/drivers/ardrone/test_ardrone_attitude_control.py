@@ -103,6 +103,23 @@ def test_one_that_cameras_see_move_though_it_reports_to_stand_is_blind_and_brake
     assert turns.control.blind and not asked.hover and asked.pitch_rad < 0.0
 
 
+@pytest.mark.parametrize(("wanted_m_s", "seconds", "blind"), [(0.2, 0.9, True), (0.05, 0.7, False)])
+def test_cameras_need_less_time_where_commands_agree_with_them(wanted_m_s, seconds, blind) -> None:
+    turns, wanted = Turns(), (wanted_m_s, 0.0, 0.0)
+    turns(Action.FLY, SOUND._replace(velocity_m_s=wanted), 2.0, velocity_m_s=wanted)
+    turns(Action.FLY, STILL, seconds, velocity_m_s=wanted, seen_m_s=(0.2, 0.0))
+    assert turns.control.blind is blind
+
+
+def test_one_that_cameras_find_blind_in_flight_is_braked_from_the_speed_that_they_saw() -> None:
+    turns = Turns()
+    turns(Action.FLY, SOUND._replace(velocity_m_s=(0.2, 0.0, 0.0)), 2.0, velocity_m_s=(0.2, 0.0, 0.0))
+    while not turns.control.blind:
+        turns(Action.FLY, STILL, 0.025, velocity_m_s=(0.2, 0.0, 0.0), seen_m_s=(0.25, 0.0))
+    braking = turns(Action.HOVER, STILL, 0.1, seen_m_s=(0.25, 0.0)).pitch_rad
+    assert braking < -0.03
+
+
 def test_one_whose_velocity_cameras_confirm_is_neither_doubted_nor_braked(turns) -> None:
     assert turns(Action.HOVER, STILL, 5.0, seen_m_s=(0.08, 0.0)).hover
     assert not turns.control.doubted

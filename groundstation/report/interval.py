@@ -1,6 +1,6 @@
 """The parts of a run that count: from TRACK until the team was ordered down or is on the floor, else in the air."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from groundstation.report.aloft import Said, flights_of, held_at, in_the_air
 from groundstation.report.tracks import RunData
 
 _STARTED = (AckStage.ACCEPTED, AckStage.EFFECTIVE)
+_TRACKS = "TRACK"  # the mode of a driver that obeys setpoints
 _ENDS, _STARTS = (Verb.LAND, Verb.CUT_MOTORS), (Verb.TAKEOFF, Verb.TRACK)
 
 # A process reports itself once a second: a shorter flight has no figures of its own.
@@ -20,13 +21,14 @@ Span = tuple[float, float]
 
 
 def tracking_spans(data: RunData) -> tuple[Span, ...]:
-    """Return (start, end) [s] of each flight; none when no drone ever accepted TRACK.
+    """Return (start, end) [s] of each flight; none when no drone ever accepted TRACK or was in that mode.
 
     A flight ends once each drone of the team was ordered LAND or CUT_MOTORS or is on the floor, however it got there;
     else with the last message.
     """
     spans = list[Span]()
-    for start in sorted(_accepted(data)):
+    accepted = _accepted(data)
+    for start in sorted([*accepted, *_shown(data, accepted)]):
         if not spans or start > spans[-1][1]:
             spans.append((start, _end(data, start)))
     return tuple(spans)
@@ -87,6 +89,21 @@ def _accepted(data: RunData) -> list[float]:
             before = first.get(ack.message.command_id, ack.time_s)
             first[ack.message.command_id] = min(before, ack.time_s)
     return list(first.values())
+
+
+def _shown(data: RunData, accepted: Sequence[float]) -> Iterator[float]:
+    """Yield when a drone was first seen in mode TRACK without an answer of anybody's [s]: a hole may hide all of them.
+
+    Answers are repeated for a fifth of a second, the mode is reported throughout.
+    """
+    for reports in data.vehicles.values():
+        # One that tells no other mode before says nothing of when it began, unless nobody does.
+        before_s, mode = -np.inf, _TRACKS if accepted else ""
+        for item in sorted(reports, key=lambda item: item.time_s):
+            begins = item.message.mode == _TRACKS != mode
+            if begins and not any(before_s <= at_s <= item.time_s for at_s in accepted):
+                yield item.time_s
+            before_s, mode = item.time_s, item.message.mode
 
 
 def _end(data: RunData, start: float) -> float:

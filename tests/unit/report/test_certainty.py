@@ -32,10 +32,11 @@ def until(track: CertaintyTrack, end_s: float) -> CertaintyTrack:
 @pytest.fixture
 def flight(lab_field: ResolvedField) -> RunData:
     """Return a good flight of two drones without a truth: in the air from 2 to 27 s, it tracks from 5 to 25 s."""
-    states = ((0.0, m.FlightState.LANDED), (2.0, m.FlightState.HOVERING), (25.5, m.FlightState.LANDING),
-              (27.0, m.FlightState.LANDED))  # fmt: skip
+    states = ((0.0, m.FlightState.LANDED, "LANDED"), (2.0, m.FlightState.HOVERING, "HOVER"),
+              (5.0, m.FlightState.FLYING, "TRACK"), (25.5, m.FlightState.LANDING, "LANDING"),
+              (27.0, m.FlightState.LANDED, "LANDED"))  # fmt: skip
     header = m.Header(0, "here", "team", "tester", 0)
-    said = [TimedMessage(t, m.VehicleStatus(header=header, flight_state=state, mode="TRACK")) for t, state in states]
+    said = [TimedMessage(t, m.VehicleStatus(header=header, flight_state=state, mode=mode)) for t, state, mode in states]
     began = m.CommandAck(header=header, command_id="1", verb=m.Verb.TRACK, stage=m.AckStage.ACCEPTED)
     ended = m.Command(header=header, id="2", verb=m.Verb.LAND, scope=(), issuer="me")
     names = (*lab_field.drones, *lab_field.tracked)

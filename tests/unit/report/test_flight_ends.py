@@ -69,6 +69,19 @@ def test_a_flight_ends_when_each_drone_is_ordered_down_or_on_the_floor(
     assert tracking_spans(_data(lab_field, told, orders)) == spans
 
 
+@pytest.mark.parametrize(("taken_s", "begun_s"), [((), 5.5), ((5.0,), 5.0), ((5.4,), 5.4)])
+def test_a_flight_begins_with_its_mode_where_the_answers_to_track_are_not_recorded(
+    lab_field: ResolvedField, taken_s: tuple[float, ...], begun_s: float
+) -> None:
+    data = _data(lab_field, {"a": [*FLIES, (62.0, LANDED)]}, [(60.0, m.Verb.LAND, "")])
+    data.acks = [TimedMessage(at_s, data.acks[0].message) for at_s in taken_s]
+    hovers = data.vehicles["drone_1"]
+    told = [(5.5, "TRACK"), (20.0, "HOLD"), (30.0, "TRACK"), (60.1, "TRACK")]
+    tracks = [TimedMessage(at_s, m.VehicleStatus(header=HEADER, flight_state=FLYING, mode=mode)) for at_s, mode in told]
+    data.vehicles["drone_1"] = [*hovers[:2], *tracks, hovers[2]]
+    assert tracking_spans(data) == ((begun_s, 60.0),)
+
+
 def test_a_simulator_knows_when_a_drone_that_is_not_heard_comes_down(lab_field: ResolvedField) -> None:
     data = _data(lab_field, {name: [*FLIES, (30.0, LOST)] for name in "ab"})
     times = np.arange(0.0, 100.0)

@@ -177,6 +177,7 @@ def test_only_the_first_of_a_drones_ends_is_counted():
 def test_fault_failsafe_and_landing_stand_in_order():
     assert [(item.time_s, item.kind) for item in story(LANDED_BY_FAILSAFE)] == [
         (1.0, "flight"),
+        (1.0, "flight"),
         (11.0, "fault"),
         (12.0, "failsafe"),
         (13.0, "warning"),

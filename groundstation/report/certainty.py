@@ -8,6 +8,7 @@ from groundstation.bus.messages import UP
 from groundstation.report.accuracy import RATE_HZ, STALE_S
 from groundstation.report.aloft import aloft_at
 from groundstation.report.tracks import CertaintyTrack, RunData
+from groundstation.report.unreported import unreported
 
 
 def target_unseen_s(data: RunData, time_s: Array) -> float | None:
@@ -22,9 +23,13 @@ def target_unseen_s(data: RunData, time_s: Array) -> float | None:
 def drone_uncertain_s(data: RunData, time_s: Array) -> float | None:
     """Return the longest time for which the place of any flying drone was unknown [s]; None if none flew then.
 
+    None as well if one flew of which no report is recorded.
+
     Unknown: absent from the estimates, contradicted by sightings, or unlocalised, at 10 Hz. A drone that takes off or
     lands may be out of view.
     """
+    if unreported(data):
+        return None
     found = [
         longest_s
         for name in data.drones

@@ -74,6 +74,9 @@ def criteria_of(figures: RunFigures, field: ResolvedField, facts: RunFacts) -> l
     tracked = simulated or figures.target is not None
     by_estimates = () if simulated else _by_the_estimates(figures)
     criteria = [*_of_safety(figures, field, tracked=tracked), *by_estimates, *criteria]
+    if not field.drones:
+        # Of nobody's team: whose flights, targets and fence were not judged is unknown.
+        criteria.append(Criterion("field_read", value=False, relation="==", limit=True, ok=False))
     if tracked:
         criteria = [*_of_the_targets(figures, field, expected), *_of_the_demo(figures, facts), *criteria]
         cores = max(MAX_CPU_CORES, CPU_CORES_PER_DRONE * len(field.drones))
@@ -129,8 +132,8 @@ def _of_safety(figures: RunFigures, field: ResolvedField, *, tracked: bool) -> I
         # Where nobody measured it, a drone may have been beyond the fence.
         worst = min(figures.drones_judged, key=lambda name: figures.drones_judged[name])
         yield replace(_above("drones_judged", judged, MIN_JUDGED), why="" if judged >= MIN_JUDGED else worst)
-    if tracked or figures.landed is not None:
-        yield Criterion("landed", figures.landed, "==", True, figures.landed is True)
+    if tracked or figures.flew:
+        yield Criterion("landed", figures.landed, "==", True, figures.landed is True, _untold(figures, figures.landed))
     if cut := figures.cuts_in_flight:
         # Drones that fell are on the ground as well.
         yield Criterion("cuts_in_flight", float(len(cut)), "==", 0.0, ok=False, why="; ".join(cut))
@@ -140,8 +143,15 @@ def _by_the_estimates(figures: RunFigures) -> Iterator[Criterion]:
     """Judge what the tracker itself said, of targets and drones whose truth nothing measured."""
     if figures.target is None and figures.target_unseen_s is not None:
         yield _below("target_unseen_s", figures.target_unseen_s, MAX_TARGET_UNSEEN_S)
-    if figures.max_fence_violation_m is None and figures.drone_uncertain_s is not None:
-        yield _below("drone_uncertain_s", figures.drone_uncertain_s, MAX_DRONE_UNCERTAIN_S)
+    if figures.max_fence_violation_m is None and figures.tracked_s > 0.0:
+        uncertain = _below("drone_uncertain_s", figures.drone_uncertain_s, MAX_DRONE_UNCERTAIN_S)
+        yield replace(uncertain, why=_untold(figures, figures.drone_uncertain_s))
+
+
+def _untold(figures: RunFigures, value: Value) -> str:
+    """Return why a drone's figure is unknown, "" if it is known."""
+    names = ", ".join(figures.unreported)
+    return f"no report of {names} in flight is recorded" if names and value is None else ""
 
 
 def _of_the_target(figures: RunFigures, expected: Expectation) -> Iterator[Criterion]:

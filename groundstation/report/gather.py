@@ -5,21 +5,19 @@ from array import array
 from collections import defaultdict
 from pathlib import Path
 
-import msgspec
 import numpy as np
 
 from groundstation.bus import messages as m
 from groundstation.bus import topics as t
-from groundstation.field.resolved import ResolvedField, field_from_json
 from groundstation.recording.chunks import among
 from groundstation.recording.copies import damage_before
 from groundstation.recording.file_topics import STATE
-from groundstation.recording.preamble import FIELD_NAME
 from groundstation.recording.reader import Recording, RecordingError, open_parts, parts
 from groundstation.recording.rerun import rerun_of
 from groundstation.recording.stretch import stretch_of
 from groundstation.report import run_facts
 from groundstation.report.captured_truth import captured_tracks
+from groundstation.report.recorded_field import recorded_field
 from groundstation.report.tracks import (
     UNKNOWN_FIELD,
     CertaintyTrack,
@@ -47,9 +45,8 @@ def gather(run_dir: Path) -> RunData:
     rows = _Rows(data)
     readable, unread = open_parts(paths)
     data.damage.extend(f"{path.name}: {why}" for path, why in unread.items())
+    data.resolved = recorded_field(readable, run_dir, data.damage)
     for recording in readable:
-        if FIELD_NAME in recording.attachments and not data.resolved.drones:
-            data.resolved = _field(recording.attachments[FIELD_NAME], data.damage)
         data.rerun = data.rerun or rerun_of(recording.metadata)
         data.stretch = data.stretch or stretch_of(recording.metadata)
         rows.take(recording)
@@ -57,14 +54,6 @@ def gather(run_dir: Path) -> RunData:
         data.damage.extend(f"{recording.path.name}: {text}" for text in damage)
     rows.finish()
     return data
-
-
-def _field(attachment: bytes, damage: list[str]) -> ResolvedField:
-    try:
-        return field_from_json(attachment)
-    except msgspec.DecodeError as error:
-        damage.append(f"field.json: {error}")
-        return UNKNOWN_FIELD
 
 
 class _Rows:

@@ -15,6 +15,7 @@ from groundstation.report.certainty import drone_uncertain_s, target_unseen_s
 from groundstation.report.happenings import cuts_in_flight, happenings, landings
 from groundstation.report.interval import recorded_share, tracking_spans, whole
 from groundstation.report.tracks import RunData
+from groundstation.report.unreported import unreported
 
 
 class RunFigures(msgspec.Struct, frozen=True, kw_only=True):
@@ -23,11 +24,11 @@ class RunFigures(msgspec.Struct, frozen=True, kw_only=True):
     target_*: of several targets, those of the worst; target: all figures of the one with the largest error; found: of
     each target from when it was found, None if it never was. target_unseen_s, drone_uncertain_s: by the estimates.
     flew: whether any drone did. recorded_share: of the flights, without holes. drones_judged: share of each drone's
-    flights for which motion capture knows its place. failsafe_landings: which drones a failsafe landed or cut, when and
-    why; cuts_in_flight: which fell because somebody ordered it. unplanned_s: for how long at most all plans were too
-    old to be flown. truth: the reference of the errors, a motion capture system of the field or the simulator, "" for
-    nothing. starved_s: how long other programs of the computer kept processes of the run from it; waited: the share of
-    the time for which each waited for a core.
+    flights for which motion capture knows its place. unreported: drones that flew without a report of their own.
+    failsafe_landings: which drones a failsafe landed or cut, when and why; cuts_in_flight: which fell because somebody
+    ordered it. unplanned_s: for how long at most all plans were too old to be flown. truth: the reference of the
+    errors, a motion capture system of the field or the simulator, "" for nothing. starved_s: how long other programs
+    of the computer kept processes of the run from it; waited: the share of the time for which each waited for a core.
     """
 
     flew: bool = True
@@ -46,6 +47,7 @@ class RunFigures(msgspec.Struct, frozen=True, kw_only=True):
     min_obstacle_m: float | None = None
     drones_judged: dict[str, float] = {}
     landed: bool | None
+    unreported: list[str] = []
     failsafe_landings: list[str] = []
     cuts_in_flight: list[str] = []
     topology_seconds: dict[str, float]
@@ -84,9 +86,9 @@ def figures_of(data: RunData) -> RunFigures:
     target = max(targets.values(), key=lambda one: one.rmse_m, default=None)
     planner = None if data.rerun else load.planner_ms(data)  # a re-run's plans have no real time
     ticks, missed, rate = load.tracker_deadlines(data)
-    cores = load.cpu_cores(data)
+    cores, hidden = load.cpu_cores(data), unreported(data)
     return RunFigures(
-        flew=bool(spans) or anybody_flew(data),
+        flew=bool(spans or hidden) or anybody_flew(data),
         tracked_s=round(sum(until - since for since, until in spans), 3),
         recorded_share=recorded_share(data),
         target_rmse_m=target.rmse_m if target else None,
@@ -102,6 +104,7 @@ def figures_of(data: RunData) -> RunFigures:
         min_obstacle_m=safety.min_obstacle_m(data),
         drones_judged=safety.judged_shares(data),
         landed=safety.landed(data),
+        unreported=hidden,
         failsafe_landings=[item.line for item in landings(happenings(data))],
         cuts_in_flight=[item.line for item in cuts_in_flight(data)],
         topology_seconds=topology_use.topology_seconds(data, start, end),

@@ -9,6 +9,7 @@ from groundstation.field.room import Fence
 from groundstation.report.accuracy import time_grid
 from groundstation.report.aloft import aloft_at
 from groundstation.report.tracks import RunData, TruthTrack
+from groundstation.report.unreported import unreported
 from groundstation.sensing.from_field import boxes_from_field
 
 # Contact with the floor lets a body sink by fractions of this; it is no breach of a fence.
@@ -76,7 +77,7 @@ def landed(data: RunData) -> bool | None:
     """Return whether every drone stood on the ground at the end.
 
     Without a simulator: by the last reports of those that flew, since motion capture may have lost one long before;
-    None if none flew, or if the recording breaks off while one flies.
+    None if none flew, if one flew without a report, or if the recording breaks off while one flies.
     """
     down = _down_at_last(data)
     return None if down is False and data.breaks_off else down
@@ -88,7 +89,9 @@ def _down_at_last(data: RunData) -> bool | None:
         return all(bool(track.on_ground[-1]) for track in tracks) and len(tracks) == len(data.drones)
     said = [_said_down(data, name) for name in data.vehicles]
     flew = [down for down in said if down is not None]
-    return all(flew) if flew else None
+    if not all(flew):
+        return False
+    return None if unreported(data) or not flew else True
 
 
 def _said_down(data: RunData, name: str) -> bool | None:

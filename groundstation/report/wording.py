@@ -21,6 +21,7 @@ _TITLES = {
     "landed": ("everybody landed", ""),
     "cuts_in_flight": ("drones that fell with their motors cut", ""),
     "tracked_s": ("time tracked", "s"),
+    "field_read": ("its field could be read", ""),
     "recorded_share": ("share of the flight that is recorded", ""),
     "command_to_airborne_s": ("from the command to the air", "s"),
     "failsafe_landings": ("flights ended by a failsafe", ""),

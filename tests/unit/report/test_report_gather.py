@@ -14,8 +14,10 @@ from groundstation.recording.timeline import Timeline
 from groundstation.recording.writing import RunWriter
 from groundstation.report.gather import gather
 from groundstation.report.load import process_loads
+from groundstation.report.tracks import UNKNOWN_FIELD
 from groundstation.settings.files import find_field
 from groundstation.settings.load import load_field
+from groundstation.settings.resolved import yaml_of
 from groundstation.time_units import NS_PER_S
 
 
@@ -97,3 +99,22 @@ def test_an_estimate_is_kept_as_plain_numbers(tmp_path: Path) -> None:
     tracemalloc.stop()
     assert track.mean[:, 0].tolist() == list(range(count)) and track.covariance[7].ravel().tolist() == [*range(7, 23)]
     assert peak < 1700 * count, "with the buffers of one file, and both entities of each message"
+
+
+@pytest.mark.parametrize("rescued_by", ["nothing", "state-2.mcap", "resolved.yaml"])
+def test_a_damaged_field_is_found_elsewhere(tmp_path: Path, rescued_by: str) -> None:
+    writer = _Writer(tmp_path)
+    writer.status(0, "tracker", "tracker")
+    writer.close()
+    path = tmp_path / "state.mcap"
+    whole = path.read_bytes()
+    flown = gather(tmp_path).resolved
+    at = whole.index(b'"drone_1"')
+    path.write_bytes(whole[:at] + b'"drone_7"' + whole[at + 9 :])
+    if rescued_by == "state-2.mcap":
+        (tmp_path / rescued_by).write_bytes(whole)
+    elif rescued_by == "resolved.yaml":
+        (tmp_path / rescued_by).write_text(yaml_of(load_field(find_field("lab"), ())))
+    data = gather(tmp_path)
+    assert data.resolved == (UNKNOWN_FIELD if rescued_by == "nothing" else flown)
+    assert any("unreadable attachment" in damage for damage in data.damage)

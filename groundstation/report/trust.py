@@ -1,7 +1,7 @@
 """Judges whether a run can be trusted, by its sensors' claims, its cameras' survey and its plans' sightings."""
 
 import math
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 
 import msgspec
@@ -16,6 +16,15 @@ from groundstation.report.tracks import RunData, TimedMessage
 _BLOCK_S, _LEAST_BLOCKS = 2.0, 4
 _TOO_SURE, _TOO_CAUTIOUS = 2.0, 0.4
 _REFUSED_PERCENT = 10.0
+# What is wrong with an observation, and its remedy. Not those that nobody could use: of what stands on the floor (a
+# quarter of a fixed camera's in good runs), of what cannot be placed yet, or of targets that a camera may not observe.
+_REFUSALS = {
+    Verdict.IMPLAUSIBLE: ("implausible", "check how it is mounted, and its calibration (groundstation calibrate)"),
+    Verdict.LATE: ("too late", "its link or its driver lags, or its delay in the field file is too large"),
+    Verdict.UNSYNCED: ("of an unknown clock", "its host's clock is compared with none: check the link to that host"),
+    Verdict.SINGULAR: ("without a usable covariance", "its driver states one that cannot be: repair that"),
+    Verdict.FROZEN: ("repeated", "its sensor or stream hangs: restart it, or its driver"),
+}
 _MOVED_SIGMAS = 3.0
 _LATE_MS, _LATE_SIGMAS = 20.0, 3.0
 # Least time for which a plan counts on a link, and largest age of an observation of it.
@@ -31,7 +40,8 @@ _JUDGED_BY_S = 30.0
 class SensorTrust(msgspec.Struct, frozen=True):
     """Of one observer: NIS per degree of freedom with its 95 % interval; refused: share of its observations [%].
 
-    verdict: consistent, too sure, too cautious, or too few observations to say.
+    refused_as: what most of them were refused as, "" for none. verdict: consistent, too sure, too cautious, or too few
+    observations to say.
     """
 
     observer: str
@@ -41,6 +51,7 @@ class SensorTrust(msgspec.Struct, frozen=True):
     high: float | None
     refused_percent: float
     verdict: str
+    refused_as: str = ""
 
 
 class SurveyShift(msgspec.Struct, frozen=True):
@@ -112,13 +123,14 @@ def _sensor(observer: str, items: list[TimedMessage[Innovation]]) -> SensorTrust
         if item.message.verdict is Verdict.ACCEPTED and item.message.nis is not None:
             blocks[int(item.time_s / _BLOCK_S)].append(item.message)
     means = [sum(i.nis or 0.0 for i in some) / sum(len(i.residual) for i in some) for some in blocks.values()]
-    refused = 100.0 * sum(i.message.verdict is Verdict.IMPLAUSIBLE for i in items) / len(items)
+    refusals = Counter(i.message.verdict for i in items if i.message.verdict in _REFUSALS)
+    refused, refused_as = 100.0 * refusals.total() / len(items), "".join(one for one, _ in refusals.most_common(1))
     if len(means) < _LEAST_BLOCKS:
-        return SensorTrust(observer, len(items), None, None, None, refused, "too few observations to say")
+        return SensorTrust(observer, len(items), None, None, None, refused, "too few observations to say", refused_as)
     mean, half = float(np.mean(means)), half_width(means)
     low, high = max(0.0, mean - half), mean + half
     verdict = "too sure" if low > _TOO_SURE else "too cautious" if high < _TOO_CAUTIOUS else "consistent"
-    return SensorTrust(observer, len(items), mean, low, high, refused, verdict)
+    return SensorTrust(observer, len(items), mean, low, high, refused, verdict, refused_as)
 
 
 def _shifts(data: RunData, belief: Belief) -> Iterator[SurveyShift]:
@@ -197,7 +209,8 @@ def _doubts_of_sensors(sensors: Sequence[SensorTrust]) -> Iterator[str]:
                 "check how its camera is mounted, its calibration and its delay (groundstation calibrate)"
             )
         if one.refused_percent > _REFUSED_PERCENT:
-            yield f"{one.refused_percent:.0f} % of what {one.observer} saw was refused as implausible"
+            what, remedy = _REFUSALS[Verdict(one.refused_as)]
+            yield f"{one.refused_percent:.0f} % of what {one.observer} saw was refused, most as {what}: {remedy}"
 
 
 def _doubts_of_figures(shifts: Sequence[SurveyShift], delays: Sequence[DelayShift]) -> Iterator[str]:

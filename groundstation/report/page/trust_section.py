@@ -27,7 +27,7 @@ def _sensors(trust: Trust) -> str:
          f"{one.refused_percent:.1f} %", one.verdict)
         for one in trust.sensors
     ]  # fmt: skip
-    head = ("sensor", "observations", "NIS per dof", "95 % interval", "refused as implausible", "verdict")
+    head = ("sensor", "observations", "NIS per dof", "95 % interval", "refused", "verdict")
     return table(head, rows, "No observation reached the filter.")
 
 

@@ -80,6 +80,24 @@ def test_nothing_speaks_against_a_healthy_run() -> None:
     assert "No reason to doubt them." in trust_section(trust)
 
 
+@pytest.mark.parametrize(
+    ("verdict", "doubt"),
+    [
+        (m.Verdict.LATE, "100 % of what ceiling saw was refused, most as too late: its link or its driver lags"),
+        (m.Verdict.UNSYNCED, "100 % of what ceiling saw was refused, most as of an unknown clock: its host's clock"),
+        (m.Verdict.SINGULAR, "100 % of what ceiling saw was refused, most as without a usable covariance"),
+        (m.Verdict.FROZEN, "100 % of what ceiling saw was refused, most as repeated: its sensor or stream hangs"),
+        (m.Verdict.UNKNOWN_ENTITY, ""),
+        (m.Verdict.NOT_PERMITTED, ""),
+    ],
+)
+def test_a_camera_that_is_refused_altogether_is_in_doubt(verdict: m.Verdict, doubt: str) -> None:
+    """But not one that only sees drones on the floor, or a target that it is not to observe."""
+    refused = [TimedMessage(one.time_s, msgspec.structs.replace(one.message, verdict=verdict)) for one in innovations()]
+    doubts = trust_of(run_with(innovations=refused)).doubts
+    assert [found[: len(doubt)] for found in doubts] == ([doubt] if doubt else [])
+
+
 def test_an_empty_run_has_no_doubts() -> None:
     assert trust_of(run_with()).doubts == []
 
@@ -91,7 +109,10 @@ def test_an_empty_run_has_no_doubts() -> None:
             {"innovations": innovations(scale=4.0)},
             ("ceiling is wrong by more than it claims", "groundstation calibrate"),
         ),
-        ({"innovations": innovations(refused=0.3)}, ("of what ceiling saw was refused as implausible",)),
+        (
+            {"innovations": innovations(refused=0.3)},
+            ("of what ceiling saw was refused, most as implausible: check how",),
+        ),
         (
             {"belief": belief(moved_m=0.05)},
             ("ceiling seems to hang 0.050 m", "5 standard", "calibrate team"),

@@ -109,7 +109,7 @@ class Again:
 
     def _reservations(self, result: Comparison) -> Iterator[str]:
         yield from (f"other than recorded: {line}" for line in versions.foreign(self._source.versions))
-        yield from (f"not from its beginning: {line}" for line in result.fragments)
+        yield from (f"not all of it: {line}" for line in result.fragments)
         if result.missing_count:
             yield f"{result.missing_count} messages that the tracker took in are not recorded: {result.missing[0]}"
         lost = sum(result.unrecorded.values())

@@ -21,6 +21,8 @@ from groundstation.time_units import NS_PER_S
 _KEPT_DIFFERENCES = 200
 # A plan is stamped with its begin; one begun shortly before the end may never have been adopted.
 _PLANNING_NS = NS_PER_S
+# Journal and messages reach the recorder one after the other.
+_ENDED_NS = NS_PER_S
 _NAMES = frozenset(topic.name for topic in OUTPUTS)
 
 
@@ -52,8 +54,9 @@ class Comparison:
     """The result of a re-run.
 
     same, unrecorded: messages by topic that were identical, or missing in the recording; fragments: lives of the
-    tracker without their begin in the journal, which cannot be repeated exactly; missing: inputs in the journal that
-    the recording lacks; differing: number of differing messages, the first ones in `findings`.
+    tracker without their begin in the journal, or whose end it lacks, which cannot be repeated exactly; missing:
+    inputs in the journal that the recording lacks; differing: number of differing messages, the first ones in
+    `findings`.
     """
 
     ticks: int = 0
@@ -185,7 +188,15 @@ class Repetition:
             self.comparison.findings.append(finding)
 
     def _find_unsaid(self, first_ns: int, last_ns: int) -> None:
-        """Count recorded messages of a finished tick that were not sent now as differences too."""
+        """Count recorded messages of a finished tick that were not sent now as differences too.
+
+        Those of a time that the journal no longer tells of were not compared at all.
+        """
+        untold_s = [(stamp_ns - last_ns) / 1e9 for _, _, stamp_ns in self.tape.said if stamp_ns > last_ns + _ENDED_NS]
+        if last_ns and untold_s:
+            ended_s = (last_ns - self._began_ns) / 1e9
+            text = f"the journal ends at {ended_s:.2f} s, {max(untold_s):.1f} s before the tracker's last message"
+            self.comparison.fragments.append(text)
         for (topic, entity, stamp_ns), records in sorted(self.tape.said.items(), key=lambda item: item[0][2]):
             if not first_ns <= stamp_ns <= last_ns - _PLANNING_NS:
                 continue

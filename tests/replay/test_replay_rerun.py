@@ -116,6 +116,20 @@ def test_a_journal_that_begins_late_proves_nothing(flown: Path, tmp_path: Path) 
     assert "the journal begins, or goes on after a gap, at tick 30" in output
 
 
+@pytest.mark.parametrize(("last_tick", "code"), [(200, 1), (370, 0)])
+def test_a_journal_that_ends_early_proves_nothing(flown: Path, tmp_path: Path, last_tick: int, code: int) -> None:
+    """But the last half second of a killed run may lack it."""
+
+    def change(record: RawRecord) -> bytes | None:
+        late = record.key.topic.name == "journal" and json.loads(record.data)["tick"] > last_tick
+        return None if late else record.data
+
+    found, output = code_of(rewritten(flown, tmp_path / "early", change), "--recompute")
+    assert found == code and ("IDENTICAL to the bit" in output) == (code == 0)
+    assert ("not all of it: the journal ends at 4." in output) == (code == 1), output
+    assert "before the tracker's last message" in output or code == 0
+
+
 def test_other_settings_are_computed_the_same_twice(flown: Path, tmp_path: Path, verdict: Any) -> None:
     change = ("--set", "planner.horizon_steps=3", "--set", "estimator.gate_probability=0.5")
     code, first = verdict(flown, *change, "--output", tmp_path / "what-if")

@@ -5,6 +5,7 @@ import struct
 import zlib
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from io import BytesIO
 from typing import IO
@@ -144,8 +145,11 @@ def _decompressed(chunk: Chunk) -> bytes:
     return bytes(zstandard.decompress(chunk.data, max_output_size=chunk.uncompressed_size))
 
 
-def inner_records(data: bytes) -> Iterator[tuple[int, int, int]]:
-    """Yield (opcode, begin, end of the body) of the records in a chunk's data, up to the first that is cut short."""
+def inner_records(data: bytes, damage: list[str] | None = None) -> Iterator[tuple[int, int, int]]:
+    """Yield (opcode, begin, end of the body) of the records in a chunk's data, up to the first that is cut short.
+
+    A message too short to be one is noted and left out.
+    """
     at, size = 0, len(data)
     while at + RECORD.size <= size:
         opcode, length = RECORD.unpack_from(data, at)
@@ -153,7 +157,15 @@ def inner_records(data: bytes) -> Iterator[tuple[int, int, int]]:
         at = begin + length
         if at > size:
             return
+        if opcode == Opcode.MESSAGE and length < _MESSAGE.size:
+            _note(damage, "a message record that is too short")
+            continue
         yield opcode, begin, at
+
+
+def _note(damage: list[str] | None, text: str) -> None:
+    if damage is not None and text not in damage:
+        damage.append(text)
 
 
 def message_of(data: bytes, begin: int, end: int) -> tuple[int, int, int, int, bytes]:
@@ -163,7 +175,7 @@ def message_of(data: bytes, begin: int, end: int) -> tuple[int, int, int, int, b
 
 def chunk_records(data: bytes, channels: Channels, wanted: Wanted, damage: list[str]) -> Iterator[RawRecord]:
     """Yield the messages of a chunk whose channel leads to a key; adds the chunk's declarations to `channels`."""
-    for opcode, begin, end in inner_records(data):
+    for opcode, begin, end in inner_records(data, damage):
         if opcode == Opcode.MESSAGE:
             channel, sequence, logged, published = _MESSAGE.unpack_from(data, begin)
             key = channels.get(channel)
@@ -181,21 +193,26 @@ def count_messages(data: bytes) -> Counter[int]:
 
 
 def declarations(data: bytes) -> tuple[dict[int, Channel], dict[int, Schema]]:
-    """Return the channels and schemas that a chunk declares, by id."""
+    """Return the channels and schemas that a chunk declares, by id; `chunk_records` notes channels that are damaged."""
     channels: dict[int, Channel] = {}
     schemas: dict[int, Schema] = {}
     for opcode, begin, end in inner_records(data):
-        if opcode == Opcode.CHANNEL:
-            channel = Channel.read(ReadDataStream(BytesIO(data[begin:end])))
-            channels[channel.id] = channel
-        elif opcode == Opcode.SCHEMA:
-            schema = Schema.read(ReadDataStream(BytesIO(data[begin:end])))
-            schemas[schema.id] = schema
+        with suppress(*UNREADABLE):
+            if opcode == Opcode.CHANNEL:
+                channel = Channel.read(ReadDataStream(BytesIO(data[begin:end])))
+                channels[channel.id] = channel
+            elif opcode == Opcode.SCHEMA:
+                schema = Schema.read(ReadDataStream(BytesIO(data[begin:end])))
+                schemas[schema.id] = schema
     return channels, schemas
 
 
 def _learn_channel(body: bytes, channels: Channels, wanted: Wanted, damage: list[str]) -> None:
-    channel = Channel.read(ReadDataStream(BytesIO(body)))
+    try:
+        channel = Channel.read(ReadDataStream(BytesIO(body)))
+    except UNREADABLE as error:
+        _note(damage, f"unreadable channel: {error}")
+        return
     if channel.id in channels:
         return
     channels[channel.id] = None

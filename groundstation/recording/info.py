@@ -128,7 +128,7 @@ def _gather(index: FileIndex, channels: dict[str, _Times]) -> int:
     total = 0
     for chunk in index.chunks:
         data = index.data(chunk)
-        for opcode, begin, end in inner_records(data):
+        for opcode, begin, end in inner_records(data, index.damage):
             if opcode == Opcode.MESSAGE:
                 number, _, logged, _, _ = message_of(data, begin, end)
                 if number in by_id:

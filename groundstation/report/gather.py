@@ -27,6 +27,7 @@ from groundstation.report.tracks import (
     TimedMessage,
     TruthTrack,
 )
+from groundstation.time_units import NS_PER_S
 
 _WANTED = (
     *(t.BELIEF, t.BODY_POSES, t.COMMAND, t.COMMAND_ACK, t.ESTIMATE, t.EVENT, t.INNOVATION, t.PLAN),
@@ -34,6 +35,8 @@ _WANTED = (
 )
 
 _TENTH_NS = 100_000_000
+# No run lasts longer: what is dated farther from its first message has a damaged time.
+_LONGEST_RUN_NS = 30 * 86_400 * NS_PER_S
 
 
 def gather(run_dir: Path) -> RunData:
@@ -68,14 +71,19 @@ class _Rows:
         self._processes: defaultdict[str, defaultdict[str, list[tuple[float, ...]]]]
         self._processes = defaultdict(lambda: defaultdict(list))
         self._heard: defaultdict[str, list[int]] = defaultdict(list)
+        self._first_ns = 0
         self._recorded: set[int] = set()  # tenths of a second, UNIX
         self._sim: list[tuple[float, ...]] = []
         self._captured: list[TimedMessage[m.BodyPoses]] = []
 
     def take(self, recording: Recording) -> None:
         """Sort a recording's records into rows. Of telemetry only the time counts, which needs no decoding."""
-        data = self._data
+        data, misdated = self._data, 0
         for raw in recording.raw_records(among((*_WANTED, t.ODOMETRY))):
+            self._first_ns = self._first_ns or raw.log_time_ns
+            if abs(raw.log_time_ns - self._first_ns) > _LONGEST_RUN_NS:
+                misdated += 1
+                continue
             self._recorded.add(raw.log_time_ns // _TENTH_NS)
             if raw.key.topic is t.ODOMETRY:
                 self._heard[raw.key.entity].append(raw.log_time_ns)
@@ -87,6 +95,8 @@ class _Rows:
             time_s = (record.log_time_ns - data.start_unix_ns) / 1e9
             data.end_s = max(data.end_s, time_s)
             self._sort(time_s, record.message)
+        if misdated:
+            recording.damage.append(f"{misdated} messages are dated far from the first")
 
     def _sort(self, time_s: float, message: m.Message) -> None:
         data = self._data

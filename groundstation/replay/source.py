@@ -73,24 +73,33 @@ def _hint(folder: Path) -> str:
 
 def _source(name: str, state: Sequence[Path], raw: Sequence[Path]) -> Source:
     readable, unread = open_parts(state)
-    opened = sorted(readable, key=lambda recording: _created_ns(recording))
+    # Where damage hides when one was begun, the order given is the better one: in a folder that of the names.
+    opened = sorted(readable, key=_created_ns) if all(map(_created_ns, readable)) else readable
     first = opened[0]
-    if FIELD_NAME not in first.attachments or "run" not in first.metadata:
-        raise RecordingError(f"{first.path}: no recording of a ground station (neither field nor run are in it)")
     if not _are_of_one_run(opened):
         raise RecordingError(f"{', '.join(map(str, state))}: these are not parts of one recording")
-    run = first.metadata["run"]
+    field = next((one.attachments[FIELD_NAME] for one in opened if FIELD_NAME in one.attachments), None)
+    run = next((one.metadata["run"] for one in opened if "run" in one.metadata), None)
+    if field is None or run is None:
+        raise RecordingError(_lacking(first, field, run))
     try:
-        msgspec.json.decode(first.attachments[FIELD_NAME], type=dict[str, msgspec.Raw])
+        msgspec.json.decode(field, type=dict[str, msgspec.Raw])
         offset_ns = int(run.get("unix_offset_ns", "0"))
     except (msgspec.DecodeError, ValueError) as error:
         raise RecordingError(f"{first.path}: its field or run cannot be read ({error})") from error
     files = tuple(recording.path for recording in opened)
-    versions = first.metadata.get("versions", {})
+    versions = next((one.metadata["versions"] for one in opened if "versions" in one.metadata), {})
     began_ns = next((record.log_time_ns for path in files for record in open_recording(path).raw_records()), 0)
     damage = tuple(f"{path.name}: {why}" for path, why in unread.items())
-    rerun, field = rerun_of(first.metadata), first.attachments[FIELD_NAME]
-    return Source(name, files, tuple(raw), field, run, versions, began_ns, offset_ns, damage, rerun)
+    return Source(name, files, tuple(raw), field, run, versions, began_ns, offset_ns, damage, rerun_of(first.metadata))
+
+
+def _lacking(first: Recording, field: bytes | None, run: dict[str, str] | None) -> str:
+    """Return why a recording cannot be replayed: damaged, or made by something else."""
+    if first.preamble_damage:
+        which = " and ".join(name for name, found in (("field", field), ("run", run)) if found is None)
+        return f"{first.path}: its {which} cannot be read, and no other part has it ({first.preamble_damage[0]})"
+    return f"{first.path}: no recording of a ground station (its field or run is not in it)"
 
 
 def _are_of_one_run(opened: Sequence[Recording]) -> bool:

@@ -130,10 +130,14 @@ def newest_run(folder: Path) -> Path:
 
     A cut of another one is none, and neither is a check before a take-off.
     """
+    from groundstation.recording.file_topics import STATE
+    from groundstation.recording.part_names import numbered_parts
     from groundstation.recording.stretch import is_stretch
     from groundstation.report import run_facts
 
-    recordings = sorted(folder.glob("*/state*.mcap"), key=lambda path: path.stat().st_mtime, reverse=True)
+    # Not `state-recovered.mcap` and other copies, which may be of any age.
+    parts = (path for run in folder.glob("*/") for _, path in numbered_parts(run, STATE))
+    recordings = sorted(parts, key=lambda path: path.stat().st_mtime, reverse=True)
     runs = (path for path in recordings if not run_facts.read(path.parent).is_check)
     newest = next((path for path in runs if not is_stretch(path)), None)
     if newest is None:

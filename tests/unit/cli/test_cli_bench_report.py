@@ -104,6 +104,8 @@ def test_report_without_argument_takes_the_newest(tmp_path: Path) -> None:
         recording.write_bytes(b"x")
         os.utime(recording, (index, index))
     assert newest_run(tmp_path).name == "a"
+    (tmp_path / "b" / "state-recovered.mcap").write_bytes(b"x")
+    assert newest_run(tmp_path).name == "a", "a copy of an old one is no new run"
 
 
 def test_report_where_nothing_was_recorded_is_a_mistake_of_usage(

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import msgspec
 
+from groundstation.bus import clock
 from groundstation.errors import GroundStationError, OperatorMistake, is_wrong_place, without_passwords
 from groundstation.process.log import DiscreetFormatter
 from groundstation.recording.disk_space import free_bytes
@@ -64,9 +65,12 @@ def write_facts(run_dir: Path, facts: run_facts.RunFacts, *, asks: bool) -> None
 
     asks: whether the run waits for the operator before the take-off; then that time means nothing.
     """
-    command_ns, lacked = 0 if asks else time.time_ns() - _age_ns(), not kernels.are_compiled()
+    age_ns, lacked = _age_ns(), not kernels.are_compiled()
     typed = without_passwords(shlex.join(["groundstation", *sys.argv[1:]]))
-    known = msgspec.structs.replace(facts, command_unix_ns=command_ns, kernels_lacked=lacked, command=typed)
+    known = msgspec.structs.replace(facts, kernels_lacked=lacked, command=typed)
+    if not asks:
+        times = {"command_unix_ns": time.time_ns() - age_ns, "command_ns": clock.now_ns() - age_ns}
+        known = msgspec.structs.replace(known, **times, clock=clock.clock_id())
     run_facts.write(run_dir, known)
 
 

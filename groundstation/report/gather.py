@@ -5,6 +5,7 @@ from array import array
 from collections import defaultdict
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
 from groundstation.bus import messages as m
@@ -12,7 +13,7 @@ from groundstation.bus import topics as t
 from groundstation.recording.chunks import among
 from groundstation.recording.copies import damage_before
 from groundstation.recording.file_topics import STATE
-from groundstation.recording.reader import Recording, RecordingError, open_parts, parts
+from groundstation.recording.reader import Recording, RecordingError, open_parts, parts, recorded_offset_ns
 from groundstation.recording.rerun import rerun_of
 from groundstation.recording.stretch import stretch_of
 from groundstation.report import run_facts
@@ -44,7 +45,7 @@ def gather(run_dir: Path) -> RunData:
     paths = parts(run_dir, STATE)
     if not paths:
         raise RecordingError(f"{run_dir}: no {STATE}.mcap in this folder; is it a run folder?")
-    data = RunData(UNKNOWN_FIELD, run_facts.read(run_dir))
+    data = RunData(UNKNOWN_FIELD, _facts(run_dir))
     rows = _Rows(data)
     readable, unread = open_parts(paths)
     data.damage.extend(f"{path.name}: {why}" for path, why in unread.items())
@@ -57,6 +58,15 @@ def gather(run_dir: Path) -> RunData:
         data.damage.extend(f"{recording.path.name}: {text}" for text in damage)
     rows.finish()
     return data
+
+
+def _facts(run_dir: Path) -> run_facts.RunFacts:
+    """Return the run's facts, its command dated as the recording dates messages: UNIX time may be set meanwhile."""
+    facts = run_facts.read(run_dir)
+    offset_ns = recorded_offset_ns(run_dir, facts.clock) if facts.command_ns else None
+    if offset_ns is None:
+        return facts
+    return msgspec.structs.replace(facts, command_unix_ns=facts.command_ns + offset_ns)
 
 
 class _Rows:

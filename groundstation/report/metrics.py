@@ -161,7 +161,8 @@ def _command_to_airborne_s(data: RunData) -> float | None:
     airborne = safety.all_airborne_s(data)
     if airborne is None or data.facts.command_unix_ns == 0:
         return None
-    return airborne + (data.start_unix_ns - data.facts.command_unix_ns) / 1e9
+    after_s = airborne + (data.start_unix_ns - data.facts.command_unix_ns) / 1e9
+    return after_s if after_s >= 0.0 else None  # one of the clocks was set meanwhile
 
 
 def _mean_nis(data: RunData) -> dict[str, float]:

@@ -13,9 +13,10 @@ class RunFacts(msgspec.Struct, frozen=True, omit_defaults=True):
     """The command that started a run.
 
     mode: demo, sitl, fly or preflight; command_unix_ns: when the operator gave the command (0: unknown, or the run
-    asked before the take-off); tracking_s: time of ordered tracking; kernels_lacked: whether they had to be compiled
-    first, once per version; real: real parts of a simulated run; command: as typed, without passwords; expected: the
-    section of the scenario's file, verbatim (`report/expectation.py` reads it).
+    asked before the take-off); command_ns, clock: the same by that boot clock, which nobody sets; tracking_s: time of
+    ordered tracking; kernels_lacked: whether they had to be compiled first, once per version; real: real parts of a
+    simulated run; command: as typed, without passwords; expected: the section of the scenario's file, verbatim
+    (`report/expectation.py` reads it).
     """
 
     mode: str = ""
@@ -23,6 +24,8 @@ class RunFacts(msgspec.Struct, frozen=True, omit_defaults=True):
     scenario: str = ""
     seed: int | None = None
     command_unix_ns: int = 0
+    command_ns: int = 0
+    clock: str = ""
     tracking_s: float | None = None
     kernels_lacked: bool = False
     real: tuple[str, ...] = ()

@@ -109,6 +109,12 @@ def test_promises_of_the_command_are_judged(tmp_path: Path) -> None:
     assert failed == {"tracked_s", "command_to_airborne_s"}
 
 
+def test_nobody_is_in_the_air_before_the_command(tmp_path: Path) -> None:
+    fly(tmp_path, Flight())
+    run_facts.write(tmp_path, RunFacts(mode="demo", command_unix_ns=UNIX + 3600 * S))
+    assert judge(gather(tmp_path), tmp_path).figures.command_to_airborne_s is None
+
+
 @pytest.mark.parametrize(("before_s", "failed"), [(140, {"tracked_s"}), (160, {"tracked_s", "command_to_airborne_s"})])
 def test_a_start_may_compile_once_per_version(tmp_path: Path, before_s: int, failed: set[str]) -> None:
     fly(tmp_path, Flight())

@@ -12,8 +12,10 @@ from groundstation.bus.topics import ESTIMATE, ODOMETRY, PROCESS_STATUS, Topic
 from groundstation.recording.copies import recover
 from groundstation.recording.timeline import Timeline
 from groundstation.recording.writing import RunWriter
+from groundstation.report import run_facts
 from groundstation.report.gather import gather
 from groundstation.report.load import process_loads
+from groundstation.report.run_facts import RunFacts
 from groundstation.report.tracks import UNKNOWN_FIELD
 from groundstation.settings.files import find_field
 from groundstation.settings.load import load_field
@@ -118,3 +120,14 @@ def test_a_damaged_field_is_found_elsewhere(tmp_path: Path, rescued_by: str) -> 
     data = gather(tmp_path)
     assert data.resolved == (UNKNOWN_FIELD if rescued_by == "nothing" else flown)
     assert any("unreadable attachment" in damage for damage in data.damage)
+
+
+@pytest.mark.parametrize(("clock", "command_s"), [("c", -9), ("other", 3600)])
+def test_the_command_is_dated_by_the_clock_of_the_recording(tmp_path: Path, clock: str, command_s: int) -> None:
+    """UNIX time was set by an hour between the command and the recorder's start."""
+    writer = _Writer(tmp_path)
+    writer.status(0, "tracker", "tracker")
+    writer.close()
+    told = RunFacts(command_unix_ns=3600 * NS_PER_S, command_ns=-9 * NS_PER_S, clock=clock)
+    run_facts.write(tmp_path, told)
+    assert gather(tmp_path).facts.command_unix_ns == command_s * NS_PER_S

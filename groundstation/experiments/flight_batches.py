@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from groundstation.errors import OperatorMistake
-from groundstation.experiments.program_digest import program_digest
+from groundstation.process.program_digest import plugged_in, program_digest
 
 # Exit code of the simulator's study for an order that it does not understand.
 _WRONG_ORDER = 2
@@ -26,9 +26,14 @@ class FlightBatch:
 
     @property
     def key(self) -> str:
-        """Return a name that only equal batches of the same program share."""
-        digest = hashlib.sha256((self.order + program_digest()).encode()).hexdigest()[:12]
+        """Return a name that only equal batches of the same program, with the same plug-ins, share."""
+        digest = hashlib.sha256((self.order + self.program).encode()).hexdigest()[:12]
         return f"{self.study}-{digest}-{self.seeds[0]:06d}-{len(self.seeds)}"
+
+    @property
+    def program(self) -> str:
+        """Return the digest of the program that flies it, as this process began with it."""
+        return program_digest(plugged_in(json.loads(self.order).get("field") or {}))
 
 
 class CampaignError(RuntimeError):
@@ -54,6 +59,11 @@ def fly(batch: FlightBatch) -> dict[str, Any]:
     if [flight["seed"] for flight in flights] != list(batch.seeds):
         lost = f"{len(flights)} of {len(batch.seeds)} flights were reported"
         raise CampaignError(f"{batch.study}: {lost}; a plug-in may have ended the process: {_end(result.stderr)}")
+    if {flight.pop("program", None) for flight in flights} != {batch.program}:
+        raise CampaignError(
+            f"{batch.study}: the program or a plug-in has changed since this campaign, or its worker, began: "
+            "start it again"
+        )
     timing = [flight.pop("spent_s") for flight in flights]
     return {"task": {"batch": batch.key}, "merits": {"flights": flights}, "timing": {"flights": timing}}
 

@@ -97,8 +97,8 @@ def _of_this_program(task: Keyed, key: str, row: dict[str, Any]) -> dict[str, An
     """Return a worker's row; raises SweepError if its key for the task is not the one of this program."""
     if key != task.key:
         raise SweepError(
-            f"a worker ran {task.key} as {key}: its program is another one than this, or has changed since the worker "
-            "began; install this one there, and start the workers again"
+            f"a worker ran {task.key} as {key}: its program or a plug-in is another one than here, or has changed "
+            "since the worker began; install this one there, and start the workers again"
         )
     return row
 

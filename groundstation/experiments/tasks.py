@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from groundstation.experiments.closed_loop import SimulatedStep, SimulationSettings, run
 from groundstation.experiments.paths import Path, figure_eight, receding
 from groundstation.experiments.planar.parameters import FIGURE_1, PlanarParameters
-from groundstation.experiments.program_digest import program_digest
 from groundstation.experiments.strategies import Strategy
+from groundstation.process.program_digest import program_digest
 
 LOST_M = 0.5
 

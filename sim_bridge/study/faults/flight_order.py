@@ -10,6 +10,7 @@ from typing import Any
 from groundstation.errors import SettingsError
 from groundstation.process import numba_cache
 from groundstation.process.parent import end_with
+from groundstation.process.program_digest import plugged_in, program_digest
 from sim_bridge.scenario import Scenario, parse_scenario
 from sim_bridge.study.faults.hosted_kinds import WRONG_ORDER, unhosted
 
@@ -48,9 +49,11 @@ def fly_seeds(fly: Callable[[FlightOrder, int], dict[str, Any]]) -> int:
         if parent_pid := values.pop("parent", None):
             end_with(parent_pid)
         order = order_of(values)
+        # Read before the modules that fly are imported, so that it is not newer than they are.
+        program = program_digest(plugged_in(order.field))
         with redirect_stdout(sys.stderr):
             for seed in order.seeds:
-                print(json.dumps(fly(order, seed)), file=results, flush=True)
+                print(json.dumps(fly(order, seed) | {"program": program}), file=results, flush=True)
     except (WrongOrder, SettingsError) as refusal:
         print(refusal, file=sys.stderr)
         return WRONG_ORDER

@@ -128,7 +128,7 @@ def test_equal_tasks_have_equal_keys_only(monkeypatch: pytest.MonkeyPatch) -> No
     task = Task("teams", 3, "paper", 1)
     assert task.key == (key := Task("teams", 3, "paper", 1).key)
     assert len({task.key, Task("teams", 3, "paper", 2).key, Task("teams", 3, "paper", 1, dropout=0.1).key}) == 3
-    monkeypatch.setattr("groundstation.experiments.tasks.program_digest", lambda: "of another program")
+    monkeypatch.setattr("groundstation.experiments.tasks.program_digest", lambda *_: "of another program")
     assert task.key != key, "a sweep goes on in a folder of results only with the program that made them"
 
 

@@ -10,6 +10,7 @@ import pytest
 
 from groundstation.errors import SettingsError
 from groundstation.field.resolved import ResolvedField
+from groundstation.process.program_digest import program_digest
 from sim_bridge.fault_kinds import FaultKind
 from sim_bridge.scenario import parse_scenario
 from sim_bridge.study.faults.command import fly
@@ -55,7 +56,8 @@ def test_words_of_a_plug_in_are_no_results_and_its_failure_is_one_line(
     monkeypatch.setattr(sys, "stdin", io.StringIO(json.dumps(order)))
     assert fly_seeds(fly) == WRONG_ORDER
     out, err = capsys.readouterr()
-    assert out == '{"seed": 1}\n'
+    (line,) = out.splitlines()
+    assert json.loads(line) == {"seed": 1, "program": program_digest()}
     assert err.splitlines()[-1] == "planner.plug_in clumsy: ZeroDivisionError: division by zero"
 
 

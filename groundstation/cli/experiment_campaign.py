@@ -48,10 +48,12 @@ def campaign_options(name: str) -> Callable[[Command], Command]:
     )
 
 
-def flown_options(name: str, seconds: float, least_s: float) -> Callable[[Command], Command]:
+def flown_options(
+    name: str, seconds: float | None, least_s: float, usual: str | bool = True
+) -> Callable[[Command], Command]:
     """Return a decorator with the options of a campaign that flies one field under one scenario.
 
-    seconds: the default of tracking in each flight [s], which takes least_s or more.
+    seconds: the default of tracking in each flight [s], which takes least_s or more; usual: that default in words.
     """
     return _all_of(
         click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Seed of the first flight."),
@@ -60,7 +62,7 @@ def flown_options(name: str, seconds: float, least_s: float) -> Callable[[Comman
             "seconds",
             type=FiniteRange(least_s, 600),
             default=seconds,
-            show_default=True,
+            show_default=usual,
             help="Seconds of tracking in each flight.",
         ),
         click.option("--field", default="lab", show_default=True, help="Field file, or a shipped one's name."),
@@ -82,7 +84,9 @@ def flights_option(flights: int) -> Callable[[Command], Command]:
     )
 
 
-def labs_options(name: str, seeds: int, seconds: float, least_s: float) -> Callable[[Command], Command]:
+def labs_options(
+    name: str, seeds: int, seconds: float | None, least_s: float, usual: str | bool = True
+) -> Callable[[Command], Command]:
     """Return a decorator with the options of a campaign over rows of wrong labs; seeds: default of flights in a row."""
     return _all_of(
         click.option(
@@ -91,7 +95,7 @@ def labs_options(name: str, seeds: int, seconds: float, least_s: float) -> Calla
         click.option(
             "--rows", "only", default="", metavar="NAMES", help="Only these rows, separated by commas (default: all)."
         ),
-        flown_options(name, seconds, least_s),
+        flown_options(name, seconds, least_s, usual),
     )
 
 

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from groundstation.experiments.flight_batches import FlightBatch
 
 _BATCH = 5
+_SECONDS = 25.0
 
 
 @click.command(
@@ -30,7 +31,7 @@ _BATCH = 5
     '  groundstation experiment culprits --rows "pan of one,all markers" --seeds 1 --json\n\n'
     "Exit codes: 0 in 9 of 10 flights of each row what is wrong was named, 1 it was not, 2 wrong settings."
 )
-@labs_options("culprits", seeds=5, seconds=25.0, least_s=5)
+@labs_options("culprits", seeds=5, seconds=None, least_s=5, usual=f"{_SECONDS:g}, or as long as the row needs")
 def culprits(
     seeds: int, seed: int, only: str, scheduler: str, workers: int, out: Path, as_json: bool, **flown: Any
 ) -> int:
@@ -60,7 +61,7 @@ def culprits(
 
 
 def _planned(
-    only: str, seeds: int, seed: int, seconds: float, field: str, scenario: str, options: tuple[str, ...]
+    only: str, seeds: int, seed: int, seconds: float | None, field: str, scenario: str, options: tuple[str, ...]
 ) -> "list[tuple[WrongLab, list[FlightBatch]]]":
     """Return the batches of flights of each chosen row."""
     from groundstation.experiments.culprit_rows import labs_of
@@ -68,14 +69,27 @@ def _planned(
     from groundstation.settings.files import find_field
 
     path = find_field(field)
-    order = flown_field(path, options) | {"seconds": seconds}
+    order = flown_field(path, options)
     base = flown_scenario(scenario, path)
     if not order["field"]["cameras"] or len(order["field"]["drones"]) < 2:
         raise SettingsError([f"{path}: culprits needs a fixed camera and two drones"])
+    labs = [(lab, _seconds(lab, seconds)) for lab in chosen_labs(only, labs_of(order["field"]))]
     return [
-        (lab, batches(_order(order, base, lab), seed, seeds, _BATCH, "culprits"))
-        for lab in chosen_labs(only, labs_of(order["field"]))
+        (lab, batches(_order(order | {"seconds": flown_s}, base, lab), seed, seeds, _BATCH, "culprits"))
+        for lab, flown_s in labs
     ]
+
+
+def _seconds(lab: "WrongLab", told: float | None) -> float:
+    """Return for how long the flights of a row track; raises UsageError if that is too short for a verdict."""
+    from groundstation.experiments.culprits import WITHIN_S, needed_s
+
+    least = needed_s(lab)
+    if told is not None and told < least:
+        begins = f"begins {lab.since_s:g} s after the order to take off and " if lab.since_s else ""
+        what = f"row {lab.name!r} needs {least:g} or more: what is wrong {begins}must be named within {WITHIN_S:g} s"
+        raise click.UsageError(f"--duration {told:g}: {what}")
+    return max(_SECONDS, least) if told is None else told
 
 
 def _order(order: dict[str, Any], base: dict[str, Any], lab: "WrongLab") -> str:

@@ -29,7 +29,8 @@ def verdict_on(lab: WrongLab, flight: Mapping[str, Any]) -> dict[str, Any]:
     """Return the verdict on one flight.
 
     end: "refused" (rightly, before the take-off), "right" (reported in flight, in time), "late", "wrong" (another one
-    was accused, or this one before it was wrong), "silent"; of a healthy lab "silent" or "false alarm".
+    was accused, or this one before it was wrong), "silent"; of a healthy lab "silent" or "false alarm"; of any lab
+    whose team did not all take off, though nothing was rightly refused, "not flown".
     size_error: relative error of the reported size; said: the first accusation, after the right one the first of
     another.
     """
@@ -41,6 +42,8 @@ def verdict_on(lab: WrongLab, flight: Mapping[str, Any]) -> dict[str, Any]:
     if end in ("right", "late"):
         other = next((line for _, line in said if _names_another(lab, line, said[0][1])), None)
         end = end if other is None else "wrong"
+    if not flight["flown"] and end != "refused":
+        end = "not flown"
     return {
         "seed": flight["seed"],
         "end": end,
@@ -69,6 +72,11 @@ def _end(lab: WrongLab, first: tuple[float, str] | None, size: float | None, ref
     if refused:
         return "refused"
     return "right" if first[0] - lab.since_s <= WITHIN_S else "late"
+
+
+def needed_s(lab: WrongLab) -> float:
+    """Return for how long a flight must track at least for its verdict [s]; tracking begins after the order."""
+    return lab.since_s + WITHIN_S
 
 
 def row_of(lab: WrongLab, verdicts: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

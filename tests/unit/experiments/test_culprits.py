@@ -3,8 +3,10 @@
 from dataclasses import replace
 from typing import Any
 
+import click
 import pytest
 
+from groundstation.cli.experiment_culprits import _seconds
 from groundstation.experiments.culprit_rows import STAND_S, WrongLab, labs_of, size_told
 from groundstation.experiments.culprits import accusations, row_of, table, verdict_on
 
@@ -15,7 +17,7 @@ EXPLAINS = ": that explains best why the team's sightings disagree"
 
 def flown(*told: tuple[float, str, str], on_pads: tuple[tuple[str, str], ...] = (), remedy: str = "") -> dict[str, Any]:
     rows = [(at_s, "WARNING", entity, text, remedy) for at_s, entity, text in told]
-    return {"seed": 1, "on_pads": on_pads, "told": rows, "rmse_m": 0.03}
+    return {"seed": 1, "flown": True, "on_pads": on_pads, "told": rows, "rmse_m": 0.03}
 
 
 @pytest.mark.parametrize(
@@ -108,3 +110,30 @@ def test_a_row_counts_what_was_wanted_and_names_the_rest() -> None:
     assert (row["as_wanted"], row["flights"], row["size_ok"], row["sizes"]) == (2, 4, 2, 3)
     assert row["otherwise"] == {4: "b: 3 off"}
     assert "2/4" in table([row])[1] and "seed 4: b: 3 off" in table([row])[2]
+
+
+def test_a_flight_that_never_was_is_not_as_wanted() -> None:
+    down = {"flown": False, "rmse_m": None}
+    for lab in (LABS["nothing"], LABS["a drone's velocity is stuck"], LABS["all markers"]):
+        found = verdict_on(lab, flown() | down)
+        assert found["end"] == "not flown"
+        row = row_of(lab, [found])
+        assert (row["as_wanted"], row["flights"]) == (0, 1) and "not flown 1" in table([row])[1]
+    pads = (("MUST", "pads: all markers are 5.0 +- 0.3 % larger than the field says"),)
+    assert verdict_on(LABS["all markers"], flown(on_pads=pads) | down)["end"] == "refused", "the pads sufficed"
+
+
+@pytest.mark.parametrize("name", ["ceiling's picture hangs", "ceiling bumped"])
+def test_a_flight_lasts_until_its_fault_must_have_been_named(name: str) -> None:
+    lab = LABS[name]
+    needs = lab.since_s + 20.0
+    assert _seconds(lab, None) == _seconds(lab, needs) == needs > 25.0
+    with pytest.raises(click.UsageError, match=rf"--duration 5: row .*{name}.* needs 38 or more: .* begins 18 s after"):
+        _seconds(lab, 5.0)
+
+
+def test_a_lab_that_is_wrong_from_the_start_is_flown_as_ever() -> None:
+    lab = LABS["all markers"]
+    assert (_seconds(lab, None), _seconds(lab, 20.0)) == (25.0, 20.0)
+    with pytest.raises(click.UsageError, match="needs 20 or more: what is wrong must be named within 20 s"):
+        _seconds(lab, 19.0)

@@ -61,11 +61,16 @@ def _worst(left: Sequence[Mapping[str, float]]) -> dict[str, float]:
 
 
 def _most(values: Sequence[float | None]) -> float | None:
-    return max((value for value in values if value is not None), default=None)
+    """Return the worst of some figures: None if a flight has none, as one that never found its target."""
+    known = [value for value in values if value is not None]
+    return max(known) if known and len(known) == len(values) else None
 
 
 def table(rows: Iterable[Mapping[str, Any]]) -> list[str]:
-    """Return the rows as lines of text; rmse and ANEES: the worst flight before and after."""
+    """Return the rows as lines of text; rmse and ANEES: the worst flight before and after.
+
+    never: one of its flights never found the target.
+    """
     lines = ["{:20s} {:>7s} {:>7s} {:>17s} {:>13s}  worst left".format("wrong", "mended", "within", "rmse m", "ANEES")]
     for row in rows:
         flights, (rmse, rmse_now), (anees, anees_now) = row["flights"], row["rmse_m"], row["anees"]
@@ -83,4 +88,4 @@ def _told(name: str, value: float) -> str:
 
 
 def _figure(value: float | None, digits: int) -> str:
-    return "-" if value is None else f"{value:.{digits}f}"
+    return "never" if value is None else f"{value:.{digits}f}"

@@ -1,5 +1,6 @@
 """Scenarios flown under strategies: their figures over seeds, and paired differences between strategies."""
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -18,6 +19,7 @@ _SUMS = ("landings", "switches")
 def rows_of(flights: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Return a row for each scenario and strategy, in their order: flights, those as expected, then figures.
 
+    never_found: flights without the target, not_flown: those whose team did not all take off.
     rmse_m: mean, median, worst over the flights that found the target; lost_s: mean; longest_s, found_s: worst;
     against: how much larger the rmse is than that of the first strategy for the same seeds, mean and half width of the
     95 % interval [m]; None with fewer than two seeds.
@@ -37,10 +39,12 @@ def rows_of(flights: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
 def _figures(flights: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     found = [one for one in flights if one.get("rmse_m") is not None]
     errors = [one["rmse_m"] for one in found]
+    not_flown = sum(not one["flown"] for one in flights)
     return {
         "flights": len(flights),
         "as_expected": sum(not one["missed"] for one in flights),
-        "never_found": len(flights) - len(found),
+        "never_found": len(flights) - len(found) - not_flown,
+        "not_flown": not_flown,
         "rmse_m": [float(pick(errors)) for pick in (np.mean, np.median, np.max)] if errors else None,
         "lost_s": float(np.mean([one["lost_s"] for one in found])) if found else None,
         "longest_s": max((one["longest_loss_s"] for one in found), default=None),
@@ -62,35 +66,43 @@ def against_best_fixed(flights: Iterable[Mapping[str, Any]]) -> list[dict[str, A
     """Return the comparison of each other strategy with the best fixed topology of its scenario.
 
     Best: it found the target in most seeds, then has the least mean rmse over those of all that did; chosen afterwards,
-    which favours it. Entries: scenario, strategy, best, seeds (number in which both found it), share (mean rmse over
-    that of the best, less 1, over these), gap_m (mean difference and half width of its 95 % interval; None with fewer
-    than two).
+    which favours it. Entries: scenario, strategy, best, found (of own flights and of the best's, in how many, of how
+    many), seeds (number in which both found it), share (mean rmse over that of the best, less 1, over these; None
+    without any), gap_m (mean difference and half width of its 95 % interval; None with fewer than two).
     """
     errors: dict[str, dict[str, dict[int, float]]] = {}
+    flown: Counter[tuple[str, str]] = Counter()
     for one in flights:
+        own = errors.setdefault(one["scenario"], {}).setdefault(one["strategy"], {})
+        flown[one["scenario"], one["strategy"]] += 1
         if one.get("rmse_m") is not None:
-            errors.setdefault(one["scenario"], {}).setdefault(one["strategy"], {})[one["seed"]] = one["rmse_m"]
+            own[one["seed"]] = one["rmse_m"]
     entries: list[dict[str, Any]] = []
     for scenario, known in errors.items():
-        if not (fixed := {name: own for name, own in known.items() if name in FIXED}):
+        if not (fixed := {name: own for name, own in known.items() if name in FIXED and own}):
             continue
         best = _best(fixed)
         for strategy, own in known.items():
             shared = sorted(own.keys() & known[best].keys())
-            if strategy in FIXED or not shared:
+            if strategy in FIXED:
                 continue
-            mean, other = (float(np.mean([rows[seed] for seed in shared])) for rows in (own, known[best]))
+            share = _mean(own, shared) / _mean(known[best], shared) - 1.0 if shared else None
             entries.append(
                 {
                     "scenario": scenario,
                     "strategy": strategy,
                     "best": best,
+                    "found": [(len(known[name]), flown[scenario, name]) for name in (strategy, best)],
                     "seeds": len(shared),
-                    "share": mean / other - 1.0,
+                    "share": share,
                     "gap_m": paired(_as_flights(own), _as_flights(known[best])),
                 }
             )
     return entries
+
+
+def _mean(errors: Mapping[int, float], seeds: Iterable[int]) -> float:
+    return float(np.mean([errors[seed] for seed in seeds]))
 
 
 def _best(errors: Mapping[str, Mapping[int, float]]) -> str:
@@ -98,7 +110,7 @@ def _best(errors: Mapping[str, Mapping[int, float]]) -> str:
     most = max(map(len, errors.values()))
     leading = {name: own for name, own in errors.items() if len(own) == most}
     shared = frozenset.intersection(*map(frozenset, leading.values()))
-    return min(leading, key=lambda name: float(np.mean([leading[name][seed] for seed in shared or leading[name]])))
+    return min(leading, key=lambda name: _mean(leading[name], shared or leading[name]))
 
 
 def _as_flights(errors: Mapping[int, float]) -> list[dict[str, float]]:
@@ -110,9 +122,11 @@ def comparison(entries: Iterable[Mapping[str, Any]]) -> list[str]:
     lines = []
     for one in entries:
         interval = "" if one["gap_m"] is None else " ({:+.3f} +- {:.3f} m)".format(*one["gap_m"])
-        seeds = f"{one['seeds']} seed{'s' * (one['seeds'] > 1)}"
-        against = f"{one['share']:+.0%} against {one['best']}{interval}"
-        lines.append(f"{one['scenario']} {one['strategy']}: {against} over {seeds}")
+        over = f" over {one['seeds']} seed{'s' * (one['seeds'] > 1)}" if one["seeds"] else ""
+        share = "no seed that both found" if one["share"] is None else f"{one['share']:+.0%}"
+        found = ", ".join(f"{count}/{flights}" for count, flights in one["found"])
+        against = f"{share} against {one['best']}{interval}{over}"
+        lines.append(f"{one['scenario']} {one['strategy']}: {against} (found {found})")
     return lines
 
 
@@ -123,6 +137,7 @@ def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
         "strategy",
         "ok",
         "never",
+        "ground",
         "mean m",
         "median",
         "worst",
@@ -133,7 +148,7 @@ def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
         "viol",
         "switch",
     )
-    layout = "{:17s} {:13s} {:>6s} {:>5s} {:>7s} {:>7s} {:>7s} {:>7s} {:>7s} {:>7s} {:>4s} {:>4s} {:>6s}"
+    layout = "{:17s} {:13s} {:>6s} {:>5s} {:>6s} {:>7s} {:>7s} {:>7s} {:>7s} {:>7s} {:>7s} {:>4s} {:>4s} {:>6s}"
     lines = [layout.format(*head) + "  against the first [m]"]
     for row in rows:
         errors = [f"{value:.3f}" for value in row["rmse_m"] or ()] or ["-"] * 3
@@ -141,7 +156,7 @@ def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
         counts = [str(row[key]) for key in ("landings", "violations", "switches")]
         against = "" if row["against"] is None else "{:+.3f} +- {:.3f}".format(*row["against"])
         share = f"{row['as_expected']}/{row['flights']}"
-        never = str(row["never_found"])
-        cells = layout.format(row["scenario"], row["strategy"], share, never, *errors, *seconds, *counts)
+        never = str(row["never_found"]), str(row["not_flown"])
+        cells = layout.format(row["scenario"], row["strategy"], share, *never, *errors, *seconds, *counts)
         lines.append(f"{cells}  {against}".rstrip())
     return lines

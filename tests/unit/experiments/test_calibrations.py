@@ -82,6 +82,8 @@ def test_a_flight_is_mended_by_rmse_and_anees_and_its_figure_by_its_own_bar() ->
     lines = table([row_of(TURNED, [good]), row_of(LATE, [late, fell])])
     assert "1/1" in lines[1] and "0.090 -> 0.030" in lines[1] and "drone_1 turn 0.20 deg" in lines[1]
     assert "1/2" in lines[2] and "ceiling delay -6.00 ms" in lines[2]
+    assert "0.040 -> never" in lines[2] and "2.0 -> never" in lines[2], "the worst flight is the one that never found"
+    assert row_of(LATE, [late, fell])["rmse_m"] == [0.04, None]
 
 
 def test_rows_are_those_whose_field_file_alone_is_wrong() -> None:

@@ -24,7 +24,7 @@ def errors_of(*meters: float | None) -> dict[str, Any]:
 
 def flight(seed: int, rmse_m: float | None, strategy: str = "ours", **more: Any) -> dict[str, Any]:
     figures = {"rmse_m": rmse_m, "lost_s": 0.0, "longest_loss_s": 0.0, "found_s": 0.5, "switches": 1}
-    return {"scenario": "walk", "strategy": strategy, "seed": seed, "missed": [], **figures, **more}
+    return {"scenario": "walk", "strategy": strategy, "seed": seed, "missed": [], "flown": True, **figures, **more}
 
 
 def test_figures_count_from_when_the_target_was_found() -> None:
@@ -104,7 +104,7 @@ def test_a_fixed_topology_that_hardly_ever_finds_the_target_is_not_the_best() ->
     flights = [flight(seed, rmse, name) for name, errors in flown.items() for seed, rmse in enumerate(errors)]
     (ours,) = against_best_fixed(flights)
     assert (ours["best"], ours["seeds"]) == ("reversed", 3)
-    assert comparison([ours])[0].endswith(" over 3 seeds")
+    assert comparison([ours])[0].endswith(" over 3 seeds (found 3/3, 3/3)")
     never = [row["never_found"] for row in rows_of(flights)]
     assert never == [0, 0, 0, 2] and [line.split()[3] for line in table(rows_of(flights))[1:]] == list("0002")
 
@@ -119,14 +119,29 @@ def test_without_a_fixed_topology_or_a_second_seed_there_is_less_to_say() -> Non
     assert against_best_fixed([flight(1, 0.02), flight(1, 0.03, "relay")]) == []
     (one,) = against_best_fixed([flight(1, 0.02), flight(1, 0.04, "flat")])
     assert (one["share"], one["gap_m"]) == (pytest.approx(-0.5), None)
-    assert comparison([one]) == ["walk ours: -50% against flat over 1 seed"]
+    assert comparison([one]) == ["walk ours: -50% against flat over 1 seed (found 1/1, 1/1)"]
 
 
 def test_a_scenario_that_never_found_its_target_has_a_row() -> None:
     lost = flight(1, None, missed=["found_s never > 25"], lost_s=None, longest_loss_s=None, found_s=None)
     (row,) = rows_of([lost])
     assert (row["never_found"], row["as_expected"]) == (1, 0)
-    assert table([row])[1].split()[2:5] == ["0/1", "1", "-"]
+    assert table([row])[1].split()[2:6] == ["0/1", "1", "0", "-"]
+
+
+def test_a_team_that_did_not_take_off_has_not_failed_to_find() -> None:
+    grounded = dict.fromkeys(("rmse_m", "lost_s", "longest_loss_s", "found_s")) | {"flown": False}
+    (row,) = rows_of([flight(1, 0.02), flight(2, None), flight(3, None, missed=["did not take off"]) | grounded])
+    assert (row["never_found"], row["not_flown"]) == (1, 1)
+    assert table([row])[1].split()[2:5] == ["2/3", "1", "1"]
+
+
+def test_a_comparison_says_how_often_each_found_the_target() -> None:
+    flown = {"ours": (0.02, 0.02, None), "relay": (None, None, None), "string": (0.03, 0.03, 0.05)}
+    flights = [flight(seed, rmse, name) for name, errors in flown.items() for seed, rmse in enumerate(errors)]
+    ours, relay = comparison(against_best_fixed(flights))
+    assert ours.startswith("walk ours: -33% against string") and ours.endswith(" over 2 seeds (found 2/3, 3/3)")
+    assert relay == "walk relay: no seed that both found against string (found 0/3, 3/3)"
 
 
 def test_both_sides_know_the_same_strategies() -> None:

@@ -171,17 +171,22 @@ def chosen_labs(only: str, labs: "Sequence[WrongLab]") -> "list[WrongLab]":
 def fly_all(batches: "Sequence[FlightBatch]", scheduler: str, workers: int, out: Path) -> list[dict[str, Any]]:
     """Return the row of each batch; a single one needs no local cluster. Raises GroundStationError.
 
-    Each row is kept in a folder of `out`, so that an interrupted campaign can be continued.
+    Each row is kept in a folder of `out`, so that an interrupted campaign can be continued. Prints in which flights
+    planning failed.
     """
-    from groundstation.experiments.flight_batches import CampaignError, fly
+    from groundstation.experiments.flight_batches import CampaignError, flights_of, fly
     from groundstation.experiments.runner import SweepError, dask_is_there, run_tasks
 
     (out / "flights").mkdir(parents=True, exist_ok=True)  # fails before hours of flights, not after
     serial = scheduler == "none" or (scheduler == "local" and (len(batches) == 1 or not dask_is_there()))
     try:
-        return run_tasks(batches, out / "flights", "" if serial else scheduler, workers, progress, fly)
+        rows = run_tasks(batches, out / "flights", "" if serial else scheduler, workers, progress, fly)
     except (SweepError, CampaignError) as error:
         raise GroundStationError(str(error)) from error
+    if failed := [one for one in flights_of(rows)[0] if one.get("planning")]:
+        seeds = " ".join(map(str, dict.fromkeys(one["seed"] for one in failed)))
+        click.echo(f"seeds {seeds}: {failed[0]['planning']}; without a plan drones that track hover", err=True)
+    return rows
 
 
 def publish(document: dict[str, Any], lines: Iterable[str], out: Path, as_json: bool) -> None:

@@ -63,7 +63,9 @@ def scenarios(
     planned, began = _planned(names, choices(strategies, STRATEGIES, "--strategies"), **flown), time.monotonic()
     found = fly_all([batch for _, batch in planned], scheduler, workers, out)
     flights = [
-        {"scenario": name, **one} for (name, _), row in zip(planned, found, strict=True) for one in flights_of([row])[0]
+        {"scenario": name, **one, "plan_ms": round(1e3 * spent["plan"], 2)}
+        for (name, _), row in zip(planned, found, strict=True)
+        for one, spent in zip(*flights_of([row]), strict=True)
     ]
     rows, best = rows_of(flights), against_best_fixed(flights)
     document = {

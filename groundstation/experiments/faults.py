@@ -8,6 +8,8 @@ from groundstation.experiments.summary import worst
 
 HEALTHY = "none"
 _SHOWN_SEEDS = 6
+# The whole, and the median of a plan within the tracker's time.
+_NO_PARTS = ("cpu", "plan")
 _WORST = (
     ("separation_m", min), ("fence_m", max), ("speed_m_s", max), ("unlocalised_s", max), ("hover_s", max),
     ("rest_s", max),
@@ -53,7 +55,8 @@ def by_kind(flights: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 def totals(flights: Sequence[Mapping[str, Any]], timing: Sequence[Mapping[str, float]]) -> dict[str, Any]:
     """Return the figures of the whole campaign, and its time by parts (shares of the loop)."""
     flown = [flight for flight in flights if "unsafe" in flight]
-    parts = {name: sum(t.get(name, 0.0) for t in timing) for name in (timing[0] if timing else ()) if name != "cpu"}
+    loop = [name for name in (timing[0] if timing else ()) if name not in _NO_PARTS]
+    parts = {name: sum(t.get(name, 0.0) for t in timing) for name in loop}
     spent = sum(parts.values())
     cpu_s = sum(t["cpu"] for t in timing)
     return {

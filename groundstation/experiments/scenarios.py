@@ -19,8 +19,9 @@ _SUMS = ("landings", "switches")
 def rows_of(flights: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Return a row for each scenario and strategy, in their order: flights, those as expected, then figures.
 
-    never_found: flights without the target, not_flown: those whose team did not all take off.
+    never_found: flights that never found the target, not_flown: those whose team did not all take off.
     rmse_m: mean, median, worst over the flights that found the target; lost_s: mean; longest_s, found_s: worst;
+    plan_ms: median time of a plan by the wall clock, in which nothing else of the flight goes on.
     against: how much larger the rmse is than that of the first strategy for the same seeds, mean and half width of the
     95 % interval [m]; None with fewer than two seeds.
     """
@@ -51,6 +52,7 @@ def _figures(flights: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "found_s": max((one["found_s"] for one in found), default=None),
         **{key: sum(one.get(key, 0) for one in flights) for key in _SUMS},
         "violations": sum(bool(one.get("violations")) for one in flights),
+        "plan_ms": float(np.median([one["plan_ms"] for one in flights])),
         "missed": {one["seed"]: one["missed"] for one in flights if one["missed"]},
     }
 
@@ -147,13 +149,14 @@ def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
         "land",
         "viol",
         "switch",
+        "plan ms",
     )
-    layout = "{:17s} {:13s} {:>6s} {:>5s} {:>6s} {:>7s} {:>7s} {:>7s} {:>7s} {:>7s} {:>7s} {:>4s} {:>4s} {:>6s}"
+    layout = "{:17s} {:13s} {:>6s} {:>5s} {:>6s} {:>7s} {:>7s} {:>7s} {:>7s} {:>7s} {:>7s} {:>4s} {:>4s} {:>6s} {:>7s}"
     lines = [layout.format(*head) + "  against the first [m]"]
     for row in rows:
         errors = [f"{value:.3f}" for value in row["rmse_m"] or ()] or ["-"] * 3
         seconds = ["-" if row[key] is None else f"{row[key]:.1f}" for key in ("lost_s", "longest_s", "found_s")]
-        counts = [str(row[key]) for key in ("landings", "violations", "switches")]
+        counts = [str(row[key]) for key in ("landings", "violations", "switches")] + [f"{row['plan_ms']:.1f}"]
         against = "" if row["against"] is None else "{:+.3f} +- {:.3f}".format(*row["against"])
         share = f"{row['as_expected']}/{row['flights']}"
         never = str(row["never_found"]), str(row["not_flown"])

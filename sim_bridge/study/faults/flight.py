@@ -87,9 +87,13 @@ class FaultFlight:
         self.orders = TeamOrders(self._bus("operator"))
         self._tracker_bus = self._bus("tracker")
         section = TrackerSection(field, epoch=1)
-        feed = TrackerFeed(
-            Arrivals(self._tracker_bus, self.heeds), lambda planner: InlineWorker(planner_of(planner)), clock.clock_id()
-        )
+        self.planning: InlineWorker
+
+        def worker_of(planner: Planner) -> InlineWorker:
+            self.planning = InlineWorker(planner_of(planner), bool(field.planner.plug_in))
+            return self.planning
+
+        feed = TrackerFeed(Arrivals(self._tracker_bus, self.heeds), worker_of, clock.clock_id())
         self.tracking = Tracking(self._tracker_bus, section, feed)
         self._tick_every = round(1e9 / field.estimator.rate_hz) // TICK_NS
         eyes = [WrongEye(eye, faults) for eye in eyes_of(self.site, scenario.cameras, 0.0, seed)]
@@ -261,6 +265,8 @@ class FaultFlight:
             "tracking_since_s": self.tracking_since_s,
             "modes": modes,
             "reasons": reasons,
+            "planning": self.planning.failed,
             **verdict,
-            "spent_s": {name: round(value, 3) for name, value in self.spent_s.items()},
+            "spent_s": {name: round(value, 3) for name, value in self.spent_s.items()}
+            | {"plan": round(self.planning.median_s, 5)},
         }

@@ -1,5 +1,7 @@
 """What the tracker's loop takes from its process in flight: its inbox, and the planner beside it."""
 
+import statistics
+import time
 from collections import Counter
 from collections.abc import Callable
 
@@ -9,6 +11,7 @@ from groundstation.errors import EstimatorFault
 from groundstation.planning.planner import Planner, PlanRequest
 from groundstation.runtime.inbox import TOPICS
 from groundstation.runtime.journal import Adoption
+from groundstation.runtime.planner_watch import FailureLog
 from sim_bridge.study.faults.local_bus import LocalBus
 
 
@@ -36,11 +39,19 @@ class Arrivals:
 
 
 class InlineWorker:
-    """Plans at once when a request is submitted; the plan is adopted a tick later."""
+    """Plans at once when a request is submitted; the plan is adopted a tick later.
 
-    def __init__(self, planner: Planner) -> None:
-        self._planner = planner
+    The flight's clock stands still meanwhile, so no planner is asked to stop: equal seeds give equal flights, however
+    slow the computer is. foreign: another package's planner, whose exceptions are failed plans as in flight; one of our
+    own that raises more than EstimatorFault is a fault of the program, and ends the flight.
+    """
+
+    def __init__(self, planner: Planner, foreign: bool = False) -> None:
+        self._planner, self._foreign = planner, foreign
         self._done: Adoption | None = None
+        self._log = FailureLog()
+        self._took_s: list[float] = []
+        self._failures: list[str] = []
 
     @property
     def idle(self) -> bool:
@@ -49,12 +60,26 @@ class InlineWorker:
 
     def submit(self, tick: int, request: PlanRequest) -> None:
         """Plan."""
+        began = time.perf_counter()
         try:
-            plan = request.put_to(self._planner, lambda: False)
-        except EstimatorFault:
-            self._done = Adoption(tick, None)
-            return
-        self._done = Adoption(tick, plan)
+            self._done = Adoption(tick, request.put_to(self._planner, lambda: False))
+        except (Exception, SystemExit) as error:
+            if not (self._foreign or isinstance(error, EstimatorFault)):
+                raise
+            self._failures.append(self._log.take(error))
+            self._done = Adoption(tick, None, self._failures[-1])
+        self._took_s.append(time.perf_counter() - began)
+
+    @property
+    def failed(self) -> str:
+        """Return how often planning failed and why at first; "" if it never did."""
+        count = len(self._failures)
+        return f"planning failed {count} time{'s' * (count > 1)}, first: {self._failures[0]}" if count else ""
+
+    @property
+    def median_s(self) -> float:
+        """Return how long a plan took, by the wall clock."""
+        return statistics.median(self._took_s) if self._took_s else 0.0
 
     def poll(self) -> Adoption | None:
         """Return and forget the finished plan."""

@@ -49,6 +49,7 @@ class MissionFlight(FaultFlight):
             "landing_since_s": self._landing_since_s,
             "landed_before": self._landed_before,
             "landed": not self.world.airborne,
+            "planning": report["planning"],
             "spent_s": report["spent_s"],
         }
 

@@ -79,7 +79,8 @@ class ScenarioFlight(FaultFlight):
             "switches": self._switches,
         }
         expected = self.scenario.expected or ScenarioExpectation()
-        return {**figures, "missed": shortfalls(figures, expected)}
+        missed = shortfalls(figures, expected)
+        return {**figures, "missed": [*missed, *filter(None, [self.planning.failed])]}
 
     def fly(self) -> dict[str, Any]:
         """Fly to the end; returns seed, strategy, figures and the time spent."""
@@ -92,5 +93,6 @@ class ScenarioFlight(FaultFlight):
             "flown": flown,
             **(self.figures() if flown else nothing),
             "reasons": {n: r for n, r in report["reasons"].items() if report["modes"][n] in _DOWN},
+            "planning": report["planning"],
             "spent_s": report["spent_s"],
         }

@@ -23,7 +23,7 @@ def errors_of(*meters: float | None) -> dict[str, Any]:
 
 
 def flight(seed: int, rmse_m: float | None, strategy: str = "ours", **more: Any) -> dict[str, Any]:
-    figures = {"rmse_m": rmse_m, "lost_s": 0.0, "longest_loss_s": 0.0, "found_s": 0.5, "switches": 1}
+    figures = {"rmse_m": rmse_m, "lost_s": 0.0, "longest_loss_s": 0.0, "found_s": 0.5, "switches": 1, "plan_ms": 2.5}
     return {"scenario": "walk", "strategy": strategy, "seed": seed, "missed": [], "flown": True, **figures, **more}
 
 
@@ -80,6 +80,7 @@ def test_strategies_are_compared_seed_by_seed() -> None:
     assert first["against"] is None
     assert second["rmse_m"] == pytest.approx([(0.03 + 0.05 + 9.0) / 3, 0.05, 9.0])
     assert "+0.010" in table([first, second])[2]
+    assert second["plan_ms"] == 2.5 and "  2.5  +0.010" in table([first, second])[2]
 
 
 def test_the_best_fixed_topology_is_compared_with_over_the_seeds_of_both() -> None:

@@ -5,6 +5,7 @@ its earlier velocity.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from drivers.watchdog_types import FREE, Action, VehicleView, WatchdogDecision
@@ -16,8 +17,8 @@ _SLOWEST_S = 1.0
 # A velocity held in a turning frame lags behind by this share of the turn.
 _TURNING_S = 0.5
 _LONGEST_STEP_S = 0.2
-# Residual motion after a take-off.
-_FIRST_M_S = 0.2
+# Residual motion after a take-off, and its climb.
+_FIRST_M_S, _FIRST_CLIMB_M_S = 0.2, 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,13 +38,15 @@ class Tolerance:
 # Reported velocities have noise of 0.05 m/s; those from camera positions twice as much, and a delay.
 REPORTED = Tolerance(deviation_m_s=0.25, excess_m=0.2)
 SEEN = Tolerance(deviation_m_s=0.4, excess_m=0.4)
+# Air disturbs a climb less; a vehicle that keeps its height above what is below climbs over a table at 0.7 m/s.
+CLIMB = Tolerance(deviation_m_s=0.25, excess_m=0.5)
 
 
 class Envelope:
     """The interval, along one axis, between the command and a slow vehicle's remaining response to earlier ones."""
 
-    def __init__(self, start_m_s: float) -> None:
-        self.low = self.high = start_m_s
+    def __init__(self, low_m_s: float, high_m_s: float) -> None:
+        self.low, self.high = low_m_s, high_m_s
 
     def step(self, wanted_m_s: float, dt_s: float) -> None:
         """Take a command that holds for a time step."""
@@ -87,14 +90,16 @@ class ControlErrorMonitor:
     def reset(self) -> None:
         """Begin anew, when it takes off, lands, or is flown by somebody else."""
         self._envelopes: tuple[Envelope, Envelope] | None = None
-        self._reported, self._seen = Excess(REPORTED), Excess(SEEN)
+        self._climb = Envelope(-_FIRST_M_S, _FIRST_CLIMB_M_S)
+        self._reported, self._seen, self._climbs = Excess(REPORTED), Excess(SEEN), Excess(CLIMB)
 
     def judge(
-        self, now_ns: int, view: VehicleView, told: WatchdogDecision | None, seen_m_s: tuple[float, float] | None
-    ) -> VehicleView:
+        self, now_ns: int, view: VehicleView, told: WatchdogDecision | None, seen_m_s: tuple[float, float] | None,
+        climb_m_s: float | None = None,
+    ) -> VehicleView:  # fmt: skip
         """Return the view completed by speed, whether cameras see it, and whether it strays from its last command.
 
-        seen_m_s: velocity forward and left by cameras, None if they do not see it.
+        seen_m_s, climb_m_s: velocity forward and left, and up, by cameras; None if they do not see it.
         """
         dt_s = 0.0 if self._last_ns is None else min((now_ns - self._last_ns) / NS_PER_S, _LONGEST_STEP_S)
         self._last_ns = now_ns
@@ -104,20 +109,22 @@ class ControlErrorMonitor:
         reported = view.velocity_m_s[:2] if view.fresh else None
         if self._envelopes is None:
             x, y = reported or (0.0, 0.0)
-            self._envelopes = (Envelope(_clamp(x, _FIRST_M_S)), Envelope(_clamp(y, _FIRST_M_S)))
-        wanted = told.velocity_m_s[:2] if told.action is Action.FLY else (told.back_m_s or (0.0, 0.0))[:2]
+            x, y = _clamp(x, _FIRST_M_S), _clamp(y, _FIRST_M_S)
+            self._envelopes = (Envelope(x, x), Envelope(y, y))
+        *wanted, up = told.velocity_m_s if told.action is Action.FLY else told.back_m_s or (0.0, 0.0, 0.0)
         for envelope, command in zip(self._envelopes, wanted, strict=True):
             envelope.step(command, dt_s)
         turning = _TURNING_S * abs(told.yaw_rate_rad_s) * math.hypot(*wanted)
         strays = self._judge_one(self._reported, reported, turning, dt_s, wanted, "reported")
         strays = strays or self._judge_one(self._seen, seen_m_s, turning, dt_s, wanted, "seen by cameras")
+        strays = self._judge_climb(climb_m_s, up, dt_s) or strays
         speeds = [0.0 if reported is None else math.hypot(*reported)]
         speeds += [] if seen_m_s is None else [math.hypot(*seen_m_s) - SEEN.deviation_m_s / 2]
         return view._replace(speed_m_s=max(speeds), stray=strays, seen=seen_m_s is not None)
 
     def _judge_one(
         self, excess: Excess, velocity: tuple[float, float] | None, turning_m_s: float, dt_s: float,
-        wanted: tuple[float, float], how: str,
+        wanted: Sequence[float], how: str,
     ) -> str:  # fmt: skip
         assert self._envelopes is not None
         if velocity is None:
@@ -126,6 +133,23 @@ class ControlErrorMonitor:
         if not excess.step(deviation, turning_m_s, dt_s):
             return ""
         return f"{math.hypot(*velocity):.1f} m/s {how}, {math.hypot(*wanted):.1f} m/s asked"
+
+    def _judge_climb(self, climb_m_s: float | None, wanted_m_s: float, dt_s: float) -> str:
+        """Judge vertical motion, by cameras only: the height that a vehicle measures is that above what is below.
+
+        Staying is never too little: the floor, a ceiling of its own or an object below may keep it where it is.
+        """
+        self._climb.step(wanted_m_s, dt_s)
+        if climb_m_s is None:
+            return ""
+        beyond = min(self._climb.beyond(climb_m_s), abs(climb_m_s))
+        if not self._climbs.step(beyond, 0.0, dt_s):
+            return ""
+        return f"{_upward(climb_m_s)} seen by cameras, {_upward(wanted_m_s)} asked"
+
+
+def _upward(climb_m_s: float) -> str:
+    return f"{abs(climb_m_s):.1f} m/s {'up' if climb_m_s >= 0.0 else 'down'}"
 
 
 def _clamp(value: float, limit: float) -> float:

@@ -110,7 +110,8 @@ class VehicleHost:
         for received in self._estimates.drain():
             if isinstance(received.message, Estimate):
                 self._hear_estimate(now_ns, received.message)
-        view = self._control_error.judge(now_ns, view, self._told, self._seen.velocity(now_ns))
+        seen_m_s, climb_m_s = self._seen.velocity(now_ns), self._seen.climb(now_ns)
+        view = self._control_error.judge(now_ns, view, self._told, seen_m_s, climb_m_s)
         aloft = view.flight_state in AIRBORNE
         near, crowded = self._near(now_ns, aloft)
         unseen_s, touches = self._unlocalised.of_flight(now_ns, aloft), self._touch_down.of_flight(aloft)

@@ -78,7 +78,7 @@ class TelemetryPublisher:
         message = Odometry(
             header=self._bus.header(self._name, stamp_ns),
             velocity_m_s=velocity_m_s,
-            velocity_covariance=_covariance(std_m_s),
+            velocity_covariance=_covariance(std_m_s, self.stated.climb_std_m_s(stamp_ns)),
             yaw_rad=self._heading.at(stamp_ns),
             roll_rad=attitude.roll_rad,
             pitch_rad=attitude.pitch_rad,
@@ -98,6 +98,6 @@ class TelemetryPublisher:
         self._bus.publish(IMU, sample)
 
 
-def _covariance(std_m_s: float) -> tuple[float, ...]:
-    horizontal = std_m_s**2
-    return (horizontal, 0.0, 0.0, 0.0, horizontal, 0.0, 0.0, 0.0, horizontal * _CLIMB_SHARE**2)
+def _covariance(std_m_s: float, climb_std_m_s: float) -> tuple[float, ...]:
+    horizontal, vertical = std_m_s**2, max(std_m_s * _CLIMB_SHARE, climb_std_m_s) ** 2
+    return (horizontal, 0.0, 0.0, 0.0, horizontal, 0.0, 0.0, 0.0, vertical)

@@ -147,6 +147,8 @@ class MavlinkVehicle:
                 return replace(known, batteries=known.batteries.with_first(now_ns, message))
             case telemetry.EkfStatusReport() | telemetry.EstimatorStatus():
                 self._publisher.stated.take(now_ns, message)
+                if self.orders.lift.lifted and (doubts := self._publisher.stated.doubts(now_ns)):
+                    self.orders.events.append((MavSeverity.WARNING, doubts))
                 return replace(known, ekf=message.flags)
             case flight.OdometryMessage():
                 self._publisher.stated.take(now_ns, message)

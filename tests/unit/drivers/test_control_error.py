@@ -125,3 +125,61 @@ def test_a_hovering_vehicle_that_is_brought_back_does_what_it_is_told(back):
     forward, left = (2.2 * 0.15, 2.2 * -0.1)  # within the tolerance of its setpoint, but beyond that of standing
     at_s, _ = fly(lambda _: asked, lambda _: (forward, left))
     assert (at_s is None) == (back is not None)
+
+
+# -- vertical motion --------------------------------------------------------------------------------------------------
+
+
+def ride(asked, climb, seconds=8.0):
+    """Return (time of the first alarm, its text) for a commanded climb and one that cameras see, by time."""
+    monitor = ControlErrorMonitor()
+    for turn in range(round(seconds / TURN_S)):
+        at_s = turn * TURN_S
+        command = WatchdogDecision(DriverMode.TRACK, Action.FLY, (0.0, 0.0, asked(at_s)), 0.0)
+        said = view()._replace(velocity_m_s=(0.0, 0.0, asked(at_s)))
+        stray = monitor.judge(round(at_s * S) + S, said, command, (0.0, 0.0), climb(at_s)).stray
+        if stray:
+            return at_s, stray
+    return None, ""
+
+
+def test_a_climb_that_was_not_asked_for_is_found_though_the_vehicle_reports_what_it_was_told():
+    """As an ArduCopter with accelerometers that read 1 m/s^2 too much: it rises ever faster."""
+    at_s, said = ride(lambda t: 0.0 if t < 3 else -0.7, lambda t: 0.0 if t < 3 else 0.65 * (t - 3))
+    assert at_s is not None and at_s - 3 <= 1.65
+    assert "m/s up seen by cameras, 0.7 m/s down asked" in said
+
+
+@pytest.mark.parametrize(("asked", "seen"), [(0.3, -0.9), (-0.2, -1.2), (0.4, 1.4)])
+def test_a_vehicle_that_moves_the_wrong_way_or_too_fast_is_found(asked, seen):
+    at_s, _ = ride(lambda t: asked, lambda t: seen if t > 2 else 0.0)
+    assert at_s is not None and at_s - 2 <= 1.3
+
+
+@pytest.mark.parametrize("asked", [0.6, -0.6])
+def test_one_that_stays_is_held_by_floor_ceiling_or_an_object_below(asked):
+    assert ride(lambda t: asked, lambda t: 0.0) == (None, "")
+
+
+def test_healthy_climbs_noise_and_the_end_of_a_take_off_give_no_alarm():
+    for seed in range(8):
+        rng, lag = random.Random(seed), Lag(seed, 1.15)
+        wanted = [0.0]
+
+        def asked(at_s, rng=rng, wanted=wanted):
+            if rng.random() < TURN_S / 0.7:
+                wanted[0] = rng.uniform(-0.6, 0.6)
+            return wanted[0]
+
+        assert ride(asked, lambda t, lag=lag, wanted=wanted: lag.step(wanted[0]), 30.0) == (None, "")
+    assert ride(lambda t: 0.0, lambda t: 1.0 if t < 1.2 else 0.0) == (None, "")
+
+
+def test_a_vehicle_that_keeps_its_height_above_what_is_below_does_not_stray():
+    """It climbs over a box at 0.5 m/s, while the tracker asks it down."""
+    assert ride(lambda t: -0.4, lambda t: 0.5 if 3 < t < 4.5 else 0.0) == (None, "")
+    assert ride(lambda t: -0.4, lambda t: 0.7 if 3 < t < 4 else 0.0) == (None, "")
+
+
+def test_nobody_is_judged_by_a_climb_that_nobody_sees():
+    assert ride(lambda t: 0.0, lambda t: None) == (None, "")

@@ -157,3 +157,37 @@ def test_forward_and_left_are_those_of_the_middle_of_the_window() -> None:
         one = EntityEstimate(name="v", kind="robot", mean=place, velocity_m_s=(0.0, 0.0, 0.0), **KNOWN)
         seen.take(S + at_ns, 1, one)
     assert seen.velocity(S + 600 * MS) == pytest.approx((0.4, -0.3))
+
+
+# -- climb ------------------------------------------------------------------------------------------------------------
+
+
+def climbing(*heights: tuple[int, float], **fields: Any) -> SeenVelocity:
+    """Return observations of a vehicle at (time [ns], height [m])."""
+    seen = SeenVelocity()
+    for at_ns, z in heights:
+        mean = (0.0, 0.0, z, 0.0)
+        seen.take(
+            S + at_ns,
+            1,
+            EntityEstimate(name="v", kind="robot", mean=mean, velocity_m_s=(0.0, 0.0, 0.0), **KNOWN | fields),
+        )
+    return seen
+
+
+def test_heights_seen_become_a_climb() -> None:
+    assert climbing((0, 1.0), (450 * MS - 1, 1.2)).climb(S + 450 * MS) is None
+    assert climbing((0, 1.0), (450 * MS, 1.9)).climb(S + 450 * MS) == pytest.approx(2.0)
+    assert climbing((0, 1.0), (100 * MS, 1.0), (500 * MS, 0.8)).climb(S + 800 * MS) == pytest.approx(-0.4)
+    assert climbing((0, 1.0), (500 * MS, 0.8)).climb(S + 800 * MS + 1) is None
+
+
+def test_a_height_that_was_set_anew_is_no_climb() -> None:
+    assert climbing((0, 1.0), (480 * MS, 1.0), (500 * MS, 1.181)).climb(S + 500 * MS) is None
+    assert climbing((0, 1.0), (480 * MS, 1.0), (500 * MS, 1.18)).climb(S + 500 * MS) == pytest.approx(0.36)
+
+
+def test_a_height_that_is_known_poorly_tells_no_climb_though_the_place_tells_a_velocity() -> None:
+    unsure = (*(1e-4,) * 10, 0.06**2, *(1e-4,) * 5)
+    seen = climbing((0, 1.0), (500 * MS, 1.2), covariance=unsure)
+    assert seen.climb(S + 500 * MS) is None and seen.velocity(S + 500 * MS) is not None

@@ -105,3 +105,28 @@ def test_its_velocity_is_doubted_while_it_lifts_off_and_for_three_seconds_after(
     stated.leave_floor(5 * S)
     assert stated.velocity_std_m_s(8 * S) == 0.5
     assert stated.velocity_std_m_s(8 * S + 1) == 0.0
+
+
+def reports_of_heights(ratio):
+    return EkfStatusReport(0, 0.1, 0.1, ratio, 0, 0), EstimatorStatus(0, AIDED, 0.1, 0.1, ratio, 0, 0, 0, 0, 0)
+
+
+@pytest.mark.parametrize("flavour", [0, 1])
+def test_a_filter_that_refuses_the_heights_it_is_fed_is_doubted_in_its_climb_only(flavour):
+    stated = StatedUncertainty()
+    for at_s, ratio, std in ((1, 0.3, 0.0), (2, 0.75, 0.25), (3, 4.96, 0.5), (4, math.nan, 0.5), (5, 0.2, 0.0)):
+        stated.take(at_s * S, reports_of_heights(ratio)[flavour])
+        assert stated.climb_std_m_s(at_s * S) == pytest.approx(std)
+        assert stated.velocity_std_m_s(at_s * S) == 0.0
+    stated.take(6 * S, reports_of_heights(2.0)[flavour])
+    assert stated.climb_std_m_s(9 * S) == 0.5 and stated.climb_std_m_s(9 * S + 1) == 0.0
+
+
+def test_heights_refused_for_longer_than_a_moment_are_told_until_they_are_taken_again():
+    stated = StatedUncertainty()
+    told = []
+    for turn, ratio in enumerate((0.9, 1.2, 1.0, 1.1, 1.5, math.nan, 2.0, 0.9)):
+        now_ns = S + turn * S // 4
+        stated.take(now_ns, reports_of_heights(ratio)[0])
+        told.append(bool(stated.doubts(now_ns)))
+    assert told == [False] * 5 + [True, True, False]

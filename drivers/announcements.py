@@ -13,6 +13,7 @@ from groundstation.time_units import NS_PER_S
 
 _UNANSWERED_NS, _UNCONFIGURED_NS = 5 * NS_PER_S, 15 * NS_PER_S
 _SILENCE_EVENT_NS = _REFUSAL_PERIOD_NS = NS_PER_S
+NOT_DOWN = "stay away; CUT MOTORS, or the kill switch of its transmitter, lets it fall"
 _STANDS = frozenset({DriverMode.CONNECTING, DriverMode.LANDED})
 _UNSOUND = "restart it; if it says this again, have that sensor repaired"
 # Refusals caused from outside of this run, in the operator's words.
@@ -37,6 +38,7 @@ class Announcements:
         self._child, self._vehicle, self._start = child, vehicle, start
         self._told = (mode, reason)
         self._silent = False
+        self._alerts: frozenset[str] = frozenset()
         self._intrusions = Refusals(_INTRUSIONS)
         self._next_refusal_ns = 0
         self.heard_ns = self._unconfigured_ns = clock.now_ns()
@@ -48,10 +50,17 @@ class Announcements:
         """
         before, self._told = self._told, (decision.mode, decision.reason)
         if before != self._told:
+            self._alerts = frozenset()
             cut, sinks = decision.mode is DriverMode.CUT, decision.mode is DriverMode.LANDING and failsafe
             severity = Severity.ERROR if cut else Severity.WARNING if sinks else Severity.INFO
             self._event(severity, f"{self._vehicle.name} {decision.mode}: {decision.reason}")
         return before[0] is not decision.mode
+
+    def tell_landing(self, told: str, why: str) -> None:
+        """Report once per landing each way in which it does not come down; told: the row of the table, or ""."""
+        if told and told not in self._alerts:
+            self._event(Severity.ERROR, f"{self._vehicle.name}: {why}", NOT_DOWN)
+        self._alerts |= {told}
 
     def tell_refusal(self, now_ns: int, command: Command, reason: str) -> None:
         """Report a command from a sender without the right to give it, at most once a second."""

@@ -23,7 +23,7 @@ _PAUSES = frozenset({Condition.TRACKER_RESTARTED, Condition.TRACKER_PAUSED, Cond
 class Situation(NamedTuple):
     """The watchdog's inputs at one moment; times in ns, gap_s: time for which the driver's own loop stood still.
 
-    clearing: a take-off is clearing an emergency, within its time.
+    clearing: a take-off is clearing an emergency, within its time. entered_m: height at which it entered the mode.
     """
 
     now_ns: int
@@ -36,6 +36,7 @@ class Situation(NamedTuple):
     take_off_ended_ns: int = 0
     clearing: bool = False
     gap_s: float = 0.0
+    entered_m: float = 0.0
 
     def since_s(self, then_ns: int) -> float:
         """Return how long ago a moment was [s]."""
@@ -65,6 +66,8 @@ def observed(at: Situation, limits: WatchdogLimits) -> dict[Condition, str]:
     _observe_state(at, holding)
     _observe_setpoints(at, holding)
     _observe_motion(vehicle, limits, holding)
+    if vehicle.away and at.mode is DriverMode.LANDING:
+        holding[Condition.FLIES_AWAY] = vehicle.away
     return holding
 
 
@@ -116,10 +119,14 @@ def _observe_motion(vehicle: VehicleView, limits: WatchdogLimits, holding: dict[
         holding[Condition.TOO_FAST] = f"it flies {vehicle.speed_m_s:.1f} m/s, {allowed}"
 
 
-def timed(at: Situation) -> dict[Condition, float]:
+def timed(at: Situation, limits: WatchdogLimits) -> dict[Condition, float]:
     """Return the duration of a condition that has its own time of begin [s]."""
     if at.mode is DriverMode.TAKING_OFF:
         return {Condition.TAKE_OFF_OVERDUE: at.since_s(at.entered_ns)}
+    # One whose sensors are wrong is heard all the same.
+    heard = at.vehicle.fresh or at.vehicle.unsound
+    if at.mode is DriverMode.LANDING and heard and at.vehicle.flight_state in AIRBORNE:
+        return {Condition.LANDING_OVERDUE: at.since_s(at.entered_ns) - at.entered_m / limits.sinks_m_s}
     heard_ns, any_heard_ns = at.gate.last_heard_ns, at.gate.any_heard_ns
     if heard_ns is None or any_heard_ns is None:
         lasted = {Condition.UNSEEN: at.since_s(at.take_off_ended_ns)}
@@ -186,7 +193,7 @@ class Evidence:
             self.charged_s[condition] = self.charged_s.get(condition, 0.0) + more_s
         # Conditions that end do not stop the timer of a wait for an order: only an order does.
         waits = {condition: at.since_s(since_ns) for condition, since_ns in self._waits.items()}
-        for condition, lasted_s in (timed(at) | waits).items():
+        for condition, lasted_s in (timed(at, limits) | waits).items():
             self.holding[condition], self.charged_s[condition] = _why(condition, at), lasted_s
         self._pardoned_s = {
             condition: min(pardoned_s, self.charged_s[condition])

@@ -11,11 +11,12 @@ from drivers.watchdog_types import ALOFT, FREE, DriverMode, WatchdogLimits
 
 
 class Reaction(StrEnum):
-    """The reaction of a row; REFUSE: a TAKEOFF is not obeyed."""
+    """The reaction of a row; TELL: nothing is left but to tell the operator; REFUSE: a TAKEOFF is not obeyed."""
 
     CUT = "CUT"
     LAND = "LAND"
     HOVER = "HOVER"
+    TELL = "tell"
     REFUSE = "refuse take-off"
 
 
@@ -60,6 +61,8 @@ class Condition(StrEnum):
     TOO_FAST = auto()
     CROWDED = auto()
     ON_FLOOR = auto()
+    FLIES_AWAY = auto()
+    LANDING_OVERDUE = auto()
     DRIVER_STOOD = auto()
     NOT_READY = auto()
     SOMEBODY_NEAR = auto()
@@ -102,6 +105,7 @@ class Failsafe:
 # A vehicle's action without another command.
 _TRACK = frozenset({DriverMode.TRACK})
 _HOVER = frozenset({DriverMode.HOVER})
+_LANDS = frozenset({DriverMode.LANDING})
 _STANDS = frozenset({DriverMode.LANDED, DriverMode.CUT})
 _UNCONVERGED = "the tracker does not know well enough where it is"
 
@@ -109,7 +113,9 @@ _UNCONVERGED = "the tracker does not know well enough where it is"
 @cache
 def failsafes(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
     """Return the table for a vehicle's limits, highest priority first."""
-    return (*_ends(limits), *_landings(limits), *_suspensions(limits), *_brakes(limits), *_refusals())
+    return (
+        *_ends(limits), *_landings(limits), *_suspensions(limits), *_brakes(limits), *_alerts(limits), *_refusals(),
+    )  # fmt: skip
 
 
 def _ends(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
@@ -201,6 +207,17 @@ def _brakes(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
     return tuple(
         Failsafe(condition, Reaction.HOVER, text, after_s, latch=Latch.NONE, modes=_TRACK)
         for condition, text, after_s in rows
+    )
+
+
+def _alerts(limits: WatchdogLimits) -> tuple[Failsafe, ...]:
+    rows = (
+        (Condition.FLIES_AWAY, "{why}", limits.away_told_s, EVENLY),
+        (Condition.LANDING_OVERDUE, "it should have landed by now", limits.landing_s, None),
+    )
+    return tuple(
+        Failsafe(condition, Reaction.TELL, f"it does not come down: {text}", after_s, "", forgets, Latch.NONE, _LANDS)
+        for condition, text, after_s, forgets in rows
     )
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 from drivers.announcements import Announcements
 from drivers.base import HostProcess, Vehicle
+from drivers.coming_down import ComingDown, away
 from drivers.control_error import ControlErrorMonitor
 from drivers.neighbours import Neighbours
 from drivers.seen_velocity import SeenVelocity
@@ -64,7 +65,7 @@ class VehicleHost:
         self._told: WatchdogDecision | None = None
         self._statuses = self._bus.subscribe([VEHICLE_STATUS], newest=True)
         self._neighbours = Neighbours(vehicle.name, limits.pad_m, limits.min_separation_m, limits.max_speed_m_s)
-        self._unlocalised, self._touch_down = UnlocalisedTime(), TouchDown()
+        self._unlocalised, self._touch_down, self._coming_down = UnlocalisedTime(), TouchDown(), ComingDown()
 
     def call_on_commands(self, wake: Callable[[], None]) -> None:
         """Have a function called, on the network's thread, whenever a command arrives."""
@@ -115,6 +116,8 @@ class VehicleHost:
         aloft = view.flight_state in AIRBORNE
         near, crowded = self._near(now_ns, aloft)
         unseen_s, touches = self._unlocalised.of_flight(now_ns, aloft), self._touch_down.of_flight(aloft)
+        flies_away = away(seen_m_s, climb_m_s, self.watchdog.limits.tolerated_speed_m_s)
+        view = view._replace(height_m=self._coming_down.height_m, away=flies_away)
         view = view._replace(touches_down=touches, on_floor=self._touch_down.low)
         return view._replace(unseen_s=unseen_s, near=near, crowded=crowded)
 
@@ -125,6 +128,7 @@ class VehicleHost:
                 self._seen.take(now_ns, estimate.epoch, entity)
                 self._unlocalised.hear(now_ns, entity)
                 self._touch_down.hear(entity)
+                self._coming_down.hear(entity)
 
     def _near(self, now_ns: int, aloft: bool) -> tuple[str, str]:
         """Return the neighbour too near to this vehicle's pad, if it stands, and to it, if it flies; "" if none is."""
@@ -151,7 +155,7 @@ class VehicleHost:
             header=self._bus.header(self.vehicle.name),
             flight_state=FlightState.LOST if lost else view.flight_state,
             mode=self.watchdog.mode,
-            failsafe=self.watchdog.failsafe,
+            failsafe=self.watchdog.told or self.watchdog.failsafe,
             battery=view.battery,
             link_quality=health.link_quality,
             rate_hz=health.rate_hz,
@@ -171,7 +175,7 @@ class VehicleHost:
     def _detail(self, of_link: str) -> str:
         """Return the reason for a vehicle's present action; if no failsafe acts, a wait of its link comes first."""
         stands, view = self.watchdog.mode is DriverMode.LANDED, self.watchdog.vehicle
-        if self.watchdog.braked or (self.watchdog.failsafe and not stands):
+        if self.watchdog.braked or self.watchdog.told or (self.watchdog.failsafe and not stands):
             return self.watchdog.explanation
         unheard = view.silence if stands and not view.fresh else ""
         return of_link or unheard or self.watchdog.explanation
@@ -228,6 +232,7 @@ class VehicleHost:
         if self._announcements.tell_mode(decision, self.watchdog.failsafe):
             # A status with a changed mode must not wait: it tells the tracker which drones are airborne.
             self._next_status_ns = 0
+        self._announcements.tell_landing(self.watchdog.told, self.watchdog.explanation)
         self._announcements.tell_silence(now_ns, view, decision.mode)
         if now_ns >= self._next_flush_ns:
             self._next_flush_ns = now_ns + _FLUSH_PERIOD_NS

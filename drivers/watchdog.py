@@ -74,7 +74,8 @@ class Watchdog:
         self._land_until_ns = 0
         self._clearing = False
         self._way_back = WayBack()
-        self._braked_by: Failsafe | None = None
+        self._passing: Failsafe | None = None
+        self._entered_m = 0.0
 
     # -- inputs -------------------------------------------------------------------------------------------------------
 
@@ -192,7 +193,7 @@ class Watchdog:
             self._take_off_ended_ns = now_ns
         if mode is DriverMode.LANDING or (mode is DriverMode.LANDED and self.mode in FREE):
             self._land_until_ns = now_ns + _TELLS_NS
-        self._entered_ns = now_ns
+        self._entered_ns, self._entered_m = now_ns, self.vehicle.height_m
         self.mode, self.reason, self.failsafe = mode, reason, "" if row is None else row.condition
         self.evidence.enter(self._situation(now_ns), row, self.limits)
         self._brake_until_ns = now_ns + self._brake_ns if row is not None and row.brake else 0
@@ -204,13 +205,18 @@ class Watchdog:
     @property
     def braked(self) -> bool:
         """Return whether a row of the table makes it hover within TRACK for now."""
-        return self._braked_by is not None
+        return self._passing is not None and self._passing.reaction is Reaction.HOVER
+
+    @property
+    def told(self) -> str:
+        """Return the condition of the row that only tells something now, or ""."""
+        return self._passing.condition if self._passing is not None and not self.braked else ""
 
     @property
     def explanation(self) -> str:
         """Return why the vehicle acts as it does, in words; if it will land for another reason, that one."""
-        if self._braked_by is not None:
-            return f"hovers: {self._text_of(self._braked_by)}"
+        if self._passing is not None:
+            return f"{'hovers: ' if self.braked else ''}{self._text_of(self._passing)}"
         if self._landing is None:
             return self.reason
         text = self._text_of(self._landing.row)
@@ -234,9 +240,9 @@ class Watchdog:
         self._last_step_ns = now_ns
         self._follow_vehicle(now_ns)
         self.evidence.step(self._situation(now_ns, gap_s), self.limits)
-        self._braked_by = self._heed_table(now_ns)
+        self._passing = self._heed_table(now_ns)
         obeyed = self.gate.obeyed(now_ns)
-        setpoint = obeyed if self.mode is DriverMode.TRACK and self._braked_by is None else None
+        setpoint = obeyed if self.mode is DriverMode.TRACK and self._passing is None else None
         acks = self._acks.effective(self.mode, self.vehicle, setpoint is not None)
         back = self._way_back.step(now_ns, self._asked_back(obeyed))
         if setpoint is None:
@@ -254,17 +260,9 @@ class Watchdog:
 
     def _situation(self, now_ns: int, gap_s: float = 0.0) -> Situation:
         return Situation(
-            now_ns,
-            self.mode,
-            self.reason,
-            self.vehicle,
-            self.upstream,
-            self.gate,
-            self._entered_ns,
-            self._take_off_ended_ns,
-            self._clears_in_time(now_ns),
-            gap_s,
-        )
+            now_ns, self.mode, self.reason, self.vehicle, self.upstream, self.gate, self._entered_ns,
+            self._take_off_ended_ns, self._clears_in_time(now_ns), gap_s, self._entered_m,
+        )  # fmt: skip
 
     def _clears_in_time(self, now_ns: int) -> bool:
         return self._clearing and now_ns - self._entered_ns < self.limits.clear_s * NS_PER_S
@@ -283,7 +281,7 @@ class Watchdog:
             self._enter(now_ns, DriverMode.HOVER, "hovers after its take-off, waiting for TRACK")
 
     def _heed_table(self, now_ns: int) -> Failsafe | None:
-        """React by the first row of the table that applies; returns it if it only brakes for now, within the mode."""
+        """React by the first row of the table that applies; returns it if it only brakes or tells, within the mode."""
         evidence = self.evidence
         for row in self._acting:
             if row.condition not in evidence.holding or not row.applies(self.mode, evidence.against_s(row)):

@@ -60,7 +60,9 @@ class WatchdogLimits:
     stands after 0.8 s with 2 m/s^2 and a lag of 0.3 s, doubled. blind_land_s: likewise while its sensors are wrong and
     no camera sees it. lost_hover_s, lost_land_s: without a position from the cameras, for vehicles that need one.
     crowded_land_s: likewise nearer to another than allowed, so that it has to make way: the limiter moves each of two
-    by 0.1 m in that time. floor_land_s: likewise on the floor. pad_m: where it takes off [x, y; world], if known;
+    by 0.1 m in that time. floor_land_s: likewise on the floor. away_told_s: for so long a landing vehicle rises or
+    flies fast before that is told; a healthy one has braked from its take-off in half of it. sinks_m_s, landing_s: the
+    slowest descent, and what a landing takes beyond it. pad_m: where it takes off [x, y; world], if known;
     min_separation_m: least distance of all airborne vehicles from there, and from it in flight.
     """
 
@@ -87,6 +89,9 @@ class WatchdogLimits:
     lost_land_s: float = 0.7
     crowded_land_s: float = 2.0
     floor_land_s: float = 0.3
+    away_told_s: float = 2.0
+    sinks_m_s: float = 0.3
+    landing_s: float = 5.0
     pad_m: tuple[float, float] | None = None
     min_separation_m: float = 0.6
 
@@ -108,7 +113,7 @@ class VehicleView(NamedTuple):
     lacked a position that it needs; unlocated: whose, and since when, in words. clears: whether a separate order ends
     its emergency without starting motors.
     mute: the report that it lacks although telemetry arrives, or "". touches_down, on_floor: by its estimate it comes
-    down to the floor, and is there.
+    down to the floor, and is there; height_m: likewise. away: how it moves without sinking, by cameras, or "".
     """
 
     flight_state: FlightState = FlightState.UNKNOWN
@@ -130,6 +135,8 @@ class VehicleView(NamedTuple):
     mute: str = ""
     touches_down: bool = False
     on_floor: bool = False
+    height_m: float = 0.0
+    away: str = ""
 
     @property
     def plausible(self) -> "VehicleView":

@@ -22,7 +22,7 @@ from groundstation.monitor.alarm import TO_DO, Alarm
 from groundstation.monitor.batteries import Battery, Charge, battery_of
 from groundstation.monitor.before_flight import forbidding
 from groundstation.monitor.endurance import flies, may_fly
-from groundstation.monitor.failsafe_words import failsafe_words
+from groundstation.monitor.failsafe_words import NOT_DOWN, failsafe_words, will_land
 from groundstation.monitor.state import MonitorState
 
 VEHICLE_SILENT_S = 1.0
@@ -82,7 +82,7 @@ def _vehicles(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
         elif down := _down(state, status):
             words, advice = _not_believed(status) if _is_heard_in_vain(status) else down
             yield Alarm(f"{name} {status.flight_state}", f"{name}: {words}", advice=advice)
-        if flies(status, state.take_offs.get(name)) and not is_silent:
+        if flies(status, state.take_offs.get(name)) and not is_silent and status.failsafe not in NOT_DOWN:
             yield from _battery(name, status, battery_of(state, name))
             yield from _link(name, status.link_quality)
 
@@ -125,8 +125,9 @@ def _left_alone(status: VehicleStatus) -> str:
 
 
 def _lands(status: VehicleStatus) -> bool:
-    """Return whether a vehicle lands, or was just ordered to."""
-    return status.flight_state is FlightState.LANDING or status.mode == "LANDING"
+    """Return whether a vehicle lands, or was just ordered to; not of one that does not come down."""
+    lands = status.flight_state is FlightState.LANDING or status.mode == "LANDING"
+    return lands and status.failsafe not in NOT_DOWN
 
 
 def _failsafe(name: str, status: VehicleStatus) -> Iterator[Alarm]:
@@ -181,17 +182,17 @@ def _near(state: MonitorState, now_ns: int) -> Iterator[Alarm]:
     """Yield pairs of flying drones that are nearer than allowed."""
     if state.estimate is None or state.estimate.age_s(now_ns) > ESTIMATE_SILENT_S:
         return
-    modes = {n: seen.message.mode for n, seen in state.vehicles.items() if seen.message.flight_state in AIRBORNE}
-    places = {one.name: one.mean[:3] for one in state.estimate.message.entities if one.name in modes}
+    lands = {n: _lands(seen.message) for n, seen in state.vehicles.items() if seen.message.flight_state in AIRBORNE}
+    places = {one.name: one.mean[:3] for one in state.estimate.message.entities if one.name in lands}
     for pair in combinations(places, 2):
         apart_m, least_m = math.dist(*(places[name] for name in pair)), state.cast.min_separation_m
         if apart_m < least_m:
             text = f"{pair[0]} and {pair[1]} are {apart_m:.2f} m apart, at least {least_m:g} m is allowed"
-            yield Alarm(f"{' '.join(pair)} near", text, False, _apart({modes[name] for name in pair}))
+            yield Alarm(f"{' '.join(pair)} near", text, False, _apart(any(lands[name] for name in pair)))
 
 
-def _apart(modes: set[str]) -> str:
-    if "LANDING" in modes:
+def _apart(one_lands: bool) -> str:
+    if one_lands:
         return "Nothing to do: it lands."
     return "Nothing to do: they are moved apart; if that does not help, one lands."
 
@@ -209,7 +210,7 @@ def _lost(state: MonitorState) -> Iterator[Alarm]:
         seen = state.vehicles.get(entity.name)
         if entity.name in state.cast.targets:
             advice = _SEARCH if any(one.message.mode == "TRACK" for one in state.vehicles.values()) else _WAITS
-        elif seen and seen.message.flight_state in AIRBORNE and seen.message.lands_in_s is None:
+        elif seen and will_land(seen.message):
             left_s = max(0.0, state.cast.unseen_land_s - unknown_s)
             within = f" within {left_s:.0f} s" if unknown_s < NEVER_S else ""
             soon = f" by itself{within}, unless it is seen"

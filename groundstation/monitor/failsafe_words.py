@@ -2,14 +2,17 @@
 
 from typing import NamedTuple
 
-from groundstation.bus.messages import VehicleStatus
+from groundstation.bus.messages import AIRBORNE, VehicleStatus
 
 # As drivers end the reason for a hover that only an order ends.
 _NEEDED = "; RESUME is needed"
 _UNCUT = "cut_ignored"
+# Values of VehicleStatus.failsafe of a vehicle that lands, and does not come down.
+NOT_DOWN = frozenset({"flies_away", "landing_overdue"})
 _RESUME = "To do: press RESUME, or HOLD to keep it there"
 
 _STAY_AWAY = "To do: stay away until it is down, it is told to land; CUT MOTORS tries to stop its motors again."
+_CUT = "To do: stay away; press CUT MOTORS, or the kill switch of its transmitter: it falls then."
 
 
 class FailsafeWords(NamedTuple):
@@ -21,10 +24,17 @@ class FailsafeWords(NamedTuple):
     advice: str
 
 
+def will_land(status: VehicleStatus) -> bool:
+    """Return whether a flying drone that nobody sees lands for that, for all that its driver says."""
+    return status.flight_state in AIRBORNE and status.lands_in_s is None and status.failsafe not in NOT_DOWN
+
+
 def failsafe_words(status: VehicleStatus) -> FailsafeWords | None:
     """Return the words for a condition that keeps a drone from its plan, or will land it; None: there is none."""
     if status.failsafe == _UNCUT or (status.mode == "CUT" and status.lands_in_s is not None):
         return FailsafeWords("uncut", "flies although its motors were cut", True, _STAY_AWAY)
+    if status.failsafe in NOT_DOWN:
+        return FailsafeWords("not down", status.detail.removeprefix("it "), True, _CUT)
     why, lands_in_s = status.detail.removeprefix("hovers: ").removesuffix(_NEEDED), status.lands_in_s
     soon = "" if lands_in_s is None else f"starts to land in {max(1, round(lands_in_s))} s"
     if status.detail.endswith(_NEEDED):

@@ -5,7 +5,8 @@ from drivers.watchdog_types import WatchdogLimits
 from skein_reference.markdown import code, page, prose, table
 
 _INTRODUCTION = """\
-Everything that stops a vehicle without an order, or keeps it from starting. Of the rows that apply the first one acts;
+Everything that stops a vehicle without an order, keeps it from starting, or is told because a landing does not help.
+Of the rows that apply the first one acts;
 an order of a person (CUT_MOTORS, LAND, HOLD) needs no row. Times are those of the default settings; where a setting
 gives them it stands behind.
 
@@ -39,13 +40,17 @@ EVIDENCE: dict[Condition, str] = {
     Condition.NO_SETPOINT: "the newest setpoint has expired (`safety.setpoint_lifetime_ms`)",
     Condition.SETPOINTS_PATCHY: "the newest setpoint is older than 0.15 s",
     Condition.UNCONVERGED: "setpoints that say so",
-    Condition.STRAYS: "reported or estimated velocity against what was commanded",
+    Condition.STRAYS: "reported or estimated velocity against what was commanded; up and down only the estimated one",
     Condition.TOO_FAST: "reported or estimated speed above 1.3 `limits.max_speed_m_s` + 0.2 m/s",
     Condition.CROWDED: "the estimates of it and of another that flies and does not land are nearer to each other than "
     "the separation, by more than two standard deviations, and it is the lower one; of two as high as each other "
     "(0.2 m) the later one by name",
     Condition.ON_FLOOR: "since its take-off it was higher, and now its estimated height, known to 0.2 m within two "
     "standard deviations, is 0.1 m or less",
+    Condition.FLIES_AWAY: "by cameras it rises faster than 0.3 m/s, or is as fast as for `too_fast` and sinks by no "
+    "more than 0.2 m/s",
+    Condition.LANDING_OVERDUE: "it says that it flies; since its landing began, less the time for its height then at "
+    "0.3 m/s",
     Condition.DRIVER_STOOD: "more than 0.5 s between two turns of the driver",
     Condition.NOT_READY: "the driver's own reason",
     Condition.SOMEBODY_NEAR: "a vehicle in the air whose estimate, less two standard deviations, is nearer to the pad "

@@ -62,3 +62,14 @@ def test_nobody_is_said_to_look_for_a_target_while_no_drone_tracks(world: World,
     world.text()
     (alarm,) = (one for one in alarms_of(world.state, NOW) if one.about == "turtlebot lost")
     assert (alarm.advice == "Nothing to do: the drones look for it.") == looks and not alarm.asks
+
+
+@pytest.mark.parametrize("failsafe", ["flies_away", "landing_overdue"])
+def test_one_that_does_not_come_down_asks_to_cut_its_motors(world: World, failsafe: str) -> None:
+    why = "it does not come down: it rises at 0.9 m/s"
+    world.vehicle("drone_1", "LANDING", failsafe=failsafe, detail=why, battery=0.05)
+    world.text()
+    (alarm,) = alarms_of(world.state, NOW)
+    assert (alarm.about, alarm.text) == ("drone_1 not down", f"drone_1 {why.removeprefix('it ')}")
+    assert alarm.asks and alarm.grave and "CUT MOTORS" in alarm.advice
+    assert safety_of(world.state, [alarm]).level is Level.ACT

@@ -88,6 +88,7 @@ function orderedBy(who, name, doing) {
 }
 
 const NEEDED = /; RESUME is needed$/;
+const NOT_DOWN = /^it does not come down/;
 // The drone's action until a failsafe lands it.
 const GOES_ON = { TRACK: taskOf, HOLD: () => "hovers", HOVER: () => "hovers" };
 
@@ -97,6 +98,7 @@ function reasonOf(name, { mode, detail, lands_in_s, braked }) {
   const [, doing, who] = detail.match(ORDERS) ?? [];
   if (who) return `${ORDERED[doing]} ${orderedBy(who, name, doing)}`;
   if (lands_in_s !== null && !braked && mode in GOES_ON && detail) return `${GOES_ON[mode](name)}, then lands: ${detail.replace(NEEDED, ". RESUME lets it go on")}`;
+  if (mode === "LANDING" && NOT_DOWN.test(detail)) return detail;
   if (mode === "LANDING" && detail && !detail.startsWith("land")) return `lands: ${detail}`;
   return mode === "HOVER" && NEEDED.test(detail) ? `hovers: ${detail.replace(NEEDED, "")}. RESUME lets it go on` : detail;
 }

@@ -26,7 +26,8 @@ class Bench:
         self.speed = self.unseen_s = self.lost_s = 0.0
         self.unseen = self.lost = self.touches_down = self.on_floor = False
         self.seen = True
-        self.near, self.crowded, self.clears = "", "", clears
+        self.near, self.crowded, self.away, self.clears = "", "", "", clears
+        self.height = 1.2
         self.holds = False
         self.upstream = Upstream()
         self.epoch = 1
@@ -56,6 +57,7 @@ class Bench:
         view = VehicleView(self.state, self.fresh, self.battery, self.not_ready, unsound=self.unsound)
         seen = view._replace(unseen_s=self.unseen_s, lost_s=self.lost_s, near=self.near, crowded=self.crowded)
         seen = seen._replace(touches_down=self.touches_down, on_floor=self.on_floor)
+        seen = seen._replace(height_m=self.height, away=self.away)
         return seen._replace(speed_m_s=self.speed, seen=self.seen, stray=self.stray, clears=self.clears).plausible
 
     def see(self):

@@ -79,6 +79,7 @@ DEVIATIONS = {
     "another too near": always(None, 2.2, Condition.CROWDED, crowded="drone_2 flies 0.41 m from it"),
     "another too near mostly": partly(0.8, 1.0, None, 4.5, Condition.CROWDED, crowded="drone_2 flies 0.41 m from it"),
     "down on the floor": always(0.5, 0.5, Condition.ON_FLOOR, on_floor=True),
+    "flies away, in no landing": always(None, None, away="it rises at 0.9 m/s"),
     "not ready for a take-off": always(None, None, not_ready="configuring"),
     "somebody over its pad": always(None, None, near="drone_2 flies 0.2 m from its pad"),
     "no lease": always(None, None, lease_alive=False),
